@@ -1,0 +1,44 @@
+# Everything happens inside .venv; nothing else is installed or exported.
+SHELL := /bin/sh
+PYTHON ?= python3
+VENV := .venv
+BIN := $(VENV)/bin
+STAMP := $(VENV)/.setup-done
+ARGS ?=
+
+# What an installation is made of. The code itself is installed editable and needs no re-run.
+INSTALLED_FROM := pyproject.toml package.xml Makefile $(shell find ros -type f)
+
+.DEFAULT_GOAL := help
+.PHONY: help setup fly test lint clean
+
+help:            ## this list
+	@sed -n 's/^\([a-z]*\):.*##/  make \1\t/p' Makefile
+
+setup: $(STAMP)  ## virtual environment, dependencies and the project in .venv
+	@:
+
+fly: setup       ## fly the pick-and-place mission; options: make fly ARGS="--controller asmc1"
+	@$(BIN)/uam fly $(ARGS)
+
+test: setup      ## all tests; options: make test ARGS="tests/unit -x"
+	@$(BIN)/python -m pytest $(ARGS)
+
+lint: setup      ## style and errors that need no run
+	@$(BIN)/ruff check .
+
+clean:           ## remove what setup, tests and colcon made; results/ stays
+	rm -rf $(VENV) build install log .pytest_cache .hypothesis .ruff_cache
+	find . -name __pycache__ -type d -prune -exec rm -rf {} +
+
+# Where ROS 2 is already there (a sourced apt installation) its own rclpy is used, not the wheels.
+$(STAMP): $(INSTALLED_FROM)
+	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11))' 2>/dev/null || { \
+	  echo "setup: Python 3.11 or newer is needed and $(PYTHON) is not; try make PYTHON=python3.12 $(MAKECMDGOALS)" >&2; exit 2; }
+	@test -x $(BIN)/python || $(PYTHON) -m venv $(VENV) || { rm -rf $(VENV); \
+	  echo "setup: $(PYTHON) -m venv failed; on Debian and Ubuntu: apt install python3-venv" >&2; exit 2; }
+	@extras=ros,test; $(BIN)/python -c 'import rclpy' 2>/dev/null && test -n "$$ROS_DISTRO" && extras=test; \
+	  echo "setup: installing uam[$$extras] into $(VENV), once (a few minutes)"; \
+	  $(BIN)/python -m pip install --quiet --disable-pip-version-check -e ".[$$extras]" || { \
+	  echo "setup: the installation failed; the lines above say why" >&2; exit 2; }
+	@touch $@

@@ -1,0 +1,1 @@
+"""Adaptive control, state estimation and missions for aerial manipulators."""

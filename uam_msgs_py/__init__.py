@@ -1,0 +1,1 @@
+"""Topics, message conversion, ROS parameters and the base of the nodes."""

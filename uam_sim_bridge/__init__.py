@@ -1,0 +1,1 @@
+"""MuJoCo plant, MAVLink bridge, autopilot stand-in, flights and reports."""
