@@ -1,0 +1,74 @@
+"""Private instances: two flights never share one, and a dead flight blocks nothing."""
+
+import socket
+import subprocess
+import sys
+
+import pytest
+
+from uam_sim_bridge.flight import ports
+from uam_sim_bridge.flight.ports import PortError, Reservation
+
+
+def test_ports_follow_px4_instances():
+    assert ports.ports_of(0) == ports.Ports(0, 1, 4560, 14540, 14580)
+    assert ports.ports_of(3) == ports.Ports(3, 4, 4563, 14543, 14583)
+
+
+def test_instances_do_not_overlap():
+    every = [ports.ports_of(i) for i in range(ports.INSTANCES)]
+    udp = [p.offboard_udp for p in every] + [p.autopilot_udp for p in every]
+    assert len(set(udp)) == len(udp)
+    assert all(0 <= p.domain <= 101 for p in every)
+
+
+def test_two_reservations_differ_and_leave_no_file(tmp_path):
+    with Reservation(folder=tmp_path) as first, Reservation(folder=tmp_path) as second:
+        assert first.ports.instance != second.ports.instance
+        assert len(list(tmp_path.iterdir())) == 2
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_taken_instance_is_refused_by_name(tmp_path):
+    with Reservation(folder=tmp_path) as first:
+        with pytest.raises(PortError, match="another flight has it"):
+            Reservation(first.ports.instance, folder=tmp_path)
+    with Reservation(first.ports.instance, folder=tmp_path) as again:
+        assert again.ports == first.ports
+
+
+def test_the_lock_of_a_killed_flight_vanishes(tmp_path):
+    program = (
+        "import os, sys, pathlib\n"
+        "from uam_sim_bridge.flight.ports import Reservation\n"
+        "r = Reservation(folder=pathlib.Path(sys.argv[1]))\n"
+        "print(r.ports.instance, flush=True)\n"
+        "os.kill(os.getpid(), 9)\n"
+    )
+    killed = subprocess.run(
+        [sys.executable, "-c", program, str(tmp_path)], capture_output=True, text=True
+    )
+    assert killed.returncode == -9, killed.stderr
+    instance = int(killed.stdout)
+    with Reservation(instance, folder=tmp_path) as again:
+        assert again.ports.instance == instance
+
+
+def test_a_port_held_by_another_program_is_skipped_and_named(tmp_path):
+    with Reservation(folder=tmp_path) as free:
+        held = free.ports
+    with socket.socket(socket.AF_INET, socket.SOCK_STREAM) as program:
+        program.bind(("127.0.0.1", held.simulator_tcp))
+        program.listen()
+        with Reservation(folder=tmp_path) as other:
+            assert other.ports.instance != held.instance
+        with pytest.raises(PortError, match=f"TCP {held.simulator_tcp}"):
+            Reservation(held.instance, folder=tmp_path)
+        with pytest.raises(PortError, match=f"TCP port {held.simulator_tcp} is in use"):
+            ports.require_free(socket.SOCK_STREAM, held.simulator_tcp, "--autopilot")
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_port_number_out_of_range_is_refused():
+    with pytest.raises(PortError, match="70000 is not in 1..65535"):
+        ports.require_free(socket.SOCK_DGRAM, 70000, "--autopilot")

@@ -1,0 +1,163 @@
+"""Supervision of child processes, with small stand-in programs instead of nodes."""
+
+import os
+import signal
+import subprocess
+import sys
+import time
+
+import pytest
+
+from uam_sim_bridge.flight import processes, shared_memory
+from uam_sim_bridge.flight.processes import NodeFailed, Processes
+
+SLEEPER = """
+import signal, sys, time
+def main():
+    signal.signal(signal.SIGINT, lambda *_: sys.exit(0))
+    print("ready", flush=True)
+    while True:
+        time.sleep(0.05)
+"""
+STUBBORN = """
+import signal, time
+def main():
+    for s in (signal.SIGINT, signal.SIGTERM):
+        signal.signal(s, signal.SIG_IGN)
+    print("ready", flush=True)
+    while True:
+        time.sleep(0.05)
+"""
+FAILING = """
+def main():
+    print("one line before")
+    raise RuntimeError("no thrust curve")
+"""
+
+
+@pytest.fixture
+def children(tmp_path):
+    for name, text in (("sleeper", SLEEPER), ("stubborn", STUBBORN), ("failing", FAILING)):
+        (tmp_path / f"{name}.py").write_text(text)
+    path = os.pathsep.join([str(tmp_path), *sys.path])
+    with Processes(tmp_path, {**os.environ, "PYTHONPATH": path}) as running:
+        yield running
+
+
+def wait_for(condition, seconds=20.0):
+    deadline = time.monotonic() + seconds
+    while not condition():
+        assert time.monotonic() < deadline, "did not happen in time"
+        time.sleep(0.01)
+
+
+def ready(children, name):
+    wait_for(lambda: "ready" in processes.tail(children._logs / f"{name}.log"))
+
+
+def gone(pid):
+    try:
+        os.kill(pid, 0)
+    except ProcessLookupError:
+        return True
+    return False
+
+
+def test_a_child_obeys_the_interrupt(children):
+    children.start("a", "sleeper")
+    ready(children, "a")
+    children.check()
+    assert children.stop(["a"]) == []
+    assert gone(children.pid("a"))
+
+
+def test_a_child_that_ignores_signals_is_killed_and_named(children, monkeypatch):
+    monkeypatch.setattr(processes, "INTERRUPT_WAIT", 0.2)
+    monkeypatch.setattr(processes, "TERMINATE_WAIT", 0.2)
+    children.start("a", "sleeper")
+    children.start("b", "stubborn")
+    ready(children, "a")
+    ready(children, "b")
+    assert children.stop(["a", "b"]) == ["b"]
+    assert gone(children.pid("a")) and gone(children.pid("b"))
+
+
+def test_a_failure_names_the_node_the_reason_and_its_last_lines(children):
+    children.start("position_controller", "failing")
+    wait_for(lambda: not children.running("position_controller"))
+    with pytest.raises(NodeFailed) as failure:
+        children.check()
+    assert "position_controller ended by itself with exit status 1" in str(failure.value)
+    assert "one line before" in failure.value.last_lines
+    assert failure.value.last_lines[-1] == "RuntimeError: no thrust curve"
+
+
+def test_a_kill_from_outside_is_a_failure_that_names_the_signal(children):
+    children.start("arm_controller", "sleeper")
+    ready(children, "arm_controller")
+    os.kill(children.pid("arm_controller"), signal.SIGKILL)
+    wait_for(lambda: not children.running("arm_controller"))
+    with pytest.raises(NodeFailed, match="arm_controller was killed by SIGKILL"):
+        children.check()
+
+
+def test_a_terminal_interrupt_does_not_reach_the_children(children):
+    children.start("a", "sleeper")
+    assert os.getsid(children.pid("a")) != os.getsid(0)
+
+
+def test_no_child_survives_a_killed_orchestrator(tmp_path):
+    (tmp_path / "sleeper.py").write_text(SLEEPER)
+    path = os.pathsep.join([str(tmp_path), *sys.path])
+    program = f"""
+import os, pathlib, sys, time
+from uam_sim_bridge.flight.processes import Processes
+folder = pathlib.Path({str(tmp_path)!r})
+children = Processes(folder, {{**os.environ, "PYTHONPATH": {path!r}}})
+children.start("a", "sleeper")
+children.start("b", "sleeper")
+print(children.pid("a"), children.pid("b"), flush=True)
+time.sleep(60)
+"""
+    orchestrator = subprocess.Popen(
+        [sys.executable, "-c", program], stdout=subprocess.PIPE, text=True
+    )
+    pids = [int(word) for word in orchestrator.stdout.readline().split()]
+    for name in ("a", "b"):
+        wait_for(lambda name=name: "ready" in processes.tail(tmp_path / f"{name}.log"))
+    orchestrator.kill()
+    orchestrator.wait()
+    orchestrator.stdout.close()
+    wait_for(lambda: all(map(gone, pids)))
+
+
+def test_the_environment_is_private_and_local(tmp_path):
+    made = processes.environment(42, tmp_path)
+    assert made["ROS_DOMAIN_ID"] == "42"
+    assert made["ROS_AUTOMATIC_DISCOVERY_RANGE"] == "LOCALHOST"
+    assert made["ROS_LOG_DIR"] == str(tmp_path)
+    assert made["OMP_NUM_THREADS"] == made["NUMBA_NUM_THREADS"] == "1"
+
+
+def test_only_the_flights_own_shared_memory_is_removed(tmp_path, monkeypatch):
+    monkeypatch.setattr(shared_memory, "FOLDER", tmp_path)
+    own = tmp_path / "fastrtps_0123456789abcdef"
+    other = tmp_path / "fastrtps_fedcba9876543210"
+    for file in (own, own.with_name(own.name + "_el"), other):
+        file.touch()
+    assert len(shared_memory.remove({own})) == 2
+    assert list(tmp_path.iterdir()) == [other]
+
+
+@pytest.mark.parametrize(
+    ("name", "private"),
+    [
+        ("fastrtps_0123456789abcdef", True),
+        ("fastrtps_port7410", True),
+        ("sem.fastrtps_port7661_mutex", True),
+        ("fastrtps_port7000", False),  # shared by every domain
+        ("somebody_elses", False),
+    ],
+)
+def test_which_shared_memory_belongs_to_a_flight(name, private):
+    assert shared_memory._is_private(name) is private

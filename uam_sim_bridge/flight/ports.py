@@ -1,0 +1,158 @@
+"""A private instance number for each flight, so that flights side by side never meet.
+
+Instance N owns ROS domain FIRST_DOMAIN + N and PX4's ports of its own instance N (px4_sitl -i N):
+TCP 4560 + N for the simulator link, UDP 14540 + N (offboard side) and 14580 + N (autopilot side).
+"""
+
+import errno
+import fcntl
+import os
+import socket
+import tempfile
+from dataclasses import dataclass
+from pathlib import Path
+from types import TracebackType
+
+SIMULATOR_TCP, OFFBOARD_UDP, AUTOPILOT_UDP = 4560, 14540, 14580  # PX4's own, instance 0
+FIRST_DOMAIN = 1  # domain 0 is everybody's default
+LAST_DOMAIN = 101  # above, the middleware's ports run into the system's ephemeral ones
+INSTANCES = min(LAST_DOMAIN - FIRST_DOMAIN + 1, AUTOPILOT_UDP - OFFBOARD_UDP)
+
+
+class PortError(ValueError):
+    """A port is in use or no instance is free; the text is one line for the user."""
+
+
+@dataclass(frozen=True)
+class Ports:
+    """What one flight may use. All on 127.0.0.1."""
+
+    instance: int
+    domain: int
+    simulator_tcp: int
+    offboard_udp: int
+    autopilot_udp: int
+
+
+def ports_of(instance: int) -> Ports:
+    """The ports of an instance, 0 <= instance < INSTANCES."""
+    if not 0 <= instance < INSTANCES:
+        raise PortError(f"instance {instance} is not in 0..{INSTANCES - 1}")
+    return Ports(
+        instance,
+        FIRST_DOMAIN + instance,
+        SIMULATOR_TCP + instance,
+        OFFBOARD_UDP + instance,
+        AUTOPILOT_UDP + instance,
+    )
+
+
+def in_use(kind: int, port: int, host: str = "127.0.0.1") -> bool:
+    """True if `port` cannot be bound; kind is socket.SOCK_STREAM (TCP) or SOCK_DGRAM (UDP)."""
+    with socket.socket(socket.AF_INET, kind) as probe:
+        if kind == socket.SOCK_STREAM:  # a closed connection's TIME_WAIT does not count
+            probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+        try:
+            probe.bind((host, port))
+        except OSError as error:
+            if error.errno in (errno.EADDRINUSE, errno.EACCES):
+                return True
+            raise
+    return False
+
+
+def require_free(kind: int, port: int, purpose: str) -> None:
+    """Raise PortError naming the port and its purpose when it cannot be bound."""
+    if not 1 <= port <= 65535:
+        raise PortError(f"{purpose}: port {port} is not in 1..65535")
+    if in_use(kind, port):
+        protocol = "TCP" if kind == socket.SOCK_STREAM else "UDP"
+        raise PortError(
+            f"{purpose}: {protocol} port {port} is in use by another program; "
+            "stop it or choose another port"
+        )
+
+
+def busy_port(ports: Ports) -> str | None:
+    """Which port of an instance another program holds, in words; None if all are free."""
+    for kind, port, purpose in (
+        (socket.SOCK_STREAM, ports.simulator_tcp, "TCP {} (simulator link)"),
+        (socket.SOCK_DGRAM, ports.offboard_udp, "UDP {} (offboard link)"),
+        (socket.SOCK_DGRAM, ports.autopilot_udp, "UDP {} (autopilot)"),
+        # RTPS: the first participant's discovery port of a domain. Taken means: the domain lives.
+        (socket.SOCK_DGRAM, 7400 + 250 * ports.domain + 10, "UDP {} (ROS discovery)"),
+    ):
+        if in_use(kind, port):
+            return purpose.format(port)
+    return None
+
+
+class Reservation:
+    """Holds one instance until released. A context manager.
+
+    The lock is a flock on <folder>/uam-<user>-<N>.lock: the system drops it with the process that
+    holds it, so a crashed flight blocks nothing and its file is used again.
+    """
+
+    def __init__(self, instance: int | None = None, folder: Path | None = None):
+        """Take `instance`, or the first one that is free; locks are kept in the temporary folder.
+
+        Raises PortError when the wanted one, or every one, is taken.
+        """
+        self._folder = folder or Path(tempfile.gettempdir())
+        self._lock: int | None = None
+        wanted = range(INSTANCES) if instance is None else [instance]
+        why = ""
+        for number in wanted:
+            ports = ports_of(number)
+            self._lock = self._take(self._path(number))
+            if self._lock is None:
+                why = "another flight has it"
+                continue
+            busy = busy_port(ports)
+            if busy is None:
+                self.ports = ports
+                return
+            why = f"{busy} is in use by another program"
+            self._drop(self._path(number))
+        if instance is not None:
+            raise PortError(f"instance {instance} is not free: {why}")
+        raise PortError(f"none of the {INSTANCES} instances is free; the last one: {why}")
+
+    def _path(self, instance: int) -> Path:
+        return self._folder / f"uam-{os.getuid()}-{instance}.lock"
+
+    @staticmethod
+    def _take(path: Path) -> int | None:
+        flags = os.O_RDWR | os.O_CREAT | os.O_CLOEXEC | os.O_NOFOLLOW
+        lock = os.open(path, flags, 0o600)
+        try:
+            fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            # The holder before us may have removed the file between our open and our lock.
+            if os.stat(path).st_ino == os.fstat(lock).st_ino:
+                return lock
+        except OSError:
+            pass
+        os.close(lock)
+        return None
+
+    def _drop(self, path: Path) -> None:
+        if self._lock is not None:
+            path.unlink(missing_ok=True)
+            os.close(self._lock)
+            self._lock = None
+
+    def release(self) -> None:
+        """Give the instance back and remove its lock file."""
+        self._drop(self._path(self.ports.instance))
+
+    def __enter__(self) -> "Reservation":
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        self.release()

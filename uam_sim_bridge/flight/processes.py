@@ -1,0 +1,200 @@
+"""Starts, watches and stops the processes of one flight.
+
+Each child has its own session, so that Ctrl-C in the terminal reaches the orchestrator alone and
+the children are stopped in order; its output goes to <logs>/<name>.log.
+"""
+
+import os
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from uam_sim_bridge.flight import shared_memory
+
+LAST_LINES = 12  # of a failed node's log that its error message shows
+INTERRUPT_WAIT, TERMINATE_WAIT = 10.0, 3.0  # seconds until the next, harder signal
+POLL = 0.02  # seconds
+
+
+class NodeFailed(RuntimeError):
+    """A process of the flight ended by itself; the text says which, why, and its last lines."""
+
+    def __init__(self, name: str, status: int, log: Path):
+        self.name, self.status, self.log = name, status, log
+        super().__init__(f"{name} {describe(status)}")
+
+    @property
+    def last_lines(self) -> list[str]:
+        """The end of the node's log, at most LAST_LINES lines."""
+        return tail(self.log)
+
+
+def describe(status: int) -> str:
+    """What a return code of subprocess means, in words."""
+    if status < 0:
+        try:
+            return f"was killed by {signal.Signals(-status).name}"
+        except ValueError:
+            return f"was killed by signal {-status}"
+    return f"ended by itself with exit status {status}"
+
+
+def tail(log: Path, count: int = LAST_LINES) -> list[str]:
+    """The last non-empty lines of a text file; none when it is not there."""
+    try:
+        with log.open("rb") as file:
+            file.seek(max(0, log.stat().st_size - 16384))
+            text = file.read().decode(errors="replace")
+    except OSError:
+        return []
+    return [line for line in text.splitlines() if line.strip()][-count:]
+
+
+@dataclass
+class Child:
+    """One running process."""
+
+    name: str
+    process: subprocess.Popen
+    log: Path
+    may_end: bool = False  # its end is expected: it was asked to stop, or ends with the mission
+    shared: set[Path] = field(default_factory=set)  # shared-memory files seen in its address space
+
+
+class Processes:
+    """The children of one flight. A context manager: nothing survives the `with` block."""
+
+    def __init__(self, logs: Path, environment: Mapping[str, str]):
+        """Output goes to `logs`, which must exist; `environment` is the children's whole one."""
+        self._logs = logs
+        self._environment = dict(environment)
+        self._children: dict[str, Child] = {}
+
+    def start(
+        self, name: str, module: str, arguments: Sequence[str] = (), may_end: bool = False
+    ) -> Child:
+        """Run `module.main()` as the process `name`; `may_end` if it stops by itself when done."""
+        log = self._logs / f"{name}.log"
+        command = [sys.executable, "-m", "uam_sim_bridge.flight.child", module, *arguments]
+        with log.open("ab") as output:
+            process = subprocess.Popen(
+                command,
+                stdin=subprocess.PIPE,  # child.py watches it
+                stdout=output,
+                stderr=subprocess.STDOUT,
+                env=self._environment,
+                start_new_session=True,
+            )
+        child = Child(name, process, log, may_end)
+        self._children[name] = child
+        return child
+
+    @property
+    def names(self) -> list[str]:
+        """Everything that was started, in that order."""
+        return list(self._children)
+
+    def pid(self, name: str) -> int:
+        """The process id of a child."""
+        return self._children[name].process.pid
+
+    def running(self, name: str) -> bool:
+        """True while the child has not ended."""
+        return self._children[name].process.poll() is None
+
+    def check(self) -> None:
+        """Raise NodeFailed for the first child that ended although nobody asked it to."""
+        for child in self._children.values():
+            status = child.process.poll()
+            if status is None or (child.may_end and status == 0):
+                continue
+            raise NodeFailed(child.name, status, child.log)
+
+    def note_shared_memory(self) -> None:
+        """Remember which shared-memory files the children use, to remove them should one be killed.
+
+        The middleware removes them itself at a clean end.
+        """
+        for child in self._children.values():
+            child.shared |= shared_memory.used_by(child.process.pid)
+
+    def stop(self, names: Iterable[str]) -> list[str]:
+        """Interrupt these children together, wait, then terminate, then kill.
+
+        Returns the names of those that did not obey the interrupt. Children that have already
+        ended, also by a failure, are left alone.
+        """
+        chosen = [self._children[name] for name in names if name in self._children]
+        disobedient: set[str] = set()
+        for signum, wait in (
+            (signal.SIGINT, INTERRUPT_WAIT),
+            (signal.SIGTERM, TERMINATE_WAIT),
+            (signal.SIGKILL, None),
+        ):
+            left = [child for child in chosen if child.process.poll() is None]
+            if not left:
+                break
+            if signum != signal.SIGINT:
+                disobedient |= {child.name for child in left}
+            for child in left:
+                child.may_end = True
+                child.process.send_signal(signum)
+            deadline = None if wait is None else time.monotonic() + wait
+            while any(child.process.poll() is None for child in left):
+                if deadline is not None and time.monotonic() > deadline:
+                    break
+                time.sleep(POLL)
+        return sorted(disobedient)
+
+    def kill(self) -> None:
+        """End everything at once, for an impatient second Ctrl-C."""
+        for child in self._children.values():
+            if child.process.poll() is None:
+                child.process.kill()
+        for child in self._children.values():
+            child.process.wait()
+
+    def close(self) -> None:
+        """Stop whatever still runs and remove what killed children left in shared memory."""
+        self.note_shared_memory()
+        self.stop(self.names)
+        for child in self._children.values():
+            if child.process.stdin and not child.process.stdin.closed:
+                child.process.stdin.close()
+        shared_memory.remove(set().union(*(child.shared for child in self._children.values())))
+
+    def __enter__(self) -> "Processes":
+        return self
+
+    def __exit__(self, *exception) -> None:
+        self.close()
+
+
+def environment(domain: int, log_folder: Path) -> dict[str, str]:
+    """What the children inherit: a private, local ROS domain and one thread each.
+
+    One thread, because the nodes' matrices are tiny and several pools of threads on few cores
+    only delay each other.
+    """
+    return {
+        **os.environ,
+        **ros_environment(domain, log_folder),
+        "OMP_NUM_THREADS": "1",
+        "OPENBLAS_NUM_THREADS": "1",
+        "NUMBA_NUM_THREADS": "1",
+        "PYTHONUNBUFFERED": "1",
+    }
+
+
+def ros_environment(domain: int, log_folder: Path) -> dict[str, str]:
+    """The variables by which ROS finds its domain and the place of its own log files."""
+    return {
+        "ROS_DOMAIN_ID": str(domain),
+        "ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST",
+        "ROS_LOG_DIR": str(log_folder),
+        "RCUTILS_COLORIZED_OUTPUT": "0",
+    }
