@@ -1,0 +1,1 @@
+"""Control laws as plain numeric objects: no ROS, no clock, no files."""

@@ -1,0 +1,77 @@
+"""Tracking errors of the paper: e, e_dot, and ||xi|| of the whole vehicle.
+
+Attitude uses the error on SO(3), e_q = 1/2 (R_d^T R - R^T R_d)^vee, and one of two forms of its rate:
+`lee` (default) Omega - R^T R_d Omega_d, or `printed` q_dot - R_d^T R q_d_dot, the paper's equation.
+"""
+
+from __future__ import annotations
+
+import math
+
+from uam_control.compiled import jit
+from uam_control.rotations import (
+    matrix_from_euler,
+    relative_rotation,
+    rotate,
+    rotate_back,
+)
+
+ERROR_RATE_FORMS = ("lee", "printed")
+
+
+@jit
+def tracking_errors(state, reference, attitude_reference, flying, printed, errors, norms):
+    """Write e, e_dot and the acceleration feedforward into errors (3, 8), norms into norms (3,).
+
+    state, reference: (3, 8) as in `coordinates`; attitude_reference: (3, 3) rows q_d (Euler) [rad],
+    Omega_d [rad/s], Omega_d_dot [rad/s^2] in the desired body frame. Rows of `errors`: e, e_dot,
+    chi_d_ddot. While not flying only the arm has errors; the rest is zero. norms: ||xi||, ||chi_ddot||,
+    ||chi_dot||.
+    """
+    errors[:] = 0.0
+    for i in range(6, state.shape[1]):
+        errors[0, i] = state[0, i] - reference[0, i]
+        errors[1, i] = state[1, i] - reference[1, i]
+        errors[2, i] = reference[2, i]
+    if flying:
+        for i in range(3):
+            errors[0, i] = state[0, i] - reference[0, i]
+            errors[1, i] = state[1, i] - reference[1, i]
+            errors[2, i] = reference[2, i]
+        attitude_errors(state, attitude_reference, printed, errors)
+    xi = acceleration = rate = 0.0
+    for i in range(state.shape[1]):
+        xi += errors[0, i] ** 2 + errors[1, i] ** 2
+        acceleration += state[2, i] ** 2
+        rate += state[1, i] ** 2
+    norms[0] = math.sqrt(xi)
+    norms[1] = math.sqrt(acceleration)
+    norms[2] = math.sqrt(rate)
+
+
+@jit
+def attitude_errors(state, attitude_reference, printed, errors):
+    """Write e_q, e_q_dot and the attitude feedforward into columns 3:6 of errors (3, 8)."""
+    actual = matrix_from_euler(state[0, 3:6])
+    desired = matrix_from_euler(attitude_reference[0])
+    relative = relative_rotation(desired, actual)  # R_d^T R
+    errors[0, 3] = 0.5 * (relative[2, 1] - relative[1, 2])
+    errors[0, 4] = 0.5 * (relative[0, 2] - relative[2, 0])
+    errors[0, 5] = 0.5 * (relative[1, 0] - relative[0, 1])
+    rate = state[1, 3:6]
+    rate_d = attitude_reference[1]
+    acceleration_d = attitude_reference[2]
+    if printed:
+        turned = rotate(relative, rate_d)
+        for i in range(3):
+            errors[1, 3 + i] = rate[i] - turned[i]
+            errors[2, 3 + i] = acceleration_d[i]
+        return
+    turned = rotate_back(relative, rate_d)  # R^T R_d Omega_d
+    feedforward = rotate_back(relative, acceleration_d)
+    for i in range(3):
+        errors[1, 3 + i] = rate[i] - turned[i]
+    # d/dt (R^T R_d Omega_d) = R^T R_d Omega_d_dot - Omega x (R^T R_d Omega_d)
+    errors[2, 3] = feedforward[0] - (rate[1] * turned[2] - rate[2] * turned[1])
+    errors[2, 4] = feedforward[1] - (rate[2] * turned[0] - rate[0] * turned[2])
+    errors[2, 5] = feedforward[2] - (rate[0] * turned[1] - rate[1] * turned[0])

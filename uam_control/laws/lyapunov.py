@@ -1,0 +1,23 @@
+"""The Lyapunov equation A^T P + P A = -Q of one subsystem, solved in closed form.
+
+With diagonal lambda_1, lambda_2 and Q the 2n x 2n equation falls apart into n equations of size two,
+A = [[0, 1], [-lambda_1, -lambda_2]], Q = diag(q_position, q_velocity).
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+
+def solve(
+    lambda_1: np.ndarray, lambda_2: np.ndarray, q_position: np.ndarray, q_velocity: np.ndarray
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Return (p11, p12, p22), each (n,): P = [[diag p11, diag p12], [diag p12, diag p22]] > 0.
+
+    All arguments have shape (n,) and are positive. r = B^T P xi = p12 e + p22 e_dot (the paper's
+    definition of r_p, r_q, r_alpha).
+    """
+    p12 = q_position / (2.0 * lambda_1)
+    p22 = (q_velocity + 2.0 * p12) / (2.0 * lambda_2)
+    p11 = lambda_2 * p12 + lambda_1 * p22
+    return p11, p12, p22

@@ -1,0 +1,129 @@
+"""The modular adaptive law of the paper (Section III), one class for all three subsystems.
+
+    tau_j  = Mbar_j (-Lambda_j xi_j - dtau_j + chi_j_d_ddot)
+    dtau_j = rho_j r_j / max(||r_j||, varpi_j),          r_j = B^T P_j xi_j
+    rho_j  = K0 + K1 ||xi|| + K2 ||xi||^2 + K3 ||chi_ddot|| + zeta_j
+
+with the adaptive laws for K0..K3 and zeta_j. xi and chi_ddot are those of the whole vehicle, r_j the
+subsystem's own: that is how couplings enter while the three parameter sets stay independent.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from uam_control.compiled import jit
+from uam_control.laws.parameters import LawParameters
+
+# Rows of the adaptation vector that every law publishes.
+ADAPTATION = ("K0", "K1", "K2", "K3", "zeta", "rho", "r_norm")
+ZETA, RHO, R_NORM, ACCELERATION = 4, 5, 6, 7
+
+
+class ModularLaw:
+    """One subsystem's law and its adapted gains.
+
+    `adaptation` (8,): K0..K3, zeta, rho, ||r||, and the filtered ||chi_ddot|| that K3 sees.
+    """
+
+    def __init__(self, parameters: LawParameters) -> None:
+        self._tau = np.zeros(len(parameters.inertia))
+        self.adaptation = np.zeros(8)
+        self.frozen = False
+        self.set_parameters(parameters)
+        self.reset()
+
+    def set_parameters(self, parameters: LawParameters) -> None:
+        """Fly `parameters` (validated) from the next tick on; the adapted gains are kept."""
+        self.parameters = parameters
+        self._record = parameters.record()
+
+    def reset(self) -> None:
+        """Put K0..K3 and zeta back to their initial values."""
+        self.adaptation[:4] = self.parameters.k_initial
+        self.adaptation[ZETA] = self.parameters.zeta_initial
+        self.adaptation[RHO:] = 0.0
+
+    def update(
+        self,
+        e: np.ndarray,
+        e_dot: np.ndarray,
+        acceleration_d: np.ndarray,
+        norms: np.ndarray,
+        saturated: bool,
+        dt: float,
+    ) -> np.ndarray:
+        """Return tau_j (n,) and advance the adapted gains by dt [s].
+
+        e, e_dot, acceleration_d: (n,), the subsystem's tracking error, its rate and chi_j_d_ddot.
+        norms (3,): ||xi||, ||chi_ddot||, ||chi_dot|| of the whole vehicle.
+        saturated: the actuator was at its limit in the last tick.
+        The returned array is reused by the next call.
+        """
+        law_step(self._record, e, e_dot, acceleration_d, norms, saturated, self.frozen, dt,
+                 self.adaptation, self._tau)
+        return self._tau
+
+
+@jit
+def law_step(record, e, e_dot, acceleration_d, norms, saturated, frozen, dt, adaptation, tau):
+    """One tick of the law: writes tau (n,) and advances adaptation (8,) in place.
+
+    Equations (ct1), (del_p), (rho_p) and (adaptive_law_p) of the paper and their twins for q, alpha.
+    """
+    p = record[0]
+    n = len(tau)
+
+    xi_norm = norms[0]
+    acceleration = min(norms[1], p.acceleration_limit)
+    if p.acceleration_cutoff > 0.0:
+        keep = math.exp(-2.0 * math.pi * p.acceleration_cutoff * dt)
+        acceleration = keep * adaptation[7] + (1.0 - keep) * acceleration
+    adaptation[7] = acceleration
+
+    r_squared = 0.0
+    for i in range(n):
+        r_i = p.p12[i] * e[i] + p.p22[i] * e_dot[i]
+        r_squared += r_i * r_i
+    r_norm = math.sqrt(r_squared)
+
+    bound = (adaptation[0] + adaptation[1] * xi_norm + adaptation[2] * xi_norm * xi_norm
+             + adaptation[3] * acceleration)
+    rho = bound + adaptation[4]
+    scale = rho / max(r_norm, p.varpi)
+    for i in range(n):
+        r_i = p.p12[i] * e[i] + p.p22[i] * e_dot[i]
+        feedback = p.gain_e[i] * e[i] + p.gain_e_dot[i] * e_dot[i]
+        tau[i] = p.inertia[i] * (acceleration_d[i] - feedback - scale * r_i)
+    adaptation[5] = rho
+    adaptation[6] = r_norm
+
+    if frozen:
+        return
+    adapt(p, r_norm, xi_norm, acceleration, bound, saturated, dt, adaptation)
+
+
+@jit
+def adapt(p, r_norm, xi_norm, acceleration, bound, saturated, dt, adaptation):
+    """Advance K0..K3 and zeta by dt, exactly for inputs that are constant over the tick.
+
+    Each law is linear in its own gain, K' = u - nu K, so K(dt) = K e^(-nu dt) + (1 - e^(-nu dt)) u/nu
+    stays positive for every dt, as the Appendix proves in continuous time.
+    """
+    regressor = 1.0
+    for i in range(4):
+        if i == 3:
+            regressor = acceleration
+        keep = math.exp(-p.nu[i] * dt)
+        gain = keep * adaptation[i] + (1.0 - keep) * r_norm * regressor / p.nu[i]
+        if p.freeze_when_saturated > 0.0 and saturated:
+            gain = min(gain, adaptation[i])
+        # the floor only keeps a decayed gain from underflowing to zero
+        adaptation[i] = max(min(gain, p.k_ceiling[i]), 1e-12)
+        regressor *= xi_norm
+    if r_norm < p.varpi:
+        rate = 1.0 + bound * r_norm
+        keep = math.exp(-rate * dt)
+        adaptation[4] = keep * adaptation[4] + (1.0 - keep) * p.epsilon / rate

@@ -1,0 +1,122 @@
+"""Parameter sets as frozen dataclasses whose fields say meaning, unit and range.
+
+A set is checked as a whole by `validated`: what passes may fly, what does not is refused with the
+name of the value, what was wrong and what is allowed. The ROS nodes declare their parameters from the
+same fields.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, fields, replace
+from typing import Any, Self
+
+import numpy as np
+
+TINY = 1e-9
+HUGE = 1e6
+
+
+class ParameterError(ValueError):
+    """A parameter set that must not be used; the message says which value and what is allowed."""
+
+
+@dataclass(frozen=True)
+class Bound:
+    """Meaning and range of a parameter; `length` None for one number, else how many numbers.
+
+    A length of 0 means one number per axis of the subsystem.
+    """
+
+    description: str
+    unit: str
+    low: float
+    high: float
+    length: int | None = None
+
+
+@dataclass(frozen=True)
+class Choice:
+    """Meaning of a parameter that is one of several words."""
+
+    description: str
+    choices: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class Switch:
+    """Meaning of a parameter that is true or false."""
+
+    description: str
+
+
+def number(default: float, description: str, unit: str, low: float, high: float) -> Any:
+    """Declare a field that is one number within [low, high]."""
+    return field(default=default, metadata={"spec": Bound(description, unit, low, high)})
+
+
+def vector(
+    default: tuple, description: str, unit: str, low: float, high: float, length: int = 0
+) -> Any:
+    """Declare a field of `length` numbers (0: one per axis), each within [low, high]."""
+    spec = Bound(description, unit, low, high, length)
+    return field(default=default, metadata={"spec": spec})
+
+
+def choice(default: str, description: str, choices: tuple[str, ...]) -> Any:
+    """Declare a field that is one of `choices`."""
+    return field(default=default, metadata={"spec": Choice(description, choices)})
+
+
+def switch(default: bool, description: str) -> Any:
+    """Declare a field that is true or false."""
+    return field(default=default, metadata={"spec": Switch(description)})
+
+
+@dataclass(frozen=True)
+class ParameterSet:
+    """Base of every parameter set."""
+
+    @classmethod
+    def specs(cls) -> dict[str, Bound | Choice | Switch]:
+        """Return what each parameter means, in order."""
+        return {item.name: item.metadata["spec"] for item in fields(cls)}
+
+    @classmethod
+    def from_mapping(cls, values: dict[str, Any], axes: int = 0) -> Self:
+        """Return a validated set; raise ParameterError on unknown names or bad values."""
+        known = cls.specs()
+        for name in values:
+            if name not in known:
+                raise ParameterError(f"{name}: unknown; allowed: {', '.join(known)}")
+        return cls(**values).validated(axes)
+
+    def validated(self, axes: int = 0) -> Self:
+        """Return this set with clean floats and tuples; raise ParameterError on the first fault.
+
+        axes: how many numbers a per-axis vector has.
+        """
+        clean = {}
+        for name, spec in self.specs().items():
+            value = getattr(self, name)
+            if isinstance(spec, Bound):
+                clean[name] = _number(name, value, spec, axes)
+            elif isinstance(spec, Choice) and value not in spec.choices:
+                raise ParameterError(f"{name}: '{value}' is not one of {', '.join(spec.choices)}")
+            elif isinstance(spec, Switch) and not isinstance(value, bool):
+                raise ParameterError(f"{name}: {value!r} is not true or false")
+        return replace(self, **clean)
+
+
+def _number(name: str, value: Any, spec: Bound, axes: int) -> float | tuple[float, ...]:
+    allowed = f"{spec.low:g} to {spec.high:g} {spec.unit}"
+    try:
+        numbers = np.asarray(value, dtype=float)
+    except (TypeError, ValueError):
+        raise ParameterError(f"{name}: {value!r} is not numeric; allowed: {allowed}") from None
+    shape = () if spec.length is None else (spec.length or axes,)
+    if numbers.shape != shape:
+        wanted = "one number" if spec.length is None else f"a list of {shape[0]} numbers"
+        raise ParameterError(f"{name}: {wanted} expected, got {value!r}; each {allowed}")
+    if not np.all((numbers >= spec.low) & (numbers <= spec.high)):  # refuses NaN too
+        raise ParameterError(f"{name}: {value!r} is outside {allowed}")
+    return float(numbers) if spec.length is None else tuple(numbers.tolist())

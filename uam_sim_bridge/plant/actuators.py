@@ -1,0 +1,80 @@
+"""Motors and servos between a command and a force: curves, lags and limits."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from uam_control.compiled import jit
+
+
+class Rotors:
+    """Four rotors: motor command 0..1 → speed with lag → thrust.
+
+    `speed` (4,) [rad/s], `thrust` (4,) [N].
+    """
+
+    def __init__(self, numbers: dict, step: float) -> None:
+        """numbers: the `rotors` entry of the vehicle; step: physics step [s]."""
+        self._coefficient = numbers["thrust_coefficient"]
+        self._efficiency = np.array(numbers["efficiency"], dtype=float)
+        self._constants = np.array([
+            numbers["thrust_coefficient"] * numbers["speed_max"] ** 2,
+            numbers["curve_factor"],
+            1.0 - math.exp(-step / numbers["lag_up"]),
+            1.0 - math.exp(-step / numbers["lag_down"]),
+        ])
+        self.speed = np.zeros(4)
+        self.thrust = np.zeros(4)
+
+    def step(self, commands: np.ndarray, output: np.ndarray) -> None:
+        """Advance one physics step; thrust [N] goes to `thrust` and to output (4,)."""
+        rotor_step(commands, self._constants, self._coefficient, self._efficiency, self.speed,
+                   self.thrust, output)
+
+
+@jit
+def rotor_step(commands, constants, coefficient, efficiency, speed, thrust, output):
+    """First-order speed lag with separate rates up and down; T = c speed^2."""
+    thrust_max, factor, gain_up, gain_down = constants
+    for i in range(4):
+        u = min(max(commands[i], 0.0), 1.0)
+        wanted = math.sqrt(thrust_max * (factor * u * u + (1.0 - factor) * u) / coefficient)
+        gain = gain_up if wanted > speed[i] else gain_down
+        speed[i] += gain * (wanted - speed[i])
+        thrust[i] = efficiency[i] * coefficient * speed[i] * speed[i]
+        output[i] = thrust[i]
+
+
+class Servos:
+    """Dynamixel XM430-W210 in current control: quantised current, torque-speed limit.
+
+    `torque` (n,) [N m] is what the gear delivers before friction; friction and reflected inertia are
+    in the MJCF.
+    """
+
+    def __init__(self, numbers: dict, joints: int) -> None:
+        """numbers: the `servos` entry of the vehicle."""
+        self._constants = np.array([
+            numbers["stall_torque"],
+            numbers["no_load_speed"],
+            numbers["torque_per_current"] * numbers["current_unit"],
+        ])
+        self.torque = np.zeros(joints)
+
+    def step(self, effort: np.ndarray, velocity: np.ndarray, output: np.ndarray) -> None:
+        """Apply the commanded effort (n,) [N m] at joint velocity (n,) [rad/s] to output (n,)."""
+        servo_step(effort, velocity, self._constants, self.torque, output)
+
+
+@jit
+def servo_step(effort, velocity, constants, torque, output):
+    """Torque = command in whole current units, within stall (1 - speed / no-load speed)."""
+    stall, no_load, unit = constants
+    for i in range(len(effort)):
+        wanted = unit * np.round(effort[i] / unit)
+        forward = max(0.0, min(1.0, 1.0 - velocity[i] / no_load)) * stall
+        backward = max(0.0, min(1.0, 1.0 + velocity[i] / no_load)) * stall
+        torque[i] = min(max(wanted, -backward), forward)
+        output[i] = torque[i]

@@ -1,0 +1,105 @@
+"""Sensors as the real ones deliver: rate, noise, bias, quantisation and latency, all seeded."""
+
+from __future__ import annotations
+
+from collections import deque
+
+import numpy as np
+
+from uam_control.rotations import quaternion_from_rotation_vector, quaternion_multiply
+
+BLOCK = 2048  # samples of noise drawn at a time: one call to the generator is dear, its numbers cheap
+
+
+class Noise:
+    """White noise (width,) per call with given standard deviations, drawn in blocks."""
+
+    def __init__(self, generator: np.random.Generator, deviations: np.ndarray) -> None:
+        self._generator = generator
+        self._deviations = deviations
+        self._rows = iter(())
+
+    def __call__(self) -> np.ndarray:
+        row = next(self._rows, None)
+        if row is None:
+            shape = (BLOCK, len(self._deviations))
+            self._rows = iter(self._generator.standard_normal(shape) * self._deviations)
+            row = next(self._rows)
+        return row
+
+
+class Delay:
+    """A line that hands out what was put in a fixed number of ticks ago."""
+
+    def __init__(self, ticks: int) -> None:
+        self._ticks = ticks
+        self._queue: deque = deque()
+
+    def put(self, tick: int, sample: tuple) -> None:
+        """Store a sample taken at `tick`."""
+        self._queue.append((tick + self._ticks, sample))
+
+    def take(self, tick: int) -> tuple | None:
+        """Return the sample due by `tick`, or None."""
+        if self._queue and self._queue[0][0] <= tick:
+            return self._queue.popleft()[1]
+        return None
+
+
+def generators(seed: int, count: int) -> list[np.random.Generator]:
+    """Return independent generators, one per noise source, from one seed."""
+    return [np.random.default_rng(s) for s in np.random.SeedSequence(seed).spawn(count)]
+
+
+class Imu:
+    """Gyroscope and accelerometer: specific force and body rates, FLU."""
+
+    def __init__(self, numbers: dict, scale: float, generator: np.random.Generator) -> None:
+        """numbers: `sensors.imu` of the vehicle; scale: factor on noise and bias."""
+        gyro, accelerometer = numbers["gyro_noise"], numbers["accelerometer_noise"]
+        biases = [numbers["gyro_bias"]] * 3 + [numbers["accelerometer_bias"]] * 3
+        self.bias = scale * generator.standard_normal(6) * np.array(biases)
+        self._noise = Noise(generator, scale * np.array([gyro] * 3 + [accelerometer] * 3))
+
+    def sample(self, rates: np.ndarray, specific_force: np.ndarray):
+        """Return (gyro (3,) [rad/s], accelerometer (3,) [m/s^2]) with noise and bias."""
+        disturbance = self._noise() + self.bias
+        return rates + disturbance[:3], specific_force + disturbance[3:]
+
+
+class Mocap:
+    """OptiTrack: pose at its own rate."""
+
+    def __init__(self, numbers: dict, scale: float, generator: np.random.Generator) -> None:
+        """numbers: `sensors.mocap` of the vehicle; scale: factor on noise."""
+        self._period = 1.0 / numbers["rate"]
+        self._next = 0.0
+        deviations = [numbers["position_noise"]] * 3 + [numbers["attitude_noise"]] * 3
+        self._noise = Noise(generator, scale * np.array(deviations))
+
+    def due(self, time: float) -> bool:
+        """Return whether an exposure falls on this tick."""
+        if time + 1e-9 < self._next:
+            return False
+        self._next += self._period
+        return True
+
+    def sample(self, position: np.ndarray, quaternion: np.ndarray):
+        """Return (position (3,) [m], quaternion [w x y z]) with noise."""
+        noise = self._noise()
+        turn = quaternion_from_rotation_vector(noise[3:])
+        return position + noise[:3], quaternion_multiply(quaternion, turn)
+
+
+class Encoders:
+    """Dynamixel position and velocity with their quantisation."""
+
+    def __init__(self, numbers: dict) -> None:
+        """numbers: `sensors.joints` of the vehicle."""
+        self._count = 2.0 * np.pi / numbers["counts_per_turn"]
+        self._velocity = numbers["velocity_unit"]
+
+    def sample(self, angle: np.ndarray, velocity: np.ndarray):
+        """Return (alpha (n,) [rad], alpha_dot (n,) [rad/s]) in whole counts."""
+        return (self._count * np.round(angle / self._count),
+                self._velocity * np.round(velocity / self._velocity))
