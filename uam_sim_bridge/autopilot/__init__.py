@@ -1,0 +1,1 @@
+"""PX4-class autopilot stand-in: rate loop, allocation, arming and OFFBOARD rules, server."""

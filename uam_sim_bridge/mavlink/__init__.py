@@ -1,0 +1,1 @@
+"""The MAVLink side: frames, thrust curve, body-rate setpoints, offboard link, simulator link."""
