@@ -1,0 +1,115 @@
+"""State estimator: motion capture + IMU + joints → chi, chi_dot, chi_ddot at the control rate.
+
+Position and attitude accelerations come from the IMU, joint accelerations numerically, as in the
+paper (Section IV); each goes through a low-pass whose corner is a parameter.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from uam_control.coordinates import ARM, ATTITUDE, POSITION
+from uam_control.estimation.filters import derivative_step, joint_step, low_pass_step
+from uam_control.estimation.pose_filter import PoseFilter
+from uam_control.parameters import ParameterSet, number
+from uam_control.rotations import euler_from_quaternion
+
+
+@dataclass(frozen=True)
+class EstimatorParameters(ParameterSet):
+    """Bandwidths and corners of the estimator's filters."""
+
+    position_bandwidth: float = number(
+        12.0, "correction of position by motion capture", "rad/s", 0.5, 60.0)
+    attitude_bandwidth: float = number(
+        8.0, "correction of attitude by motion capture", "rad/s", 0.5, 60.0)
+    joint_bandwidth: float = number(
+        60.0, "correction of joint state by the encoder angle", "rad/s", 1.0, 125.0)
+    joint_velocity_weight: float = number(
+        80.0, "correction of joint state by the encoder velocity", "1/s", 0.0, 200.0)
+    acceleration_cutoff: float = number(
+        5.0, "low-pass on the acceleration of the vehicle", "Hz", 0.1, 100.0)
+    angular_acceleration_cutoff: float = number(
+        10.0, "low-pass on the derivative of the body rates", "Hz", 0.1, 100.0)
+    joint_acceleration_cutoff: float = number(
+        5.0, "low-pass on the derivative of the joint velocities", "Hz", 0.1, 100.0)
+
+
+class StateEstimator:
+    """Feed the samples as they arrive, in any order; `update` gives the state at the newest IMU."""
+
+    def __init__(self, parameters: EstimatorParameters) -> None:
+        self.parameters = parameters
+        self._pose = PoseFilter(parameters.position_bandwidth, parameters.attitude_bandwidth)
+        self._state = np.zeros((3, 8))
+        self._joints = np.zeros((2, 2))
+        self._rates_filter = np.zeros((2, 3))
+        self._joints_filter = np.zeros((2, 2))
+        self._acceleration = np.zeros(3)
+        self._imu_stamp: float | None = None
+        self._joint_stamp: float | None = None
+        self._started = False
+        self._period = 0.0
+
+    def set_parameters(self, parameters: EstimatorParameters) -> None:
+        """Use `parameters` (validated) from the next sample on."""
+        self.parameters = parameters
+        self._pose.set_bandwidths(parameters.position_bandwidth, parameters.attitude_bandwidth)
+
+    @property
+    def waiting_for(self) -> list[str]:
+        """Names of the inputs not seen yet."""
+        seen = {"imu": self._imu_stamp is not None, "mocap": self._started,
+                "joints": self._joint_stamp is not None}
+        return [name for name, there in seen.items() if not there]
+
+    @property
+    def quaternion(self) -> np.ndarray:
+        """Attitude [w x y z] (4,)."""
+        return self._pose.quaternion
+
+    def mocap(self, stamp: float, position: np.ndarray, quaternion: np.ndarray) -> None:
+        """Take a pose: position (3,) [m] world, quaternion [w x y z], exposed at stamp [s]."""
+        if not self._started:
+            self._pose.start(position, quaternion)
+            self._started = True
+        self._pose.correct(stamp, position, quaternion)
+
+    def imu(self, stamp: float, gyro: np.ndarray, specific_force: np.ndarray) -> None:
+        """Take an IMU sample: gyro (3,) [rad/s], specific force (3,) [m/s^2], FLU."""
+        last, self._imu_stamp = self._imu_stamp, stamp
+        self._period = 0.0 if last is None else min(max(stamp - last, 0.0), 0.05)
+        if self._started and self._period > 0.0:
+            self._pose.predict(stamp, self._period, gyro, specific_force)
+
+    def joints(self, stamp: float, alpha: np.ndarray, alpha_dot: np.ndarray) -> None:
+        """Take joint readings: alpha (n,) [rad], alpha_dot (n,) [rad/s]."""
+        p = self.parameters
+        last, self._joint_stamp = self._joint_stamp, stamp
+        if last is None:
+            self._joints[0] = alpha
+            self._joints[1] = alpha_dot
+            return
+        dt = min(max(stamp - last, 0.0), 0.05)
+        joint_step(alpha, alpha_dot, p.joint_bandwidth, p.joint_velocity_weight, dt, self._joints)
+        derivative_step(self._joints[1], p.joint_acceleration_cutoff, dt, self._joints_filter,
+                        self._state[2, ARM])
+
+    def update(self) -> np.ndarray:
+        """Return the state (3, 8) at the newest IMU stamp; the array is reused by the next call."""
+        p, pose, state = self.parameters, self._pose, self._state
+        if self._period > 0.0:
+            derivative_step(pose.rates, p.angular_acceleration_cutoff, self._period,
+                            self._rates_filter, state[2, ATTITUDE])
+            low_pass_step(pose.acceleration, p.acceleration_cutoff, self._period,
+                          self._acceleration)
+        state[0, POSITION] = pose.position
+        state[0, ATTITUDE] = euler_from_quaternion(pose.quaternion)
+        state[0, ARM] = self._joints[0]
+        state[1, POSITION] = pose.velocity
+        state[1, ATTITUDE] = pose.rates
+        state[1, ARM] = self._joints[1]
+        state[2, POSITION] = self._acceleration
+        return state

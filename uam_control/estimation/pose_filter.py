@@ -1,0 +1,109 @@
+"""Pose filter: integrates the IMU and corrects with motion capture that arrives late.
+
+A fixed-gain observer (what a Kalman filter with constant noise converges to). The pose in force when
+the camera exposed is kept in a ring, so that the correction compares like with like.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from uam_control.compiled import jit
+from uam_control.rotations import (
+    matrix_from_quaternion,
+    quaternion_from_rotation_vector,
+    quaternion_multiply,
+    rotate,
+    rotation_error,
+)
+
+HISTORY = 64  # ticks of pose kept, 256 ms at 250 Hz
+GRAVITY = 9.81
+
+
+class PoseFilter:
+    """Position, velocity, attitude and the biases of gyroscope and accelerometer.
+
+    position, velocity (3,) world; quaternion [w x y z]; rates (3,) body, bias removed;
+    acceleration (3,) world, gravity and bias removed; gyro_bias (3,) body; accelerometer_bias (3,)
+    world.
+    """
+
+    def __init__(self, position_bandwidth: float, attitude_bandwidth: float) -> None:
+        """Bandwidths [rad/s] of the corrections from motion capture."""
+        self.set_bandwidths(position_bandwidth, attitude_bandwidth)
+        self.position = np.zeros(3)
+        self.velocity = np.zeros(3)
+        self.quaternion = np.array([1.0, 0.0, 0.0, 0.0])
+        self.rates = np.zeros(3)
+        self.acceleration = np.zeros(3)
+        self.gyro_bias = np.zeros(3)
+        self.accelerometer_bias = np.zeros(3)
+        self._stamps = np.full(HISTORY, -1.0)
+        self._poses = np.zeros((HISTORY, 7))
+        self._count = 0
+        self._last_correction = -1.0
+
+    def set_bandwidths(self, position: float, attitude: float) -> None:
+        """Change the corrections; the estimate goes on."""
+        self._bandwidths = np.array([position, attitude], dtype=float)
+
+    def start(self, position: np.ndarray, quaternion: np.ndarray) -> None:
+        """Begin at rest at a measured pose."""
+        self.position[:] = position
+        self.quaternion[:] = quaternion
+
+    def predict(self, stamp: float, dt: float, gyro: np.ndarray, specific_force: np.ndarray):
+        """Integrate one IMU sample over dt [s]; gyro [rad/s], specific force [m/s^2], FLU."""
+        row = self._count % HISTORY
+        self._count += 1
+        self._stamps[row] = stamp
+        predict(dt, gyro, specific_force, self.position, self.velocity, self.quaternion, self.rates,
+                self.acceleration, self.gyro_bias, self.accelerometer_bias, self._poses[row])
+
+    def correct(self, stamp: float, position: np.ndarray, quaternion: np.ndarray) -> None:
+        """Correct with a pose exposed at `stamp`; older than the history: refused silently."""
+        row = int(np.argmin(np.abs(self._stamps - stamp)))
+        if abs(self._stamps[row] - stamp) > 0.02:
+            return
+        dt = min(max(stamp - self._last_correction, 1e-3), 0.05)
+        self._last_correction = stamp
+        correct(dt, self._bandwidths, position, quaternion, self._poses[row], self.position,
+                self.velocity, self.quaternion, self.gyro_bias, self.accelerometer_bias)
+
+
+@jit
+def predict(dt, gyro, specific_force, position, velocity, quaternion, rates, acceleration, gyro_bias,
+            accelerometer_bias, pose):
+    """Advance the pose by dt and write it, with its quaternion, into pose (7,)."""
+    for i in range(3):
+        rates[i] = gyro[i] - gyro_bias[i]
+    turned = quaternion_multiply(quaternion, quaternion_from_rotation_vector(rates * dt))
+    norm = np.sqrt(np.sum(turned * turned))
+    quaternion[:] = turned / norm
+    force = rotate(matrix_from_quaternion(quaternion), specific_force)
+    force[2] -= GRAVITY
+    for i in range(3):
+        acceleration[i] = force[i] - accelerometer_bias[i]
+        position[i] += dt * velocity[i] + 0.5 * dt * dt * acceleration[i]
+        velocity[i] += dt * acceleration[i]
+    pose[:3] = position
+    pose[3:] = quaternion
+
+
+@jit
+def correct(dt, bandwidths, measured_position, measured_quaternion, pose, position, velocity,
+            quaternion, gyro_bias, accelerometer_bias):
+    """Observer gains 3w, 3w^2, w^3 (triple pole) for position, 2w, w^2 for attitude."""
+    w = bandwidths[0]
+    for i in range(3):
+        innovation = measured_position[i] - pose[i]
+        position[i] += 3.0 * w * dt * innovation
+        velocity[i] += 3.0 * w * w * dt * innovation
+        accelerometer_bias[i] -= w * w * w * dt * innovation
+    w = bandwidths[1]
+    error = rotation_error(measured_quaternion, pose[3:])
+    quaternion[:] = quaternion_multiply(
+        quaternion, quaternion_from_rotation_vector(2.0 * w * dt * error))
+    for i in range(3):
+        gyro_bias[i] -= w * w * dt * error[i]

@@ -1,0 +1,126 @@
+"""Smooth, bounded references: chi_d, chi_d_dot, chi_d_ddot as functions of mission time."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+
+from uam_control.compiled import jit
+from uam_control.coordinates import COORDINATES, SIZE
+
+
+class Trajectory(Protocol):
+    """Anything that can fill a reference."""
+
+    def write(self, time: float, reference: np.ndarray) -> None:
+        """Write chi_d, chi_d_dot, chi_d_ddot at mission time [s] into reference (3, 8)."""
+
+
+@dataclass(frozen=True)
+class Move:
+    """One coordinate goes to `to` between two times, with rate and acceleration zero at both."""
+
+    coordinate: str
+    start: float
+    end: float
+    to: float
+
+
+class Moves:
+    """Minimum-jerk moves from a starting pose; a coordinate holds its value between moves."""
+
+    def __init__(self, start: np.ndarray, moves: list[Move]) -> None:
+        """start: chi (8,) at mission time 0; moves of one coordinate must not overlap."""
+        self._start = np.array(start, dtype=float)
+        value = dict(zip(COORDINATES, self._start, strict=True))
+        rows = []
+        for move in sorted(moves, key=lambda m: m.start):
+            rows.append((COORDINATES.index(move.coordinate), move.start, move.end,
+                         value[move.coordinate], move.to))
+            value[move.coordinate] = move.to
+        self._rows = np.array(rows, dtype=float).reshape(-1, 5)
+
+    def write(self, time: float, reference: np.ndarray) -> None:
+        """See `Trajectory.write`."""
+        write_moves(time, self._start, self._rows, reference)
+
+
+@jit
+def write_moves(time, start, rows, reference):
+    """Evaluate the moves; rows (m, 5): coordinate, start, end, from, to; sorted by start."""
+    reference[:] = 0.0
+    reference[0] = start
+    for row in rows:
+        if time < row[1]:
+            continue
+        i, length, distance = int(row[0]), row[2] - row[1], row[4] - row[3]
+        s = min((time - row[1]) / length, 1.0)
+        reference[0, i] = row[3] + distance * s * s * s * (10.0 + s * (6.0 * s - 15.0))
+        reference[1, i] = distance / length * 30.0 * s * s * (1.0 - s) * (1.0 - s)
+        reference[2, i] = distance / (length * length) * 60.0 * s * (1.0 - s) * (1.0 - 2.0 * s)
+
+
+class Sampled:
+    """A sampled trajectory: cubic between samples that carry value and rate, linear acceleration.
+
+    times (m,) [s], increasing; samples (m, 3, 8). Before the first and after the last sample the
+    value holds.
+    """
+
+    def __init__(self, times: np.ndarray, samples: np.ndarray) -> None:
+        self._times = np.ascontiguousarray(times, dtype=float)
+        self._samples = np.ascontiguousarray(samples, dtype=float)
+
+    @property
+    def end(self) -> float:
+        """Time of the last sample [s]."""
+        return float(self._times[-1])
+
+    @property
+    def first(self) -> np.ndarray:
+        """chi (8,) of the first sample."""
+        return self._samples[0, 0]
+
+    @property
+    def last(self) -> np.ndarray:
+        """chi (8,) of the last sample."""
+        return self._samples[-1, 0]
+
+    def write(self, time: float, reference: np.ndarray) -> None:
+        """See `Trajectory.write`."""
+        times, samples = self._times, self._samples
+        reference[:] = 0.0
+        if time <= times[0] or time >= times[-1]:
+            reference[0] = samples[0 if time <= times[0] else -1, 0]
+            return
+        row = int(np.searchsorted(times, time, side="right")) - 1
+        length = times[row + 1] - times[row]
+        s = (time - times[row]) / length
+        (p0, v0, a0), (p1, v1, a1) = samples[row], samples[row + 1]
+        reference[0] = (
+            (2 * s**3 - 3 * s**2 + 1) * p0 + (s**3 - 2 * s**2 + s) * length * v0
+            + (-2 * s**3 + 3 * s**2) * p1 + (s**3 - s**2) * length * v1)
+        reference[1] = (
+            (6 * s**2 - 6 * s) * (p0 - p1) / length
+            + (3 * s**2 - 4 * s + 1) * v0 + (3 * s**2 - 2 * s) * v1)
+        reference[2] = (1 - s) * a0 + s * a1
+
+
+class Chain:
+    """Trajectories one after the other, each on its own clock from its start time."""
+
+    def __init__(self, parts: list[tuple[float, Trajectory]]) -> None:
+        """parts: (start in mission time [s], trajectory), in order."""
+        self._parts = parts
+
+    def write(self, time: float, reference: np.ndarray) -> None:
+        """See `Trajectory.write`."""
+        start, part = next((p for p in reversed(self._parts) if time >= p[0]), self._parts[0])
+        part.write(time - start, reference)
+
+
+def empty_reference() -> np.ndarray:
+    """Return a reference (3, 8) of zeros."""
+    return np.zeros((3, SIZE))
