@@ -1,0 +1,1 @@
+"""What a flight looked like: figures, pictures, video, one offline page."""
