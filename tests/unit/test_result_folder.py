@@ -49,6 +49,8 @@ def test_a_folder_of_the_users_choice_is_used_unless_it_holds_a_flight(here):
     with pytest.raises(ResultFolderError, match="already holds a flight"):
         ResultFolder.create("hover", "modular", out=here / "a/b")
     assert json.loads(folder.metrics.read_text()) == {"seed": 1}
+    inside = ResultFolder.create("hover", "modular", out=here / "results/mine")
+    assert (here / "results/latest").resolve() == inside.path
 
 
 def test_a_folder_that_cannot_be_written_is_refused_in_one_line(here):

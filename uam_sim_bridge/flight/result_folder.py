@@ -63,9 +63,10 @@ class ResultFolder:
         out: Path | None = None,
         now: datetime | None = None,
     ) -> ResultFolder:
-        """Make `out`, or results/<time>-<scenario>-<controller> with results/latest at it.
+        """Make `out`, or results/<time>-<scenario>-<controller>.
 
-        scenario: name or file, of which the stem is used.
+        scenario: name or file, of which the stem is used. results/latest is turned to the new
+        folder if it lies in results/.
         Raises ResultFolderError: not writable, not a directory, or `out` already has a flight.
         """
         if out is not None:
@@ -75,6 +76,8 @@ class ResultFolder:
                 raise ResultFolderError(
                     f"result folder {folder.path} already holds a flight; give another --out"
                 )
+            if folder.path.absolute().parent == RESULTS.absolute():
+                _point_latest_at(folder.path)
             return folder
         stamp = (now or datetime.now()).strftime("%Y%m%d-%H%M%S")
         name = "-".join([stamp, _in_a_name(Path(scenario).stem), _in_a_name(controller)])
