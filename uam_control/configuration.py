@@ -2,7 +2,7 @@
 
 | installation | config/ is |
 |---|---|
-| source checkout, `pip install -e .`, `colcon build --symlink-install` | config/ beside the packages |
+| checkout, `pip install -e .`, `colcon build --symlink-install` | config/ beside the packages |
 | wheel, `colcon build` | share/uam/config under the installation prefix |
 """
 

@@ -1,0 +1,110 @@
+"""Every topic of the stack: name, message type, quality of service. Nothing is named elsewhere.
+
+Frames are REP-103: ENU world, FLU body. Names can be remapped the ROS way.
+"""
+
+from dataclasses import dataclass
+
+from diagnostic_msgs.msg import DiagnosticArray
+from geometry_msgs.msg import PoseStamped, TwistStamped
+from rcl_interfaces.msg import Log
+from rclpy.qos import (
+    QoSDurabilityPolicy,
+    QoSHistoryPolicy,
+    QoSProfile,
+    QoSReliabilityPolicy,
+)
+from rosgraph_msgs.msg import Clock
+from sensor_msgs.msg import Imu, JointState
+from std_msgs.msg import Bool, Float64MultiArray, String
+from trajectory_msgs.msg import JointTrajectory
+
+try:  # not among the wheels of PyPI; there with a ROS from apt
+    from tf2_msgs.msg import TFMessage
+except ImportError:
+    TFMessage = None
+
+
+def _qos(depth: int, reliable: bool = True, latched: bool = False) -> QoSProfile:
+    return QoSProfile(
+        history=QoSHistoryPolicy.KEEP_LAST,
+        depth=depth,
+        reliability=QoSReliabilityPolicy.RELIABLE if reliable else QoSReliabilityPolicy.BEST_EFFORT,
+        durability=(
+            QoSDurabilityPolicy.TRANSIENT_LOCAL if latched else QoSDurabilityPolicy.VOLATILE
+        ),
+    )
+
+
+SENSOR_DATA = _qos(5, reliable=False)  # as rclpy.qos.qos_profile_sensor_data
+RELIABLE = _qos(10)
+LATCHED = _qos(1, latched=True)  # a late subscriber gets the last message
+
+
+@dataclass(frozen=True)
+class Topic:
+    """One topic. `one_publisher`: its sequence numbers have no gap unless a message was lost."""
+
+    name: str
+    type: type
+    qos: QoSProfile
+    content: str
+    one_publisher: bool = True
+
+
+CLOCK = Topic("/clock", Clock, _qos(1, reliable=False), "simulation time")
+
+# Sensors
+IMU = Topic("/imu/data", Imu, SENSOR_DATA, "body rates and specific force, FLU, 250 Hz")
+JOINTS = Topic("/joint_states", JointState, SENSOR_DATA, "alpha_1, alpha_2, 250 Hz")
+MOCAP = Topic("/vrpn_mocap/uam/pose", PoseStamped, SENSOR_DATA, "motion capture, world, 120 Hz")
+
+# Control, once per tick, stamped with the IMU sample that the tick belongs to
+STATE = Topic("/uam/state", JointTrajectory, RELIABLE, "estimated chi, chi_dot, chi_ddot")
+REFERENCE = Topic(
+    "/uam/reference", JointTrajectory, RELIABLE, "chi_d ... of the coordinates to be controlled"
+)
+POSITION_COMMAND = Topic(
+    "/uam/position/command", JointTrajectory, RELIABLE, "p_d, q_d, their derivatives, and tau_p"
+)
+ATTITUDE_COMMAND = Topic("/uam/attitude/command", JointTrajectory, RELIABLE, "tau_q, FLU")
+ARM_COMMAND = Topic("/uam/arm/command", JointTrajectory, RELIABLE, "tau_alpha")
+ARM_EFFORT = Topic(
+    "/arm_effort_controller/commands", Float64MultiArray, RELIABLE, "tau_alpha [N m]"
+)
+MAGNET = Topic("/uam/magnet", Bool, RELIABLE, "magnet on")
+SETPOINT = Topic(
+    "/uam/setpoint", TwistStamped, RELIABLE, "body rates FLU and thrust 0..1 (linear.z) as sent"
+)
+POSITION_ADAPTATION = Topic(
+    "/uam/position/adaptation", JointState, RELIABLE, "K0..K3, zeta, rho, r_norm, 50 Hz"
+)
+ATTITUDE_ADAPTATION = Topic("/uam/attitude/adaptation", JointState, RELIABLE, "as for position")
+ARM_ADAPTATION = Topic("/uam/arm/adaptation", JointState, RELIABLE, "as for position")
+
+# States of mission and autopilot
+ARMING = Topic("/uam/arming", Bool, LATCHED, "the autopilot is to be armed and in OFFBOARD")
+AUTOPILOT_STATE = Topic(
+    "/uam/autopilot/state", DiagnosticArray, LATCHED, "see uam_msgs_py.status.AutopilotState"
+)
+MISSION_STATUS = Topic(
+    "/uam/mission/status", DiagnosticArray, LATCHED, "see uam_msgs_py.status.MissionStatus"
+)
+
+# What only a simulator knows
+TRUTH_STATE = Topic("/uam/truth/state", JointTrajectory, RELIABLE, "true chi, chi_dot, chi_ddot")
+TRUTH_PAYLOAD = Topic("/uam/truth/payload", PoseStamped, RELIABLE, "payload, world")
+TRUTH_ROTORS = Topic(
+    "/uam/truth/rotors", JointState, RELIABLE, "rotor_1..4: command 0..1, speed rad/s, thrust N"
+)
+TRUTH_MAGNET = Topic(
+    "/uam/truth/magnet", JointState, RELIABLE, "magnet: on 0/1, holding force N; swing: angle rad"
+)
+
+# ROS conventions
+ROBOT_DESCRIPTION = Topic("/robot_description", String, LATCHED, "URDF")
+DIAGNOSTICS = Topic("/diagnostics", DiagnosticArray, RELIABLE, "health, 1 Hz", one_publisher=False)
+ROSOUT = Topic("/rosout", Log, _qos(1000, latched=True), "log of all nodes", one_publisher=False)
+TF = Topic("/tf", TFMessage, _qos(100), "transforms", one_publisher=False) if TFMessage else None
+
+ALL = [topic for topic in list(vars().values()) if isinstance(topic, Topic)]
