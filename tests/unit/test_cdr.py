@@ -113,23 +113,24 @@ def test_states_poses_and_twists():
     assert block.stamps.tolist() == [3_000_000_004]
 
 
-@pytest.mark.parametrize("cut", [0, 1, 40, 400])
-def test_a_log_without_its_end_is_read_up_to_there(tmp_path, cut):
-    writer = McapWriter(tmp_path / "log.mcap")
+@pytest.mark.parametrize("more", [0, 1, 30])
+def test_a_log_without_its_end_is_read_up_to_there(tmp_path, more):
+    file = tmp_path / "log.mcap"
+    writer = McapWriter(file)
     name = "trajectory_msgs/msg/JointTrajectory"
     channel = writer.add_channel("/uam/state", name, schema(name), {})
+    sizes = []
     for k in range(20):
         data = serialize(trajectory(k, ["x"], [[float(k)], [], [], []]))
         writer.write(channel, k, k, data)
         if k % 5 == 4:
             writer.flush()
-    whole = (tmp_path / "log.mcap").read_bytes()
+            sizes.append(file.stat().st_size)
     writer.close()
-    (tmp_path / "cut.mcap").write_bytes(whole[: len(whole) - cut])
-    found = read_log(tmp_path / "cut.mcap")["/uam/state"]
-    assert found.times == list(range(20 if cut < 40 else len(found.times)))
-    assert len(found.times) >= 15
-    assert read_log(tmp_path / "log.mcap", {"/other"}) == {}
+    (tmp_path / "cut.mcap").write_bytes(file.read_bytes()[: sizes[2] + more])
+    assert read_log(tmp_path / "cut.mcap")["/uam/state"].times == list(range(15))
+    assert read_log(file)["/uam/state"].times == list(range(20))
+    assert read_log(file, {"/other"}) == {}
 
 
 def test_what_is_no_log_is_refused(tmp_path):
