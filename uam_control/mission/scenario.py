@@ -106,7 +106,7 @@ def from_yaml(file: Path) -> Scenario:
     reader.no_overlap(moves)
     phases = tuple((reader.number(p, "from", "phases"), str(p.get("name", ""))) for p in
                    document.get("phases") or [{"from": 0.0, "name": "flight"}])
-    magnet = tuple((reader.number(m, "at", "magnet"), bool(m.get("on")))
+    magnet = tuple((reader.number(m, "at", "magnet"), reader.switch(m, "energised", "magnet"))
                    for m in document.get("magnet") or [])
     payload = document.get("payload") or {}
     drop = payload.get("drop_point")
@@ -146,6 +146,13 @@ class Reader:
         if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value):
             raise ScenarioError(f"{self.where}: '{owner}.{key}' is {value!r}, a number expected")
         return float(value)
+
+    def switch(self, entry: Any, key: str, owner: str) -> bool:
+        """Return a required true or false."""
+        value = entry.get(key) if isinstance(entry, dict) else None
+        if not isinstance(value, bool):
+            raise ScenarioError(f"{self.where}: '{owner}.{key}' is {value!r}, true or false expected")
+        return value
 
     def move(self, entry: Any, index: int) -> Move:
         """Return one entry of `moves`; angles are given in degrees (roll and pitch cannot be)."""

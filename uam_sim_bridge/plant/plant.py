@@ -11,6 +11,7 @@ from uam_control.compiled import jit
 from uam_control.coordinates import ARM, ATTITUDE, POSITION
 from uam_control.rotations import euler_from_quaternion
 from uam_sim_bridge.plant.actuators import Rotors, Servos
+from uam_sim_bridge.plant.magnet import pull_fraction
 from uam_sim_bridge.plant.sensors import Delay, Encoders, Imu, Mocap, Noise, generators
 from uam_sim_bridge.plant.vehicle import Vehicle
 
@@ -113,6 +114,11 @@ class Plant:
         self._arm_control = data.ctrl[4:6]
         self._force_on_base = data.xfrc_applied[self.model.body("base").id, 0:3]
         self._magnet_gain = self.model.actuator("magnet").gainprm[0]
+        self._magnet_control = data.ctrl[6:7]
+        self._gap_scale = self.vehicle.numbers["magnet"]["gap_scale"]
+        self._face = data.site_xpos[self.model.site("magnet_face").id]
+        self._payload_axes = data.xmat[self.model.body("payload").id]
+        self._payload_half_height = self.model.geom("payload").size[2]
         self._alpha[:] = arm_start
         data.qpos[self._swing] = -sum(arm_start)
         if payload_mass <= 0.0:  # out of the way rather than another model
@@ -151,7 +157,9 @@ class Plant:
         if self._gust is not None:
             self.wind += (1.0 - self._gust_keep) * (self._wind_mean - self.wind) + self._gust()
         drag_force(self._drag, self._velocity, self.wind, self._force_on_base)
-        self.data.ctrl[6] = 1.0 if magnet else 0.0
+        self._magnet_control[0] = pull_fraction(
+            self._face, self._payload_position, self._payload_axes, self._payload_half_height,
+            self._gap_scale) if magnet else 0.0
         self._specific_force[:] = 0.0
         for _ in range(self._steps):
             self.rotors.step(motor_commands, self._thrust_control)
@@ -181,7 +189,7 @@ class Plant:
             quaternion=self._quaternion.copy(),
             payload_position=self._payload_position.copy(),
             payload_quaternion=self._payload_quaternion.copy(),
-            magnet_force=float(self.data.ctrl[6] * self._magnet_gain),
+            magnet_force=float(self._magnet_control[0] * self._magnet_gain),
             magnet_swing=float(self.data.qpos[self._swing]),
             rotor_speed=self.rotors.speed.copy(),
             rotor_thrust=self.rotors.thrust.copy(),
