@@ -1,0 +1,306 @@
+"""The autopilot object on a rigid quadrotor: arming rules, hover, rate steps, failsafe descent."""
+
+import math
+
+import numpy as np
+import pytest
+from quadrotor import MASS, Quadrotor
+
+from uam_control.configuration import path
+from uam_control.parameters import ParameterError
+from uam_control.rotations import quaternion_multiply
+from uam_sim_bridge.autopilot.core import Autopilot
+from uam_sim_bridge.autopilot.modes import FORCE, Command, Mode, Result
+from uam_sim_bridge.autopilot.params import Parameters
+from uam_sim_bridge.mavlink.frames import swap_body, swap_quaternion, swap_world
+from uam_sim_bridge.mavlink.setpoint import RateThrustMap
+
+OFFBOARD = (1.0, 6.0, 0.0)
+HOVER = MASS * 9.81 / (4 * 10.34)
+
+
+class Bench:
+    """Quadrotor and autopilot in one loop, with vision at 125 Hz."""
+
+    def __init__(self, height=0.0):
+        self.autopilot = Autopilot(Parameters.load(path("autopilot/s500.yaml")))
+        self.body = Quadrotor(height=height)
+        self.vision = True
+        self.vision_tilt = np.array([1.0, 0.0, 0.0, 0.0])
+        self.ticks = 0
+
+    @property
+    def time(self):
+        return self.body.time
+
+    def tick(self, setpoint=None):
+        """One 4 ms tick; setpoint: (rates FLU (3,), thrust) or None."""
+        body, autopilot = self.body, self.autopilot
+        self.ticks += 1
+        if self.vision and self.ticks % 2:
+            attitude = quaternion_multiply(body.quaternion, self.vision_tilt)
+            autopilot.vision(body.time, swap_world(body.position), swap_quaternion(attitude))
+        if setpoint is not None:
+            autopilot.setpoint(body.time, swap_body(np.array(setpoint[0], float)), setpoint[1])
+        motors = autopilot.update(body.time, swap_body(body.gyro), swap_body(body.accel))
+        body.step(motors)
+        return motors
+
+    def run(self, seconds, setpoint=None):
+        for _ in range(round(seconds / 0.004)):
+            self.tick(setpoint)
+
+    def command(self, command, *parameters):
+        return self.autopilot.command(self.time, command, (*parameters, *[0.0] * 7)[:7])
+
+    def texts(self):
+        return " / ".join(text for _, text in self.autopilot.commander.take_texts())
+
+    def fly(self):
+        """Arm on the ground or in the air, OFFBOARD, idle setpoints."""
+        self.run(1.0, ((0, 0, 0), 0.0))
+        assert self.command(Command.DO_SET_MODE, *OFFBOARD) == Result.ACCEPTED
+        assert self.command(Command.ARM_DISARM, 1.0) == Result.ACCEPTED
+        return self
+
+
+def airborne():
+    """An armed bench that hovers 20 m up."""
+    bench = Bench().fly()
+    bench.body.position[2] = 20.0
+    bench.body.hover()
+    bench.run(0.5, ((0, 0, 0), HOVER))
+    return bench
+
+
+def test_offboard_needs_a_stream():
+    bench = Bench()
+    bench.run(0.5)
+    assert bench.command(Command.DO_SET_MODE, *OFFBOARD) == Result.TEMPORARILY_REJECTED
+    assert "no offboard signal" in bench.texts()
+    for _ in range(3):  # 1 Hz is too slow
+        bench.tick(((0, 0, 0), 0.0))
+        bench.run(1.0)
+    assert bench.command(Command.DO_SET_MODE, *OFFBOARD) == Result.TEMPORARILY_REJECTED
+    bench.run(0.6, ((0, 0, 0), 0.0))
+    assert bench.command(Command.DO_SET_MODE, *OFFBOARD) == Result.ACCEPTED
+    assert bench.autopilot.status.mode is Mode.OFFBOARD
+
+
+def test_arming_refused_without_stream():
+    bench = Bench()
+    bench.run(1.0, ((0, 0, 0), 0.0))
+    bench.command(Command.DO_SET_MODE, *OFFBOARD)
+    bench.run(2.0)
+    assert bench.command(Command.ARM_DISARM, 1.0) == Result.TEMPORARILY_REJECTED
+    assert "no offboard signal" in bench.texts()
+
+
+def test_arming_refused_without_vision():
+    bench = Bench()
+    bench.vision = False
+    bench.run(1.0, ((0, 0, 0), 0.0))
+    bench.command(Command.DO_SET_MODE, *OFFBOARD)
+    assert bench.command(Command.ARM_DISARM, 1.0) == Result.TEMPORARILY_REJECTED
+    assert "vision" in bench.texts()
+    bench.vision = True
+    bench.run(0.2, ((0, 0, 0), 0.0))
+    assert bench.command(Command.ARM_DISARM, 1.0) == Result.ACCEPTED
+
+
+def test_arming_refused_when_vision_and_gravity_disagree():
+    bench = Bench()
+    bench.vision_tilt = np.array([math.cos(0.3), math.sin(0.3), 0.0, 0.0])  # 34 deg of roll
+    bench.run(1.0, ((0, 0, 0), 0.0))
+    bench.command(Command.DO_SET_MODE, *OFFBOARD)
+    assert bench.command(Command.ARM_DISARM, 1.0) == Result.TEMPORARILY_REJECTED
+    assert "tilt differs" in bench.texts()
+
+
+def test_arming_refused_outside_offboard():
+    bench = Bench()
+    bench.run(1.0, ((0, 0, 0), 0.0))
+    assert bench.command(Command.ARM_DISARM, 1.0) == Result.TEMPORARILY_REJECTED
+    assert "Offboard" in bench.texts()
+
+
+@pytest.mark.parametrize(
+    ("command", "parameters", "result"),
+    [
+        (Command.ARM_DISARM, (0.5,), Result.DENIED),
+        (Command.ARM_DISARM, (math.nan,), Result.DENIED),
+        (Command.DO_SET_MODE, (1.0, 3.0, 0.0), Result.DENIED),
+        (Command.DO_SET_MODE, (1.0, 99.0, 0.0), Result.DENIED),
+        (Command.DO_SET_MODE, (0.0, 6.0, 0.0), Result.DENIED),
+        (Command.DO_SET_MODE, (1.0, math.nan, 0.0), Result.DENIED),
+        (Command.DO_SET_MODE, (math.inf, 6.0, 0.0), Result.DENIED),
+        (12345, (), Result.UNSUPPORTED),
+    ],
+)
+def test_odd_commands(command, parameters, result):
+    assert Bench().command(command, *parameters) == result
+
+
+def test_motors_stand_still_while_disarmed():
+    bench = Bench()
+    bench.run(1.0, ((1.0, 1.0, 1.0), 0.9))
+    assert np.all(bench.tick(((1.0, 1.0, 1.0), 0.9)) == 0.0)
+
+
+def test_hover_thrust_carries_the_weight():
+    bench = airborne()
+    thrust = RateThrustMap().thrust_command(MASS * 9.81)
+    before = bench.body.velocity[2]
+    bench.run(2.0, ((0, 0, 0), thrust))
+    assert bench.body.thrusts.sum() == pytest.approx(MASS * 9.81, rel=1e-3)
+    assert bench.body.velocity[2] == pytest.approx(before, abs=0.02)
+
+
+@pytest.mark.parametrize(("axis", "size"), [(0, 1.0), (1, 1.0), (2, 0.5)])
+def test_rate_steps_are_followed(axis, size):
+    bench = airborne()
+    wanted = np.zeros(3)
+    wanted[axis] = size
+    rates = []
+    for _ in range(125 if axis < 2 else 500):
+        bench.tick((wanted, HOVER))
+        rates.append(bench.body.gyro.copy())
+    rates = np.array(rates)
+    half = np.argmax(rates[:, axis] > 0.5 * size) * 0.004
+    assert half < (0.12 if axis < 2 else 0.5)
+    assert rates[:, axis].max() < 1.5 * size
+    assert rates[-25:, axis].mean() == pytest.approx(size, rel=0.15)
+    others = np.delete(rates, axis, axis=1)
+    assert np.abs(others).max() < 0.1 * size
+
+
+def test_a_torque_through_the_map_is_the_torque_that_acts():
+    """tau_q → body rates → P path → motors: the first reaction equals tau_q (D and I aside)."""
+    bench = airborne()
+    tau_q = np.array([0.2, -0.15, 0.0])
+    rates, thrust = RateThrustMap().map(
+        np.array([0.0, 0.0, MASS * 9.81]), tau_q, np.zeros(3), bench.body.gyro)
+    bench.autopilot.set_parameter("MC_ROLLRATE_I", 0.0)
+    motors = bench.autopilot
+    bench.tick((rates, thrust))
+    u = motors.motors
+    newtons = 10.34 * (0.3 * u * u + 0.7 * u)
+    arm = 0.171
+    roll = arm * (-newtons[0] + newtons[1] + newtons[2] - newtons[3])
+    pitch = arm * (-newtons[0] + newtons[1] - newtons[2] + newtons[3])
+    assert [roll, pitch] == pytest.approx([0.2, -0.15], abs=0.01)
+    assert newtons.sum() == pytest.approx(MASS * 9.81, rel=1e-6)
+
+
+def test_setpoints_that_are_not_finite_are_refused():
+    bench = airborne()
+    before = bench.autopilot._setpoint.copy()
+    for bad in (math.nan, math.inf):
+        assert not bench.autopilot.setpoint(bench.time, np.array([bad, 0.0, 0.0]), 0.5)
+        assert not bench.autopilot.setpoint(bench.time, np.zeros(3), bad)
+    assert np.all(bench.autopilot._setpoint == before)
+    bench.autopilot.setpoint(bench.time, np.zeros(3), 7.0)
+    assert bench.autopilot._setpoint[3] == 1.0
+
+
+def test_loss_of_the_stream_descends_level_and_disarms():
+    bench = airborne()
+    bench.body.position[2] = 3.0
+    bench.run(0.5, ((0.5, 0.0, 0.0), HOVER))  # some tilt left
+    bench.run(0.9)
+    assert bench.autopilot.status.mode is Mode.OFFBOARD
+    bench.run(0.2)
+    status = bench.autopilot.status
+    assert status.mode is Mode.LAND and status.failsafe and status.armed
+    assert "Failsafe" in bench.texts()
+    speeds = []
+    for _ in range(3000):
+        bench.tick()
+        speeds.append(bench.body.velocity[2])
+        if not bench.autopilot.status.armed:
+            break
+    assert not bench.autopilot.status.armed
+    assert bench.body.position[2] == 0.0
+    assert "Disarmed by landing" in bench.texts()
+    assert min(speeds) > -1.6
+    assert min(speeds[250:]) > -1.0
+
+
+def test_descent_without_vision_stays_level():
+    bench = airborne()
+    bench.vision = False
+    bench.run(1.1)
+    bench.run(3.0)
+    tilt = 2 * math.acos(min(1.0, abs(bench.body.quaternion[0])))
+    assert tilt < math.radians(5.0)
+    assert -2.5 < bench.body.velocity[2] < 0.0
+
+
+def test_offboard_comes_back_only_when_asked():
+    bench = airborne()
+    bench.run(1.5)
+    bench.run(1.0, ((0, 0, 0), HOVER))
+    assert bench.autopilot.status.mode is Mode.LAND
+    assert bench.command(Command.DO_SET_MODE, *OFFBOARD) == Result.ACCEPTED
+    bench.run(0.1, ((0, 0, 0), HOVER))
+    assert bench.autopilot.status.mode is Mode.OFFBOARD and bench.autopilot.status.armed
+
+
+def test_disarming_in_flight_needs_force():
+    bench = airborne()
+    assert bench.command(Command.ARM_DISARM, 0.0) == Result.TEMPORARILY_REJECTED
+    assert "not landed" in bench.texts()
+    assert bench.command(Command.ARM_DISARM, 0.0, FORCE) == Result.ACCEPTED
+    assert np.all(bench.tick(((0, 0, 0), HOVER)) == 0.0)
+
+
+def test_forced_arming_skips_the_estimator():
+    bench = Bench()
+    bench.vision = False
+    bench.run(1.0, ((0, 0, 0), 0.0))
+    bench.command(Command.DO_SET_MODE, *OFFBOARD)
+    assert bench.command(Command.ARM_DISARM, 1.0, FORCE) == Result.ACCEPTED
+
+
+def test_auto_disarm_without_take_off():
+    bench = Bench().fly()
+    bench.run(9.5, ((0, 0, 0), 0.0))
+    assert bench.autopilot.status.armed
+    bench.run(1.0, ((0, 0, 0), 0.0))
+    assert not bench.autopilot.status.armed
+
+
+def test_integral_is_frozen_on_the_ground_and_cleared_when_disarmed():
+    bench = Bench().fly()
+    bench.run(1.0, ((0.3, 0.0, 0.0), 0.05))
+    assert np.all(bench.autopilot._memory[4] == 0.0)
+    bench.run(1.0, ((0.3, 0.0, 0.0), 0.4))  # pushes, does not lift
+    assert bench.autopilot._memory[4, 0] > 0.02
+    bench.command(Command.ARM_DISARM, 0.0, FORCE)
+    bench.tick()
+    assert np.all(bench.autopilot._memory[4] == 0.0)
+
+
+def test_parameters_are_checked_and_take_effect():
+    autopilot = Autopilot()
+    for name, value in (("MC_ROLLRATE_P", -1.0), ("NOT_THERE", 1.0), ("THR_MDL_FAC", math.nan),
+                        ("MAV_SYS_ID", 1.5), ("COM_OF_LOSS_T", True)):
+        with pytest.raises(ParameterError, match=name):
+            autopilot.set_parameter(name, value)
+    autopilot.set_parameter("MC_ROLLRATE_K", 2.0)
+    assert autopilot._gains[0, 0] == pytest.approx(0.3)
+    with pytest.raises(ValueError, match="geometry"):  # all rotors turning one way: no yaw
+        for i in range(4):
+            autopilot.set_parameter(f"CA_ROTOR{i}_KM", 0.01)
+
+
+def test_parameter_files(tmp_path):
+    bad = tmp_path / "bad.yaml"
+    with pytest.raises(ParameterError, match="No such file"):
+        Parameters.load(bad)
+    for text, message in (("[1, 2]", "NAME: value"), ("MC_ROLLRATE_P: x", "not a number"),
+                          ("A: [", "not YAML"), ("FOO: 1", "unknown")):
+        bad.write_text(text)
+        with pytest.raises(ParameterError, match=message) as error:
+            Parameters.load(bad)
+        assert "\n" not in str(error.value) and "bad.yaml" in str(error.value)

@@ -1,0 +1,133 @@
+"""The offboard sequence against a scripted autopilot, and against the stand-in itself."""
+
+import numpy as np
+import pytest
+
+from uam_sim_bridge.autopilot.core import Autopilot
+from uam_sim_bridge.autopilot.modes import Command, Mode, Result, Severity
+from uam_sim_bridge.mavlink.offboard import (
+    OffboardParameters,
+    OffboardSequence,
+    Phase,
+    Request,
+)
+
+DOWN = np.array([0.0, 0.0, -9.81])
+COMMANDS = {
+    Request.OFFBOARD: (Command.DO_SET_MODE, (1.0, 6.0, 0.0)),
+    Request.ARM: (Command.ARM_DISARM, (1.0, 0.0)),
+    Request.DISARM: (Command.ARM_DISARM, (0.0, 0.0)),
+}
+
+
+def run(sequence, seconds, start, connected=True, armed=False, mode=Mode.HOLD):
+    """Tick with constant answers; return the requests with their times."""
+    asked = []
+    for k in range(round(seconds / 0.004)):
+        request = sequence.update(start + k * 0.004, connected, armed, mode)
+        if request:
+            asked.append((round(start + k * 0.004, 3), request))
+    return asked
+
+
+def flying():
+    s = OffboardSequence()
+    s.want(True)
+    run(s, 1.1, 0.0)
+    run(s, 0.1, 1.1, mode=Mode.OFFBOARD)
+    run(s, 0.1, 1.2, armed=True, mode=Mode.OFFBOARD)
+    assert s.phase is Phase.FLYING
+    return s
+
+
+def test_order_and_times():
+    s = OffboardSequence()
+    s.want(True)
+    assert run(s, 1.0, 0.0, connected=False) == []
+    assert s.phase is Phase.WAITING and not s.streaming
+    asked = run(s, 1.8, 1.0)
+    assert asked == [(2.0, Request.OFFBOARD), (2.5, Request.OFFBOARD)]
+    assert s.streaming
+    asked = run(s, 0.1, 2.8, mode=Mode.OFFBOARD)
+    assert asked == [(2.8, Request.ARM)]
+    run(s, 0.1, 2.9, armed=True, mode=Mode.OFFBOARD)
+    assert s.phase is Phase.FLYING and s.armed_stamp == pytest.approx(2.9)
+
+
+def test_streams_but_asks_nothing_until_wanted():
+    s = OffboardSequence()
+    assert run(s, 5.0, 0.0) == []
+    assert s.streaming and s.phase is Phase.STREAMING
+
+
+def test_gives_up_with_the_reasons():
+    s = OffboardSequence(OffboardParameters(attempts=3))
+    s.want(True)
+    run(s, 1.1, 0.0)
+    s.answer(Request.OFFBOARD, Result.TEMPORARILY_REJECTED)
+    s.text(Severity.CRITICAL, "no offboard signal")
+    s.text(Severity.INFO, "chatter")
+    asked = run(s, 5.0, 1.1)
+    assert len(asked) == 2 and s.phase is Phase.FAILED
+    assert "OFFBOARD refused (temporarily rejected)" in s.reasons
+    assert "no offboard signal" in s.reasons and "chatter" not in s.reasons
+    assert "no success after 3 requests" in s.reasons[-1]
+    s.want(False)
+    s.want(True)
+    assert run(s, 0.1, 6.1) and s.phase is Phase.OFFBOARD
+
+
+def test_lost_mode_is_asked_for_again_boundedly():
+    s = flying()
+    asked = run(s, 1.2, 2.0, armed=True, mode=Mode.LAND)
+    assert [request for _, request in asked] == [Request.OFFBOARD] * 3
+    assert "left OFFBOARD for LAND" in s.reasons[-1]
+    run(s, 0.1, 3.2, armed=True, mode=Mode.OFFBOARD)
+    assert s.phase is Phase.FLYING
+    run(s, 10.0, 3.3, armed=True, mode=Mode.LAND)
+    assert s.phase is Phase.FAILED
+
+
+def test_unexpected_disarm_is_a_failure():
+    s = flying()
+    run(s, 0.1, 2.0, armed=False, mode=Mode.OFFBOARD)
+    assert s.phase is Phase.FAILED and "disarmed in flight" in s.reasons[-1]
+
+
+def test_disarm():
+    s = flying()
+    s.want(False)
+    assert run(s, 0.1, 2.0, armed=True, mode=Mode.OFFBOARD) == [(2.0, Request.DISARM)]
+    s.answer(Request.DISARM, Result.TEMPORARILY_REJECTED)
+    run(s, 0.1, 3.0, armed=False, mode=Mode.OFFBOARD)
+    assert s.phase is Phase.DISARMED and s.reasons == () and s.streaming
+
+
+def test_stream_goes_on_when_heartbeats_stop_in_flight():
+    s = flying()
+    run(s, 1.0, 2.0, connected=False, armed=True, mode=Mode.OFFBOARD)
+    assert s.streaming and s.phase is Phase.FLYING
+
+
+def test_with_the_stand_in():
+    """Vision comes late: arming is refused in words, then succeeds; auto-disarm ends it."""
+    autopilot, s = Autopilot(), OffboardSequence()
+    s.want(True)
+    heard = set()
+    for k in range(2500):
+        t = k * 0.004
+        if t > 3.0:
+            autopilot.vision(t, np.zeros(3), np.array([1.0, 0.0, 0.0, 0.0]))
+        status = autopilot.status
+        request = s.update(t, True, status.armed, status.mode)
+        autopilot.setpoint(t, np.zeros(3), 0.0)
+        if request:
+            command, parameters = COMMANDS[request]
+            s.answer(request, autopilot.command(t, command, parameters))
+        for severity, text in autopilot.commander.take_texts():
+            s.text(severity, text)
+        heard.update(s.reasons)
+        autopilot.update(t, np.zeros(3), DOWN)
+    assert s.phase is Phase.FLYING and 3.0 < s.armed_stamp < 4.0
+    assert any("vision" in reason for reason in heard)
+    assert s.reasons == ()

@@ -1,0 +1,125 @@
+"""Arming, modes and failsafe: PX4's rules (v1.16) for flying OFFBOARD without radio control.
+
+| event | rule |
+|---|---|
+| OFFBOARD asked | needs a stream of setpoints faster than 2 Hz for half a second |
+| arming | needs a valid estimate from vision, and in OFFBOARD the stream |
+| disarming | only when landed, unless forced |
+| in OFFBOARD no setpoint for COM_OF_LOSS_T | armed: failsafe Descend; it stays until OFFBOARD is \
+asked again; disarmed: nothing, but arming is refused |
+| landed for COM_DISARM_LAND after a flight | disarm |
+| not taken off COM_DISARM_PRFLT after arming | disarm |
+"""
+
+from __future__ import annotations
+
+import math
+
+from uam_sim_bridge.autopilot.modes import Mode, Result, Severity
+from uam_sim_bridge.autopilot.params import Parameters
+
+STREAM_GAP = 0.5  # s: slower than 2 Hz is no stream
+STREAM_TIME = 0.5  # s for which it must have lasted
+
+
+class Commander:
+    """The state machine. `texts` collects (severity, text) for STATUSTEXT until they are taken."""
+
+    def __init__(self, parameters: Parameters) -> None:
+        self._parameters = parameters
+        self.armed = False
+        self.mode = Mode.HOLD
+        self.failsafe = False
+        self.texts: list[tuple[Severity, str]] = []
+        self._stream_start = -math.inf
+        self._stream_last = -math.inf
+        self._armed_at = 0.0
+        self._flew = False
+        self._landed_at: float | None = None
+
+    def setpoint(self, time: float) -> None:
+        """Note that a valid setpoint arrived."""
+        if time - self._stream_last > STREAM_GAP:
+            self._stream_start = time
+        self._stream_last = time
+
+    def streaming(self, time: float) -> bool:
+        """Whether the stream allows OFFBOARD to be entered."""
+        fresh = time - self._stream_last <= STREAM_GAP
+        return fresh and self._stream_last - self._stream_start >= STREAM_TIME
+
+    def request_mode(self, time: float, mode: Mode) -> Result:
+        """Handle a request for a mode."""
+        if mode is Mode.OFFBOARD:
+            if not self.streaming(time):
+                self._say(Severity.CRITICAL, "Switching to mode 'Offboard' is currently not "
+                          "possible: no offboard signal")
+                return Result.TEMPORARILY_REJECTED
+        elif mode not in (Mode.LAND, Mode.HOLD) or (mode is Mode.HOLD and self.armed):
+            self._say(Severity.CRITICAL, f"Mode {mode.name.title()} is not available")
+            return Result.DENIED
+        self.mode = mode
+        self.failsafe = False
+        return Result.ACCEPTED
+
+    def request_arm(self, time: float, faults: list[str]) -> Result:
+        """Handle a request to arm; `faults` of the estimator refuse it."""
+        if self.armed:
+            return Result.ACCEPTED
+        reasons = list(faults)
+        if self.mode is not Mode.OFFBOARD:
+            reasons.append(f"Preflight Fail: mode {self.mode.name.title()} needs radio control or "
+                           "position; switch to Offboard")
+        elif not self.streaming(time):
+            reasons.append("Preflight Fail: no offboard signal")
+        if reasons:
+            for reason in reasons:
+                self._say(Severity.CRITICAL, reason)
+            self._say(Severity.CRITICAL, "Arming denied: Resolve system health failures first")
+            return Result.TEMPORARILY_REJECTED
+        self.armed, self._armed_at = True, time
+        self._flew, self._landed_at = False, None
+        self._say(Severity.INFO, "Armed by external command")
+        return Result.ACCEPTED
+
+    def request_disarm(self, landed: bool, force: bool) -> Result:
+        """Handle a request to disarm."""
+        if self.armed and not landed and not force:
+            self._say(Severity.CRITICAL, "Disarming denied: not landed")
+            return Result.TEMPORARILY_REJECTED
+        if self.armed:
+            self._disarm("Disarmed by external command" + (" (forced)" if force else ""))
+        return Result.ACCEPTED
+
+    def update(self, time: float, landed: bool) -> None:
+        """Apply the rules that act by themselves; call once per tick."""
+        if not self.armed:
+            return
+        parameters = self._parameters
+        if self.mode is Mode.OFFBOARD and time - self._stream_last > parameters["COM_OF_LOSS_T"]:
+            self.mode = Mode.LAND
+            self.failsafe = True
+            self._say(Severity.CRITICAL, "Failsafe activated: no offboard signal, descending")
+        if not landed:
+            self._flew, self._landed_at = True, None
+            return
+        if self._landed_at is None:
+            self._landed_at = time
+        wait = parameters["COM_DISARM_LAND" if self._flew else "COM_DISARM_PRFLT"]
+        since = self._landed_at if self._flew else self._armed_at
+        if wait > 0.0 and time - since > wait:
+            self._disarm("Disarmed by landing" if self._flew else "Disarmed by auto preflight")
+
+    def take_texts(self) -> list[tuple[Severity, str]]:
+        """Return the texts since the last call."""
+        texts, self.texts = self.texts, []
+        return texts
+
+    def _disarm(self, text: str) -> None:
+        self.armed = False
+        if self.failsafe:
+            self.mode, self.failsafe = Mode.HOLD, False
+        self._say(Severity.INFO, text)
+
+    def _say(self, severity: Severity, text: str) -> None:
+        self.texts.append((severity, text))

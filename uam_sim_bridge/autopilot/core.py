@@ -1,0 +1,213 @@
+"""The autopilot stand-in as a pure object: sensor sample in, motor commands out, no sockets.
+
+`server` wraps it in MAVLink; the direct engine calls it as it is. Everything is FRD and NED, time
+is that of the sensor samples, in seconds. One `update` is one cycle of PX4's rate loop: gyro
+filter, rate PID, allocation, thrust model; around it commander, land detector and estimator.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from uam_control.compiled import jit
+from uam_sim_bridge.autopilot.allocation import allocate, normalised_mixer, unallocated_torque
+from uam_sim_bridge.autopilot.commander import Commander
+from uam_sim_bridge.autopilot.descent import Descent
+from uam_sim_bridge.autopilot.estimator import Estimator
+from uam_sim_bridge.autopilot.landing import LandDetector
+from uam_sim_bridge.autopilot.modes import CUSTOM_MODE_ENABLED, FORCE, Command, Mode, Result
+from uam_sim_bridge.autopilot.params import Parameters
+from uam_sim_bridge.autopilot.rate_control import (
+    INTEGRAL,
+    RATES,
+    TORQUE,
+    UNALLOCATED,
+    filter_coefficients,
+    filter_gyro,
+    rate_torque,
+    reset_filters,
+)
+from uam_sim_bridge.mavlink.thrust_curve import inverse_curve
+
+SHORTEST_STEP, LONGEST_STEP = 0.000125, 0.02  # s, bounds of the time step (PX4)
+
+
+@dataclass(frozen=True)
+class AutopilotStatus:
+    """What a companion computer knows of the autopilot."""
+
+    armed: bool
+    mode: Mode
+    landed: bool
+    failsafe: bool
+
+
+@jit
+def control_tick(
+    gyro, dt, armed, landed, setpoint, model_factor, filters, gains, mixer, inverse, memory, motors
+):
+    """One cycle of the rate loop: gyro (3,) and setpoint (4,) → motors (4,), FRD."""
+    filter_gyro(gyro, dt, filters, memory)
+    if not armed:
+        for axis in range(3):
+            memory[INTEGRAL, axis] = 0.0
+            memory[TORQUE, axis] = 0.0
+            memory[UNALLOCATED, axis] = 0.0
+        for i in range(4):
+            motors[i] = 0.0
+        return
+    rate_torque(setpoint, dt, filters, gains, landed, memory)
+    torque = memory[TORQUE]
+    allocate(torque, setpoint[3], mixer, motors)
+    unallocated_torque(torque, motors, inverse, memory[UNALLOCATED])
+    for i in range(4):
+        motors[i] = inverse_curve(model_factor, motors[i])
+
+
+class Autopilot:
+    """PX4-class autopilot.
+
+    `motors` (4,): commands 0..1 in PX4's order (front-right CCW, back-left CCW, front-left CW,
+    back-right CW), zero while disarmed; rewritten by every `update`.
+    """
+
+    def __init__(self, parameters: Parameters | None = None, sample_rate: float = 250.0) -> None:
+        """sample_rate [Hz]: how often `update` will be called."""
+        self.parameters = parameters or Parameters()
+        self.motors = np.zeros(4)
+        self.estimator = Estimator()
+        self.commander = Commander(self.parameters)
+        self.landing = LandDetector(self.parameters)
+        self._descent = Descent(self.parameters)
+        self._setpoint = np.zeros(4)
+        self._memory = np.zeros((7, 3))
+        self._time: float | None = None
+        self._sample_rate = sample_rate
+        self._configure()
+
+    def set_parameter(self, name: str, value: float) -> None:
+        """Change one parameter in flight; raises ParameterError, the old value staying."""
+        old = self.parameters[name] if name in self.parameters.names else 0.0
+        self.parameters.set(name, value)
+        try:
+            self._configure()
+        except ValueError:
+            self.parameters.set(name, old)
+            raise
+
+    def set_sample_rate(self, sample_rate: float) -> None:
+        """Recompute the filters for another rate of samples [Hz]."""
+        self._sample_rate = sample_rate
+        self._configure()
+
+    def setpoint(self, time: float, rates: np.ndarray, thrust: float) -> bool:
+        """Take a body-rate setpoint (3,) [rad/s, FRD] and a normalised thrust; False: refused.
+
+        What is not finite is refused; the thrust is clamped to 0..1.
+        """
+        if not (
+            math.isfinite(thrust)
+            and math.isfinite(rates[0])
+            and math.isfinite(rates[1])
+            and math.isfinite(rates[2])
+        ):
+            return False
+        self._setpoint[0] = rates[0]
+        self._setpoint[1] = rates[1]
+        self._setpoint[2] = rates[2]
+        self._setpoint[3] = min(1.0, max(0.0, thrust))
+        self.commander.setpoint(time)
+        return True
+
+    def vision(self, time: float, position: np.ndarray, quaternion: np.ndarray) -> bool:
+        """Take an external pose (NED [m], FRD → NED [w x y z]); False: refused as not finite."""
+        norm = float(np.linalg.norm(quaternion))
+        if not (np.all(np.isfinite(position)) and math.isfinite(norm) and norm > 0.5):
+            return False
+        self.estimator.vision(time, position, quaternion / norm)
+        return True
+
+    def command(self, time: float, command: int, parameters: tuple[float, ...]) -> Result:
+        """Handle DO_SET_MODE or ARM_DISARM with COMMAND_LONG's parameters; others: UNSUPPORTED."""
+        first, second = parameters[0], parameters[1]
+        if command == Command.ARM_DISARM:
+            force = second == FORCE
+            if first == 0.0:
+                return self.commander.request_disarm(self.landing.landed, force)
+            if first != 1.0:
+                return Result.DENIED
+            return self.commander.request_arm(time, [] if force else self.estimator.faults(time))
+        if command == Command.DO_SET_MODE:
+            if not (math.isfinite(first) and int(first) & CUSTOM_MODE_ENABLED):
+                return Result.DENIED
+            third = parameters[2]
+            if not (math.isfinite(second) and math.isfinite(third)):
+                return Result.DENIED
+            try:
+                mode = Mode((int(second), int(third)))
+            except ValueError:
+                return Result.DENIED
+            return self.commander.request_mode(time, mode)
+        return Result.UNSUPPORTED
+
+    def update(self, time: float, gyro: np.ndarray, accel: np.ndarray) -> np.ndarray:
+        """Advance to `time` [s] and return `motors`.
+
+        gyro (3,) [rad/s] and specific force accel (3,) [m/s^2] FRD, float64 (at rest z = -9.81).
+        """
+        if self._time is None:
+            self._time = time - 1.0 / self._sample_rate
+            reset_filters(gyro, self._filters, self._memory)
+        dt = min(LONGEST_STEP, max(SHORTEST_STEP, time - self._time))
+        self._time = time
+        commander, landing = self.commander, self.landing
+        self.estimator.predict(time, gyro, accel, dt)
+        commander.update(time, landing.landed)
+        setpoint = self._setpoint
+        descending = commander.armed and commander.mode is not Mode.OFFBOARD
+        if descending:
+            setpoint = self._descent.update(self.estimator.estimate, dt)
+        else:
+            self._descent.reset()
+        control_tick(
+            gyro, dt, commander.armed, landing.maybe_landed, setpoint, self._model_factor,
+            self._filters, self._gains, self._mixer, self._inverse, self._memory, self.motors)
+        if commander.armed:
+            memory, estimate = self._memory, self.estimator.estimate
+            landing.update(
+                time, True, descending, float(setpoint[3]),
+                (float(memory[RATES, 0]), float(memory[RATES, 1])),
+                (float(estimate[7]), float(estimate[8]), float(estimate[9])))
+        else:
+            landing.update(time, False, False, 0.0, (0.0, 0.0), (0.0, 0.0, 0.0))
+        return self.motors
+
+    @property
+    def status(self) -> AutopilotStatus:
+        """The state as HEARTBEAT and EXTENDED_SYS_STATE tell it."""
+        c = self.commander
+        return AutopilotStatus(c.armed, c.mode, self.landing.landed, c.failsafe)
+
+    @property
+    def rates(self) -> np.ndarray:
+        """Filtered body rates (3,) FRD [rad/s]."""
+        return self._memory[RATES]
+
+    def _configure(self) -> None:
+        p = self.parameters
+        mixer = normalised_mixer(*map(np.array, p.rotors()))
+        self._mixer, self._inverse = mixer, np.ascontiguousarray(np.linalg.pinv(mixer))
+        axes = ("ROLLRATE", "PITCHRATE", "YAWRATE")
+        k = np.array([p[f"MC_{axis}_K"] for axis in axes])
+        self._gains = np.array([[p[f"MC_{axis}_{what}"] for axis in axes] for what in "PID"] + [
+            [p[f"MC_{axis}_FF"] for axis in axes],
+            p.vector("MC_RR_INT_LIM", "MC_PR_INT_LIM", "MC_YR_INT_LIM")])
+        self._gains[:3] *= k
+        self._filters = filter_coefficients(
+            self._sample_rate, p["IMU_GYRO_CUTOFF"], p["IMU_DGYRO_CUTOFF"], p["MC_YAW_TQ_CUTOFF"])
+        self._model_factor = p["THR_MDL_FAC"]
+        self.landing.configure(p)
+        self._descent.configure(p)

@@ -1,0 +1,59 @@
+"""The failsafe descent: level attitude, constant sink speed (PX4's mode Descend)."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from uam_control.compiled import jit
+from uam_control.rotations import euler_from_quaternion
+from uam_sim_bridge.autopilot.estimator import ATTITUDE, GRAVITY
+from uam_sim_bridge.autopilot.params import Parameters
+
+_MIN_COSINE = 0.5  # of the tilt, when thrust makes up for it
+
+
+@jit
+def descend(euler, sink_rate, integral, dt, gains, setpoint):
+    """Write body rates (3,) FRD [rad/s] and thrust into setpoint (4,); return the new integral.
+
+    euler (3,) FRD in NED; sink_rate [m/s] down; integral: acceleration [m/s^2] down; gains (8,):
+    roll P, pitch P, sink speed, P, I, hover thrust, least and largest thrust.
+    """
+    setpoint[0] = -gains[0] * euler[0]
+    setpoint[1] = -gains[1] * euler[1]
+    setpoint[2] = 0.0
+    error = gains[2] - sink_rate
+    integral = min(GRAVITY, max(-GRAVITY, integral + gains[4] * error * dt))
+    upward = GRAVITY - gains[3] * error - integral
+    cosine = max(_MIN_COSINE, math.cos(euler[0]) * math.cos(euler[1]))
+    thrust = gains[5] * upward / GRAVITY / cosine
+    setpoint[3] = min(gains[7], max(gains[6], thrust))
+    return integral
+
+
+class Descent:
+    """The descent with its integral; `reset` at every start."""
+
+    def __init__(self, parameters: Parameters) -> None:
+        self.setpoint = np.zeros(4)
+        self._integral = 0.0
+        self.configure(parameters)
+
+    def configure(self, parameters: Parameters) -> None:
+        """Take the gains from the autopilot's parameters."""
+        self._gains = np.array(parameters.vector(
+            "MC_ROLL_P", "MC_PITCH_P", "MPC_LAND_SPEED", "MPC_Z_VEL_P_ACC", "MPC_Z_VEL_I_ACC",
+            "MPC_THR_HOVER", "MPC_THR_MIN", "MPC_THR_MAX"))
+
+    def reset(self) -> None:
+        """Forget the integral."""
+        self._integral = 0.0
+
+    def update(self, estimate: np.ndarray, dt: float) -> np.ndarray:
+        """Return the setpoint (4,) for the estimate (10,) of `Estimator`."""
+        euler = euler_from_quaternion(estimate[ATTITUDE])
+        self._integral = descend(
+            euler, estimate[9], self._integral, dt, self._gains, self.setpoint)
+        return self.setpoint

@@ -1,0 +1,138 @@
+"""Attitude, velocity and position for arming checks, telemetry and the failsafe descent.
+
+A complementary filter stands in for PX4's EKF2: it integrates gyro and accelerometer and is pulled
+towards the vision pose; without vision, roll and pitch are pulled towards the measured gravity and
+position and velocity drift. It is good for a level descent, not for precise flight: the control
+laws have their own estimator.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from uam_control.compiled import jit
+from uam_control.rotations import (
+    matrix_from_quaternion,
+    quaternion_from_rotation_vector,
+    quaternion_multiply,
+    rotate,
+    rotation_error,
+)
+
+GRAVITY = 9.80665  # m/s^2, as PX4
+
+# slices of `estimate` (10,): attitude FRD → NED [w x y z], position NED [m], velocity NED [m/s]
+ATTITUDE, POSITION, VELOCITY = slice(0, 4), slice(4, 7), slice(7, 10)
+
+VISION_TIMEOUT = 0.5  # s
+ALIGN_SAMPLES = 5  # vision poses before the estimate counts as valid
+MAX_TILT_DIFFERENCE = math.radians(10.0)  # between vision and measured gravity, at rest
+
+_LEVEL_GAIN = 0.2  # 1/s, pull of gravity on roll and pitch
+_VISION_ATTITUDE = 5.0  # 1/s, pull of vision on attitude
+_VISION_POSITION = 20.0  # 1/s, on position
+_VISION_VELOCITY = 100.0  # 1/s^2, of the position difference on velocity: two poles at -10 1/s
+_LONGEST_PULL = 0.04  # s, the longest interval that one pose makes up for
+_FORCE_TIME = 0.2  # s, of the average of the specific force
+_VELOCITY_KEPT = 5.0  # s without vision, after which the integrated velocity is worth nothing
+
+
+@jit
+def predict(gyro, accel, dt, aided, estimate, mean_force):
+    """Advance `estimate` by dt with gyro (3,) [rad/s] and specific force (3,) [m/s^2], FRD.
+
+    mean_force (3,): slow average of the specific force, for the check before arming.
+    """
+    for i in range(3):
+        mean_force[i] += min(1.0, dt / _FORCE_TIME) * (accel[i] - mean_force[i])
+    matrix = matrix_from_quaternion(estimate[0:4])
+    force = rotate(matrix, accel)
+    turn = np.empty(3)
+    # where gravity should be seen in the body, against where it is: -accel at rest
+    pull = 0.0
+    norm = math.sqrt(accel[0] ** 2 + accel[1] ** 2 + accel[2] ** 2)
+    if abs(norm - GRAVITY) < 1.0 and not aided:
+        pull = _LEVEL_GAIN / norm
+    down = matrix[2]
+    turn[0] = dt * (gyro[0] + pull * (-accel[1] * down[2] + accel[2] * down[1]))
+    turn[1] = dt * (gyro[1] + pull * (-accel[2] * down[0] + accel[0] * down[2]))
+    turn[2] = dt * (gyro[2] + pull * (-accel[0] * down[1] + accel[1] * down[0]))
+    q = quaternion_multiply(estimate[0:4], quaternion_from_rotation_vector(turn))
+    scale = 1.0 / math.sqrt(q[0] ** 2 + q[1] ** 2 + q[2] ** 2 + q[3] ** 2)
+    for i in range(4):
+        estimate[i] = q[i] * scale
+    for i in range(3):
+        acceleration = force[i] + (GRAVITY if i == 2 else 0.0)
+        estimate[4 + i] += dt * (estimate[7 + i] + 0.5 * dt * acceleration)
+        estimate[7 + i] += dt * acceleration
+
+
+@jit
+def correct(position, quaternion, interval, estimate):
+    """Pull `estimate` towards a vision pose (NED; FRD → NED), `interval` [s] after the last one."""
+    interval = min(interval, _LONGEST_PULL)
+    error = rotation_error(quaternion, estimate[0:4])
+    for i in range(3):
+        error[i] *= _VISION_ATTITUDE * interval
+    q = quaternion_multiply(estimate[0:4], quaternion_from_rotation_vector(error))
+    for i in range(4):
+        estimate[i] = q[i]
+    for i in range(3):
+        difference = position[i] - estimate[4 + i]
+        estimate[4 + i] += _VISION_POSITION * interval * difference
+        estimate[7 + i] += _VISION_VELOCITY * interval * difference
+
+
+class Estimator:
+    """The filter with its bookkeeping of vision; NED and FRD throughout.
+
+    `estimate` (10,): attitude quaternion, position [m], velocity [m/s].
+    """
+
+    def __init__(self) -> None:
+        self.estimate = np.zeros(10)
+        self.estimate[0] = 1.0
+        self._vision_time = -math.inf
+        self._vision_count = 0
+        self._vision_down = np.array([0.0, 0.0, 1.0])
+        self._force = np.zeros(3)
+
+    def aided(self, time: float) -> bool:
+        """Whether vision is fresh."""
+        return time - self._vision_time < VISION_TIMEOUT
+
+    def predict(self, time: float, gyro: np.ndarray, accel: np.ndarray, dt: float) -> None:
+        """Advance by one sensor sample."""
+        predict(gyro, accel, dt, self.aided(time), self.estimate, self._force)
+
+    def vision(self, time: float, position: np.ndarray, quaternion: np.ndarray) -> None:
+        """Take a pose (3,), (4,) arriving at `time`; the first after a gap sets the estimate."""
+        gap = time - self._vision_time
+        self._vision_time = time
+        self._vision_down = matrix_from_quaternion(quaternion)[2].copy()
+        if gap > VISION_TIMEOUT:
+            self._vision_count = 1
+            self.estimate[ATTITUDE] = quaternion
+            self.estimate[POSITION] = position
+            if gap > _VELOCITY_KEPT:
+                self.estimate[VELOCITY] = 0.0
+            return
+        self._vision_count += 1
+        correct(position, quaternion, gap, self.estimate)
+
+    def faults(self, time: float) -> list[str]:
+        """Return why the estimate is no basis for arming, in PX4's words; empty when it is one."""
+        if not self.aided(time):
+            return ["Preflight Fail: no valid vision pose (external vision missing)"]
+        if self._vision_count < ALIGN_SAMPLES:
+            return ["Preflight Fail: attitude estimate not aligned yet"]
+        norm = float(np.linalg.norm(self._force))
+        if not 0.8 * GRAVITY < norm < 1.2 * GRAVITY:
+            return [f"Preflight Fail: accelerometer reads {norm:.1f} m/s^2 at rest"]
+        cosine = float(-self._force @ self._vision_down) / norm
+        if cosine < math.cos(MAX_TILT_DIFFERENCE):
+            angle = math.degrees(math.acos(max(-1.0, cosine)))
+            return [f"Preflight Fail: vision tilt differs from gravity by {angle:.0f} deg"]
+        return []

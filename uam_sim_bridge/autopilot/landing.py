@@ -1,0 +1,71 @@
+"""Whether the vehicle stands on the ground: PX4's multicopter land detector, three stages in a row.
+
+Ground contact: little thrust, no motion. Maybe landed: hardly any thrust, no rotation. Landed:
+both for a while. Each stage needs a third of LNDMC_TRIG_TIME; any counter-evidence resets at once.
+"""
+
+from __future__ import annotations
+
+import math
+
+from uam_sim_bridge.autopilot.params import Parameters
+
+_LOW_THRUST = 0.3  # share of the way from least to hover thrust (PX4)
+_NO_THRUST = 0.1
+_WIDER = 2.5  # of the motion thresholds once maybe landed (PX4)
+
+
+class LandDetector:
+    """`landed` is true on the ground and while disarmed; `maybe_landed` freezes the integrals."""
+
+    def __init__(self, parameters: Parameters) -> None:
+        self.landed = True
+        self.maybe_landed = True
+        self._contact = True
+        self._since = [-math.inf, -math.inf, -math.inf]
+        self.configure(parameters)
+
+    def configure(self, parameters: Parameters) -> None:
+        """Take the thresholds from the autopilot's parameters."""
+        least, hover = parameters["MPC_THR_MIN"], parameters["MPC_THR_HOVER"]
+        self._low = least + _LOW_THRUST * (hover - least)
+        self._none_descending = least + _NO_THRUST * (hover - least)
+        self._none = parameters["MPC_MANTHR_MIN"] + 0.01
+        self._rotation = math.radians(parameters["LNDMC_ROT_MAX"])
+        self._vertical = parameters["LNDMC_Z_VEL_MAX"]
+        self._horizontal = parameters["LNDMC_XY_VEL_MAX"]
+        self._stage_time = parameters["LNDMC_TRIG_TIME"] / 3.0
+
+    def update(
+        self,
+        time: float,
+        armed: bool,
+        descending: bool,
+        thrust: float,
+        rates: tuple[float, float],
+        velocity: tuple[float, float, float],
+    ) -> None:
+        """Take this tick's thrust command, roll and pitch rate [rad/s], velocity NED [m/s]."""
+        if not armed:
+            self.landed = self.maybe_landed = self._contact = True
+            return
+        wider = _WIDER if self.maybe_landed else 1.0
+        contact = (
+            thrust <= self._low
+            and abs(velocity[2]) <= wider * self._vertical
+            and math.hypot(velocity[0], velocity[1]) <= self._horizontal
+        )
+        self._contact = self._stage(0, time, contact, self._contact)
+        still = math.hypot(*rates) <= wider * self._rotation
+        none = thrust <= (self._none_descending if descending else self._none)
+        self.maybe_landed = self._stage(
+            1, time, self._contact and still and none, self.maybe_landed)
+        self.landed = self._stage(2, time, self.maybe_landed, self.landed)
+
+    def _stage(self, stage: int, time: float, evidence: bool, now: bool) -> bool:
+        if not evidence:
+            self._since[stage] = math.inf
+            return False
+        if self._since[stage] > time:
+            self._since[stage] = time
+        return now or time - self._since[stage] >= self._stage_time

@@ -1,0 +1,68 @@
+"""PX4's flight modes as MAVLink carries them, command results and message severities."""
+
+from __future__ import annotations
+
+from enum import Enum, IntEnum
+
+
+class Mode(Enum):
+    """Flight modes that matter here; the value is PX4's (main mode, sub mode)."""
+
+    MANUAL = (1, 0)
+    ALTITUDE = (2, 0)
+    POSITION = (3, 0)
+    TAKEOFF = (4, 2)
+    HOLD = (4, 3)
+    MISSION = (4, 4)
+    RETURN = (4, 5)
+    LAND = (4, 6)  # PX4 reports its failsafe mode Descend as this one, too
+    ACRO = (5, 0)
+    OFFBOARD = (6, 0)
+    STABILIZED = (7, 0)
+    UNKNOWN = (0, 0)
+
+    @property
+    def custom_mode(self) -> int:
+        """HEARTBEAT.custom_mode: main mode in bits 16..23, sub mode in bits 24..31."""
+        main, sub = self.value
+        return main << 16 | sub << 24
+
+    @classmethod
+    def from_custom_mode(cls, custom_mode: int) -> Mode:
+        """Return the mode of a HEARTBEAT.custom_mode; UNKNOWN for others."""
+        try:
+            return cls((custom_mode >> 16 & 0xFF, custom_mode >> 24 & 0xFF))
+        except ValueError:
+            return cls.UNKNOWN
+
+
+class Result(IntEnum):
+    """MAV_RESULT."""
+
+    ACCEPTED = 0
+    TEMPORARILY_REJECTED = 1
+    DENIED = 2
+    UNSUPPORTED = 3
+    FAILED = 4
+
+
+class Severity(IntEnum):
+    """MAV_SEVERITY, as far as used."""
+
+    CRITICAL = 2
+    ERROR = 3
+    WARNING = 4
+    INFO = 6
+
+
+class Command(IntEnum):
+    """MAV_CMD, as far as used."""
+
+    DO_SET_MODE = 176
+    ARM_DISARM = 400
+    SET_MESSAGE_INTERVAL = 511
+    REQUEST_MESSAGE = 512
+
+
+FORCE = 21196  # second parameter of ARM_DISARM: without asking
+CUSTOM_MODE_ENABLED = 1  # MAV_MODE_FLAG in the first parameter of DO_SET_MODE

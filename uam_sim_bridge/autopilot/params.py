@@ -1,0 +1,131 @@
+"""The autopilot's parameters: PX4's names, units, ranges and v1.16 defaults."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from pathlib import Path
+
+import yaml
+
+from uam_control.parameters import ParameterError
+
+
+@dataclass(frozen=True)
+class Definition:
+    """Default, range and unit of one parameter; `integer` says how MAVLink carries it."""
+
+    default: float
+    low: float
+    high: float
+    unit: str
+    description: str
+    integer: bool = False
+
+
+def _axis(rate: str, limit: str, axis: str, p: float, i: float, d: float) -> dict[str, Definition]:
+    return {
+        f"MC_{rate}_P": Definition(p, 0.0, 2.0, "1/(rad/s)", f"{axis} rate P"),
+        f"MC_{rate}_I": Definition(i, 0.0, 10.0, "1/rad", f"{axis} rate I"),
+        f"MC_{rate}_D": Definition(d, 0.0, 0.1, "s/rad", f"{axis} rate D"),
+        f"MC_{rate}_FF": Definition(0.0, 0.0, 2.0, "1/(rad/s)", f"{axis} rate feed-forward"),
+        f"MC_{rate}_K": Definition(1.0, 0.01, 5.0, "1", f"{axis} rate gain on P, I, D"),
+        f"MC_{limit}_INT_LIM": Definition(0.3, 0.0, 5.0, "1", f"{axis} rate integral limit"),
+    }
+
+
+# px, py, km of the S-500 rotors in PX4's motor order
+_ROTORS = ((1, 1, 1), (-1, -1, 1), (1, -1, -1), (-1, 1, -1))
+
+DEFINITIONS: dict[str, Definition] = {
+    "MAV_SYS_ID": Definition(1, 1, 250, "1", "system id", True),
+    "MAV_COMP_ID": Definition(1, 1, 250, "1", "component id", True),
+    **_axis("ROLLRATE", "RR", "roll", 0.15, 0.2, 0.003),
+    **_axis("PITCHRATE", "PR", "pitch", 0.15, 0.2, 0.003),
+    **_axis("YAWRATE", "YR", "yaw", 0.2, 0.1, 0.0),
+    "MC_YAW_TQ_CUTOFF": Definition(2.0, 0.0, 10.0, "Hz", "low pass on the yaw torque; 0 off"),
+    "MC_ROLL_P": Definition(6.5, 0.0, 12.0, "1/s", "roll P of the failsafe's attitude loop"),
+    "MC_PITCH_P": Definition(6.5, 0.0, 12.0, "1/s", "pitch P of the failsafe's attitude loop"),
+    "IMU_GYRO_CUTOFF": Definition(40.0, 0.0, 1000.0, "Hz", "low pass on the gyro; 0 off"),
+    "IMU_DGYRO_CUTOFF": Definition(20.0, 0.0, 1000.0, "Hz", "low pass on its derivative; 0 off"),
+    "THR_MDL_FAC": Definition(0.0, 0.0, 1.0, "1", "thrust model factor"),
+    "MPC_THR_HOVER": Definition(0.5, 0.1, 0.8, "1", "normalised thrust in hover"),
+    "MPC_THR_MIN": Definition(0.12, 0.05, 1.0, "1", "smallest thrust of the failsafe descent"),
+    "MPC_THR_MAX": Definition(1.0, 0.0, 1.0, "1", "largest thrust of the failsafe descent"),
+    "MPC_MANTHR_MIN": Definition(0.08, 0.0, 1.0, "1", "thrust that counts as none when landed"),
+    "MPC_LAND_SPEED": Definition(0.7, 0.2, 5.0, "m/s", "speed of the failsafe descent"),
+    "MPC_Z_VEL_P_ACC": Definition(4.0, 2.0, 15.0, "1/s", "P of the descent-speed loop"),
+    "MPC_Z_VEL_I_ACC": Definition(2.0, 0.2, 3.0, "1/s^2", "I of the descent-speed loop"),
+    "COM_OF_LOSS_T": Definition(1.0, 0.0, 60.0, "s", "time without setpoints before failsafe"),
+    "COM_DISARM_LAND": Definition(2.0, -1.0, 20.0, "s", "disarm after landing; <= 0 never"),
+    "COM_DISARM_PRFLT": Definition(10.0, -1.0, 200.0, "s", "disarm without take-off; <= 0 never"),
+    "LNDMC_TRIG_TIME": Definition(1.0, 0.1, 10.0, "s", "time until landed is believed"),
+    "LNDMC_Z_VEL_MAX": Definition(0.25, 0.0, 10.0, "m/s", "vertical speed when landed"),
+    "LNDMC_XY_VEL_MAX": Definition(1.5, 0.0, 10.0, "m/s", "horizontal speed when landed"),
+    "LNDMC_ROT_MAX": Definition(20.0, 0.0, 1000.0, "deg/s", "rotation when landed"),
+    **{
+        f"CA_ROTOR{i}_{what}": Definition(sign * size, -limit, limit, unit, f"rotor {i + 1} {text}")
+        for i, signs in enumerate(_ROTORS)
+        for what, sign, size, limit, unit, text in (
+            ("PX", signs[0], 0.171, 5.0, "m", "forward"),
+            ("PY", signs[1], 0.171, 5.0, "m", "right"),
+            ("KM", signs[2], 0.016, 1.0, "m", "moment per thrust, > 0 counter-clockwise"),
+        )
+    },
+}
+
+
+class Parameters:
+    """A complete set of values; the order of `names` is the index in PARAM_VALUE."""
+
+    names = tuple(DEFINITIONS)
+
+    def __init__(self, values: dict[str, float] | None = None) -> None:
+        """Raises ParameterError on an unknown name or a value out of range."""
+        self._values = {name: d.default for name, d in DEFINITIONS.items()}
+        for name, value in (values or {}).items():
+            self.set(name, value)
+
+    @classmethod
+    def load(cls, path: Path | str) -> Parameters:
+        """Read a YAML file `NAME: value`; raises ParameterError, one line with the file's name."""
+        try:
+            values = yaml.safe_load(Path(path).read_text())
+        except OSError as error:
+            raise ParameterError(f"{path}: {error.strerror}") from None
+        except (yaml.YAMLError, UnicodeDecodeError) as error:
+            raise ParameterError(f"{path}: not YAML: {' '.join(str(error).split())}") from None
+        if not isinstance(values, dict):
+            raise ParameterError(f"{path}: 'NAME: value' lines expected")
+        try:
+            return cls(values)
+        except ParameterError as error:
+            raise ParameterError(f"{path}: {error}") from None
+
+    def __getitem__(self, name: str) -> float:
+        return self._values[name]
+
+    def set(self, name: str, value: float) -> None:
+        """Set one value; raises ParameterError saying what is allowed, the old value staying."""
+        definition = DEFINITIONS.get(name)
+        if definition is None:
+            raise ParameterError(f"unknown autopilot parameter {name}")
+        allowed = f"allowed: {definition.low:g} to {definition.high:g} {definition.unit}"
+        if isinstance(value, bool) or not isinstance(value, int | float):
+            raise ParameterError(f"{name}: {value!r} is not a number; {allowed}")
+        if not math.isfinite(value) or not definition.low <= value <= definition.high:
+            raise ParameterError(f"{name}: {value:g} is out of range; {allowed}")
+        if definition.integer and value != int(value):
+            raise ParameterError(f"{name}: {value:g} is not an integer; {allowed}")
+        self._values[name] = float(value)
+
+    def vector(self, *names: str) -> list[float]:
+        """Return the values of several names."""
+        return [self._values[name] for name in names]
+
+    def rotors(self) -> tuple[list[float], list[float], list[float]]:
+        """Return px, py, km of the four rotors."""
+        px, py, km = (
+            self.vector(*(f"CA_ROTOR{i}_{what}" for i in range(4))) for what in ("PX", "PY", "KM")
+        )
+        return px, py, km

@@ -1,0 +1,120 @@
+"""The body-rate loop, with PX4's structure (v1.16: VehicleAngularVelocity, RateControl).
+
+    gyro → low pass (Butterworth, 2nd order, IMU_GYRO_CUTOFF) → rates
+    rates → difference → low pass (1st order, IMU_DGYRO_CUTOFF) → angular acceleration
+    torque = K (P error + D (-angular acceleration)) + FF setpoint + integral, normalised, FRD
+    yaw torque → low pass (1st order, MC_YAW_TQ_CUTOFF)
+
+The integral stops growing into an axis whose torque the motors could not make, shrinks its gain
+for errors towards 400 deg/s, is limited, frozen while landed and zero while disarmed.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from uam_control.compiled import jit
+
+# rows of `memory` (7, 3), the loop's whole state
+DELAY_1, DELAY_2, RATES, ACCELERATION, INTEGRAL, TORQUE, UNALLOCATED = range(7)
+# rows of `gains` (5, 3)
+P, I, D, FF, LIMIT = range(5)  # noqa: E741
+# entries of `filters` (7,)
+B0, B1, B2, A1, A2, ACCELERATION_ALPHA, YAW_ALPHA = range(7)
+
+FULL_INTEGRATION_ERROR = math.radians(400.0)  # the integral's gain reaches 0 here (PX4)
+
+
+def filter_coefficients(
+    sample_rate: float, gyro_cutoff: float, acceleration_cutoff: float, yaw_cutoff: float
+) -> np.ndarray:
+    """Return `filters` (7,) for a sample rate and three cut-offs [Hz]; 0: no filter."""
+    filters = np.zeros(7)
+    filters[: A2 + 1] = butterworth(sample_rate, gyro_cutoff)
+    filters[ACCELERATION_ALPHA] = alpha(sample_rate, acceleration_cutoff)
+    filters[YAW_ALPHA] = alpha(sample_rate, yaw_cutoff)
+    return filters
+
+
+def butterworth(sample_rate: float, cutoff: float) -> tuple[float, float, float, float, float]:
+    """Return b0, b1, b2, a1, a2 of a 2nd-order Butterworth low pass (bilinear transform, a0 = 1).
+
+    A cut-off [Hz] of 0 or at and above half the sample rate passes the signal unchanged (PX4).
+    """
+    if not 0.0 < cutoff < sample_rate / 2.0:
+        return 1.0, 0.0, 0.0, 0.0, 0.0
+    w = math.tan(math.pi * cutoff / sample_rate)
+    scale = 1.0 / (1.0 + math.sqrt(2.0) * w + w * w)
+    b0 = w * w * scale
+    return (
+        b0,
+        2.0 * b0,
+        b0,
+        2.0 * (w * w - 1.0) * scale,
+        (1.0 - math.sqrt(2.0) * w + w * w) * scale,
+    )
+
+
+def alpha(sample_rate: float, cutoff: float) -> float:
+    """Return the weight of a new sample in a 1st-order low pass; 1 (no filter) for cut-off 0."""
+    if cutoff <= 0.0:
+        return 1.0
+    dt = 1.0 / sample_rate
+    return dt / (dt + 1.0 / (2.0 * math.pi * cutoff))
+
+
+@jit
+def filter_gyro(gyro, dt, filters, memory):
+    """Advance the rows DELAY, RATES, ACCELERATION of `memory` by one gyro sample (3,) [rad/s]."""
+    for axis in range(3):
+        d1 = memory[DELAY_1, axis]
+        d2 = memory[DELAY_2, axis]
+        d0 = gyro[axis] - filters[A1] * d1 - filters[A2] * d2
+        rate = filters[B0] * d0 + filters[B1] * d1 + filters[B2] * d2
+        memory[DELAY_2, axis] = d1
+        memory[DELAY_1, axis] = d0
+        slope = (rate - memory[RATES, axis]) / dt
+        memory[ACCELERATION, axis] += filters[ACCELERATION_ALPHA] * (
+            slope - memory[ACCELERATION, axis]
+        )
+        memory[RATES, axis] = rate
+
+
+def reset_filters(gyro: np.ndarray, filters: np.ndarray, memory: np.ndarray) -> None:
+    """Start the filters at rest with the value gyro (3,)."""
+    gain = 1.0 + filters[A1] + filters[A2]
+    memory[DELAY_1] = memory[DELAY_2] = np.asarray(gyro) / gain
+    memory[RATES] = gyro
+    memory[ACCELERATION] = 0.0
+
+
+@jit
+def rate_torque(setpoint, dt, filters, gains, landed, memory):
+    """Advance TORQUE and INTEGRAL of `memory`.
+
+    setpoint (>= 3,): wanted body rates FRD [rad/s] first; gains (5, 3): rows P, I, D (times K), FF,
+    LIMIT; landed: the integral is frozen.
+    """
+    for axis in range(3):
+        error = setpoint[axis] - memory[RATES, axis]
+        torque = (
+            gains[P, axis] * error
+            + memory[INTEGRAL, axis]
+            - gains[D, axis] * memory[ACCELERATION, axis]
+            + gains[FF, axis] * setpoint[axis]
+        )
+        if axis == 2:
+            torque = memory[TORQUE, 2] + filters[YAW_ALPHA] * (torque - memory[TORQUE, 2])
+        memory[TORQUE, axis] = torque
+        if landed:
+            continue
+        if memory[UNALLOCATED, axis] > 0.0:
+            error = min(error, 0.0)
+        elif memory[UNALLOCATED, axis] < 0.0:
+            error = max(error, 0.0)
+        ratio = error / FULL_INTEGRATION_ERROR
+        growth = max(0.0, 1.0 - ratio * ratio) * gains[I, axis] * error * dt
+        limit = gains[LIMIT, axis]
+        memory[INTEGRAL, axis] = min(limit, max(-limit, memory[INTEGRAL, axis] + growth))

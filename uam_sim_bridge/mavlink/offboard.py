@@ -1,0 +1,176 @@
+"""From "fly" to an armed vehicle in OFFBOARD, and back: a state machine on simulation time.
+
+It neither sends nor receives: `update` takes what is known of the autopilot and returns what to
+ask it for. The bridge and the direct engine use the same object.
+
+    WAITING    no heartbeat yet
+    STREAMING  setpoints go out (the autopilot demands a stream before the switch)
+    OFFBOARD   asking for the mode
+    ARMING     asking to arm
+    FLYING     armed, in OFFBOARD; asks again when the autopilot leaves the mode
+    DISARMING  asking to disarm
+    DISARMED   done
+    FAILED     an attempt too many; `reasons` says why, `want` starts again
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from enum import Enum
+
+from uam_control.parameters import ParameterSet, number
+from uam_sim_bridge.autopilot.modes import Mode, Result, Severity
+
+_KEPT_REASONS = 5
+
+
+class Phase(Enum):
+    """Where the sequence stands; the value is for people."""
+
+    WAITING = "waiting for the autopilot"
+    STREAMING = "streaming setpoints"
+    OFFBOARD = "asking for OFFBOARD"
+    ARMING = "arming"
+    FLYING = "flying"
+    DISARMING = "disarming"
+    DISARMED = "disarmed"
+    FAILED = "failed"
+
+
+class Request(Enum):
+    """What to ask the autopilot for; the value is for people."""
+
+    OFFBOARD = "OFFBOARD"
+    ARM = "arming"
+    DISARM = "disarming"
+
+
+@dataclass(frozen=True)
+class OffboardParameters(ParameterSet):
+    """Times and patience of the sequence."""
+
+    stream_time: float = number(
+        1.0, "stream of setpoints before OFFBOARD is asked for", "s", 0.0, 30.0)
+    retry_interval: float = number(0.5, "time between two requests", "s", 0.05, 10.0)
+    attempts: float = number(
+        40.0, "requests without success before giving up", "1", 1.0, 10000.0)
+    recovery_attempts: float = number(
+        6.0, "requests for OFFBOARD after it was lost in flight", "1", 0.0, 10000.0)
+
+
+class OffboardSequence:
+    """The state machine.
+
+    `phase`; `armed_stamp` [s] or None: when armed was first seen in this flight; `reasons`: what
+    the autopilot said against the last requests, newest last.
+    """
+
+    def __init__(self, parameters: OffboardParameters | None = None) -> None:
+        self.parameters = (parameters or OffboardParameters()).validated()
+        self.phase = Phase.WAITING
+        self.armed_stamp: float | None = None
+        self.reasons: tuple[str, ...] = ()
+        self._wanted = False
+        self._stream_start = math.inf
+        self._asked = -math.inf
+        self._attempts = 0
+
+    @property
+    def streaming(self) -> bool:
+        """Whether setpoints are to be sent: always, once an autopilot is there."""
+        return self.phase is not Phase.WAITING
+
+    def want(self, armed: bool) -> None:
+        """Take the pilot's wish: True fly, False disarm. A new wish forgets earlier failures."""
+        if armed == self._wanted:
+            return
+        self._wanted = armed
+        self.reasons = ()
+        self._attempts, self._asked = 0, -math.inf
+        if self.phase in (Phase.FAILED, Phase.DISARMED):
+            self.phase = Phase.STREAMING
+
+    def update(self, time: float, connected: bool, armed: bool, mode: Mode) -> Request | None:
+        """Advance to `time` [s] and return what to ask for now, if anything.
+
+        connected: a heartbeat came recently; armed, mode: the autopilot's latest word.
+        """
+        if not connected:
+            if self.phase is not Phase.FLYING:  # in flight the stream must go on
+                self.phase = Phase.WAITING
+            return None
+        if self.phase is Phase.WAITING:
+            self.phase = Phase.STREAMING
+            self._stream_start = time
+        if not self._wanted:
+            return self._stay_disarmed(time, armed)
+        if self.phase is Phase.FLYING:
+            return self._keep_flying(time, armed, mode)
+        if self.phase is Phase.FAILED:
+            return None
+        if time - self._stream_start < self.parameters.stream_time:
+            self.phase = Phase.STREAMING
+            return None
+        if mode is not Mode.OFFBOARD:
+            return self._ask(time, Phase.OFFBOARD, Request.OFFBOARD)
+        if not armed:
+            return self._ask(time, Phase.ARMING, Request.ARM)
+        self.phase, self._attempts, self.reasons = Phase.FLYING, 0, ()
+        self.armed_stamp = time
+        return None
+
+    def answer(self, request: Request, result: int) -> None:
+        """Take a COMMAND_ACK's result for a request; a refusal becomes a reason."""
+        if result == Result.ACCEPTED:
+            return
+        try:
+            word = Result(result).name.lower().replace("_", " ")
+        except ValueError:
+            word = f"result {result}"
+        self._reason(f"{request.value} refused ({word})")
+
+    def text(self, severity: int, text: str) -> None:
+        """Take a STATUSTEXT; warnings and worse become reasons."""
+        if severity <= Severity.WARNING:
+            self._reason(text)
+
+    def _reason(self, text: str) -> None:
+        others = tuple(reason for reason in self.reasons if reason != text)
+        self.reasons = (*others, text)[-_KEPT_REASONS:]
+
+    def _stay_disarmed(self, time: float, armed: bool) -> Request | None:
+        if armed and self.phase is not Phase.FAILED:
+            return self._ask(time, Phase.DISARMING, Request.DISARM)
+        if not armed and self.phase in (Phase.DISARMING, Phase.FLYING, Phase.FAILED):
+            self.phase, self.reasons = Phase.DISARMED, ()
+        elif not armed and self.phase is not Phase.DISARMED:
+            self.phase = Phase.STREAMING
+        return None
+
+    def _keep_flying(self, time: float, armed: bool, mode: Mode) -> Request | None:
+        if not armed:
+            self._reason("the autopilot disarmed in flight")
+            self.phase = Phase.FAILED
+            return None
+        if mode is Mode.OFFBOARD:
+            self._attempts = 0
+            return None
+        self._reason(f"the autopilot left OFFBOARD for {mode.name}")
+        if self._attempts >= self.parameters.recovery_attempts:
+            self.phase = Phase.FAILED
+            return None
+        return self._ask(time, Phase.FLYING, Request.OFFBOARD)
+
+    def _ask(self, time: float, phase: Phase, request: Request) -> Request | None:
+        if phase is not self.phase and phase is not Phase.FLYING:
+            self.phase, self._attempts, self._asked = phase, 0, -math.inf
+        if time - self._asked < self.parameters.retry_interval:
+            return None
+        if self._attempts >= self.parameters.attempts:
+            self._reason(f"no success after {self._attempts} requests for {request.value}")
+            self.phase = Phase.FAILED
+            return None
+        self._asked = time
+        self._attempts += 1
+        return request
