@@ -1,0 +1,200 @@
+"""The figures of a flight, or of several over one another: the paper's five and four more.
+
+`draw(flights, directory)` writes each as PNG and SVG; every figure can also be had alone.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from pathlib import Path
+
+import numpy as np
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+
+from uam_sim_bridge.flight import metrics
+from uam_sim_bridge.flight.atomic import replacing
+from uam_sim_bridge.report import panels, paper, style
+from uam_sim_bridge.report.panels import Flight, Panel
+from uam_sim_bridge.report.path_figure import path_figure
+
+DEGREES = 180.0 / np.pi
+ROLL, PITCH, YAW = "roll φ", "pitch θ", "yaw ψ"
+
+
+def position_errors(flights: Sequence[Flight]) -> Figure:
+    """The paper's first figure: position error over time."""
+    drawn = [Panel(f"{axis} error [m]", f"error.{axis}") for axis in "xyz"]
+    return _errors("Position tracking error", flights, drawn, "position_m", "m", 3)
+
+
+def attitude_errors(flights: Sequence[Flight]) -> Figure:
+    """The paper's second figure: attitude error over time."""
+    drawn = [
+        Panel(f"{label} error [°]", f"error.{name}", DEGREES)
+        for label, name in ((ROLL, "roll"), (PITCH, "pitch"), (YAW, "yaw"))
+    ]
+    return _errors("Attitude tracking error", flights, drawn, "attitude_deg", "°", 2)
+
+
+def arm_errors(flights: Sequence[Flight]) -> Figure:
+    """The paper's third figure: joint error over time."""
+    drawn = [
+        Panel(f"{label} error [°]", f"error.alpha_{joint}", DEGREES)
+        for label, joint in (("α₁", 1), ("α₂", 2))
+    ]
+    return _errors("Arm tracking error", flights, drawn, "arm_deg", "°", 2)
+
+
+def vehicle_inputs(flights: Sequence[Flight]) -> Figure:
+    """The paper's fourth figure: what position and attitude law ask for."""
+    drawn = [Panel(f"$\\tau_{{p,{axis}}}$ [N]", f"tau_p.{axis}") for axis in "xyz"]
+    drawn += [
+        Panel(f"$\\tau_{{q,\\{symbol}}}$ [N m]", f"tau_q.{name}")
+        for symbol, name in (("phi", "roll"), ("theta", "pitch"), ("psi", "yaw"))
+    ]
+    return panels.stack("Vehicle control inputs", flights, drawn, columns=2)[0]
+
+
+def arm_inputs(flights: Sequence[Flight]) -> Figure:
+    """The paper's fifth figure: what the arm law asks for."""
+    drawn = [Panel(f"$\\tau_{{\\alpha {joint}}}$ [N m]", f"tau_alpha.{joint}") for joint in "12"]
+    return panels.stack("Arm control inputs", flights, drawn)[0]
+
+
+def setpoints(flights: Sequence[Flight]) -> Figure:
+    """What was sent to the autopilot."""
+    drawn = [
+        Panel(f"{name} rate [°/s]", f"setpoint.rate_{axis}", DEGREES)
+        for name, axis in (("roll", "x"), ("pitch", "y"), ("yaw", "z"))
+    ]
+    drawn.append(Panel("thrust [1]", "setpoint.thrust"))
+    return panels.stack("Setpoints sent to the autopilot", flights, drawn, panel_height=1.25)[0]
+
+
+def payload(flights: Sequence[Flight]) -> Figure | None:
+    """Where the payload was; None where no flight had one."""
+    flights = [f for f in flights if not np.isnan(f.series["payload.z"]).all()]
+    if not any(f.series.info.get("payload_mass_kg") for f in flights):
+        return None
+    drawn = [Panel(f"payload {axis} [m]", f"payload.{axis}") for axis in "xyz"]
+    return panels.stack("Payload", flights, drawn, panel_height=1.15)[0]
+
+
+def adaptation(flights: Sequence[Flight]) -> Figure | None:
+    """Adapted gains, zeta and rho of the three subsystems; None where the law adapts none."""
+    if not any(np.isfinite(f.series.block("adaptation.")).any() for f in flights):
+        return None
+    figure, axes = panels.grid("Adaptation", 3, 3, 1.65)
+    for column, subsystem in enumerate(("position", "attitude", "arm")):
+        for number, flight in enumerate(flights):
+            _adaptation_of(axes[:, column], flight, subsystem, number, len(flights))
+        axes[0, column].annotate(
+            subsystem,
+            (0.0, 1.0),
+            xycoords="axes fraction",
+            xytext=(0, 14),
+            textcoords="offset points",
+            fontweight="bold",
+        )
+    for axis in axes.flat:
+        axis.set_yscale("log")
+    for axis, label in zip(axes[:, 0], ("$K_0 \\ldots K_3$", "ζ", "ρ"), strict=True):
+        axis.set_ylabel(label)
+    axes[0, 2].legend(
+        handles=[Line2D([], [], color=c, label=f"$K_{i}$") for i, c in enumerate(style.GAINS)],
+        loc="lower right",
+        ncols=4,
+        handlelength=1.0,
+        columnspacing=0.8,
+        fontsize=7.5,
+    )
+    panels.finish(figure, axes, flights)
+    for axis in axes[-1]:
+        axis.set_xlabel("time [s]")
+    return figure
+
+
+def _adaptation_of(axes, flight: Flight, subsystem: str, number: int, flights: int) -> None:
+    series = flight.series
+    dash = ("-", "--", ":", "-.")[number % 4]
+    colour = style.FLIGHTS[number % len(style.FLIGHTS)]
+    lines = [(0, f"K{i}", gain, dash if flights > 1 else "-") for i, gain in enumerate(style.GAINS)]
+    for row, name, line_colour, style_of_line in [
+        *lines,
+        (1, "zeta", colour, "-"),
+        (2, "rho", colour, "-"),
+    ]:
+        values = series[f"adaptation.{subsystem}.{name}"]
+        shown = series.flown & (values > 0.0)
+        if shown.any():
+            axes[row].plot(
+                *panels.thin(series.time[shown], values[shown], 400),
+                color=line_colour,
+                linestyle=style_of_line,
+                linewidth=1.0,
+            )
+
+
+def _errors(
+    title: str, flights: Sequence[Flight], drawn: list[Panel], group: str, unit: str, digits: int
+) -> Figure:
+    """Error panels; a single flight gets its RMS beside the paper's."""
+    figure, axes = panels.stack(title, flights, drawn)
+    if len(flights) == 1:
+        own = metrics.errors(flights[0].series)[group]
+        for axis, value, published in zip(axes, own, paper.RMS[group], strict=True):
+            axis.annotate(
+                f"RMS {value:.{digits}f} {unit}   (paper {published:g} {unit})".replace(" °", "°"),
+                (1.0, 1.0),
+                xycoords="axes fraction",
+                xytext=(-5, -5),
+                textcoords="offset points",
+                ha="right",
+                va="top",
+                fontsize=8.0,
+                bbox={"facecolor": "white", "edgecolor": "none", "alpha": 0.8, "pad": 1.5},
+                zorder=20,
+            )
+    for axis in axes:
+        axis.axhline(0.0, color=style.REFERENCE, linewidth=0.8, zorder=2)
+    return figure
+
+
+# file name → (figure, caption in the report), in the order shown
+FIGURES: dict[str, tuple[Callable[[Sequence[Flight]], Figure | None], str]] = {
+    "position_errors": (position_errors, "Position error, truth minus reference."),
+    "attitude_errors": (
+        attitude_errors,
+        "Attitude error; the reference of roll and pitch is what the position law asks for.",
+    ),
+    "arm_errors": (arm_errors, "Joint error of the arm, truth minus reference."),
+    "vehicle_inputs": (vehicle_inputs, "Forces and torques that the two vehicle laws ask for."),
+    "arm_inputs": (arm_inputs, "Joint torques that the arm law asks for."),
+    "path": (path_figure, "Vehicle, arm and payload in the plane of the mission."),
+    "payload": (payload, "The payload on its stand, on the magnet and on the mat."),
+    "adaptation": (adaptation, "Adapted gains on a logarithmic scale, in flight."),
+    "setpoints": (setpoints, "Body rates and collective thrust sent to the autopilot."),
+}
+
+
+def draw(
+    flights: Sequence[Flight],
+    directory: Path,
+    progress: Callable[[str], None] = lambda text: None,
+    names: Sequence[str] | None = None,
+) -> list[str]:
+    """Write the figures (all, or those of `names`) to `directory`; return the names written."""
+    directory.mkdir(parents=True, exist_ok=True)
+    written = []
+    with style.styled():
+        for name in names or FIGURES:
+            progress(f"figure {name}")
+            figure = FIGURES[name][0](flights)
+            if figure is None:
+                continue
+            for suffix, metadata in ((".png", None), (".svg", {"Date": None})):
+                with replacing(directory / (name + suffix)) as temporary:
+                    figure.savefig(temporary, dpi=style.PIXELS_PER_INCH, metadata=metadata)
+            written.append(name)
+    return written

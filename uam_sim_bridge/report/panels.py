@@ -1,0 +1,186 @@
+"""Stacked panels over mission time: phases shaded, payload events marked, long lines thinned."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+from matplotlib.ticker import MaxNLocator
+
+from uam_sim_bridge.flight.timeseries import ON_GROUND, Series
+from uam_sim_bridge.report import style
+
+BUCKETS = 900  # about one per pixel column of a panel
+MARGIN_S = 1.0  # shown before take-off and after touchdown
+
+
+@dataclass(frozen=True)
+class Flight:
+    """A flight to be drawn: its series and the name it gets in a legend."""
+
+    label: str
+    series: Series
+
+
+@dataclass(frozen=True)
+class Panel:
+    """One axis over time: label with unit, column of the table, factor to the unit of the label."""
+
+    label: str
+    column: str
+    factor: float = 1.0
+
+
+def window(flights: Sequence[Flight]) -> tuple[float, float]:
+    """Mission times [s] between which anything flew, with a margin."""
+    times = [f.series.time[f.series.flown] for f in flights]
+    times = [t for t in times if len(t)] or [f.series.time for f in flights]
+    return min(t[0] for t in times) - MARGIN_S, max(t[-1] for t in times) + MARGIN_S
+
+
+def thin(time: np.ndarray, values: np.ndarray, buckets: int = BUCKETS):
+    """Fewer points of the same picture: lowest and highest of each of `buckets` stretches.
+
+    Unlike taking every n-th point this keeps every peak. time, values: (ticks,).
+    """
+    length = len(time) // buckets
+    if length <= 2:
+        return time, values
+    whole = length * buckets
+    blocks = np.nan_to_num(values[:whole]).reshape(buckets, length)
+    first = np.arange(buckets) * length
+    low, high = first + blocks.argmin(axis=1), first + blocks.argmax(axis=1)
+    rows = np.unique(np.concatenate([low, high, np.arange(whole, len(time))]))
+    return time[rows], values[rows]
+
+
+def stack(
+    title: str,
+    flights: Sequence[Flight],
+    panels: Sequence[Panel],
+    columns: int = 1,
+    panel_height: float = 1.45,
+) -> tuple[Figure, list[Axes]]:
+    """One panel below the other (column by column), one line per flight in each."""
+    rows = -(-len(panels) // columns)
+    figure, axes = grid(title, rows, columns, panel_height)
+    ordered = list(axes.T.flat)
+    for axis, panel in zip(ordered, panels, strict=True):
+        lines(axis, flights, panel)
+    finish(figure, axes, flights)
+    return figure, ordered
+
+
+def grid(title: str, rows: int, columns: int, panel_height: float) -> tuple[Figure, np.ndarray]:
+    """An empty grid of panels (rows, columns) with a title and room for phase names and legend."""
+    height = rows * panel_height + 1.05
+    figure = Figure(figsize=(style.WIDTH, height), layout=None)
+    axes = figure.subplots(rows, columns, sharex=True, squeeze=False)
+    figure.subplots_adjust(
+        left=0.085,
+        right=0.985,
+        top=1.0 - 0.62 / height,
+        bottom=0.44 / height,
+        hspace=0.16,
+        wspace=0.2,
+    )
+    figure.text(0.012, 1.0 - 0.1 / height, title, va="top", fontsize=11.5, fontweight="bold")
+    return figure, axes
+
+
+def lines(axis: Axes, flights: Sequence[Flight], panel: Panel) -> None:
+    """Draw one column of every flight."""
+    for number, flight in enumerate(flights):
+        values = flight.series[panel.column] * panel.factor
+        width = 1.1 if number == 0 else 0.9
+        axis.plot(
+            *thin(flight.series.time, values),
+            color=style.FLIGHTS[number % len(style.FLIGHTS)],
+            linewidth=width,
+            zorder=3 + len(flights) - number,
+        )
+    axis.set_ylabel(panel.label)
+    axis.yaxis.set_major_locator(MaxNLocator(nbins=4, min_n_ticks=3, symmetric=False))
+    axis.margins(y=0.12)
+
+
+def finish(figure: Figure, axes: np.ndarray, flights: Sequence[Flight]) -> None:
+    """Phases, events, time axis and legend, common to every figure over time."""
+    start, end = window(flights)
+    axes[0, 0].set_xlim(start, end)
+    first = flights[0].series
+    for axis in axes.flat:
+        bands(axis, first, end)
+        for time, colour, _ in events(first):
+            axis.axvline(time, color=colour, linewidth=0.9, linestyle=(0, (4, 2.5)), zorder=2.5)
+    for axis in axes[0]:
+        phase_names(figure, axis, first, start, end)
+    for axis in axes[-1]:
+        axis.set_xlabel("time from take-off command [s]")
+    figure.align_ylabels(axes)
+    legend(figure, flights, events(first))
+
+
+def bands(axis: Axes, series: Series, end: float) -> None:
+    """Every second phase on a light ground."""
+    for number, (name, begin, until) in enumerate(series.phase_spans()):
+        if number % 2 == 1 and name not in ON_GROUND:
+            axis.axvspan(begin, min(until, end), color=style.BAND, linewidth=0.0, zorder=0)
+
+
+def phase_names(figure: Figure, axis: Axes, series: Series, start: float, end: float) -> None:
+    """Names of the phases above a panel; one that would run into its neighbour is left out."""
+    inches = figure.get_figwidth() * axis.get_position().width
+    per_character = 0.068 * (end - start) / inches  # seconds that one letter of 7.5 pt takes
+    reached = -np.inf
+    for name, begin, until in series.phase_spans():
+        middle, half = 0.5 * (begin + until), 0.5 * per_character * len(name)
+        if name in ON_GROUND or middle - half < reached or middle + half > end + 3 * half:
+            continue
+        axis.annotate(
+            name,
+            (middle, 1.0),
+            xycoords=("data", "axes fraction"),
+            xytext=(0, 3),
+            textcoords="offset points",
+            ha="center",
+            va="bottom",
+            fontsize=7.5,
+            color=style.MUTED,
+        )
+        reached = middle + half + per_character
+
+
+def events(series: Series) -> list[tuple[float, str, str]]:
+    """(time [s], colour, name) of the magnet's switching."""
+    found = []
+    for on, off in series.magnet_spans():
+        found.append((on, style.PICK, "magnet on"))
+        found.append((off, style.DROP, "magnet off"))
+    return found
+
+
+def legend(figure: Figure, flights: Sequence[Flight], marked) -> None:
+    """Flights and events in the upper right corner."""
+    handles = [
+        Line2D([], [], color=style.FLIGHTS[n % len(style.FLIGHTS)], label=flight.label)
+        for n, flight in enumerate(flights)
+    ]
+    named = dict.fromkeys((name, colour) for _, colour, name in marked)
+    handles += [
+        Line2D([], [], color=colour, linewidth=0.9, linestyle=(0, (4, 2.5)), label=name)
+        for name, colour in named
+    ]
+    corner = (0.99, 1.0 - 0.02 / figure.get_figheight())
+    figure.legend(
+        handles=handles,
+        loc="upper right",
+        bbox_to_anchor=corner,
+        ncols=len(handles),
+        handlelength=1.7,
+        columnspacing=1.4,
+    )

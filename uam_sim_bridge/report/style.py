@@ -1,0 +1,56 @@
+"""Colours and type of every figure, in one place so that they read as one set."""
+
+from __future__ import annotations
+
+import matplotlib as mpl
+
+INK = "#22303c"
+MUTED = "#74808b"
+GRID = "#e3e7eb"
+BAND = "#f3f5f7"
+# One colour per flight; distinguishable with the common colour-vision deficiencies and in grey.
+FLIGHTS = ("#1f5fa8", "#d9822b", "#2a9d8f", "#a63d57", "#7b6bb0", "#6b7680")
+GAINS = ("#0b3c6f", "#3f7fbf", "#57a773", "#d9822b")
+PICK = "#2a8a57"
+DROP = "#c2512f"
+PAYLOAD = "#2a8a57"
+REFERENCE = "#9aa5af"
+
+WIDTH = 9.6  # [in] of a figure; shown at about 960 pixels
+PIXELS_PER_INCH = 160
+
+SETTINGS = {
+    "font.family": "DejaVu Sans",
+    "font.size": 9.0,
+    "text.color": INK,
+    "axes.edgecolor": "#b8c0c8",
+    "axes.labelcolor": INK,
+    "axes.labelsize": 9.0,
+    "axes.linewidth": 0.8,
+    "axes.spines.top": False,
+    "axes.spines.right": False,
+    "axes.grid": True,
+    "axes.axisbelow": True,
+    "axes.formatter.limits": (-3, 4),
+    "grid.color": GRID,
+    "grid.linewidth": 0.7,
+    "xtick.color": MUTED,
+    "ytick.color": MUTED,
+    "xtick.labelsize": 8.0,
+    "ytick.labelsize": 8.0,
+    "xtick.major.size": 3.0,
+    "ytick.major.size": 3.0,
+    "lines.linewidth": 1.1,
+    "lines.solid_joinstyle": "round",
+    "legend.frameon": False,
+    "legend.fontsize": 8.5,
+    "figure.facecolor": "white",
+    "savefig.facecolor": "white",
+    # The same flight gives the same bytes.
+    "svg.hashsalt": "uam",
+}
+
+
+def styled():
+    """Context in which figures are drawn and saved."""
+    return mpl.rc_context(SETTINGS)
