@@ -69,7 +69,7 @@ def airborne():
     bench = Bench().fly()
     bench.body.position[2] = 20.0
     bench.body.hover()
-    bench.run(0.5, ((0, 0, 0), HOVER))
+    bench.run(2.0, ((0, 0, 0), HOVER))  # until the estimator has forgotten the jump
     return bench
 
 
