@@ -77,7 +77,7 @@ def payload(flights: Sequence[Flight]) -> Figure | None:
     flights = [f for f in flights if not np.isnan(f.series["payload.z"]).all()]
     if not any(f.series.info.get("payload_mass_kg") for f in flights):
         return None
-    drawn = [Panel(f"payload {axis} [m]", f"payload.{axis}") for axis in "xyz"]
+    drawn = [Panel(f"payload {axis} [m]", f"payload.{axis}", on_ground=True) for axis in "xyz"]
     return panels.stack("Payload", flights, drawn, panel_height=1.15)[0]
 
 
@@ -104,10 +104,11 @@ def adaptation(flights: Sequence[Flight]) -> Figure | None:
     axes[0, 2].legend(
         handles=[Line2D([], [], color=c, label=f"$K_{i}$") for i, c in enumerate(style.GAINS)],
         loc="lower right",
+        bbox_to_anchor=(1.02, 1.06),
         ncols=4,
         handlelength=1.0,
         columnspacing=0.8,
-        fontsize=7.5,
+        fontsize=8.0,
     )
     panels.finish(figure, axes, flights)
     for axis in axes[-1]:
@@ -139,23 +140,26 @@ def _adaptation_of(axes, flight: Flight, subsystem: str, number: int, flights: i
 def _errors(
     title: str, flights: Sequence[Flight], drawn: list[Panel], group: str, unit: str, digits: int
 ) -> Figure:
-    """Error panels; a single flight gets its RMS beside the paper's."""
-    figure, axes = panels.stack(title, flights, drawn)
-    if len(flights) == 1:
+    """Error panels; a single flight gets its RMS and the paper's beside them."""
+    single = len(flights) == 1
+    figure, axes = panels.stack(title, flights, drawn, right=0.875 if single else panels.RIGHT)
+    if single:
         own = metrics.errors(flights[0].series)[group]
         for axis, value, published in zip(axes, own, paper.RMS[group], strict=True):
-            axis.annotate(
-                f"RMS {value:.{digits}f} {unit}   (paper {published:g} {unit})".replace(" °", "°"),
-                (1.0, 1.0),
-                xycoords="axes fraction",
-                xytext=(-5, -5),
-                textcoords="offset points",
-                ha="right",
-                va="top",
-                fontsize=8.0,
-                bbox={"facecolor": "white", "edgecolor": "none", "alpha": 0.8, "pad": 1.5},
-                zorder=20,
-            )
+            for text, height, size, colour in (
+                ("RMS", 0.74, 7.5, style.MUTED),
+                (f"{value:.{digits}f} {unit}".replace(" °", "°"), 0.58, 10.5, style.INK),
+                (f"paper {published:g} {unit}".replace(" °", "°"), 0.42, 7.5, style.MUTED),
+            ):
+                axis.text(
+                    1.02,
+                    height,
+                    text,
+                    transform=axis.transAxes,
+                    fontsize=size,
+                    color=colour,
+                    va="center",
+                )
     for axis in axes:
         axis.axhline(0.0, color=style.REFERENCE, linewidth=0.8, zorder=2)
     return figure

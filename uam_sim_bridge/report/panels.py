@@ -15,6 +15,7 @@ from uam_sim_bridge.flight.timeseries import ON_GROUND, Series
 from uam_sim_bridge.report import style
 
 BUCKETS = 900  # about one per pixel column of a panel
+RIGHT = 0.985  # right edge of the panels as part of the width
 MARGIN_S = 1.0  # shown before take-off and after touchdown
 
 
@@ -28,11 +29,15 @@ class Flight:
 
 @dataclass(frozen=True)
 class Panel:
-    """One axis over time: label with unit, column of the table, factor to the unit of the label."""
+    """One axis over time: label with unit, column of the table, factor to the unit of the label.
+
+    Where nothing flies nothing is drawn, unless `on_ground` asks for it.
+    """
 
     label: str
     column: str
     factor: float = 1.0
+    on_ground: bool = False
 
 
 def window(flights: Sequence[Flight]) -> tuple[float, float]:
@@ -64,10 +69,11 @@ def stack(
     panels: Sequence[Panel],
     columns: int = 1,
     panel_height: float = 1.45,
+    right: float = RIGHT,
 ) -> tuple[Figure, list[Axes]]:
     """One panel below the other (column by column), one line per flight in each."""
     rows = -(-len(panels) // columns)
-    figure, axes = grid(title, rows, columns, panel_height)
+    figure, axes = grid(title, rows, columns, panel_height, right)
     ordered = list(axes.T.flat)
     for axis, panel in zip(ordered, panels, strict=True):
         lines(axis, flights, panel)
@@ -75,14 +81,16 @@ def stack(
     return figure, ordered
 
 
-def grid(title: str, rows: int, columns: int, panel_height: float) -> tuple[Figure, np.ndarray]:
+def grid(
+    title: str, rows: int, columns: int, panel_height: float, right: float = RIGHT
+) -> tuple[Figure, np.ndarray]:
     """An empty grid of panels (rows, columns) with a title and room for phase names and legend."""
     height = rows * panel_height + 1.05
     figure = Figure(figsize=(style.WIDTH, height), layout=None)
     axes = figure.subplots(rows, columns, sharex=True, squeeze=False)
     figure.subplots_adjust(
         left=0.085,
-        right=0.985,
+        right=right,
         top=1.0 - 0.62 / height,
         bottom=0.44 / height,
         hspace=0.16,
@@ -95,10 +103,11 @@ def grid(title: str, rows: int, columns: int, panel_height: float) -> tuple[Figu
 def lines(axis: Axes, flights: Sequence[Flight], panel: Panel) -> None:
     """Draw one column of every flight."""
     for number, flight in enumerate(flights):
-        values = flight.series[panel.column] * panel.factor
+        series = flight.series
+        shown = slice(None) if panel.on_ground else series.flown
         width = 1.1 if number == 0 else 0.9
         axis.plot(
-            *thin(flight.series.time, values),
+            *thin(series.time[shown], series[panel.column][shown] * panel.factor),
             color=style.FLIGHTS[number % len(style.FLIGHTS)],
             linewidth=width,
             zorder=3 + len(flights) - number,

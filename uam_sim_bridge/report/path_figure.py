@@ -18,6 +18,7 @@ from uam_sim_bridge.report.poses import Poses
 
 POSES = 5
 TALLEST, ABOVE, BELOW = 4.5, 0.62, 0.45  # [in] of a panel, above it, below it
+MOVING = [0, 2, 6, 7]  # x, z and the joints among the coordinates
 REACH = 0.35  # [m] shown around the path, for rotors and arm
 SCENERY = {"stand_post": "#b9a58f", "stand_top": "#8c7660", "drop_mat": "#e3c552"}
 CHAIN = ("base", "link_1", "link_2", "magnet")
@@ -97,9 +98,14 @@ def _path(axis: Axes, series: Series, start: float, end: float, number: int) -> 
 
 
 def _poses(axis: Axes, poses: Poses, start: float, end: float) -> None:
-    """Vehicle, arm and payload at times evenly spread along the stretch, the last one darkest."""
-    for number, time in enumerate(np.linspace(start, end, POSES)):
-        poses.put(poses.series.row_at(time))
+    """Vehicle, arm and payload, evenly spread along the way, the last one darkest."""
+    series = poses.series
+    first, last = series.row_at(start), series.row_at(end)
+    steps = np.abs(np.diff(series.block("reference.")[first : last + 1, MOVING], axis=0))
+    # The arm's turning counts as well; a little per tick keeps a hover from having no length.
+    way = np.cumsum(steps @ [1.0, 1.0, 0.2, 0.2] + 1e-9)
+    for number, part in enumerate(np.linspace(0.0, way[-1], POSES)):
+        poses.put(first + int(np.searchsorted(way, part)))
         opacity = 0.25 + 0.75 * number / (POSES - 1)
         _pose(axis, poses, opacity, 8 + number)
 
