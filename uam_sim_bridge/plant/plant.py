@@ -107,8 +107,8 @@ class Plant:
         self._alpha_ddot = data.qacc[arm_v:arm_v + 2]
         self._swing = joint("magnet_swing").qposadr[0]
         payload_q = joint("payload").qposadr[0]
-        self._payload_position = data.qpos[payload_q:payload_q + 3]
-        self._payload_quaternion = data.qpos[payload_q + 3:payload_q + 7]
+        self._payload_pose = data.qpos[payload_q:payload_q + 7]
+        self._payload_position = self._payload_pose[0:3]
         self._sensed_force = data.sensordata[0:3]
         self._thrust_control = data.ctrl[0:4]
         self._arm_control = data.ctrl[4:6]
@@ -180,6 +180,20 @@ class Plant:
         state[2, 0:6] = self._base_acceleration
         state[2, ARM] = self._alpha_ddot
 
+    def write_payload(self, pose: np.ndarray) -> None:
+        """Write the payload's position [m] and quaternion [w x y z] into pose (7,)."""
+        pose[:] = self._payload_pose
+
+    @property
+    def magnet_force(self) -> float:
+        """Holding force of the magnet at the present air gap [N]."""
+        return float(self._magnet_control[0] * self._magnet_gain)
+
+    @property
+    def magnet_swing(self) -> float:
+        """Angle of the magnet's pivot [rad], relative to link 2."""
+        return float(self.data.qpos[self._swing])
+
     def truth(self) -> Truth:
         """Return a copy of everything true at this tick."""
         state = np.empty((3, 8))
@@ -188,9 +202,9 @@ class Plant:
             state=state,
             quaternion=self._quaternion.copy(),
             payload_position=self._payload_position.copy(),
-            payload_quaternion=self._payload_quaternion.copy(),
-            magnet_force=float(self._magnet_control[0] * self._magnet_gain),
-            magnet_swing=float(self.data.qpos[self._swing]),
+            payload_quaternion=self._payload_pose[3:7].copy(),
+            magnet_force=self.magnet_force,
+            magnet_swing=self.magnet_swing,
             rotor_speed=self.rotors.speed.copy(),
             rotor_thrust=self.rotors.thrust.copy(),
         )
