@@ -58,6 +58,15 @@ def test_the_flight_lasts_from_take_off_command_to_touchdown_command():
     ]
 
 
+def test_time_counts_down_to_the_take_off_command():
+    made = recording(["waiting"] * 3 + ["take-off"] * 3, start=-1.5)
+    made.values[:3, COLUMNS["time"]] = -1.0
+    assert made.series().time.tolist() == [-1.5, -1.0, -0.5, 0.0, 0.5, 1.0]
+    never = recording(["waiting"] * 3, start=-1.5)
+    never.values[:3, COLUMNS["time"]] = -1.0
+    assert never.series().time.tolist() == [-1.0, -1.0, -1.0]
+
+
 def test_magnet_spans_end_where_it_is_switched_off_or_the_recording_ends():
     made = recording(["carry"] * 6, start=0.0)
     made.values[:6, COLUMNS["magnet.on"]] = [0, 1, 1, 0, 0, 1]

@@ -118,14 +118,25 @@ class Recording:
         return self.values[self.count - 1]
 
     def series(self, info: Mapping[str, Any] | None = None) -> Series:
-        """What has been recorded so far; the error columns are computed here."""
+        """What has been recorded so far; error columns and the countdown are computed here."""
         values = self.values[: self.count]
+        count_down(values[:, COLUMNS["time"]])
         truth, reference = (values[:, COLUMNS.block(group)] for group in ("truth.", "reference."))
         error = truth[:, :SIZE] - reference[:, :SIZE]
         error[:, ANGLES] = wrap(error[:, ANGLES])
         values[:, COLUMNS.block("error.")] = error
         names = tuple(self.phase_names)
         return Series(values, self.phases[: self.count], names, dict(info or {}))
+
+
+def count_down(time: np.ndarray) -> None:
+    """Let mission time (ticks,) [s] run up to the first tick not before take-off, in place.
+
+    Until take-off nobody can know how long it still takes; the recorded value stands still.
+    """
+    start = int(np.argmax(time >= 0.0)) if np.any(time >= 0.0) else len(time)
+    if 0 < start < len(time) - 1:
+        time[:start] = time[start] - (time[start + 1] - time[start]) * np.arange(start, 0, -1)
 
 
 def wrap(angle: np.ndarray) -> np.ndarray:
