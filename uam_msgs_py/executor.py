@@ -25,14 +25,21 @@ except (ImportError, AttributeError):
 
 
 class LeanExecutor:
-    """Spins one node, all of whose subscriptions, services and timers exist already.
+    """Spins one node, whose subscriptions, services and timers were made before.
 
     Messages are delivered in the order of the node's subscriptions within one wake-up. A callback
     that raises ends `spin` with that exception.
     """
 
     def __init__(self, node: Node):
-        self._context = node.context
+        self._node = node
+        self._rest = SingleThreadedExecutor(context=node.context)
+        self._rest.add_node(node)
+        self._gather()
+
+    def _gather(self) -> None:
+        """Take note of the node's entities and make the wait set for them."""
+        node = self._node
         self._subscriptions = [
             (s.handle, s.msg_type, s.raw, s.callback, s.handle.pointer) for s in node.subscriptions
         ]
@@ -40,18 +47,15 @@ class LeanExecutor:
         self._clients = [c.handle for c in node.clients]
         self._timers = [t.handle for t in node.timers]
         self._waitables = list(node.waitables)
-        events = sum(w.get_num_entities().num_events for w in self._waitables)
         self._wait_set = WaitSet(
             len(self._subscriptions),
             0,
             len(self._timers),
             len(self._clients),
             len(self._services),
-            events,
+            sum(waitable.get_num_entities().num_events for waitable in self._waitables),
             node.context.handle,
         )
-        self._rest = SingleThreadedExecutor(context=node.context)
-        self._rest.add_node(node)
 
     def spin_once(self, timeout: float) -> None:
         """Serve what is ready, waiting at most `timeout` seconds for something."""
@@ -83,6 +87,7 @@ class LeanExecutor:
             or any(waitable.is_ready(ready) for waitable in self._waitables)
         ):
             self._rest.spin_once(timeout_sec=0)
+            self._gather()  # a service may have changed them, as setting use_sim_time does
 
     def shutdown(self) -> None:
         """Let go of the node."""

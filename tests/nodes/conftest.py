@@ -1,0 +1,124 @@
+"""Node tests run over real ROS, on this machine only, in a domain of their own."""
+
+import os
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import pytest
+import rclpy
+from rclpy.executors import SingleThreadedExecutor
+from rclpy.node import Node
+
+from uam_sim_bridge.flight.ports import Reservation
+
+PATIENCE = 60.0  # [s] for a process to get somewhere; only a failing test waits that long
+
+
+@pytest.fixture(scope="session", autouse=True)
+def domain(tmp_path_factory) -> Iterator[int]:
+    """A ROS domain that no other flight or test uses."""
+    with Reservation() as reservation:
+        os.environ["ROS_DOMAIN_ID"] = str(reservation.ports.domain)
+        os.environ["ROS_AUTOMATIC_DISCOVERY_RANGE"] = "LOCALHOST"
+        os.environ["ROS_LOG_DIR"] = str(tmp_path_factory.mktemp("ros_log"))
+        yield reservation.ports.domain
+
+
+class Probe:
+    """A node of the test and its executor."""
+
+    def __init__(self, context):
+        self.node = Node("probe", context=context)
+        self._executor = SingleThreadedExecutor(context=context)
+        self._executor.add_node(self.node)
+
+    def until(self, condition: Callable[[], object], what: str) -> None:
+        """Spin until `condition()`; fail, saying `what` did not happen, after PATIENCE."""
+        deadline = time.monotonic() + PATIENCE
+        while not condition():
+            assert time.monotonic() < deadline, f"{what}: not within {PATIENCE:g} s"
+            self._executor.spin_once(timeout_sec=0.02)
+
+    def collect(self, topic) -> list:
+        """Return a list that fills with the messages of `topic`."""
+        messages = []
+        self.node.create_subscription(topic.type, topic.name, messages.append, topic.qos)
+        return messages
+
+    def publisher(self, topic):
+        """Return a publisher of `topic`."""
+        return self.node.create_publisher(topic.type, topic.name, topic.qos)
+
+    def call(self, kind, name: str, request):
+        """Call a service and return its response."""
+        client = self.node.create_client(kind, name)
+        self.until(client.service_is_ready, f"service {name}")
+        future = client.call_async(request)
+        self.until(future.done, f"answer of {name}")
+        self.node.destroy_client(client)
+        return future.result()
+
+
+@pytest.fixture
+def probe() -> Iterator[Probe]:
+    """A node in the test's own process."""
+    context = rclpy.Context()
+    rclpy.init(context=context)
+    made = Probe(context)
+    yield made
+    made.node.destroy_node()
+    context.try_shutdown()
+
+
+class Running:
+    """A node in a process of its own, its output in a file."""
+
+    def __init__(self, module: str, arguments: list[str], log: Path):
+        self.log = log
+        code = f"import sys; from {module} import main; sys.exit(main())"
+        with log.open("wb") as output:
+            self.process = subprocess.Popen(
+                [sys.executable, "-c", code, *arguments],
+                stdin=subprocess.DEVNULL, stdout=output, stderr=subprocess.STDOUT,
+            )
+
+    @property
+    def output(self) -> str:
+        """What it has printed so far."""
+        return self.log.read_text()
+
+    def until_said(self, text: str) -> None:
+        """Wait until the node has printed `text`."""
+        deadline = time.monotonic() + PATIENCE
+        while text not in self.output:
+            assert self.process.poll() is None, f"ended before saying {text!r}:\n{self.output}"
+            assert time.monotonic() < deadline, f"never said {text!r}:\n{self.output}"
+            time.sleep(0.05)
+
+    def interrupt(self, times: int = 1, number: int = signal.SIGINT) -> int:
+        """Send SIGINT (several times in a row) and return the exit status."""
+        for _ in range(times):
+            self.process.send_signal(number)
+            time.sleep(0.005)
+        return self.process.wait(PATIENCE)
+
+
+@pytest.fixture
+def start(tmp_path) -> Iterator[Callable[..., Running]]:
+    """start(module, *arguments) runs module.main() in a process that ends with the test."""
+    running: list[Running] = []
+
+    def launch(module: str, *arguments: str) -> Running:
+        node = Running(module, list(arguments), tmp_path / f"node_{len(running)}.log")
+        running.append(node)
+        return node
+
+    yield launch
+    for node in running:
+        if node.process.poll() is None:
+            node.process.kill()
+        node.process.wait()

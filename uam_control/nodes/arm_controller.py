@@ -1,0 +1,44 @@
+"""Node: arm law. state + reference + the attitude asked by the position law → joint efforts."""
+
+from uam_control.controllers import ArmController
+from uam_control.nodes.controller_node import ControllerNode
+from uam_msgs_py import topics
+from uam_msgs_py.control import ARM_NAMES, TorqueWriter
+from uam_msgs_py.convert import EffortWriter
+from uam_msgs_py.node import run
+
+NAME = "arm_controller"
+
+
+class ArmControllerNode(ControllerNode):
+    """Publishes joint efforts, one message per state, on the ground as well.
+
+    The attitude reference enters through ||xi||, the norm of the whole vehicle's errors.
+    """
+
+    def __init__(self):
+        super().__init__(
+            NAME,
+            ArmController,
+            [topics.STATE, topics.REFERENCE, topics.POSITION_COMMAND],
+            topics.ARM_ADAPTATION,
+        )
+        self._effort = self.publisher(topics.ARM_EFFORT)
+        self._command = self.publisher(topics.ARM_COMMAND)
+        self._effort_writer = EffortWriter(len(ARM_NAMES))
+        self._writer = TorqueWriter(ARM_NAMES)
+
+    def tick(self, stamp, dt, state, reference, position):
+        flying = reference.flying and position.flying
+        tau = self.controller.update(state, reference.values, position.attitude, flying, dt)
+        self._effort_writer.values[:] = tau
+        self._effort.publish(self._effort_writer.message)
+        self._command.publish(self._writer.fill(stamp, tau))
+
+    def evaluate(self, controller, dt, state, reference, attitude):
+        return controller.update(state, reference, attitude, True, dt)
+
+
+def main() -> int:
+    """Run the node; return its exit status."""
+    return run(ArmControllerNode, NAME)

@@ -1,0 +1,38 @@
+"""Node: attitude law. state + reference + the attitude asked by the position law → tau_q."""
+
+from uam_control.controllers import AttitudeController
+from uam_control.nodes.controller_node import ControllerNode
+from uam_msgs_py import topics
+from uam_msgs_py.control import ATTITUDE_NAMES, TorqueWriter
+from uam_msgs_py.node import run
+
+NAME = "attitude_controller"
+
+
+class AttitudeControllerNode(ControllerNode):
+    """Publishes /uam/attitude/command, empty while not flying."""
+
+    def __init__(self):
+        super().__init__(
+            NAME,
+            AttitudeController,
+            [topics.STATE, topics.REFERENCE, topics.POSITION_COMMAND],
+            topics.ATTITUDE_ADAPTATION,
+        )
+        self._command = self.publisher(topics.ATTITUDE_COMMAND)
+        self._writer = TorqueWriter(ATTITUDE_NAMES)
+
+    def tick(self, stamp, dt, state, reference, position):
+        flying = reference.flying and position.flying
+        tau = self.controller.update(state, reference.values, position.attitude, flying, dt)
+        self._command.publish(
+            self._writer.fill(stamp, tau) if flying else self._writer.idle(stamp)
+        )
+
+    def evaluate(self, controller, dt, state, reference, attitude):
+        return controller.update(state, reference, attitude, True, dt)
+
+
+def main() -> int:
+    """Run the node; return its exit status."""
+    return run(AttitudeControllerNode, NAME)

@@ -1,0 +1,81 @@
+"""What the three controller nodes share: the joined inputs, the parameters, the adaptation."""
+
+import time
+
+import numpy as np
+
+from uam_control.controllers import Controller
+from uam_control.coordinates import SIZE
+from uam_control.laws.modular import ADAPTATION
+from uam_control.nodes.timing import Ticks, Timing
+from uam_control.profile import NODES, load_profile
+from uam_msgs_py import topics
+from uam_msgs_py.control import read_position_command, read_reference, read_state
+from uam_msgs_py.convert import JointStateWriter
+from uam_msgs_py.joins import StampJoin
+from uam_msgs_py.node import UamNode
+from uam_msgs_py.parameters import NodeParameters
+from uam_msgs_py.topics import Topic
+
+DEFAULT_PROFILE = "s500"  # for what no parameter file says
+ADAPTATION_PERIOD = 20_000_000  # [ns] between two adaptation messages
+
+
+class ControllerNode(UamNode):
+    """One adaptive law: runs once per stamp, when all its inputs of that stamp are there."""
+
+    READERS = {
+        topics.STATE.name: read_state,
+        topics.REFERENCE.name: read_reference,
+        topics.POSITION_COMMAND.name: read_position_command,
+    }
+
+    def __init__(
+        self, name: str, controller: type[Controller], inputs: list[Topic], adaptation: Topic
+    ):
+        """inputs: the topics whose messages `tick` takes, in that order."""
+        super().__init__(name)
+        kind, axes = NODES[name]
+        self.parameter_set = NodeParameters(
+            self, kind, axes, load_profile(DEFAULT_PROFILE).section(name)
+        )
+        timing = NodeParameters(self, Timing, read_only=True).current
+        self._ticks = Ticks(timing)
+        self.controller = controller(self.parameter_set.current)
+        self.parameter_set.apply = self.controller.set_parameters
+        self._warm_up(controller(self.parameter_set.current), timing.control_period)
+        self._adaptation = self.publisher(adaptation)
+        self._gains = JointStateWriter(ADAPTATION)
+        self._join = StampJoin([topic.name for topic in inputs], self._joined)
+        self.joins.append(self._join)
+        for topic in inputs:
+            self._feed(topic)
+
+    def _feed(self, topic: Topic) -> None:
+        add, name, read = self._join.add, topic.name, self.READERS[topic.name]
+        self.listen(topic, lambda message: add(name, *read(message)))
+
+    def _joined(self, stamp: int, *values) -> None:
+        begun = time.perf_counter()
+        self.tick(stamp, self._ticks.step(stamp), *values)
+        if stamp // ADAPTATION_PERIOD != self.stamp // ADAPTATION_PERIOD:
+            self._gains.position[:] = self.controller.adaptation
+            self._adaptation.publish(self._gains.stamped(stamp))
+        self.done_tick(stamp, begun)
+
+    def tick(self, stamp: int, dt: float, *values) -> None:
+        """Control at `stamp` [ns], dt [s] after the last tick; publish the command."""
+        raise NotImplementedError
+
+    def evaluate(self, controller: Controller, dt: float, state, reference, attitude):
+        """Return the controller's output while flying; used to compile it before the flight."""
+        raise NotImplementedError
+
+    def _warm_up(self, spare: Controller, dt: float) -> None:
+        """Compile the law on a controller that never flies: the first call takes a second."""
+        self.evaluate(spare, dt, np.zeros((3, SIZE)), np.zeros((3, SIZE)), np.zeros((3, 3)))
+
+    def diagnose(self):
+        level, summary, values = super().diagnose()
+        gains = dict(zip(ADAPTATION, (f"{x:.4g}" for x in self.controller.adaptation), strict=True))
+        return level, summary, values | gains | {"saturated": self.controller.saturated}

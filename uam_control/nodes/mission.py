@@ -1,0 +1,123 @@
+"""Node: flies a scenario. state + autopilot → reference, magnet, arming."""
+
+import time
+
+import numpy as np
+from std_msgs.msg import Bool
+
+from uam_control.coordinates import ARM, ATTITUDE, POSITION
+from uam_control.mission import Mission, MissionParameters, load_scenario
+from uam_control.nodes.timing import Ticks, Timing
+from uam_control.profile import load_profile
+from uam_msgs_py import topics
+from uam_msgs_py.control import ReferenceWriter, read_state
+from uam_msgs_py.convert import SECOND, seconds
+from uam_msgs_py.node import UamNode, run
+from uam_msgs_py.parameters import NodeParameters
+from uam_msgs_py.status import ERROR, OK, AutopilotState, MissionStatus
+
+NAME = "mission"
+DEFAULT_PROFILE, DEFAULT_SCENARIO = "s500", "pick_and_place"
+STATUS_PERIOD = 500_000_000  # [ns]
+
+
+class MissionNode(UamNode):
+    """For each state: the reference of the next tick, and the magnet of this one.
+
+    The reference goes out one tick ahead, so that it waits for the state and not the state for it.
+    """
+
+    def __init__(self):
+        super().__init__(NAME)
+        section = load_profile(DEFAULT_PROFILE).section(NAME)
+        self.parameter_set = NodeParameters(self, MissionParameters, defaults=section)
+        self._period = Ticks(NodeParameters(self, Timing, read_only=True).current).period
+        scenario = self.declare_parameter("scenario", DEFAULT_SCENARIO).value
+        self._mission = Mission(load_scenario(scenario), self.parameter_set.current)
+        self.parameter_set.apply = self._set_parameters
+        self._armed_since: float | None = None
+        self._ahead = -1  # stamp [ns] of the newest reference
+        self._arm: bool | None = None
+        self._phase = ""
+        self._errors = (0.0, 0.0, 0.0)
+        self._due = 0  # stamp [ns] of the next status
+
+        self._reference = self.publisher(topics.REFERENCE)
+        self._magnet = self.publisher(topics.MAGNET)
+        self._arming = self.publisher(topics.ARMING)
+        self._status = self.publisher(topics.MISSION_STATUS)
+        self._writer, self._magnet_message = ReferenceWriter(), Bool()
+        self.listen(topics.AUTOPILOT_STATE, self._on_autopilot, required=False)
+        self.listen(topics.STATE, self._on_state)
+
+    def _set_parameters(self, parameters: MissionParameters) -> None:
+        self._mission.parameters = parameters
+
+    def _on_autopilot(self, message) -> None:
+        _, state = AutopilotState.from_message(message)
+        armed = state.armed and state.armed_since is not None
+        self._armed_since = seconds(state.armed_since) if armed else None
+
+    def _on_state(self, message) -> None:
+        begun = time.perf_counter()
+        stamp, state = read_state(message)
+        if stamp != self._ahead:  # the first tick, or one after a gap
+            self._advance(stamp, state)
+        output = self._mission.output  # as of this tick, from the step one tick ago
+        self._measure(state, output)
+        self._tell(stamp)  # before the magnet: who has the magnet of a tick has its status, too
+        self._magnet_message.data = bool(output.magnet)
+        self._magnet.publish(self._magnet_message)
+        self._advance(stamp + self._period, state)
+        self.done_tick(stamp, begun)
+
+    def _advance(self, stamp: int, state: np.ndarray) -> None:
+        """Publish the reference of the tick `stamp` [ns]."""
+        output = self._mission.step(seconds(stamp), state, self._armed_since)
+        time_of_mission = max(0, round(output.time * SECOND))
+        self._reference.publish(
+            self._writer.fill(stamp, output.reference, output.flying, time_of_mission)
+        )
+        self._ahead = stamp
+
+    def _measure(self, state: np.ndarray, output) -> None:
+        """Errors of this tick: norms of estimate − reference; zero what is not controlled."""
+        error = state[0] - output.reference[0]
+        error[3:] = (error[3:] + np.pi) % (2.0 * np.pi) - np.pi
+        norms = [float(np.linalg.norm(error[part])) for part in (POSITION, ATTITUDE, ARM)]
+        self._errors = tuple(norms) if output.flying else (0.0, 0.0, norms[2])
+
+    def _tell(self, stamp: int) -> None:
+        """Arming when it changes; the status when it changes and twice a second."""
+        output = self._mission.output
+        if output.arm != self._arm:
+            self._arm = output.arm
+            self._arming.publish(Bool(data=bool(output.arm)))
+        now = f"{output.phase} {output.done}"
+        if now == self._phase and stamp < self._due:
+            return
+        if now != self._phase:
+            self.get_logger().info(
+                f"{output.abort_reason or output.phase} at {output.time:.3f} s"
+                + (", done" if output.done else "")
+            )
+        self._phase, self._due = now, stamp + STATUS_PERIOD
+        self._status.publish(self.status.to_message(stamp))
+
+    @property
+    def status(self) -> MissionStatus:
+        """Where the mission is now."""
+        output = self._mission.output
+        return MissionStatus(
+            output.phase, output.time, *self._errors, output.done, output.abort_reason
+        )
+
+    def diagnose(self):
+        output = self._mission.output
+        level = ERROR if output.abort_reason else OK
+        return level, output.abort_reason or output.phase, {"mission time [s]": output.time}
+
+
+def main() -> int:
+    """Run the node; return its exit status."""
+    return run(MissionNode, NAME)

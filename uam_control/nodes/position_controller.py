@@ -1,0 +1,40 @@
+"""Node: position law. state + reference → tau_p and the attitude that points the thrust so."""
+
+from uam_control.controllers import PositionController
+from uam_control.nodes.controller_node import ControllerNode
+from uam_msgs_py import topics
+from uam_msgs_py.control import PositionCommandWriter
+from uam_msgs_py.node import run
+
+NAME = "position_controller"
+
+
+class PositionControllerNode(ControllerNode):
+    """Publishes /uam/position/command, empty while not flying."""
+
+    def __init__(self):
+        super().__init__(
+            NAME,
+            PositionController,
+            [topics.STATE, topics.REFERENCE],
+            topics.POSITION_ADAPTATION,
+        )
+        self._command = self.publisher(topics.POSITION_COMMAND)
+        self._writer = PositionCommandWriter()
+
+    def tick(self, stamp, dt, state, reference):
+        tau = self.controller.update(state, reference.values, reference.flying, dt)
+        if reference.flying:
+            attitude = self.controller.attitude_reference
+            message = self._writer.fill(stamp, reference.values, attitude, tau)
+        else:
+            message = self._writer.idle(stamp)
+        self._command.publish(message)
+
+    def evaluate(self, controller, dt, state, reference, attitude):
+        return controller.update(state, reference, True, dt)
+
+
+def main() -> int:
+    """Run the node; return its exit status."""
+    return run(PositionControllerNode, NAME)

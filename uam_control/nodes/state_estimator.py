@@ -1,0 +1,79 @@
+"""Node: motion capture + IMU + joints → chi, chi_dot, chi_ddot, once per IMU sample."""
+
+import time
+
+import numpy as np
+
+from uam_control.coordinates import COORDINATES, JOINTS
+from uam_control.estimation import EstimatorParameters, StateEstimator
+from uam_control.profile import load_profile
+from uam_msgs_py import topics
+from uam_msgs_py.convert import TrajectoryWriter, read_imu, read_joints, read_pose, seconds
+from uam_msgs_py.node import UamNode, run
+from uam_msgs_py.parameters import NodeParameters
+
+NAME = "state_estimator"
+DEFAULT_PROFILE = "s500"
+NAMES = list(JOINTS)
+
+
+class StateEstimatorNode(UamNode):
+    """Publishes /uam/state with the stamp of the IMU sample that it belongs to.
+
+    The IMU sample is what makes a tick. A sensor hub (the simulator is one) publishes it last, so
+    that everything else of the tick has arrived by then and a repeated flight sees the same.
+    """
+
+    def __init__(self):
+        super().__init__(NAME)
+        section = load_profile(DEFAULT_PROFILE).section(NAME)
+        self.parameter_set = NodeParameters(self, EstimatorParameters, defaults=section)
+        self._estimator = StateEstimator(self.parameter_set.current)
+        self.parameter_set.apply = self._estimator.set_parameters
+        self._warm_up()
+        self._state = self.publisher(topics.STATE)
+        self._writer = TrajectoryWriter(COORDINATES)
+        self._mocap = self.listen(topics.MOCAP, self._on_mocap)
+        self._joints = self.listen(topics.JOINTS, self._on_joints)
+        self.listen(topics.IMU, self._on_imu)
+        self._last_imu = -1
+
+    def _on_mocap(self, message) -> None:
+        stamp, position, quaternion = read_pose(message)
+        self._estimator.mocap(seconds(stamp), position, quaternion)
+
+    def _on_joints(self, message) -> None:
+        stamp, position, velocity = read_joints(message, NAMES)
+        self._estimator.joints(seconds(stamp), position, velocity)
+
+    def _on_imu(self, message) -> None:
+        begun = time.perf_counter()
+        stamp, gyro, specific_force = read_imu(message)
+        if stamp <= self._last_imu:
+            self.say(f"IMU stamp {stamp} ns does not follow {self._last_imu} ns; ignored", "imu")
+            return
+        self._last_imu = stamp
+        self.take_waiting(self._mocap)
+        self.take_waiting(self._joints)
+        estimator = self._estimator
+        estimator.imu(seconds(stamp), gyro, specific_force)
+        if estimator.waiting_for:
+            return
+        self._state.publish(self._writer.fill(stamp, estimator.update()))
+        self.done_tick(stamp, begun)
+
+    def _warm_up(self) -> None:
+        """Compile the filters on an estimator that never flies."""
+        spare = StateEstimator(self.parameter_set.current)
+        rest, level = np.zeros(3), np.array([1.0, 0.0, 0.0, 0.0])
+        for tick in range(3):
+            stamp = 0.004 * tick
+            spare.mocap(stamp, rest, level)
+            spare.joints(stamp, np.zeros(2), np.zeros(2))
+            spare.imu(stamp, rest, np.array([0.0, 0.0, 9.81]))
+            spare.update()
+
+
+def main() -> int:
+    """Run the node; return its exit status."""
+    return run(StateEstimatorNode, NAME)

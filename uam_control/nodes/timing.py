@@ -1,0 +1,31 @@
+"""The control period as the nodes see it: from stamp to stamp."""
+
+from dataclasses import dataclass
+
+from uam_control.parameters import ParameterSet, number
+from uam_msgs_py.convert import SECOND, seconds
+
+
+@dataclass(frozen=True)
+class Timing(ParameterSet):
+    """When control ticks come."""
+
+    control_period: float = number(0.004, "time between two control ticks", "s", 1e-4, 0.1)
+
+
+class Ticks:
+    """Turns stamps into time steps."""
+
+    def __init__(self, timing: Timing):
+        self.period = round(timing.control_period * SECOND)  # [ns]
+        self._last: int | None = None
+
+    def step(self, stamp: int) -> float:
+        """Return the time since the last tick [s].
+
+        One control period at the first tick, and after a gap of more than ten or a step back in
+        time: nothing may be integrated over what was not seen.
+        """
+        gap = self.period if self._last is None else stamp - self._last
+        self._last = stamp
+        return seconds(gap if 0 < gap <= 10 * self.period else self.period)

@@ -1,0 +1,54 @@
+"""Joins the messages of several topics that carry the same stamp.
+
+Never by order of arrival: between processes that order is chance, and a lockstep flight must be the
+same to the last bit.
+"""
+
+from collections.abc import Callable, Sequence
+from typing import Any
+
+
+class StampJoin:
+    """Calls `fire(stamp, *values)` once every input has delivered its value for a stamp.
+
+    Ticks fire in the order of their stamps. When one fires, older incomplete ones can no longer
+    matter; they are dropped and counted, as is whatever arrives for them later.
+    """
+
+    def __init__(self, inputs: Sequence[str], fire: Callable[..., None], depth: int = 32):
+        """inputs: names, in the order of the values; depth: incomplete stamps kept at most."""
+        self._index = {name: i for i, name in enumerate(inputs)}
+        self._fire = fire
+        self._depth = depth
+        self._open: dict[int, list[Any]] = {}
+        self._last = -1
+        self.fired = 0
+        self.dropped = 0
+        self.last_seen: dict[str, int | None] = dict.fromkeys(inputs)
+
+    def add(self, name: str, stamp: int, value: Any) -> None:
+        """Take the value of input `name` for `stamp` [ns]; may fire. None is not a value."""
+        self.last_seen[name] = stamp
+        if stamp <= self._last:
+            self.dropped += 1
+            return
+        values = self._open.get(stamp)
+        if values is None:
+            values = self._open[stamp] = [None] * len(self._index)
+            if len(self._open) > self._depth:
+                del self._open[min(self._open)]
+                self.dropped += 1
+        values[self._index[name]] = value
+        if any(value is None for value in values):
+            return
+        self._last = stamp
+        for old in [key for key in self._open if key <= stamp]:
+            del self._open[old]
+            self.dropped += old != stamp
+        self.fired += 1
+        self._fire(stamp, *values)
+
+    @property
+    def waiting_for(self) -> list[str]:
+        """Inputs that have never arrived."""
+        return [name for name, stamp in self.last_seen.items() if stamp is None]
