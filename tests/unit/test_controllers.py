@@ -1,0 +1,156 @@
+"""Errors on SO(3), limits, the attitude that tau_p asks for, and the modularity of the three."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from uam_control.controllers import (
+    ArmController,
+    AttitudeController,
+    PositionController,
+    limit_force,
+)
+from uam_control.laws.errors import attitude_errors
+from uam_control.profile import load_profile
+from uam_control.rotations import matrix_from_euler
+from uam_control.thrust_direction import AttitudeReference
+
+DT = 0.004
+angle = st.floats(-0.6, 0.6)
+
+
+def attitude(state_euler, reference_euler, rate=(0, 0, 0), rate_d=(0, 0, 0), printed=False):
+    state, reference, errors = np.zeros((3, 8)), np.zeros((3, 3)), np.zeros((3, 8))
+    state[0, 3:6], state[1, 3:6] = state_euler, rate
+    reference[0], reference[1] = reference_euler, rate_d
+    attitude_errors(state, reference, printed, errors)
+    return errors[0, 3:6], errors[1, 3:6]
+
+
+def test_attitude_error_of_a_pure_rotation_is_its_sine():
+    for axis in range(3):
+        turn = np.zeros(3)
+        turn[axis] = 0.4
+        error, _ = attitude(turn, np.zeros(3))
+        expected = np.zeros(3)
+        expected[axis] = np.sin(0.4)
+        np.testing.assert_allclose(error, expected, atol=1e-12)
+
+
+@given(st.tuples(angle, angle, angle), st.tuples(angle, angle, angle))
+def test_attitude_error_is_the_papers_vee_of_the_skew_part(actual, desired):
+    error, _ = attitude(actual, desired)
+    r, r_d = matrix_from_euler(np.array(actual)), matrix_from_euler(np.array(desired))
+    skew = 0.5 * (r_d.T @ r - r.T @ r_d)
+    np.testing.assert_allclose(error, [skew[2, 1], skew[0, 2], skew[1, 0]], atol=1e-12)
+
+
+def test_rate_error_forms_differ_by_about_twice_e_cross_rate():
+    rate_d = np.array([0.3, -0.2, 0.5])
+    error, lee = attitude((0.02, 0.01, -0.03), np.zeros(3), rate_d=rate_d)
+    _, printed = attitude((0.02, 0.01, -0.03), np.zeros(3), rate_d=rate_d, printed=True)
+    np.testing.assert_allclose(lee - printed, 2.0 * np.cross(error, rate_d), atol=2e-3)
+
+
+@given(st.tuples(st.floats(-8, 8), st.floats(-8, 8), st.floats(5, 30)), st.floats(-3, 3))
+def test_settled_attitude_reference_points_the_thrust_along_tau(tau, yaw):
+    reference = np.zeros((3, 8))
+    reference[0, 5] = yaw
+    filtered = AttitudeReference(cutoff=5.0)
+    for _ in range(400):
+        value = filtered.update(np.array(tau), reference, 0.02)
+    axis = matrix_from_euler(value[0])[:, 2]
+    np.testing.assert_allclose(axis, np.array(tau) / np.linalg.norm(tau), atol=1e-6)
+    np.testing.assert_allclose(value[1:], 0.0, atol=1e-4)
+
+
+def test_attitude_reference_rates_are_derivatives():
+    """Omega_d and its derivative against finite differences of R_d, while yawing and tilting."""
+    filtered, step = AttitudeReference(cutoff=2.0), 1e-4
+    reference = np.zeros((3, 8))
+    rotations, rates, accelerations = [], [], []
+    for k in range(3000):
+        t = k * step
+        reference[:, 5] = 0.5 * np.sin(t), 0.5 * np.cos(t), -0.5 * np.sin(t)
+        value = filtered.update(np.array([3 * np.sin(2 * t), 2 * np.cos(3 * t), 20.0]), reference,
+                                step)
+        rotations.append(matrix_from_euler(value[0]))
+        rates.append(value[1].copy())
+        accelerations.append(value[2].copy())
+    k = 2500
+    skew = rotations[k].T @ (rotations[k + 1] - rotations[k - 1]) / (2 * step)
+    np.testing.assert_allclose([skew[2, 1], skew[0, 2], skew[1, 0]], rates[k], atol=2e-3)
+    np.testing.assert_allclose((rates[k + 1] - rates[k - 1]) / (2 * step), accelerations[k],
+                               atol=2e-2)
+
+
+@given(st.tuples(*[st.floats(-200, 200)] * 3))
+def test_limited_force_is_within_thrust_and_tilt(tau):
+    out = np.zeros(3)
+    limit_force(np.array(tau), 21.6, 1.0, 36.0, 0.35, out)
+    assert 1.0 <= out[2] <= 36.0
+    assert np.linalg.norm(out) <= 36.0 + 1e-9
+    assert np.hypot(out[0], out[1]) <= out[2] * np.tan(0.35) + 1e-9
+
+
+def sets():
+    return load_profile("s500").sets
+
+
+def trio():
+    s = sets()
+    return (PositionController(s["position_controller"]), AttitudeController(
+        s["attitude_controller"]), ArmController(s["arm_controller"]))
+
+
+def fly(position, other, arm, ticks=200):
+    """Feed all three the same made-up motion and return what they did."""
+    rng = np.random.default_rng(4)
+    reference = np.zeros((3, 8))
+    outputs = []
+    for _ in range(ticks):
+        state = 0.05 * rng.standard_normal((3, 8))
+        tau_p = position.update(state, reference, True, DT).copy()
+        tau_q = other.update(state, reference, position.attitude_reference, True, DT).copy()
+        tau_a = arm.update(state, reference, position.attitude_reference, True, DT).copy()
+        outputs.append((tau_p, tau_q, tau_a))
+    return outputs
+
+
+def test_modularity_one_subsystems_gains_leave_the_others_untouched():
+    """The paper's claim: other gains for the arm change neither tau_p, tau_q nor their gains."""
+    position, other, arm = trio()
+    before = fly(position, other, arm)
+    gains = position.adaptation.copy(), other.adaptation.copy()
+    position, other, arm = trio()
+    arm.set_parameters(type(arm.parameters).from_mapping(
+        {**vars(arm.parameters), "lambda_1": [10.0, 10.0], "nu": [3.0, 3.0, 3.0, 3.0]}, 2))
+    after = fly(position, other, arm)
+    for (p1, q1, _), (p2, q2, _) in zip(before, after, strict=True):
+        np.testing.assert_array_equal(p1, p2)
+        np.testing.assert_array_equal(q1, q2)
+    np.testing.assert_array_equal(gains[0], position.adaptation)
+    np.testing.assert_array_equal(gains[1], other.adaptation)
+    assert any(not np.array_equal(a[2], b[2]) for a, b in zip(before, after, strict=True))
+
+
+def test_idle_controllers_give_nothing_and_start_afresh():
+    position, other, arm = trio()
+    fly(position, other, arm)
+    state, reference = np.zeros((3, 8)), np.zeros((3, 8))
+    assert not position.update(state, reference, False, DT).any()
+    assert not other.update(state, reference, position.attitude_reference, False, DT).any()
+    np.testing.assert_array_equal(position.adaptation[:4], position.parameters.k_initial)
+    np.testing.assert_array_equal(other.adaptation[:4], other.parameters.k_initial)
+
+
+def test_gravity_feedforward_carries_the_weight_and_zero_is_the_printed_law():
+    state, reference = np.zeros((3, 8)), np.zeros((3, 8))
+    position, *_ = trio()
+    assert position.update(state, reference, True, DT)[2] == pytest.approx(2.2 * 9.81)
+    printed = PositionController(load_profile("paper_table1").sets["position_controller"])
+    state[0, 2] = -1.0  # a metre too low: far from lifting 21.6 N
+    assert printed.update(state, reference, True, DT)[2] < 8.0

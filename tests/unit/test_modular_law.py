@@ -1,0 +1,186 @@
+"""The modular adaptive law against hand-worked numbers and the properties that the paper proves."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from scipy.linalg import solve_continuous_lyapunov
+
+from uam_control.laws import lyapunov
+from uam_control.laws.modular import ModularLaw
+from uam_control.laws.parameters import LawParameters
+from uam_control.parameters import ParameterError
+
+ONE_AXIS = {
+    "inertia": [2.0],
+    "lambda_1": [4.0],
+    "lambda_2": [3.0],
+    "lambda_table": [1.5],
+    "q_position": [8.0],
+    "q_velocity": [4.0],
+    "k_initial": [0.5, 0.25, 0.125, 0.0625],
+    "zeta_initial": 0.1,
+    "nu": [1.0, 2.0, 4.0, 8.0],
+    "epsilon": 0.2,
+    "varpi": 0.5,
+}
+# by hand: p12 = 8 / (2*4) = 1, p22 = (4 + 2*1) / (2*3) = 1, p11 = 3*1 + 4*1 = 7
+DT = 0.004
+positive = st.floats(1e-3, 1e3)
+
+
+def law(**changes):
+    return ModularLaw(LawParameters.from_mapping(ONE_AXIS | changes, 1))
+
+
+def update(a_law, e, e_dot, acceleration_d=0.0, norms=(0.0, 0.0, 0.0), saturated=False, dt=DT):
+    return float(a_law.update(np.array([e]), np.array([e_dot]), np.array([acceleration_d]),
+                              np.array(norms, dtype=float), saturated, dt)[0])
+
+
+def test_lyapunov_by_hand():
+    p11, p12, p22 = lyapunov.solve(*(np.array([v]) for v in (4.0, 3.0, 8.0, 4.0)))
+    assert (p11[0], p12[0], p22[0]) == (7.0, 1.0, 1.0)
+
+
+@given(lambda_1=positive, lambda_2=positive, q_1=positive, q_2=positive)
+def test_lyapunov_solves_its_equation_and_is_positive_definite(lambda_1, lambda_2, q_1, q_2):
+    p11, p12, p22 = (float(v[0]) for v in lyapunov.solve(
+        *(np.array([v]) for v in (lambda_1, lambda_2, q_1, q_2))))
+    a = np.array([[0.0, 1.0], [-lambda_1, -lambda_2]])
+    p = np.array([[p11, p12], [p12, p22]])
+    scale = np.abs(a).max() * np.abs(p).max() + q_1 + q_2
+    np.testing.assert_allclose(a.T @ p + p @ a, -np.diag([q_1, q_2]), atol=1e-9 * scale)
+    assert p11 > 0.0 and p11 * p22 - p12 * p12 > 0.0
+
+
+def test_lyapunov_agrees_with_scipy_on_the_full_matrix():
+    lambda_1, lambda_2 = np.array([4.0, 9.0, 2.0]), np.array([3.0, 5.0, 0.5])
+    q_1, q_2 = np.array([8.0, 1.0, 700.0]), np.array([4.0, 2.0, 5.0])
+    a = np.block([[np.zeros((3, 3)), np.eye(3)], [-np.diag(lambda_1), -np.diag(lambda_2)]])
+    p = solve_continuous_lyapunov(a.T, -np.diag(np.concatenate([q_1, q_2])))
+    p11, p12, p22 = lyapunov.solve(lambda_1, lambda_2, q_1, q_2)
+    ours = np.block([[np.diag(p11), np.diag(p12)], [np.diag(p12), np.diag(p22)]])
+    np.testing.assert_allclose(ours, p, rtol=1e-9, atol=1e-9)
+
+
+def test_tau_outside_the_boundary_layer_by_hand():
+    # r = 1*0.5 + 1*0.25 = 0.75 >= varpi; rho = .5 + .25*2 + .125*4 + .0625*8 + .1 = 2.1
+    # tau = 2 (1 - 4*0.5 - 3*0.25 - 2.1) = -7.7
+    a_law = law()
+    assert update(a_law, 0.5, 0.25, 1.0, (2.0, 8.0, 0.0)) == pytest.approx(-7.7)
+    assert a_law.adaptation[5] == pytest.approx(2.1)
+    assert a_law.adaptation[6] == pytest.approx(0.75)
+
+
+def test_tau_inside_the_boundary_layer_by_hand():
+    # r = 0.25 < varpi = 0.5: dtau = 2.1 * 0.25 / 0.5 = 1.05; tau = 2 (-4*0.25 - 1.05) = -4.1
+    assert update(law(), 0.25, 0.0, 0.0, (2.0, 8.0, 0.0)) == pytest.approx(-4.1)
+
+
+def test_table_form_by_hand():
+    # Lambda (e_dot + 2 e) = 1.5 (0.25 + 1) = 1.875; dtau = 2.1; tau = 2 (-1.875 - 2.1)
+    value = update(law(lambda_form="table"), 0.5, 0.25, 0.0, (2.0, 8.0, 0.0))
+    assert value == pytest.approx(-7.95)
+
+
+def test_adaptive_laws_by_hand():
+    """K' = r x - nu K integrated exactly over a tick: K e^(-nu dt) + (1 - e^(-nu dt)) r x / nu."""
+    a_law = law()
+    update(a_law, 0.5, 0.25, 0.0, (2.0, 8.0, 0.0))
+    r = 0.75
+    for i, (start, nu, regressor) in enumerate(
+            [(0.5, 1.0, 1.0), (0.25, 2.0, 2.0), (0.125, 4.0, 4.0), (0.0625, 8.0, 8.0)]):
+        keep = math.exp(-nu * DT)
+        expected = start * keep + (1.0 - keep) * r * regressor / nu
+        assert a_law.adaptation[i] == pytest.approx(expected, rel=1e-12)
+    assert a_law.adaptation[4] == 0.1  # zeta rests outside the boundary layer
+
+
+def test_zeta_inside_the_boundary_layer_by_hand():
+    a_law = law()
+    update(a_law, 0.25, 0.0, 0.0, (2.0, 8.0, 0.0))
+    rate = 1.0 + 2.0 * 0.25  # 1 + (rho - zeta) ||r||
+    expected = 0.1 * math.exp(-rate * DT) + (1.0 - math.exp(-rate * DT)) * 0.2 / rate
+    assert a_law.adaptation[4] == pytest.approx(expected, rel=1e-12)
+
+
+@given(e=st.floats(-10, 10), e_dot=st.floats(-10, 10), xi=st.floats(0, 20),
+       acceleration=st.floats(0, 100), dt=st.floats(1e-6, 1e3))
+def test_gains_stay_positive_for_any_step(e, e_dot, xi, acceleration, dt):
+    a_law = law()
+    for _ in range(5):
+        update(a_law, e, e_dot, 0.0, (xi, acceleration, 0.0), dt=dt)
+    assert np.all(a_law.adaptation[:5] > 0.0)
+    assert np.all(np.isfinite(a_law.adaptation))
+
+
+@given(xi=st.floats(0, 10), acceleration=st.floats(0, 50))
+def test_tau_is_continuous_at_the_boundary_layer(xi, acceleration):
+    below, above = (update(law(), 0.5 + step, 0.0, 0.0, (xi, acceleration, 0.0))
+                    for step in (-1e-9, 1e-9))
+    assert below == pytest.approx(above, abs=1e-5)
+
+
+@given(dt=st.floats(1e-4, 10.0), e=st.floats(0.6, 3.0), xi=st.floats(0.0, 5.0))
+def test_one_long_step_equals_two_halves(dt, e, xi):
+    """The exact integration does not depend on the step (outside the boundary layer)."""
+    whole, halves = law(), law()
+    update(whole, e, 0.0, 0.0, (xi, 3.0, 0.0), dt=dt)
+    for _ in range(2):
+        update(halves, e, 0.0, 0.0, (xi, 3.0, 0.0), dt=dt / 2)
+    np.testing.assert_allclose(whole.adaptation[:4], halves.adaptation[:4], rtol=1e-9)
+
+
+def test_ceiling_projects_each_gain():
+    a_law = law(k_ceiling=[0.6, 0.0, 0.2, 0.0])
+    for _ in range(2000):
+        update(a_law, 5.0, 0.0, 0.0, (2.0, 8.0, 0.0))
+    assert a_law.adaptation[0] == 0.6 and a_law.adaptation[2] == 0.2
+    assert a_law.adaptation[1] > 1.0 and a_law.adaptation[3] > 1.0  # 0 means no ceiling
+
+
+def test_saturation_freezes_growth_but_not_decay():
+    a_law = law(freeze_when_saturated=True)
+    update(a_law, 5.0, 0.0, 0.0, (2.0, 8.0, 0.0), saturated=True)
+    np.testing.assert_array_equal(a_law.adaptation[:4], ONE_AXIS["k_initial"])
+    update(a_law, 0.0, 0.0, 0.0, (0.0, 0.0, 0.0), saturated=True)
+    assert np.all(a_law.adaptation[:4] < ONE_AXIS["k_initial"])
+
+
+def test_acceleration_limit_bounds_the_regressor():
+    limited, plain = law(acceleration_limit=1.0), law()
+    update(limited, 1.0, 0.0, 0.0, (0.0, 50.0, 0.0))
+    update(plain, 1.0, 0.0, 0.0, (0.0, 1.0, 0.0))
+    assert limited.adaptation[3] == plain.adaptation[3]
+
+
+def test_freeze_keeps_the_gains_and_reset_restores_them():
+    a_law = law()
+    a_law.frozen = True
+    update(a_law, 5.0, 0.0)
+    np.testing.assert_array_equal(a_law.adaptation[:4], ONE_AXIS["k_initial"])
+    a_law.frozen = False
+    update(a_law, 5.0, 0.0)
+    a_law.reset()
+    np.testing.assert_array_equal(a_law.adaptation[:5], [*ONE_AXIS["k_initial"], 0.1])
+
+
+@pytest.mark.parametrize(("change", "reason"), [
+    ({"inertia": [0.0]}, "inertia.*outside"),
+    ({"lambda_1": [-4.0]}, "lambda_1.*outside"),
+    ({"q_position": [float("nan")]}, "q_position.*outside"),
+    ({"lambda_2": [1.0, 2.0]}, "lambda_2.*1 numbers"),
+    ({"nu": [1.0]}, "nu.*4 numbers"),
+    ({"varpi": "wide"}, "varpi.*not numeric"),
+    ({"lambda_form": "other"}, "lambda_form.*theory, table"),
+    ({"freeze_when_saturated": 1}, "true or false"),
+    ({"gain": 1.0}, "gain: unknown"),
+])
+def test_bad_parameters_are_refused_with_the_reason(change, reason):
+    with pytest.raises(ParameterError, match=reason):
+        LawParameters.from_mapping(ONE_AXIS | change, 1)
