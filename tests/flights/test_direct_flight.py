@@ -1,0 +1,86 @@
+"""Flights in the direct engine, judged by what the plant says."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from uam_control.mission import load_scenario
+from uam_control.profile import load_profile
+from uam_sim_bridge.flight.direct import DirectFlight
+from uam_sim_bridge.flight.metrics import compute
+from uam_sim_bridge.plant import Vehicle
+
+DROP_POINT = [0.789, 0.0]
+
+
+def flight(scenario="pick_and_place", profile="s500", payload=0.2, seed=1, **changes):
+    return DirectFlight(load_scenario(scenario), load_profile(profile),
+                        Vehicle.load().changed(changes), payload, seed)
+
+
+def fly_until(a_flight, time):
+    while a_flight.mission.output.time < time and not a_flight.mission.output.done:
+        a_flight.tick()
+    return a_flight
+
+
+def metrics(a_flight, payload=0.2):
+    return compute(a_flight.recording.series(), {
+        "payload_mass_kg": payload, "drop_point": DROP_POINT,
+        "abort_reason": a_flight.mission.output.abort_reason})
+
+
+@pytest.fixture(scope="module")
+def mission():
+    a_flight = flight()
+    a_flight.run()
+    return a_flight
+
+
+def test_mission_is_completed(mission):
+    result = metrics(mission)
+    assert result["mission_completed"], result["shortfalls"]
+    assert result["payload_lifted"]
+    assert result["payload_place_error_m"] < 0.15
+
+
+def test_errors_are_not_above_the_papers(mission):
+    rms = metrics(mission)["rms"]
+    assert np.all(np.array(rms["position_m"]) <= [0.05, 0.02, 0.09])
+    assert np.all(np.array(rms["attitude_deg"]) <= [3.11, 2.81, 3.01])
+    assert np.all(np.array(rms["arm_deg"]) <= [1.19, 1.16])
+
+
+def test_payload_rises_after_35_s_and_falls_after_70_s(mission):
+    series = mission.recording.series()
+    height = series["payload.z"]
+    at = [height[series.row_at(t)] for t in (34.9, 40.0, 69.9, 71.5)]
+    assert at[0] == pytest.approx(0.777, abs=0.002)  # on its stand
+    assert at[1] > at[0]
+    assert at[2] > 0.5 and at[3] < 0.1
+
+
+def test_same_seed_same_flight_other_seed_other_noise():
+    def end(seed):
+        return fly_until(flight("hover", seed=seed), 4.0).recording.series().values
+
+    first, again, other = end(1), end(1), end(2)
+    np.testing.assert_array_equal(first, again)
+    assert not np.array_equal(first, other)
+
+
+def test_a_magnet_weaker_than_the_payload_lifts_nothing():
+    a_flight = flight()
+    a_flight.plant.model.actuator("magnet").gainprm[0] = 1.0  # N, the payload weighs 1.96 N
+    fly_until(a_flight, 40.0)
+    height = a_flight.recording.series()["payload.z"]
+    assert height.max() < height[0] + 0.005
+
+
+def test_the_printed_law_with_table_1_stays_on_the_ground():
+    """law.md, decision 3: no gravity term and Mbar = I cannot lift 2.2 kg."""
+    a_flight = fly_until(flight(profile="paper_table1"), 5.0)
+    series = a_flight.recording.series()
+    assert np.nanmax(series["truth.z"]) < 0.30
+    assert a_flight.position.parameters.safeguards == []

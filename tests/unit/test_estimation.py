@@ -1,0 +1,88 @@
+"""The estimator on made-up motion with known truth, and its filters against closed forms."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from uam_control.estimation import EstimatorParameters, StateEstimator
+from uam_control.estimation.filters import derivative_step, low_pass_step
+from uam_control.rotations import matrix_from_euler, quaternion_from_euler
+
+DT = 0.004
+
+
+def motion(t):
+    """Position, velocity, acceleration, Euler angles and body rates of a gentle made-up flight."""
+    p = np.array([np.sin(t), 0.5 * np.cos(t), 1.0 + 0.2 * np.sin(2 * t)])
+    v = np.array([np.cos(t), -0.5 * np.sin(t), 0.4 * np.cos(2 * t)])
+    a = np.array([-np.sin(t), -0.5 * np.cos(t), -0.8 * np.sin(2 * t)])
+    euler = np.array([0.1 * np.sin(t), 0.0, 0.0])
+    rates = np.array([0.1 * np.cos(t), 0.0, 0.0])
+    return p, v, a, euler, rates
+
+
+def feed(estimator, until, gyro_bias=0.0, force_bias=0.0, latency=3):
+    """Feed samples up to `until` [s]: IMU and joints at once, motion capture `latency` ticks late."""
+    late = []
+    for k in range(round(until / DT)):
+        t = k * DT
+        p, v, a, euler, rates = motion(t)
+        force = matrix_from_euler(euler).T @ (a + [0, 0, 9.81])
+        if k % 2 == 0:
+            late.append((k + latency, (t, p, quaternion_from_euler(euler))))
+        while late and late[0][0] <= k:
+            estimator.mocap(*late.pop(0)[1])
+        estimator.joints(t, np.array([0.3 * np.sin(t), 0.2]), np.array([0.3 * np.cos(t), 0.0]))
+        estimator.imu(t, rates + gyro_bias, force + force_bias)
+        if not estimator.waiting_for:
+            state = estimator.update()
+    return t, state
+
+
+def test_follows_a_motion_despite_late_motion_capture_and_biases():
+    t, state = feed(StateEstimator(EstimatorParameters()), 12.0, gyro_bias=0.01, force_bias=0.1)
+    p, v, a, euler, rates = motion(t)
+    np.testing.assert_allclose(state[0, :3], p, atol=2e-3)
+    np.testing.assert_allclose(state[1, :3], v, atol=1e-2)
+    np.testing.assert_allclose(state[2, :3], a, atol=0.08)
+    np.testing.assert_allclose(state[0, 3:6], euler, atol=3e-3)
+    np.testing.assert_allclose(state[1, 3:6], rates, atol=3e-3)
+    np.testing.assert_allclose(state[0, 6:], [0.3 * np.sin(t), 0.2], atol=2e-3)
+    np.testing.assert_allclose(state[1, 6:], [0.3 * np.cos(t), 0.0], atol=5e-3)
+    np.testing.assert_allclose(state[2, 6:], [-0.3 * np.sin(t), 0.0], atol=3e-2)
+
+
+def test_says_what_it_waits_for():
+    estimator = StateEstimator(EstimatorParameters())
+    assert estimator.waiting_for == ["imu", "mocap", "joints"]
+    estimator.imu(0.0, np.zeros(3), np.array([0, 0, 9.81]))
+    estimator.joints(0.0, np.zeros(2), np.zeros(2))
+    assert estimator.waiting_for == ["mocap"]
+    estimator.mocap(0.0, np.ones(3), np.array([1.0, 0, 0, 0]))
+    assert estimator.waiting_for == []
+    np.testing.assert_array_equal(estimator.update()[0, :3], np.ones(3))
+
+
+def test_gravity_is_not_an_acceleration():
+    estimator = StateEstimator(EstimatorParameters())
+    for k in range(500):
+        if k % 2 == 0:
+            estimator.mocap(k * DT, np.zeros(3), np.array([1.0, 0, 0, 0]))
+        estimator.joints(k * DT, np.zeros(2), np.zeros(2))
+        estimator.imu(k * DT, np.zeros(3), np.array([0.0, 0.0, 9.81]))
+        state = estimator.update()
+    np.testing.assert_allclose(state, 0.0, atol=1e-9)
+
+
+def test_derivative_of_a_ramp_is_its_slope():
+    state, out = np.zeros((2, 1)), np.zeros(1)
+    for k in range(400):
+        derivative_step(np.array([0.7 * k * DT]), 10.0, DT, state, out)
+    assert out[0] == pytest.approx(0.7, rel=1e-2)  # the input counts as held over a tick
+
+
+def test_low_pass_step_response_by_hand():
+    state = np.zeros(1)
+    low_pass_step(np.ones(1), 1.0 / (2.0 * np.pi), 1.0, state)  # time constant 1 s, one step of 1 s
+    assert state[0] == pytest.approx(1.0 - np.exp(-1.0))

@@ -1,0 +1,190 @@
+"""References, scenario files and the sequence of a flight."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from uam_control.mission import Mission, MissionParameters, ScenarioError, load_scenario
+from uam_control.mission.scenario import CSV_REQUIRED
+from uam_control.mission.trajectory import Move, Moves, Sampled
+
+START = np.array([0.0, 0.0, 0.28, 0.0, 0.0, 0.0, 0.0, np.pi / 2])
+
+
+def value(trajectory, time):
+    reference = np.zeros((3, 8))
+    trajectory.write(time, reference)
+    return reference
+
+
+def assert_smooth(trajectory, end, speed, acceleration, step=1e-3):
+    """Rates are derivatives of values, and everything is bounded."""
+    for time in np.arange(step, end, 0.0317):
+        before, now, after = (value(trajectory, time + d) for d in (-step, 0.0, step))
+        np.testing.assert_allclose((after[0] - before[0]) / (2 * step), now[1], atol=1e-4)
+        np.testing.assert_allclose((after[1] - before[1]) / (2 * step), now[2], atol=2e-2)
+        assert np.all(np.abs(now[1]) <= speed) and np.all(np.abs(now[2]) <= acceleration)
+
+
+@given(st.floats(0.5, 30), st.floats(-2, 2))
+def test_a_move_starts_and_ends_at_rest(length, to):
+    moves = Moves(START, [Move("x", 1.0, 1.0 + length, to)])
+    for time, expected in ((0.5, 0.0), (1.0, 0.0), (1.0 + length, to), (2.0 + length, to)):
+        reference = value(moves, time)
+        assert reference[0, 0] == pytest.approx(expected, abs=1e-12)
+        np.testing.assert_allclose(reference[1:], 0.0, atol=1e-9)
+    assert value(moves, 1.0 + length / 2)[0, 0] == pytest.approx(to / 2)
+
+
+def test_the_papers_scenario():
+    scenario = load_scenario("pick_and_place")
+    trajectory = scenario.trajectory(START)
+    assert_smooth(trajectory, 90.0, speed=1.0, acceleration=2.0)
+    degrees = np.degrees
+    assert value(trajectory, 2.0)[0, 0] == 0.0
+    at_payload = value(trajectory, 30.0)[0]
+    assert at_payload[:2] == pytest.approx([-1.0, 0.0])
+    assert degrees(at_payload[6:]) == pytest.approx([45.0, 45.0])
+    at_drop = value(trajectory, 65.0)[0]
+    assert at_drop[:3] == pytest.approx([1.0, 0.0, 1.0])
+    assert degrees(at_drop[6:]) == pytest.approx([-45.0, -45.0])
+    assert value(trajectory, 82.0)[0, :3] == pytest.approx([0.0, 0.0, 1.0])
+    assert [scenario.magnet_on(t) for t in (34.9, 35.0, 69.9, 70.0)] == [False, True, True, False]
+    assert [scenario.phase(t) for t in (0, 2, 34, 36, 66, 71, 83)] == [
+        "take-off", "approach", "pick", "carry", "drop", "return", "land"]
+
+
+def test_sampled_trajectory_meets_its_samples():
+    times = np.linspace(0.0, 6.0, 61)
+    samples = np.zeros((61, 3, 8))
+    samples[:, 0, 0], samples[:, 1, 0], samples[:, 2, 0] = (
+        np.sin(times), np.cos(times), -np.sin(times))
+    sampled = Sampled(times, samples)
+    for time in (0.05, 1.234, 3.3, 5.99):
+        np.testing.assert_allclose(value(sampled, time)[:, 0],
+                                   [np.sin(time), np.cos(time), -np.sin(time)], atol=2e-3)
+    assert value(sampled, 99.0)[0, 0] == samples[-1, 0, 0] and not value(sampled, 99.0)[1:].any()
+
+
+ROW = "{t},0,0,1,0,0,0,0,0,0,0,0"
+
+
+def csv_file(folder, header=",".join(CSV_REQUIRED), rows=(ROW.format(t=0), ROW.format(t=1))):
+    file = folder / "trajectory.csv"
+    file.write_text("\n".join([header, *rows]) + "\n")
+    return str(file)
+
+
+def test_csv_is_flown_between_take_off_and_landing(tmp_path):
+    rows = [f"{t},{0.1 * t},0,1.2,0,0.1,0,0,0,0,0,0,0.1,1.2" for t in range(5)]
+    scenario = load_scenario(csv_file(tmp_path, ",".join(CSV_REQUIRED) + ",alpha_1,alpha_2", rows))
+    trajectory = scenario.trajectory(START)
+    assert value(trajectory, 0.0)[0] == pytest.approx(START)
+    assert value(trajectory, 3.0)[0, [2, 6, 7]] == pytest.approx([1.2, 0.1, 1.2])
+    assert value(trajectory, 5.0)[0, 0] == pytest.approx(0.2)
+    end = scenario.landing.at + scenario.landing.duration
+    assert value(trajectory, end)[0, 2] < START[2]
+
+
+@pytest.mark.parametrize(("changes", "reason"), [
+    ({"header": "t,px,py"}, "line 1: column pz, yaw.* is missing"),
+    ({"rows": [ROW.format(t=0), ROW.format(t="nan")]}, "line 3 column t: 'nan'"),
+    ({"rows": [ROW.format(t=1), ROW.format(t=0.5)]}, "line 3 column t: time does not increase"),
+    ({"rows": [ROW.format(t=0)]}, "at least two rows"),
+    ({"rows": [ROW.format(t=0), "1,0,0,x,0,0,0,0,0,0,0,0"]}, "line 3 column pz: 'x'"),
+    ({"rows": [ROW.format(t=0), "1,0,0,-1,0,0,0,0,0,0,0,0"]}, "line 3 column pz: below"),
+    ({"header": ",".join(CSV_REQUIRED) + ",alpha_1",
+      "rows": [ROW.format(t=0) + ",0", ROW.format(t=1) + ",0"]}, "without its twin"),
+    ({"header": ",".join(CSV_REQUIRED) + ",alpha_1,alpha_2,alpha_3",
+      "rows": [ROW.format(t=0) + ",0,0,0", ROW.format(t=1) + ",0,0,0"]}, "two joints"),
+])
+def test_bad_csv_is_refused_naming_line_and_column(tmp_path, changes, reason):
+    with pytest.raises(ScenarioError, match=reason):
+        load_scenario(csv_file(tmp_path, **changes))
+
+
+@pytest.mark.parametrize(("text", "reason"), [
+    ("moves: [", "line 1.* not valid YAML"),
+    ("- a list", "a mapping expected"),
+    ("landing: {at: 5, duration: 3}", "'arm_start' is missing"),
+    ("arm_start: {alpha_1_deg: 0, alpha_2_deg: x}\nlanding: {at: 5, duration: 3}",
+     "arm_start.alpha_2_deg' is 'x'"),
+    ("arm_start: {alpha_1_deg: 0, alpha_2_deg: 0}\nlanding: {at: 5, duration: 3}\n"
+     "moves: [{coordinate: roll, from: 0, until: 1, to: 1}]", "coordinate' is 'roll', allowed"),
+    ("arm_start: {alpha_1_deg: 0, alpha_2_deg: 0}\nlanding: {at: 5, duration: 3}\n"
+     "moves: [{coordinate: x, from: 0, until: 2, to: 1}, {coordinate: x, from: 1, until: 3, to: 0}]",
+     "two moves of x overlap at 1"),
+])
+def test_bad_scenario_is_refused(tmp_path, text, reason):
+    file = tmp_path / "bad.yaml"
+    file.write_text(text)
+    with pytest.raises(ScenarioError, match=reason):
+        load_scenario(str(file))
+
+
+def test_unknown_scenario_lists_what_there_is():
+    with pytest.raises(ScenarioError, match="hover.*pick_and_place"):
+        load_scenario("nonsense")
+
+
+class Flight:
+    """Steps a mission with a state that follows the reference perfectly."""
+
+    def __init__(self, name="hover", armed_at=1.0):
+        self.mission = Mission(load_scenario(name), MissionParameters())
+        self.state = np.zeros((3, 8))
+        self.state[0] = START
+        self.armed_at, self.stamp = armed_at, 0.0
+
+    def step(self, follow=True):
+        self.stamp += 0.01
+        armed = self.armed_at if self.stamp >= self.armed_at else None
+        output = self.mission.step(self.stamp, self.state, armed)
+        if follow and output.flying:
+            self.state[:2] = output.reference[:2]
+            self.state[0, 2] = max(self.state[0, 2], START[2])
+            self.state[1, 2] *= self.state[0, 2] > START[2]
+        return output
+
+    def until(self, condition, limit=40.0):
+        while not condition(output := self.step()):
+            assert self.stamp < limit, f"still {output.phase} at {self.stamp}"
+        return output
+
+
+def test_sequence_waits_for_arming_flies_and_lands():
+    flight = Flight()
+    output = flight.until(lambda o: o.flying)
+    assert flight.stamp == pytest.approx(1.5, abs=0.011)  # armed at 1.0 + takeoff_delay
+    assert output.arm and output.time == 0.0
+    assert flight.until(lambda o: o.phase == "hover").reference[0, 2] == pytest.approx(1.0)
+    output = flight.until(lambda o: o.phase == "landed")
+    assert not output.flying and not output.arm and not output.abort_reason
+    assert not flight.step().done
+    flight.until(lambda o: o.done)
+
+
+@pytest.mark.parametrize(("disturb", "reason"), [
+    (lambda s: s.__setitem__((0, 0), 3.0), "position error"),
+    (lambda s: s.__setitem__((0, 3), 1.5), "tilt"),
+    (lambda s: s.__setitem__((0, 1), np.nan), "position error"),
+])
+def test_a_lost_vehicle_ends_the_flight_with_the_reason(disturb, reason):
+    flight = Flight()
+    flight.until(lambda o: o.time > 4.0)
+    disturb(flight.state)
+    output = flight.step(follow=False)
+    assert reason in output.abort_reason
+    assert not output.flying and not output.arm and not output.magnet
+
+
+def test_disarming_in_flight_is_noticed():
+    flight = Flight()
+    flight.until(lambda o: o.time > 4.0)
+    flight.armed_at = np.inf
+    assert "disarmed" in flight.step().abort_reason
+
+

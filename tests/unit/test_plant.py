@@ -1,0 +1,127 @@
+"""Motors, servos, sensors, magnet and payload behave as their data sheets say."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from uam_sim_bridge.plant import Plant, Vehicle
+from uam_sim_bridge.plant.actuators import Rotors, Servos
+from uam_sim_bridge.plant.magnet import pull_fraction
+from uam_sim_bridge.plant.sensors import Delay, Encoders, Mocap
+
+VEHICLE = Vehicle.load()
+NUMBERS = VEHICLE.numbers
+STEP = 0.002
+
+
+def rotors(commands, seconds, start=0.0):
+    group = Rotors(NUMBERS["rotors"], STEP)
+    group.speed[:] = start
+    out = np.zeros(4)
+    for _ in range(round(seconds / STEP)):
+        group.step(np.asarray(commands, dtype=float), out)
+    return group
+
+
+def test_rotor_thrust_curve_and_limit():
+    settled = rotors([1.0, 0.5, 0.0, 7.0], 1.0)
+    full = VEHICLE.thrust_max
+    assert full == pytest.approx(10.34, abs=0.01)
+    np.testing.assert_allclose(
+        settled.thrust, [full, full * (0.3 * 0.25 + 0.7 * 0.5), 0.0, full], rtol=1e-9, atol=1e-9)
+
+
+def test_rotor_lag_is_faster_up_than_down():
+    up = rotors([1.0] * 4, 0.012)
+    assert up.speed[0] == pytest.approx(1100 * (1 - np.exp(-0.012 / 0.0125)), rel=1e-9)
+    down = rotors([0.0] * 4, 0.012, start=1100.0)
+    assert down.speed[0] == pytest.approx(1100 * np.exp(-0.012 / 0.025), rel=1e-9)
+
+
+@given(st.floats(-5, 5), st.floats(-12, 12))
+def test_servo_stays_within_the_torque_speed_line(effort, speed):
+    servos, out = Servos(NUMBERS["servos"], 1), np.zeros(1)
+    servos.step(np.array([effort]), np.array([speed]), out)
+    unit = NUMBERS["servos"]["torque_per_current"] * NUMBERS["servos"]["current_unit"]
+    assert abs(out[0]) <= 3.0 + 1e-12
+    if effort * speed > 0:  # driving: less torque the faster, none at no-load speed
+        assert abs(out[0]) <= 3.0 * max(0.0, 1.0 - abs(speed) / 8.06) + 1e-9
+    if abs(effort) < 1.0 and abs(speed) < 4.0:
+        assert out[0] == pytest.approx(effort, abs=unit / 2 + 1e-12)
+
+
+@given(st.floats(-2, 2), st.floats(-5, 5))
+def test_encoder_reads_whole_counts(angle, velocity):
+    alpha, alpha_dot = Encoders(NUMBERS["sensors"]["joints"]).sample(
+        np.array([angle]), np.array([velocity]))
+    count = 2 * np.pi / 4096
+    assert abs(alpha[0] - angle) <= count / 2 + 1e-12
+    assert alpha[0] / count == pytest.approx(round(alpha[0] / count), abs=1e-6)
+    assert abs(alpha_dot[0] - velocity) <= 0.02398 / 2 + 1e-12
+
+
+def test_mocap_keeps_its_rate_on_average():
+    mocap = Mocap(NUMBERS["sensors"]["mocap"], 1.0, np.random.default_rng(1))
+    exposures = sum(mocap.due(k * 0.004) for k in range(2500))
+    assert exposures == pytest.approx(1200, abs=1)
+
+
+def test_delay_hands_out_what_went_in_some_ticks_ago():
+    line = Delay(3)
+    got = []
+    for tick in range(6):
+        line.put(tick, (tick,))
+        got.append(line.take(tick))
+    assert got == [None, None, None, (0,), (1,), (2,)]
+
+
+def test_sensors_arrive_late_with_the_stamp_of_their_exposure():
+    plant = Plant(VEHICLE, 0.2, seed=3)
+    ages = {"imu": [], "joints": [], "mocap": []}
+    for _ in range(100):
+        samples = plant.sense()
+        for name, age in ages.items():
+            sample = getattr(samples, name)
+            if sample is not None:
+                age.append(plant.time - sample[0])
+        plant.step(np.zeros(4), np.zeros(2), False)
+    assert ages["imu"] == pytest.approx([0.004] * len(ages["imu"]))
+    assert ages["joints"] == pytest.approx([0.004] * len(ages["joints"]))
+    assert ages["mocap"] == pytest.approx([0.012] * len(ages["mocap"]))
+    assert len(ages["imu"]) == 99 and 46 <= len(ages["mocap"]) <= 48
+
+
+def test_same_seed_same_noise_other_seed_other_noise():
+    def readings(seed):
+        plant = Plant(VEHICLE, 0.2, seed=seed)
+        return np.concatenate([np.concatenate(plant.sense().hil[1:]) for _ in range(50)])
+
+    np.testing.assert_array_equal(readings(1), readings(1))
+    assert not np.array_equal(readings(1), readings(2))
+
+
+def test_noise_has_the_stated_size():
+    plant = Plant(VEHICLE, 0.2, seed=5)
+    gyro = np.array([plant.sense().hil[1] for _ in range(4000)])
+    np.testing.assert_allclose(gyro.std(axis=0), NUMBERS["sensors"]["imu"]["gyro_noise"], rtol=0.06)
+
+
+def test_magnet_pull_falls_with_the_gap():
+    upright = np.eye(3).ravel()
+    pulls = [pull_fraction(np.array([0, 0, 0.02 + gap]), np.zeros(3), upright, 0.02, 0.003)
+             for gap in (-0.001, 0.0, 0.003, 0.012)]
+    assert pulls == pytest.approx([1.0, 1.0, 0.25, 0.04])
+
+
+def test_drag_and_wind_push_the_vehicle():
+    still = Plant(VEHICLE, 0.0, seed=1)
+    windy = Plant(VEHICLE.changed({"air.wind": [3.0, 0.0, 0.0]}), 0.0, seed=1)
+    for plant in (still, windy):
+        plant.data.qpos[2] = 20.0
+        for _ in range(100):
+            plant.step(np.zeros(4), np.zeros(2), False)
+    push = windy.truth().state[1, 0] - still.truth().state[1, 0]
+    assert push == pytest.approx(0.15 * 3.0 / 2.2 * 0.4, rel=0.1)
