@@ -274,4 +274,4 @@ def quaternion_of(message) -> np.ndarray:
     norm = math.sqrt(values @ values)
     if not abs(norm - 1.0) < 0.01:
         raise BadMessage(f"orientation has norm {norm:.3g}, 1 expected")
-    return values / norm
+    return values if abs(norm - 1.0) < 1e-12 else values / norm  # rounding errors may stay

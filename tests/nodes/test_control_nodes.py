@@ -108,7 +108,8 @@ def test_every_parameter_says_meaning_unit_and_range(start, probe):
     nu, varpi, form = probe.call(
         DescribeParameters, "/arm_controller/describe_parameters", request
     ).descriptors
-    assert nu.description.endswith("[1/s]") and "each 1e-06 to 10000 1/s" in nu.additional_constraints
+    assert nu.description.endswith("[1/s]")
+    assert nu.additional_constraints == "each 1e-06 to 10000 1/s"
     assert varpi.floating_point_range[0].to_value == pytest.approx(1e6)
     assert form.additional_constraints == "one of: theory, table"
 

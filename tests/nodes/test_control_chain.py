@@ -1,0 +1,182 @@
+"""The control nodes together, each in its process: the same numbers as the maths in one loop."""
+
+import time
+
+import numpy as np
+import pytest
+
+from uam_control.controllers import ArmController, AttitudeController, PositionController
+from uam_control.coordinates import COORDINATES, JOINTS
+from uam_control.estimation import StateEstimator
+from uam_control.mission import Mission, load_scenario
+from uam_control.profile import load_profile
+from uam_msgs_py import topics
+from uam_msgs_py.control import (
+    ATTITUDE_NAMES,
+    read_position_command,
+    read_reference,
+    read_state,
+    read_torque,
+)
+from uam_msgs_py.convert import (
+    ImuWriter,
+    JointStateWriter,
+    PoseWriter,
+    TrajectoryWriter,
+    read_effort,
+    seconds,
+)
+from uam_msgs_py.status import AutopilotState, MissionStatus
+
+PERIOD = 4_000_000  # [ns]
+ARMED_AT = 40 * PERIOD  # take-off follows 0.5 s later
+TICKS = 200
+NODES = ("state_estimator", "mission", "position_controller", "attitude_controller",
+         "arm_controller")
+
+
+def samples():
+    """Sensor samples of a vehicle on the ground that is shaken a little: (stamp, imu, mocap...)."""
+    generator = np.random.default_rng(7)
+    for tick in range(1, TICKS + 1):
+        noise = 0.01 * generator.standard_normal(17)
+        pose = None
+        if tick % 2 == 1:
+            quaternion = np.array([1.0, *noise[3:6]])
+            pose = (noise[:3], quaternion / np.linalg.norm(quaternion))
+        yield (
+            tick * PERIOD,
+            (noise[6:9], np.array([0.0, 0.0, 9.81]) + noise[9:12]),
+            pose,
+            (np.array([0.0, np.pi / 2]) + noise[12:14], noise[14:16]),
+        )
+
+
+def expected():
+    """What the maths gives for `samples`: state, tau_p, tau_q (None while idle), tau_alpha."""
+    sets = load_profile("s500").sets
+    estimator = StateEstimator(sets["state_estimator"])
+    mission = Mission(load_scenario("pick_and_place"), sets["mission"])
+    position = PositionController(sets["position_controller"])
+    attitude = AttitudeController(sets["attitude_controller"])
+    arm = ArmController(sets["arm_controller"])
+    dt = seconds(PERIOD)
+    for stamp, imu, pose, joints in samples():
+        time = seconds(stamp)
+        if pose is not None:
+            estimator.mocap(time, *pose)
+        estimator.joints(time, *joints)
+        estimator.imu(time, *imu)
+        state = estimator.update()
+        output = mission.output
+        flying = output.flying
+        tau_p = position.update(state, output.reference, flying, dt).copy()
+        asked = position.attitude_reference
+        tau_q = attitude.update(state, output.reference, asked, flying, dt).copy()
+        tau_alpha = arm.update(state, output.reference, asked, flying, dt).copy()
+        yield state.copy(), tau_p if flying else None, tau_q if flying else None, tau_alpha
+        armed = seconds(ARMED_AT) if stamp >= ARMED_AT else None
+        mission.step(seconds(stamp + PERIOD), state, armed)
+
+
+class Plant:
+    """Publishes the samples of a tick and collects the answers."""
+
+    def __init__(self, probe):
+        self.probe = probe
+        self.mocap = probe.publisher(topics.MOCAP)
+        self.joints = probe.publisher(topics.JOINTS)
+        self.imu = probe.publisher(topics.IMU)
+        self.autopilot = probe.publisher(topics.AUTOPILOT_STATE)
+        self.states = probe.collect(topics.STATE)
+        self.references = probe.collect(topics.REFERENCE)
+        self.position = probe.collect(topics.POSITION_COMMAND)
+        self.attitude = probe.collect(topics.ATTITUDE_COMMAND)
+        self.effort = probe.collect(topics.ARM_EFFORT)
+        self.magnet = probe.collect(topics.MAGNET)
+        self.status = probe.collect(topics.MISSION_STATUS)
+        self.arming = probe.collect(topics.ARMING)
+        self.adaptation = probe.collect(topics.ATTITUDE_ADAPTATION)
+        self.pose, self.joint, self.imu_writer = PoseWriter(), JointStateWriter(JOINTS), ImuWriter()
+
+    def wait_for_connections(self):
+        """Return when all nodes hear each other."""
+        node = self.probe.node
+        listeners = {topics.STATE.name: 5, topics.REFERENCE.name: 4,
+                     topics.POSITION_COMMAND.name: 3, topics.IMU.name: 1}
+        speakers = (topics.ARM_EFFORT.name, topics.MAGNET.name, topics.ATTITUDE_COMMAND.name)
+        self.probe.until(
+            lambda: all(node.count_subscribers(name) >= n for name, n in listeners.items())
+            and all(node.count_publishers(name) for name in speakers), "discovery")
+        settled = time.monotonic() + 1.0  # seen from here does not mean matched everywhere
+        self.probe.until(lambda: time.monotonic() > settled, "settling")
+
+    def tick(self, number, stamp, imu, pose, joints):
+        """Publish one tick's samples and wait for all answers to it."""
+        if pose is not None:
+            self.mocap.publish(self.pose.fill(stamp, *pose))
+        self.joint.position[:], self.joint.velocity[:] = joints
+        self.joints.publish(self.joint.stamped(stamp))
+        self.imu.publish(self.imu_writer.fill(stamp, *imu))
+        if stamp == ARMED_AT:
+            state = AutopilotState(True, "OFFBOARD", True, ARMED_AT)
+            self.autopilot.publish(state.to_message(stamp))
+        answers = (self.states, self.position, self.attitude, self.effort, self.magnet)
+        self.probe.until(
+            lambda: all(len(messages) > number for messages in answers), f"answers to tick {number}"
+        )
+
+
+def test_the_nodes_compute_what_the_maths_does_bit_for_bit(start, probe):
+    for name in NODES:
+        start(f"uam_control.nodes.{name}")
+    plant = Plant(probe)
+    plant.wait_for_connections()
+    for number, sample in enumerate(samples()):
+        plant.tick(number, *sample)
+
+    airborne = 0
+    for i, (state, tau_p, tau_q, tau_alpha) in enumerate(expected()):
+        stamp = (i + 1) * PERIOD
+        at, published = read_state(plant.states[i])
+        assert at == stamp
+        np.testing.assert_array_equal(published, state)
+        at, command = read_position_command(plant.position[i])
+        assert at == stamp and command.flying == (tau_p is not None)
+        at, torque = read_torque(plant.attitude[i], ATTITUDE_NAMES)
+        assert at == stamp and (torque is None) == (tau_q is None)
+        np.testing.assert_array_equal(read_effort(plant.effort[i], JOINTS), tau_alpha)
+        if tau_p is not None:
+            airborne += 1
+            np.testing.assert_array_equal(command.tau, tau_p)
+            np.testing.assert_array_equal(torque, tau_q)
+    assert airborne == TICKS - (ARMED_AT + 500_000_000) // PERIOD + 1
+
+    stamps = [read_reference(message)[0] for message in plant.references]
+    assert stamps == [(i + 1) * PERIOD for i in range(TICKS + 1)]  # the last is one tick ahead
+    assert len(plant.effort) == len(plant.magnet) == TICKS
+    assert [message.data for message in plant.arming] == [True]
+    phases = [MissionStatus.from_message(message)[1].phase for message in plant.status]
+    assert list(dict.fromkeys(phases)) == ["waiting", "take-off"]
+    assert len(plant.adaptation) == pytest.approx(TICKS * 0.004 * 50, abs=1)
+
+
+def test_a_state_with_nan_is_refused_and_the_next_one_used(start, probe):
+    mission = start("uam_control.nodes.mission")
+    states, magnet = probe.publisher(topics.STATE), probe.collect(topics.MAGNET)
+    writer = TrajectoryWriter(COORDINATES)
+    probe.until(lambda: states.get_subscription_count() == 1, "mission to listen")
+    probe.until(lambda: probe.node.count_publishers(topics.MAGNET.name), "mission to speak")
+    state = np.zeros((3, 8))
+    state[1, 2] = np.nan
+    states.publish(writer.fill(PERIOD, state))
+    mission.until_said("/uam/state: refused: velocities of z is nan")
+    stamp = PERIOD
+
+    def answered():
+        nonlocal stamp
+        stamp += PERIOD
+        states.publish(writer.fill(stamp, np.zeros((3, 8))))
+        return magnet
+
+    probe.until(answered, "a good state to be used")

@@ -1,0 +1,214 @@
+"""Conversion between arrays and messages: round trips, order of quaternions, refusals."""
+
+import math
+
+import numpy as np
+import pytest
+from geometry_msgs.msg import PoseStamped
+from hypothesis import given
+from hypothesis import strategies as st
+from hypothesis.extra.numpy import arrays
+from sensor_msgs.msg import JointState
+from std_msgs.msg import Float64MultiArray
+
+from uam_control.coordinates import COORDINATES, JOINTS
+from uam_msgs_py.control import (
+    ARM_NAMES,
+    ATTITUDE_NAMES,
+    PositionCommandWriter,
+    ReferenceWriter,
+    TorqueWriter,
+    read_position_command,
+    read_reference,
+    read_state,
+    read_torque,
+)
+from uam_msgs_py.convert import (
+    BadMessage,
+    EffortWriter,
+    ImuWriter,
+    JointStateWriter,
+    PoseWriter,
+    SetpointWriter,
+    TrajectoryWriter,
+    read_effort,
+    read_imu,
+    read_joints,
+    read_pose,
+    read_setpoint,
+    set_stamp,
+    stamp_of,
+)
+
+FINITE = st.floats(-1e100, 1e100)
+STATES = arrays(float, (3, 8), elements=FINITE)
+STAMPS = st.integers(0, 2**31 * 1_000_000_000 - 1)
+
+
+@given(STAMPS)
+def test_stamps_keep_every_nanosecond(stamp):
+    header = PoseStamped().header
+    set_stamp(header.stamp, stamp)
+    assert stamp_of(header.stamp) == stamp
+
+
+@given(STATES, STAMPS)
+def test_state_round_trip(state, stamp):
+    message = TrajectoryWriter(COORDINATES).fill(stamp, state)
+    assert message.joint_names == list(COORDINATES)
+    at, read = read_state(message)
+    assert at == stamp
+    np.testing.assert_array_equal(read, state)
+
+
+def test_a_writer_is_filled_again_without_a_new_message():
+    writer = TrajectoryWriter(COORDINATES)
+    first = writer.fill(1, np.ones((3, 8)))
+    second = writer.fill(2, np.full((3, 8), 2.0))
+    assert first is second
+    assert list(second.points[0].velocities) == [2.0] * 8
+
+
+def test_quaternion_order_changes_at_the_edge():
+    message = PoseWriter().fill(5, np.array([1.0, 2.0, 3.0]), np.array([0.5, 0.1, -0.7, 0.5]))
+    o = message.pose.orientation
+    assert (o.x, o.y, o.z, o.w) == (0.1, -0.7, 0.5, 0.5)
+    stamp, position, quaternion = read_pose(message)
+    assert stamp == 5
+    np.testing.assert_array_equal(position, [1.0, 2.0, 3.0])
+    np.testing.assert_allclose(quaternion, [0.5, 0.1, -0.7, 0.5])
+
+
+@given(arrays(float, 4, elements=st.floats(-1, 1)).filter(lambda q: np.linalg.norm(q) > 0.1))
+def test_unit_quaternions_pass_unchanged(raw):
+    quaternion = raw / np.linalg.norm(raw)
+    _, _, read = read_pose(PoseWriter().fill(0, np.zeros(3), quaternion))
+    np.testing.assert_array_equal(read, quaternion)
+
+
+@pytest.mark.parametrize("quaternion", [(0.0, 0.0, 0.0, 0.0), (2.0, 0.0, 0.0, 0.0),
+                                        (math.nan, 0.0, 0.0, 0.0)])
+def test_what_is_no_rotation_is_refused(quaternion):
+    with pytest.raises(BadMessage, match="orientation has norm"):
+        read_pose(PoseWriter().fill(0, np.zeros(3), np.array(quaternion)))
+
+
+def test_another_frame_is_refused():
+    message = PoseWriter().fill(0, np.zeros(3), np.array([1.0, 0.0, 0.0, 0.0]))
+    message.header.frame_id = "camera"
+    with pytest.raises(BadMessage, match="frame 'camera', expected 'world'"):
+        read_pose(message)
+
+
+def test_imu_round_trip_has_no_orientation():
+    gyro, force = np.array([0.1, 0.2, 0.3]), np.array([0.0, 0.5, 9.81])
+    message = ImuWriter().fill(9, gyro, force)
+    assert message.orientation_covariance[0] == -1.0
+    stamp, read_gyro, read_force = read_imu(message)
+    assert stamp == 9
+    np.testing.assert_array_equal(read_gyro, gyro)
+    np.testing.assert_array_equal(read_force, force)
+
+
+def test_imu_with_infinity_is_refused():
+    message = ImuWriter().fill(0, np.array([0.0, math.inf, 0.0]), np.zeros(3))
+    with pytest.raises(BadMessage, match="angular_velocity is"):
+        read_imu(message)
+
+
+def test_joints_are_found_by_name_among_others():
+    message = JointState(name=["rotor", "alpha_2", "alpha_1"], position=[9.0, 2.0, 1.0],
+                         velocity=[8.0, 0.2, 0.1])
+    _, position, velocity = read_joints(message, list(JOINTS))
+    np.testing.assert_array_equal(position, [1.0, 2.0])
+    np.testing.assert_array_equal(velocity, [0.1, 0.2])
+
+
+@pytest.mark.parametrize(
+    ("message", "complaint"),
+    [
+        (JointState(name=["alpha_1"], position=[1.0], velocity=[1.0]),
+         "joint names alpha_1; expected alpha_1, alpha_2"),
+        (JointState(name=["alpha_1", "alpha_2"], position=[1.0, 1.0]), "0 velocities for 2 joints"),
+        (JointState(name=["alpha_1", "alpha_2"], position=[1.0, math.nan], velocity=[0.0, 0.0]),
+         "positions of alpha_2 is nan"),
+    ],
+)
+def test_bad_joint_states_are_refused(message, complaint):
+    with pytest.raises(BadMessage, match=complaint):
+        read_joints(message, list(JOINTS))
+
+
+def test_joint_state_writer():
+    writer = JointStateWriter(JOINTS)
+    writer.position[:], writer.velocity[:], writer.effort[:] = (1.0, 2.0), (0.1, 0.2), (3.0, 4.0)
+    message = writer.stamped(7)
+    assert list(message.effort) == [3.0, 4.0]
+    stamp, position, velocity = read_joints(message, list(JOINTS))
+    assert stamp == 7 and list(position) == [1.0, 2.0] and list(velocity) == [0.1, 0.2]
+
+
+@pytest.mark.parametrize(
+    ("change", "complaint"),
+    [
+        (lambda m: m.joint_names.__setitem__(0, "u"), "joint names u, y"),
+        (lambda m: m.points.clear(), "0 points, 1 expected"),
+        (lambda m: setattr(m.points[0], "velocities", [1.0]), "1 velocities, 8 expected"),
+        (lambda m: m.points[0].accelerations.__setitem__(3, math.nan),
+         "accelerations of roll is nan"),
+    ],
+)
+def test_bad_states_are_refused(change, complaint):
+    message = TrajectoryWriter(COORDINATES).fill(0, np.zeros((3, 8)))
+    change(message)
+    with pytest.raises(BadMessage, match=complaint):
+        read_state(message)
+
+
+@given(STATES, st.booleans())
+def test_reference_names_what_is_controlled(values, flying):
+    message = ReferenceWriter().fill(4, values, flying, 1_500_000_000)
+    assert message.joint_names == list(COORDINATES if flying else JOINTS)
+    assert message.points[0].time_from_start.sec == 1
+    stamp, reference = read_reference(message)
+    assert stamp == 4 and reference.flying == flying
+    np.testing.assert_array_equal(reference.values[:, 6:], values[:, 6:])
+    np.testing.assert_array_equal(reference.values[:, :6], values[:, :6] if flying else 0.0)
+
+
+def test_position_command_round_trip():
+    reference = np.arange(24.0).reshape(3, 8)
+    attitude, tau = -np.arange(9.0).reshape(3, 3), np.array([1.0, 2.0, 22.0])
+    writer = PositionCommandWriter()
+    message = writer.fill(8, reference, attitude, tau)
+    assert list(message.points[0].positions[:3]) == [0.0, 1.0, 2.0]
+    assert list(message.points[0].effort) == [1.0, 2.0, 22.0, 0.0, 0.0, 0.0]
+    stamp, command = read_position_command(message)
+    assert stamp == 8 and command.flying
+    np.testing.assert_array_equal(command.attitude, attitude)
+    np.testing.assert_array_equal(command.tau, tau)
+
+
+def test_idle_commands_are_empty_but_stamped():
+    stamp, command = read_position_command(PositionCommandWriter().idle(12))
+    assert stamp == 12 and not command.flying and not command.tau.any()
+    assert read_torque(TorqueWriter(ATTITUDE_NAMES).idle(12), ATTITUDE_NAMES) == (12, None)
+
+
+def test_torque_round_trip_and_refusal():
+    message = TorqueWriter(ARM_NAMES).fill(3, np.array([0.5, -0.25]))
+    stamp, torque = read_torque(message, ARM_NAMES)
+    assert stamp == 3 and list(torque) == [0.5, -0.25]
+    with pytest.raises(BadMessage, match="expected roll, pitch, yaw"):
+        read_torque(message, ATTITUDE_NAMES)
+
+
+def test_effort_and_setpoint():
+    writer = EffortWriter(2)
+    writer.values[:] = 0.5, -0.5
+    assert list(read_effort(writer.message, JOINTS)) == [0.5, -0.5]
+    with pytest.raises(BadMessage, match="3 efforts, 2 expected"):
+        read_effort(Float64MultiArray(data=[1.0, 2.0, 3.0]), JOINTS)
+    message = SetpointWriter().fill(6, np.array([0.1, 0.2, 0.3]), 0.6)
+    stamp, rates, thrust = read_setpoint(message)
+    assert stamp == 6 and list(rates) == [0.1, 0.2, 0.3] and thrust == 0.6

@@ -1,0 +1,66 @@
+"""Joining messages by stamp."""
+
+import numpy as np
+from hypothesis import given
+from hypothesis import strategies as st
+
+from uam_msgs_py.joins import StampJoin
+
+
+def joined(depth=32):
+    fired = []
+    join = StampJoin(["a", "b", "c"], lambda stamp, *values: fired.append((stamp, values)), depth)
+    return join, fired
+
+
+def test_it_fires_when_the_last_input_of_a_stamp_arrives():
+    join, fired = joined()
+    join.add("c", 4, "c4")
+    join.add("a", 4, "a4")
+    assert fired == []
+    join.add("b", 4, "b4")
+    assert fired == [(4, ("a4", "b4", "c4"))]
+
+
+def test_arrays_are_values_like_any_other():
+    join, fired = joined()
+    for name in "abc":
+        join.add(name, 4, np.zeros(3))
+    assert len(fired) == 1
+
+
+@given(st.permutations([(name, stamp) for stamp in (4, 8, 12) for name in "abc"]))
+def test_every_order_of_arrival_fires_in_order_and_never_mixes(order):
+    join, fired = joined()
+    for name, stamp in order:
+        join.add(name, stamp, (name, stamp))
+    stamps = [stamp for stamp, _ in fired]
+    assert stamps == sorted(set(stamps)) and stamps[-1] == 12
+    for stamp, values in fired:
+        assert values == tuple((name, stamp) for name in "abc")
+
+
+def test_an_incomplete_tick_is_dropped_and_counted():
+    join, fired = joined()
+    join.add("a", 4, 1)
+    for name in "abc":
+        join.add(name, 8, 1)
+    join.add("b", 4, 1)  # too late
+    assert [stamp for stamp, _ in fired] == [8]
+    assert join.dropped == 2 and join.fired == 1
+
+
+def test_memory_is_bounded():
+    join, fired = joined(depth=4)
+    for stamp in range(100):
+        join.add("a", stamp, 1)
+    assert join.dropped == 96
+    for name in "bc":
+        join.add(name, 99, 1)
+    assert [stamp for stamp, _ in fired] == [99]
+
+
+def test_it_says_what_never_came():
+    join, _ = joined()
+    join.add("b", 4, 1)
+    assert join.waiting_for == ["a", "c"]

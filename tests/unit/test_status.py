@@ -1,0 +1,41 @@
+"""States as key-value pairs of a diagnostic message."""
+
+import pytest
+
+from uam_msgs_py.convert import BadMessage
+from uam_msgs_py.status import ERROR, OK, STALE, WARN, AutopilotState, MissionStatus
+
+
+@pytest.mark.parametrize(
+    ("state", "level"),
+    [
+        (AutopilotState(), STALE),
+        (AutopilotState(True, "OFFBOARD", True, 12_000_000_000), OK),
+        (AutopilotState(True, "AUTO.LAND", True, 5, "setpoint lost"), WARN),
+    ],
+)
+def test_autopilot_state_round_trip(state, level):
+    message = state.to_message(7)
+    assert message.status[0].level == level
+    assert AutopilotState.from_message(message) == (7, state)
+
+
+def test_mission_status_round_trip():
+    status = MissionStatus("carry", 41.25, 0.01, 0.02, 0.03, False, "")
+    message = status.to_message(3_000_000_001)
+    assert message.status[0].level == OK
+    assert MissionStatus.from_message(message) == (3_000_000_001, status)
+    given_up = MissionStatus(phase="aborted", done=True, abort_reason="tilt").to_message(1)
+    assert given_up.status[0].level == ERROR and given_up.status[0].message == "tilt"
+
+
+def test_what_is_missing_or_strange_is_refused():
+    message = MissionStatus().to_message(0)
+    with pytest.raises(BadMessage, match="no status 'autopilot'"):
+        AutopilotState.from_message(message)
+    message.status[0].values[1].value = "soon"
+    with pytest.raises(BadMessage, match="'time' is 'soon'"):
+        MissionStatus.from_message(message)
+    del message.status[0].values[1]
+    with pytest.raises(BadMessage, match="'time' is missing"):
+        MissionStatus.from_message(message)
