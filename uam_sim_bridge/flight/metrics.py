@@ -84,7 +84,7 @@ def compute(
     simulated = _span(series.time)
     metrics = {key: info.get(key) for key in PASSED_ON}
     metrics |= {
-        "duration_s": duration,
+        "duration_s": round(duration, 6),
         "wall_s": wall,
         "real_time_factor": simulated / wall if wall else None,
         "mission_completed": not shortfalls,

@@ -1,0 +1,189 @@
+"""Snapshots and video of a flight, rendered without a screen.
+
+    python -m uam_sim_bridge.report.rendering DIR [--no-video]
+
+renders the flight in the result folder DIR; `render` does so in a child process, because the
+choice of OpenGL has to be made before MuJoCo is imported and a broken driver may take its process
+with it. The child writes its progress to standard output, one JSON line per step.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import os
+import subprocess
+import sys
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from uam_sim_bridge.flight import timeseries
+from uam_sim_bridge.flight.atomic import replacing
+from uam_sim_bridge.flight.timeseries import Series
+
+SNAPSHOT_SIZE = (1280, 720)
+CAPTION_PART = 0.11  # of the height, to be read in the strip
+SNAPSHOTS, STRIP, VIDEO = "snapshots", "snapshots.png", "flight.mp4"
+PLATFORMS = ("egl", "osmesa")
+NO_RENDERER = 3  # exit status of the child
+HOW_TO_GET_ONE = (
+    "no offscreen renderer found, so no pictures of the flight; "
+    "on Debian or Ubuntu: sudo apt install libegl1 libgl1-mesa-dri"
+)
+
+
+@dataclass(frozen=True)
+class Rendered:
+    """What there is now; `problem` is a line for the user, empty when all went well."""
+
+    snapshots: tuple[Path, ...] = ()
+    strip: Path | None = None
+    video: Path | None = None
+    problem: str = ""
+
+
+def render(
+    directory: Path,
+    video: bool = True,
+    progress: Callable[[str], None] = lambda text: None,
+) -> Rendered:
+    """Render the flight in `directory` to `directory`/figures; never raises for want of OpenGL."""
+    environment = os.environ | {"MUJOCO_GL": os.environ.get("MUJOCO_GL") or PLATFORMS[0]}
+    command = [sys.executable, "-m", "uam_sim_bridge.report.rendering", str(directory)]
+    if not video:
+        command.append("--no-video")
+    child = subprocess.Popen(
+        command,
+        env=environment,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        errors="replace",
+    )
+    try:
+        for line in child.stdout:
+            if line.startswith("{"):
+                progress(json.loads(line)["progress"])
+        errors = child.stderr.read().strip()
+        status = child.wait()
+    finally:
+        if child.poll() is None:
+            child.terminate()
+            child.wait()
+    found = existing(directory)
+    if status == 0:
+        return found
+    last = errors.splitlines()[-1] if errors else f"exit status {status}"
+    problem = HOW_TO_GET_ONE if status == NO_RENDERER else f"rendering failed: {last}"
+    return Rendered(found.snapshots, found.strip, found.video, problem)
+
+
+def existing(directory: Path) -> Rendered:
+    """The pictures that `directory` has."""
+    figures = directory / "figures"
+    strip, video = figures / STRIP, figures / VIDEO
+    return Rendered(
+        tuple(sorted((figures / SNAPSHOTS).glob("*.png"))),
+        strip if strip.exists() else None,
+        video if video.exists() else None,
+    )
+
+
+def snapshot_times(series: Series) -> list[tuple[float, str]]:
+    """(mission time [s], caption): the scenario's, of those reached; else six over the flight."""
+    flown = series.time[series.flown]
+    if not len(flown):
+        return [(float(series.time[-1]), "on the ground")]
+    wanted = [(float(t), str(c)) for t, c in series.info.get("snapshots") or []]
+    reached = [(t, c) for t, c in wanted if t <= flown[-1]]
+    if reached:
+        return reached
+    times = np.linspace(flown[0], flown[-1], 8)[1:-1]
+    return [
+        (float(t), f"({letter}) {series.phase_names[series.phases[series.row_at(t)]]}")
+        for letter, t in zip("abcdef", times, strict=True)
+    ]
+
+
+def render_here(directory: Path, video: bool, report: Callable[[str], None]) -> None:
+    """Render in this process, which must have been started with MUJOCO_GL set."""
+    series = timeseries.read(directory / "timeseries.parquet")
+    report("opening the renderer")
+    figures = directory / "figures"
+    _snapshots(series, figures, report)
+    if video:
+        _video(series, figures / VIDEO, report)
+
+
+def _snapshots(series: Series, figures: Path, report: Callable[[str], None]) -> None:
+    from uam_sim_bridge.report import captions
+    from uam_sim_bridge.report.scene import Scene
+
+    folder = figures / SNAPSHOTS
+    folder.mkdir(parents=True, exist_ok=True)
+    scene = _opened(lambda: Scene(series, *SNAPSHOT_SIZE))
+    wanted = snapshot_times(series)
+    pictures = []
+    for number, (time, caption) in enumerate(wanted):
+        report(f"snapshot {number + 1} of {len(wanted)}")
+        pixels = scene.picture(series.row_at(time))
+        pictures.append(captions.labelled(pixels, caption, f"t = {time:.1f} s", CAPTION_PART))
+        with replacing(folder / f"{'abcdefghijklmnopqrstuvwxyz'[number % 26]}.png") as temporary:
+            pictures[-1].save(temporary)
+    scene.close()
+    with replacing(figures / STRIP) as temporary:
+        captions.strip(pictures).save(temporary)
+
+
+def _video(series: Series, path: Path, report: Callable[[str], None]) -> None:
+    from uam_sim_bridge.report import video
+    from uam_sim_bridge.report.scene import Scene
+
+    scene = _opened(lambda: Scene(series, *video.SIZE))
+
+    def say(done: int, of: int) -> None:
+        if done % 10 == 0 or done == of:
+            report(f"video {100 * done // of} %")
+
+    video.write(series, scene.picture, path, say)
+    scene.close()
+
+
+class NoRenderer(RuntimeError):
+    """There is no OpenGL that draws without a screen."""
+
+
+def _opened(make):
+    try:
+        return make()
+    except Exception as error:  # MuJoCo, PyOpenGL and glfw each have their own
+        raise NoRenderer(str(error)) from error
+
+
+def main(arguments: list[str] | None = None) -> int:
+    """Command line, see the module's text."""
+    parser = argparse.ArgumentParser(prog="python -m uam_sim_bridge.report.rendering")
+    parser.add_argument("directory", type=Path)
+    parser.add_argument("--no-video", action="store_true")
+    options = parser.parse_args(arguments)
+    os.environ.setdefault("MUJOCO_GL", PLATFORMS[0])
+
+    def report(text: str) -> None:
+        print(json.dumps({"progress": text}), flush=True)
+
+    try:
+        render_here(options.directory, not options.no_video, report)
+    except NoRenderer as error:
+        print(error, file=sys.stderr)
+        return NO_RENDERER
+    except timeseries.UnreadableFlight as error:
+        print(error, file=sys.stderr)
+        return 2
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
