@@ -1,0 +1,47 @@
+"""Everything of the report in one call; each step can also be had alone.
+
+| step | function | writes |
+|---|---|---|
+| figures | `figures.draw` | figures/*.png, *.svg |
+| pictures | `rendering.render` | figures/snapshots/*.png, snapshots.png, flight.mp4 |
+| page | `page.write_page` | report.html |
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+from uam_sim_bridge.flight import timeseries
+from uam_sim_bridge.report import figures, page, rendering
+
+
+@dataclass(frozen=True)
+class Report:
+    """Where the page is, and a line on what could not be made (empty when all was)."""
+
+    page: Path
+    problem: str
+
+
+def build_report(
+    directory: Path,
+    progress: Callable[[str], None] = lambda text: None,
+    video: bool = True,
+    pictures: bool = True,
+) -> Report:
+    """Make the report of the flight in a result folder.
+
+    Needs timeseries.parquet and metrics.json; shows info.json, parameters.yaml and versions.json
+    where they are. progress: called with a short text as each step begins. Raises
+    timeseries.UnreadableFlight, never for want of a renderer.
+    """
+    directory = Path(directory)
+    series = timeseries.read(directory / "timeseries.parquet")
+    label = series.info.get("controller") or directory.name
+    figures.draw([figures.Flight(label, series)], directory / "figures", progress)
+    rendered = rendering.render(directory, video, progress) if pictures else None
+    progress("page")
+    written = page.write_page(directory, rendered)
+    return Report(written, rendered.problem if rendered else "")

@@ -1,0 +1,90 @@
+"""report.html: one page that shows the whole flight, without any request to the network."""
+
+from __future__ import annotations
+
+import base64
+import json
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import jinja2
+
+from uam_sim_bridge.flight.atomic import write_text
+from uam_sim_bridge.report import outcome, parameters
+from uam_sim_bridge.report.figures import FIGURES
+from uam_sim_bridge.report.rendering import Rendered, existing
+
+MEDIA = {".png": "image/png", ".mp4": "video/mp4"}
+PAPER_SCENARIO = "pick_and_place"
+FACTS = (
+    ("controller", "controller"),
+    ("profile", "profile"),
+    ("scenario", "scenario"),
+    ("engine", "engine"),
+    ("clock", "clock"),
+    ("autopilot", "autopilot"),
+    ("seed", "seed"),
+    ("payload_mass_kg", "payload mass [kg]"),
+)
+
+
+def write_page(directory: Path, rendered: Rendered | None = None) -> Path:
+    """Write `directory`/report.html from what the result folder has, and return its path.
+
+    rendered: what the renderer said, if it ran; else the pictures that are there are shown.
+    """
+    metrics = _json(directory / "metrics.json")
+    info = _json(directory / "info.json")
+    rendered = rendered or existing(directory)
+    try:
+        comparison, no_parameters = parameters.compare(directory / "parameters.yaml"), ""
+    except parameters.ProfileError as error:
+        comparison, no_parameters = None, str(error)
+    environment = jinja2.Environment(
+        loader=jinja2.PackageLoader("uam_sim_bridge.report", "."),
+        autoescape=True,
+        trim_blocks=True,
+        lstrip_blocks=True,
+        undefined=jinja2.StrictUndefined,
+    )
+    text = environment.get_template("page.html.j2").render(
+        metrics=metrics,
+        info=info,
+        verdict=outcome.verdict(metrics),
+        payload=outcome.payload_story(metrics),
+        landing=outcome.landing_story(metrics),
+        errors=outcome.error_rows(metrics),
+        facts=[(label, metrics.get(key)) for key, label in FACTS],
+        papers_mission=metrics.get("scenario") == PAPER_SCENARIO,
+        strip=_embedded(rendered.strip),
+        video=_embedded(rendered.video),
+        problem=rendered.problem,
+        figures=_figures(directory / "figures"),
+        comparison=comparison,
+        no_parameters=no_parameters,
+        versions=_json(directory / "versions.json"),
+        command=info.get("command"),
+    )
+    write_text(directory / "report.html", text)
+    return directory / "report.html"
+
+
+def _figures(folder: Path) -> list[tuple[str, str, str]]:
+    """(name, caption, data URI) of the figures that were drawn."""
+    return [
+        (name, caption, _embedded(folder / f"{name}.png"))
+        for name, (_, caption) in FIGURES.items()
+        if (folder / f"{name}.png").exists()
+    ]
+
+
+def _embedded(file: Path | None) -> str | None:
+    """The file as a data URI."""
+    if file is None:
+        return None
+    return f"data:{MEDIA[file.suffix]};base64,{base64.b64encode(file.read_bytes()).decode()}"
+
+
+def _json(file: Path) -> Mapping[str, Any]:
+    return json.loads(file.read_text()) if file.exists() else {}
