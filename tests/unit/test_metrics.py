@@ -72,6 +72,7 @@ def test_a_completed_mission():
     assert result["abort_reason"] is None
     assert result["payload_lifted"] is True
     assert result["payload_lift_height_m"] == pytest.approx(0.3)
+    assert result["payload_lifted_at_s"] == 1.0
     assert result["payload_place_error_m"] == pytest.approx(0.05)
     assert result["landing_error_m"] == pytest.approx(0.05)
     assert {key: result[key] for key in metrics.PASSED_ON} == {

@@ -50,6 +50,7 @@ class Payload:
     """What happened to the payload; None where there was none or it cannot be told."""
 
     lifted: bool | None = None
+    lifted_at_s: float | None = None
     lift_height_m: float | None = None
     place_error_m: float | None = None
     at_rest: bool | None = None
@@ -91,6 +92,7 @@ def compute(
         "shortfalls": shortfalls,
         "abort_reason": info.get("abort_reason") or None,
         "payload_lifted": payload.lifted,
+        "payload_lifted_at_s": payload.lifted_at_s,
         "payload_lift_height_m": payload.lift_height_m,
         "payload_place_error_m": payload.place_error_m,
         "landing_error_m": landing,
@@ -141,16 +143,18 @@ def payload_facts(
     if not mass or not spans or np.isnan(place).all():
         return Payload()
     start, end = series.row_at(spans[0][0]), series.row_at(spans[-1][1])
-    rise = float(np.max(place[start : end + 1, 2]) - place[start, 2])
+    height = place[start : end + 1, 2] - place[start, 2]
+    rise = float(np.max(height))
     lifted = rise >= criteria.lift_m
+    when = float(series.time[start + int(np.argmax(height >= criteria.lift_m))]) if lifted else None
     if drop_point is None:
-        return Payload(lifted, rise)
+        return Payload(lifted, when, rise)
     distance = float(np.hypot(*(place[-1, :2] - np.asarray(drop_point, dtype=float))))
     # Half a second of travel, so that one bounce is not taken for rest.
     before = series.row_at(series.time[-1] - 0.5)
     elapsed = series.time[-1] - series.time[before]
     speed = float(np.linalg.norm(place[-1] - place[before])) / elapsed if elapsed > 0.0 else 0.0
-    return Payload(lifted, rise, distance, speed <= criteria.rest_m_s)
+    return Payload(lifted, when, rise, distance, speed <= criteria.rest_m_s)
 
 
 def landing_error(series: Series, point: Sequence[float]) -> float | None:

@@ -11,6 +11,7 @@ from pathlib import Path
 import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
+from matplotlib.ticker import NullFormatter
 
 from uam_sim_bridge.flight import metrics
 from uam_sim_bridge.flight.atomic import replacing
@@ -99,6 +100,9 @@ def adaptation(flights: Sequence[Flight]) -> Figure | None:
         )
     for axis in axes.flat:
         axis.set_yscale("log")
+        low, high = axis.get_ylim()
+        axis.set_ylim(10.0 ** np.floor(np.log10(low)), 10.0 ** np.ceil(np.log10(high)))
+        axis.yaxis.set_minor_formatter(NullFormatter())
     for axis, label in zip(axes[:, 0], ("$K_0 \\ldots K_3$", "ζ", "ρ"), strict=True):
         axis.set_ylabel(label)
     axes[0, 2].legend(

@@ -120,11 +120,10 @@ def render_here(directory: Path, video: bool, report: Callable[[str], None]) -> 
 
 def _snapshots(series: Series, figures: Path, report: Callable[[str], None]) -> None:
     from uam_sim_bridge.report import captions
-    from uam_sim_bridge.report.scene import Scene
 
     folder = figures / SNAPSHOTS
     folder.mkdir(parents=True, exist_ok=True)
-    scene = _opened(lambda: Scene(series, *SNAPSHOT_SIZE))
+    scene = _scene(series, SNAPSHOT_SIZE)
     wanted = snapshot_times(series)
     pictures = []
     for number, (time, caption) in enumerate(wanted):
@@ -140,9 +139,8 @@ def _snapshots(series: Series, figures: Path, report: Callable[[str], None]) -> 
 
 def _video(series: Series, path: Path, report: Callable[[str], None]) -> None:
     from uam_sim_bridge.report import video
-    from uam_sim_bridge.report.scene import Scene
 
-    scene = _opened(lambda: Scene(series, *video.SIZE))
+    scene = _scene(series, video.SIZE)
 
     def say(done: int, of: int) -> None:
         if done % 10 == 0 or done == of:
@@ -156,11 +154,14 @@ class NoRenderer(RuntimeError):
     """There is no OpenGL that draws without a screen."""
 
 
-def _opened(make):
+def _scene(series: Series, size: tuple[int, int]):
     try:
-        return make()
-    except Exception as error:  # MuJoCo, PyOpenGL and glfw each have their own
-        raise NoRenderer(str(error)) from error
+        # Already the import of MuJoCo fails where the library that MUJOCO_GL names is missing.
+        from uam_sim_bridge.report.scene import Scene
+
+        return Scene(series, *size)
+    except Exception as error:  # MuJoCo, PyOpenGL and GLFW each have their own
+        raise NoRenderer(f"{type(error).__name__}: {error}") from error
 
 
 def main(arguments: list[str] | None = None) -> int:

@@ -28,7 +28,7 @@ class Scene:
         """width, height: pixels. Raises what `mujoco.Renderer` raises where there is no OpenGL."""
         self.poses = Poses(series)
         self.series = series
-        self.height = CAMERA["height"]
+        self._thickness = height / 480  # lines are measured in pixels
         _light(self.poses.model)
         vis = self.poses.model.vis
         vis.global_.offwidth, vis.global_.offheight = width, height
@@ -49,7 +49,7 @@ class Scene:
         # Positions alone are not enough to draw: cameras and lights follow from this.
         mujoco.mj_camlight(self.poses.model, self.poses.data)
         x, y = self._look_at[row]
-        self._camera.lookat[:] = x, y, self.height
+        self._camera.lookat[:] = x, y, CAMERA["height"]
         self._renderer.update_scene(self.poses.data, self._camera)
         self._draw_path("reference.", self._path_rows, REFERENCE_RGBA, 1.5, dashed=True)
         flown = self._path_rows[self._path_rows <= row]
@@ -68,7 +68,7 @@ class Scene:
             mujoco.mjv_initGeom(
                 geom, line, np.zeros(3), np.zeros(3), np.zeros(9), np.array(rgba, np.float32)
             )
-            mujoco.mjv_connector(geom, line, pixels, points[i], points[i + 1])
+            mujoco.mjv_connector(geom, line, self._thickness * pixels, points[i], points[i + 1])
             geom.category = mujoco.mjtCatBit.mjCAT_DECOR  # no shadow
             scene.ngeom += 1
 

@@ -31,7 +31,7 @@ SETTINGS = {
     "axes.spines.right": False,
     "axes.grid": True,
     "axes.axisbelow": True,
-    "axes.formatter.limits": (-3, 4),
+    "axes.formatter.limits": (-5, 6),
     "grid.color": GRID,
     "grid.linewidth": 0.7,
     "xtick.color": MUTED,
