@@ -32,6 +32,7 @@ from uam_sim_bridge.autopilot.rate_control import (
 )
 from uam_sim_bridge.mavlink.thrust_curve import inverse_curve
 
+FARTHEST_VISION = 1e5  # m
 SHORTEST_STEP, LONGEST_STEP = 0.000125, 0.02  # s, bounds of the time step (PX4)
 
 
@@ -123,9 +124,10 @@ class Autopilot:
         return True
 
     def vision(self, time: float, position: np.ndarray, quaternion: np.ndarray) -> bool:
-        """Take an external pose (NED [m], FRD → NED [w x y z]); False: refused as not finite."""
+        """Take an external pose (NED [m], FRD → NED [w x y z]); False: refused as nonsense."""
         norm = float(np.linalg.norm(quaternion))
-        if not (np.all(np.isfinite(position)) and math.isfinite(norm) and norm > 0.5):
+        near = float(np.abs(position).max()) < FARTHEST_VISION  # false for NaN
+        if not (near and 0.5 < norm < 2.0):
             return False
         self.estimator.vision(time, position, quaternion / norm)
         return True

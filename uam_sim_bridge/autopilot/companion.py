@@ -1,0 +1,175 @@
+"""The autopilot's side of the link to a companion computer: bytes in, messages out, no sockets."""
+
+from __future__ import annotations
+
+import math
+import struct
+
+import numpy as np
+
+from uam_control.parameters import ParameterError
+from uam_control.rotations import matrix_from_quaternion, quaternion_from_euler, rotate
+from uam_sim_bridge.autopilot.core import Autopilot
+from uam_sim_bridge.autopilot.modes import Command, Result, Severity
+from uam_sim_bridge.autopilot.params import DEFINITIONS
+from uam_sim_bridge.autopilot.telemetry import Telemetry
+from uam_sim_bridge.mavlink.wire import Message, clean_text, mavlink2, text_chunks
+
+ATTITUDE_IGNORED = 128  # the only type_mask of SET_ATTITUDE_TARGET that is flown
+_PARAMETERS_PER_TICK = 10
+_REAL, _INTEGER = mavlink2.MAV_PARAM_TYPE_REAL32, mavlink2.MAV_PARAM_TYPE_INT32
+_POSE_FRAMES = (mavlink2.MAV_FRAME_LOCAL_NED, mavlink2.MAV_FRAME_LOCAL_FRD)
+
+
+class Companion:
+    """Handles what a companion computer sends; `out` collects the answers for the transport."""
+
+    def __init__(self, autopilot: Autopilot) -> None:
+        self._autopilot = autopilot
+        self._system = int(autopilot.parameters["MAV_SYS_ID"])
+        self.telemetry = Telemetry(autopilot)
+        self.out: list[Message] = []
+        self._listing: list[str] = []
+        self._texts = 0
+        self._said: set[str] = set()
+        self._handlers = {
+            "SET_ATTITUDE_TARGET": self._attitude_target,
+            "VISION_POSITION_ESTIMATE": self._vision_position,
+            "ODOMETRY": self._odometry,
+            "COMMAND_LONG": self._command_long,
+            "COMMAND_INT": self._command_int,
+            "SET_MODE": self._set_mode,
+            "PARAM_REQUEST_READ": self._parameter_read,
+            "PARAM_REQUEST_LIST": self._parameter_list,
+            "PARAM_SET": self._parameter_set,
+            "TIMESYNC": self._timesync,
+        }
+
+    def handle(self, time: float, message: Message) -> None:
+        """Take one valid message that arrived at `time` [s]; others than ours are ignored."""
+        handler = self._handlers.get(message.get_type())
+        if handler is None or getattr(message, "target_system", 0) not in (0, self._system):
+            return
+        handler(time, message)
+
+    def tick(self, time: float) -> list[Message]:
+        """Return everything to be sent at `time`: answers, texts, parameters, telemetry."""
+        for severity, text in self._autopilot.commander.take_texts():
+            self._texts += 1
+            self.out += text_chunks(severity, text, self._texts)
+        for name in self._listing[:_PARAMETERS_PER_TICK]:
+            self._send_parameter(name)
+        del self._listing[:_PARAMETERS_PER_TICK]
+        self.out += self.telemetry.due(time)
+        out, self.out = self.out, []
+        return out
+
+    def _say_once(self, text: str) -> None:
+        if text not in self._said:
+            self._said.add(text)
+            self._autopilot.commander.texts.append((Severity.WARNING, text))
+
+    def _attitude_target(self, time: float, m: Message) -> None:
+        if m.type_mask != ATTITUDE_IGNORED:
+            self._say_once(f"setpoint refused: type_mask {m.type_mask}, only 128 (body rates)")
+            return
+        rates = (m.body_roll_rate, m.body_pitch_rate, m.body_yaw_rate)
+        if not self._autopilot.setpoint(time, rates, m.thrust):
+            self._say_once("setpoint refused: not finite")
+
+    def _vision_position(self, time: float, m: Message) -> None:
+        euler = np.array([m.roll, m.pitch, m.yaw])
+        position = np.array([m.x, m.y, m.z])
+        if np.all(np.isfinite(euler)):
+            self._autopilot.vision(time, position, quaternion_from_euler(euler))
+
+    def _odometry(self, time: float, m: Message) -> None:
+        position, quaternion = np.array([m.x, m.y, m.z]), np.array(m.q, dtype=float)
+        if m.frame_id not in _POSE_FRAMES:
+            self._say_once(f"odometry refused: frame {m.frame_id}, local NED or FRD expected")
+        else:
+            self._autopilot.vision(time, position, quaternion)
+
+    def _command_long(self, time: float, m: Message) -> None:
+        parameters = (m.param1, m.param2, m.param3, m.param4, m.param5, m.param6, m.param7)
+        self._run(time, m, parameters)
+
+    def _command_int(self, time: float, m: Message) -> None:
+        parameters = (m.param1, m.param2, m.param3, m.param4, float(m.x), float(m.y), m.z)
+        self._run(time, m, parameters)
+
+    def _run(self, time: float, m: Message, parameters: tuple[float, ...]) -> None:
+        first, second = parameters[0], parameters[1]
+        number = int(first) if math.isfinite(first) else -1
+        if m.command == Command.SET_MESSAGE_INTERVAL:
+            known = self.telemetry.set_interval(number, second)
+            result = Result.ACCEPTED if known else Result.DENIED
+        elif m.command == Command.REQUEST_MESSAGE:
+            message = self.telemetry.build(number, time)
+            result = Result.UNSUPPORTED if message is None else Result.ACCEPTED
+            if message is not None:
+                self.out.append(message)
+        else:
+            result = self._autopilot.command(time, m.command, parameters)
+        self.out.append(mavlink2.MAVLink_command_ack_message(
+            m.command, result, 0, 0, m.get_srcSystem(), m.get_srcComponent()))
+
+    def _set_mode(self, time: float, m: Message) -> None:
+        main, sub = m.custom_mode >> 16 & 0xFF, m.custom_mode >> 24 & 0xFF
+        self._autopilot.command(
+            time, Command.DO_SET_MODE, (float(m.base_mode), float(main), float(sub), 0, 0, 0, 0))
+
+    def _parameter_read(self, time: float, m: Message) -> None:
+        names = self._autopilot.parameters.names
+        if 0 <= m.param_index < len(names):
+            self._send_parameter(names[m.param_index])
+        elif clean_text(m.param_id) in DEFINITIONS:
+            self._send_parameter(clean_text(m.param_id))
+
+    def _parameter_list(self, time: float, m: Message) -> None:
+        self._listing = list(self._autopilot.parameters.names)
+
+    def _parameter_set(self, time: float, m: Message) -> None:
+        name = clean_text(m.param_id)
+        definition = DEFINITIONS.get(name)
+        value = m.param_value
+        if definition is not None and definition.integer:
+            # PX4 sends integers as the bytes of an int32 in the float's place
+            value = struct.unpack("<i", struct.pack("<f", value))[0]
+        try:
+            self._autopilot.set_parameter(name, value)
+        except (ParameterError, ValueError) as error:
+            self._autopilot.commander.texts.append((Severity.WARNING, str(error)))
+        if definition is not None:
+            self._send_parameter(name)
+
+    def _send_parameter(self, name: str) -> None:
+        parameters, definition = self._autopilot.parameters, DEFINITIONS[name]
+        value, kind = parameters[name], _REAL
+        if definition.integer:
+            value, kind = struct.unpack("<f", struct.pack("<i", int(value)))[0], _INTEGER
+        self.out.append(mavlink2.MAVLink_param_value_message(
+            name.encode(), value, kind, len(parameters.names), parameters.names.index(name)))
+
+    def _timesync(self, time: float, m: Message) -> None:
+        if m.tc1 == 0:
+            self.out.append(mavlink2.MAVLink_timesync_message(round(time * 1e9), m.ts1))
+
+
+def warm_up() -> None:
+    """Compile everything that a flight will call, so that no tick waits for the compiler."""
+    autopilot = Autopilot()
+    companion = Companion(autopilot)
+    zero, down, level = np.zeros(3), np.array([0.0, 0.0, -9.81]), np.array([1.0, 0.0, 0.0, 0.0])
+    for k in range(300):
+        time = 0.004 * k
+        autopilot.vision(time, zero, level)
+        autopilot.setpoint(time, zero, 0.5)
+        companion.tick(time)
+        if k == 200:
+            autopilot.command(time, Command.DO_SET_MODE, (1.0, 6.0, 0.0))
+            autopilot.command(time, Command.ARM_DISARM, (1.0, 0.0))
+        autopilot.update(time, zero, down)
+    rotate(matrix_from_quaternion(quaternion_from_euler(zero)), zero)
+    autopilot.command(time, Command.DO_SET_MODE, (1.0, 4.0, 6.0))
+    autopilot.update(time + 0.004, zero, down)

@@ -1,0 +1,121 @@
+"""What the autopilot tells: message streams at their intervals, on sensor time."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+
+from uam_control.rotations import matrix_from_quaternion, rotate_back
+from uam_sim_bridge.autopilot.core import Autopilot
+from uam_sim_bridge.mavlink.wire import Message, mavlink2
+
+_NAN = float("nan")
+_NO_COVARIANCE = [_NAN] * 21
+_LANDED, _IN_AIR, _LANDING = 1, 2, 4  # MAV_LANDED_STATE
+_STANDBY, _ACTIVE, _CRITICAL = 3, 4, 5  # MAV_STATE
+_GYRO, _ACCELEROMETER, _VISION = 1, 2, 128  # MAV_SYS_STATUS_SENSOR
+FASTEST = 0.004  # s
+
+
+def heartbeat(autopilot: Autopilot, time: float) -> Message:
+    """HEARTBEAT of a PX4 quadrotor."""
+    status = autopilot.status
+    state = _CRITICAL if status.failsafe else _ACTIVE if status.armed else _STANDBY
+    armed = mavlink2.MAV_MODE_FLAG_SAFETY_ARMED if status.armed else 0
+    return mavlink2.MAVLink_heartbeat_message(
+        mavlink2.MAV_TYPE_QUADROTOR, mavlink2.MAV_AUTOPILOT_PX4,
+        mavlink2.MAV_MODE_FLAG_CUSTOM_MODE_ENABLED | armed, status.mode.custom_mode, state, 3)
+
+
+def sys_status(autopilot: Autopilot, time: float) -> Message:
+    """SYS_STATUS: sensors and their health; no battery is simulated."""
+    there = _GYRO | _ACCELEROMETER | _VISION
+    healthy = there if autopilot.estimator.aided(time) else _GYRO | _ACCELEROMETER
+    return mavlink2.MAVLink_sys_status_message(
+        there, there, healthy, 0, 65535, -1, -1, 0, 0, 0, 0, 0, 0)
+
+
+def extended_sys_state(autopilot: Autopilot, time: float) -> Message:
+    """EXTENDED_SYS_STATE: on the ground or in the air."""
+    status = autopilot.status
+    state = _LANDED if status.landed else _LANDING if status.failsafe else _IN_AIR
+    return mavlink2.MAVLink_extended_sys_state_message(0, state)
+
+
+def attitude_quaternion(autopilot: Autopilot, time: float) -> Message:
+    """ATTITUDE_QUATERNION, FRD → NED."""
+    q, rates = autopilot.estimator.estimate[0:4].tolist(), autopilot.rates.tolist()
+    return mavlink2.MAVLink_attitude_quaternion_message(_milliseconds(time), *q, *rates)
+
+
+def odometry(autopilot: Autopilot, time: float) -> Message:
+    """ODOMETRY: pose in local NED, velocity in body FRD."""
+    estimate = autopilot.estimator.estimate
+    velocity = rotate_back(matrix_from_quaternion(estimate[0:4]), estimate[7:10])
+    return mavlink2.MAVLink_odometry_message(
+        round(time * 1e6), mavlink2.MAV_FRAME_LOCAL_NED, mavlink2.MAV_FRAME_BODY_FRD,
+        *estimate[4:7].tolist(), estimate[0:4].tolist(), *velocity.tolist(),
+        *autopilot.rates.tolist(), _NO_COVARIANCE, _NO_COVARIANCE)
+
+
+def timesync(autopilot: Autopilot, time: float) -> Message:
+    """TIMESYNC request."""
+    return mavlink2.MAVLink_timesync_message(0, round(time * 1e9))
+
+
+def _milliseconds(time: float) -> int:
+    return round(time * 1e3) & 0xFFFFFFFF
+
+
+# message id → (builder, default interval [s]); PX4's onboard link, 0 for off
+STREAMS: dict[int, tuple[Callable[[Autopilot, float], Message], float]] = {
+    mavlink2.MAVLINK_MSG_ID_HEARTBEAT: (heartbeat, 1.0),
+    mavlink2.MAVLINK_MSG_ID_SYS_STATUS: (sys_status, 0.2),
+    mavlink2.MAVLINK_MSG_ID_EXTENDED_SYS_STATE: (extended_sys_state, 0.2),
+    mavlink2.MAVLINK_MSG_ID_ATTITUDE_QUATERNION: (attitude_quaternion, 0.02),
+    mavlink2.MAVLINK_MSG_ID_ODOMETRY: (odometry, 1.0 / 30.0),
+    mavlink2.MAVLINK_MSG_ID_TIMESYNC: (timesync, 0.1),
+}
+
+
+class Telemetry:
+    """The streams with their intervals and next due times."""
+
+    def __init__(self, autopilot: Autopilot) -> None:
+        self._autopilot = autopilot
+        self._intervals = {number: interval for number, (_, interval) in STREAMS.items()}
+        self._due = dict.fromkeys(STREAMS, -math.inf)
+        self._told = autopilot.status
+
+    def set_interval(self, number: int, microseconds: float) -> bool:
+        """Handle SET_MESSAGE_INTERVAL: -1 off, 0 default; False where there is no such stream."""
+        if number not in STREAMS or not math.isfinite(microseconds):
+            return False
+        if microseconds < 0.0:
+            self._intervals[number] = 0.0
+        elif microseconds == 0.0:
+            self._intervals[number] = STREAMS[number][1]
+        else:
+            self._intervals[number] = max(FASTEST, microseconds * 1e-6)
+        self._due[number] = -math.inf
+        return True
+
+    def build(self, number: int, time: float) -> Message | None:
+        """Return one message of a stream, None where there is no such stream."""
+        return STREAMS[number][0](self._autopilot, time) if number in STREAMS else None
+
+    def due(self, time: float) -> list[Message]:
+        """Return the messages due at `time` [s]; a change of state brings its HEARTBEAT at once."""
+        if self._told != self._autopilot.status:
+            self._told = self._autopilot.status
+            self._due[mavlink2.MAVLINK_MSG_ID_HEARTBEAT] = -math.inf
+            self._due[mavlink2.MAVLINK_MSG_ID_EXTENDED_SYS_STATE] = -math.inf
+        messages = []
+        for number, due in self._due.items():
+            interval = self._intervals[number]
+            if interval <= 0.0 or time < due - 1e-9:
+                continue
+            following = due + interval
+            self._due[number] = following if following > time else time + interval
+            messages.append(STREAMS[number][0](self._autopilot, time))
+        return messages
