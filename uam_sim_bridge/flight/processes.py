@@ -9,7 +9,7 @@ import signal
 import subprocess
 import sys
 import time
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -73,6 +73,7 @@ class Processes:
         self._logs = logs
         self._environment = dict(environment)
         self._children: dict[str, Child] = {}
+        self.hurry: Callable[[], bool] = lambda: False  # True: the next, harder signal at once
 
     def start(
         self, name: str, module: str, arguments: Sequence[str] = (), may_end: bool = False
@@ -145,18 +146,10 @@ class Processes:
                 child.process.send_signal(signum)
             deadline = None if wait is None else time.monotonic() + wait
             while any(child.process.poll() is None for child in left):
-                if deadline is not None and time.monotonic() > deadline:
+                if deadline is not None and (time.monotonic() > deadline or self.hurry()):
                     break
                 time.sleep(POLL)
         return sorted(disobedient)
-
-    def kill(self) -> None:
-        """End everything at once, for an impatient second Ctrl-C."""
-        for child in self._children.values():
-            if child.process.poll() is None:
-                child.process.kill()
-        for child in self._children.values():
-            child.process.wait()
 
     def close(self) -> None:
         """Stop whatever still runs and remove what killed children left in shared memory."""

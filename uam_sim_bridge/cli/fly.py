@@ -1,0 +1,194 @@
+"""`uam fly`: the main job."""
+
+from __future__ import annotations
+
+import argparse
+import math
+import shlex
+import sys
+from pathlib import Path
+
+from rich.console import Console
+
+from uam_control import configuration
+from uam_control.configuration import ConfigurationError
+from uam_control.mission import ScenarioError
+from uam_control.profile import ProfileError
+from uam_sim_bridge.flight import settings as flight_settings
+from uam_sim_bridge.flight.conclude import conclude
+from uam_sim_bridge.flight.ports import INSTANCES, PortError
+from uam_sim_bridge.flight.progress import Progress
+from uam_sim_bridge.flight.result_folder import ResultFolder, ResultFolderError
+from uam_sim_bridge.flight.settings import FlightSettings, SettingsError
+
+COMPLETED, NOT_COMPLETED, WRONG_USE, INTERRUPTED = 0, 1, 2, 130
+USER_ERRORS = (SettingsError, ScenarioError, ProfileError, ConfigurationError, PortError,
+               ResultFolderError)
+
+EXAMPLES = """\
+examples:
+  uam fly                                    the paper's mission, default profile
+  uam fly --scenario hover --seed 7          another scenario, other noise
+  uam fly --scenario path.csv --no-video     a trajectory of your own
+  uam fly --profile mine.yaml --engine direct
+  uam fly --clock realtime                   paced by the wall clock, latency measured
+  uam fly --payload-mass 0.3 --wind 2 0 0    heavier payload, 2 m/s from the west
+
+A trajectory has the columns t,px,py,pz,yaw,vx,vy,vz,ax,ay,az,dyaw (SI, ENU) and, if the arm is to
+move, alpha_1,alpha_2. Exit status: 0 mission completed, 1 flown but not completed, 2 wrong use.
+"""
+
+
+def add(commands) -> None:
+    """Add the subcommand to the command line."""
+    parser = commands.add_parser(
+        "fly",
+        help="fly a scenario and write a result folder",
+        description="Start every node, fly a scenario, write a result folder.",
+        epilog=EXAMPLES,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    scenarios = ", ".join(configuration.names("scenarios"))
+    profiles = ", ".join(configuration.names("profiles"))
+    option = parser.add_argument
+    option("--controller", default="modular", metavar="NAME",
+           help=f"{', '.join(flight_settings.CONTROLLERS)} (default %(default)s)")
+    option("--profile", metavar="NAME|FILE",
+           help=f"parameters: {profiles}, or a ROS parameter file (default: the controller's)")
+    option("--scenario", default="pick_and_place", metavar="NAME|FILE",
+           help=f"{scenarios}, or a .yaml or .csv file (default %(default)s)")
+    option("--engine", default="ros", metavar="ros|direct",
+           help="nodes and sockets, or one loop without them (default %(default)s)")
+    option("--clock", default="lockstep", metavar="lockstep|realtime",
+           help="simulated time, the same flight for the same seed; or the wall clock "
+           "(default %(default)s)")
+    option("--autopilot", default="builtin", metavar="builtin",
+           help="the stand-in (default %(default)s)")
+    option("--payload-mass", type=_number("mass", "kg", 0.0), metavar="KG",
+           help="default: the scenario's")
+    option("--wind", type=_number("wind", "m/s"), nargs=3, metavar=("X", "Y", "Z"),
+           help="mean wind [m/s, ENU] (default: calm)")
+    option("--gust", type=_number("gust", "m/s", 0.0), metavar="M/S",
+           help="standard deviation of the gusts per axis (default: none)")
+    option("--noise", type=_number("noise", "", 0.0), metavar="FACTOR",
+           help="multiplies noise and bias of the sensors (default 1)")
+    option("--seed", type=_seed, default=1, metavar="N",
+           help="of all noise (default %(default)s)")
+    option("--out", type=Path, metavar="DIR",
+           help="result folder (default results/<time>-<scenario>-<controller>)")
+    option("--no-video", action="store_true", help="leave out the video, which takes longest")
+    option("--instance", type=int, metavar="N",
+           help=f"ROS domain and ports of this instance, 0..{INSTANCES - 1}, numbered as PX4 does "
+           "(default: the first that is free)")
+    parser.set_defaults(run=run)
+
+
+def _number(name: str, unit: str, low: float = -math.inf):
+    """An argparse type: a finite number not below `low`."""
+    def read(text: str) -> float:
+        try:
+            value = float(text)
+        except ValueError:
+            value = math.nan
+        if not math.isfinite(value) or value < low:
+            least = f", at least {low:g}" if low > -math.inf else ""
+            raise argparse.ArgumentTypeError(
+                f"'{text}' is not a {name}: a number{f' in {unit}' if unit else ''}{least}"
+            )
+        return value
+    return read
+
+
+def _seed(text: str) -> int:
+    if not text.isdecimal():
+        raise argparse.ArgumentTypeError(f"'{text}' is not a seed: a whole number, 0 or more")
+    return int(text)
+
+
+def run(options: argparse.Namespace) -> int:
+    """Fly as asked; returns the exit status."""
+    try:
+        settings = flight_settings.settings(
+            scenario=options.scenario,
+            controller=options.controller,
+            profile=options.profile,
+            engine=options.engine,
+            clock=options.clock,
+            autopilot=options.autopilot,
+            payload_mass=options.payload_mass,
+            seed=options.seed,
+            out=options.out,
+            video=not options.no_video,
+            vehicle_changes=_vehicle_changes(options),
+            instance=options.instance,
+        )
+        return fly(settings)
+    except USER_ERRORS as error:
+        print(f"uam fly: {error}", file=sys.stderr)
+        return WRONG_USE
+    except KeyboardInterrupt:
+        print("uam fly: interrupted", file=sys.stderr)
+        return INTERRUPTED
+
+
+def _vehicle_changes(options: argparse.Namespace) -> dict[str, object]:
+    changes = {
+        "air.wind": options.wind,
+        "air.gust": options.gust,
+        "sensors.noise_scale": options.noise,
+    }
+    return {name: value for name, value in changes.items() if value is not None}
+
+
+def fly(settings: FlightSettings) -> int:
+    """Fly and report; returns the exit status. Raises USER_ERRORS before anything has flown."""
+    engine = _engine(settings.engine)
+    folder = ResultFolder.create(settings.scenario.name, settings.controller, settings.out)
+    landing = settings.scenario.landing
+    console = Console()
+    with Progress(console, landing.at + landing.duration) as progress:
+        try:
+            outcome = engine(settings, folder, progress)
+        except USER_ERRORS:
+            _remove_if_empty(folder.path)
+            raise
+        progress.finish()
+        metrics = conclude(settings, folder, outcome, shlex.join(["uam", *sys.argv[1:]]))
+    for note in outcome.notes:
+        print(f"note: {note}")
+    if outcome.failure:
+        print(f"uam fly: {outcome.failure}", file=sys.stderr)
+        for line in outcome.details:
+            print(f"  | {line}", file=sys.stderr)
+    print(f"results: {folder.path}")
+    if outcome.interrupted:
+        return INTERRUPTED
+    completed = metrics is not None and metrics["mission_completed"] and not outcome.failure
+    return COMPLETED if completed else NOT_COMPLETED
+
+
+def _engine(name: str):
+    """The engine's `fly`. Raises SettingsError where ROS is not installed."""
+    if name == "direct":
+        from uam_sim_bridge.flight.direct_engine import fly as engine
+
+        return engine
+    try:
+        import rclpy  # noqa: F401
+    except ImportError:
+        raise SettingsError(
+            "the ROS engine needs rclpy, which is not installed: make setup, or source a ROS 2 "
+            "installation, or fly with --engine direct"
+        ) from None
+    from uam_sim_bridge.flight.ros_engine import fly as engine
+
+    return engine
+
+
+def _remove_if_empty(folder: Path) -> None:
+    """Take away a result folder that a refused flight has left empty."""
+    for path in (folder / "logs", folder):
+        try:
+            path.rmdir()
+        except OSError:
+            return

@@ -1,0 +1,223 @@
+"""A flight's log.mcap → the table of its control ticks.
+
+A tick is a stamp of /uam/truth/state at which the mission had a reference; everything else is
+joined to it by stamp. What a tick has no message of its own for (the gains, at 50 Hz; in real time
+a message that was lost) holds the last value, as it did for whoever received it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from diagnostic_msgs.msg import DiagnosticArray
+from rclpy.serialization import deserialize_message
+
+from uam_control.coordinates import ARM, COORDINATES
+from uam_control.mission import Scenario
+from uam_msgs_py import topics
+from uam_msgs_py.status import MissionStatus
+from uam_sim_bridge.flight import cdr
+from uam_sim_bridge.flight.mcap_reader import TopicLog, UnreadableLog, read_log
+from uam_sim_bridge.flight.timeseries import COLUMNS, SUBSYSTEMS, Recording, Series
+
+SECOND = 1e9
+STATE_ROWS = ("positions", "velocities", "accelerations")
+TRUTH, STATE, REFERENCE = (t.name for t in (topics.TRUTH_STATE, topics.STATE, topics.REFERENCE))
+POSITION, ATTITUDE, JOINTS = (
+    t.name for t in (topics.POSITION_COMMAND, topics.ATTITUDE_COMMAND, topics.ARM_COMMAND)
+)
+SETPOINT, STATUS = topics.SETPOINT.name, topics.MISSION_STATUS.name
+PAYLOAD, ROTORS, MAGNET = (
+    t.name for t in (topics.TRUTH_PAYLOAD, topics.TRUTH_ROTORS, topics.TRUTH_MAGNET)
+)
+ADAPTATION = {
+    "position": topics.POSITION_ADAPTATION.name,
+    "attitude": topics.ATTITUDE_ADAPTATION.name,
+    "arm": topics.ARM_ADAPTATION.name,
+}
+TOPICS = {
+    *(TRUTH, STATE, REFERENCE, POSITION, ATTITUDE, JOINTS, SETPOINT, STATUS),
+    *(PAYLOAD, ROTORS, MAGNET, *ADAPTATION.values()),
+}
+
+
+class Samples:
+    """Values of one topic in the order of their stamps: stamps (m,) [ns], rows (m, n)."""
+
+    def __init__(self, stamps: np.ndarray, rows: np.ndarray):
+        order = np.argsort(stamps, kind="stable")
+        self.stamps, self.rows = stamps[order], rows[order]
+
+    def at(self, ticks: np.ndarray) -> np.ndarray:
+        """Rows (len(ticks), n) at the stamps `ticks` [ns] or last before; NaN before the first."""
+        out = np.full((len(ticks), self.rows.shape[1]), np.nan)
+        if not len(self.stamps):
+            return out
+        index = np.searchsorted(self.stamps, ticks, side="right") - 1
+        there = index >= 0
+        out[there] = self.rows[index[there]]
+        return out
+
+
+class Log:
+    """The topics of a log, decoded when asked for."""
+
+    def __init__(self, found: Mapping[str, TopicLog]):
+        self._topics = found
+
+    def blocks(self, topic: str) -> list[cdr.Block]:
+        """Decoded messages of a topic; [] where there are none."""
+        log = self._topics.get(topic)
+        return cdr.read(log.type_name, log.messages) if log and log.messages else []
+
+    def samples(self, topic: str, fields: Sequence[str], width: int) -> Samples:
+        """`fields` side by side, `width` numbers each; zeros for messages that are idle (empty)."""
+        stamps, rows = [], []
+        for block in self.blocks(topic):
+            stamps.append(block.stamps)
+            rows.append(np.hstack([_field(block, field, width) for field in fields]))
+        if not stamps:
+            return Samples(np.zeros(0, np.int64), np.zeros((0, width * len(fields))))
+        return Samples(np.concatenate(stamps), np.vstack(rows))
+
+    def mission_end(self) -> tuple[int | None, str]:
+        """Stamp [ns] at which the mission was done, None if it was not; why it was given up."""
+        end, reason = None, ""
+        log = self._topics.get(STATUS)
+        for data in log.messages if log else []:
+            stamp, status = MissionStatus.from_message(deserialize_message(data, DiagnosticArray))
+            reason = status.abort_reason or reason
+            if status.done and end is None:
+                end = stamp
+        return end, reason
+
+
+def _field(block: cdr.Block, field: str, width: int) -> np.ndarray:
+    found = block.fields.get(field)
+    if found is None:
+        return np.zeros((len(block.stamps), width))
+    return found[:, :width]
+
+
+class References:
+    """What the mission asked for, and when: rows (m, 24), flying (m,), take-off stamp."""
+
+    def __init__(self, log: Log):
+        stamps, rows, flying = [], [], []
+        self.takeoff: int | None = None  # stamp [ns] of mission time 0
+        for block in log.blocks(REFERENCE):
+            whole = len(block.names) == len(COORDINATES)
+            values = np.zeros((len(block.stamps), 3, len(COORDINATES)))
+            for i, row in enumerate(STATE_ROWS):
+                values[:, i, slice(None) if whole else ARM] = block.fields[row]
+            stamps.append(block.stamps)
+            rows.append(values.reshape(len(values), -1))
+            flying.append(np.full((len(values), 1), float(whole)))
+            if whole:
+                self.takeoff = int(np.min(block.stamps - block.fields["time_from_start"]))
+        if not stamps:
+            raise UnreadableLog("the log has no reference: the mission never began")
+        joined = np.hstack([np.vstack(rows), np.vstack(flying)])
+        self.samples = Samples(np.concatenate(stamps), joined)
+        self._hold_after_landing()
+
+    def _hold_after_landing(self) -> None:
+        """After the flight nothing is asked of the pose any more; its last reference stays."""
+        rows = self.samples.rows
+        flights = np.flatnonzero(rows[:, -1])
+        if len(flights):
+            pose = [c for c in range(3 * len(COORDINATES)) if c % len(COORDINATES) < ARM.start]
+            rows[flights[-1] + 1 :, pose] = rows[flights[-1], pose]
+
+
+@dataclass(frozen=True)
+class Flight:
+    """What a log tells: the table, whether the mission ended by itself, and why it was given up."""
+
+    series: Series
+    done: bool
+    abort_reason: str
+
+
+def read_flight(path: Path, scenario: Scenario, info: Mapping[str, Any] | None = None) -> Flight:
+    """The flight of `scenario` that is recorded in `path`.
+
+    Raises UnreadableLog when the file is no log, or the log of a flight that never began.
+    """
+    log = Log(read_log(path, TOPICS))
+    end, abort_reason = log.mission_end()
+    references = References(log)
+    truth = log.samples(TRUTH, STATE_ROWS, len(COORDINATES))
+    first, last = references.samples.stamps[[0, -1]]
+    # The mission is one tick ahead: its last reference is of a tick that nobody controlled. What
+    # follows its end depends on how fast the plant heard of it.
+    last = last if end is None else min(last, end + 1)
+    ticks = truth.stamps[(truth.stamps >= first) & (truth.stamps < last)]
+    if not len(ticks):
+        raise UnreadableLog(f"{path} has no control tick")
+    recording = Recording(len(ticks))
+    values = recording.values
+    takeoff = references.takeoff if references.takeoff is not None else int(last)
+    time = values[:, COLUMNS["time"]] = (ticks - takeoff) / SECOND
+    values[:, COLUMNS.block("truth.")] = truth.at(ticks)
+    values[:, COLUMNS.block("estimate.")] = log.samples(STATE, STATE_ROWS, 8).at(ticks)
+    reference = references.samples.at(ticks)
+    flying = reference[:, -1] > 0.5
+    values[:, COLUMNS.block("reference.")] = reference[:, :-1]
+    _commands(log, ticks, values)
+    for subsystem in SUBSYSTEMS:
+        gains = log.samples(ADAPTATION[subsystem], ("position",), 7)
+        values[:, COLUMNS.block(f"adaptation.{subsystem}.")] = gains.at(ticks)
+    _truth(log, ticks, values)
+    for number, name in enumerate(phases(time, flying, scenario, bool(abort_reason))):
+        recording.phases[number] = recording.phase_names.setdefault(
+            name, len(recording.phase_names)
+        )
+    recording.count = len(ticks)
+    return Flight(recording.series(info), end is not None, abort_reason)
+
+
+def _commands(log: Log, ticks: np.ndarray, values: np.ndarray) -> None:
+    """Fill in what the controllers commanded, and the attitude that the position law asked for."""
+    position = log.samples(POSITION, (*STATE_ROWS, "effort"), 6).at(ticks)
+    asked = [COLUMNS[f"reference.{angle}"] for angle in ("roll", "pitch", "yaw")]
+    for row in range(3):
+        columns = [column + row * len(COORDINATES) for column in asked]
+        values[:, columns] = position[:, 6 * row + 3 : 6 * row + 6]
+    values[:, COLUMNS.block("tau_p.")] = position[:, 18:21]
+    values[:, COLUMNS.block("tau_q.")] = log.samples(ATTITUDE, ("effort",), 3).at(ticks)
+    values[:, COLUMNS.block("tau_alpha.")] = log.samples(JOINTS, ("effort",), 2).at(ticks)
+    setpoint = log.samples(SETPOINT, ("angular", "linear"), 3).at(ticks)
+    values[:, COLUMNS.block("setpoint.")] = setpoint[:, [0, 1, 2, 5]]
+
+
+def _truth(log: Log, ticks: np.ndarray, values: np.ndarray) -> None:
+    """Fill in what only the simulator knew."""
+    rotors = log.samples(ROTORS, ("position", "effort"), 4).at(ticks)
+    for i in range(4):
+        values[:, COLUMNS[f"rotor_{i + 1}.command"]] = rotors[:, i]
+        values[:, COLUMNS[f"rotor_{i + 1}.thrust"]] = rotors[:, 4 + i]
+    position = log.samples(PAYLOAD, ("position",), 3).at(ticks)
+    x, y, z, w = log.samples(PAYLOAD, ("orientation",), 4).at(ticks).T
+    values[:, COLUMNS.block("payload.")] = np.column_stack([position, w, x, y, z])
+    magnet = log.samples(MAGNET, ("position", "effort"), 2).at(ticks)
+    values[:, COLUMNS.block("magnet.")] = magnet[:, [0, 2, 1]]
+
+
+def phases(
+    time: np.ndarray, flying: np.ndarray, scenario: Scenario, aborted: bool
+) -> Iterator[str]:
+    """The phase of each tick; time (m,) [s], flying (m,): position and attitude are controlled."""
+    flights = np.flatnonzero(flying)
+    takeoff = flights[0] if len(flights) else len(time)
+    for number, now in enumerate(time.tolist()):
+        if flying[number]:
+            yield scenario.phase(max(now, 0.0))
+        elif number < takeoff:
+            yield "waiting"
+        else:
+            yield "aborted" if aborted else "landed"

@@ -1,0 +1,41 @@
+"""How a flight went, whichever engine flew it."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+from uam_sim_bridge.flight.timeseries import Series
+
+
+@dataclass
+class Outcome:
+    """What an engine hands over.
+
+    series: None when no control tick was recorded. wall_s: from the first tick to the last.
+    abort_reason: why the mission was given up. failure: why the flight could not go on, in one
+    line, and `details`, the last lines of the log that tell more. latency_s, missed_ticks: realtime
+    only.
+    """
+
+    series: Series | None
+    wall_s: float = 0.0
+    abort_reason: str = ""
+    failure: str = ""
+    details: Sequence[str] = ()
+    interrupted: bool = False
+    latency_s: Sequence[float] | None = None
+    missed_ticks: int | None = None
+    notes: list[str] = field(default_factory=list)
+
+    @property
+    def partial(self) -> bool:
+        """Whether the recording stops before the mission was over."""
+        return bool(self.failure) or self.interrupted
+
+    @property
+    def reason(self) -> str:
+        """Why the mission was not completed, as far as the engine knows; "" if it does not."""
+        if self.interrupted:
+            return "interrupted by the user"
+        return self.failure or self.abort_reason

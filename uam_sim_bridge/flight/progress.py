@@ -1,0 +1,104 @@
+"""What the user sees while a flight runs: a live panel on a terminal, plain lines elsewhere."""
+
+from __future__ import annotations
+
+import math
+import time
+from dataclasses import dataclass
+
+from rich.console import Console
+from rich.live import Live
+from rich.table import Table
+
+PLAIN_INTERVAL = 10.0  # [s] of mission time between two plain lines within a phase
+
+
+@dataclass(frozen=True)
+class Status:
+    """Where a flight is. Errors are norms: [m], [rad], [rad]; time: mission time [s]."""
+
+    phase: str
+    time: float
+    position_error: float
+    attitude_error: float
+    arm_error: float
+    real_time_factor: float
+    autopilot: str = ""
+
+
+class Progress:
+    """Shows messages and the newest status. A context manager."""
+
+    def __init__(self, console: Console | None = None, duration: float | None = None):
+        """duration: how long the mission will take [s], if known."""
+        self.console = console or Console()
+        self._duration = duration
+        self._live: Live | None = None
+        self._shown: tuple[str, float] = ("", -math.inf)
+        self._begin = time.monotonic()
+
+    def __enter__(self) -> Progress:
+        return self
+
+    def __exit__(self, *exception) -> None:
+        self.finish()
+
+    def message(self, text: str) -> None:
+        """One line that stays."""
+        self.console.print(text, highlight=False, markup=False)
+
+    def update(self, status: Status) -> None:
+        """Show the newest status."""
+        if not self.console.is_terminal:
+            self._plain(status)
+            return
+        if self._live is None:
+            self._live = Live(
+                console=self.console, refresh_per_second=4, transient=True, redirect_stderr=False
+            )
+            self._live.start()
+        self._live.update(self._panel(status))
+
+    def finish(self) -> None:
+        """Take the live panel away."""
+        if self._live is not None:
+            self._live.stop()
+            self._live = None
+
+    def _plain(self, status: Status) -> None:
+        phase, last = self._shown
+        if status.phase == phase and status.time < last + PLAIN_INTERVAL:
+            return
+        self._shown = (status.phase, status.time)
+        self.message(
+            f"{self._when(status):>15}  {status.phase:<9} "
+            f"errors {status.position_error:.3f} m, {math.degrees(status.attitude_error):.1f} deg, "
+            f"arm {math.degrees(status.arm_error):.1f} deg; "
+            f"{status.real_time_factor:.2f}x real time"
+        )
+
+    def _when(self, status: Status) -> str:
+        if status.time < 0.0:
+            return "before take-off"
+        if self._duration is None:
+            return f"{status.time:.1f} s"
+        return f"{status.time:.1f} of {self._duration:.0f} s"
+
+    def _panel(self, status: Status) -> Table:
+        table = Table.grid(padding=(0, 3))
+        table.add_row("phase", f"[bold]{status.phase}[/bold]", self._bar(status.time))
+        table.add_row("mission time", self._when(status))
+        table.add_row(
+            "errors",
+            f"{status.position_error:.3f} m",
+            f"attitude {math.degrees(status.attitude_error):.2f}°   "
+            f"arm {math.degrees(status.arm_error):.2f}°",
+        )
+        table.add_row("real time", f"{status.real_time_factor:.2f}x", status.autopilot)
+        return table
+
+    def _bar(self, at: float, width: int = 40) -> str:
+        if self._duration is None:
+            return ""
+        done = round(width * min(max(at / self._duration, 0.0), 1.0))
+        return "━" * done + "[dim]" + "─" * (width - done) + "[/dim]"

@@ -1,0 +1,205 @@
+"""The ROS engine: every node a process of its own, supervised from here.
+
+    ports → parameter file → processes → readiness → flight → stop in order → log → table
+
+Nothing is left behind, however it ends: no process, port, lock or shared memory.
+"""
+
+from __future__ import annotations
+
+import json
+import time
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any
+
+from uam_sim_bridge.flight import wiring
+from uam_sim_bridge.flight.interrupts import Interrupts
+from uam_sim_bridge.flight.log_reader import read_flight
+from uam_sim_bridge.flight.mcap_reader import UnreadableLog
+from uam_sim_bridge.flight.outcome import Outcome
+from uam_sim_bridge.flight.ports import Ports, Reservation
+from uam_sim_bridge.flight.processes import NodeFailed, Processes, environment
+from uam_sim_bridge.flight.progress import Progress
+from uam_sim_bridge.flight.result_folder import ResultFolder
+from uam_sim_bridge.flight.settings import FlightSettings
+from uam_sim_bridge.flight.status_listener import StatusListener
+from uam_sim_bridge.flight.warm_up import is_cold, warm_up
+
+# Executable → module. Started and, at the end, stopped in this order, the recorder last.
+MODULES = {
+    wiring.RECORDER: "uam_sim_bridge.nodes.recorder",
+    wiring.PLANT: "uam_sim_bridge.nodes.mujoco_sim",
+    wiring.ESTIMATOR: "uam_control.nodes.state_estimator",
+    wiring.MISSION: "uam_control.nodes.mission",
+    wiring.POSITION: "uam_control.nodes.position_controller",
+    wiring.ATTITUDE: "uam_control.nodes.attitude_controller",
+    wiring.ARM: "uam_control.nodes.arm_controller",
+    wiring.BRIDGE: "uam_sim_bridge.nodes.mavlink_bridge",
+}
+AUTOPILOT, AUTOPILOT_MODULE = "autopilot", "uam_sim_bridge.autopilot.server"
+START_TIMEOUT = 60.0  # [s] until every node must be connected to the others
+ANSWER_TIMEOUT = 10.0  # [s] for the answers to one lockstep tick
+OVERTIME = 60.0  # [s] simulated, beyond the scenario's landing, until a flight is ended
+POLL = 0.1  # [s]
+
+
+def fly(settings: FlightSettings, folder: ResultFolder, progress: Progress) -> Outcome:
+    """Fly; what was recorded lies in `folder` afterwards, also after a failure or Ctrl-C.
+
+    Raises PortError when no instance is free.
+    """
+    (folder.path / "logs").mkdir(exist_ok=True)
+    if is_cold():
+        progress.message("compiling the control path (once)")
+        warm_up()
+    with Reservation(settings.instance) as reservation, Interrupts() as stop:
+        ports = reservation.ports
+        folder.write_parameters(parameters(settings, folder, ports))
+        failure = _supervise(settings, folder, ports, progress, stop)
+    return _outcome(settings, folder, failure, stop.raised)
+
+
+def parameters(
+    settings: FlightSettings, folder: ResultFolder, ports: Ports
+) -> dict[str, dict[str, Any]]:
+    """Every node's parameters: those of the profile, and those of this flight."""
+    sections = {node: _values(values) for node, values in settings.profile.sets.items()}
+    sections[wiring.MISSION]["scenario"] = _scenario(settings)
+    landing = settings.scenario.landing
+    sections[wiring.PLANT] = {
+        "vehicle_changes": json.dumps(settings.vehicle_changes),
+        "payload_mass": float(settings.payload_mass),
+        "seed": settings.seed,
+        "arm_start": list(settings.scenario.arm_start),
+        "clock": settings.clock,
+        "hil_port": ports.simulator_tcp,
+        "autopilot_always_answers": settings.autopilot == "builtin",
+        "recorded": True,
+        "start_timeout": START_TIMEOUT,
+        "answer_timeout": ANSWER_TIMEOUT,
+        "time_limit": landing.at + landing.duration + OVERTIME,
+        "statistics": str(folder.path / "logs" / "mujoco_sim.json"),
+    }
+    sections[wiring.BRIDGE] = settings.profile.section(wiring.BRIDGE) | {
+        "clock": settings.clock,
+        "local_port": ports.offboard_udp,
+        "autopilot_port": ports.autopilot_udp,
+    }
+    sections[wiring.RECORDER] = {
+        "file": str(folder.log),
+        "statistics": str(folder.path / "logs" / "recorder.json"),
+    }
+    return sections
+
+
+def _values(parameter_set) -> dict[str, Any]:
+    """A parameter set as ROS parameters; ROS knows no empty list, which stands for the default."""
+    values = asdict(parameter_set)
+    return {
+        name: list(value) if isinstance(value, tuple) else value
+        for name, value in values.items()
+        if value != ()
+    }
+
+
+def _scenario(settings: FlightSettings) -> str:
+    """What the mission node is told to load: a name, or a file wherever the node runs."""
+    given = Path(settings.scenario_source)
+    return str(given.absolute()) if given.suffix else settings.scenario_source
+
+
+def _supervise(
+    settings: FlightSettings,
+    folder: ResultFolder,
+    ports: Ports,
+    progress: Progress,
+    stop: Interrupts,
+) -> NodeFailed | None:
+    """Start everything, watch it until the plant ends, stop it; returns what failed."""
+    logs = folder.path / "logs"
+    surroundings = environment(ports.domain, logs)
+    with Processes(logs, surroundings) as children:
+        children.hurry = lambda: stop.impatient
+        try:
+            _start(children, settings, folder, ports)
+            progress.message(
+                f"{len(children.names)} processes in ROS domain {ports.domain}, "
+                f"autopilot on TCP {ports.simulator_tcp}, UDP {ports.autopilot_udp}"
+            )
+            with StatusListener(surroundings, ports.domain) as listener:
+                _watch(children, listener, progress, stop)
+        except NodeFailed as failure:
+            return failure
+        finally:
+            children.note_shared_memory()
+            others = [name for name in children.names if name != wiring.RECORDER]
+            disobedient = children.stop(others) + children.stop([wiring.RECORDER])
+            if disobedient and not stop.impatient:
+                progress.message(f"had to be killed: {', '.join(disobedient)}")
+    return None
+
+
+def _start(
+    children: Processes, settings: FlightSettings, folder: ResultFolder, ports: Ports
+) -> None:
+    # What the nodes log is in their output already; files of their own would repeat it.
+    arguments = ["--ros-args", "--disable-external-lib-logs"]
+    arguments += ["--params-file", str(folder.parameters)]
+    for name, module in MODULES.items():
+        children.start(name, module, arguments, may_end=name == wiring.PLANT)
+    if settings.autopilot == "builtin":
+        instance = ["--instance", str(ports.instance), "--wait", str(START_TIMEOUT)]
+        children.start(AUTOPILOT, AUTOPILOT_MODULE, instance, may_end=True)
+
+
+def _watch(
+    children: Processes, listener: StatusListener, progress: Progress, stop: Interrupts
+) -> None:
+    """Show the progress until the plant ends or the user stops it. Raises NodeFailed."""
+    while children.running(wiring.PLANT) and not stop.raised:
+        children.check()
+        status = listener.poll()
+        if status is not None:
+            progress.update(status)
+        time.sleep(POLL)
+    progress.finish()
+    if not stop.raised:
+        children.check()
+
+
+def _outcome(
+    settings: FlightSettings,
+    folder: ResultFolder,
+    failure: NodeFailed | None,
+    interrupted: bool,
+) -> Outcome:
+    outcome = Outcome(series=None, interrupted=interrupted)
+    if failure is not None and not interrupted:
+        outcome.failure, outcome.details = str(failure), failure.last_lines
+    numbers = _statistics(folder.path / "logs" / "mujoco_sim.json")
+    outcome.wall_s = numbers.get("wall_s", 0.0)
+    if settings.clock == "realtime":
+        outcome.latency_s = numbers.get("latency_s", [])
+        outcome.missed_ticks = numbers.get("missed_ticks")
+    lost = _statistics(folder.path / "logs" / "recorder.json").get("lost", {})
+    if lost:
+        text = ", ".join(f"{count} of {topic}" for topic, count in lost.items())
+        outcome.notes.append(f"the recorder lost messages: {text}")
+    try:
+        flight = read_flight(folder.log, settings.scenario)
+    except (UnreadableLog, OSError) as error:
+        outcome.failure = outcome.failure or f"nothing recorded: {error}"
+        return outcome
+    outcome.series, outcome.abort_reason = flight.series, flight.abort_reason
+    if not flight.done and not outcome.partial:
+        outcome.failure = numbers.get("ended_by") or "the mission did not end"
+    return outcome
+
+
+def _statistics(file: Path) -> dict[str, Any]:
+    """What a node reported at its end; {} when it did not get to it."""
+    try:
+        return json.loads(file.read_text())
+    except (OSError, ValueError):
+        return {}

@@ -1,0 +1,92 @@
+"""Listens to a flight from outside, for the progress display: two topics, twice a second."""
+
+from __future__ import annotations
+
+import os
+import time
+from collections.abc import Mapping
+
+import rclpy
+from rclpy.node import Node
+from rclpy.signals import SignalHandlerOptions
+
+from uam_msgs_py import topics
+from uam_msgs_py.convert import seconds
+from uam_msgs_py.status import AutopilotState, MissionStatus
+from uam_sim_bridge.flight.progress import Status
+
+
+class StatusListener:
+    """A node of its own ROS context. A context manager; polled, hence no executor."""
+
+    def __init__(self, environment: Mapping[str, str], domain: int):
+        """environment: of the flight's processes, of which ROS reads some variables here too."""
+        before = dict(os.environ)
+        os.environ.update(environment)
+        try:
+            self._context = rclpy.Context()
+            rclpy.init(
+                args=["--ros-args", "--disable-external-lib-logs"],
+                context=self._context,
+                domain_id=domain,
+                signal_handler_options=SignalHandlerOptions.NO,
+            )
+            self._node = Node(
+                "uam_fly",
+                context=self._context,
+                use_global_arguments=False,
+                start_parameter_services=False,
+                enable_rosout=False,
+            )
+        finally:
+            os.environ.clear()
+            os.environ.update(before)
+        self._mission = self._listen(topics.MISSION_STATUS)
+        self._autopilot = self._listen(topics.AUTOPILOT_STATE)
+        self._autopilot_text = ""
+        self._last: tuple[float, float] | None = None  # simulated and wall time [s]
+
+    def _listen(self, topic: topics.Topic):
+        return self._node.create_subscription(topic.type, topic.name, lambda _: None, topic.qos)
+
+    def poll(self) -> Status | None:
+        """The newest status, None if there is none since the last call."""
+        for message in _messages(self._autopilot):
+            _, state = AutopilotState.from_message(message)
+            reasons = f": {state.reasons}" if state.reasons else ""
+            self._autopilot_text = f"{state.summary}{reasons}"
+        newest = None
+        for message in _messages(self._mission):
+            newest = message
+        if newest is None:
+            return None
+        stamp, mission = MissionStatus.from_message(newest)
+        return Status(
+            phase=mission.phase,
+            time=mission.time,
+            position_error=mission.position_error,
+            attitude_error=mission.attitude_error,
+            arm_error=mission.arm_error,
+            real_time_factor=self._real_time_factor(seconds(stamp)),
+            autopilot=self._autopilot_text,
+        )
+
+    def _real_time_factor(self, simulated: float) -> float:
+        """Simulated over wall time since the first status."""
+        wall = time.monotonic()
+        if self._last is None:
+            self._last = simulated, wall
+        since = wall - self._last[1]
+        return (simulated - self._last[0]) / since if since > 0.0 else 0.0
+
+    def __enter__(self) -> StatusListener:
+        return self
+
+    def __exit__(self, *exception) -> None:
+        self._node.destroy_node()
+        rclpy.shutdown(context=self._context)
+
+
+def _messages(subscription):
+    while (taken := subscription.handle.take_message(subscription.msg_type, False)) is not None:
+        yield taken[0]

@@ -1,0 +1,167 @@
+"""The plant's side of the ROS topics: sensors and truth out, answers in."""
+
+from __future__ import annotations
+
+import numpy as np
+from rclpy.node import Node
+from rosgraph_msgs.msg import Clock
+
+from uam_control.coordinates import ARM, COORDINATES
+from uam_msgs_py import topics
+from uam_msgs_py.convert import (
+    ImuWriter,
+    JointStateWriter,
+    PoseWriter,
+    TrajectoryWriter,
+    read_effort,
+    set_stamp,
+)
+from uam_msgs_py.status import MissionStatus
+from uam_sim_bridge.nodes.recorder import stamp_of
+from uam_sim_bridge.plant import Samples, Truth
+
+JOINTS = list(COORDINATES[ARM])
+ROTORS = [f"rotor_{i}" for i in range(1, 5)]
+
+
+def nanoseconds(time: float) -> int:
+    """Seconds of the maths → stamp; exact, as ticks are whole microseconds."""
+    return round(time * 1e6) * 1000
+
+
+class Sensors:
+    """Publishes /clock and what the sensors deliver."""
+
+    def __init__(self, node: Node):
+        def publisher(topic: topics.Topic):
+            return node.create_publisher(topic.type, topic.name, topic.qos)
+
+        self._clock, self._imu = publisher(topics.CLOCK), publisher(topics.IMU)
+        self._joints, self._mocap = publisher(topics.JOINTS), publisher(topics.MOCAP)
+        self._clock_message = Clock()
+        self._imu_writer, self._mocap_writer = ImuWriter(), PoseWriter()
+        self._joint_writer = JointStateWriter(JOINTS)
+
+    def clock(self, stamp: int) -> None:
+        """Publish simulation time [ns]."""
+        set_stamp(self._clock_message.clock, stamp)
+        self._clock.publish(self._clock_message)
+
+    def publish(self, samples: Samples) -> int | None:
+        """Publish what arrived at this tick; returns the IMU's stamp [ns], if it was among it.
+
+        The IMU goes last: it is what the estimator's tick begins with.
+        """
+        if samples.mocap is not None:
+            time, position, quaternion = samples.mocap
+            self._mocap.publish(self._mocap_writer.fill(nanoseconds(time), position, quaternion))
+        if samples.joints is not None:
+            time, alpha, alpha_dot, torque = samples.joints
+            writer = self._joint_writer
+            writer.position[:], writer.velocity[:], writer.effort[:] = alpha, alpha_dot, torque
+            self._joints.publish(writer.stamped(nanoseconds(time)))
+        if samples.imu is None:
+            return None
+        time, gyro, force = samples.imu
+        stamp = nanoseconds(time)
+        self._imu.publish(self._imu_writer.fill(stamp, gyro, force))
+        return stamp
+
+
+class TruthTopics:
+    """Publishes what only a simulator knows; no controller subscribes to it."""
+
+    def __init__(self, node: Node):
+        def publisher(topic: topics.Topic):
+            return node.create_publisher(topic.type, topic.name, topic.qos)
+
+        self._state, self._payload = publisher(topics.TRUTH_STATE), publisher(topics.TRUTH_PAYLOAD)
+        self._rotors, self._magnet = publisher(topics.TRUTH_ROTORS), publisher(topics.TRUTH_MAGNET)
+        self._state_writer = TrajectoryWriter(COORDINATES)
+        self._payload_writer = PoseWriter()
+        self._rotor_writer = JointStateWriter(ROTORS)
+        self._magnet_writer = JointStateWriter(["magnet", "swing"])
+
+    def publish(self, stamp: int, truth: Truth, motors: np.ndarray, magnet: bool) -> None:
+        """Publish the truth at this tick [ns]; motors (4,) and magnet as last commanded."""
+        self._state.publish(self._state_writer.fill(stamp, truth.state))
+        self._payload.publish(
+            self._payload_writer.fill(stamp, truth.payload_position, truth.payload_quaternion)
+        )
+        rotors = self._rotor_writer
+        rotors.position[:], rotors.velocity[:] = motors, truth.rotor_speed
+        rotors.effort[:] = truth.rotor_thrust
+        self._rotors.publish(rotors.stamped(stamp))
+        writer = self._magnet_writer
+        writer.position[:] = magnet, truth.magnet_swing
+        writer.effort[0] = truth.magnet_force
+        self._magnet.publish(writer.stamped(stamp))
+
+
+# Which node to look at first when an answer is missing: the answers' common way leads through it.
+SUSPECTS = {
+    frozenset({"setpoint", "effort", "magnet"}): "state_estimator",
+    frozenset({"setpoint", "effort"}): "position_controller or mission",
+    frozenset({"setpoint"}): "attitude_controller or mavlink_bridge",
+    frozenset({"effort"}): "arm_controller",
+    frozenset({"magnet"}): "mission",
+}
+
+
+class Answers:
+    """What the nodes answer to a tick: setpoint sent, joint efforts, magnet; and the mission's end.
+
+    `effort` (2,) [N m] and `magnet` hold until the next message. `setpoints`: stamp [ns] → wall
+    time [ns] at which the bridge published it; kept only by `take`, for whoever measures latency
+    to take out.
+    """
+
+    def __init__(self, node: Node):
+        self.effort = np.zeros(2)
+        self.magnet = False
+        self.mission = MissionStatus()
+        self.setpoints: dict[int, int] = {}
+        self._arrived: set[str] = set()
+        self._setpoint_stamp = -1
+
+        def subscribe(topic: topics.Topic, callback, raw: bool = False):
+            return node.create_subscription(topic.type, topic.name, callback, topic.qos, raw=raw)
+
+        self._subscriptions = [
+            subscribe(topics.SETPOINT, self._on_setpoint, raw=True),
+            subscribe(topics.ARM_EFFORT, self._on_effort),
+            subscribe(topics.MAGNET, self._on_magnet),
+            subscribe(topics.MISSION_STATUS, self._on_mission),
+        ]
+
+    def begin(self) -> None:
+        """Forget what has arrived, at the beginning of a tick."""
+        self._arrived.clear()
+
+    def missing(self, stamp: int) -> frozenset[str]:
+        """Answers that the tick of `stamp` [ns] still lacks."""
+        lacking = {"effort", "magnet"} - self._arrived
+        return frozenset(lacking | {"setpoint"} if self._setpoint_stamp < stamp else lacking)
+
+    def take(self) -> None:
+        """Take every message that is there, without waiting."""
+        for subscription in self._subscriptions:
+            take = subscription.handle.take_message
+            while (taken := take(subscription.msg_type, subscription.raw)) is not None:
+                subscription.callback(*taken)
+
+    def _on_setpoint(self, data: bytes, info: dict | None = None) -> None:
+        self._setpoint_stamp = stamp_of(data)
+        if info is not None:
+            self.setpoints[self._setpoint_stamp] = info["source_timestamp"]
+
+    def _on_effort(self, message, info: dict | None = None) -> None:
+        self.effort = read_effort(message, JOINTS)
+        self._arrived.add("effort")
+
+    def _on_magnet(self, message, info: dict | None = None) -> None:
+        self.magnet = message.data
+        self._arrived.add("magnet")
+
+    def _on_mission(self, message, info: dict | None = None) -> None:
+        _, self.mission = MissionStatus.from_message(message)

@@ -1,0 +1,206 @@
+"""Records every topic of the stack to an MCAP file.
+
+Messages are taken raw, never decoded. The node polls its subscriptions instead of being called for
+each message: the middleware's own threads collect, and taking fifty messages in one go costs a
+tenth of being woken up for each.
+
+Log time is simulation time: the header's stamp; or the last /clock that was published before the
+message, for types without a header and for /diagnostics, whose publishers may not have seen a tick
+yet. Publish time is the publisher's wall clock. With `simulated: false` (on hardware, where nobody
+publishes /clock) both are wall time.
+"""
+
+import json
+import struct
+import sys
+import time
+from bisect import bisect_right
+from dataclasses import dataclass
+from pathlib import Path
+
+import rclpy
+from rclpy.node import Node
+from rclpy.qos import QoSDurabilityPolicy, QoSHistoryPolicy, QoSProfile
+from rclpy.signals import SignalHandlerOptions
+
+from uam_msgs_py import topics
+from uam_msgs_py.node import StopSignal
+from uam_sim_bridge.flight.mcap_writer import McapWriter
+from uam_sim_bridge.flight.message_definitions import schema
+
+DEPTH = 2000  # messages per topic that may wait for one poll: 8 s at control rate
+# CDR: four bytes of encapsulation (the second is 1 for little-endian), then seconds and
+# nanoseconds, because std_msgs/Header and rosgraph_msgs/Clock both begin with the stamp.
+LITTLE_ENDIAN_STAMP, BIG_ENDIAN_STAMP = struct.Struct("<iI"), struct.Struct(">iI")
+CLOCK = "/clock"
+
+
+def stamp_of(data: bytes) -> int:
+    """The stamp [ns] at the beginning of a serialized message that has a header."""
+    layout = LITTLE_ENDIAN_STAMP if data[1] & 1 else BIG_ENDIAN_STAMP
+    seconds, nanoseconds = layout.unpack_from(data, 4)
+    return seconds * 1_000_000_000 + nanoseconds
+
+
+def type_name(message_type: type) -> str:
+    """`package/msg/Name` of a generated message class."""
+    return f"{message_type.__module__.split('.')[0]}/msg/{message_type.__name__}"
+
+
+def begins_with_stamp(message_type: type) -> bool:
+    """Whether `stamp_of` applies."""
+    fields = list(message_type.get_fields_and_field_types().items())
+    return fields[0] in (("header", "std_msgs/Header"), ("clock", "builtin_interfaces/Time"))
+
+
+@dataclass
+class Track:
+    """One recorded topic."""
+
+    topic: str
+    subscription: object
+    message_type: type
+    stamped: bool
+    channel: int
+    one_publisher: bool
+    last_sequence: int = 0
+    lost: int = 0
+
+
+class Recording:
+    """The open file and the subscriptions that feed it."""
+
+    def __init__(self, node: Node, file: Path, chosen: list[topics.Topic], simulated: bool):
+        """Subscribe to `chosen` and create `file`."""
+        self._simulated = simulated
+        self._writer = McapWriter(file)
+        self._tracks = [self._track(node, topic) for topic in chosen]
+        # The clock comes last in each poll: when it has been taken, every /clock that was
+        # published before any message taken in this poll is known.
+        self._tracks.sort(key=lambda track: track.topic == CLOCK)
+        self._clock_wall: list[int] = []  # publisher's wall clock of each /clock [ns]
+        self._clock_sim: list[int] = []
+
+    def _track(self, node: Node, topic: topics.Topic) -> Track:
+        qos = QoSProfile(
+            history=QoSHistoryPolicy.KEEP_LAST,
+            depth=DEPTH,
+            reliability=topic.qos.reliability,
+            durability=topic.qos.durability,
+        )
+        subscription = node.create_subscription(
+            topic.type, topic.name, lambda _: None, qos, raw=True
+        )
+        name = type_name(topic.type)
+        metadata = {"offered_qos_profiles": _qos_text(topic.qos)}
+        channel = self._writer.add_channel(topic.name, name, schema(name), metadata)
+        stamped = begins_with_stamp(topic.type) and topic.one_publisher
+        return Track(
+            topic.name, subscription, topic.type, stamped, channel, topic.one_publisher
+        )
+
+    def poll(self) -> None:
+        """Write everything that has arrived."""
+        batch = []
+        for track in self._tracks:
+            take = track.subscription.handle.take_message
+            while (taken := take(track.message_type, True)) is not None:
+                data, info = taken
+                published = info["source_timestamp"]
+                if track.topic == CLOCK:
+                    self._clock_wall.append(published)
+                    self._clock_sim.append(stamp_of(data))
+                sequence = info["publication_sequence_number"]
+                self._count_lost(track, sequence)
+                batch.append((track, data, published, sequence))
+        for track, data, published, sequence in batch:
+            at = stamp_of(data) if track.stamped else self._sim_time(published)
+            self._writer.write(track.channel, max(at, 0), published, data, sequence & 0xFFFFFFFF)
+        del self._clock_wall[:-DEPTH], self._clock_sim[:-DEPTH]
+
+    def _sim_time(self, published: int) -> int:
+        """Simulation time [ns] at the wall time `published` [ns]."""
+        if not self._simulated:
+            return published
+        before = bisect_right(self._clock_wall, published)
+        return self._clock_sim[before - 1] if before else 0
+
+    @staticmethod
+    def _count_lost(track: Track, sequence: int) -> None:
+        if track.one_publisher and 0 < track.last_sequence < sequence - 1:
+            track.lost += sequence - 1 - track.last_sequence
+        track.last_sequence = sequence
+
+    def flush(self) -> None:
+        """Bring what was written to the file."""
+        self._writer.flush()
+
+    @property
+    def lost(self) -> dict[str, int]:
+        """Messages known to be lost, for topics that lost any."""
+        return {track.topic: track.lost for track in self._tracks if track.lost}
+
+    @property
+    def counts(self) -> dict[str, int]:
+        """Messages written, per topic."""
+        return self._writer.counts
+
+    def close(self) -> None:
+        """Index and end the file."""
+        lost = {topic: str(count) for topic, count in self.lost.items()}
+        self._writer.add_metadata("lost messages", lost)
+        self._writer.close()
+
+
+def _qos_text(qos: QoSProfile) -> str:
+    """The QoS as rosbag2 notes it in a channel's metadata."""
+    transient = qos.durability == QoSDurabilityPolicy.TRANSIENT_LOCAL
+    return "\n".join(
+        [
+            "- history: keep_last",
+            f"  depth: {qos.depth}",
+            f"  reliability: {'reliable' if qos.reliability.name == 'RELIABLE' else 'best_effort'}",
+            f"  durability: {'transient_local' if transient else 'volatile'}",
+        ]
+    )
+
+
+def main() -> int:
+    """Record until SIGINT or SIGTERM, then complete the file."""
+    # The context must outlive the signal: what has arrived by then is still to be written.
+    rclpy.init(args=sys.argv, signal_handler_options=SignalHandlerOptions.NO)
+    stop = StopSignal()
+    node = Node("recorder", start_parameter_services=False)
+    file = Path(node.declare_parameter("file", "log.mcap").value)
+    statistics = node.declare_parameter("statistics", "").value
+    simulated = node.declare_parameter("simulated", True).value
+    flush_period = node.declare_parameter("flush_period", 0.5).value
+    poll_period = node.declare_parameter("poll_period", 0.02).value
+    try:
+        recording = Recording(node, file, topics.ALL, simulated)
+    except OSError as error:
+        print(f"recorder: cannot write {file}: {error.strerror}", flush=True)
+        return 1
+    print(f"recorder: {len(topics.ALL)} topics to {file}", flush=True)
+    polls_per_flush = max(1, round(flush_period / poll_period))
+    polls = 0
+    while not stop.raised:
+        time.sleep(poll_period)
+        recording.poll()
+        polls += 1
+        if polls % polls_per_flush == 0:
+            recording.flush()
+    recording.poll()
+    recording.close()
+    for topic, count in recording.lost.items():
+        print(f"recorder: {count} messages of {topic} were lost", flush=True)
+    if statistics:
+        summary = {"messages": recording.counts, "lost": recording.lost}
+        Path(statistics).write_text(json.dumps(summary, indent=1))
+    node.destroy_node()
+    rclpy.shutdown()
+    return 0
+
+
+if __name__ == "__main__":
+    raise SystemExit(main())
