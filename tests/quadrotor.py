@@ -55,7 +55,7 @@ class Quadrotor:
         force = np.array([0.0, 0.0, self.thrusts.sum()])
         torque = np.array([Y @ self.thrusts, -X @ self.thrusts, REACTION @ self.thrusts])
         acceleration = rotation @ force / self.mass - [0.0, 0.0, GRAVITY]
-        if self.position[2] <= 0.0 and acceleration[2] <= 0.0:
+        if self.position[2] <= 0.0 and (self.velocity[2] < 0.0 or acceleration[2] <= 0.0):
             stop = -self.velocity / h  # the ground's impulse is felt by the accelerometer
             self.velocity[:] = self.gyro[:] = 0.0
             self.position[2] = 0.0

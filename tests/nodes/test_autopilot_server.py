@@ -1,0 +1,346 @@
+"""The autopilot as a process on real sockets: a rigid quadrotor, HIL link, offboard link."""
+
+import random
+import socket
+import subprocess
+import sys
+import time
+
+import numpy as np
+import pytest
+from quadrotor import MASS, Quadrotor
+
+from uam_sim_bridge.autopilot.modes import Mode
+from uam_sim_bridge.mavlink.hil_server import HilError, HilParameters, HilServer
+from uam_sim_bridge.mavlink.link import OffboardLink, UdpTransport
+from uam_sim_bridge.mavlink.offboard import OffboardSequence, Phase
+from uam_sim_bridge.mavlink.setpoint import RateThrustMap, RateThrustParameters
+from uam_sim_bridge.mavlink.wire import Codec, Framer, mavlink2
+
+START_TIMEOUT = 60.0  # s: a first start compiles
+PATIENT = HilParameters(answer_timeout=30.0, silent_timeout=10.0)  # a loaded machine is no failure
+HOVER = MASS * 9.81
+
+
+def free_port(kind):
+    with socket.socket(socket.AF_INET, kind) as s:
+        s.bind(("127.0.0.1", 0))
+        return s.getsockname()[1]
+
+
+def start(*arguments):
+    return subprocess.Popen(
+        [sys.executable, "-m", "uam_sim_bridge.autopilot.server", *map(str, arguments)],
+        stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+
+
+class Flight:
+    """Quadrotor, HIL server, the autopilot's process and the bridge's link, in lockstep."""
+
+    def __init__(self):
+        self.tcp, self.udp = free_port(socket.SOCK_STREAM), free_port(socket.SOCK_DGRAM)
+        self.local = free_port(socket.SOCK_DGRAM)
+        self.hil = HilServer(self.tcp, parameters=PATIENT)
+        self.process = start("--sim-port", self.tcp, "--mavlink-port", self.udp,
+                             "--companion-port", self.local)
+        self.sequence = OffboardSequence()
+        self.link = OffboardLink(UdpTransport(self.local, ("127.0.0.1", self.udp)), self.sequence,
+                                 RateThrustParameters())
+        self.body = Quadrotor()
+        self.streaming = self.vision = True
+        self.heard = []
+        self.ticks = 0
+        assert self.hil.accept(START_TIMEOUT)
+
+    def tick(self, rates=(0, 0, 0), thrust=0.0):
+        body, link = self.body, self.link
+        self.ticks += 1
+        link.poll(body.time)
+        link.tick(body.time)
+        self.heard += self.sequence.reasons
+        if self.vision and self.ticks % 5 == 0:
+            link.send_vision(body.time, body.position, body.quaternion, 0.005, 0.02)
+        if self.streaming and self.sequence.streaming:
+            link.send_setpoint(np.array(rates, float), thrust, body.time)
+        motors = self.hil.exchange(
+            body.time, body.gyro, body.accel, body.position, body.quaternion)
+        assert self.hil.answered
+        body.step(motors)
+
+    def run(self, seconds, rates=(0, 0, 0), thrust=0.0):
+        for _ in range(round(seconds / 0.004)):
+            self.tick(rates, thrust)
+
+    def airborne(self, height=20.0):
+        """Arm on the ground, put the vehicle up there and let it hover."""
+        self.sequence.want(True)
+        self.run(3.0)
+        assert self.sequence.phase is Phase.FLYING, self.sequence.reasons
+        self.body.position[2] = height
+        self.body.hover()
+        self.run(1.0, thrust=HOVER / 41.36)
+
+    def close(self):
+        self.hil.close()
+        self.link.close()
+        try:
+            return self.process.communicate(timeout=20)
+        finally:
+            self.process.kill()
+
+
+@pytest.fixture
+def flight():
+    f = Flight()
+    yield f
+    f.close()
+
+
+def test_arms_flies_and_tracks_rate_steps(flight):
+    flight.airborne()
+    assert flight.hil.armed and flight.link.mode is Mode.OFFBOARD
+    assert 1.0 < flight.sequence.armed_stamp < 1.2
+    # hover thrust from the map carries the weight
+    _, thrust = RateThrustMap().map(
+        np.array([0, 0, HOVER]), np.zeros(3), np.zeros(3), np.zeros(3))
+    flight.run(1.0, thrust=thrust)
+    assert flight.body.thrusts.sum() == pytest.approx(HOVER, rel=2e-3)
+    # roll step of 1 rad/s (FLU): 10 - 90 % quickly, little overshoot, no coupling
+    rates = []
+    for _ in range(100):
+        flight.tick((1.0, 0.0, 0.0), thrust)
+        rates.append(flight.body.gyro.copy())
+    rates = np.array(rates)
+    assert np.argmax(rates[:, 0] > 0.9) * 0.004 < 0.2
+    assert rates[:, 0].max() < 1.5
+    assert rates[-20:, 0].mean() == pytest.approx(1.0, rel=0.15)
+    assert np.abs(rates[:, 1:]).max() < 0.1
+    # parameters of the mapping were read and agree
+    assert flight.link.values["MC_ROLLRATE_P"] == pytest.approx(0.15)
+    assert flight.link.warnings == ()
+
+
+def test_same_flight_twice_is_the_same_to_the_bit():
+    ends = []
+    for _ in range(2):
+        f = Flight()
+        f.airborne()
+        f.run(0.4, (0.5, -0.3, 0.2), 0.53)
+        f.close()
+        ends.append(np.concatenate([f.body.position, f.body.quaternion, f.body.thrusts]))
+    assert np.array_equal(*ends)
+
+
+def test_arming_is_refused_in_words(flight):
+    flight.vision = False
+    flight.sequence.want(True)
+    flight.run(2.5)
+    assert flight.sequence.phase is Phase.ARMING and not flight.hil.armed
+    assert any("vision" in reason for reason in flight.heard)
+    flight.vision = True
+    flight.run(1.0)
+    assert flight.sequence.phase is Phase.FLYING
+
+
+def test_offboard_is_refused_without_a_stream(flight):
+    flight.streaming = False
+    flight.sequence.want(True)
+    flight.run(2.5)
+    assert flight.sequence.phase is Phase.OFFBOARD and not flight.hil.armed
+    assert any("no offboard signal" in reason for reason in flight.heard)
+
+
+def test_loss_of_the_stream_and_recovery(flight):
+    flight.airborne()
+    flight.streaming = False
+    flight.run(0.9, thrust=0.5)
+    assert flight.link.mode is Mode.OFFBOARD
+    flight.run(0.3)
+    assert flight.link.mode is Mode.LAND and flight.hil.armed  # descending
+    flight.streaming = True
+    flight.run(1.5, thrust=HOVER / 41.36)
+    assert flight.link.mode is Mode.OFFBOARD and flight.sequence.phase is Phase.FLYING
+
+
+def test_stream_lost_for_good_lands_and_disarms(flight):
+    flight.airborne(2.0)
+    flight.streaming = False
+    flight.sequence.parameters = flight.sequence.parameters.__class__(recovery_attempts=0.0)
+    for _ in range(4000):
+        flight.tick()
+        if not flight.hil.armed:
+            break
+    assert not flight.hil.armed and flight.body.position[2] == 0.0
+    flight.run(0.5)
+    assert flight.sequence.phase is Phase.FAILED
+
+
+def test_garbage_and_truncated_bytes_are_survived(flight):
+    flight.airborne()
+    noise = random.Random(3)
+    stranger = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+    good = flight.link._codec
+    kill = good.encode(mavlink2.MAVLink_command_long_message(1, 1, 400, 0, 0, 21196, 0, 0, 0, 0, 0))
+    for _ in range(200):
+        flight.link._transport.send(noise.randbytes(noise.randrange(1, 300)))
+        flight.link._transport.send(kill[:noise.randrange(1, len(kill))])
+        stranger.sendto(kill, ("127.0.0.1", flight.udp))  # not the first peer
+        flight.tick(thrust=HOVER / 41.36)
+    assert flight.hil.armed and flight.link.mode is Mode.OFFBOARD
+    flight.hil._link.setblocking(True)
+    flight.hil._link.sendall(noise.randbytes(500) + bytes(300))
+    flight.hil._link.setblocking(False)
+    flight.run(0.2, thrust=HOVER / 41.36)
+    assert flight.hil.armed
+    stranger.close()
+
+
+def test_ends_with_the_simulator(flight):
+    flight.run(0.2)
+    out, err = flight.close()
+    assert flight.process.returncode == 0
+    assert "closed the link" in out and err == ""
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (["--wait", "0.2", "--sim-port", "1"], "no simulator at 127.0.0.1:1"),
+        (["--params", "/nowhere.yaml"], "No such file"),
+        (["--instance", "-1"], "instance number"),
+        (["--sim-port", "70000"], "not a port"),
+        (["--wait", "x"], "not a time"),
+    ],
+)
+def test_wrong_use_is_one_line_and_status_2(arguments, message):
+    extra = ["--mavlink-port", free_port(socket.SOCK_DGRAM)]
+    process = start(*arguments, *extra)
+    _, err = process.communicate(timeout=60)
+    assert process.returncode == 2
+    assert message in err.strip().splitlines()[-1] and "Traceback" not in err
+
+
+def test_taken_udp_port_is_said():
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as s:
+        s.bind(("127.0.0.1", 0))
+        process = start("--mavlink-port", s.getsockname()[1], "--wait", "0.1")
+        _, err = process.communicate(timeout=60)
+    assert process.returncode == 2 and "UDP port" in err
+    assert "in use" in err and "Traceback" not in err
+
+
+def test_sigterm_ends_it_quietly():
+    port = free_port(socket.SOCK_STREAM)
+    process = start("--sim-port", port, "--mavlink-port", free_port(socket.SOCK_DGRAM))
+    assert "waiting for the simulator" in process.stdout.readline()
+    process.terminate()
+    _, err = process.communicate(timeout=20)
+    assert process.returncode == 0 and err == ""
+
+
+def test_help_has_examples():
+    process = start("--help")
+    out, _ = process.communicate(timeout=60)
+    assert process.returncode == 0 and "autopilot --instance 3" in out
+
+
+class FakeAutopilot:
+    """The TCP client's side by hand."""
+
+    def __init__(self, port):
+        self.socket = socket.create_connection(("127.0.0.1", port), timeout=10)
+        self.codec = Codec(1, 1)
+        self.framer = Framer(self.codec)
+
+    def sensors(self):
+        return self.framer.stream(self.socket.recv(65536))
+
+    def answer(self, microseconds, motors, mode):
+        self.socket.sendall(self.codec.encode(mavlink2.MAVLink_hil_actuator_controls_message(
+            microseconds, [*motors, *[0.0] * 12], mode, 1)))
+
+
+@pytest.fixture
+def pair():
+    server = HilServer(0, parameters=HilParameters(answer_timeout=0.2, silent_timeout=0.01))
+    fake = FakeAutopilot(server._listener.getsockname()[1])
+    assert server.accept(5.0)
+    yield server, fake
+    fake.socket.close()
+    server.close()
+
+
+BODY = (np.array([0.1, 0.2, 0.3]), np.array([0.0, 0.0, 9.81]), np.zeros(3),
+        np.array([1.0, 0.0, 0.0, 0.0]))
+
+
+def test_sensor_message_is_frd_with_slow_sensors_at_50_hz(pair):
+    server, fake = pair
+    messages = []
+    for k in range(25):
+        server.send(0.004 * k, *BODY)
+        messages += fake.sensors()
+    assert len(messages) == 25
+    first = messages[0]
+    assert (first.xgyro, first.ygyro, first.zgyro) == pytest.approx((0.1, -0.2, -0.3))
+    assert (first.xacc, first.yacc, first.zacc) == pytest.approx((0.0, 0.0, -9.81))
+    assert first.id == 0
+    slow = [k for k, m in enumerate(messages) if m.fields_updated == 0x3F | 0x1C0 | 0x1A00]
+    assert slow == [0, 5, 10, 15, 20]
+    assert all(m.fields_updated & 0x3F == 0x3F for m in messages)
+    # nose east: the field's north part comes from the left
+    assert first.ymag == pytest.approx(-0.215, abs=0.02)
+    assert first.zmag == pytest.approx(0.425, abs=0.02)
+    assert first.pressure_alt == pytest.approx(488.0, abs=1.0)
+    assert len({m.xmag for m in messages}) == 5  # never constant
+
+
+def test_motors_count_only_while_armed_and_finite(pair):
+    server, fake = pair
+    server.send(0.0, *BODY)
+    fake.answer(0, [0.1, 0.2, 0.3, 1.4], 129)
+    assert server.receive(1.0) == pytest.approx([0.1, 0.2, 0.3, 1.0]) and server.armed
+    for k, (motors, mode) in enumerate(
+            [([0.5] * 4, 1), ([0.5, float("nan"), 0.5, 0.5], 129)], start=1):
+        server.send(0.004 * k, *BODY)
+        fake.answer(4000 * k, motors, mode)
+        assert np.all(server.receive(1.0) == 0.0)
+
+
+def test_waits_are_bounded_and_shorter_after_silence(pair):
+    server, fake = pair
+    server.send(0.0, *BODY)
+    fake.answer(0, [0.5] * 4, 129)
+    server.receive(1.0)
+    begin = time.monotonic()
+    motors = server.exchange(0.004, *BODY)
+    first = time.monotonic() - begin
+    server.exchange(0.008, *BODY)
+    assert first >= 0.2 and not server.answered and server.missed == 2
+    assert motors == pytest.approx([0.5] * 4)  # the last commands hold
+    fake.answer(8000, [0.4] * 4, 129)
+    server.send(0.012, *BODY)
+    server.receive(0.05)
+    assert not server.answered  # an old answer is none
+    assert server.motors == pytest.approx([0.4] * 4)
+
+
+def test_hang_up_stops_the_motors(pair):
+    server, fake = pair
+    server.send(0.0, *BODY)
+    fake.answer(0, [0.5] * 4, 129)
+    server.receive(1.0)
+    fake.socket.close()
+    for k in range(3):
+        server.exchange(0.004 * (k + 1), *BODY)
+    assert not server.connected and np.all(server.motors == 0.0) and not server.armed
+
+
+def test_taken_simulator_port_is_said():
+    with socket.socket(socket.AF_INET, socket.SOCK_STREAM) as s:
+        s.bind(("127.0.0.1", 0))
+        s.listen()
+        port = s.getsockname()[1]
+        with pytest.raises(HilError, match=f"TCP port {port} .*in use") as error:
+            HilServer(port)
+        assert "\n" not in str(error.value)
