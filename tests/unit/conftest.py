@@ -1,9 +1,14 @@
 """A made-up flight for the tests of the report: the paper's scenario with invented errors."""
 
+from dataclasses import asdict
+
 import numpy as np
 import pytest
 
 from uam_control.mission import load_scenario
+from uam_control.profile import load_profile
+from uam_sim_bridge.flight import metrics
+from uam_sim_bridge.flight.result_folder import ResultFolder
 from uam_sim_bridge.flight.timeseries import COLUMNS, Recording
 
 PERIOD = 0.04  # ten times the control period: enough for a picture
@@ -83,6 +88,24 @@ def magnet_face(chi):
     forward = LINKS[0] * np.sin(first) + LINKS[1] * np.sin(both)
     down = 0.073 + LINKS[0] * np.cos(first) + LINKS[1] * np.cos(both) + 0.030
     return np.array([chi[0] + forward, chi[1], chi[2] - down])
+
+
+def write_folder(directory, series):
+    """What a flight leaves in its result folder before the report is made."""
+    folder = ResultFolder.create("pick_and_place", "modular", out=directory)
+    folder.write_series(series)
+    folder.write_info(series.info)
+    folder.write_metrics(metrics.compute(series, series.info))
+    folder.write_versions()
+    profile = load_profile("s500")
+    folder.write_parameters({node: asdict(values) for node, values in profile.sets.items()})
+    return folder.path
+
+
+@pytest.fixture
+def flight_folder(tmp_path, flight):
+    """A result folder with the made-up flight, no report yet."""
+    return write_folder(tmp_path / "flight", flight)
 
 
 @pytest.fixture(scope="session")

@@ -4,18 +4,17 @@
 
 renders the flight in the result folder DIR; `render` does so in a child process, because the
 choice of OpenGL has to be made before MuJoCo is imported and a broken driver may take its process
-with it. The child writes its progress to standard output, one JSON line per step.
+with it. The child writes its progress to standard output, a line per step.
 """
 
 from __future__ import annotations
 
 import argparse
-import json
 import os
 import subprocess
 import sys
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -27,7 +26,8 @@ from uam_sim_bridge.flight.timeseries import Series
 SNAPSHOT_SIZE = (1280, 720)
 CAPTION_PART = 0.11  # of the height, to be read in the strip
 SNAPSHOTS, STRIP, VIDEO = "snapshots", "snapshots.png", "flight.mp4"
-PLATFORMS = ("egl", "osmesa")
+PLATFORM = "egl"  # needs neither screen nor GPU
+PROGRESS = "progress: "
 NO_RENDERER = 3  # exit status of the child
 HOW_TO_GET_ONE = (
     "no offscreen renderer found, so no pictures of the flight; "
@@ -49,36 +49,49 @@ def render(
     directory: Path,
     video: bool = True,
     progress: Callable[[str], None] = lambda text: None,
+    platforms: Sequence[str] | None = None,
 ) -> Rendered:
-    """Render the flight in `directory` to `directory`/figures; never raises for want of OpenGL."""
-    environment = os.environ | {"MUJOCO_GL": os.environ.get("MUJOCO_GL") or PLATFORMS[0]}
+    """Render the flight in `directory` to `directory`/figures; never raises for want of OpenGL.
+
+    platforms: values of MUJOCO_GL to try; by default the user's, if he has set it, and PLATFORM.
+    """
+    if platforms is None:
+        platforms = dict.fromkeys(filter(None, (os.environ.get("MUJOCO_GL"), PLATFORM)))
+    for platform in platforms:
+        status, last_line = _child(directory, video, progress, platform)
+        if status != NO_RENDERER:
+            break
+    problem = ""
+    if status == NO_RENDERER:
+        problem = f"{HOW_TO_GET_ONE} ({last_line[:120]})"
+    elif status != 0:
+        problem = f"rendering failed: {last_line or f'exit status {status}'}"
+    return replace(existing(directory), problem=problem)
+
+
+def _child(directory: Path, video: bool, progress, platform: str) -> tuple[int, str]:
+    """Run this module as a process; (exit status, last line that was not progress)."""
     command = [sys.executable, "-m", "uam_sim_bridge.report.rendering", str(directory)]
-    if not video:
-        command.append("--no-video")
     child = subprocess.Popen(
-        command,
-        env=environment,
+        command if video else [*command, "--no-video"],
+        env=os.environ | {"MUJOCO_GL": platform},
         stdout=subprocess.PIPE,
-        stderr=subprocess.PIPE,
+        stderr=subprocess.STDOUT,
         text=True,
         errors="replace",
     )
+    last_line = ""
     try:
         for line in child.stdout:
-            if line.startswith("{"):
-                progress(json.loads(line)["progress"])
-        errors = child.stderr.read().strip()
-        status = child.wait()
+            if line.startswith(PROGRESS):
+                progress(line.removeprefix(PROGRESS).strip())
+            elif line.strip():
+                last_line = line.strip()
+        return child.wait(), last_line
     finally:
         if child.poll() is None:
             child.terminate()
             child.wait()
-    found = existing(directory)
-    if status == 0:
-        return found
-    last = errors.splitlines()[-1] if errors else f"exit status {status}"
-    problem = HOW_TO_GET_ONE if status == NO_RENDERER else f"rendering failed: {last}"
-    return Rendered(found.snapshots, found.strip, found.video, problem)
 
 
 def existing(directory: Path) -> Rendered:
@@ -170,10 +183,10 @@ def main(arguments: list[str] | None = None) -> int:
     parser.add_argument("directory", type=Path)
     parser.add_argument("--no-video", action="store_true")
     options = parser.parse_args(arguments)
-    os.environ.setdefault("MUJOCO_GL", PLATFORMS[0])
+    os.environ.setdefault("MUJOCO_GL", PLATFORM)
 
     def report(text: str) -> None:
-        print(json.dumps({"progress": text}), flush=True)
+        print(PROGRESS + text, flush=True)
 
     try:
         render_here(options.directory, not options.no_video, report)

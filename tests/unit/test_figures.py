@@ -1,0 +1,118 @@
+"""What the figures show: lines, phases, events, RMS, one flight or several."""
+
+import numpy as np
+import pytest
+from PIL import Image
+
+from uam_sim_bridge.flight import metrics
+from uam_sim_bridge.flight.timeseries import COLUMNS, Series
+from uam_sim_bridge.report import figures, panels
+from uam_sim_bridge.report.panels import Flight
+
+
+def words(figure):
+    """Every text of a figure."""
+    found = [text.get_text() for text in figure.texts]
+    for axis in figure.axes:
+        found += [text.get_text() for text in axis.texts] + [axis.get_ylabel()]
+    for legend in figure.legends:
+        found += [text.get_text() for text in legend.get_texts()]
+    return found
+
+
+def without_magnet(flight):
+    """The same flight as if there had been neither magnet nor payload."""
+    values = flight.values.copy()
+    values[:, COLUMNS.block("magnet.")] = 0.0
+    values[:, COLUMNS.block("payload.")] = np.nan
+    return Series(values, flight.phases, flight.phase_names, {"payload_mass_kg": 0.0})
+
+
+def test_thinning_keeps_every_peak():
+    time = np.arange(10_000) * 0.004
+    values = np.sin(time)
+    values[[1234, 8765]] = [9.0, -9.0]
+    thin_time, thin_values = panels.thin(time, values, buckets=100)
+    assert len(thin_time) <= 200
+    assert thin_values.max() == 9.0
+    assert thin_values.min() == -9.0
+    assert thin_time[thin_values.argmax()] == time[1234]
+    assert np.all(np.diff(thin_time) > 0.0)
+
+
+def test_short_series_are_not_thinned():
+    time, values = np.arange(10.0), np.arange(10.0) ** 2
+    np.testing.assert_array_equal(panels.thin(time, values)[1], values)
+
+
+def test_all_figures_are_written_as_png_and_svg(flight, tmp_path):
+    steps = []
+    written = figures.draw([Flight("modular", flight)], tmp_path, steps.append)
+    assert written == list(figures.FIGURES)
+    assert len(steps) == len(written)
+    for name in written:
+        with Image.open(tmp_path / f"{name}.png") as picture:
+            assert picture.width == 1536
+        assert (tmp_path / f"{name}.svg").read_text().startswith("<?xml")
+
+
+def test_the_same_flight_gives_the_same_picture(flight, tmp_path):
+    for place in ("a", "b"):
+        figures.draw([Flight("modular", flight)], tmp_path / place, names=["arm_errors"])
+    first, second = (tmp_path / place / "arm_errors.svg" for place in ("a", "b"))
+    assert first.read_bytes() == second.read_bytes()
+
+
+def test_an_error_figure_names_phases_events_and_rms(flight):
+    figure = figures.position_errors([Flight("modular", flight)])
+    shown = words(figure)
+    for phase in ("take-off", "approach", "pick", "carry", "drop", "return", "land"):
+        assert phase in shown
+    assert "landed" not in shown
+    assert {"magnet on", "magnet off", "modular"} <= set(shown)
+    x = metrics.errors(flight)["position_m"][0]
+    assert f"{x:.3f} m" in shown
+    assert "paper 0.05 m" in shown
+    marks = [line.get_xdata()[0] for line in figure.axes[0].lines if line.get_linestyle() == "--"]
+    assert marks == pytest.approx([35.0, 70.0], abs=0.05)
+
+
+def test_a_line_shows_the_flight_in_the_unit_of_its_label(flight):
+    figure = figures.attitude_errors([Flight("modular", flight)])
+    line = figure.axes[1].lines[0]
+    assert figure.axes[1].get_ylabel() == "pitch θ error [°]"
+    drawn = line.get_ydata()
+    assert drawn.max() == pytest.approx(np.degrees(flight["error.pitch"][flight.flown].max()))
+    assert line.get_xdata()[0] >= 0.0
+
+
+def test_several_flights_lie_over_one_another(flight, make_flight):
+    other = make_flight(seed=2, scale=3.0)
+    figure = figures.arm_errors([Flight("modular", flight), Flight("ASMC-1", other)])
+    shown = words(figure)
+    assert {"modular", "ASMC-1"} <= set(shown)
+    assert not any("RMS" in text for text in shown)
+    colours = {line.get_color() for line in figure.axes[0].lines[:2]}
+    assert len(colours) == 2
+
+
+def test_a_flight_without_payload_has_no_payload_figure_and_one_path(flight, tmp_path):
+    plain = Flight("modular", without_magnet(flight))
+    written = figures.draw([plain], tmp_path, names=["path", "payload", "position_errors"])
+    assert written == ["path", "position_errors"]
+    assert len(figures.path_figure([plain]).axes) == 1
+    assert len(figures.path_figure([Flight("modular", flight)]).axes) == 3
+
+
+def test_a_law_without_adaptation_has_no_adaptation_figure(flight):
+    values = flight.values.copy()
+    values[:, COLUMNS.block("adaptation.")] = np.nan
+    series = Series(values, flight.phases, flight.phase_names, flight.info)
+    assert figures.adaptation([Flight("other", series)]) is None
+
+
+def test_a_flight_that_never_took_off_is_drawn_too(flight, tmp_path):
+    rows = flight.time < -0.5
+    series = Series(flight.values[rows], flight.phases[rows], flight.phase_names, flight.info)
+    wanted = ["position_errors", "path", "adaptation"]
+    assert figures.draw([Flight("modular", series)], tmp_path, names=wanted)[:2] == wanted[:2]

@@ -1,0 +1,112 @@
+"""Snapshots and video: what they show, when, and what happens without a renderer."""
+
+import json
+import subprocess
+
+import imageio_ffmpeg
+import numpy as np
+import pytest
+from PIL import Image
+
+from uam_sim_bridge.flight.timeseries import Series
+from uam_sim_bridge.report import figures, rendering, video
+from uam_sim_bridge.report.build import build_report
+from uam_sim_bridge.report.poses import Poses
+
+
+def cut(series, end):
+    """The first part of a flight, up to mission time `end` [s], one snapshot in it."""
+    rows = series.time < end
+    info = series.info | {"snapshots": [[0.5 * end, "(a) take-off"], [80.0, "never reached"]]}
+    return Series(series.values[rows], series.phases[rows], series.phase_names, info)
+
+
+def test_a_pose_puts_every_body_where_it_was(flight):
+    poses = Poses(flight)
+    row = flight.row_at(50.0)
+    poses.put(row)
+    np.testing.assert_allclose(poses.body("base"), flight.block("truth.")[row, :3])
+    np.testing.assert_allclose(poses.body("payload"), flight.block("payload.")[row, :3])
+    chi = flight.block("truth.")[row].copy()
+    # link 1 by hand, at the recorded attitude: 0.1 m at alpha_1 from straight down
+    link_2 = poses.body("link_2") - poses.body("link_1")
+    assert np.linalg.norm(link_2) == pytest.approx(0.1)
+    down = np.array([np.sin(chi[6] - chi[4]), 0.0, -np.cos(chi[6] - chi[4])])
+    np.testing.assert_allclose(link_2 / 0.1, down, atol=0.03)
+
+
+def test_a_flight_without_payload_shows_none(flight):
+    info = flight.info | {"payload_mass_kg": 0.0}
+    poses = Poses(Series(flight.values, flight.phases, flight.phase_names, info))
+    poses.put(flight.row_at(50.0))
+    assert np.linalg.norm(poses.body("payload")) > 20.0
+
+
+def test_snapshots_are_the_scenarios_as_far_as_the_flight_went(flight):
+    times = rendering.snapshot_times(flight)
+    assert [caption[:3] for _, caption in times] == ["(a)", "(b)", "(c)", "(d)", "(e)", "(f)"]
+    assert rendering.snapshot_times(cut(flight, 3.0)) == [(1.5, "(a) take-off")]
+    plain = Series(flight.values, flight.phases, flight.phase_names, {})
+    spread = rendering.snapshot_times(plain)
+    assert len(spread) == 6
+    assert spread[0][1] == "(a) approach"
+
+
+def test_a_video_is_short_whatever_the_flight_and_its_speed_is_a_whole_number(flight):
+    rows, speed = video.frame_rows(flight)
+    assert speed == 6
+    assert 12.0 < len(rows) / video.RATE <= video.LONGEST_S
+    steps = np.diff(flight.time[rows])
+    assert steps.mean() == pytest.approx(speed / video.RATE, rel=0.01)
+    assert video.speed_up(14.0) == 1
+    assert video.speed_up(15.1) == 2
+
+
+def test_without_a_renderer_the_report_goes_on_and_says_how_to_get_one(flight_folder, monkeypatch):
+    for screen in ("DISPLAY", "WAYLAND_DISPLAY"):
+        monkeypatch.delenv(screen, raising=False)
+    monkeypatch.setattr(rendering, "PLATFORM", "glfw")
+    monkeypatch.delenv("MUJOCO_GL", raising=False)
+    monkeypatch.setattr(figures, "FIGURES", {})
+    report = build_report(flight_folder)
+    assert report.problem.startswith(rendering.HOW_TO_GET_ONE)
+    assert "\n" not in report.problem
+    html = report.page.read_text()
+    assert "apt install libegl1 libgl1-mesa-dri" in html
+    assert "<video" not in html
+
+
+def test_a_folder_without_a_flight_is_one_line(tmp_path):
+    rendered = rendering.render(tmp_path)
+    assert rendered.problem.startswith("rendering failed: ")
+    assert "timeseries.parquet" in rendered.problem
+
+
+def test_snapshots_and_video_are_rendered_without_a_screen(tmp_path, flight):
+    short = cut(flight, 1.0)
+    short.write(tmp_path / "timeseries.parquet")
+    (tmp_path / "metrics.json").write_text(json.dumps({}))
+    steps = []
+    rendered = rendering.render(tmp_path, progress=steps.append)
+    if rendered.problem.startswith(rendering.HOW_TO_GET_ONE):
+        pytest.skip(rendered.problem)
+    assert rendered.problem == ""
+    assert steps[-1] == "video 100 %"
+    assert [file.name for file in rendered.snapshots] == ["a.png"]
+    with Image.open(rendered.snapshots[0]) as picture:
+        assert picture.size == rendering.SNAPSHOT_SIZE
+        pixels = np.asarray(picture.convert("RGB"), dtype=float)
+    # sky above, floor below, and a vehicle that is neither
+    assert pixels[20, :, 2].mean() > pixels[20, :, 0].mean() + 20.0
+    assert (pixels[:600].sum(axis=2) < 150.0).sum() > 500
+    probe = subprocess.run(
+        [imageio_ffmpeg.get_ffmpeg_exe(), "-i", str(rendered.video)],
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert "h264" in probe.stderr
+    assert "yuv420p" in probe.stderr
+    assert "848x480" in probe.stderr
+    frames, _ = imageio_ffmpeg.count_frames_and_secs(str(rendered.video))
+    assert frames == len(video.frame_rows(short)[0])

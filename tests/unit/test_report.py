@@ -1,0 +1,141 @@
+"""The page and the closing table: what they say, and that the page needs nothing else."""
+
+import io
+import json
+import re
+
+import numpy as np
+import pytest
+from rich.console import Console
+
+from uam_sim_bridge.flight import timeseries
+from uam_sim_bridge.report import console, figures, outcome, page, parameters, rendering
+from uam_sim_bridge.report.build import build_report
+
+
+def text_of(html):
+    """The words of a page."""
+    bare = re.sub(r"<style>.*?</style>|<[^>]+>", " ", html, flags=re.S)
+    return re.sub(r"\s+", " ", bare)
+
+
+def change_metrics(folder, **changes):
+    """Write metrics.json again with some entries changed."""
+    file = folder / "metrics.json"
+    file.write_text(json.dumps(json.loads(file.read_text()) | changes))
+
+
+def test_the_report_is_one_page_that_asks_for_nothing_else(flight_folder, monkeypatch):
+    for name in list(figures.FIGURES)[2:]:
+        monkeypatch.delitem(figures.FIGURES, name)
+    steps = []
+    report = build_report(flight_folder, steps.append, pictures=False)
+    html = report.page.read_text()
+    assert report.page == flight_folder / "report.html"
+    assert report.problem == ""
+    assert steps[-1] == "page"
+    assert html.count('src="data:image/png;base64,') == 2
+    assert all(source.startswith("data:") for source in re.findall(r'(?:src|href)="([^"]*)', html))
+    assert not re.search(r"@import|url\(|<link|<script", html)
+
+
+def test_the_page_says_what_happened_and_how_to_repeat_it(flight_folder):
+    words = text_of(page.write_page(flight_folder).read_text())
+    metrics = json.loads((flight_folder / "metrics.json").read_text())
+    assert metrics["mission_completed"] is True
+    assert "Mission completed" in words
+    assert f"{metrics['rms']['attitude_deg'][1]:.2f}°" in words
+    assert "0.050 m" in words
+    assert "3.11°" in words
+    assert "uam fly --engine direct --seed 1" in words
+    assert f"numpy {np.__version__}" in words
+    assert "from the take-off command to the touchdown command" in words
+    assert words.count("better") == 8
+    assert "latency" not in words
+
+
+def test_the_page_marks_what_is_worse_than_the_paper_and_says_why_not_completed(flight_folder):
+    metrics = json.loads((flight_folder / "metrics.json").read_text())
+    metrics["rms"]["arm_deg"] = [1.19, 5.0]
+    metrics["rms"]["position_m"][0] = None
+    change_metrics(
+        flight_folder,
+        rms=metrics["rms"],
+        mission_completed=False,
+        abort_reason="tilt <70>",
+        shortfalls=["aborted: tilt <70>"],
+        clock="realtime",
+        latency_ms={"p50": 2.5, "p99": 10.25, "max": None},
+        missed_ticks=7,
+    )
+    html = page.write_page(flight_folder).read_text()
+    words = text_of(html)
+    assert "aborted: tilt &lt;70&gt;" in html
+    assert "Mission aborted" in words
+    assert (words.count("better"), words.count("equal"), words.count("worse")) == (5, 1, 1)
+    assert "10.25 ms" in words
+    assert "missed control ticks 7" in words
+
+
+def test_the_page_names_every_safeguard_and_every_difference(flight_folder):
+    file = flight_folder / "parameters.yaml"
+    file.write_text(
+        "position_controller:\n  ros__parameters:\n"
+        "    lambda_1: [2.0, 2.0, 7.5]\n    epsilon: 0.0001\n"
+        "    k_ceiling: [5.0, 5.0, 5.0, 5.0]\n    acceleration_limit: 0.0\n"
+    )
+    found = parameters.compare(file)
+    rows = {row.name: row for row in found.controllers["position_controller"]}
+    assert (rows["lambda_1"].flown, rows["lambda_1"].paper) == ("2, 2, 7.5", "2, 2, 4")
+    assert rows["lambda_1"].differs
+    assert not rows["epsilon"].differs
+    assert found.safeguards == {"position_controller": ["k_ceiling = 5 (each)"]}
+    words = text_of(page.write_page(flight_folder).read_text())
+    assert "position_controller: k_ceiling = 5 (each)" in words
+    assert "No safeguard was on" not in words
+
+
+def test_table_one_has_no_safeguard_and_no_difference_from_itself(tmp_path):
+    from uam_control import configuration
+
+    found = parameters.compare(configuration.path("profiles/paper_table1.yaml"))
+    assert found.safeguards == {}
+    assert not any(row.differs for rows in found.controllers.values() for row in rows)
+
+
+def test_a_folder_with_little_in_it_still_gets_a_page(flight_folder):
+    for name in ("parameters.yaml", "versions.json", "info.json"):
+        (flight_folder / name).unlink()
+    words = text_of(page.write_page(flight_folder).read_text())
+    assert "parameters.yaml" in words
+    with pytest.raises(timeseries.UnreadableFlight):
+        build_report(flight_folder.parent / "nothing")
+
+
+def test_the_page_says_when_there_was_no_renderer(flight_folder):
+    rendered = rendering.Rendered(problem=rendering.HOW_TO_GET_ONE)
+    words = text_of(page.write_page(flight_folder, rendered).read_text())
+    assert "apt install libegl1 libgl1-mesa-dri" in words
+
+
+def test_the_console_shows_the_same(flight_folder):
+    metrics = json.loads((flight_folder / "metrics.json").read_text())
+    out = io.StringIO()
+    Console(file=out, width=100).print(console.summary(metrics, flight_folder))
+    lines = out.getvalue().splitlines()
+    assert lines[0].strip() == "Mission completed"
+    pitch = next(line for line in lines if "pitch" in line)
+    assert f"{metrics['rms']['attitude_deg'][1]:.2f}°" in pitch
+    assert "2.81°" in pitch
+    assert "better" in pitch
+    assert any("drop point" in line for line in lines)
+    assert str(flight_folder) in "".join(line.strip() for line in lines)
+
+
+def test_outcomes_in_words():
+    assert outcome.payload_story({"payload_lifted": None}) == "no payload in this flight"
+    assert outcome.payload_story({"payload_lifted": False}) == "not lifted"
+    story = {"payload_lifted": True, "payload_place_error_m": 0.034}
+    assert outcome.payload_story(story) == "lifted, came to rest 3.4 cm from the drop point"
+    assert outcome.landing_story({"landing_error_m": None}) == "not landed"
+    assert outcome.landing_story({"landing_error_m": 1.234}) == "1.23 m from the landing point"
