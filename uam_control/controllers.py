@@ -25,7 +25,8 @@ class PositionLimits(ParameterSet):
     """What surrounds the position law: weight, limits of tau_p, filter of the attitude it asks."""
 
     gravity_feedforward_mass: float = number(
-        0.0, "mass whose weight is added to tau_p, 0 = the printed law", "kg", 0.0, 50.0)
+        0.0, "mass whose weight is added to tau_p, 0 = the printed law", "kg", 0.0, 50.0
+    )
     gravity: float = number(9.81, "acceleration of gravity", "m/s^2", 0.0, 30.0)
     thrust_min: float = number(1.0, "least upward force", "N", TINY, 1e3)
     thrust_max: float = number(36.0, "largest force", "N", TINY, 1e3)
@@ -59,7 +60,9 @@ class Controller:
         self.law = ModularLaw(parameters)
         self.saturated = False
         self._errors = np.zeros((3, SIZE))
+        self._own = tuple(self._errors[:, self.columns])
         self._norms = np.zeros(3)
+        self._printed = parameters.error_rate_form == "printed"
 
     @property
     def parameters(self) -> PositionParameters | TorqueParameters:
@@ -69,6 +72,7 @@ class Controller:
     def set_parameters(self, parameters: PositionParameters | TorqueParameters) -> None:
         """Fly `parameters` (validated) from the next tick on; adapted gains are kept."""
         self.law.set_parameters(parameters)
+        self._printed = parameters.error_rate_form == "printed"
 
     @property
     def adaptation(self) -> np.ndarray:
@@ -81,11 +85,10 @@ class Controller:
         return self._errors
 
     def _law_output(self, state, reference, attitude_reference, flying, dt):
-        printed = self.parameters.error_rate_form == "printed"
-        tracking_errors(state, reference, attitude_reference, flying, printed, self._errors,
-                        self._norms)
-        own = self._errors[:, self.columns]
-        return self.law.update(own[0], own[1], own[2], self._norms, self.saturated, dt)
+        tracking_errors(
+            state, reference, attitude_reference, flying, self._printed, self._errors, self._norms
+        )
+        return self.law.update(*self._own, self._norms, self.saturated, dt)
 
     def _idle(self) -> None:
         self.law.reset()
@@ -125,8 +128,14 @@ class PositionController(Controller):
             return self._tau
         tau = self._law_output(state, reference, self._attitude.value, True, dt)
         p = self.parameters
-        self.saturated = limit_force(tau, p.gravity_feedforward_mass * p.gravity, p.thrust_min,
-                                     p.thrust_max, p.tilt_max, self._tau)
+        self.saturated = limit_force(
+            tau,
+            p.gravity_feedforward_mass * p.gravity,
+            p.thrust_min,
+            p.thrust_max,
+            p.tilt_max,
+            self._tau,
+        )
         self._attitude.update(self._tau, reference, dt)
         return self._tau
 
@@ -186,8 +195,10 @@ def limit_force(tau, weight, thrust_min, thrust_max, tilt_max, limited):
     upward = tau[2] + weight
     limited[2] = min(max(upward, thrust_min), thrust_max)
     horizontal = math.sqrt(tau[0] * tau[0] + tau[1] * tau[1])
-    room = min(limited[2] * math.tan(tilt_max),
-               math.sqrt(max(thrust_max * thrust_max - limited[2] * limited[2], 0.0)))
+    room = min(
+        limited[2] * math.tan(tilt_max),
+        math.sqrt(max(thrust_max * thrust_max - limited[2] * limited[2], 0.0)),
+    )
     scale = 1.0 if horizontal <= room else room / horizontal
     limited[0] = scale * tau[0]
     limited[1] = scale * tau[1]

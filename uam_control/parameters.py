@@ -1,8 +1,8 @@
 """Parameter sets as frozen dataclasses whose fields say meaning, unit and range.
 
 A set is checked as a whole by `validated`: what passes may fly, what does not is refused with the
-name of the value, what was wrong and what is allowed. The ROS nodes declare their parameters from the
-same fields.
+name of the value, what was wrong and what is allowed. The ROS nodes declare their parameters from
+the same fields.
 """
 
 from __future__ import annotations

@@ -34,7 +34,8 @@ ROS_OWN = ("use_sim_time",)  # parameters of ROS itself, allowed in every sectio
 
 
 class ProfileError(ValueError):
-    """A profile that cannot fly; the message is one line: file, node, parameter, what is allowed."""
+    """A profile that cannot fly; the message is one line: file, node, parameter, what is
+    allowed."""
 
 
 @dataclass(frozen=True)

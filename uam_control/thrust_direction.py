@@ -1,8 +1,8 @@
 """The attitude that points the thrust along tau_p, smoothed so that it has rates to follow.
 
-tau_p = R_B^W [0 0 u_1] fixes roll and pitch for a given yaw (the paper's equation for tau_p). Its raw
-value carries the noise of the position loop; a critically damped second-order filter gives q_d, and
-with it Omega_d and Omega_d_dot, without differentiating noise.
+tau_p = R_B^W [0 0 u_1] fixes roll and pitch for a given yaw (the paper's equation for tau_p). Its
+raw value carries the noise of the position loop; a critically damped second-order filter gives
+q_d, and with it Omega_d and Omega_d_dot, without differentiating noise.
 """
 
 from __future__ import annotations
@@ -34,7 +34,8 @@ class AttitudeReference:
         self.value[0, 2] = yaw
 
     def update(self, tau_p: np.ndarray, reference: np.ndarray, dt: float) -> np.ndarray:
-        """Advance by dt with tau_p (3,) [N, world, z > 0]; yaw and its rates from reference (3, 8)."""
+        """Advance by dt with tau_p (3,) [N, world, z > 0]; yaw and its rates from reference (3,
+        8)."""
         attitude_reference_step(tau_p, reference, self.cutoff, dt, self._filter, self.value)
         return self.value
 
@@ -60,7 +61,8 @@ def attitude_reference_step(tau_p, reference, cutoff, dt, filtered, value):
         filtered[axis, 0] = wanted + decay * (offset + slope * dt)
         filtered[axis, 1] = decay * (rate - omega * slope * dt)
         accelerations[axis] = -omega * omega * (filtered[axis, 0] - wanted) - (
-            2.0 * omega * filtered[axis, 1])
+            2.0 * omega * filtered[axis, 1]
+        )
 
     roll, pitch = filtered[0, 0], filtered[1, 0]
     roll_rate, pitch_rate = filtered[0, 1], filtered[1, 1]
@@ -71,9 +73,15 @@ def attitude_reference_step(tau_p, reference, cutoff, dt, filtered, value):
     value[1, 1] = cr * pitch_rate + sr * cp * yaw_rate
     value[1, 2] = -sr * pitch_rate + cr * cp * yaw_rate
     value[2, 0] = accelerations[0] - sp * yaw_acceleration - cp * pitch_rate * yaw_rate
-    value[2, 1] = (cr * accelerations[1] + sr * cp * yaw_acceleration
-                   - sr * roll_rate * pitch_rate
-                   + (cr * cp * roll_rate - sr * sp * pitch_rate) * yaw_rate)
-    value[2, 2] = (-sr * accelerations[1] + cr * cp * yaw_acceleration
-                   - cr * roll_rate * pitch_rate
-                   - (sr * cp * roll_rate + cr * sp * pitch_rate) * yaw_rate)
+    value[2, 1] = (
+        cr * accelerations[1]
+        + sr * cp * yaw_acceleration
+        - sr * roll_rate * pitch_rate
+        + (cr * cp * roll_rate - sr * sp * pitch_rate) * yaw_rate
+    )
+    value[2, 2] = (
+        -sr * accelerations[1]
+        + cr * cp * yaw_acceleration
+        - cr * roll_rate * pitch_rate
+        - (sr * cp * roll_rate + cr * sp * pitch_rate) * yaw_rate
+    )

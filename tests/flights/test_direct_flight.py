@@ -15,8 +15,13 @@ DROP_POINT = [0.789, 0.0]
 
 
 def flight(scenario="pick_and_place", profile="s500", payload=0.2, seed=1, **changes):
-    return DirectFlight(load_scenario(scenario), load_profile(profile),
-                        Vehicle.load().changed(changes), payload, seed)
+    return DirectFlight(
+        load_scenario(scenario),
+        load_profile(profile),
+        Vehicle.load().changed(changes),
+        payload,
+        seed,
+    )
 
 
 def fly_until(a_flight, time):
@@ -26,9 +31,14 @@ def fly_until(a_flight, time):
 
 
 def metrics(a_flight, payload=0.2):
-    return compute(a_flight.recording.series(), {
-        "payload_mass_kg": payload, "drop_point": DROP_POINT,
-        "abort_reason": a_flight.mission.output.abort_reason})
+    return compute(
+        a_flight.recording.series(),
+        {
+            "payload_mass_kg": payload,
+            "drop_point": DROP_POINT,
+            "abort_reason": a_flight.mission.output.abort_reason,
+        },
+    )
 
 
 @pytest.fixture(scope="module")
@@ -55,9 +65,9 @@ def test_errors_are_not_above_the_papers(mission):
 def test_payload_rises_after_35_s_and_falls_after_70_s(mission):
     series = mission.recording.series()
     height = series["payload.z"]
-    at = [height[series.row_at(t)] for t in (34.9, 40.0, 69.9, 71.5)]
+    at = [height[series.row_at(t)] for t in (34.9, 37.5, 69.9, 71.5)]
     assert at[0] == pytest.approx(0.747, abs=0.002)  # on its stand
-    assert at[1] > at[0]
+    assert at[1] > at[0] + 0.02
     assert at[2] > 0.5 and at[3] < 0.1
 
 

@@ -75,16 +75,18 @@ def test_attitude_reference_rates_are_derivatives():
     for k in range(3000):
         t = k * step
         reference[:, 5] = 0.5 * np.sin(t), 0.5 * np.cos(t), -0.5 * np.sin(t)
-        value = filtered.update(np.array([3 * np.sin(2 * t), 2 * np.cos(3 * t), 20.0]), reference,
-                                step)
+        value = filtered.update(
+            np.array([3 * np.sin(2 * t), 2 * np.cos(3 * t), 20.0]), reference, step
+        )
         rotations.append(matrix_from_euler(value[0]))
         rates.append(value[1].copy())
         accelerations.append(value[2].copy())
     k = 2500
     skew = rotations[k].T @ (rotations[k + 1] - rotations[k - 1]) / (2 * step)
     np.testing.assert_allclose([skew[2, 1], skew[0, 2], skew[1, 0]], rates[k], atol=2e-3)
-    np.testing.assert_allclose((rates[k + 1] - rates[k - 1]) / (2 * step), accelerations[k],
-                               atol=2e-2)
+    np.testing.assert_allclose(
+        (rates[k + 1] - rates[k - 1]) / (2 * step), accelerations[k], atol=2e-2
+    )
 
 
 @given(st.tuples(*[st.floats(-200, 200)] * 3))
@@ -102,8 +104,11 @@ def sets():
 
 def trio():
     s = sets()
-    return (PositionController(s["position_controller"]), AttitudeController(
-        s["attitude_controller"]), ArmController(s["arm_controller"]))
+    return (
+        PositionController(s["position_controller"]),
+        AttitudeController(s["attitude_controller"]),
+        ArmController(s["arm_controller"]),
+    )
 
 
 def fly(position, other, arm, ticks=200):
@@ -126,8 +131,11 @@ def test_modularity_one_subsystems_gains_leave_the_others_untouched():
     before = fly(position, other, arm)
     gains = position.adaptation.copy(), other.adaptation.copy()
     position, other, arm = trio()
-    arm.set_parameters(type(arm.parameters).from_mapping(
-        {**vars(arm.parameters), "lambda_1": [10.0, 10.0], "nu": [3.0, 3.0, 3.0, 3.0]}, 2))
+    arm.set_parameters(
+        type(arm.parameters).from_mapping(
+            {**vars(arm.parameters), "lambda_1": [10.0, 10.0], "nu": [3.0, 3.0, 3.0, 3.0]}, 2
+        )
+    )
     after = fly(position, other, arm)
     for (p1, q1, _), (p2, q2, _) in zip(before, after, strict=True):
         np.testing.assert_array_equal(p1, p2)

@@ -23,7 +23,8 @@ def motion(t):
 
 
 def feed(estimator, until, gyro_bias=0.0, force_bias=0.0, latency=3):
-    """Feed samples up to `until` [s]: IMU and joints at once, motion capture `latency` ticks late."""
+    """Feed samples up to `until` [s]: IMU and joints at once, motion capture `latency` ticks
+    late."""
     late = []
     for k in range(round(until / DT)):
         t = k * DT

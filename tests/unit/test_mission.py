@@ -54,25 +54,40 @@ def test_the_papers_scenario():
     assert value(trajectory, 82.0)[0, :3] == pytest.approx([0.0, 0.0, 1.0])
     assert [scenario.magnet_on(t) for t in (34.9, 35.0, 69.9, 70.0)] == [False, True, True, False]
     assert [scenario.phase(t) for t in (0, 2, 34, 36, 66, 71, 83)] == [
-        "take-off", "approach", "pick", "carry", "drop", "return", "land"]
+        "take-off",
+        "approach",
+        "pick",
+        "carry",
+        "drop",
+        "return",
+        "land",
+    ]
 
 
 def test_sampled_trajectory_meets_its_samples():
     times = np.linspace(0.0, 6.0, 61)
     samples = np.zeros((61, 3, 8))
     samples[:, 0, 0], samples[:, 1, 0], samples[:, 2, 0] = (
-        np.sin(times), np.cos(times), -np.sin(times))
+        np.sin(times),
+        np.cos(times),
+        -np.sin(times),
+    )
     sampled = Sampled(times, samples)
     for time in (0.05, 1.234, 3.3, 5.99):
-        np.testing.assert_allclose(value(sampled, time)[:, 0],
-                                   [np.sin(time), np.cos(time), -np.sin(time)], atol=2e-3)
+        np.testing.assert_allclose(
+            value(sampled, time)[:, 0], [np.sin(time), np.cos(time), -np.sin(time)], atol=2e-3
+        )
     assert value(sampled, 99.0)[0, 0] == samples[-1, 0, 0] and not value(sampled, 99.0)[1:].any()
 
 
 ROW = "{t},0,0,1,0,0,0,0,0,0,0,0"
 
 
-def csv_file(folder, header=",".join(CSV_REQUIRED), rows=(ROW.format(t=0), ROW.format(t=1))):
+HEADER = ",".join(CSV_REQUIRED)
+TWO_ROWS = (ROW.format(t=0), ROW.format(t=1))
+
+
+def csv_file(folder, header=HEADER, rows=TWO_ROWS):
     file = folder / "trajectory.csv"
     file.write_text("\n".join([header, *rows]) + "\n")
     return str(file)
@@ -89,35 +104,59 @@ def test_csv_is_flown_between_take_off_and_landing(tmp_path):
     assert value(trajectory, end)[0, 2] < START[2]
 
 
-@pytest.mark.parametrize(("changes", "reason"), [
-    ({"header": "t,px,py"}, "line 1: column pz, yaw.* is missing"),
-    ({"rows": [ROW.format(t=0), ROW.format(t="nan")]}, "line 3 column t: 'nan'"),
-    ({"rows": [ROW.format(t=1), ROW.format(t=0.5)]}, "line 3 column t: time does not increase"),
-    ({"rows": [ROW.format(t=0)]}, "at least two rows"),
-    ({"rows": [ROW.format(t=0), "1,0,0,x,0,0,0,0,0,0,0,0"]}, "line 3 column pz: 'x'"),
-    ({"rows": [ROW.format(t=0), "1,0,0,-1,0,0,0,0,0,0,0,0"]}, "line 3 column pz: below"),
-    ({"header": ",".join(CSV_REQUIRED) + ",alpha_1",
-      "rows": [ROW.format(t=0) + ",0", ROW.format(t=1) + ",0"]}, "without its twin"),
-    ({"header": ",".join(CSV_REQUIRED) + ",alpha_1,alpha_2,alpha_3",
-      "rows": [ROW.format(t=0) + ",0,0,0", ROW.format(t=1) + ",0,0,0"]}, "two joints"),
-])
+@pytest.mark.parametrize(
+    ("changes", "reason"),
+    [
+        ({"header": "t,px,py"}, "line 1: column pz, yaw.* is missing"),
+        ({"rows": [ROW.format(t=0), ROW.format(t="nan")]}, "line 3 column t: 'nan'"),
+        ({"rows": [ROW.format(t=1), ROW.format(t=0.5)]}, "line 3 column t: time does not increase"),
+        ({"rows": [ROW.format(t=0)]}, "at least two rows"),
+        ({"rows": [ROW.format(t=0), "1,0,0,x,0,0,0,0,0,0,0,0"]}, "line 3 column pz: 'x'"),
+        ({"rows": [ROW.format(t=0), "1,0,0,-1,0,0,0,0,0,0,0,0"]}, "line 3 column pz: below"),
+        (
+            {
+                "header": ",".join(CSV_REQUIRED) + ",alpha_1",
+                "rows": [ROW.format(t=0) + ",0", ROW.format(t=1) + ",0"],
+            },
+            "without its twin",
+        ),
+        (
+            {
+                "header": ",".join(CSV_REQUIRED) + ",alpha_1,alpha_2,alpha_3",
+                "rows": [ROW.format(t=0) + ",0,0,0", ROW.format(t=1) + ",0,0,0"],
+            },
+            "two joints",
+        ),
+    ],
+)
 def test_bad_csv_is_refused_naming_line_and_column(tmp_path, changes, reason):
     with pytest.raises(ScenarioError, match=reason):
         load_scenario(csv_file(tmp_path, **changes))
 
 
-@pytest.mark.parametrize(("text", "reason"), [
-    ("moves: [", "line 1.* not valid YAML"),
-    ("- a list", "a mapping expected"),
-    ("landing: {at: 5, duration: 3}", "'arm_start' is missing"),
-    ("arm_start: {alpha_1_deg: 0, alpha_2_deg: x}\nlanding: {at: 5, duration: 3}",
-     "arm_start.alpha_2_deg' is 'x'"),
-    ("arm_start: {alpha_1_deg: 0, alpha_2_deg: 0}\nlanding: {at: 5, duration: 3}\n"
-     "moves: [{coordinate: roll, from: 0, until: 1, to: 1}]", "coordinate' is 'roll', allowed"),
-    ("arm_start: {alpha_1_deg: 0, alpha_2_deg: 0}\nlanding: {at: 5, duration: 3}\n"
-     "moves: [{coordinate: x, from: 0, until: 2, to: 1}, {coordinate: x, from: 1, until: 3, to: 0}]",
-     "two moves of x overlap at 1"),
-])
+@pytest.mark.parametrize(
+    ("text", "reason"),
+    [
+        ("moves: [", "line 1.* not valid YAML"),
+        ("- a list", "a mapping expected"),
+        ("landing: {at: 5, duration: 3}", "'arm_start' is missing"),
+        (
+            "arm_start: {alpha_1_deg: 0, alpha_2_deg: x}\nlanding: {at: 5, duration: 3}",
+            "arm_start.alpha_2_deg' is 'x'",
+        ),
+        (
+            "arm_start: {alpha_1_deg: 0, alpha_2_deg: 0}\nlanding: {at: 5, duration: 3}\n"
+            "moves: [{coordinate: roll, from: 0, until: 1, to: 1}]",
+            "coordinate' is 'roll', allowed",
+        ),
+        (
+            "arm_start: {alpha_1_deg: 0, alpha_2_deg: 0}\nlanding: {at: 5, duration: 3}\n"
+            "moves: [{coordinate: x, from: 0, until: 2, to: 1},"
+            " {coordinate: x, from: 1, until: 3, to: 0}]",
+            "two moves of x overlap at 1",
+        ),
+    ],
+)
 def test_bad_scenario_is_refused(tmp_path, text, reason):
     file = tmp_path / "bad.yaml"
     file.write_text(text)
@@ -167,11 +206,14 @@ def test_sequence_waits_for_arming_flies_and_lands():
     flight.until(lambda o: o.done)
 
 
-@pytest.mark.parametrize(("disturb", "reason"), [
-    (lambda s: s.__setitem__((0, 0), 3.0), "position error"),
-    (lambda s: s.__setitem__((0, 3), 1.5), "tilt"),
-    (lambda s: s.__setitem__((0, 1), np.nan), "position error"),
-])
+@pytest.mark.parametrize(
+    ("disturb", "reason"),
+    [
+        (lambda s: s.__setitem__((0, 0), 3.0), "position error"),
+        (lambda s: s.__setitem__((0, 3), 1.5), "tilt"),
+        (lambda s: s.__setitem__((0, 1), np.nan), "position error"),
+    ],
+)
 def test_a_lost_vehicle_ends_the_flight_with_the_reason(disturb, reason):
     flight = Flight()
     flight.until(lambda o: o.time > 4.0)
@@ -186,5 +228,3 @@ def test_disarming_in_flight_is_noticed():
     flight.until(lambda o: o.time > 4.0)
     flight.armed_at = np.inf
     assert "disarmed" in flight.step().abort_reason
-
-

@@ -38,8 +38,16 @@ def law(**changes):
 
 
 def update(a_law, e, e_dot, acceleration_d=0.0, norms=(0.0, 0.0, 0.0), saturated=False, dt=DT):
-    return float(a_law.update(np.array([e]), np.array([e_dot]), np.array([acceleration_d]),
-                              np.array(norms, dtype=float), saturated, dt)[0])
+    return float(
+        a_law.update(
+            np.array([e]),
+            np.array([e_dot]),
+            np.array([acceleration_d]),
+            np.array(norms, dtype=float),
+            saturated,
+            dt,
+        )[0]
+    )
 
 
 def test_lyapunov_by_hand():
@@ -49,8 +57,10 @@ def test_lyapunov_by_hand():
 
 @given(lambda_1=positive, lambda_2=positive, q_1=positive, q_2=positive)
 def test_lyapunov_solves_its_equation_and_is_positive_definite(lambda_1, lambda_2, q_1, q_2):
-    p11, p12, p22 = (float(v[0]) for v in lyapunov.solve(
-        *(np.array([v]) for v in (lambda_1, lambda_2, q_1, q_2))))
+    p11, p12, p22 = (
+        float(v[0])
+        for v in lyapunov.solve(*(np.array([v]) for v in (lambda_1, lambda_2, q_1, q_2)))
+    )
     a = np.array([[0.0, 1.0], [-lambda_1, -lambda_2]])
     p = np.array([[p11, p12], [p12, p22]])
     scale = np.abs(a).max() * np.abs(p).max() + q_1 + q_2
@@ -94,7 +104,8 @@ def test_adaptive_laws_by_hand():
     update(a_law, 0.5, 0.25, 0.0, (2.0, 8.0, 0.0))
     r = 0.75
     for i, (start, nu, regressor) in enumerate(
-            [(0.5, 1.0, 1.0), (0.25, 2.0, 2.0), (0.125, 4.0, 4.0), (0.0625, 8.0, 8.0)]):
+        [(0.5, 1.0, 1.0), (0.25, 2.0, 2.0), (0.125, 4.0, 4.0), (0.0625, 8.0, 8.0)]
+    ):
         keep = math.exp(-nu * DT)
         expected = start * keep + (1.0 - keep) * r * regressor / nu
         assert a_law.adaptation[i] == pytest.approx(expected, rel=1e-12)
@@ -109,8 +120,13 @@ def test_zeta_inside_the_boundary_layer_by_hand():
     assert a_law.adaptation[4] == pytest.approx(expected, rel=1e-12)
 
 
-@given(e=st.floats(-10, 10), e_dot=st.floats(-10, 10), xi=st.floats(0, 20),
-       acceleration=st.floats(0, 100), dt=st.floats(1e-6, 1e3))
+@given(
+    e=st.floats(-10, 10),
+    e_dot=st.floats(-10, 10),
+    xi=st.floats(0, 20),
+    acceleration=st.floats(0, 100),
+    dt=st.floats(1e-6, 1e3),
+)
 def test_gains_stay_positive_for_any_step(e, e_dot, xi, acceleration, dt):
     a_law = law()
     for _ in range(5):
@@ -121,8 +137,9 @@ def test_gains_stay_positive_for_any_step(e, e_dot, xi, acceleration, dt):
 
 @given(xi=st.floats(0, 10), acceleration=st.floats(0, 50))
 def test_tau_is_continuous_at_the_boundary_layer(xi, acceleration):
-    below, above = (update(law(), 0.5 + step, 0.0, 0.0, (xi, acceleration, 0.0))
-                    for step in (-1e-9, 1e-9))
+    below, above = (
+        update(law(), 0.5 + step, 0.0, 0.0, (xi, acceleration, 0.0)) for step in (-1e-9, 1e-9)
+    )
     assert below == pytest.approx(above, abs=1e-5)
 
 
@@ -170,17 +187,20 @@ def test_freeze_keeps_the_gains_and_reset_restores_them():
     np.testing.assert_array_equal(a_law.adaptation[:5], [*ONE_AXIS["k_initial"], 0.1])
 
 
-@pytest.mark.parametrize(("change", "reason"), [
-    ({"inertia": [0.0]}, "inertia.*outside"),
-    ({"lambda_1": [-4.0]}, "lambda_1.*outside"),
-    ({"q_position": [float("nan")]}, "q_position.*outside"),
-    ({"lambda_2": [1.0, 2.0]}, "lambda_2.*1 numbers"),
-    ({"nu": [1.0]}, "nu.*4 numbers"),
-    ({"varpi": "wide"}, "varpi.*not numeric"),
-    ({"lambda_form": "other"}, "lambda_form.*theory, table"),
-    ({"freeze_when_saturated": 1}, "true or false"),
-    ({"gain": 1.0}, "gain: unknown"),
-])
+@pytest.mark.parametrize(
+    ("change", "reason"),
+    [
+        ({"inertia": [0.0]}, "inertia.*outside"),
+        ({"lambda_1": [-4.0]}, "lambda_1.*outside"),
+        ({"q_position": [float("nan")]}, "q_position.*outside"),
+        ({"lambda_2": [1.0, 2.0]}, "lambda_2.*1 numbers"),
+        ({"nu": [1.0]}, "nu.*4 numbers"),
+        ({"varpi": "wide"}, "varpi.*not numeric"),
+        ({"lambda_form": "other"}, "lambda_form.*theory, table"),
+        ({"freeze_when_saturated": 1}, "true or false"),
+        ({"gain": 1.0}, "gain: unknown"),
+    ],
+)
 def test_bad_parameters_are_refused_with_the_reason(change, reason):
     with pytest.raises(ParameterError, match=reason):
         LawParameters.from_mapping(ONE_AXIS | change, 1)

@@ -31,7 +31,8 @@ def test_rotor_thrust_curve_and_limit():
     full = VEHICLE.thrust_max
     assert full == pytest.approx(10.34, abs=0.01)
     np.testing.assert_allclose(
-        settled.thrust, [full, full * (0.3 * 0.25 + 0.7 * 0.5), 0.0, full], rtol=1e-9, atol=1e-9)
+        settled.thrust, [full, full * (0.3 * 0.25 + 0.7 * 0.5), 0.0, full], rtol=1e-9, atol=1e-9
+    )
 
 
 def test_rotor_lag_is_faster_up_than_down():
@@ -56,7 +57,8 @@ def test_servo_stays_within_the_torque_speed_line(effort, speed):
 @given(st.floats(-2, 2), st.floats(-5, 5))
 def test_encoder_reads_whole_counts(angle, velocity):
     alpha, alpha_dot = Encoders(NUMBERS["sensors"]["joints"]).sample(
-        np.array([angle]), np.array([velocity]))
+        np.array([angle]), np.array([velocity])
+    )
     count = 2 * np.pi / 4096
     assert abs(alpha[0] - angle) <= count / 2 + 1e-12
     assert alpha[0] / count == pytest.approx(round(alpha[0] / count), abs=1e-6)
@@ -111,8 +113,10 @@ def test_noise_has_the_stated_size():
 
 def test_magnet_pull_falls_with_the_gap():
     upright = np.eye(3).ravel()
-    pulls = [pull_fraction(np.array([0, 0, 0.02 + gap]), np.zeros(3), upright, 0.02, 0.003)
-             for gap in (-0.001, 0.0, 0.003, 0.012)]
+    pulls = [
+        pull_fraction(np.array([0, 0, 0.02 + gap]), np.zeros(3), upright, 0.02, 0.003)
+        for gap in (-0.001, 0.0, 0.003, 0.012)
+    ]
     assert pulls == pytest.approx([1.0, 1.0, 0.25, 0.04])
 
 

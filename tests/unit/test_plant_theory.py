@@ -115,7 +115,8 @@ def test_hover_thrust_is_the_weight():
     factor = VEHICLE.numbers["rotors"]["curve_factor"]
     command = (-(1 - factor) + np.sqrt((1 - factor) ** 2 + 4 * factor * thrust)) / (2 * factor)
     plant.rotors.speed[:] = np.sqrt(
-        thrust * VEHICLE.thrust_max / VEHICLE.numbers["rotors"]["thrust_coefficient"])
+        thrust * VEHICLE.thrust_max / VEHICLE.numbers["rotors"]["thrust_coefficient"]
+    )
     plant.data.qpos[2] = 5.0
     for _ in range(250):
         plant.sense()
@@ -132,7 +133,9 @@ def test_accelerometer_at_rest_feels_the_ground():
     effort = np.zeros(2)
     for _ in range(500):
         hil = plant.sense().hil
-        effort[:] = -2.0 * (plant.truth().state[0, 6:8] - [0.0, np.pi / 2]) - 0.2 * (
-            plant.truth().state[1, 6:8])
+        effort[:] = (
+            -2.0 * (plant.truth().state[0, 6:8] - [0.0, np.pi / 2])
+            - 0.2 * (plant.truth().state[1, 6:8])
+        )
         plant.step(np.zeros(4), effort, False)
     np.testing.assert_allclose(hil[2], [0.0, 0.0, 9.81], atol=0.05)

@@ -17,20 +17,28 @@ def test_euler_quaternion_matrix_agree(euler):
     matrix = r.matrix_from_euler(euler)
     quaternion = r.quaternion_from_euler(euler)
     np.testing.assert_allclose(r.matrix_from_quaternion(quaternion), matrix, atol=1e-12)
-    np.testing.assert_allclose(r.matrix_from_euler(r.euler_from_quaternion(quaternion)), matrix,
-                               atol=1e-6)
+    np.testing.assert_allclose(
+        r.matrix_from_euler(r.euler_from_quaternion(quaternion)), matrix, atol=1e-6
+    )
     np.testing.assert_allclose(matrix @ matrix.T, np.eye(3), atol=1e-12)
     assert np.linalg.det(matrix) > 0.999
 
 
 def test_matrix_is_z_y_x():
     """The paper's R_B^W: yaw about z, then pitch about y, then roll about x."""
-    np.testing.assert_allclose(r.matrix_from_euler(np.array([0, 0, np.pi / 2])) @ [1, 0, 0],
-                               [0, 1, 0], atol=1e-12)
-    np.testing.assert_allclose(r.matrix_from_euler(np.array([0, 0.3, 0])) @ [0, 0, 1],
-                               [np.sin(0.3), 0, np.cos(0.3)], atol=1e-12)
-    np.testing.assert_allclose(r.matrix_from_euler(np.array([0.3, 0, 0])) @ [0, 0, 1],
-                               [0, -np.sin(0.3), np.cos(0.3)], atol=1e-12)
+    np.testing.assert_allclose(
+        r.matrix_from_euler(np.array([0, 0, np.pi / 2])) @ [1, 0, 0], [0, 1, 0], atol=1e-12
+    )
+    np.testing.assert_allclose(
+        r.matrix_from_euler(np.array([0, 0.3, 0])) @ [0, 0, 1],
+        [np.sin(0.3), 0, np.cos(0.3)],
+        atol=1e-12,
+    )
+    np.testing.assert_allclose(
+        r.matrix_from_euler(np.array([0.3, 0, 0])) @ [0, 0, 1],
+        [0, -np.sin(0.3), np.cos(0.3)],
+        atol=1e-12,
+    )
 
 
 @given(angles, angles)
@@ -38,7 +46,9 @@ def test_product_of_quaternions_is_product_of_matrices(a, b):
     qa, qb = r.quaternion_from_euler(a), r.quaternion_from_euler(b)
     np.testing.assert_allclose(
         r.matrix_from_quaternion(r.quaternion_multiply(qa, qb)),
-        r.matrix_from_quaternion(qa) @ r.matrix_from_quaternion(qb), atol=1e-12)
+        r.matrix_from_quaternion(qa) @ r.matrix_from_quaternion(qb),
+        atol=1e-12,
+    )
 
 
 @given(angles, small)
@@ -62,5 +72,6 @@ def test_rotate_and_back(euler, v):
 def test_wrapped_angle_is_the_same_direction(angle):
     wrapped = r.wrap_angle(angle)
     assert -np.pi <= wrapped < np.pi
-    np.testing.assert_allclose([np.cos(wrapped), np.sin(wrapped)], [np.cos(angle), np.sin(angle)],
-                               atol=1e-9)
+    np.testing.assert_allclose(
+        [np.cos(wrapped), np.sin(wrapped)], [np.cos(angle), np.sin(angle)], atol=1e-9
+    )

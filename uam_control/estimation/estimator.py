@@ -10,7 +10,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from uam_control.coordinates import ARM, ATTITUDE, POSITION
+from uam_control.compiled import jit
+from uam_control.coordinates import ARM
 from uam_control.estimation.filters import derivative_step, joint_step, low_pass_step
 from uam_control.estimation.pose_filter import PoseFilter
 from uam_control.parameters import ParameterSet, number
@@ -22,19 +23,26 @@ class EstimatorParameters(ParameterSet):
     """Bandwidths and corners of the estimator's filters."""
 
     position_bandwidth: float = number(
-        12.0, "correction of position by motion capture", "rad/s", 0.5, 60.0)
+        12.0, "correction of position by motion capture", "rad/s", 0.5, 60.0
+    )
     attitude_bandwidth: float = number(
-        8.0, "correction of attitude by motion capture", "rad/s", 0.5, 60.0)
+        8.0, "correction of attitude by motion capture", "rad/s", 0.5, 60.0
+    )
     joint_bandwidth: float = number(
-        60.0, "correction of joint state by the encoder angle", "rad/s", 1.0, 125.0)
+        60.0, "correction of joint state by the encoder angle", "rad/s", 1.0, 125.0
+    )
     joint_velocity_weight: float = number(
-        80.0, "correction of joint state by the encoder velocity", "1/s", 0.0, 200.0)
+        80.0, "correction of joint state by the encoder velocity", "1/s", 0.0, 200.0
+    )
     acceleration_cutoff: float = number(
-        5.0, "low-pass on the acceleration of the vehicle", "Hz", 0.1, 100.0)
+        5.0, "low-pass on the acceleration of the vehicle", "Hz", 0.1, 100.0
+    )
     angular_acceleration_cutoff: float = number(
-        10.0, "low-pass on the derivative of the body rates", "Hz", 0.1, 100.0)
+        10.0, "low-pass on the derivative of the body rates", "Hz", 0.1, 100.0
+    )
     joint_acceleration_cutoff: float = number(
-        5.0, "low-pass on the derivative of the joint velocities", "Hz", 0.1, 100.0)
+        5.0, "low-pass on the derivative of the joint velocities", "Hz", 0.1, 100.0
+    )
 
 
 class StateEstimator:
@@ -61,8 +69,11 @@ class StateEstimator:
     @property
     def waiting_for(self) -> list[str]:
         """Names of the inputs not seen yet."""
-        seen = {"imu": self._imu_stamp is not None, "mocap": self._started,
-                "joints": self._joint_stamp is not None}
+        seen = {
+            "imu": self._imu_stamp is not None,
+            "mocap": self._started,
+            "joints": self._joint_stamp is not None,
+        }
         return [name for name, there in seen.items() if not there]
 
     @property
@@ -94,22 +105,57 @@ class StateEstimator:
             return
         dt = min(max(stamp - last, 0.0), 0.05)
         joint_step(alpha, alpha_dot, p.joint_bandwidth, p.joint_velocity_weight, dt, self._joints)
-        derivative_step(self._joints[1], p.joint_acceleration_cutoff, dt, self._joints_filter,
-                        self._state[2, ARM])
+        derivative_step(
+            self._joints[1],
+            p.joint_acceleration_cutoff,
+            dt,
+            self._joints_filter,
+            self._state[2, ARM],
+        )
 
     def update(self) -> np.ndarray:
         """Return the state (3, 8) at the newest IMU stamp; the array is reused by the next call."""
         p, pose, state = self.parameters, self._pose, self._state
-        if self._period > 0.0:
-            derivative_step(pose.rates, p.angular_acceleration_cutoff, self._period,
-                            self._rates_filter, state[2, ATTITUDE])
-            low_pass_step(pose.acceleration, p.acceleration_cutoff, self._period,
-                          self._acceleration)
-        state[0, POSITION] = pose.position
-        state[0, ATTITUDE] = euler_from_quaternion(pose.quaternion)
-        state[0, ARM] = self._joints[0]
-        state[1, POSITION] = pose.velocity
-        state[1, ATTITUDE] = pose.rates
-        state[1, ARM] = self._joints[1]
-        state[2, POSITION] = self._acceleration
+        assemble(
+            pose.position,
+            pose.velocity,
+            pose.quaternion,
+            pose.rates,
+            pose.acceleration,
+            self._joints,
+            self._period,
+            p.angular_acceleration_cutoff,
+            p.acceleration_cutoff,
+            self._rates_filter,
+            self._acceleration,
+            state,
+        )
         return state
+
+
+@jit
+def assemble(
+    position,
+    velocity,
+    quaternion,
+    rates,
+    acceleration,
+    joints,
+    period,
+    angular_cutoff,
+    linear_cutoff,
+    rates_filter,
+    filtered,
+    state,
+):
+    """Filter the accelerations over `period` [s] and gather the state (3, 8)."""
+    if period > 0.0:
+        derivative_step(rates, angular_cutoff, period, rates_filter, state[2, 3:6])
+        low_pass_step(acceleration, linear_cutoff, period, filtered)
+    euler = euler_from_quaternion(quaternion)
+    for i in range(3):
+        state[0, i], state[0, 3 + i] = position[i], euler[i]
+        state[1, i], state[1, 3 + i] = velocity[i], rates[i]
+        state[2, i] = filtered[i]
+    for i in range(joints.shape[1]):
+        state[0, 6 + i], state[1, 6 + i] = joints[0, i], joints[1, i]

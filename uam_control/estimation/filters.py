@@ -42,5 +42,6 @@ def joint_step(angle, velocity, bandwidth, velocity_weight, dt, state):
         state[0, i] += dt * state[1, i]
         innovation = angle[i] - state[0, i]
         state[0, i] += 2.0 * bandwidth * dt * innovation
-        state[1, i] += dt * (bandwidth * bandwidth * innovation
-                             + velocity_weight * (velocity[i] - state[1, i]))
+        state[1, i] += dt * (
+            bandwidth * bandwidth * innovation + velocity_weight * (velocity[i] - state[1, i])
+        )

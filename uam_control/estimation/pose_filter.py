@@ -1,7 +1,7 @@
 """Pose filter: integrates the IMU and corrects with motion capture that arrives late.
 
-A fixed-gain observer (what a Kalman filter with constant noise converges to). The pose in force when
-the camera exposed is kept in a ring, so that the correction compares like with like.
+A fixed-gain observer (what a Kalman filter with constant noise converges to). The pose in force
+when the camera exposed is kept in a ring, so that the correction compares like with like.
 """
 
 from __future__ import annotations
@@ -18,6 +18,7 @@ from uam_control.rotations import (
 )
 
 HISTORY = 64  # ticks of pose kept, 256 ms at 250 Hz
+OLDEST_MATCH = 0.02  # [s] a pose without a prediction this near is not used
 GRAVITY = 9.81
 
 
@@ -58,23 +59,65 @@ class PoseFilter:
         row = self._count % HISTORY
         self._count += 1
         self._stamps[row] = stamp
-        predict(dt, gyro, specific_force, self.position, self.velocity, self.quaternion, self.rates,
-                self.acceleration, self.gyro_bias, self.accelerometer_bias, self._poses[row])
+        predict(
+            dt,
+            gyro,
+            specific_force,
+            self.position,
+            self.velocity,
+            self.quaternion,
+            self.rates,
+            self.acceleration,
+            self.gyro_bias,
+            self.accelerometer_bias,
+            self._poses[row],
+        )
 
     def correct(self, stamp: float, position: np.ndarray, quaternion: np.ndarray) -> None:
-        """Correct with a pose exposed at `stamp`; older than the history: refused silently."""
-        row = int(np.argmin(np.abs(self._stamps - stamp)))
-        if abs(self._stamps[row] - stamp) > 0.02:
+        """Correct with a pose exposed at `stamp`; older than the history: not used."""
+        row = nearest(self._stamps, stamp)
+        if abs(self._stamps[row] - stamp) > OLDEST_MATCH:
             return
         dt = min(max(stamp - self._last_correction, 1e-3), 0.05)
         self._last_correction = stamp
-        correct(dt, self._bandwidths, position, quaternion, self._poses[row], self.position,
-                self.velocity, self.quaternion, self.gyro_bias, self.accelerometer_bias)
+        correct(
+            dt,
+            self._bandwidths,
+            position,
+            quaternion,
+            self._poses[row],
+            self.position,
+            self.velocity,
+            self.quaternion,
+            self.gyro_bias,
+            self.accelerometer_bias,
+        )
 
 
 @jit
-def predict(dt, gyro, specific_force, position, velocity, quaternion, rates, acceleration, gyro_bias,
-            accelerometer_bias, pose):
+def nearest(stamps, stamp):
+    """Return the row of the stamp nearest to `stamp`."""
+    best = 0
+    for row in range(len(stamps)):
+        if abs(stamps[row] - stamp) < abs(stamps[best] - stamp):
+            best = row
+    return best
+
+
+@jit
+def predict(
+    dt,
+    gyro,
+    specific_force,
+    position,
+    velocity,
+    quaternion,
+    rates,
+    acceleration,
+    gyro_bias,
+    accelerometer_bias,
+    pose,
+):
     """Advance the pose by dt and write it, with its quaternion, into pose (7,)."""
     for i in range(3):
         rates[i] = gyro[i] - gyro_bias[i]
@@ -92,8 +135,18 @@ def predict(dt, gyro, specific_force, position, velocity, quaternion, rates, acc
 
 
 @jit
-def correct(dt, bandwidths, measured_position, measured_quaternion, pose, position, velocity,
-            quaternion, gyro_bias, accelerometer_bias):
+def correct(
+    dt,
+    bandwidths,
+    measured_position,
+    measured_quaternion,
+    pose,
+    position,
+    velocity,
+    quaternion,
+    gyro_bias,
+    accelerometer_bias,
+):
     """Observer gains 3w, 3w^2, w^3 (triple pole) for position, 2w, w^2 for attitude."""
     w = bandwidths[0]
     for i in range(3):
@@ -104,6 +157,7 @@ def correct(dt, bandwidths, measured_position, measured_quaternion, pose, positi
     w = bandwidths[1]
     error = rotation_error(measured_quaternion, pose[3:])
     quaternion[:] = quaternion_multiply(
-        quaternion, quaternion_from_rotation_vector(2.0 * w * dt * error))
+        quaternion, quaternion_from_rotation_vector(2.0 * w * dt * error)
+    )
     for i in range(3):
         gyro_bias[i] -= w * w * dt * error[i]

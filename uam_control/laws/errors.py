@@ -1,7 +1,8 @@
 """Tracking errors of the paper: e, e_dot, and ||xi|| of the whole vehicle.
 
-Attitude uses the error on SO(3), e_q = 1/2 (R_d^T R - R^T R_d)^vee, and one of two forms of its rate:
-`lee` (default) Omega - R^T R_d Omega_d, or `printed` q_dot - R_d^T R q_d_dot, the paper's equation.
+Attitude uses the error on SO(3), e_q = 1/2 (R_d^T R - R^T R_d)^vee, and one of two forms of its
+rate: `lee` (default) Omega - R^T R_d Omega_d, or `printed` q_dot - R_d^T R q_d_dot, the paper's
+equation.
 """
 
 from __future__ import annotations
@@ -25,7 +26,8 @@ def tracking_errors(state, reference, attitude_reference, flying, printed, error
 
     state, reference: (3, 8) as in `coordinates`; attitude_reference: (3, 3) rows q_d (Euler) [rad],
     Omega_d [rad/s], Omega_d_dot [rad/s^2] in the desired body frame. Rows of `errors`: e, e_dot,
-    chi_d_ddot. While not flying only the arm has errors; the rest is zero. norms: ||xi||, ||chi_ddot||,
+    chi_d_ddot. While not flying only the arm has errors; the rest is zero. norms: ||xi||,
+    ||chi_ddot||,
     ||chi_dot||.
     """
     errors[:] = 0.0

@@ -1,7 +1,7 @@
 """The Lyapunov equation A^T P + P A = -Q of one subsystem, solved in closed form.
 
-With diagonal lambda_1, lambda_2 and Q the 2n x 2n equation falls apart into n equations of size two,
-A = [[0, 1], [-lambda_1, -lambda_2]], Q = diag(q_position, q_velocity).
+With diagonal lambda_1, lambda_2 and Q the 2n x 2n equation falls apart into n equations of size
+two, A = [[0, 1], [-lambda_1, -lambda_2]], Q = diag(q_position, q_velocity).
 """
 
 from __future__ import annotations

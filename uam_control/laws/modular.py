@@ -4,8 +4,8 @@
     dtau_j = rho_j r_j / max(||r_j||, varpi_j),          r_j = B^T P_j xi_j
     rho_j  = K0 + K1 ||xi|| + K2 ||xi||^2 + K3 ||chi_ddot|| + zeta_j
 
-with the adaptive laws for K0..K3 and zeta_j. xi and chi_ddot are those of the whole vehicle, r_j the
-subsystem's own: that is how couplings enter while the three parameter sets stay independent.
+with the adaptive laws for K0..K3 and zeta_j. xi and chi_ddot are those of the whole vehicle, r_j
+the subsystem's own: that is how couplings enter while the three parameter sets stay independent.
 """
 
 from __future__ import annotations
@@ -62,8 +62,18 @@ class ModularLaw:
         saturated: the actuator was at its limit in the last tick.
         The returned array is reused by the next call.
         """
-        law_step(self._record, e, e_dot, acceleration_d, norms, saturated, self.frozen, dt,
-                 self.adaptation, self._tau)
+        law_step(
+            self._record,
+            e,
+            e_dot,
+            acceleration_d,
+            norms,
+            saturated,
+            self.frozen,
+            dt,
+            self.adaptation,
+            self._tau,
+        )
         return self._tau
 
 
@@ -71,7 +81,8 @@ class ModularLaw:
 def law_step(record, e, e_dot, acceleration_d, norms, saturated, frozen, dt, adaptation, tau):
     """One tick of the law: writes tau (n,) and advances adaptation (8,) in place.
 
-    Equations (ct1), (del_p), (rho_p) and (adaptive_law_p) of the paper and their twins for q, alpha.
+    Equations (ct1), (del_p), (rho_p) and (adaptive_law_p) of the paper and their twins for q,
+    alpha.
     """
     p = record[0]
     n = len(tau)
@@ -89,8 +100,12 @@ def law_step(record, e, e_dot, acceleration_d, norms, saturated, frozen, dt, ada
         r_squared += r_i * r_i
     r_norm = math.sqrt(r_squared)
 
-    bound = (adaptation[0] + adaptation[1] * xi_norm + adaptation[2] * xi_norm * xi_norm
-             + adaptation[3] * acceleration)
+    bound = (
+        adaptation[0]
+        + adaptation[1] * xi_norm
+        + adaptation[2] * xi_norm * xi_norm
+        + adaptation[3] * acceleration
+    )
     rho = bound + adaptation[4]
     scale = rho / max(r_norm, p.varpi)
     for i in range(n):
@@ -109,8 +124,8 @@ def law_step(record, e, e_dot, acceleration_d, norms, saturated, frozen, dt, ada
 def adapt(p, r_norm, xi_norm, acceleration, bound, saturated, dt, adaptation):
     """Advance K0..K3 and zeta by dt, exactly for inputs that are constant over the tick.
 
-    Each law is linear in its own gain, K' = u - nu K, so K(dt) = K e^(-nu dt) + (1 - e^(-nu dt)) u/nu
-    stays positive for every dt, as the Appendix proves in continuous time.
+    Each law is linear in its own gain, K' = u - nu K, so K(dt) = K e^(-nu dt) + (1 - e^(-nu dt))
+    u/nu stays positive for every dt, as the Appendix proves in continuous time.
     """
     regressor = 1.0
     for i in range(4):

@@ -19,39 +19,60 @@ class LawParameters(ParameterSet):
     lambda_1: tuple = vector((), "lambda_1, gain on e", "1/s^2", TINY, HUGE)
     lambda_2: tuple = vector((), "lambda_2, gain on e_dot", "1/s", TINY, HUGE)
     lambda_form: str = choice(
-        "theory", "theory: Lambda = [lambda_1 lambda_2]; table: lambda_table (e_dot + 2 e)",
-        ("theory", "table"))
-    lambda_table: tuple = vector((), "Lambda as printed, used by lambda_form: table", "1/s",
-                                 TINY, HUGE)
+        "theory",
+        "theory: Lambda = [lambda_1 lambda_2]; table: lambda_table (e_dot + 2 e)",
+        ("theory", "table"),
+    )
+    lambda_table: tuple = vector(
+        (), "Lambda as printed, used by lambda_form: table", "1/s", TINY, HUGE
+    )
     q_position: tuple = vector((), "Q, its half on e", "1", TINY, HUGE)
     q_velocity: tuple = vector((), "Q, its half on e_dot", "1", TINY, HUGE)
     error_rate_form: str = choice(
-        "lee", "lee: Omega - R^T R_d Omega_d; printed: q_dot - R_d^T R q_d_dot", ERROR_RATE_FORMS)
+        "lee", "lee: Omega - R^T R_d Omega_d; printed: q_dot - R_d^T R q_d_dot", ERROR_RATE_FORMS
+    )
     k_initial: tuple = vector((), "K0..K3 at the start", "1", TINY, HUGE, 4)
     zeta_initial: float = number(0.01, "zeta at the start", "1", TINY, HUGE)
     nu: tuple = vector((), "leakage nu_0..nu_3 of K0..K3", "1/s", 1e-6, 1e4, 4)
     epsilon: float = number(1e-4, "epsilon, what drives zeta", "1/s", TINY, HUGE)
     varpi: float = number(0.1, "varpi, boundary layer of ||r||", "1", TINY, HUGE)
-    k_ceiling: tuple = vector((0.0, 0.0, 0.0, 0.0), "safeguard: largest K0..K3, 0 = off", "1",
-                              0.0, HUGE, 4)
+    k_ceiling: tuple = vector(
+        (0.0, 0.0, 0.0, 0.0), "safeguard: largest K0..K3, 0 = off", "1", 0.0, HUGE, 4
+    )
     freeze_when_saturated: bool = switch(
-        False, "safeguard: K0..K3 do not grow while the actuator saturates")
+        False, "safeguard: K0..K3 do not grow while the actuator saturates"
+    )
     acceleration_limit: float = number(
-        0.0, "safeguard: largest ||chi_ddot|| used, 0 = off", "m/s^2 or rad/s^2", 0.0, HUGE)
+        0.0, "safeguard: largest ||chi_ddot|| used, 0 = off", "m/s^2 or rad/s^2", 0.0, HUGE
+    )
     acceleration_cutoff: float = number(
-        0.0, "safeguard: low-pass on ||chi_ddot||, 0 = off", "Hz", 0.0, 125.0)
+        0.0, "safeguard: low-pass on ||chi_ddot||, 0 = off", "Hz", 0.0, 125.0
+    )
 
     @property
     def safeguards(self) -> list[str]:
-        """Names of the safeguards that are on; none of them is in the paper (law.md, decision 7)."""
-        return [name for name in ("k_ceiling", "freeze_when_saturated", "acceleration_limit",
-                                  "acceleration_cutoff") if np.any(getattr(self, name))]
+        """Names of the safeguards that are on; none of them is in the paper (law.md, decision
+        7)."""
+        return [
+            name
+            for name in (
+                "k_ceiling",
+                "freeze_when_saturated",
+                "acceleration_limit",
+                "acceleration_cutoff",
+            )
+            if np.any(getattr(self, name))
+        ]
 
     def record(self) -> np.ndarray:
         """Return the one-element structured array that the compiled law reads."""
         n = len(self.inertia)
-        p11, p12, p22 = lyapunov.solve(*(np.array(values) for values in (
-            self.lambda_1, self.lambda_2, self.q_position, self.q_velocity)))
+        p11, p12, p22 = lyapunov.solve(
+            *(
+                np.array(values)
+                for values in (self.lambda_1, self.lambda_2, self.q_position, self.q_velocity)
+            )
+        )
         theory = self.lambda_form == "theory"
         table = np.array(self.lambda_table)
         ceiling = np.array(self.k_ceiling)
@@ -71,9 +92,15 @@ class LawParameters(ParameterSet):
             "freeze_when_saturated": float(self.freeze_when_saturated),
         }
         lengths = {"nu": (4,), "k_ceiling": (4,)}
-        record = np.zeros(1, np.dtype([
-            (name, np.float64, lengths.get(name, (n,) if np.ndim(value) else ()))
-            for name, value in values.items()]))
+        record = np.zeros(
+            1,
+            np.dtype(
+                [
+                    (name, np.float64, lengths.get(name, (n,) if np.ndim(value) else ()))
+                    for name, value in values.items()
+                ]
+            ),
+        )
         for name, value in values.items():
             record[name][0] = value
         return record

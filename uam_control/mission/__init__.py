@@ -3,5 +3,11 @@
 from uam_control.mission.mission import Mission, MissionOutput, MissionParameters
 from uam_control.mission.scenario import Scenario, ScenarioError, load_scenario
 
-__all__ = ["Mission", "MissionOutput", "MissionParameters", "Scenario", "ScenarioError",
-           "load_scenario"]
+__all__ = [
+    "Mission",
+    "MissionOutput",
+    "MissionParameters",
+    "Scenario",
+    "ScenarioError",
+    "load_scenario",
+]

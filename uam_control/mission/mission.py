@@ -1,12 +1,15 @@
-"""The sequence of a flight: waiting, take-off, the scenario's phases, landing, landed, or aborted."""
+"""The sequence of a flight: waiting, take-off, the scenario's phases, landing, landed, or
+aborted."""
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
 
-from uam_control.coordinates import ARM, POSITION
+from uam_control.compiled import jit
+from uam_control.coordinates import ARM
 from uam_control.mission.scenario import Scenario
 from uam_control.mission.trajectory import Trajectory, empty_reference
 from uam_control.parameters import ParameterSet, number
@@ -60,8 +63,8 @@ class Mission:
     def step(self, stamp: float, state: np.ndarray, armed_since: float | None) -> MissionOutput:
         """Return what holds at `stamp` [s].
 
-        state: newest estimate (3, 8). armed_since: stamp at which the autopilot reported armed, None
-        while it is not. Call it for every tick with the stamp of the tick to come.
+        state: newest estimate (3, 8). armed_since: stamp at which the autopilot reported armed,
+        None while it is not. Call it for every tick with the stamp of the tick to come.
         """
         output = self.output
         if self._end is not None:
@@ -105,8 +108,7 @@ class Mission:
         landing, p = self.scenario.landing, self.parameters
         if self.output.time < landing.at + 0.5 * landing.duration:
             return
-        if (state[0, 2] < self._ground + p.touchdown_height
-                and abs(state[1, 2]) < p.touchdown_speed):
+        if state[0, 2] < self._ground + p.touchdown_height and abs(state[1, 2]) < p.touchdown_speed:
             if self._at_rest_since is None:
                 self._at_rest_since = stamp
             if stamp - self._at_rest_since >= p.touchdown_time:
@@ -121,12 +123,11 @@ class Mission:
         p = self.parameters
         if armed_since is None:
             return "the autopilot disarmed in flight"
-        error = float(np.linalg.norm(state[0, POSITION] - self.output.reference[0, POSITION]))
+        error, tilt = deviation(state, self.output.reference)
         if not error < p.position_error_max:
             return f"position error {error:.2f} m exceeds {p.position_error_max:g} m"
-        tilt = float(np.arccos(np.clip(np.cos(state[0, 3]) * np.cos(state[0, 4]), -1.0, 1.0)))
-        if tilt > p.tilt_max:
-            return f"tilt {np.degrees(tilt):.0f} deg exceeds {np.degrees(p.tilt_max):.0f} deg"
+        if not tilt < p.tilt_max:
+            return f"tilt {math.degrees(tilt):.0f} deg exceeds {math.degrees(p.tilt_max):.0f} deg"
         return ""
 
     def _stop(self, stamp: float, phase: str) -> None:
@@ -134,3 +135,13 @@ class Mission:
         output.flying = output.arm = output.magnet = False
         output.phase = phase
         self._end = stamp + self.parameters.settle_time
+
+
+@jit
+def deviation(state, reference):
+    """Return the distance from the reference [m] and the tilt [rad]; NaN where the state is."""
+    squared = 0.0
+    for i in range(3):
+        squared += (state[0, i] - reference[0, i]) ** 2
+    cosine = math.cos(state[0, 3]) * math.cos(state[0, 4])
+    return math.sqrt(squared), math.acos(min(1.0, max(-1.0, cosine)))

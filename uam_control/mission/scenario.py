@@ -35,7 +35,8 @@ class Landing:
 
 @dataclass(frozen=True)
 class Scenario:
-    """A flight: moves or samples, phases, magnet switching, landing. Times are mission times [s]."""
+    """A flight: moves or samples, phases, magnet switching, landing. Times are mission times
+    [s]."""
 
     name: str
     description: str
@@ -53,15 +54,25 @@ class Scenario:
     def trajectory(self, start: np.ndarray) -> Trajectory:
         """Return the reference from chi (8,) at take-off to the ground below the landing point."""
         ground = start[2]
-        down = Move("z", self.landing.at, self.landing.at + self.landing.duration,
-                    ground - SINK)
+        down = Move("z", self.landing.at, self.landing.at + self.landing.duration, ground - SINK)
         if self.samples is None:
             return Moves(start, [*self.moves, down])
-        climb = [Move(name, 0.0, self.samples_start, value)
-                 for name, value in zip(COORDINATES, self.samples.first, strict=True)]
-        return Chain([(0.0, Moves(start, climb)), (self.samples_start, self.samples),
-                      (self.landing.at, Moves(self.samples.last, [
-                          Move("z", 0.0, self.landing.duration, ground - SINK)]))])
+        climb = [
+            Move(name, 0.0, self.samples_start, value)
+            for name, value in zip(COORDINATES, self.samples.first, strict=True)
+        ]
+        return Chain(
+            [
+                (0.0, Moves(start, climb)),
+                (self.samples_start, self.samples),
+                (
+                    self.landing.at,
+                    Moves(
+                        self.samples.last, [Move("z", 0.0, self.landing.duration, ground - SINK)]
+                    ),
+                ),
+            ]
+        )
 
     def phase(self, time: float) -> str:
         """Return the name of the phase at mission time [s] >= 0."""
@@ -104,26 +115,35 @@ def from_yaml(file: Path) -> Scenario:
     landing = reader.mapping(document, "landing")
     moves = [reader.move(entry, i) for i, entry in enumerate(document.get("moves") or [])]
     reader.no_overlap(moves)
-    phases = tuple((reader.number(p, "from", "phases"), str(p.get("name", ""))) for p in
-                   document.get("phases") or [{"from": 0.0, "name": "flight"}])
-    magnet = tuple((reader.number(m, "at", "magnet"), reader.switch(m, "energised", "magnet"))
-                   for m in document.get("magnet") or [])
+    phases = tuple(
+        (reader.number(p, "from", "phases"), str(p.get("name", "")))
+        for p in document.get("phases") or [{"from": 0.0, "name": "flight"}]
+    )
+    magnet = tuple(
+        (reader.number(m, "at", "magnet"), reader.switch(m, "energised", "magnet"))
+        for m in document.get("magnet") or []
+    )
     payload = document.get("payload") or {}
     drop = payload.get("drop_point")
     return Scenario(
         name=file.stem,
         description=str(document.get("description", "")),
-        arm_start=(math.radians(reader.number(arm, "alpha_1_deg", "arm_start")),
-                   math.radians(reader.number(arm, "alpha_2_deg", "arm_start"))),
+        arm_start=(
+            math.radians(reader.number(arm, "alpha_1_deg", "arm_start")),
+            math.radians(reader.number(arm, "alpha_2_deg", "arm_start")),
+        ),
         phases=phases,
-        landing=Landing(reader.number(landing, "at", "landing"),
-                        reader.number(landing, "duration", "landing")),
+        landing=Landing(
+            reader.number(landing, "at", "landing"), reader.number(landing, "duration", "landing")
+        ),
         moves=tuple(moves),
         magnet=magnet,
         payload_mass=reader.number(payload, "mass", "payload") if payload else 0.0,
         drop_point=(float(drop[0]), float(drop[1])) if drop else None,
-        snapshots=tuple((reader.number(s, "at", "snapshots"), str(s.get("caption", "")))
-                        for s in document.get("snapshots") or []),
+        snapshots=tuple(
+            (reader.number(s, "at", "snapshots"), str(s.get("caption", "")))
+            for s in document.get("snapshots") or []
+        ),
     )
 
 
@@ -143,7 +163,11 @@ class Reader:
     def number(self, entry: Any, key: str, owner: str) -> float:
         """Return a required finite number."""
         value = entry.get(key) if isinstance(entry, dict) else None
-        if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value):
+        if (
+            isinstance(value, bool)
+            or not isinstance(value, int | float)
+            or not math.isfinite(value)
+        ):
             raise ScenarioError(f"{self.where}: '{owner}.{key}' is {value!r}, a number expected")
         return float(value)
 
@@ -151,7 +175,9 @@ class Reader:
         """Return a required true or false."""
         value = entry.get(key) if isinstance(entry, dict) else None
         if not isinstance(value, bool):
-            raise ScenarioError(f"{self.where}: '{owner}.{key}' is {value!r}, true or false expected")
+            raise ScenarioError(
+                f"{self.where}: '{owner}.{key}' is {value!r}, true or false expected"
+            )
         return value
 
     def move(self, entry: Any, index: int) -> Move:
@@ -160,8 +186,10 @@ class Reader:
         coordinate = entry.get("coordinate") if isinstance(entry, dict) else None
         allowed = [c for c in COORDINATES if c not in ("roll", "pitch")]
         if coordinate not in allowed:
-            raise ScenarioError(f"{self.where}: '{owner}.coordinate' is {coordinate!r}, "
-                                f"allowed: {', '.join(allowed)}")
+            raise ScenarioError(
+                f"{self.where}: '{owner}.coordinate' is {coordinate!r}, "
+                f"allowed: {', '.join(allowed)}"
+            )
         angle = coordinate in ANGLES
         target = self.number(entry, "to_deg" if angle else "to", owner)
         start, end = self.number(entry, "from", owner), self.number(entry, "until", owner)
@@ -175,8 +203,9 @@ class Reader:
         for move in sorted(moves, key=lambda m: m.start):
             before = last.get(move.coordinate)
             if before and before.end > move.start:
-                raise ScenarioError(f"{self.where}: two moves of {move.coordinate} overlap at "
-                                    f"{move.start} s")
+                raise ScenarioError(
+                    f"{self.where}: two moves of {move.coordinate} overlap at {move.start} s"
+                )
             last[move.coordinate] = move
 
 
@@ -192,18 +221,27 @@ def from_csv(file: Path, takeoff: float = 3.0, landing: float = 5.0) -> Scenario
         rows.fieldnames = columns
         missing = [name for name in CSV_REQUIRED if name not in columns]
         if missing:
-            raise ScenarioError(f"{file} line 1: column {', '.join(missing)} is missing; needed: "
-                                f"{','.join(CSV_REQUIRED)}")
+            raise ScenarioError(
+                f"{file} line 1: column {', '.join(missing)} is missing; needed: "
+                f"{','.join(CSV_REQUIRED)}"
+            )
         optional = [name for name in CSV_OPTIONAL if name in columns]
         if len(optional) == 1:
-            raise ScenarioError(f"{file} line 1: {optional[0]} without its twin; the arm has two "
-                                "joints: alpha_1,alpha_2")
+            raise ScenarioError(
+                f"{file} line 1: {optional[0]} without its twin; the arm has two "
+                "joints: alpha_1,alpha_2"
+            )
         strange = [c for c in columns if c.startswith("alpha") and c not in CSV_OPTIONAL]
         if strange:
-            raise ScenarioError(f"{file} line 1: column {strange[0]}: the arm has two joints: "
-                                "alpha_1,alpha_2")
-        table = np.array([_csv_row(file, line, row, (*CSV_REQUIRED, *optional))
-                          for line, row in enumerate(rows, start=2)])
+            raise ScenarioError(
+                f"{file} line 1: column {strange[0]}: the arm has two joints: alpha_1,alpha_2"
+            )
+        table = np.array(
+            [
+                _csv_row(file, line, row, (*CSV_REQUIRED, *optional))
+                for line, row in enumerate(rows, start=2)
+            ]
+        )
     if len(table) < 2:
         raise ScenarioError(f"{file}: at least two rows expected, got {len(table)}")
     times = table[:, 0]
@@ -216,7 +254,7 @@ def from_csv(file: Path, takeoff: float = 3.0, landing: float = 5.0) -> Scenario
         raise ScenarioError(f"{file} line {line} column pz: below the ground")
     samples = np.zeros((len(table), 3, 8))
     for row, first in enumerate((1, 5, 8)):
-        samples[:, row, 0:3] = table[:, first:first + 3]
+        samples[:, row, 0:3] = table[:, first : first + 3]
     samples[:, 0, 5] = table[:, 4]
     samples[:, 1, 5] = table[:, 11]
     samples[:, 2, 5] = np.gradient(table[:, 11], times)
@@ -249,7 +287,8 @@ def _csv_row(file: Path, line: int, row: dict, names: tuple[str, ...]) -> list[f
         except (TypeError, ValueError):
             value = math.nan
         if not math.isfinite(value):
-            raise ScenarioError(f"{file} line {line} column {name}: {row[name]!r} is not a finite "
-                                "number")
+            raise ScenarioError(
+                f"{file} line {line} column {name}: {row[name]!r} is not a finite number"
+            )
         numbers.append(value)
     return numbers

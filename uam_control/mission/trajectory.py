@@ -37,8 +37,15 @@ class Moves:
         value = dict(zip(COORDINATES, self._start, strict=True))
         rows = []
         for move in sorted(moves, key=lambda m: m.start):
-            rows.append((COORDINATES.index(move.coordinate), move.start, move.end,
-                         value[move.coordinate], move.to))
+            rows.append(
+                (
+                    COORDINATES.index(move.coordinate),
+                    move.start,
+                    move.end,
+                    value[move.coordinate],
+                    move.to,
+                )
+            )
             value[move.coordinate] = move.to
         self._rows = np.array(rows, dtype=float).reshape(-1, 5)
 
@@ -100,11 +107,16 @@ class Sampled:
         s = (time - times[row]) / length
         (p0, v0, a0), (p1, v1, a1) = samples[row], samples[row + 1]
         reference[0] = (
-            (2 * s**3 - 3 * s**2 + 1) * p0 + (s**3 - 2 * s**2 + s) * length * v0
-            + (-2 * s**3 + 3 * s**2) * p1 + (s**3 - s**2) * length * v1)
+            (2 * s**3 - 3 * s**2 + 1) * p0
+            + (s**3 - 2 * s**2 + s) * length * v0
+            + (-2 * s**3 + 3 * s**2) * p1
+            + (s**3 - s**2) * length * v1
+        )
         reference[1] = (
             (6 * s**2 - 6 * s) * (p0 - p1) / length
-            + (3 * s**2 - 4 * s + 1) * v0 + (3 * s**2 - 2 * s) * v1)
+            + (3 * s**2 - 4 * s + 1) * v0
+            + (3 * s**2 - 2 * s) * v1
+        )
         reference[2] = (1 - s) * a0 + s * a1
 
 

@@ -27,14 +27,19 @@ from uam_sim_bridge.plant import Plant, Vehicle
 
 LONGEST_WAIT = 20.0  # [s] simulated, for the autopilot to get ready and armed
 
-_TRUTH = COLUMNS.block("truth.")
-_ESTIMATE = COLUMNS.block("estimate.")
-_REFERENCE = COLUMNS.block("reference.")
-_INPUTS = slice(COLUMNS["tau_p.x"], COLUMNS["setpoint.thrust"] + 1)
-_ADAPTATION = COLUMNS.block("adaptation.")
-_ROTORS = slice(COLUMNS["rotor_1.command"], COLUMNS["rotor_4.thrust"] + 1)
-_PAYLOAD = COLUMNS.block("payload.")
-_MAGNET = COLUMNS.block("magnet.")
+# where each group of columns begins; constants of the compiled `record`
+_TRUTH = COLUMNS.block("truth.").start
+_ESTIMATE = COLUMNS.block("estimate.").start
+_REFERENCE = COLUMNS.block("reference.").start
+_TAU_P = COLUMNS["tau_p.x"]
+_TAU_Q = COLUMNS["tau_q.roll"]
+_TAU_ALPHA = COLUMNS["tau_alpha.1"]
+_SETPOINT = COLUMNS["setpoint.rate_x"]
+_ADAPTATION = COLUMNS.block("adaptation.").start
+_COMMAND = COLUMNS["rotor_1.command"]
+_THRUST = COLUMNS["rotor_1.thrust"]
+_PAYLOAD = COLUMNS.block("payload.").start
+_MAGNET = COLUMNS["magnet.on"]
 
 
 class DirectFlight:
@@ -59,6 +64,7 @@ class DirectFlight:
         self.attitude = AttitudeController(sets["attitude_controller"])
         self.arm = ArmController(sets["arm_controller"])
         self.bridge = Bridge(profile)
+        self._truth = np.zeros((3, 8))
         length = scenario.landing.at + scenario.landing.duration + 12.0
         self.recording = Recording(int(length / self.plant.period))
 
@@ -72,7 +78,9 @@ class DirectFlight:
                 progress(output.time, output.phase)
             if output.time < 0.0 and plant.time > LONGEST_WAIT:
                 reasons = "; ".join(self.bridge.sequence.reasons)
-                self.mission.abort(plant.time, f"the autopilot did not arm: {reasons or 'no reason'}")
+                self.mission.abort(
+                    plant.time, f"the autopilot did not arm: {reasons or 'no reason'}"
+                )
         return self.recording
 
     def tick(self) -> None:
@@ -101,20 +109,31 @@ class DirectFlight:
         self.bridge.send(plant.time, tau_p, tau_q, state, flying, output.arm, samples.mocap)
         motors = self.bridge.autopilot_tick(samples.hil)
 
+        plant.write_truth_state(self._truth)
         row = self.recording.next_row(phase)
-        row[0] = time
-        plant.write_truth_state(row[_TRUTH].reshape(3, 8))
-        record(state, reference, attitude_reference, tau_p, tau_q, tau_alpha, self.bridge.setpoint,
-               row[_ESTIMATE], row[_REFERENCE], row[_INPUTS])
-        adaptation = row[_ADAPTATION]
-        adaptation[0:7] = self.position.adaptation
-        adaptation[7:14] = self.attitude.adaptation
-        adaptation[14:21] = self.arm.adaptation
-        rotors = row[_ROTORS]
-        rotors[0:4] = motors
-        rotors[4:8] = plant.rotors.thrust
-        plant.write_payload(row[_PAYLOAD])
-        row[_MAGNET] = magnet, plant.magnet_force, plant.magnet_swing
+        record(
+            row,
+            time,
+            self._truth,
+            state,
+            reference,
+            attitude_reference,
+            tau_p,
+            tau_q,
+            tau_alpha,
+            self.bridge.setpoint,
+            self.position.adaptation,
+            self.attitude.adaptation,
+            self.arm.adaptation,
+            motors,
+            plant.rotors.thrust,
+            plant.payload_pose,
+        )
+        row[_MAGNET], row[_MAGNET + 1], row[_MAGNET + 2] = (
+            magnet,
+            plant.magnet_force,
+            plant.magnet_swing,
+        )
 
         plant.step(motors, tau_alpha, magnet)
         mission.step(plant.time, state, self.bridge.sequence.armed_stamp)
@@ -152,10 +171,12 @@ class Bridge:
     def _request(self, time: float, request: Request) -> None:
         if request is Request.OFFBOARD:
             result = self.autopilot.command(
-                time, Command.DO_SET_MODE, (CUSTOM_MODE_ENABLED, *Mode.OFFBOARD.value))
+                time, Command.DO_SET_MODE, (CUSTOM_MODE_ENABLED, *Mode.OFFBOARD.value)
+            )
         else:
             result = self.autopilot.command(
-                time, Command.ARM_DISARM, (float(request is Request.ARM), 0.0))
+                time, Command.ARM_DISARM, (float(request is Request.ARM), 0.0)
+            )
         self.sequence.answer(request, result)
 
     def autopilot_tick(self, hil: tuple) -> np.ndarray:
@@ -165,18 +186,43 @@ class Bridge:
 
 
 @jit
-def record(state, reference, attitude_reference, tau_p, tau_q, tau_alpha, setpoint, estimated,
-           referenced, inputs):
+def record(
+    row,
+    time,
+    truth,
+    state,
+    reference,
+    attitude_reference,
+    tau_p,
+    tau_q,
+    tau_alpha,
+    setpoint,
+    position_gains,
+    attitude_gains,
+    arm_gains,
+    motors,
+    thrust,
+    payload_pose,
+):
     """Copy one tick into its row of the recording; roll and pitch reference are what tau_p asks."""
+    row[0] = time
     for i in range(3):
         for j in range(8):
-            estimated[8 * i + j] = state[i, j]
-            referenced[8 * i + j] = reference[i, j]
+            row[_TRUTH + 8 * i + j] = truth[i, j]
+            row[_ESTIMATE + 8 * i + j] = state[i, j]
+            row[_REFERENCE + 8 * i + j] = reference[i, j]
         for j in range(3):
-            referenced[8 * i + 3 + j] = attitude_reference[i, j]
-        inputs[i] = tau_p[i]
-        inputs[3 + i] = tau_q[i]
+            row[_REFERENCE + 8 * i + 3 + j] = attitude_reference[i, j]
+        row[_TAU_P + i] = tau_p[i]
+        row[_TAU_Q + i] = tau_q[i]
     for i in range(2):
-        inputs[6 + i] = tau_alpha[i]
+        row[_TAU_ALPHA + i] = tau_alpha[i]
     for i in range(4):
-        inputs[8 + i] = setpoint[i]
+        row[_SETPOINT + i] = setpoint[i]
+        row[_COMMAND + i] = motors[i]
+        row[_THRUST + i] = thrust[i]
+    for i in range(7):
+        row[_ADAPTATION + i] = position_gains[i]
+        row[_ADAPTATION + 7 + i] = attitude_gains[i]
+        row[_ADAPTATION + 14 + i] = arm_gains[i]
+        row[_PAYLOAD + i] = payload_pose[i]

@@ -1,4 +1,5 @@
-"""The vehicle and its surroundings in MuJoCo, with sensors and actuators as the real ones behave."""
+"""The vehicle and its surroundings in MuJoCo, with sensors and actuators as the real ones
+behave."""
 
 from uam_sim_bridge.plant.plant import Plant, Samples, Truth
 from uam_sim_bridge.plant.vehicle import Vehicle

@@ -17,27 +17,29 @@ class Rotors:
 
     def __init__(self, numbers: dict, step: float) -> None:
         """numbers: the `rotors` entry of the vehicle; step: physics step [s]."""
-        self._coefficient = numbers["thrust_coefficient"]
-        self._efficiency = np.array(numbers["efficiency"], dtype=float)
-        self._constants = np.array([
-            numbers["thrust_coefficient"] * numbers["speed_max"] ** 2,
-            numbers["curve_factor"],
-            1.0 - math.exp(-step / numbers["lag_up"]),
-            1.0 - math.exp(-step / numbers["lag_down"]),
-        ])
+        self.efficiency = np.array(numbers["efficiency"], dtype=float)
+        self.constants = np.array(
+            [
+                numbers["thrust_coefficient"],
+                numbers["thrust_coefficient"] * numbers["speed_max"] ** 2,
+                numbers["curve_factor"],
+                1.0 - math.exp(-step / numbers["lag_up"]),
+                1.0 - math.exp(-step / numbers["lag_down"]),
+            ]
+        )
         self.speed = np.zeros(4)
         self.thrust = np.zeros(4)
 
     def step(self, commands: np.ndarray, output: np.ndarray) -> None:
         """Advance one physics step; thrust [N] goes to `thrust` and to output (4,)."""
-        rotor_step(commands, self._constants, self._coefficient, self._efficiency, self.speed,
-                   self.thrust, output)
+        rotor_step(commands, self.constants, self.efficiency, self.speed, self.thrust, output)
 
 
 @jit
-def rotor_step(commands, constants, coefficient, efficiency, speed, thrust, output):
+def rotor_step(commands, constants, efficiency, speed, thrust, output):
     """First-order speed lag with separate rates up and down; T = c speed^2."""
-    thrust_max, factor, gain_up, gain_down = constants
+    coefficient, thrust_max, factor = constants[0], constants[1], constants[2]
+    gain_up, gain_down = constants[3], constants[4]
     for i in range(4):
         u = min(max(commands[i], 0.0), 1.0)
         wanted = math.sqrt(thrust_max * (factor * u * u + (1.0 - factor) * u) / coefficient)
@@ -50,28 +52,30 @@ def rotor_step(commands, constants, coefficient, efficiency, speed, thrust, outp
 class Servos:
     """Dynamixel XM430-W210 in current control: quantised current, torque-speed limit.
 
-    `torque` (n,) [N m] is what the gear delivers before friction; friction and reflected inertia are
-    in the MJCF.
+    `torque` (n,) [N m] is what the gear delivers before friction; friction and reflected inertia
+    are in the MJCF.
     """
 
     def __init__(self, numbers: dict, joints: int) -> None:
         """numbers: the `servos` entry of the vehicle."""
-        self._constants = np.array([
-            numbers["stall_torque"],
-            numbers["no_load_speed"],
-            numbers["torque_per_current"] * numbers["current_unit"],
-        ])
+        self.constants = np.array(
+            [
+                numbers["stall_torque"],
+                numbers["no_load_speed"],
+                numbers["torque_per_current"] * numbers["current_unit"],
+            ]
+        )
         self.torque = np.zeros(joints)
 
     def step(self, effort: np.ndarray, velocity: np.ndarray, output: np.ndarray) -> None:
         """Apply the commanded effort (n,) [N m] at joint velocity (n,) [rad/s] to output (n,)."""
-        servo_step(effort, velocity, self._constants, self.torque, output)
+        servo_step(effort, velocity, self.constants, self.torque, output)
 
 
 @jit
 def servo_step(effort, velocity, constants, torque, output):
     """Torque = command in whole current units, within stall (1 - speed / no-load speed)."""
-    stall, no_load, unit = constants
+    stall, no_load, unit = constants[0], constants[1], constants[2]
     for i in range(len(effort)):
         wanted = unit * np.round(effort[i] / unit)
         forward = max(0.0, min(1.0, 1.0 - velocity[i] / no_load)) * stall

@@ -8,9 +8,8 @@ import mujoco
 import numpy as np
 
 from uam_control.compiled import jit
-from uam_control.coordinates import ARM, ATTITUDE, POSITION
 from uam_control.rotations import euler_from_quaternion
-from uam_sim_bridge.plant.actuators import Rotors, Servos
+from uam_sim_bridge.plant.actuators import Rotors, Servos, rotor_step, servo_step
 from uam_sim_bridge.plant.magnet import pull_fraction
 from uam_sim_bridge.plant.sensors import Delay, Encoders, Imu, Mocap, Noise, generators
 from uam_sim_bridge.plant.vehicle import Vehicle
@@ -20,8 +19,8 @@ from uam_sim_bridge.plant.vehicle import Vehicle
 class Samples:
     """What arrives at one tick; each entry None or a tuple that begins with its stamp [s].
 
-    imu: (stamp, gyro (3,) [rad/s], specific force (3,) [m/s^2]), FLU, as the companion computer gets
-    it. joints: (stamp, alpha (n,), alpha_dot (n,), torque (n,)). mocap: (stamp, position (3,),
+    imu: (stamp, gyro (3,) [rad/s], specific force (3,) [m/s^2]), FLU, as the companion computer
+    gets it. joints: (stamp, alpha (n,), alpha_dot (n,), torque (n,)). mocap: (stamp, position (3,),
     quaternion [w x y z]). hil: as imu, undelayed, for the autopilot's own sensors.
     """
 
@@ -74,8 +73,9 @@ class Plant:
         self._imu = Imu(sensors["imu"], scale, imu_noise)
         self._mocap = Mocap(sensors["mocap"], scale, mocap_noise)
         self._encoders = Encoders(sensors["joints"])
-        self._delays = {name: Delay(sensors[name]["latency_ticks"])
-                        for name in ("imu", "mocap", "joints")}
+        self._delays = {
+            name: Delay(sensors[name]["latency_ticks"]) for name in ("imu", "mocap", "joints")
+        }
         self._effort_delay = Delay(numbers["servos"]["command_latency_ticks"])
         self._effort = np.zeros(2)
 
@@ -96,29 +96,29 @@ class Plant:
         """Keep views into MuJoCo's arrays and set the starting pose."""
         data, joint = self.data, self.model.joint
         base_q, base_v = joint("base").qposadr[0], joint("base").dofadr[0]
-        self._position = data.qpos[base_q:base_q + 3]
-        self._quaternion = data.qpos[base_q + 3:base_q + 7]
-        self._velocity = data.qvel[base_v:base_v + 3]
-        self._rates = data.qvel[base_v + 3:base_v + 6]
+        self._position = data.qpos[base_q : base_q + 3]
+        self._quaternion = data.qpos[base_q + 3 : base_q + 7]
+        self._velocity = data.qvel[base_v : base_v + 3]
+        self._rates = data.qvel[base_v + 3 : base_v + 6]
         arm_q, arm_v = joint("alpha_1").qposadr[0], joint("alpha_1").dofadr[0]
-        self._alpha = data.qpos[arm_q:arm_q + 2]
-        self._alpha_dot = data.qvel[arm_v:arm_v + 2]
-        self._base_acceleration = data.qacc[base_v:base_v + 6]
-        self._alpha_ddot = data.qacc[arm_v:arm_v + 2]
+        self._alpha = data.qpos[arm_q : arm_q + 2]
+        self._alpha_dot = data.qvel[arm_v : arm_v + 2]
+        self._base_acceleration = data.qacc[base_v : base_v + 6]
+        self._alpha_ddot = data.qacc[arm_v : arm_v + 2]
         self._swing = joint("magnet_swing").qposadr[0]
         payload_q = joint("payload").qposadr[0]
-        self._payload_pose = data.qpos[payload_q:payload_q + 7]
+        self._payload_pose = data.qpos[payload_q : payload_q + 7]
         self._payload_position = self._payload_pose[0:3]
         self._sensed_force = data.sensordata[0:3]
-        self._thrust_control = data.ctrl[0:4]
-        self._arm_control = data.ctrl[4:6]
+        self._control = data.ctrl[0:6]
         self._force_on_base = data.xfrc_applied[self.model.body("base").id, 0:3]
         self._magnet_gain = self.model.actuator("magnet").gainprm[0]
         self._magnet_control = data.ctrl[6:7]
-        self._gap_scale = self.vehicle.numbers["magnet"]["gap_scale"]
         self._face = data.site_xpos[self.model.site("magnet_face").id]
         self._payload_axes = data.xmat[self.model.body("payload").id]
-        self._payload_half_height = self.model.geom("payload").size[2]
+        self._magnet_constants = np.array(
+            [self.model.geom("payload").size[2], self.vehicle.numbers["magnet"]["gap_scale"]]
+        )
         self._alpha[:] = arm_start
         data.qpos[self._swing] = -sum(arm_start)
         if payload_mass <= 0.0:  # out of the way rather than another model
@@ -139,50 +139,72 @@ class Plant:
         alpha, alpha_dot = self._encoders.sample(self._alpha, self._alpha_dot)
         delays["joints"].put(tick, (time, alpha, alpha_dot, self.servos.torque.copy()))
         if self._mocap.due(time):
-            delays["mocap"].put(
-                tick, (time, *self._mocap.sample(self._position, self._quaternion)))
-        return Samples(delays["imu"].take(tick), delays["joints"].take(tick),
-                       delays["mocap"].take(tick), hil)
+            delays["mocap"].put(tick, (time, *self._mocap.sample(self._position, self._quaternion)))
+        return Samples(
+            delays["imu"].take(tick), delays["joints"].take(tick), delays["mocap"].take(tick), hil
+        )
 
     def step(self, motor_commands: np.ndarray, arm_effort: np.ndarray, magnet: bool) -> None:
         """Advance one control period.
 
-        motor_commands (4,) 0..1 in PX4 order, arm_effort (2,) [N m] as sent now (the bus delays it),
-        magnet: current on.
+        motor_commands (4,) 0..1 in PX4 order, arm_effort (2,) [N m] as sent now (the bus delays
+        it), magnet: current on.
         """
-        self._effort_delay.put(self.tick, (np.array(arm_effort, dtype=float),))
+        self._effort_delay.put(self.tick, (float(arm_effort[0]), float(arm_effort[1])))
         due = self._effort_delay.take(self.tick)
         if due is not None:
-            self._effort = due[0]
+            self._effort[:] = due
         if self._gust is not None:
             self.wind += (1.0 - self._gust_keep) * (self._wind_mean - self.wind) + self._gust()
-        drag_force(self._drag, self._velocity, self.wind, self._force_on_base)
-        self._magnet_control[0] = pull_fraction(
-            self._face, self._payload_position, self._payload_axes, self._payload_half_height,
-            self._gap_scale) if magnet else 0.0
-        self._specific_force[:] = 0.0
+        surroundings(
+            self._drag,
+            self._velocity,
+            self.wind,
+            self._force_on_base,
+            magnet,
+            self._face,
+            self._payload_position,
+            self._payload_axes,
+            self._magnet_constants,
+            self._magnet_control,
+            self._specific_force,
+        )
+        rotors, servos = self.rotors, self.servos
         for _ in range(self._steps):
-            self.rotors.step(motor_commands, self._thrust_control)
-            self.servos.step(self._effort, self._alpha_dot, self._arm_control)
+            actuate(
+                motor_commands,
+                rotors.constants,
+                rotors.efficiency,
+                rotors.speed,
+                rotors.thrust,
+                self._effort,
+                self._alpha_dot,
+                servos.constants,
+                servos.torque,
+                self._control,
+            )
             mujoco.mj_step(self.model, self.data)
-            self._specific_force += self._sensed_force
-        self._specific_force /= self._steps
+            average(self._sensed_force, 1.0 / self._steps, self._specific_force)
         self.tick += 1
 
     def write_truth_state(self, state: np.ndarray) -> None:
         """Write chi, chi_dot, chi_ddot into state (3, 8)."""
-        state[0, POSITION] = self._position
-        state[0, ATTITUDE] = euler_from_quaternion(self._quaternion)
-        state[0, ARM] = self._alpha
-        state[1, POSITION] = self._velocity
-        state[1, ATTITUDE] = self._rates
-        state[1, ARM] = self._alpha_dot
-        state[2, 0:6] = self._base_acceleration
-        state[2, ARM] = self._alpha_ddot
+        write_state(
+            self._position,
+            self._quaternion,
+            self._velocity,
+            self._rates,
+            self._alpha,
+            self._alpha_dot,
+            self._base_acceleration,
+            self._alpha_ddot,
+            state,
+        )
 
-    def write_payload(self, pose: np.ndarray) -> None:
-        """Write the payload's position [m] and quaternion [w x y z] into pose (7,)."""
-        pose[:] = self._payload_pose
+    @property
+    def payload_pose(self) -> np.ndarray:
+        """Position [m] and quaternion [w x y z] (7,) of the payload: a view, to be copied."""
+        return self._payload_pose
 
     @property
     def magnet_force(self) -> float:
@@ -211,7 +233,67 @@ class Plant:
 
 
 @jit
-def drag_force(drag, velocity, wind, force):
-    """Write the linear drag -c (v - wind) [N, world] into force (3,)."""
+def write_state(
+    position, quaternion, velocity, rates, alpha, alpha_dot, base_acceleration, alpha_ddot, state
+):
+    """Gather chi, chi_dot, chi_ddot into state (3, 8)."""
+    euler = euler_from_quaternion(quaternion)
+    for i in range(3):
+        state[0, i], state[0, 3 + i] = position[i], euler[i]
+        state[1, i], state[1, 3 + i] = velocity[i], rates[i]
+        state[2, i], state[2, 3 + i] = base_acceleration[i], base_acceleration[3 + i]
+    for i in range(2):
+        state[0, 6 + i], state[1, 6 + i], state[2, 6 + i] = alpha[i], alpha_dot[i], alpha_ddot[i]
+
+
+@jit
+def surroundings(
+    drag,
+    velocity,
+    wind,
+    force,
+    magnet,
+    face,
+    payload,
+    payload_axes,
+    magnet_constants,
+    magnet_control,
+    specific_force,
+):
+    """Before a tick: drag -c (v - wind) [N, world] into force (3,), pull of the magnet at its gap.
+
+    Also clears specific_force (3,) for the average over the physics steps of the tick.
+    """
     for i in range(3):
         force[i] = drag[i] * (wind[i] - velocity[i])
+        specific_force[i] = 0.0
+    magnet_control[0] = (
+        pull_fraction(face, payload, payload_axes, magnet_constants[0], magnet_constants[1])
+        if magnet
+        else 0.0
+    )
+
+
+@jit
+def actuate(
+    commands,
+    rotor_constants,
+    efficiency,
+    speed,
+    thrust,
+    effort,
+    joint_rates,
+    servo_constants,
+    torque,
+    control,
+):
+    """Before a physics step: rotors into control[0:4] [N], servos into control[4:6] [N m]."""
+    rotor_step(commands, rotor_constants, efficiency, speed, thrust, control[0:4])
+    servo_step(effort, joint_rates, servo_constants, torque, control[4:6])
+
+
+@jit
+def average(sample, weight, mean):
+    """Add weight * sample (3,) to mean (3,)."""
+    for i in range(3):
+        mean[i] += weight * sample[i]

@@ -6,9 +6,12 @@ from collections import deque
 
 import numpy as np
 
+from uam_control.compiled import jit
 from uam_control.rotations import quaternion_from_rotation_vector, quaternion_multiply
 
-BLOCK = 2048  # samples of noise drawn at a time: one call to the generator is dear, its numbers cheap
+BLOCK = (
+    2048  # samples of noise drawn at a time: one call to the generator is dear, its numbers cheap
+)
 
 
 class Noise:
@@ -63,8 +66,7 @@ class Imu:
 
     def sample(self, rates: np.ndarray, specific_force: np.ndarray):
         """Return (gyro (3,) [rad/s], accelerometer (3,) [m/s^2]) with noise and bias."""
-        disturbance = self._noise() + self.bias
-        return rates + disturbance[:3], specific_force + disturbance[3:]
+        return disturbed(rates, specific_force, self._noise(), self.bias)
 
 
 class Mocap:
@@ -101,5 +103,23 @@ class Encoders:
 
     def sample(self, angle: np.ndarray, velocity: np.ndarray):
         """Return (alpha (n,) [rad], alpha_dot (n,) [rad/s]) in whole counts."""
-        return (self._count * np.round(angle / self._count),
-                self._velocity * np.round(velocity / self._velocity))
+        return quantised(angle, self._count), quantised(velocity, self._velocity)
+
+
+@jit
+def disturbed(rates, specific_force, noise, bias):
+    """Return rates and specific force (3,) each with noise and bias (6,) added."""
+    gyro, accelerometer = np.empty(3), np.empty(3)
+    for i in range(3):
+        gyro[i] = rates[i] + noise[i] + bias[i]
+        accelerometer[i] = specific_force[i] + noise[3 + i] + bias[3 + i]
+    return gyro, accelerometer
+
+
+@jit
+def quantised(values, unit):
+    """Return values (n,) in whole units."""
+    out = np.empty(len(values))
+    for i in range(len(values)):
+        out[i] = unit * np.round(values[i] / unit)
+    return out

@@ -14,10 +14,14 @@ SHAPES = {
     mujoco.mjtGeom.mjGEOM_BOX: lambda s: ("box", {"size": _text(2.0 * s)}),
     mujoco.mjtGeom.mjGEOM_SPHERE: lambda s: ("sphere", {"radius": _text(s[:1])}),
     mujoco.mjtGeom.mjGEOM_CYLINDER: lambda s: (
-        "cylinder", {"radius": _text(s[:1]), "length": _text(2.0 * s[1:2])}),
+        "cylinder",
+        {"radius": _text(s[:1]), "length": _text(2.0 * s[1:2])},
+    ),
     # URDF knows no capsule: a cylinder as long as the whole capsule
     mujoco.mjtGeom.mjGEOM_CAPSULE: lambda s: (
-        "cylinder", {"radius": _text(s[:1]), "length": _text(2.0 * (s[1:2] + s[:1]))}),
+        "cylinder",
+        {"radius": _text(s[:1]), "length": _text(2.0 * (s[1:2] + s[:1]))},
+    ),
 }
 
 
@@ -47,12 +51,19 @@ def _inertial(link: ElementTree.Element, model: mujoco.MjModel, body: int) -> No
         return
     inertial = ElementTree.SubElement(link, "inertial")
     ElementTree.SubElement(inertial, "origin", xyz=_text(model.body_ipos[body]), rpy="0 0 0")
-    ElementTree.SubElement(inertial, "mass", value=_text(model.body_mass[body:body + 1]))
+    ElementTree.SubElement(inertial, "mass", value=_text(model.body_mass[body : body + 1]))
     axes = _matrix(model.body_iquat[body])
     tensor = axes @ np.diag(model.body_inertia[body]) @ axes.T
-    ElementTree.SubElement(inertial, "inertia", {
-        f"i{a}{b}": _text(tensor[i, j:j + 1])
-        for i, a in enumerate("xyz") for j, b in enumerate("xyz") if j >= i})
+    ElementTree.SubElement(
+        inertial,
+        "inertia",
+        {
+            f"i{a}{b}": _text(tensor[i, j : j + 1])
+            for i, a in enumerate("xyz")
+            for j, b in enumerate("xyz")
+            if j >= i
+        },
+    )
 
 
 def _visual(link: ElementTree.Element, model: mujoco.MjModel, geom: int) -> None:
@@ -60,8 +71,12 @@ def _visual(link: ElementTree.Element, model: mujoco.MjModel, geom: int) -> None
     if shape is None:
         return
     visual = ElementTree.SubElement(link, "visual")
-    ElementTree.SubElement(visual, "origin", xyz=_text(model.geom_pos[geom]),
-                           rpy=_text(_euler(_matrix(model.geom_quat[geom]))))
+    ElementTree.SubElement(
+        visual,
+        "origin",
+        xyz=_text(model.geom_pos[geom]),
+        rpy=_text(_euler(_matrix(model.geom_quat[geom]))),
+    )
     tag, attributes = shape(model.geom_size[geom])
     ElementTree.SubElement(ElementTree.SubElement(visual, "geometry"), tag, attributes)
     material = model.geom_matid[geom]
@@ -79,17 +94,26 @@ def _joint(
     limited = hinge and bool(model.jnt_limited[index])
     kind = "fixed" if not hinge else "revolute" if limited else "continuous"
     joint = ElementTree.SubElement(robot, "joint", name=name, type=kind)
-    ElementTree.SubElement(joint, "origin", xyz=_text(model.body_pos[body]),
-                           rpy=_text(_euler(_matrix(model.body_quat[body]))))
+    ElementTree.SubElement(
+        joint,
+        "origin",
+        xyz=_text(model.body_pos[body]),
+        rpy=_text(_euler(_matrix(model.body_quat[body]))),
+    )
     ElementTree.SubElement(joint, "parent", link=parent)
     ElementTree.SubElement(joint, "child", link=model.body(body).name)
     if hinge:
         ElementTree.SubElement(joint, "axis", xyz=_text(model.jnt_axis[index]))
     if limited:
         low, high = model.jnt_range[index]
-        ElementTree.SubElement(joint, "limit", lower=_text([low]), upper=_text([high]),
-                               effort=_text([servos["stall_torque"]]),
-                               velocity=_text([servos["no_load_speed"]]))
+        ElementTree.SubElement(
+            joint,
+            "limit",
+            lower=_text([low]),
+            upper=_text([high]),
+            effort=_text([servos["stall_torque"]]),
+            velocity=_text([servos["no_load_speed"]]),
+        )
 
 
 def _matrix(quaternion: np.ndarray) -> np.ndarray:
@@ -100,9 +124,13 @@ def _matrix(quaternion: np.ndarray) -> np.ndarray:
 
 def _euler(matrix: np.ndarray) -> np.ndarray:
     """Fixed-axis roll, pitch, yaw, as URDF's rpy."""
-    return np.array([np.arctan2(matrix[2, 1], matrix[2, 2]),
-                     np.arcsin(np.clip(-matrix[2, 0], -1.0, 1.0)),
-                     np.arctan2(matrix[1, 0], matrix[0, 0])])
+    return np.array(
+        [
+            np.arctan2(matrix[2, 1], matrix[2, 2]),
+            np.arcsin(np.clip(-matrix[2, 0], -1.0, 1.0)),
+            np.arctan2(matrix[1, 0], matrix[0, 0]),
+        ]
+    )
 
 
 def _text(numbers: np.ndarray | list) -> str:
