@@ -1,0 +1,271 @@
+"""The bridge node over real ROS and real UDP, with the autopilot's objects on the other end."""
+
+import math
+import socket
+
+import numpy as np
+import pytest
+from quadrotor import MASS, Quadrotor
+from std_msgs.msg import Bool
+
+from uam_control.rotations import euler_from_quaternion
+from uam_msgs_py import topics
+from uam_msgs_py.control import ATTITUDE_NAMES, PositionCommandWriter, TorqueWriter
+from uam_msgs_py.convert import PoseWriter, TrajectoryWriter, read_setpoint
+from uam_msgs_py.status import AutopilotState
+from uam_sim_bridge.autopilot.companion import Companion
+from uam_sim_bridge.autopilot.core import Autopilot
+from uam_sim_bridge.autopilot.modes import Mode
+from uam_sim_bridge.mavlink.frames import swap_body
+from uam_sim_bridge.mavlink.wire import Codec, Framer
+
+MODULE = "uam_sim_bridge.nodes.mavlink_bridge"
+PERIOD = 4_000_000
+NAMES = ["x", "y", "z", "roll", "pitch", "yaw", "alpha_1", "alpha_2"]
+WEIGHT = MASS * 9.81
+
+
+def free_port():
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as s:
+        s.bind(("127.0.0.1", 0))
+        return s.getsockname()[1]
+
+
+class Rig:
+    """Plant, estimator and controllers as seen by the bridge, tick by tick."""
+
+    def __init__(self, probe, start, *arguments):
+        self.local, self.remote = free_port(), free_port()
+        self.socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+        self.socket.bind(("127.0.0.1", self.remote))
+        self.socket.setblocking(False)
+        self.codec = Codec(1, 1)
+        self.framer = Framer(self.codec)
+        self.autopilot = Autopilot()
+        self.companion = Companion(self.autopilot)
+        self.received = []
+        self.body = Quadrotor()
+        self.probe, self.count = probe, 0
+        self.setpoints = probe.collect(topics.SETPOINT)
+        self.states = probe.collect(topics.AUTOPILOT_STATE)
+        self.out = {t.name: probe.publisher(t) for t in (
+            topics.STATE, topics.POSITION_COMMAND, topics.ATTITUDE_COMMAND, topics.MOCAP,
+            topics.ARMING)}
+        self.node = start(MODULE, "--ros-args", "-p", f"local_port:={self.local}", "-p",
+                          f"autopilot_port:={self.remote}", *arguments)
+        self.state, self.pose = TrajectoryWriter(NAMES), PoseWriter()
+        self.position, self.torque = PositionCommandWriter(), TorqueWriter(ATTITUDE_NAMES)
+        for publisher in self.out.values():
+            probe.until(publisher.get_subscription_count, "the bridge to listen")
+        probe.until(lambda: probe.node.count_publishers(topics.SETPOINT.name), "the bridge to talk")
+
+    def publish(self, topic, message):
+        self.out[topic.name].publish(message)
+
+    def inputs(self, tau_p=None, tau_q=None):
+        """Publish one tick's inputs; without tau_p idle ones."""
+        stamp, body = self.count * PERIOD, self.body
+        chi = np.zeros((3, 8))
+        chi[0, :3], chi[0, 3:6] = body.position, euler_from_quaternion(body.quaternion)
+        chi[1, :3], chi[1, 3:6] = body.velocity, body.gyro
+        if self.count % 2 == 0:
+            self.publish(topics.MOCAP, self.pose.fill(stamp, body.position, body.quaternion))
+        self.publish(topics.STATE, self.state.fill(stamp, chi))
+        if tau_p is None:
+            self.publish(topics.POSITION_COMMAND, self.position.idle(stamp))
+            self.publish(topics.ATTITUDE_COMMAND, self.torque.idle(stamp))
+        else:
+            self.publish(topics.POSITION_COMMAND, self.position.fill(
+                stamp, chi, np.zeros((3, 3)), np.array(tau_p, float)))
+            self.publish(topics.ATTITUDE_COMMAND,
+                         self.torque.fill(stamp, np.array(tau_q or (0, 0, 0), float)))
+
+    def hear(self):
+        """Let the autopilot take what has arrived; return the messages."""
+        arrived = []
+        while True:
+            try:
+                data = self.socket.recv(65535)
+            except BlockingIOError:
+                break
+            arrived += self.framer.datagram(data)
+        for message in arrived:
+            self.companion.handle(self.body.time, message)
+        self.received += arrived
+        return arrived
+
+    def tick(self, tau_p=None, tau_q=None):
+        """One lockstep tick; return the acknowledged setpoint (rates, thrust)."""
+        self.inputs(tau_p, tau_q)
+        before, stamp = len(self.setpoints), self.count * PERIOD
+        self.probe.until(lambda: len(self.setpoints) > before, "an acknowledged tick")
+        found, rates, thrust = read_setpoint(self.setpoints[-1])
+        assert found == stamp
+        self.autopilot_tick()
+        self.count += 1
+        return rates, thrust
+
+    def autopilot_tick(self):
+        self.hear()
+        body = self.body
+        motors = self.autopilot.update(body.time, swap_body(body.gyro), swap_body(body.accel))
+        for message in self.companion.tick(body.time):
+            self.socket.sendto(self.codec.encode(message), ("127.0.0.1", self.local))
+        body.step(motors)
+
+    def fly(self):
+        """Arm, put the vehicle up and let it hover."""
+        self.publish(topics.ARMING, Bool(data=True))
+        for _ in range(500):
+            self.tick()
+            if self.autopilot.status.armed:
+                break
+        assert self.autopilot.status.armed, self.node.output
+        self.body.position[2] = 5.0
+        self.body.hover()
+        for _ in range(100):
+            self.tick((0, 0, WEIGHT))
+
+    def kinds(self):
+        return {m.get_type() for m in self.received}
+
+
+@pytest.fixture
+def make_rig(probe, start):
+    rigs = []
+
+    def make(*arguments):
+        rigs.append(Rig(probe, start, *arguments))
+        return rigs[-1]
+
+    yield make
+    for rig in rigs:
+        rig.socket.close()
+
+
+def test_alone_it_waits_and_stops(start):
+    node = start(MODULE, "--ros-args", "-p", f"local_port:={free_port()}")
+    node.until_said("waiting for /vrpn_mocap/uam/pose, /uam/state, /uam/position/command, "
+                    "/uam/attitude/command")
+    assert node.interrupt(times=3) == 0
+    assert "Traceback" not in node.output
+
+
+@pytest.mark.parametrize(
+    ("arguments", "complaint"),
+    [
+        (["-p", "rate_p:=[0.0, 0.1, 0.1]"], "rate_p"),
+        (["-p", "clock:=sundial"], "clock: 'sundial' is not one of"),
+        (["-p", "local_port:=99999"], "local_port"),
+    ],
+)
+def test_bad_parameters_are_refused_in_one_line(start, arguments, complaint):
+    node = start(MODULE, "--ros-args", *arguments)
+    assert node.process.wait(60) == 2
+    said = [line for line in node.output.splitlines() if line.startswith("mavlink_bridge: ")]
+    assert len(said) == 1 and complaint in said[0] and "Traceback" not in node.output
+
+
+def test_taken_port_is_said(start):
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as s:
+        s.bind(("127.0.0.1", 0))
+        port = s.getsockname()[1]
+        node = start(MODULE, "--ros-args", "-p", f"local_port:={port}")
+        assert node.process.wait(60) == 2
+    assert f"UDP port {port}" in node.output and "Traceback" not in node.output
+
+
+def test_from_the_ground_to_hover_and_back(make_rig):
+    rig = make_rig()
+    rates, thrust = rig.tick()
+    assert np.all(rates == 0.0) and thrust == 0.0
+    rig.fly()
+    states = [AutopilotState.from_message(m)[1] for m in rig.states]
+    assert not states[0].armed and states[-1].armed and states[-1].mode == "OFFBOARD"
+    since = states[-1].armed_since
+    assert since % PERIOD == 0 and 1.0e9 < since < 2.5e9
+    rates, thrust = rig.tick((0, 0, WEIGHT), (0.1, 0.0, 0.0))
+    assert thrust == pytest.approx(WEIGHT / 41.36, rel=1e-6)
+    assert rates == pytest.approx([0.1 / (5.00105 * 0.15), 0, 0], rel=1e-3, abs=1e-9)
+    sent = [m for m in rig.received if m.get_type() == "SET_ATTITUDE_TARGET"][-1]
+    assert sent.type_mask == 128
+    assert (sent.body_roll_rate, sent.body_pitch_rate) == pytest.approx((rates[0], 0.0), rel=1e-5)
+    assert sent.thrust == pytest.approx(thrust)
+    assert {"HEARTBEAT", "VISION_POSITION_ESTIMATE", "COMMAND_LONG", "PARAM_REQUEST_READ"} <= (
+        rig.kinds())
+    # landed: idle commands, then disarm
+    rig.body.position[2] = 0.0
+    rig.body.velocity[:] = rig.body.gyro[:] = 0.0
+    for _ in range(400):
+        rig.tick()
+    rig.publish(topics.ARMING, Bool(data=False))
+    for _ in range(300):
+        rig.tick()
+        if not rig.autopilot.status.armed:
+            break
+    assert not rig.autopilot.status.armed
+
+
+def test_mapping_parameters_of_the_autopilot_are_compared(make_rig):
+    rig = make_rig()
+    rig.autopilot.set_parameter("MC_ROLLRATE_P", 0.3)
+    for _ in range(100):
+        rig.tick()
+    rig.node.until_said("MC_ROLLRATE_P is 0.3 on the autopilot, the bridge assumes 0.15")
+
+
+def test_bad_commands_in_flight_hold_level_then_the_failsafe_acts(make_rig):
+    rig = make_rig()
+    rig.fly()
+    thrusts = []
+    for _ in range(200):
+        rates, thrust = rig.tick((0, 0, math.nan))
+        thrusts.append(thrust)
+        assert np.all(np.isfinite(rates)) and np.all(np.abs(rates) <= 2.0)
+    assert thrusts == pytest.approx([WEIGHT / 41.36] * 200, rel=0.02)
+    assert rig.autopilot.status.mode is Mode.OFFBOARD
+    for _ in range(400):
+        rig.tick((0, 0, math.nan))
+    assert rig.autopilot.status.mode is Mode.LAND  # COM_OF_LOSS_T after the hold
+    assert rig.autopilot.status.armed
+    assert "holding level" in rig.node.output
+    # good commands again: the bridge asks for OFFBOARD again
+    for _ in range(400):
+        rig.tick((0, 0, WEIGHT))
+    assert rig.autopilot.status.mode is Mode.OFFBOARD
+
+
+def test_idle_high_up_is_not_thrust_zero(make_rig):
+    rig = make_rig()
+    rig.fly()
+    _, thrust = rig.tick()
+    assert thrust == pytest.approx(WEIGHT / 41.36, rel=0.02)
+
+
+def test_garbage_from_the_autopilots_port_does_no_harm(make_rig):
+    rig = make_rig()
+    noise = np.random.default_rng(2)
+    for _ in range(50):
+        rig.socket.sendto(noise.bytes(int(noise.integers(1, 400))), ("127.0.0.1", rig.local))
+        rig.tick()
+    assert rig.node.process.poll() is None
+
+
+def test_realtime_watchdog_holds_level_and_then_stops(make_rig):
+    """Ticks stop in flight: level setpoints go on by themselves for hold_time, then none."""
+    rig = make_rig("-p", "clock:=realtime", "-p", "stale_after:=2.0", "-p", "hold_time:=1.0")
+    rig.fly()
+    rig.hear()
+    rig.received.clear()
+
+    def stream():
+        rig.hear()
+        return [m for m in rig.received if m.get_type() == "SET_ATTITUDE_TARGET"]
+
+    rig.probe.until(lambda: len(stream()) >= 5, "setpoints of the watchdog")
+    assert stream()[-1].thrust == pytest.approx(WEIGHT / 41.36, rel=0.05)
+    rig.node.until_said("stream stopped")
+    rig.hear()
+    rig.received.clear()
+    rig.probe.until(lambda: (rig.hear(), "HEARTBEAT" in rig.kinds())[1], "a heartbeat")
+    assert stream() == []
