@@ -81,6 +81,19 @@ def test_a_completed_mission():
     assert "latency_ms" not in result
 
 
+def test_a_payload_that_hangs_lower_than_it_stood_is_lifted_one_that_falls_is_not():
+    made = flight()
+    made.values[4:6, COLUMNS["payload.z"]] = 0.6
+    made.values[4:6, COLUMNS["payload.x"]] = 0.2
+    result = metrics.compute(made.series(), INFO)
+    assert result["payload_lifted"] is True
+    assert result["payload_lift_height_m"] == 0.0
+    made.values[5, COLUMNS["payload.z"]] = 0.03
+    result = metrics.compute(made.series(), INFO)
+    assert result["payload_lifted"] is False
+    assert result["payload_lifted_at_s"] is None
+
+
 @pytest.mark.parametrize(
     ("rows", "column", "value", "shortfall"),
     [

@@ -37,9 +37,8 @@ PASSED_ON = (
 class Criteria:
     """What counts as a completed mission."""
 
-    # Rise that counts as lifted. Small, because the hanging arm then carries the payload lower
-    # than the stand on which it was.
-    lift_m: float = 0.01
+    away_m: float = 0.05  # from where the payload stood, and above where it lies in the end
+    held_s: float = 0.5  # how long it must be both; a fall from the stand is shorter
     place_m: float = 0.15  # horizontal distance of the payload from the drop point
     landing_m: float = 0.15  # horizontal distance of the vehicle from the landing point
     rest_m_s: float = 0.02  # speed below which the payload is at rest
@@ -135,18 +134,21 @@ def payload_facts(
 ) -> Payload:
     """Whether the payload was lifted by the magnet and where it came to rest.
 
-    Lifted: after the magnet was switched on it rose `lift_m` above where it stood at that moment.
-    Its place is judged only if the scenario has a drop point.
+    Lifted: while the magnet was on, it was for `held_s` more than `away_m` from where it stood and
+    more than that above the lowest place where it ever lay. Not told by height alone, because the
+    hanging arm carries it lower than the stand.
     """
     spans = series.magnet_spans()
     place = series.block("payload.")[:, :3]
     if not mass or not spans or np.isnan(place).all():
         return Payload()
     start, end = series.row_at(spans[0][0]), series.row_at(spans[-1][1])
-    height = place[start : end + 1, 2] - place[start, 2]
-    rise = float(np.max(height))
-    lifted = rise >= criteria.lift_m
-    when = float(series.time[start + int(np.argmax(height >= criteria.lift_m))]) if lifted else None
+    carried, time = place[start : end + 1], series.time[start : end + 1]
+    rise = float(np.max(carried[:, 2] - place[start, 2]))
+    away = np.linalg.norm(carried - place[start], axis=1) >= criteria.away_m
+    above = carried[:, 2] - np.nanmin(place[:, 2]) >= criteria.away_m
+    when = _first_held(time, away & above, criteria.held_s)
+    lifted = when is not None
     if drop_point is None:
         return Payload(lifted, when, rise)
     distance = float(np.hypot(*(place[-1, :2] - np.asarray(drop_point, dtype=float))))
@@ -155,6 +157,15 @@ def payload_facts(
     elapsed = series.time[-1] - series.time[before]
     speed = float(np.linalg.norm(place[-1] - place[before])) / elapsed if elapsed > 0.0 else 0.0
     return Payload(lifted, when, rise, distance, speed <= criteria.rest_m_s)
+
+
+def _first_held(time: np.ndarray, true: np.ndarray, span: float) -> float | None:
+    """Beginning [s] of the first stretch of `true` (ticks,) that lasts `span` [s]."""
+    edges = np.flatnonzero(np.diff(true.astype(np.int8), prepend=0, append=0))
+    for begin, end in zip(edges[::2], edges[1::2] - 1, strict=True):
+        if time[end] - time[begin] >= span:
+            return float(time[begin])
+    return None
 
 
 def landing_error(series: Series, point: Sequence[float]) -> float | None:

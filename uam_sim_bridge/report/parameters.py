@@ -75,9 +75,16 @@ def _row(name: str, value: Any, table: Mapping[str, Any], specs: Mapping[str, An
         unit=getattr(spec, "unit", ""),
         flown=text(value),
         paper=text(table[name]) if known else "",
-        differs=known and text(value) != text(table[name]),
+        differs=known and not _same(value, table[name]),
         safeguard_on=description.startswith(SAFEGUARD) and bool(np.any(value)),
     )
+
+
+def _same(one: Any, other: Any) -> bool:
+    """Equality of parameters; YAML has lists where the sets have tuples."""
+    if isinstance(one, list | tuple) and isinstance(other, list | tuple):
+        return list(one) == list(other)
+    return one == other
 
 
 def text(value: Any) -> str:
