@@ -132,6 +132,27 @@ def test_the_console_shows_the_same(flight_folder):
     assert str(flight_folder) in "".join(line.strip() for line in lines)
 
 
+def test_progress_without_a_terminal_is_a_line_per_kind_of_step():
+    out = io.StringIO()
+    with console.reporting(Console(file=out, force_terminal=False)) as progress:
+        for step in ("figure path", "figure payload", "video 4 %", "video 8 %", "page"):
+            progress(step)
+    assert out.getvalue().splitlines() == [
+        "report: figure path",
+        "report: video 4 %",
+        "report: page",
+    ]
+
+
+def test_notes_and_changes_of_the_vehicle_are_on_the_page(flight_folder):
+    info = json.loads((flight_folder / "info.json").read_text())
+    info |= {"notes": ["2 messages lost"], "vehicle_changes": {"air.wind": [2.0, 0.0, 0.0]}}
+    (flight_folder / "info.json").write_text(json.dumps(info))
+    words = text_of(page.write_page(flight_folder).read_text())
+    assert "Note: 2 messages lost" in words
+    assert "air.wind 2.0, 0.0, 0.0" in words
+
+
 def test_outcomes_in_words():
     assert outcome.payload_story({"payload_lifted": None}) == "no payload in this flight"
     assert outcome.payload_story({"payload_lifted": False}) == "not lifted"

@@ -1,16 +1,39 @@
-"""The table at the end of a flight, for the terminal."""
+"""For the terminal: progress of the report, and the table at the end of a flight."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
-from rich.console import Group
+from rich.console import Console, Group
 from rich.table import Table
 from rich.text import Text
 
 from uam_sim_bridge.report import outcome
+
+
+@contextmanager
+def reporting(console: Console) -> Iterator[Callable[[str], None]]:
+    """Progress for `build_report`: a live line on a terminal, one line per kind of step elsewhere.
+
+    with reporting(console) as progress:
+        build_report(directory, progress)
+    """
+    if console.is_terminal:
+        with console.status("report") as status:
+            yield lambda text: status.update(f"report: {text}")
+        return
+    said: set[str] = set()
+
+    def say(text: str) -> None:
+        kind = text.split()[0]
+        if kind not in said:
+            said.add(kind)
+            console.print(f"report: {text}", highlight=False, markup=False)
+
+    yield say
 
 
 def summary(metrics: Mapping[str, Any], directory: Path | None = None) -> Group:

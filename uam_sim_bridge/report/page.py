@@ -50,7 +50,7 @@ def write_page(directory: Path, rendered: Rendered | None = None) -> Path:
     )
     text = environment.get_template("page.html.j2").render(
         metrics=metrics,
-        info=info,
+        info={"notes": [], "vehicle_changes": {}} | info,
         verdict=outcome.verdict(metrics),
         payload=outcome.payload_story(metrics),
         landing=outcome.landing_story(metrics),
