@@ -58,7 +58,10 @@ def _limits(flights: Sequence[Flight]) -> tuple[tuple[float, float], tuple[float
     shown = [f.series.flown if f.series.flown.any() else slice(None) for f in flights]
     x = np.concatenate([f.series["truth.x"][s] for f, s in zip(flights, shown, strict=True)])
     z = np.concatenate([f.series["truth.z"][s] for f, s in zip(flights, shown, strict=True)])
-    return (x.min() - REACH, x.max() + REACH), (min(z.min(), 0.0) - 0.05, z.max() + 0.25)
+    up = (min(z.min(), 0.0) - 0.05, z.max() + 0.25)
+    middle, half = 0.5 * (x.min() + x.max()), 0.5 * (x.max() - x.min()) + REACH
+    half = max(half, up[1] - up[0])  # at least twice as wide as high
+    return (middle - half, middle + half), up
 
 
 def _stretches(series: Series) -> list[tuple[str, float, float]]:
