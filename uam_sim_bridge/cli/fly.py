@@ -20,6 +20,8 @@ from uam_sim_bridge.flight.ports import INSTANCES, PortError
 from uam_sim_bridge.flight.progress import Progress
 from uam_sim_bridge.flight.result_folder import ResultFolder, ResultFolderError
 from uam_sim_bridge.flight.settings import FlightSettings, SettingsError
+from uam_sim_bridge.report.build import build_report
+from uam_sim_bridge.report.console import reporting, summary
 
 COMPLETED, NOT_COMPLETED, WRONG_USE, INTERRUPTED = 0, 1, 2, 130
 USER_ERRORS = (SettingsError, ScenarioError, ProfileError, ConfigurationError, PortError,
@@ -152,15 +154,24 @@ def fly(settings: FlightSettings) -> int:
         except USER_ERRORS:
             _remove_if_empty(folder.path)
             raise
-        progress.finish()
-        metrics = conclude(settings, folder, outcome, shlex.join(["uam", *sys.argv[1:]]))
+    metrics = conclude(settings, folder, outcome, shlex.join(["uam", *sys.argv[1:]]))
+    if metrics is not None:
+        # Who pressed Ctrl-C gets the figures of what was flown, but does not wait for pictures.
+        with reporting(console) as say:
+            report = build_report(
+                folder.path, say, video=settings.video, pictures=not outcome.interrupted
+            )
+        if report.problem:
+            outcome.notes.append(report.problem)
+        console.print(summary(metrics, folder.path))
+    else:
+        print(f"results: {folder.path}")
     for note in outcome.notes:
         print(f"note: {note}")
     if outcome.failure:
         print(f"uam fly: {outcome.failure}", file=sys.stderr)
         for line in outcome.details:
             print(f"  | {line}", file=sys.stderr)
-    print(f"results: {folder.path}")
     if outcome.interrupted:
         return INTERRUPTED
     completed = metrics is not None and metrics["mission_completed"] and not outcome.failure

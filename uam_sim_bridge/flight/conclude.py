@@ -38,6 +38,8 @@ def conclude(
     settings: FlightSettings, folder: ResultFolder, outcome: Outcome, command: str
 ) -> dict[str, Any] | None:
     """Write metrics, table and facts; returns the metrics, None where nothing was recorded."""
+    if outcome.partial:
+        outcome.notes.insert(0, f"partial: the recording ends with the flight ({outcome.reason})")
     info = facts(settings, outcome, command)
     folder.write_info(info)
     folder.write_versions()

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import numpy as np
+from rclpy.event_handler import PublisherEventCallbacks, SubscriptionEventCallbacks
 from rclpy.node import Node
+from rclpy.publisher import Publisher
 from rosgraph_msgs.msg import Clock
 
 from uam_control.coordinates import ARM, COORDINATES
@@ -29,15 +31,20 @@ def nanoseconds(time: float) -> int:
     return round(time * 1e6) * 1000
 
 
+def publisher(node: Node, topic: topics.Topic) -> Publisher:
+    """A publisher without events, each of which would be waited for again and again."""
+    events = PublisherEventCallbacks(use_default_callbacks=False)
+    return node.create_publisher(topic.type, topic.name, topic.qos, event_callbacks=events)
+
+
 class Sensors:
     """Publishes /clock and what the sensors deliver."""
 
     def __init__(self, node: Node):
-        def publisher(topic: topics.Topic):
-            return node.create_publisher(topic.type, topic.name, topic.qos)
-
-        self._clock, self._imu = publisher(topics.CLOCK), publisher(topics.IMU)
-        self._joints, self._mocap = publisher(topics.JOINTS), publisher(topics.MOCAP)
+        self._clock, self._imu, self._joints, self._mocap = (
+            publisher(node, topic)
+            for topic in (topics.CLOCK, topics.IMU, topics.JOINTS, topics.MOCAP)
+        )
         self._clock_message = Clock()
         self._imu_writer, self._mocap_writer = ImuWriter(), PoseWriter()
         self._joint_writer = JointStateWriter(JOINTS)
@@ -72,11 +79,15 @@ class TruthTopics:
     """Publishes what only a simulator knows; no controller subscribes to it."""
 
     def __init__(self, node: Node):
-        def publisher(topic: topics.Topic):
-            return node.create_publisher(topic.type, topic.name, topic.qos)
-
-        self._state, self._payload = publisher(topics.TRUTH_STATE), publisher(topics.TRUTH_PAYLOAD)
-        self._rotors, self._magnet = publisher(topics.TRUTH_ROTORS), publisher(topics.TRUTH_MAGNET)
+        self._state, self._payload, self._rotors, self._magnet = (
+            publisher(node, topic)
+            for topic in (
+                topics.TRUTH_STATE,
+                topics.TRUTH_PAYLOAD,
+                topics.TRUTH_ROTORS,
+                topics.TRUTH_MAGNET,
+            )
+        )
         self._state_writer = TrajectoryWriter(COORDINATES)
         self._payload_writer = PoseWriter()
         self._rotor_writer = JointStateWriter(ROTORS)
@@ -125,7 +136,14 @@ class Answers:
         self._setpoint_stamp = -1
 
         def subscribe(topic: topics.Topic, callback, raw: bool = False):
-            return node.create_subscription(topic.type, topic.name, callback, topic.qos, raw=raw)
+            return node.create_subscription(
+                topic.type,
+                topic.name,
+                callback,
+                topic.qos,
+                raw=raw,
+                event_callbacks=SubscriptionEventCallbacks(use_default_callbacks=False),
+            )
 
         self._subscriptions = [
             subscribe(topics.SETPOINT, self._on_setpoint, raw=True),
