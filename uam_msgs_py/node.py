@@ -15,7 +15,7 @@ from rclpy.publisher import Publisher
 from rclpy.signals import SignalHandlerOptions
 from rclpy.subscription import Subscription
 
-from uam_msgs_py import topics
+from uam_msgs_py import connections, topics
 from uam_msgs_py.convert import BadMessage
 from uam_msgs_py.executor import spin
 from uam_msgs_py.joins import StampJoin
@@ -39,6 +39,8 @@ class UamNode(Node):
         self._required: dict[str, int] = {}
         self._counts: dict[str, int] = {}
         self._said: dict[str, float] = {}
+        self._outlets: dict[str, Publisher] = {}
+        self._inlets: dict[str, Subscription] = {}
         self.joins: list[StampJoin] = []
         self.stamp = 0  # [ns] of the newest tick
         self.ticks = self.refused = 0
@@ -52,7 +54,8 @@ class UamNode(Node):
 
     def publisher(self, topic: Topic) -> Publisher:
         """Return a publisher of `topic`."""
-        return self.create_publisher(topic.type, topic.name, topic.qos)
+        made = self._outlets[topic.name] = self.create_publisher(topic.type, topic.name, topic.qos)
+        return made
 
     def listen(
         self, topic: Topic, handle: Callable[[Any], None], required: bool = True
@@ -75,7 +78,8 @@ class UamNode(Node):
                 return
             counts[name] += 1
 
-        return self.create_subscription(topic.type, name, callback, topic.qos)
+        made = self._inlets[name] = self.create_subscription(topic.type, name, callback, topic.qos)
+        return made
 
     def take_waiting(self, subscription: Subscription) -> None:
         """Deliver at once what has arrived on `subscription`.
@@ -139,6 +143,7 @@ class UamNode(Node):
             "messages refused": self.refused,
         }
         self._busy = self._busy_max = 0.0
+        common |= connections.of(self._outlets, self._inlets)
         stamp = self.stamp or self.get_clock().now().nanoseconds
         self._diagnostics.publish(
             diagnostic(stamp, self.get_name(), level, summary, common | values)

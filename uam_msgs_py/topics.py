@@ -36,8 +36,10 @@ def _qos(depth: int, reliable: bool = True, latched: bool = False) -> QoSProfile
     )
 
 
-SENSOR_DATA = _qos(5, reliable=False)  # as rclpy.qos.qos_profile_sensor_data
-RELIABLE = _qos(10)
+# 128 ms at control rate: what a short stall of a process leaves behind is still worked through.
+DEPTH = 32
+SENSOR_DATA = _qos(DEPTH, reliable=False)  # rclpy.qos.qos_profile_sensor_data, but deeper
+RELIABLE = _qos(DEPTH)
 LATCHED = _qos(1, latched=True)  # a late subscriber gets the last message
 
 

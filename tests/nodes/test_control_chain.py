@@ -1,7 +1,5 @@
 """The control nodes together, each in its process: the same numbers as the maths in one loop."""
 
-import time
-
 import numpy as np
 import pytest
 
@@ -11,6 +9,7 @@ from uam_control.estimation import StateEstimator
 from uam_control.mission import Mission, load_scenario
 from uam_control.profile import load_profile
 from uam_msgs_py import topics
+from uam_msgs_py.connections import Connections
 from uam_msgs_py.control import (
     ATTITUDE_NAMES,
     read_position_command,
@@ -84,6 +83,7 @@ class Plant:
 
     def __init__(self, probe):
         self.probe = probe
+        self.connections = Connections(probe.node)
         self.mocap = probe.publisher(topics.MOCAP)
         self.joints = probe.publisher(topics.JOINTS)
         self.imu = probe.publisher(topics.IMU)
@@ -100,16 +100,24 @@ class Plant:
         self.pose, self.joint, self.imu_writer = PoseWriter(), JointStateWriter(JOINTS), ImuWriter()
 
     def wait_for_connections(self):
-        """Return when all nodes hear each other."""
-        node = self.probe.node
-        listeners = {topics.STATE.name: 5, topics.REFERENCE.name: 4,
-                     topics.POSITION_COMMAND.name: 3, topics.IMU.name: 1}
-        speakers = (topics.ARM_EFFORT.name, topics.MAGNET.name, topics.ATTITUDE_COMMAND.name)
+        """Return when every publisher has found its listeners, and they it."""
+        said = self.connections
+        readers = {  # the probe listens to all but the sensors
+            ("state_estimator", topics.STATE.name): 5,
+            ("mission", topics.REFERENCE.name): 4,
+            ("mission", topics.MAGNET.name): 1,
+            ("position_controller", topics.POSITION_COMMAND.name): 3,
+            ("attitude_controller", topics.ATTITUDE_COMMAND.name): 1,
+            ("arm_controller", topics.ARM_EFFORT.name): 1,
+        }
+        sensors = (topics.IMU, topics.JOINTS, topics.MOCAP)
         self.probe.until(
-            lambda: all(node.count_subscribers(name) >= n for name, n in listeners.items())
-            and all(node.count_publishers(name) for name in speakers), "discovery")
-        settled = time.monotonic() + 1.0  # seen from here does not mean matched everywhere
-        self.probe.until(lambda: time.monotonic() > settled, "settling")
+            lambda: all(said.readers(*who) >= count for who, count in readers.items())
+            and all(said.writers("state_estimator", t.name) for t in sensors)
+            and said.writers("mission", topics.AUTOPILOT_STATE.name)
+            and all(p.get_subscription_count() for p in (self.imu, self.joints, self.mocap)),
+            "connections",
+        )
 
     def tick(self, number, stamp, imu, pose, joints):
         """Publish one tick's samples and wait for all answers to it."""

@@ -35,8 +35,8 @@ class ArmControllerNode(ControllerNode):
         self._effort.publish(self._effort_writer.message)
         self._command.publish(self._writer.fill(stamp, tau))
 
-    def evaluate(self, controller, dt, state, reference, attitude):
-        return controller.update(state, reference, attitude, True, dt)
+    def evaluate(self, controller, dt, state, reference, attitude, flying):
+        return controller.update(state, reference, attitude, flying, dt)
 
 
 def main() -> int:

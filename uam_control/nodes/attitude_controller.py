@@ -29,8 +29,8 @@ class AttitudeControllerNode(ControllerNode):
             self._writer.fill(stamp, tau) if flying else self._writer.idle(stamp)
         )
 
-    def evaluate(self, controller, dt, state, reference, attitude):
-        return controller.update(state, reference, attitude, True, dt)
+    def evaluate(self, controller, dt, state, reference, attitude, flying):
+        return controller.update(state, reference, attitude, flying, dt)
 
 
 def main() -> int:

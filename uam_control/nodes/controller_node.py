@@ -67,13 +67,15 @@ class ControllerNode(UamNode):
         """Control at `stamp` [ns], dt [s] after the last tick; publish the command."""
         raise NotImplementedError
 
-    def evaluate(self, controller: Controller, dt: float, state, reference, attitude):
-        """Return the controller's output while flying; used to compile it before the flight."""
+    def evaluate(self, controller: Controller, dt: float, state, reference, attitude, flying: bool):
+        """Return the controller's output; used to compile it before the flight."""
         raise NotImplementedError
 
     def _warm_up(self, spare: Controller, dt: float) -> None:
         """Compile the law on a controller that never flies: the first call takes a second."""
-        self.evaluate(spare, dt, np.zeros((3, SIZE)), np.zeros((3, SIZE)), np.zeros((3, 3)))
+        nothing = np.zeros((3, SIZE))
+        for flying in (False, True):
+            self.evaluate(spare, dt, nothing, nothing, np.zeros((3, 3)), flying)
 
     def diagnose(self):
         level, summary, values = super().diagnose()

@@ -5,7 +5,7 @@ import time
 import numpy as np
 from std_msgs.msg import Bool
 
-from uam_control.coordinates import ARM, ATTITUDE, POSITION
+from uam_control.coordinates import ARM, ATTITUDE, POSITION, SIZE
 from uam_control.mission import Mission, MissionParameters, load_scenario
 from uam_control.nodes.timing import Ticks, Timing
 from uam_control.profile import load_profile
@@ -34,6 +34,7 @@ class MissionNode(UamNode):
         self._period = Ticks(NodeParameters(self, Timing, read_only=True).current).period
         scenario = self.declare_parameter("scenario", DEFAULT_SCENARIO).value
         self._mission = Mission(load_scenario(scenario), self.parameter_set.current)
+        warm_up(Mission(self._mission.scenario, self.parameter_set.current))
         self.parameter_set.apply = self._set_parameters
         self._armed_since: float | None = None
         self._ahead = -1  # stamp [ns] of the newest reference
@@ -116,6 +117,14 @@ class MissionNode(UamNode):
         output = self._mission.output
         level = ERROR if output.abort_reason else OK
         return level, output.abort_reason or output.phase, {"mission time [s]": output.time}
+
+
+def warm_up(spare: Mission) -> None:
+    """Compile what is called in flight, on a mission that never flies."""
+    state = np.zeros((3, SIZE))
+    takeoff = spare.parameters.takeoff_delay
+    for stamp in (0.0, takeoff, takeoff + 0.004):
+        spare.step(stamp, state, 0.0)
 
 
 def main() -> int:

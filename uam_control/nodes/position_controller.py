@@ -31,8 +31,8 @@ class PositionControllerNode(ControllerNode):
             message = self._writer.idle(stamp)
         self._command.publish(message)
 
-    def evaluate(self, controller, dt, state, reference, attitude):
-        return controller.update(state, reference, True, dt)
+    def evaluate(self, controller, dt, state, reference, attitude, flying):
+        return controller.update(state, reference, flying, dt)
 
 
 def main() -> int:
