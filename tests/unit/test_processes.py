@@ -1,5 +1,6 @@
 """Supervision of child processes, with small stand-in programs instead of nodes."""
 
+import mmap
 import os
 import signal
 import subprocess
@@ -139,25 +140,32 @@ def test_the_environment_is_private_and_local(tmp_path):
     assert made["OMP_NUM_THREADS"] == made["NUMBA_NUM_THREADS"] == "1"
 
 
-def test_only_the_flights_own_shared_memory_is_removed(tmp_path, monkeypatch):
+def segment(folder, name):
+    """A file as the middleware makes them, with its lock file."""
+    file = folder / name
+    file.write_bytes(bytes(4096))
+    file.with_name(name + "_el").touch()
+    return file
+
+
+def test_shared_memory_is_removed_once_nobody_uses_it(tmp_path, monkeypatch):
     monkeypatch.setattr(shared_memory, "FOLDER", tmp_path)
-    own = tmp_path / "fastrtps_0123456789abcdef"
-    other = tmp_path / "fastrtps_fedcba9876543210"
-    for file in (own, own.with_name(own.name + "_el"), other):
-        file.touch()
-    assert len(shared_memory.remove({own})) == 2
-    assert list(tmp_path.iterdir()) == [other]
+    file = segment(tmp_path, "fastrtps_0123456789abcdef")
+    other = segment(tmp_path, "fastrtps_fedcba9876543210")
+    with file.open("r+b") as opened, mmap.mmap(opened.fileno(), 4096):
+        assert shared_memory.used_by(os.getpid()) == {file}
+        assert shared_memory.remove_unused({file}) == []
+    assert shared_memory.used_by(os.getpid()) == set()
+    assert len(shared_memory.remove_unused({file})) == 2
+    assert set(tmp_path.iterdir()) == {other, other.with_name(other.name + "_el")}
 
 
-@pytest.mark.parametrize(
-    ("name", "private"),
-    [
-        ("fastrtps_0123456789abcdef", True),
-        ("fastrtps_port7410", True),
-        ("sem.fastrtps_port7661_mutex", True),
-        ("fastrtps_port7000", False),  # shared by every domain
-        ("somebody_elses", False),
-    ],
-)
-def test_which_shared_memory_belongs_to_a_flight(name, private):
-    assert shared_memory._is_private(name) is private
+def test_what_was_abandoned_long_ago_is_found(tmp_path, monkeypatch):
+    monkeypatch.setattr(shared_memory, "FOLDER", tmp_path)
+    fresh = segment(tmp_path, "fastrtps_port7661")
+    old = segment(tmp_path, "sem.fastrtps_port7661_mutex")
+    foreign = segment(tmp_path, "fastrtps_somebody_elses")
+    for file in (old, foreign):
+        os.utime(file, (0, 0))
+    assert shared_memory.abandoned() == {old}
+    assert shared_memory.abandoned(age=-1.0) == {fresh, old}

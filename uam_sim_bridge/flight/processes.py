@@ -24,13 +24,12 @@ class NodeFailed(RuntimeError):
     """A process of the flight ended by itself; the text says which, why, and its last lines."""
 
     def __init__(self, name: str, status: int, log: Path):
-        self.name, self.status, self.log = name, status, log
-        super().__init__(f"{name} {describe(status)}")
-
-    @property
-    def last_lines(self) -> list[str]:
-        """The end of the node's log, at most LAST_LINES lines."""
-        return tail(self.log)
+        self.name, self.status = name, status
+        self.last_lines = tail(log)
+        own_words = self.last_lines[-1] if self.last_lines else ""
+        why = own_words.removeprefix(f"{name}: ")  # nodes end with one line that begins so
+        said = f": {why}" if why != own_words else ""
+        super().__init__(f"{name} {describe(status)}{said}")
 
 
 def describe(status: int) -> str:
@@ -158,7 +157,8 @@ class Processes:
         for child in self._children.values():
             if child.process.stdin and not child.process.stdin.closed:
                 child.process.stdin.close()
-        shared_memory.remove(set().union(*(child.shared for child in self._children.values())))
+        used = set().union(*(child.shared for child in self._children.values()))
+        shared_memory.remove_unused(used)
 
     def __enter__(self) -> "Processes":
         return self

@@ -13,7 +13,7 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
-from uam_sim_bridge.flight import wiring
+from uam_sim_bridge.flight import shared_memory, wiring
 from uam_sim_bridge.flight.interrupts import Interrupts
 from uam_sim_bridge.flight.log_reader import read_flight
 from uam_sim_bridge.flight.mcap_reader import UnreadableLog
@@ -53,6 +53,7 @@ def fly(settings: FlightSettings, folder: ResultFolder, progress: Progress) -> O
     if is_cold():
         progress.message("compiling the control path (once)")
         warm_up()
+    shared_memory.remove_unused(shared_memory.abandoned())
     with Reservation(settings.instance) as reservation, Interrupts() as stop:
         ports = reservation.ports
         folder.write_parameters(parameters(settings, folder, ports))

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from pathlib import Path
 
+from uam_control import configuration
 from uam_control.mission import Scenario, load_scenario
 from uam_control.profile import Profile, load_profile
 
@@ -59,8 +60,8 @@ def settings(
 ) -> FlightSettings:
     """Check the options and load what they name.
 
-    Raises SettingsError, and what load_scenario and load_profile raise (ScenarioError,
-    ProfileError); each is one line for the user.
+    Raises SettingsError, and what loading raises (ConfigurationError, ScenarioError, ProfileError);
+    each is one line for the user.
     """
     if controller in ANNOUNCED:
         raise SettingsError(
@@ -75,13 +76,14 @@ def settings(
         raise SettingsError("the direct engine has no clock: --clock realtime needs --engine ros")
     if not 0 <= seed < 2**31:
         raise SettingsError(f"seed {seed} is outside 0..{2**31 - 1}")
-    loaded = load_scenario(scenario)
+    loaded = load_scenario(str(configuration.named("scenarios", scenario)))
+    chosen = profile or CONTROLLERS[controller]
     mass = loaded.payload_mass if payload_mass is None else payload_mass
     if not 0.0 <= mass <= PAYLOAD_MAX:
         raise SettingsError(f"payload mass {mass:g} kg is outside 0..{PAYLOAD_MAX:g} kg")
     return FlightSettings(
         scenario=loaded,
-        profile=load_profile(profile or CONTROLLERS[controller]),
+        profile=load_profile(str(configuration.named("profiles", chosen))),
         payload_mass=mass,
         out=None if out is None else Path(out),
         controller=controller,

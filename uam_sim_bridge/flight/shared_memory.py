@@ -1,18 +1,21 @@
 """Shared-memory files of the middleware (Fast DDS: /dev/shm/fastrtps_*, sem.fastrtps_*).
 
-A participant that ends cleanly removes its own; one that is killed cannot.
+Those who end cleanly remove them, the last one those that several use. Who is killed cannot, and
+what he used with others then stays as well.
 """
 
+from __future__ import annotations
+
+import os
 import re
+import time
 from collections.abc import Iterable
 from pathlib import Path
 
 FOLDER = Path("/dev/shm")
-# A participant's segment is named by a random number; a port by the UDP port it stands for.
-SEGMENT = re.compile(r"^fastrtps_[0-9a-f]{16}$")
-PORT = re.compile(r"^(?:sem\.)?fastrtps_port(\d+)(?:_mutex)?$")
-# Ports below belong to multicast groups that every domain on the machine shares.
-FIRST_PRIVATE_PORT = 7400
+# A participant's segment is named by a random number, a port by its own number.
+NAME = re.compile(r"^(?:fastrtps_[0-9a-f]{16}|fastrtps_port\d+|sem\.fastrtps_port\d+_mutex)$")
+ABANDONED = 60.0  # [s] a file that old and without a user was not just being created
 
 
 def used_by(pid: int) -> set[Path]:
@@ -23,28 +26,42 @@ def used_by(pid: int) -> set[Path]:
         return set()
     found = set()
     for line in maps.splitlines():
-        path = Path(line.split(maxsplit=5)[5]) if line.count(" ") >= 5 and "/" in line else None
-        if path is not None and path.parent == FOLDER and _is_private(path.name):
+        words = line.split(maxsplit=5)
+        path = Path(words[5]) if len(words) == 6 else None
+        if path is not None and path.parent == FOLDER and NAME.match(path.name):
             found.add(path)
     return found
 
 
-def _is_private(name: str) -> bool:
-    port = PORT.match(name)
-    return bool(SEGMENT.match(name)) or (port is not None and int(port[1]) >= FIRST_PRIVATE_PORT)
+def abandoned(age: float = ABANDONED) -> set[Path]:
+    """Files of this user that are older than `age` [s]; not all of them need be unused."""
+    oldest = time.time() - age
+    found = set()
+    for path in FOLDER.glob("*fastrtps_*"):
+        try:
+            status = path.stat()
+        except OSError:
+            continue
+        if NAME.match(path.name) and status.st_uid == os.getuid() and status.st_mtime < oldest:
+            found.add(path)
+    return found
 
 
-def remove(files: Iterable[Path]) -> list[Path]:
-    """Remove these files and their lock files (`_el`); returns those that were still there.
-
-    Only for files whose users have all ended.
-    """
+def remove_unused(files: Iterable[Path]) -> list[Path]:
+    """Remove those of `files` that no process uses, each with its lock file; returns them."""
+    there = [path for path in files if path.exists()]
+    if not there:
+        return []
+    pids = [int(entry.name) for entry in Path("/proc").glob("[0-9]*")]
+    used = set().union(*(used_by(pid) for pid in pids))
     removed = []
-    for file in files:
-        for path in (file, file.with_name(file.name + "_el")):
+    for path in there:
+        if path in used:
+            continue
+        for file in (path, path.with_name(path.name + "_el")):
             try:
-                path.unlink()
-                removed.append(path)
+                file.unlink()
+                removed.append(file)
             except OSError:
                 continue
     return removed

@@ -1,0 +1,87 @@
+"""Flights that are cut short: the reason is named, what was flown is kept, nothing is left."""
+
+import json
+import os
+import signal
+
+import pytest
+from whole_flight import assert_nothing_left, wait_until_gone
+
+from uam_sim_bridge.flight import shared_memory, timeseries
+from uam_sim_bridge.flight.ports import Reservation
+
+
+def kept(flight):
+    """The metrics of a flight that was cut short after its take-off."""
+    figures = json.loads((flight.out / "metrics.json").read_text())
+    assert not figures["mission_completed"]
+    series = timeseries.read(flight.out / "timeseries.parquet")
+    assert series.flown.any() and not series.in_phase("landed").any()
+    page = (flight.out / "report.html").read_text()
+    assert "partial" in page
+    return figures
+
+
+@pytest.mark.parametrize("victim", ["position_controller", "autopilot", "recorder"])
+def test_a_killed_node_ends_the_flight_and_is_named(fly, short_scenario, victim):
+    flight = fly("--scenario", str(short_scenario))
+    flight.until_phase("take-off")
+    nodes, shared = flight.children(), flight.shared_memory()
+    assert len(nodes) == 9 and shared
+    os.kill(nodes[victim], signal.SIGKILL)
+    assert flight.wait() == 1
+    assert f"uam fly: {victim} was killed by SIGKILL" in flight.complained
+    assert "Traceback" not in flight.complained
+    assert_nothing_left(flight, list(nodes.values()), shared)
+    if victim != "recorder":
+        assert f"{victim} was killed by SIGKILL" in kept(flight)["abort_reason"]
+
+
+@pytest.mark.slow
+def test_a_node_that_hangs_is_named_and_killed(fly, short_scenario):
+    flight = fly("--scenario", str(short_scenario))
+    flight.until_phase("take-off")
+    nodes, shared = flight.children(), flight.shared_memory()
+    os.kill(nodes["arm_controller"], signal.SIGSTOP)
+    assert flight.wait() == 1
+    assert "no effort for t = " in flight.complained
+    assert "arm_controller is silent" in flight.complained
+    assert "had to be killed: arm_controller" in flight.said
+    assert_nothing_left(flight, list(nodes.values()), shared)
+    kept(flight)
+
+
+def test_ctrl_c_keeps_what_was_flown(fly, short_scenario):
+    flight = fly("--scenario", str(short_scenario))
+    flight.until_phase("take-off")
+    nodes, shared = flight.children(), flight.shared_memory()
+    flight.process.send_signal(signal.SIGINT)
+    assert flight.wait() == 130
+    assert "Traceback" not in flight.complained
+    assert_nothing_left(flight, list(nodes.values()), shared)
+    assert kept(flight)["abort_reason"] == "interrupted by the user"
+
+
+def test_ctrl_c_before_the_first_tick_leaves_nothing(fly, short_scenario):
+    flight = fly("--scenario", str(short_scenario))
+    flight.until(lambda: "processes in ROS domain" in flight.said, "started")
+    nodes = flight.children()
+    flight.process.send_signal(signal.SIGINT)
+    assert flight.wait() == 130
+    assert "Traceback" not in flight.complained
+    assert_nothing_left(flight, list(nodes.values()), set())
+
+
+def test_no_node_survives_a_killed_orchestrator(fly, short_scenario):
+    flight = fly("--scenario", str(short_scenario))
+    flight.until_phase("take-off")
+    nodes, used = flight.children(), flight.shared_memory()
+    flight.process.kill()
+    flight.wait()
+    wait_until_gone(list(nodes.values()))
+    assert flight.out.joinpath("logs/mujoco_sim.json").exists(), "the nodes ended in good order"
+    # What the killed process shared with them is for the next flight to remove, and its lock.
+    shared_memory.remove_unused(used)
+    assert [file for file in used if file.exists()] == []
+    with Reservation(flight.instance):
+        pass

@@ -1,0 +1,120 @@
+"""Lockstep flights through the ROS engine, whole."""
+
+import json
+import math
+
+import pytest
+from mcap.reader import make_reader
+from mcap_ros2.decoder import DecoderFactory
+
+from uam_control.mission import load_scenario
+from uam_sim_bridge.flight import timeseries
+from uam_sim_bridge.flight.direct import DirectFlight
+from uam_sim_bridge.flight.log_reader import read_flight
+from uam_sim_bridge.flight.metrics import errors
+from uam_sim_bridge.flight.settings import settings
+from uam_sim_bridge.plant import Vehicle
+
+WALL = ("wall_s", "real_time_factor")  # what may differ between two runs of one flight
+
+
+def metrics(flight):
+    return json.loads((flight.out / "metrics.json").read_text())
+
+
+def test_the_mission_is_completed_and_said_so(two_flights):
+    flight = two_flights[0]
+    found = metrics(flight)
+    assert found["mission_completed"] and found["abort_reason"] is None
+    assert found["engine"] == "ros" and found["clock"] == "lockstep" and found["seed"] == 3
+    assert "Mission completed" in flight.said
+    for phase in ("take-off", "hover", "land"):
+        assert phase in flight.said
+    for name in ("report.html", "versions.json", "parameters.yaml", "info.json"):
+        assert (flight.out / name).stat().st_size > 0
+
+
+def test_one_seed_gives_one_flight(two_flights):
+    first, second = (metrics(flight) for flight in two_flights)
+    for figures in (first, second):
+        for key in WALL:
+            figures.pop(key)
+    assert first == second
+    a, b = (timeseries.read(flight.out / "timeseries.parquet") for flight in two_flights)
+    assert a.values.tobytes() == b.values.tobytes()
+    assert a.phases.tolist() == b.phases.tolist()
+
+
+def test_flights_side_by_side_use_different_domains_and_ports(two_flights):
+    domains = [flight.said.split("ROS domain ")[1].split(",")[0] for flight in two_flights]
+    assert domains[0] != domains[1]
+
+
+def test_the_direct_engine_flies_the_same(two_flights, short_scenario):
+    asked = settings(scenario=str(short_scenario), seed=3)
+    direct = DirectFlight(asked.scenario, asked.profile, Vehicle.load(), 0.0, seed=3)
+    expected = errors(direct.run().series())
+    found = metrics(two_flights[0])["rms"]
+    # Noise meets the flight at other instants: what is near the noise itself may differ more.
+    floor = {"position_m": 5e-4, "attitude_deg": 0.02, "arm_deg": 0.02}
+    for group, figures in expected.items():
+        for ours, theirs in zip(found[group], figures, strict=True):
+            assert ours == pytest.approx(theirs, rel=0.05, abs=floor[group])
+
+
+def test_every_tick_is_in_the_table(two_flights):
+    series = timeseries.read(two_flights[0].out / "timeseries.parquet")
+    steps = [round(1e6 * step) for step in (series.time[1:] - series.time[:-1])]
+    assert set(steps) == {4000}
+    assert series.time[0] < 0.0 and 0.0 in series.time
+    names = [name for name, _, _ in series.phase_spans()]
+    assert names == ["waiting", "take-off", "hover", "land", "landed"]
+    flown = series.values[series.flown]
+    assert not math.isnan(flown.sum()), "every column has a number on every tick of the flight"
+
+
+def test_the_log_opens_with_the_public_readers_and_is_whole(two_flights):
+    flight = two_flights[0]
+    with (flight.out / "log.mcap").open("rb") as file:
+        reader = make_reader(file, decoder_factories=[DecoderFactory()])
+        summary = reader.get_summary()
+        counts = {
+            summary.channels[number].topic: count
+            for number, count in summary.statistics.channel_message_counts.items()
+        }
+        (lost,) = [m.metadata for m in reader.iter_metadata() if m.name == "lost messages"]
+        assert lost == {}
+        ticks = counts["/uam/state"]
+        per_tick = ("/imu/data", "/joint_states", "/uam/position/command", "/uam/setpoint")
+        assert {counts[topic] for topic in per_tick} == {ticks}
+        assert counts["/arm_effort_controller/commands"] == counts["/uam/magnet"] == ticks
+        assert summary.statistics.message_end_time < 60 * 10**9, "log time is simulation time"
+        found = {}
+        for kind, channel, message, content in reader.iter_decoded_messages():
+            assert kind.encoding == "ros2msg"
+            if channel.topic not in found and message.log_time > 4 * 10**9:
+                found[channel.topic] = content
+                if hasattr(content, "header") and channel.topic != "/diagnostics":
+                    stamp = content.header.stamp
+                    assert stamp.sec * 10**9 + stamp.nanosec == message.log_time
+    assert list(found["/uam/state"].joint_names)[-1] == "alpha_2"
+    assert found["/imu/data"].orientation_covariance[0] == -1.0
+    assert 0.0 < found["/uam/setpoint"].twist.linear.z < 1.0
+
+
+def test_messages_without_a_stamp_lie_at_their_tick(two_flights):
+    """Efforts are published while /clock shows the tick that they answer."""
+    with (two_flights[0].out / "log.mcap").open("rb") as file:
+        times = {"/clock": [], "/arm_effort_controller/commands": []}
+        for _, channel, message in make_reader(file).iter_messages(topics=list(times)):
+            times[channel.topic].append(message.log_time)
+    efforts = times["/arm_effort_controller/commands"]
+    assert efforts == times["/clock"][-len(efforts) :]
+
+
+def test_reading_the_log_again_gives_the_table(two_flights, short_scenario):
+    out = two_flights[0].out
+    again = read_flight(out / "log.mcap", load_scenario(str(short_scenario)))
+    assert again.done and again.abort_reason == ""
+    table = timeseries.read(out / "timeseries.parquet")
+    assert again.series.values.tobytes() == table.values.tobytes()

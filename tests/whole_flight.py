@@ -1,0 +1,146 @@
+"""Whole flights through the command line, as a user starts them."""
+
+import fcntl
+import os
+import signal
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Callable
+from pathlib import Path
+
+from uam_sim_bridge.flight import shared_memory
+from uam_sim_bridge.flight.ports import SIMULATOR_TCP
+
+ROOT = Path(__file__).resolve().parents[1]
+PATIENCE = 240.0  # [s] only a failing test waits that long
+# Up, a second of hovering, down: about 7 s of simulated time with arming.
+SHORT = """\
+description: Up and down, for tests.
+arm_start: {alpha_1_deg: 0, alpha_2_deg: 90}
+phases:
+  - {from: 0, name: take-off}
+  - {from: 1.5, name: hover}
+  - {from: 2, name: land}
+moves:
+  - {coordinate: z, from: 0, until: 1.5, to: 0.6}
+landing: {at: 2, duration: 2}
+"""
+
+
+class Flight:
+    """`uam fly` in a process of its own."""
+
+    def __init__(self, folder: Path, *options: str):
+        """Fly to <folder>/<out>; `options` go to the command line."""
+        folder.mkdir(exist_ok=True)
+        self.out = folder / "out"
+        self._text = (folder / "stdout").open("w+")
+        self._errors = (folder / "stderr").open("w+")
+        command = [sys.executable, "-m", "uam_sim_bridge.cli.main", "fly", "--out", str(self.out)]
+        self.process = subprocess.Popen(
+            [*command, "--no-video", *options],
+            stdout=self._text,
+            stderr=self._errors,
+            cwd=ROOT,
+            start_new_session=True,
+        )
+
+    @property
+    def said(self) -> str:
+        """Its standard output so far."""
+        return (self.out.parent / "stdout").read_text()
+
+    @property
+    def complained(self) -> str:
+        """Its standard error so far."""
+        return (self.out.parent / "stderr").read_text()
+
+    def until(self, condition: Callable[[], object], what: str) -> None:
+        """Wait for `condition()` while it flies."""
+        deadline = time.monotonic() + PATIENCE
+        while not condition():
+            assert self.process.poll() is None, f"{what}: it ended\n{self.said}{self.complained}"
+            assert time.monotonic() < deadline, f"{what}: not in time\n{self.said}"
+            time.sleep(0.05)
+
+    def until_phase(self, phase: str) -> None:
+        """Wait until the display has shown a phase."""
+        self.until(lambda: f" s  {phase} " in self.said, phase)
+
+    @property
+    def instance(self) -> int:
+        """The instance number of its ports."""
+        return int(self.said.split("autopilot on TCP ")[1].split(",")[0]) - SIMULATOR_TCP
+
+    def children(self) -> dict[str, int]:
+        """Its nodes: name → process id."""
+        found = {}
+        for entry in Path("/proc").glob("[0-9]*"):
+            try:
+                words = (entry / "cmdline").read_text().split("\0")
+                parent = int((entry / "stat").read_text().rsplit(")", 1)[1].split()[1])
+            except OSError:
+                continue
+            if parent == self.process.pid and "uam_sim_bridge.flight.child" in words:
+                module = words[words.index("uam_sim_bridge.flight.child") + 1]
+                found["autopilot" if "autopilot" in module else module.split(".")[-1]] = int(
+                    entry.name
+                )
+        return found
+
+    def shared_memory(self) -> set[Path]:
+        """The middleware's files that its nodes use now."""
+        return set().union(*(shared_memory.used_by(pid) for pid in self.children().values()))
+
+    def wait(self) -> int:
+        """Its exit status."""
+        return self.process.wait(PATIENCE)
+
+    def end(self) -> None:
+        """Kill it if it still runs."""
+        if self.process.poll() is None:
+            self.process.send_signal(signal.SIGKILL)
+        self.process.wait()
+        self._text.close()
+        self._errors.close()
+
+
+def is_gone(pid: int) -> bool:
+    """Whether no process has this id any more (a zombie is gone, too)."""
+    try:
+        state = Path(f"/proc/{pid}/stat").read_text().rsplit(")", 1)[1].split()[0]
+    except OSError:
+        return True
+    return state == "Z"
+
+
+def lock_is_held(instance: int) -> bool:
+    """Whether some process holds the lock of an instance; a lock file without holder is removed."""
+    file = Path(tempfile.gettempdir()) / f"uam-{os.getuid()}-{instance}.lock"
+    try:
+        with file.open() as lock:
+            fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except FileNotFoundError:
+        return False
+    except BlockingIOError:
+        return True
+    raise AssertionError(f"{file} was left behind")
+
+
+def wait_until_gone(pids: list[int], seconds: float = 20.0) -> None:
+    """Wait until none of the processes exists; fail after `seconds`."""
+    deadline = time.monotonic() + seconds
+    while alive := [pid for pid in pids if not is_gone(pid)]:
+        assert time.monotonic() < deadline, f"still there: {alive}"
+        time.sleep(0.1)
+
+
+def assert_nothing_left(flight: Flight, pids: list[int], files: set[Path]) -> None:
+    """No process, shared memory or temporary file is there; the lock may be another flight's."""
+    assert [pid for pid in pids if not is_gone(pid)] == []
+    # Ports are numbered over all domains: another flight may use them now.
+    assert shared_memory.remove_unused(files) == []
+    assert list(flight.out.rglob(".*")) == []
+    lock_is_held(flight.instance)
