@@ -2,15 +2,16 @@
 
 rclpy's SingleThreadedExecutor gathers every entity of the node, builds a wait set, a task and a
 coroutine for each callback: 50 to 170 µs a message, five times the price of the message itself.
-A control node's entities never change after start, so `LeanExecutor` keeps one wait set and calls
-the callbacks of ready subscriptions directly. Whatever is rare (services, timers, events of the
-middleware) is waited for in the same wait set and handed to a SingleThreadedExecutor, which knows
-how to serve it.
+A control node's entities hardly ever change after its start, so `LeanExecutor` keeps a wait set of
+its subscriptions and calls the callbacks of ready ones directly. What is rare (services, timers,
+events of the middleware) is looked for fifty times a second, and handed to a
+SingleThreadedExecutor, which knows how to serve it.
 
-`WaitSet` is not public in rclpy. Where it is missing or different, `spin` falls back to the
+`WaitSet` is not public in rclpy. Where it is missing, `spin` falls back to the
 SingleThreadedExecutor alone: slower, otherwise the same.
 """
 
+import time
 from collections.abc import Callable
 
 from rclpy.executors import SingleThreadedExecutor
@@ -24,22 +25,32 @@ except (ImportError, AttributeError):
     WaitSet = None
 
 
+REST_PERIOD = 0.02  # [s] between two looks at services, timers and events
+
+
 class LeanExecutor:
     """Spins one node, whose subscriptions, services and timers were made before.
 
     Messages are delivered in the order of the node's subscriptions within one wake-up. A callback
     that raises ends `spin` with that exception.
+
+    A node with `defer` and `settle` is asked to settle after each wake-up, when all that had arrived
+    has been delivered: it then acts on the newest, and skips ticks when it has fallen behind.
     """
 
     def __init__(self, node: Node):
         self._node = node
         self._rest = SingleThreadedExecutor(context=node.context)
         self._rest.add_node(node)
+        self._settle = getattr(node, "settle", lambda: None)
+        if hasattr(node, "defer"):
+            node.defer()
+        self._next_look = 0.0
         self._gather()
 
     def _gather(self) -> None:
-        """Take note of the node's entities and make the wait set for them."""
-        node = self._node
+        """Take note of the node's entities and make the wait sets for them."""
+        node, context = self._node, self._node.context.handle
         self._subscriptions = [
             (s.handle, s.msg_type, s.raw, s.callback, s.handle.pointer) for s in node.subscriptions
         ]
@@ -47,46 +58,57 @@ class LeanExecutor:
         self._clients = [c.handle for c in node.clients]
         self._timers = [t.handle for t in node.timers]
         self._waitables = list(node.waitables)
-        self._wait_set = WaitSet(
-            len(self._subscriptions),
-            0,
-            len(self._timers),
-            len(self._clients),
-            len(self._services),
-            sum(waitable.get_num_entities().num_events for waitable in self._waitables),
-            node.context.handle,
-        )
+        events = sum(waitable.get_num_entities().num_events for waitable in self._waitables)
+        counts = (len(self._timers), len(self._clients), len(self._services), events)
+        self._messages = WaitSet(len(self._subscriptions), 0, 0, 0, 0, 0, context)
+        self._others = WaitSet(0, 0, *counts, context)
 
     def spin_once(self, timeout: float) -> None:
-        """Serve what is ready, waiting at most `timeout` seconds for something."""
-        ready = self._wait_set
-        ready.clear_entities()
-        for handle, *_ in self._subscriptions:
-            ready.add_subscription(handle)
-        for handle in self._services:
-            ready.add_service(handle)
-        for handle in self._clients:
-            ready.add_client(handle)
-        for handle in self._timers:
-            ready.add_timer(handle)
-        for waitable in self._waitables:
-            waitable.add_to_wait_set(ready)
-        ready.wait(int(timeout * 1e9))
+        """Serve what is ready, waiting at most `timeout` seconds for a message.
 
-        arrived = ready.get_ready_entities("subscription")
+        Shorter than `timeout` by itself when it is time to look for services and timers.
+        """
+        left = self._next_look - time.monotonic()
+        if left <= 0.0:
+            self._serve_others()
+            left = REST_PERIOD
+            self._next_look = time.monotonic() + left
+        messages = self._messages
+        messages.clear_entities()
+        for handle, *_ in self._subscriptions:
+            messages.add_subscription(handle)
+        messages.wait(int(min(timeout, left) * 1e9))
+        arrived = messages.get_ready_entities("subscription")
         for handle, kind, raw, callback, pointer in self._subscriptions:
             while pointer in arrived:
                 taken = handle.take_message(kind, raw)
                 if taken is None:
                     break
                 callback(taken[0])
-        if (
-            (self._services and ready.get_ready_entities("service"))
-            or (self._timers and ready.get_ready_entities("timer"))
-            or (self._clients and ready.get_ready_entities("client"))
-            or any(waitable.is_ready(ready) for waitable in self._waitables)
-        ):
+        self._settle()
+
+    def _serve_others(self) -> None:
+        """Serve services, clients, timers and events that are ready now."""
+        others = self._others
+        others.clear_entities()
+        for handle in self._services:
+            others.add_service(handle)
+        for handle in self._clients:
+            others.add_client(handle)
+        for handle in self._timers:
+            others.add_timer(handle)
+        for waitable in self._waitables:
+            waitable.add_to_wait_set(others)
+        others.wait(0)
+        ready = [
+            entity
+            for kind in ("service", "client", "timer")
+            for entity in others.get_ready_entities(kind)
+        ]
+        ready += [waitable for waitable in self._waitables if waitable.is_ready(others)]
+        for _ in ready:
             self._rest.spin_once(timeout_sec=0)
+        if ready:
             self._gather()  # a service may have changed them, as setting use_sim_time does
 
     def shutdown(self) -> None:

@@ -13,6 +13,9 @@ class StampJoin:
 
     Ticks fire in the order of their stamps. When one fires, older incomplete ones can no longer
     matter; they are dropped and counted, as is whatever arrives for them later.
+
+    deferred: `settle` fires, once all that has arrived has been added, and only the newest complete
+    stamp. A node that has fallen behind then skips ticks instead of being late for all of them.
     """
 
     def __init__(self, inputs: Sequence[str], fire: Callable[..., None], depth: int = 32):
@@ -22,6 +25,8 @@ class StampJoin:
         self._depth = depth
         self._open: dict[int, list[Any]] = {}
         self._last = -1
+        self._ready: tuple[int, list[Any]] | None = None
+        self.deferred = False
         self.fired = 0
         self.dropped = 0
         self.last_seen: dict[str, int | None] = dict.fromkeys(inputs)
@@ -45,8 +50,19 @@ class StampJoin:
         for old in [key for key in self._open if key <= stamp]:
             del self._open[old]
             self.dropped += old != stamp
-        self.fired += 1
-        self._fire(stamp, *values)
+        if not self.deferred:
+            self.fired += 1
+            self._fire(stamp, *values)
+            return
+        self.dropped += self._ready is not None
+        self._ready = (stamp, values)
+
+    def settle(self) -> None:
+        """Where `deferred`: fire the newest complete stamp, if there is one."""
+        if self._ready is not None:
+            (stamp, values), self._ready = self._ready, None
+            self.fired += 1
+            self._fire(stamp, *values)
 
     @property
     def waiting_for(self) -> list[str]:

@@ -44,6 +44,7 @@ class UamNode(Node):
         self.joins: list[StampJoin] = []
         self.stamp = 0  # [ns] of the newest tick
         self.ticks = self.refused = 0
+        self.deferred = False
         self._busy = self._busy_max = 0.0
         self._at_last_report = (0, 0.0)
         self._waiting: list[str] = []
@@ -90,6 +91,17 @@ class UamNode(Node):
         """
         while (taken := subscription.handle.take_message(subscription.msg_type, False)) is not None:
             subscription.callback(taken[0])
+
+    def defer(self) -> None:
+        """From now on act in `settle`, on the newest of what has arrived."""
+        self.deferred = True
+        for join in self.joins:
+            join.deferred = True
+
+    def settle(self) -> None:
+        """Act on the newest complete inputs; called when all that has arrived is delivered."""
+        for join in self.joins:
+            join.settle()
 
     def say(self, text: str, key: str | None = None) -> None:
         """Log a warning, the same kind (`key`) at most once in SAY_PERIOD."""

@@ -42,6 +42,7 @@ class MissionNode(UamNode):
         self._phase = ""
         self._errors = (0.0, 0.0, 0.0)
         self._due = 0  # stamp [ns] of the next status
+        self._newest: tuple[int, np.ndarray] | None = None
 
         self._reference = self.publisher(topics.REFERENCE)
         self._magnet = self.publisher(topics.MAGNET)
@@ -60,8 +61,15 @@ class MissionNode(UamNode):
         self._armed_since = seconds(state.armed_since) if armed else None
 
     def _on_state(self, message) -> None:
+        self._newest = read_state(message)
+        if not self.deferred:
+            self.settle()
+
+    def settle(self) -> None:
+        if self._newest is None:
+            return
         begun = time.perf_counter()
-        stamp, state = read_state(message)
+        (stamp, state), self._newest = self._newest, None
         if stamp != self._ahead:  # the first tick, or one after a gap
             self._advance(stamp, state)
         output = self._mission.output  # as of this tick, from the step one tick ago

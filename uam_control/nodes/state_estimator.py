@@ -37,6 +37,8 @@ class StateEstimatorNode(UamNode):
         self._joints = self.listen(topics.JOINTS, self._on_joints)
         self.listen(topics.IMU, self._on_imu)
         self._last_imu = -1
+        self._begun = 0.0
+        self._pending = False
 
     def _on_mocap(self, message) -> None:
         stamp, position, quaternion = read_pose(message)
@@ -59,8 +61,17 @@ class StateEstimatorNode(UamNode):
         estimator.imu(seconds(stamp), gyro, specific_force)
         if estimator.waiting_for:
             return
-        self._state.publish(self._writer.fill(stamp, estimator.update()))
-        self.done_tick(stamp, begun)
+        state = estimator.update()  # for every sample, as its filters count them
+        self._writer.fill(stamp, state)
+        self._begun, self._pending = begun, True
+        if not self.deferred:
+            self.settle()
+
+    def settle(self) -> None:
+        if self._pending:
+            self._pending = False
+            self._state.publish(self._writer.message)
+            self.done_tick(self._last_imu, self._begun)
 
     def _warm_up(self) -> None:
         """Compile the filters on an estimator that never flies."""
