@@ -84,7 +84,7 @@ class Flight:
             except OSError:
                 continue
             if parent == self.process.pid and "uam_sim_bridge.flight.child" in words:
-                module = words[words.index("uam_sim_bridge.flight.child") + 1]
+                module = words[words.index("uam_sim_bridge.flight.child") + 2]
                 found["autopilot" if "autopilot" in module else module.split(".")[-1]] = int(
                     entry.name
                 )

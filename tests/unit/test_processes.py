@@ -104,7 +104,7 @@ def test_a_kill_from_outside_is_a_failure_that_names_the_signal(children):
 
 def test_a_terminal_interrupt_does_not_reach_the_children(children):
     children.start("a", "sleeper")
-    assert os.getsid(children.pid("a")) != os.getsid(0)
+    assert os.getpgid(children.pid("a")) != os.getpgid(0)
 
 
 def test_no_child_survives_a_killed_orchestrator(tmp_path):

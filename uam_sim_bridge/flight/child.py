@@ -1,6 +1,6 @@
 """How a node runs inside a flight: it ends when the orchestrator ends, however that ends.
 
-    python -m uam_sim_bridge.flight.child <package.module> [arguments of the node...]
+    python -m uam_sim_bridge.flight.child <niceness> <package.module> [arguments of the node...]
 
 The orchestrator holds the other end of this process's standard input and never writes to it. When
 the orchestrator is gone - even by `kill -9`, which no handler sees - the pipe reports its end; the
@@ -34,8 +34,9 @@ def _follow_the_orchestrator() -> None:
 
 def main() -> None:
     """Import the module and call its `main()`, which reads sys.argv."""
-    module = sys.argv[1]
-    sys.argv = [module, *sys.argv[2:]]
+    niceness, module = int(sys.argv[1]), sys.argv[2]
+    sys.argv = sys.argv[2:]
+    os.nice(niceness)
     threading.Thread(target=_follow_the_orchestrator, daemon=True).start()
     sys.exit(importlib.import_module(module).main())
 

@@ -1,7 +1,8 @@
 """Starts, watches and stops the processes of one flight.
 
-Each child has its own session, so that Ctrl-C in the terminal reaches the orchestrator alone and
-the children are stopped in order; its output goes to <logs>/<name>.log.
+Each child has its own process group, so that Ctrl-C in the terminal reaches the orchestrator alone
+and the children are stopped in order; its output goes to <logs>/<name>.log. It stays in the session,
+as schedulers share processor time between sessions first, whatever the processes' priorities.
 """
 
 import os
@@ -75,11 +76,20 @@ class Processes:
         self.hurry: Callable[[], bool] = lambda: False  # True: the next, harder signal at once
 
     def start(
-        self, name: str, module: str, arguments: Sequence[str] = (), may_end: bool = False
+        self,
+        name: str,
+        module: str,
+        arguments: Sequence[str] = (),
+        may_end: bool = False,
+        niceness: int = 0,
     ) -> Child:
-        """Run `module.main()` as the process `name`; `may_end` if it stops by itself when done."""
+        """Run `module.main()` as the process `name`.
+
+        may_end: it stops by itself when done; niceness: how far it steps back for the others.
+        """
         log = self._logs / f"{name}.log"
-        command = [sys.executable, "-m", "uam_sim_bridge.flight.child", module, *arguments]
+        runner = [sys.executable, "-m", "uam_sim_bridge.flight.child", str(niceness)]
+        command = [*runner, module, *arguments]
         with log.open("ab") as output:
             process = subprocess.Popen(
                 command,
@@ -87,7 +97,7 @@ class Processes:
                 stdout=output,
                 stderr=subprocess.STDOUT,
                 env=self._environment,
-                start_new_session=True,
+                process_group=0,
             )
         child = Child(name, process, log, may_end)
         self._children[name] = child

@@ -41,6 +41,7 @@ AUTOPILOT, AUTOPILOT_MODULE = "autopilot", "uam_sim_bridge.autopilot.server"
 START_TIMEOUT = 60.0  # [s] until every node must be connected to the others
 ANSWER_TIMEOUT = 10.0  # [s] for the answers to one lockstep tick
 OVERTIME = 60.0  # [s] simulated, beyond the scenario's landing, until a flight is ended
+RECORDER_NICENESS = 10  # nobody waits for it, and it has seconds of room
 POLL = 0.1  # [s]
 
 
@@ -148,7 +149,13 @@ def _start(
     arguments = ["--ros-args", "--disable-external-lib-logs"]
     arguments += ["--params-file", str(folder.parameters)]
     for name, module in MODULES.items():
-        children.start(name, module, arguments, may_end=name == wiring.PLANT)
+        children.start(
+            name,
+            module,
+            arguments,
+            may_end=name == wiring.PLANT,
+            niceness=RECORDER_NICENESS if name == wiring.RECORDER else 0,
+        )
     if settings.autopilot == "builtin":
         instance = ["--instance", str(ports.instance), "--wait", str(START_TIMEOUT)]
         children.start(AUTOPILOT, AUTOPILOT_MODULE, instance, may_end=True)
@@ -183,6 +190,11 @@ def _outcome(
     if settings.clock == "realtime":
         outcome.latency_s = numbers.get("latency_s", [])
         outcome.missed_ticks = numbers.get("missed_ticks")
+        late, asked = numbers.get("late_ticks", 0), numbers.get("answerable_ticks", 0)
+        if late:
+            outcome.notes.append(
+                f"{late} of {asked} setpoints came later than one control period after their sample"
+            )
     lost = _statistics(folder.path / "logs" / "recorder.json").get("lost", {})
     if lost:
         text = ", ".join(f"{count} of {topic}" for topic, count in lost.items())

@@ -8,10 +8,11 @@ lockstep  At every control tick the plant waits for the setpoint that the bridge
           Every wait is bounded in wall time; when one ends, the node says who did not answer.
 realtime  Ticks begin at absolute deadlines of the wall clock, `control period` apart. What has not
           arrived by the next deadline is missing, and what was commanded last holds. A control tick
-          counts as missed when its setpoint was published later than one control period after
-          the IMU sample it answers, or never. The latency of a tick is the time between these two
-          publications; the bridge publishes /uam/setpoint after it has sent the setpoint to the
-          autopilot, so the autopilot has it by then.
+          counts as missed when no new setpoint arrived during it, so that the autopilot went on
+          with an old one. The latency of a tick is the time from the publication of its IMU sample
+          to that of its setpoint; a tick whose latency exceeds the control period counts as late.
+          The bridge publishes /uam/setpoint when it has sent the setpoint to the autopilot, which
+          therefore has it by then.
 """
 
 from __future__ import annotations
@@ -107,6 +108,7 @@ class Statistics:
     wall_s: float = 0.0
     answerable_ticks: int = 0  # realtime: ticks with an IMU sample, which hence want a setpoint
     missed_ticks: int = 0
+    late_ticks: int = 0
     late_motor_commands: int = 0
     latency_s: list[float] = field(default_factory=list)
     ended_by: str = ""
@@ -192,12 +194,13 @@ class Simulator:
         self.answers.begin()
         samples, truth = plant.sense(), plant.truth()
         self.sensors.clock(now)
-        self.truth.publish(now, truth, self.hil.motors, self.answers.magnet)
         # Sensors with latency deliver nothing at first. The estimator cannot begin before all have,
         # and which of the early samples it would have seen by then is chance: they are not sent.
         self._complete = self._complete or None not in (samples.imu, samples.joints, samples.mocap)
         self._published = time.time_ns()
         self._stamp = self.sensors.publish(samples) if self._complete else None
+        # Nobody waits for the truth: it goes out while the estimator works.
+        self.truth.publish(now, truth, self.hil.motors, self.answers.magnet)
         return samples, truth
 
     def _send_hil(self, samples: Samples, truth: Truth) -> None:
@@ -245,25 +248,27 @@ class Simulator:
         self.answers.take()
 
     def _measure(self) -> None:
-        """Note the latencies of the setpoints that have arrived."""
+        """Note what became of this tick, and the latencies of the setpoints that have arrived."""
+        numbers = self.statistics
         if self._stamp is not None:
             self._unanswered[self._stamp] = self._published
-            self.statistics.answerable_ticks += 1
+            numbers.answerable_ticks += 1
+            numbers.missed_ticks += not self.answers.setpoints
         for answered, sent in self.answers.setpoints.items():
             begun = self._unanswered.pop(answered, None)
             if begun is None:
                 continue
             latency = (sent - begun) * 1e-9
-            self.statistics.latency_s.append(latency)
-            self.statistics.missed_ticks += latency > self.plant.period
+            numbers.latency_s.append(latency)
+            numbers.late_ticks += latency > self.plant.period
         self.answers.setpoints.clear()
 
     def report(self) -> Statistics:
-        """The statistics so far; ticks without an answer are missed ones, except the last."""
+        """The statistics so far; ticks that were never answered are late ones, except the last."""
         numbers = self.statistics
         numbers.ticks, numbers.simulated_s = self.plant.tick, self.plant.time
         self._unanswered.pop(self._stamp, None)
-        numbers.missed_ticks += len(self._unanswered)
+        numbers.late_ticks += len(self._unanswered)
         numbers.late_motor_commands = self.hil.missed
         self._unanswered.clear()
         return numbers
