@@ -1,8 +1,8 @@
 """Starts, watches and stops the processes of one flight.
 
 Each child has its own process group, so that Ctrl-C in the terminal reaches the orchestrator alone
-and the children are stopped in order; its output goes to <logs>/<name>.log. It stays in the session,
-as schedulers share processor time between sessions first, whatever the processes' priorities.
+and the children are stopped in order; its output goes to <logs>/<name>.log. It stays in the
+session: schedulers share time between sessions first, whatever the processes' priorities.
 """
 
 import os

@@ -22,96 +22,32 @@ import json
 import math
 import sys
 import time
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict
 from pathlib import Path
 
 import rclpy
-from rcl_interfaces.msg import ParameterDescriptor
 from rclpy.node import Node
 from rclpy.signals import SignalHandlerOptions
 
 from uam_control.coordinates import POSITION
 from uam_control.parameters import ParameterError
+from uam_msgs_py.connections import Connections, of
 from uam_msgs_py.executor import LeanExecutor
 from uam_msgs_py.node import StopSignal, refuse
 from uam_msgs_py.parameters import refuse_unknown
 from uam_sim_bridge.flight import wiring
 from uam_sim_bridge.mavlink.hil_server import HilParameters, HilServer
+from uam_sim_bridge.nodes.plant_options import Options, Statistics, declare
 from uam_sim_bridge.nodes.plant_topics import SUSPECTS, Answers, Sensors, TruthTopics, nanoseconds
 from uam_sim_bridge.plant import Plant, Samples, Truth, Vehicle
 
 NAME = "mujoco_sim"
-SETTLE = 0.5  # [s] after discovery is complete here, for it to complete everywhere
 REPORT_INTERVAL = 5.0  # [s] between two lines that say who is waited for
 SERVICE_TICKS = 25  # in real time the parameter services are looked after every so many ticks
 
 
 class PlantStopped(RuntimeError):
     """The flight cannot go on; the text is one line and says who did not answer."""
-
-
-@dataclass(frozen=True)
-class Options:
-    """The node's parameters."""
-
-    vehicle: str = "s500_arm"
-    vehicle_changes: str = "{}"
-    payload_mass: float = 0.2
-    seed: int = 1
-    arm_start: list[float] = field(default_factory=lambda: [0.0, math.pi / 2.0])
-    clock: str = "lockstep"
-    hil_port: int = 4560
-    autopilot_always_answers: bool = True
-    recorded: bool = False
-    start_timeout: float = 0.0
-    answer_timeout: float = 10.0
-    time_limit: float = 0.0
-    statistics: str = ""
-
-
-DESCRIPTIONS = {
-    "vehicle": "name of a file in config/vehicle",
-    "vehicle_changes": 'JSON, dotted entries of that file to replace, as {"air.gust": 1.0}',
-    "payload_mass": "mass of the payload [kg], 0 for none",
-    "seed": "of all noise",
-    "arm_start": "joint angles on the ground [rad]",
-    "clock": "lockstep or realtime",
-    "hil_port": "TCP port at which the autopilot connects",
-    "autopilot_always_answers": "the stand-in does; PX4 is silent while it boots",
-    "recorded": "wait for the recorder as well",
-    "start_timeout": "longest wait for the other nodes [s], 0 = for ever",
-    "answer_timeout": "longest wait for the answers to a tick [s of wall time]",
-    "time_limit": "simulation time at which the flight ends in any case [s], 0 = never",
-    "statistics": "JSON file to write at the end, empty = none",
-}
-
-
-def declare(node: Node) -> Options:
-    """Declare the parameters and return their values. Raises ParameterError for a bad one."""
-    values = {}
-    for name, default in asdict(Options()).items():
-        text = ParameterDescriptor(description=DESCRIPTIONS[name], read_only=True)
-        values[name] = node.declare_parameter(name, default, text).value
-    options = Options(**values)
-    if options.clock not in ("lockstep", "realtime"):
-        raise ParameterError(f"clock: '{options.clock}' is not lockstep or realtime")
-    return options
-
-
-@dataclass
-class Statistics:
-    """What the node reports at the end."""
-
-    clock: str
-    ticks: int = 0
-    simulated_s: float = 0.0
-    wall_s: float = 0.0
-    answerable_ticks: int = 0  # realtime: ticks with an IMU sample, which hence want a setpoint
-    missed_ticks: int = 0
-    late_ticks: int = 0
-    late_motor_commands: int = 0
-    latency_s: list[float] = field(default_factory=list)
-    ended_by: str = ""
 
 
 class Simulator:
@@ -123,6 +59,7 @@ class Simulator:
         self.plant = Plant(vehicle, options.payload_mass, options.seed, tuple(options.arm_start))
         self.sensors, self.truth = Sensors(node), TruthTopics(node)
         self.answers = Answers(node)
+        self.connections = Connections(node)
         self.executor = LeanExecutor(node)
         patience = options.answer_timeout
         waits = HilParameters(answer_timeout=patience)
@@ -141,21 +78,26 @@ class Simulator:
         begin, reported, last = time.monotonic(), -math.inf, []
         while not self._stop.raised:
             self.executor.spin_once(0.05)
-            waiting = wiring.missing(self.node, self.options.recorded)
-            if not self.hil.accept(0.0):
-                waiting.append(f"autopilot to connect to TCP port {self.options.hil_port}")
+            waiting = self._waiting_for()
             if not waiting:
                 break
             now = time.monotonic()
             if limit and now - begin > limit:
                 raise PlantStopped(f"not ready after {limit:g} s, waiting for {_listed(waiting)}")
             if waiting != last and now - reported > 1.0 or now - reported > REPORT_INTERVAL:
-                print(f"mujoco_sim: waiting for {_listed(waiting)}", flush=True)
+                print(f"{NAME}: waiting for {_listed(waiting)}", flush=True)
                 reported, last = now, waiting
-        settled = time.monotonic() + SETTLE
-        while not self._stop.raised and time.monotonic() < settled:
-            self.executor.spin_once(0.05)
-        print("mujoco_sim: everyone is there", flush=True)
+        print(f"{NAME}: everyone is there", flush=True)
+
+    def _waiting_for(self) -> list[str]:
+        recorded = self.options.recorded
+        waiting = wiring.missing(self.node, recorded)
+        if not waiting:  # the ends exist; have they found each other?
+            plant = of(self.sensors.outlets | self.truth.outlets, self.answers.inlets)
+            waiting = list(wiring.unconnected(self.connections, plant, recorded))
+        if not self.hil.accept(0.0):
+            waiting.append(f"autopilot to connect to TCP port {self.options.hil_port}")
+        return waiting
 
     def run(self) -> None:
         """Fly until the mission is done, the time limit, or SIGINT."""

@@ -6,6 +6,7 @@ import numpy as np
 from rclpy.event_handler import PublisherEventCallbacks, SubscriptionEventCallbacks
 from rclpy.node import Node
 from rclpy.publisher import Publisher
+from rclpy.subscription import Subscription
 from rosgraph_msgs.msg import Clock
 
 from uam_control.coordinates import ARM, COORDINATES
@@ -31,20 +32,25 @@ def nanoseconds(time: float) -> int:
     return round(time * 1e6) * 1000
 
 
-def publisher(node: Node, topic: topics.Topic) -> Publisher:
-    """A publisher without events, each of which would be waited for again and again."""
-    events = PublisherEventCallbacks(use_default_callbacks=False)
-    return node.create_publisher(topic.type, topic.name, topic.qos, event_callbacks=events)
+class Outlets:
+    """Publishers by topic, without events, each of which would be waited for again and again."""
+
+    def __init__(self, node: Node, chosen: tuple[topics.Topic, ...]):
+        events = PublisherEventCallbacks(use_default_callbacks=False)
+        self.outlets: dict[str, Publisher] = {
+            topic.name: node.create_publisher(
+                topic.type, topic.name, topic.qos, event_callbacks=events
+            )
+            for topic in chosen
+        }
 
 
-class Sensors:
+class Sensors(Outlets):
     """Publishes /clock and what the sensors deliver."""
 
     def __init__(self, node: Node):
-        self._clock, self._imu, self._joints, self._mocap = (
-            publisher(node, topic)
-            for topic in (topics.CLOCK, topics.IMU, topics.JOINTS, topics.MOCAP)
-        )
+        super().__init__(node, (topics.CLOCK, topics.IMU, topics.JOINTS, topics.MOCAP))
+        self._clock, self._imu, self._joints, self._mocap = self.outlets.values()
         self._clock_message = Clock()
         self._imu_writer, self._mocap_writer = ImuWriter(), PoseWriter()
         self._joint_writer = JointStateWriter(JOINTS)
@@ -75,19 +81,13 @@ class Sensors:
         return stamp
 
 
-class TruthTopics:
+class TruthTopics(Outlets):
     """Publishes what only a simulator knows; no controller subscribes to it."""
 
     def __init__(self, node: Node):
-        self._state, self._payload, self._rotors, self._magnet = (
-            publisher(node, topic)
-            for topic in (
-                topics.TRUTH_STATE,
-                topics.TRUTH_PAYLOAD,
-                topics.TRUTH_ROTORS,
-                topics.TRUTH_MAGNET,
-            )
-        )
+        truth = (topics.TRUTH_STATE, topics.TRUTH_PAYLOAD, topics.TRUTH_ROTORS, topics.TRUTH_MAGNET)
+        super().__init__(node, truth)
+        self._state, self._payload, self._rotors, self._magnet = self.outlets.values()
         self._state_writer = TrajectoryWriter(COORDINATES)
         self._payload_writer = PoseWriter()
         self._rotor_writer = JointStateWriter(ROTORS)
@@ -135,22 +135,18 @@ class Answers:
         self._arrived: set[str] = set()
         self._setpoint_stamp = -1
 
-        def subscribe(topic: topics.Topic, callback, raw: bool = False):
-            return node.create_subscription(
-                topic.type,
-                topic.name,
-                callback,
-                topic.qos,
-                raw=raw,
-                event_callbacks=SubscriptionEventCallbacks(use_default_callbacks=False),
+        events = SubscriptionEventCallbacks(use_default_callbacks=False)
+        self.inlets: dict[str, Subscription] = {
+            topic.name: node.create_subscription(
+                topic.type, topic.name, callback, topic.qos, raw=raw, event_callbacks=events
             )
-
-        self._subscriptions = [
-            subscribe(topics.SETPOINT, self._on_setpoint, raw=True),
-            subscribe(topics.ARM_EFFORT, self._on_effort),
-            subscribe(topics.MAGNET, self._on_magnet),
-            subscribe(topics.MISSION_STATUS, self._on_mission),
-        ]
+            for topic, callback, raw in (
+                (topics.SETPOINT, self._on_setpoint, True),
+                (topics.ARM_EFFORT, self._on_effort, False),
+                (topics.MAGNET, self._on_magnet, False),
+                (topics.MISSION_STATUS, self._on_mission, False),
+            )
+        }
 
     def begin(self) -> None:
         """Forget what has arrived, at the beginning of a tick."""
@@ -163,7 +159,7 @@ class Answers:
 
     def take(self) -> None:
         """Take every message that is there, without waiting."""
-        for subscription in self._subscriptions:
+        for subscription in self.inlets.values():
             take = subscription.handle.take_message
             while (taken := take(subscription.msg_type, subscription.raw)) is not None:
                 subscription.callback(*taken)

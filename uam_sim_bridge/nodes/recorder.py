@@ -19,12 +19,15 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import rclpy
+from diagnostic_msgs.msg import DiagnosticArray
 from rclpy.node import Node
 from rclpy.qos import QoSDurabilityPolicy, QoSHistoryPolicy, QoSProfile
 from rclpy.signals import SignalHandlerOptions
+from rclpy.subscription import Subscription
 
-from uam_msgs_py import topics
+from uam_msgs_py import connections, topics
 from uam_msgs_py.node import StopSignal
+from uam_msgs_py.status import OK, WARN, diagnostic
 from uam_sim_bridge.flight.mcap_writer import McapWriter
 from uam_sim_bridge.flight.message_definitions import schema
 
@@ -58,7 +61,7 @@ class Track:
     """One recorded topic."""
 
     topic: str
-    subscription: object
+    subscription: Subscription
     message_type: type
     stamped: bool
     channel: int
@@ -131,6 +134,11 @@ class Recording:
             track.lost += sequence - 1 - track.last_sequence
         track.last_sequence = sequence
 
+    @property
+    def inlets(self) -> dict[str, Subscription]:
+        """The subscriptions by topic."""
+        return {track.topic: track.subscription for track in self._tracks}
+
     def flush(self) -> None:
         """Bring what was written to the file."""
         self._writer.flush()
@@ -165,6 +173,15 @@ def _qos_text(qos: QoSProfile) -> str:
     )
 
 
+def _health(node: Node, recording: Recording) -> DiagnosticArray:
+    """The node's entry of /diagnostics: to whom it is connected, and what it has lost."""
+    lost = sum(recording.lost.values())
+    summary = f"{lost} messages lost" if lost else "recording"
+    values = {"messages lost": lost} | connections.of({}, recording.inlets)
+    now = node.get_clock().now().nanoseconds
+    return diagnostic(now, node.get_name(), WARN if lost else OK, summary, values)
+
+
 def main() -> int:
     """Record until SIGINT or SIGTERM, then complete the file."""
     # The context must outlive the signal: what has arrived by then is still to be written.
@@ -181,6 +198,9 @@ def main() -> int:
     except OSError as error:
         print(f"recorder: cannot write {file}: {error.strerror}", flush=True)
         return 1
+    health = node.create_publisher(
+        topics.DIAGNOSTICS.type, topics.DIAGNOSTICS.name, topics.DIAGNOSTICS.qos
+    )
     print(f"recorder: {len(topics.ALL)} topics to {file}", flush=True)
     polls_per_flush = max(1, round(flush_period / poll_period))
     polls = 0
@@ -190,6 +210,7 @@ def main() -> int:
         polls += 1
         if polls % polls_per_flush == 0:
             recording.flush()
+            health.publish(_health(node, recording))
     recording.poll()
     recording.close()
     for topic, count in recording.lost.items():

@@ -1,0 +1,117 @@
+"""The recorder over real ROS: what is published is in the file, at the right time."""
+
+import json
+import time
+
+import pytest
+from mcap.reader import make_reader
+from mcap_ros2.decoder import DecoderFactory
+from rosgraph_msgs.msg import Clock
+from std_msgs.msg import Bool
+
+from uam_msgs_py import topics
+from uam_msgs_py.connections import Connections
+from uam_msgs_py.convert import SetpointWriter, set_stamp
+from uam_sim_bridge.flight.mcap_reader import read_log
+
+MODULE = "uam_sim_bridge.nodes.recorder"
+TICK = 4_000_000
+
+
+@pytest.fixture
+def recorder(start, tmp_path, probe):
+    """A recorder that hears the probe: (process, file, statistics file)."""
+    file, statistics = tmp_path / "log.mcap", tmp_path / "recorder.json"
+    running = start(
+        MODULE, "--ros-args", "-p", f"file:={file}", "-p", f"statistics:={statistics}"
+    )
+    running.until_said("recorder: ")
+    return running, file, statistics
+
+
+def connected(probe, *publishers):
+    """Wait until both ends have found each other."""
+    said = Connections(probe.node)
+    probe.until(
+        lambda: all(
+            p.get_subscription_count() and said.writers("recorder", p.topic_name)
+            for p in publishers
+        ),
+        "the recorder listens",
+    )
+
+
+def decoded(file):
+    with file.open("rb") as stream:
+        reader = make_reader(stream, decoder_factories=[DecoderFactory()])
+        return [
+            (channel.topic, message.log_time, content)
+            for _, channel, message, content in reader.iter_decoded_messages()
+        ]
+
+
+def test_every_message_is_there_at_its_simulated_time(recorder, probe):
+    running, file, statistics = recorder
+    clock, setpoint, magnet = (
+        probe.publisher(topic) for topic in (topics.CLOCK, topics.SETPOINT, topics.MAGNET)
+    )
+    connected(probe, clock, setpoint, magnet)
+    writer, now = SetpointWriter(), Clock()
+    for k in range(1, 301):
+        set_stamp(now.clock, k * TICK)
+        clock.publish(now)
+        setpoint.publish(writer.fill(k * TICK - 1000, [0.0, 0.0, 0.001 * k], 0.5))
+        magnet.publish(Bool(data=k > 150))
+        time.sleep(0.001)
+    assert running.interrupt() == 0
+    found = decoded(file)
+    sent = [(time, content) for topic, time, content in found if topic == topics.SETPOINT.name]
+    assert [time for time, _ in sent] == [k * TICK - 1000 for k in range(1, 301)]
+    assert [content.twist.angular.z for _, content in sent] == [0.001 * k for k in range(1, 301)]
+    # A message without a stamp gets the time that /clock showed when it was published.
+    switched = [(time, content.data) for topic, time, content in found if topic == "/uam/magnet"]
+    assert switched == [(k * TICK, k > 150) for k in range(1, 301)]
+    report = json.loads(statistics.read_text())
+    assert report["lost"] == {} and report["messages"]["/uam/setpoint"] == 300
+
+
+def test_a_gap_in_the_sequence_is_counted_as_lost(recorder, probe):
+    running, file, statistics = recorder
+    setpoint = probe.publisher(topics.SETPOINT)
+    connected(probe, setpoint)
+    writer = SetpointWriter()
+    running.process.send_signal(19)  # SIGSTOP: it cannot even receive
+    for k in range(200):
+        setpoint.publish(writer.fill(k, [0.0, 0.0, 0.0], 0.5))
+    running.process.send_signal(18)
+    for k in range(200, 210):
+        setpoint.publish(writer.fill(k, [0.0, 0.0, 0.0], 0.5))
+        time.sleep(0.02)
+    assert running.interrupt() == 0
+    report = json.loads(statistics.read_text())
+    kept, lost = report["messages"]["/uam/setpoint"], report["lost"].get("/uam/setpoint", 0)
+    assert kept >= 10
+    first = read_log(file)["/uam/setpoint"].times[0]  # what came before the first is not counted
+    assert kept + lost == 210 - first
+
+
+def test_a_killed_recorder_leaves_what_was_flushed(recorder, probe):
+    running, file, _ = recorder
+    setpoint = probe.publisher(topics.SETPOINT)
+    connected(probe, setpoint)
+    writer = SetpointWriter()
+    for k in range(150):
+        setpoint.publish(writer.fill(k * TICK, [0.0, 0.0, 0.0], 0.5))
+        time.sleep(0.01)
+    running.process.kill()
+    running.process.wait()
+    times = read_log(file)["/uam/setpoint"].times
+    assert times == [k * TICK for k in range(len(times))]
+    assert len(times) >= 50, "at most half a second is lost"
+
+
+def test_a_file_that_cannot_be_written_is_named(start):
+    running = start(MODULE, "--ros-args", "-p", "file:=/proc/nowhere/log.mcap")
+    assert running.process.wait(60) == 1
+    assert "recorder: cannot write /proc/nowhere/log.mcap: No such file" in running.output
+    assert "Traceback" not in running.output

@@ -1,0 +1,75 @@
+"""What the plant node can be told, and what it reports at its end."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import asdict, dataclass, field
+
+from rcl_interfaces.msg import ParameterDescriptor
+from rclpy.node import Node
+
+from uam_control.parameters import ParameterError
+
+
+@dataclass(frozen=True)
+class Options:
+    """The node's parameters."""
+
+    vehicle: str = "s500_arm"
+    vehicle_changes: str = "{}"
+    payload_mass: float = 0.2
+    seed: int = 1
+    arm_start: list[float] = field(default_factory=lambda: [0.0, math.pi / 2.0])
+    clock: str = "lockstep"
+    hil_port: int = 4560
+    autopilot_always_answers: bool = True
+    recorded: bool = False
+    start_timeout: float = 0.0
+    answer_timeout: float = 10.0
+    time_limit: float = 0.0
+    statistics: str = ""
+
+
+DESCRIPTIONS = {
+    "vehicle": "name of a file in config/vehicle",
+    "vehicle_changes": 'JSON, dotted entries of that file to replace, as {"air.gust": 1.0}',
+    "payload_mass": "mass of the payload [kg], 0 for none",
+    "seed": "of all noise",
+    "arm_start": "joint angles on the ground [rad]",
+    "clock": "lockstep or realtime",
+    "hil_port": "TCP port at which the autopilot connects",
+    "autopilot_always_answers": "the stand-in does; PX4 is silent while it boots",
+    "recorded": "wait for the recorder as well",
+    "start_timeout": "longest wait for the other nodes [s], 0 = for ever",
+    "answer_timeout": "longest wait for the answers to a tick [s of wall time]",
+    "time_limit": "simulation time at which the flight ends in any case [s], 0 = never",
+    "statistics": "JSON file to write at the end, empty = none",
+}
+
+
+def declare(node: Node) -> Options:
+    """Declare the parameters and return their values. Raises ParameterError for a bad one."""
+    values = {}
+    for name, default in asdict(Options()).items():
+        text = ParameterDescriptor(description=DESCRIPTIONS[name], read_only=True)
+        values[name] = node.declare_parameter(name, default, text).value
+    options = Options(**values)
+    if options.clock not in ("lockstep", "realtime"):
+        raise ParameterError(f"clock: '{options.clock}' is not lockstep or realtime")
+    return options
+
+
+@dataclass
+class Statistics:
+    """What the node reports at the end."""
+
+    clock: str
+    ticks: int = 0
+    simulated_s: float = 0.0
+    wall_s: float = 0.0
+    answerable_ticks: int = 0  # realtime: ticks with an IMU sample, which hence want a setpoint
+    missed_ticks: int = 0
+    late_ticks: int = 0
+    late_motor_commands: int = 0
+    latency_s: list[float] = field(default_factory=list)
+    ended_by: str = ""
