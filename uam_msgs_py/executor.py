@@ -34,8 +34,8 @@ class LeanExecutor:
     Messages are delivered in the order of the node's subscriptions within one wake-up. A callback
     that raises ends `spin` with that exception.
 
-    A node with `defer` and `settle` is asked to settle after each wake-up, when all that had arrived
-    has been delivered: it then acts on the newest, and skips ticks when it has fallen behind.
+    A node with `defer` and `settle` is asked to settle after each wake-up, when all that had
+    arrived has been delivered: it then acts on the newest, and skips ticks when it is behind.
     """
 
     def __init__(self, node: Node):

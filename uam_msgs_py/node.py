@@ -177,6 +177,16 @@ class StopSignal:
     def _note(self, *_):
         self.raised = True
 
+    @staticmethod
+    def ignore() -> None:
+        """Let no signal harm what is left to do: ending the process.
+
+        At its own end the interpreter gives handlers of Python back to the system, which would
+        kill the process, and with it the exit status.
+        """
+        for number in (signal.SIGINT, signal.SIGTERM):
+            signal.signal(number, signal.SIG_IGN)
+
 
 def run(make: Callable[[], UamNode], name: str) -> int:
     """Build a node and serve it until SIGINT or SIGTERM; return the exit status.
@@ -208,6 +218,7 @@ def run(make: Callable[[], UamNode], name: str) -> int:
         if node is not None:
             node.destroy_node()
         rclpy.try_shutdown()
+        stop.ignore()
 
 
 def refuse(name: str, error: Exception) -> int:
