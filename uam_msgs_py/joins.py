@@ -64,6 +64,10 @@ class StampJoin:
             self.fired += 1
             self._fire(stamp, *values)
 
+    def incomplete_after(self, name: str) -> bool:
+        """Whether input `name` has delivered a stamp that still lacks others."""
+        return self.last_seen.get(name) in self._open
+
     @property
     def waiting_for(self) -> list[str]:
         """Inputs that have never arrived."""

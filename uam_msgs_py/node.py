@@ -42,6 +42,7 @@ class UamNode(Node):
         self._outlets: dict[str, Publisher] = {}
         self._inlets: dict[str, Subscription] = {}
         self.joins: list[StampJoin] = []
+        self.triggers: tuple[str, ...] = ()  # topics that wake the node, () for all of them
         self.stamp = 0  # [ns] of the newest tick
         self.ticks = self.refused = 0
         self.deferred = False
@@ -97,6 +98,10 @@ class UamNode(Node):
         self.deferred = True
         for join in self.joins:
             join.deferred = True
+
+    def stalled(self) -> bool:
+        """Whether a trigger has come before the other inputs of its tick."""
+        return any(join.incomplete_after(name) for join in self.joins for name in self.triggers)
 
     def settle(self) -> None:
         """Act on the newest complete inputs; called when all that has arrived is delivered."""

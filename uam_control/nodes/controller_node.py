@@ -33,7 +33,10 @@ class ControllerNode(UamNode):
     def __init__(
         self, name: str, controller: type[Controller], inputs: list[Topic], adaptation: Topic
     ):
-        """inputs: the topics whose messages `tick` takes, in that order."""
+        """inputs: the topics whose messages `tick` takes, in that order.
+
+        The reference comes a tick ahead, so of the others the last one completes the tick.
+        """
         super().__init__(name)
         kind, axes = NODES[name]
         self.parameter_set = NodeParameters(
@@ -48,6 +51,7 @@ class ControllerNode(UamNode):
         self._gains = JointStateWriter(ADAPTATION)
         self._join = StampJoin([topic.name for topic in inputs], self._joined)
         self.joins.append(self._join)
+        self.triggers = ([t for t in inputs if t is not topics.REFERENCE][-1].name,)
         for topic in inputs:
             self._feed(topic)
 

@@ -51,6 +51,7 @@ class MissionNode(UamNode):
         self._writer, self._magnet_message = ReferenceWriter(), Bool()
         self.listen(topics.AUTOPILOT_STATE, self._on_autopilot, required=False)
         self.listen(topics.STATE, self._on_state)
+        self.triggers = (topics.STATE.name,)
 
     def _set_parameters(self, parameters: MissionParameters) -> None:
         self._mission.parameters = parameters

@@ -36,6 +36,7 @@ class StateEstimatorNode(UamNode):
         self._mocap = self.listen(topics.MOCAP, self._on_mocap)
         self._joints = self.listen(topics.JOINTS, self._on_joints)
         self.listen(topics.IMU, self._on_imu)
+        self.triggers = (topics.IMU.name,)
         self._last_imu = -1
         self._begun = 0.0
         self._pending = False

@@ -111,6 +111,7 @@ class MavlinkBridgeNode(UamNode):
         self._feed(topics.STATE, read_state)
         self._feed(topics.POSITION_COMMAND, read_position_command)
         self._feed(topics.ATTITUDE_COMMAND, self._read_attitude_command)
+        self.triggers = (topics.ATTITUDE_COMMAND.name,)
         if options.clock == "realtime":
             steady = Clock(clock_type=ClockType.STEADY_TIME)
             self.create_timer(WATCH_PERIOD, self._watch, clock=steady)

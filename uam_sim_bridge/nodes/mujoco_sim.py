@@ -31,6 +31,7 @@ from rclpy.signals import SignalHandlerOptions
 
 from uam_control.coordinates import POSITION
 from uam_control.parameters import ParameterError
+from uam_msgs_py import topics
 from uam_msgs_py.connections import Connections, of
 from uam_msgs_py.executor import LeanExecutor
 from uam_msgs_py.node import StopSignal, refuse
@@ -60,13 +61,14 @@ class Simulator:
         self.sensors, self.truth = Sensors(node), TruthTopics(node)
         self.answers = Answers(node)
         self.connections = Connections(node)
-        self.executor = LeanExecutor(node)
+        self.executor = LeanExecutor(node, [topics.SETPOINT.name], lambda: self._setpoint_is_there)
         patience = options.answer_timeout
         waits = HilParameters(answer_timeout=patience)
         if options.autopilot_always_answers:
             waits = HilParameters(answer_timeout=patience, silent_timeout=patience)
         self.hil = HilServer(options.hil_port, parameters=waits, seed=options.seed)
         self.statistics = Statistics(options.clock)
+        self._setpoint_is_there = False  # as a rule it is the last answer to arrive
         self._complete = False  # every kind of sensor has delivered
         self._stamp: int | None = None  # of this tick's IMU sample [ns]
         self._published = 0  # wall time [ns] of its publication
@@ -167,6 +169,7 @@ class Simulator:
             return
         deadline = time.monotonic() + self.options.answer_timeout
         while missing := self.answers.missing(self._stamp):
+            self._setpoint_is_there = "setpoint" not in missing
             self.executor.spin_once(0.1)
             if self._stop.raised:
                 return
