@@ -31,15 +31,15 @@ REST_PERIOD = 0.05  # [s] between two looks at services, timers and events
 class LeanExecutor:
     """Spins one node, whose subscriptions, services and timers were made before.
 
-    Within one wake-up messages are delivered in the order of the node's subscriptions, triggers last.
-    A callback that raises ends `spin` with that exception.
+    Within one wake-up messages are delivered in the order of the node's subscriptions, triggers
+    last. A callback that raises ends `spin` with that exception.
 
     A node with `defer` and `settle` is asked to settle after each wake-up, when all that had
     arrived has been delivered: it then acts on the newest, and skips ticks when it is behind.
 
-    A wake-up costs more than the work of a tick. So a node may name the input that completes a tick,
-    as a rule (`triggers`): only that wakes it, and the others are taken along. When it came first for
-    once (`stalled()`), the next message of any input wakes the node.
+    A wake-up costs more than the work of a tick. So a node may name the input that completes a
+    tick, as a rule (`triggers`): only that wakes it, and the others are taken along. When it came
+    first for once (`stalled()`), the next message of any input wakes the node.
     """
 
     def __init__(
