@@ -94,9 +94,9 @@ class Flight:
         """The middleware's files that its nodes use now."""
         return set().union(*(shared_memory.used_by(pid) for pid in self.children().values()))
 
-    def wait(self) -> int:
-        """Its exit status."""
-        return self.process.wait(PATIENCE)
+    def wait(self, patience: float = PATIENCE) -> int:
+        """Its exit status, within `patience` [s]."""
+        return self.process.wait(patience)
 
     def end(self) -> None:
         """Kill it if it still runs."""
