@@ -9,6 +9,7 @@ from uam_control.estimation import EstimatorParameters, StateEstimator
 from uam_control.profile import load_profile
 from uam_msgs_py import topics
 from uam_msgs_py.convert import TrajectoryWriter, read_imu, read_joints, read_pose, seconds
+from uam_msgs_py.joins import still_due
 from uam_msgs_py.node import UamNode, run
 from uam_msgs_py.parameters import NodeParameters
 
@@ -38,8 +39,7 @@ class StateEstimatorNode(UamNode):
         self.listen(topics.IMU, self._on_imu)
         self.triggers = (topics.IMU.name,)
         self._last_imu = -1
-        self._begun = 0.0
-        self._pending = False
+        self._pending: list[tuple[int, np.ndarray, float]] = []
 
     def _on_mocap(self, message) -> None:
         stamp, position, quaternion = read_pose(message)
@@ -62,17 +62,16 @@ class StateEstimatorNode(UamNode):
         estimator.imu(seconds(stamp), gyro, specific_force)
         if estimator.waiting_for:
             return
-        state = estimator.update()  # for every sample, as its filters count them
-        self._writer.fill(stamp, state)
-        self._begun, self._pending = begun, True
+        # for every sample, as the filters count them
+        self._pending.append((stamp, estimator.update().copy(), begun))
         if not self.deferred:
             self.settle()
 
     def settle(self) -> None:
-        if self._pending:
-            self._pending = False
-            self._state.publish(self._writer.message)
-            self.done_tick(self._last_imu, self._begun)
+        pending, self._pending = self._pending, []
+        for stamp, state, begun in still_due(pending):
+            self._state.publish(self._writer.fill(stamp, state))
+            self.done_tick(stamp, begun)
 
     def _warm_up(self) -> None:
         """Compile the filters on an estimator that never flies."""

@@ -8,9 +8,9 @@ lockstep  At every control tick the plant waits for the setpoint that the bridge
           Every wait is bounded in wall time; when one ends, the node says who did not answer.
 realtime  Ticks begin at absolute deadlines of the wall clock, `control period` apart. What has not
           arrived by the next deadline is missing, and what was commanded last holds. A control tick
-          counts as missed when no new setpoint arrived during it, so that the autopilot went on
-          with an old one. The latency of a tick is the time from the publication of its IMU sample
-          to that of its setpoint; a tick whose latency exceeds the control period counts as late.
+          counts as missed when its setpoint was never sent, or later than DEADLINE_TICKS control
+          periods after its IMU sample. The latency of a tick is the time between these two
+          publications; beyond one control period it counts as late.
           The bridge publishes /uam/setpoint when it has sent the setpoint to the autopilot, which
           therefore has it by then.
 """
@@ -44,6 +44,7 @@ from uam_sim_bridge.plant import Plant, Samples, Truth, Vehicle
 
 NAME = "mujoco_sim"
 REPORT_INTERVAL = 5.0  # [s] between two lines that say who is waited for
+DEADLINE_TICKS = 3  # [control periods] 12 ms, about a rotor's time constant
 SERVICE_TICKS = 25  # in real time the parameter services are looked after every so many ticks
 
 
@@ -198,7 +199,6 @@ class Simulator:
         if self._stamp is not None:
             self._unanswered[self._stamp] = self._published
             numbers.answerable_ticks += 1
-            numbers.missed_ticks += not self.answers.setpoints
         for answered, sent in self.answers.setpoints.items():
             begun = self._unanswered.pop(answered, None)
             if begun is None:
@@ -206,14 +206,17 @@ class Simulator:
             latency = (sent - begun) * 1e-9
             numbers.latency_s.append(latency)
             numbers.late_ticks += latency > self.plant.period
+            numbers.missed_ticks += latency > DEADLINE_TICKS * self.plant.period
         self.answers.setpoints.clear()
 
     def report(self) -> Statistics:
-        """The statistics so far; ticks that were never answered are late ones, except the last."""
+        """The statistics so far; ticks never answered count, except those still on their way."""
         numbers = self.statistics
         numbers.ticks, numbers.simulated_s = self.plant.tick, self.plant.time
-        self._unanswered.pop(self._stamp, None)
-        numbers.late_ticks += len(self._unanswered)
+        underway = DEADLINE_TICKS * self.plant.period * 1e9
+        never = sum(self._published - sent > underway for sent in self._unanswered.values())
+        numbers.late_ticks += never
+        numbers.missed_ticks += never
         numbers.late_motor_commands = self.hil.missed
         self._unanswered.clear()
         return numbers
