@@ -43,6 +43,7 @@ ANSWER_TIMEOUT = 10.0  # [s] for the answers to one lockstep tick
 OVERTIME = 60.0  # [s] simulated, beyond the scenario's landing, until a flight is ended
 RECORDER_NICENESS = 10  # nobody waits for it, and it has seconds of room
 POLL = 0.1  # [s]
+NOTE_PERIOD = 1.0  # [s] between two looks at the shared memory that the nodes use
 
 
 def fly(settings: FlightSettings, folder: ResultFolder, progress: Progress) -> Outcome:
@@ -51,14 +52,15 @@ def fly(settings: FlightSettings, folder: ResultFolder, progress: Progress) -> O
     Raises PortError when no instance is free.
     """
     (folder.path / "logs").mkdir(exist_ok=True)
-    if is_cold():
-        progress.message("compiling the control path (once)")
-        warm_up()
-    shared_memory.remove_unused(shared_memory.abandoned())
-    with Reservation(settings.instance) as reservation, Interrupts() as stop:
-        ports = reservation.ports
-        folder.write_parameters(parameters(settings, folder, ports))
-        failure = _supervise(settings, folder, ports, progress, stop)
+    with Reservation(settings.instance) as reservation:
+        if is_cold():
+            progress.message("compiling the control path (once)")
+            warm_up()
+        shared_memory.remove_unused(shared_memory.abandoned())
+        with Interrupts() as stop:
+            ports = reservation.ports
+            folder.write_parameters(parameters(settings, folder, ports))
+            failure = _supervise(settings, folder, ports, progress, stop)
     return _outcome(settings, folder, failure, stop.raised)
 
 
@@ -165,7 +167,11 @@ def _watch(
     children: Processes, listener: StatusListener, progress: Progress, stop: Interrupts
 ) -> None:
     """Show the progress until the plant ends or the user stops it. Raises NodeFailed."""
+    noted = -NOTE_PERIOD
     while children.running(wiring.PLANT) and not stop.raised:
+        if time.monotonic() - noted >= NOTE_PERIOD:  # who is killed cannot be asked any more
+            children.note_shared_memory()
+            noted = time.monotonic()
         children.check()
         status = listener.poll()
         if status is not None:
