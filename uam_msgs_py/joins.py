@@ -7,13 +7,6 @@ same to the last bit.
 from collections.abc import Callable, Sequence
 from typing import Any
 
-BACKLOG = 3  # ticks that are worked off one by one; further behind, a node skips to the newest
-
-
-def still_due(pending: list) -> list:
-    """Return what is to be done of `pending` ticks: all of a short backlog, else the newest."""
-    return pending if len(pending) <= BACKLOG else pending[-1:]
-
 
 class StampJoin:
     """Calls `fire(stamp, *values)` once every input has delivered its value for a stamp.
@@ -21,9 +14,8 @@ class StampJoin:
     Ticks fire in the order of their stamps. When one fires, older incomplete ones can no longer
     matter; they are dropped and counted, as is whatever arrives for them later.
 
-    deferred: `settle` fires, once all that has arrived has been added. A node that has fallen
-    behind by more than BACKLOG ticks then skips to the newest instead of being late for all of
-    them.
+    deferred: `settle` fires, once all that has arrived has been added, and only the newest complete
+    stamp. A node that has fallen behind then skips ticks instead of being late for all of them.
     """
 
     def __init__(self, inputs: Sequence[str], fire: Callable[..., None], depth: int = 32):
@@ -33,7 +25,7 @@ class StampJoin:
         self._depth = depth
         self._open: dict[int, list[Any]] = {}
         self._last = -1
-        self._ready: list[tuple[int, list[Any]]] = []
+        self._ready: tuple[int, list[Any]] | None = None
         self.deferred = False
         self.fired = 0
         self.dropped = 0
@@ -62,14 +54,13 @@ class StampJoin:
             self.fired += 1
             self._fire(stamp, *values)
             return
-        self._ready.append((stamp, values))
+        self.dropped += self._ready is not None
+        self._ready = (stamp, values)
 
     def settle(self) -> None:
-        """Where `deferred`: fire the complete stamps that are still due."""
-        ready, self._ready = self._ready, []
-        due = still_due(ready)
-        self.dropped += len(ready) - len(due)
-        for stamp, values in due:
+        """Where `deferred`: fire the newest complete stamp, if there is one."""
+        if self._ready is not None:
+            (stamp, values), self._ready = self._ready, None
             self.fired += 1
             self._fire(stamp, *values)
 

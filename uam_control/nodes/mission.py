@@ -12,7 +12,6 @@ from uam_control.profile import load_profile
 from uam_msgs_py import topics
 from uam_msgs_py.control import ReferenceWriter, read_state
 from uam_msgs_py.convert import SECOND, seconds
-from uam_msgs_py.joins import still_due
 from uam_msgs_py.node import UamNode, run
 from uam_msgs_py.parameters import NodeParameters
 from uam_msgs_py.status import ERROR, OK, AutopilotState, MissionStatus
@@ -43,7 +42,7 @@ class MissionNode(UamNode):
         self._phase = ""
         self._errors = (0.0, 0.0, 0.0)
         self._due = 0  # stamp [ns] of the next status
-        self._pending: list[tuple[int, np.ndarray]] = []
+        self._pending: tuple[int, np.ndarray] | None = None
 
         self._reference = self.publisher(topics.REFERENCE)
         self._magnet = self.publisher(topics.MAGNET)
@@ -63,17 +62,15 @@ class MissionNode(UamNode):
         self._armed_since = seconds(state.armed_since) if armed else None
 
     def _on_state(self, message) -> None:
-        self._pending.append(read_state(message))
+        self._pending = read_state(message)
         if not self.deferred:
             self.settle()
 
     def settle(self) -> None:
-        pending, self._pending = self._pending, []
-        for stamp, state in still_due(pending):
-            self._tick(stamp, state)
-
-    def _tick(self, stamp: int, state: np.ndarray) -> None:
+        if self._pending is None:
+            return
         begun = time.perf_counter()
+        (stamp, state), self._pending = self._pending, None
         if stamp != self._ahead:  # the first tick, or one after a gap
             self._advance(stamp, state)
         output = self._mission.output  # as of this tick, from the step one tick ago

@@ -9,7 +9,6 @@ from uam_control.estimation import EstimatorParameters, StateEstimator
 from uam_control.profile import load_profile
 from uam_msgs_py import topics
 from uam_msgs_py.convert import TrajectoryWriter, read_imu, read_joints, read_pose, seconds
-from uam_msgs_py.joins import still_due
 from uam_msgs_py.node import UamNode, run
 from uam_msgs_py.parameters import NodeParameters
 
@@ -39,7 +38,7 @@ class StateEstimatorNode(UamNode):
         self.listen(topics.IMU, self._on_imu)
         self.triggers = (topics.IMU.name,)
         self._last_imu = -1
-        self._pending: list[tuple[int, np.ndarray, float]] = []
+        self._pending: tuple[int, np.ndarray, float] | None = None
 
     def _on_mocap(self, message) -> None:
         stamp, position, quaternion = read_pose(message)
@@ -63,15 +62,16 @@ class StateEstimatorNode(UamNode):
         if estimator.waiting_for:
             return
         # for every sample, as the filters count them
-        self._pending.append((stamp, estimator.update().copy(), begun))
+        self._pending = (stamp, estimator.update(), begun)
         if not self.deferred:
             self.settle()
 
     def settle(self) -> None:
-        pending, self._pending = self._pending, []
-        for stamp, state, begun in still_due(pending):
-            self._state.publish(self._writer.fill(stamp, state))
-            self.done_tick(stamp, begun)
+        if self._pending is None:
+            return
+        (stamp, state, begun), self._pending = self._pending, None
+        self._state.publish(self._writer.fill(stamp, state))
+        self.done_tick(stamp, begun)
 
     def _warm_up(self) -> None:
         """Compile the filters on an estimator that never flies."""
