@@ -1,11 +1,10 @@
-"""A spin loop whose cost per message is a few microseconds.
+"""A spin loop that does less for each message than rclpy's own.
 
 rclpy's SingleThreadedExecutor gathers every entity of the node, builds a wait set, a task and a
-coroutine for each callback: 50 to 170 µs a message, five times the price of the message itself.
-A control node's entities hardly ever change after its start, so `LeanExecutor` keeps a wait set of
-its subscriptions and calls the callbacks of ready ones directly. What is rare (services, timers,
-events of the middleware) is looked for twenty times a second, and handed to a
-SingleThreadedExecutor, which knows how to serve it.
+coroutine for each callback. A control node's entities hardly ever change after its start, so
+`LeanExecutor` keeps a wait set of its subscriptions and calls the callbacks of ready ones
+directly. What is rare (services, timers, events of the middleware) is looked for twenty times a
+second, and handed to a SingleThreadedExecutor, which knows how to serve it.
 
 `WaitSet` is not public in rclpy. Where it is missing, `spin` falls back to the
 SingleThreadedExecutor alone: slower, otherwise the same.

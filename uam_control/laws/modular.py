@@ -91,8 +91,8 @@ def law_step(record, e, e_dot, acceleration_d, norms, saturated, frozen, dt, ada
     acceleration = min(norms[1], p.acceleration_limit)
     if p.acceleration_cutoff > 0.0:
         keep = math.exp(-2.0 * math.pi * p.acceleration_cutoff * dt)
-        acceleration = keep * adaptation[7] + (1.0 - keep) * acceleration
-    adaptation[7] = acceleration
+        acceleration = keep * adaptation[ACCELERATION] + (1.0 - keep) * acceleration
+    adaptation[ACCELERATION] = acceleration
 
     r_squared = 0.0
     for i in range(n):
@@ -106,14 +106,14 @@ def law_step(record, e, e_dot, acceleration_d, norms, saturated, frozen, dt, ada
         + adaptation[2] * xi_norm * xi_norm
         + adaptation[3] * acceleration
     )
-    rho = bound + adaptation[4]
+    rho = bound + adaptation[ZETA]
     scale = rho / max(r_norm, p.varpi)
     for i in range(n):
         r_i = p.p12[i] * e[i] + p.p22[i] * e_dot[i]
         feedback = p.gain_e[i] * e[i] + p.gain_e_dot[i] * e_dot[i]
         tau[i] = p.inertia[i] * (acceleration_d[i] - feedback - scale * r_i)
-    adaptation[5] = rho
-    adaptation[6] = r_norm
+    adaptation[RHO] = rho
+    adaptation[R_NORM] = r_norm
 
     if frozen:
         return
@@ -141,4 +141,4 @@ def adapt(p, r_norm, xi_norm, acceleration, bound, saturated, dt, adaptation):
     if r_norm < p.varpi:
         rate = 1.0 + bound * r_norm
         keep = math.exp(-rate * dt)
-        adaptation[4] = keep * adaptation[4] + (1.0 - keep) * p.epsilon / rate
+        adaptation[ZETA] = keep * adaptation[ZETA] + (1.0 - keep) * p.epsilon / rate

@@ -9,6 +9,7 @@ from uam_control.coordinates import ARM, ATTITUDE, POSITION, SIZE
 from uam_control.mission import Mission, MissionParameters, load_scenario
 from uam_control.nodes.timing import Ticks, Timing
 from uam_control.profile import load_profile
+from uam_control.rotations import wrap_angle
 from uam_msgs_py import topics
 from uam_msgs_py.control import ReferenceWriter, read_state
 from uam_msgs_py.convert import SECOND, seconds
@@ -93,7 +94,7 @@ class MissionNode(UamNode):
     def _measure(self, state: np.ndarray, output) -> None:
         """Errors of this tick: norms of estimate − reference; zero what is not controlled."""
         error = state[0] - output.reference[0]
-        error[3:] = (error[3:] + np.pi) % (2.0 * np.pi) - np.pi
+        error[3:] = wrap_angle(error[3:])
         norms = [float(np.linalg.norm(error[part])) for part in (POSITION, ATTITUDE, ARM)]
         self._errors = tuple(norms) if output.flying else (0.0, 0.0, norms[2])
 

@@ -63,7 +63,7 @@ class DirectFlight:
         self.position = PositionController(sets["position_controller"])
         self.attitude = AttitudeController(sets["attitude_controller"])
         self.arm = ArmController(sets["arm_controller"])
-        self.bridge = Bridge(profile)
+        self.bridge = Bridge()
         self._truth = np.zeros((3, 8))
         length = scenario.landing.at + scenario.landing.duration + 12.0
         self.recording = Recording(int(length / self.plant.period))
@@ -145,7 +145,7 @@ class Bridge:
     `setpoint` (4,): body rates [rad/s, FLU] and normalised thrust of the last tick.
     """
 
-    def __init__(self, profile: Profile) -> None:
+    def __init__(self) -> None:
         self.map = RateThrustMap()
         self.sequence = OffboardSequence()
         self.autopilot = Autopilot(Parameters.load(configuration.path("autopilot/s500.yaml")))

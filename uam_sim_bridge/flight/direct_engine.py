@@ -7,13 +7,14 @@ import time
 import numpy as np
 
 from uam_control.coordinates import ARM, ATTITUDE, POSITION, SIZE
+from uam_control.rotations import wrap_angle
 from uam_sim_bridge.flight.direct import DirectFlight
 from uam_sim_bridge.flight.interrupts import Interrupts
 from uam_sim_bridge.flight.outcome import Outcome
 from uam_sim_bridge.flight.progress import Progress, Status
 from uam_sim_bridge.flight.result_folder import ResultFolder
 from uam_sim_bridge.flight.settings import FlightSettings
-from uam_sim_bridge.flight.timeseries import COLUMNS, wrap
+from uam_sim_bridge.flight.timeseries import COLUMNS
 from uam_sim_bridge.flight.warm_up import is_cold, warm_up
 from uam_sim_bridge.plant import Vehicle
 
@@ -58,7 +59,7 @@ def _report(flight: DirectFlight, begin: float, progress: Progress, stop: Interr
         return
     row, output = recording.values[recording.count - 1], flight.mission.output
     error = row[COLUMNS.block("estimate.")][:SIZE] - row[COLUMNS.block("reference.")][:SIZE]
-    error[ATTITUDE.start :] = wrap(error[ATTITUDE.start :])
+    error[ATTITUDE.start :] = wrap_angle(error[ATTITUDE.start :])
     norms = [float(np.linalg.norm(error[part])) for part in (POSITION, ATTITUDE, ARM)]
     wall = time.monotonic() - begin
     progress.update(

@@ -25,11 +25,12 @@ import pyarrow.parquet as pq
 
 from uam_control.coordinates import COORDINATES as NAMES
 from uam_control.coordinates import POSITION, SIZE
+from uam_control.laws.modular import ADAPTATION
+from uam_control.rotations import wrap_angle
 from uam_sim_bridge.flight.atomic import replacing
 
 UNITS = {name: "m" if name in NAMES[POSITION] else "rad" for name in NAMES}
 ANGLES = slice(3, 8)
-ADAPTED = ("K0", "K1", "K2", "K3", "zeta", "rho", "r_norm")
 SUBSYSTEMS = ("position", "attitude", "arm")
 # Phases between flights of the mission node; those in flight are named by the scenario.
 ON_GROUND = ("waiting", "landed", "aborted")
@@ -50,7 +51,7 @@ def _declare() -> dict[str, str]:
     columns |= {f"setpoint.rate_{axis}": "rad/s" for axis in "xyz"} | {"setpoint.thrust": "1"}
     # The units of the gains differ with subsystem and power of ||xi||; rho and zeta are those of
     # tau before the multiplication by Mbar, so a unit per column would mislead.
-    columns |= {f"adaptation.{s}.{gain}": "1" for s in SUBSYSTEMS for gain in ADAPTED}
+    columns |= {f"adaptation.{s}.{gain}": "1" for s in SUBSYSTEMS for gain in ADAPTATION}
     columns |= {f"rotor_{i}.command": "1" for i in range(1, 5)}
     columns |= {f"rotor_{i}.thrust": "N" for i in range(1, 5)}
     columns |= {f"payload.{axis}": "m" for axis in "xyz"}
@@ -123,7 +124,7 @@ class Recording:
         count_down(values[:, COLUMNS["time"]])
         truth, reference = (values[:, COLUMNS.block(group)] for group in ("truth.", "reference."))
         error = truth[:, :SIZE] - reference[:, :SIZE]
-        error[:, ANGLES] = wrap(error[:, ANGLES])
+        error[:, ANGLES] = wrap_angle(error[:, ANGLES])
         values[:, COLUMNS.block("error.")] = error
         names = tuple(self.phase_names)
         return Series(values, self.phases[: self.count], names, dict(info or {}))
@@ -137,11 +138,6 @@ def count_down(time: np.ndarray) -> None:
     start = int(np.argmax(time >= 0.0)) if np.any(time >= 0.0) else len(time)
     if 0 < start < len(time) - 1:
         time[:start] = time[start] - (time[start + 1] - time[start]) * np.arange(start, 0, -1)
-
-
-def wrap(angle: np.ndarray) -> np.ndarray:
-    """Angles [rad] brought into [-pi, pi)."""
-    return (angle + np.pi) % (2.0 * np.pi) - np.pi
 
 
 @dataclass

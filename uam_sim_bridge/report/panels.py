@@ -184,6 +184,11 @@ def legend(figure: Figure, flights: Sequence[Flight], marked) -> None:
         Line2D([], [], color=colour, linewidth=0.9, linestyle=(0, (4, 2.5)), label=name)
         for name, colour in named
     ]
+    corner_legend(figure, handles)
+
+
+def corner_legend(figure: Figure, handles: Sequence[Line2D]) -> None:
+    """One row of handles in the upper right corner."""
     corner = (0.99, 1.0 - 0.02 / figure.get_figheight())
     figure.legend(
         handles=handles,

@@ -13,7 +13,7 @@ from matplotlib.patches import Rectangle
 
 from uam_sim_bridge.flight.timeseries import Series
 from uam_sim_bridge.report import style
-from uam_sim_bridge.report.panels import Flight
+from uam_sim_bridge.report.panels import Flight, corner_legend
 from uam_sim_bridge.report.poses import Poses
 
 POSES = 5
@@ -182,12 +182,4 @@ def _legend(figure: Figure, flights: Sequence[Flight]) -> None:
             for n, flight in enumerate(flights)
         ),
     ]
-    corner = (0.99, 1.0 - 0.02 / figure.get_figheight())
-    figure.legend(
-        handles=handles,
-        loc="upper right",
-        bbox_to_anchor=corner,
-        ncols=len(handles),
-        handlelength=1.7,
-        columnspacing=1.4,
-    )
+    corner_legend(figure, handles)
