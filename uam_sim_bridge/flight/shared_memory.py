@@ -48,17 +48,22 @@ def abandoned(age: float = ABANDONED) -> set[Path]:
 
 
 def remove_unused(files: Iterable[Path]) -> list[Path]:
-    """Remove those of `files` that no process uses, each with its lock file; returns them."""
-    there = [path for path in files if path.exists()]
-    if not there:
+    """Remove those of `files` that no process uses, each with its locks; returns what was removed.
+
+    A port's mutex is mapped only for a moment and outlives the port, even after a clean end.
+    """
+    files = set(files)
+    if not files:
         return []
     pids = [int(entry.name) for entry in Path("/proc").glob("[0-9]*")]
     used = set().union(*(used_by(pid) for pid in pids))
     removed = []
-    for path in there:
-        if path in used:
+    for path in files:
+        port = path.with_name(path.name.removeprefix("sem.").removesuffix("_mutex"))
+        if path in used or port in used:
             continue
-        for file in (path, path.with_name(path.name + "_el")):
+        locks = (path.with_name(path.name + "_el"), path.with_name(f"sem.{path.name}_mutex"))
+        for file in (path, *locks):
             try:
                 file.unlink()
                 removed.append(file)
