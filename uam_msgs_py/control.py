@@ -7,18 +7,16 @@ alone, and the position and attitude commands are stamped but empty.
 from dataclasses import dataclass
 
 import numpy as np
-from trajectory_msgs.msg import JointTrajectory
 
 from uam_control.coordinates import ARM, ATTITUDE, COORDINATES, JOINTS, POSITION, SIZE
 from uam_msgs_py.convert import (
-    BadMessage,
+    IdleWriter,
     TrajectoryWriter,
     check_names,
-    idle_trajectory,
     read_trajectory,
-    set_stamp,
-    stamp_of,
+    trajectory,
 )
+from uam_msgs_py.layouts import BadMessage
 
 ALL = list(COORDINATES)
 ARM_NAMES = list(JOINTS)
@@ -27,11 +25,11 @@ ATTITUDE_NAMES = list(COORDINATES[ATTITUDE])
 ROWS = TrajectoryWriter.ROWS[:3]
 
 
-def read_state(message: JointTrajectory) -> tuple[int, np.ndarray]:
+def read_state(data: bytes) -> tuple[int, np.ndarray]:
     """Return (stamp [ns], chi, chi_dot, chi_ddot (3, 8)); raises BadMessage."""
-    state = np.empty((3, SIZE))
+    message, state = trajectory(data), np.empty((3, SIZE))
     read_trajectory(message, ALL, ROWS, state)
-    return stamp_of(message.header.stamp), state
+    return message.stamp, state
 
 
 @dataclass(frozen=True)
@@ -50,22 +48,22 @@ class ReferenceWriter:
 
     def fill(
         self, stamp: int, reference: np.ndarray, flying: bool, mission_time: int
-    ) -> JointTrajectory:
+    ) -> bytes:
         """Return the message; reference (3, 8), mission_time [ns] (not negative)."""
         if flying:
             return self._whole.fill(stamp, reference, mission_time)
         return self._arm.fill(stamp, reference[:, ARM], mission_time)
 
 
-def read_reference(message: JointTrajectory) -> tuple[int, Reference]:
+def read_reference(data: bytes) -> tuple[int, Reference]:
     """Return (stamp [ns], reference); raises BadMessage."""
-    values = np.zeros((3, SIZE))
-    flying = message.joint_names != ARM_NAMES
+    message, values = trajectory(data), np.zeros((3, SIZE))
+    flying = message.layout.names != ARM_NAMES
     if flying:
         read_trajectory(message, ALL, ROWS, values)
     else:
         read_trajectory(message, ARM_NAMES, ROWS, values[:, ARM])
-    return stamp_of(message.header.stamp), Reference(values, flying)
+    return message.stamp, Reference(values, flying)
 
 
 @dataclass(frozen=True)
@@ -82,11 +80,11 @@ class PositionCommandWriter:
 
     def __init__(self):
         self._writer = TrajectoryWriter(POSE_NAMES, TrajectoryWriter.ROWS)
-        self._idle = idle_trajectory()
+        self._idle = IdleWriter()
 
     def fill(
         self, stamp: int, reference: np.ndarray, attitude: np.ndarray, tau: np.ndarray
-    ) -> JointTrajectory:
+    ) -> bytes:
         """Return the message; reference (3, 8), attitude (3, 3), tau (3,) [N, world]."""
         for i, row in enumerate(ROWS):
             values = self._writer.values[row]
@@ -95,22 +93,21 @@ class PositionCommandWriter:
         self._writer.values["effort"][POSITION] = tau
         return self._writer.stamped(stamp)
 
-    def idle(self, stamp: int) -> JointTrajectory:
+    def idle(self, stamp: int) -> bytes:
         """Return the empty message of this stamp [ns]."""
-        set_stamp(self._idle.header.stamp, stamp)
-        return self._idle
+        return self._idle.stamped(stamp)
 
 
-def read_position_command(message: JointTrajectory) -> tuple[int, PositionCommand]:
+def read_position_command(data: bytes) -> tuple[int, PositionCommand]:
     """Return (stamp [ns], command); raises BadMessage."""
-    values = np.zeros((4, len(POSE_NAMES)))
-    flying = bool(message.joint_names)
+    message, values = trajectory(data), np.zeros((4, len(POSE_NAMES)))
+    flying = bool(message.layout.names)
     if flying:
         read_trajectory(message, POSE_NAMES, TrajectoryWriter.ROWS, values)
-    elif message.points:
+    elif message.layout.points:
         raise BadMessage("points without joint names")
     command = PositionCommand(values[3, POSITION], values[:3, ATTITUDE], flying)
-    return stamp_of(message.header.stamp), command
+    return message.stamp, command
 
 
 class TorqueWriter:
@@ -118,25 +115,24 @@ class TorqueWriter:
 
     def __init__(self, names: list[str]):
         self._writer = TrajectoryWriter(names, ["effort"])
-        self._idle = idle_trajectory()
+        self._idle = IdleWriter()
 
-    def fill(self, stamp: int, tau: np.ndarray) -> JointTrajectory:
+    def fill(self, stamp: int, tau: np.ndarray) -> bytes:
         """Return the message; tau (n,) [N m]."""
         self._writer.values["effort"][:] = tau
         return self._writer.stamped(stamp)
 
-    def idle(self, stamp: int) -> JointTrajectory:
+    def idle(self, stamp: int) -> bytes:
         """Return the empty message of this stamp [ns]."""
-        set_stamp(self._idle.header.stamp, stamp)
-        return self._idle
+        return self._idle.stamped(stamp)
 
 
-def read_torque(message: JointTrajectory, names: list[str]) -> tuple[int, np.ndarray | None]:
+def read_torque(data: bytes, names: list[str]) -> tuple[int, np.ndarray | None]:
     """Return (stamp [ns], torque (n,) [N m], or None while idle); raises BadMessage."""
-    stamp = stamp_of(message.header.stamp)
-    if not message.joint_names and not message.points:
-        return stamp, None
-    check_names(message.joint_names, names)
+    message = trajectory(data)
+    if not message.layout.names and not message.layout.points:
+        return message.stamp, None
+    check_names(message.layout.names, names)
     torque = np.empty((1, len(names)))
     read_trajectory(message, names, ["effort"], torque)
-    return stamp, torque[0]
+    return message.stamp, torque[0]

@@ -1,33 +1,51 @@
-"""numpy ↔ ROS messages, without copies that cost time at 250 Hz.
+"""numpy ↔ serialized ROS messages, with what costs time at 250 Hz left out.
 
-Writers own one message and NumPy views into its arrays: filling one is a few assignments, and the
-message is published again and again. Readers check names, lengths, frames and numbers, and raise
-BadMessage with one line. This is the only place where quaternions change between [w x y z] (maths)
-and x, y, z, w (ROS). Stamps are integer nanoseconds.
+Writers serialize one message when they are made; afterwards only numbers and stamp are put into its
+bytes, which are what is published. Readers take serialized messages (raw subscriptions), look up
+where the numbers lie, check names, lengths, frames and numbers, and raise BadMessage with one line.
+This is the only place where quaternions change between [w x y z] (maths) and x, y, z, w (ROS).
+Stamps are integer nanoseconds.
 """
 
 import math
-from array import array
 from collections.abc import Sequence
 
 import numpy as np
 from geometry_msgs.msg import PoseStamped, TwistStamped
+from rclpy.serialization import deserialize_message, serialize_message
+from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import Imu, JointState
-from std_msgs.msg import Float64MultiArray
+from std_msgs.msg import Bool, Float64MultiArray
 from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
+
+from uam_msgs_py.layouts import (
+    ENCAPSULATION,
+    SECOND,
+    STAMP,
+    BadMessage,
+    Layout,
+    Layouts,
+    is_little_endian,
+    stamp_of,
+)
 
 WORLD = "world"  # frame of poses and states, ENU
 BODY = "base_link"  # frame of rates, forces and torques, FLU
-SECOND = 1_000_000_000
 
 
-class BadMessage(ValueError):
-    """A message that must not be used; the text is one line: what was wrong, what is expected."""
+def type_name(message_type: type) -> str:
+    """`package/msg/Name` of a generated message class."""
+    return f"{message_type.__module__.split('.')[0]}/msg/{message_type.__name__}"
 
 
-def stamp_of(stamp) -> int:
-    """builtin_interfaces/Time → integer nanoseconds."""
-    return stamp.sec * SECOND + stamp.nanosec
+KINDS = (JointTrajectory, JointState, Imu, PoseStamped, TwistStamped, Float64MultiArray, Clock)
+LAYOUTS = {kind: Layouts(type_name(kind)) for kind in KINDS}
+SWITCH = {on: serialize_message(Bool(data=on)) for on in (False, True)}
+
+
+def stays_serialized(message_type: type) -> bool:
+    """Whether messages of this type are read and written here, serialized."""
+    return message_type in LAYOUTS
 
 
 def set_stamp(stamp, nanoseconds: int) -> None:
@@ -40,13 +58,79 @@ def seconds(nanoseconds: int) -> float:
     return nanoseconds / SECOND
 
 
-def view(message, field: str, size: int) -> np.ndarray:
-    """Give a message's float64[] field `size` zeros and return the NumPy view that fills it."""
-    setattr(message, field, array("d", bytes(8 * size)))
-    return np.frombuffer(getattr(message, field))  # the message may have copied what it was given
+class Template:
+    """A serialized message; `values` holds a view for each of its fields of numbers."""
+
+    def __init__(self, message):
+        """message: of a type in LAYOUTS, with its names and with arrays as long as they will be."""
+        data = serialize_message(message)
+        layout = LAYOUTS[type(message)].of(data)
+        # Numbers are aligned from the end of the encapsulation: let that be aligned in memory.
+        self._bytes = np.zeros(4 + len(data), dtype=np.uint8)[4:]
+        self._bytes[:] = np.frombuffer(data, dtype=np.uint8)
+        self.values = {
+            name: self._bytes[where].view("<f8") for name, where in layout.fields.items()
+        }
+        self._stamp = self._time(STAMP)
+        self._duration = None if layout.duration is None else self._time(layout.duration)
+
+    def _time(self, where: slice) -> np.ndarray:
+        return self._bytes[where].view("<i4")  # seconds; nanoseconds fit an int32 as well
+
+    def stamped(self, stamp: int, time_from_start: int = 0) -> bytes:
+        """Return the message with this stamp [ns]; time_from_start [ns], of trajectories only."""
+        self._stamp[:] = divmod(stamp, SECOND)
+        if self._duration is not None:
+            self._duration[:] = divmod(time_from_start, SECOND)
+        return self._bytes.tobytes()
+
+    def plain(self) -> bytes:
+        """Return the message, of a type that has no stamp."""
+        return self._bytes.tobytes()
 
 
-class TrajectoryWriter:
+class Serialized:
+    """A received message: its bytes and their layout."""
+
+    def __init__(self, kind: type, data: bytes):
+        """kind: a type in LAYOUTS. Raises BadMessage."""
+        if not is_little_endian(data):
+            data = _here(kind, data)
+        self.data = data
+        self.layout: Layout = LAYOUTS[kind].of(data)
+
+    @property
+    def stamp(self) -> int:
+        """Its stamp [ns]."""
+        return stamp_of(self.data)
+
+    def numbers(self, field: str) -> np.ndarray:
+        """A read-only view (n,) of a field of numbers, (0,) where it is empty."""
+        where = self.layout.fields.get(field)
+        if where is None:
+            return _NOTHING
+        return np.frombuffer(self.data, "<f8", (where.stop - where.start) // 8, where.start)
+
+    def vector(self, field: str) -> np.ndarray:
+        """A copy of a field of numbers; raises BadMessage unless all are finite."""
+        values = self.numbers(field).copy()
+        if not math.isfinite(values.sum()):
+            raise BadMessage(f"{field} is {values.tolist()}, finite numbers expected")
+        return values
+
+
+_NOTHING = np.zeros(0)
+
+
+def _here(kind: type, data: bytes) -> bytes:
+    """Serialize anew, in the byte order of this machine, what another one has sent."""
+    try:
+        return serialize_message(deserialize_message(data, kind))
+    except Exception as error:  # rclpy raises its own classes, without a common base
+        raise BadMessage(f"cannot be deserialized ({error})") from None
+
+
+class TrajectoryWriter(Template):
     """A JointTrajectory with one point: rows positions, velocities, accelerations, effort.
 
     `values` holds a view (n,) for each row in use; write to them and publish `stamped(stamp)`.
@@ -56,20 +140,12 @@ class TrajectoryWriter:
 
     def __init__(self, names: Sequence[str], rows: Sequence[str] = ROWS[:3]):
         """names: of the n joints; rows: those of ROWS that are used."""
-        point = JointTrajectoryPoint()
-        self.message = JointTrajectory(joint_names=list(names), points=[point])
-        self.message.header.frame_id = WORLD
-        self.values = {row: view(point, row, len(names)) for row in rows}
-        self._stamp = self.message.header.stamp
-        self._time = point.time_from_start
+        point = JointTrajectoryPoint(**{row: [0.0] * len(names) for row in rows})
+        message = JointTrajectory(joint_names=list(names), points=[point])
+        message.header.frame_id = WORLD
+        super().__init__(message)
 
-    def stamped(self, stamp: int, time_from_start: int = 0) -> JointTrajectory:
-        """Return the message with this stamp [ns]; time_from_start [ns]."""
-        set_stamp(self._stamp, stamp)
-        set_stamp(self._time, time_from_start)
-        return self.message
-
-    def fill(self, stamp: int, state: np.ndarray, time_from_start: int = 0) -> JointTrajectory:
+    def fill(self, stamp: int, state: np.ndarray, time_from_start: int = 0) -> bytes:
         """Return the message with state (3, n): positions, velocities, accelerations."""
         values = self.values
         values["positions"][:] = state[0]
@@ -78,27 +154,34 @@ class TrajectoryWriter:
         return self.stamped(stamp, time_from_start)
 
 
-def idle_trajectory() -> JointTrajectory:
-    """Return a JointTrajectory without names and points: nothing is commanded at its stamp."""
-    message = JointTrajectory()
-    message.header.frame_id = WORLD
-    return message
+class IdleWriter(Template):
+    """A JointTrajectory without names and points: nothing is commanded at its stamp."""
+
+    def __init__(self):
+        message = JointTrajectory()
+        message.header.frame_id = WORLD
+        super().__init__(message)
+
+
+def trajectory(data: bytes) -> Serialized:
+    """A received JointTrajectory; raises BadMessage."""
+    return Serialized(JointTrajectory, data)
 
 
 def read_trajectory(
-    message: JointTrajectory, names: Sequence[str], rows: Sequence[str], out: np.ndarray
+    message: Serialized, names: Sequence[str], rows: Sequence[str], out: np.ndarray
 ) -> None:
     """Copy the first point's `rows` into out (len(rows), len(names)).
 
     Raises BadMessage on other joint names, wrong lengths, no point, or a number that is not finite.
     """
-    if message.joint_names != names:
-        check_names(message.joint_names, names)
-    if len(message.points) != 1:
-        raise BadMessage(f"{len(message.points)} points, 1 expected")
-    point = message.points[0]
+    layout = message.layout
+    if layout.names != names:
+        check_names(layout.names, names)
+    if layout.points != 1:
+        raise BadMessage(f"{layout.points} points, 1 expected")
     for i, row in enumerate(rows):
-        _copy(row, getattr(point, row), names, out[i])
+        _copy(row, message.numbers(row), names, out[i])
 
 
 def check_names(given: Sequence[str], expected: Sequence[str]) -> None:
@@ -109,7 +192,7 @@ def check_names(given: Sequence[str], expected: Sequence[str]) -> None:
         )
 
 
-def _copy(what: str, values: array, names: Sequence[str], out: np.ndarray) -> None:
+def _copy(what: str, values: np.ndarray, names: Sequence[str], out: np.ndarray) -> None:
     if len(values) != len(out):
         raise BadMessage(f"{len(values)} {what}, {len(out)} expected ({', '.join(names)})")
     out[:] = values
@@ -120,158 +203,139 @@ def _copy(what: str, values: array, names: Sequence[str], out: np.ndarray) -> No
         raise BadMessage(f"{what} overflow")
 
 
-class JointStateWriter:
+class JointStateWriter(Template):
     """A JointState whose views position, velocity, effort (n,) are written and published."""
 
     def __init__(self, names: Sequence[str]):
         """names: of the n joints."""
-        self.message = JointState(name=list(names))
-        self.position = view(self.message, "position", len(names))
-        self.velocity = view(self.message, "velocity", len(names))
-        self.effort = view(self.message, "effort", len(names))
-
-    def stamped(self, stamp: int) -> JointState:
-        """Return the message with this stamp [ns]."""
-        set_stamp(self.message.header.stamp, stamp)
-        return self.message
+        zeros = [0.0] * len(names)
+        super().__init__(JointState(name=list(names), position=zeros, velocity=zeros, effort=zeros))
+        self.position, self.velocity, self.effort = self.values.values()
 
 
-def read_joints(message: JointState, names: Sequence[str]) -> tuple[int, np.ndarray, np.ndarray]:
+def read_joints(data: bytes, names: Sequence[str]) -> tuple[int, np.ndarray, np.ndarray]:
     """Return (stamp [ns], position (n,) [rad], velocity (n,) [rad/s]) in the order of `names`.
 
     The message may hold further joints, in any order, as /joint_states does on robots. Raises
     BadMessage where one of `names` or a number is missing or not finite.
     """
+    message = Serialized(JointState, data)
     position, velocity = np.empty(len(names)), np.empty(len(names))
-    order = list(message.name)
-    for what, source, out in (
-        ("positions", message.position, position),
-        ("velocities", message.velocity, velocity),
-    ):
+    order = message.layout.names
+    for what, field, out in (("positions", "position", position),
+                             ("velocities", "velocity", velocity)):
+        source = message.numbers(field)
         if len(source) != len(order):
             raise BadMessage(f"{len(source)} {what} for {len(order)} joints")
         if order != names:
             try:
-                source = array("d", (source[order.index(name)] for name in names))
+                source = source[[order.index(name) for name in names]]
             except ValueError:
                 check_names(order, names)
         _copy(what, source, names, out)
-    return stamp_of(message.header.stamp), position, velocity
+    return message.stamp, position, velocity
 
 
-class ImuWriter:
+class ImuWriter(Template):
     """An Imu without orientation (orientation_covariance[0] = -1)."""
 
     def __init__(self):
-        self.message = Imu()
-        self.message.header.frame_id = BODY
-        self.message.orientation_covariance[0] = -1.0
+        message = Imu()
+        message.header.frame_id = BODY
+        message.orientation_covariance[0] = -1.0
+        super().__init__(message)
+        self._gyro = self.values["angular_velocity"]
+        self._force = self.values["linear_acceleration"]
 
-    def fill(self, stamp: int, gyro: np.ndarray, specific_force: np.ndarray) -> Imu:
+    def fill(self, stamp: int, gyro: np.ndarray, specific_force: np.ndarray) -> bytes:
         """Return the message; gyro (3,) [rad/s], specific_force (3,) [m/s^2], FLU."""
-        set_vector(self.message.angular_velocity, gyro)
-        set_vector(self.message.linear_acceleration, specific_force)
-        set_stamp(self.message.header.stamp, stamp)
-        return self.message
+        self._gyro[:], self._force[:] = gyro, specific_force
+        return self.stamped(stamp)
 
 
-def read_imu(message: Imu) -> tuple[int, np.ndarray, np.ndarray]:
+def read_imu(data: bytes) -> tuple[int, np.ndarray, np.ndarray]:
     """Return (stamp [ns], gyro (3,) [rad/s], specific force (3,) [m/s^2]), FLU."""
-    return (
-        stamp_of(message.header.stamp),
-        vector("angular_velocity", message.angular_velocity),
-        vector("linear_acceleration", message.linear_acceleration),
-    )
+    message = Serialized(Imu, data)
+    return message.stamp, message.vector("angular_velocity"), message.vector("linear_acceleration")
 
 
-class PoseWriter:
+class PoseWriter(Template):
     """A PoseStamped in the world frame."""
 
     def __init__(self):
-        self.message = PoseStamped()
-        self.message.header.frame_id = WORLD
+        message = PoseStamped()
+        message.header.frame_id = WORLD
+        super().__init__(message)
+        self._position, self._orientation = self.values["position"], self.values["orientation"]
 
-    def fill(self, stamp: int, position: np.ndarray, quaternion: np.ndarray) -> PoseStamped:
+    def fill(self, stamp: int, position: np.ndarray, quaternion: np.ndarray) -> bytes:
         """Return the message; position (3,) [m], quaternion [w x y z] body → world."""
-        set_vector(self.message.pose.position, position)
-        set_quaternion(self.message.pose.orientation, quaternion)
-        set_stamp(self.message.header.stamp, stamp)
-        return self.message
+        self._position[:] = position
+        self._orientation[:3], self._orientation[3] = quaternion[1:], quaternion[0]
+        return self.stamped(stamp)
 
 
-def read_pose(message: PoseStamped, frame: str = WORLD) -> tuple[int, np.ndarray, np.ndarray]:
+def read_pose(data: bytes, frame: str = WORLD) -> tuple[int, np.ndarray, np.ndarray]:
     """Return (stamp [ns], position (3,) [m], quaternion [w x y z], normalised).
 
     Raises BadMessage for another frame, or numbers that are not finite or not a rotation.
     """
-    if message.header.frame_id != frame:
-        raise BadMessage(f"frame '{message.header.frame_id}', expected '{frame}'")
-    return (
-        stamp_of(message.header.stamp),
-        vector("position", message.pose.position),
-        quaternion_of(message.pose.orientation),
-    )
+    message = Serialized(PoseStamped, data)
+    if message.layout.frame != frame:
+        raise BadMessage(f"frame '{message.layout.frame}', expected '{frame}'")
+    quaternion = np.roll(message.numbers("orientation"), 1)
+    norm = math.sqrt(quaternion @ quaternion)
+    if not abs(norm - 1.0) < 0.01:
+        raise BadMessage(f"orientation has norm {norm:.3g}, 1 expected")
+    if not abs(norm - 1.0) < 1e-12:  # rounding errors may stay
+        quaternion = quaternion / norm
+    return message.stamp, message.vector("position"), quaternion
 
 
-class EffortWriter:
-    """A Float64MultiArray of the ros2_control effort controllers; write to `values` (n,)."""
+class EffortWriter(Template):
+    """A Float64MultiArray of the ros2_control effort controllers."""
 
     def __init__(self, count: int):
-        self.message = Float64MultiArray()
-        self.values = view(self.message, "data", count)
+        super().__init__(Float64MultiArray(data=[0.0] * count))
+        self._effort = self.values["data"]
+
+    def fill(self, effort: np.ndarray) -> bytes:
+        """Return the message; effort (n,) [N m]."""
+        self._effort[:] = effort
+        return self.plain()
 
 
-def read_effort(message: Float64MultiArray, names: Sequence[str]) -> np.ndarray:
+def read_effort(data: bytes, names: Sequence[str]) -> np.ndarray:
     """Return the efforts (n,) [N m]; raises BadMessage on a wrong number of joints or a NaN."""
     out = np.empty(len(names))
-    _copy("efforts", message.data, names, out)
+    _copy("efforts", Serialized(Float64MultiArray, data).numbers("data"), names, out)
     return out
 
 
-class SetpointWriter:
+class SetpointWriter(Template):
     """The TwistStamped that repeats what was sent to the autopilot."""
 
     def __init__(self):
-        self.message = TwistStamped()
-        self.message.header.frame_id = BODY
+        message = TwistStamped()
+        message.header.frame_id = BODY
+        super().__init__(message)
+        self._rates, self._linear = self.values["angular"], self.values["linear"]
 
-    def fill(self, stamp: int, rates: np.ndarray, thrust: float) -> TwistStamped:
+    def fill(self, stamp: int, rates: np.ndarray, thrust: float) -> bytes:
         """Return the message; rates (3,) [rad/s, FLU], thrust 0..1."""
-        set_vector(self.message.twist.angular, rates)
-        self.message.twist.linear.z = float(thrust)
-        set_stamp(self.message.header.stamp, stamp)
-        return self.message
+        self._rates[:] = rates
+        self._linear[2] = thrust
+        return self.stamped(stamp)
 
 
-def read_setpoint(message: TwistStamped) -> tuple[int, np.ndarray, float]:
+def read_setpoint(data: bytes) -> tuple[int, np.ndarray, float]:
     """Return (stamp [ns], body rates (3,) [rad/s, FLU], thrust 0..1)."""
-    rates = vector("angular", message.twist.angular)
-    return stamp_of(message.header.stamp), rates, message.twist.linear.z
+    message = Serialized(TwistStamped, data)
+    return message.stamp, message.vector("angular"), float(message.vector("linear")[2])
 
 
-def set_vector(message, values: np.ndarray) -> None:
-    """(3,) → Vector3 or Point, in place."""
-    message.x, message.y, message.z = float(values[0]), float(values[1]), float(values[2])
-
-
-def vector(name: str, message) -> np.ndarray:
-    """Vector3 or Point → (3,); raises BadMessage where a number is not finite."""
-    values = np.array((message.x, message.y, message.z))
-    if not math.isfinite(message.x + message.y + message.z):
-        raise BadMessage(f"{name} is {values.tolist()}, finite numbers expected")
-    return values
-
-
-def set_quaternion(message, quaternion: np.ndarray) -> None:
-    """[w x y z] → Quaternion, in place."""
-    w, x, y, z = quaternion
-    message.w, message.x, message.y, message.z = float(w), float(x), float(y), float(z)
-
-
-def quaternion_of(message) -> np.ndarray:
-    """Quaternion → [w x y z], normalised; raises BadMessage unless its norm is 1 within 1 %."""
-    values = np.array((message.w, message.x, message.y, message.z))
-    norm = math.sqrt(values @ values)
-    if not abs(norm - 1.0) < 0.01:
-        raise BadMessage(f"orientation has norm {norm:.3g}, 1 expected")
-    return values if abs(norm - 1.0) < 1e-12 else values / norm  # rounding errors may stay
+def read_switch(data: bytes) -> bool:
+    """Whether a Bool is true; raises BadMessage."""
+    if len(data) <= ENCAPSULATION:
+        raise BadMessage(f"{len(data)} bytes, too short for a Bool")
+    return data[ENCAPSULATION] != 0

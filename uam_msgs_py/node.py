@@ -16,9 +16,10 @@ from rclpy.signals import SignalHandlerOptions
 from rclpy.subscription import Subscription
 
 from uam_msgs_py import connections, topics
-from uam_msgs_py.convert import BadMessage
+from uam_msgs_py.convert import stays_serialized
 from uam_msgs_py.executor import spin
 from uam_msgs_py.joins import StampJoin
+from uam_msgs_py.layouts import BadMessage
 from uam_msgs_py.parameters import refuse_unknown
 from uam_msgs_py.status import ERROR, OK, STALE, WARN, diagnostic
 from uam_msgs_py.topics import Topic
@@ -64,6 +65,7 @@ class UamNode(Node):
     ) -> Subscription:
         """Call `handle(message)` for each message; a BadMessage it raises is refused and said.
 
+        The message comes serialized where uam_msgs_py.convert reads its type.
         required: the node reports that it waits while this input is silent.
         """
         counts, name = self._counts, topic.name
@@ -80,7 +82,9 @@ class UamNode(Node):
                 return
             counts[name] += 1
 
-        made = self._inlets[name] = self.create_subscription(topic.type, name, callback, topic.qos)
+        raw = stays_serialized(topic.type)
+        made = self.create_subscription(topic.type, name, callback, topic.qos, raw=raw)
+        self._inlets[name] = made
         return made
 
     def take_waiting(self, subscription: Subscription) -> None:
@@ -90,7 +94,8 @@ class UamNode(Node):
         the last of them calls this for the others, and so has what was published before, although
         a spin loop may deliver topics in another order.
         """
-        while (taken := subscription.handle.take_message(subscription.msg_type, False)) is not None:
+        kind, raw = subscription.msg_type, subscription.raw
+        while (taken := subscription.handle.take_message(kind, raw)) is not None:
             subscription.callback(taken[0])
 
     def defer(self) -> None:

@@ -4,7 +4,8 @@ from dataclasses import dataclass, fields
 
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 
-from uam_msgs_py.convert import BadMessage, set_stamp, stamp_of
+from uam_msgs_py.convert import set_stamp
+from uam_msgs_py.layouts import SECOND, BadMessage
 
 OK, WARN, ERROR, STALE = (
     DiagnosticStatus.OK,
@@ -58,7 +59,8 @@ class _Status:
                 raise BadMessage(
                     f"{cls.NAME}: '{item.name}' is {texts[item.name]!r}, {item.type} expected"
                 ) from None
-        return stamp_of(message.header.stamp), cls(**values)
+        stamp = message.header.stamp
+        return stamp.sec * SECOND + stamp.nanosec, cls(**values)
 
 
 def _truth(text: str) -> bool:

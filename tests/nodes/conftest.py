@@ -13,6 +13,7 @@ import rclpy
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 
+from uam_msgs_py.convert import stays_serialized
 from uam_sim_bridge.flight.ports import Reservation
 
 PATIENCE = 60.0  # [s] for a process to get somewhere; only a failing test waits that long
@@ -44,9 +45,9 @@ class Probe:
             self._executor.spin_once(timeout_sec=0.02)
 
     def collect(self, topic) -> list:
-        """Return a list that fills with the messages of `topic`."""
-        messages = []
-        self.node.create_subscription(topic.type, topic.name, messages.append, topic.qos)
+        """Return a list that fills with the messages of `topic`, serialized where nodes take so."""
+        messages, raw = [], stays_serialized(topic.type)
+        self.node.create_subscription(topic.type, topic.name, messages.append, topic.qos, raw=raw)
         return messages
 
     def publisher(self, topic):

@@ -1,6 +1,7 @@
 """Conversion between arrays and messages: round trips, order of quaternions, refusals."""
 
 import math
+import struct
 
 import numpy as np
 import pytest
@@ -8,8 +9,10 @@ from geometry_msgs.msg import PoseStamped
 from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
-from sensor_msgs.msg import JointState
-from std_msgs.msg import Float64MultiArray
+from rclpy.serialization import deserialize_message, serialize_message
+from sensor_msgs.msg import Imu, JointState
+from std_msgs.msg import Bool, Float64MultiArray
+from trajectory_msgs.msg import JointTrajectory
 
 from uam_control.coordinates import COORDINATES, JOINTS
 from uam_msgs_py.control import (
@@ -24,7 +27,8 @@ from uam_msgs_py.control import (
     read_torque,
 )
 from uam_msgs_py.convert import (
-    BadMessage,
+    LAYOUTS,
+    SWITCH,
     EffortWriter,
     ImuWriter,
     JointStateWriter,
@@ -36,9 +40,10 @@ from uam_msgs_py.convert import (
     read_joints,
     read_pose,
     read_setpoint,
+    read_switch,
     set_stamp,
-    stamp_of,
 )
+from uam_msgs_py.layouts import KNOWN_LAYOUTS, BadMessage, stamp_of
 
 FINITE = st.floats(-1e100, 1e100)
 STATES = arrays(float, (3, 8), elements=FINITE)
@@ -47,31 +52,33 @@ STAMPS = st.integers(0, 2**31 * 1_000_000_000 - 1)
 
 @given(STAMPS)
 def test_stamps_keep_every_nanosecond(stamp):
-    header = PoseStamped().header
-    set_stamp(header.stamp, stamp)
-    assert stamp_of(header.stamp) == stamp
+    message = PoseStamped()
+    set_stamp(message.header.stamp, stamp)
+    assert stamp_of(serialize_message(message)) == stamp
 
 
 @given(STATES, STAMPS)
 def test_state_round_trip(state, stamp):
-    message = TrajectoryWriter(COORDINATES).fill(stamp, state)
+    data = TrajectoryWriter(COORDINATES).fill(stamp, state)
+    message = deserialize_message(data, JointTrajectory)
     assert message.joint_names == list(COORDINATES)
-    at, read = read_state(message)
+    assert list(message.points[0].accelerations) == state[2].tolist()
+    at, read = read_state(data)
     assert at == stamp
     np.testing.assert_array_equal(read, state)
 
 
-def test_a_writer_is_filled_again_without_a_new_message():
+def test_a_writer_is_filled_again_and_again():
     writer = TrajectoryWriter(COORDINATES)
     first = writer.fill(1, np.ones((3, 8)))
     second = writer.fill(2, np.full((3, 8), 2.0))
-    assert first is second
-    assert list(second.points[0].velocities) == [2.0] * 8
+    assert read_state(first)[1].tolist() == np.ones((3, 8)).tolist(), "what was sent stays"
+    assert list(deserialize_message(second, JointTrajectory).points[0].velocities) == [2.0] * 8
 
 
 def test_quaternion_order_changes_at_the_edge():
     message = PoseWriter().fill(5, np.array([1.0, 2.0, 3.0]), np.array([0.5, 0.1, -0.7, 0.5]))
-    o = message.pose.orientation
+    o = deserialize_message(message, PoseStamped).pose.orientation
     assert (o.x, o.y, o.z, o.w) == (0.1, -0.7, 0.5, 0.5)
     stamp, position, quaternion = read_pose(message)
     assert stamp == 5
@@ -94,16 +101,16 @@ def test_what_is_no_rotation_is_refused(quaternion):
 
 
 def test_another_frame_is_refused():
-    message = PoseWriter().fill(0, np.zeros(3), np.array([1.0, 0.0, 0.0, 0.0]))
+    message = PoseStamped()
     message.header.frame_id = "camera"
     with pytest.raises(BadMessage, match="frame 'camera', expected 'world'"):
-        read_pose(message)
+        read_pose(serialize_message(message))
 
 
 def test_imu_round_trip_has_no_orientation():
     gyro, force = np.array([0.1, 0.2, 0.3]), np.array([0.0, 0.5, 9.81])
     message = ImuWriter().fill(9, gyro, force)
-    assert message.orientation_covariance[0] == -1.0
+    assert deserialize_message(message, Imu).orientation_covariance[0] == -1.0
     stamp, read_gyro, read_force = read_imu(message)
     assert stamp == 9
     np.testing.assert_array_equal(read_gyro, gyro)
@@ -119,7 +126,7 @@ def test_imu_with_infinity_is_refused():
 def test_joints_are_found_by_name_among_others():
     message = JointState(name=["rotor", "alpha_2", "alpha_1"], position=[9.0, 2.0, 1.0],
                          velocity=[8.0, 0.2, 0.1])
-    _, position, velocity = read_joints(message, list(JOINTS))
+    _, position, velocity = read_joints(serialize_message(message), list(JOINTS))
     np.testing.assert_array_equal(position, [1.0, 2.0])
     np.testing.assert_array_equal(velocity, [0.1, 0.2])
 
@@ -136,14 +143,14 @@ def test_joints_are_found_by_name_among_others():
 )
 def test_bad_joint_states_are_refused(message, complaint):
     with pytest.raises(BadMessage, match=complaint):
-        read_joints(message, list(JOINTS))
+        read_joints(serialize_message(message), list(JOINTS))
 
 
 def test_joint_state_writer():
     writer = JointStateWriter(JOINTS)
     writer.position[:], writer.velocity[:], writer.effort[:] = (1.0, 2.0), (0.1, 0.2), (3.0, 4.0)
     message = writer.stamped(7)
-    assert list(message.effort) == [3.0, 4.0]
+    assert list(deserialize_message(message, JointState).effort) == [3.0, 4.0]
     stamp, position, velocity = read_joints(message, list(JOINTS))
     assert stamp == 7 and list(position) == [1.0, 2.0] and list(velocity) == [0.1, 0.2]
 
@@ -159,18 +166,21 @@ def test_joint_state_writer():
     ],
 )
 def test_bad_states_are_refused(change, complaint):
-    message = TrajectoryWriter(COORDINATES).fill(0, np.zeros((3, 8)))
+    good = TrajectoryWriter(COORDINATES).fill(0, np.zeros((3, 8)))
+    read_state(good)
+    message = deserialize_message(good, JointTrajectory)
     change(message)
     with pytest.raises(BadMessage, match=complaint):
-        read_state(message)
+        read_state(serialize_message(message))
 
 
 @given(STATES, st.booleans())
 def test_reference_names_what_is_controlled(values, flying):
-    message = ReferenceWriter().fill(4, values, flying, 1_500_000_000)
+    data = ReferenceWriter().fill(4, values, flying, 1_500_000_000)
+    message = deserialize_message(data, JointTrajectory)
     assert message.joint_names == list(COORDINATES if flying else JOINTS)
     assert message.points[0].time_from_start.sec == 1
-    stamp, reference = read_reference(message)
+    stamp, reference = read_reference(data)
     assert stamp == 4 and reference.flying == flying
     np.testing.assert_array_equal(reference.values[:, 6:], values[:, 6:])
     np.testing.assert_array_equal(reference.values[:, :6], values[:, :6] if flying else 0.0)
@@ -180,10 +190,11 @@ def test_position_command_round_trip():
     reference = np.arange(24.0).reshape(3, 8)
     attitude, tau = -np.arange(9.0).reshape(3, 3), np.array([1.0, 2.0, 22.0])
     writer = PositionCommandWriter()
-    message = writer.fill(8, reference, attitude, tau)
-    assert list(message.points[0].positions[:3]) == [0.0, 1.0, 2.0]
-    assert list(message.points[0].effort) == [1.0, 2.0, 22.0, 0.0, 0.0, 0.0]
-    stamp, command = read_position_command(message)
+    data = writer.fill(8, reference, attitude, tau)
+    (point,) = deserialize_message(data, JointTrajectory).points
+    assert list(point.positions[:3]) == [0.0, 1.0, 2.0]
+    assert list(point.effort) == [1.0, 2.0, 22.0, 0.0, 0.0, 0.0]
+    stamp, command = read_position_command(data)
     assert stamp == 8 and command.flying
     np.testing.assert_array_equal(command.attitude, attitude)
     np.testing.assert_array_equal(command.tau, tau)
@@ -204,11 +215,64 @@ def test_torque_round_trip_and_refusal():
 
 
 def test_effort_and_setpoint():
-    writer = EffortWriter(2)
-    writer.values[:] = 0.5, -0.5
-    assert list(read_effort(writer.message, JOINTS)) == [0.5, -0.5]
+    data = EffortWriter(2).fill(np.array([0.5, -0.5]))
+    assert list(deserialize_message(data, Float64MultiArray).data) == [0.5, -0.5]
+    assert list(read_effort(data, JOINTS)) == [0.5, -0.5]
     with pytest.raises(BadMessage, match="3 efforts, 2 expected"):
-        read_effort(Float64MultiArray(data=[1.0, 2.0, 3.0]), JOINTS)
+        read_effort(serialize_message(Float64MultiArray(data=[1.0, 2.0, 3.0])), JOINTS)
     message = SetpointWriter().fill(6, np.array([0.1, 0.2, 0.3]), 0.6)
     stamp, rates, thrust = read_setpoint(message)
     assert stamp == 6 and list(rates) == [0.1, 0.2, 0.3] and thrust == 0.6
+
+
+def test_a_switch():
+    for on in (False, True):
+        assert deserialize_message(SWITCH[on], Bool).data is on
+        assert read_switch(SWITCH[on]) is on
+    with pytest.raises(BadMessage, match="4 bytes, too short"):
+        read_switch(SWITCH[True][:4])
+
+
+@given(st.integers(0, 400), st.data())
+def test_what_ends_early_or_is_garbled_is_refused_or_read_never_worse(length, data):
+    good = TrajectoryWriter(COORDINATES).fill(5, np.ones((3, 8)))
+    read_state(good)  # its layout is known from here on
+    end = LAYOUTS[JointTrajectory].of(good).duration.stop  # padding may follow
+    cut = good[: min(length, end - 1)]
+    with pytest.raises(BadMessage):
+        read_state(cut)
+    at = data.draw(st.integers(0, len(good) - 1))
+    garbled = good[:at] + bytes([data.draw(st.integers(0, 255))]) + good[at + 1 :]
+    try:
+        _, state = read_state(garbled)
+    except BadMessage:
+        return
+    assert np.isfinite(state).all()
+
+
+def test_rows_of_other_lengths_but_the_same_size_are_told_apart():
+    good = deserialize_message(TrajectoryWriter(COORDINATES).fill(0, np.ones((3, 8))),
+                               JointTrajectory)
+    read_state(serialize_message(good))
+    good.points[0].effort, good.points[0].accelerations = good.points[0].accelerations, []
+    with pytest.raises(BadMessage, match="0 accelerations, 8 expected"):
+        read_state(serialize_message(good))
+
+
+def test_the_other_byte_order_is_read():
+    little = serialize_message(PoseStamped())
+    values = [0.5, -1.5, 2.5, 0.0, 0.0, 0.0, 1.0]
+    big = b"\0\0\0\0" + struct.pack(">iI", 7, 9) + struct.pack(">I6s", 6, b"world\0")
+    big += bytes(-(len(big) - 4) % 8) + struct.pack(">7d", *values)
+    assert little[:4] == b"\0\1\0\0"
+    stamp, position, quaternion = read_pose(big)
+    assert stamp == stamp_of(big) == 7_000_000_009
+    assert position.tolist() == values[:3] and quaternion.tolist() == [1.0, 0.0, 0.0, 0.0]
+
+
+def test_ever_new_names_do_not_fill_the_memory():
+    for number in range(3 * KNOWN_LAYOUTS):
+        message = JointState(name=[f"joint_{number}"], position=[0.0], velocity=[0.0])
+        with pytest.raises(BadMessage, match=f"joint_{number};"):
+            read_joints(serialize_message(message), list(JOINTS))
+    assert sum(map(len, LAYOUTS[JointState]._known.values())) <= KNOWN_LAYOUTS

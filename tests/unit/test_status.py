@@ -2,7 +2,7 @@
 
 import pytest
 
-from uam_msgs_py.convert import BadMessage
+from uam_msgs_py.layouts import BadMessage
 from uam_msgs_py.status import ERROR, OK, STALE, WARN, AutopilotState, MissionStatus
 
 

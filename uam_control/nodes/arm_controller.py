@@ -31,8 +31,7 @@ class ArmControllerNode(ControllerNode):
     def tick(self, stamp, dt, state, reference, position):
         flying = reference.flying and position.flying
         tau = self.controller.update(state, reference.values, position.attitude, flying, dt)
-        self._effort_writer.values[:] = tau
-        self._effort.publish(self._effort_writer.message)
+        self._effort.publish(self._effort_writer.fill(tau))
         self._command.publish(self._writer.fill(stamp, tau))
 
     def evaluate(self, controller, dt, state, reference, attitude, flying):

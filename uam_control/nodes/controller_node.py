@@ -57,7 +57,7 @@ class ControllerNode(UamNode):
 
     def _feed(self, topic: Topic) -> None:
         add, name, read = self._join.add, topic.name, self.READERS[topic.name]
-        self.listen(topic, lambda message: add(name, *read(message)))
+        self.listen(topic, lambda data: add(name, *read(data)))
 
     def _joined(self, stamp: int, *values) -> None:
         begun = time.perf_counter()

@@ -12,7 +12,8 @@ from uam_control.profile import load_profile
 from uam_control.rotations import wrap_angle
 from uam_msgs_py import topics
 from uam_msgs_py.control import ReferenceWriter, read_state
-from uam_msgs_py.convert import SECOND, seconds
+from uam_msgs_py.convert import SWITCH, seconds
+from uam_msgs_py.layouts import SECOND
 from uam_msgs_py.node import UamNode, run
 from uam_msgs_py.parameters import NodeParameters
 from uam_msgs_py.status import ERROR, OK, AutopilotState, MissionStatus
@@ -49,7 +50,7 @@ class MissionNode(UamNode):
         self._magnet = self.publisher(topics.MAGNET)
         self._arming = self.publisher(topics.ARMING)
         self._status = self.publisher(topics.MISSION_STATUS)
-        self._writer, self._magnet_message = ReferenceWriter(), Bool()
+        self._writer = ReferenceWriter()
         self.listen(topics.AUTOPILOT_STATE, self._on_autopilot, required=False)
         self.listen(topics.STATE, self._on_state)
         self.triggers = (topics.STATE.name,)
@@ -62,8 +63,8 @@ class MissionNode(UamNode):
         armed = state.armed and state.armed_since is not None
         self._armed_since = seconds(state.armed_since) if armed else None
 
-    def _on_state(self, message) -> None:
-        self._pending = read_state(message)
+    def _on_state(self, data: bytes) -> None:
+        self._pending = read_state(data)
         if not self.deferred:
             self.settle()
 
@@ -77,8 +78,7 @@ class MissionNode(UamNode):
         output = self._mission.output  # as of this tick, from the step one tick ago
         self._measure(state, output)
         self._tell(stamp)  # before the magnet: who has the magnet of a tick has its status, too
-        self._magnet_message.data = bool(output.magnet)
-        self._magnet.publish(self._magnet_message)
+        self._magnet.publish(SWITCH[bool(output.magnet)])
         self._advance(stamp + self._period, state)
         self.done_tick(stamp, begun)
 

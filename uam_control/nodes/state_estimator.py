@@ -40,17 +40,17 @@ class StateEstimatorNode(UamNode):
         self._last_imu = -1
         self._pending: tuple[int, np.ndarray, float] | None = None
 
-    def _on_mocap(self, message) -> None:
-        stamp, position, quaternion = read_pose(message)
+    def _on_mocap(self, data: bytes) -> None:
+        stamp, position, quaternion = read_pose(data)
         self._estimator.mocap(seconds(stamp), position, quaternion)
 
-    def _on_joints(self, message) -> None:
-        stamp, position, velocity = read_joints(message, NAMES)
+    def _on_joints(self, data: bytes) -> None:
+        stamp, position, velocity = read_joints(data, NAMES)
         self._estimator.joints(seconds(stamp), position, velocity)
 
-    def _on_imu(self, message) -> None:
+    def _on_imu(self, data: bytes) -> None:
         begun = time.perf_counter()
-        stamp, gyro, specific_force = read_imu(message)
+        stamp, gyro, specific_force = read_imu(data)
         if stamp <= self._last_imu:
             self.say(f"IMU stamp {stamp} ns does not follow {self._last_imu} ns; ignored", "imu")
             return

@@ -31,8 +31,9 @@ from uam_msgs_py.control import (
     read_state,
     read_torque,
 )
-from uam_msgs_py.convert import BadMessage, SetpointWriter, read_pose, seconds, stamp_of
+from uam_msgs_py.convert import SetpointWriter, read_pose, seconds
 from uam_msgs_py.joins import StampJoin
+from uam_msgs_py.layouts import BadMessage, stamp_of
 from uam_msgs_py.node import UamNode, run
 from uam_msgs_py.parameters import NodeParameters
 from uam_msgs_py.status import OK, WARN, AutopilotState
@@ -129,26 +130,26 @@ class MavlinkBridgeNode(UamNode):
     def _feed(self, topic: topics.Topic, read) -> None:
         """Join a topic; a message that must not be used still counts for its stamp."""
 
-        def handle(message) -> None:
+        def handle(data: bytes) -> None:
             try:
-                stamp, value = read(message)
+                stamp, value = read(data)
             except BadMessage:
-                self._join.add(topic.name, stamp_of(message.header.stamp), BAD)
+                self._join.add(topic.name, stamp_of(data), BAD)
                 raise
             self._join.add(topic.name, stamp, value)
 
         self.listen(topic, handle)
 
     @staticmethod
-    def _read_attitude_command(message) -> tuple[int, tuple[np.ndarray | None]]:
-        stamp, torque = read_torque(message, ATTITUDE_NAMES)
+    def _read_attitude_command(data: bytes) -> tuple[int, tuple[np.ndarray | None]]:
+        stamp, torque = read_torque(data, ATTITUDE_NAMES)
         return stamp, (torque,)  # None means "idle" here, but "not there" to the join
 
     def _on_arming(self, message) -> None:
         self.sequence.want(bool(message.data))
 
-    def _on_mocap(self, message) -> None:
-        self._pose = read_pose(message)
+    def _on_mocap(self, data: bytes) -> None:
+        self._pose = read_pose(data)
 
     def _tick(self, stamp: int, state, position, torque) -> None:
         begun = time.perf_counter()

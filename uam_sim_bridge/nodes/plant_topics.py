@@ -15,12 +15,13 @@ from uam_msgs_py.convert import (
     ImuWriter,
     JointStateWriter,
     PoseWriter,
+    Template,
     TrajectoryWriter,
     read_effort,
-    set_stamp,
+    read_switch,
 )
+from uam_msgs_py.layouts import stamp_of
 from uam_msgs_py.status import MissionStatus
-from uam_sim_bridge.nodes.recorder import stamp_of
 from uam_sim_bridge.plant import Samples, Truth
 
 JOINTS = list(COORDINATES[ARM])
@@ -51,14 +52,13 @@ class Sensors(Outlets):
     def __init__(self, node: Node):
         super().__init__(node, (topics.CLOCK, topics.IMU, topics.JOINTS, topics.MOCAP))
         self._clock, self._imu, self._joints, self._mocap = self.outlets.values()
-        self._clock_message = Clock()
+        self._clock_writer = Template(Clock())
         self._imu_writer, self._mocap_writer = ImuWriter(), PoseWriter()
         self._joint_writer = JointStateWriter(JOINTS)
 
     def clock(self, stamp: int) -> None:
         """Publish simulation time [ns]."""
-        set_stamp(self._clock_message.clock, stamp)
-        self._clock.publish(self._clock_message)
+        self._clock.publish(self._clock_writer.stamped(stamp))
 
     def publish(self, samples: Samples) -> int | None:
         """Publish what arrived at this tick; returns the IMU's stamp [ns], if it was among it.
@@ -142,8 +142,8 @@ class Answers:
             )
             for topic, callback, raw in (
                 (topics.SETPOINT, self._on_setpoint, True),
-                (topics.ARM_EFFORT, self._on_effort, False),
-                (topics.MAGNET, self._on_magnet, False),
+                (topics.ARM_EFFORT, self._on_effort, True),
+                (topics.MAGNET, self._on_magnet, True),
                 (topics.MISSION_STATUS, self._on_mission, False),
             )
         }
@@ -169,12 +169,12 @@ class Answers:
         if info is not None:
             self.setpoints[self._setpoint_stamp] = info["source_timestamp"]
 
-    def _on_effort(self, message, info: dict | None = None) -> None:
-        self.effort = read_effort(message, JOINTS)
+    def _on_effort(self, data: bytes, info: dict | None = None) -> None:
+        self.effort = read_effort(data, JOINTS)
         self._arrived.add("effort")
 
-    def _on_magnet(self, message, info: dict | None = None) -> None:
-        self.magnet = message.data
+    def _on_magnet(self, data: bytes, info: dict | None = None) -> None:
+        self.magnet = read_switch(data)
         self._arrived.add("magnet")
 
     def _on_mission(self, message, info: dict | None = None) -> None:

@@ -11,7 +11,6 @@ publishes /clock) both are wall time.
 """
 
 import json
-import struct
 import sys
 import time
 from bisect import bisect_right
@@ -26,28 +25,15 @@ from rclpy.signals import SignalHandlerOptions
 from rclpy.subscription import Subscription
 
 from uam_msgs_py import connections, topics
+from uam_msgs_py.convert import type_name
+from uam_msgs_py.layouts import stamp_of
 from uam_msgs_py.node import StopSignal
 from uam_msgs_py.status import OK, WARN, diagnostic
 from uam_sim_bridge.flight.mcap_writer import McapWriter
 from uam_sim_bridge.flight.message_definitions import schema
 
 DEPTH = 2000  # messages per topic that may wait for one poll: 8 s at control rate
-# CDR: four bytes of encapsulation (the second is 1 for little-endian), then seconds and
-# nanoseconds, because std_msgs/Header and rosgraph_msgs/Clock both begin with the stamp.
-LITTLE_ENDIAN_STAMP, BIG_ENDIAN_STAMP = struct.Struct("<iI"), struct.Struct(">iI")
 CLOCK = "/clock"
-
-
-def stamp_of(data: bytes) -> int:
-    """The stamp [ns] at the beginning of a serialized message that has a header."""
-    layout = LITTLE_ENDIAN_STAMP if data[1] & 1 else BIG_ENDIAN_STAMP
-    seconds, nanoseconds = layout.unpack_from(data, 4)
-    return seconds * 1_000_000_000 + nanoseconds
-
-
-def type_name(message_type: type) -> str:
-    """`package/msg/Name` of a generated message class."""
-    return f"{message_type.__module__.split('.')[0]}/msg/{message_type.__name__}"
 
 
 def begins_with_stamp(message_type: type) -> bool:
