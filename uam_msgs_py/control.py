@@ -11,9 +11,8 @@ import numpy as np
 from uam_control.coordinates import ARM, ATTITUDE, COORDINATES, JOINTS, POSITION, SIZE
 from uam_msgs_py.convert import (
     IdleWriter,
+    TrajectoryReader,
     TrajectoryWriter,
-    check_names,
-    read_trajectory,
     trajectory,
 )
 from uam_msgs_py.layouts import BadMessage
@@ -23,13 +22,16 @@ ARM_NAMES = list(JOINTS)
 POSE_NAMES = list(COORDINATES[:6])
 ATTITUDE_NAMES = list(COORDINATES[ATTITUDE])
 ROWS = TrajectoryWriter.ROWS[:3]
+WHOLE, ARM_ALONE = TrajectoryReader(ALL), TrajectoryReader(ARM_NAMES)
+POSE = TrajectoryReader(POSE_NAMES, TrajectoryWriter.ROWS)
+TAU_Q = TrajectoryReader(ATTITUDE_NAMES, ["effort"])
+TAU_ALPHA = TrajectoryReader(ARM_NAMES, ["effort"])
 
 
 def read_state(data: bytes) -> tuple[int, np.ndarray]:
     """Return (stamp [ns], chi, chi_dot, chi_ddot (3, 8)); raises BadMessage."""
-    message, state = trajectory(data), np.empty((3, SIZE))
-    read_trajectory(message, ALL, ROWS, state)
-    return message.stamp, state
+    message = trajectory(data)
+    return message.stamp, WHOLE.read(message)
 
 
 @dataclass(frozen=True)
@@ -57,13 +59,12 @@ class ReferenceWriter:
 
 def read_reference(data: bytes) -> tuple[int, Reference]:
     """Return (stamp [ns], reference); raises BadMessage."""
-    message, values = trajectory(data), np.zeros((3, SIZE))
-    flying = message.layout.names != ARM_NAMES
-    if flying:
-        read_trajectory(message, ALL, ROWS, values)
-    else:
-        read_trajectory(message, ARM_NAMES, ROWS, values[:, ARM])
-    return message.stamp, Reference(values, flying)
+    message = trajectory(data)
+    if message.layout.names != ARM_NAMES:
+        return message.stamp, Reference(WHOLE.read(message), True)
+    values = np.zeros((3, SIZE))
+    values[:, ARM] = ARM_ALONE.read(message)
+    return message.stamp, Reference(values, False)
 
 
 @dataclass(frozen=True)
@@ -73,6 +74,9 @@ class PositionCommand:
     tau: np.ndarray
     attitude: np.ndarray
     flying: bool
+
+
+NO_COMMAND = PositionCommand(np.zeros(3), np.zeros((3, 3)), False)
 
 
 class PositionCommandWriter:
@@ -100,14 +104,13 @@ class PositionCommandWriter:
 
 def read_position_command(data: bytes) -> tuple[int, PositionCommand]:
     """Return (stamp [ns], command); raises BadMessage."""
-    message, values = trajectory(data), np.zeros((4, len(POSE_NAMES)))
-    flying = bool(message.layout.names)
-    if flying:
-        read_trajectory(message, POSE_NAMES, TrajectoryWriter.ROWS, values)
-    elif message.layout.points:
-        raise BadMessage("points without joint names")
-    command = PositionCommand(values[3, POSITION], values[:3, ATTITUDE], flying)
-    return message.stamp, command
+    message = trajectory(data)
+    if not message.layout.names:
+        if message.layout.points:
+            raise BadMessage("points without joint names")
+        return message.stamp, NO_COMMAND
+    values = POSE.read(message)
+    return message.stamp, PositionCommand(values[3, POSITION], values[:3, ATTITUDE], True)
 
 
 class TorqueWriter:
@@ -127,12 +130,12 @@ class TorqueWriter:
         return self._idle.stamped(stamp)
 
 
-def read_torque(data: bytes, names: list[str]) -> tuple[int, np.ndarray | None]:
-    """Return (stamp [ns], torque (n,) [N m], or None while idle); raises BadMessage."""
+def read_torque(data: bytes, reader: TrajectoryReader) -> tuple[int, np.ndarray | None]:
+    """Return (stamp [ns], torque (n,) [N m], or None while idle); raises BadMessage.
+
+    reader: TAU_Q or TAU_ALPHA, for the attitude's or the arm's torques.
+    """
     message = trajectory(data)
     if not message.layout.names and not message.layout.points:
         return message.stamp, None
-    check_names(message.layout.names, names)
-    torque = np.empty((1, len(names)))
-    read_trajectory(message, names, ["effort"], torque)
-    return message.stamp, torque[0]
+    return message.stamp, reader.read(message)[0]

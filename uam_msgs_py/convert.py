@@ -106,10 +106,10 @@ class Serialized:
 
     def numbers(self, field: str) -> np.ndarray:
         """A read-only view (n,) of a field of numbers, (0,) where it is empty."""
-        where = self.layout.fields.get(field)
-        if where is None:
+        length = self.layout.length(field)
+        if not length:
             return _NOTHING
-        return np.frombuffer(self.data, "<f8", (where.stop - where.start) // 8, where.start)
+        return np.frombuffer(self.data, "<f8", length, self.layout.fields[field].start)
 
     def vector(self, field: str) -> np.ndarray:
         """A copy of a field of numbers; raises BadMessage unless all are finite."""
@@ -168,20 +168,45 @@ def trajectory(data: bytes) -> Serialized:
     return Serialized(JointTrajectory, data)
 
 
-def read_trajectory(
-    message: Serialized, names: Sequence[str], rows: Sequence[str], out: np.ndarray
-) -> None:
-    """Copy the first point's `rows` into out (len(rows), len(names)).
+class TrajectoryReader:
+    """Reads `rows` of trajectories of the joints `names`.
 
-    Raises BadMessage on other joint names, wrong lengths, no point, or a number that is not finite.
+    Rows that lie next to each other in a message are as far apart as any two of them, so that one
+    strided view holds them all.
     """
-    layout = message.layout
-    if layout.names != names:
+
+    def __init__(self, names: Sequence[str], rows: Sequence[str] = TrajectoryWriter.ROWS[:3]):
+        """names: of the n joints; rows: adjacent ones of TrajectoryWriter.ROWS."""
+        self._names, self._rows = list(names), list(rows)
+
+    def read(self, message: Serialized) -> np.ndarray:
+        """Return a copy (rows, n) of the first point's rows.
+
+        Raises BadMessage on other joint names, wrong lengths, no point, or a number that is not
+        finite.
+        """
+        checked = message.layout.checked.get(self)
+        if checked is None:
+            checked = message.layout.checked[self] = self._check(message.layout)
+        shape, start, strides = checked
+        values = np.ndarray(shape, "<f8", message.data, start, strides).copy()
+        if not math.isfinite(values.sum()):
+            for row, numbers in zip(self._rows, values, strict=True):
+                _refuse_infinite(row, numbers, self._names)
+            raise BadMessage("overflow")
+        return values
+
+    def _check(self, layout: Layout) -> tuple[tuple[int, int], int, tuple[int, int]]:
+        """Shape, first byte and strides [bytes] of the rows; raises BadMessage."""
+        names, rows = self._names, self._rows
         check_names(layout.names, names)
-    if layout.points != 1:
-        raise BadMessage(f"{layout.points} points, 1 expected")
-    for i, row in enumerate(rows):
-        _copy(row, message.numbers(row), names, out[i])
+        if layout.points != 1:
+            raise BadMessage(f"{layout.points} points, 1 expected")
+        for row in rows:
+            _check_length(row, layout.length(row), names)
+        starts = [layout.fields[row].start for row in rows]
+        stride = starts[1] - starts[0] if len(starts) > 1 else 0
+        return (len(rows), len(names)), starts[0], (stride, 8)
 
 
 def check_names(given: Sequence[str], expected: Sequence[str]) -> None:
@@ -192,11 +217,13 @@ def check_names(given: Sequence[str], expected: Sequence[str]) -> None:
         )
 
 
-def _copy(what: str, values: np.ndarray, names: Sequence[str], out: np.ndarray) -> None:
-    if len(values) != len(out):
-        raise BadMessage(f"{len(values)} {what}, {len(out)} expected ({', '.join(names)})")
-    out[:] = values
-    if not math.isfinite(out.sum()):
+def _check_length(what: str, length: int, names: Sequence[str]) -> None:
+    if length != len(names):
+        raise BadMessage(f"{length} {what}, {len(names)} expected ({', '.join(names)})")
+
+
+def _refuse_infinite(what: str, values: np.ndarray, names: Sequence[str]) -> None:
+    if not math.isfinite(values.sum()):
         for name, value in zip(names, values, strict=True):
             if not math.isfinite(value):
                 raise BadMessage(f"{what} of {name} is {value}")
@@ -220,20 +247,19 @@ def read_joints(data: bytes, names: Sequence[str]) -> tuple[int, np.ndarray, np.
     BadMessage where one of `names` or a number is missing or not finite.
     """
     message = Serialized(JointState, data)
-    position, velocity = np.empty(len(names)), np.empty(len(names))
-    order = message.layout.names
-    for what, field, out in (("positions", "position", position),
-                             ("velocities", "velocity", velocity)):
-        source = message.numbers(field)
-        if len(source) != len(order):
-            raise BadMessage(f"{len(source)} {what} for {len(order)} joints")
+    order, found = message.layout.names, []
+    for what, field in (("positions", "position"), ("velocities", "velocity")):
+        values = message.numbers(field)
+        if len(values) != len(order):
+            raise BadMessage(f"{len(values)} {what} for {len(order)} joints")
         if order != names:
             try:
-                source = source[[order.index(name) for name in names]]
+                values = values[[order.index(name) for name in names]]
             except ValueError:
                 check_names(order, names)
-        _copy(what, source, names, out)
-    return message.stamp, position, velocity
+        _refuse_infinite(what, values, names)
+        found.append(values)
+    return message.stamp, *found
 
 
 class ImuWriter(Template):
@@ -307,9 +333,10 @@ class EffortWriter(Template):
 
 def read_effort(data: bytes, names: Sequence[str]) -> np.ndarray:
     """Return the efforts (n,) [N m]; raises BadMessage on a wrong number of joints or a NaN."""
-    out = np.empty(len(names))
-    _copy("efforts", Serialized(Float64MultiArray, data).numbers("data"), names, out)
-    return out
+    effort = Serialized(Float64MultiArray, data).numbers("data")
+    _check_length("efforts", len(effort), names)
+    _refuse_infinite("effort", effort, names)
+    return effort
 
 
 class SetpointWriter(Template):

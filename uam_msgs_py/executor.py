@@ -34,7 +34,7 @@ class LeanExecutor:
     last. A callback that raises ends `spin` with that exception.
 
     A node with `defer` and `settle` is asked to settle after each wake-up, when all that had
-    arrived has been delivered: it then acts on the newest, and skips ticks when it is behind.
+    arrived has been delivered: it then knows how far it is behind.
 
     A wake-up costs more than the work of a tick. So a node may name the input that completes a
     tick, as a rule (`triggers`): only that wakes it, and the others are taken along. When it came

@@ -14,6 +14,7 @@ from __future__ import annotations
 import struct
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from typing import Any
 
 SECOND = 1_000_000_000  # [ns]
 ENCAPSULATION = 4
@@ -49,8 +50,14 @@ class Layout:
     points: int = 0  # of a trajectory; the fields are those of the first
     fields: dict[str, slice] = field(default_factory=dict)  # float64, in bytes
     duration: slice | None = None  # time_from_start
+    checked: dict[object, Any] = field(default_factory=dict)  # what readers found out about it
     _fixed: struct.Struct = struct.Struct("")
     _expected: tuple[bytes, ...] = ()
+
+    def length(self, name: str) -> int:
+        """How many numbers a field has; 0 when it is empty."""
+        where = self.fields.get(name)
+        return (where.stop - where.start) // 8 if where else 0
 
     def fits(self, data: bytes) -> bool:
         """Whether `data` (as long as the message of this layout) is laid out alike."""

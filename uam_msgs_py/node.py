@@ -99,7 +99,7 @@ class UamNode(Node):
             subscription.callback(taken[0])
 
     def defer(self) -> None:
-        """From now on act in `settle`, on the newest of what has arrived."""
+        """From now on act in `settle`, when all that has arrived is delivered."""
         self.deferred = True
         for join in self.joins:
             join.deferred = True
@@ -109,7 +109,7 @@ class UamNode(Node):
         return any(join.incomplete_after(name) for join in self.joins for name in self.triggers)
 
     def settle(self) -> None:
-        """Act on the newest complete inputs; called when all that has arrived is delivered."""
+        """Act on complete inputs; called when all that has arrived is delivered."""
         for join in self.joins:
             join.settle()
 

@@ -18,6 +18,8 @@ from uam_control.coordinates import COORDINATES, JOINTS
 from uam_msgs_py.control import (
     ARM_NAMES,
     ATTITUDE_NAMES,
+    TAU_ALPHA,
+    TAU_Q,
     PositionCommandWriter,
     ReferenceWriter,
     TorqueWriter,
@@ -203,15 +205,15 @@ def test_position_command_round_trip():
 def test_idle_commands_are_empty_but_stamped():
     stamp, command = read_position_command(PositionCommandWriter().idle(12))
     assert stamp == 12 and not command.flying and not command.tau.any()
-    assert read_torque(TorqueWriter(ATTITUDE_NAMES).idle(12), ATTITUDE_NAMES) == (12, None)
+    assert read_torque(TorqueWriter(ATTITUDE_NAMES).idle(12), TAU_Q) == (12, None)
 
 
 def test_torque_round_trip_and_refusal():
     message = TorqueWriter(ARM_NAMES).fill(3, np.array([0.5, -0.25]))
-    stamp, torque = read_torque(message, ARM_NAMES)
+    stamp, torque = read_torque(message, TAU_ALPHA)
     assert stamp == 3 and list(torque) == [0.5, -0.25]
     with pytest.raises(BadMessage, match="expected roll, pitch, yaw"):
-        read_torque(message, ATTITUDE_NAMES)
+        read_torque(message, TAU_Q)
 
 
 def test_effort_and_setpoint():

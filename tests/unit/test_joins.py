@@ -4,7 +4,7 @@ import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
 
-from uam_msgs_py.joins import StampJoin
+from uam_msgs_py.joins import BACKLOG, StampJoin
 
 
 def joined(depth=32):
@@ -64,3 +64,19 @@ def test_it_says_what_never_came():
     join, _ = joined()
     join.add("b", 4, 1)
     assert join.waiting_for == ["a", "c"]
+
+
+@given(st.integers(0, 3 * BACKLOG))
+def test_who_is_far_behind_goes_on_with_the_newest(ticks):
+    join, fired = joined()
+    join.deferred = True
+    for stamp in range(ticks):
+        for name in "abc":
+            join.add(name, stamp, stamp)
+    assert fired == []
+    join.settle()
+    every = list(range(ticks))
+    assert [stamp for stamp, _ in fired] == (every if ticks <= BACKLOG else every[-1:])
+    assert join.fired + join.dropped == ticks
+    join.settle()
+    assert join.fired == len(fired)

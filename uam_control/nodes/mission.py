@@ -13,6 +13,7 @@ from uam_control.rotations import wrap_angle
 from uam_msgs_py import topics
 from uam_msgs_py.control import ReferenceWriter, read_state
 from uam_msgs_py.convert import SWITCH, seconds
+from uam_msgs_py.joins import Backlog
 from uam_msgs_py.layouts import SECOND
 from uam_msgs_py.node import UamNode, run
 from uam_msgs_py.parameters import NodeParameters
@@ -44,7 +45,7 @@ class MissionNode(UamNode):
         self._phase = ""
         self._errors = (0.0, 0.0, 0.0)
         self._due = 0  # stamp [ns] of the next status
-        self._pending: tuple[int, np.ndarray] | None = None
+        self._states = Backlog()
 
         self._reference = self.publisher(topics.REFERENCE)
         self._magnet = self.publisher(topics.MAGNET)
@@ -64,15 +65,16 @@ class MissionNode(UamNode):
         self._armed_since = seconds(state.armed_since) if armed else None
 
     def _on_state(self, data: bytes) -> None:
-        self._pending = read_state(data)
+        self._states.put(read_state(data))
         if not self.deferred:
             self.settle()
 
     def settle(self) -> None:
-        if self._pending is None:
-            return
+        for stamp, state in self._states.take():
+            self._tick(stamp, state)
+
+    def _tick(self, stamp: int, state: np.ndarray) -> None:
         begun = time.perf_counter()
-        (stamp, state), self._pending = self._pending, None
         if stamp != self._ahead:  # the first tick, or one after a gap
             self._advance(stamp, state)
         output = self._mission.output  # as of this tick, from the step one tick ago

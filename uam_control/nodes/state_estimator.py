@@ -9,6 +9,7 @@ from uam_control.estimation import EstimatorParameters, StateEstimator
 from uam_control.profile import load_profile
 from uam_msgs_py import topics
 from uam_msgs_py.convert import TrajectoryWriter, read_imu, read_joints, read_pose, seconds
+from uam_msgs_py.joins import Backlog
 from uam_msgs_py.node import UamNode, run
 from uam_msgs_py.parameters import NodeParameters
 
@@ -38,7 +39,7 @@ class StateEstimatorNode(UamNode):
         self.listen(topics.IMU, self._on_imu)
         self.triggers = (topics.IMU.name,)
         self._last_imu = -1
-        self._pending: tuple[int, np.ndarray, float] | None = None
+        self._updates = Backlog()
 
     def _on_mocap(self, data: bytes) -> None:
         stamp, position, quaternion = read_pose(data)
@@ -62,16 +63,14 @@ class StateEstimatorNode(UamNode):
         if estimator.waiting_for:
             return
         # for every sample, as the filters count them
-        self._pending = (stamp, estimator.update(), begun)
+        self._updates.put((stamp, self._writer.fill(stamp, estimator.update()), begun))
         if not self.deferred:
             self.settle()
 
     def settle(self) -> None:
-        if self._pending is None:
-            return
-        (stamp, state, begun), self._pending = self._pending, None
-        self._state.publish(self._writer.fill(stamp, state))
-        self.done_tick(stamp, begun)
+        for stamp, data, begun in self._updates.take():
+            self._state.publish(data)
+            self.done_tick(stamp, begun)
 
     def _warm_up(self) -> None:
         """Compile the filters on an estimator that never flies."""

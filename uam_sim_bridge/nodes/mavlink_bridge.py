@@ -26,7 +26,7 @@ from uam_control.coordinates import ATTITUDE
 from uam_control.parameters import ParameterSet, choice, number
 from uam_msgs_py import topics
 from uam_msgs_py.control import (
-    ATTITUDE_NAMES,
+    TAU_Q,
     read_position_command,
     read_state,
     read_torque,
@@ -142,7 +142,7 @@ class MavlinkBridgeNode(UamNode):
 
     @staticmethod
     def _read_attitude_command(data: bytes) -> tuple[int, tuple[np.ndarray | None]]:
-        stamp, torque = read_torque(data, ATTITUDE_NAMES)
+        stamp, torque = read_torque(data, TAU_Q)
         return stamp, (torque,)  # None means "idle" here, but "not there" to the join
 
     def _on_arming(self, message) -> None:
