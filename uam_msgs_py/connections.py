@@ -15,6 +15,7 @@ from rclpy.subscription import Subscription
 from uam_msgs_py import topics
 
 READERS, WRITERS = "readers of ", "writers of "
+RECORDER, RECORDED_UNTIL = "recorder", "recorded until [s]"
 
 
 def of(outlets: Mapping[str, Publisher], inlets: Mapping[str, Subscription]) -> dict[str, int]:
@@ -45,6 +46,10 @@ class Connections:
     def writers(self, node: str, topic: str) -> int:
         """How many publishers the subscription to `topic` in `node` has found."""
         return self._count(node, WRITERS + topic)
+
+    def recorded_until(self) -> float:
+        """Simulation time [s] up to which the recorder had everything when it spoke last."""
+        return float(self._said.get(RECORDER, {}).get(RECORDED_UNTIL, 0.0))
 
     def _count(self, node: str, key: str) -> int:
         return int(self._said.get(node, {}).get(key, 0))

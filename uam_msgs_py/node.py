@@ -83,7 +83,7 @@ class UamNode(Node):
             counts[name] += 1
 
         raw = stays_serialized(topic.type)
-        made = self.create_subscription(topic.type, name, callback, topic.qos, raw=raw)
+        made = self.create_subscription(topic.type, name, callback, topic.reading, raw=raw)
         self._inlets[name] = made
         return made
 

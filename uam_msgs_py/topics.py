@@ -53,6 +53,15 @@ class Topic:
     content: str
     one_publisher: bool = True
 
+    @property
+    def reading(self) -> QoSProfile:
+        """What the stack's own nodes ask for.
+
+        Best effort for what comes at every tick: the next message makes up for a lost one, and
+        thousands of acknowledgements a second are saved. Whoever wants them may ask for them.
+        """
+        return SENSOR_DATA if self.qos is RELIABLE and self is not DIAGNOSTICS else self.qos
+
 
 CLOCK = Topic("/clock", Clock, _qos(1, reliable=False), "simulation time")
 

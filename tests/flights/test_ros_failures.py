@@ -3,6 +3,7 @@
 import json
 import os
 import signal
+import time
 
 import pytest
 from whole_flight import assert_nothing_left, wait_until_gone
@@ -35,6 +36,19 @@ def test_a_killed_node_ends_the_flight_and_is_named(fly, short_scenario, victim)
     assert_nothing_left(flight, list(nodes.values()), shared)
     if victim != "recorder":
         assert f"{victim} was killed by SIGKILL" in kept(flight)["abort_reason"]
+
+
+def test_a_recorder_without_processor_time_loses_nothing(fly, short_scenario):
+    flight = fly("--scenario", str(short_scenario))
+    flight.until_phase("take-off")
+    recorder = flight.children()["recorder"]
+    os.kill(recorder, signal.SIGSTOP)
+    time.sleep(5.0)
+    os.kill(recorder, signal.SIGCONT)
+    assert flight.wait() == 0
+    assert json.loads((flight.out / "logs/recorder.json").read_text())["lost"] == {}
+    time_of = timeseries.read(flight.out / "timeseries.parquet").time
+    assert {round(1e6 * step) for step in time_of[1:] - time_of[:-1]} == {4000}
 
 
 @pytest.mark.slow

@@ -14,11 +14,13 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
+from uam_control import configuration
 from uam_sim_bridge.flight import shared_memory
 
 LAST_LINES = 12  # of a failed node's log that its error message shows
 INTERRUPT_WAIT, TERMINATE_WAIT = 10.0, 3.0  # seconds until the next, harder signal
 POLL = 0.02  # seconds
+PROFILES_FILE = "FASTRTPS_DEFAULT_PROFILES_FILE"
 
 
 class NodeFailed(RuntimeError):
@@ -194,8 +196,9 @@ def environment(domain: int, log_folder: Path) -> dict[str, str]:
 
 
 def ros_environment(domain: int, log_folder: Path) -> dict[str, str]:
-    """The variables by which ROS finds its domain and the place of its own log files."""
+    """The variables by which ROS finds its domain, its transports and the place of its logs."""
     return {
+        PROFILES_FILE: os.environ.get(PROFILES_FILE) or str(configuration.path("dds/fastdds.xml")),
         "ROS_DOMAIN_ID": str(domain),
         "ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST",
         "ROS_LOG_DIR": str(log_folder),

@@ -5,12 +5,14 @@ the autopilot it is a simulator that speaks MAVLink over TCP. Two clocks:
 
 lockstep  At every control tick the plant waits for the setpoint that the bridge sent for this
           tick's IMU sample, for joint efforts and magnet, and for the autopilot's motor commands.
+          It also waits for a recorder that has fallen far behind, so that nothing is lost.
           Every wait is bounded in wall time; when one ends, the node says who did not answer.
-realtime  Ticks begin at absolute deadlines of the wall clock, `control period` apart. What has not
-          arrived by the next deadline is missing, and what was commanded last holds. A control tick
-          counts as missed when its setpoint was never sent, or later than DEADLINE_TICKS control
-          periods after its IMU sample. The latency of a tick is the time between these two
-          publications; beyond one control period it counts as late.
+realtime  Ticks begin at absolute deadlines of the wall clock, `control period` apart; after a stall
+          of the machine they follow each other at most CATCH_UP times as fast. What has not arrived
+          by the next deadline is missing, and what was commanded last holds. A control tick counts
+          as missed when its setpoint was never sent, or later than DEADLINE_TICKS control periods
+          after its IMU sample. The latency of a tick is the time between these two publications;
+          beyond one control period it counts as late.
           The bridge publishes /uam/setpoint when it has sent the setpoint to the autopilot, which
           therefore has it by then.
 """
@@ -25,6 +27,7 @@ import time
 from dataclasses import asdict
 from pathlib import Path
 
+import numpy as np
 import rclpy
 from rclpy.node import Node
 from rclpy.signals import SignalHandlerOptions
@@ -45,6 +48,8 @@ from uam_sim_bridge.plant import Plant, Samples, Truth, Vehicle
 NAME = "mujoco_sim"
 REPORT_INTERVAL = 5.0  # [s] between two lines that say who is waited for
 DEADLINE_TICKS = 3  # [control periods] 12 ms, about a rotor's time constant
+CATCH_UP = 2.0  # [1] times real time, after a stall of the machine
+RECORDER_LAG = 2.0  # [s] half of what fits the queue that config/dds gives each process
 SERVICE_TICKS = 25  # in real time the parameter services are looked after every so many ticks
 
 
@@ -59,6 +64,7 @@ class Simulator:
         self.node, self.options, self._stop = node, options, stop
         vehicle = Vehicle.load(options.vehicle).changed(json.loads(options.vehicle_changes))
         self.plant = Plant(vehicle, options.payload_mass, options.seed, tuple(options.arm_start))
+        _warm_up(Plant(vehicle, options.payload_mass, options.seed, tuple(options.arm_start)))
         self.sensors, self.truth = Sensors(node), TruthTopics(node)
         self.answers = Answers(node)
         self.connections = Connections(node)
@@ -73,6 +79,7 @@ class Simulator:
         self._complete = False  # every kind of sensor has delivered
         self._stamp: int | None = None  # of this tick's IMU sample [ns]
         self._published = 0  # wall time [ns] of its publication
+        self._begun = 0.0  # wall time [s] at which this tick began
         self._unanswered: dict[int, int] = {}  # stamp [ns] → wall time of publication [ns]
 
     def wait_for_everyone(self) -> None:
@@ -106,7 +113,6 @@ class Simulator:
         """Fly until the mission is done, the time limit, or SIGINT."""
         realtime = self.options.clock == "realtime"
         limit = self.options.time_limit or math.inf
-        period = self.plant.period
         gc.collect()
         gc.freeze()  # what exists now stays; later collections need not look at it
         begin = time.monotonic()
@@ -114,7 +120,7 @@ class Simulator:
             samples, truth = self._begin_tick()
             if realtime:
                 self._send_hil(samples, truth)
-                self._wait_until(begin + (self.plant.tick + 1) * period)
+                self._wait_until(self._deadline(begin))
                 self._measure()
                 self._receive_hil(0.0)
             else:
@@ -132,9 +138,18 @@ class Simulator:
             self.statistics.ended_by = "interrupt"
         self.statistics.wall_s = time.monotonic() - begin
 
+    def _deadline(self, begin: float) -> float:
+        """Wall time [s] at which the next tick of a flight begun at `begin` begins.
+
+        After a stall ticks come faster, but not in a burst that nobody could follow.
+        """
+        on_time = begin + (self.plant.tick + 1) * self.plant.period
+        return max(on_time, self._begun + self.plant.period / CATCH_UP)
+
     def _begin_tick(self) -> tuple[Samples, Truth]:
         """Publish what is due at this tick."""
         plant = self.plant
+        self._begun = time.monotonic()
         now = nanoseconds(plant.time)
         self.answers.begin()
         samples, truth = plant.sense(), plant.truth()
@@ -166,9 +181,16 @@ class Simulator:
             )
 
     def _wait_for_answers(self) -> None:
+        deadline = time.monotonic() + self.options.answer_timeout
+        while self.options.recorded and self._recorder_is_behind():
+            self.executor.spin_once(0.1)
+            if self._stop.raised:
+                return
+            if time.monotonic() > deadline:
+                raise PlantStopped(f"nothing recorded since {self.connections.recorded_until():g} s"
+                                   "; the recorder is silent")
         if self._stamp is None:
             return
-        deadline = time.monotonic() + self.options.answer_timeout
         while missing := self.answers.missing(self._stamp):
             self._setpoint_is_there = "setpoint" not in missing
             self.executor.spin_once(0.1)
@@ -176,6 +198,10 @@ class Simulator:
                 return
             if time.monotonic() > deadline:
                 raise PlantStopped(self._no_answer(missing))
+
+    def _recorder_is_behind(self) -> bool:
+        """Whether messages could be lost if the flight went on."""
+        return self.plant.time - self.connections.recorded_until() > RECORDER_LAG
 
     def _no_answer(self, missing: frozenset[str]) -> str:
         suspect = SUSPECTS.get(missing)
@@ -225,6 +251,14 @@ class Simulator:
         """End the link to the autopilot."""
         self.hil.close()
         self.executor.shutdown()
+
+
+def _warm_up(spare: Plant) -> None:
+    """Compile what a tick calls, on a plant that is thrown away: a first call takes long."""
+    for _ in range(10):
+        spare.sense()
+        spare.truth()
+        spare.step(np.zeros(4), np.zeros(2), False)
 
 
 def _listed(waiting: list[str]) -> str:

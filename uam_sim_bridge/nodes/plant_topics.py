@@ -138,7 +138,7 @@ class Answers:
         events = SubscriptionEventCallbacks(use_default_callbacks=False)
         self.inlets: dict[str, Subscription] = {
             topic.name: node.create_subscription(
-                topic.type, topic.name, callback, topic.qos, raw=raw, event_callbacks=events
+                topic.type, topic.name, callback, topic.reading, raw=raw, event_callbacks=events
             )
             for topic, callback, raw in (
                 (topics.SETPOINT, self._on_setpoint, True),

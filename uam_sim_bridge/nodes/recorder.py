@@ -26,7 +26,7 @@ from rclpy.subscription import Subscription
 
 from uam_msgs_py import connections, topics
 from uam_msgs_py.convert import type_name
-from uam_msgs_py.layouts import stamp_of
+from uam_msgs_py.layouts import SECOND, stamp_of
 from uam_msgs_py.node import StopSignal
 from uam_msgs_py.status import OK, WARN, diagnostic
 from uam_sim_bridge.flight.mcap_writer import McapWriter
@@ -74,7 +74,7 @@ class Recording:
         qos = QoSProfile(
             history=QoSHistoryPolicy.KEEP_LAST,
             depth=DEPTH,
-            reliability=topic.qos.reliability,
+            reliability=topic.reading.reliability,
             durability=topic.qos.durability,
         )
         subscription = node.create_subscription(
@@ -130,6 +130,11 @@ class Recording:
         self._writer.flush()
 
     @property
+    def until(self) -> float:
+        """Simulation time [s] of the newest /clock that was taken, 0 before the first."""
+        return self._clock_sim[-1] / SECOND if self._clock_sim else 0.0
+
+    @property
     def lost(self) -> dict[str, int]:
         """Messages known to be lost, for topics that lost any."""
         return {track.topic: track.lost for track in self._tracks if track.lost}
@@ -163,7 +168,8 @@ def _health(node: Node, recording: Recording) -> DiagnosticArray:
     """The node's entry of /diagnostics: to whom it is connected, and what it has lost."""
     lost = sum(recording.lost.values())
     summary = f"{lost} messages lost" if lost else "recording"
-    values = {"messages lost": lost} | connections.of({}, recording.inlets)
+    values = {"messages lost": lost, connections.RECORDED_UNTIL: recording.until}
+    values |= connections.of({}, recording.inlets)
     now = node.get_clock().now().nanoseconds
     return diagnostic(now, node.get_name(), WARN if lost else OK, summary, values)
 
