@@ -141,6 +141,7 @@ def assert_nothing_left(flight: Flight, pids: list[int], files: set[Path]) -> No
     """No process, shared memory or temporary file is there; the lock may be another flight's."""
     assert [pid for pid in pids if not is_gone(pid)] == []
     # Ports are numbered over all domains: another flight may use them now.
-    assert shared_memory.remove_unused(files) == []
+    left = shared_memory.remove_unused(files)
+    assert left == [], left
     assert list(flight.out.rglob(".*")) == []
     lock_is_held(flight.instance)

@@ -1,6 +1,5 @@
 """Supervision of child processes, with small stand-in programs instead of nodes."""
 
-import mmap
 import os
 import signal
 import subprocess
@@ -152,10 +151,16 @@ def test_shared_memory_is_removed_once_nobody_uses_it(tmp_path, monkeypatch):
     monkeypatch.setattr(shared_memory, "FOLDER", tmp_path)
     file = segment(tmp_path, "fastrtps_0123456789abcdef")
     other = segment(tmp_path, "fastrtps_fedcba9876543210")
-    with file.open("r+b") as opened, mmap.mmap(opened.fileno(), 4096):
-        assert shared_memory.used_by(os.getpid()) == {file}
-        assert shared_memory.remove_unused({file}) == []
-    assert shared_memory.used_by(os.getpid()) == set()
+    hold = "import mmap, sys; f = open(sys.argv[1], 'r+b'); m = mmap.mmap(f.fileno(), 4096); input()"
+    user = subprocess.Popen(
+        [sys.executable, "-c", hold, str(file)], stdin=subprocess.PIPE, stdout=subprocess.PIPE
+    )
+    while not shared_memory.used_by(user.pid):
+        assert user.poll() is None
+        time.sleep(0.01)
+    assert shared_memory.used_by(user.pid) == {file}
+    assert shared_memory.remove_unused({file}) == []
+    user.communicate(b"\n")
     assert len(shared_memory.remove_unused({file})) == 2
     assert set(tmp_path.iterdir()) == {other, other.with_name(other.name + "_el")}
 

@@ -48,15 +48,16 @@ def abandoned(age: float = ABANDONED) -> set[Path]:
 
 
 def remove_unused(files: Iterable[Path]) -> list[Path]:
-    """Remove those of `files` that no process uses, each with its locks; returns what was removed.
+    """Remove those of `files` that no other process uses, each with its locks; returns them.
 
-    A port's mutex is mapped only for a moment and outlives the port, even after a clean end.
+    Our own use does not count: the middleware lets go of a killed process's memory only after a
+    while. A port's mutex is mapped only for a moment and outlives the port, even a clean end.
     """
     files = set(files)
     if not files:
         return []
     pids = [int(entry.name) for entry in Path("/proc").glob("[0-9]*")]
-    used = set().union(*(used_by(pid) for pid in pids))
+    used = set().union(*(used_by(pid) for pid in pids if pid != os.getpid()))
     removed = []
     for path in files:
         port = path.with_name(path.name.removeprefix("sem.").removesuffix("_mutex"))

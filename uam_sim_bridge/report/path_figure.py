@@ -106,7 +106,7 @@ def _poses(axis: Axes, poses: Poses, start: float, end: float) -> None:
     first, last = series.row_at(start), series.row_at(end)
     steps = np.abs(np.diff(series.block("reference.")[first : last + 1, MOVING], axis=0))
     # The arm's turning counts as well; a little per tick keeps a hover from having no length.
-    way = np.cumsum(steps @ [1.0, 1.0, 0.2, 0.2] + 1e-9)
+    way = np.append(0.0, np.cumsum(steps @ [1.0, 1.0, 0.2, 0.2] + 1e-9))
     for number, part in enumerate(np.linspace(0.0, way[-1], POSES)):
         poses.put(first + int(np.searchsorted(way, part)))
         opacity = 0.25 + 0.75 * number / (POSES - 1)
