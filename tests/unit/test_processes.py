@@ -151,9 +151,9 @@ def test_shared_memory_is_removed_once_nobody_uses_it(tmp_path, monkeypatch):
     monkeypatch.setattr(shared_memory, "FOLDER", tmp_path)
     file = segment(tmp_path, "fastrtps_0123456789abcdef")
     other = segment(tmp_path, "fastrtps_fedcba9876543210")
-    hold = "import mmap, sys; f = open(sys.argv[1], 'r+b'); m = mmap.mmap(f.fileno(), 4096); input()"
+    hold = "import mmap; f = open('{}', 'r+b'); m = mmap.mmap(f.fileno(), 4096); input()"
     user = subprocess.Popen(
-        [sys.executable, "-c", hold, str(file)], stdin=subprocess.PIPE, stdout=subprocess.PIPE
+        [sys.executable, "-c", hold.format(file)], stdin=subprocess.PIPE
     )
     while not shared_memory.used_by(user.pid):
         assert user.poll() is None
