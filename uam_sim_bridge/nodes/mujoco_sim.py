@@ -80,6 +80,7 @@ class Simulator:
         self._stamp: int | None = None  # of this tick's IMU sample [ns]
         self._published = 0  # wall time [ns] of its publication
         self._begun = 0.0  # wall time [s] at which this tick began
+        self._begun_at = 0.0  # and simulation time [s]
         self._unanswered: dict[int, int] = {}  # stamp [ns] → wall time of publication [ns]
 
     def wait_for_everyone(self) -> None:
@@ -137,6 +138,7 @@ class Simulator:
         else:
             self.statistics.ended_by = "interrupt"
         self.statistics.wall_s = time.monotonic() - begin
+        self._wait_for_the_recorder(0.0)  # what we have published goes when we go
 
     def _deadline(self, begin: float) -> float:
         """Wall time [s] at which the next tick of a flight begun at `begin` begins.
@@ -149,7 +151,7 @@ class Simulator:
     def _begin_tick(self) -> tuple[Samples, Truth]:
         """Publish what is due at this tick."""
         plant = self.plant
-        self._begun = time.monotonic()
+        self._begun, self._begun_at = time.monotonic(), plant.time
         now = nanoseconds(plant.time)
         self.answers.begin()
         samples, truth = plant.sense(), plant.truth()
@@ -181,16 +183,10 @@ class Simulator:
             )
 
     def _wait_for_answers(self) -> None:
-        deadline = time.monotonic() + self.options.answer_timeout
-        while self.options.recorded and self._recorder_is_behind():
-            self.executor.spin_once(0.1)
-            if self._stop.raised:
-                return
-            if time.monotonic() > deadline:
-                raise PlantStopped(f"nothing recorded since {self.connections.recorded_until():g} s"
-                                   "; the recorder is silent")
-        if self._stamp is None:
+        self._wait_for_the_recorder(RECORDER_LAG)
+        if self._stamp is None or self._stop.raised:
             return
+        deadline = time.monotonic() + self.options.answer_timeout
         while missing := self.answers.missing(self._stamp):
             self._setpoint_is_there = "setpoint" not in missing
             self.executor.spin_once(0.1)
@@ -199,9 +195,16 @@ class Simulator:
             if time.monotonic() > deadline:
                 raise PlantStopped(self._no_answer(missing))
 
-    def _recorder_is_behind(self) -> bool:
-        """Whether messages could be lost if the flight went on."""
-        return self.plant.time - self.connections.recorded_until() > RECORDER_LAG
+    def _wait_for_the_recorder(self, lag: float) -> None:
+        """Return when it is not more than `lag` [s] behind the last tick that was published."""
+        if not self.options.recorded:
+            return
+        deadline = time.monotonic() + self.options.answer_timeout
+        while self._begun_at - self.connections.recorded_until() > lag and not self._stop.raised:
+            if time.monotonic() > deadline:
+                raise PlantStopped(f"nothing recorded since {self.connections.recorded_until():g} s"
+                                   "; the recorder is silent")
+            self.executor.spin_once(0.1)
 
     def _no_answer(self, missing: frozenset[str]) -> str:
         suspect = SUSPECTS.get(missing)

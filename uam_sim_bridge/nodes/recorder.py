@@ -88,8 +88,8 @@ class Recording:
             topic.name, subscription, topic.type, stamped, channel, topic.one_publisher
         )
 
-    def poll(self) -> None:
-        """Write everything that has arrived."""
+    def poll(self) -> int:
+        """Write everything that has arrived; returns how many messages that was."""
         batch = []
         for track in self._tracks:
             take = track.subscription.handle.take_message
@@ -106,6 +106,17 @@ class Recording:
             at = stamp_of(data) if track.stamped else self._sim_time(published)
             self._writer.write(track.channel, max(at, 0), published, data, sequence & 0xFFFFFFFF)
         del self._clock_wall[:-DEPTH], self._clock_sim[:-DEPTH]
+        return len(batch)
+
+    def drain(self, quiet: float = 0.2, longest: float = 1.0) -> None:
+        """Write what is still on its way: until nothing came for `quiet` [s], or `longest` [s]."""
+        now = last = time.monotonic()
+        end = now + longest
+        while now - last < quiet and now < end:
+            if self.poll():
+                last = time.monotonic()
+            time.sleep(quiet / 10.0)
+            now = time.monotonic()
 
     def _sim_time(self, published: int) -> int:
         """Simulation time [ns] at the wall time `published` [ns]."""
@@ -203,7 +214,7 @@ def main() -> int:
         if polls % polls_per_flush == 0:
             recording.flush()
             health.publish(_health(node, recording))
-    recording.poll()
+    recording.drain()
     recording.close()
     for topic, count in recording.lost.items():
         print(f"recorder: {count} messages of {topic} were lost", flush=True)
