@@ -49,6 +49,7 @@ NAME = "mujoco_sim"
 REPORT_INTERVAL = 5.0  # [s] between two lines that say who is waited for
 DEADLINE_TICKS = 3  # [control periods] 12 ms, about a rotor's time constant
 CATCH_UP = 2.0  # [1] times real time, after a stall of the machine
+LAST_WAIT = 3.0  # [s] for a recorder that has not seen the last tick, and may have lost it
 RECORDER_LAG = 2.0  # [s] half of what fits the queue that config/dds gives each process
 SERVICE_TICKS = 25  # in real time the parameter services are looked after every so many ticks
 
@@ -138,7 +139,7 @@ class Simulator:
         else:
             self.statistics.ended_by = "interrupt"
         self.statistics.wall_s = time.monotonic() - begin
-        self._wait_for_the_recorder(0.0)  # what we have published goes when we go
+        self._recorder_has_caught_up(0.0, LAST_WAIT)  # what we have published goes when we go
 
     def _deadline(self, begin: float) -> float:
         """Wall time [s] at which the next tick of a flight begun at `begin` begins.
@@ -183,7 +184,9 @@ class Simulator:
             )
 
     def _wait_for_answers(self) -> None:
-        self._wait_for_the_recorder(RECORDER_LAG)
+        if not self._recorder_has_caught_up(RECORDER_LAG, self.options.answer_timeout):
+            raise PlantStopped(f"nothing recorded since {self.connections.recorded_until():g} s"
+                               "; the recorder is silent")
         if self._stamp is None or self._stop.raised:
             return
         deadline = time.monotonic() + self.options.answer_timeout
@@ -195,16 +198,19 @@ class Simulator:
             if time.monotonic() > deadline:
                 raise PlantStopped(self._no_answer(missing))
 
-    def _wait_for_the_recorder(self, lag: float) -> None:
-        """Return when it is not more than `lag` [s] behind the last tick that was published."""
-        if not self.options.recorded:
-            return
-        deadline = time.monotonic() + self.options.answer_timeout
-        while self._begun_at - self.connections.recorded_until() > lag and not self._stop.raised:
+    def _recorder_has_caught_up(self, lag: float, patience: float) -> bool:
+        """Wait until it is not more than `lag` [s] behind what was published; False: it stays so.
+
+        patience: longest wait [s of wall time].
+        """
+        deadline = time.monotonic() + patience
+        while self.options.recorded and not self._stop.raised:
+            if self._begun_at - self.connections.recorded_until() <= lag:
+                break
             if time.monotonic() > deadline:
-                raise PlantStopped(f"nothing recorded since {self.connections.recorded_until():g} s"
-                                   "; the recorder is silent")
+                return False
             self.executor.spin_once(0.1)
+        return True
 
     def _no_answer(self, missing: frozenset[str]) -> str:
         suspect = SUSPECTS.get(missing)
