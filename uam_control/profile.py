@@ -60,7 +60,14 @@ def load_profile(name_or_file: str) -> Profile:
             file = configuration.path(f"profiles/{name_or_file}.yaml")
         except configuration.ConfigurationError as error:
             raise ProfileError(str(error)) from None
-    sections = read_sections(file)
+    return profile_of(read_sections(file), file)
+
+
+def profile_of(sections: dict[str, dict[str, Any]], file: Path) -> Profile:
+    """Return the checked profile of the raw `sections`, which are those of `file` or belong there.
+
+    Raises ProfileError.
+    """
     sets = {}
     for node, (kind, axes) in NODES.items():
         values = {k: v for k, v in sections.get(node, {}).items() if k not in ROS_OWN}

@@ -6,9 +6,9 @@ import argparse
 import sys
 from collections.abc import Sequence
 
-from uam_sim_bridge.cli import fly
+from uam_sim_bridge.cli import fly, tune
 
-COMMANDS = (fly,)  # each has add(subparsers), which sets `run`: arguments → exit status
+COMMANDS = (fly, tune)  # each has add(subparsers), which sets `run`: arguments → exit status
 WRONG_USE = 2
 
 

@@ -1,0 +1,66 @@
+"""Flies the trials of a campaign in parallel processes, one per core unless told otherwise."""
+
+from __future__ import annotations
+
+import multiprocessing
+import os
+import signal
+from collections.abc import Callable, Sequence
+from concurrent.futures import ProcessPoolExecutor, as_completed
+
+from uam_sim_bridge.campaign.trial import Result, Trial, fly
+from uam_sim_bridge.flight.warm_up import is_cold, warm_up
+
+SINGLE_THREAD = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "NUMBA_NUM_THREADS")
+
+
+def cores() -> int:
+    """How many processes may run at once on this machine."""
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+
+
+def fly_all(
+    trials: Sequence[Trial],
+    jobs: int,
+    work: Callable[[Trial], Result] | None = None,
+    progress: Callable[[int, Result], None] = lambda done, result: None,
+) -> list[Result]:
+    """Fly every trial; results in the order of the trials, whatever order they finished in.
+
+    work: what a process does with a trial (default: fly it, keep the figures); must be importable.
+    progress: called with the number of flights done and the newest result.
+    """
+    if is_cold():
+        warm_up()
+    work = work or figures_of
+    results: list[Result | None] = [None] * len(trials)
+    with _executor(jobs) as executor:
+        waiting = {executor.submit(work, trial): i for i, trial in enumerate(trials)}
+        try:
+            for done, future in enumerate(as_completed(waiting), 1):
+                result = results[waiting[future]] = future.result()
+                progress(done, result)
+        except BaseException:
+            executor.shutdown(wait=False, cancel_futures=True)
+            raise
+    return results
+
+
+def figures_of(trial: Trial) -> Result:
+    """Fly; the time series is thrown away."""
+    return fly(trial)[0]
+
+
+
+
+def _executor(jobs: int) -> ProcessPoolExecutor:
+    """Fresh processes of one thread each, deaf to Ctrl-C, which is for the main process."""
+    for name in SINGLE_THREAD:
+        os.environ.setdefault(name, "1")
+    return ProcessPoolExecutor(
+        jobs, mp_context=multiprocessing.get_context("spawn"), initializer=_ignore_interrupts
+    )
+
+
+def _ignore_interrupts() -> None:
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
