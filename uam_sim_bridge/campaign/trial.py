@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from pathlib import Path
 
 import numpy as np
 
@@ -19,7 +20,7 @@ ERRORS = ("x", "y", "z", "roll", "pitch", "yaw", "alpha_1", "alpha_2")
 
 @dataclass(frozen=True)
 class Trial:
-    """One flight. label: the row of the tables that it counts for."""
+    """One flight. label: the row of the tables that it counts for; keep: file for its series."""
 
     label: str
     profile: Profile
@@ -27,6 +28,7 @@ class Trial:
     seed: int
     scenario: str = "pick_and_place"
     vehicle_changes: dict[str, object] = field(default_factory=dict)
+    keep: Path | None = None
 
 
 @dataclass(frozen=True)
@@ -58,7 +60,9 @@ def fly(trial: Trial) -> tuple[Result, Series]:
     vehicle = Vehicle.load().changed(trial.vehicle_changes)
     flight = DirectFlight(scenario, trial.profile, vehicle, trial.payload_mass, trial.seed)
     flight.run()
-    series = flight.recording.series()
+    series = flight.recording.series({"controller": trial.label})
+    if trial.keep is not None:
+        series.write(trial.keep)
     figures = metrics.compute(
         series,
         {

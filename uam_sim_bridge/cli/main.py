@@ -6,9 +6,10 @@ import argparse
 import sys
 from collections.abc import Sequence
 
-from uam_sim_bridge.cli import fly, tune
+from uam_sim_bridge.cli import compare, fly, tune
 
-COMMANDS = (fly, tune)  # each has add(subparsers), which sets `run`: arguments → exit status
+# each has add(subparsers), which sets `run`: arguments → exit status
+COMMANDS = (fly, compare, tune)
 WRONG_USE = 2
 
 

@@ -8,14 +8,12 @@ import sys
 from datetime import datetime
 from pathlib import Path
 
-from rich.console import Console
-from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
-
 from uam_control import configuration
 from uam_control.configuration import ConfigurationError
 from uam_control.mission import ScenarioError
 from uam_control.profile import ProfileError, load_profile
 from uam_sim_bridge.campaign.pool import cores
+from uam_sim_bridge.cli.counting import Counting
 from uam_sim_bridge.flight.result_folder import RESULTS
 from uam_sim_bridge.flight.warm_up import is_cold, warm_up
 
@@ -104,11 +102,10 @@ def tune(options: argparse.Namespace, space) -> int:
         warm_up()
     status = 0
     try:
-        with _bar() as bar:
-            line = bar.add_task("tune", total=options.evaluations, best="")
+        with Counting("tune", options.evaluations) as counting:
 
             def show(done: int, best: float | None) -> None:
-                bar.update(line, completed=done, best="" if best is None else f"best {best:.4g}")
+                counting.show(done, "" if best is None else f"best cost {best:.4g}")
 
             search(task, options.jobs, show)
     except KeyboardInterrupt:
@@ -128,14 +125,3 @@ def tune(options: argparse.Namespace, space) -> int:
     print(f"profile   {out / 'best.yaml'}   (uam fly --profile {out / 'best.yaml'})")
     print(f"plot      {out / 'search.png'}")
     return status
-
-
-def _bar() -> Progress:
-    return Progress(
-        TextColumn("{task.description}"),
-        BarColumn(),
-        MofNCompleteColumn(),
-        TextColumn("{task.fields[best]}"),
-        TimeRemainingColumn(),
-        console=Console(),
-    )

@@ -1,0 +1,107 @@
+"""`uam compare`: the paper's tables and figures, every controller over the same flights."""
+
+from __future__ import annotations
+
+import argparse
+import shlex
+import sys
+from datetime import datetime
+from pathlib import Path
+
+from uam_control.configuration import ConfigurationError
+from uam_control.profile import ProfileError, load_profile
+from uam_sim_bridge.campaign.pool import cores, fly_all
+from uam_sim_bridge.cli.counting import Counting
+from uam_sim_bridge.flight.result_folder import RESULTS
+
+INTERRUPTED, WRONG_USE = 130, 2
+EXAMPLES = """\
+examples:
+  uam compare                          every controller, payloads 0.1 0.2 0.3 kg, 5 seeds
+  uam compare --seeds 10 --jobs 4
+  uam compare --profile mine=mine.yaml     one more row, of a profile of your own
+
+Left in --out: report.html, tables.md, flights.csv, comparison.json and figures/. The baselines are
+reconstructions (docs/law.md). The same command gives the same tables.
+"""
+
+
+def add(commands) -> None:
+    """Add the subcommand to the command line."""
+    parser = commands.add_parser(
+        "compare",
+        help="all controllers over the same flights: the paper's tables and figures",
+        description="Fly every controller over the same payloads and seeds in the direct engine; "
+        "write the paper's three tables and five figures.",
+        epilog=EXAMPLES,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    option = parser.add_argument
+    option("--seeds", type=int, default=5, metavar="N", help="seeds 1..N (default %(default)s)")
+    option("--payload-mass", type=float, nargs="+", metavar="KG",
+           help="payloads (default 0.1 0.2 0.3)")
+    option("--profile", action="append", default=[], metavar="LABEL=FILE",
+           help="a further row; may be given again")
+    option("--jobs", type=int, default=cores(), metavar="N",
+           help="processes (default: one per core, %(default)s)")
+    option("--out", type=Path, metavar="DIR",
+           help="result folder (default results/<time>-compare)")
+    parser.set_defaults(run=run)
+
+
+def run(options: argparse.Namespace) -> int:
+    """Compare as asked; returns the exit status."""
+    from uam_sim_bridge.compare import plan
+
+    try:
+        if options.seeds < 1 or options.jobs < 1:
+            raise ConfigurationError("--seeds and --jobs are 1 or more")
+        payloads = tuple(options.payload_mass or plan.PAYLOADS)
+        if not all(0.0 <= mass <= 2.0 for mass in payloads):
+            raise ConfigurationError("--payload-mass is 0 to 2 kg")
+        rows = (*plan.entries(), *map(_further, options.profile))
+        out = options.out or RESULTS / f"{datetime.now():%Y%m%d-%H%M%S}-compare"
+        (out / "flights").mkdir(parents=True, exist_ok=True)
+        return compare(rows, payloads, range(1, options.seeds + 1), options.jobs, out)
+    except (ConfigurationError, ProfileError, OSError) as error:
+        print(f"uam compare: {error}", file=sys.stderr)
+        return WRONG_USE
+    except KeyboardInterrupt:
+        print("uam compare: interrupted", file=sys.stderr)
+        return INTERRUPTED
+
+
+def _further(text: str):
+    from uam_control import configuration
+    from uam_sim_bridge.compare.plan import Entry
+
+    label, _, file = text.partition("=")
+    if not label or not file:
+        raise ConfigurationError(f"--profile {text}: LABEL=FILE is expected")
+    return Entry(label, load_profile(str(configuration.named("profiles", file))))
+
+
+def compare(rows, payloads, seeds, jobs: int, out: Path) -> int:
+    """Fly, then write everything; returns the exit status."""
+    from uam_sim_bridge.compare import plan, report
+
+    trials = plan.trials(rows, payloads, list(seeds), out / "flights")
+    with Counting("compare", len(trials)) as counting:
+
+        def show(done: int, result) -> None:
+            counting.show(
+                done, f"{result.label}, {result.payload_mass:g} kg, seed {result.seed}"
+            )
+
+        results = fly_all(trials, jobs, progress=show)
+    facts = {
+        "command": shlex.join(["uam", *sys.argv[1:]]),
+        "payloads_kg": list(payloads),
+        "seeds": list(seeds),
+        "profiles": {row.label: row.profile.file.name for row in rows},
+        "budgets": report.budgets(rows),
+    }
+    written = report.write(out, trials, results, facts)
+    print(written.text)
+    print(f"results  {out}\nreport   {written.page}")
+    return 0

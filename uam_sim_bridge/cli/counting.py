@@ -1,0 +1,49 @@
+"""How far a long piece of work is: a bar on a terminal, now and then a line elsewhere."""
+
+from __future__ import annotations
+
+from types import TracebackType
+
+from rich.console import Console
+from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
+
+LINES = 20  # at most so many where the output is not a terminal
+
+
+class Counting:
+    """A context manager; `show(done, text)` as often as wanted."""
+
+    def __init__(self, what: str, total: int):
+        self._what, self._total = what, total
+        self._console = Console()
+        self._said = 0
+        self._bar = Progress(
+            TextColumn("{task.description}"),
+            BarColumn(),
+            MofNCompleteColumn(),
+            TimeElapsedColumn(),
+            TextColumn("{task.fields[text]}"),
+            console=self._console,
+            disable=not self._console.is_terminal,
+        )
+        self._line = self._bar.add_task(what, total=total, text="")
+
+    def __enter__(self) -> Counting:
+        self._bar.__enter__()
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        self._bar.__exit__(kind, error, trace)
+
+    def show(self, done: int, text: str) -> None:
+        """Show that `done` pieces are done, and a word on the newest."""
+        self._bar.update(self._line, completed=done, text=text)
+        share = LINES * done // self._total
+        if not self._console.is_terminal and share > self._said:
+            self._said = share
+            print(f"{self._what}: {done} of {self._total}, {text}", flush=True)

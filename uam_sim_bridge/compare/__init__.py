@@ -1,0 +1,1 @@
+"""`uam compare`: the paper's comparison, every controller over the same flights."""

@@ -1,0 +1,67 @@
+"""Which flights a comparison is made of."""
+
+from __future__ import annotations
+
+import copy
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from uam_control.profile import Profile, load_profile, profile_of
+from uam_sim_bridge.campaign.trial import Trial
+
+CONTROLLERS = ("position_controller", "attitude_controller", "arm_controller")
+PROPOSED = "proposed"
+ASMC1, ASMC2 = "ASMC-1 (reconstructed)", "ASMC-2 (reconstructed)"
+FROZEN, VERBATIM = "proposed, adaptation frozen", "Table I verbatim"
+PAYLOADS = (0.1, 0.2, 0.3)  # [kg]
+
+
+@dataclass(frozen=True)
+class Entry:
+    """One row of the tables."""
+
+    label: str
+    profile: Profile
+
+
+def entries() -> tuple[Entry, ...]:
+    """The paper's three controllers in its order, then what else the reader should see."""
+    proposed = load_profile("s500")
+    return (
+        Entry(ASMC1, load_profile("asmc1")),
+        Entry(ASMC2, load_profile("asmc2")),
+        Entry(PROPOSED, proposed),
+        Entry(FROZEN, frozen(proposed)),
+        Entry(VERBATIM, load_profile("paper_table1")),
+    )
+
+
+def frozen(profile: Profile) -> Profile:
+    """The same profile with the adapted gains kept at their initial values."""
+    sections = copy.deepcopy(profile.sections)
+    for node in CONTROLLERS:
+        sections[node]["adapt"] = False
+    return profile_of(sections, Path(f"{profile.name}_frozen.yaml"))
+
+
+def trials(
+    rows: Sequence[Entry], payloads: Sequence[float], seeds: Sequence[int], folder: Path
+) -> list[Trial]:
+    """Every row over every payload and seed. Those that the figures show keep their series.
+
+    The figures show the middle payload and the first seed.
+    """
+    shown = payloads[len(payloads) // 2], seeds[0]
+    return [
+        Trial(
+            row.label,
+            row.profile,
+            mass,
+            seed,
+            keep=folder / f"{number}.parquet" if (mass, seed) == shown else None,
+        )
+        for number, row in enumerate(rows)
+        for mass in payloads
+        for seed in seeds
+    ]
