@@ -121,6 +121,7 @@ class Plant:
         )
         self._alpha[:] = arm_start
         data.qpos[self._swing] = -sum(arm_start)
+        self._payload_position[0:2] += self.vehicle.numbers["variation"]["payload_offset"]
         if payload_mass <= 0.0:  # out of the way rather than another model
             self._payload_position[:] = (5.0, 5.0, 0.02)
 

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import mujoco
+import numpy as np
 import yaml
 
 from uam_control.configuration import path
@@ -49,4 +50,16 @@ class Vehicle:
         """Return the MuJoCo model with a payload of payload_mass [kg] (0: far away, massless)."""
         spec = mujoco.MjSpec.from_file(str(self.model_path))
         spec.geom("payload").mass = max(payload_mass, 1e-3)
-        return spec.compile()
+        model = spec.compile()
+        self._vary(model)
+        return model
+
+    def _vary(self, model: mujoco.MjModel) -> None:
+        """Give vehicle and arm the masses of `variation`."""
+        variation = self.numbers["variation"]
+        if variation["mass"] == 1.0 and variation["inertia"] == 1.0:
+            return
+        own = np.arange(model.nbody) != model.body("payload").id
+        model.body_mass[own] *= variation["mass"]
+        model.body_inertia[own] *= variation["mass"] * variation["inertia"]
+        mujoco.mj_setConst(model, mujoco.MjData(model))
