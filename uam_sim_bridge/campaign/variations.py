@@ -68,6 +68,6 @@ def common(draws: Sequence[Draw], failed: Sequence[bool]) -> list[tuple[str, flo
     for name in draws[0].values:
         values = np.array([d.values[name] for d in draws])
         spread = values.std()
-        lost, kept = values[failed].mean(), values[~failed].mean()
-        found.append((name, float(lost), float(kept), float((lost - kept) / spread if spread else 0.0)))
+        lost, kept = float(values[failed].mean()), float(values[~failed].mean())
+        found.append((name, lost, kept, (lost - kept) / float(spread) if spread else 0.0))
     return sorted(found, key=lambda entry: -abs(entry[3]))

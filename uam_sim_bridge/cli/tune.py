@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import shlex
+import signal
 import sys
 from datetime import datetime
 from pathlib import Path
@@ -101,6 +102,7 @@ def tune(options: argparse.Namespace, space) -> int:
         print("compiling the control path (once)")
         warm_up()
     status = 0
+    signal.signal(signal.SIGTERM, signal.default_int_handler)  # as Ctrl-C
     try:
         with Counting("tune", options.evaluations) as counting:
 
