@@ -6,10 +6,10 @@ import argparse
 import sys
 from collections.abc import Sequence
 
-from uam_sim_bridge.cli import compare, fly, tune
+from uam_sim_bridge.cli import campaign, compare, fly, tune
 
 # each has add(subparsers), which sets `run`: arguments → exit status
-COMMANDS = (fly, compare, tune)
+COMMANDS = (fly, compare, tune, campaign)
 WRONG_USE = 2
 
 

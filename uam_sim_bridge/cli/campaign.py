@@ -1,0 +1,85 @@
+"""`uam campaign`: many random flights around the nominal one."""
+
+from __future__ import annotations
+
+import argparse
+import shlex
+import sys
+from datetime import datetime
+from pathlib import Path
+
+from uam_control import configuration
+from uam_control.configuration import ConfigurationError
+from uam_control.profile import ProfileError, load_profile
+from uam_sim_bridge.campaign.pool import cores, fly_all
+from uam_sim_bridge.cli.counting import Counting
+from uam_sim_bridge.flight.result_folder import RESULTS
+
+INTERRUPTED, WRONG_USE = 130, 2
+EXAMPLES = """\
+examples:
+  uam campaign                             1,000 flights of the flying profile
+  uam campaign --flights 100 --profile asmc2
+
+Payload, its place, wind, gusts, sensor noise, masses, inertias and motors are drawn from the ranges
+of config/campaign/robustness.yaml. Left in --out: summary.md, flights.csv, campaign.json,
+campaign.png. The same seed gives the same flights.
+"""
+
+
+def add(commands) -> None:
+    """Add the subcommand to the command line."""
+    parser = commands.add_parser(
+        "campaign",
+        help="many random flights: success rate, errors, what the losses have in common",
+        description="Fly the mission many times in the direct engine, each with another payload, "
+        "wind, noise, mass and motors.",
+        epilog=EXAMPLES,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    option = parser.add_argument
+    option("--flights", type=int, default=1000, metavar="N", help="(default %(default)s)")
+    option("--profile", default="s500", metavar="NAME|FILE", help="(default %(default)s)")
+    option("--seed", type=int, default=1, metavar="N", help="of the draw (default %(default)s)")
+    option("--jobs", type=int, default=cores(), metavar="N",
+           help="processes (default: one per core, %(default)s)")
+    option("--out", type=Path, metavar="DIR",
+           help="result folder (default results/<time>-campaign)")
+    parser.set_defaults(run=run)
+
+
+def run(options: argparse.Namespace) -> int:
+    """Fly as asked; returns the exit status."""
+    try:
+        if options.flights < 1 or options.jobs < 1 or options.seed < 0:
+            raise ConfigurationError("--flights and --jobs are 1 or more, --seed 0 or more")
+        profile = load_profile(str(configuration.named("profiles", options.profile)))
+        out = options.out or RESULTS / f"{datetime.now():%Y%m%d-%H%M%S}-campaign"
+        out.mkdir(parents=True, exist_ok=True)
+        return campaign(options, profile, out)
+    except (ConfigurationError, ProfileError, OSError) as error:
+        print(f"uam campaign: {error}", file=sys.stderr)
+        return WRONG_USE
+    except KeyboardInterrupt:
+        print("uam campaign: interrupted", file=sys.stderr)
+        return INTERRUPTED
+
+
+def campaign(options: argparse.Namespace, profile, out: Path) -> int:
+    """Fly, then write everything; returns the exit status."""
+    from uam_sim_bridge.campaign import report
+    from uam_sim_bridge.campaign.variations import draw
+
+    draws = draw(profile, options.flights, options.seed)
+    bad = 0
+    with Counting("campaign", len(draws)) as counting:
+
+        def show(done: int, result) -> None:
+            nonlocal bad
+            bad += not result.completed
+            counting.show(done, f"{bad} not completed")
+
+        results = fly_all([one.trial for one in draws], options.jobs, progress=show)
+    print(report.write(out, draws, results, shlex.join(["uam", *sys.argv[1:]])))
+    print(f"results  {out}")
+    return 0
