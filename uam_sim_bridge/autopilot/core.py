@@ -68,6 +68,19 @@ def control_tick(
         motors[i] = inverse_curve(model_factor, motors[i])
 
 
+@jit
+def magnitude_of_usable(position, quaternion):
+    """Return the norm of the quaternion (4,) of an external pose, 0 where the pose is nonsense."""
+    for i in range(3):
+        if not abs(position[i]) < FARTHEST_VISION:  # true for NaN
+            return 0.0
+    squared = 0.0
+    for i in range(4):
+        squared += quaternion[i] * quaternion[i]
+    norm = math.sqrt(squared)
+    return norm if 0.5 < norm < 2.0 else 0.0
+
+
 class Autopilot:
     """PX4-class autopilot.
 
@@ -125,9 +138,8 @@ class Autopilot:
 
     def vision(self, time: float, position: np.ndarray, quaternion: np.ndarray) -> bool:
         """Take an external pose (NED [m], FRD → NED [w x y z]); False: refused as nonsense."""
-        norm = float(np.linalg.norm(quaternion))
-        near = float(np.abs(position).max()) < FARTHEST_VISION  # false for NaN
-        if not (near and 0.5 < norm < 2.0):
+        norm = magnitude_of_usable(position, quaternion)
+        if not norm:
             return False
         self.estimator.vision(time, position, quaternion / norm)
         return True

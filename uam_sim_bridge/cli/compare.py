@@ -83,17 +83,22 @@ def _further(text: str):
 
 def compare(rows, payloads, seeds, jobs: int, out: Path) -> int:
     """Fly, then write everything; returns the exit status."""
-    from uam_sim_bridge.compare import plan, report
+    from uam_sim_bridge.compare import modularity, plan, report
 
     trials = plan.trials(rows, payloads, list(seeds), out / "flights")
-    with Counting("compare", len(trials)) as counting:
+    proposed = next(row.profile for row in rows if row.label == plan.PROPOSED)
+    kept = out / "flights" / "modularity.parquet"
+    extra = modularity.trials(proposed, plan.middle(payloads), seeds[0], kept)
+    with Counting("compare", len(trials) + len(extra)) as counting:
 
         def show(done: int, result) -> None:
             counting.show(
                 done, f"{result.label}, {result.payload_mass:g} kg, seed {result.seed}"
             )
 
-        results = fly_all(trials, jobs, progress=show)
+        results = fly_all([*trials, *extra], jobs, progress=show)
+    modular = modularity.Evidence.of(proposed, kept, results[len(trials):])
+    results = results[: len(trials)]
     facts = {
         "command": shlex.join(["uam", *sys.argv[1:]]),
         "payloads_kg": list(payloads),
@@ -101,7 +106,7 @@ def compare(rows, payloads, seeds, jobs: int, out: Path) -> int:
         "profiles": {row.label: row.profile.file.name for row in rows},
         "budgets": report.budgets(rows),
     }
-    written = report.write(out, trials, results, facts)
+    written = report.write(out, trials, results, modular, facts)
     print(written.text)
     print(f"results  {out}\nreport   {written.page}")
     return 0

@@ -45,6 +45,11 @@ def frozen(profile: Profile) -> Profile:
     return profile_of(sections, Path(f"{profile.name}_frozen.yaml"))
 
 
+def middle(payloads: Sequence[float]) -> float:
+    """The payload of the flights that are shown."""
+    return payloads[len(payloads) // 2]
+
+
 def trials(
     rows: Sequence[Entry], payloads: Sequence[float], seeds: Sequence[int], folder: Path
 ) -> list[Trial]:
@@ -52,7 +57,7 @@ def trials(
 
     The figures show the middle payload and the first seed.
     """
-    shown = payloads[len(payloads) // 2], seeds[0]
+    shown = middle(payloads), seeds[0]
     return [
         Trial(
             row.label,

@@ -15,6 +15,7 @@ from matplotlib.figure import Figure
 
 from uam_sim_bridge.campaign.trial import ERRORS, Result, Trial
 from uam_sim_bridge.compare import plan, tables
+from uam_sim_bridge.compare.modularity import Evidence
 from uam_sim_bridge.flight import timeseries
 from uam_sim_bridge.flight.atomic import replacing, write_text
 from uam_sim_bridge.flight.result_folder import as_json, versions
@@ -51,12 +52,18 @@ def budgets(rows: Sequence[plan.Entry]) -> dict[str, str]:
 
 
 def write(
-    out: Path, trials: Sequence[Trial], results: Sequence[Result], facts: Mapping[str, Any]
+    out: Path,
+    trials: Sequence[Trial],
+    results: Sequence[Result],
+    modular: Evidence,
+    facts: Mapping[str, Any],
 ) -> Written:
     """Write flights.csv, comparison.json, tables.md, figures/ and report.html to `out`."""
     found = tables.rows(results)
-    claims = tables.claims(found)
+    claims = [*tables.claims(found), modular.claim]
     markdown = tables.as_markdown(found)
+    for table in modular.tables():
+        markdown += "\n" + _markdown(*table)
     _flights(out / "flights.csv", results)
     numbers = {
         row.label: {
@@ -72,7 +79,7 @@ def write(
                "interval over seeds.\n")
     drawn = _draw(out, trials, results)
     page = out / "report.html"
-    write_text(page, _page(found, claims, drawn, out, facts))
+    write_text(page, _page(found, claims, modular, drawn, out, facts))
     return Written(markdown + "\n" + "\n".join(claims) + "\n", page)
 
 
@@ -144,7 +151,12 @@ def _gains(results: Sequence[Result]) -> Figure:
     return figure
 
 
-def _page(found, claims, drawn, out: Path, facts) -> str:
+def _markdown(head: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
+    lines = [head, ["---"] * len(head), *rows]
+    return "".join(f"| {' | '.join(cells)} |\n" for cells in lines)
+
+
+def _page(found, claims, modular: Evidence, drawn, out: Path, facts) -> str:
     environment = jinja2.Environment(
         loader=jinja2.PackageLoader("uam_sim_bridge.compare", "."),
         autoescape=True, trim_blocks=True, lstrip_blocks=True, undefined=jinja2.StrictUndefined,
@@ -163,7 +175,7 @@ def _page(found, claims, drawn, out: Path, facts) -> str:
         for title, columns in tables.TABLES
     ]
     return environment.get_template("report.html.j2").render(
-        tables=shown, claims=claims, pictures=pictures, facts=facts,
+        tables=shown, claims=claims, modularity=modular.tables(), pictures=pictures, facts=facts,
         confidence=tables.CONFIDENCE, shown=OVERLAID,
     )
 

@@ -1,0 +1,74 @@
+"""How much a whole direct flight costs beside its bare physics, in one run on one core.
+
+    .venv/bin/python benchmarks/direct_engine.py [--profile] [--seconds 90]
+
+Alternates a stretch of flight with as many bare `mj_step` of the same model, so that both see the
+same machine. Prints the real-time factor and the ratio; --profile says where the rest goes.
+"""
+
+from __future__ import annotations
+
+import argparse
+import cProfile
+import os
+import pstats
+import time
+
+import mujoco
+
+from uam_control.mission import load_scenario
+from uam_control.profile import load_profile
+from uam_sim_bridge.flight.direct import DirectFlight
+from uam_sim_bridge.flight.warm_up import warm_up
+from uam_sim_bridge.plant import Vehicle
+
+STRETCH = 250  # ticks
+
+
+def new_flight() -> DirectFlight:
+    """The paper's mission."""
+    return DirectFlight(load_scenario("pick_and_place"), load_profile("s500"), Vehicle.load(), 0.2,
+                        seed=1)
+
+
+def measure() -> tuple[float, float, float]:
+    """Return wall time of a flight, of its bare physics, and simulated time [s]."""
+    flight, bare = new_flight(), new_flight()
+    model, data = bare.plant.model, bare.plant.data
+    steps = round(bare.plant.period / model.opt.timestep)
+    flown = physics = 0.0
+    while not flight.mission.output.done:
+        before = time.perf_counter()
+        ticks = 0
+        while ticks < STRETCH and not flight.mission.output.done:
+            flight.tick()
+            ticks += 1
+        between = time.perf_counter()
+        for _ in range(ticks * steps):
+            mujoco.mj_step(model, data)
+        flown += between - before
+        physics += time.perf_counter() - between
+    return flown, physics, flight.plant.time
+
+
+def main() -> None:
+    """Measure and print."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--profile", action="store_true", help="where the time goes")
+    parser.add_argument("--runs", type=int, default=5, help="the best of so many (default 5)")
+    options = parser.parse_args()
+    if hasattr(os, "sched_setaffinity"):
+        os.sched_setaffinity(0, {min(os.sched_getaffinity(0))})
+    warm_up()
+    flown, physics, simulated = min(measure() for _ in range(options.runs))
+    print(f"flight          {flown:.2f} s for {simulated:.1f} s, {simulated / flown:.0f} x real")
+    print(f"bare mj_step    {physics:.2f} s, {simulated / physics:.0f} x real")
+    print(f"ratio           {flown / physics:.2f}")
+    if options.profile:
+        flight, profile = new_flight(), cProfile.Profile()
+        profile.runcall(flight.run)
+        pstats.Stats(profile).sort_stats("tottime").print_stats(25)
+
+
+if __name__ == "__main__":
+    main()
