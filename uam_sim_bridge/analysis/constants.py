@@ -43,7 +43,10 @@ def smallest(sigma: np.ndarray, regressors: np.ndarray, nu: np.ndarray) -> np.nd
     least = np.concatenate([sigma / scale, np.zeros(4)])
     system = np.vstack([constraints.T, least])
     target = np.array([0.0, 0.0, 0.0, 0.0, 1.0])
-    weights, _ = nnls(system, target, maxiter=30 * system.shape[1])
+    try:
+        weights, _ = nnls(system, target, maxiter=30 * system.shape[1])
+    except RuntimeError:  # no convergence: K*0 alone is a bound, too
+        return np.array([scale, 0.0, 0.0, 0.0])
     residual = system @ weights - target
     found = np.maximum(scale * -residual[:4] / residual[4] / root, 0.0)
     # rounding must not let one tick escape

@@ -70,7 +70,7 @@ class Body:
         model.opt.disableflags |= flags.mjDSBL_CONSTRAINT | flags.mjDSBL_CONTACT
         model.opt.enableflags = 0  # no sleeping
         self.data = mujoco.MjData(model)
-        self.data.qpos[model.joint("payload").qposadr[0] : +model.nq - 4] = (50.0, 0.0, 0.0)
+        self.data.qpos[model.joint("payload").qposadr[0]] = 50.0
         self._unit, self._column = np.zeros(model.nv), np.zeros(model.nv)
 
     def place(self, chi: np.ndarray, swing: float) -> None:
