@@ -135,6 +135,10 @@ def test_v_falls_outside_the_bound_and_stays_within():
     assert found["within_bound"] == found["within_envelope"] == 1.0
     assert found["rate_inequality_holds"] == 1.0
     assert parts.total[-1] < found["bound"]
+    sharper = lyapunov.decrease("position", LAW, truth, rows[:, 6:10], zeta, star)
+    assert np.all(np.gradient(parts.total, time) <= sharper)
+    coarse = lyapunov.comparison(LAW, zeta, star)
+    assert np.all(sharper <= -coarse.rate * parts.total + coarse.growth + 1e-9)
 
 
 def test_a_v_that_leaves_its_bound_is_reported():
@@ -155,6 +159,7 @@ def analysed(direct_flight):
 def test_a_real_flight(analysed):
     found = analysed.summary()
     assert found["V"]["within_bound"] == 1.0
+    assert min(found[name]["step_inequality_holds"] for name in analysed.subsystems) > 0.99
     position, attitude, arm = (found[name] for name in ("position", "attitude", "arm"))
     # the law adapts to the payload's weight; the pitching torque of the arm is the autopilot's
     assert position["coupling"]["rms"][2] == pytest.approx(1.23, abs=0.1)

@@ -75,6 +75,28 @@ def parts(
     )
 
 
+def decrease(
+    subsystem: str,
+    parameters,
+    truth: Tracking,
+    gains: np.ndarray,
+    zeta: np.ndarray,
+    constants: np.ndarray,
+) -> np.ndarray:
+    """Upper bound of dV_j/dt (m,) before the proof turns it into -rate_j V_j + growth_j.
+
+        -1/2 xi_j^T Q_j xi_j - 1/2 sum_i nu_ji ((K_ji - K*_ji)^2 - K*_ji^2) + epsilon_j / zeta_min_j
+
+    from (subs_4p), whose sum should run to i = 3, and from (new_2) with (subs_3p). Much sharper:
+    nothing is divided by lambda_max(P_j).
+    """
+    columns, nu = COLUMNS_OF[subsystem], np.array(parameters.nu)
+    square = truth.e[:, columns] ** 2 @ np.array(parameters.q_position)
+    square += truth.e_dot[:, columns] ** 2 @ np.array(parameters.q_velocity)
+    pulled = ((gains - constants) ** 2 - constants**2) @ nu
+    return -0.5 * (square + pulled) + parameters.epsilon / float(zeta.min())
+
+
 def comparison(parameters, zeta: np.ndarray, constants: np.ndarray) -> Comparison:
     """rate_j and growth_j of one subsystem; parameters: its LawParameters, zeta (m,), constants K*.
 

@@ -32,6 +32,7 @@ class Subsystem:
     printed: np.ndarray  # (4,) K* by the paper's expressions
     parts: lyapunov.Parts
     comparison: lyapunov.Comparison
+    decrease: np.ndarray  # (m,) what dV_j/dt stays below, see lyapunov.decrease
     gains: np.ndarray  # (m, 4) K as flown
     zeta: np.ndarray  # (m,)
     error: np.ndarray  # (m,) ||xi_j||
@@ -69,6 +70,9 @@ class Stability:
             columns = COLUMNS_OF[name]
             found[name] = {
                 "V": check(self.time, s.parts.total, s.comparison),
+                "step_inequality_holds": np.mean(
+                    np.gradient(s.parts.total, self.time) <= s.decrease
+                ),
                 "V_tracking_max": s.parts.tracking.max(),
                 "xi_max": s.error.max(),
                 "xi_bound": s.error_bound,
@@ -190,6 +194,7 @@ def _subsystem(name, series, rows, truth, parameters, best, printed_ones) -> Sub
         printed=printed_ones,
         parts=parts,
         comparison=comparison,
+        decrease=lyapunov.decrease(name, parameters, truth, gains, zeta, best),
         gains=gains,
         zeta=zeta,
         error=np.linalg.norm(xi, axis=1),
