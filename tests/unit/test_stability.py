@@ -179,8 +179,11 @@ def test_sigma_is_what_the_error_equation_says(analysed, direct_flight):
     acceleration = analysed.coupling.sigma[:, :3] + asked / 2.2
     true = direct_flight.block("truth.")[analysed.rows, 16:19]
     np.testing.assert_allclose(acceleration, true, atol=1e-9)
-    bound = constants.regressor(analysed.truth) @ analysed.subsystems["position"].constants
-    assert np.all(analysed.coupling.sigma_norm("position") <= bound * (1 + 1e-9))
+    regressors = constants.regressor(analysed.truth)
+    for name, one in analysed.subsystems.items():
+        for star in (one.constants, one.printed):
+            bound = regressors @ star
+            assert np.all(analysed.coupling.sigma_norm(name) <= bound * (1 + 1e-9))
 
 
 def test_figures_of_a_flight_of_three_seconds(short_direct_flight, tmp_path):

@@ -12,7 +12,6 @@ expressions below (up_bound_p), products of norms, which are far larger.
 from __future__ import annotations
 
 import numpy as np
-from scipy.optimize import nnls
 
 from uam_sim_bridge.analysis.coupling import Coupling, nominal_inertia
 from uam_sim_bridge.analysis.dynamics import Dynamics
@@ -35,6 +34,8 @@ def smallest(sigma: np.ndarray, regressors: np.ndarray, nu: np.ndarray) -> np.nd
     y = sqrt(nu) K*, min ||y|| subject to G y >= h is y = -s[:4] / s[4], s the residual of NNLS on
     [G^T; h^T] u = (0, 0, 0, 0, 1).
     """
+    from scipy.optimize import nnls  # takes half a second, which `uam --help` should not wait
+
     scale = float(np.max(sigma))
     if scale <= 0.0:
         return np.zeros(4)
