@@ -166,6 +166,7 @@ def test_a_real_flight(analysed):
     assert 0.7 < position["coupling"]["adaptive_share"] < 1.0
     assert attitude["coupling"]["actuators_share"] > 0.9
     assert arm["coupling"]["feedback_share"] > 0.9
+    assert arm["coupling"]["actuators_share"] is None
     assert position["xi_max"] < position["xi_bound"]
     assert found["assumptions"]["saturated"]["position"] < 0.01
     for one in analysed.subsystems.values():

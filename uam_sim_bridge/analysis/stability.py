@@ -129,6 +129,8 @@ def shares(forces: coupling.Coupling, terms: supply.Supply, columns: slice) -> d
     for name, term in met.items():
         found[f"{name}_rms"] = rms(term)
         found[f"{name}_share"] = float(np.sum(term * plant)) / power if power else None
+    if columns == COLUMNS_OF["arm"]:  # what its servos made of tau is not recorded
+        found["actuators_rms"] = found["actuators_share"] = None
     return found
 
 

@@ -50,7 +50,7 @@ def verdict(found: Mapping[str, Any]) -> str:
 
 
 def caveats(found: Mapping[str, Any]) -> list[str]:
-    """What the proof assumes and this flight did not have, one sentence each."""
+    """What the proof assumes, measured, one sentence each."""
     a = found["assumptions"]
     radius, norm = a["mass_matrix"]["radius"], a["mass_matrix"]["norm"]
     ceilings = {name: max(a["at_ceiling"][name]) for name in SUBSYSTEMS}
@@ -62,9 +62,9 @@ def caveats(found: Mapping[str, Any]) -> list[str]:
         + ".",
         f"Acceleration: the ‖chi_ddot‖ that K3 sees was below the true one at {_percent(max(seen))}"
         " of the ticks: estimate, limit and filter lie between.",
-        "Limits cut tau at " + _list(a["saturated"], "{:.1%}") + " of the ticks.",
+        "Limits cut tau at " + _list(a["saturated"], "{:.1f} %", 100.0) + " of the ticks.",
         "A ceiling held a gain down at "
-        + _list(ceilings, "{:.1%}")
+        + _list(ceilings, "{:.1f} %", 100.0)
         + " of the ticks.",
         f"Estimator: ‖xi‖ is {_number(a['estimator']['rms_xi'])} RMS, the error of its estimate "
         f"{_number(a['estimator']['rms_error'])}.",
@@ -89,12 +89,14 @@ def _row(name: str, one: Mapping[str, Any]) -> Row:
     )
 
 
-def _list(values: Mapping[str, float], form: str) -> str:
-    return ", ".join(f"{form.format(values[name])} ({name})" for name in SUBSYSTEMS)
+def _list(values: Mapping[str, float], form: str, factor: float = 1.0) -> str:
+    return ", ".join(f"{form.format(factor * values[name])} ({name})" for name in SUBSYSTEMS)
 
 
 def _number(value: float | None) -> str:
-    return "–" if value is None else f"{value:.3g}"
+    if value is None:
+        return "–"
+    return f"{value:.0f}" if 100.0 <= abs(value) < 1e5 else f"{value:.3g}"
 
 
 def _percent(fraction: float, digits: int = 1) -> str:

@@ -56,6 +56,7 @@ def coupling(flights: Sequence[Flight]) -> Figure | None:
     if found is None:
         return None
     figure, axes = panels.grid("Coupling force, and what supplies it", 4, 2, 1.45)
+    figure.subplots_adjust(wspace=0.26)  # small torques have long labels
     supply = found.supply
     drawn = (
         (supply.applied - supply.asked, ACTUATORS, 0.9),
