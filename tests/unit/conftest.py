@@ -1,15 +1,19 @@
-"""A made-up flight for the tests of the report: the paper's scenario with invented errors."""
+"""A made-up flight for the tests of the report (the paper's scenario with invented errors), and
+real ones of the direct engine."""
 
 from dataclasses import asdict
 
 import numpy as np
 import pytest
+from whole_flight import SHORT
 
 from uam_control.mission import load_scenario
 from uam_control.profile import load_profile
 from uam_sim_bridge.flight import metrics
+from uam_sim_bridge.flight.direct import DirectFlight
 from uam_sim_bridge.flight.result_folder import ResultFolder
 from uam_sim_bridge.flight.timeseries import COLUMNS, Recording
+from uam_sim_bridge.plant import Vehicle
 
 PERIOD = 0.04  # ten times the control period: enough for a picture
 TOUCHDOWN = 87.0
@@ -118,3 +122,24 @@ def flight():
 def make_flight():
     """`made_up_flight` itself."""
     return made_up_flight
+
+
+def flown(scenario, seed=1, mass=0.2):
+    """A flight of the direct engine with the flying profile."""
+    flight = DirectFlight(scenario, load_profile("s500"), Vehicle.load(), mass, seed)
+    info = {"controller": "modular", "payload_mass_kg": mass, "seed": seed}
+    return flight.run().series(info)
+
+
+@pytest.fixture(scope="session")
+def direct_flight():
+    """The pick-and-place mission in the direct engine."""
+    return flown(load_scenario("pick_and_place"))
+
+
+@pytest.fixture(scope="session")
+def short_direct_flight(tmp_path_factory):
+    """Up and down, three seconds."""
+    file = tmp_path_factory.mktemp("scenario") / "short.yaml"
+    file.write_text(SHORT)
+    return flown(load_scenario(str(file)))

@@ -4,8 +4,11 @@ import numpy as np
 import pytest
 from PIL import Image
 
+from uam_control.profile import load_profile
+from uam_sim_bridge.analysis.stability import analyse
 from uam_sim_bridge.flight import metrics
 from uam_sim_bridge.flight.timeseries import COLUMNS, Series
+from uam_sim_bridge.plant import Vehicle
 from uam_sim_bridge.report import figures, panels
 from uam_sim_bridge.report.panels import Flight
 
@@ -47,7 +50,8 @@ def test_short_series_are_not_thinned():
 
 def test_all_figures_are_written_as_png_and_svg(flight, tmp_path):
     steps = []
-    written = figures.draw([Flight("modular", flight)], tmp_path, steps.append)
+    found = analyse(flight, load_profile("s500").sets, Vehicle.load(), 0.2)
+    written = figures.draw([Flight("modular", flight, found)], tmp_path, steps.append)
     assert written == list(figures.FIGURES)
     assert len(steps) == len(written)
     for name in written:

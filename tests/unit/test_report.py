@@ -39,6 +39,19 @@ def test_the_report_is_one_page_that_asks_for_nothing_else(flight_folder, monkey
     assert not re.search(r"@import|url\(|<link|<script", html)
 
 
+def test_the_page_says_how_stable_it_was(flight_folder, monkeypatch):
+    for name in list(figures.FIGURES):
+        monkeypatch.delitem(figures.FIGURES, name)
+    assert "Appendix" not in text_of(page.write_page(flight_folder).read_text())
+    build_report(flight_folder, pictures=False)
+    found = json.loads((flight_folder / "stability.json").read_text())
+    words = text_of((flight_folder / "report.html").read_text())
+    assert "Stability: the Appendix along this flight" in words
+    assert f"of {found['ticks']} ticks in the air" in words
+    assert f"{found['arm']['xi_max']:.3g}" in words
+    assert "spectral radius" in words
+
+
 def test_the_page_says_what_happened_and_how_to_repeat_it(flight_folder):
     words = text_of(page.write_page(flight_folder).read_text())
     metrics = json.loads((flight_folder / "metrics.json").read_text())

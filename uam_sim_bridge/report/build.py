@@ -2,6 +2,7 @@
 
 | step | function | writes |
 |---|---|---|
+| stability | `stability_of` | stability.json |
 | figures | `figures.draw` | figures/*.png, *.svg |
 | pictures | `rendering.render` | figures/snapshots/*.png, snapshots.png, flight.mp4 |
 | page | `page.write_page` | report.html |
@@ -13,7 +14,12 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
+from uam_control.profile import ProfileError
+from uam_sim_bridge.analysis.folder import analyse_folder
+from uam_sim_bridge.analysis.stability import Stability
 from uam_sim_bridge.flight import timeseries
+from uam_sim_bridge.flight.atomic import write_text
+from uam_sim_bridge.flight.result_folder import as_json
 from uam_sim_bridge.report import figures, page, rendering
 
 
@@ -40,8 +46,21 @@ def build_report(
     directory = Path(directory)
     series = timeseries.read(directory / "timeseries.parquet")
     label = series.info.get("controller") or directory.name
-    figures.draw([figures.Flight(label, series)], directory / "figures", progress)
+    progress("stability")
+    flight = figures.Flight(label, series, stability_of(directory, series))
+    figures.draw([flight], directory / "figures", progress)
     rendered = rendering.render(directory, video, progress) if pictures else None
     progress("page")
     written = page.write_page(directory, rendered)
     return Report(written, rendered.problem if rendered else "")
+
+
+def stability_of(directory: Path, series: timeseries.Series) -> Stability | None:
+    """The analysis, also written to stability.json; None where it has nothing to say."""
+    try:
+        found = analyse_folder(directory, series)
+    except ProfileError:  # the page says that the parameters are missing
+        return None
+    if found is not None:
+        write_text(directory / "stability.json", as_json(found.summary()))
+    return found

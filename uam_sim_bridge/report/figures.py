@@ -1,4 +1,4 @@
-"""The figures of a flight, or of several over one another: the paper's five and four more.
+"""The figures of a flight, or of several over one another: the paper's five and more.
 
 `draw(flights, directory)` writes each as PNG and SVG; every figure can also be had alone.
 """
@@ -18,6 +18,7 @@ from uam_sim_bridge.flight.atomic import replacing
 from uam_sim_bridge.report import panels, paper, style
 from uam_sim_bridge.report.panels import Flight, Panel
 from uam_sim_bridge.report.path_figure import path_figure
+from uam_sim_bridge.report.stability_figures import coupling, lyapunov
 
 DEGREES = 180.0 / np.pi
 ROLL, PITCH, YAW = "roll φ", "pitch θ", "yaw ψ"
@@ -182,6 +183,17 @@ FIGURES: dict[str, tuple[Callable[[Sequence[Flight]], Figure | None], str]] = {
     "path": (path_figure, "Vehicle, arm and payload in the plane of the mission."),
     "payload": (payload, "The payload on its stand, on the magnet and on the mat."),
     "adaptation": (adaptation, "Adapted gains on a logarithmic scale, in flight."),
+    "coupling": (
+        coupling,
+        "The plant's true coupling force on each axis, less the weight fed forward, and what meets "
+        "it: the adaptive term, the feedback, and what the actuators do beyond the law's wish "
+        "(on the attitude the integrator of the autopilot). Means over 0.2 s.",
+    ),
+    "lyapunov": (
+        lyapunov,
+        "The Appendix's Lyapunov functions with the constants K* of this flight, their three "
+        "terms, what the proof's differential inequality allows, and the ultimate bound.",
+    ),
     "setpoints": (setpoints, "Body rates and collective thrust sent to the autopilot."),
 }
 

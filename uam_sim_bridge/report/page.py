@@ -11,7 +11,7 @@ from typing import Any
 import jinja2
 
 from uam_sim_bridge.flight.atomic import write_text
-from uam_sim_bridge.report import outcome, parameters
+from uam_sim_bridge.report import outcome, parameters, stability
 from uam_sim_bridge.report.figures import FIGURES
 from uam_sim_bridge.report.rendering import Rendered, existing
 
@@ -61,6 +61,7 @@ def write_page(directory: Path, rendered: Rendered | None = None) -> Path:
         video=_embedded(rendered.video),
         problem=rendered.problem,
         figures=_figures(directory / "figures"),
+        stability=_stability(directory / "stability.json"),
         comparison=comparison,
         no_parameters=no_parameters,
         versions=_json(directory / "versions.json"),
@@ -77,6 +78,18 @@ def _figures(folder: Path) -> list[tuple[str, str, str]]:
         for name, (_, caption) in FIGURES.items()
         if (folder / f"{name}.png").exists()
     ]
+
+
+def _stability(file: Path) -> dict[str, Any] | None:
+    """What the page says about the Appendix; None where nothing was analysed."""
+    found = _json(file)
+    if not found:
+        return None
+    return {
+        "verdict": stability.verdict(found),
+        "rows": stability.rows(found),
+        "caveats": stability.caveats(found),
+    }
 
 
 def _embedded(file: Path | None) -> str | None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -14,6 +15,9 @@ from matplotlib.ticker import MaxNLocator
 from uam_sim_bridge.flight.timeseries import ON_GROUND, Series
 from uam_sim_bridge.report import style
 
+if TYPE_CHECKING:
+    from uam_sim_bridge.analysis.stability import Stability
+
 BUCKETS = 900  # about one per pixel column of a panel
 RIGHT = 0.985  # right edge of the panels as part of the width
 MARGIN_S = 1.0  # shown before take-off and after touchdown
@@ -21,10 +25,11 @@ MARGIN_S = 1.0  # shown before take-off and after touchdown
 
 @dataclass(frozen=True)
 class Flight:
-    """A flight to be drawn: its series and the name it gets in a legend."""
+    """A flight to be drawn: its series, its name in a legend, its analysis if there is one."""
 
     label: str
     series: Series
+    stability: Stability | None = None
 
 
 @dataclass(frozen=True)
@@ -117,8 +122,16 @@ def lines(axis: Axes, flights: Sequence[Flight], panel: Panel) -> None:
     axis.margins(y=0.12)
 
 
-def finish(figure: Figure, axes: np.ndarray, flights: Sequence[Flight]) -> None:
-    """Phases, events, time axis and legend, common to every figure over time."""
+def finish(
+    figure: Figure,
+    axes: np.ndarray,
+    flights: Sequence[Flight],
+    handles: Sequence[Line2D] | None = None,
+) -> None:
+    """Phases, events, time axis and legend, common to every figure over time.
+
+    handles: what the legend names instead of flights and events.
+    """
     start, end = window(flights)
     axes[0, 0].set_xlim(start, end)
     first = flights[0].series
@@ -131,7 +144,10 @@ def finish(figure: Figure, axes: np.ndarray, flights: Sequence[Flight]) -> None:
     for axis in axes[-1]:
         axis.set_xlabel("time from take-off command [s]")
     figure.align_ylabels(axes)
-    legend(figure, flights, events(first))
+    if handles is None:
+        legend(figure, flights, events(first))
+    else:
+        corner_legend(figure, handles)
 
 
 def bands(axis: Axes, series: Series, end: float) -> None:
