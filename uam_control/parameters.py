@@ -7,6 +7,7 @@ the same fields.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field, fields, replace
 from typing import Any, Self
 
@@ -89,6 +90,11 @@ class ParameterSet:
             if name not in known:
                 raise ParameterError(f"{name}: unknown; allowed: {', '.join(known)}")
         return cls(**values).validated(axes)
+
+    @classmethod
+    def among(cls, values: Mapping[str, Any]) -> Self:
+        """Return a validated set of those `values` that belong to it; others may be there."""
+        return cls.from_mapping({k: v for k, v in values.items() if k in cls.specs()})
 
     def validated(self, axes: int = 0) -> Self:
         """Return this set with clean floats and tuples; raise ParameterError on the first fault.

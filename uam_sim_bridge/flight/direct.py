@@ -6,7 +6,8 @@ estimator, controllers, bridge, mission for the next tick, autopilot, physics.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
+from typing import Any
 
 import numpy as np
 
@@ -21,8 +22,8 @@ from uam_sim_bridge.autopilot.modes import CUSTOM_MODE_ENABLED, Command, Mode
 from uam_sim_bridge.autopilot.params import Parameters
 from uam_sim_bridge.flight.timeseries import COLUMNS, Recording
 from uam_sim_bridge.mavlink.frames import swap_body, swap_quaternion, swap_world
-from uam_sim_bridge.mavlink.offboard import OffboardSequence, Request
-from uam_sim_bridge.mavlink.setpoint import RateThrustMap
+from uam_sim_bridge.mavlink.offboard import OffboardParameters, OffboardSequence, Request
+from uam_sim_bridge.mavlink.setpoint import RateThrustMap, RateThrustParameters
 from uam_sim_bridge.plant import Plant, Vehicle
 
 LONGEST_WAIT = 20.0  # [s] simulated, for the autopilot to get ready and armed
@@ -63,7 +64,7 @@ class DirectFlight:
         self.position = PositionController(sets["position_controller"])
         self.attitude = AttitudeController(sets["attitude_controller"])
         self.arm = ArmController(sets["arm_controller"])
-        self.bridge = Bridge()
+        self.bridge = Bridge(profile.section("mavlink_bridge"))
         self._truth = np.zeros((3, 8))
         length = scenario.landing.at + scenario.landing.duration + 12.0
         self.recording = Recording(int(length / self.plant.period))
@@ -145,9 +146,10 @@ class Bridge:
     `setpoint` (4,): body rates [rad/s, FLU] and normalised thrust of the last tick.
     """
 
-    def __init__(self) -> None:
-        self.map = RateThrustMap()
-        self.sequence = OffboardSequence()
+    def __init__(self, section: Mapping[str, Any]) -> None:
+        """section: what the profile says of the mavlink_bridge node; {} for its defaults."""
+        self.map = RateThrustMap(RateThrustParameters.among(section))
+        self.sequence = OffboardSequence(OffboardParameters.among(section))
         self.autopilot = Autopilot(Parameters.load(configuration.path("autopilot/s500.yaml")))
         self.setpoint = np.zeros(4)
 
