@@ -57,6 +57,9 @@ def add(commands) -> None:
            help="processes (default: one per core, %(default)s)")
     option("--seed", type=int, default=1, metavar="N",
            help="of the optimiser; with --jobs 1 the search repeats (default %(default)s)")
+    option("--step", type=float, default=0.1, metavar="SHARE",
+           help="how far from the start the search looks at first, of the logarithmic range; smaller "
+           "from a good start (default %(default)s)")
     option("--out", type=Path, metavar="DIR",
            help="result folder, of a stopped search to go on with it (default "
            "results/<time>-tune-<controller>)")
@@ -92,12 +95,16 @@ def tune(options: argparse.Namespace, space) -> int:
     """Search, show how far it is, write what was found."""
     from uam_sim_bridge.tuning import outcome
     from uam_sim_bridge.tuning.search import Task, open_study, search
+    from uam_sim_bridge.tuning.space import TuningError
 
     name = f"{datetime.now():%Y%m%d-%H%M%S}-tune-{space.name}"
     out = options.out or RESULTS / name
     out.mkdir(parents=True, exist_ok=True)
     storage = options.storage or str(out / "study.journal")
-    task = Task(space, options.study or space.name, storage, options.evaluations, options.seed)
+    if not 0.0 < options.step <= 0.5:
+        raise TuningError(f"--step {options.step:g} is outside 0 to 0.5")
+    task = Task(space, options.study or space.name, storage, options.evaluations, options.seed,
+                options.step)
     if is_cold():
         print("compiling the control path (once)")
         warm_up()

@@ -23,7 +23,7 @@ from uam_sim_bridge.campaign.trial import fly
 from uam_sim_bridge.tuning.space import Space, TuningError
 
 POLL = 1.0  # [s]
-STEP = 0.15  # of the logarithmic range: how far CMA-ES looks around the start at first
+STEP = 0.1  # of the logarithmic range: how far CMA-ES looks around the start at first
 HOPELESS = 1.5  # times the best cost so far: what one flight alone may exceed it before we give up
 DONE = (TrialState.COMPLETE, TrialState.PRUNED)
 
@@ -37,6 +37,7 @@ class Task:
     storage: str
     evaluations: int
     seed: int
+    step: float = STEP
 
 
 def open_storage(where: str):
@@ -56,7 +57,7 @@ def open_study(task: Task) -> optuna.Study:
     space = task.space
     start = {knob.name: knob.value(space.start) for knob in space.knobs}
     sampler = optuna.samplers.CmaEsSampler(
-        x0=start, sigma0=STEP, seed=task.seed, warn_independent_sampling=False
+        x0=start, sigma0=task.step, seed=task.seed, warn_independent_sampling=False
     )
     study = optuna.create_study(
         storage=open_storage(task.storage),
