@@ -58,8 +58,8 @@ def add(commands) -> None:
     option("--seed", type=int, default=1, metavar="N",
            help="of the optimiser; with --jobs 1 the search repeats (default %(default)s)")
     option("--step", type=float, default=0.1, metavar="SHARE",
-           help="how far from the start the search looks at first, of the logarithmic range; smaller "
-           "from a good start (default %(default)s)")
+           help="how far from the start the search looks at first, of the logarithmic range; "
+           "smaller from a good start (default %(default)s)")
     option("--out", type=Path, metavar="DIR",
            help="result folder, of a stopped search to go on with it (default "
            "results/<time>-tune-<controller>)")

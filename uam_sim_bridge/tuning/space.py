@@ -110,6 +110,7 @@ class Space:
                 profile,
                 flight["payload_mass"],
                 flight["seed"],
+                flight.get("scenario", "pick_and_place"),
                 vehicle_changes=flight.get("vehicle", {}),
             )
             for flight in self.flights

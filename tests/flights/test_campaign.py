@@ -1,0 +1,41 @@
+"""Random flights around the nominal one, and the short way through `uam compare`."""
+
+import csv
+import json
+
+import numpy as np
+
+from uam_control.profile import load_profile
+from uam_sim_bridge.campaign.variations import common, draw, ranges
+from uam_sim_bridge.cli.main import main
+
+FLIGHTS = 12
+
+
+def test_a_draw_repeats_and_a_longer_one_begins_alike():
+    profile = load_profile("s500")
+    few, many = draw(profile, 3, seed=5), draw(profile, 6, seed=5)
+    assert [d.values for d in few] == [d.values for d in many[:3]]
+    assert [d.trial.vehicle_changes for d in few] == [d.trial.vehicle_changes for d in many[:3]]
+    assert draw(profile, 1, seed=6)[0].values != few[0].values
+    for name, (low, high) in ranges().items():
+        assert all(low <= d.values[name] <= high for d in many), name
+
+
+def test_what_failures_have_in_common_is_found():
+    drawn = draw(load_profile("s500"), 40, seed=1)
+    failed = [d.values["wind"] > 4.0 for d in drawn]
+    name, lost, kept, distance = common(drawn, failed)[0]
+    assert name == "wind" and lost > 4.0 > kept and distance > 1.0
+
+
+def test_most_random_flights_are_flown_to_the_end(tmp_path, capsys):
+    assert main(["campaign", "--flights", str(FLIGHTS), "--out", str(tmp_path)]) == 0
+    found = json.loads((tmp_path / "campaign.json").read_text())
+    assert found["flights"] == FLIGHTS and found["lost"] == 0
+    assert found["completed"] >= FLIGHTS // 2
+    assert f"{found['completed']} of {FLIGHTS} flights completed" in capsys.readouterr().out
+    rows = list(csv.DictReader((tmp_path / "flights.csv").open()))
+    assert len(rows) == FLIGHTS
+    assert all(np.isfinite(float(row["rms x"])) for row in rows)
+    assert (tmp_path / "campaign.png").stat().st_size > 0

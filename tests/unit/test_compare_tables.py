@@ -1,0 +1,50 @@
+"""Tables of the comparison, worked by hand."""
+
+import numpy as np
+import pytest
+
+from uam_sim_bridge.campaign.trial import Result
+from uam_sim_bridge.compare import tables
+from uam_sim_bridge.compare.plan import ASMC1, ASMC2, PROPOSED
+
+
+def flight(label, seed, rms, mass=0.2, completed=True, lost=False):
+    return Result(label, mass, seed, np.full(8, float(rms)), np.full(8, float(rms)), 1.0, lost,
+                  completed, "" if completed else "fell", 0.0, (0.0, 0.0), {})
+
+
+def test_a_row_is_the_mean_with_students_interval_over_seeds():
+    # seeds' means: (1 + 3) / 2 = 2, (3 + 5) / 2 = 4, (5 + 7) / 2 = 6; s = 2, t(0.975, 2) = 4.3027
+    flights = [flight(PROPOSED, seed, 2 * seed + k, mass) for seed in (1, 2, 3)
+               for k, mass in ((-1, 0.1), (1, 0.3))]
+    (row,) = tables.rows(flights)
+    assert row.mean[0] == pytest.approx(4.0) and row.worst[7] == pytest.approx(7.0)
+    assert row.half_width[0] == pytest.approx(4.3027 * 2.0 / np.sqrt(3.0), rel=1e-4)
+    assert np.isnan(tables.rows(flights[:2])[0].half_width).all()
+
+
+def test_degradation_is_the_papers():
+    # Table II, x: ASMC-1 0.15, proposed 0.05: 66.6 %
+    paper = tables.degradation(tables.PAPER[ASMC1], tables.PAPER[PROPOSED])
+    assert paper[0] == pytest.approx(66.67, abs=0.01)
+    assert paper[3] == pytest.approx(47.99, abs=0.01)
+
+
+def test_claims_say_where_they_hold_and_where_not():
+    flights = [flight(ASMC1, s, 3.0 + 0.01 * s) for s in (1, 2, 3)]
+    flights += [flight(ASMC2, s, 0.02 + 0.001 * s, 0.2, s != 2, s == 2) for s in (1, 2, 3)]
+    flights += [flight(PROPOSED, s, 0.03 + 0.001 * s) for s in (1, 2, 3)]
+    first, second, third, limit, aim, lost = tables.claims(tables.rows(flights))
+    assert f"than with {ASMC1}: holds for x, y" in first and "does not" not in first
+    assert "holds in no column; does not hold for x" in second
+    assert f"with {ASMC2} than with {ASMC1}: holds for x" in third
+    assert "missed in y" in limit and "missed in x, y" in aim
+    assert lost == f"{ASMC2}: 1 of 3 flights not completed, 1 of them lost (fell)."
+
+
+def test_the_tables_have_our_figures_the_papers_and_the_degradation():
+    text = tables.as_markdown(tables.rows([flight(ASMC1, 1, 0.4), flight(PROPOSED, 1, 0.1)]))
+    position, attitude, arm = text.strip().split("\n\n")
+    assert "| ASMC-1 (reconstructed) | 0.4000 | 0.4000 | 0.4000 | 0.15 | 0.08 | 0.31 | 75 |" in (
+        position)
+    assert "RMS attitude error [deg]" in attitude and "alpha_2" in arm

@@ -1,0 +1,139 @@
+"""The tuner's search space, cost and file, and a short search."""
+
+import dataclasses
+
+import numpy as np
+import pytest
+import yaml
+
+from uam_control import configuration
+from uam_control.profile import load_profile
+from uam_sim_bridge.campaign.trial import Result
+from uam_sim_bridge.cli.main import main
+from uam_sim_bridge.tuning.space import Cost, TuningError, load_space
+
+COST = Cost(
+    aim=(1.0,) * 8,
+    peak_weight=0.5,
+    restless_weight=0.1,
+    restless_allowed=(2.0, 4.0),
+    not_completed=3.0,
+    lost=100.0,
+)
+FLIGHT = Result(
+    label="x",
+    payload_mass=0.2,
+    seed=1,
+    rms=np.full(8, 2.0),
+    largest=np.full(8, 10.0),
+    flown=1.0,
+    lost=False,
+    completed=True,
+    why="",
+    place_error=0.01,
+    restless=(2.0, 8.0),
+    peaks={},
+)
+SPACE = {
+    "profile": "s500",
+    "flights": [{"payload_mass": 0.0, "seed": 3, "scenario": "hover"}],
+    "cost": {
+        "aim": [0.025, 0.01, 0.045, 1.6, 1.4, 1.5, 0.6, 0.6],
+        "peak_weight": 0.3,
+        "restless_weight": 0.1,
+        "restless_allowed": [0.03, 0.02],
+        "not_completed": 3.0,
+        "lost": 100.0,
+    },
+    "knobs": [
+        {"node": "position_controller", "parameter": "lambda_1", "entries": [0, 1], "low": 0.5,
+         "high": 6.0},
+        {"node": "arm_controller", "parameter": "varpi", "low": 0.1, "high": 10.0},
+    ],
+}
+
+
+def test_cost_worked_by_hand():
+    # mean (2/1)^2 = 4; peak (10/5)^2 = 4, half of it 2; restless 0.1 (1 + 4) = 0.5
+    assert COST.of(FLIGHT) == pytest.approx(6.5)
+    assert COST.of(dataclasses.replace(FLIGHT, completed=False)) == pytest.approx(9.5)
+    lost = dataclasses.replace(FLIGHT, lost=True, flown=0.25)
+    assert COST.of(lost) == pytest.approx(175.0)
+    nothing = dataclasses.replace(FLIGHT, rms=np.full(8, np.nan), flown=0.0)
+    assert COST.of(nothing) == pytest.approx(200.0)
+
+
+def write(tmp_path, **changes):
+    file = tmp_path / "space.yaml"
+    file.write_text(yaml.safe_dump({**SPACE, **changes}))
+    return str(file)
+
+
+def test_a_knob_turns_what_it_names_and_nothing_else(tmp_path):
+    space = load_space(write(tmp_path))
+    first, second = space.knobs
+    assert first.name == "position_controller.lambda_1[0,1]"
+    made = space.profile({first.name: 3.14159, second.name: 2.0})
+    start = load_profile("s500")
+    old, new = start.sets["position_controller"], made.sets["position_controller"]
+    assert new.lambda_1 == (3.142, 3.142, old.lambda_1[2])
+    assert dataclasses.replace(new, lambda_1=old.lambda_1) == old
+    assert made.sets["arm_controller"].varpi == 2.0
+    assert made.sets["attitude_controller"] == start.sets["attitude_controller"]
+    assert first.value(made) == 3.142
+
+
+@pytest.mark.parametrize("name", configuration.names("tuning"))
+def test_the_spaces_of_the_project_begin_inside_their_ranges(name):
+    space = load_space(name)
+    for knob in space.knobs:
+        entry = knob.entries[0] if knob.entries else None
+        value = getattr(space.start.sets[knob.node], knob.parameter)
+        value = value if entry is None else value[entry]
+        assert knob.low <= value <= knob.high, knob.name
+
+
+@pytest.mark.parametrize(
+    ("knob", "complaint"),
+    [
+        ({"node": "nobody"}, "no such node"),
+        ({"parameter": "lambda_9"}, "no such parameter"),
+        ({"entries": [3]}, "entries 0 to 2 are expected"),
+        ({"entries": []}, "entries 0 to 2 are expected"),
+        ({"low": 7.0}, "0 < low < high"),
+    ],
+)
+def test_a_bad_knob_is_refused_by_name(tmp_path, knob, complaint):
+    knobs = [{**SPACE["knobs"][0], **knob}]
+    with pytest.raises(TuningError, match=complaint):
+        load_space(write(tmp_path, knobs=knobs))
+
+
+def test_a_search_finds_goes_on_and_leaves_a_profile_that_loads(tmp_path, capsys):
+    space, out = write(tmp_path), tmp_path / "out"
+    arguments = ["tune", "--space", space, "--jobs", "1", "--out", str(out)]
+    assert main([*arguments, "--evaluations", "2"]) == 0
+    assert "best      evaluation" in capsys.readouterr().out
+    assert main([*arguments, "--evaluations", "3"]) == 0
+    rows = (out / "evaluations.csv").read_text().splitlines()
+    assert len(rows) == 1 + 3
+    costs = [float(row.split(",")[1]) for row in rows[1:]]
+    assert len(set(costs)) == 3 and all(0.0 < cost < 100.0 for cost in costs)
+    best = load_profile(str(out / "best.yaml"))
+    assert best.sets["arm_controller"].varpi > 0.0
+    assert (out / "search.png").stat().st_size > 0
+
+
+@pytest.mark.parametrize(
+    ("arguments", "complaint"),
+    [
+        (["--space", "nowhere.yaml"], "nowhere.yaml does not exist"),
+        (["--step", "2"], "--step 2 is outside"),
+        (["--profile", "nobody"], "unknown profile 'nobody'"),
+    ],
+)
+def test_wrong_use_is_one_line(tmp_path, capsys, monkeypatch, arguments, complaint):
+    monkeypatch.chdir(tmp_path)
+    assert main(["tune", *arguments]) == 2
+    said = capsys.readouterr().err
+    assert said.startswith("uam tune: ") and complaint in said and said.count("\n") == 1
