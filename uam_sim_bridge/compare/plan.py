@@ -13,7 +13,8 @@ from uam_sim_bridge.campaign.trial import Trial
 CONTROLLERS = ("position_controller", "attitude_controller", "arm_controller")
 PROPOSED = "proposed"
 ASMC1, ASMC2 = "ASMC-1 (reconstructed)", "ASMC-2 (reconstructed)"
-FROZEN, VERBATIM = "proposed, adaptation frozen", "Table I verbatim"
+FROZEN = "proposed, adaptation frozen"
+VERBATIM, WITH_WEIGHT = "Table I verbatim", "Table I and the weight"
 PAYLOADS = (0.1, 0.2, 0.3)  # [kg]
 
 
@@ -27,13 +28,14 @@ class Entry:
 
 def entries() -> tuple[Entry, ...]:
     """The paper's three controllers in its order, then what else the reader should see."""
-    proposed = load_profile("s500")
+    proposed, verbatim = load_profile("s500"), load_profile("paper_table1")
     return (
         Entry(ASMC1, load_profile("asmc1")),
         Entry(ASMC2, load_profile("asmc2")),
         Entry(PROPOSED, proposed),
         Entry(FROZEN, frozen(proposed)),
-        Entry(VERBATIM, load_profile("paper_table1")),
+        Entry(VERBATIM, verbatim),
+        Entry(WITH_WEIGHT, with_weight(verbatim, proposed)),
     )
 
 
@@ -43,6 +45,14 @@ def frozen(profile: Profile) -> Profile:
     for node in CONTROLLERS:
         sections[node]["adapt"] = False
     return profile_of(sections, Path(f"{profile.name}_frozen.yaml"))
+
+
+def with_weight(profile: Profile, other: Profile) -> Profile:
+    """The same profile with the weight that `other` adds to tau_p, without which nothing flies."""
+    name = "gravity_feedforward_mass"
+    sections = copy.deepcopy(profile.sections)
+    sections[CONTROLLERS[0]][name] = other.sections[CONTROLLERS[0]][name]
+    return profile_of(sections, Path(f"{profile.name}_weight.yaml"))
 
 
 def middle(payloads: Sequence[float]) -> float:
