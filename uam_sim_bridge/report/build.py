@@ -13,6 +13,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
+from uam_control.laws import catalogue
 from uam_sim_bridge.flight import timeseries
 from uam_sim_bridge.report import figures, page, rendering
 
@@ -39,7 +40,7 @@ def build_report(
     """
     directory = Path(directory)
     series = timeseries.read(directory / "timeseries.parquet")
-    label = series.info.get("controller") or directory.name
+    label = catalogue.label(series.info.get("controller") or directory.name)
     figures.draw([figures.Flight(label, series)], directory / "figures", progress)
     rendered = rendering.render(directory, video, progress) if pictures else None
     progress("page")
