@@ -89,6 +89,8 @@ def facts(metrics: Mapping[str, Any], directory: Path | None) -> Table:
         table.add_row("latency", figures)
     if metrics.get("missed_ticks") is not None:
         table.add_row("missed", f"{metrics['missed_ticks']} control ticks")
+    if metrics.get("clamps"):
+        table.add_row("clamps", outcome.clamp_story(metrics))
     if directory is not None:
         table.add_row("results", str(directory))
         if (directory / "report.html").exists():

@@ -57,6 +57,7 @@ def write_page(directory: Path, rendered: Rendered | None = None) -> Path:
         payload=outcome.payload_story(metrics),
         landing=outcome.landing_story(metrics),
         errors=outcome.error_rows(metrics),
+        clamps=outcome.clamp_story(metrics) if metrics.get("clamps") else None,
         facts=[(label, (metrics | {"controller": controller}).get(key)) for key, label in FACTS],
         controller=controller,
         papers_mission=metrics.get("scenario") == PAPER_SCENARIO,
