@@ -1,7 +1,8 @@
 """The three controllers: what the position, attitude and arm nodes run, and the direct engine too.
 
 Each holds one law with its own parameters and adapted gains, and sees the rest of the vehicle only
-through ||xi|| and ||chi_ddot||. Nothing here knows ROS.
+through ||xi||, ||chi_ddot|| and ||chi_dot||. Which law flies follows from the type of the
+parameters; errors, limits and weight are the same for all. Nothing here knows ROS.
 """
 
 from __future__ import annotations
@@ -13,10 +14,12 @@ import numpy as np
 
 from uam_control.compiled import jit
 from uam_control.coordinates import ARM, ATTITUDE, POSITION, SIZE
+from uam_control.laws import catalogue
+from uam_control.laws.asmc1 import Asmc1Parameters
+from uam_control.laws.asmc2 import Asmc2Parameters
 from uam_control.laws.errors import tracking_errors
-from uam_control.laws.modular import ModularLaw
-from uam_control.laws.parameters import LawParameters
-from uam_control.parameters import TINY, ParameterSet, number, vector
+from uam_control.laws.parameters import LawParameters, ModularParameters
+from uam_control.parameters import TINY, ParameterError, ParameterSet, number, vector
 from uam_control.thrust_direction import AttitudeReference
 
 
@@ -42,22 +45,51 @@ class TorqueLimits(ParameterSet):
 
 
 @dataclass(frozen=True)
-class PositionParameters(LawParameters, PositionLimits):
+class ModularPosition(ModularParameters, PositionLimits):
     """Everything the position controller can be told."""
 
 
 @dataclass(frozen=True)
-class TorqueParameters(LawParameters, TorqueLimits):
+class ModularTorque(ModularParameters, TorqueLimits):
     """Everything the attitude or the arm controller can be told."""
 
 
+@dataclass(frozen=True)
+class Asmc1Position(Asmc1Parameters, PositionLimits):
+    """See `ModularPosition`."""
+
+
+@dataclass(frozen=True)
+class Asmc1Torque(Asmc1Parameters, TorqueLimits):
+    """See `ModularTorque`."""
+
+
+@dataclass(frozen=True)
+class Asmc2Position(Asmc2Parameters, PositionLimits):
+    """See `ModularPosition`."""
+
+
+@dataclass(frozen=True)
+class Asmc2Torque(Asmc2Parameters, TorqueLimits):
+    """See `ModularTorque`."""
+
+
+POSITION_SETS = {"modular": ModularPosition, "asmc1": Asmc1Position, "asmc2": Asmc2Position}
+TORQUE_SETS = {"modular": ModularTorque, "asmc1": Asmc1Torque, "asmc2": Asmc2Torque}
+
+
 class Controller:
-    """What the three have in common: errors of the whole vehicle, one law, its saturation."""
+    """What the three have in common: errors of the whole vehicle, one law, its saturation.
+
+    `adaptation` (len(names),) are the law's published gains, called `names`.
+    """
 
     columns: slice
 
-    def __init__(self, parameters: PositionParameters | TorqueParameters) -> None:
-        self.law = ModularLaw(parameters)
+    def __init__(self, parameters: LawParameters) -> None:
+        self.law = catalogue.entry(parameters.law).law(parameters)
+        self.names = self.law.names
+        self.adaptation = self.law.adaptation[: len(self.names)]
         self.saturated = False
         self._errors = np.zeros((3, SIZE))
         self._own = tuple(self._errors[:, self.columns])
@@ -65,19 +97,20 @@ class Controller:
         self._printed = parameters.error_rate_form == "printed"
 
     @property
-    def parameters(self) -> PositionParameters | TorqueParameters:
+    def parameters(self) -> LawParameters:
         """The set that flies now."""
         return self.law.parameters
 
-    def set_parameters(self, parameters: PositionParameters | TorqueParameters) -> None:
-        """Fly `parameters` (validated) from the next tick on; adapted gains are kept."""
+    def set_parameters(self, parameters: LawParameters) -> None:
+        """Fly `parameters` (validated) from the next tick on; adapted gains are kept.
+
+        Raises ParameterError for those of another law.
+        """
+        flying = self.law.parameters.law
+        if parameters.law != flying:
+            raise ParameterError(f"law: {flying} flies, it cannot change to {parameters.law}")
         self.law.set_parameters(parameters)
         self._printed = parameters.error_rate_form == "printed"
-
-    @property
-    def adaptation(self) -> np.ndarray:
-        """K0..K3, zeta, rho, ||r|| (7,)."""
-        return self.law.adaptation[:7]
 
     @property
     def errors(self) -> np.ndarray:
@@ -100,12 +133,12 @@ class PositionController(Controller):
 
     columns = POSITION
 
-    def __init__(self, parameters: PositionParameters) -> None:
+    def __init__(self, parameters: PositionLimits) -> None:
         super().__init__(parameters)
         self._attitude = AttitudeReference(parameters.attitude_cutoff)
         self._tau = np.zeros(3)
 
-    def set_parameters(self, parameters: PositionParameters) -> None:
+    def set_parameters(self, parameters: PositionLimits) -> None:
         """See `Controller.set_parameters`; also moves the corner of the attitude filter."""
         super().set_parameters(parameters)
         self._attitude.cutoff = parameters.attitude_cutoff
@@ -143,12 +176,12 @@ class PositionController(Controller):
 class TorqueController(Controller):
     """tau_q or tau_alpha: the law's output within the torque limits."""
 
-    def __init__(self, parameters: TorqueParameters) -> None:
+    def __init__(self, parameters: TorqueLimits) -> None:
         super().__init__(parameters)
         self._tau = np.zeros(len(parameters.torque_max))
         self._torque_max = np.array(parameters.torque_max)
 
-    def set_parameters(self, parameters: TorqueParameters) -> None:
+    def set_parameters(self, parameters: TorqueLimits) -> None:
         """See `Controller.set_parameters`."""
         super().set_parameters(parameters)
         self._torque_max = np.array(parameters.torque_max)

@@ -37,10 +37,11 @@ class Bound:
 
 @dataclass(frozen=True)
 class Choice:
-    """Meaning of a parameter that is one of several words."""
+    """Meaning of a parameter that is one of several words; `fixed` once its node runs."""
 
     description: str
     choices: tuple[str, ...]
+    fixed: bool = False
 
 
 @dataclass(frozen=True)
@@ -63,9 +64,11 @@ def vector(
     return field(default=default, metadata={"spec": spec})
 
 
-def choice(default: str, description: str, choices: tuple[str, ...]) -> Any:
-    """Declare a field that is one of `choices`."""
-    return field(default=default, metadata={"spec": Choice(description, choices)})
+def choice(
+    default: str, description: str, choices: tuple[str, ...], fixed: bool = False
+) -> Any:
+    """Declare a field that is one of `choices`; `fixed` once the node runs."""
+    return field(default=default, metadata={"spec": Choice(description, choices, fixed)})
 
 
 def switch(default: bool, description: str) -> Any:

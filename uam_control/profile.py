@@ -10,6 +10,7 @@ A profile is read whole and checked whole; the same sets go to the nodes and to 
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -17,19 +18,20 @@ from typing import Any
 import yaml
 
 from uam_control import configuration
-from uam_control.controllers import PositionParameters, TorqueParameters
+from uam_control.controllers import POSITION_SETS, TORQUE_SETS
 from uam_control.estimation import EstimatorParameters
+from uam_control.laws import catalogue
 from uam_control.mission import MissionParameters
 from uam_control.parameters import ParameterError, ParameterSet
 
-# node → (parameter set, axes of its per-axis vectors)
-NODES: dict[str, tuple[type[ParameterSet], int]] = {
-    "position_controller": (PositionParameters, 3),
-    "attitude_controller": (TorqueParameters, 3),
-    "arm_controller": (TorqueParameters, 2),
-    "state_estimator": (EstimatorParameters, 0),
-    "mission": (MissionParameters, 0),
+# controller → (law → parameter set, axes of its per-axis vectors)
+CONTROLLERS: dict[str, tuple[dict[str, type[ParameterSet]], int]] = {
+    "position_controller": (POSITION_SETS, 3),
+    "attitude_controller": (TORQUE_SETS, 3),
+    "arm_controller": (TORQUE_SETS, 2),
 }
+OTHERS = {"state_estimator": EstimatorParameters, "mission": MissionParameters}
+NODES = (*CONTROLLERS, *OTHERS)
 ROS_OWN = ("use_sim_time",)  # parameters of ROS itself, allowed in every section
 
 
@@ -51,6 +53,23 @@ class Profile:
         """Return the raw parameters of a node, {} where the profile has none."""
         return self.sections.get(node, {})
 
+    def laws(self) -> dict[str, str]:
+        """Return controller → law."""
+        return {node: self.sets[node].law for node in CONTROLLERS}
+
+
+def parameter_set(node: str, values: Mapping[str, Any]) -> tuple[type[ParameterSet], int]:
+    """Return the kind of parameters of a node and its axes; a controller's follow from its law.
+
+    values: the node's section, whose `law` counts. Raises ParameterError for an unknown law.
+    """
+    if node in OTHERS:
+        return OTHERS[node], 0
+    sets, axes = CONTROLLERS[node]
+    law = values.get("law", catalogue.DEFAULT)
+    catalogue.entry(law)
+    return sets[law], axes
+
 
 def load_profile(name_or_file: str) -> Profile:
     """Return a profile by name (config/profiles) or from a .yaml file; raises ProfileError."""
@@ -69,9 +88,10 @@ def profile_of(sections: dict[str, dict[str, Any]], file: Path) -> Profile:
     Raises ProfileError.
     """
     sets = {}
-    for node, (kind, axes) in NODES.items():
+    for node in NODES:
         values = {k: v for k, v in sections.get(node, {}).items() if k not in ROS_OWN}
         try:
+            kind, axes = parameter_set(node, values)
             sets[node] = kind.from_mapping(values, axes)
         except ParameterError as error:
             raise ProfileError(f"{file}: {node}: {error}") from None

@@ -26,7 +26,9 @@ def descriptor(spec: Bound | Choice | Switch, read_only: bool) -> ParameterDescr
     Typing is dynamic because people write `5` where a float is meant; the set checks types itself.
     """
     text = ParameterDescriptor(
-        description=spec.description, dynamic_typing=True, read_only=read_only
+        description=spec.description,
+        dynamic_typing=True,
+        read_only=read_only or getattr(spec, "fixed", False),
     )
     if isinstance(spec, Choice):
         text.additional_constraints = "one of: " + ", ".join(spec.choices)
@@ -65,13 +67,9 @@ class NodeParameters(Generic[S]):
         """
         self._node, self._axes = node, axes
         self.apply = apply
-        given = {
-            name: value.value
-            for name, value in node._parameter_overrides.items()
-            if name in kind.specs()
-        }
-        base = {} if complete(kind, given) else dict(defaults or {})
-        self.current = kind.from_mapping(base | given, axes)
+        told = {name: value for name, value in given(node).items() if name in kind.specs()}
+        base = {} if complete(kind, told) else dict(defaults or {})
+        self.current = kind.from_mapping(base | told, axes)
         for name, spec in kind.specs().items():
             value = getattr(self.current, name)
             node.declare_parameter(
@@ -104,6 +102,11 @@ class NodeParameters(Generic[S]):
         self.current = new
         if self.apply is not None:
             self.apply(new)
+
+
+def given(node: Node) -> dict[str, Any]:
+    """Return what the parameter file and the command line say, by name."""
+    return {name: value.value for name, value in node._parameter_overrides.items()}
 
 
 def complete(kind: type[ParameterSet], given: dict[str, Any]) -> bool:

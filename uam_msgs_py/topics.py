@@ -88,7 +88,7 @@ SETPOINT = Topic(
     "/uam/setpoint", TwistStamped, RELIABLE, "body rates FLU and thrust 0..1 (linear.z) as sent"
 )
 POSITION_ADAPTATION = Topic(
-    "/uam/position/adaptation", JointState, RELIABLE, "K0..K3, zeta, rho, r_norm, 50 Hz"
+    "/uam/position/adaptation", JointState, RELIABLE, "the gains of the law, by its names, 50 Hz"
 )
 ATTITUDE_ADAPTATION = Topic("/uam/attitude/adaptation", JointState, RELIABLE, "as for position")
 ARM_ADAPTATION = Topic("/uam/arm/adaptation", JointState, RELIABLE, "as for position")

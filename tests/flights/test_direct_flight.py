@@ -90,6 +90,17 @@ def test_a_magnet_weaker_than_the_payload_lifts_nothing():
     assert height.max() < height[0] + 0.005
 
 
+@pytest.mark.parametrize("profile", ["asmc1", "asmc2"])
+def test_the_reconstructed_baselines_take_off_hover_and_land(profile):
+    a_flight = flight("hover", profile, payload=0.0)
+    a_flight.run()
+    result = metrics(a_flight, payload=0.0)
+    assert result["mission_completed"], result["shortfalls"]
+    assert max(result["max"]["position_m"]) < 0.1
+    series = a_flight.recording.series()
+    assert np.isnan(series["adaptation.position.K0"]).all()
+
+
 def test_the_printed_law_with_table_1_stays_on_the_ground():
     """law.md, decision 3: no gravity term and Mbar = I cannot lift 2.2 kg."""
     a_flight = fly_until(flight(profile="paper_table1"), 5.0)

@@ -50,6 +50,8 @@ def test_diagnostics_say_what_is_missing(start, probe):
         ("position_controller", ["-p", "lamda_1:=[1.0, 1.0, 1.0]"], "lamda_1: unknown; allowed:"),
         ("arm_controller", ["-p", "inertia:=[1.0, 1.0, 1.0]"], "a list of 2 numbers expected"),
         ("attitude_controller", ["-p", "inertia:=[1.0, .nan, 1.0]"], "inertia:"),
+        ("arm_controller", ["-p", "law:=pid"], "law: 'pid' is not one of modular, asmc1, asmc2"),
+        ("arm_controller", ["-p", "law:=asmc1", "-p", "varpi:=1.0"], "varpi: unknown; allowed: "),
         ("mission", ["-p", "scenario:=nowhere"], "nowhere"),
         ("mission", ["--params-file", "no_such_file.yaml"], "no_such_file.yaml"),
         ("state_estimator", ["-p", "position_bandwidth:=fast"], "'fast' is not numeric"),
@@ -113,3 +115,13 @@ def test_every_parameter_says_meaning_unit_and_range(start, probe):
     assert varpi.floating_point_range[0].to_value == pytest.approx(1e6)
     assert form.additional_constraints == "one of: theory, table"
 
+
+def test_the_law_is_fixed_and_its_own_parameters_are_tunable(start, probe):
+    profile = configuration.path("profiles/asmc2.yaml")
+    start("uam_control.nodes.arm_controller", "--ros-args", "--params-file", str(profile))
+    assert get_parameter(probe, "arm_controller", "law").string_value == "asmc2"
+    refused = set_parameter(probe, "arm_controller", "law", "modular")
+    assert not refused.successful
+    assert "read-only" in refused.reason and "\n" not in refused.reason
+    assert set_parameter(probe, "arm_controller", "kappa", [12.0, 12.0]).successful
+    assert set_parameter(probe, "arm_controller", "adapt", False).successful

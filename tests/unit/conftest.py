@@ -7,12 +7,13 @@ import numpy as np
 import pytest
 from whole_flight import SHORT
 
+from uam_control.laws.modular import ADAPTATION
 from uam_control.mission import load_scenario
 from uam_control.profile import load_profile
 from uam_sim_bridge.flight import metrics
 from uam_sim_bridge.flight.direct import DirectFlight
 from uam_sim_bridge.flight.result_folder import ResultFolder
-from uam_sim_bridge.flight.timeseries import COLUMNS, Recording
+from uam_sim_bridge.flight.timeseries import COLUMNS, Recording, gain_columns
 from uam_sim_bridge.plant import Vehicle
 
 PERIOD = 0.04  # ten times the control period: enough for a picture
@@ -56,7 +57,8 @@ def made_up_flight(seed=1, scale=1.0, info=None):
         row[COLUMNS.block("setpoint.")] = [*error[3:6], (0.58 + 0.05 * magnet) * flying]
         for subsystem in ("position", "attitude", "arm"):
             gains = np.abs(1.0 + np.sin(0.1 * time + np.arange(7)))
-            row[COLUMNS.block(f"adaptation.{subsystem}.")] = gains if flying else 0.0
+            row[COLUMNS.block(f"adaptation.{subsystem}.")] = np.nan
+            row[gain_columns(subsystem, ADAPTATION)] = gains if flying else 0.0
         for i in range(1, 5):
             row[COLUMNS[f"rotor_{i}.command"]] = 0.6 * flying
             row[COLUMNS[f"rotor_{i}.thrust"]] = 5.4 * flying

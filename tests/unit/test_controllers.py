@@ -2,19 +2,24 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from uam_control import configuration
 from uam_control.controllers import (
     ArmController,
     AttitudeController,
     PositionController,
     limit_force,
 )
+from uam_control.laws.catalogue import LAWS
 from uam_control.laws.errors import attitude_errors
-from uam_control.profile import load_profile
+from uam_control.parameters import ParameterError
+from uam_control.profile import ProfileError, load_profile
 from uam_control.rotations import matrix_from_euler
 from uam_control.thrust_direction import AttitudeReference
 
@@ -98,12 +103,11 @@ def test_limited_force_is_within_thrust_and_tilt(tau):
     assert np.hypot(out[0], out[1]) <= out[2] * np.tan(0.35) + 1e-9
 
 
-def sets():
-    return load_profile("s500").sets
+PROFILES = [entry.profile for entry in LAWS.values()]
 
 
-def trio():
-    s = sets()
+def trio(profile="s500"):
+    s = load_profile(profile).sets
     return (
         PositionController(s["position_controller"]),
         AttitudeController(s["attitude_controller"]),
@@ -162,3 +166,67 @@ def test_gravity_feedforward_carries_the_weight_and_zero_is_the_printed_law():
     printed = PositionController(load_profile("paper_table1").sets["position_controller"])
     state[0, 2] = -1.0  # a metre too low: far from lifting 21.6 N
     assert printed.update(state, reference, True, DT)[2] < 8.0
+
+
+@pytest.mark.parametrize("law", LAWS)
+def test_a_profile_says_which_law_flies(law):
+    entry = LAWS[law]
+    assert set(load_profile(entry.profile).laws().values()) == {law}
+    for controller, axes in zip(trio(entry.profile), (3, 3, 2), strict=True):
+        assert type(controller.law) is entry.law
+        assert len(controller.names) == len(controller.adaptation)
+        assert len(controller.law.update(*np.zeros((3, axes)), np.zeros(3), False, DT)) == axes
+
+
+def test_a_profile_without_law_is_modular_and_an_unknown_law_is_refused(tmp_path):
+    assert set(load_profile("paper_table1").laws().values()) == {"modular"}
+    file = tmp_path / "other.yaml"
+    text = configuration.path("profiles/asmc1.yaml").read_text()
+    head, tail = text.split("arm_controller:")
+    file.write_text(head + "arm_controller:" + tail.replace("law: asmc1", "law: pid"))
+    with pytest.raises(ProfileError, match="arm_controller: law: 'pid' is not one of modular, as"):
+        load_profile(str(file))
+
+
+@pytest.mark.parametrize("law", ["asmc1", "asmc2"])
+def test_the_baselines_have_one_gamma_for_all_subsystems(law):
+    profile = load_profile(LAWS[law].profile)
+    assert len({profile.sets[node].gamma for node in profile.laws()}) == 1
+
+
+def test_the_law_cannot_change_while_it_flies_but_its_parameters_can():
+    position, *_ = trio("asmc1")
+    with pytest.raises(ParameterError, match="law: asmc1 flies, it cannot change to modular"):
+        position.set_parameters(trio()[0].parameters)
+    position.set_parameters(replace(position.parameters, gamma=7.0, thrust_max=30.0))
+    assert position.law.parameters.gamma == 7.0
+
+
+@pytest.mark.parametrize("profile", PROFILES)
+def test_without_adaptation_what_is_adapted_stays(profile):
+    adapting, frozen = trio(profile), trio(profile)
+    for controller in frozen:
+        controller.set_parameters(replace(controller.parameters, adapt=False))
+    count = {"s500": [5] * 3, "asmc1": [3, 3, 2], "asmc2": [3] * 3}[profile]
+    before = [c.adaptation[:n].copy() for c, n in zip(frozen, count, strict=True)]
+    fly(*adapting), fly(*frozen)
+    for n, start, moving, still in zip(count, before, adapting, frozen, strict=True):
+        np.testing.assert_array_equal(still.adaptation[:n], start)
+        assert not np.array_equal(moving.adaptation[:n], start)
+
+
+@pytest.mark.parametrize("profile", PROFILES)
+def test_every_law_is_within_the_same_limits(profile):
+    position, other, arm = trio(profile)
+    reference = np.zeros((3, 8))
+    state = np.full((3, 8), 3.0)
+    for _ in range(5):
+        tau = position.update(state, reference, True, DT)
+        torques = [
+            controller.update(state, reference, position.attitude_reference, True, DT)
+            for controller in (other, arm)
+        ]
+        assert np.linalg.norm(tau) <= 36.0 + 1e-9
+        for controller, torque in zip((other, arm), torques, strict=True):
+            assert np.all(np.abs(torque) <= controller.parameters.torque_max)
+    assert position.saturated and other.saturated and arm.saturated

@@ -7,7 +7,7 @@ from PIL import Image
 from uam_control.profile import load_profile
 from uam_sim_bridge.analysis.stability import analyse
 from uam_sim_bridge.flight import metrics
-from uam_sim_bridge.flight.timeseries import COLUMNS, Series
+from uam_sim_bridge.flight.timeseries import COLUMNS, Series, gain_columns
 from uam_sim_bridge.plant import Vehicle
 from uam_sim_bridge.report import figures, panels
 from uam_sim_bridge.report.panels import Flight
@@ -113,6 +113,19 @@ def test_a_law_without_adaptation_has_no_adaptation_figure(flight):
     values[:, COLUMNS.block("adaptation.")] = np.nan
     series = Series(values, flight.phases, flight.phase_names, flight.info)
     assert figures.adaptation([Flight("other", series)]) is None
+
+
+def test_each_law_has_its_own_rows_in_the_adaptation_figure(flight):
+    values = flight.values.copy()
+    values[:, COLUMNS.block("adaptation.")] = np.nan
+    values[:, gain_columns("position", ("D1", "D2", "D3", "s_norm"))] = [-0.1, 0.2, 0.3, 0.4]
+    other = Flight("ASMC-1", Series(values, flight.phases, flight.phase_names, flight.info))
+    rows = ["$|\\hat D|$", "‖s‖"]
+    alone = figures.adaptation([other])
+    assert [axis.get_ylabel() for axis in alone.axes[::3]] == rows
+    assert alone.axes[0].lines[0].get_ydata().min() == 0.1  # magnitudes, for the scale
+    both = figures.adaptation([Flight("modular", flight), other])
+    assert [axis.get_ylabel() for axis in both.axes[::3]][3:] == rows
 
 
 def test_a_flight_that_never_took_off_is_drawn_too(flight, tmp_path):

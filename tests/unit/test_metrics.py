@@ -150,3 +150,15 @@ def test_latency_belongs_to_realtime_flights():
     assert "latency_ms" not in metrics.compute(flight().series(), INFO, latency)
     nothing = metrics.compute(flight().series(), info)
     assert nothing["latency_ms"] == {"p50": None, "p99": None, "max": None}
+
+
+def test_clamps_are_counted_before_the_law_is_reset_on_the_ground():
+    made = flight()
+    assert "clamps" in metrics.compute(made.series(), INFO)
+    made.values[:, COLUMNS.block("adaptation.")] = np.nan
+    assert "clamps" not in metrics.compute(made.series(), INFO)  # a law without clamps
+    for subsystem, counted in (("position", 3.0), ("attitude", 0.0), ("arm", 1.0)):
+        made.values[:8, COLUMNS[f"adaptation.{subsystem}.clamps"]] = counted
+        made.values[8:, COLUMNS[f"adaptation.{subsystem}.clamps"]] = 0.0
+    found = metrics.compute(made.series(), INFO)["clamps"]
+    assert found == {"position": 3, "attitude": 0, "arm": 1}

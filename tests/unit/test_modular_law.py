@@ -12,7 +12,7 @@ from scipy.linalg import solve_continuous_lyapunov
 
 from uam_control.laws import lyapunov
 from uam_control.laws.modular import ModularLaw
-from uam_control.laws.parameters import LawParameters
+from uam_control.laws.parameters import ModularParameters
 from uam_control.parameters import ParameterError
 
 ONE_AXIS = {
@@ -34,7 +34,7 @@ positive = st.floats(1e-3, 1e3)
 
 
 def law(**changes):
-    return ModularLaw(LawParameters.from_mapping(ONE_AXIS | changes, 1))
+    return ModularLaw(ModularParameters.from_mapping(ONE_AXIS | changes, 1))
 
 
 def update(a_law, e, e_dot, acceleration_d=0.0, norms=(0.0, 0.0, 0.0), saturated=False, dt=DT):
@@ -203,4 +203,4 @@ def test_freeze_keeps_the_gains_and_reset_restores_them():
 )
 def test_bad_parameters_are_refused_with_the_reason(change, reason):
     with pytest.raises(ParameterError, match=reason):
-        LawParameters.from_mapping(ONE_AXIS | change, 1)
+        ModularParameters.from_mapping(ONE_AXIS | change, 1)

@@ -116,6 +116,27 @@ def test_table_one_has_no_safeguard_and_no_difference_from_itself(tmp_path):
     assert not any(row.differs for rows in found.controllers.values() for row in rows)
 
 
+def test_a_reconstructed_law_is_called_so_and_is_not_compared_with_table_one(flight_folder):
+    from uam_control import configuration
+
+    file = configuration.path("profiles/asmc2.yaml")
+    rows = {row.name: row for row in parameters.compare(file).controllers["arm_controller"]}
+    assert rows["varpi"].paper == "" and not rows["varpi"].differs  # another varpi
+    assert rows["kappa"].description.startswith("kappa")
+    assert rows["torque_max"].paper != ""
+    (flight_folder / "parameters.yaml").write_text(file.read_text())
+    clamps = {"position": 0, "attitude": 3, "arm": 12}
+    change_metrics(flight_folder, controller="asmc2", clamps=clamps)
+    words = text_of(page.write_page(flight_folder).read_text())
+    assert "controller ASMC-2 (reconstructed)" in words
+    assert "controller asmc2" not in words and "flew as printed" not in words
+    assert "position 0, attitude 3, arm 12" in words
+    out = io.StringIO()
+    metrics = json.loads((flight_folder / "metrics.json").read_text())
+    Console(file=out, width=100).print(console.summary(metrics))
+    assert "ASMC-2 (reconstructed)" in out.getvalue()
+
+
 def test_a_folder_with_little_in_it_still_gets_a_page(flight_folder):
     for name in ("parameters.yaml", "versions.json", "info.json"):
         (flight_folder / name).unlink()

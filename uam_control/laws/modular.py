@@ -12,69 +12,12 @@ from __future__ import annotations
 
 import math
 
-import numpy as np
-
 from uam_control.compiled import jit
-from uam_control.laws.parameters import LawParameters
+from uam_control.laws.law import Law
 
-# Rows of the adaptation vector that every law publishes.
+# what it publishes
 ADAPTATION = ("K0", "K1", "K2", "K3", "zeta", "rho", "r_norm")
 ZETA, RHO, R_NORM, ACCELERATION = 4, 5, 6, 7
-
-
-class ModularLaw:
-    """One subsystem's law and its adapted gains.
-
-    `adaptation` (8,): K0..K3, zeta, rho, ||r||, and the filtered ||chi_ddot|| that K3 sees.
-    """
-
-    def __init__(self, parameters: LawParameters) -> None:
-        self._tau = np.zeros(len(parameters.inertia))
-        self.adaptation = np.zeros(8)
-        self.frozen = False
-        self.set_parameters(parameters)
-        self.reset()
-
-    def set_parameters(self, parameters: LawParameters) -> None:
-        """Fly `parameters` (validated) from the next tick on; the adapted gains are kept."""
-        self.parameters = parameters
-        self._record = parameters.record()
-
-    def reset(self) -> None:
-        """Put K0..K3 and zeta back to their initial values."""
-        self.adaptation[:4] = self.parameters.k_initial
-        self.adaptation[ZETA] = self.parameters.zeta_initial
-        self.adaptation[RHO:] = 0.0
-
-    def update(
-        self,
-        e: np.ndarray,
-        e_dot: np.ndarray,
-        acceleration_d: np.ndarray,
-        norms: np.ndarray,
-        saturated: bool,
-        dt: float,
-    ) -> np.ndarray:
-        """Return tau_j (n,) and advance the adapted gains by dt [s].
-
-        e, e_dot, acceleration_d: (n,), the subsystem's tracking error, its rate and chi_j_d_ddot.
-        norms (3,): ||xi||, ||chi_ddot||, ||chi_dot|| of the whole vehicle.
-        saturated: the actuator was at its limit in the last tick.
-        The returned array is reused by the next call.
-        """
-        law_step(
-            self._record,
-            e,
-            e_dot,
-            acceleration_d,
-            norms,
-            saturated,
-            self.frozen,
-            dt,
-            self.adaptation,
-            self._tau,
-        )
-        return self._tau
 
 
 @jit
@@ -142,3 +85,18 @@ def adapt(p, r_norm, xi_norm, acceleration, bound, saturated, dt, adaptation):
         rate = 1.0 + bound * r_norm
         keep = math.exp(-rate * dt)
         adaptation[ZETA] = keep * adaptation[ZETA] + (1.0 - keep) * p.epsilon / rate
+
+
+class ModularLaw(Law):
+    """`adaptation` (8,): K0..K3, zeta, rho, ||r||, and the filtered ||chi_ddot|| that K3 sees."""
+
+    step = law_step
+
+    def __init__(self, parameters) -> None:
+        super().__init__(parameters, ADAPTATION, memory=1)
+
+    def reset(self) -> None:
+        """Put K0..K3 and zeta back to their initial values."""
+        self.adaptation[:4] = self.parameters.k_initial
+        self.adaptation[ZETA] = self.parameters.zeta_initial
+        self.adaptation[RHO:] = 0.0

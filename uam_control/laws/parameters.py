@@ -1,20 +1,76 @@
-"""The parameters of the modular adaptive law of one subsystem (the paper's Table I)."""
+"""Parameters that all laws have, and those of the modular adaptive law (the paper's Table I)."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
 from uam_control.laws import lyapunov
 from uam_control.laws.errors import ERROR_RATE_FORMS
-from uam_control.parameters import HUGE, TINY, ParameterSet, choice, number, switch, vector
+from uam_control.parameters import (
+    HUGE,
+    TINY,
+    Bound,
+    ParameterSet,
+    Switch,
+    choice,
+    number,
+    switch,
+    vector,
+)
+
+SAFEGUARD = "safeguard"  # how the description of a parameter begins that the law does not have
 
 
 @dataclass(frozen=True)
 class LawParameters(ParameterSet):
-    """One entry per axis (3 for position and attitude, one per joint for the arm), or K0..K3."""
+    """What every law has; vectors have one entry per axis (3, or one per joint of the arm)."""
 
+    law: str = choice("", "the law that flies, fixed once the node runs", (), fixed=True)
+    adapt: bool = switch(
+        True, "false: the adapted gains stay, those of a whole flight at their initial values"
+    )
+    error_rate_form: str = choice(
+        "lee", "lee: Omega - R^T R_d Omega_d; printed: q_dot - R_d^T R q_d_dot", ERROR_RATE_FORMS
+    )
+
+    @property
+    def safeguards(self) -> list[str]:
+        """Names of the safeguards that are on; no law's source has any (docs/law.md)."""
+        return [
+            name
+            for name, spec in self.specs().items()
+            if isinstance(spec, Bound | Switch)
+            and spec.description.startswith(SAFEGUARD)
+            and np.any(getattr(self, name))
+        ]
+
+    def record(self) -> np.ndarray:
+        """Return the one-element structured array that the compiled law reads."""
+        raise NotImplementedError
+
+
+def structured(values: dict[str, Any]) -> np.ndarray:
+    """Return `values`, numbers and vectors, as a one-element structured float64 array."""
+    fields = [(name, np.float64, np.shape(value)) for name, value in values.items()]
+    record = np.zeros(1, np.dtype(fields))
+    for name, value in values.items():
+        record[name][0] = value
+    return record
+
+
+def ceiling(values: tuple) -> np.ndarray:
+    """Return the largest values allowed, where 0 means that there is none."""
+    return np.where(np.array(values) > 0.0, values, np.inf)
+
+
+@dataclass(frozen=True)
+class ModularParameters(LawParameters):
+    """One entry per axis, or K0..K3."""
+
+    law: str = choice("modular", "the law that flies, fixed", ("modular",), fixed=True)
     inertia: tuple = vector((), "Mbar, its diagonal", "kg or kg m^2", TINY, 1e3)
     lambda_1: tuple = vector((), "lambda_1, gain on e", "1/s^2", TINY, HUGE)
     lambda_2: tuple = vector((), "lambda_2, gain on e_dot", "1/s", TINY, HUGE)
@@ -28,9 +84,6 @@ class LawParameters(ParameterSet):
     )
     q_position: tuple = vector((), "Q, its half on e", "1", TINY, HUGE)
     q_velocity: tuple = vector((), "Q, its half on e_dot", "1", TINY, HUGE)
-    error_rate_form: str = choice(
-        "lee", "lee: Omega - R^T R_d Omega_d; printed: q_dot - R_d^T R q_d_dot", ERROR_RATE_FORMS
-    )
     k_initial: tuple = vector((), "K0..K3 at the start", "1", TINY, HUGE, 4)
     zeta_initial: float = number(0.01, "zeta at the start", "1", TINY, HUGE)
     nu: tuple = vector((), "leakage nu_0..nu_3 of K0..K3", "1/s", 1e-6, 1e4, 4)
@@ -49,24 +102,8 @@ class LawParameters(ParameterSet):
         0.0, "safeguard: low-pass on ||chi_ddot||, 0 = off", "Hz", 0.0, 125.0
     )
 
-    @property
-    def safeguards(self) -> list[str]:
-        """Names of the safeguards that are on; none of them is in the paper (law.md, decision
-        7)."""
-        return [
-            name
-            for name in (
-                "k_ceiling",
-                "freeze_when_saturated",
-                "acceleration_limit",
-                "acceleration_cutoff",
-            )
-            if np.any(getattr(self, name))
-        ]
-
     def record(self) -> np.ndarray:
         """Return the one-element structured array that the compiled law reads."""
-        n = len(self.inertia)
         p11, p12, p22 = lyapunov.solve(
             *(
                 np.array(values)
@@ -75,32 +112,20 @@ class LawParameters(ParameterSet):
         )
         theory = self.lambda_form == "theory"
         table = np.array(self.lambda_table)
-        ceiling = np.array(self.k_ceiling)
-        values = {
-            "inertia": self.inertia,
-            "gain_e": self.lambda_1 if theory else 2.0 * table,
-            "gain_e_dot": self.lambda_2 if theory else table,
-            "p11": p11,
-            "p12": p12,
-            "p22": p22,
-            "nu": self.nu,
-            "k_ceiling": np.where(ceiling > 0.0, ceiling, np.inf),
-            "epsilon": self.epsilon,
-            "varpi": self.varpi,
-            "acceleration_limit": self.acceleration_limit or np.inf,
-            "acceleration_cutoff": self.acceleration_cutoff,
-            "freeze_when_saturated": float(self.freeze_when_saturated),
-        }
-        lengths = {"nu": (4,), "k_ceiling": (4,)}
-        record = np.zeros(
-            1,
-            np.dtype(
-                [
-                    (name, np.float64, lengths.get(name, (n,) if np.ndim(value) else ()))
-                    for name, value in values.items()
-                ]
-            ),
+        return structured(
+            {
+                "inertia": self.inertia,
+                "gain_e": self.lambda_1 if theory else 2.0 * table,
+                "gain_e_dot": self.lambda_2 if theory else table,
+                "p11": p11,
+                "p12": p12,
+                "p22": p22,
+                "nu": self.nu,
+                "k_ceiling": ceiling(self.k_ceiling),
+                "epsilon": self.epsilon,
+                "varpi": self.varpi,
+                "acceleration_limit": self.acceleration_limit or np.inf,
+                "acceleration_cutoff": self.acceleration_cutoff,
+                "freeze_when_saturated": float(self.freeze_when_saturated),
+            }
         )
-        for name, value in values.items():
-            record[name][0] = value
-        return record

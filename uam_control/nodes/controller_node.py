@@ -6,18 +6,17 @@ import numpy as np
 
 from uam_control.controllers import Controller
 from uam_control.coordinates import SIZE
-from uam_control.laws.modular import ADAPTATION
+from uam_control.laws import catalogue
 from uam_control.nodes.timing import Ticks, Timing
-from uam_control.profile import NODES, load_profile
+from uam_control.profile import load_profile, parameter_set
 from uam_msgs_py import topics
 from uam_msgs_py.control import read_position_command, read_reference, read_state
 from uam_msgs_py.convert import JointStateWriter
 from uam_msgs_py.joins import StampJoin
 from uam_msgs_py.node import UamNode
-from uam_msgs_py.parameters import NodeParameters
+from uam_msgs_py.parameters import NodeParameters, given
 from uam_msgs_py.topics import Topic
 
-DEFAULT_PROFILE = "s500"  # for what no parameter file says
 ADAPTATION_PERIOD = 20_000_000  # [ns] between two adaptation messages
 
 
@@ -38,17 +37,18 @@ class ControllerNode(UamNode):
         The reference comes a tick ahead, so of the others the last one completes the tick.
         """
         super().__init__(name)
-        kind, axes = NODES[name]
-        self.parameter_set = NodeParameters(
-            self, kind, axes, load_profile(DEFAULT_PROFILE).section(name)
-        )
+        law = given(self).get("law", catalogue.DEFAULT)
+        kind, axes = parameter_set(name, {"law": law})
+        # for what no parameter file says
+        defaults = load_profile(catalogue.entry(law).profile).section(name)
+        self.parameter_set = NodeParameters(self, kind, axes, defaults)
         timing = NodeParameters(self, Timing, read_only=True).current
         self._ticks = Ticks(timing)
         self.controller = controller(self.parameter_set.current)
         self.parameter_set.apply = self.controller.set_parameters
         self._warm_up(controller(self.parameter_set.current), timing.control_period)
         self._adaptation = self.publisher(adaptation)
-        self._gains = JointStateWriter(ADAPTATION)
+        self._gains = JointStateWriter(self.controller.names)
         self._join = StampJoin([topic.name for topic in inputs], self._joined)
         self.joins.append(self._join)
         self.triggers = ([t for t in inputs if t is not topics.REFERENCE][-1].name,)
@@ -83,5 +83,6 @@ class ControllerNode(UamNode):
 
     def diagnose(self):
         level, summary, values = super().diagnose()
-        gains = dict(zip(ADAPTATION, (f"{x:.4g}" for x in self.controller.adaptation), strict=True))
+        now = (f"{x:.4g}" for x in self.controller.adaptation)
+        gains = dict(zip(self.controller.names, now, strict=True))
         return level, summary, values | gains | {"saturated": self.controller.saturated}

@@ -12,6 +12,7 @@ from rich.console import Console
 
 from uam_control import configuration
 from uam_control.configuration import ConfigurationError
+from uam_control.laws.catalogue import LAWS
 from uam_control.mission import ScenarioError
 from uam_control.profile import ProfileError
 from uam_sim_bridge.flight import settings as flight_settings
@@ -54,7 +55,8 @@ def add(commands) -> None:
     profiles = ", ".join(configuration.names("profiles"))
     option = parser.add_argument
     option("--controller", default="modular", metavar="NAME",
-           help=f"{', '.join(flight_settings.CONTROLLERS)} (default %(default)s)")
+           help="; ".join(f"{name}: {entry.label}" for name, entry in LAWS.items())
+           + " (default %(default)s)")
     option("--profile", metavar="NAME|FILE",
            help=f"parameters: {profiles}, or a ROS parameter file (default: the controller's)")
     option("--scenario", default="pick_and_place", metavar="NAME|FILE",

@@ -20,7 +20,7 @@ from uam_control.profile import Profile
 from uam_sim_bridge.autopilot.core import Autopilot
 from uam_sim_bridge.autopilot.modes import CUSTOM_MODE_ENABLED, Command, Mode
 from uam_sim_bridge.autopilot.params import Parameters
-from uam_sim_bridge.flight.timeseries import COLUMNS, Recording
+from uam_sim_bridge.flight.timeseries import COLUMNS, SUBSYSTEMS, Recording, gain_columns
 from uam_sim_bridge.mavlink.frames import swap_body, swap_quaternion, swap_world
 from uam_sim_bridge.mavlink.offboard import OffboardParameters, OffboardSequence, Request
 from uam_sim_bridge.mavlink.setpoint import RateThrustMap, RateThrustParameters
@@ -36,7 +36,6 @@ _TAU_P = COLUMNS["tau_p.x"]
 _TAU_Q = COLUMNS["tau_q.roll"]
 _TAU_ALPHA = COLUMNS["tau_alpha.1"]
 _SETPOINT = COLUMNS["setpoint.rate_x"]
-_ADAPTATION = COLUMNS.block("adaptation.").start
 _COMMAND = COLUMNS["rotor_1.command"]
 _THRUST = COLUMNS["rotor_1.thrust"]
 _PAYLOAD = COLUMNS.block("payload.").start
@@ -66,6 +65,12 @@ class DirectFlight:
         self.arm = ArmController(sets["arm_controller"])
         self.bridge = Bridge(profile.section("mavlink_bridge"))
         self._truth = np.zeros((3, 8))
+        controllers = (self.position, self.attitude, self.arm)
+        self._gains = tuple(controller.adaptation for controller in controllers)
+        self._gain_columns = tuple(
+            gain_columns(subsystem, controller.names)
+            for subsystem, controller in zip(SUBSYSTEMS, controllers, strict=True)
+        )
         length = scenario.landing.at + scenario.landing.duration + 12.0
         self.recording = Recording(int(length / self.plant.period))
 
@@ -123,9 +128,8 @@ class DirectFlight:
             tau_q,
             tau_alpha,
             self.bridge.setpoint,
-            self.position.adaptation,
-            self.attitude.adaptation,
-            self.arm.adaptation,
+            self._gains,
+            self._gain_columns,
             motors,
             plant.rotors.thrust,
             plant.payload_pose,
@@ -199,14 +203,16 @@ def record(
     tau_q,
     tau_alpha,
     setpoint,
-    position_gains,
-    attitude_gains,
-    arm_gains,
+    gains,
+    gain_columns,
     motors,
     thrust,
     payload_pose,
 ):
-    """Copy one tick into its row of the recording; roll and pitch reference are what tau_p asks."""
+    """Copy one tick into its row of the recording; roll and pitch reference are what tau_p asks.
+
+    gains, gain_columns: three arrays each, the published gains and where they go.
+    """
     row[0] = time
     for i in range(3):
         for j in range(8):
@@ -224,7 +230,8 @@ def record(
         row[_COMMAND + i] = motors[i]
         row[_THRUST + i] = thrust[i]
     for i in range(7):
-        row[_ADAPTATION + i] = position_gains[i]
-        row[_ADAPTATION + 7 + i] = attitude_gains[i]
-        row[_ADAPTATION + 14 + i] = arm_gains[i]
         row[_PAYLOAD + i] = payload_pose[i]
+    for subsystem in range(3):
+        columns, values = gain_columns[subsystem], gains[subsystem]
+        for i in range(len(columns)):
+            row[columns[i]] = values[i]

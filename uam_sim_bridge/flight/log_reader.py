@@ -22,7 +22,13 @@ from uam_msgs_py import topics
 from uam_msgs_py.status import MissionStatus
 from uam_sim_bridge.flight import cdr
 from uam_sim_bridge.flight.mcap_reader import TopicLog, UnreadableLog, read_log
-from uam_sim_bridge.flight.timeseries import COLUMNS, SUBSYSTEMS, Recording, Series
+from uam_sim_bridge.flight.timeseries import (
+    COLUMNS,
+    SUBSYSTEMS,
+    Recording,
+    Series,
+    gain_columns,
+)
 
 SECOND = 1e9
 STATE_ROWS = ("positions", "velocities", "accelerations")
@@ -170,8 +176,9 @@ def read_flight(path: Path, scenario: Scenario, info: Mapping[str, Any] | None =
     values[:, COLUMNS.block("reference.")] = reference[:, :-1]
     _commands(log, ticks, values)
     for subsystem in SUBSYSTEMS:
-        gains = log.samples(ADAPTATION[subsystem], ("position",), 7)
-        values[:, COLUMNS.block(f"adaptation.{subsystem}.")] = gains.at(ticks)
+        for block in log.blocks(ADAPTATION[subsystem]):  # one, as a law has one set of names
+            gains = Samples(block.stamps, block.fields["position"])
+            values[:, gain_columns(subsystem, block.names)] = gains.at(ticks)
     _truth(log, ticks, values)
     for number, name in enumerate(phases(time, flying, scenario, bool(abort_reason))):
         recording.phases[number] = recording.phase_names.setdefault(

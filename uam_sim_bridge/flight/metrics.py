@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from uam_control.coordinates import ARM, ATTITUDE, POSITION
-from uam_sim_bridge.flight.timeseries import Series
+from uam_sim_bridge.flight.timeseries import SUBSYSTEMS, Series
 
 # (key, columns of the error block, factor from SI to the unit that the key names)
 GROUPS = (
@@ -64,9 +64,8 @@ def compute(
     """The content of metrics.json.
 
     info: PASSED_ON, `wall_s`, `abort_reason` ("" or None when there was none); optionally
-    `drop_point` [x, y] and `landing_point` [x, y] (default the origin) [m], `missed_ticks`,
-    `clamps` (counted by the law). latency_s: sensor-to-setpoint latency per tick [s], used when
-    `clock` is "realtime".
+    `drop_point` [x, y] and `landing_point` [x, y] (default the origin) [m], `missed_ticks`.
+    latency_s: sensor-to-setpoint latency per tick [s], used when `clock` is "realtime".
     """
     criteria = criteria or Criteria()
     payload = payload_facts(series, info.get("payload_mass_kg"), info.get("drop_point"), criteria)
@@ -101,8 +100,9 @@ def compute(
     if info.get("clock") == "realtime":
         metrics["latency_ms"] = latency_figures(latency_s)
         metrics["missed_ticks"] = info.get("missed_ticks")
-    if info.get("clamps") is not None:
-        metrics["clamps"] = info["clamps"]
+    counted = clamps(series)
+    if counted is not None:
+        metrics["clamps"] = counted
     return plain(metrics)
 
 
@@ -210,6 +210,14 @@ def latency_figures(latency_s: Sequence[float] | np.ndarray | None) -> dict[str,
     milliseconds = 1e3 * np.asarray(latency_s, dtype=float)
     p50, p99 = np.percentile(milliseconds, [50.0, 99.0])
     return {"p50": float(p50), "p99": float(p99), "max": float(np.max(milliseconds))}
+
+
+def clamps(series: Series) -> dict[str, int] | None:
+    """How often each subsystem's law clamped its error; None for laws that never do."""
+    counts = {s: series[f"adaptation.{s}.clamps"] for s in SUBSYSTEMS}
+    if not any(np.isfinite(count).any() for count in counts.values()):
+        return None
+    return {s: int(np.nanmax(count, initial=0.0)) for s, count in counts.items()}
 
 
 def _span(times: np.ndarray) -> float:

@@ -6,11 +6,10 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from uam_control import configuration
+from uam_control.laws.catalogue import LAWS
 from uam_control.mission import Scenario, load_scenario
 from uam_control.profile import Profile, load_profile
 
-CONTROLLERS = {"modular": "s500"}  # controller → its default profile
-ANNOUNCED = ("asmc1", "asmc2")  # the paper's baselines, not there yet
 ENGINES = ("ros", "direct")
 CLOCKS = ("lockstep", "realtime")
 AUTOPILOTS = ("builtin",)
@@ -63,12 +62,7 @@ def settings(
     Raises SettingsError, and what loading raises (ConfigurationError, ScenarioError, ProfileError);
     each is one line for the user.
     """
-    if controller in ANNOUNCED:
-        raise SettingsError(
-            f"controller {controller} is not part of this version; there are: "
-            + ", ".join(CONTROLLERS)
-        )
-    _choice("controller", controller, CONTROLLERS)
+    _choice("controller", controller, LAWS)
     _choice("engine", engine, ENGINES)
     _choice("clock", clock, CLOCKS)
     _choice("autopilot", autopilot, AUTOPILOTS)
@@ -77,13 +71,21 @@ def settings(
     if not 0 <= seed < 2**31:
         raise SettingsError(f"seed {seed} is outside 0..{2**31 - 1}")
     loaded = load_scenario(str(configuration.named("scenarios", scenario)))
-    chosen = profile or CONTROLLERS[controller]
+    flown = load_profile(
+        str(configuration.named("profiles", profile or LAWS[controller].profile))
+    )
+    for node, law in flown.laws().items():
+        if law != controller:
+            raise SettingsError(
+                f"profile {flown.name} has the law {law} for {node}, not {controller}: "
+                f"--controller {law}, or another --profile"
+            )
     mass = loaded.payload_mass if payload_mass is None else payload_mass
     if not 0.0 <= mass <= PAYLOAD_MAX:
         raise SettingsError(f"payload mass {mass:g} kg is outside 0..{PAYLOAD_MAX:g} kg")
     return FlightSettings(
         scenario=loaded,
-        profile=load_profile(str(configuration.named("profiles", chosen))),
+        profile=flown,
         payload_mass=mass,
         out=None if out is None else Path(out),
         controller=controller,

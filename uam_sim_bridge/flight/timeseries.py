@@ -25,7 +25,7 @@ import pyarrow.parquet as pq
 
 from uam_control.coordinates import COORDINATES as NAMES
 from uam_control.coordinates import POSITION, SIZE
-from uam_control.laws.modular import ADAPTATION
+from uam_control.laws.catalogue import ADAPTATION
 from uam_control.rotations import wrap_angle
 from uam_sim_bridge.flight.atomic import replacing
 
@@ -49,8 +49,9 @@ def _declare() -> dict[str, str]:
     columns |= {f"tau_q.{axis}": "N m" for axis in ("roll", "pitch", "yaw")}
     columns |= {f"tau_alpha.{joint}": "N m" for joint in "12"}
     columns |= {f"setpoint.rate_{axis}": "rad/s" for axis in "xyz"} | {"setpoint.thrust": "1"}
-    # The units of the gains differ with subsystem and power of ||xi||; rho and zeta are those of
-    # tau before the multiplication by Mbar, so a unit per column would mislead.
+    # The gains of every law, NaN for those that did not fly. Their units differ with subsystem and
+    # power of ||xi||; rho and zeta are those of tau before the multiplication by Mbar, so a unit
+    # per column would mislead.
     columns |= {f"adaptation.{s}.{gain}": "1" for s in SUBSYSTEMS for gain in ADAPTATION}
     columns |= {f"rotor_{i}.command": "1" for i in range(1, 5)}
     columns |= {f"rotor_{i}.thrust": "N" for i in range(1, 5)}
@@ -94,6 +95,11 @@ class Columns:
 
 
 COLUMNS = Columns(_declare())
+
+
+def gain_columns(subsystem: str, names: Iterable[str]) -> np.ndarray:
+    """Numbers (n,) of the columns of a law's gains, called `names`."""
+    return np.array([COLUMNS[f"adaptation.{subsystem}.{name}"] for name in names])
 
 
 class UnreadableFlight(ValueError):

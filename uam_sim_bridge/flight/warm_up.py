@@ -10,6 +10,7 @@ import sys
 from collections.abc import Iterator
 from pathlib import Path
 
+from uam_control.laws.catalogue import LAWS
 from uam_control.mission import load_scenario
 from uam_control.profile import load_profile
 from uam_sim_bridge.flight.direct import DirectFlight
@@ -40,7 +41,9 @@ def is_cold() -> bool:
 
 
 def warm_up() -> None:
-    """Fly a few seconds in the direct engine, which runs every function of the nodes."""
-    flight = DirectFlight(load_scenario("hover"), load_profile("s500"), Vehicle.load(), 0.0, seed=1)
-    for _ in range(TICKS):
-        flight.tick()
+    """Fly a few seconds in the direct engine with each law: it runs every function of the nodes."""
+    scenario, vehicle = load_scenario("hover"), Vehicle.load()
+    for entry in LAWS.values():
+        flight = DirectFlight(scenario, load_profile(entry.profile), vehicle, 0.0, seed=1)
+        for _ in range(TICKS):
+            flight.tick()

@@ -14,6 +14,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
+from uam_control.laws import catalogue
 from uam_control.profile import ProfileError
 from uam_sim_bridge.analysis.folder import analyse_folder
 from uam_sim_bridge.analysis.stability import Stability
@@ -45,7 +46,7 @@ def build_report(
     """
     directory = Path(directory)
     series = timeseries.read(directory / "timeseries.parquet")
-    label = series.info.get("controller") or directory.name
+    label = catalogue.label(series.info.get("controller") or directory.name)
     progress("stability")
     flight = figures.Flight(label, series, stability_of(directory, series))
     figures.draw([flight], directory / "figures", progress)

@@ -11,6 +11,7 @@ from rich.console import Console, Group
 from rich.table import Table
 from rich.text import Text
 
+from uam_control.laws import catalogue
 from uam_sim_bridge.report import outcome
 
 
@@ -76,6 +77,7 @@ def facts(metrics: Mapping[str, Any], directory: Path | None) -> Table:
     table = Table.grid(padding=(0, 2))
     table.add_column(style="dim")
     table.add_column(overflow="fold")
+    table.add_row("controller", catalogue.label(metrics["controller"]))
     table.add_row("payload", outcome.payload_story(metrics))
     table.add_row("landing", outcome.landing_story(metrics))
     factor = metrics.get("real_time_factor")
@@ -87,6 +89,8 @@ def facts(metrics: Mapping[str, Any], directory: Path | None) -> Table:
         table.add_row("latency", figures)
     if metrics.get("missed_ticks") is not None:
         table.add_row("missed", f"{metrics['missed_ticks']} control ticks")
+    if metrics.get("clamps"):
+        table.add_row("clamps", outcome.clamp_story(metrics))
     if directory is not None:
         table.add_row("results", str(directory))
         if (directory / "report.html").exists():

@@ -15,6 +15,7 @@ from matplotlib.ticker import NullFormatter
 
 from uam_sim_bridge.flight import metrics
 from uam_sim_bridge.flight.atomic import replacing
+from uam_sim_bridge.flight.timeseries import SUBSYSTEMS
 from uam_sim_bridge.report import panels, paper, style
 from uam_sim_bridge.report.panels import Flight, Panel
 from uam_sim_bridge.report.path_figure import path_figure
@@ -83,14 +84,30 @@ def payload(flights: Sequence[Flight]) -> Figure | None:
     return panels.stack("Payload", flights, drawn, panel_height=1.15)[0]
 
 
+# rows of the figure of the adaptation: gains of one law → label
+GAINS = {
+    ("K0", "K1", "K2", "K3"): "$K_0 \\ldots K_3$",
+    ("zeta",): "ζ",
+    ("rho",): "ρ",
+    ("D1", "D2", "D3"): "$|\\hat D|$",
+    ("s_norm",): "‖s‖",
+    ("theta0", "theta1", "theta2"): "$\\theta_0 \\ldots \\theta_2$",
+    ("w_norm",): "‖w‖",
+    ("eta",): "largest |η|",
+}
+SYMBOLS = {"K": "K", "D": "D", "theta": "\\theta"}
+
+
 def adaptation(flights: Sequence[Flight]) -> Figure | None:
-    """Adapted gains, zeta and rho of the three subsystems; None where the law adapts none."""
-    if not any(np.isfinite(f.series.block("adaptation.")).any() for f in flights):
+    """Adapted gains and what drives them, by subsystem, for the laws flown; None without any."""
+    shown = [names for names in GAINS if any(_adapted(f, names) for f in flights)]
+    if not shown:
         return None
-    figure, axes = panels.grid("Adaptation", 3, 3, 1.65)
+    figure, axes = panels.grid("Adaptation", len(shown), 3, 1.65)
     for column, subsystem in enumerate(("position", "attitude", "arm")):
         for number, flight in enumerate(flights):
-            _adaptation_of(axes[:, column], flight, subsystem, number, len(flights))
+            for axis, names in zip(axes[:, column], shown, strict=True):
+                _adaptation_of(axis, flight, subsystem, names, number, len(flights))
         axes[0, column].annotate(
             subsystem,
             (0.0, 1.0),
@@ -104,40 +121,50 @@ def adaptation(flights: Sequence[Flight]) -> Figure | None:
         low, high = axis.get_ylim()
         axis.set_ylim(10.0 ** np.floor(np.log10(low)), 10.0 ** np.ceil(np.log10(high)))
         axis.yaxis.set_minor_formatter(NullFormatter())
-    for axis, label in zip(axes[:, 0], ("$K_0 \\ldots K_3$", "ζ", "ρ"), strict=True):
-        axis.set_ylabel(label)
-    axes[0, 2].legend(
-        handles=[Line2D([], [], color=c, label=f"$K_{i}$") for i, c in enumerate(style.GAINS)],
-        loc="lower right",
-        bbox_to_anchor=(1.02, 1.06),
-        ncols=4,
-        handlelength=1.0,
-        columnspacing=0.8,
-        fontsize=8.0,
-    )
+    for row, names in zip(axes, shown, strict=True):
+        row[0].set_ylabel(GAINS[names])
+        if len(names) > 1:
+            _gain_legend(row[2], names)
     panels.finish(figure, axes, flights)
     for axis in axes[-1]:
         axis.set_xlabel("time [s]")
     return figure
 
 
-def _adaptation_of(axes, flight: Flight, subsystem: str, number: int, flights: int) -> None:
+def _gain_legend(axis, names: tuple[str, ...]) -> None:
+    lines = zip(style.GAINS, names, strict=False)
+    axis.legend(
+        handles=[
+            Line2D([], [], color=c, label=f"${SYMBOLS[name[:-1]]}_{name[-1]}$") for c, name in lines
+        ],
+        loc="lower right",
+        bbox_to_anchor=(1.02, 0.97),
+        ncols=len(names),
+        handlelength=1.0,
+        columnspacing=0.8,
+        fontsize=8.0,
+    )
+
+
+def _adapted(flight: Flight, names: tuple[str, ...]) -> bool:
+    """Whether the flight has any of these gains, in any subsystem."""
+    columns = [f"adaptation.{s}.{name}" for s in SUBSYSTEMS for name in names]
+    return any(np.isfinite(flight.series[column]).any() for column in columns)
+
+
+def _adaptation_of(
+    axis, flight: Flight, subsystem: str, names: tuple[str, ...], number: int, flights: int
+) -> None:
     series = flight.series
-    dash = ("-", "--", ":", "-.")[number % 4]
-    colour = style.FLIGHTS[number % len(style.FLIGHTS)]
-    lines = [(0, f"K{i}", gain, dash if flights > 1 else "-") for i, gain in enumerate(style.GAINS)]
-    for row, name, line_colour, style_of_line in [
-        *lines,
-        (1, "zeta", colour, "-"),
-        (2, "rho", colour, "-"),
-    ]:
-        values = series[f"adaptation.{subsystem}.{name}"]
+    for i, name in enumerate(names):
+        values = np.abs(series[f"adaptation.{subsystem}.{name}"])
         shown = series.flown & (values > 0.0)
         if shown.any():
-            axes[row].plot(
+            several = len(names) > 1  # then the colour tells the gain, the dash the flight
+            axis.plot(
                 *panels.thin(series.time[shown], values[shown], 400),
-                color=line_colour,
-                linestyle=style_of_line,
+                color=style.GAINS[i] if several else style.FLIGHTS[number % len(style.FLIGHTS)],
+                linestyle=("-", "--", ":", "-.")[number % 4] if several and flights > 1 else "-",
                 linewidth=1.0,
             )
 

@@ -74,6 +74,11 @@ def landing_story(metrics: Mapping[str, Any]) -> str:
     return "not landed" if error is None else f"{distance(error)} from the landing point"
 
 
+def clamp_story(metrics: Mapping[str, Any]) -> str:
+    """How often each law left its prescribed performance and was clamped, in one line."""
+    return ", ".join(f"{subsystem} {count}" for subsystem, count in metrics["clamps"].items())
+
+
 def distance(metres: float) -> str:
     """A distance as a person says it."""
     return f"{metres:.2f} m" if metres >= 1.0 else f"{100.0 * metres:.1f} cm"

@@ -10,6 +10,7 @@ from typing import Any
 
 import jinja2
 
+from uam_control.laws import catalogue
 from uam_sim_bridge.flight.atomic import write_text
 from uam_sim_bridge.report import outcome, parameters, stability
 from uam_sim_bridge.report.figures import FIGURES
@@ -36,6 +37,7 @@ def write_page(directory: Path, rendered: Rendered | None = None) -> Path:
     """
     metrics = _json(directory / "metrics.json")
     info = _json(directory / "info.json")
+    controller = catalogue.label(metrics.get("controller"))
     rendered = rendered or existing(directory)
     try:
         comparison, no_parameters = parameters.compare(directory / "parameters.yaml"), ""
@@ -55,7 +57,9 @@ def write_page(directory: Path, rendered: Rendered | None = None) -> Path:
         payload=outcome.payload_story(metrics),
         landing=outcome.landing_story(metrics),
         errors=outcome.error_rows(metrics),
-        facts=[(label, metrics.get(key)) for key, label in FACTS],
+        clamps=outcome.clamp_story(metrics) if metrics.get("clamps") else None,
+        facts=[(label, (metrics | {"controller": controller}).get(key)) for key, label in FACTS],
+        controller=controller,
         papers_mission=metrics.get("scenario") == PAPER_SCENARIO,
         strip=_embedded(rendered.strip),
         video=_embedded(rendered.video),

@@ -9,11 +9,18 @@ from typing import Any
 
 import numpy as np
 
-from uam_control.profile import ProfileError, load_profile, read_sections
+from uam_control.laws.parameters import SAFEGUARD
+from uam_control.parameters import ParameterError, ParameterSet
+from uam_control.profile import (
+    CONTROLLERS,
+    NODES,
+    ProfileError,
+    load_profile,
+    parameter_set,
+    read_sections,
+)
 
-CONTROLLERS = ("position_controller", "attitude_controller", "arm_controller")
 PAPER_PROFILE = "paper_table1"
-SAFEGUARD = "safeguard"  # how the description of a parameter begins that the paper does not have
 
 
 @dataclass(frozen=True)
@@ -55,14 +62,27 @@ def compare(parameter_file: Path) -> Comparison:
     paper = load_profile(PAPER_PROFILE).sets
     rows = {}
     for node, values in flown.items():
-        known = paper.get(node)
-        specs = known.specs() if known else {}
-        table = asdict(known) if known else {}
+        specs = _specs(parameter_file, node, values)
+        table = _table(paper[node], specs) if node in paper else {}
         rows[node] = [_row(name, value, table, specs) for name, value in values.items()]
     return Comparison(
         {node: rows[node] for node in CONTROLLERS if node in rows},
         {node: found for node, found in rows.items() if node not in CONTROLLERS and found},
     )
+
+
+def _specs(file: Path, node: str, values: Mapping[str, Any]) -> Mapping[str, Any]:
+    """What the parameters mean to the law that flew."""
+    try:
+        return parameter_set(node, values)[0].specs() if node in NODES else {}
+    except ParameterError as error:
+        raise ProfileError(f"{file}: {node}: {error}") from None
+
+
+def _table(paper: ParameterSet, specs: Mapping[str, Any]) -> dict[str, Any]:
+    """Table I's values of those parameters that mean the same to the law that flew."""
+    known = paper.specs()
+    return {name: value for name, value in asdict(paper).items() if specs.get(name) == known[name]}
 
 
 def _row(name: str, value: Any, table: Mapping[str, Any], specs: Mapping[str, Any]) -> Row:

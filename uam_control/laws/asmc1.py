@@ -1,0 +1,109 @@
+"""ASMC-1, a RECONSTRUCTION after Kim et al. 2013 and 2016, whose exact law could not be had.
+
+Adaptive sliding mode in the manner of passivity-based control, with an estimate Dhat of a slowly
+varying disturbance that knows nothing of the state:
+
+    s = e_dot + Lambda e,   chi_r_dot = chi_d_dot - Lambda e
+    tau = Mhat chi_r_ddot + Ghat + Dhat - A s - K sat(s / phi),   Dhat_dot = -Gamma s
+
+with diagonal Mhat, A = a Mhat, K = k Mhat and Gamma = gamma Mhat. Ghat of the law itself is 0: the
+weight is added to tau_p for every law alike (`gravity_feedforward_mass`), and for the arm law.md
+gives no law a gravity term. For the attitude e and e_dot are the errors on SO(3).
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from uam_control.compiled import jit
+from uam_control.laws.law import Law
+from uam_control.laws.parameters import LawParameters, structured
+from uam_control.parameters import HUGE, TINY, choice, number, switch, vector
+
+
+@dataclass(frozen=True)
+class Asmc1Parameters(LawParameters):
+    """One entry per axis; gamma is one number, by design the same in all three subsystems."""
+
+    law: str = choice("asmc1", "the law that flies, fixed", ("asmc1",), fixed=True)
+    inertia: tuple = vector((), "Mhat, diagonal mass matrix", "kg or kg m^2", TINY, 1e3)
+    slope: tuple = vector((), "Lambda, slope of the sliding surface", "1/s", TINY, HUGE)
+    damping: tuple = vector((), "a, with A = a Mhat", "1/s", 0.0, HUGE)
+    switching: tuple = vector((), "k, with K = k Mhat", "m/s^2 or rad/s^2", 0.0, HUGE)
+    boundary: tuple = vector((), "phi, boundary layer of s", "m/s or rad/s", TINY, HUGE)
+    switching_form: str = choice(
+        "sat", "sat: K sat(s/phi); sign: K sign(s), without boundary layer", ("sat", "sign")
+    )
+    gamma: float = number(5.0, "gamma, with Gamma = gamma Mhat", "1/s^2", 0.0, HUGE)
+    disturbance_ceiling: float = number(
+        0.0, "safeguard: largest |Dhat| per axis, 0 = off", "N or N m", 0.0, HUGE
+    )
+    freeze_when_saturated: bool = switch(
+        False, "safeguard: |Dhat| does not grow while the actuator saturates"
+    )
+
+    def record(self) -> np.ndarray:
+        """See `LawParameters.record`."""
+        inertia = np.array(self.inertia)
+        return structured(
+            {
+                "inertia": self.inertia,
+                "slope": self.slope,
+                "damping": inertia * self.damping,
+                "switching": inertia * self.switching,
+                "boundary": self.boundary,
+                "sign": float(self.switching_form == "sign"),
+                "gamma": inertia * self.gamma,
+                "ceiling": self.disturbance_ceiling or np.inf,
+                "freeze_when_saturated": float(self.freeze_when_saturated),
+            }
+        )
+
+
+@jit
+def asmc1_step(record, e, e_dot, acceleration_d, norms, saturated, frozen, dt, adaptation, tau):
+    """One tick of ASMC-1: writes tau (n,) and advances adaptation (n + 1,) in place.
+
+    Dhat does not act on its own derivative: over a tick of constant s the sum is exact.
+    """
+    p = record[0]
+    n = len(tau)
+    squared = 0.0
+    for i in range(n):
+        s = e_dot[i] + p.slope[i] * e[i]
+        squared += s * s
+        if p.sign > 0.0:
+            switched = np.sign(s)
+        else:
+            switched = min(max(s / p.boundary[i], -1.0), 1.0)
+        tau[i] = (
+            p.inertia[i] * (acceleration_d[i] - p.slope[i] * e_dot[i])
+            + adaptation[i]
+            - p.damping[i] * s
+            - p.switching[i] * switched
+        )
+        if frozen:
+            continue
+        disturbance = adaptation[i] - p.gamma[i] * s * dt
+        if p.freeze_when_saturated > 0.0 and saturated:
+            held = abs(adaptation[i])
+            disturbance = min(max(disturbance, -held), held)
+        adaptation[i] = min(max(disturbance, -p.ceiling), p.ceiling)
+    adaptation[n] = math.sqrt(squared)
+
+
+class Asmc1Law(Law):
+    """`adaptation` (n + 1,): Dhat per axis and ||s||."""
+
+    step = asmc1_step
+
+    def __init__(self, parameters: Asmc1Parameters) -> None:
+        axes = range(1, len(parameters.inertia) + 1)
+        super().__init__(parameters, (*(f"D{i}" for i in axes), "s_norm"))
+
+    def reset(self) -> None:
+        """Forget the disturbance."""
+        self.adaptation[:] = 0.0
