@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from uam_control.laws.modular import ModularLaw
-from uam_control.laws.parameters import LawParameters
+from uam_control.laws.parameters import ModularParameters
 from uam_control.profile import load_profile
 from uam_sim_bridge.analysis import constants, lyapunov, stability, ticks
 from uam_sim_bridge.analysis.folder import analyse_folder
@@ -16,7 +16,7 @@ from uam_sim_bridge.flight.timeseries import COLUMNS, Series
 from uam_sim_bridge.plant import Vehicle
 from uam_sim_bridge.report import figures, panels
 
-LAW = LawParameters(
+LAW = ModularParameters(
     inertia=(1.0, 1.0, 1.0),
     lambda_1=(4.0, 4.0, 4.0),
     lambda_2=(4.0, 4.0, 4.0),

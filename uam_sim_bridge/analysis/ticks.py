@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import numpy as np
 
-from uam_sim_bridge.flight.timeseries import Series
+from uam_control.laws.modular import ADAPTATION
+from uam_sim_bridge.flight.timeseries import SUBSYSTEMS, Series, gain_columns
 
 CLEARANCE = 0.01  # [m] above where the vehicle stood: no ground under its feet
 LIFTED = 0.001  # [m] above where the payload stood: nothing but the magnet carries it
 FIRM = 0.5  # of the magnet's largest force: less and there is an air gap
 FREQUENCY = 50.0  # [Hz]
-NEEDED = ("truth.", "estimate.", "reference.", "tau_", "adaptation.", "rotor_")
+NEEDED = ("truth.", "estimate.", "reference.", "tau_", "rotor_")
 FEWEST = 10  # ticks; below that there is nothing to say
 
 
@@ -22,8 +23,9 @@ def in_the_air(series: Series, frequency: float = FREQUENCY) -> np.ndarray:
     if len(series) < FEWEST:
         return np.zeros(0, dtype=int)
     flown = series.flown & (series["truth.z"] > series["truth.z"][0] + CLEARANCE)
+    gains = np.hstack([series.values[:, gain_columns(s, ADAPTATION)] for s in SUBSYSTEMS])
     complete = np.logical_and.reduce(
-        [np.isfinite(series.block(group)).all(axis=1) for group in NEEDED]
+        [np.isfinite(block).all(axis=1) for block in (*map(series.block, NEEDED), gains)]
     )
     rows = np.flatnonzero(flown & complete)
     return rows[:: max(1, round(1.0 / (frequency * period(series))))]
