@@ -120,10 +120,11 @@ def test_each_law_has_its_own_rows_in_the_adaptation_figure(flight):
     values[:, COLUMNS.block("adaptation.")] = np.nan
     values[:, gain_columns("position", ("D1", "D2", "D3", "s_norm"))] = [-0.1, 0.2, 0.3, 0.4]
     other = Flight("ASMC-1", Series(values, flight.phases, flight.phase_names, flight.info))
-    rows = ["$|\\hat D|$", "‖s‖"]
+    rows = ["$\\hat D$", "‖s‖"]
     alone = figures.adaptation([other])
     assert [axis.get_ylabel() for axis in alone.axes[::3]] == rows
-    assert alone.axes[0].lines[0].get_ydata().min() == 0.1  # magnitudes, for the scale
+    assert alone.axes[0].lines[0].get_ydata().max() == -0.1  # signed, hence linear
+    assert [axis.get_yscale() for axis in alone.axes[::3]] == ["linear", "log"]
     both = figures.adaptation([Flight("modular", flight), other])
     assert [axis.get_ylabel() for axis in both.axes[::3]][3:] == rows
 

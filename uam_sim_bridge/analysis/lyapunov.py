@@ -98,7 +98,7 @@ def decrease(
 
 
 def comparison(parameters, zeta: np.ndarray, constants: np.ndarray) -> Comparison:
-    """rate_j and growth_j of one subsystem; parameters: its ModularParameters, zeta (m,), constants K*.
+    """rate_j and growth_j of one subsystem; its ModularParameters, zeta (m,), constants K*.
 
     zeta_min and zeta_max are those of the flight.
     """

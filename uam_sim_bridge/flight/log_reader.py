@@ -176,9 +176,7 @@ def read_flight(path: Path, scenario: Scenario, info: Mapping[str, Any] | None =
     values[:, COLUMNS.block("reference.")] = reference[:, :-1]
     _commands(log, ticks, values)
     for subsystem in SUBSYSTEMS:
-        for block in log.blocks(ADAPTATION[subsystem]):  # one, as a law has one set of names
-            gains = Samples(block.stamps, block.fields["position"])
-            values[:, gain_columns(subsystem, block.names)] = gains.at(ticks)
+        adaptation(log, subsystem, ticks, values)
     _truth(log, ticks, values)
     for number, name in enumerate(phases(time, flying, scenario, bool(abort_reason))):
         recording.phases[number] = recording.phase_names.setdefault(
@@ -186,6 +184,13 @@ def read_flight(path: Path, scenario: Scenario, info: Mapping[str, Any] | None =
         )
     recording.count = len(ticks)
     return Flight(recording.series(info), end is not None, abort_reason)
+
+
+def adaptation(log: Log, subsystem: str, ticks: np.ndarray, values: np.ndarray) -> None:
+    """Fill in the gains of a subsystem's law: one block of messages, as a law has one set."""
+    for block in log.blocks(ADAPTATION[subsystem]):
+        gains = Samples(block.stamps, block.fields["position"])
+        values[:, gain_columns(subsystem, block.names)] = gains.at(ticks)
 
 
 def _commands(log: Log, ticks: np.ndarray, values: np.ndarray) -> None:

@@ -89,12 +89,13 @@ GAINS = {
     ("K0", "K1", "K2", "K3"): "$K_0 \\ldots K_3$",
     ("zeta",): "ζ",
     ("rho",): "ρ",
-    ("D1", "D2", "D3"): "$|\\hat D|$",
+    ("D1", "D2", "D3"): "$\\hat D$",
     ("s_norm",): "‖s‖",
     ("theta0", "theta1", "theta2"): "$\\theta_0 \\ldots \\theta_2$",
     ("w_norm",): "‖w‖",
     ("eta",): "largest |η|",
 }
+SIGNED = ("D1", "D2", "D3")  # drawn on a linear scale
 SYMBOLS = {"K": "K", "D": "D", "theta": "\\theta"}
 
 
@@ -116,29 +117,30 @@ def adaptation(flights: Sequence[Flight]) -> Figure | None:
             textcoords="offset points",
             fontweight="bold",
         )
-    for axis in axes.flat:
-        axis.set_yscale("log")
-        low, high = axis.get_ylim()
-        axis.set_ylim(10.0 ** np.floor(np.log10(low)), 10.0 ** np.ceil(np.log10(high)))
-        axis.yaxis.set_minor_formatter(NullFormatter())
     for row, names in zip(axes, shown, strict=True):
         row[0].set_ylabel(GAINS[names])
         if len(names) > 1:
-            _gain_legend(row[2], names)
+            _gain_legend(row[2], names, above=1.06 if names == shown[0] else 0.97)
+        for axis in row if names != SIGNED else ():
+            axis.set_yscale("log")
+            low, high = axis.get_ylim()
+            axis.set_ylim(10.0 ** np.floor(np.log10(low)), 10.0 ** np.ceil(np.log10(high)))
+            axis.yaxis.set_minor_formatter(NullFormatter())
     panels.finish(figure, axes, flights)
     for axis in axes[-1]:
         axis.set_xlabel("time [s]")
     return figure
 
 
-def _gain_legend(axis, names: tuple[str, ...]) -> None:
+def _gain_legend(axis, names: tuple[str, ...], above: float) -> None:
+    """Names of the gains of a row; above the names of the phases in the first."""
     lines = zip(style.GAINS, names, strict=False)
     axis.legend(
         handles=[
             Line2D([], [], color=c, label=f"${SYMBOLS[name[:-1]]}_{name[-1]}$") for c, name in lines
         ],
         loc="lower right",
-        bbox_to_anchor=(1.02, 0.97),
+        bbox_to_anchor=(1.02, above),
         ncols=len(names),
         handlelength=1.0,
         columnspacing=0.8,
@@ -157,8 +159,8 @@ def _adaptation_of(
 ) -> None:
     series = flight.series
     for i, name in enumerate(names):
-        values = np.abs(series[f"adaptation.{subsystem}.{name}"])
-        shown = series.flown & (values > 0.0)
+        values = series[f"adaptation.{subsystem}.{name}"]
+        shown = series.flown & (np.isfinite(values) if names == SIGNED else values > 0.0)
         if shown.any():
             several = len(names) > 1  # then the colour tells the gain, the dash the flight
             axis.plot(
@@ -209,7 +211,7 @@ FIGURES: dict[str, tuple[Callable[[Sequence[Flight]], Figure | None], str]] = {
     "arm_inputs": (arm_inputs, "Joint torques that the arm law asks for."),
     "path": (path_figure, "Vehicle, arm and payload in the plane of the mission."),
     "payload": (payload, "The payload on its stand, on the magnet and on the mat."),
-    "adaptation": (adaptation, "Adapted gains on a logarithmic scale, in flight."),
+    "adaptation": (adaptation, "Adapted gains and what drives them, in flight."),
     "coupling": (
         coupling,
         "The plant's true coupling force on each axis, less the weight fed forward, and what meets "

@@ -1,0 +1,34 @@
+"""The gains in a log go to the columns that bear their names."""
+
+import numpy as np
+import pytest
+
+pytest.importorskip("rclpy")
+
+from uam_control.laws.catalogue import LAWS
+from uam_control.profile import load_profile
+from uam_msgs_py.convert import JointStateWriter
+from uam_sim_bridge.flight import log_reader
+from uam_sim_bridge.flight.mcap_reader import TopicLog
+from uam_sim_bridge.flight.timeseries import COLUMNS, gain_columns
+
+
+@pytest.mark.parametrize("law", LAWS)
+def test_the_gains_of_every_law_are_read_by_name(law):
+    entry = LAWS[law]
+    names = entry.law(load_profile(entry.profile).sets["arm_controller"]).names
+    writer = JointStateWriter(names)
+    messages = []
+    for k in (1, 2):
+        writer.position[:] = 10.0 * k + np.arange(len(names))
+        messages.append(bytes(writer.stamped(20_000_000 * k)))
+    topic = log_reader.ADAPTATION["arm"]
+    log = log_reader.Log({topic: TopicLog("sensor_msgs/msg/JointState", [], messages)})
+    values = np.full((3, len(COLUMNS)), np.nan)
+    ticks = np.array([16_000_000, 36_000_000, 40_000_000])
+    log_reader.adaptation(log, "arm", ticks, values)
+    columns = gain_columns("arm", names)
+    assert np.isnan(values[0]).all()  # nothing was said yet
+    np.testing.assert_array_equal(values[1, columns], 10.0 + np.arange(len(names)))
+    np.testing.assert_array_equal(values[2, columns], 20.0 + np.arange(len(names)))
+    assert np.isfinite(values[2]).sum() == len(names)
