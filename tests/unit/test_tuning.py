@@ -88,7 +88,7 @@ def test_the_spaces_of_the_project_begin_inside_their_ranges(name):
     space = load_space(name)
     for knob in space.knobs:
         entry = knob.entries[0] if knob.entries else None
-        value = getattr(space.start.sets[knob.node], knob.parameter)
+        value = getattr(space.start.sets[knob.nodes[0]], knob.parameter)
         value = value if entry is None else value[entry]
         assert knob.low <= value <= knob.high, knob.name
 

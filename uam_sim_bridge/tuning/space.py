@@ -24,9 +24,12 @@ class TuningError(ValueError):
 
 @dataclass(frozen=True)
 class Knob:
-    """One number of the search: some entries of a parameter, moved together, logarithmically."""
+    """One number of the search: some entries of a parameter, moved together, logarithmically.
 
-    node: str
+    nodes: those that it is set in, as a rule one.
+    """
+
+    nodes: tuple[str, ...]
     parameter: str
     low: float
     high: float
@@ -36,11 +39,12 @@ class Knob:
     def name(self) -> str:
         """As "arm_controller.lambda_1[0]"."""
         where = ",".join(map(str, self.entries))
-        return f"{self.node}.{self.parameter}" + (f"[{where}]" if where else "")
+        node = self.nodes[0] if len(self.nodes) == 1 else "all"
+        return f"{node}.{self.parameter}" + (f"[{where}]" if where else "")
 
     def value(self, profile: Profile) -> float:
         """The value in a profile (its first entry), moved into the range."""
-        value = getattr(profile.sets[self.node], self.parameter)
+        value = getattr(profile.sets[self.nodes[0]], self.parameter)
         value = value[self.entries[0]] if self.entries else value
         return min(max(float(value), self.low), self.high)
 
@@ -89,13 +93,13 @@ class Space:
     def profile(self, values: Mapping[str, float], name: str = "candidate") -> Profile:
         """The start profile with the knobs at `values` (by name). Raises ProfileError."""
         sections = copy.deepcopy(self.start.sections)
-        for knob in self.knobs:
+        for knob, node in [(k, node) for k in self.knobs for node in k.nodes]:
             value = float(f"{values[knob.name]:.{DIGITS}g}")
-            section = sections.setdefault(knob.node, {})
+            section = sections.setdefault(node, {})
             if not knob.entries:
                 section[knob.parameter] = value
                 continue
-            vector = list(getattr(self.start.sets[knob.node], knob.parameter))
+            vector = list(getattr(self.start.sets[node], knob.parameter))
             vector = list(section.get(knob.parameter, vector))
             for entry in knob.entries:
                 vector[entry] = value
@@ -125,6 +129,9 @@ def load_space(name_or_file: str, start: Profile | None = None) -> Space:
     try:
         file = configuration.named("tuning", name_or_file)
         document = yaml.safe_load(file.read_text())
+        if "judged_as" in document:  # flights and cost of another space: a fair comparison
+            other = configuration.named("tuning", document["judged_as"])
+            document = {**yaml.safe_load(other.read_text()), **document}
         start = start or load_profile(document["profile"])
         knobs = tuple(_knob(entry, start) for entry in document["knobs"])
         cost = {
@@ -149,16 +156,23 @@ def load_space(name_or_file: str, start: Profile | None = None) -> Space:
 
 
 def _knob(entry: dict[str, Any], start: Profile) -> Knob:
-    knob = Knob(**{**entry, "entries": tuple(entry.get("entries", ()))})
-    if knob.node not in NODES:
-        raise TuningError(f"{knob.name}: no such node; there are: {', '.join(NODES)}")
-    value = getattr(start.sets[knob.node], knob.parameter, None)
+    entry = dict(entry)
+    nodes = (entry.pop("node"),) if "node" in entry else tuple(entry.pop("nodes"))
+    knob = Knob(nodes, **{**entry, "entries": tuple(entry.get("entries", ()))})
+    for node in nodes:
+        if node not in NODES:
+            raise TuningError(f"{knob.name}: no such node; there are: {', '.join(NODES)}")
+        _check(knob, getattr(start.sets[node], knob.parameter, None))
+    if not 0.0 < knob.low < knob.high:
+        raise TuningError(f"{knob.name}: 0 < low < high is expected")
+    return knob
+
+
+def _check(knob: Knob, value: Any) -> None:
+    """Refuse a knob that does not fit the parameter's `value`."""
     length = len(value) if isinstance(value, tuple) else 0
     if value is None or isinstance(value, str | bool):
         raise TuningError(f"{knob.name}: no such parameter, or not a number")
     if bool(length) != bool(knob.entries) or any(not 0 <= i < length for i in knob.entries):
         raise TuningError(f"{knob.name}: entries 0 to {length - 1} are expected" if length
                           else f"{knob.name}: one number, has no entries")
-    if not 0.0 < knob.low < knob.high:
-        raise TuningError(f"{knob.name}: 0 < low < high is expected")
-    return knob
