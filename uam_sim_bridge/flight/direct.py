@@ -6,8 +6,9 @@ estimator, controllers, bridge, mission for the next tick, autopilot, physics.
 
 from __future__ import annotations
 
+from collections import deque
 from collections.abc import Callable, Mapping
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -24,7 +25,7 @@ from uam_sim_bridge.flight.timeseries import COLUMNS, SUBSYSTEMS, Recording, gai
 from uam_sim_bridge.mavlink.frames import swap_body, swap_quaternion, swap_world
 from uam_sim_bridge.mavlink.offboard import OffboardParameters, OffboardSequence, Request
 from uam_sim_bridge.mavlink.setpoint import RateThrustMap, RateThrustParameters
-from uam_sim_bridge.plant import Plant, Vehicle
+from uam_sim_bridge.plant import Plant, Samples, Vehicle
 
 LONGEST_WAIT = 20.0  # [s] simulated, for the autopilot to get ready and armed
 
@@ -64,7 +65,8 @@ class DirectFlight:
         self.attitude = AttitudeController(sets["attitude_controller"])
         self.arm = ArmController(sets["arm_controller"])
         self.bridge = Bridge(profile.section("mavlink_bridge"))
-        self._truth = np.zeros((3, 8))
+        self._truths: deque[_Snapshot] = deque()  # of ticks whose IMU sample is on its way
+        self._complete = False  # every kind of sensor has delivered
         controllers = (self.position, self.attitude, self.arm)
         self._gains = tuple(controller.adaptation for controller in controllers)
         self._gain_columns = tuple(
@@ -93,34 +95,30 @@ class DirectFlight:
         """One control period of the whole vehicle."""
         plant, mission, estimator, dt = self.plant, self.mission, self.estimator, self.plant.period
         samples = plant.sense()
-        if samples.mocap is not None:
-            estimator.mocap(*samples.mocap)
-        if samples.joints is not None:
-            estimator.joints(*samples.joints[:3])
-        if samples.imu is not None:
-            estimator.imu(*samples.imu)
-        if estimator.waiting_for:
+        self._truths.append(_Snapshot.of(plant))
+        if not self._sensed(samples):
             motors = self.bridge.autopilot_tick(samples.hil)
             plant.step(motors, np.zeros(2), False)
             return
-        state = estimator.update()
+        stamp, state = samples.imu[0], estimator.update()
         output = mission.output
         reference, flying, magnet = output.reference, output.flying, output.magnet
-        time, phase = output.time, output.phase
 
         tau_p = self.position.update(state, reference, flying, dt)
         attitude_reference = self.position.attitude_reference
         tau_q = self.attitude.update(state, reference, attitude_reference, flying, dt)
         tau_alpha = self.arm.update(state, reference, attitude_reference, flying, dt)
-        self.bridge.send(plant.time, tau_p, tau_q, state, flying, output.arm, samples.mocap)
+        self.bridge.send(
+            stamp, plant.time, tau_p, tau_q, state, flying, output.arm, samples.mocap
+        )
         motors = self.bridge.autopilot_tick(samples.hil)
 
-        plant.write_truth_state(self._truth)
-        row = self.recording.next_row(phase)
+        truth = self._truth_at(stamp)
+        row = self.recording.next_row(output.phase)
         record(
             row,
-            time,
-            self._truth,
+            output.time,
+            truth.state,
             state,
             reference,
             attitude_reference,
@@ -131,17 +129,67 @@ class DirectFlight:
             self._gains,
             self._gain_columns,
             motors,
-            plant.rotors.thrust,
-            plant.payload_pose,
+            truth.thrust,
+            truth.payload_pose,
         )
         row[_MAGNET], row[_MAGNET + 1], row[_MAGNET + 2] = (
             magnet,
-            plant.magnet_force,
-            plant.magnet_swing,
+            truth.magnet_force,
+            truth.magnet_swing,
         )
 
         plant.step(motors, tau_alpha, magnet)
-        mission.step(plant.time, state, self.bridge.sequence.armed_stamp)
+        mission.step(stamp + dt, state, self.bridge.sequence.armed_stamp)
+
+    def _sensed(self, samples: Samples) -> bool:
+        """Feed the estimator; whether it has a state now. As the plant's node does, nothing is
+        delivered before every kind of sensor has."""
+        estimator = self.estimator
+        here = samples.imu is not None
+        self._complete = self._complete or (
+            here and samples.mocap is not None and samples.joints is not None
+        )
+        if not self._complete:
+            return False
+        if samples.mocap is not None:
+            estimator.mocap(*samples.mocap)
+        if samples.joints is not None:
+            estimator.joints(*samples.joints[:3])
+        if here:
+            estimator.imu(*samples.imu)
+        return here and not estimator.waiting_for
+
+    def _truth_at(self, stamp: float) -> _Snapshot:
+        """What was true when the IMU sample of `stamp` [s] was taken."""
+        truths = self._truths
+        while truths[0].time < stamp - 1e-9:
+            truths.popleft()
+        return truths.popleft()
+
+
+class _Snapshot(NamedTuple):
+    """The truth of one tick, at plant time [s]; see `plant.Truth`."""
+
+    time: float
+    state: np.ndarray
+    thrust: np.ndarray
+    payload_pose: np.ndarray
+    magnet_force: float
+    magnet_swing: float
+
+    @classmethod
+    def of(cls, plant: Plant) -> _Snapshot:
+        """A copy of what is true now."""
+        state = np.empty((3, 8))
+        plant.write_truth_state(state)
+        return cls(
+            plant.time,
+            state,
+            plant.rotors.thrust.copy(),
+            plant.payload_pose.copy(),
+            plant.magnet_force,
+            plant.magnet_swing,
+        )
 
 
 class Bridge:
@@ -157,14 +205,17 @@ class Bridge:
         self.autopilot = Autopilot(Parameters.load(configuration.path("autopilot/s500.yaml")))
         self.setpoint = np.zeros(4)
 
-    def send(self, time, tau_p, tau_q, state, flying, arm, mocap) -> None:
-        """One tick of the bridge: vision, requests, setpoint."""
+    def send(self, stamp, time, tau_p, tau_q, state, flying, arm, mocap) -> None:
+        """One tick of the bridge: vision, requests, setpoint.
+
+        stamp: of the tick's IMU sample [s], the bridge's clock; time: the autopilot's [s].
+        """
         autopilot, setpoint = self.autopilot, self.setpoint
         if mocap is not None:
             autopilot.vision(time, swap_world(mocap[1]), swap_quaternion(mocap[2]))
         self.sequence.want(arm)
         status = autopilot.commander
-        request = self.sequence.update(time, True, status.armed, status.mode)
+        request = self.sequence.update(stamp, True, status.armed, status.mode)
         if request is not None:
             self._request(time, request)
         if flying:
