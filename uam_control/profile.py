@@ -32,7 +32,10 @@ CONTROLLERS: dict[str, tuple[dict[str, type[ParameterSet]], int]] = {
 }
 OTHERS = {"state_estimator": EstimatorParameters, "mission": MissionParameters}
 NODES = (*CONTROLLERS, *OTHERS)
-ROS_OWN = ("use_sim_time",)  # parameters of ROS itself, allowed in every section
+# Parameters that a file may hold but that are no part of a profile: of ROS itself, and those that
+# the effective parameters of a flight have besides.
+ROS_OWN = ("use_sim_time",)
+FLIGHT_OWN = {"mission": ("scenario",)}
 
 
 class ProfileError(ValueError):
@@ -89,7 +92,8 @@ def profile_of(sections: dict[str, dict[str, Any]], file: Path) -> Profile:
     """
     sets = {}
     for node in NODES:
-        values = {k: v for k, v in sections.get(node, {}).items() if k not in ROS_OWN}
+        aside = (*ROS_OWN, *FLIGHT_OWN.get(node, ()))
+        values = {k: v for k, v in sections.get(node, {}).items() if k not in aside}
         try:
             kind, axes = parameter_set(node, values)
             sets[node] = kind.from_mapping(values, axes)

@@ -9,6 +9,7 @@ from mcap_ros2.decoder import DecoderFactory
 
 from uam_control.laws.modular import ADAPTATION
 from uam_control.mission import load_scenario
+from uam_control.profile import load_profile
 from uam_sim_bridge.flight import timeseries
 from uam_sim_bridge.flight.direct import DirectFlight
 from uam_sim_bridge.flight.log_reader import read_flight
@@ -32,8 +33,10 @@ def test_the_mission_is_completed_and_said_so(two_flights):
     assert "Mission completed" in flight.said
     for phase in ("take-off", "hover", "land"):
         assert phase in flight.said
-    for name in ("report.html", "versions.json", "parameters.yaml", "info.json"):
+    for name in ("report.html", "versions.json", "stability.json", "info.json"):
         assert (flight.out / name).stat().st_size > 0
+    flown = load_profile(str(flight.out / "parameters.yaml"))
+    assert flown.sets == load_profile("s500").sets
 
 
 def test_one_seed_gives_one_flight(two_flights):

@@ -17,7 +17,7 @@ from typing import Any
 
 import numpy as np
 
-from uam_control.coordinates import ATTITUDE
+from uam_control.coordinates import ATTITUDE, POSITION
 from uam_sim_bridge.analysis import ticks
 from uam_sim_bridge.analysis.coupling import nominal_inertia
 from uam_sim_bridge.analysis.dynamics import Dynamics
@@ -25,8 +25,7 @@ from uam_sim_bridge.analysis.supply import COLUMNS_OF, NODE_OF, Supply
 from uam_sim_bridge.analysis.tracking import Tracking
 from uam_sim_bridge.flight.timeseries import Series
 
-ROUNDING = 1e-6  # [N, N m] between tau as recorded and as computed again
-AT = 1.0 - 1e-6  # of a ceiling
+AT = 1.0 - 1e-6  # of a limit or ceiling
 
 
 def mass_matrix(dynamics: Dynamics, sets: dict) -> dict[str, Any]:
@@ -53,11 +52,18 @@ def mass_matrix(dynamics: Dynamics, sets: dict) -> dict[str, Any]:
     }
 
 
-def saturated(supply: Supply) -> dict[str, float]:
-    """Fraction of the ticks in which limits cut tau_j."""
-    law = supply.feedforward + supply.feedback + supply.adaptive + supply.weight
-    cut = np.abs(supply.asked - law) > ROUNDING
-    return {name: float(cut[:, c].any(axis=1).mean()) for name, c in COLUMNS_OF.items()}
+def saturated(supply: Supply, sets: dict) -> dict[str, float]:
+    """Fraction of the ticks in which tau_j, as recorded, is at one of its limits."""
+    force, limits = supply.asked[:, POSITION], sets[NODE_OF["position"]]
+    tilted = np.hypot(force[:, 0], force[:, 1]) >= AT * force[:, 2] * np.tan(limits.tilt_max)
+    large = np.linalg.norm(force, axis=1) >= AT * limits.thrust_max
+    small = force[:, 2] <= limits.thrust_min / AT
+    found = {"position": float((tilted | large | small).mean())}
+    for name in ("attitude", "arm"):
+        most = np.array(sets[NODE_OF[name]].torque_max)
+        at = np.abs(supply.asked[:, COLUMNS_OF[name]]) >= AT * most
+        found[name] = float(at.any(axis=1).mean())
+    return found
 
 
 def at_ceiling(gains: np.ndarray, ceiling: tuple) -> list[float]:

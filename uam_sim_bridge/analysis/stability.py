@@ -171,7 +171,7 @@ def analyse(
         seen[name] = assumptions.acceleration(series, rows, truth, parameters)
     margins = {
         "mass_matrix": assumptions.mass_matrix(true, sets),
-        "saturated": assumptions.saturated(terms),
+        "saturated": assumptions.saturated(terms, sets),
         "at_ceiling": ceilings,
         "acceleration": seen,
         "estimator": assumptions.estimator(truth, estimate),
