@@ -13,6 +13,7 @@ import rclpy
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 
+from uam_msgs_py.connections import Connections
 from uam_msgs_py.convert import stays_serialized
 from uam_sim_bridge.flight.ports import Reservation
 
@@ -36,6 +37,7 @@ class Probe:
         self.node = Node("probe", context=context)
         self._executor = SingleThreadedExecutor(context=context)
         self._executor.add_node(self.node)
+        self._said = Connections(self.node)
 
     def until(self, condition: Callable[[], object], what: str) -> None:
         """Spin until `condition()`; fail, saying `what` did not happen, after PATIENCE."""
@@ -53,6 +55,20 @@ class Probe:
     def publisher(self, topic):
         """Return a publisher of `topic`."""
         return self.node.create_publisher(topic.type, topic.name, topic.qos)
+
+    def until_connected(self, node: str, publishers=(), hears=()) -> None:
+        """Wait until `node` has found `publishers` of ours, and us as the reader of `hears`.
+
+        Both ends must have: what is published before is lost for a best-effort reader.
+        """
+        said = self._said
+        self.until(
+            lambda: all(
+                p.get_subscription_count() and said.writers(node, p.topic_name) for p in publishers
+            )
+            and all(said.readers(node, topic.name) for topic in hears),
+            f"{node} to be connected",
+        )
 
     def call(self, kind, name: str, request):
         """Call a service and return its response."""

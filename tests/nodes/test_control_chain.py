@@ -173,8 +173,7 @@ def test_a_state_with_nan_is_refused_and_the_next_one_used(start, probe):
     mission = start("uam_control.nodes.mission")
     states, magnet = probe.publisher(topics.STATE), probe.collect(topics.MAGNET)
     writer = TrajectoryWriter(COORDINATES)
-    probe.until(lambda: states.get_subscription_count() == 1, "mission to listen")
-    probe.until(lambda: probe.node.count_publishers(topics.MAGNET.name), "mission to speak")
+    probe.until_connected("mission", [states], [topics.MAGNET])
     state = np.zeros((3, 8))
     state[1, 2] = np.nan
     states.publish(writer.fill(PERIOD, state))

@@ -55,9 +55,8 @@ class Rig:
                           f"autopilot_port:={self.remote}", *arguments)
         self.state, self.pose = TrajectoryWriter(NAMES), PoseWriter()
         self.position, self.torque = PositionCommandWriter(), TorqueWriter(ATTITUDE_NAMES)
-        for publisher in self.out.values():
-            probe.until(publisher.get_subscription_count, "the bridge to listen")
-        probe.until(lambda: probe.node.count_publishers(topics.SETPOINT.name), "the bridge to talk")
+        hears = (topics.SETPOINT, topics.AUTOPILOT_STATE)
+        probe.until_connected("mavlink_bridge", self.out.values(), hears)
 
     def publish(self, topic, message):
         self.out[topic.name].publish(message)
