@@ -86,6 +86,8 @@ def claims(found: Sequence[Row]) -> list[str]:
         return []
     first, second, proposed = (by_label[label] for label in (ASMC1, ASMC2, PROPOSED))
     said = []
+    if np.isnan(proposed.half_width).any():
+        said.append("One seed only: what follows has no confidence intervals.")
     for better, worse in ((proposed, first), (proposed, second), (second, first)):
         apart, near, against = [], [], []
         for i, name in enumerate(ERRORS):
