@@ -44,7 +44,6 @@ def stamp_of(data: bytes) -> int:
 class Layout:
     """The layout of one message and of all that fit it."""
 
-    size: int = 0  # bytes
     frame: str = ""
     names: list[str] = field(default_factory=list)  # of the joints
     points: int = 0  # of a trajectory; the fields are those of the first
@@ -198,7 +197,6 @@ class Layouts:
         cursor = Cursor(data)
         self._walk(cursor)
         layout = cursor.layout
-        layout.size = len(data)
         layout.fix(data, cursor.fixed)
         if self._count >= KNOWN_LAYOUTS:  # somebody sends ever new names: forget, but go on
             self._known.clear()

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import csv
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -11,7 +10,7 @@ from matplotlib.figure import Figure
 
 from uam_sim_bridge.campaign.trial import ERRORS, Result
 from uam_sim_bridge.campaign.variations import Draw, common
-from uam_sim_bridge.flight.atomic import replacing, write_text
+from uam_sim_bridge.flight.atomic import replacing, write_rows, write_text
 from uam_sim_bridge.flight.result_folder import as_json, versions
 from uam_sim_bridge.report import style
 
@@ -39,13 +38,12 @@ def write(out: Path, draws: Sequence[Draw], results: Sequence[Result], command: 
 
 
 def _flights(file: Path, draws: Sequence[Draw], results: Sequence[Result]) -> None:
-    with replacing(file) as temporary, temporary.open("w", newline="") as out:
-        writer = csv.writer(out)
-        writer.writerow(["flight", *draws[0].values, *(f"rms {n}" for n in ERRORS), "completed",
-                         "lost", "why"])
-        for i, (draw, r) in enumerate(zip(draws, results, strict=True)):
-            writer.writerow([i, *(f"{x:.4g}" for x in draw.values.values()),
-                             *(f"{x:.4g}" for x in r.rms), r.completed, r.lost, r.why])
+    head = ["flight", *draws[0].values, *(f"rms {n}" for n in ERRORS), "completed", "lost", "why"]
+    write_rows(file, head, (
+        [i, *(f"{x:.4g}" for x in draw.values.values()), *(f"{x:.4g}" for x in r.rms),
+         r.completed, r.lost, r.why]
+        for i, (draw, r) in enumerate(zip(draws, results, strict=True))
+    ))
 
 
 def _summary(draws, results, failed, rms, command: str) -> str:

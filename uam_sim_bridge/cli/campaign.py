@@ -5,7 +5,6 @@ from __future__ import annotations
 import argparse
 import shlex
 import sys
-from datetime import datetime
 from pathlib import Path
 
 from uam_control import configuration
@@ -13,7 +12,7 @@ from uam_control.configuration import ConfigurationError
 from uam_control.profile import ProfileError, load_profile
 from uam_sim_bridge.campaign.pool import cores, fly_all
 from uam_sim_bridge.cli.counting import Counting
-from uam_sim_bridge.flight.result_folder import RESULTS
+from uam_sim_bridge.flight.result_folder import ResultFolderError, make_folder
 
 INTERRUPTED, WRONG_USE = 130, 2
 EXAMPLES = """\
@@ -54,10 +53,8 @@ def run(options: argparse.Namespace) -> int:
         if options.flights < 1 or options.jobs < 1 or options.seed < 0:
             raise ConfigurationError("--flights and --jobs are 1 or more, --seed 0 or more")
         profile = load_profile(str(configuration.named("profiles", options.profile)))
-        out = options.out or RESULTS / f"{datetime.now():%Y%m%d-%H%M%S}-campaign"
-        out.mkdir(parents=True, exist_ok=True)
-        return campaign(options, profile, out)
-    except (ConfigurationError, ProfileError, OSError) as error:
+        return campaign(options, profile, make_folder(options.out, "campaign"))
+    except (ConfigurationError, ProfileError, ResultFolderError, OSError) as error:
         print(f"uam campaign: {error}", file=sys.stderr)
         return WRONG_USE
     except KeyboardInterrupt:

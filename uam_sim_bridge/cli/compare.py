@@ -5,14 +5,13 @@ from __future__ import annotations
 import argparse
 import shlex
 import sys
-from datetime import datetime
 from pathlib import Path
 
 from uam_control.configuration import ConfigurationError
 from uam_control.profile import ProfileError, load_profile
 from uam_sim_bridge.campaign.pool import cores, fly_all
 from uam_sim_bridge.cli.counting import Counting
-from uam_sim_bridge.flight.result_folder import RESULTS
+from uam_sim_bridge.flight.result_folder import ResultFolderError, make_folder
 
 INTERRUPTED, WRONG_USE = 130, 2
 EXAMPLES = """\
@@ -60,10 +59,10 @@ def run(options: argparse.Namespace) -> int:
         if not all(0.0 <= mass <= 2.0 for mass in payloads):
             raise ConfigurationError("--payload-mass is 0 to 2 kg")
         rows = (*plan.entries(), *map(_further, options.profile))
-        out = options.out or RESULTS / f"{datetime.now():%Y%m%d-%H%M%S}-compare"
-        (out / "flights").mkdir(parents=True, exist_ok=True)
+        out = make_folder(options.out, "compare")
+        (out / "flights").mkdir(exist_ok=True)
         return compare(rows, payloads, range(1, options.seeds + 1), options.jobs, out)
-    except (ConfigurationError, ProfileError, OSError) as error:
+    except (ConfigurationError, ProfileError, ResultFolderError, OSError) as error:
         print(f"uam compare: {error}", file=sys.stderr)
         return WRONG_USE
     except KeyboardInterrupt:

@@ -6,7 +6,6 @@ import argparse
 import shlex
 import signal
 import sys
-from datetime import datetime
 from pathlib import Path
 
 from uam_control import configuration
@@ -15,7 +14,7 @@ from uam_control.mission import ScenarioError
 from uam_control.profile import ProfileError, load_profile
 from uam_sim_bridge.campaign.pool import cores
 from uam_sim_bridge.cli.counting import Counting
-from uam_sim_bridge.flight.result_folder import RESULTS
+from uam_sim_bridge.flight.result_folder import ResultFolderError, make_folder
 from uam_sim_bridge.flight.warm_up import is_cold, warm_up
 
 INTERRUPTED, WRONG_USE = 130, 2
@@ -86,7 +85,8 @@ def run(options: argparse.Namespace) -> int:
             start = load_profile(str(configuration.named("profiles", options.profile)))
         space = load_space(options.space or options.controller, start)
         return tune(options, space)
-    except (TuningError, ProfileError, ScenarioError, ConfigurationError, OSError) as error:
+    except (TuningError, ProfileError, ScenarioError, ConfigurationError, ResultFolderError,
+            OSError) as error:
         print(f"uam tune: {error}", file=sys.stderr)
         return WRONG_USE
 
@@ -97,12 +97,10 @@ def tune(options: argparse.Namespace, space) -> int:
     from uam_sim_bridge.tuning.search import Task, open_study, search
     from uam_sim_bridge.tuning.space import TuningError
 
-    name = f"{datetime.now():%Y%m%d-%H%M%S}-tune-{space.name}"
-    out = options.out or RESULTS / name
-    out.mkdir(parents=True, exist_ok=True)
-    storage = options.storage or str(out / "study.journal")
-    if not 0.0 < options.step <= 0.5:
+    if not 0.0 < options.step <= 0.5:  # before a folder is made
         raise TuningError(f"--step {options.step:g} is outside 0 to 0.5")
+    out = make_folder(options.out, "tune", space.name)
+    storage = options.storage or str(out / "study.journal")
     task = Task(space, options.study or space.name, storage, options.evaluations, options.seed,
                 options.step)
     if is_cold():

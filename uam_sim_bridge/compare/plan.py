@@ -7,12 +7,13 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
+from uam_control.laws import catalogue
 from uam_control.profile import Profile, load_profile, profile_of
 from uam_sim_bridge.campaign.trial import Trial
 
 CONTROLLERS = ("position_controller", "attitude_controller", "arm_controller")
 PROPOSED = "proposed"
-ASMC1, ASMC2 = "ASMC-1 (reconstructed)", "ASMC-2 (reconstructed)"
+ASMC1, ASMC2 = catalogue.label("asmc1"), catalogue.label("asmc2")
 FROZEN = "proposed, adaptation frozen"
 VERBATIM, WITH_WEIGHT = "Table I verbatim", "Table I and the weight"
 PAYLOADS = (0.1, 0.2, 0.3)  # [kg]

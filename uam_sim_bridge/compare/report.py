@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import base64
-import csv
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -17,7 +16,7 @@ from uam_sim_bridge.campaign.trial import ERRORS, Result, Trial
 from uam_sim_bridge.compare import plan, tables
 from uam_sim_bridge.compare.modularity import Evidence
 from uam_sim_bridge.flight import timeseries
-from uam_sim_bridge.flight.atomic import replacing, write_text
+from uam_sim_bridge.flight.atomic import replacing, write_rows, write_text
 from uam_sim_bridge.flight.result_folder import as_json, versions
 from uam_sim_bridge.report import figures, style
 
@@ -84,14 +83,13 @@ def write(
 
 
 def _flights(file: Path, results: Sequence[Result]) -> None:
-    with replacing(file) as temporary, temporary.open("w", newline="") as out:
-        writer = csv.writer(out)
-        writer.writerow(["controller", "payload_kg", "seed", *(f"rms {n}" for n in ERRORS),
-                         "completed", "lost", "place_error_m", "why"])
-        for r in results:
-            place = "" if r.place_error is None else f"{r.place_error:.4f}"
-            writer.writerow([r.label, r.payload_mass, r.seed, *(f"{x:.6g}" for x in r.rms),
-                             r.completed, r.lost, place, r.why])
+    head = ["controller", "payload_kg", "seed", *(f"rms {n}" for n in ERRORS), "completed", "lost",
+            "place_error_m", "why"]
+    write_rows(file, head, (
+        [r.label, r.payload_mass, r.seed, *(f"{x:.6g}" for x in r.rms), r.completed, r.lost,
+         "" if r.place_error is None else f"{r.place_error:.4f}", r.why]
+        for r in results
+    ))
 
 
 def _draw(out: Path, trials: Sequence[Trial], results: Sequence[Result]) -> list[str]:
@@ -186,11 +184,10 @@ def _html_row(row: tables.Row, found: Sequence[tables.Row], columns: slice, titl
     papers = tables.PAPER.get(row.label)
     cells = []
     for i in range(*columns.indices(len(ERRORS))):
-        half = "" if np.isnan(row.half_width[i]) else f" ± {row.half_width[i]:.{digits}f}"
         worse = ""
         if proposed is not None and row is not proposed:
             worse = f"{tables.degradation(row.mean, proposed.mean)[i]:.0f} %"
-        cells.append({"ours": f"{row.mean[i]:.{digits}f}{half}",
+        cells.append({"ours": tables.cell(row.mean[i], row.half_width[i], digits),
                       "paper": f"{papers[i]:g}" if papers else "", "worse": worse})
     lost = f"{row.lost} of {row.flights} lost" if row.lost else ""
     return {"label": row.label, "lost": lost, "cells": cells}

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import csv
 import os
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
@@ -26,3 +27,11 @@ def write_text(path: Path, text: str) -> None:
     """Write `text` (UTF-8) to `path` whole."""
     with replacing(path) as temporary:
         temporary.write_text(text, encoding="utf-8")
+
+
+def write_rows(path: Path, head: Iterable[object], rows: Iterable[Iterable[object]]) -> None:
+    """Write a CSV table; the file appears whole or not at all."""
+    with replacing(path) as temporary, temporary.open("w", newline="") as out:
+        writer = csv.writer(out)
+        writer.writerow(head)
+        writer.writerows(rows)

@@ -79,9 +79,7 @@ class ResultFolder:
             if folder.path.absolute().parent == RESULTS.absolute():
                 _point_latest_at(folder.path)
             return folder
-        stamp = (now or datetime.now()).strftime("%Y%m%d-%H%M%S")
-        name = "-".join([stamp, _in_a_name(Path(scenario).stem), _in_a_name(controller)])
-        folder = cls(_unique(RESULTS, name))
+        folder = cls(make_folder(None, Path(scenario).stem, controller, now=now))
         _point_latest_at(folder.path)
         return folder
 
@@ -147,6 +145,16 @@ def git_commit(directory: Path | None = None) -> str | None:
         return git("rev-parse", "--short=12", "HEAD") + ("+changes" if changed else "")
     except (OSError, subprocess.SubprocessError):
         return None
+
+
+def make_folder(out: Path | None, *words: str, now: datetime | None = None) -> Path:
+    """Make `out`, or results/<time>-<words>; returns it. Raises ResultFolderError."""
+    if out is not None:
+        out = Path(out).expanduser()
+        _usable(out)
+        return out
+    stamp = (now or datetime.now()).strftime("%Y%m%d-%H%M%S")
+    return _unique(RESULTS, "-".join([stamp, *map(_in_a_name, words)]))
 
 
 def _in_a_name(text: str) -> str:

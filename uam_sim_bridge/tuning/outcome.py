@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import csv
 from pathlib import Path
 
 import matplotlib
@@ -11,7 +10,7 @@ import optuna
 import yaml
 from matplotlib.figure import Figure
 
-from uam_sim_bridge.flight.atomic import replacing, write_text
+from uam_sim_bridge.flight.atomic import replacing, write_rows, write_text
 from uam_sim_bridge.report import style
 from uam_sim_bridge.tuning.search import DONE
 from uam_sim_bridge.tuning.space import Space
@@ -43,12 +42,11 @@ def write_best(file: Path, space: Space, study: optuna.Study, command: str) -> N
 def write_evaluations(file: Path, space: Space, study: optuna.Study) -> None:
     """Write one row per evaluation: number, cost, values of the knobs."""
     names = [knob.name for knob in space.knobs]
-    with replacing(file) as temporary, temporary.open("w", newline="") as out:
-        writer = csv.writer(out)
-        writer.writerow(["evaluation", "cost", *names])
-        for trial in study.get_trials(deepcopy=False, states=DONE):
-            values = [f"{trial.params.get(name, np.nan):.6g}" for name in names]
-            writer.writerow([trial.number, f"{trial.value:.6g}", *values])
+    write_rows(file, ["evaluation", "cost", *names], (
+        [trial.number, f"{trial.value:.6g}",
+         *(f"{trial.params.get(name, np.nan):.6g}" for name in names)]
+        for trial in study.get_trials(deepcopy=False, states=DONE)
+    ))
 
 
 def plot(file: Path, space: Space, study: optuna.Study) -> None:
