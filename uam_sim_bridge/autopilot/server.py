@@ -230,6 +230,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     try:
         file = options.params or path("autopilot/s500.yaml")
         autopilot = Autopilot(Parameters.load(file))
+        # as PX4 SITL does; the highest instances do not fit MAVLink's one byte
+        autopilot.set_parameter("MAV_SYS_ID", min(options.instance + 1, 250))
         codec = Codec(int(autopilot.parameters["MAV_SYS_ID"]),
                       int(autopilot.parameters["MAV_COMP_ID"]))
         n = options.instance

@@ -21,12 +21,13 @@ from uam_sim_bridge.flight.ports import INSTANCES, PortError
 from uam_sim_bridge.flight.progress import Progress
 from uam_sim_bridge.flight.result_folder import ResultFolder, ResultFolderError
 from uam_sim_bridge.flight.settings import FlightSettings, SettingsError
+from uam_sim_bridge.px4.installation import Px4Error
 from uam_sim_bridge.report.build import build_report
 from uam_sim_bridge.report.console import reporting, summary
 
 COMPLETED, NOT_COMPLETED, WRONG_USE, INTERRUPTED = 0, 1, 2, 130
 USER_ERRORS = (SettingsError, ScenarioError, ProfileError, ConfigurationError, PortError,
-               ResultFolderError)
+               Px4Error, ResultFolderError)
 
 EXAMPLES = """\
 examples:
@@ -34,6 +35,7 @@ examples:
   uam fly --scenario hover --seed 7          another scenario, other noise
   uam fly --scenario path.csv --no-video     a trajectory of your own
   uam fly --profile mine.yaml --engine direct
+  uam fly --autopilot px4 --px4-dir ~/PX4-Autopilot/build/px4_sitl_default
   uam fly --clock realtime                   paced by the wall clock, latency measured
   uam fly --payload-mass 0.3 --wind 2 0 0    heavier payload, 2 m/s from the west
 
@@ -66,8 +68,10 @@ def add(commands) -> None:
     option("--clock", default="lockstep", metavar="lockstep|realtime",
            help="simulated time, the same flight for the same seed; or the wall clock "
            "(default %(default)s)")
-    option("--autopilot", default="builtin", metavar="builtin",
-           help="the stand-in (default %(default)s)")
+    option("--autopilot", default="builtin", metavar="builtin|px4",
+           help="the stand-in, or PX4 in software (default %(default)s)")
+    option("--px4-dir", metavar="DIR",
+           help="PX4's build directory, with bin/px4 and etc/ (default: $PX4_SITL_DIR)")
     option("--payload-mass", type=_number("mass", "kg", 0.0), metavar="KG",
            help="default: the scenario's")
     option("--wind", type=_number("wind", "m/s"), nargs=3, metavar=("X", "Y", "Z"),
@@ -119,6 +123,7 @@ def run(options: argparse.Namespace) -> int:
             engine=options.engine,
             clock=options.clock,
             autopilot=options.autopilot,
+            px4_dir=options.px4_dir,
             payload_mass=options.payload_mass,
             seed=options.seed,
             out=options.out,

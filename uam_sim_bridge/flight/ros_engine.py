@@ -22,7 +22,7 @@ from uam_sim_bridge.flight.ports import Ports, Reservation
 from uam_sim_bridge.flight.processes import NodeFailed, Processes, environment
 from uam_sim_bridge.flight.progress import Progress
 from uam_sim_bridge.flight.result_folder import ResultFolder
-from uam_sim_bridge.flight.settings import FlightSettings
+from uam_sim_bridge.flight.settings import BUILTIN, PX4, FlightSettings
 from uam_sim_bridge.flight.status_listener import StatusListener
 from uam_sim_bridge.flight.warm_up import is_cold, warm_up
 
@@ -37,7 +37,13 @@ MODULES = {
     wiring.ARM: "uam_control.nodes.arm_controller",
     wiring.BRIDGE: "uam_sim_bridge.nodes.mavlink_bridge",
 }
-AUTOPILOT, AUTOPILOT_MODULE = "autopilot", "uam_sim_bridge.autopilot.server"
+AUTOPILOT = "autopilot"
+AUTOPILOT_MODULES = {
+    BUILTIN: "uam_sim_bridge.autopilot.server",
+    PX4: "uam_sim_bridge.px4.sitl",
+}
+PX4_LOG = "px4.ulg"
+PX4_LINGER = 4.0  # [s] simulated, after the mission, in which PX4 disarms and closes its log
 START_TIMEOUT = 60.0  # [s] until every node must be connected to the others
 ANSWER_TIMEOUT = 10.0  # [s] for the answers to one lockstep tick
 OVERTIME = 60.0  # [s] simulated, beyond the scenario's landing, until a flight is ended
@@ -78,7 +84,8 @@ def parameters(
         "arm_start": list(settings.scenario.arm_start),
         "clock": settings.clock,
         "hil_port": ports.simulator_tcp,
-        "autopilot_always_answers": settings.autopilot == "builtin",
+        "autopilot_always_answers": settings.autopilot == BUILTIN,
+        "linger": 0.0 if settings.autopilot == BUILTIN else PX4_LINGER,
         "recorded": True,
         "start_timeout": START_TIMEOUT,
         "answer_timeout": ANSWER_TIMEOUT,
@@ -89,6 +96,7 @@ def parameters(
         "clock": settings.clock,
         "local_port": ports.offboard_udp,
         "autopilot_port": ports.autopilot_udp,
+        "autopilot_system": float(ports.instance + 1),  # as PX4 SITL numbers its instances
     }
     sections[wiring.RECORDER] = {
         "file": str(folder.log),
@@ -158,9 +166,17 @@ def _start(
             may_end=name == wiring.PLANT,
             niceness=RECORDER_NICENESS if name == wiring.RECORDER else 0,
         )
-    if settings.autopilot == "builtin":
-        instance = ["--instance", str(ports.instance), "--wait", str(START_TIMEOUT)]
-        children.start(AUTOPILOT, AUTOPILOT_MODULE, instance, may_end=True)
+    module = AUTOPILOT_MODULES[settings.autopilot]
+    children.start(AUTOPILOT, module, _autopilot(settings, folder, ports), may_end=True)
+
+
+def _autopilot(settings: FlightSettings, folder: ResultFolder, ports: Ports) -> list[str]:
+    """The arguments of the autopilot's process."""
+    instance = ["--instance", str(ports.instance)]
+    if settings.px4 is None:
+        return [*instance, "--wait", str(START_TIMEOUT)]
+    log = folder.path / PX4_LOG
+    return [*instance, "--px4-dir", str(settings.px4.directory), "--log", str(log.absolute())]
 
 
 def _watch(

@@ -9,10 +9,12 @@ from uam_control import configuration
 from uam_control.laws.catalogue import LAWS
 from uam_control.mission import Scenario, load_scenario
 from uam_control.profile import Profile, load_profile
+from uam_sim_bridge.px4.installation import Px4Installation
 
 ENGINES = ("ros", "direct")
 CLOCKS = ("lockstep", "realtime")
-AUTOPILOTS = ("builtin",)
+BUILTIN, PX4 = "builtin", "px4"
+AUTOPILOTS = (BUILTIN, PX4)
 PAYLOAD_MAX = 2.0  # [kg] more than the rotors could ever carry
 
 
@@ -35,7 +37,8 @@ class FlightSettings:
     controller: str = "modular"
     engine: str = "ros"
     clock: str = "lockstep"
-    autopilot: str = "builtin"
+    autopilot: str = BUILTIN
+    px4: Px4Installation | None = None  # what flies as the autopilot px4
     seed: int = 1
     video: bool = True
     scenario_source: str = ""  # what the user called it: a name or a file
@@ -49,7 +52,8 @@ def settings(
     profile: str | None = None,
     engine: str = "ros",
     clock: str = "lockstep",
-    autopilot: str = "builtin",
+    autopilot: str = BUILTIN,
+    px4_dir: str | None = None,
     payload_mass: float | None = None,
     seed: int = 1,
     out: str | Path | None = None,
@@ -59,8 +63,8 @@ def settings(
 ) -> FlightSettings:
     """Check the options and load what they name.
 
-    Raises SettingsError, and what loading raises (ConfigurationError, ScenarioError, ProfileError);
-    each is one line for the user.
+    Raises SettingsError, and what loading raises (ConfigurationError, ScenarioError, ProfileError,
+    Px4Error); each is one line for the user.
     """
     _choice("controller", controller, LAWS)
     _choice("engine", engine, ENGINES)
@@ -68,6 +72,10 @@ def settings(
     _choice("autopilot", autopilot, AUTOPILOTS)
     if engine == "direct" and clock == "realtime":
         raise SettingsError("the direct engine has no clock: --clock realtime needs --engine ros")
+    if engine == "direct" and autopilot != BUILTIN:
+        raise SettingsError(f"the direct engine flies the stand-in alone: --autopilot {autopilot} "
+                            "needs --engine ros")
+    px4 = Px4Installation.find(px4_dir) if autopilot == PX4 else None
     if not 0 <= seed < 2**31:
         raise SettingsError(f"seed {seed} is outside 0..{2**31 - 1}")
     loaded = load_scenario(str(configuration.named("scenarios", scenario)))
@@ -92,6 +100,7 @@ def settings(
         engine=engine,
         clock=clock,
         autopilot=autopilot,
+        px4=px4,
         seed=seed,
         video=video,
         scenario_source=scenario,

@@ -114,7 +114,7 @@ class Simulator:
     def run(self) -> None:
         """Fly until the mission is done, the time limit, or SIGINT."""
         realtime = self.options.clock == "realtime"
-        limit = self.options.time_limit or math.inf
+        limit, end = self.options.time_limit or math.inf, math.inf
         gc.collect()
         gc.freeze()  # what exists now stays; later collections need not look at it
         begin = time.monotonic()
@@ -130,11 +130,13 @@ class Simulator:
                 self._send_hil(samples, truth)
                 self._receive_hil()
             self.plant.step(self.hil.motors, self.answers.effort, self.answers.magnet)
-            if self.answers.mission.done:
+            if self.answers.mission.done and not self.statistics.ended_by:
                 self.statistics.ended_by = "mission"
+                end = self.plant.time + self.options.linger
+            if self.plant.time >= end:
                 break
             if self.plant.time >= limit:
-                self.statistics.ended_by = f"time limit of {limit:g} s"
+                self.statistics.ended_by = self.statistics.ended_by or f"time limit of {limit:g} s"
                 break
         else:
             self.statistics.ended_by = "interrupt"

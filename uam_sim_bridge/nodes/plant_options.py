@@ -23,6 +23,7 @@ class Options:
     clock: str = "lockstep"
     hil_port: int = 4560
     autopilot_always_answers: bool = True
+    linger: float = 0.0
     recorded: bool = False
     start_timeout: float = 0.0
     answer_timeout: float = 10.0
@@ -39,6 +40,7 @@ DESCRIPTIONS = {
     "clock": "lockstep or realtime",
     "hil_port": "TCP port at which the autopilot connects",
     "autopilot_always_answers": "the stand-in does; PX4 is silent while it boots",
+    "linger": "how long it goes on after the mission, for an autopilot that has to finish [s]",
     "recorded": "wait for the recorder as well",
     "start_timeout": "longest wait for the other nodes [s], 0 = for ever",
     "answer_timeout": "longest wait for the answers to a tick [s of wall time]",
