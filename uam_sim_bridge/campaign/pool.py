@@ -51,8 +51,6 @@ def figures_of(trial: Trial) -> Result:
     return fly(trial)[0]
 
 
-
-
 def _executor(jobs: int) -> ProcessPoolExecutor:
     """Fresh processes of one thread each, deaf to Ctrl-C, which is for the main process."""
     for name in SINGLE_THREAD:

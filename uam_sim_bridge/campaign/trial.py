@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from uam_control.mission import load_scenario
+from uam_control.mission import Scenario, load_scenario
 from uam_control.profile import Profile
 from uam_sim_bridge.flight import metrics
 from uam_sim_bridge.flight.direct import DirectFlight
@@ -61,6 +61,11 @@ def fly(trial: Trial) -> tuple[Result, Series]:
     flight = DirectFlight(scenario, trial.profile, vehicle, trial.payload_mass, trial.seed)
     flight.run()
     series = flight.recording.series({"controller": trial.label})
+    return result(trial, scenario, series, flight.mission.output.abort_reason), series
+
+
+def result(trial: Trial, scenario: Scenario, series: Series, abort_reason: str) -> Result:
+    """Take the figures of a flight that was flown; writes its series where they are to be kept."""
     if trial.keep is not None:
         series.write(trial.keep)
     figures = metrics.compute(
@@ -68,7 +73,7 @@ def fly(trial: Trial) -> tuple[Result, Series]:
         {
             "payload_mass_kg": trial.payload_mass,
             "drop_point": scenario.drop_point,
-            "abort_reason": flight.mission.output.abort_reason,
+            "abort_reason": abort_reason,
         },
     )
     flown = series.flown
@@ -89,7 +94,7 @@ def fly(trial: Trial) -> tuple[Result, Series]:
             _change(series.block("tau_alpha.")[flown]),
         ),
         peaks=_peaks(series, flown),
-    ), series
+    )
 
 
 def _row(groups: dict[str, list[float | None]]) -> np.ndarray:

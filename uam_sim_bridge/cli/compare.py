@@ -7,17 +7,21 @@ import shlex
 import sys
 from pathlib import Path
 
+from uam_control import configuration
 from uam_control.configuration import ConfigurationError
 from uam_control.profile import ProfileError, load_profile
-from uam_sim_bridge.campaign.pool import cores, fly_all
+from uam_sim_bridge.campaign.pool import cores, figures_of, fly_all
 from uam_sim_bridge.cli.counting import Counting
+from uam_sim_bridge.compare import plan
 from uam_sim_bridge.flight.result_folder import ResultFolderError, make_folder
+from uam_sim_bridge.flight.settings import ENGINES, SettingsError, require_ros
 
 INTERRUPTED, WRONG_USE = 130, 2
 EXAMPLES = """\
 examples:
   uam compare                          every controller, payloads 0.1 0.2 0.3 kg, 5 seeds
   uam compare --seeds 10 --jobs 4
+  uam compare --engine ros --rows proposed --seeds 10    through the nodes, one flight at a time
   uam compare --profile mine=mine.yaml     one more row, of a profile of your own
 
 Left in --out: report.html, tables.md, flights.csv, comparison.json and figures/. The baselines are
@@ -30,8 +34,8 @@ def add(commands) -> None:
     parser = commands.add_parser(
         "compare",
         help="all controllers over the same flights: the paper's tables and figures",
-        description="Fly every controller over the same payloads and seeds in the direct engine; "
-        "write the paper's three tables and five figures.",
+        description="Fly every controller over the same payloads and seeds; write the paper's "
+        "three tables and five figures.",
         epilog=EXAMPLES,
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
@@ -39,10 +43,14 @@ def add(commands) -> None:
     option("--seeds", type=int, default=5, metavar="N", help="seeds 1..N (default %(default)s)")
     option("--payload-mass", type=float, nargs="+", metavar="KG",
            help="payloads (default 0.1 0.2 0.3)")
+    option("--engine", choices=ENGINES, default="direct",
+           help="nodes and sockets, or one loop without them (default %(default)s)")
+    option("--rows", nargs="+", metavar="NAME", choices=tuple(plan.ROWS), default=tuple(plan.ROWS),
+           help=f"what is flown: {', '.join(plan.ROWS)} (default: all)")
     option("--profile", action="append", default=[], metavar="LABEL=FILE",
            help="a further row; may be given again")
-    option("--jobs", type=int, default=cores(), metavar="N",
-           help="processes (default: one per core, %(default)s)")
+    option("--jobs", type=int, metavar="N",
+           help=f"flights at a time (default: one per core, {cores()}; with --engine ros 1)")
     option("--out", type=Path, metavar="DIR",
            help="result folder (default results/<time>-compare)")
     parser.set_defaults(run=run)
@@ -50,19 +58,21 @@ def add(commands) -> None:
 
 def run(options: argparse.Namespace) -> int:
     """Compare as asked; returns the exit status."""
-    from uam_sim_bridge.compare import plan
-
     try:
-        if options.seeds < 1 or options.jobs < 1:
+        jobs = options.jobs
+        if jobs is None:
+            jobs = 1 if options.engine == "ros" else cores()
+        if options.seeds < 1 or jobs < 1:
             raise ConfigurationError("--seeds and --jobs are 1 or more")
         payloads = tuple(options.payload_mass or plan.PAYLOADS)
         if not all(0.0 <= mass <= 2.0 for mass in payloads):
             raise ConfigurationError("--payload-mass is 0 to 2 kg")
-        rows = (*plan.entries(), *map(_further, options.profile))
+        rows = (*plan.entries(options.rows), *map(_further, options.profile))
         out = make_folder(options.out, "compare")
         (out / "flights").mkdir(exist_ok=True)
-        return compare(rows, payloads, range(1, options.seeds + 1), options.jobs, out)
-    except (ConfigurationError, ProfileError, ResultFolderError, OSError) as error:
+        seeds = range(1, options.seeds + 1)
+        return compare(rows, payloads, seeds, options.engine, jobs, out)
+    except (ConfigurationError, ProfileError, ResultFolderError, SettingsError, OSError) as error:
         print(f"uam compare: {error}", file=sys.stderr)
         return WRONG_USE
     except KeyboardInterrupt:
@@ -71,21 +81,18 @@ def run(options: argparse.Namespace) -> int:
 
 
 def _further(text: str):
-    from uam_control import configuration
-    from uam_sim_bridge.compare.plan import Entry
-
     label, _, file = text.partition("=")
     if not label or not file:
         raise ConfigurationError(f"--profile {text}: LABEL=FILE is expected")
-    return Entry(label, load_profile(str(configuration.named("profiles", file))))
+    return plan.Entry(label, load_profile(str(configuration.named("profiles", file))))
 
 
-def compare(rows, payloads, seeds, jobs: int, out: Path) -> int:
+def compare(rows, payloads, seeds, engine: str, jobs: int, out: Path) -> int:
     """Fly, then write everything; returns the exit status."""
-    from uam_sim_bridge.compare import modularity, plan, report
+    from uam_sim_bridge.compare import modularity, report
 
     trials = plan.trials(rows, payloads, list(seeds), out / "flights")
-    proposed = next(row.profile for row in rows if row.label == plan.PROPOSED)
+    proposed = load_profile("s500")
     kept = out / "flights" / "modularity.parquet"
     extra = modularity.trials(proposed, plan.middle(payloads), seeds[0], kept)
     with Counting("compare", len(trials) + len(extra)) as counting:
@@ -95,11 +102,12 @@ def compare(rows, payloads, seeds, jobs: int, out: Path) -> int:
                 done, f"{result.label}, {result.payload_mass:g} kg, seed {result.seed}"
             )
 
-        results = fly_all([*trials, *extra], jobs, progress=show)
+        results = fly_all([*trials, *extra], jobs, _work(engine), progress=show)
     modular = modularity.Evidence.of(proposed, kept, results[len(trials):])
     results = results[: len(trials)]
     facts = {
         "command": shlex.join(["uam", *sys.argv[1:]]),
+        "engine": engine,
         "payloads_kg": list(payloads),
         "seeds": list(seeds),
         "profiles": {row.label: row.profile.file.name for row in rows},
@@ -109,3 +117,13 @@ def compare(rows, payloads, seeds, jobs: int, out: Path) -> int:
     print(written.text)
     print(f"results  {out}\nreport   {written.page}")
     return 0
+
+
+def _work(engine: str):
+    """What a process does with a trial. Raises SettingsError where ROS is not installed."""
+    if engine == "direct":
+        return figures_of
+    require_ros()
+    from uam_sim_bridge.campaign.ros_trial import fly
+
+    return fly

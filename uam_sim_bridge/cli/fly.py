@@ -191,13 +191,7 @@ def _engine(name: str):
         from uam_sim_bridge.flight.direct_engine import fly as engine
 
         return engine
-    try:
-        import rclpy  # noqa: F401
-    except ImportError:
-        raise SettingsError(
-            "the ROS engine needs rclpy, which is not installed: make setup, or source a ROS 2 "
-            "installation, or fly with --engine direct"
-        ) from None
+    flight_settings.require_ros()
     from uam_sim_bridge.flight.ros_engine import fly as engine
 
     return engine

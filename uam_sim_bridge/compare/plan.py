@@ -19,6 +19,18 @@ VERBATIM, WITH_WEIGHT = "Table I verbatim", "Table I and the weight"
 PAYLOADS = (0.1, 0.2, 0.3)  # [kg]
 
 
+# What the command line calls the rows: the paper's three controllers in its order, then what else
+# the reader should see.
+ROWS = {
+    "asmc1": ASMC1,
+    "asmc2": ASMC2,
+    "proposed": PROPOSED,
+    "frozen": FROZEN,
+    "table1": VERBATIM,
+    "table1_weight": WITH_WEIGHT,
+}
+
+
 @dataclass(frozen=True)
 class Entry:
     """One row of the tables."""
@@ -27,17 +39,18 @@ class Entry:
     profile: Profile
 
 
-def entries() -> tuple[Entry, ...]:
-    """The paper's three controllers in its order, then what else the reader should see."""
+def entries(names: Sequence[str] = tuple(ROWS)) -> tuple[Entry, ...]:
+    """Return the rows of these `names`, keys of ROWS."""
     proposed, verbatim = load_profile("s500"), load_profile("paper_table1")
-    return (
-        Entry(ASMC1, load_profile("asmc1")),
-        Entry(ASMC2, load_profile("asmc2")),
-        Entry(PROPOSED, proposed),
-        Entry(FROZEN, frozen(proposed)),
-        Entry(VERBATIM, verbatim),
-        Entry(WITH_WEIGHT, with_weight(verbatim, proposed)),
-    )
+    profiles = {
+        ASMC1: load_profile("asmc1"),
+        ASMC2: load_profile("asmc2"),
+        PROPOSED: proposed,
+        FROZEN: frozen(proposed),
+        VERBATIM: verbatim,
+        WITH_WEIGHT: with_weight(verbatim, proposed),
+    }
+    return tuple(Entry(ROWS[name], profiles[ROWS[name]]) for name in names)
 
 
 def frozen(profile: Profile) -> Profile:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import importlib.util
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -107,6 +108,15 @@ def settings(
         instance=instance,
         vehicle_changes=dict(vehicle_changes or {}),
     )
+
+
+def require_ros() -> None:
+    """Raise SettingsError where ROS is not installed."""
+    if importlib.util.find_spec("rclpy") is None:
+        raise SettingsError(
+            "the ROS engine needs rclpy, which is not installed: make setup, or source a ROS 2 "
+            "installation, or fly with --engine direct"
+        )
 
 
 def _choice(name: str, value: str, allowed) -> None:

@@ -1,0 +1,49 @@
+"""`uam compare` from the command line, as short as it can be."""
+
+import json
+
+import pytest
+
+from uam_sim_bridge.campaign import ros_trial, trial
+from uam_sim_bridge.cli.main import main
+from uam_sim_bridge.compare import plan
+
+
+def compare(out, *options):
+    status = main(["compare", "--rows", "proposed", "--seeds", "1", "--payload-mass", "0.2",
+                   "--out", str(out), *options])
+    assert status == 0
+    return json.loads((out / "comparison.json").read_text())
+
+
+def test_a_comparison_is_written_and_repeats(tmp_path, capsys):
+    first = compare(tmp_path / "a")
+    (row,) = first["rows"].values()
+    assert row["flights"] == row["completed"] == 1 and row["lost"] == 0
+    assert "not one bit differs" in first["claims"][-1]
+    assert first["seeds"] == [1] and first["payloads_kg"] == [0.2] and first["engine"] == "direct"
+    assert "500 evaluations" in first["budgets"]["proposed"]
+    for name in ("position_errors", "rms", "gains"):
+        assert (tmp_path / "a" / "figures" / f"{name}.png").stat().st_size > 0
+    assert "proposed" in (tmp_path / "a" / "report.html").read_text()
+    assert "RMS position error" in capsys.readouterr().out
+    assert compare(tmp_path / "b", "--jobs", "1")["rows"] == first["rows"]
+
+
+@pytest.mark.parametrize("options, said", [
+    (["--seeds", "0"], "1 or more"),
+    (["--payload-mass", "3"], "0 to 2 kg"),
+    (["--profile", "mine"], "LABEL=FILE"),
+])
+def test_wrong_use_is_refused_in_one_line(options, said, tmp_path, capsys):
+    assert main(["compare", "--out", str(tmp_path), *options]) == 2
+    error = capsys.readouterr().err
+    assert said in error and error.count("\n") == 1
+
+
+def test_a_trial_through_the_nodes_is_the_trial_of_the_direct_engine():
+    (proposed,) = plan.entries(["proposed"])
+    asked = trial.Trial(proposed.label, proposed.profile, 0.2, 1)
+    through_ros, direct = ros_trial.fly(asked), trial.fly(asked)[0]
+    assert through_ros.completed and direct.completed
+    assert through_ros.rms == pytest.approx(direct.rms, rel=1e-3)
