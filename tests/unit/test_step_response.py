@@ -24,7 +24,8 @@ def test_a_second_order_lag_overshoots_by_what_its_damping_says():
     damped = frequency * np.sqrt(1.0 - damping**2)
     t = np.maximum(TIME, 0.0)
     decay = np.exp(-damping * frequency * t)
-    response = 1.0 - decay * (np.cos(damped * t) + damping * frequency / damped * np.sin(damped * t))
+    ratio = damping / np.sqrt(1.0 - damping**2)
+    response = 1.0 - decay * (np.cos(damped * t) + ratio * np.sin(damped * t))
     expected = np.exp(-np.pi * damping / np.sqrt(1.0 - damping**2))
     assert figures(TIME, response).overshoot == pytest.approx(expected, rel=0.01)
 
