@@ -1,0 +1,75 @@
+"""A real PX4 flies the mission. Skipped, saying so, where none is pointed at (PX4_SITL_DIR)."""
+
+import json
+import os
+
+import numpy as np
+import pytest
+
+from whole_flight import Flight
+from uam_sim_bridge.px4.installation import VARIABLE, Px4Error, Px4Installation
+from uam_sim_bridge.px4.rate_steps import LIMIT, compared, measure
+
+PLACED = 0.25  # [m]
+TIMES_THE_STAND_INS = 2.0
+PATIENCE = 900.0  # [s]
+
+
+def _installation():
+    try:
+        return Px4Installation.find()
+    except Px4Error:
+        return None
+
+
+pytestmark = [
+    pytest.mark.slow,
+    pytest.mark.skipif(
+        _installation() is None,
+        reason=f"no PX4 to fly with: set {VARIABLE} to a build of PX4 v1.16 SITL"
+        + (f" ({os.environ[VARIABLE]} is none)" if os.environ.get(VARIABLE) else ""),
+    ),
+]
+
+
+@pytest.fixture
+def fly(tmp_path):
+    flights = []
+
+    def start(name, *options):
+        flights.append(Flight(tmp_path / name, *options))
+        return flights[-1]
+
+    yield start
+    for flight in flights:
+        flight.end()
+
+
+def metrics(flight):
+    assert flight.wait(PATIENCE) == 0, flight.said + flight.complained
+    return json.loads((flight.out / "metrics.json").read_text())
+
+
+def test_px4_flies_the_mission_about_as_well_as_the_stand_in(fly):
+    px4 = fly("px4", "--autopilot", "px4")
+    found = metrics(px4)
+    assert found["autopilot"] == "px4" and found["mission_completed"] and found["payload_lifted"]
+    assert found["payload_place_error_m"] < PLACED
+    assert (px4.out / "px4.ulg").read_bytes().startswith(b"ULog")
+    ours = metrics(fly("stand-in"))
+    for group, rms in ours["rms"].items():
+        limit = TIMES_THE_STAND_INS * np.array(rms)
+        assert np.all(np.array(found["rms"][group]) <= limit), (group, found["rms"][group], rms)
+
+
+def test_two_flights_with_px4_at_once(fly):
+    both = [fly(name, "--autopilot", "px4", "--scenario", "hover") for name in ("one", "other")]
+    for flight in both:
+        assert metrics(flight)["mission_completed"]
+    assert both[0].instance != both[1].instance
+
+
+def test_the_stand_in_answers_body_rate_steps_as_px4_does():
+    found = compared(measure(None), measure(_installation()))
+    for axis, row in found.items():
+        assert row["distance"] <= LIMIT, (axis, row)
