@@ -12,9 +12,10 @@ from quadrotor import MASS, Quadrotor
 
 from uam_sim_bridge.autopilot.modes import Mode
 from uam_sim_bridge.mavlink.hil_server import HilError, HilParameters, HilServer
-from uam_sim_bridge.mavlink.link import OffboardLink, UdpTransport
+from uam_sim_bridge.mavlink.link import OffboardLink
 from uam_sim_bridge.mavlink.offboard import OffboardSequence, Phase
 from uam_sim_bridge.mavlink.setpoint import RateThrustMap, RateThrustParameters
+from uam_sim_bridge.mavlink.transport import UdpTransport
 from uam_sim_bridge.mavlink.wire import Codec, Framer, mavlink2
 
 START_TIMEOUT = 60.0  # s: a first start compiles
