@@ -307,7 +307,7 @@ def test_plugged_in_again_it_goes_on(wires):
     answer = Framer(Codec(9, 9)).stream(w.plant.recv(500))[0]
     assert answer.mode == 0 and set(answer.controls) == {0.0}
     w.plug()
-    w.router.until_said("is back")
+    w.router.until_said("flight controller is up")
     w.plant.sendall(w.codec.encode(sensor(8_000)))
     w.until(lambda: [m for m in w.hear() if m.get_type() == "HIL_SENSOR"])
     assert w.router.interrupt(times=3) == 0 and "Traceback" not in w.router.output

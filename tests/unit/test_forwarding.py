@@ -103,6 +103,17 @@ def test_the_station_gets_the_bytes_as_they_came(make):
     assert [rig.socket.recv(500) for _ in chunks] == chunks
 
 
+def test_long_chunks_reach_the_station_in_pieces(make):
+    rig = make()
+    chunk = random.Random(1).randbytes(70_000)
+    rig.line.arriving = [chunk]
+    rig.gcs.receive()
+    got = b""
+    while len(got) < len(chunk):
+        got += rig.socket.recv(65535)
+    assert got == chunk
+
+
 def test_whole_valid_messages_reach_the_autopilot_as_they_are(make):
     rig = make()
     frame = rig.codec.encode(arm())

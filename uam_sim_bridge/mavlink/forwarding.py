@@ -17,6 +17,7 @@ from uam_sim_bridge.mavlink.transport import Transport, open_transport
 from uam_sim_bridge.mavlink.wire import Codec, Framer
 
 BYTES_PER_TICK = 2048  # read from the station, hence forwarded at most
+DATAGRAM = 1400  # bytes to the station at once: what passes any network in one piece
 LINE_SHARE = 0.2  # of a line of known speed: the setpoints come first
 
 
@@ -60,7 +61,8 @@ class GroundStation:
         """Return what the autopilot sent; the station gets it too."""
         chunks = self._autopilot.receive()
         for chunk in chunks:
-            self._station.send(chunk)
+            for at in range(0, len(chunk), DATAGRAM):
+                self._station.send(chunk[at:at + DATAGRAM])
         return chunks
 
     def forward(self) -> None:

@@ -83,6 +83,16 @@ class OffboardLink:
         """Messages refused for their signature."""
         return self._codec.refused
 
+    @property
+    def open(self) -> bool:
+        """Whether the transport is open, as far as this end can tell."""
+        return self._transport.connected
+
+    @property
+    def dropped(self) -> int:
+        """Frames that the transport did not take."""
+        return self._transport.dropped
+
     def connected(self, time: float) -> bool:
         """Whether a heartbeat came within the last seconds."""
         return time - self._heard < HEARTBEAT_TIMEOUT

@@ -41,6 +41,7 @@ LOOK_PERIOD = 0.1  # s, the longest wait: a lost link is tried again, the load l
 FULL = 0.8  # of the line, from which a warning is given
 WARN_PERIOD = 10.0  # s between two warnings of the same direction
 PLANT_PATIENCE = 5.0  # s for the plant to take a message
+AUTOPILOT_IDS, PLANT_IDS = (1, 1), (1, 200)  # system and component, where a message is packed anew
 TO, FROM = "to the flight controller", "from the flight controller"
 
 
@@ -53,8 +54,9 @@ class Router:
         """hil_rate [Hz]: HIL_SENSOR to the flight controller, at most."""
         self._controller, self._plant, self._bridge = controller, plant, bridge
         plant.settimeout(PLANT_PATIENCE)
-        self._codec = Codec(1, 1)
-        self._from_controller, self._from_plant = Framer(self._codec), Framer(self._codec)
+        self._as_autopilot, self._as_plant = Codec(*AUTOPILOT_IDS), Codec(*PLANT_IDS)
+        self._from_controller = Framer(self._as_autopilot)
+        self._from_plant = Framer(self._as_plant)
         self._outbox = Outbox(controller)
         self._thinner = Thinner(hil_rate)
         self.meters = {TO: Meter(), FROM: Meter()}
@@ -119,7 +121,7 @@ class Router:
         if message.fields_updated == before:
             self._to_controller(message)
         else:
-            self._outbox.put(message.get_type(), self._codec.encode(message))
+            self._outbox.put(message.get_type(), self._as_plant.encode(message))
         return True
 
     def _take_controller(self, message: Message) -> bool:
@@ -135,7 +137,7 @@ class Router:
     def _to_plant(self, message: Message) -> bool:
         message.time_usec = self._stamp
         try:
-            self._plant.sendall(self._codec.encode(message))
+            self._plant.sendall(self._as_autopilot.encode(message))
         except OSError:
             return False
         return True
@@ -147,12 +149,12 @@ class Router:
             return True
         self._there = there
         if there:
-            say("the link to the flight controller is back")
+            say("the link to the flight controller is up")
             return True
         say("the link to the flight controller is lost: the motors stand still")
         self._outbox.clear()
         self._commands = None
-        self._from_controller = Framer(self._codec)
+        self._from_controller = Framer(self._as_autopilot)
         return self._to_plant(mavlink2.MAVLink_hil_actuator_controls_message(
             self._stamp, [0.0] * 16, 0, 0))
 
@@ -227,7 +229,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         closables.append(controller := open_transport(options.link))
         rate = options.hil_rate or sustainable_rate(controller.bytes_per_second)
         closables.append(bridge := UdpPort(
-            options.mavlink_port, options.companion_port, Codec(1, 1)))
+            options.mavlink_port, options.companion_port, Codec(*AUTOPILOT_IDS)))
         closables.append(plant := connect(
             NAME, options.sim_host, options.sim_port, options.wait))
         say(f"connected to the simulator at {options.sim_host}:{options.sim_port}; HIL_SENSOR at "

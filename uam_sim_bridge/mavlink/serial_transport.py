@@ -5,6 +5,7 @@ from __future__ import annotations
 import errno
 import os
 import select
+import termios
 import time
 from collections.abc import Callable
 
@@ -33,7 +34,10 @@ class SerialTransport(StreamTransport):
             raise PortError(f"serial device {device} at {baud} baud: {_reason(error)}") from None
 
     def _open(self, now: float) -> bool:
-        self._port = serial.Serial(self._device, self._baud, timeout=0, exclusive=True)
+        try:
+            self._port = serial.Serial(self._device, self._baud, timeout=0, exclusive=True)
+        except termios.error as error:  # unplugged just now: pyserial lets it through
+            raise OSError(*error.args) from None
         return True
 
     def _read(self) -> bytes:

@@ -300,6 +300,8 @@ class MavlinkBridgeNode(UamNode):
             "landed": link.landed,
             "messages of other systems": link.ignored,
             "refused": link.refused,
+            "link open": link.open,
+            "frames dropped": link.dropped,
             "level hold": self._hold.active,
         }
         summary = "; ".join((sequence.phase.value, *notes))
