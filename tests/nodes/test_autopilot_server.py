@@ -12,9 +12,11 @@ from quadrotor import MASS, Quadrotor
 
 from uam_sim_bridge.autopilot.modes import Mode
 from uam_sim_bridge.mavlink.hil_server import HilError, HilParameters, HilServer
-from uam_sim_bridge.mavlink.link import OffboardLink, UdpTransport
+from uam_sim_bridge.mavlink.link import OffboardLink
 from uam_sim_bridge.mavlink.offboard import OffboardSequence, Phase
 from uam_sim_bridge.mavlink.setpoint import RateThrustMap, RateThrustParameters
+from uam_sim_bridge.mavlink.signing import Signing
+from uam_sim_bridge.mavlink.transport import UdpTransport
 from uam_sim_bridge.mavlink.wire import Codec, Framer, mavlink2
 
 START_TIMEOUT = 60.0  # s: a first start compiles
@@ -37,15 +39,15 @@ def start(*arguments):
 class Flight:
     """Quadrotor, HIL server, the autopilot's process and the bridge's link, in lockstep."""
 
-    def __init__(self):
+    def __init__(self, signing=None, arguments=()):
         self.tcp, self.udp = free_port(socket.SOCK_STREAM), free_port(socket.SOCK_DGRAM)
         self.local = free_port(socket.SOCK_DGRAM)
         self.hil = HilServer(self.tcp, parameters=PATIENT)
         self.process = start("--sim-port", self.tcp, "--mavlink-port", self.udp,
-                             "--companion-port", self.local)
+                             "--companion-port", self.local, *arguments)
         self.sequence = OffboardSequence()
         self.link = OffboardLink(UdpTransport(self.local, ("127.0.0.1", self.udp)), self.sequence,
-                                 RateThrustParameters())
+                                 RateThrustParameters(), signing=signing)
         self.body = Quadrotor()
         self.streaming = self.vision = True
         self.heard = []
@@ -195,6 +197,22 @@ def test_garbage_and_truncated_bytes_are_survived(flight):
     stranger.close()
 
 
+def test_signed_flight_and_no_answer_to_others():
+    key = "ab" * 32
+    f = Flight(Signing.from_text(key), ("--signing-key", key))
+    f.airborne()
+    assert f.link.refused == 0
+    other = f.link._codec
+    f.link._codec = Codec(1, 191)  # no signature: the stream ends for the autopilot
+    f.run(1.3, thrust=HOVER / 41.36)
+    assert f.link.mode is Mode.LAND
+    f.link._codec = other
+    f.run(0.1)
+    assert f.link.mode is Mode.LAND and f.hil.armed
+    out, err = f.close()
+    assert key not in out + err
+
+
 def test_ends_with_the_simulator(flight):
     flight.run(0.2)
     out, err = flight.close()
@@ -210,6 +228,10 @@ def test_ends_with_the_simulator(flight):
         (["--instance", "-1"], "instance number"),
         (["--sim-port", "70000"], "not a port"),
         (["--wait", "x"], "not a time"),
+        (["--signing-key", "secret"], "not 64 hex digits"),
+        (["--serial", "/dev/nothing:57600"], "No such file"),
+        (["--serial", "/dev/null"], "a device and"),
+        (["--serial", "/dev/null:57600", "--signing-key", "ab" * 32], "not signed"),
     ],
 )
 def test_wrong_use_is_one_line_and_status_2(arguments, message):

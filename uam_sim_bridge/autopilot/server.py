@@ -3,6 +3,9 @@
 TCP client of the simulator (HIL_SENSOR in, HIL_ACTUATOR_CONTROLS out), UDP towards the companion
 computer. All time is the simulator's. Before a HIL_SENSOR is handled, everything that has arrived
 over UDP is; what is to be told goes out before the answer. So a lockstep flight is deterministic.
+
+With --serial, one line carries both, as at a flight controller in HITL mode; see
+`uam_sim_bridge.mavlink.router` for its other end.
 """
 
 from __future__ import annotations
@@ -12,7 +15,6 @@ import math
 import signal
 import socket
 import sys
-import time as clock
 from collections.abc import Sequence
 
 import numpy as np
@@ -22,74 +24,26 @@ from uam_control.parameters import ParameterError
 from uam_sim_bridge.autopilot.companion import Companion, warm_up
 from uam_sim_bridge.autopilot.core import Autopilot
 from uam_sim_bridge.autopilot.params import Parameters
+from uam_sim_bridge.autopilot.serial_line import SerialLine
+from uam_sim_bridge.mavlink.signing import Signing
+from uam_sim_bridge.mavlink.sitl_options import add_port_options, fill_ports
+from uam_sim_bridge.mavlink.sitl_ports import UdpPort, connect
 from uam_sim_bridge.mavlink.wire import Codec, Framer, Message, mavlink2
 
-HOST = "127.0.0.1"
 _GYRO_AND_ACCELEROMETER = 0x3F  # HIL_SENSOR.fields_updated
 _LOCKSTEP = 1  # HIL_ACTUATOR_CONTROLS.flags
 _CUSTOM_MODE, _ARMED = 1, 128  # its mode
 _RATE_SAMPLES = 8  # intervals from which the rate of HIL_SENSOR is measured
 
 
-class ServerError(RuntimeError):
-    """The server cannot go on; the text is one line for the user."""
-
-
-class UdpPort:
-    """The companion side: answers only the first peer that sends a valid message, as PX4 does."""
-
-    def __init__(self, local: int, remote: int, codec: Codec) -> None:
-        """local: port to listen on; remote: port told unasked until a peer has spoken.
-
-        Raises ServerError where the port is taken.
-        """
-        self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
-        try:
-            self._socket.bind((HOST, local))
-        except OSError as error:
-            self._socket.close()
-            raise ServerError(f"UDP port {local} for the companion computer: {error.strerror}; "
-                              "choose another instance or --mavlink-port") from None
-        self._socket.setblocking(False)
-        self._codec = codec
-        self._framer = Framer(codec)
-        self._peer = (HOST, remote)
-        self._locked = False
-
-    def receive(self) -> list[Message]:
-        """Return all messages that have arrived."""
-        messages: list[Message] = []
-        while True:
-            try:
-                data, sender = self._socket.recvfrom(65535)
-            except BlockingIOError:
-                return messages
-            except ConnectionError:  # the peer's port was closed when we sent last
-                continue
-            if self._locked and sender != self._peer:
-                continue
-            new = self._framer.datagram(data)
-            if new:
-                self._peer, self._locked = sender, True
-            messages += new
-
-    def send(self, messages: list[Message]) -> None:
-        """Send each message in a datagram of its own; nobody listening is no error."""
-        for message in messages:
-            try:
-                self._socket.sendto(self._codec.encode(message), self._peer)
-            except (BlockingIOError, ConnectionError):
-                pass
-
-    def close(self) -> None:
-        """Give the port back."""
-        self._socket.close()
-
-
 class Server:
     """Autopilot, companion side and simulator side together."""
 
-    def __init__(self, autopilot: Autopilot, simulator: socket.socket, udp: UdpPort) -> None:
+    def __init__(
+        self, autopilot: Autopilot, simulator: socket.socket | SerialLine,
+        udp: UdpPort | SerialLine,
+    ) -> None:
+        """simulator, udp: where HIL messages and those of the companion come from; may be one."""
         p = autopilot.parameters
         self._codec = Codec(int(p["MAV_SYS_ID"]), int(p["MAV_COMP_ID"]))
         self._framer = Framer(self._codec)
@@ -114,6 +68,8 @@ class Server:
                 if kind == "HIL_SENSOR":
                     self._sensor(message)
                 elif kind in ("VISION_POSITION_ESTIMATE", "ODOMETRY"):
+                    self._companion.handle(self._microseconds * 1e-6, message)
+                elif self._udp is self._simulator and self._microseconds >= 0:
                     self._companion.handle(self._microseconds * 1e-6, message)
 
     def _sensor(self, m: Message) -> None:
@@ -146,54 +102,6 @@ class Server:
             self._autopilot.set_sample_rate(1e6 / float(np.median(self._intervals)))
 
 
-def connect(host: str, port: int, patience: float) -> socket.socket:
-    """Return the link to the simulator, waiting up to `patience` seconds for it to listen.
-
-    Raises ServerError when it does not.
-    """
-    end = clock.monotonic() + patience
-    said = False
-    while True:
-        try:
-            link = socket.create_connection((host, port), timeout=max(0.1, patience))
-            break
-        except socket.gaierror as error:
-            raise ServerError(f"simulator host {host}: {error.strerror}") from None
-        except OSError as error:
-            if clock.monotonic() > end:
-                raise ServerError(f"no simulator at {host}:{port} within {patience:g} s "
-                                  f"({error.strerror or 'no answer'})") from None
-            if not said:
-                print(f"autopilot: waiting for the simulator at {host}:{port}", flush=True)
-                said = True
-            clock.sleep(0.05)
-    link.settimeout(None)
-    link.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
-    return link
-
-
-def _port(text: str) -> int:
-    if not text.isdecimal() or not 1 <= int(text) <= 65535:
-        raise argparse.ArgumentTypeError(f"{text} is not a port (1..65535)")
-    return int(text)
-
-
-def _instance(text: str) -> int:
-    if not text.isdecimal() or int(text) > 254:
-        raise argparse.ArgumentTypeError(f"{text} is not an instance number (0..254)")
-    return int(text)
-
-
-def _seconds(text: str) -> float:
-    try:
-        value = float(text)
-    except ValueError:
-        value = math.nan
-    if not 0.0 <= value <= 86400.0:
-        raise argparse.ArgumentTypeError(f"{text} is not a time in seconds (0..86400)")
-    return value
-
-
 def parser() -> argparse.ArgumentParser:
     """The command line."""
     p = argparse.ArgumentParser(
@@ -204,46 +112,51 @@ def parser() -> argparse.ArgumentParser:
         epilog="examples:\n"
         "  autopilot                         instance 0: simulator 4560, UDP 14580 -> 14540\n"
         "  autopilot --instance 3            every port + 3\n"
-        "  autopilot --params my_frame.yaml  NAME: value lines, PX4's names\n",
+        "  autopilot --params my_frame.yaml  NAME: value lines, PX4's names\n"
+        "  autopilot --serial /dev/ttyUSB0:921600  at the far end of hitl_router's line\n",
     )
-    p.add_argument("-i", "--instance", type=_instance, default=0, metavar="N",
-                   help="PX4 instance number, added to the default ports")
-    p.add_argument("--sim-host", default=HOST, metavar="HOST",
-                   help="simulator (default %(default)s)")
-    p.add_argument("--sim-port", type=_port, metavar="PORT", help="simulator (default 4560 + N)")
-    p.add_argument("--mavlink-port", type=_port, metavar="PORT",
-                   help="own UDP port (default 14580 + N)")
-    p.add_argument("--companion-port", type=_port, metavar="PORT",
-                   help="UDP port told unasked until a peer speaks (default 14540 + N)")
+    add_port_options(p)
     p.add_argument("--params", metavar="FILE",
                    help="parameters (default: config/autopilot/s500.yaml)")
-    p.add_argument("--wait", type=_seconds, default=60.0, metavar="SECONDS",
-                   help="how long to wait for the simulator (default %(default)g)")
+    p.add_argument("--serial", metavar="DEVICE:BAUD",
+                   help="everything over this line instead of TCP and UDP, as in HITL")
+    p.add_argument("--signing-key", default="", metavar="KEY",
+                   help="sign on UDP and refuse what is not: 64 hex digits, or a file of them")
     return p
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run until the simulator closes the link: 0; wrong use, port taken, no simulator: 2."""
     options = parser().parse_args(arguments)
+    fill_ports(options)
     signal.signal(signal.SIGTERM, lambda *_: sys.exit(0))
     udp = link = None
     try:
+        if options.serial and options.signing_key:
+            raise ValueError("--signing-key is for UDP, the line of --serial is not signed")
         file = options.params or path("autopilot/s500.yaml")
         autopilot = Autopilot(Parameters.load(file))
         # as PX4 SITL does; the highest instances do not fit MAVLink's one byte
         autopilot.set_parameter("MAV_SYS_ID", min(options.instance + 1, 250))
         codec = Codec(int(autopilot.parameters["MAV_SYS_ID"]),
-                      int(autopilot.parameters["MAV_COMP_ID"]))
-        n = options.instance
-        udp = UdpPort(options.mavlink_port or 14580 + n, options.companion_port or 14540 + n, codec)
+                      int(autopilot.parameters["MAV_COMP_ID"]),
+                      Signing.from_text(options.signing_key))
+        if options.serial:
+            link = udp = SerialLine(options.serial, codec)
+            warm_up()
+            print(f"autopilot: on the serial line {options.serial}", flush=True)
+            Server(autopilot, link, udp).run()
+            print("autopilot: the serial line is gone", flush=True)
+            return 0
+        udp = UdpPort(options.mavlink_port, options.companion_port, codec)
         warm_up()
-        link = connect(options.sim_host, options.sim_port or 4560 + n, options.wait)
-        print(f"autopilot: connected to the simulator at {options.sim_host}:"
-              f"{options.sim_port or 4560 + n}", flush=True)
+        link = connect("autopilot", options.sim_host, options.sim_port, options.wait)
+        print(f"autopilot: connected to the simulator at {options.sim_host}:{options.sim_port}",
+              flush=True)
         Server(autopilot, link, udp).run()
         print("autopilot: the simulator closed the link", flush=True)
         return 0
-    except (ServerError, ParameterError, ConfigurationError, ValueError) as error:
+    except (ParameterError, ConfigurationError, ValueError) as error:
         print(f"autopilot: {error}", file=sys.stderr, flush=True)
         return 2
     except KeyboardInterrupt:

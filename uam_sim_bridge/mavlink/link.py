@@ -7,17 +7,16 @@ the control ticks; there are no wall timers.
 from __future__ import annotations
 
 import math
-import socket
-from typing import Protocol
 
 import numpy as np
 
 from uam_sim_bridge.autopilot.modes import CUSTOM_MODE_ENABLED, Command, Mode
-from uam_sim_bridge.flight.ports import PortError
 from uam_sim_bridge.mavlink.frames import swap_body
 from uam_sim_bridge.mavlink.offboard import OffboardSequence, Request
 from uam_sim_bridge.mavlink.parameter_check import WATCHED, differences
 from uam_sim_bridge.mavlink.setpoint import RateThrustParameters
+from uam_sim_bridge.mavlink.signing import Signing
+from uam_sim_bridge.mavlink.transport import Transport
 from uam_sim_bridge.mavlink.vision import vision_message
 from uam_sim_bridge.mavlink.wire import (
     Codec,
@@ -41,63 +40,12 @@ INTERVALS = {
 }
 
 
-class Transport(Protocol):
-    """What carries the bytes: `receive` returns the datagrams (or chunks) that have arrived."""
-
-    def send(self, data: bytes) -> None: ...
-
-    def receive(self) -> list[bytes]: ...
-
-    def close(self) -> None: ...
-
-
-class UdpTransport:
-    """UDP between a local port and the autopilot's; packets from elsewhere are ignored."""
-
-    def __init__(self, local_port: int, remote: tuple[str, int], host: str = "127.0.0.1") -> None:
-        """Raises PortError in one line where the local port is taken."""
-        self._remote = (socket.gethostbyname(remote[0]), remote[1])
-        self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
-        try:
-            self._socket.bind((host, local_port))
-        except (OSError, OverflowError) as error:
-            self._socket.close()
-            reason = getattr(error, "strerror", None) or str(error)
-            raise PortError(f"UDP port {local_port} for MAVLink: {reason}; stop the program that "
-                            "uses it or choose another instance") from None
-        self._socket.setblocking(False)
-
-    def send(self, data: bytes) -> None:
-        """Send one datagram; nobody listening is no error."""
-        try:
-            self._socket.sendto(data, self._remote)
-        except (BlockingIOError, ConnectionError):
-            pass
-
-    def receive(self) -> list[bytes]:
-        """Return the datagrams that have arrived."""
-        datagrams = []
-        while True:
-            try:
-                data, sender = self._socket.recvfrom(65535)
-            except BlockingIOError:
-                return datagrams
-            except ConnectionError:  # our last datagram found nobody
-                continue
-            if sender == self._remote:
-                datagrams.append(data)
-
-    def close(self) -> None:
-        """Give the port back."""
-        self._socket.close()
-
-
 class OffboardLink:
     """The autopilot as the bridge sees it, and the way to it.
 
     `armed`, `mode`, `landed`: its latest word; `armed_since` [s] or None: tick at which it was
     first known armed; `values`: its parameters by name; `warnings`: where they disagree with the
-    mapping; `ignored`: messages of other systems.
+    mapping; `ignored`: messages of other systems, and answers to others.
     """
 
     def __init__(
@@ -106,6 +54,7 @@ class OffboardLink:
         sequence: OffboardSequence,
         mapping: RateThrustParameters,
         target_system: int = 1,
+        signing: Signing | None = None,
     ) -> None:
         self.sequence = sequence
         self.mode, self.armed, self.landed = Mode.UNKNOWN, False, True
@@ -116,7 +65,7 @@ class OffboardLink:
         self._transport = transport
         self._mapping = mapping
         self._target = target_system
-        self._codec = Codec(target_system, mavlink2.MAV_COMP_ID_ONBOARD_COMPUTER)
+        self._codec = Codec(target_system, mavlink2.MAV_COMP_ID_ONBOARD_COMPUTER, signing)
         self._framer = Framer(self._codec)
         self._texts = TextAssembler()
         self._asked: dict[int, Request] = {}
@@ -129,6 +78,21 @@ class OffboardLink:
         self._mapping = mapping
         self.warnings = tuple(differences(mapping, self.values))
 
+    @property
+    def refused(self) -> int:
+        """Messages refused for their signature."""
+        return self._codec.refused
+
+    @property
+    def open(self) -> bool:
+        """Whether the transport is open, as far as this end can tell."""
+        return self._transport.connected
+
+    @property
+    def dropped(self) -> int:
+        """Frames that the transport did not take."""
+        return self._transport.dropped
+
     def connected(self, time: float) -> bool:
         """Whether a heartbeat came within the last seconds."""
         return time - self._heard < HEARTBEAT_TIMEOUT
@@ -136,8 +100,8 @@ class OffboardLink:
     def poll(self, time: float) -> None:
         """Handle everything that has arrived, at the tick `time` [s]."""
         for data in self._transport.receive():
-            for message in self._framer.datagram(data):
-                if message.get_srcSystem() != self._target:
+            for message in self._framer.take(data, self._transport.stream):
+                if message.get_srcSystem() != self._target or not self._for_us(message):
                     self.ignored += 1
                 else:
                     self._handle(time, message)
@@ -176,6 +140,12 @@ class OffboardLink:
     def close(self) -> None:
         """Close the transport."""
         self._transport.close()
+
+    def _for_us(self, m: Message) -> bool:
+        """Whether it is for everybody or for us: a ground station gets answers of its own."""
+        return (getattr(m, "target_system", 0) in (0, self._target)
+                and getattr(m, "target_component", 0)
+                in (0, mavlink2.MAV_COMP_ID_ONBOARD_COMPUTER))
 
     def _send(self, message: Message) -> None:
         self._transport.send(self._codec.encode(message))

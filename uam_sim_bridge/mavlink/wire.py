@@ -11,6 +11,8 @@ import struct
 
 from pymavlink.dialects.v20 import common as mavlink2
 
+from uam_sim_bridge.mavlink.signing import Seal, Signing
+
 MARKER_1, MARKER_2 = 0xFE, 0xFD
 _OVERHEAD_1, _OVERHEAD_2, _SIGNATURE = 8, 12, 13
 _SIGNED = 1  # incompatibility flag
@@ -19,16 +21,27 @@ Message = mavlink2.MAVLink_message
 
 
 class Codec:
-    """Packs messages of one sender (system and component id) and unpacks those of others."""
+    """Packs messages of one sender (system and component id) and unpacks those of others.
 
-    def __init__(self, system: int, component: int) -> None:
+    With `signing`, what it packs is signed, and only what is signed well is unpacked.
+    """
+
+    def __init__(self, system: int, component: int, signing: Signing | None = None) -> None:
         self._mav = mavlink2.MAVLink(None, srcSystem=system, srcComponent=component)
+        self._seal = None if signing is None else Seal(self._mav, signing)
+
+    @property
+    def refused(self) -> int:
+        """Whole messages refused: not signed, signed with another key, or heard before."""
+        return 0 if self._seal is None else self._seal.refused
 
     def encode(self, message: Message) -> bytes:
         """Return the frame of `message` with the next sequence number.
 
         Raises struct.error where a value does not fit its field.
         """
+        if self._seal is not None:
+            self._seal.refresh()
         frame = message.pack(self._mav)
         self._mav.seq = (self._mav.seq + 1) % 256
         return frame
@@ -38,17 +51,22 @@ class Codec:
 
         Messages unknown to the dialect count as not valid: their checksum cannot be tested.
         """
+        if self._seal is not None:
+            self._seal.refresh()
+        message = None
         try:
             message = self._mav.decode(bytearray(frame))
         except (mavlink2.MAVError, struct.error, ValueError, IndexError, KeyError):
-            return None
+            pass
+        if self._seal is not None:
+            self._seal.settle(message is not None)
         return None if isinstance(message, mavlink2.MAVLink_unknown) else message
 
 
 class Framer:
     """Cuts a byte stream (TCP, serial) or single datagrams into messages.
 
-    `bad_bytes` counts what belonged to no message.
+    `bad_bytes` counts what belonged to no message. What the codec refuses is passed over whole.
     """
 
     def __init__(self, codec: Codec) -> None:
@@ -67,6 +85,10 @@ class Framer:
         """Return the messages of one datagram; nothing is carried over to the next."""
         return self._cut(data, final=True)[0]
 
+    def take(self, data: bytes, stream: bool) -> list[Message]:
+        """Return the messages of a chunk of a stream, or of one datagram."""
+        return self.stream(data) if stream else self.datagram(data)
+
     def _cut(self, data: bytes, final: bool) -> tuple[list[Message], int]:
         messages: list[Message] = []
         at, size = 0, len(data)
@@ -82,9 +104,11 @@ class Framer:
                 if not final:
                     break
             else:
+                refused = self._codec.refused
                 message = self._codec.decode(data[at:end])
                 if message is not None:
                     messages.append(message)
+                if message is not None or self._codec.refused > refused:  # refused: whole as well
                     at = end
                     continue
             at += 1  # a false start: look again behind it

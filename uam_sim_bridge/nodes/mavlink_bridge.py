@@ -20,6 +20,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from rcl_interfaces.msg import ParameterDescriptor
 from rclpy.clock import Clock, ClockType
 
 from uam_control.coordinates import ATTITUDE
@@ -35,13 +36,18 @@ from uam_msgs_py.convert import SetpointWriter, read_pose, seconds
 from uam_msgs_py.joins import StampJoin
 from uam_msgs_py.layouts import BadMessage, stamp_of
 from uam_msgs_py.node import UamNode, run
-from uam_msgs_py.parameters import NodeParameters
+from uam_msgs_py.parameters import NodeParameters, given
 from uam_msgs_py.status import OK, WARN, AutopilotState
+from uam_sim_bridge.flight.ports import PortError
+from uam_sim_bridge.mavlink.forwarding import GroundStation
 from uam_sim_bridge.mavlink.hold import HoldParameters, LevelHold
-from uam_sim_bridge.mavlink.link import OffboardLink, UdpTransport
+from uam_sim_bridge.mavlink.link import OffboardLink
 from uam_sim_bridge.mavlink.offboard import OffboardParameters, OffboardSequence
 from uam_sim_bridge.mavlink.setpoint import RateThrustMap, RateThrustParameters, SetpointRefused
+from uam_sim_bridge.mavlink.signing import Signing
+from uam_sim_bridge.mavlink.transport import Transport, UdpTransport, open_transport
 from uam_sim_bridge.mavlink.vision import vision_message
+from uam_sim_bridge.mavlink.wire import Codec, mavlink2
 
 NAME = "mavlink_bridge"
 STATE_PERIOD = 500_000_000  # ns between two reports of the autopilot's state
@@ -60,6 +66,8 @@ class BridgeParameters(ParameterSet):
     autopilot_port: float = number(
         14580, "UDP port of the autopilot (14580 + instance)", "1", 1, 65535)
     autopilot_system: float = number(1, "MAVLink system id of the autopilot", "1", 1, 255)
+    signing_link_id: float = number(
+        0, "number of this link in MAVLink 2 signatures", "1", 0, 255)
     vision_interval: float = number(
         0.02, "least time between two vision poses sent", "s", 0.0, 1.0)
     vision_position_deviation: float = number(
@@ -79,16 +87,14 @@ class MavlinkBridgeNode(UamNode):
         self._options = NodeParameters(self, BridgeParameters, read_only=True).current
         offboard = NodeParameters(self, OffboardParameters, read_only=True).current
         hold = NodeParameters(self, HoldParameters, read_only=True).current
-        host = self.declare_parameter("autopilot_host", "127.0.0.1").value
 
         self.map = RateThrustMap(self._map_parameters.current)
         self._map_parameters.apply = self._configure
         self.sequence = OffboardSequence(offboard)
         self._hold = LevelHold(hold)
         options = self._options
-        transport = UdpTransport(int(options.local_port), (host, int(options.autopilot_port)))
-        self.link = OffboardLink(
-            transport, self.sequence, self.map.parameters, int(options.autopilot_system))
+        self._station: GroundStation | None = None
+        self.link = self._open_link()
         self._state = np.zeros((3, 8))
         self._pose: tuple[int, np.ndarray, np.ndarray] | None = None
         self._pose_sent = -1.0
@@ -116,6 +122,41 @@ class MavlinkBridgeNode(UamNode):
         if options.clock == "realtime":
             steady = Clock(clock_type=ClockType.STEADY_TIME)
             self.create_timer(WATCH_PERIOD, self._watch, clock=steady)
+
+    def _open_link(self) -> OffboardLink:
+        """Open the links that the parameters name; raises PortError in one line."""
+        options = self._options
+        system = int(options.autopilot_system)
+        host = self.declare_parameter("autopilot_host", "127.0.0.1").value
+        url = self._text("autopilot", "link to the autopilot, in place of the UDP port: "
+                         "udp:HOST:PORT[:LOCAL_PORT], tcp:HOST:PORT or serial:DEVICE:BAUD")
+        station = self._text("gcs", "ground station that watches: udp:HOST:PORT[:LOCAL_PORT]")
+        signing = Signing.from_text(
+            self._text("signing_key", "MAVLink 2 signing: 64 hex digits, or a file that holds "
+                       "them; read as 'set' from outside", secret=True),
+            int(options.signing_link_id))
+        transport: Transport
+        if url:
+            transport = open_transport(url)
+        else:
+            transport = UdpTransport(int(options.local_port), (host, int(options.autopilot_port)))
+        if station:
+            codec = Codec(system, mavlink2.MAV_COMP_ID_ONBOARD_COMPUTER, signing)
+            transport = self._station = GroundStation(station, transport, codec)
+        return OffboardLink(transport, self.sequence, self.map.parameters, system, signing)
+
+    def _text(self, name: str, description: str, secret: bool = False) -> str:
+        """Declare a read-only text, '' by default, and return it; a secret one is not shown.
+
+        Raises PortError where something else is given, such as a key that reads as a number.
+        """
+        value = given(self).get(name, "")
+        if not isinstance(value, str):
+            raise PortError(f"{name}: a text expected" + (", or a file's name" if secret else ""))
+        shown = "set" if secret and value else value
+        descriptor = ParameterDescriptor(description=description, read_only=True)
+        self.declare_parameter(name, shown, descriptor, ignore_override=True)
+        return value
 
     def _configure(self, parameters: RateThrustParameters) -> None:
         self.map.configure(parameters)
@@ -214,6 +255,8 @@ class MavlinkBridgeNode(UamNode):
                     options.vision_position_deviation, options.vision_attitude_deviation)
         if setpoint is not None and self.sequence.streaming:
             link.send_setpoint(*setpoint, now)
+        if self._station is not None:
+            self._station.forward()
 
     def _watch(self) -> None:
         """In real time: act when ticks stop coming."""
@@ -256,6 +299,9 @@ class MavlinkBridgeNode(UamNode):
             "armed": link.armed,
             "landed": link.landed,
             "messages of other systems": link.ignored,
+            "refused": link.refused,
+            "link open": link.open,
+            "frames dropped": link.dropped,
             "level hold": self._hold.active,
         }
         summary = "; ".join((sequence.phase.value, *notes))

@@ -21,9 +21,10 @@ from uam_control.mission.trajectory import empty_reference
 from uam_control.profile import load_profile
 from uam_sim_bridge.flight.ports import Ports
 from uam_sim_bridge.mavlink.hil_server import HilParameters, HilServer
-from uam_sim_bridge.mavlink.link import OffboardLink, UdpTransport
+from uam_sim_bridge.mavlink.link import OffboardLink
 from uam_sim_bridge.mavlink.offboard import OffboardSequence, Phase
 from uam_sim_bridge.mavlink.setpoint import RateThrustMap
+from uam_sim_bridge.mavlink.udp_transport import UdpTransport
 from uam_sim_bridge.plant import Plant, Vehicle
 
 HOST = "127.0.0.1"

@@ -1,0 +1,348 @@
+"""The HITL router as a process, over pseudo-terminals: plant and bridge on one side, the stand-in
+at the end of the line on the other."""
+
+import os
+import random
+import select
+import socket
+import threading
+import time
+import tty
+
+import numpy as np
+import pytest
+from quadrotor import Quadrotor
+
+from uam_sim_bridge.autopilot.modes import Mode
+from uam_sim_bridge.mavlink.hil_server import HilParameters, HilServer
+from uam_sim_bridge.mavlink.link import OffboardLink
+from uam_sim_bridge.mavlink.offboard import OffboardSequence, Phase
+from uam_sim_bridge.mavlink.setpoint import RateThrustParameters
+from uam_sim_bridge.mavlink.transport import UdpTransport
+from uam_sim_bridge.mavlink.wire import Codec, Framer, mavlink2
+
+ROUTER, AUTOPILOT = "uam_sim_bridge.mavlink.router", "uam_sim_bridge.autopilot.server"
+PATIENCE = 60.0  # s for a process to start: the stand-in compiles
+# a frame cut short by garbage is waited for; only then does the time matter
+HIL = HilParameters(answer_timeout=2.0, silent_timeout=0.5)
+PATIENT = HilParameters(answer_timeout=30.0, silent_timeout=10.0)
+
+
+def free_port(kind):
+    with socket.socket(socket.AF_INET, kind) as s:
+        s.bind(("127.0.0.1", 0))
+        return s.getsockname()[1]
+
+
+class Cable:
+    """Two pseudo-terminals joined back to back: `ends` are the devices; it can be cut."""
+
+    def __init__(self):
+        pairs = [os.openpty(), os.openpty()]
+        for _, near in pairs:
+            tty.setraw(near)
+        self.ends = [os.ttyname(near) for _, near in pairs]
+        self._far = [far for far, _ in pairs]
+        self._near = [near for _, near in pairs]
+        self._lock, self._cut = threading.Lock(), threading.Event()
+        self._thread = threading.Thread(target=self._pump, daemon=True)
+        self._thread.start()
+
+    def _pump(self):
+        while not self._cut.is_set():
+            for source in select.select(self._far, [], [], 0.02)[0]:
+                data = os.read(source, 4096)
+                self.put(1 - self._far.index(source), data)
+
+    def put(self, end, data):
+        """Let bytes come out at an end."""
+        with self._lock:
+            os.write(self._far[end], data)
+
+    def cut(self):
+        if not self._cut.is_set():
+            self._cut.set()
+            self._thread.join(PATIENCE)
+            for number in (*self._far, *self._near):
+                os.close(number)
+
+
+class Bench:
+    """Plant, bridge's link, router and stand-in in one loop."""
+
+    def __init__(self, start, *arguments, hil=HIL):
+        self.cable = Cable()
+        tcp, self.udp = free_port(socket.SOCK_STREAM), free_port(socket.SOCK_DGRAM)
+        local = free_port(socket.SOCK_DGRAM)
+        self.hil = HilServer(tcp, parameters=hil)
+        self.autopilot = start(AUTOPILOT, "--serial", f"{self.cable.ends[1]}:921600")
+        self.autopilot.until_said("on the serial line")
+        self.router = start(ROUTER, f"serial:{self.cable.ends[0]}:921600", "--sim-port", str(tcp),
+                            "--mavlink-port", str(self.udp), "--companion-port", str(local),
+                            *arguments)
+        self.sequence = OffboardSequence()
+        self.link = OffboardLink(
+            UdpTransport(local, ("127.0.0.1", self.udp)), self.sequence, RateThrustParameters())
+        self.body = Quadrotor()
+        self.ticks = self.answered = 0
+        assert self.hil.accept(PATIENCE), self.router.output
+        self.router.until_said("connected to the simulator")
+
+    def tick(self, thrust=0.0):
+        body, link = self.body, self.link
+        self.ticks += 1
+        link.poll(body.time)
+        link.tick(body.time)
+        if self.ticks % 5 == 0:
+            link.send_vision(body.time, body.position, body.quaternion, 0.005, 0.02)
+        if self.sequence.streaming:
+            link.send_setpoint(np.zeros(3), thrust, body.time)
+        motors = self.hil.exchange(
+            body.time, body.gyro, body.accel, body.position, body.quaternion)
+        self.answered += self.hil.answered
+        body.step(motors)
+
+    def until(self, condition, what, thrust=0.0):
+        """Tick until it is so."""
+        end = time.monotonic() + PATIENCE
+        while not condition():
+            assert time.monotonic() < end, f"{what}: not within {PATIENCE:g} s\n" + (
+                self.router.output + self.autopilot.output)
+            self.tick(thrust)
+
+    def arm(self):
+        self.until(lambda: self.answered > 20, "answers")
+        self.sequence.want(True)
+        self.until(lambda: self.sequence.phase is Phase.FLYING, "armed and in OFFBOARD")
+        self.until(lambda: self.hil.armed and self.hil.motors.max() > 0.1, "turning motors", 0.3)
+
+    def close(self):
+        self.hil.close()
+        self.link.close()
+        self.cable.cut()
+
+
+@pytest.fixture
+def bench(start):
+    benches = []
+
+    def make(*arguments, **options):
+        benches.append(Bench(start, *arguments, **options))
+        return benches[-1]
+
+    yield make
+    for b in benches:
+        b.close()
+
+
+def test_arms_over_the_line_and_ends_with_the_simulator(bench):
+    b = bench()
+    b.arm()
+    assert b.link.mode is Mode.OFFBOARD and b.link.values["MC_ROLLRATE_P"] == pytest.approx(0.15)
+    b.hil.close()
+    assert b.router.process.wait(PATIENCE) == 0
+    assert "the simulator closed the link" in b.router.output
+    assert "Traceback" not in b.router.output + b.autopilot.output
+    b.cable.cut()
+    assert b.autopilot.process.wait(PATIENCE) == 0
+    assert "the serial line is gone" in b.autopilot.output
+
+
+def test_garbage_on_the_line_is_survived(bench):
+    b = bench()
+    b.arm()
+    noise = random.Random(7)
+    for _ in range(10):
+        for end in (0, 1):
+            b.cable.put(end, noise.randbytes(noise.randrange(1, 200)))
+        before = b.answered
+        b.until(lambda: b.answered >= before + 5, "answers after garbage", 0.3)  # noqa: B023
+    assert b.router.process.poll() is None and b.autopilot.process.poll() is None
+
+
+def test_a_cut_line_stops_the_motors_and_both_ends_say_so(bench):
+    b = bench()
+    b.arm()
+    b.cable.cut()
+    b.router.until_said("lost: the motors stand still")
+    b.until(lambda: not b.hil.armed, "motors at rest")
+    assert np.all(b.hil.motors == 0.0) and b.hil.connected
+    assert b.autopilot.process.wait(PATIENCE) == 0
+    assert b.router.interrupt() == 0 and "Traceback" not in b.router.output
+
+
+def test_sensors_left_out_are_answered_with_what_is_known(bench):
+    b = bench("--hil-rate", "50", hil=PATIENT)
+    b.until(lambda: b.answered > 100, "answers")
+    assert b.hil.missed == 0
+
+
+class Wires:
+    """A router between plain sockets and the hand-made flight controller."""
+
+    def __init__(self, start, device, *arguments, baud=921600):
+        self.device = device
+        self.plug()
+        self.listener = socket.create_server(("127.0.0.1", 0))
+        self.udp, port = free_port(socket.SOCK_DGRAM), self.listener.getsockname()[1]
+        self.bridge = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+        self.bridge.bind(("127.0.0.1", 0))
+        self.bridge.settimeout(PATIENCE)
+        self.router = start(
+            ROUTER, f"serial:{device}:{baud}", "--sim-port", str(port),
+            "--mavlink-port", str(self.udp), "--companion-port",
+            str(self.bridge.getsockname()[1]), *arguments)
+        self.listener.settimeout(PATIENCE)
+        self.plant, _ = self.listener.accept()
+        self.plant.settimeout(PATIENCE)
+        self.codec, self.heard, self.framer = Codec(1, 200), [], Framer(Codec(9, 9))
+
+    def plug(self):
+        self.far, self.near = os.openpty()
+        tty.setraw(self.near)
+        os.set_blocking(self.far, False)
+        self.device.symlink_to(os.ttyname(self.near))
+
+    def unplug(self):
+        self.device.unlink()
+        os.close(self.far)
+        os.close(self.near)
+
+    def hear(self):
+        """Messages that have come out of the line."""
+        try:
+            self.heard += self.framer.stream(os.read(self.far, 65536))
+        except BlockingIOError:
+            time.sleep(0.001)
+        return self.heard
+
+    def until(self, condition):
+        end = time.monotonic() + PATIENCE
+        while not condition():
+            assert time.monotonic() < end, self.router.output
+        return True
+
+    def say(self, *messages):
+        for message in messages:
+            os.write(self.far, self.codec.encode(message))
+
+    def close(self):
+        for thing in (self.plant, self.listener, self.bridge):
+            thing.close()
+        self.unplug()
+
+
+@pytest.fixture
+def wires(start, tmp_path):
+    made = []
+
+    def make(*arguments, **options):
+        made.append(Wires(start, tmp_path / "ttyACM0", *arguments, **options))
+        return made[-1]
+
+    yield make
+    for w in made:
+        w.close()
+
+
+def sensor(microseconds):
+    return mavlink2.MAVLink_hil_sensor_message(microseconds, *[0.1] * 13, 0x1FFF, 0)
+
+
+def controls(microseconds, mode=129):
+    return mavlink2.MAVLink_hil_actuator_controls_message(microseconds, [0.5] * 16, mode, 0)
+
+
+def test_commands_go_to_the_plant_with_its_time_and_the_rest_to_the_bridge(wires):
+    w = wires()
+    heartbeat = mavlink2.MAVLink_heartbeat_message(2, 12, 0x81, 6 << 16, 4, 3)
+    w.plant.sendall(w.codec.encode(sensor(8_000)))
+    w.until(lambda: [m for m in w.hear() if m.get_type() == "HIL_SENSOR"])
+    w.say(heartbeat, controls(77_000_000))
+    frame = w.bridge.recv(500)
+    assert Framer(Codec(9, 9)).datagram(frame)[0].custom_mode == 6 << 16
+    answer = Framer(Codec(9, 9)).stream(w.plant.recv(500))[0]
+    assert answer.time_usec == 8_000 and answer.mode == 129 and answer.controls[0] == 0.5
+    request = w.codec.encode(mavlink2.MAVLink_param_request_list_message(1, 1))
+    w.bridge.sendto(request, ("127.0.0.1", w.udp))
+    w.until(lambda: [m for m in w.hear() if m.get_type() == "PARAM_REQUEST_LIST"])
+    assert bytes(w.heard[-1].get_msgbuf()) == request
+
+
+def test_no_commands_at_all_are_no_trouble(wires):
+    """PX4 in HITL may be silent while disarmed."""
+    w = wires()
+    for k in range(200):
+        w.plant.sendall(w.codec.encode(sensor(4_000 * k)))
+        time.sleep(0.0005)
+    w.until(lambda: [m for m in w.hear() if m.get_type() == "HIL_SENSOR"
+                     and m.time_usec == 199 * 4_000])
+    assert w.router.process.poll() is None
+
+
+def test_a_line_that_is_too_full_is_said_and_sensors_go_first(wires):
+    w = wires("--hil-rate", "250", baud=57600)
+    request = w.codec.encode(mavlink2.MAVLink_param_request_list_message(1, 1))
+    k = 0
+
+    def warned():
+        nonlocal k
+        k += 1
+        w.plant.sendall(w.codec.encode(sensor(4_000 * k)))
+        for _ in range(5):
+            w.bridge.sendto(request, ("127.0.0.1", w.udp))
+        w.hear()
+        return "% of the line" in w.router.output
+
+    w.until(warned)
+    assert "bytes/s to the flight controller" in w.router.output
+    kinds = [m.get_type() for m in w.heard]
+    assert kinds.count("HIL_SENSOR") > kinds.count("PARAM_REQUEST_LIST")
+
+
+def test_plugged_in_again_it_goes_on(wires):
+    w = wires()
+    w.unplug()
+    w.router.until_said("lost: the motors stand still")
+    answer = Framer(Codec(9, 9)).stream(w.plant.recv(500))[0]
+    assert answer.mode == 0 and set(answer.controls) == {0.0}
+    w.plug()
+    w.router.until_said("flight controller is up")
+    w.plant.sendall(w.codec.encode(sensor(8_000)))
+    w.until(lambda: [m for m in w.hear() if m.get_type() == "HIL_SENSOR"])
+    assert w.router.interrupt(times=3) == 0 and "Traceback" not in w.router.output
+
+
+@pytest.mark.parametrize(
+    ("arguments", "complaint"),
+    [
+        (["pigeon:coop"], "allowed: udp:HOST:PORT"),
+        (["serial:/dev/null:921600"], "serial device /dev/null"),
+        (["serial:/dev/nothing:921600"], "No such file"),
+        (["udp:127.0.0.1:9", "--wait", "0.2", "--sim-port", "1"], "no simulator at 127.0.0.1:1"),
+        (["udp:127.0.0.1:9", "--hil-rate", "0"], "not a rate"),
+        (["udp:127.0.0.1:9", "--instance", "x"], "not an instance number"),
+        ([], "LINK"),
+    ],
+)
+def test_wrong_use_is_one_line_and_status_2(start, arguments, complaint):
+    ports = ["--mavlink-port", str(free_port(socket.SOCK_DGRAM))]
+    router = start(ROUTER, *ports, *arguments)
+    assert router.process.wait(PATIENCE) == 2
+    assert complaint in router.output.strip().splitlines()[-1]
+    assert "Traceback" not in router.output
+
+
+def test_a_line_too_slow_for_any_flight_is_refused(start):
+    far, near = os.openpty()
+    router = start(ROUTER, f"serial:{os.ttyname(near)}:57600")
+    assert router.process.wait(PATIENCE) == 2
+    assert "5760 bytes/s do not carry" in router.output and "Traceback" not in router.output
+    os.close(far)
+    os.close(near)
+
+
+def test_help_has_examples(start):
+    router = start(ROUTER, "--help")
+    assert router.process.wait(PATIENCE) == 0
+    assert "hitl_router serial:/dev/ttyACM0:921600" in router.output

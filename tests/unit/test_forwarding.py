@@ -1,0 +1,214 @@
+"""The ground station beside the bridge: what passes, in which bounds, and whose word it is."""
+
+import random
+import socket
+import time
+
+import numpy as np
+import pytest
+
+from uam_sim_bridge.autopilot.modes import Mode
+from uam_sim_bridge.flight.ports import PortError
+from uam_sim_bridge.mavlink.forwarding import BYTES_PER_TICK, LINE_SHARE, GroundStation
+from uam_sim_bridge.mavlink.link import OffboardLink
+from uam_sim_bridge.mavlink.offboard import OffboardSequence, Request
+from uam_sim_bridge.mavlink.pacing import BURST
+from uam_sim_bridge.mavlink.setpoint import RateThrustParameters
+from uam_sim_bridge.mavlink.signing import Signing
+from uam_sim_bridge.mavlink.wire import Codec, Framer, mavlink2
+
+PATIENCE = 30.0  # s
+SPEED = 92160.0  # bytes/s
+
+
+class Line:
+    """An autopilot's transport by hand."""
+
+    stream, connected, dropped = True, True, 0
+
+    def __init__(self, bytes_per_second=None):
+        self.bytes_per_second = bytes_per_second
+        self.arriving, self.sent = [], []
+
+    def send(self, data):
+        self.sent.append(data)
+        return True
+
+    def receive(self):
+        chunks, self.arriving = self.arriving, []
+        return chunks
+
+    def fileno(self):
+        return -1
+
+    def close(self):
+        self.connected = False
+
+
+class Rig:
+    """A station's socket, the forwarder and the line; `now` is wall time by hand."""
+
+    def __init__(self, bytes_per_second=None, signing=None):
+        self.socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+        self.socket.bind(("127.0.0.1", 0))
+        self.socket.settimeout(PATIENCE)
+        self.now = 0.0
+        self.line = Line(bytes_per_second)
+        self.gcs = GroundStation(f"udp:localhost:{self.socket.getsockname()[1]}", self.line,
+                                 Codec(1, 191, signing), lambda: self.now)
+        self.line.arriving = [b"hello"]
+        self.gcs.receive()
+        _, self.place = self.socket.recvfrom(100)
+        self.codec = Codec(255, 190)
+
+    def say(self, *messages):
+        for message in messages:
+            self.socket.sendto(self.codec.encode(message), self.place)
+
+    def forward_all(self, count):
+        """Forward until `count` messages have been decided upon."""
+        end = time.monotonic() + PATIENCE
+        while self.gcs.forwarded + self.gcs.held_back < count:
+            assert time.monotonic() < end
+            self.gcs.forward()
+
+
+@pytest.fixture
+def make():
+    rigs = []
+
+    def rig(*arguments, **options):
+        rigs.append(Rig(*arguments, **options))
+        return rigs[-1]
+
+    yield rig
+    for r in rigs:
+        r.gcs.close()
+        r.socket.close()
+
+
+def arm(system=1):
+    return mavlink2.MAVLink_command_long_message(system, 1, 400, 0, 1, 0, 0, 0, 0, 0, 0)
+
+
+def heartbeat():
+    return mavlink2.MAVLink_heartbeat_message(2, 12, 0x81, 6 << 16, 4, 3)
+
+
+def test_the_station_gets_the_bytes_as_they_came(make):
+    rig = make()
+    chunks = [b"\xfd\x01garbage", Codec(1, 1).encode(heartbeat())[:7], bytes(range(200))]
+    rig.line.arriving = list(chunks)
+    assert rig.gcs.receive() == chunks
+    assert [rig.socket.recv(500) for _ in chunks] == chunks
+
+
+def test_long_chunks_reach_the_station_in_pieces(make):
+    rig = make()
+    chunk = random.Random(1).randbytes(70_000)
+    rig.line.arriving = [chunk]
+    rig.gcs.receive()
+    got = b""
+    while len(got) < len(chunk):
+        got += rig.socket.recv(65535)
+    assert got == chunk
+
+
+def test_whole_valid_messages_reach_the_autopilot_as_they_are(make):
+    rig = make()
+    frame = rig.codec.encode(arm())
+    for data in (b"garbage\xfd\xfe" + frame, frame[:20], frame[20:], frame[:-1] + b"\x00" + frame):
+        rig.socket.sendto(data, rig.place)
+    rig.forward_all(2)
+    assert rig.line.sent == [frame, frame]
+
+
+def test_a_flood_costs_a_tick_a_bounded_number_of_bytes(make):
+    rig = make()
+    size = len(rig.codec.encode(arm()))
+    rig.say(*[arm()] * 200)
+    before = 0
+    end = time.monotonic() + PATIENCE
+    while rig.gcs.forwarded < 200:
+        assert time.monotonic() < end
+        rig.gcs.forward()
+        assert (rig.gcs.forwarded - before) * size <= BYTES_PER_TICK + size
+        before = rig.gcs.forwarded
+    assert len(rig.line.sent) == 200
+
+
+def test_garbage_without_end_is_bounded_as_well(make):
+    rig = make()
+    noise = random.Random(4)
+    for _ in range(100):
+        rig.socket.sendto(noise.randbytes(1400), rig.place)
+    for _ in range(200):
+        rig.gcs.forward()
+    rig.say(arm())
+    rig.forward_all(1)
+    assert len(rig.line.sent) == 1
+
+
+def test_on_a_slow_line_the_station_has_its_share_and_no_more(make):
+    rig = make(SPEED)
+    ticks = 500
+    for k in range(ticks):
+        rig.now = 0.004 * k
+        rig.say(*[arm()] * 10)
+        rig.gcs.forward()
+    rig.forward_all(10 * ticks)
+    size = len(rig.line.sent[0])
+    allowed = LINE_SHARE * SPEED * (rig.now + BURST) + size
+    assert 0.9 * allowed < sum(map(len, rig.line.sent)) <= allowed
+    assert rig.gcs.held_back > 0
+
+
+def test_with_signing_only_a_station_with_the_key_may_speak(make):
+    signing = Signing(bytes(range(32)))
+    rig = make(signing=signing)
+    rig.say(arm())
+    signed = Codec(255, 190, signing).encode(arm())
+    for frame in (signed, signed):  # the second is a replay
+        rig.socket.sendto(frame, rig.place)
+    rig.forward_all(1)
+    rig.gcs.forward()
+    assert rig.line.sent == [signed]
+
+
+def test_nothing_a_station_says_counts_as_the_autopilots_word(make):
+    rig = make()
+    sequence = OffboardSequence()
+    link = OffboardLink(rig.gcs, sequence, RateThrustParameters())
+    rig.codec = Codec(1, 1)  # it pretends
+    rig.say(heartbeat(), mavlink2.MAVLink_statustext_message(2, b"down with it"))
+    rig.forward_all(2)
+    link.poll(1.0)
+    assert not link.connected(1.0) and link.mode is Mode.UNKNOWN and sequence.reasons == ()
+    # the autopilot's answer to the station is not one to us
+    ack = mavlink2.MAVLink_command_ack_message(400, 0, 0, 0, 255, 190)
+    link._asked[400] = Request.ARM
+    rig.line.arriving = [Codec(1, 1).encode(ack)]
+    link.poll(2.0)
+    assert not link.armed and link.ignored == 1
+    ack = mavlink2.MAVLink_command_ack_message(400, 0, 0, 0, 1, 191)
+    rig.line.arriving = [Codec(1, 1).encode(ack)]
+    link.poll(3.0)
+    assert link.armed
+
+
+def test_chunks_of_a_stream_are_joined_by_the_link(make):
+    rig = make()
+    link = OffboardLink(rig.gcs, OffboardSequence(), RateThrustParameters())
+    frame = Codec(1, 1).encode(heartbeat())
+    for piece in (frame[:9], frame[9:]):
+        rig.line.arriving = [piece]
+        link.poll(1.0)
+    assert link.connected(1.0)
+    link.send_setpoint(np.zeros(3), 0.5, 1.0)
+    assert Framer(Codec(2, 2)).stream(rig.line.sent[-1])[0].get_type() == "SET_ATTITUDE_TARGET"
+
+
+@pytest.mark.parametrize("url", ["tcp:localhost:1", "serial:/dev/ttyS0:57600", "14550"])
+def test_a_station_is_reached_over_udp_only(url):
+    with pytest.raises(PortError, match="udp:HOST:PORT"):
+        GroundStation(url, Line(), Codec(1, 191))
