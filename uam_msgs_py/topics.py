@@ -15,7 +15,7 @@ from rclpy.qos import (
     QoSReliabilityPolicy,
 )
 from rosgraph_msgs.msg import Clock
-from sensor_msgs.msg import Imu, JointState
+from sensor_msgs.msg import BatteryState, Imu, JointState
 from std_msgs.msg import Bool, Float64MultiArray, String
 from trajectory_msgs.msg import JointTrajectory
 
@@ -97,6 +97,9 @@ ARM_ADAPTATION = Topic("/uam/arm/adaptation", JointState, RELIABLE, "as for posi
 ARMING = Topic("/uam/arming", Bool, LATCHED, "the autopilot is to be armed and in OFFBOARD")
 AUTOPILOT_STATE = Topic(
     "/uam/autopilot/state", DiagnosticArray, LATCHED, "see uam_msgs_py.status.AutopilotState"
+)
+AUTOPILOT_BATTERY = Topic(
+    "/uam/autopilot/battery", BatteryState, RELIABLE, "as the autopilot tells it, 1 Hz; NaN unknown"
 )
 MISSION_STATUS = Topic(
     "/uam/mission/status", DiagnosticArray, LATCHED, "see uam_msgs_py.status.MissionStatus"

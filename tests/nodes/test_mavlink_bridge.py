@@ -374,3 +374,47 @@ def test_signed_on_both_sides_and_nothing_else_is_taken(make_rig, tmp_path):
 
     rig.probe.until(refused, "refusals under /diagnostics")
     assert key not in rig.node.output
+def test_mapping_parameters_of_the_autopilot_are_adopted(make_rig):
+    rig = make_rig("-p", "autopilot_parameters:=adopt")
+    rig.autopilot.set_parameter("THR_MDL_FAC", 0.3)
+    rig.autopilot.set_parameter("MC_ROLLRATE_P", 0.3)
+    rig.fly()
+    rig.node.until_said("adopted from the autopilot: MC_ROLLRATE_P is 0.3")
+    rates, _ = rig.tick((0, 0, WEIGHT), (0.1, 0.0, 0.0))
+    assert rates == pytest.approx([0.1 / (5.00105 * 0.3), 0, 0], rel=1e-3, abs=1e-9)
+    # never in flight
+    rig.autopilot.set_parameter("MC_PITCHRATE_P", 0.3)
+    rig.companion.handle(rig.body.time, mavlink2.MAVLink_param_request_read_message(
+        1, 1, b"MC_PITCHRATE_P", -1))
+    for _ in range(20):
+        rig.tick((0, 0, WEIGHT))
+    rig.node.until_said("MC_PITCHRATE_P is 0.3 on the autopilot, the bridge assumes 0.15")
+    gyro = rig.body.gyro.copy()
+    rates, _ = rig.tick((0, 0, WEIGHT), (0.0, 0.1, 0.0))
+    assert rates[1] - gyro[1] == pytest.approx(0.1 / (5.00105 * 0.15), rel=1e-3)
+
+
+def test_battery_and_health_are_published(make_rig, probe):
+    batteries = probe.collect(topics.AUTOPILOT_BATTERY)
+    reports = probe.collect(topics.DIAGNOSTICS)
+    rig = make_rig()
+    for _ in range(700):
+        rig.tick()
+    assert len(batteries) >= 2 and not batteries[-1].present
+    assert math.isnan(batteries[-1].voltage) and math.isnan(batteries[-1].percentage)
+    rig.socket.sendto(
+        rig.codec.encode(mavlink2.MAVLink_battery_status_message(
+            0, 0, 1, 2500, [4000] * 4 + [65535] * 6, 500, 100, -1, 75)),
+        ("127.0.0.1", rig.local))
+    for _ in range(260):
+        rig.tick()
+    assert any(b.present and b.voltage == pytest.approx(16.0) and b.current == pytest.approx(-5.0)
+               and b.percentage == pytest.approx(0.75) for b in batteries)
+
+    def values():
+        found = [s for m in reports for s in m.status if s.name == "mavlink_bridge"]
+        return {pair.key: pair.value for pair in found[-1].values} if found else {}
+
+    probe.until(lambda: values().get("estimator"), "flags of the estimator")
+    assert "attitude" in values()["estimator"] and values()["round trip [ms]"]
+    assert float(values()["messages [1/s]"]) > 20.0 and values()["messages lost"] == "0"

@@ -5,8 +5,8 @@ import os
 
 import numpy as np
 import pytest
-
 from whole_flight import Flight
+
 from uam_sim_bridge.px4.installation import VARIABLE, Px4Error, Px4Installation
 from uam_sim_bridge.px4.rate_steps import LIMIT, compared, measure
 

@@ -69,8 +69,9 @@ def test_gives_up_with_the_reasons():
     s.text(Severity.INFO, "chatter")
     asked = run(s, 5.0, 1.1)
     assert len(asked) == 2 and s.phase is Phase.FAILED
-    assert "OFFBOARD refused (temporarily rejected)" in s.reasons
-    assert "no offboard signal" in s.reasons and "chatter" not in s.reasons
+    said = "; ".join(s.reasons)
+    assert "OFFBOARD refused (temporarily rejected)" in said
+    assert "no offboard signal" in said and "chatter" not in said
     assert "no success after 3 requests" in s.reasons[-1]
     s.want(False)
     s.want(True)
@@ -107,6 +108,41 @@ def test_stream_goes_on_when_heartbeats_stop_in_flight():
     s = flying()
     run(s, 1.0, 2.0, connected=False, armed=True, mode=Mode.OFFBOARD)
     assert s.streaming and s.phase is Phase.FLYING
+
+
+def test_a_failure_outlasts_the_loss_of_the_link():
+    """Disarmed in the air, then silence, then back: nothing is armed by itself."""
+    s = flying()
+    run(s, 0.1, 2.0, armed=False, mode=Mode.OFFBOARD)
+    assert s.phase is Phase.FAILED
+    run(s, 5.0, 2.1, connected=False)
+    assert run(s, 30.0, 7.1) == [] and s.phase is Phase.FAILED and s.streaming
+    s.want(False)
+    s.want(True)
+    assert run(s, 0.1, 37.1, mode=Mode.OFFBOARD) == [(37.1, Request.ARM)]
+
+
+def test_reboot_in_flight_is_the_end():
+    s = flying()
+    s.rebooted(2.0)
+    assert s.phase is Phase.FAILED and "rebooted in flight" in s.reasons[-1]
+    assert run(s, 30.0, 2.0) == []
+    run(s, 5.0, 32.0, connected=False)
+    assert run(s, 30.0, 37.0) == []
+
+
+def test_reboot_on_the_ground_starts_over_with_a_new_stream():
+    s = OffboardSequence()
+    s.want(True)
+    run(s, 1.2, 0.0)
+    run(s, 0.3, 1.2, mode=Mode.OFFBOARD)
+    assert s.phase is Phase.ARMING
+    s.rebooted(1.5)
+    assert s.phase is Phase.STREAMING and "the autopilot rebooted" in s.reasons[-1]
+    assert run(s, 1.1, 1.5) == [(2.5, Request.OFFBOARD)]
+    waiting = OffboardSequence()
+    waiting.rebooted(0.0)
+    assert waiting.phase is Phase.WAITING and waiting.reasons == ()
 
 
 def test_with_the_stand_in():

@@ -7,7 +7,14 @@ from hypothesis import given
 from hypothesis import strategies as st
 from pymavlink.dialects.v20 import common as mavlink2
 
-from uam_sim_bridge.mavlink.wire import Codec, Framer, TextAssembler, clean_text, text_chunks
+from uam_sim_bridge.mavlink.wire import (
+    UNREAD,
+    Codec,
+    Framer,
+    TextAssembler,
+    clean_text,
+    text_chunks,
+)
 
 
 def sample(k):
@@ -63,6 +70,26 @@ def test_a_flipped_bit_is_noticed(place):
     framer = Framer(Codec(2, 2))
     found = framer.datagram(bytes(good))
     assert found == [] and framer.bad_bytes == len(good)
+
+
+def unread_frame(number, payload, sequence=7):
+    """A frame as another dialect makes it."""
+    body = bytes([len(payload), 0, 0, sequence, 1, 1, *number.to_bytes(3, "little")]) + payload
+    crc = mavlink2.x25crc(body + bytes([UNREAD[number]])).crc
+    return b"\xfd" + body + crc.to_bytes(2, "little")
+
+
+@pytest.mark.parametrize("number", UNREAD)
+def test_messages_that_the_dialect_lacks_are_no_garbage(number):
+    good = frames(2)
+    framer = Framer(Codec(2, 2))
+    other = unread_frame(number, b"\xfd\x03\x00abc")
+    assert numbers(framer.datagram(good[0] + other + good[1])) == [0, 1]
+    assert framer.bad_bytes == 0 and framer.unread == 1
+    damaged = bytearray(other)
+    damaged[12] ^= 1
+    framer.datagram(bytes(damaged))
+    assert framer.bad_bytes == len(other) and framer.unread == 1
 
 
 def test_random_bytes_do_no_harm():

@@ -60,6 +60,7 @@ class Command(IntEnum):
 
     DO_SET_MODE = 176
     ARM_DISARM = 400
+    RUN_PREARM_CHECKS = 401
     SET_MESSAGE_INTERVAL = 511
     REQUEST_MESSAGE = 512
 

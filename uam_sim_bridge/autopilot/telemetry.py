@@ -14,6 +14,10 @@ _NO_COVARIANCE = [_NAN] * 21
 _LANDED, _IN_AIR, _LANDING = 1, 2, 4  # MAV_LANDED_STATE
 _STANDBY, _ACTIVE, _CRITICAL = 3, 4, 5  # MAV_STATE
 _GYRO, _ACCELEROMETER, _VISION = 1, 2, 128  # MAV_SYS_STATUS_SENSOR
+_NO_VOLTAGE, _NO_TEMPERATURE = 65535, 32767  # what MAVLink defines as unknown
+_AIDED = (mavlink2.ESTIMATOR_VELOCITY_HORIZ | mavlink2.ESTIMATOR_VELOCITY_VERT
+          | mavlink2.ESTIMATOR_POS_HORIZ_REL | mavlink2.ESTIMATOR_POS_VERT_ABS
+          | mavlink2.ESTIMATOR_PRED_POS_HORIZ_REL)
 FASTEST = 0.004  # s
 
 
@@ -32,7 +36,7 @@ def sys_status(autopilot: Autopilot, time: float) -> Message:
     there = _GYRO | _ACCELEROMETER | _VISION
     healthy = there if autopilot.estimator.aided(time) else _GYRO | _ACCELEROMETER
     return mavlink2.MAVLink_sys_status_message(
-        there, there, healthy, 0, 65535, -1, -1, 0, 0, 0, 0, 0, 0)
+        there, there, healthy, 0, _NO_VOLTAGE, -1, -1, 0, 0, 0, 0, 0, 0)
 
 
 def extended_sys_state(autopilot: Autopilot, time: float) -> Message:
@@ -58,6 +62,21 @@ def odometry(autopilot: Autopilot, time: float) -> Message:
         *autopilot.rates.tolist(), _NO_COVARIANCE, _NO_COVARIANCE)
 
 
+def battery_status(autopilot: Autopilot, time: float) -> Message:
+    """BATTERY_STATUS: no battery is simulated, every field says "unknown"."""
+    return mavlink2.MAVLink_battery_status_message(
+        0, mavlink2.MAV_BATTERY_FUNCTION_ALL, mavlink2.MAV_BATTERY_TYPE_LIPO, _NO_TEMPERATURE,
+        [_NO_VOLTAGE] * 10, -1, -1, -1, -1)
+
+
+def estimator_status(autopilot: Autopilot, time: float) -> Message:
+    """ESTIMATOR_STATUS: positions and velocities with vision, constant-position mode without."""
+    flags = mavlink2.ESTIMATOR_ATTITUDE
+    flags |= _AIDED if autopilot.estimator.aided(time) else mavlink2.ESTIMATOR_CONST_POS_MODE
+    return mavlink2.MAVLink_estimator_status_message(
+        round(time * 1e6), flags, *[_NAN] * 8)
+
+
 def timesync(autopilot: Autopilot, time: float) -> Message:
     """TIMESYNC request."""
     return mavlink2.MAVLink_timesync_message(0, round(time * 1e9))
@@ -74,6 +93,8 @@ STREAMS: dict[int, tuple[Callable[[Autopilot, float], Message], float]] = {
     mavlink2.MAVLINK_MSG_ID_EXTENDED_SYS_STATE: (extended_sys_state, 0.2),
     mavlink2.MAVLINK_MSG_ID_ATTITUDE_QUATERNION: (attitude_quaternion, 0.02),
     mavlink2.MAVLINK_MSG_ID_ODOMETRY: (odometry, 1.0 / 30.0),
+    mavlink2.MAVLINK_MSG_ID_BATTERY_STATUS: (battery_status, 2.0),
+    mavlink2.MAVLINK_MSG_ID_ESTIMATOR_STATUS: (estimator_status, 1.0),
     mavlink2.MAVLINK_MSG_ID_TIMESYNC: (timesync, 0.1),
 }
 

@@ -53,6 +53,7 @@ WIRES = (
     Wire(topics.TRUTH_PAYLOAD, PLANT),
     Wire(topics.TRUTH_ROTORS, PLANT),
     Wire(topics.TRUTH_MAGNET, PLANT),
+    Wire(topics.AUTOPILOT_BATTERY, BRIDGE),
     Wire(topics.ARM_COMMAND, ARM),
     Wire(topics.POSITION_ADAPTATION, POSITION),
     Wire(topics.ATTITUDE_ADAPTATION, ATTITUDE),

@@ -10,12 +10,26 @@ import math
 
 import numpy as np
 
-from uam_sim_bridge.autopilot.modes import CUSTOM_MODE_ENABLED, Command, Mode
+from uam_sim_bridge.autopilot.modes import CUSTOM_MODE_ENABLED, Command, Mode, Result
+from uam_sim_bridge.mavlink.battery import Battery, from_battery_status, from_sys_status
+from uam_sim_bridge.mavlink.events import EventReader
 from uam_sim_bridge.mavlink.frames import swap_body
+from uam_sim_bridge.mavlink.health import unhealthy
+from uam_sim_bridge.mavlink.link_statistics import LinkStatistics
 from uam_sim_bridge.mavlink.offboard import OffboardSequence, Request
-from uam_sim_bridge.mavlink.parameter_check import WATCHED, differences
+from uam_sim_bridge.mavlink.parameter_check import (
+    WATCHED,
+    differences,
+    expected,
+    stream_loss,
+    untold,
+    value_of,
+)
+from uam_sim_bridge.mavlink.reboot import RebootDetector
 from uam_sim_bridge.mavlink.setpoint import RateThrustParameters
 from uam_sim_bridge.mavlink.signing import Signing
+from uam_sim_bridge.mavlink.streams import StreamCheck
+from uam_sim_bridge.mavlink.time_sync import TimeSync, nanoseconds
 from uam_sim_bridge.mavlink.transport import Transport
 from uam_sim_bridge.mavlink.vision import vision_message
 from uam_sim_bridge.mavlink.wire import (
@@ -30,14 +44,9 @@ from uam_sim_bridge.mavlink.wire import (
 HEARTBEAT_PERIOD = 1.0  # s
 HEARTBEAT_TIMEOUT = 3.0  # s without one: not connected
 PARAMETER_RETRY, PARAMETER_ATTEMPTS = 0.5, 10  # s, times
+EXPLAIN_PERIOD = 3.0  # s between two requests to say again what keeps it from arming
 _NO_ATTITUDE = [1.0, 0.0, 0.0, 0.0]
 ATTITUDE_IGNORED = 128  # type_mask of SET_ATTITUDE_TARGET: body rates and thrust count
-# asked of the autopilot on connection: message id → interval [s]
-INTERVALS = {
-    mavlink2.MAVLINK_MSG_ID_EXTENDED_SYS_STATE: 0.2,
-    mavlink2.MAVLINK_MSG_ID_ATTITUDE_QUATERNION: 0.1,
-    mavlink2.MAVLINK_MSG_ID_ODOMETRY: 0.1,
-}
 
 
 class OffboardLink:
@@ -45,7 +54,9 @@ class OffboardLink:
 
     `armed`, `mode`, `landed`: its latest word; `armed_since` [s] or None: tick at which it was
     first known armed; `values`: its parameters by name; `warnings`: where they disagree with the
-    mapping; `ignored`: messages of other systems, and answers to others.
+    mapping, and streams that do not come; `ignored`: messages of other systems, and answers to
+    others; `battery`, `estimator_flags`, `unhealthy` sensors, `load` 0..1: its latest word, None
+    before the first; `reboots`: how often it has restarted.
     """
 
     def __init__(
@@ -54,14 +65,26 @@ class OffboardLink:
         sequence: OffboardSequence,
         mapping: RateThrustParameters,
         target_system: int = 1,
+        hold_time: float = 0.0,
         signing: Signing | None = None,
     ) -> None:
+        """hold_time [s]: how long the bridge holds level, to be compared with COM_OF_LOSS_T."""
         self.sequence = sequence
         self.mode, self.armed, self.landed = Mode.UNKNOWN, False, True
         self.armed_since: float | None = None
         self.values: dict[str, float] = {}
-        self.warnings: tuple[str, ...] = ()
-        self.ignored = 0
+        self.ignored = self.reboots = 0
+        self.battery: Battery | None = None
+        self.estimator_flags: int | None = None
+        self.unhealthy: tuple[str, ...] = ()
+        self.load: float | None = None
+        self.time_sync = TimeSync()
+        self.streams = StreamCheck()
+        self.statistics = LinkStatistics()
+        self._reboot = RebootDetector()
+        self._events = EventReader()
+        self._parameter_warnings: tuple[str, ...] = ()
+        self._hold_time = hold_time
         self._transport = transport
         self._mapping = mapping
         self._target = target_system
@@ -69,14 +92,34 @@ class OffboardLink:
         self._framer = Framer(self._codec)
         self._texts = TextAssembler()
         self._asked: dict[int, Request] = {}
-        self._heard = self._beat = self._parameters_asked = -math.inf
+        self._heard = self._beat = self._parameters_asked = self._explained = -math.inf
         self._parameter_attempts = 0
-        self._set_up = False
+        self._met = False  # connected at the last tick
 
     def set_mapping(self, mapping: RateThrustParameters) -> None:
         """Compare the autopilot's parameters with another mapping from now on."""
         self._mapping = mapping
-        self.warnings = tuple(differences(mapping, self.values))
+        self._compare()
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """One line for each thing about parameters and streams that is not as it should be."""
+        return self._parameter_warnings + self.streams.warnings
+
+    @property
+    def mapping_told(self) -> bool:
+        """Whether the autopilot has told every parameter that the mapping assumes."""
+        return all(name in self.values for name in expected(self._mapping))
+
+    @property
+    def bad_bytes(self) -> int:
+        """Bytes that belonged to no message."""
+        return self._framer.bad_bytes
+
+    @property
+    def lost(self) -> int:
+        """Messages lost on their way to us, by gaps in their numbers."""
+        return self.statistics.lost(self._framer.unread)
 
     @property
     def refused(self) -> int:
@@ -104,7 +147,10 @@ class OffboardLink:
                 if message.get_srcSystem() != self._target or not self._for_us(message):
                     self.ignored += 1
                 else:
+                    self.statistics.count(message.get_srcComponent(), message.get_seq())
+                    self.streams.count(message.get_msgId())
                     self._handle(time, message)
+        self.statistics.tick(time)
 
     def tick(self, time: float) -> None:
         """Send what is due besides setpoints: heartbeat, requests of the sequence, questions."""
@@ -114,6 +160,9 @@ class OffboardLink:
                 mavlink2.MAV_TYPE_ONBOARD_CONTROLLER, mavlink2.MAV_AUTOPILOT_INVALID, 0, 0,
                 mavlink2.MAV_STATE_ACTIVE, 3))
         connected = self.connected(time)
+        if connected and not self._met:
+            self._meet()
+        self._met = connected
         if connected:
             self._ask_set_up(time)
         request = self.sequence.update(time, connected, self.armed, self.mode)
@@ -152,24 +201,80 @@ class OffboardLink:
 
     def _handle(self, time: float, m: Message) -> None:
         kind = m.get_type()
+        self._watch_clock(time, kind, m)
         if kind == "HEARTBEAT":
             if m.autopilot != mavlink2.MAV_AUTOPILOT_INVALID:
                 self._heard = time
                 self._take_state(time, Mode.from_custom_mode(m.custom_mode),
                                  bool(m.base_mode & mavlink2.MAV_MODE_FLAG_SAFETY_ARMED))
         elif kind == "COMMAND_ACK":
-            self._acknowledged(time, m.command, m.result)
+            # a ground station behind us has answers of its own; 0: said to all
+            if m.target_component in (0, mavlink2.MAV_COMP_ID_ONBOARD_COMPUTER):
+                self._acknowledged(time, m.command, m.result)
         elif kind == "EXTENDED_SYS_STATE":
             self.landed = m.landed_state == mavlink2.MAV_LANDED_STATE_ON_GROUND
         elif kind == "STATUSTEXT":
             text = self._texts.add(m)
             if text is not None:
                 self.sequence.text(m.severity, text)
+        elif kind == "EVENT":
+            said = self._events.read(m)
+            if said is not None:
+                self.sequence.text(*said)
         elif kind == "PARAM_VALUE":
-            self.values[clean_text(m.param_id)] = m.param_value
-            self.warnings = tuple(differences(self._mapping, self.values))
+            self.values[clean_text(m.param_id)] = value_of(m)
+            self._compare()
         elif kind == "TIMESYNC" and m.tc1 == 0:
-            self._send(mavlink2.MAVLink_timesync_message(round(time * 1e9), m.ts1))
+            self._send(mavlink2.MAVLink_timesync_message(nanoseconds(time), m.ts1))
+        else:
+            self._take_health(kind, m)
+
+    def _take_health(self, kind: str, m: Message) -> None:
+        if kind == "BATTERY_STATUS" and m.id == 0:
+            self.battery = from_battery_status(m)
+        elif kind == "SYS_STATUS":
+            self.unhealthy = unhealthy(
+                m.onboard_control_sensors_present, m.onboard_control_sensors_enabled,
+                m.onboard_control_sensors_health)
+            self.load = 1e-3 * m.load
+            if self.battery is None or not self.battery.known:
+                self.battery = from_sys_status(m)
+        elif kind == "ESTIMATOR_STATUS":
+            self.estimator_flags = m.flags
+
+    def _watch_clock(self, time: float, kind: str, m: Message) -> None:
+        """Follow the autopilot's clock, and notice that it starts again."""
+        if m.get_srcComponent() != mavlink2.MAV_COMP_ID_AUTOPILOT1:
+            return
+        if kind == "TIMESYNC":
+            since_boot = (m.tc1 or m.ts1) * 1e-9
+        elif kind == "ATTITUDE_QUATERNION":
+            since_boot = m.time_boot_ms * 1e-3
+        else:
+            return
+        restarted = self._reboot.time_since_boot(since_boot)
+        if not restarted and kind == "TIMESYNC" and m.tc1 != 0:
+            restarted = self.time_sync.answer(time, m.tc1, m.ts1)
+        if restarted:
+            self.reboots += 1
+            self.time_sync.restart()
+            self._meet()
+            self.sequence.rebooted(time)
+
+    def _meet(self) -> None:
+        """Ask for everything anew: the autopilot is there for the first time, or again."""
+        self.statistics.restart()
+        self.streams.restart()
+        self.values.clear()
+        self._asked.clear()
+        self._parameters_asked, self._parameter_attempts = -math.inf, 0
+        self._compare()
+
+    def _compare(self) -> None:
+        missing = self._missing if self._parameter_attempts > PARAMETER_ATTEMPTS else []
+        self._parameter_warnings = (
+            *differences(self._mapping, self.values), *stream_loss(self.values, self._hold_time),
+            *untold(missing, PARAMETER_ATTEMPTS))
 
     def _take_state(self, time: float, mode: Mode, armed: bool) -> None:
         if armed and not self.armed:
@@ -179,11 +284,18 @@ class OffboardLink:
         self.mode, self.armed = mode, armed
 
     def _acknowledged(self, time: float, command: int, result: int) -> None:
+        if command == Command.SET_MESSAGE_INTERVAL:
+            self.streams.answer(result)
+            return
         request = self._asked.pop(command, None)
         if request is None:
             return
         self.sequence.answer(request, result)
-        if result != mavlink2.MAV_RESULT_ACCEPTED:
+        if result != Result.ACCEPTED:
+            # PX4 tells a failed check once, when it begins to fail: that may have been before us
+            if request is Request.ARM and time - self._explained >= EXPLAIN_PERIOD:
+                self._explained = time
+                self._command(Command.RUN_PREARM_CHECKS)
             return
         # the heartbeat that says so may be a second away
         mode = Mode.OFFBOARD if request is Request.OFFBOARD else self.mode
@@ -205,16 +317,26 @@ class OffboardLink:
             self._target, mavlink2.MAV_COMP_ID_AUTOPILOT1, command, 0, *values))
 
     def _ask_set_up(self, time: float) -> None:
-        if not self._set_up:
-            self._set_up = True
-            for number, interval in INTERVALS.items():
-                self._command(Command.SET_MESSAGE_INTERVAL, number, interval * 1e6)
+        ts1 = self.time_sync.request(time)
+        if ts1 is not None:
+            self._send(mavlink2.MAVLink_timesync_message(0, ts1))
+        wanted = self.streams.request(time)
+        if wanted is not None:
+            self._command(Command.SET_MESSAGE_INTERVAL, *wanted)
         if time - self._parameters_asked < PARAMETER_RETRY:
             return
-        missing = [name for name in WATCHED if name not in self.values]
-        if missing and self._parameter_attempts < PARAMETER_ATTEMPTS:
-            self._parameters_asked = time
-            self._parameter_attempts += 1
-            for name in missing:
-                self._send(mavlink2.MAVLink_param_request_read_message(
-                    self._target, mavlink2.MAV_COMP_ID_AUTOPILOT1, name.encode(), -1))
+        missing = self._missing
+        if not missing or self._parameter_attempts > PARAMETER_ATTEMPTS:
+            return
+        self._parameters_asked = time
+        self._parameter_attempts += 1
+        if self._parameter_attempts > PARAMETER_ATTEMPTS:  # the last answers have had their time
+            self._compare()
+            return
+        for name in missing:
+            self._send(mavlink2.MAVLink_param_request_read_message(
+                self._target, mavlink2.MAV_COMP_ID_AUTOPILOT1, name.encode(), -1))
+
+    @property
+    def _missing(self) -> list[str]:
+        return [name for name in WATCHED if name not in self.values]

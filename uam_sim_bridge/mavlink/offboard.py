@@ -8,9 +8,11 @@ ask it for. The bridge and the direct engine use the same object.
     OFFBOARD   asking for the mode
     ARMING     asking to arm
     FLYING     armed, in OFFBOARD; asks again when the autopilot leaves the mode
+               (also without heartbeats: the stream must go on)
     DISARMING  asking to disarm
     DISARMED   done
-    FAILED     an attempt too many; `reasons` says why, `want` starts again
+    FAILED     an attempt too many, disarmed or rebooted in flight; `reasons` says why, and only a
+               new wish (`want`) starts again: nothing is armed in the air by itself
 """
 
 from __future__ import annotations
@@ -21,6 +23,7 @@ from enum import Enum
 
 from uam_control.parameters import ParameterSet, number
 from uam_sim_bridge.autopilot.modes import Mode, Result, Severity
+from uam_sim_bridge.mavlink.advice import with_advice
 
 _KEPT_REASONS = 5
 
@@ -63,7 +66,7 @@ class OffboardSequence:
     """The state machine.
 
     `phase`; `armed_stamp` [s] or None: when armed was first seen in this flight; `reasons`: what
-    the autopilot said against the last requests, newest last.
+    the autopilot said against the last requests and what to do about it, newest last.
     """
 
     def __init__(self, parameters: OffboardParameters | None = None) -> None:
@@ -75,6 +78,7 @@ class OffboardSequence:
         self._stream_start = math.inf
         self._asked = -math.inf
         self._attempts = 0
+        self._in_flight = False  # from FLYING until disarmed as wished, or a new wish
 
     @property
     def streaming(self) -> bool:
@@ -89,7 +93,7 @@ class OffboardSequence:
         self.reasons = ()
         self._attempts, self._asked = 0, -math.inf
         if self.phase in (Phase.FAILED, Phase.DISARMED):
-            self.phase = Phase.STREAMING
+            self.phase, self._in_flight = Phase.STREAMING, False
 
     def update(self, time: float, connected: bool, armed: bool, mode: Mode) -> Request | None:
         """Advance to `time` [s] and return what to ask for now, if anything.
@@ -97,7 +101,7 @@ class OffboardSequence:
         connected: a heartbeat came recently; armed, mode: the autopilot's latest word.
         """
         if not connected:
-            if self.phase is not Phase.FLYING:  # in flight the stream must go on
+            if self.phase not in (Phase.FLYING, Phase.FAILED):
                 self.phase = Phase.WAITING
             return None
         if self.phase is Phase.WAITING:
@@ -117,8 +121,21 @@ class OffboardSequence:
         if not armed:
             return self._ask(time, Phase.ARMING, Request.ARM)
         self.phase, self._attempts, self.reasons = Phase.FLYING, 0, ()
-        self.armed_stamp = time
+        self.armed_stamp, self._in_flight = time, True
         return None
+
+    def rebooted(self, time: float) -> None:
+        """Note at `time` [s] that the autopilot has restarted.
+
+        On the ground it is asked for everything again, after a new stream; in flight that is the
+        end of it.
+        """
+        if self._in_flight:  # FAILED, where a heartbeat said "disarmed" first
+            self._reason("the autopilot rebooted in flight")
+            self.phase = Phase.FAILED
+        elif self.phase in (Phase.STREAMING, Phase.OFFBOARD, Phase.ARMING):
+            self._reason("the autopilot rebooted")
+            self.phase, self._stream_start = Phase.STREAMING, time
 
     def answer(self, request: Request, result: int) -> None:
         """Take a COMMAND_ACK's result for a request; a refusal becomes a reason."""
@@ -133,9 +150,10 @@ class OffboardSequence:
     def text(self, severity: int, text: str) -> None:
         """Take a STATUSTEXT; warnings and worse become reasons."""
         if severity <= Severity.WARNING:
-            self._reason(text)
+            self._reason(text.strip())  # PX4 ends a text with a tab where an event says the same
 
     def _reason(self, text: str) -> None:
+        text = with_advice(text)
         others = tuple(reason for reason in self.reasons if reason != text)
         self.reasons = (*others, text)[-_KEPT_REASONS:]
 
@@ -143,7 +161,7 @@ class OffboardSequence:
         if armed and self.phase is not Phase.FAILED:
             return self._ask(time, Phase.DISARMING, Request.DISARM)
         if not armed and self.phase in (Phase.DISARMING, Phase.FLYING, Phase.FAILED):
-            self.phase, self.reasons = Phase.DISARMED, ()
+            self.phase, self.reasons, self._in_flight = Phase.DISARMED, (), False
         elif not armed and self.phase is not Phase.DISARMED:
             self.phase = Phase.STREAMING
         return None

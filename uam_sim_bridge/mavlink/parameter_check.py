@@ -1,11 +1,18 @@
-"""Whether the autopilot's parameters are those that the bridge's mapping assumes."""
+"""Whether the autopilot's parameters are those that the bridge's mapping assumes; or to adopt them.
+
+PX4 carries an integer parameter as its four bytes in the place of PARAM_VALUE's float; param_type
+says which it is.
+"""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+import struct
+from collections.abc import Iterable, Iterator
+from dataclasses import replace
 
 from uam_sim_bridge.mavlink.setpoint import RateThrustParameters
+from uam_sim_bridge.mavlink.wire import Message, mavlink2
 
 _AXES = ("ROLLRATE", "PITCHRATE", "YAWRATE")
 # read from the autopilot; those without a counterpart in the mapping are for the record
@@ -14,6 +21,19 @@ WATCHED = (
     "THR_MDL_FAC", "MPC_THR_HOVER", "COM_OF_LOSS_T",
 )  # fmt: skip
 _TOLERANCE = 1e-4  # relative: MAVLink carries 32-bit numbers
+_INTEGERS = {
+    mavlink2.MAV_PARAM_TYPE_UINT8: "<Bxxx", mavlink2.MAV_PARAM_TYPE_INT8: "<bxxx",
+    mavlink2.MAV_PARAM_TYPE_UINT16: "<Hxx", mavlink2.MAV_PARAM_TYPE_INT16: "<hxx",
+    mavlink2.MAV_PARAM_TYPE_UINT32: "<I", mavlink2.MAV_PARAM_TYPE_INT32: "<i",
+}  # fmt: skip
+
+
+def value_of(message: Message) -> float:
+    """Return the value in a PARAM_VALUE, whatever its type."""
+    layout = _INTEGERS.get(message.param_type)
+    if layout is None:
+        return message.param_value
+    return float(struct.unpack(layout, struct.pack("<f", message.param_value))[0])
 
 
 def expected(mapping: RateThrustParameters) -> dict[str, float]:
@@ -31,3 +51,43 @@ def differences(mapping: RateThrustParameters, values: dict[str, float]) -> Iter
         if found is not None and not math.isclose(
                 found, wanted, rel_tol=_TOLERANCE, abs_tol=_TOLERANCE):
             yield f"{name} is {found:g} on the autopilot, the bridge assumes {wanted:g}"
+
+
+def adopted(mapping: RateThrustParameters, values: dict[str, float]) -> RateThrustParameters:
+    """Return the mapping with the autopilot's own values where they differ from it.
+
+    Raises ParameterError, naming the value, where one is out of the range of the mapping.
+    """
+    if not any(True for _ in differences(mapping, values)):
+        return mapping
+    taken = expected(mapping) | values
+
+    def axes(what: str) -> tuple[float, ...]:
+        # seven digits are what 32 bits carry: 0.15, not 0.15000000596
+        return tuple(float(f"{taken[f'MC_{axis}_{what}']:.7g}") for axis in _AXES)
+
+    return replace(
+        mapping, rate_p=axes("P"), rate_k=axes("K"),
+        thr_mdl_fac=float(f"{taken['THR_MDL_FAC']:.7g}")).validated()
+
+
+def stream_loss(values: dict[str, float], hold_time: float) -> Iterator[str]:
+    """Yield what is wrong with COM_OF_LOSS_T; hold_time [s]: how long the bridge holds level.
+
+    The autopilot should wait for setpoints longer than a hiccup of the stream and need not be
+    quicker than the bridge, whose level hold comes first.
+    """
+    wait = values.get("COM_OF_LOSS_T")
+    if wait is None:
+        return
+    if wait <= 0.0:
+        yield "COM_OF_LOSS_T is 0 on the autopilot: any late setpoint is a failsafe"
+    elif wait < hold_time * (1.0 - _TOLERANCE):
+        yield (f"COM_OF_LOSS_T is {wait:g} s on the autopilot, shorter than the bridge's hold_time "
+               f"of {hold_time:g} s")
+
+
+def untold(names: Iterable[str], attempts: int) -> Iterator[str]:
+    """Yield one line for each parameter that was asked for in vain."""
+    for name in names:
+        yield f"{name} was not told by the autopilot in {attempts} requests"

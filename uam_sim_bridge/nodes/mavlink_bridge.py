@@ -22,10 +22,12 @@ from typing import Any
 import numpy as np
 from rcl_interfaces.msg import ParameterDescriptor
 from rclpy.clock import Clock, ClockType
+from rclpy.parameter import Parameter
 
 from uam_control.coordinates import ATTITUDE
-from uam_control.parameters import ParameterSet, choice, number
+from uam_control.parameters import ParameterError, ParameterSet, choice, number
 from uam_msgs_py import topics
+from uam_msgs_py.battery import battery_message
 from uam_msgs_py.control import (
     TAU_Q,
     read_position_command,
@@ -42,7 +44,9 @@ from uam_sim_bridge.flight.ports import PortError
 from uam_sim_bridge.mavlink.forwarding import GroundStation
 from uam_sim_bridge.mavlink.hold import HoldParameters, LevelHold
 from uam_sim_bridge.mavlink.link import OffboardLink
+from uam_sim_bridge.mavlink.link_report import faults, report
 from uam_sim_bridge.mavlink.offboard import OffboardParameters, OffboardSequence
+from uam_sim_bridge.mavlink.parameter_check import adopted, differences
 from uam_sim_bridge.mavlink.setpoint import RateThrustMap, RateThrustParameters, SetpointRefused
 from uam_sim_bridge.mavlink.signing import Signing
 from uam_sim_bridge.mavlink.transport import Transport, UdpTransport, open_transport
@@ -51,6 +55,7 @@ from uam_sim_bridge.mavlink.wire import Codec, mavlink2
 
 NAME = "mavlink_bridge"
 STATE_PERIOD = 500_000_000  # ns between two reports of the autopilot's state
+BATTERY_PERIOD = 1_000_000_000  # ns
 WATCH_PERIOD = 0.02  # s between two looks of the real-time watchdog, and its setpoints
 BAD = object()  # stands for a message that must not be used
 
@@ -74,12 +79,15 @@ class BridgeParameters(ParameterSet):
         0.005, "standard deviation told with a vision pose", "m", 1e-4, 1.0)
     vision_attitude_deviation: float = number(
         0.02, "standard deviation told with a vision pose", "rad", 1e-4, 1.0)
+    autopilot_parameters: str = choice(
+        "warn", "where the autopilot's MC_*RATE_P/K or THR_MDL_FAC differ from the mapping: warn, "
+        "or adopt them before arming", ("warn", "adopt"))
     stale_after: float = number(
         0.1, "real time without a tick, after which the commands count as lost", "s", 0.01, 5.0)
 
 
 class MavlinkBridgeNode(UamNode):
-    """Publishes /uam/setpoint and /uam/autopilot/state."""
+    """Publishes /uam/setpoint, /uam/autopilot/state and /uam/autopilot/battery."""
 
     def __init__(self) -> None:
         super().__init__(NAME)
@@ -94,13 +102,15 @@ class MavlinkBridgeNode(UamNode):
         self._hold = LevelHold(hold)
         options = self._options
         self._station: GroundStation | None = None
-        self.link = self._open_link()
+        self.link = self._open_link(hold.hold_time)
         self._state = np.zeros((3, 8))
         self._pose: tuple[int, np.ndarray, np.ndarray] | None = None
         self._pose_sent = -1.0
         self._told: tuple[Any, ...] = ()
         self._told_at = -STATE_PERIOD
         self._warned: tuple[str, ...] = ()
+        self._adopted: tuple[str, ...] = ()
+        self._battery_told = -BATTERY_PERIOD
         self._last_tick = time.monotonic()
         self._ground: float | None = None  # height [m] at which the vehicle stood
         self._margin = hold.ground_margin
@@ -109,6 +119,7 @@ class MavlinkBridgeNode(UamNode):
 
         self._setpoint = self.publisher(topics.SETPOINT)
         self._autopilot_state = self.publisher(topics.AUTOPILOT_STATE)
+        self._battery = self.publisher(topics.AUTOPILOT_BATTERY)
         self._writer = SetpointWriter()
         names = [t.name for t in (topics.STATE, topics.POSITION_COMMAND, topics.ATTITUDE_COMMAND)]
         self._join = StampJoin(names, self._tick)
@@ -123,7 +134,7 @@ class MavlinkBridgeNode(UamNode):
             steady = Clock(clock_type=ClockType.STEADY_TIME)
             self.create_timer(WATCH_PERIOD, self._watch, clock=steady)
 
-    def _open_link(self) -> OffboardLink:
+    def _open_link(self, hold_time: float) -> OffboardLink:
         """Open the links that the parameters name; raises PortError in one line."""
         options = self._options
         system = int(options.autopilot_system)
@@ -143,7 +154,8 @@ class MavlinkBridgeNode(UamNode):
         if station:
             codec = Codec(system, mavlink2.MAV_COMP_ID_ONBOARD_COMPUTER, signing)
             transport = self._station = GroundStation(station, transport, codec)
-        return OffboardLink(transport, self.sequence, self.map.parameters, system, signing)
+        return OffboardLink(
+            transport, self.sequence, self.map.parameters, system, hold_time, signing)
 
     def _text(self, name: str, description: str, secret: bool = False) -> str:
         """Declare a read-only text, '' by default, and return it; a secret one is not shown.
@@ -201,12 +213,33 @@ class MavlinkBridgeNode(UamNode):
         if state is not BAD:
             self._state = state
         self.link.poll(now)
+        self._adopt()
         setpoint = self._command(now, state, position, torque)
         self._send(now, setpoint)
         self._tell(stamp)
         rates, thrust = setpoint or (self._idle, 0.0)
         self._setpoint.publish(self._writer.fill(stamp, rates, thrust))
         self.done_tick(stamp, begun)
+
+    def _adopt(self) -> None:
+        """Take the autopilot's parameters over where that is wished; never while it is armed."""
+        link = self.link
+        wished = self._options.autopilot_parameters == "adopt"
+        if not wished or link.armed or not link.mapping_told:
+            return
+        old, changes = self.map.parameters, tuple(differences(self.map.parameters, link.values))
+        if not changes or changes == self._adopted:
+            return
+        self._adopted = changes
+        try:
+            new = adopted(old, link.values)
+        except ParameterError as error:
+            self.get_logger().warning(f"the autopilot's parameters are not adopted: {error}")
+            return
+        names = ("rate_p", "rate_k", "thr_mdl_fac")
+        self.set_parameters([Parameter(name, value=_plain(getattr(new, name))) for name in names])
+        for change in changes:
+            self.get_logger().info(f"adopted from the autopilot: {change}")
 
     def _command(self, now: float, state, position, torque) -> tuple[np.ndarray, float] | None:
         """Return body rates (3,) and thrust for this tick, None for no setpoint at all."""
@@ -269,14 +302,18 @@ class MavlinkBridgeNode(UamNode):
         self._tell(round(now * 1e9))
 
     def _tell(self, stamp: int) -> None:
-        """Publish the autopilot's state when it changes and twice a second."""
+        """Publish the autopilot's state when it changes and twice a second, its battery once."""
         link, sequence = self.link, self.sequence
+        if link.battery is not None and stamp - self._battery_told >= BATTERY_PERIOD:
+            self._battery_told = stamp
+            self._battery.publish(battery_message(stamp, link.battery))
         connected = link.connected(seconds(stamp))
         what = (connected, link.mode, link.armed, sequence.phase, sequence.reasons)
         if link.warnings != self._warned:
-            self._warned = link.warnings
             for warning in link.warnings:
-                self.get_logger().warning(warning)
+                if warning not in self._warned:
+                    self.get_logger().warning(warning)
+            self._warned = link.warnings
         if what == self._told and stamp - self._told_at < STATE_PERIOD:
             return
         if what != self._told:
@@ -292,7 +329,7 @@ class MavlinkBridgeNode(UamNode):
 
     def diagnose(self):
         link, sequence = self.link, self.sequence
-        notes = (*sequence.reasons, *link.warnings)
+        notes = (*sequence.reasons, *faults(link), *link.warnings)
         values = {
             "sequence": sequence.phase.value,
             "autopilot mode": link.mode.name,
@@ -303,6 +340,8 @@ class MavlinkBridgeNode(UamNode):
             "link open": link.open,
             "frames dropped": link.dropped,
             "level hold": self._hold.active,
+            "adopted": "; ".join(self._adopted),
+            **report(link),
         }
         summary = "; ".join((sequence.phase.value, *notes))
         return WARN if notes else OK, summary, values
@@ -312,6 +351,11 @@ class MavlinkBridgeNode(UamNode):
         spare, zero, level = RateThrustMap(), np.zeros(3), np.array([1.0, 0.0, 0.0, 0.0])
         spare.map(zero, zero, self._state[0, ATTITUDE], self._state[1, ATTITUDE])
         vision_message(0.0, zero, level, 1.0, 1.0)
+
+
+def _plain(value: float | tuple[float, ...]) -> float | list[float]:
+    """Return the value as ROS parameters take it."""
+    return list(value) if isinstance(value, tuple) else value
 
 
 def main() -> int:

@@ -1,0 +1,330 @@
+"""The link against the stand-in in memory: set-up, cuts, reboots, lost modes."""
+
+import struct
+
+import numpy as np
+import pytest
+
+from uam_sim_bridge.autopilot.companion import Companion
+from uam_sim_bridge.autopilot.core import Autopilot
+from uam_sim_bridge.autopilot.modes import Command, Mode, Result
+from uam_sim_bridge.mavlink.event_messages import EventMessage
+from uam_sim_bridge.mavlink.events import SUMMARY, event_id
+from uam_sim_bridge.mavlink.link import OffboardLink
+from uam_sim_bridge.mavlink.link_report import faults, report
+from uam_sim_bridge.mavlink.offboard import OffboardSequence, Phase
+from uam_sim_bridge.mavlink.parameter_check import WATCHED
+from uam_sim_bridge.mavlink.setpoint import RateThrustParameters
+from uam_sim_bridge.mavlink.streams import ONLY_COUNTED, RATES
+from uam_sim_bridge.mavlink.wire import Codec, Framer, clean_text, mavlink2
+
+DOWN = np.array([0.0, 0.0, -9.81])
+LEVEL = np.array([1.0, 0.0, 0.0, 0.0])
+ARM = (Command.ARM_DISARM, 1.0)
+
+
+class Memory:
+    """A transport of two lists."""
+
+    stream, connected, dropped = False, True, 0
+
+    def __init__(self):
+        self.there, self.here = [], []
+
+    def send(self, data):
+        self.there.append(data)
+
+    def receive(self):
+        arrived, self.here = self.here, []
+        return arrived
+
+    def close(self):
+        pass
+
+
+class Rig:
+    """Link and autopilot, tick by tick. `cut`: nothing gets through; `deaf`: what it never hears.
+
+    The body does not move; what matters here are words, not flight.
+    """
+
+    def __init__(self, hold_time=1.0):
+        self.memory, self.sequence = Memory(), OffboardSequence()
+        self.link = OffboardLink(
+            self.memory, self.sequence, RateThrustParameters(), hold_time=hold_time)
+        self.codec, self.framer = Codec(1, 1), Framer(Codec(1, 1))
+        self.ticks, self.cut, self.vision = 0, False, True
+        self.deaf = ()
+        self.asked = []  # messages that reached the autopilot
+        self.said = set()
+        self.boot()
+
+    def boot(self):
+        """Start the autopilot anew: its clock at zero, disarmed, numbering from zero."""
+        self.autopilot = Autopilot()
+        for name in ("THR_MDL_FAC",):
+            self.autopilot.set_parameter(name, 0.3)
+        self.companion = Companion(self.autopilot)
+        self.codec = Codec(1, 1)
+        self.booted = self.ticks
+
+    @property
+    def time(self):
+        return 0.004 * self.ticks
+
+    @property
+    def uptime(self):
+        return 0.004 * (self.ticks - self.booted)
+
+    def say(self, *messages):
+        for message in messages:
+            frame = self.codec.encode(message)
+            if not self.cut:
+                self.memory.here.append(frame)
+
+    def run(self, seconds, autopilot=True):
+        """autopilot: False while it boots, all silent."""
+        for _ in range(round(seconds / 0.004)):
+            link = self.link
+            link.poll(self.time)
+            link.tick(self.time)
+            if self.sequence.streaming:
+                link.send_setpoint(np.zeros(3), 0.5, self.time)
+            self.said.update(self.sequence.reasons)
+            sent, self.memory.there = self.memory.there, []
+            if autopilot:
+                self._autopilot(b"" if self.cut else b"".join(sent))
+            self.ticks += 1
+
+    def _autopilot(self, data):
+        for message in self.framer.datagram(data):
+            if message.get_type() not in self.deaf:
+                self.asked.append(message)
+                self.companion.handle(self.uptime, message)
+        if self.vision and self.ticks % 5 == 0:
+            self.autopilot.vision(self.uptime, np.zeros(3), LEVEL)
+        self.autopilot.update(self.uptime, np.zeros(3), DOWN)
+        self.say(*self.companion.tick(self.uptime))
+
+    def fly(self):
+        self.sequence.want(True)
+        self.run(2.0)
+        assert self.sequence.phase is Phase.FLYING, self.sequence.reasons
+        self.asked.clear()
+        return self
+
+    def commands(self):
+        return [(m.command, m.param1) for m in self.asked if m.get_type() == "COMMAND_LONG"]
+
+    def reasons(self):
+        return "; ".join(self.said)
+
+
+@pytest.fixture
+def rig():
+    return Rig()
+
+
+def test_set_up(rig):
+    rig.run(6.0)
+    link = rig.link
+    asked = [first for command, first in rig.commands() if command == Command.SET_MESSAGE_INTERVAL]
+    assert asked == [number for number in RATES if number not in ONLY_COUNTED]
+    read = [clean_text(m.param_id) for m in rig.asked if m.get_type() == "PARAM_REQUEST_READ"]
+    assert sorted(read) == sorted(WATCHED)
+    assert link.mapping_told and link.warnings == ()
+    assert link.lost == link.bad_bytes == 0 and link.statistics.rate > 30.0
+
+
+def test_time_is_compared_both_ways(rig):
+    rig.run(3.0)
+    sync = rig.link.time_sync
+    assert sync.round_trip == pytest.approx(0.004, abs=0.0041)
+    assert sync.offset == pytest.approx(0.0, abs=0.005)
+    ours = [m for m in rig.asked if m.get_type() == "TIMESYNC"]
+    assert len([m for m in ours if m.tc1 == 0]) == pytest.approx(15, abs=2)
+    assert len([m for m in ours if m.tc1 != 0]) == pytest.approx(30, abs=2)
+
+
+def test_the_report_shows_the_autopilots_health(rig):
+    rig.fly()
+    values = report(rig.link)
+    assert "attitude" in values["estimator"] and values["battery [V]"] is None
+    assert faults(rig.link) == () and values["sensors unhealthy"] == ""
+    rig.vision = False
+    rig.run(2.0)
+    assert "autopilot: no horizontal position estimate" in faults(rig.link)
+    assert report(rig.link)["sensors unhealthy"] == "vision_position"
+
+
+def test_a_battery_that_sys_status_alone_knows(rig):
+    rig.run(2.5)
+    assert not rig.link.battery.known
+    rig.say(mavlink2.MAVLink_sys_status_message(0, 0, 0, 0, 15200, 250, 80, 0, 0, 0, 0, 0, 0))
+    rig.run(0.008)
+    assert rig.link.battery.voltage == pytest.approx(15.2)
+
+
+def test_cut_of_a_fifth_of_a_second_changes_nothing(rig):
+    rig.fly().cut = True
+    rig.run(0.2)
+    rig.cut = False
+    rig.run(1.0)
+    assert rig.sequence.phase is Phase.FLYING and rig.autopilot.status.mode is Mode.OFFBOARD
+    assert rig.reasons() == "" and rig.link.lost > 0
+    assert not any(c == Command.DO_SET_MODE for c, _ in rig.commands())
+
+
+def test_cut_of_two_seconds_is_a_failsafe_and_offboard_is_asked_for_again(rig):
+    rig.fly().cut = True
+    rig.run(2.0)
+    assert rig.autopilot.status.mode is Mode.LAND and rig.link.connected(rig.time)
+    assert rig.sequence.phase is Phase.FLYING and rig.sequence.streaming
+    rig.cut = False
+    rig.run(2.0)
+    assert rig.autopilot.status.mode is Mode.OFFBOARD and rig.autopilot.status.armed
+    assert rig.sequence.phase is Phase.FLYING
+    assert "left OFFBOARD for LAND → a failsafe" in rig.reasons()
+    assert ARM not in rig.commands()
+
+
+def test_cut_for_good(rig):
+    rig.fly().cut = True
+    rig.run(5.0)
+    assert not rig.link.connected(rig.time)
+    # what it sends may arrive: the stream goes on for as long as the bridge lives
+    assert rig.sequence.phase is Phase.FLYING and rig.sequence.streaming
+    assert rig.autopilot.status.mode is Mode.LAND
+
+
+def test_disarmed_behind_a_cut_is_not_armed_again(rig):
+    rig.fly().cut = True
+    rig.run(4.0)
+    rig.autopilot.commander.armed = False
+    rig.cut = False
+    rig.run(5.0)
+    assert rig.sequence.phase is Phase.FAILED and "disarmed in flight" in rig.reasons()
+    rig.cut = True
+    rig.run(4.0)
+    rig.cut = False
+    rig.run(5.0)
+    assert rig.sequence.phase is Phase.FAILED and not rig.autopilot.status.armed
+    assert ARM not in rig.commands()
+
+
+def test_the_autopilot_leaves_offboard_by_itself(rig):
+    rig.fly()
+    rig.autopilot.command(rig.uptime, Command.DO_SET_MODE, (1.0, 4.0, 6.0))
+    rig.run(2.0)
+    assert rig.autopilot.status.mode is Mode.OFFBOARD
+    assert "left OFFBOARD for LAND" in rig.reasons()
+
+
+def test_reboot_on_the_ground_asks_for_everything_again(rig):
+    rig.run(8.0)
+    rig.asked.clear()
+    rig.boot()
+    rig.run(1.0)
+    assert rig.link.reboots == 1 and rig.sequence.phase is Phase.STREAMING
+    intervals = [c for c, _ in rig.commands() if c == Command.SET_MESSAGE_INTERVAL]
+    assert len(intervals) == len(RATES) - len(ONLY_COUNTED)
+    assert rig.link.mapping_told and rig.link.time_sync.offset == pytest.approx(-8.0, abs=0.01)
+    rig.sequence.want(True)
+    rig.run(2.0)
+    assert rig.sequence.phase is Phase.FLYING and rig.link.reboots == 1
+
+
+def test_reboot_in_flight_is_never_armed_again(rig):
+    rig.run(8.0)
+    rig.fly()
+    rig.run(1.0, autopilot=False)
+    rig.boot()
+    rig.run(20.0)
+    assert rig.link.reboots == 1 and rig.sequence.phase is Phase.FAILED
+    assert "the autopilot rebooted in flight → check its power supply" in rig.reasons()
+    assert not rig.autopilot.status.armed and ARM not in rig.commands()
+    assert rig.sequence.streaming  # should the autopilot fly on after all, it has setpoints
+
+
+def test_slow_reboot_in_flight_behind_a_heartbeat_gap(rig):
+    rig.run(10.0)
+    rig.fly()
+    rig.run(5.0, autopilot=False)
+    assert not rig.link.connected(rig.time)
+    rig.boot()
+    rig.run(20.0)
+    assert rig.link.reboots == 1 and rig.sequence.phase is Phase.FAILED
+    assert ARM not in rig.commands()
+
+
+def test_messages_that_overtake_each_other_are_no_reboot(rig):
+    rig.run(5.0)
+    late = round((rig.uptime - 0.5) * 1e3)
+    rig.say(mavlink2.MAVLink_attitude_quaternion_message(late, 1, 0, 0, 0, 0, 0, 0))
+    rig.run(0.1)
+    assert rig.link.reboots == 0
+
+
+def test_a_parameter_that_never_arrives_is_a_warning(rig):
+    rig.deaf = ("PARAM_REQUEST_READ",)
+    rig.run(7.0)
+    assert "THR_MDL_FAC was not told by the autopilot in 10 requests" in rig.link.warnings
+    asked = len([m for m in rig.asked if m.get_type() == "PARAM_REQUEST_READ"])
+    rig.run(5.0)
+    assert asked == 0 and not rig.link.mapping_told
+
+
+def test_differences_and_a_short_loss_time_are_warnings():
+    rig = Rig(hold_time=2.0)
+    rig.autopilot.set_parameter("MC_ROLLRATE_P", 0.3)
+    rig.run(1.0)
+    assert rig.link.warnings == (
+        "MC_ROLLRATE_P is 0.3 on the autopilot, the bridge assumes 0.15",
+        "COM_OF_LOSS_T is 1 s on the autopilot, shorter than the bridge's hold_time of 2 s")
+
+
+def test_integer_parameters_are_read_by_type(rig):
+    rig.run(0.1)
+    value = struct.unpack("<f", struct.pack("<i", 7))[0]
+    rig.say(mavlink2.MAVLink_param_value_message(
+        b"COM_RCL_EXCEPT", value, mavlink2.MAV_PARAM_TYPE_INT32, 900, 17))
+    rig.run(0.1)
+    assert rig.link.values["COM_RCL_EXCEPT"] == 7
+
+
+def test_a_refused_arming_is_asked_to_be_explained(rig):
+    rig.vision = False
+    rig.sequence.want(True)
+    rig.run(3.0)
+    asked = [c for c, _ in rig.commands()]
+    assert asked.count(Command.RUN_PREARM_CHECKS) == 1 < asked.count(Command.ARM_DISARM)
+    summary = struct.pack("<BIIII", 0, 0, 0, 1, 1)
+    rig.say(EventMessage(0, 0, event_id(SUMMARY), 0, 1, 8, summary),
+            EventMessage(0, 0, event_id("check_modes_attitude"), 0, 2, 2,
+                         struct.pack("<IB", 0xFFFFFFFF, 16)))
+    rig.run(0.1)
+    assert "No valid attitude estimate → hold the vehicle still" in rig.reasons()
+
+
+def test_answers_to_others_are_not_ours(rig):
+    rig.sequence.want(True)
+    rig.run(0.02)
+    rig.say(mavlink2.MAVLink_command_ack_message(
+        Command.ARM_DISARM, Result.DENIED, 0, 0, 255, mavlink2.MAV_COMP_ID_MISSIONPLANNER))
+    rig.run(2.0)
+    assert "denied" not in rig.reasons() and rig.sequence.phase is Phase.FLYING
+
+
+def test_the_same_words_twice():
+    """What the link does depends on ticks and messages alone."""
+
+    def words():
+        rig = Rig()
+        rig.fly()
+        rig.cut = True
+        rig.run(1.5)
+        rig.cut = False
+        rig.run(1.0)
+        return [rig.codec.encode(m) for m in rig.asked]
+
+    assert words() == words()

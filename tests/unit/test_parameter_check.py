@@ -1,0 +1,72 @@
+"""Parameters of the autopilot: read by type, compared, adopted, missed."""
+
+import math
+import struct
+
+import pytest
+
+from uam_control.parameters import ParameterError
+from uam_sim_bridge.mavlink.parameter_check import (
+    adopted,
+    differences,
+    expected,
+    stream_loss,
+    untold,
+    value_of,
+)
+from uam_sim_bridge.mavlink.setpoint import RateThrustParameters
+from uam_sim_bridge.mavlink.wire import Codec, Framer, mavlink2
+
+
+def told(value, kind, layout=None):
+    """The value as it comes out of a frame."""
+    if layout:
+        value = struct.unpack("<f", struct.pack(layout, value).ljust(4, b"\0"))[0]
+    message = mavlink2.MAVLink_param_value_message(b"NAME", value, kind, 1, 0)
+    (arrived,) = Framer(Codec(1, 191)).datagram(Codec(1, 1).encode(message))
+    return value_of(arrived)
+
+
+def test_values_by_type():
+    assert told(0.15, mavlink2.MAV_PARAM_TYPE_REAL32) == pytest.approx(0.15)
+    for value in (0, 1, 7, 21196, -3, 2**31 - 1):
+        assert told(value, mavlink2.MAV_PARAM_TYPE_INT32, "<i") == value
+    assert told(200, mavlink2.MAV_PARAM_TYPE_UINT8, "<B") == 200
+    assert told(-2, mavlink2.MAV_PARAM_TYPE_INT16, "<h") == -2
+
+
+def test_the_same_values_change_nothing():
+    mapping = RateThrustParameters()
+    values = {name: struct.unpack("<f", struct.pack("<f", value))[0]
+              for name, value in expected(mapping).items()}
+    assert adopted(mapping, values) is mapping
+    assert adopted(mapping, {}) is mapping
+
+
+def test_adopted():
+    values = {"MC_ROLLRATE_P": 0.3, "MC_YAWRATE_K": 2.0,
+              "THR_MDL_FAC": struct.unpack("<f", struct.pack("<f", 0.1))[0]}
+    new = adopted(RateThrustParameters(), values)
+    assert new.rate_p == (0.3, 0.15, 0.2) and new.rate_k == (1.0, 1.0, 2.0)
+    assert new.thr_mdl_fac == 0.1
+    assert list(differences(new, values)) == []
+
+
+def test_what_the_mapping_cannot_take_is_refused():
+    with pytest.raises(ParameterError, match="rate_p"):
+        adopted(RateThrustParameters(), {"MC_ROLLRATE_P": 0.0})
+    with pytest.raises(ParameterError, match="thr_mdl_fac"):
+        adopted(RateThrustParameters(), {"THR_MDL_FAC": math.nan})
+
+
+def test_loss_of_the_stream():
+    assert list(stream_loss({}, 1.0)) == []
+    assert list(stream_loss({"COM_OF_LOSS_T": 1.0}, 1.0)) == []
+    assert list(stream_loss({"COM_OF_LOSS_T": 0.5}, 1.0)) == [
+        "COM_OF_LOSS_T is 0.5 s on the autopilot, shorter than the bridge's hold_time of 1 s"]
+    assert "COM_OF_LOSS_T is 0 on the autopilot" in next(stream_loss({"COM_OF_LOSS_T": 0.0}, 1.0))
+
+
+def test_untold():
+    assert list(untold(["THR_MDL_FAC"], 10)) == [
+        "THR_MDL_FAC was not told by the autopilot in 10 requests"]

@@ -1,0 +1,84 @@
+"""Clock offset and round trip against a simulated autopilot with delays, losses and reboots."""
+
+import numpy as np
+import pytest
+
+from uam_sim_bridge.mavlink.time_sync import PERIOD, TimeSync, nanoseconds
+
+
+def run(sync, seconds, start, offset, delay, back=None, lost=0.0, seed=1):
+    """Tick at 250 Hz with an autopilot `offset` [s] ahead; delays [s]: callables or numbers.
+
+    Returns the times at which a jump was said.
+    """
+    noise = np.random.default_rng(seed)
+    waiting, jumps = [], []
+    for k in range(round(seconds / 0.004)):
+        time = start + 0.004 * k
+        for arrival, tc1, ts1 in [w for w in waiting if w[0] <= time]:
+            waiting.remove((arrival, tc1, ts1))
+            if sync.answer(time, tc1, ts1):
+                jumps.append(time)
+        ts1 = sync.request(time)
+        if ts1 is not None and noise.random() >= lost:
+            there = delay(noise) if callable(delay) else delay
+            home = there if back is None else back
+            waiting.append((time + there + home, nanoseconds(time + there + offset), ts1))
+    return jumps
+
+
+def test_nothing_is_known_before_an_answer():
+    sync = TimeSync()
+    assert sync.offset is None and sync.round_trip is None
+    assert sync.request(0.0) == 1  # 0 would be taken for an answer
+    assert sync.request(PERIOD / 2) is None
+    assert sync.request(PERIOD) == 200_000_000
+
+
+def test_constant_delay():
+    sync = TimeSync()
+    assert run(sync, 5.0, 10.0, offset=123.4, delay=0.004) == []
+    assert sync.offset == pytest.approx(123.4, abs=0.003)
+    assert sync.round_trip == pytest.approx(0.008, abs=0.0041)
+
+
+def test_random_delays_and_losses():
+    sync = TimeSync()
+    run(sync, 30.0, 20.0, offset=-7.0, delay=lambda n: n.exponential(0.02), back=0.002, lost=0.3)
+    # a single answer is wrong by up to half the round trip, some 50 ms here
+    assert sync.offset == pytest.approx(-7.0, abs=0.008)
+    assert 0.01 < sync.round_trip < 0.06 and sync.resets == 0
+
+
+def test_a_reboot_resets_at_once_and_only_once():
+    sync = TimeSync()
+    run(sync, 5.0, 0.0, offset=500.0, delay=0.004)
+    jumps = run(sync, 5.0, 5.0, offset=-4.0, delay=0.004)
+    assert len(jumps) == 1 and jumps[0] < 5.0 + 3 * PERIOD
+    assert sync.resets == 1 and sync.offset == pytest.approx(-4.0, abs=0.003)
+
+
+def test_a_single_wild_answer_does_no_harm():
+    sync = TimeSync()
+    run(sync, 2.0, 0.0, offset=1.0, delay=0.0)
+    ts1 = sync.request(2.0)
+    assert not sync.answer(2.004, ts1 + 10**12, ts1)
+    run(sync, 1.0, 2.2, offset=1.0, delay=0.0)
+    assert sync.resets == 0 and sync.offset == pytest.approx(1.0, abs=0.003)
+
+
+def test_a_slow_answer_is_no_jump():
+    sync = TimeSync()
+    run(sync, 2.0, 0.0, offset=1.0, delay=0.0)
+    assert run(sync, 3.0, 2.0, offset=1.0, delay=0.6, back=0.0) == []
+    assert sync.resets == 0
+
+
+def test_answers_to_others_are_ignored():
+    sync = TimeSync()
+    ts1 = sync.request(1.0)
+    assert not sync.answer(1.0, 5, 77) and sync.offset is None
+    sync.answer(1.0, ts1 + 1000, ts1)
+    offset = sync.offset
+    sync.answer(1.0, 10**15, ts1)  # the same answer twice
+    assert sync.offset == offset

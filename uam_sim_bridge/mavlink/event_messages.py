@@ -1,0 +1,92 @@
+"""EVENT and CURRENT_EVENT_SEQUENCE, which pymavlink leaves out: MAVLink marks them as unfinished.
+
+PX4 sends them all the same, and most of its reasons for not arming come as nothing else. Importing
+this module adds them to the dialect, so that they are decoded and checked like all others.
+"""
+
+from __future__ import annotations
+
+import struct
+
+from pymavlink.dialects.v20 import common as mavlink2
+
+ARGUMENTS = 40  # bytes
+
+
+class EventMessage(mavlink2.MAVLink_message):
+    """EVENT; `arguments`: bytes, trailing zeros cut off in one that was received."""
+
+    id = 410
+    msgname = "EVENT"
+    fieldnames = ["destination_component", "destination_system", "id", "event_time_boot_ms",
+                  "sequence", "log_levels", "arguments"]
+    ordered_fieldnames = ["id", "event_time_boot_ms", "sequence", "destination_component",
+                          "destination_system", "log_levels", "arguments"]
+    fieldtypes = ["uint8_t", "uint8_t", "uint32_t", "uint32_t", "uint16_t", "uint8_t", "uint8_t"]
+    fielddisplays_by_name: dict[str, str] = {}
+    fieldenums_by_name: dict[str, str] = {}
+    fieldunits_by_name: dict[str, str] = {"event_time_boot_ms": "ms"}
+    native_format = bytearray(b"<IIHBBBB")
+    orders = [3, 4, 0, 1, 2, 5, 6]
+    lengths = [1, 1, 1, 1, 1, 1, ARGUMENTS]
+    array_lengths = [0, 0, 0, 0, 0, 0, ARGUMENTS]
+    crc_extra = 160
+    unpacker = struct.Struct(f"<IIHBBB{ARGUMENTS}s")
+    instance_field = None
+    instance_offset = -1
+
+    def __init__(self, destination_component: int, destination_system: int, id: int,
+                 event_time_boot_ms: int, sequence: int, log_levels: int, arguments: bytes):
+        super().__init__(EventMessage.id, EventMessage.msgname)
+        self._fieldnames = EventMessage.fieldnames
+        self._instance_field, self._instance_offset = None, -1
+        self.destination_component = destination_component
+        self.destination_system = destination_system
+        self.event = id  # `id` of the object stays that of the message
+        self.event_time_boot_ms = event_time_boot_ms
+        self.sequence = sequence
+        self.log_levels = log_levels
+        self.arguments = arguments
+
+    def pack(self, mav: mavlink2.MAVLink, force_mavlink1: bool = False) -> bytes:
+        """Return the frame."""
+        payload = self.unpacker.pack(
+            self.event, self.event_time_boot_ms, self.sequence, self.destination_component,
+            self.destination_system, self.log_levels, self.arguments)
+        return self._pack(mav, self.crc_extra, payload, force_mavlink1=force_mavlink1)
+
+
+class CurrentEventSequenceMessage(mavlink2.MAVLink_message):
+    """CURRENT_EVENT_SEQUENCE: the number of the newest event."""
+
+    id = 411
+    msgname = "CURRENT_EVENT_SEQUENCE"
+    fieldnames = ordered_fieldnames = ["sequence", "flags"]
+    fieldtypes = ["uint16_t", "uint8_t"]
+    fielddisplays_by_name: dict[str, str] = {}
+    fieldenums_by_name: dict[str, str] = {}
+    fieldunits_by_name: dict[str, str] = {}
+    native_format = bytearray(b"<HB")
+    orders = [0, 1]
+    lengths = [1, 1]
+    array_lengths = [0, 0]
+    crc_extra = 106
+    unpacker = struct.Struct("<HB")
+    instance_field = None
+    instance_offset = -1
+
+    def __init__(self, sequence: int, flags: int):
+        super().__init__(CurrentEventSequenceMessage.id, CurrentEventSequenceMessage.msgname)
+        self._fieldnames = CurrentEventSequenceMessage.fieldnames
+        self._instance_field, self._instance_offset = None, -1
+        self.sequence = sequence
+        self.flags = flags
+
+    def pack(self, mav: mavlink2.MAVLink, force_mavlink1: bool = False) -> bytes:
+        """Return the frame."""
+        payload = self.unpacker.pack(self.sequence, self.flags)
+        return self._pack(mav, self.crc_extra, payload, force_mavlink1=force_mavlink1)
+
+
+for _kind in (EventMessage, CurrentEventSequenceMessage):
+    mavlink2.mavlink_map.setdefault(_kind.id, _kind)
