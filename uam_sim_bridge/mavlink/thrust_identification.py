@@ -8,8 +8,9 @@ parameters. In steady flight Newton's law along the body's thrust axis,
 needs what the bridge has anyway: attitude and acceleration of /uam/state, the thrust sent, and the
 mass. The command goes through the lag of the motors and of the acceleration's filter first, so that
 both sides of the quotient belong to the same instant. The factor follows it as first-order low pass
-within bounds and a slew limit: with a short time constant at first, then with as long a one as has
-been measured (which makes it a mean), in the end with a long one, much slower than the position law.
+within bounds and a slew limit: with a short time constant at first, then with one as long as has
+been measured (which makes it a mean), in the end with a long one, much slower than the position
+law.
 
 | while | the factor |
 |---|---|
@@ -37,7 +38,7 @@ from uam_control.parameters import ParameterSet, choice, number
 GRAVITY = 9.81  # m/s^2
 USABLE = (0.1, 0.9)  # normalised thrust: beyond, torques take their share of it (allocation)
 LONGEST_GAP = 0.1  # s between two ticks; longer ones begin anew
-SETTLED = 3.0  # first time constants of learning, after which the factor tells whether something hangs
+SETTLED = 3.0  # times `identification_start`: learnt so long, it can tell whether something hangs
 # The word of the magnet comes from another process. It counts from a stamp on by which it has
 # arrived everywhere, so that a lockstep flight is the same every time.
 MAGNET_DELAY = 0.01  # s
