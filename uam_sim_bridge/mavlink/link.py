@@ -96,8 +96,8 @@ class OffboardLink:
     """The autopilot as the bridge sees it, and the way to it.
 
     `armed`, `mode`, `landed`: its latest word; `armed_since` [s] or None: tick at which it was
-    first known armed; `values`: its parameters by name; `warnings`: where they disagree with the
-    mapping; `ignored`: messages of other systems.
+    first known armed; `values`: by name, those of its parameters that are WATCHED;
+    `warnings`: where they disagree with the mapping; `ignored`: messages of other systems.
     """
 
     def __init__(
@@ -196,8 +196,10 @@ class OffboardLink:
             if text is not None:
                 self.sequence.text(m.severity, text)
         elif kind == "PARAM_VALUE":
-            self.values[clean_text(m.param_id)] = m.param_value
-            self.warnings = tuple(differences(self._mapping, self.values))
+            name = clean_text(m.param_id)
+            if name in WATCHED:  # of others there may be any number
+                self.values[name] = m.param_value
+                self.warnings = tuple(differences(self._mapping, self.values))
         elif kind == "TIMESYNC" and m.tc1 == 0:
             self._send(mavlink2.MAVLink_timesync_message(round(time * 1e9), m.ts1))
 
