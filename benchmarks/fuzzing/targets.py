@@ -79,7 +79,7 @@ class Bridge:
             self._wanted = not self._wanted
             self._sequence.want(self._wanted)
         now = self._ticks * PERIOD
-        if self._ticks % REBORN < REBORN // 2 and self._ticks % 50 == 0:
+        if self._ticks % REBORN < REBORN // 2 and self._ticks % 5 == 0:
             chunks = [*chunks, self._codec.encode(self._heartbeat())]
         self._transport.arrived = chunks
         self._link.poll(now)
