@@ -89,7 +89,7 @@ class Bridge:
 
     def _heartbeat(self):
         """Of an autopilot in OFFBOARD, armed or not, so that the sequence gets anywhere."""
-        armed = 128 if self._rng.random() < 0.5 else 0
+        armed = 128 if self._rng.random() < 0.1 else 0
         return mavlink2.MAVLink_heartbeat_message(2, 12, 1 | armed, 6 << 16, 4, 3)
 
     def _setpoint(self, now: float) -> None:

@@ -141,6 +141,15 @@ def test_it_is_held_while_accelerating_saturated_or_not_flying():
         assert hover.identification.update(time, hover.state, 0.95, 40.0, True) == 1.0
 
 
+def test_a_vehicle_that_sways_is_not_measured_where_it_passes_through_rest():
+    hover = Hover()
+    for k in range(5000):
+        hover.time += DT
+        hover.state[2, 0] = 3.0 * math.sin(2.0 * math.pi * 2.0 * k * DT)
+        hover.identification.update(hover.time, hover.state, 0.6, 25.0, True)
+    assert hover.factor == 1.0
+
+
 def test_a_payload_is_not_taken_for_weak_motors():
     hover = Hover()
     hover.fly(30.0)

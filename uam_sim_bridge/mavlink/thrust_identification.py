@@ -14,7 +14,8 @@ law.
 
 | while | the factor |
 |---|---|
-| on the ground, near it, tilted, accelerating, thrust near its ends, numbers missing | is held |
+| on the ground, near it, tilted, accelerating, thrust near its ends, numbers missing; and some time \
+after each | is held |
 | the magnet is on, as nobody knows the payload's mass | is held |
 | after it, until the quotient is back where it was: then nothing hangs on the vehicle | is held |
 | `thrust_identification` freeze | is held |
@@ -66,6 +67,8 @@ class ThrustIdentificationParameters(ParameterSet):
         0.15, "tilt up to which thrust is compared", "rad", 0.01, 1.0)
     identification_acceleration: float = number(
         1.0, "acceleration of the vehicle up to which thrust is compared", "m/s^2", 0.05, 20.0)
+    identification_settling: float = number(
+        0.5, "how long all that must have been so without a break", "s", 0.0, 60.0)
     identification_release: float = number(
         1.0, "wait after the magnet went off, before it is judged whether something hangs",
         "s", 0.1, 60.0)
@@ -116,6 +119,7 @@ class ThrustIdentification:
         self._assumed = 0.0  # N, lagged as the motors
         self._ground: float | None = None  # m, where it stood
         self._learnt = 0.0  # s of learning so far
+        self._unsteady = -math.inf  # s, when the flight was not steady last
         self._switches: deque[tuple[float, bool]] = deque()
         self._magnet = False
         self._released: float | None = None  # s, magnet off and not yet judged
@@ -151,7 +155,7 @@ class ThrustIdentification:
             return self.factor
         dt, self._time = time - self._time, time
         if not 0.0 < dt <= LONGEST_GAP:  # the first tick, or ticks are missing
-            self._assumed = assumed
+            self._assumed, self._unsteady = assumed, time
             return self.factor
         p = self.parameters
         self._assumed += (1.0 - math.exp(-dt / max(p.identification_lag, 1e-3))) * (
@@ -164,6 +168,7 @@ class ThrustIdentification:
         height = float(state[0, 2])
         if not flying or self._ground is None:
             self._land(height)
+            self._unsteady = time
         elif not self._magnet and p.identification_height < height - self._ground < math.inf:
             self._compare(time, dt, state, command)
         return self.factor
@@ -173,6 +178,9 @@ class ThrustIdentification:
         p = self.parameters
         force = steady_force(state, p.identification_tilt, p.identification_acceleration)
         if force == 0.0 or self._assumed <= 0.0 or not USABLE[0] <= command <= USABLE[1]:
+            self._unsteady = time
+        # A vehicle that sways passes through rest, and its motors clip: rest has to last.
+        if time - self._unsteady <= p.identification_settling:
             return
         measured = p.identification_mass * force / self._assumed
         measured = min(p.factor_max, max(p.factor_min, measured))
