@@ -78,7 +78,7 @@ def test_it_converges_while_tilted_and_turned():
 
 def test_the_slew_limit_holds():
     hover = Hover(0.6, factor_slew=0.01)
-    before = hover.factor
+    before = hover.fly(1.0)
     assert before - hover.fly(2.0) == pytest.approx(0.02, rel=0.02)
 
 

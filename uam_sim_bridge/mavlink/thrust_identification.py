@@ -14,8 +14,8 @@ law.
 
 | while | the factor |
 |---|---|
-| on the ground, near it, tilted, accelerating, thrust near its ends, numbers missing; and some time \
-after each | is held |
+| on the ground, near it, tilted, accelerating, thrust near its ends, numbers missing | is held |
+| `identification_settling` after any of these | is held |
 | the magnet is on, as nobody knows the payload's mass | is held |
 | after it, until the quotient is back where it was: then nothing hangs on the vehicle | is held |
 | `thrust_identification` freeze | is held |
