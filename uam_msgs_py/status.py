@@ -114,7 +114,7 @@ class MissionStatus(_Status):
     """Where the mission is, on every change of phase and twice a second.
 
     time: mission time [s], negative before take-off. Errors are norms of estimate − reference:
-    [m], [rad], [rad].
+    [m], [rad], [rad]. magnet: whether it is on; unlike /uam/magnet this has a stamp.
     """
 
     phase: str = "waiting"
@@ -124,6 +124,7 @@ class MissionStatus(_Status):
     arm_error: float = 0.0
     done: bool = False
     abort_reason: str = ""
+    magnet: bool = False
 
     NAME = "mission"
 

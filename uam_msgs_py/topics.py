@@ -87,6 +87,9 @@ MAGNET = Topic("/uam/magnet", Bool, RELIABLE, "magnet on")
 SETPOINT = Topic(
     "/uam/setpoint", TwistStamped, RELIABLE, "body rates FLU and thrust 0..1 (linear.z) as sent"
 )
+THRUST = Topic(
+    "/uam/thrust", JointState, RELIABLE, "factor: true / assumed thrust as identified, 10 Hz"
+)
 POSITION_ADAPTATION = Topic(
     "/uam/position/adaptation", JointState, RELIABLE, "the gains of the law, by its names, 50 Hz"
 )

@@ -3,18 +3,20 @@
 import math
 import os
 import socket
+import time
 import tty
 
 import numpy as np
 import pytest
 from quadrotor import MASS, Quadrotor
+from sensor_msgs.msg import JointState
 from std_msgs.msg import Bool
 
 from uam_control.rotations import euler_from_quaternion
 from uam_msgs_py import topics
 from uam_msgs_py.control import ATTITUDE_NAMES, PositionCommandWriter, TorqueWriter
-from uam_msgs_py.convert import PoseWriter, TrajectoryWriter, read_setpoint
-from uam_msgs_py.status import AutopilotState
+from uam_msgs_py.convert import PoseWriter, Serialized, TrajectoryWriter, read_setpoint
+from uam_msgs_py.status import AutopilotState, MissionStatus
 from uam_sim_bridge.autopilot.companion import Companion
 from uam_sim_bridge.autopilot.core import Autopilot
 from uam_sim_bridge.autopilot.modes import Mode
@@ -241,6 +243,33 @@ def test_bad_commands_in_flight_hold_level_then_the_failsafe_acts(make_rig):
     for _ in range(400):
         rig.tick((0, 0, WEIGHT))
     assert rig.autopilot.status.mode is Mode.OFFBOARD
+
+
+def test_the_thrust_factor_is_identified_told_and_held_while_the_magnet_is_on(make_rig, probe):
+    """The vehicle hovers with the thrust of its weight; the bridge believes it is lighter."""
+    status = probe.publisher(topics.MISSION_STATUS)
+    told = probe.collect(topics.THRUST)
+    rig = make_rig("-p", "identification_mass:=1.9", "-p", "factor_slew:=0.5")
+    probe.until_connected("mavlink_bridge", [status], [topics.THRUST])
+
+    def factor():
+        return Serialized(JointState, told[-1]).numbers("position")[0]
+
+    rig.fly()
+    assert factor() == 1.0
+    for _ in range(300):
+        _, thrust = rig.tick((0, 0, WEIGHT))
+    assert 0.86 < factor() < 0.97
+    assert thrust * 41.36 == pytest.approx(WEIGHT / factor(), rel=0.01)  # it is applied
+    stamp = (rig.count - 1) * PERIOD
+    status.publish(MissionStatus("carry", 1.0, magnet=True).to_message(stamp))
+    time.sleep(0.2)  # it is not part of the join; let it arrive
+    for _ in range(30):
+        rig.tick((0, 0, WEIGHT))
+    held = factor()
+    for _ in range(100):
+        rig.tick((0, 0, WEIGHT))
+    assert factor() == held
 
 
 def test_idle_high_up_is_not_thrust_zero(make_rig):

@@ -10,11 +10,16 @@ from uam_sim_bridge.mavlink.hold import HoldParameters
 from uam_sim_bridge.mavlink.offboard import OffboardParameters
 from uam_sim_bridge.mavlink.parameter_check import WATCHED, differences, expected
 from uam_sim_bridge.mavlink.setpoint import RateThrustParameters
+from uam_sim_bridge.mavlink.thrust_identification import ThrustIdentificationParameters
+from uam_sim_bridge.plant import Vehicle
 
 BRIDGE = yaml.safe_load(path("bridge/s500.yaml").read_text())["mavlink_bridge"]["ros__parameters"]
 
 
-@pytest.mark.parametrize("kind", [RateThrustParameters, OffboardParameters, HoldParameters])
+@pytest.mark.parametrize(
+    "kind",
+    [RateThrustParameters, OffboardParameters, HoldParameters, ThrustIdentificationParameters],
+)
 def test_the_file_holds_the_defaults(kind: type[ParameterSet]):
     given = {name: value for name, value in BRIDGE.items() if name in kind.specs()}
     assert set(given) == set(kind.specs())
@@ -37,6 +42,12 @@ def test_plant_file_is_what_the_bridge_assumes():
     full = rotors["thrust_coefficient"] * rotors["speed_max"] ** 2
     assert full == pytest.approx(BRIDGE["rotor_thrust_max"], rel=1e-3)
     assert rotors["curve_factor"] == BRIDGE["motor_curve_factor"]
+
+
+def test_the_vehicle_weighs_what_the_bridge_assumes():
+    model = Vehicle.load().compile(0.0)
+    base = model.body_subtreemass[model.body("base").id]
+    assert base == pytest.approx(BRIDGE["identification_mass"], rel=1e-3)
 
 
 def test_differences_are_named():

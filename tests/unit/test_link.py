@@ -287,9 +287,9 @@ def test_integer_parameters_are_read_by_type(rig):
     rig.run(0.1)
     value = struct.unpack("<f", struct.pack("<i", 7))[0]
     rig.say(mavlink2.MAVLink_param_value_message(
-        b"COM_RCL_EXCEPT", value, mavlink2.MAV_PARAM_TYPE_INT32, 900, 17))
+        b"MC_ROLLRATE_P", value, mavlink2.MAV_PARAM_TYPE_INT32, 900, 17))
     rig.run(0.1)
-    assert rig.link.values["COM_RCL_EXCEPT"] == 7
+    assert rig.link.values["MC_ROLLRATE_P"] == 7
 
 
 def test_a_refused_arming_is_asked_to_be_explained(rig):

@@ -32,3 +32,13 @@ def test_the_gains_of_every_law_are_read_by_name(law):
     np.testing.assert_array_equal(values[1, columns], 10.0 + np.arange(len(names)))
     np.testing.assert_array_equal(values[2, columns], 20.0 + np.arange(len(names)))
     assert np.isfinite(values[2]).sum() == len(names)
+
+
+def test_the_thrust_factor_holds_between_its_messages():
+    writer, messages = JointStateWriter(["factor"]), []
+    for k, factor in enumerate((1.0, 0.9)):
+        writer.position[0] = factor
+        messages.append(bytes(writer.stamped(100_000_000 * k)))
+    log = log_reader.Log({log_reader.THRUST: TopicLog("sensor_msgs/msg/JointState", [], messages)})
+    found = log.samples(log_reader.THRUST, ("position",), 1)
+    np.testing.assert_array_equal(found.at(np.array([4_000_000, 104_000_000]))[:, 0], [1.0, 0.9])

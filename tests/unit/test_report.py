@@ -67,6 +67,13 @@ def test_the_page_says_what_happened_and_how_to_repeat_it(flight_folder):
     assert "latency" not in words
 
 
+def test_the_page_says_what_the_motors_gave(flight_folder):
+    found = {"end": 0.859, "least": 0.8586, "largest": 1.0}
+    change_metrics(flight_folder, thrust_factor=found)
+    words = text_of(page.write_page(flight_folder).read_text())
+    assert "0.859 of the assumed thrust at the end (0.859 to 1.000 in flight)" in words
+
+
 def test_the_page_marks_what_is_worse_than_the_paper_and_says_why_not_completed(flight_folder):
     metrics = json.loads((flight_folder / "metrics.json").read_text())
     metrics["rms"]["arm_deg"] = [1.19, 5.0]

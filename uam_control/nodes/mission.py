@@ -42,7 +42,7 @@ class MissionNode(UamNode):
         self._armed_since: float | None = None
         self._ahead = -1  # stamp [ns] of the newest reference
         self._arm: bool | None = None
-        self._phase = ""
+        self._told: tuple = ()  # what the last status said
         self._errors = (0.0, 0.0, 0.0)
         self._due = 0  # stamp [ns] of the next status
         self._states = Backlog()
@@ -106,15 +106,15 @@ class MissionNode(UamNode):
         if output.arm != self._arm:
             self._arm = output.arm
             self._arming.publish(Bool(data=bool(output.arm)))
-        now = f"{output.phase} {output.done}"
-        if now == self._phase and stamp < self._due:
+        now = (output.phase, output.done, bool(output.magnet))
+        if now == self._told and stamp < self._due:
             return
-        if now != self._phase:
+        if now[:2] != self._told[:2]:
             self.get_logger().info(
                 f"{output.abort_reason or output.phase} at {output.time:.3f} s"
                 + (", done" if output.done else "")
             )
-        self._phase, self._due = now, stamp + STATUS_PERIOD
+        self._told, self._due = now, stamp + STATUS_PERIOD
         self._status.publish(self.status.to_message(stamp))
 
     @property
@@ -122,7 +122,8 @@ class MissionNode(UamNode):
         """Where the mission is now."""
         output = self._mission.output
         return MissionStatus(
-            output.phase, output.time, *self._errors, output.done, output.abort_reason
+            output.phase, output.time, *self._errors, output.done, output.abort_reason,
+            bool(output.magnet),
         )
 
     def diagnose(self):

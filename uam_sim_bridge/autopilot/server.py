@@ -33,6 +33,7 @@ from uam_sim_bridge.mavlink.wire import Codec, Framer, Message, mavlink2
 _GYRO_AND_ACCELEROMETER = 0x3F  # HIL_SENSOR.fields_updated
 _LOCKSTEP = 1  # HIL_ACTUATOR_CONTROLS.flags
 _CUSTOM_MODE, _ARMED = 1, 128  # its mode
+_LATEST = 2**53  # µs: MAVLink's nanoseconds end a little later
 _RATE_SAMPLES = 8  # intervals from which the rate of HIL_SENSOR is measured
 
 
@@ -73,7 +74,7 @@ class Server:
                     self._companion.handle(self._microseconds * 1e-6, message)
 
     def _sensor(self, m: Message) -> None:
-        if m.id != 0 or m.time_usec <= self._microseconds:
+        if m.id != 0 or not self._microseconds < m.time_usec <= _LATEST:
             return
         self._measure_rate(m.time_usec)
         self._microseconds = m.time_usec

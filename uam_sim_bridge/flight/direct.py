@@ -25,6 +25,10 @@ from uam_sim_bridge.flight.timeseries import COLUMNS, SUBSYSTEMS, Recording, gai
 from uam_sim_bridge.mavlink.frames import swap_body, swap_quaternion, swap_world
 from uam_sim_bridge.mavlink.offboard import OffboardParameters, OffboardSequence, Request
 from uam_sim_bridge.mavlink.setpoint import RateThrustMap, RateThrustParameters
+from uam_sim_bridge.mavlink.thrust_identification import (
+    ThrustIdentification,
+    ThrustIdentificationParameters,
+)
 from uam_sim_bridge.plant import Plant, Samples, Vehicle
 
 LONGEST_WAIT = 20.0  # [s] simulated, for the autopilot to get ready and armed
@@ -37,6 +41,7 @@ _TAU_P = COLUMNS["tau_p.x"]
 _TAU_Q = COLUMNS["tau_q.roll"]
 _TAU_ALPHA = COLUMNS["tau_alpha.1"]
 _SETPOINT = COLUMNS["setpoint.rate_x"]
+_FACTOR = COLUMNS["thrust.factor"]
 _COMMAND = COLUMNS["rotor_1.command"]
 _THRUST = COLUMNS["rotor_1.thrust"]
 _PAYLOAD = COLUMNS.block("payload.").start
@@ -108,6 +113,7 @@ class DirectFlight:
         attitude_reference = self.position.attitude_reference
         tau_q = self.attitude.update(state, reference, attitude_reference, flying, dt)
         tau_alpha = self.arm.update(state, reference, attitude_reference, flying, dt)
+        self.bridge.identification.switch(stamp, magnet)
         self.bridge.send(
             stamp, plant.time, tau_p, tau_q, state, flying, output.arm, samples.mocap
         )
@@ -137,6 +143,7 @@ class DirectFlight:
             truth.magnet_force,
             truth.magnet_swing,
         )
+        row[_FACTOR] = self.bridge.factor
 
         plant.step(motors, tau_alpha, magnet)
         mission.step(stamp + dt, state, self.bridge.sequence.armed_stamp)
@@ -195,15 +202,20 @@ class _Snapshot(NamedTuple):
 class Bridge:
     """What the MAVLink bridge and the autopilot do, joined without a link.
 
-    `setpoint` (4,): body rates [rad/s, FLU] and normalised thrust of the last tick.
+    `setpoint` (4,): body rates [rad/s, FLU] and normalised thrust of the last tick; `factor`: the
+    thrust factor it was made with.
     """
 
     def __init__(self, section: Mapping[str, Any]) -> None:
         """section: what the profile says of the mavlink_bridge node; {} for its defaults."""
         self.map = RateThrustMap(RateThrustParameters.among(section))
+        self.identification = ThrustIdentification(
+            ThrustIdentificationParameters.among(section)
+        )
         self.sequence = OffboardSequence(OffboardParameters.among(section))
         self.autopilot = Autopilot(Parameters.load(configuration.path("autopilot/s500.yaml")))
         self.setpoint = np.zeros(4)
+        self.factor = 1.0
 
     def send(self, stamp, time, tau_p, tau_q, state, flying, arm, mocap) -> None:
         """One tick of the bridge: vision, requests, setpoint.
@@ -224,6 +236,10 @@ class Bridge:
         else:
             setpoint[:] = 0.0
         autopilot.setpoint(time, swap_body(setpoint), setpoint[3])
+        thrust, self.factor = float(setpoint[3]), self.map.thrust_factor
+        self.map.thrust_factor = self.identification.update(
+            stamp, state, thrust, self.map.assumed_thrust(thrust), flying and status.armed
+        )
 
     def _request(self, time: float, request: Request) -> None:
         if request is Request.OFFBOARD:

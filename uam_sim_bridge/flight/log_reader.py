@@ -37,6 +37,7 @@ POSITION, ATTITUDE, JOINTS = (
     t.name for t in (topics.POSITION_COMMAND, topics.ATTITUDE_COMMAND, topics.ARM_COMMAND)
 )
 SETPOINT, STATUS = topics.SETPOINT.name, topics.MISSION_STATUS.name
+THRUST = topics.THRUST.name
 PAYLOAD, ROTORS, MAGNET = (
     t.name for t in (topics.TRUTH_PAYLOAD, topics.TRUTH_ROTORS, topics.TRUTH_MAGNET)
 )
@@ -47,7 +48,7 @@ ADAPTATION = {
 }
 TOPICS = {
     *(TRUTH, STATE, REFERENCE, POSITION, ATTITUDE, JOINTS, SETPOINT, STATUS),
-    *(PAYLOAD, ROTORS, MAGNET, *ADAPTATION.values()),
+    *(PAYLOAD, ROTORS, MAGNET, THRUST, *ADAPTATION.values()),
 }
 
 
@@ -205,6 +206,8 @@ def _commands(log: Log, ticks: np.ndarray, values: np.ndarray) -> None:
     values[:, COLUMNS.block("tau_alpha.")] = log.samples(JOINTS, ("effort",), 2).at(ticks)
     setpoint = log.samples(SETPOINT, ("angular", "linear"), 3).at(ticks)
     values[:, COLUMNS.block("setpoint.")] = setpoint[:, [0, 1, 2, 5]]
+    factor = log.samples(THRUST, ("position",), 1).at(ticks)
+    values[:, COLUMNS["thrust.factor"]] = factor[:, 0]
 
 
 def _truth(log: Log, ticks: np.ndarray, values: np.ndarray) -> None:

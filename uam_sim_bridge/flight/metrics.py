@@ -100,6 +100,9 @@ def compute(
     if info.get("clock") == "realtime":
         metrics["latency_ms"] = latency_figures(latency_s)
         metrics["missed_ticks"] = info.get("missed_ticks")
+    factor = thrust_factor(series)
+    if factor is not None:
+        metrics["thrust_factor"] = factor
     counted = clamps(series)
     if counted is not None:
         metrics["clamps"] = counted
@@ -210,6 +213,15 @@ def latency_figures(latency_s: Sequence[float] | np.ndarray | None) -> dict[str,
     milliseconds = 1e3 * np.asarray(latency_s, dtype=float)
     p50, p99 = np.percentile(milliseconds, [50.0, 99.0])
     return {"p50": float(p50), "p99": float(p99), "max": float(np.max(milliseconds))}
+
+
+def thrust_factor(series: Series) -> dict[str, float] | None:
+    """True / assumed thrust as identified: at the end, and its range in flight; None unknown."""
+    factor = series["thrust.factor"][series.flown]
+    factor = factor[np.isfinite(factor)]
+    if not len(factor):
+        return None
+    return {"end": factor[-1], "least": np.min(factor), "largest": np.max(factor)}
 
 
 def clamps(series: Series) -> dict[str, int] | None:

@@ -49,6 +49,7 @@ def _declare() -> dict[str, str]:
     columns |= {f"tau_q.{axis}": "N m" for axis in ("roll", "pitch", "yaw")}
     columns |= {f"tau_alpha.{joint}": "N m" for joint in "12"}
     columns |= {f"setpoint.rate_{axis}": "rad/s" for axis in "xyz"} | {"setpoint.thrust": "1"}
+    columns |= {"thrust.factor": "1"}  # true / assumed, identified and applied
     # The gains of every law, NaN for those that did not fly. Their units differ with subsystem and
     # power of ||xi||; rho and zeta are those of tau before the multiplication by Mbar, so a unit
     # per column would mislead.

@@ -53,10 +53,10 @@ class OffboardLink:
     """The autopilot as the bridge sees it, and the way to it.
 
     `armed`, `mode`, `landed`: its latest word; `armed_since` [s] or None: tick at which it was
-    first known armed; `values`: its parameters by name; `warnings`: where they disagree with the
-    mapping, and streams that do not come; `ignored`: messages of other systems, and answers to
-    others; `battery`, `estimator_flags`, `unhealthy` sensors, `load` 0..1: its latest word, None
-    before the first; `reboots`: how often it has restarted.
+    first known armed; `values`: by name, those of its parameters that are WATCHED; `warnings`:
+    where they disagree with the mapping, and streams that do not come; `ignored`: messages of
+    other systems, and answers to others; `battery`, `estimator_flags`, `unhealthy` sensors, `load`
+    0..1: its latest word, None before the first; `reboots`: how often it has restarted.
     """
 
     def __init__(
@@ -222,8 +222,10 @@ class OffboardLink:
             if said is not None:
                 self.sequence.text(*said)
         elif kind == "PARAM_VALUE":
-            self.values[clean_text(m.param_id)] = value_of(m)
-            self._compare()
+            name = clean_text(m.param_id)
+            if name in WATCHED:  # of others there may be any number
+                self.values[name] = value_of(m)
+                self._compare()
         elif kind == "TIMESYNC" and m.tc1 == 0:
             self._send(mavlink2.MAVLink_timesync_message(nanoseconds(time), m.ts1))
         else:

@@ -15,6 +15,10 @@ makes the proportional path equal to tau_q. What the loop does beyond is welcome
 as integral action on tau_q (K I / (K P) of it per second) and takes up constant torques such as the
 arm's weight; its D acts as rate damping.
 
+Both stand on the thrust of the motors: full thrust × battery × `thrust_factor`, the last one
+identified in flight (thrust_identification.py). Where it is wrong, u1 and tau_q are off by the same
+factor.
+
 Assumptions: omega is the rate that the loop sees (its gyro filter is ignored); K P, the thrust
 curve and the rotor geometry here are those of the autopilot (the bridge reads and compares them);
 the motors do not saturate. Where the autopilot's thrust model differs from the motors' curve, S is
@@ -33,7 +37,11 @@ import numpy as np
 from uam_control.compiled import jit
 from uam_control.parameters import ParameterSet, number, vector
 from uam_sim_bridge.autopilot.allocation import torque_scale
-from uam_sim_bridge.mavlink.thrust_curve import command_of_thrust, thrust_slope
+from uam_sim_bridge.mavlink.thrust_curve import (
+    command_of_thrust,
+    thrust_of_command,
+    thrust_slope,
+)
 
 # entries of the flat parameter array of the compiled map
 (_FULL, _BATTERY, _MOTOR, _MODEL, _MIN, _MAX, _COMMAND_MAX, _GAIN, _LIMIT) = (
@@ -143,11 +151,13 @@ def rate_thrust_map(tau_p, tau_q, attitude, body_rates, p, rates):
 class RateThrustMap:
     """The map above with its parameters; one instance per flight.
 
-    `rates` (3,) is reused by every call: copy it to keep it.
+    `rates` (3,) is reused by every call: copy it to keep it. `thrust_factor`: true thrust / thrust
+    of the parameters' curve, 1 until something else is set.
     """
 
     def __init__(self, parameters: RateThrustParameters | None = None) -> None:
         self.rates = np.zeros(3)
+        self._factor = 1.0
         self.configure(parameters or RateThrustParameters())
 
     def configure(self, parameters: RateThrustParameters) -> None:
@@ -155,6 +165,20 @@ class RateThrustMap:
         checked = parameters.validated()
         self._flat = checked.flat()
         self.parameters = checked
+        self.thrust_factor = self._factor
+
+    @property
+    def thrust_factor(self) -> float:
+        """True thrust / thrust of the parameters' curve."""
+        return self._factor
+
+    @thrust_factor.setter
+    def thrust_factor(self, factor: float) -> None:
+        """Raises ValueError, the old factor staying, where it is not a positive number."""
+        if not (math.isfinite(factor) and factor > 0.0):
+            raise ValueError(f"thrust factor {factor} is not a positive number")
+        self._factor = factor
+        self._flat[_BATTERY] = self.parameters.battery_factor * factor
 
     def map(
         self, tau_p: np.ndarray, tau_q: np.ndarray, attitude: np.ndarray, body_rates: np.ndarray
@@ -168,6 +192,12 @@ class RateThrustMap:
         if thrust < 0.0:
             raise SetpointRefused(f"{INPUTS[int(-thrust) - 1]} is not finite")
         return self.rates, thrust
+
+    def assumed_thrust(self, command: float) -> float:
+        """Return the collective [N] of a normalised thrust by the curve, without the factor."""
+        p = self._flat
+        return thrust_of_command(
+            command, p[_FULL], self.parameters.battery_factor, p[_MOTOR], p[_MODEL])
 
     def thrust_command(self, newtons: float) -> float:
         """Return the normalised thrust of a collective [N], unclamped by thrust_min/max."""

@@ -34,12 +34,12 @@ from uam_msgs_py.control import (
     read_state,
     read_torque,
 )
-from uam_msgs_py.convert import SetpointWriter, read_pose, seconds
+from uam_msgs_py.convert import JointStateWriter, SetpointWriter, read_pose, seconds
 from uam_msgs_py.joins import StampJoin
 from uam_msgs_py.layouts import BadMessage, stamp_of
 from uam_msgs_py.node import UamNode, run
 from uam_msgs_py.parameters import NodeParameters, given
-from uam_msgs_py.status import OK, WARN, AutopilotState
+from uam_msgs_py.status import OK, WARN, AutopilotState, MissionStatus
 from uam_sim_bridge.flight.ports import PortError
 from uam_sim_bridge.mavlink.forwarding import GroundStation
 from uam_sim_bridge.mavlink.hold import HoldParameters, LevelHold
@@ -49,6 +49,11 @@ from uam_sim_bridge.mavlink.offboard import OffboardParameters, OffboardSequence
 from uam_sim_bridge.mavlink.parameter_check import adopted, differences
 from uam_sim_bridge.mavlink.setpoint import RateThrustMap, RateThrustParameters, SetpointRefused
 from uam_sim_bridge.mavlink.signing import Signing
+from uam_sim_bridge.mavlink.thrust_identification import (
+    ThrustIdentification,
+    ThrustIdentificationParameters,
+    steady_force,
+)
 from uam_sim_bridge.mavlink.transport import Transport, UdpTransport, open_transport
 from uam_sim_bridge.mavlink.vision import vision_message
 from uam_sim_bridge.mavlink.wire import Codec, mavlink2
@@ -56,6 +61,7 @@ from uam_sim_bridge.mavlink.wire import Codec, mavlink2
 NAME = "mavlink_bridge"
 STATE_PERIOD = 500_000_000  # ns between two reports of the autopilot's state
 BATTERY_PERIOD = 1_000_000_000  # ns
+THRUST_PERIOD = 100_000_000  # ns between two reports of the thrust factor
 WATCH_PERIOD = 0.02  # s between two looks of the real-time watchdog, and its setpoints
 BAD = object()  # stands for a message that must not be used
 
@@ -87,7 +93,7 @@ class BridgeParameters(ParameterSet):
 
 
 class MavlinkBridgeNode(UamNode):
-    """Publishes /uam/setpoint, /uam/autopilot/state and /uam/autopilot/battery."""
+    """Publishes /uam/setpoint, /uam/thrust, /uam/autopilot/state and /uam/autopilot/battery."""
 
     def __init__(self) -> None:
         super().__init__(NAME)
@@ -98,6 +104,9 @@ class MavlinkBridgeNode(UamNode):
 
         self.map = RateThrustMap(self._map_parameters.current)
         self._map_parameters.apply = self._configure
+        thrust = NodeParameters(self, ThrustIdentificationParameters)
+        self.identification = ThrustIdentification(thrust.current)
+        thrust.apply = self.identification.configure
         self.sequence = OffboardSequence(offboard)
         self._hold = LevelHold(hold)
         options = self._options
@@ -120,12 +129,15 @@ class MavlinkBridgeNode(UamNode):
         self._setpoint = self.publisher(topics.SETPOINT)
         self._autopilot_state = self.publisher(topics.AUTOPILOT_STATE)
         self._battery = self.publisher(topics.AUTOPILOT_BATTERY)
+        self._thrust = self.publisher(topics.THRUST)
         self._writer = SetpointWriter()
+        self._factor_writer = JointStateWriter(["factor"])
         names = [t.name for t in (topics.STATE, topics.POSITION_COMMAND, topics.ATTITUDE_COMMAND)]
         self._join = StampJoin(names, self._tick)
         self.joins.append(self._join)
         self._arming = self.listen(topics.ARMING, self._on_arming, required=False)
         self._mocap = self.listen(topics.MOCAP, self._on_mocap)
+        self._mission = self.listen(topics.MISSION_STATUS, self._on_mission, required=False)
         self._feed(topics.STATE, read_state)
         self._feed(topics.POSITION_COMMAND, read_position_command)
         self._feed(topics.ATTITUDE_COMMAND, self._read_attitude_command)
@@ -201,6 +213,10 @@ class MavlinkBridgeNode(UamNode):
     def _on_arming(self, message) -> None:
         self.sequence.want(bool(message.data))
 
+    def _on_mission(self, message) -> None:
+        stamp, status = MissionStatus.from_message(message)
+        self.identification.switch(seconds(stamp), status.magnet)
+
     def _on_mocap(self, data: bytes) -> None:
         self._pose = read_pose(data)
 
@@ -210,6 +226,7 @@ class MavlinkBridgeNode(UamNode):
         self._last_tick = time.monotonic()
         self.take_waiting(self._arming)
         self.take_waiting(self._mocap)
+        self.take_waiting(self._mission)
         if state is not BAD:
             self._state = state
         self.link.poll(now)
@@ -218,6 +235,7 @@ class MavlinkBridgeNode(UamNode):
         self._send(now, setpoint)
         self._tell(stamp)
         rates, thrust = setpoint or (self._idle, 0.0)
+        self._identify(stamp, state, position, thrust)
         self._setpoint.publish(self._writer.fill(stamp, rates, thrust))
         self.done_tick(stamp, begun)
 
@@ -240,6 +258,16 @@ class MavlinkBridgeNode(UamNode):
         self.set_parameters([Parameter(name, value=_plain(getattr(new, name))) for name in names])
         for change in changes:
             self.get_logger().info(f"adopted from the autopilot: {change}")
+    def _identify(self, stamp: int, state, position, thrust: float) -> None:
+        """Compare the thrust sent with the acceleration; the factor counts from the next tick."""
+        if stamp // THRUST_PERIOD != self.stamp // THRUST_PERIOD:
+            self._factor_writer.position[0] = self.map.thrust_factor  # as applied at this tick
+            self._thrust.publish(self._factor_writer.stamped(stamp))
+        if state is BAD or position is BAD:
+            return
+        self.map.thrust_factor = self.identification.update(
+            seconds(stamp), state, thrust, self.map.assumed_thrust(thrust),
+            position.flying and self.link.armed)
 
     def _command(self, now: float, state, position, torque) -> tuple[np.ndarray, float] | None:
         """Return body rates (3,) and thrust for this tick, None for no setpoint at all."""
@@ -342,6 +370,7 @@ class MavlinkBridgeNode(UamNode):
             "level hold": self._hold.active,
             "adopted": "; ".join(self._adopted),
             **report(link),
+            "thrust factor [1]": f"{self.map.thrust_factor:.4f}",
         }
         summary = "; ".join((sequence.phase.value, *notes))
         return WARN if notes else OK, summary, values
@@ -350,6 +379,8 @@ class MavlinkBridgeNode(UamNode):
         """Compile the maths before the flight: a first call takes a second."""
         spare, zero, level = RateThrustMap(), np.zeros(3), np.array([1.0, 0.0, 0.0, 0.0])
         spare.map(zero, zero, self._state[0, ATTITUDE], self._state[1, ATTITUDE])
+        spare.assumed_thrust(0.5)
+        steady_force(self._state, 0.1, 1.0)
         vision_message(0.0, zero, level, 1.0, 1.0)
 
 

@@ -72,6 +72,7 @@ def setpoints(flights: Sequence[Flight]) -> Figure:
         for name, axis in (("roll", "x"), ("pitch", "y"), ("yaw", "z"))
     ]
     drawn.append(Panel("thrust [1]", "setpoint.thrust"))
+    drawn.append(Panel("true / assumed [1]", "thrust.factor"))
     return panels.stack("Setpoints sent to the autopilot", flights, drawn, panel_height=1.25)[0]
 
 
@@ -223,7 +224,11 @@ FIGURES: dict[str, tuple[Callable[[Sequence[Flight]], Figure | None], str]] = {
         "The Appendix's Lyapunov functions with the constants K* of this flight, their three "
         "terms, what the proof's differential inequality allows, and the ultimate bound.",
     ),
-    "setpoints": (setpoints, "Body rates and collective thrust sent to the autopilot."),
+    "setpoints": (
+        setpoints,
+        "Body rates and collective thrust sent to the autopilot; the thrust that the motors truly "
+        "have / that their curve says, as identified in flight.",
+    ),
 }
 
 

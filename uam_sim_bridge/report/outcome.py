@@ -79,6 +79,17 @@ def clamp_story(metrics: Mapping[str, Any]) -> str:
     return ", ".join(f"{subsystem} {count}" for subsystem, count in metrics["clamps"].items())
 
 
+def thrust_story(metrics: Mapping[str, Any]) -> str | None:
+    """True thrust beside the assumed one as identified in flight, in one line."""
+    found = metrics.get("thrust_factor")
+    if found is None:
+        return None
+    return (
+        f"{found['end']:.3f} of the assumed thrust at the end"
+        f" ({found['least']:.3f} to {found['largest']:.3f} in flight)"
+    )
+
+
 def distance(metres: float) -> str:
     """A distance as a person says it."""
     return f"{metres:.2f} m" if metres >= 1.0 else f"{100.0 * metres:.1f} cm"

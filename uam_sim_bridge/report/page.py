@@ -56,6 +56,7 @@ def write_page(directory: Path, rendered: Rendered | None = None) -> Path:
         verdict=outcome.verdict(metrics),
         payload=outcome.payload_story(metrics),
         landing=outcome.landing_story(metrics),
+        thrust=outcome.thrust_story(metrics),
         errors=outcome.error_rows(metrics),
         clamps=outcome.clamp_story(metrics) if metrics.get("clamps") else None,
         facts=[(label, (metrics | {"controller": controller}).get(key)) for key, label in FACTS],

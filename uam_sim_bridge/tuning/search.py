@@ -8,7 +8,6 @@ that was stopped goes on where it was.
 from __future__ import annotations
 
 import multiprocessing
-import signal
 import time
 import warnings
 from collections.abc import Callable
@@ -19,6 +18,7 @@ from optuna.storages import JournalStorage, RDBStorage
 from optuna.storages.journal import JournalFileBackend
 from optuna.trial import TrialState
 
+from uam_sim_bridge.campaign.pool import prepare_worker
 from uam_sim_bridge.campaign.trial import fly
 from uam_sim_bridge.tuning.space import Space, TuningError
 
@@ -89,7 +89,7 @@ def evaluate(space: Space, trial: optuna.Trial, best: float | None) -> float:
 
 def work(task: Task, number: int) -> None:
     """Evaluate until the study has as many evaluations as asked for; a worker's whole life."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    prepare_worker()
     study = open_study(Task(**{**vars(task), "seed": task.seed + number}))
     study.optimize(
         lambda trial: evaluate(task.space, trial, _best(study)),

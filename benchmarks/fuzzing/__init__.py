@@ -1,0 +1,1 @@
+"""What benchmarks/fuzz_mavlink.py is made of."""
