@@ -21,6 +21,7 @@ from uam_sim_bridge.flight.ports import INSTANCES, PortError
 from uam_sim_bridge.flight.progress import Progress
 from uam_sim_bridge.flight.result_folder import ResultFolder, ResultFolderError
 from uam_sim_bridge.flight.settings import FlightSettings, SettingsError
+from uam_sim_bridge.mavlink.transport import ALLOWED
 from uam_sim_bridge.px4.installation import Px4Error
 from uam_sim_bridge.report.build import build_report
 from uam_sim_bridge.report.console import reporting, summary
@@ -36,6 +37,7 @@ examples:
   uam fly --scenario path.csv --no-video     a trajectory of your own
   uam fly --profile mine.yaml --engine direct
   uam fly --autopilot px4 --px4-dir ~/PX4-Autopilot/build/px4_sitl_default
+  uam fly --autopilot serial:/dev/ttyACM0:921600 --clock realtime --gcs udp:127.0.0.1:14550
   uam fly --clock realtime                   paced by the wall clock, latency measured
   uam fly --payload-mass 0.3 --wind 2 0 0    heavier payload, 2 m/s from the west
 
@@ -68,10 +70,13 @@ def add(commands) -> None:
     option("--clock", default="lockstep", metavar="lockstep|realtime",
            help="simulated time, the same flight for the same seed; or the wall clock "
            "(default %(default)s)")
-    option("--autopilot", default="builtin", metavar="builtin|px4",
-           help="the stand-in, or PX4 in software (default %(default)s)")
+    option("--autopilot", default="builtin", metavar="builtin|px4|URL",
+           help="the stand-in; PX4 in software; or one that you started, by its link: "
+           f"{ALLOWED}; serial: a flight controller in HITL mode (default %(default)s)")
     option("--px4-dir", metavar="DIR",
            help="PX4's build directory, with bin/px4 and etc/ (default: $PX4_SITL_DIR)")
+    option("--gcs", default="", metavar="URL",
+           help="ground station that watches, as udp:127.0.0.1:14550 (default: none)")
     option("--payload-mass", type=_number("mass", "kg", 0.0), metavar="KG",
            help="default: the scenario's")
     option("--wind", type=_number("wind", "m/s"), nargs=3, metavar=("X", "Y", "Z"),
@@ -124,6 +129,7 @@ def run(options: argparse.Namespace) -> int:
             clock=options.clock,
             autopilot=options.autopilot,
             px4_dir=options.px4_dir,
+            gcs=options.gcs,
             payload_mass=options.payload_mass,
             seed=options.seed,
             out=options.out,

@@ -73,15 +73,20 @@ def require_free(kind: int, port: int, purpose: str) -> None:
         )
 
 
-def busy_port(ports: Ports) -> str | None:
-    """Which port of an instance another program holds, in words; None if all are free."""
-    for kind, port, purpose in (
+def busy_port(ports: Ports, own_autopilot: bool = True) -> str | None:
+    """Which port of an instance another program holds, in words; None if all are free.
+
+    own_autopilot: the autopilot is to be started, so its port must be free, too.
+    """
+    wanted = [
         (socket.SOCK_STREAM, ports.simulator_tcp, "TCP {} (simulator link)"),
         (socket.SOCK_DGRAM, ports.offboard_udp, "UDP {} (offboard link)"),
-        (socket.SOCK_DGRAM, ports.autopilot_udp, "UDP {} (autopilot)"),
         # RTPS: the first participant's discovery port of a domain. Taken means: the domain lives.
         (socket.SOCK_DGRAM, 7400 + 250 * ports.domain + 10, "UDP {} (ROS discovery)"),
-    ):
+    ]
+    if own_autopilot:
+        wanted.append((socket.SOCK_DGRAM, ports.autopilot_udp, "UDP {} (autopilot)"))
+    for kind, port, purpose in wanted:
         if in_use(kind, port):
             return purpose.format(port)
     return None
@@ -94,9 +99,15 @@ class Reservation:
     holds it, so a crashed flight blocks nothing and its file is used again.
     """
 
-    def __init__(self, instance: int | None = None, folder: Path | None = None):
+    def __init__(
+        self,
+        instance: int | None = None,
+        folder: Path | None = None,
+        own_autopilot: bool = True,
+    ):
         """Take `instance`, or the first one that is free; locks are kept in the temporary folder.
 
+        own_autopilot: see `busy_port`.
         Raises PortError when the wanted one, or every one, is taken.
         """
         self._folder = folder or Path(tempfile.gettempdir())
@@ -109,7 +120,7 @@ class Reservation:
             if self._lock is None:
                 why = "another flight has it"
                 continue
-            busy = busy_port(ports)
+            busy = busy_port(ports, own_autopilot)
             if busy is None:
                 self.ports = ports
                 return

@@ -22,7 +22,7 @@ from uam_sim_bridge.flight.ports import Ports, Reservation
 from uam_sim_bridge.flight.processes import NodeFailed, Processes, environment
 from uam_sim_bridge.flight.progress import Progress
 from uam_sim_bridge.flight.result_folder import ResultFolder
-from uam_sim_bridge.flight.settings import BUILTIN, PX4, FlightSettings
+from uam_sim_bridge.flight.settings import BUILTIN, FlightSettings
 from uam_sim_bridge.flight.status_listener import StatusListener
 from uam_sim_bridge.flight.warm_up import is_cold, warm_up
 
@@ -38,10 +38,8 @@ MODULES = {
     wiring.BRIDGE: "uam_sim_bridge.nodes.mavlink_bridge",
 }
 AUTOPILOT = "autopilot"
-AUTOPILOT_MODULES = {
-    BUILTIN: "uam_sim_bridge.autopilot.server",
-    PX4: "uam_sim_bridge.px4.sitl",
-}
+STAND_IN, SITL = "uam_sim_bridge.autopilot.server", "uam_sim_bridge.px4.sitl"
+HITL_ROUTER = "uam_sim_bridge.mavlink.router"
 PX4_LOG = "px4.ulg"
 PX4_LINGER = 4.0  # [s] simulated, after the mission, in which PX4 disarms and closes its log
 START_TIMEOUT = 60.0  # [s] until every node must be connected to the others
@@ -58,7 +56,7 @@ def fly(settings: FlightSettings, folder: ResultFolder, progress: Progress) -> O
     Raises PortError when no instance is free.
     """
     (folder.path / "logs").mkdir(exist_ok=True)
-    with Reservation(settings.instance) as reservation:
+    with Reservation(settings.instance, own_autopilot=not _started(settings)) as reservation:
         if is_cold():
             progress.message("compiling the control path (once)")
             warm_up()
@@ -96,8 +94,12 @@ def parameters(
         "clock": settings.clock,
         "local_port": ports.offboard_udp,
         "autopilot_port": ports.autopilot_udp,
-        "autopilot_system": float(ports.instance + 1),  # as PX4 SITL numbers its instances
+        # as PX4 SITL numbers its instances; a flight controller is the first of its kind
+        "autopilot_system": 1.0 if _in_the_loop(settings) else float(ports.instance + 1),
+        "gcs": settings.gcs,
     }
+    if _started(settings):
+        sections[wiring.BRIDGE]["autopilot"] = settings.autopilot
     sections[wiring.RECORDER] = {
         "file": str(folder.log),
         "statistics": str(folder.path / "logs" / "recorder.json"),
@@ -166,17 +168,36 @@ def _start(
             may_end=name == wiring.PLANT,
             niceness=RECORDER_NICENESS if name == wiring.RECORDER else 0,
         )
-    module = AUTOPILOT_MODULES[settings.autopilot]
-    children.start(AUTOPILOT, module, _autopilot(settings, folder, ports), may_end=True)
+    module, own = _autopilot(settings, folder, ports)
+    if module:
+        children.start(AUTOPILOT, module, own, may_end=True)
 
 
-def _autopilot(settings: FlightSettings, folder: ResultFolder, ports: Ports) -> list[str]:
-    """The arguments of the autopilot's process."""
+def _in_the_loop(settings: FlightSettings) -> bool:
+    """Whether a flight controller flies the simulated vehicle, all over one serial line."""
+    return settings.link is not None and settings.link.kind == "serial"
+
+
+def _started(settings: FlightSettings) -> bool:
+    """Whether the user has started the autopilot, which connects to the plant by itself."""
+    return settings.link is not None and not _in_the_loop(settings)
+
+
+def _autopilot(
+    settings: FlightSettings, folder: ResultFolder, ports: Ports
+) -> tuple[str, list[str]]:
+    """Module and arguments of the autopilot's process; no module where the user started one."""
     instance = ["--instance", str(ports.instance)]
-    if settings.px4 is None:
-        return [*instance, "--wait", str(START_TIMEOUT)]
-    log = folder.path / PX4_LOG
-    return [*instance, "--px4-dir", str(settings.px4.directory), "--log", str(log.absolute())]
+    patience = ["--wait", str(START_TIMEOUT)]
+    if _in_the_loop(settings):
+        return HITL_ROUTER, [settings.autopilot, *instance, *patience]
+    if settings.px4 is not None:
+        log = folder.path / PX4_LOG
+        own = ["--px4-dir", str(settings.px4.directory), "--log", str(log.absolute())]
+        return SITL, [*instance, *own]
+    if _started(settings):
+        return "", []
+    return STAND_IN, [*instance, *patience]
 
 
 def _watch(

@@ -10,12 +10,13 @@ from uam_control import configuration
 from uam_control.laws.catalogue import LAWS
 from uam_control.mission import Scenario, load_scenario
 from uam_control.profile import Profile, load_profile
+from uam_sim_bridge.flight.ports import AUTOPILOT_UDP, INSTANCES
+from uam_sim_bridge.mavlink.transport import ALLOWED, LinkUrl, parse_url
 from uam_sim_bridge.px4.installation import Px4Installation
 
 ENGINES = ("ros", "direct")
 CLOCKS = ("lockstep", "realtime")
 BUILTIN, PX4 = "builtin", "px4"
-AUTOPILOTS = (BUILTIN, PX4)
 PAYLOAD_MAX = 2.0  # [kg] more than the rotors could ever carry
 
 
@@ -28,7 +29,8 @@ class FlightSettings:
     """One flight. Scenario and profile are loaded, hence valid.
 
     payload_mass [kg]; vehicle_changes: dotted entries of config/vehicle/*.yaml to replace, as
-    {"air.wind": [3.0, 0.0, 0.0]}; out: the result folder, None for the default one.
+    {"air.wind": [3.0, 0.0, 0.0]}; out: the result folder, None for the default one. autopilot:
+    BUILTIN, PX4, or the URL of one that the user has started; link: that URL, taken apart.
     """
 
     scenario: Scenario
@@ -40,6 +42,8 @@ class FlightSettings:
     clock: str = "lockstep"
     autopilot: str = BUILTIN
     px4: Px4Installation | None = None  # what flies as the autopilot px4
+    link: LinkUrl | None = None
+    gcs: str = ""  # URL of a ground station that watches
     seed: int = 1
     video: bool = True
     scenario_source: str = ""  # what the user called it: a name or a file
@@ -55,6 +59,7 @@ def settings(
     clock: str = "lockstep",
     autopilot: str = BUILTIN,
     px4_dir: str | None = None,
+    gcs: str = "",
     payload_mass: float | None = None,
     seed: int = 1,
     out: str | Path | None = None,
@@ -65,18 +70,23 @@ def settings(
     """Check the options and load what they name.
 
     Raises SettingsError, and what loading raises (ConfigurationError, ScenarioError, ProfileError,
-    Px4Error); each is one line for the user.
+    Px4Error, PortError); each is one line for the user.
     """
     _choice("controller", controller, LAWS)
     _choice("engine", engine, ENGINES)
     _choice("clock", clock, CLOCKS)
-    _choice("autopilot", autopilot, AUTOPILOTS)
     if engine == "direct" and clock == "realtime":
         raise SettingsError("the direct engine has no clock: --clock realtime needs --engine ros")
     if engine == "direct" and autopilot != BUILTIN:
         raise SettingsError(f"the direct engine flies the stand-in alone: --autopilot {autopilot} "
                             "needs --engine ros")
     px4 = Px4Installation.find(px4_dir) if autopilot == PX4 else None
+    link = None if autopilot in (BUILTIN, PX4) else _link(autopilot)
+    if link is not None and link.kind == "serial" and clock != "realtime":
+        raise SettingsError("a flight controller has a clock of its own: --autopilot serial:... "
+                            "needs --clock realtime")
+    if gcs and (parse_url(gcs).kind != "udp" or engine == "direct"):
+        raise SettingsError("--gcs is udp:HOST:PORT, and needs --engine ros")
     if not 0 <= seed < 2**31:
         raise SettingsError(f"seed {seed} is outside 0..{2**31 - 1}")
     loaded = load_scenario(str(configuration.named("scenarios", scenario)))
@@ -102,10 +112,12 @@ def settings(
         clock=clock,
         autopilot=autopilot,
         px4=px4,
+        link=link,
+        gcs=gcs,
         seed=seed,
         video=video,
         scenario_source=scenario,
-        instance=instance,
+        instance=_instance_of(link) if instance is None else instance,
         vehicle_changes=dict(vehicle_changes or {}),
     )
 
@@ -117,6 +129,24 @@ def require_ros() -> None:
             "the ROS engine needs rclpy, which is not installed: make setup, or source a ROS 2 "
             "installation, or fly with --engine direct"
         )
+
+
+def _link(autopilot: str) -> LinkUrl:
+    if ":" not in autopilot:
+        raise SettingsError(f"unknown autopilot '{autopilot}'; there are: {BUILTIN}, {PX4}, or a "
+                            f"link: {ALLOWED}")
+    return parse_url(autopilot)
+
+
+def _instance_of(link: LinkUrl | None) -> int | None:
+    """The instance whose simulator port an autopilot that the user has started connects to.
+
+    PX4 tells it by its offboard port; instance 0 where that says nothing.
+    """
+    if link is None or link.kind == "serial":
+        return None
+    number = link.number - AUTOPILOT_UDP
+    return number if link.kind == "udp" and 0 <= number < INSTANCES else 0
 
 
 def _choice(name: str, value: str, allowed) -> None:

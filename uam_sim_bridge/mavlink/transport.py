@@ -10,6 +10,7 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import Protocol
 
 from uam_sim_bridge.flight.ports import PortError
@@ -43,19 +44,28 @@ class Transport(Protocol):
     def close(self) -> None: ...
 
 
-def open_transport(url: str, read_limit: int = READ_LIMIT) -> Transport:
-    """Open the link that `url` names.
+@dataclass(frozen=True)
+class LinkUrl:
+    """A link's URL, taken apart. kind: udp, tcp or serial; place: host or device.
 
-    read_limit: bytes taken per `receive` from a UDP link. Raises PortError in one line where the
-    URL is none of the table above, or the link cannot be had.
+    number: port or baud rate; local: local UDP port, 0 for any.
     """
-    kind, _, place = url.partition(":")
+
+    kind: str
+    place: str
+    number: int
+    local: int = 0
+
+
+def parse_url(url: str) -> LinkUrl:
+    """Take `url` apart; raises PortError in one line where it is none of the table above."""
+    kind, _, rest = url.partition(":")
     if kind == "serial":
-        device, _, baud = place.rpartition(":")  # a device's name may contain colons
+        device, _, baud = rest.rpartition(":")  # a device's name may contain colons
         if not device or not _within(baud, SLOWEST, FASTEST):
             raise _bad(url, f"a device and {SLOWEST}..{FASTEST} baud expected")
-        return SerialTransport(device, int(baud))
-    parts = place.split(":")
+        return LinkUrl(kind, device, int(baud))
+    parts = rest.split(":")
     if kind not in ("udp", "tcp"):
         raise _bad(url, "unknown kind of link" if kind else "empty")
     if not parts[0] or len(parts) not in ((2, 3) if kind == "udp" else (2,)):
@@ -63,10 +73,21 @@ def open_transport(url: str, read_limit: int = READ_LIMIT) -> Transport:
     for port in parts[1:]:
         if not _within(port, 1, 65535):
             raise _bad(url, f"port {port} is not in 1..65535")
-    remote = (parts[0], int(parts[1]))
-    if kind == "tcp":
-        return TcpTransport(remote)
-    return UdpTransport(int(parts[2]) if len(parts) == 3 else 0, remote, read_limit)
+    return LinkUrl(kind, parts[0], *map(int, parts[1:]))
+
+
+def open_transport(url: str, read_limit: int = READ_LIMIT) -> Transport:
+    """Open the link that `url` names.
+
+    read_limit: bytes taken per `receive` from a UDP link. Raises PortError in one line where the
+    URL is none of the table above, or the link cannot be had.
+    """
+    link = parse_url(url)
+    if link.kind == "serial":
+        return SerialTransport(link.place, link.number)
+    if link.kind == "tcp":
+        return TcpTransport((link.place, link.number))
+    return UdpTransport(link.local, (link.place, link.number), read_limit)
 
 
 def _within(text: str, low: int, high: int) -> bool:

@@ -1,0 +1,103 @@
+"""Autopilots that the user has started: by UDP, and over a serial line (HITL)."""
+
+import json
+import os
+import select
+import subprocess
+import sys
+import threading
+import tty
+
+import pytest
+
+from uam_sim_bridge.flight.ports import AUTOPILOT_UDP, Reservation
+
+AUTOPILOT = [sys.executable, "-m", "uam_sim_bridge.autopilot.server"]
+
+
+class SerialLine:
+    """Two pseudo-terminals joined end to end: `near` and `far` are what two programs open."""
+
+    def __init__(self):
+        pairs = [os.openpty() for _ in range(2)]
+        for _, slave in pairs:
+            tty.setraw(slave)
+        self._ends = pairs
+        self.near, self.far = (os.ttyname(slave) for _, slave in pairs)
+        self._stop, self._wake = os.pipe()
+        self._pump = threading.Thread(target=self._carry, daemon=True)
+        self._pump.start()
+
+    def _carry(self):
+        (one, _), (other, _) = self._ends
+        there = {one: other, other: one}
+        while True:
+            readable = select.select([one, other, self._stop], [], [])[0]
+            if self._stop in readable:
+                return
+            for end in readable:
+                os.write(there[end], os.read(end, 4096))
+
+    def close(self):
+        os.write(self._wake, b".")
+        self._pump.join()
+        for end in (*self._ends[0], *self._ends[1], self._stop, self._wake):
+            os.close(end)
+
+
+@pytest.fixture
+def started():
+    """started(*arguments): the stand-in as a program of the user's; ended after the test."""
+    running = []
+
+    def start(*arguments):
+        running.append(subprocess.Popen([*AUTOPILOT, *arguments]))
+        return running[-1]
+
+    yield start
+    for process in running:
+        process.terminate()
+        process.wait(20)
+
+
+def test_an_autopilot_that_the_user_has_started_flies_by_its_udp_link(
+        fly, short_scenario, started):
+    with Reservation() as free:
+        instance = free.ports.instance
+    autopilot = started("--instance", str(instance), "--wait", "120")
+    url = f"udp:127.0.0.1:{AUTOPILOT_UDP + instance}"
+    flight = fly("--scenario", str(short_scenario), "--autopilot", url)
+    assert flight.wait() == 0, flight.said + flight.complained
+    found = json.loads((flight.out / "metrics.json").read_text())
+    assert found["mission_completed"] and found["autopilot"] == url
+    assert autopilot.wait(20) == 0  # the plant hung up
+
+
+def test_a_flight_controller_on_a_serial_line_flies_the_simulated_vehicle(
+        fly, short_scenario, started):
+    line = SerialLine()
+    try:
+        started("--serial", f"{line.far}:921600")
+        flight = fly("--scenario", str(short_scenario), "--clock", "realtime",
+                     "--autopilot", f"serial:{line.near}:921600")
+        assert flight.wait() in (0, 1), flight.said + flight.complained
+        found = json.loads((flight.out / "metrics.json").read_text())
+        # how well it flies in real time depends on the machine; that it armed and took off does not
+        assert found["duration_s"] > 0.0, found
+        assert found["autopilot"].startswith("serial:") and found["clock"] == "realtime"
+        assert "HIL_SENSOR at 250 Hz" in (flight.out / "logs" / "autopilot.log").read_text()
+    finally:
+        line.close()
+
+
+@pytest.mark.parametrize("options, said", [
+    (["--autopilot", "ardupilot"], "builtin, px4, or a link"),
+    (["--autopilot", "udp:127.0.0.1:0"], "port 0 is not in 1..65535"),
+    (["--autopilot", "serial:/dev/null:921600"], "needs --clock realtime"),
+    (["--autopilot", "udp:127.0.0.1:14580", "--engine", "direct"], "needs --engine ros"),
+    (["--gcs", "tcp:127.0.0.1:14550"], "--gcs is udp:HOST:PORT"),
+])
+def test_a_wrong_autopilot_is_refused_in_one_line(fly, options, said):
+    flight = fly(*options)
+    assert flight.wait() == 2
+    assert said in flight.complained and flight.complained.count("\n") == 1
