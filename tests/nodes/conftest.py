@@ -16,6 +16,7 @@ from rclpy.node import Node
 from uam_msgs_py.connections import Connections
 from uam_msgs_py.convert import stays_serialized
 from uam_sim_bridge.flight.ports import Reservation
+from uam_sim_bridge.flight.processes import ros_environment
 
 PATIENCE = 60.0  # [s] for a process to get somewhere; only a failing test waits that long
 
@@ -24,9 +25,8 @@ PATIENCE = 60.0  # [s] for a process to get somewhere; only a failing test waits
 def domain(tmp_path_factory) -> Iterator[int]:
     """A ROS domain that no other flight or test uses."""
     with Reservation() as reservation:
-        os.environ["ROS_DOMAIN_ID"] = str(reservation.ports.domain)
-        os.environ["ROS_AUTOMATIC_DISCOVERY_RANGE"] = "LOCALHOST"
-        os.environ["ROS_LOG_DIR"] = str(tmp_path_factory.mktemp("ros_log"))
+        logs = tmp_path_factory.mktemp("ros_log")
+        os.environ.update(ros_environment(reservation.ports.domain, logs))
         yield reservation.ports.domain
 
 

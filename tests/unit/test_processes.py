@@ -5,6 +5,7 @@ import signal
 import subprocess
 import sys
 import time
+from pathlib import Path
 
 import pytest
 
@@ -131,12 +132,24 @@ time.sleep(60)
     wait_for(lambda: all(map(gone, pids)))
 
 
-def test_the_environment_is_private_and_local(tmp_path):
+def test_the_environment_is_private_and_local(tmp_path, monkeypatch):
+    monkeypatch.delenv(processes.PROFILES_FILE, raising=False)
+    monkeypatch.delenv("RMW_IMPLEMENTATION", raising=False)
     made = processes.environment(42, tmp_path)
     assert made["ROS_DOMAIN_ID"] == "42"
-    assert made["ROS_AUTOMATIC_DISCOVERY_RANGE"] == "LOCALHOST"
+    assert made["ROS_AUTOMATIC_DISCOVERY_RANGE"] == "SYSTEM_DEFAULT"
+    assert "<address>127.0.0.1</address>" in Path(made[processes.PROFILES_FILE]).read_text()
     assert made["ROS_LOG_DIR"] == str(tmp_path)
     assert made["OMP_NUM_THREADS"] == made["NUMBA_NUM_THREADS"] == "1"
+
+
+@pytest.mark.parametrize("name, value", [
+    (processes.PROFILES_FILE, "/home/me/mine.xml"), ("RMW_IMPLEMENTATION", "rmw_cyclonedds_cpp")])
+def test_with_the_users_own_middleware_ros_keeps_it_on_this_machine(
+        name, value, tmp_path, monkeypatch):
+    monkeypatch.setenv(name, value)
+    made = processes.environment(42, tmp_path)
+    assert made[name] == value and made["ROS_AUTOMATIC_DISCOVERY_RANGE"] == "LOCALHOST"
 
 
 def segment(folder, name):
@@ -174,3 +187,17 @@ def test_what_was_abandoned_long_ago_is_found(tmp_path, monkeypatch):
         os.utime(file, (0, 0))
     assert shared_memory.abandoned() == {old}
     assert shared_memory.abandoned(age=-1.0) == {fresh, old}
+
+
+def test_nothing_is_removed_while_another_flight_is_there(tmp_path, monkeypatch):
+    monkeypatch.setattr(shared_memory, "FOLDER", tmp_path)
+    file = tmp_path / "fastrtps_port7001"
+    file.touch()
+    with shared_memory.Presence(tmp_path) as ours:
+        with shared_memory.Presence(tmp_path) as theirs:
+            assert ours.remove_unused({file}) == theirs.remove_unused({file}) == []
+            assert file.exists()
+        assert ours.remove_unused({file}) == [file]
+        with shared_memory.Presence(tmp_path):  # asking has not cost us our own share
+            file.touch()
+            assert ours.remove_unused({file}) == []

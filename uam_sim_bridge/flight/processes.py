@@ -70,8 +70,17 @@ class Child:
 class Processes:
     """The children of one flight. A context manager: nothing survives the `with` block."""
 
-    def __init__(self, logs: Path, environment: Mapping[str, str]):
-        """Output goes to `logs`, which must exist; `environment` is the children's whole one."""
+    def __init__(
+        self,
+        logs: Path,
+        environment: Mapping[str, str],
+        tidy: Callable[[Iterable[Path]], object] = shared_memory.remove_unused,
+    ):
+        """Output goes to `logs`, which must exist; `environment` is the children's whole one.
+
+        tidy: told of the shared-memory files that they have used, when all have ended.
+        """
+        self._tidy = tidy
         self._logs = logs
         self._environment = dict(environment)
         self._children: dict[str, Child] = {}
@@ -170,7 +179,7 @@ class Processes:
             if child.process.stdin and not child.process.stdin.closed:
                 child.process.stdin.close()
         used = set().union(*(child.shared for child in self._children.values()))
-        shared_memory.remove_unused(used)
+        self._tidy(used)
 
     def __enter__(self) -> "Processes":
         return self
@@ -196,11 +205,19 @@ def environment(domain: int, log_folder: Path) -> dict[str, str]:
 
 
 def ros_environment(domain: int, log_folder: Path) -> dict[str, str]:
-    """The variables by which ROS finds its domain, its transports and the place of its logs."""
+    """The variables by which ROS finds its domain, its transports and the place of its logs.
+
+    Our transports stay on this machine (config/dds/fastdds.xml). Where the user's own file or
+    another middleware is used, ROS is told to.
+    """
+    transports = str(configuration.path("dds/fastdds.xml"))
+    chosen = os.environ.get(PROFILES_FILE) or transports
+    middleware = os.environ.get("RMW_IMPLEMENTATION") or "rmw_fastrtps_cpp"
+    ours = chosen == transports and "fastrtps" in middleware
     return {
-        PROFILES_FILE: os.environ.get(PROFILES_FILE) or str(configuration.path("dds/fastdds.xml")),
+        PROFILES_FILE: chosen,
         "ROS_DOMAIN_ID": str(domain),
-        "ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST",
+        "ROS_AUTOMATIC_DISCOVERY_RANGE": "SYSTEM_DEFAULT" if ours else "LOCALHOST",
         "ROS_LOG_DIR": str(log_folder),
         "RCUTILS_COLORIZED_OUTPUT": "0",
     }

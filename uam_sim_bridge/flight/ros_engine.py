@@ -56,15 +56,18 @@ def fly(settings: FlightSettings, folder: ResultFolder, progress: Progress) -> O
     Raises PortError when no instance is free.
     """
     (folder.path / "logs").mkdir(exist_ok=True)
-    with Reservation(settings.instance, own_autopilot=not _started(settings)) as reservation:
+    with (
+        Reservation(settings.instance, own_autopilot=not _started(settings)) as reservation,
+        shared_memory.Presence() as presence,
+    ):
         if is_cold():
             progress.message("compiling the control path (once)")
             warm_up()
-        shared_memory.remove_unused(shared_memory.abandoned())
+        presence.remove_unused(shared_memory.abandoned())
         with Interrupts() as stop:
             ports = reservation.ports
             folder.write_parameters(parameters(settings, folder, ports))
-            failure = _supervise(settings, folder, ports, progress, stop)
+            failure = _supervise(settings, folder, ports, progress, stop, presence)
     return _outcome(settings, folder, failure, stop.raised)
 
 
@@ -129,11 +132,12 @@ def _supervise(
     ports: Ports,
     progress: Progress,
     stop: Interrupts,
+    presence: shared_memory.Presence,
 ) -> NodeFailed | None:
     """Start everything, watch it until the plant ends, stop it; returns what failed."""
     logs = folder.path / "logs"
     surroundings = environment(ports.domain, logs)
-    with Processes(logs, surroundings) as children:
+    with Processes(logs, surroundings, presence.remove_unused) as children:
         children.hurry = lambda: stop.impatient
         try:
             _start(children, settings, folder, ports)

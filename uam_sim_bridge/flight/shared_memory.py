@@ -1,13 +1,17 @@
 """Shared-memory files of the middleware (Fast DDS: /dev/shm/fastrtps_*, sem.fastrtps_*).
 
 Those who end cleanly remove them, the last one those that several use. Who is killed cannot, and
-what he used with others then stays as well.
+what he used with others then stays as well. Ports are numbered over all ROS domains, and a file
+that a process has opened but not yet mapped looks unused: so files are removed only while no other
+flight is there (`Presence`).
 """
 
 from __future__ import annotations
 
+import fcntl
 import os
 import re
+import tempfile
 import time
 from collections.abc import Iterable
 from pathlib import Path
@@ -71,3 +75,33 @@ def remove_unused(files: Iterable[Path]) -> list[Path]:
             except OSError:
                 continue
     return removed
+
+
+class Presence:
+    """Held by every flight of this user while it lasts. A context manager.
+
+    A lock that all share; the system drops it with the process that holds it.
+    """
+
+    def __init__(self, folder: Path | None = None):
+        """Keep the lock's file in `folder`, by default the temporary one."""
+        self._path = (folder or Path(tempfile.gettempdir())) / f"uam-{os.getuid()}-flights.lock"
+
+    def __enter__(self) -> Presence:
+        flags = os.O_RDWR | os.O_CREAT | os.O_CLOEXEC | os.O_NOFOLLOW
+        self._lock = os.open(self._path, flags, 0o600)
+        fcntl.flock(self._lock, fcntl.LOCK_SH)
+        return self
+
+    def __exit__(self, *exception) -> None:
+        os.close(self._lock)
+
+    def remove_unused(self, files: Iterable[Path]) -> list[Path]:
+        """See `remove_unused` above; while other flights are there nothing is removed."""
+        try:
+            fcntl.flock(self._lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            return remove_unused(files)
+        except BlockingIOError:
+            return []
+        finally:
+            fcntl.flock(self._lock, fcntl.LOCK_SH)
