@@ -110,7 +110,9 @@ def read_position_command(data: bytes) -> tuple[int, PositionCommand]:
             raise BadMessage("points without joint names")
         return message.stamp, NO_COMMAND
     values = POSE.read(message)
-    return message.stamp, PositionCommand(values[3, POSITION], values[:3, ATTITUDE], True)
+    # a copy, as strided arrays would have the control path compiled a second time, in flight
+    attitude = values[:3, ATTITUDE].copy()
+    return message.stamp, PositionCommand(values[3, POSITION], attitude, True)
 
 
 class TorqueWriter:
