@@ -208,9 +208,7 @@ class OffboardLink:
                 self._take_state(time, Mode.from_custom_mode(m.custom_mode),
                                  bool(m.base_mode & mavlink2.MAV_MODE_FLAG_SAFETY_ARMED))
         elif kind == "COMMAND_ACK":
-            # a ground station behind us has answers of its own; 0: said to all
-            if m.target_component in (0, mavlink2.MAV_COMP_ID_ONBOARD_COMPUTER):
-                self._acknowledged(time, m.command, m.result)
+            self._acknowledged(time, m.command, m.result)
         elif kind == "EXTENDED_SYS_STATE":
             self.landed = m.landed_state == mavlink2.MAV_LANDED_STATE_ON_GROUND
         elif kind == "STATUSTEXT":
