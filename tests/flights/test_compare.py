@@ -43,7 +43,7 @@ def test_wrong_use_is_refused_in_one_line(options, said, tmp_path, capsys):
 
 def test_a_trial_through_the_nodes_is_the_trial_of_the_direct_engine():
     (proposed,) = plan.entries(["proposed"])
-    asked = trial.Trial(proposed.label, proposed.profile, 0.2, 1)
+    asked = trial.Trial(proposed.label, proposed.profile, 0.0, 1, scenario="hover")
     through_ros, direct = ros_trial.fly(asked), trial.fly(asked)[0]
     assert through_ros.completed and direct.completed
     assert through_ros.rms == pytest.approx(direct.rms, rel=1e-3)
