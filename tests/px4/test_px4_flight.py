@@ -1,13 +1,12 @@
 """A real PX4 flies the mission. Skipped, saying so, where none is pointed at (PX4_SITL_DIR)."""
 
 import json
-import os
 
 import numpy as np
 import pytest
+from px4_at_hand import NO_PX4, installation
 from whole_flight import Flight
 
-from uam_sim_bridge.px4.installation import VARIABLE, Px4Error, Px4Installation
 from uam_sim_bridge.px4.rate_steps import LIMIT, compared, measure
 
 PLACED = 0.25  # [m]
@@ -15,20 +14,9 @@ TIMES_THE_STAND_INS = 2.0
 PATIENCE = 900.0  # [s]
 
 
-def _installation():
-    try:
-        return Px4Installation.find()
-    except Px4Error:
-        return None
-
-
 pytestmark = [
     pytest.mark.slow,
-    pytest.mark.skipif(
-        _installation() is None,
-        reason=f"no PX4 to fly with: set {VARIABLE} to a build of PX4 v1.16 SITL"
-        + (f" ({os.environ[VARIABLE]} is none)" if os.environ.get(VARIABLE) else ""),
-    ),
+    pytest.mark.skipif(installation() is None, reason=NO_PX4),
 ]
 
 
@@ -70,6 +58,6 @@ def test_two_flights_with_px4_at_once(fly):
 
 
 def test_the_stand_in_answers_body_rate_steps_as_px4_does():
-    found = compared(measure(None), measure(_installation()))
+    found = compared(measure(None), measure(installation()))
     for axis, row in found.items():
         assert row["distance"] <= LIMIT, (axis, row)

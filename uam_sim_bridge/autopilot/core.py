@@ -190,11 +190,11 @@ class Autopilot:
             gyro, dt, commander.armed, landing.maybe_landed, setpoint, self._model_factor,
             self._filters, self._gains, self._mixer, self._inverse, self._memory, self.motors)
         if commander.armed:
-            memory, estimate = self._memory, self.estimator.estimate
+            memory, estimator = self._memory, self.estimator
+            velocity = tuple(estimator.estimate[7:10].tolist()) if estimator.aided(time) else None
             landing.update(
                 time, True, descending, float(setpoint[3]),
-                (float(memory[RATES, 0]), float(memory[RATES, 1])),
-                (float(estimate[7]), float(estimate[8]), float(estimate[9])))
+                (float(memory[RATES, 0]), float(memory[RATES, 1])), velocity)
         else:
             landing.update(time, False, False, 0.0, (0.0, 0.0), (0.0, 0.0, 0.0))
         return self.motors

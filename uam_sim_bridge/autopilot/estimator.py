@@ -34,16 +34,19 @@ _LEVEL_GAIN = 0.2  # 1/s, pull of gravity on roll and pitch
 _VISION_ATTITUDE = 5.0  # 1/s, pull of vision on attitude
 _VISION_POSITION = 20.0  # 1/s, on position
 _VISION_VELOCITY = 100.0  # 1/s^2, of the position difference on velocity: two poles at -10 1/s
+_VISION_BIAS = 50.0  # 1/s^3, of it on the acceleration's bias: a third pole at -0.5 1/s
 _LONGEST_PULL = 0.04  # s, the longest interval that one pose makes up for
 _FORCE_TIME = 0.2  # s, of the average of the specific force
 _VELOCITY_KEPT = 5.0  # s without vision, after which the integrated velocity is worth nothing
 
 
 @jit
-def predict(gyro, accel, dt, aided, estimate, mean_force):
+def predict(gyro, accel, dt, aided, estimate, bias, mean_force):
     """Advance `estimate` by dt with gyro (3,) [rad/s] and specific force (3,) [m/s^2], FRD.
 
-    mean_force (3,): slow average of the specific force, for the check before arming.
+    bias (3,): of the acceleration, NED [m/s^2], learnt from vision: without it a descent that has
+    lost vision would drift upwards or fall. mean_force (3,): slow average of the specific force,
+    for the check before arming.
     """
     for i in range(3):
         mean_force[i] += min(1.0, dt / _FORCE_TIME) * (accel[i] - mean_force[i])
@@ -64,14 +67,17 @@ def predict(gyro, accel, dt, aided, estimate, mean_force):
     for i in range(4):
         estimate[i] = q[i] * scale
     for i in range(3):
-        acceleration = force[i] + (GRAVITY if i == 2 else 0.0)
+        acceleration = force[i] - bias[i] + (GRAVITY if i == 2 else 0.0)
         estimate[4 + i] += dt * (estimate[7 + i] + 0.5 * dt * acceleration)
         estimate[7 + i] += dt * acceleration
 
 
 @jit
-def correct(position, quaternion, interval, estimate):
-    """Pull `estimate` towards a vision pose (NED; FRD → NED), `interval` [s] after the last one."""
+def correct(position, quaternion, interval, estimate, bias):
+    """Pull `estimate` towards a vision pose (NED; FRD → NED), `interval` [s] after the last one.
+
+    bias (3,): see `predict`.
+    """
     interval = min(interval, _LONGEST_PULL)
     error = rotation_error(quaternion, estimate[0:4])
     for i in range(3):
@@ -83,6 +89,7 @@ def correct(position, quaternion, interval, estimate):
         difference = position[i] - estimate[4 + i]
         estimate[4 + i] += _VISION_POSITION * interval * difference
         estimate[7 + i] += _VISION_VELOCITY * interval * difference
+        bias[i] -= _VISION_BIAS * interval * difference
 
 
 class Estimator:
@@ -98,6 +105,7 @@ class Estimator:
         self._vision_count = 0
         self._vision_down = np.array([0.0, 0.0, 1.0])
         self._force = np.zeros(3)
+        self._bias = np.zeros(3)
 
     def aided(self, time: float) -> bool:
         """Whether vision is fresh."""
@@ -105,7 +113,7 @@ class Estimator:
 
     def predict(self, time: float, gyro: np.ndarray, accel: np.ndarray, dt: float) -> None:
         """Advance by one sensor sample."""
-        predict(gyro, accel, dt, self.aided(time), self.estimate, self._force)
+        predict(gyro, accel, dt, self.aided(time), self.estimate, self._bias, self._force)
 
     def vision(self, time: float, position: np.ndarray, quaternion: np.ndarray) -> None:
         """Take a pose (3,), (4,) arriving at `time`; the first after a gap sets the estimate."""
@@ -120,7 +128,7 @@ class Estimator:
                 self.estimate[VELOCITY] = 0.0
             return
         self._vision_count += 1
-        correct(position, quaternion, gap, self.estimate)
+        correct(position, quaternion, gap, self.estimate, self._bias)
 
     def faults(self, time: float) -> list[str]:
         """Return why the estimate is no basis for arming, in PX4's words; empty when it is one."""

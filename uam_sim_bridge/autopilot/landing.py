@@ -43,16 +43,20 @@ class LandDetector:
         descending: bool,
         thrust: float,
         rates: tuple[float, float],
-        velocity: tuple[float, float, float],
+        velocity: tuple[float, float, float] | None,
     ) -> None:
-        """Take this tick's thrust command, roll and pitch rate [rad/s], velocity NED [m/s]."""
+        """Take this tick's thrust command, roll and pitch rate [rad/s], velocity NED [m/s].
+
+        velocity: None where it is only integrated, without vision; it then drifts, and little
+        thrust has to do. A descent that would have drifted on would else take off again.
+        """
         if not armed:
             self.landed = self.maybe_landed = self._contact = True
             return
         wider = _WIDER if self.maybe_landed else 1.0
-        contact = (
-            thrust <= self._low
-            and abs(velocity[2]) <= wider * self._vertical
+        contact = thrust <= self._low and (
+            velocity is None
+            or abs(velocity[2]) <= wider * self._vertical
             and math.hypot(velocity[0], velocity[1]) <= self._horizontal
         )
         self._contact = self._stage(0, time, contact, self._contact)

@@ -9,6 +9,8 @@ from __future__ import annotations
 import argparse
 import sys
 import tempfile
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import asdict
 from pathlib import Path
 
@@ -19,39 +21,50 @@ from uam_sim_bridge.flight.ports import PortError, Reservation
 from uam_sim_bridge.flight.processes import NodeFailed, Processes, environment
 from uam_sim_bridge.flight.result_folder import ResultFolderError, as_json, make_folder
 from uam_sim_bridge.flight.warm_up import is_cold, warm_up
+from uam_sim_bridge.px4.hover_flight import HoverFlight, NotFlown
 from uam_sim_bridge.px4.installation import WANTED, Px4Error, Px4Installation
-from uam_sim_bridge.px4.rate_experiment import AXES, NotFlown, RateExperiment, experiment
+from uam_sim_bridge.px4.rate_experiment import AXES, experiment, responses
 from uam_sim_bridge.px4.step_response import distance, figures
 from uam_sim_bridge.report import style
 
 STAND_IN, PX4 = "stand-in", "PX4"
+STAND_IN_MODULE, SITL_MODULE = "uam_sim_bridge.autopilot.server", "uam_sim_bridge.px4.sitl"
 LIMIT = 0.10  # of the step: how far the curves may be apart
 PATIENCE = 60.0  # [s] for an autopilot to connect
 
 Responses = dict[str, tuple[np.ndarray, np.ndarray]]
 
 
-def measure(px4: Px4Installation | None) -> Responses:
-    """Fly the experiment with PX4, or with the stand-in for None. Raises NotFlown, PortError."""
+@contextmanager
+def flown_by(px4: Px4Installation | None) -> Iterator[HoverFlight]:
+    """A hover flight to which PX4, or the stand-in for None, is connected.
+
+    Raises NotFlown, PortError.
+    """
     with (
-        tempfile.TemporaryDirectory(prefix="uam-steps-") as folder,
+        tempfile.TemporaryDirectory(prefix="uam-hover-") as folder,
         Reservation() as reservation,
         Processes(Path(folder), environment(reservation.ports.domain, Path(folder))) as children,
     ):
         ports = reservation.ports
-        arguments = ["--instance", str(ports.instance)]
-        flown = RateExperiment(ports, px4 is None, experiment())
+        flight = HoverFlight(ports, always_answers=px4 is None)
         try:
-            if px4 is None:
-                children.start("autopilot", "uam_sim_bridge.autopilot.server", arguments, True)
-            else:
+            module, arguments = STAND_IN_MODULE, ["--instance", str(ports.instance)]
+            if px4 is not None:
+                module = SITL_MODULE
                 arguments += ["--px4-dir", str(px4.directory)]
-                children.start("autopilot", "uam_sim_bridge.px4.sitl", arguments, True)
-            flown.connect(PATIENCE)
-            return flown.run()
+            children.start("autopilot", module, arguments, True)
+            flight.connect(PATIENCE)
+            yield flight
         finally:
-            flown.close()
+            flight.close()
             children.stop(["autopilot"])
+
+
+def measure(px4: Px4Installation | None) -> Responses:
+    """Fly the experiment with PX4, or with the stand-in for None. Raises NotFlown, PortError."""
+    with flown_by(px4) as flight:
+        return responses(flight, experiment())
 
 
 def compared(stand_in: Responses, px4: Responses) -> dict[str, dict]:

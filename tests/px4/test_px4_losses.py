@@ -1,0 +1,58 @@
+"""What is lost while a real PX4 flies, and what PX4 and our end of the link then do.
+
+The stand-in flies the same tests, so that both are known to behave alike.
+"""
+
+import pytest
+from px4_at_hand import NO_PX4, installation
+
+from uam_sim_bridge.autopilot.modes import Mode
+from uam_sim_bridge.mavlink.offboard import Phase
+from uam_sim_bridge.px4.rate_steps import flown_by
+
+AUTOPILOTS = [
+    pytest.param(False, id="stand-in"),
+    pytest.param(True, id="px4", marks=pytest.mark.skipif(installation() is None, reason=NO_PX4)),
+]
+GARBAGE = bytes(range(256)) * 4 + b"\xfd\x09\x00\x00\x00\x01\x01\x00\x00\x00half a frame"
+
+
+@pytest.fixture(params=AUTOPILOTS)
+def hovering(request):
+    """A vehicle that hovers."""
+    with flown_by(installation() if request.param else None) as flight:
+        flight.take_off()
+        yield flight
+
+
+def test_a_short_gap_of_the_stream_is_nothing(hovering):
+    hovering.mute(0.2)
+    hovering.hover(1.0)
+    assert hovering.modes_seen == {Mode.OFFBOARD} and hovering.height > 1.0
+
+
+def test_a_long_gap_ends_in_the_failsafe_and_the_mode_is_asked_for_again(hovering):
+    hovering.mute(2.0)
+    assert hovering.mode is not Mode.OFFBOARD
+    hovering.hover(3.0)
+    assert hovering.mode is Mode.OFFBOARD and hovering.phase is Phase.FLYING
+    assert hovering.height > 0.5
+
+
+def test_the_stream_lost_for_good_ends_on_the_ground_disarmed(hovering):
+    hovering.mute(25.0)
+    assert not hovering.armed and hovering.on_ground
+    assert hovering.hardest_touchdown < 1.5
+
+
+def test_vision_lost_is_flown_on_with_body_rates(hovering):
+    hovering.blind(3.0)
+    assert hovering.mode is Mode.OFFBOARD and hovering.height > 1.0
+    assert hovering.largest_tilt < 0.2
+
+
+def test_garbage_on_the_link_changes_nothing(hovering):
+    for _ in range(50):
+        hovering.send_raw(GARBAGE)
+        hovering.hover(0.02)
+    assert hovering.modes_seen == {Mode.OFFBOARD} and hovering.height > 1.0
