@@ -35,6 +35,8 @@ _VISION_ATTITUDE = 5.0  # 1/s, pull of vision on attitude
 _VISION_POSITION = 20.0  # 1/s, on position
 _VISION_VELOCITY = 100.0  # 1/s^2, of the position difference on velocity: two poles at -10 1/s
 _VISION_BIAS = 50.0  # 1/s^3, of it on the acceleration's bias: a third pole at -0.5 1/s
+_BIAS_WINDOW = 0.02  # m, a larger difference is a jump of vision and says nothing about the bias
+_BIAS_MAX = 0.4  # m/s^2
 _LONGEST_PULL = 0.04  # s, the longest interval that one pose makes up for
 _FORCE_TIME = 0.2  # s, of the average of the specific force
 _VELOCITY_KEPT = 5.0  # s without vision, after which the integrated velocity is worth nothing
@@ -89,7 +91,9 @@ def correct(position, quaternion, interval, estimate, bias):
         difference = position[i] - estimate[4 + i]
         estimate[4 + i] += _VISION_POSITION * interval * difference
         estimate[7 + i] += _VISION_VELOCITY * interval * difference
-        bias[i] -= _VISION_BIAS * interval * difference
+        if abs(difference) < _BIAS_WINDOW:
+            learnt = bias[i] - _VISION_BIAS * interval * difference
+            bias[i] = min(_BIAS_MAX, max(-_BIAS_MAX, learnt))
 
 
 class Estimator:
