@@ -36,6 +36,8 @@ class Progress:
         self._live: Live | None = None
         self._shown: tuple[str, float] = ("", -math.inf)
         self._begin = time.monotonic()
+        self.last: Status | None = None
+        self._autopilot = ""
 
     def __enter__(self) -> Progress:
         return self
@@ -48,7 +50,8 @@ class Progress:
         self.console.print(text, highlight=False, markup=False)
 
     def update(self, status: Status) -> None:
-        """Show the newest status."""
+        """Show the newest status, which is kept as `last`."""
+        self.last = status
         if not self.console.is_terminal:
             self._plain(status)
             return
@@ -66,6 +69,9 @@ class Progress:
             self._live = None
 
     def _plain(self, status: Status) -> None:
+        if status.time < 0.0 and status.autopilot != self._autopilot:
+            self._autopilot = status.autopilot
+            self.message(f"autopilot {status.autopilot}")
         phase, last = self._shown
         if status.phase == phase and status.time < last + PLAIN_INTERVAL:
             return

@@ -68,7 +68,11 @@ def fly(settings: FlightSettings, folder: ResultFolder, progress: Progress) -> O
             ports = reservation.ports
             folder.write_parameters(parameters(settings, folder, ports))
             failure = _supervise(settings, folder, ports, progress, stop, presence)
-    return _outcome(settings, folder, failure, stop.raised)
+    outcome = _outcome(settings, folder, failure, stop.raised)
+    last = progress.last
+    if outcome.failure and failure is None and last is not None and last.time < 0.0:
+        outcome.failure = f"no take-off ({outcome.failure}); autopilot {last.autopilot}"
+    return outcome
 
 
 def parameters(
