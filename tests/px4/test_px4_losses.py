@@ -6,8 +6,9 @@ The stand-in flies the same tests, so that both are known to behave alike.
 import pytest
 from px4_at_hand import NO_PX4, installation
 
-from uam_sim_bridge.autopilot.modes import Mode
+from uam_sim_bridge.autopilot.modes import CUSTOM_MODE_ENABLED, Command, Mode
 from uam_sim_bridge.mavlink.offboard import Phase
+from uam_sim_bridge.mavlink.wire import Codec, mavlink2
 from uam_sim_bridge.px4.rate_steps import flown_by
 
 AUTOPILOTS = [
@@ -56,3 +57,14 @@ def test_garbage_on_the_link_changes_nothing(hovering):
         hovering.send_raw(GARBAGE)
         hovering.hover(0.02)
     assert hovering.modes_seen == {Mode.OFFBOARD} and hovering.height > 1.0
+
+
+def test_another_mode_from_a_ground_station_is_taken_back(hovering):
+    command = mavlink2.MAVLink_command_long_message(
+        hovering.system, mavlink2.MAV_COMP_ID_AUTOPILOT1, Command.DO_SET_MODE, 0,
+        CUSTOM_MODE_ENABLED, *Mode.LAND.value, 0, 0, 0, 0)
+    hovering.send_raw(Codec(255, mavlink2.MAV_COMP_ID_MISSIONPLANNER).encode(command))
+    hovering.hover(4.0)
+    assert Mode.LAND in hovering.modes_seen
+    assert hovering.mode is Mode.OFFBOARD and hovering.phase is Phase.FLYING
+    assert hovering.height > 0.5

@@ -57,8 +57,9 @@ class HoverFlight:
             waits = HilParameters(silent_timeout=waits.answer_timeout)
         self._hil = HilServer(ports.simulator_tcp, parameters=waits)
         self._transport = UdpTransport(ports.offboard_udp, (HOST, ports.autopilot_udp))
+        self.system = ports.instance + 1  # MAVLink system id of the autopilot
         self._link = OffboardLink(
-            self._transport, self._sequence, self._map.parameters, ports.instance + 1)
+            self._transport, self._sequence, self._map.parameters, self.system)
         self._reference = empty_reference()
         self._reference[0, 6:8] = ARM
         self._state = np.zeros((3, 8))
