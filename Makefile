@@ -22,7 +22,10 @@ fly: setup       ## fly the pick-and-place mission; options: make fly ARGS="--co
 	@$(BIN)/uam fly $(ARGS)
 
 test: setup      ## all tests; options: make test ARGS="tests/unit -x"
-	@$(BIN)/python -m pytest $(ARGS)
+	@$(if $(ARGS),$(BIN)/python -m pytest $(ARGS),\
+	$(BIN)/python -m pytest -n 2 --dist loadfile tests/unit && \
+	$(BIN)/python -m pytest -n 2 --dist loadfile tests/nodes tests/packaging && \
+	$(BIN)/python -m pytest tests/flights tests/px4)
 
 lint: setup      ## style and errors that need no run
 	@$(BIN)/ruff check .

@@ -50,6 +50,8 @@ setup(
     package_data={"": ["**/*"]},
     exclude_package_data={"": ["*.pyc"]},
     data_files=shared_data(),
+    # colcon downloads nothing; `uam doctor` compares what is there with this list
+    install_requires=PROJECT["project"]["dependencies"],
     entry_points={
         "console_scripts": [f"{k} = {v}" for k, v in PROJECT["project"]["scripts"].items()]
     },

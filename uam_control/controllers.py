@@ -36,6 +36,14 @@ class PositionLimits(ParameterSet):
     tilt_max: float = number(0.35, "largest angle of tau_p from the vertical", "rad", 0.01, 1.5)
     attitude_cutoff: float = number(5.0, "filter on the attitude asked for", "Hz", 0.1, 100.0)
 
+    def check_together(self) -> None:
+        """See `ParameterSet.check_together`."""
+        super().check_together()
+        if self.thrust_min > self.thrust_max:
+            raise ParameterError(
+                f"thrust_min: {self.thrust_min:g} N is above thrust_max, {self.thrust_max:g} N"
+            )
+
 
 @dataclass(frozen=True)
 class TorqueLimits(ParameterSet):
@@ -111,6 +119,10 @@ class Controller:
             raise ParameterError(f"law: {flying} flies, it cannot change to {parameters.law}")
         self.law.set_parameters(parameters)
         self._printed = parameters.error_rate_form == "printed"
+
+    def reset_adaptation(self) -> None:
+        """Put the adapted gains back to their initial values, in flight; nothing else changes."""
+        self.law.reset_adaptation()
 
     @property
     def errors(self) -> np.ndarray:

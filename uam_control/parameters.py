@@ -8,7 +8,7 @@ the same fields.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field, fields, replace
+from dataclasses import asdict, dataclass, field, fields, replace
 from typing import Any, Self
 
 import numpy as np
@@ -94,6 +94,15 @@ class ParameterSet:
                 raise ParameterError(f"{name}: unknown; allowed: {', '.join(known)}")
         return cls(**values).validated(axes)
 
+    def to_mapping(self) -> dict[str, Any]:
+        """Return what `from_mapping` reads, as YAML has it; empty lists stand for defaults and stay
+        out."""
+        return {
+            name: list(value) if isinstance(value, tuple) else value
+            for name, value in asdict(self).items()
+            if value != ()
+        }
+
     @classmethod
     def among(cls, values: Mapping[str, Any]) -> Self:
         """Return a validated set of those `values` that belong to it; others may be there."""
@@ -113,15 +122,23 @@ class ParameterSet:
                 raise ParameterError(f"{name}: '{value}' is not one of {', '.join(spec.choices)}")
             elif isinstance(spec, Switch) and not isinstance(value, bool):
                 raise ParameterError(f"{name}: {value!r} is not true or false")
-        return replace(self, **clean)
+        checked = replace(self, **clean)
+        checked.check_together()
+        return checked
+
+    def check_together(self) -> None:
+        """Raise ParameterError where values that are good by themselves do not go together."""
 
 
 def _number(name: str, value: Any, spec: Bound, axes: int) -> float | tuple[float, ...]:
     allowed = f"{spec.low:g} to {spec.high:g} {spec.unit}"
     try:
-        numbers = np.asarray(value, dtype=float)
-    except (TypeError, ValueError):
-        raise ParameterError(f"{name}: {value!r} is not numeric; allowed: {allowed}") from None
+        numbers = np.asarray(value)
+    except ValueError:  # lists of different lengths
+        numbers = np.array(None)
+    if numbers.dtype.kind not in "iuf":  # neither true nor "1" is a number
+        raise ParameterError(f"{name}: {value!r} is not numeric; allowed: {allowed}")
+    numbers = numbers.astype(float)
     shape = () if spec.length is None else (spec.length or axes,)
     if numbers.shape != shape:
         wanted = "one number" if spec.length is None else f"a list of {shape[0]} numbers"

@@ -6,41 +6,41 @@
         ...
 
 A profile is read whole and checked whole; the same sets go to the nodes and to the direct engine.
+What `ros2 param dump` wrote of the nodes of a flight is a profile, too.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
-import yaml
-
 from uam_control import configuration
 from uam_control.controllers import POSITION_SETS, TORQUE_SETS
+from uam_control.coordinates import ARM, ATTITUDE, COORDINATES, POSITION
 from uam_control.estimation import EstimatorParameters
 from uam_control.laws import catalogue
 from uam_control.mission import MissionParameters
+from uam_control.parameter_file import ProfileError, read_sections
 from uam_control.parameters import ParameterError, ParameterSet
 
-# controller → (law → parameter set, axes of its per-axis vectors)
-CONTROLLERS: dict[str, tuple[dict[str, type[ParameterSet]], int]] = {
-    "position_controller": (POSITION_SETS, 3),
-    "attitude_controller": (TORQUE_SETS, 3),
-    "arm_controller": (TORQUE_SETS, 2),
+# controller → (law → parameter set, names of the entries of its per-axis vectors)
+CONTROLLERS: dict[str, tuple[dict[str, type[ParameterSet]], tuple[str, ...]]] = {
+    "position_controller": (POSITION_SETS, COORDINATES[POSITION]),
+    "attitude_controller": (TORQUE_SETS, COORDINATES[ATTITUDE]),
+    "arm_controller": (TORQUE_SETS, COORDINATES[ARM]),
 }
 OTHERS = {"state_estimator": EstimatorParameters, "mission": MissionParameters}
 NODES = (*CONTROLLERS, *OTHERS)
-# Parameters that a file may hold but that are no part of a profile: of ROS itself, and those that
-# the effective parameters of a flight have besides.
-ROS_OWN = ("use_sim_time",)
-FLIGHT_OWN = {"mission": ("scenario",)}
-
-
-class ProfileError(ValueError):
-    """A profile that cannot fly; the message is one line: file, node, parameter, what is
-    allowed."""
+BRIDGE = "mavlink_bridge"
+BRIDGE_LINKS = (
+    *("clock", "local_port", "autopilot_port", "autopilot_host", "autopilot_system"),
+    *("autopilot", "gcs"),
+)
+# Parameters that a node has but a profile has not: they belong to a flight.
+FLIGHT_OWN = {**dict.fromkeys(CONTROLLERS, ("control_period",)),
+              "mission": ("control_period", "scenario")}
 
 
 @dataclass(frozen=True)
@@ -56,33 +56,57 @@ class Profile:
         """Return the raw parameters of a node, {} where the profile has none."""
         return self.sections.get(node, {})
 
+    def bridge(self) -> dict[str, Any]:
+        """Return what it says of the bridge, without the links of the flight that it was dumped
+        from: a flight has its own."""
+        values = self.section(BRIDGE)
+        key_is_hidden = values.get("signing_key") == "set"
+        aside = (*BRIDGE_LINKS, "signing_key") if key_is_hidden else BRIDGE_LINKS
+        return {name: value for name, value in values.items() if name not in aside}
+
     def laws(self) -> dict[str, str]:
         """Return controller → law."""
         return {node: self.sets[node].law for node in CONTROLLERS}
 
 
-def parameter_set(node: str, values: Mapping[str, Any]) -> tuple[type[ParameterSet], int]:
-    """Return the kind of parameters of a node and its axes; a controller's follow from its law.
+def parameter_set(
+    node: str, values: Mapping[str, Any]
+) -> tuple[type[ParameterSet], tuple[str, ...]]:
+    """Return the kind of parameters of a node and the names of its axes; a controller's follow
+    from its law.
 
     values: the node's section, whose `law` counts. Raises ParameterError for an unknown law.
     """
     if node in OTHERS:
-        return OTHERS[node], 0
+        return OTHERS[node], ()
     sets, axes = CONTROLLERS[node]
     law = values.get("law", catalogue.DEFAULT)
     catalogue.entry(law)
     return sets[law], axes
 
 
-def load_profile(name_or_file: str) -> Profile:
-    """Return a profile by name (config/profiles) or from a .yaml file; raises ProfileError."""
+def load_profile(*names_or_files: str) -> Profile:
+    """Return a profile by name (config/profiles) or from a .yaml file; raises ProfileError.
+
+    Of several what comes later counts, parameter by parameter.
+    """
+    sections: dict[str, dict[str, Any]] = {}
+    files = [_file(given) for given in names_or_files]
+    for file in files:
+        for node, values in read_sections(file).items():
+            sections[node] = sections.get(node, {}) | values
+    found = profile_of(sections, files[-1])
+    return replace(found, name="+".join(file.stem for file in files))
+
+
+def _file(name_or_file: str) -> Path:
     file = Path(name_or_file)
-    if file.suffix not in (".yaml", ".yml"):
-        try:
-            file = configuration.path(f"profiles/{name_or_file}.yaml")
-        except configuration.ConfigurationError as error:
-            raise ProfileError(str(error)) from None
-    return profile_of(read_sections(file), file)
+    if file.suffix in (".yaml", ".yml"):
+        return file
+    try:
+        return configuration.path(f"profiles/{name_or_file}.yaml")
+    except configuration.ConfigurationError as error:
+        raise ProfileError(str(error)) from None
 
 
 def profile_of(sections: dict[str, dict[str, Any]], file: Path) -> Profile:
@@ -92,32 +116,11 @@ def profile_of(sections: dict[str, dict[str, Any]], file: Path) -> Profile:
     """
     sets = {}
     for node in NODES:
-        aside = (*ROS_OWN, *FLIGHT_OWN.get(node, ()))
+        aside = FLIGHT_OWN.get(node, ())
         values = {k: v for k, v in sections.get(node, {}).items() if k not in aside}
         try:
             kind, axes = parameter_set(node, values)
-            sets[node] = kind.from_mapping(values, axes)
+            sets[node] = kind.from_mapping(values, len(axes))
         except ParameterError as error:
             raise ProfileError(f"{file}: {node}: {error}") from None
     return Profile(file.stem, file, sets, sections)
-
-
-def read_sections(file: Path) -> dict[str, dict[str, Any]]:
-    """Return the sections of a ROS parameter file, node → parameters; raises ProfileError."""
-    try:
-        document = yaml.safe_load(file.read_text())
-    except OSError as error:
-        raise ProfileError(f"{file}: {error.strerror}") from None
-    except (yaml.YAMLError, UnicodeDecodeError) as error:
-        mark = getattr(error, "problem_mark", None)
-        where = f" line {mark.line + 1} column {mark.column + 1}" if mark else ""
-        raise ProfileError(f"{file}{where}: not valid YAML") from None
-    if not isinstance(document, dict):
-        raise ProfileError(f"{file}: a ROS parameter file expected: <node>: ros__parameters: ...")
-    sections = {}
-    for node, body in document.items():
-        values = body.get("ros__parameters") if isinstance(body, dict) else None
-        if not isinstance(values, dict):
-            raise ProfileError(f"{file}: '{node}' has no 'ros__parameters' mapping")
-        sections[str(node).strip("/")] = values
-    return sections

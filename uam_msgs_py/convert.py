@@ -262,6 +262,20 @@ def read_joints(data: bytes, names: Sequence[str]) -> tuple[int, np.ndarray, np.
     return message.stamp, *found
 
 
+def read_values(data: bytes, field: str) -> tuple[int, list[str], np.ndarray]:
+    """Return (stamp [ns], names, values (n,)) of one field of a JointState, finite or not.
+
+    The values are NaN where the message leaves the field empty; raises BadMessage where there are
+    more or fewer than names.
+    """
+    message = Serialized(JointState, data)
+    names, values = message.layout.names, message.numbers(field)
+    if not len(values):
+        return message.stamp, names, np.full(len(names), math.nan)
+    _check_length(field, len(values), names)
+    return message.stamp, names, values
+
+
 class ImuWriter(Template):
     """An Imu without orientation (orientation_covariance[0] = -1)."""
 

@@ -3,8 +3,10 @@
 rclpy's SingleThreadedExecutor gathers every entity of the node, builds a wait set, a task and a
 coroutine for each callback. A control node's entities hardly ever change after its start, so
 `LeanExecutor` keeps a wait set of its subscriptions and calls the callbacks of ready ones
-directly. What is rare (services, timers, events of the middleware) is looked for twenty times a
-second, and handed to a SingleThreadedExecutor, which knows how to serve it.
+directly. What is rare is looked for fifty times a second, of the wall clock and of the node's
+ticks. Of requests and timers one is served at a tick: many at once must not keep one from its time.
+Clients and events of the middleware are handed to a SingleThreadedExecutor, which knows how to
+serve them; it would serve waiting messages first, so requests do not go that way.
 
 `WaitSet` is not public in rclpy. Where it is missing, `spin` falls back to the
 SingleThreadedExecutor alone: slower, otherwise the same.
@@ -24,7 +26,8 @@ except (ImportError, AttributeError):
     WaitSet = None
 
 
-REST_PERIOD = 0.05  # [s] between two looks at services, timers and events
+REST_PERIOD = 0.02  # [s] between two looks at services, timers and events
+REST_STAMPS = round(REST_PERIOD * 1e9)  # [ns] of ticks, which a simulation may do faster
 
 
 class LeanExecutor:
@@ -56,7 +59,7 @@ class LeanExecutor:
         self._settle = getattr(node, "settle", lambda: None)
         if hasattr(node, "defer"):
             node.defer()
-        self._next_look = 0.0
+        self._next_look, self._looked_at = 0.0, 0
         self._gather()
 
     def _gather(self) -> None:
@@ -82,10 +85,10 @@ class LeanExecutor:
         Shorter than `timeout` by itself when it is time to look for services and timers.
         """
         left = self._next_look - time.monotonic()
-        if left <= 0.0:
-            self._serve_others()
-            left = REST_PERIOD
-            self._next_look = time.monotonic() + left
+        stamp = getattr(self._node, "stamp", 0)
+        if left <= 0.0 or stamp - self._looked_at >= REST_STAMPS:
+            left = 0.0 if self._serve_others() else REST_PERIOD
+            self._next_look, self._looked_at = time.monotonic() + left, stamp
         inputs = self._inputs if not self._triggers or self._stalled() else self._triggers
         messages = self._messages
         messages.clear_entities()
@@ -97,8 +100,8 @@ class LeanExecutor:
                 callback(taken[0])
         self._settle()
 
-    def _serve_others(self) -> None:
-        """Serve services, clients, timers and events that are ready now."""
+    def _serve_others(self) -> bool:
+        """Serve services, clients, timers and events that are ready now; whether any was."""
         others = self._others
         others.clear_entities()
         for handle in self._services:
@@ -110,16 +113,28 @@ class LeanExecutor:
         for waitable in self._waitables:
             waitable.add_to_wait_set(others)
         others.wait(0)
-        ready = [
-            entity
-            for kind in ("service", "client", "timer")
-            for entity in others.get_ready_entities(kind)
-        ]
-        ready += [waitable for waitable in self._waitables if waitable.is_ready(others)]
-        for _ in ready:
+        services, timers = (set(others.get_ready_entities(kind)) for kind in ("service", "timer"))
+        handed = list(others.get_ready_entities("client"))
+        handed += [waitable for waitable in self._waitables if waitable.is_ready(others)]
+        for _ in handed:
             self._rest.spin_once(timeout_sec=0)
-        if ready:
+        for timer in (t for t in self._node.timers if t.handle.pointer in timers):
+            timer.handle.call_timer()
+            timer.callback()
+        request = next((s for s in self._node.services if s.handle.pointer in services), None)
+        if request is not None:
+            self._answer(request)
+        if handed or services:
             self._gather()  # a service may have changed them, as setting use_sim_time does
+        return bool(handed or services)
+
+    @staticmethod
+    def _answer(service) -> None:
+        """Take one request and send the response."""
+        request, header = service.handle.service_take_request(service.srv_type.Request)
+        if header is not None:
+            response = service.callback(request, service.srv_type.Response())
+            service.send_response(response, header)
 
     def shutdown(self) -> None:
         """Let go of the node."""

@@ -10,45 +10,50 @@ from typing import Any
 
 import rclpy
 from rclpy.clock import Clock, ClockType
-from rclpy.node import Node
 from rclpy.publisher import Publisher
+from rclpy.qos import QoSProfile
 from rclpy.signals import SignalHandlerOptions
 from rclpy.subscription import Subscription
 
 from uam_msgs_py import connections, topics
 from uam_msgs_py.convert import stays_serialized
 from uam_msgs_py.executor import spin
+from uam_msgs_py.health import LoopTime, ages
 from uam_msgs_py.joins import StampJoin
 from uam_msgs_py.layouts import BadMessage
 from uam_msgs_py.parameters import refuse_unknown
 from uam_msgs_py.status import ERROR, OK, STALE, WARN, diagnostic
 from uam_msgs_py.topics import Topic
+from uam_msgs_py.tunable import TunableNode
 
 DIAGNOSTICS_PERIOD = 1.0  # [s]
 SAY_PERIOD = 2.0  # [s] between two lines of the same kind in the log
 
 
-class UamNode(Node):
+class UamNode(TunableNode):
     """A node that acts when messages arrive; it has no clock of its own.
 
     A subclass sets up with `publisher` and `listen`, and calls `done_tick` after each control tick.
     Timers run on the steady clock of the machine and only report: no state depends on them.
     """
 
+    wake_up = 0.1  # [s] of wall time after which it looks around even if no trigger has come
+
     def __init__(self, name: str):
         super().__init__(name)
         self._required: dict[str, int] = {}
         self._counts: dict[str, int] = {}
+        self._arrivals: dict[str, float] = {}  # time.monotonic() of each input's newest message
         self._said: dict[str, float] = {}
         self._outlets: dict[str, Publisher] = {}
         self._inlets: dict[str, Subscription] = {}
         self.joins: list[StampJoin] = []
         self.triggers: tuple[str, ...] = ()  # topics that wake the node, () for all of them
-        self.stamp = 0  # [ns] of the newest tick
         self.ticks = self.refused = 0
         self.deferred = False
-        self._busy = self._busy_max = 0.0
+        self._loop = LoopTime()
         self._at_last_report = (0, 0.0)
+        self._dropped_before = 0
         self._waiting: list[str] = []
         self._diagnostics = self.publisher(topics.DIAGNOSTICS)
         steady = Clock(clock_type=ClockType.STEADY_TIME)
@@ -61,14 +66,19 @@ class UamNode(Node):
         return made
 
     def listen(
-        self, topic: Topic, handle: Callable[[Any], None], required: bool = True
+        self,
+        topic: Topic,
+        handle: Callable[[Any], None],
+        required: bool = True,
+        qos: QoSProfile | None = None,
     ) -> Subscription:
         """Call `handle(message)` for each message; a BadMessage it raises is refused and said.
 
         The message comes serialized where uam_msgs_py.convert reads its type.
-        required: the node reports that it waits while this input is silent.
+        required: the node reports that it waits while this input is silent. qos: if not what the
+        stack's nodes ask for (`Topic.reading`).
         """
-        counts, name = self._counts, topic.name
+        counts, arrivals, name = self._counts, self._arrivals, topic.name
         counts[name] = 0
         if required:
             self._required[name] = 0
@@ -81,9 +91,10 @@ class UamNode(Node):
                 self.say(f"{name}: refused: {error}", key=name)
                 return
             counts[name] += 1
+            arrivals[name] = time.monotonic()
 
         raw = stays_serialized(topic.type)
-        made = self.create_subscription(topic.type, name, callback, topic.reading, raw=raw)
+        made = self.create_subscription(topic.type, name, callback, qos or topic.reading, raw=raw)
         self._inlets[name] = made
         return made
 
@@ -124,9 +135,7 @@ class UamNode(Node):
         """Note that the tick `stamp` [ns], begun at time.perf_counter() `begun`, is finished."""
         self.stamp = stamp
         self.ticks += 1
-        spent = time.perf_counter() - begun
-        self._busy += spent
-        self._busy_max = max(self._busy_max, spent)
+        self._loop.add(begun)
 
     @property
     def waiting_for(self) -> list[str]:
@@ -151,20 +160,23 @@ class UamNode(Node):
         ticks, last = self._at_last_report
         now = time.monotonic()
         done = self.ticks - ticks
+        dropped = sum(join.dropped for join in self.joins)
         self._at_last_report = (self.ticks, now)
         if self.waiting_for and level < ERROR:
             level, summary = STALE, "waiting for " + ", ".join(self.waiting_for)
         elif self.refused and level == OK:
             level, summary = WARN, f"{self.refused} messages refused"
+        elif dropped > self._dropped_before and level == OK:
+            level, summary = WARN, f"{dropped - self._dropped_before} ticks dropped of late"
+        self._dropped_before = dropped
         common = {
             "ticks": self.ticks,
             "tick rate [Hz]": f"{done / (now - last):.1f}" if last else "",
-            "tick mean [ms]": f"{1e3 * self._busy / done:.3f}" if done else "",
-            "tick max [ms]": f"{1e3 * self._busy_max:.3f}" if done else "",
-            "incomplete ticks dropped": sum(join.dropped for join in self.joins),
+            **self._loop.report(),
+            "incomplete ticks dropped": dropped,
             "messages refused": self.refused,
         }
-        self._busy = self._busy_max = 0.0
+        common |= ages(self._counts, self._arrivals)
         common |= connections.of(self._outlets, self._inlets)
         stamp = self.stamp or self.get_clock().now().nanoseconds
         self._diagnostics.publish(
@@ -219,7 +231,7 @@ def run(make: Callable[[], UamNode], name: str) -> int:
             return refuse(name, error)
         gc.collect()
         gc.freeze()  # what lives now lives on: the collector need not look at it in flight
-        spin(node, lambda: not stop.raised and not getattr(node, "failure", ""))
+        spin(node, lambda: not stop.raised and not getattr(node, "failure", ""), node.wake_up)
         failure = getattr(node, "failure", "")
         if failure:
             print(f"{name}: {failure}", file=sys.stderr, flush=True)

@@ -4,25 +4,29 @@ A change is tried on a copy of the whole set. If the set as a whole may fly it i
 effect between two control ticks; otherwise ROS gets the reason and the old values fly on.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Any, Generic, TypeVar
 
 from rcl_interfaces.msg import (
     FloatingPointRange,
     ParameterDescriptor,
+    ParameterValue,
     SetParametersResult,
 )
 from rclpy.node import Node
-from rclpy.parameter import Parameter
+from rclpy.parameter import Parameter, parameter_value_to_python
 
 from uam_control.parameters import Bound, Choice, ParameterError, ParameterSet, Switch
 
 S = TypeVar("S", bound=ParameterSet)
 
 
-def descriptor(spec: Bound | Choice | Switch, read_only: bool) -> ParameterDescriptor:
-    """Return what `ros2 param describe` shows: meaning, unit, range.
+def descriptor(
+    spec: Bound | Choice | Switch, read_only: bool, axes: Sequence[str] = ()
+) -> ParameterDescriptor:
+    """Return what `ros2 param describe` shows: meaning, unit, range, and the order in a vector.
 
+    axes: what the entries of a per-axis vector belong to.
     Typing is dynamic because people write `5` where a float is meant; the set checks types itself.
     """
     text = ParameterDescriptor(
@@ -35,7 +39,8 @@ def descriptor(spec: Bound | Choice | Switch, read_only: bool) -> ParameterDescr
     if isinstance(spec, Bound):
         text.description = f"{spec.description} [{spec.unit}]"
         each = "" if spec.length is None else "each "
-        text.additional_constraints = f"{each}{spec.low:g} to {spec.high:g} {spec.unit}"
+        order = f"; {', '.join(axes)}" if spec.length == 0 and axes else ""
+        text.additional_constraints = f"{each}{spec.low:g} to {spec.high:g} {spec.unit}{order}"
         if spec.length is None:
             text.floating_point_range = [
                 FloatingPointRange(from_value=spec.low, to_value=spec.high, step=0.0)
@@ -54,28 +59,29 @@ class NodeParameters(Generic[S]):
         self,
         node: Node,
         kind: type[S],
-        axes: int = 0,
+        axes: Sequence[str] = (),
         defaults: dict[str, Any] | None = None,
         apply: Callable[[S], None] | None = None,
         read_only: bool = False,
     ):
         """Declare all parameters of `kind`.
 
-        axes: numbers in a per-axis vector. defaults: the values of the default profile, used for
-        what the parameter file does not say, unless that file is complete by itself. read_only:
-        fixed once the node runs. Raises ParameterError for values that must not fly.
+        axes: names of the entries of a per-axis vector. defaults: the values of the default
+        profile, used for what the parameter file does not say, unless that file is complete by
+        itself. read_only: fixed once the node runs. Raises ParameterError for values that must not
+        fly.
         """
-        self._node, self._axes = node, axes
+        self._axes = len(axes)
         self.apply = apply
         told = {name: value for name, value in given(node).items() if name in kind.specs()}
         base = {} if complete(kind, told) else dict(defaults or {})
-        self.current = kind.from_mapping(base | told, axes)
+        self.current = kind.from_mapping(base | told, self._axes)
         for name, spec in kind.specs().items():
             value = getattr(self.current, name)
             node.declare_parameter(
                 name,
                 list(value) if isinstance(value, tuple) else value,
-                descriptor(spec, read_only),
+                descriptor(spec, read_only, axes),
                 ignore_override=True,
             )
         node.add_on_set_parameters_callback(self._check)
@@ -91,7 +97,6 @@ class NodeParameters(Generic[S]):
         try:
             self._candidate(changes)
         except ParameterError as error:
-            self._node.get_logger().warning(f"refused, the old values fly on: {error}")
             return SetParametersResult(successful=False, reason=str(error))
         return SetParametersResult(successful=True)
 
@@ -107,6 +112,12 @@ class NodeParameters(Generic[S]):
 def given(node: Node) -> dict[str, Any]:
     """Return what the parameter file and the command line say, by name."""
     return {name: value.value for name, value in node._parameter_overrides.items()}
+
+
+def plain(message: ParameterValue) -> Any:
+    """The value of a parameter that a service told, as YAML has it: arrays as lists."""
+    value = parameter_value_to_python(message)
+    return list(value) if hasattr(value, "__len__") and not isinstance(value, str) else value
 
 
 def complete(kind: type[ParameterSet], given: dict[str, Any]) -> bool:

@@ -1,6 +1,7 @@
 """States that travel as diagnostic_msgs/DiagnosticArray: one status with key-value pairs."""
 
 from dataclasses import dataclass, fields
+from typing import ClassVar
 
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 
@@ -37,6 +38,8 @@ def diagnostic(
 class _Status:
     """Conversion of a dataclass to and from the key-value pairs of one status."""
 
+    LATER: ClassVar[tuple[str, ...]] = ()  # entries that older logs lack
+
     def to_message(self, stamp: int) -> DiagnosticArray:
         """Return the message; stamp [ns]."""
         values = {item.name: getattr(self, item.name) for item in fields(self)}
@@ -52,6 +55,8 @@ class _Status:
         values = {}
         for item in fields(cls):
             if item.name not in texts:
+                if item.name in cls.LATER:
+                    continue
                 raise BadMessage(f"{cls.NAME}: '{item.name}' is missing")
             try:
                 values[item.name] = _READ[item.type](texts[item.name])
@@ -114,7 +119,8 @@ class MissionStatus(_Status):
     """Where the mission is, on every change of phase and twice a second.
 
     time: mission time [s], negative before take-off. Errors are norms of estimate − reference:
-    [m], [rad], [rad]. magnet: whether it is on; unlike /uam/magnet this has a stamp.
+    [m], [rad], [rad]. magnet: whether it is on; unlike /uam/magnet this has a stamp. state, cause:
+    of the supervisor (uam_control.supervision.State), and why it is in it.
     """
 
     phase: str = "waiting"
@@ -125,13 +131,18 @@ class MissionStatus(_Status):
     done: bool = False
     abort_reason: str = ""
     magnet: bool = False
+    state: str = "grounded"
+    cause: str = ""
 
     NAME = "mission"
+    LATER = ("state", "cause")
 
     @property
     def level(self) -> bytes:
-        """ERROR when the mission was given up."""
-        return ERROR if self.abort_reason else OK
+        """ERROR when the mission was given up, WARN while it holds."""
+        if self.abort_reason:
+            return ERROR
+        return WARN if self.state == "holding" else OK
 
     @property
     def summary(self) -> str:

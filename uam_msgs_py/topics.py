@@ -3,7 +3,7 @@
 Frames are REP-103: ENU world, FLU body. Names can be remapped the ROS way.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 from diagnostic_msgs.msg import DiagnosticArray
 from geometry_msgs.msg import PoseStamped, TwistStamped
@@ -18,11 +18,12 @@ from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import BatteryState, Imu, JointState
 from std_msgs.msg import Bool, Float64MultiArray, String
 from trajectory_msgs.msg import JointTrajectory
+from visualization_msgs.msg import MarkerArray
 
-try:  # not among the wheels of PyPI; there with a ROS from apt
+try:
     from tf2_msgs.msg import TFMessage
-except ImportError:
-    TFMessage = None
+except ImportError:  # not among the wheels of PyPI
+    from uam_msgs_py.tf_message import TFMessage
 
 
 def _qos(depth: int, reliable: bool = True, latched: bool = False) -> QoSProfile:
@@ -40,6 +41,7 @@ def _qos(depth: int, reliable: bool = True, latched: bool = False) -> QoSProfile
 DEPTH = 32
 SENSOR_DATA = _qos(DEPTH, reliable=False)  # rclpy.qos.qos_profile_sensor_data, but deeper
 RELIABLE = _qos(DEPTH)
+NEWEST = _qos(4, reliable=False)  # for who looks now and then, and wants the present alone
 LATCHED = _qos(1, latched=True)  # a late subscriber gets the last message
 
 
@@ -49,7 +51,7 @@ class Topic:
 
     name: str
     type: type
-    qos: QoSProfile
+    qos: QoSProfile = field(hash=False)  # has none
     content: str
     one_publisher: bool = True
 
@@ -108,6 +110,23 @@ MISSION_STATUS = Topic(
     "/uam/mission/status", DiagnosticArray, LATCHED, "see uam_msgs_py.status.MissionStatus"
 )
 
+# What was asked of the nodes in flight; reliable and kept, as each comes only once
+CHANGES = Topic(
+    "/uam/parameter_changes",
+    DiagnosticArray,
+    _qos(1000, latched=True),
+    "see uam_msgs_py.changes.Change",
+    one_publisher=False,
+)
+
+FAULTS = Topic(
+    "/uam/faults",
+    DiagnosticArray,
+    _qos(1000, latched=True),
+    "faults put into the flight; see uam_msgs_py.faults.FaultEvent",
+    one_publisher=False,
+)
+
 # What only a simulator knows
 TRUTH_STATE = Topic("/uam/truth/state", JointTrajectory, RELIABLE, "true chi, chi_dot, chi_ddot")
 TRUTH_PAYLOAD = Topic("/uam/truth/payload", PoseStamped, RELIABLE, "payload, world")
@@ -118,10 +137,23 @@ TRUTH_MAGNET = Topic(
     "/uam/truth/magnet", JointState, RELIABLE, "magnet: on 0/1, holding force N; swing: angle rad"
 )
 
+# To be seen, in RViz and Foxglove. Losses do not count: the next message says it all again.
+ROBOT_DESCRIPTION = Topic("/robot_description", String, LATCHED, "URDF", one_publisher=False)
+TF = Topic("/tf", TFMessage, _qos(100), "vehicle, reference, payload, 25 Hz", one_publisher=False)
+TF_STATIC = Topic("/tf_static", TFMessage, LATCHED, "what never moves", one_publisher=False)
+TRACKING_ERROR = Topic(
+    "/uam/tracking/error",
+    JointState,
+    RELIABLE,
+    "estimate - reference: chi, chi_dot; 0 where nothing is asked; 25 Hz",
+    one_publisher=False,
+)
+MARKERS = Topic(
+    "/uam/markers", MarkerArray, LATCHED, "paths, payload, magnet, phase", one_publisher=False
+)
+
 # ROS conventions
-ROBOT_DESCRIPTION = Topic("/robot_description", String, LATCHED, "URDF")
 DIAGNOSTICS = Topic("/diagnostics", DiagnosticArray, RELIABLE, "health, 1 Hz", one_publisher=False)
 ROSOUT = Topic("/rosout", Log, _qos(1000, latched=True), "log of all nodes", one_publisher=False)
-TF = Topic("/tf", TFMessage, _qos(100), "transforms", one_publisher=False) if TFMessage else None
 
 ALL = [topic for topic in list(vars().values()) if isinstance(topic, Topic)]

@@ -6,7 +6,7 @@ import pytest
 from whole_flight import SHORT, Flight
 
 
-@pytest.fixture(scope="module")
+@pytest.fixture(scope="session")
 def short_scenario(tmp_path_factory) -> Path:
     """A scenario file of a few seconds."""
     file = tmp_path_factory.mktemp("scenario") / "short.yaml"
@@ -28,7 +28,7 @@ def fly(tmp_path):
         flight.end()
 
 
-@pytest.fixture(scope="module")
+@pytest.fixture(scope="session")
 def two_flights(tmp_path_factory, short_scenario):
     """Two lockstep flights with one seed, flown at the same time; both have ended."""
     folder = tmp_path_factory.mktemp("twins")

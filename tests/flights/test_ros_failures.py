@@ -6,10 +6,14 @@ import signal
 import time
 
 import pytest
+from rich.console import Console
 from whole_flight import assert_nothing_left, wait_until_gone
 
-from uam_sim_bridge.flight import shared_memory, timeseries
+from uam_sim_bridge.flight import ros_engine, shared_memory, timeseries
 from uam_sim_bridge.flight.ports import Reservation
+from uam_sim_bridge.flight.progress import Progress
+from uam_sim_bridge.flight.result_folder import ResultFolder
+from uam_sim_bridge.flight.settings import settings
 
 
 def kept(flight):
@@ -28,7 +32,7 @@ def test_a_killed_node_ends_the_flight_and_is_named(fly, short_scenario, victim)
     flight = fly("--scenario", str(short_scenario))
     flight.until_phase("take-off")
     nodes, shared = flight.children(), flight.shared_memory()
-    assert len(nodes) == 9 and shared
+    assert len(nodes) == 10 and shared
     os.kill(nodes[victim], signal.SIGKILL)
     assert flight.wait() == 1
     assert f"uam fly: {victim} was killed by SIGKILL" in flight.complained
@@ -36,6 +40,17 @@ def test_a_killed_node_ends_the_flight_and_is_named(fly, short_scenario, victim)
     assert_nothing_left(flight, list(nodes.values()), shared)
     if victim != "recorder":
         assert f"{victim} was killed by SIGKILL" in kept(flight)["abort_reason"]
+
+
+def test_a_killed_scene_is_announced_and_the_flight_goes_on(fly, short_scenario):
+    flight = fly("--scenario", str(short_scenario))
+    flight.until_phase("take-off")
+    os.kill(flight.children()["scene"], signal.SIGKILL)
+    assert flight.wait() == 0
+    assert "scene was killed by SIGKILL; the flight goes on without it" in flight.said
+    figures = json.loads((flight.out / "metrics.json").read_text())
+    assert figures["mission_completed"]
+    assert_nothing_left(flight, [], set())
 
 
 def test_a_recorder_without_processor_time_loses_nothing(fly, short_scenario):
@@ -99,3 +114,15 @@ def test_no_node_survives_a_killed_orchestrator(fly, short_scenario):
     assert [file for file in used if file.exists()] == []
     with Reservation(flight.instance):
         pass
+
+
+def test_who_does_not_find_the_others_is_started_once_more(short_scenario, tmp_path, monkeypatch):
+    monkeypatch.setattr(ros_engine, "START_TIMEOUT", 0.1)
+    with (tmp_path / "said").open("w+") as said, Progress(Console(file=said, width=400)) as shown:
+        wanted = settings(scenario=str(short_scenario))
+        flown = ros_engine.fly(wanted, ResultFolder(tmp_path), shown)
+        said.seek(0)
+        text = said.read()
+    assert text.count("processes in ROS domain") == 2
+    assert "no progress for 0.1 s" in text and "starting once more" in text
+    assert "no progress for 0.1 s" in flown.failure and flown.series is None

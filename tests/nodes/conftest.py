@@ -52,6 +52,12 @@ class Probe:
         self.node.create_subscription(topic.type, topic.name, messages.append, topic.qos, raw=raw)
         return messages
 
+    def collect_raw(self, topic) -> list:
+        """The same, but serialized whatever the type."""
+        messages = []
+        self.node.create_subscription(topic.type, topic.name, messages.append, topic.qos, raw=True)
+        return messages
+
     def publisher(self, topic):
         """Return a publisher of `topic`."""
         return self.node.create_publisher(topic.type, topic.name, topic.qos)

@@ -272,6 +272,30 @@ def test_the_thrust_factor_is_identified_told_and_held_while_the_magnet_is_on(ma
     assert factor() == held
 
 
+def test_a_mission_in_failsafe_is_left_to_the_autopilot_down_to_the_ground(make_rig, probe):
+    """Level, then no stream, and no wish for OFFBOARD, at any height; idle does not mean thrust
+    0."""
+    status = probe.publisher(topics.MISSION_STATUS)
+    rig = make_rig()
+    probe.until_connected("mavlink_bridge", [status], [])
+    rig.fly()
+    told = MissionStatus("aborted", 1.0, state="failsafe", cause="tilt").to_message(1)
+    status.publish(told)
+    time.sleep(0.2)  # it is not part of the join; let it arrive
+    for _ in range(100):
+        _, thrust = rig.tick()
+        assert thrust == pytest.approx(WEIGHT / 41.36, rel=0.02)
+    for _ in range(500):
+        rig.tick()
+    assert rig.autopilot.status.mode is Mode.LAND
+    rig.body.position[2] = 0.2
+    rig.received.clear()
+    for _ in range(200):
+        rig.tick()
+    assert rig.autopilot.status.mode is Mode.LAND
+    assert not rig.kinds() & {"SET_ATTITUDE_TARGET", "COMMAND_LONG"}
+
+
 def test_idle_high_up_is_not_thrust_zero(make_rig):
     rig = make_rig()
     rig.fly()

@@ -5,6 +5,7 @@ import socket
 
 from uam_msgs_py import topics
 from uam_sim_bridge.flight import wiring
+from uam_sim_bridge.nodes.plant_options import NOT_READY
 
 MODULE = "uam_sim_bridge.nodes.mujoco_sim"
 
@@ -36,10 +37,10 @@ def test_alone_it_says_who_is_missing_and_stops_cleanly(start):
 def test_a_bounded_start_names_who_never_came(start, tmp_path):
     statistics = tmp_path / "plant.json"
     running = start(MODULE, *options(start_timeout=1.0, statistics=statistics))
-    assert running.process.wait(60) == 1
-    assert "not ready after 1 s, waiting for state_estimator" in running.output
+    assert running.process.wait(60) == NOT_READY
+    assert "no progress for 1 s, waiting for state_estimator" in running.output
     report = json.loads(statistics.read_text())
-    assert report["ticks"] == 0 and "not ready" in report["ended_by"]
+    assert report["ticks"] == 0 and "no progress" in report["ended_by"]
 
 
 def test_wrong_parameters_are_refused_in_one_line(start):
@@ -47,6 +48,7 @@ def test_wrong_parameters_are_refused_in_one_line(start):
         (options(clock="sundial"), "clock: 'sundial' is not lockstep or realtime"),
         (options(vehicle="glider"), "no vehicle/glider.yaml in the configuration"),
         (options(gravity="9.81"), "gravity: unknown"),
+        (options(faults="'{}'"), 'faults: {"seed": N, "faults": [...]} expected, as JSON'),
     ):
         running = start(MODULE, *arguments)
         assert running.process.wait(60) == 2

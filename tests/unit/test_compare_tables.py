@@ -34,12 +34,14 @@ def test_claims_say_where_they_hold_and_where_not():
     flights = [flight(ASMC1, s, 3.0 + 0.01 * s) for s in (1, 2, 3)]
     flights += [flight(ASMC2, s, 0.02 + 0.001 * s, 0.2, s != 2, s == 2) for s in (1, 2, 3)]
     flights += [flight(PROPOSED, s, 0.03 + 0.001 * s) for s in (1, 2, 3)]
-    first, second, third, limit, aim, lost = tables.claims(tables.rows(flights))
+    first, second, third, limit, aim, lost, kept = tables.claims(tables.rows(flights))
     assert f"than with {ASMC1}: holds for x, y" in first and "does not" not in first
     assert "holds in no column; does not hold for x" in second
     assert f"with {ASMC2} than with {ASMC1}: holds for x" in third
     assert "missed in y" in limit and "missed in x, y" in aim
     assert lost == f"{ASMC2}: 1 of 3 flights not completed, 1 of them lost (fell)."
+    assert kept == f"{PROPOSED}: all 3 flights completed, none lost."
+    assert tables.claims(tables.rows(flights[6:])) == [limit, aim, kept]
 
 
 def test_the_tables_have_our_figures_the_papers_and_the_degradation():

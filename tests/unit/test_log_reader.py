@@ -6,8 +6,10 @@ import pytest
 pytest.importorskip("rclpy")
 
 from uam_control.laws.catalogue import LAWS
+from uam_control.mission import load_scenario
 from uam_control.profile import load_profile
 from uam_msgs_py.convert import JointStateWriter
+from uam_msgs_py.status import MissionStatus
 from uam_sim_bridge.flight import log_reader
 from uam_sim_bridge.flight.mcap_reader import TopicLog
 from uam_sim_bridge.flight.timeseries import COLUMNS, gain_columns
@@ -42,3 +44,48 @@ def test_the_thrust_factor_holds_between_its_messages():
     log = log_reader.Log({log_reader.THRUST: TopicLog("sensor_msgs/msg/JointState", [], messages)})
     found = log.samples(log_reader.THRUST, ("position",), 1)
     np.testing.assert_array_equal(found.at(np.array([4_000_000, 104_000_000]))[:, 0], [1.0, 0.9])
+
+
+SECOND = 1_000_000_000
+
+
+def told(*entries):
+    """(stamp [s], MissionStatus) from (stamp, phase, state, cause, abort_reason)."""
+    return [
+        (round(at * SECOND), MissionStatus(phase, state=state, cause=cause, abort_reason=reason))
+        for at, phase, state, cause, reason in entries
+    ]
+
+
+def phases(statuses, seconds, flying):
+    ticks = np.array(seconds) * SECOND
+    time = np.array(seconds) - 10.0  # take-off at 10 s
+    scenario = load_scenario("hover")
+    return list(log_reader.phases(ticks, time, np.array(flying), scenario, statuses))
+
+
+def test_phases_are_the_scenarios_unless_the_mission_left_it():
+    planned = told((9, "waiting", "grounded", "", ""), (10, "take-off", "taking off", "armed", ""),
+                   (24, "landed", "disarmed", "touchdown", ""))  # fmt: skip
+    seconds, flying = [9, 10, 14, 20, 25], [False, True, True, True, False]
+    expected = ["waiting", "take-off", "hover", "land", "landed"]
+    assert phases(planned, seconds, flying) == expected
+    held = told((9, "waiting", "grounded", "", ""), (10, "take-off", "taking off", "armed", ""),
+                (13, "hover", "flying", "airborne", ""), (15, "hold", "holding", "asked", ""),
+                (19.5, "land", "landing", "battery", "battery"),
+                (24, "landed", "disarmed", "touchdown", "battery"))  # fmt: skip
+    assert phases(held, [9, 10, 14, 16, 20, 25], [False, *[True] * 4, False]) == [
+        "waiting", "take-off", "hover", "hold", "land", "landed"]  # fmt: skip
+    lost = told((9, "waiting", "grounded", "", ""), (10, "take-off", "taking off", "armed", ""),
+                (15, "aborted", "failsafe", "tilt", "tilt"))  # fmt: skip
+    assert phases(lost, [14, 16], [True, False]) == ["hover", "aborted"]
+
+
+def test_transitions_are_told_with_mission_time_and_cause():
+    statuses = told((9, "waiting", "grounded", "", ""), (10, "take-off", "taking off", "armed", ""),
+                    (10.5, "take-off", "taking off", "armed", ""),
+                    (12.25, "hold", "holding", "tilt", ""))  # fmt: skip
+    assert log_reader.transitions(statuses, 10 * SECOND) == [
+        {"time_s": 0.0, "from": "grounded", "to": "taking off", "cause": "armed"},
+        {"time_s": 2.25, "from": "taking off", "to": "holding", "cause": "tilt"},
+    ]

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from uam_control.mission import Mission, MissionParameters, ScenarioError, load_scenario
 from uam_control.mission.scenario import CSV_REQUIRED
 from uam_control.mission.trajectory import Move, Moves, Sampled
+from uam_control.supervision import Command, State
 
 START = np.array([0.0, 0.0, 0.28, 0.0, 0.0, 0.0, 0.0, np.pi / 2])
 
@@ -206,25 +207,153 @@ def test_sequence_waits_for_arming_flies_and_lands():
     flight.until(lambda o: o.done)
 
 
+def disturb(flight, entry, value, seconds):
+    """Fly on for a while with one entry of the state as it should not be."""
+    for _ in range(round(seconds / 0.01)):
+        output = flight.step()
+        flight.state[entry] = value
+    return output
+
+
 @pytest.mark.parametrize(
-    ("disturb", "reason"),
+    ("entry", "value", "reason"),
     [
-        (lambda s: s.__setitem__((0, 0), 3.0), "position error"),
-        (lambda s: s.__setitem__((0, 3), 1.5), "tilt"),
-        (lambda s: s.__setitem__((0, 1), np.nan), "position error"),
+        ((0, 0), 4.0, "position error 4.00 m exceeds 3 m"),
+        ((0, 3), 1.5, "tilt 1.50 rad exceeds 1.05 rad"),
+        ((0, 1), np.nan, "estimate is not finite"),
     ],
 )
-def test_a_lost_vehicle_ends_the_flight_with_the_reason(disturb, reason):
+def test_a_lost_vehicle_is_left_to_the_autopilot_not_dropped(entry, value, reason):
     flight = Flight()
     flight.until(lambda o: o.time > 4.0)
-    disturb(flight.state)
-    output = flight.step(follow=False)
-    assert reason in output.abort_reason
-    assert not output.flying and not output.arm and not output.magnet
+    output = disturb(flight, entry, value, 0.2)
+    assert output.state is State.FAILSAFE and output.abort_reason == output.cause == reason
+    assert not output.flying and output.arm and not output.done
+    assert np.all(np.isfinite(output.reference))
+    flight.armed_at = np.inf  # the autopilot has landed and disarmed
+    output = flight.until(lambda o: o.done)
+    assert output.phase == "aborted" and not output.arm
+
+
+def test_a_vehicle_that_is_off_its_path_holds_then_lands_where_it_is():
+    flight = Flight()
+    flight.until(lambda o: o.time > 4.0)
+    assert disturb(flight, (0, 0), 1.2, 0.3).state is State.FLYING  # not for long enough
+    output = disturb(flight, (0, 0), 1.2, 0.4)
+    assert output.state is State.HOLDING and output.phase == "hold" and not output.abort_reason
+    output = disturb(flight, (0, 0), 1.2, 5.1)
+    assert output.state is State.LANDING and output.phase == "land"
+    assert output.abort_reason == "position error 1.20 m exceeds 1 m for 5 s"
+    output = disturb(flight, (0, 0), 1.2, 15.0)
+    assert output.reference[0, 0] == pytest.approx(1.2, abs=0.02) and output.phase == "landed"
+    assert flight.until(lambda o: o.done).abort_reason
+
+
+def test_hold_stops_the_scenario_and_resume_goes_on_with_it():
+    flight = Flight("pick_and_place")
+    flight.until(lambda o: o.time > 10.0)
+    assert flight.mission.request(Command.RESUME) == (False, "refused: not while flying")
+    assert flight.mission.request(Command.HOLD) == (True, "hold by command")
+    assert flight.step().state is State.HOLDING
+    flight.until(lambda o: o.time > 13.0)
+    held = flight.step().reference.copy()
+    np.testing.assert_array_equal(held[1:], 0.0)
+    flight.until(lambda o: o.time > 20.0)
+    np.testing.assert_array_equal(flight.step().reference, held)
+    assert flight.mission.request(Command.RESUME)[0]
+    assert flight.step().phase == "approach"
+    output = flight.until(lambda o: o.done, limit=120.0)
+    assert not output.abort_reason and output.phase == "landed"
+    assert [(c.source, c.target) for c in flight.mission.changes] == [
+        (State.GROUNDED, State.TAKING_OFF),
+        (State.TAKING_OFF, State.FLYING),
+        (State.FLYING, State.HOLDING),
+        (State.HOLDING, State.FLYING),
+        (State.FLYING, State.LANDING),
+        (State.LANDING, State.DISARMED),
+    ]
+
+
+def test_land_goes_down_from_where_it_is_and_stows_the_arm():
+    flight = Flight("pick_and_place")
+    flight.until(lambda o: o.time > 25.0)
+    x = flight.state[0, 0]
+    assert flight.mission.request(Command.LAND)[0]
+    output = flight.until(lambda o: o.phase == "landed", limit=60.0)
+    assert output.abort_reason == "land by command" and output.time < 35.0
+    assert output.reference[0, 0] == pytest.approx(x, abs=0.06)
+    assert output.reference[0, 6:] == pytest.approx([0.0, np.pi / 2])
+
+
+def test_disarming_in_the_air_is_refused_and_on_the_ground_done():
+    flight = Flight()
+    assert flight.mission.request(Command.DISARM) == (False, "no state of the vehicle yet")
+    flight.until(lambda o: o.time > 4.0)
+    refused = (False, "refused: flying and not on the ground: land first")
+    assert flight.mission.request(Command.DISARM) == refused
+    assert flight.step().arm
+    waiting = Flight()
+    waiting.step()
+    assert waiting.mission.request(Command.DISARM)[0]
+    output = waiting.step()
+    assert not output.arm and output.state is State.DISARMED and output.time < 0.0
+    assert waiting.mission.switch_magnet(True)[0] is False
+
+
+def test_the_magnet_is_as_asked_for_until_the_scenario_switches_it():
+    flight = Flight("pick_and_place")
+    flight.until(lambda o: o.time > 10.0)
+    assert flight.mission.switch_magnet(True) == (
+        True, "magnet on until the scenario switches it next")
+    assert flight.step().magnet
+    assert flight.until(lambda o: o.time > 36.0).magnet
+    flight.mission.switch_magnet(False)
+    assert not flight.step().magnet
+    assert not flight.until(lambda o: o.time > 71.0, limit=80.0).magnet
+
+
+def test_nothing_takes_off_while_a_limit_is_passed():
+    flight = Flight()
+    flight.state[0, 3] = 1.2  # lying on its side
+    for _ in range(300):
+        output = flight.step()
+    assert output.state is State.GROUNDED and "tilt" in flight.mission.beyond
+    flight.state[0, 3] = 0.0
+    assert flight.until(lambda o: o.flying).state is State.TAKING_OFF
 
 
 def test_disarming_in_flight_is_noticed():
     flight = Flight()
     flight.until(lambda o: o.time > 4.0)
     flight.armed_at = np.inf
-    assert "disarmed" in flight.step().abort_reason
+    output = flight.step()
+    assert "disarmed" in output.abort_reason and output.phase == "aborted"
+
+
+STRANGE = st.floats(-10.0, 10.0) | st.sampled_from([np.nan, np.inf, -np.inf])
+HAPPENINGS = st.tuples(
+    st.integers(1, 300), st.integers(0, 2), st.integers(0, 7), STRANGE,
+    st.sampled_from([None, *Command]), st.booleans(), st.booleans(),
+)  # fmt: skip
+
+
+@settings(deadline=None, max_examples=60)
+@given(st.lists(HAPPENINGS, max_size=12))
+def test_a_reference_is_finite_and_never_jumps_whatever_happens(happenings):
+    flight = Flight("pick_and_place", armed_at=0.0)
+    wanted, before = True, None
+    for ticks, row, column, value, command, magnet, well in happenings:
+        for _ in range(ticks):
+            output = flight.step()
+            assert np.all(np.isfinite(output.reference)) and np.isfinite(output.time)
+            assert wanted or not output.arm
+            wanted = output.arm
+            if before is not None and output.flying:
+                assert np.max(np.abs(output.reference[0] - before)) < 0.02
+            before = output.reference[0].copy() if output.flying else None
+        if command is not None:
+            flight.mission.request(command)
+        flight.mission.switch_magnet(magnet)
+        flight.state[row, column] = value
+        if well:
+            flight.state[:] = output.reference

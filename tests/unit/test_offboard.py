@@ -167,3 +167,12 @@ def test_with_the_stand_in():
     assert s.phase is Phase.FLYING and 3.0 < s.armed_stamp < 4.0
     assert any("vision" in reason for reason in heard)
     assert s.reasons == ()
+
+
+def test_an_autopilot_that_is_to_help_itself_is_not_asked_for_offboard_again():
+    s = flying()
+    s.let_go = True
+    assert run(s, 5.0, 2.0, armed=True, mode=Mode.LAND) == []
+    assert run(s, 5.0, 7.0, armed=False, mode=Mode.HOLD) == []  # nor to arm, once it has landed
+    s.want(False)
+    assert run(s, 5.0, 12.0, armed=False, mode=Mode.HOLD) == []

@@ -57,9 +57,7 @@ def test_the_lock_of_a_killed_flight_vanishes(tmp_path):
 def test_a_port_held_by_another_program_is_skipped_and_named(tmp_path):
     with Reservation(folder=tmp_path) as free:
         held = free.ports
-    with socket.socket(socket.AF_INET, socket.SOCK_STREAM) as program:
-        program.bind(("127.0.0.1", held.simulator_tcp))
-        program.listen()
+    with socket.create_server(("127.0.0.1", held.simulator_tcp)):
         with Reservation(folder=tmp_path) as other:
             assert other.ports.instance != held.instance
         with pytest.raises(PortError, match=f"TCP {held.simulator_tcp}"):

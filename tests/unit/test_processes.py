@@ -102,6 +102,19 @@ def test_a_kill_from_outside_is_a_failure_that_names_the_signal(children):
         children.check()
 
 
+def test_the_end_of_an_optional_child_is_told_once_and_no_failure(children):
+    children.start("scene", "sleeper", optional=True)
+    children.start("other", "sleeper", optional=True)
+    ready(children, "scene")
+    assert children.missed() == []
+    os.kill(children.pid("scene"), signal.SIGKILL)
+    wait_for(lambda: not children.running("scene"))
+    children.check()
+    assert [str(failure) for failure in children.missed()] == ["scene was killed by SIGKILL"]
+    children.stop(["other"])
+    assert children.missed() == [], "told once; and who was asked to stop is not missed"
+
+
 def test_a_terminal_interrupt_does_not_reach_the_children(children):
     children.start("a", "sleeper")
     assert os.getpgid(children.pid("a")) != os.getpgid(0)

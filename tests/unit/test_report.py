@@ -97,6 +97,19 @@ def test_the_page_marks_what_is_worse_than_the_paper_and_says_why_not_completed(
     assert "missed control ticks 7" in words
 
 
+def test_page_and_console_say_where_the_supervisor_stepped_in(flight_folder):
+    steps = [
+        {"time_s": 0.0, "from": "grounded", "to": "taking off", "cause": "armed"},
+        {"time_s": 3.25, "from": "flying", "to": "holding", "cause": "tilt 0.90 rad"},
+    ]
+    assert outcome.supervision_story({"transitions": steps[:1]}) is None
+    change_metrics(flight_folder, transitions=steps)
+    words = text_of(page.write_page(flight_folder).read_text())
+    assert "3.250 s flying → holding tilt 0.90 rad" in words
+    metrics = json.loads((flight_folder / "metrics.json").read_text())
+    assert outcome.supervision_story(metrics) == "holding at 3.2 s (tilt 0.90 rad)"
+
+
 def test_the_page_names_every_safeguard_and_every_difference(flight_folder):
     file = flight_folder / "parameters.yaml"
     file.write_text(

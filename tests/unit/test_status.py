@@ -29,6 +29,13 @@ def test_mission_status_round_trip():
     assert given_up.status[0].level == ERROR and given_up.status[0].message == "tilt"
 
 
+def test_a_mission_that_holds_is_a_warning_and_an_older_log_has_no_states():
+    holding = MissionStatus("hold", state="holding", cause="tilt").to_message(1)
+    assert holding.status[0].level == WARN
+    del holding.status[0].values[-2:]
+    assert MissionStatus.from_message(holding)[1] == MissionStatus("hold")
+
+
 def test_what_is_missing_or_strange_is_refused():
     message = MissionStatus().to_message(0)
     with pytest.raises(BadMessage, match="no status 'autopilot'"):

@@ -104,6 +104,6 @@ class Asmc1Law(Law):
         axes = range(1, len(parameters.inertia) + 1)
         super().__init__(parameters, (*(f"D{i}" for i in axes), "s_norm"))
 
-    def reset(self) -> None:
+    def reset_adaptation(self) -> None:
         """Forget the disturbance."""
-        self.adaptation[:] = 0.0
+        self.adaptation[:-1] = 0.0

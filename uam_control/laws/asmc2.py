@@ -153,7 +153,6 @@ class Asmc2Law(Law):
         """How often |eta| was clamped since the reset, axes counted singly."""
         return int(self.adaptation[CLAMPS])
 
-    def reset(self) -> None:
-        """Put theta back to its initial value; the allowed error narrows from now on."""
-        self.adaptation[:] = 0.0
+    def reset_adaptation(self) -> None:
+        """Put theta back to its initial value; the time since the start of the law goes on."""
         self.adaptation[:3] = self.parameters.theta_initial

@@ -32,7 +32,12 @@ class Law:
         self._record = parameters.record()
 
     def reset(self) -> None:
-        """Put the adapted gains back to their initial values."""
+        """Start afresh: adapted gains at their initial values, nothing remembered."""
+        self.adaptation[:] = 0.0
+        self.reset_adaptation()
+
+    def reset_adaptation(self) -> None:
+        """Put the adapted gains back to their initial values; filters and time go on."""
         raise NotImplementedError
 
     def update(

@@ -95,8 +95,7 @@ class ModularLaw(Law):
     def __init__(self, parameters) -> None:
         super().__init__(parameters, ADAPTATION, memory=1)
 
-    def reset(self) -> None:
+    def reset_adaptation(self) -> None:
         """Put K0..K3 and zeta back to their initial values."""
         self.adaptation[:4] = self.parameters.k_initial
         self.adaptation[ZETA] = self.parameters.zeta_initial
-        self.adaptation[RHO:] = 0.0

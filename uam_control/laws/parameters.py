@@ -13,6 +13,7 @@ from uam_control.parameters import (
     HUGE,
     TINY,
     Bound,
+    ParameterError,
     ParameterSet,
     Switch,
     choice,
@@ -102,14 +103,24 @@ class ModularParameters(LawParameters):
         0.0, "safeguard: low-pass on ||chi_ddot||, 0 = off", "Hz", 0.0, 125.0
     )
 
+    def check_together(self) -> None:
+        """Also refuse gains whose Lyapunov matrix P is not positive definite as computed."""
+        super().check_together()
+        p11, p12, p22 = self.lyapunov_matrix()
+        if not np.all((1.0 - 1e-12) * p11 * p22 > p12 * p12):
+            raise ParameterError(
+                "lambda_1, lambda_2, q_position, q_velocity: together they give a matrix P that "
+                "is not positive definite in double precision"
+            )
+
+    def lyapunov_matrix(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Return p11, p12, p22, each (n,), see `lyapunov.solve`."""
+        given = (self.lambda_1, self.lambda_2, self.q_position, self.q_velocity)
+        return lyapunov.solve(*map(np.array, given))
+
     def record(self) -> np.ndarray:
         """Return the one-element structured array that the compiled law reads."""
-        p11, p12, p22 = lyapunov.solve(
-            *(
-                np.array(values)
-                for values in (self.lambda_1, self.lambda_2, self.q_position, self.q_velocity)
-            )
-        )
+        p11, p12, p22 = self.lyapunov_matrix()
         theory = self.lambda_form == "theory"
         table = np.array(self.lambda_table)
         return structured(

@@ -1,32 +1,33 @@
 """The sequence of a flight: waiting, take-off, the scenario's phases, landing, landed, or
-aborted."""
+aborted; the supervisor decides what of it is done."""
 
 from __future__ import annotations
 
 import math
+from collections import deque
 from dataclasses import dataclass
 
 import numpy as np
 
-from uam_control.compiled import jit
 from uam_control.coordinates import ARM
+from uam_control.mission.guidance import Guidance
+from uam_control.mission.parameters import MissionParameters
 from uam_control.mission.scenario import Scenario
-from uam_control.mission.trajectory import Trajectory, empty_reference
-from uam_control.parameters import ParameterSet, number
+from uam_control.mission.trajectory import empty_reference
+from uam_control.supervision import (
+    Change,
+    Command,
+    Decision,
+    Event,
+    Guide,
+    Observation,
+    Readings,
+    State,
+    Supervisor,
+)
 
-
-@dataclass(frozen=True)
-class MissionParameters(ParameterSet):
-    """When the flight begins, ends, and is given up."""
-
-    takeoff_delay: float = number(0.5, "from armed to take-off", "s", 0.0, 60.0)
-    touchdown_height: float = number(0.05, "height that counts as on the ground", "m", 0.0, 0.5)
-    touchdown_speed: float = number(0.10, "vertical speed that counts as at rest", "m/s", 0.0, 1.0)
-    touchdown_time: float = number(0.3, "how long both must hold", "s", 0.0, 5.0)
-    touchdown_timeout: float = number(8.0, "longest wait for touchdown", "s", 0.0, 60.0)
-    settle_time: float = number(1.5, "from touchdown to the end", "s", 0.0, 60.0)
-    position_error_max: float = number(1.5, "position error that ends the flight", "m", 0.1, 100.0)
-    tilt_max: float = number(1.05, "tilt that ends the flight", "rad", 0.1, 3.2)
+# phases that no scenario has
+WAITING, HOLD, LAND, LANDED, ABORTED = "waiting", "hold", "land", "landed", "aborted"
 
 
 @dataclass
@@ -34,114 +35,215 @@ class MissionOutput:
     """What the mission wants at one tick.
 
     reference (3, 8), reused by the next step; flying: position and attitude are to be controlled;
-    time: mission time [s], negative before take-off; arm: the autopilot is to be armed.
+    time: since take-off [s], negative before; arm: the autopilot is to be armed; state, cause: of
+    the supervisor, and why it is in it; abort_reason: why the scenario was given up.
     """
 
     reference: np.ndarray
     flying: bool = False
     time: float = -1.0
-    phase: str = "waiting"
+    phase: str = WAITING
     magnet: bool = False
     arm: bool = True
     done: bool = False
     abort_reason: str = ""
+    state: State = State.GROUNDED
+    cause: str = ""
 
 
 class Mission:
-    """Steps through a scenario; plain states, no clock but the stamps it is given."""
+    """Steps through a scenario under supervision; no clock but the stamps it is given."""
 
     def __init__(self, scenario: Scenario, parameters: MissionParameters) -> None:
         self.scenario = scenario
-        self.parameters = parameters
         self.output = MissionOutput(empty_reference())
         self.output.reference[0, ARM] = scenario.arm_start
-        self._trajectory: Trajectory | None = None
+        self._supervisor = Supervisor(parameters)
+        self._parameters = parameters
+        self._requests: deque[Command] = deque()
+        self._seen: Observation | None = None
+        self._guidance: Guidance | None = None
         self._takeoff = self._ground = 0.0
+        self._half_down = math.inf  # stamp from which a descent may touch down
         self._at_rest_since: float | None = None
+        self._failsafe_since = math.inf
         self._end: float | None = None
+        self._magnet: tuple[bool, bool] | None = None  # as overridden, as the scenario had it then
 
-    def step(self, stamp: float, state: np.ndarray, armed_since: float | None) -> MissionOutput:
+    def configure(self, parameters: MissionParameters) -> None:
+        """Use `parameters` (validated) from the next step on."""
+        self._parameters = parameters
+        self._supervisor.configure(parameters)
+        if self._guidance is not None:
+            self._guidance.parameters = parameters
+
+    @property
+    def changes(self) -> list[Change]:
+        """Every change of state so far, in order."""
+        return self._supervisor.changes
+
+    @property
+    def beyond(self) -> str:
+        """What is beyond a limit now, "" where nothing is."""
+        return self._supervisor.beyond
+
+    def step(
+        self,
+        stamp: float,
+        state: np.ndarray,
+        armed_since: float | None,
+        readings: Readings | None = None,
+    ) -> MissionOutput:
         """Return what holds at `stamp` [s].
 
         state: newest estimate (3, 8). armed_since: stamp at which the autopilot reported armed,
-        None while it is not. Call it for every tick with the stamp of the tick to come.
+        None while it is not. readings: what else is known. Call it for every tick with the stamp of
+        the tick to come.
         """
-        output = self.output
-        if self._end is not None:
+        output, guidance = self.output, self._guidance
+        if guidance is not None:
             output.time = stamp - self._takeoff
+        if output.state is not State.DISARMED:
+            if guidance is not None:
+                guidance.advance(stamp)
+            seen = self._seen = self._observe(stamp, state, armed_since, readings or Readings())
+            command = self._requests.popleft() if self._requests else None
+            decision = self._supervisor.step(stamp, seen, command)
+            if guidance is not None:
+                guidance.write(stamp)
+            self._follow(stamp, decision)
+            if output.state is State.FAILSAFE and self._end is None:
+                given = self._failsafe_since + self._parameters.failsafe_timeout
+                if armed_since is None or stamp >= given:
+                    self._end = stamp + self._parameters.settle_time
+        if self._end is not None:
             output.done = stamp >= self._end
-        elif self._trajectory is None:
-            if armed_since is not None and stamp >= armed_since + self.parameters.takeoff_delay:
-                self._take_off(stamp, state)
-        else:
-            self._fly(stamp, state, armed_since)
         return output
 
-    def abort(self, stamp: float, reason: str) -> None:
-        """Give the flight up: motors off, and the reason kept."""
-        self.output.abort_reason = reason
-        self._stop(stamp, "aborted")
+    def give_up(self, stamp: float, reason: str) -> None:
+        """End a flight that has not taken off."""
+        self._follow(stamp, self._supervisor.give_up(stamp, reason))
 
-    def _take_off(self, stamp: float, state: np.ndarray) -> None:
-        start = state[0].copy()
+    def request(self, command: Command) -> tuple[bool, str]:
+        """Ask for something in flight, to be done at the next step.
+
+        Returns whether it will be, and what or why not, in one line.
+        """
+        if self._seen is None:
+            return False, "no state of the vehicle yet"
+        refusal = self._supervisor.refusal(command, self._seen)
+        if refusal:
+            return False, f"refused: {refusal}"
+        self._requests.append(command)
+        return True, command.value.value
+
+    def switch_magnet(self, on: bool) -> tuple[bool, str]:
+        """Have the magnet on or off until the scenario switches it next; answers as `request`."""
+        if self.output.state is State.DISARMED:
+            return False, "refused: not while disarmed"
+        self._magnet = on, self._scenario_magnet()
+        return True, f"magnet {'on' if on else 'off'} until the scenario switches it next"
+
+    def _observe(
+        self, stamp: float, state: np.ndarray, armed_since: float | None, readings: Readings
+    ) -> Observation:
+        p, guidance, armed = self._parameters, self._guidance, armed_since is not None
+        seen = Observation(
+            state, self.output.reference, self._ground, armed=armed, readings=readings
+        )
+        if guidance is None:
+            seen.ready = armed and stamp >= armed_since + p.takeoff_delay
+            seen.on_ground = True
+            return seen
+        seen.on_ground = bool(
+            state[0, 2] < self._ground + p.touchdown_height and abs(state[1, 2]) < p.touchdown_speed
+        )
+        landing, time = self.scenario.landing, guidance.scenario_time
+        seen.landing_due = time >= landing.at
+        if time >= landing.at + 0.5 * landing.duration or stamp >= self._half_down:
+            seen.touchdown = self._at_rest(stamp, seen.on_ground)
+        late = landing.at + landing.duration + p.touchdown_timeout
+        seen.overdue = time > late or stamp > guidance.end + p.touchdown_timeout
+        return seen
+
+    def _at_rest(self, stamp: float, on_ground: bool) -> bool:
+        """Whether it has been on the ground for long enough."""
+        if not on_ground:
+            self._at_rest_since = None
+            return False
+        if self._at_rest_since is None:
+            self._at_rest_since = stamp
+        return stamp - self._at_rest_since >= self._parameters.touchdown_time
+
+    def _follow(self, stamp: float, decision: Decision) -> None:
+        """Do what the supervisor has decided."""
+        output = self.output
+        if decision.state is not output.state:
+            before, output.state = output.state, decision.state
+            self._enter(stamp, before, decision)
+        output.cause, output.arm = decision.cause, decision.arm
+        output.flying = decision.guide is not Guide.NOTHING
+        output.phase = self._phase(decision)
+        output.magnet = self._magnet_on(decision)
+
+    def _enter(self, stamp: float, before: State, decision: Decision) -> None:
+        state, guidance = decision.state, self._guidance
+        planned = decision.guide is Guide.SCENARIO or self.changes[-1].event is Event.TOUCHDOWN
+        if state is not State.HOLDING and not planned:
+            reasons = (self.output.abort_reason, decision.cause)
+            self.output.abort_reason = "; then ".join(filter(None, reasons))
+        if state is State.TAKING_OFF:
+            self._take_off(stamp)
+        elif state is State.HOLDING:
+            guidance.stop(stamp, decision.stow)
+        elif state is State.FLYING and before is State.HOLDING:
+            guidance.go_on(stamp)
+        elif decision.guide is Guide.DESCEND:
+            guidance.descend(stamp, self._seen.state, self._ground, decision.stow)
+            self._half_down = 0.5 * (stamp + guidance.end)
+        elif state is State.FAILSAFE:
+            guidance.rest(stamp, decision.stow)
+            self._failsafe_since = stamp
+        elif state is State.DISARMED:
+            self._end = stamp + self._parameters.settle_time
+            self._magnet = None
+
+    def _take_off(self, stamp: float) -> None:
+        start = self._seen.state[0].copy()
         start[3:5] = 0.0
         start[ARM] = self.scenario.arm_start
         self._takeoff, self._ground = stamp, start[2]
-        self._trajectory = self.scenario.trajectory(start)
-        self._reference(stamp)
-        self.output.flying = True
+        self._guidance = Guidance(
+            self.scenario.trajectory(start),
+            stamp,
+            self.output.reference,
+            self.scenario.arm_start,
+            self._parameters,
+        )
+        self._guidance.advance(stamp)
+        self._guidance.write(stamp)
+        self.output.time = 0.0
 
-    def _reference(self, stamp: float) -> None:
-        time = stamp - self._takeoff
-        output = self.output
-        self._trajectory.write(time, output.reference)
-        output.time = time
-        output.phase = self.scenario.phase(time)
-        output.magnet = self.scenario.magnet_on(time)
+    def _phase(self, decision: Decision) -> str:
+        if decision.state is State.GROUNDED:
+            return WAITING
+        if decision.state is State.DISARMED:
+            ended = self.changes[-1].event
+            return LANDED if ended in (Event.TOUCHDOWN, Event.DISARM_ON_GROUND) else ABORTED
+        if decision.guide is Guide.SCENARIO:
+            return self.scenario.phase(self._guidance.scenario_time)
+        return {Guide.STOP: HOLD, Guide.DESCEND: LAND, Guide.NOTHING: ABORTED}[decision.guide]
 
-    def _fly(self, stamp: float, state: np.ndarray, armed_since: float | None) -> None:
-        fault = self._fault(state, armed_since)
-        if fault:
-            self.abort(stamp, fault)
-            return
-        self._reference(stamp)
-        landing, p = self.scenario.landing, self.parameters
-        if self.output.time < landing.at + 0.5 * landing.duration:
-            return
-        if state[0, 2] < self._ground + p.touchdown_height and abs(state[1, 2]) < p.touchdown_speed:
-            if self._at_rest_since is None:
-                self._at_rest_since = stamp
-            if stamp - self._at_rest_since >= p.touchdown_time:
-                self._stop(stamp, "landed")
-                return
-        else:
-            self._at_rest_since = None
-        if self.output.time > landing.at + landing.duration + p.touchdown_timeout:
-            self.abort(stamp, f"no touchdown within {p.touchdown_timeout:g} s")
+    def _scenario_magnet(self) -> bool:
+        guidance = self._guidance
+        return guidance is not None and self.scenario.magnet_on(guidance.scenario_time)
 
-    def _fault(self, state: np.ndarray, armed_since: float | None) -> str:
-        p = self.parameters
-        if armed_since is None:
-            return "the autopilot disarmed in flight"
-        error, tilt = deviation(state, self.output.reference)
-        if not error < p.position_error_max:
-            return f"position error {error:.2f} m exceeds {p.position_error_max:g} m"
-        if not tilt < p.tilt_max:
-            return f"tilt {math.degrees(tilt):.0f} deg exceeds {math.degrees(p.tilt_max):.0f} deg"
-        return ""
-
-    def _stop(self, stamp: float, phase: str) -> None:
-        output = self.output
-        output.flying = output.arm = output.magnet = False
-        output.phase = phase
-        self._end = stamp + self.parameters.settle_time
-
-
-@jit
-def deviation(state, reference):
-    """Return the distance from the reference [m] and the tilt [rad]; NaN where the state is."""
-    squared = 0.0
-    for i in range(3):
-        squared += (state[0, i] - reference[0, i]) ** 2
-    cosine = math.cos(state[0, 3]) * math.cos(state[0, 4])
-    return math.sqrt(squared), math.acos(min(1.0, max(-1.0, cosine)))
+    def _magnet_on(self, decision: Decision) -> bool:
+        """What people want of the magnet, until the scenario has a new wish, else the scenario."""
+        wanted = self._scenario_magnet()
+        if self._magnet is not None:
+            on, before = self._magnet
+            if wanted == before:
+                return on
+            self._magnet = None
+        return wanted and decision.keep_magnet

@@ -50,6 +50,7 @@ class Scenario:
     payload_mass: float = 0.0
     drop_point: tuple[float, float] | None = None
     snapshots: tuple[tuple[float, str], ...] = field(default=())
+    faults: tuple[object, ...] = ()  # as written; what injects them reads them
 
     def trajectory(self, start: np.ndarray) -> Trajectory:
         """Return the reference from chi (8,) at take-off to the ground below the landing point."""
@@ -144,6 +145,7 @@ def from_yaml(file: Path) -> Scenario:
             (reader.number(s, "at", "snapshots"), str(s.get("caption", "")))
             for s in document.get("snapshots") or []
         ),
+        faults=reader.entries(document, "faults"),
     )
 
 
@@ -159,6 +161,13 @@ class Reader:
         if not isinstance(value, dict):
             raise ScenarioError(f"{self.where}: '{key}' is missing or not a mapping")
         return value
+
+    def entries(self, document: dict, key: str) -> tuple[object, ...]:
+        """Return an optional list."""
+        value = document.get(key) or []
+        if not isinstance(value, list):
+            raise ScenarioError(f"{self.where}: '{key}' is not a list")
+        return tuple(value)
 
     def number(self, entry: Any, key: str, owner: str) -> float:
         """Return a required finite number."""

@@ -3,6 +3,8 @@
 import time
 
 import numpy as np
+from rclpy.parameter import Parameter
+from std_srvs.srv import SetBool, Trigger
 
 from uam_control.controllers import Controller
 from uam_control.coordinates import SIZE
@@ -10,6 +12,7 @@ from uam_control.laws import catalogue
 from uam_control.nodes.timing import Ticks, Timing
 from uam_control.profile import load_profile, parameter_set
 from uam_msgs_py import topics
+from uam_msgs_py.changes import Change
 from uam_msgs_py.control import read_position_command, read_reference, read_state
 from uam_msgs_py.convert import JointStateWriter
 from uam_msgs_py.joins import StampJoin
@@ -18,6 +21,7 @@ from uam_msgs_py.parameters import NodeParameters, given
 from uam_msgs_py.topics import Topic
 
 ADAPTATION_PERIOD = 20_000_000  # [ns] between two adaptation messages
+RESET, FREEZE = "reset_adaptation", "freeze_adaptation"  # services
 
 
 class ControllerNode(UamNode):
@@ -54,6 +58,8 @@ class ControllerNode(UamNode):
         self.triggers = ([t for t in inputs if t is not topics.REFERENCE][-1].name,)
         for topic in inputs:
             self._feed(topic)
+        self.create_service(Trigger, f"~/{RESET}", self._on_reset)
+        self.create_service(SetBool, f"~/{FREEZE}", self._on_freeze)
 
     def _feed(self, topic: Topic) -> None:
         add, name, read = self._join.add, topic.name, self.READERS[topic.name]
@@ -81,8 +87,33 @@ class ControllerNode(UamNode):
         for flying in (False, True):
             self.evaluate(spare, dt, nothing, nothing, np.zeros((3, 3)), flying)
 
+    def _on_reset(self, request, response):
+        controller = self.controller
+        old = self._adapted()
+        controller.reset_adaptation()
+        new = self._adapted()
+        changed = {name: (old[name], new[name]) for name in new if new[name] != old[name]}
+        self.tell(Change(self.get_name(), RESET, changed))
+        response.success = True
+        response.message = f"adapted gains at their initial values: {_listed(new)}"
+        return response
+
+    def _on_freeze(self, request, response):
+        """The parameter `adapt` by another name, so that the two cannot disagree."""
+        result = self.change_parameters([Parameter("adapt", value=not request.data)], FREEZE)
+        frozen = "frozen at" if request.data else "free, from"
+        response.success = result.successful
+        response.message = result.reason or f"adapted gains {frozen}: {_listed(self._adapted())}"
+        return response
+
+    def _adapted(self) -> dict[str, float]:
+        return dict(zip(self.controller.names, self.controller.adaptation.tolist(), strict=True))
+
     def diagnose(self):
         level, summary, values = super().diagnose()
-        now = (f"{x:.4g}" for x in self.controller.adaptation)
-        gains = dict(zip(self.controller.names, now, strict=True))
+        gains = {name: f"{value:.4g}" for name, value in self._adapted().items()}
         return level, summary, values | gains | {"saturated": self.controller.saturated}
+
+
+def _listed(gains: dict[str, float]) -> str:
+    return ", ".join(f"{name} {value:.4g}" for name, value in gains.items())

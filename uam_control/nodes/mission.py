@@ -3,13 +3,17 @@
 import time
 
 import numpy as np
+from rcl_interfaces.msg import ParameterDescriptor
 from std_msgs.msg import Bool
 
 from uam_control.coordinates import ARM, ATTITUDE, POSITION, SIZE
 from uam_control.mission import Mission, MissionParameters, load_scenario
+from uam_control.nodes.mission_inputs import MissionInputs
+from uam_control.nodes.mission_services import offer
 from uam_control.nodes.timing import Ticks, Timing
 from uam_control.profile import load_profile
 from uam_control.rotations import wrap_angle
+from uam_control.supervision import State
 from uam_msgs_py import topics
 from uam_msgs_py.control import ReferenceWriter, read_state
 from uam_msgs_py.convert import SWITCH, seconds
@@ -17,7 +21,7 @@ from uam_msgs_py.joins import Backlog
 from uam_msgs_py.layouts import SECOND
 from uam_msgs_py.node import UamNode, run
 from uam_msgs_py.parameters import NodeParameters
-from uam_msgs_py.status import ERROR, OK, AutopilotState, MissionStatus
+from uam_msgs_py.status import ERROR, OK, WARN, AutopilotState, MissionStatus
 
 NAME = "mission"
 DEFAULT_PROFILE, DEFAULT_SCENARIO = "s500", "pick_and_place"
@@ -35,10 +39,14 @@ class MissionNode(UamNode):
         section = load_profile(DEFAULT_PROFILE).section(NAME)
         self.parameter_set = NodeParameters(self, MissionParameters, defaults=section)
         self._period = Ticks(NodeParameters(self, Timing, read_only=True).current).period
-        scenario = self.declare_parameter("scenario", DEFAULT_SCENARIO).value
+        about = ParameterDescriptor(
+            description="name of a scenario, or its file; fixed once the node runs", read_only=True
+        )
+        scenario = self.declare_parameter("scenario", DEFAULT_SCENARIO, about).value
         self._mission = Mission(load_scenario(scenario), self.parameter_set.current)
-        warm_up(Mission(self._mission.scenario, self.parameter_set.current))
-        self.parameter_set.apply = self._set_parameters
+        spare = Mission(self._mission.scenario, self.parameter_set.current)
+        warm_up(spare, self.parameter_set.current.takeoff_delay)
+        self.parameter_set.apply = self._mission.configure
         self._armed_since: float | None = None
         self._ahead = -1  # stamp [ns] of the newest reference
         self._arm: bool | None = None
@@ -53,11 +61,10 @@ class MissionNode(UamNode):
         self._status = self.publisher(topics.MISSION_STATUS)
         self._writer = ReferenceWriter()
         self.listen(topics.AUTOPILOT_STATE, self._on_autopilot, required=False)
+        self._inputs = MissionInputs(self, seconds(self._period))
         self.listen(topics.STATE, self._on_state)
         self.triggers = (topics.STATE.name,)
-
-    def _set_parameters(self, parameters: MissionParameters) -> None:
-        self._mission.parameters = parameters
+        offer(self, self._mission)
 
     def _on_autopilot(self, message) -> None:
         _, state = AutopilotState.from_message(message)
@@ -75,6 +82,7 @@ class MissionNode(UamNode):
 
     def _tick(self, stamp: int, state: np.ndarray) -> None:
         begun = time.perf_counter()
+        self._inputs.tick(stamp)
         if stamp != self._ahead:  # the first tick, or one after a gap
             self._advance(stamp, state)
         output = self._mission.output  # as of this tick, from the step one tick ago
@@ -86,7 +94,8 @@ class MissionNode(UamNode):
 
     def _advance(self, stamp: int, state: np.ndarray) -> None:
         """Publish the reference of the tick `stamp` [ns]."""
-        output = self._mission.step(seconds(stamp), state, self._armed_since)
+        readings = self._inputs.readings
+        output = self._mission.step(seconds(stamp), state, self._armed_since, readings)
         time_of_mission = max(0, round(output.time * SECOND))
         self._reference.publish(
             self._writer.fill(stamp, output.reference, output.flying, time_of_mission)
@@ -106,14 +115,11 @@ class MissionNode(UamNode):
         if output.arm != self._arm:
             self._arm = output.arm
             self._arming.publish(Bool(data=bool(output.arm)))
-        now = (output.phase, output.done, bool(output.magnet))
+        now = (output.phase, output.done, output.state, output.cause, bool(output.magnet))
         if now == self._told and stamp < self._due:
             return
-        if now[:2] != self._told[:2]:
-            self.get_logger().info(
-                f"{output.abort_reason or output.phase} at {output.time:.3f} s"
-                + (", done" if output.done else "")
-            )
+        if now[:4] != self._told[:4]:
+            self._log()
         self._told, self._due = now, stamp + STATUS_PERIOD
         self._status.publish(self.status.to_message(stamp))
 
@@ -123,19 +129,37 @@ class MissionNode(UamNode):
         output = self._mission.output
         return MissionStatus(
             output.phase, output.time, *self._errors, output.done, output.abort_reason,
-            bool(output.magnet),
+            bool(output.magnet), output.state.value, output.cause,
         )
 
-    def diagnose(self):
+    def _log(self) -> None:
         output = self._mission.output
-        level = ERROR if output.abort_reason else OK
-        return level, output.abort_reason or output.phase, {"mission time [s]": output.time}
+        text = f"{output.phase} at {output.time:.3f} s; {output.state.value}: {output.cause}"
+        text += ", done" if output.done else ""
+        # in two lines, as rclpy wants one severity for each
+        if output.abort_reason or output.state is State.HOLDING:
+            self.get_logger().warning(text)
+        else:
+            self.get_logger().info(text)
+
+    def diagnose(self):
+        output, beyond = self._mission.output, self._mission.beyond
+        level = WARN if beyond or output.state is State.HOLDING else OK
+        if output.abort_reason:
+            level = ERROR
+        summary = output.abort_reason or beyond or output.phase
+        values = {
+            "mission time [s]": output.time,
+            "state": output.state.value,
+            "cause": output.cause,
+            "beyond a limit": beyond,
+        }
+        return level, summary, values
 
 
-def warm_up(spare: Mission) -> None:
-    """Compile what is called in flight, on a mission that never flies."""
+def warm_up(spare: Mission, takeoff: float) -> None:
+    """Compile what is called in flight, on a mission that never flies; takeoff [s]: its delay."""
     state = np.zeros((3, SIZE))
-    takeoff = spare.parameters.takeoff_delay
     for stamp in (0.0, takeoff, takeoff + 0.004):
         spare.step(stamp, state, 0.0)
 

@@ -46,6 +46,14 @@ class Result(IntEnum):
     FAILED = 4
 
 
+def result_word(result: int) -> str:
+    """Return a MAV_RESULT in words."""
+    try:
+        return Result(result).name.lower().replace("_", " ")
+    except ValueError:
+        return f"result {result}"
+
+
 class Severity(IntEnum):
     """MAV_SEVERITY, as far as used."""
 

@@ -36,6 +36,7 @@ def fly_all(
         warm_up()
     work = work or figures_of
     results: list[Result | None] = [None] * len(trials)
+    others = multiprocessing.active_children()
     with _executor(jobs) as executor:
         waiting = {executor.submit(work, trial): i for i, trial in enumerate(trials)}
         try:
@@ -44,6 +45,10 @@ def fly_all(
                 progress(done, result)
         except BaseException:
             executor.shutdown(wait=False, cancel_futures=True)
+            # Those that fly now, and the next ones, would otherwise be waited for.
+            for worker in multiprocessing.active_children():
+                if worker not in others:
+                    worker.terminate()
             raise
     return results
 

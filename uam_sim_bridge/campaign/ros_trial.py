@@ -14,7 +14,7 @@ from uam_sim_bridge.campaign.trial import Result, Trial
 from uam_sim_bridge.flight import ros_engine
 from uam_sim_bridge.flight.progress import Progress
 from uam_sim_bridge.flight.result_folder import ResultFolder
-from uam_sim_bridge.flight.settings import FlightSettings
+from uam_sim_bridge.flight.settings import ONLOOKERS, FlightSettings
 
 
 class NotFlown(RuntimeError):
@@ -31,6 +31,7 @@ def fly(trial: Trial) -> Result:
         seed=trial.seed,
         scenario_source=trial.scenario,
         vehicle_changes=trial.vehicle_changes,
+        without=ONLOOKERS,
     )
     with (
         tempfile.TemporaryDirectory(prefix="uam-trial-") as folder,

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import argparse
 import math
-import shlex
 import sys
 from pathlib import Path
 
@@ -15,12 +14,13 @@ from uam_control.configuration import ConfigurationError
 from uam_control.laws.catalogue import LAWS
 from uam_control.mission import ScenarioError
 from uam_control.profile import ProfileError
+from uam_sim_bridge.faults import FaultError
 from uam_sim_bridge.flight import settings as flight_settings
-from uam_sim_bridge.flight.conclude import conclude
+from uam_sim_bridge.flight.conclude import command_line, conclude
 from uam_sim_bridge.flight.ports import INSTANCES, PortError
 from uam_sim_bridge.flight.progress import Progress
 from uam_sim_bridge.flight.result_folder import ResultFolder, ResultFolderError
-from uam_sim_bridge.flight.settings import FlightSettings, SettingsError
+from uam_sim_bridge.flight.settings import ONLOOKERS, REPLACEABLE, FlightSettings, SettingsError
 from uam_sim_bridge.mavlink.transport import ALLOWED
 from uam_sim_bridge.px4.installation import Px4Error
 from uam_sim_bridge.report.build import build_report
@@ -28,7 +28,7 @@ from uam_sim_bridge.report.console import reporting, summary
 
 COMPLETED, NOT_COMPLETED, WRONG_USE, INTERRUPTED = 0, 1, 2, 130
 USER_ERRORS = (SettingsError, ScenarioError, ProfileError, ConfigurationError, PortError,
-               Px4Error, ResultFolderError)
+               Px4Error, ResultFolderError, FaultError)
 
 EXAMPLES = """\
 examples:
@@ -38,8 +38,12 @@ examples:
   uam fly --profile mine.yaml --engine direct
   uam fly --autopilot px4 --px4-dir ~/PX4-Autopilot/build/px4_sitl_default
   uam fly --autopilot serial:/dev/ttyACM0:921600 --clock realtime --gcs udp:127.0.0.1:14550
+  uam fly --view --clock realtime            watch it and tune it in a browser
   uam fly --clock realtime                   paced by the wall clock, latency measured
+  uam fly --without arm_controller           with an arm controller of yours: examples/
   uam fly --payload-mass 0.3 --wind 2 0 0    heavier payload, 2 m/s from the west
+  uam fly --fault mocap_dropout@20+3         no motion capture from 20 s on, for 3 s
+  uam fly --fault motor_loss@pick+1:motor=2,remaining=0.7
 
 A trajectory has the columns t,px,py,pz,yaw,vx,vy,vz,ax,ay,az,dyaw (SI, ENU) and, if the arm is to
 move, alpha_1,alpha_2. Exit status: 0 mission completed, 1 flown but not completed, 2 wrong use.
@@ -61,8 +65,9 @@ def add(commands) -> None:
     option("--controller", default="modular", metavar="NAME",
            help="; ".join(f"{name}: {entry.label}" for name, entry in LAWS.items())
            + " (default %(default)s)")
-    option("--profile", metavar="NAME|FILE",
-           help=f"parameters: {profiles}, or a ROS parameter file (default: the controller's)")
+    option("--profile", metavar="NAME|FILE", action="append",
+           help=f"parameters: {profiles}, or a ROS parameter file, as ros2 param dump writes it; "
+           "given again, the later one counts (default: the controller's)")
     option("--scenario", default="pick_and_place", metavar="NAME|FILE",
            help=f"{scenarios}, or a .yaml or .csv file (default %(default)s)")
     option("--engine", default="ros", metavar="ros|direct",
@@ -87,6 +92,15 @@ def add(commands) -> None:
            help="multiplies noise and bias of the sensors (default 1)")
     option("--seed", type=_seed, default=1, metavar="N",
            help="of all noise (default %(default)s)")
+    option("--without", action="append", default=[], metavar="NODE",
+           help=f"leave a node out and wait for yours of that name: {', '.join(REPLACEABLE)}; "
+           f"or leave out what only looks on: {', '.join(ONLOOKERS)}; may be given again")
+    option("--view", action="store_true",
+           help="serve the cockpit, a local web page: the scene, charts, gains, commands")
+    option("--fault", action="append", default=[], metavar="SPEC|FILE",
+           help="inject a fault: NAME@SECONDS[+DURATION] or NAME@PHASE[+AFTER[+DURATION]], then "
+           ":parameter=value,...; or a YAML file of several; may be given again; "
+           "uam faults --list tells what there is")
     option("--out", type=Path, metavar="DIR",
            help="result folder (default results/<time>-<scenario>-<controller>)")
     option("--no-video", action="store_true", help="leave out the video, which takes longest")
@@ -136,6 +150,9 @@ def run(options: argparse.Namespace) -> int:
             video=not options.no_video,
             vehicle_changes=_vehicle_changes(options),
             instance=options.instance,
+            without=options.without,
+            view=options.view,
+            faults=options.fault,
         )
         return fly(settings)
     except USER_ERRORS as error:
@@ -167,7 +184,7 @@ def fly(settings: FlightSettings) -> int:
         except USER_ERRORS:
             _remove_if_empty(folder.path)
             raise
-    metrics = conclude(settings, folder, outcome, shlex.join(["uam", *sys.argv[1:]]))
+    metrics = conclude(settings, folder, outcome, command_line())
     if metrics is not None:
         # Who pressed Ctrl-C gets the figures of what was flown, but does not wait for pictures.
         with reporting(console) as say:

@@ -6,10 +6,10 @@ import argparse
 import sys
 from collections.abc import Sequence
 
-from uam_sim_bridge.cli import campaign, compare, fly, tune
+from uam_sim_bridge.cli import campaign, compare, doctor, faults, fly, profile, report, tune, view
 
 # each has add(subparsers), which sets `run`: arguments → exit status
-COMMANDS = (fly, compare, tune, campaign)
+COMMANDS = (fly, view, profile, report, compare, tune, campaign, faults, doctor)
 WRONG_USE = 2
 
 

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import shlex
+import sys
+from collections.abc import Mapping
 from typing import Any
 
 from uam_sim_bridge.flight import metrics
@@ -10,8 +13,13 @@ from uam_sim_bridge.flight.result_folder import ResultFolder
 from uam_sim_bridge.flight.settings import FlightSettings
 
 
-def facts(settings: FlightSettings, outcome: Outcome, command: str) -> dict[str, Any]:
-    """What is known about a flight beside its table."""
+def command_line() -> str:
+    """What the user typed."""
+    return shlex.join(["uam", *sys.argv[1:]])
+
+
+def asked(settings: FlightSettings, command: str) -> dict[str, Any]:
+    """What a flight is asked to be."""
     scenario = settings.scenario
     return {
         "controller": settings.controller,
@@ -23,13 +31,9 @@ def facts(settings: FlightSettings, outcome: Outcome, command: str) -> dict[str,
         "seed": settings.seed,
         "payload_mass_kg": settings.payload_mass,
         "vehicle_changes": settings.vehicle_changes,
-        "wall_s": outcome.wall_s,
-        "abort_reason": outcome.reason,
-        "partial": outcome.partial,
-        "notes": outcome.notes,
-        "missed_ticks": outcome.missed_ticks,
         "drop_point": list(scenario.drop_point) if scenario.drop_point else None,
         "snapshots": [list(snapshot) for snapshot in scenario.snapshots],
+        "faults_planned": settings.faults.entries,
         "command": command,
     }
 
@@ -38,11 +42,28 @@ def conclude(
     settings: FlightSettings, folder: ResultFolder, outcome: Outcome, command: str
 ) -> dict[str, Any] | None:
     """Write metrics, table and facts; returns the metrics, None where nothing was recorded."""
+    folder.write_versions()
+    return complete(folder, asked(settings, command), outcome)
+
+
+def complete(
+    folder: ResultFolder, known: Mapping[str, Any], outcome: Outcome
+) -> dict[str, Any] | None:
+    """Write metrics, table and facts of a flight of which is `known` what it was asked to be."""
     if outcome.partial:
         outcome.notes.insert(0, f"partial: the recording ends with the flight ({outcome.reason})")
-    info = facts(settings, outcome, command)
+    info = {
+        **known,
+        "wall_s": outcome.wall_s,
+        "abort_reason": outcome.reason,
+        "partial": outcome.partial,
+        "notes": outcome.notes,
+        "missed_ticks": outcome.missed_ticks,
+        "parameter_changes": outcome.parameter_changes,
+        "transitions": outcome.transitions,
+        "faults": outcome.faults,
+    }
     folder.write_info(info)
-    folder.write_versions()
     if outcome.series is None:
         return None
     outcome.series.info.update(info)

@@ -6,6 +6,7 @@ estimator, controllers, bridge, mission for the next tick, autopilot, physics.
 
 from __future__ import annotations
 
+import math
 from collections import deque
 from collections.abc import Callable, Mapping
 from typing import Any, NamedTuple
@@ -15,23 +16,32 @@ import numpy as np
 from uam_control import configuration
 from uam_control.compiled import jit
 from uam_control.controllers import ArmController, AttitudeController, PositionController
+from uam_control.coordinates import ATTITUDE
 from uam_control.estimation import StateEstimator
 from uam_control.mission import Mission, Scenario
 from uam_control.profile import Profile
+from uam_control.supervision import Inputs, State
 from uam_sim_bridge.autopilot.core import Autopilot
 from uam_sim_bridge.autopilot.modes import CUSTOM_MODE_ENABLED, Command, Mode
 from uam_sim_bridge.autopilot.params import Parameters
+from uam_sim_bridge.faults import Schedule
+from uam_sim_bridge.faults.direct import DirectFaults
+from uam_sim_bridge.flight.limits import time_limit
 from uam_sim_bridge.flight.timeseries import COLUMNS, SUBSYSTEMS, Recording, gain_columns
 from uam_sim_bridge.mavlink.frames import swap_body, swap_quaternion, swap_world
+from uam_sim_bridge.mavlink.hold import HoldParameters, LevelHold
 from uam_sim_bridge.mavlink.offboard import OffboardParameters, OffboardSequence, Request
-from uam_sim_bridge.mavlink.setpoint import RateThrustMap, RateThrustParameters
+from uam_sim_bridge.mavlink.setpoint import RateThrustMap, RateThrustParameters, SetpointRefused
 from uam_sim_bridge.mavlink.thrust_identification import (
     ThrustIdentification,
     ThrustIdentificationParameters,
 )
 from uam_sim_bridge.plant import Plant, Samples, Vehicle
 
+GAINS_TICKS = 25  # between two looks at the adapted gains for the supervisor
 LONGEST_WAIT = 20.0  # [s] simulated, for the autopilot to get ready and armed
+
+IDLE = (np.zeros(3), 0.0)  # setpoint of a vehicle on the ground
 
 # where each group of columns begins; constants of the compiled `record`
 _TRUTH = COLUMNS.block("truth.").start
@@ -61,18 +71,30 @@ class DirectFlight:
         vehicle: Vehicle,
         payload_mass: float,
         seed: int,
+        faults: Schedule | None = None,
     ) -> None:
+        """payload_mass [kg]; faults: those that `faults.limits.check` lets pass."""
         sets = profile.sets
-        self.plant = Plant(vehicle, payload_mass, seed, scenario.arm_start)
+        self._faults = DirectFaults(faults) if faults else None
+        started = (vehicle, payload_mass, seed, scenario.arm_start)
+        self.plant = self._faults.plant(*started) if self._faults else Plant(*started)
         self.estimator = StateEstimator(sets["state_estimator"])
         self.mission = Mission(scenario, sets["mission"])
         self.position = PositionController(sets["position_controller"])
         self.attitude = AttitudeController(sets["attitude_controller"])
         self.arm = ArmController(sets["arm_controller"])
         self.bridge = Bridge(profile.section("mavlink_bridge"))
+        self.inputs = Inputs(self.plant.period)
+        if self._faults:
+            self.bridge.passes = self._faults.link.passes
+        self.ended_by = ""  # why it was ended although the mission was not done
+        self._limit = time_limit(scenario)
+        self._ahead = math.inf  # [s] stamp of the tick that the mission is ready for
+        self._effort, self._magnet = np.zeros(2), False  # as last commanded
+        self._lag = 0  # ticks from an IMU sample to its arrival
         self._truths: deque[_Snapshot] = deque()  # of ticks whose IMU sample is on its way
         self._complete = False  # every kind of sensor has delivered
-        controllers = (self.position, self.attitude, self.arm)
+        controllers = self._controllers = (self.position, self.attitude, self.arm)
         self._gains = tuple(controller.adaptation for controller in controllers)
         self._gain_columns = tuple(
             gain_columns(subsystem, controller.names)
@@ -90,11 +112,18 @@ class DirectFlight:
             if progress is not None and plant.tick % ticks_a_second == 0:
                 progress(output.time, output.phase)
             if output.time < 0.0 and plant.time > LONGEST_WAIT:
-                reasons = "; ".join(self.bridge.sequence.reasons)
-                self.mission.abort(
-                    plant.time, f"the autopilot did not arm: {reasons or 'no reason'}"
-                )
+                reasons = "; ".join(self.bridge.sequence.reasons) or "no reason"
+                against = self.mission.beyond or f"the autopilot did not arm: {reasons}"
+                self.mission.give_up(plant.time, against)
+            if plant.time >= self._limit:
+                self.ended_by = f"time limit of {self._limit:g} s"
+                break
         return self.recording
+
+    @property
+    def fault_records(self) -> list[dict[str, Any]]:
+        """The faults that there were; see `faults.timeline.record`."""
+        return self._faults.records if self._faults else []
 
     def tick(self) -> None:
         """One control period of the whole vehicle."""
@@ -102,11 +131,14 @@ class DirectFlight:
         samples = plant.sense()
         self._truths.append(_Snapshot.of(plant))
         if not self._sensed(samples):
-            motors = self.bridge.autopilot_tick(samples.hil)
-            plant.step(motors, np.zeros(2), False)
+            self._blind_tick(samples)
             return
         stamp, state = samples.imu[0], estimator.update()
+        if stamp > self._ahead + 0.5 * dt:  # after a gap, as the mission's node does
+            mission.step(stamp, state, self.bridge.armed_since, self.inputs.at(stamp))
         output = mission.output
+        if self._faults:
+            self._faults.update(stamp, output.time)
         reference, flying, magnet = output.reference, output.flying, output.magnet
 
         tau_p = self.position.update(state, reference, flying, dt)
@@ -115,7 +147,7 @@ class DirectFlight:
         tau_alpha = self.arm.update(state, reference, attitude_reference, flying, dt)
         self.bridge.identification.switch(stamp, magnet)
         self.bridge.send(
-            stamp, plant.time, tau_p, tau_q, state, flying, output.arm, samples.mocap
+            stamp, plant.time, tau_p, tau_q, state, flying, output, samples.mocap
         )
         motors = self.bridge.autopilot_tick(samples.hil)
 
@@ -145,8 +177,28 @@ class DirectFlight:
         )
         row[_FACTOR] = self.bridge.factor
 
+        self._effort[:], self._magnet, self._ahead = tau_alpha, magnet, stamp + dt
+        self._lag = len(self._truths)
         plant.step(motors, tau_alpha, magnet)
-        mission.step(stamp + dt, state, self.bridge.sequence.armed_stamp)
+        if plant.tick % GAINS_TICKS == 0:
+            for subsystem, controller in zip(SUBSYSTEMS, self._controllers, strict=True):
+                self.inputs.gains(subsystem, controller.names, controller.adaptation)
+        mission.step(self._ahead, state, self.bridge.armed_since, self.inputs.at(stamp))
+
+    def _blind_tick(self, samples: Samples) -> None:
+        """One without an IMU sample: only autopilot and physics go on, with the last commands."""
+        motors = self.bridge.autopilot_tick(samples.hil)
+        if self.recording.count and len(self._truths) > self._lag:
+            truth = self._truths.popleft()
+            last = self.recording.count - 1
+            row = self.recording.next_row(self.mission.output.phase)
+            row[:] = self.recording.values[last]
+            row[0] += self.plant.period
+            row[_TRUTH : _TRUTH + truth.state.size] = truth.state.ravel()
+            row[_COMMAND : _COMMAND + 4], row[_THRUST : _THRUST + 4] = motors, truth.thrust
+            row[_PAYLOAD : _PAYLOAD + 7] = truth.payload_pose
+            row[_MAGNET + 1], row[_MAGNET + 2] = truth.magnet_force, truth.magnet_swing
+        self.plant.step(motors, self._effort, self._magnet)
 
     def _sensed(self, samples: Samples) -> bool:
         """Feed the estimator; whether it has a state now. As the plant's node does, nothing is
@@ -160,8 +212,10 @@ class DirectFlight:
             return False
         if samples.mocap is not None:
             estimator.mocap(*samples.mocap)
+            self.inputs.mocap(samples.mocap[0])
         if samples.joints is not None:
             estimator.joints(*samples.joints[:3])
+            self.inputs.joints(samples.joints[0], samples.joints[3])
         if here:
             estimator.imu(*samples.imu)
         return here and not estimator.waiting_for
@@ -213,33 +267,55 @@ class Bridge:
             ThrustIdentificationParameters.among(section)
         )
         self.sequence = OffboardSequence(OffboardParameters.among(section))
+        self._hold = LevelHold(HoldParameters.among(section))
         self.autopilot = Autopilot(Parameters.load(configuration.path("autopilot/s500.yaml")))
         self.setpoint = np.zeros(4)
         self.factor = 1.0
+        self.passes: Callable[[], bool] = lambda: True  # whether a message reaches the autopilot
 
-    def send(self, stamp, time, tau_p, tau_q, state, flying, arm, mocap) -> None:
+    @property
+    def armed_since(self) -> float | None:
+        """Stamp [s] at which the autopilot was first seen armed, None while it is not."""
+        return self.sequence.armed_stamp if self.autopilot.commander.armed else None
+
+    def send(self, stamp, time, tau_p, tau_q, state, flying, wanted, mocap) -> None:
         """One tick of the bridge: vision, requests, setpoint.
 
-        stamp: of the tick's IMU sample [s], the bridge's clock; time: the autopilot's [s].
+        stamp: of the tick's IMU sample [s], the bridge's clock; time: the autopilot's [s]; wanted:
+        the mission's output.
         """
         autopilot, setpoint = self.autopilot, self.setpoint
-        if mocap is not None:
+        if mocap is not None and self.passes():
             autopilot.vision(time, swap_world(mocap[1]), swap_quaternion(mocap[2]))
-        self.sequence.want(arm)
+        self.sequence.want(wanted.arm)
+        self.sequence.let_go = wanted.state is State.FAILSAFE
         status = autopilot.commander
         request = self.sequence.update(stamp, True, status.armed, status.mode)
-        if request is not None:
+        if request is not None and self.passes():
             self._request(time, request)
-        if flying:
-            rates, setpoint[3] = self.map.map(tau_p, tau_q, state[0, 3:6], state[1, 3:6])
-            setpoint[0:3] = rates
-        else:
-            setpoint[:] = 0.0
-        autopilot.setpoint(time, swap_body(setpoint), setpoint[3])
+        command = self._command(stamp, tau_p, tau_q, state, flying)
+        setpoint[:] = 0.0
+        if command is not None:
+            setpoint[0:3], setpoint[3] = command
+        if command is not None and self.passes():
+            autopilot.setpoint(time, swap_body(setpoint), setpoint[3])
         thrust, self.factor = float(setpoint[3]), self.map.thrust_factor
         self.map.thrust_factor = self.identification.update(
             stamp, state, thrust, self.map.assumed_thrust(thrust), flying and status.armed
         )
+
+    def _command(self, stamp, tau_p, tau_q, state, flying):
+        """Rates (3,) and thrust of this tick, None for no setpoint: what the node does."""
+        if flying:
+            try:
+                rates, thrust = self.map.map(tau_p, tau_q, state[0, 3:6], state[1, 3:6])
+            except SetpointRefused:
+                return self._hold.setpoint(stamp, state[0, ATTITUDE])
+            self._hold.good(stamp, thrust)
+            return rates, thrust
+        if self.sequence.let_go and self.autopilot.commander.armed:
+            return self._hold.setpoint(stamp, state[0, ATTITUDE])
+        return IDLE
 
     def _request(self, time: float, request: Request) -> None:
         if request is Request.OFFBOARD:

@@ -7,8 +7,10 @@ a message that was lost) holds the last value, as it did for whoever received it
 
 from __future__ import annotations
 
+from bisect import bisect_right
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -18,10 +20,14 @@ from rclpy.serialization import deserialize_message
 
 from uam_control.coordinates import ARM, COORDINATES
 from uam_control.mission import Scenario
+from uam_control.mission.mission import ABORTED, LANDED, WAITING
+from uam_control.supervision import State
 from uam_msgs_py import topics
+from uam_msgs_py.changes import Change
 from uam_msgs_py.status import MissionStatus
-from uam_sim_bridge.flight import cdr
+from uam_sim_bridge.flight import cdr, fault_log
 from uam_sim_bridge.flight.mcap_reader import TopicLog, UnreadableLog, read_log
+from uam_sim_bridge.flight.outcome import transition
 from uam_sim_bridge.flight.timeseries import (
     COLUMNS,
     SUBSYSTEMS,
@@ -37,7 +43,7 @@ POSITION, ATTITUDE, JOINTS = (
     t.name for t in (topics.POSITION_COMMAND, topics.ATTITUDE_COMMAND, topics.ARM_COMMAND)
 )
 SETPOINT, STATUS = topics.SETPOINT.name, topics.MISSION_STATUS.name
-THRUST = topics.THRUST.name
+THRUST, CHANGES, FAULTS = (t.name for t in (topics.THRUST, topics.CHANGES, topics.FAULTS))
 PAYLOAD, ROTORS, MAGNET = (
     t.name for t in (topics.TRUTH_PAYLOAD, topics.TRUTH_ROTORS, topics.TRUTH_MAGNET)
 )
@@ -48,7 +54,7 @@ ADAPTATION = {
 }
 TOPICS = {
     *(TRUTH, STATE, REFERENCE, POSITION, ATTITUDE, JOINTS, SETPOINT, STATUS),
-    *(PAYLOAD, ROTORS, MAGNET, THRUST, *ADAPTATION.values()),
+    *(PAYLOAD, ROTORS, MAGNET, THRUST, CHANGES, FAULTS, *ADAPTATION.values()),
 }
 
 
@@ -76,6 +82,16 @@ class Log:
     def __init__(self, found: Mapping[str, TopicLog]):
         self._topics = found
 
+    def messages(self, topic: str) -> list[bytes]:
+        """Serialized messages of a topic in file order; [] where there are none."""
+        log = self._topics.get(topic)
+        return log.messages if log else []
+
+    def wall_seconds(self, topic: str) -> float:
+        """Wall time between the first and the last message of a topic [s]; 0 without."""
+        log = self._topics.get(topic)
+        return (max(log.published) - min(log.published)) / SECOND if log and log.published else 0.0
+
     def blocks(self, topic: str) -> list[cdr.Block]:
         """Decoded messages of a topic; [] where there are none."""
         log = self._topics.get(topic)
@@ -91,16 +107,12 @@ class Log:
             return Samples(np.zeros(0, np.int64), np.zeros((0, width * len(fields))))
         return Samples(np.concatenate(stamps), np.vstack(rows))
 
-    def mission_end(self) -> tuple[int | None, str]:
-        """Stamp [ns] at which the mission was done, None if it was not; why it was given up."""
-        end, reason = None, ""
-        log = self._topics.get(STATUS)
-        for data in log.messages if log else []:
-            stamp, status = MissionStatus.from_message(deserialize_message(data, DiagnosticArray))
-            reason = status.abort_reason or reason
-            if status.done and end is None:
-                end = stamp
-        return end, reason
+    def statuses(self) -> list[tuple[int, MissionStatus]]:
+        """What the mission said of itself, and at which stamp [ns], in order."""
+        return [
+            MissionStatus.from_message(deserialize_message(data, DiagnosticArray))
+            for data in self.messages(STATUS)
+        ]
 
 
 def _field(block: cdr.Block, field: str, width: int) -> np.ndarray:
@@ -143,11 +155,17 @@ class References:
 
 @dataclass(frozen=True)
 class Flight:
-    """What a log tells: the table, whether the mission ended by itself, and why it was given up."""
+    """What a log tells: the table, whether the mission ended by itself, why it was given up, what
+    was asked of the parameters, how the states followed each other, which faults there were, how
+    long it took [s of wall time]."""
 
     series: Series
     done: bool
     abort_reason: str
+    parameter_changes: list[dict[str, Any]]
+    transitions: list[dict[str, Any]]
+    faults: list[dict[str, Any]]
+    wall_s: float
 
 
 def read_flight(path: Path, scenario: Scenario, info: Mapping[str, Any] | None = None) -> Flight:
@@ -156,7 +174,9 @@ def read_flight(path: Path, scenario: Scenario, info: Mapping[str, Any] | None =
     Raises UnreadableLog when the file is no log, or the log of a flight that never began.
     """
     log = Log(read_log(path, TOPICS))
-    end, abort_reason = log.mission_end()
+    statuses = log.statuses()
+    end = next((stamp for stamp, status in statuses if status.done), None)
+    abort_reason = statuses[-1][1].abort_reason if statuses else ""
     references = References(log)
     truth = log.samples(TRUTH, STATE_ROWS, len(COORDINATES))
     first, last = references.samples.stamps[[0, -1]]
@@ -179,12 +199,37 @@ def read_flight(path: Path, scenario: Scenario, info: Mapping[str, Any] | None =
     for subsystem in SUBSYSTEMS:
         adaptation(log, subsystem, ticks, values)
     _truth(log, ticks, values)
-    for number, name in enumerate(phases(time, flying, scenario, bool(abort_reason))):
+    for number, name in enumerate(phases(ticks, time, flying, scenario, statuses)):
         recording.phases[number] = recording.phase_names.setdefault(
             name, len(recording.phase_names)
         )
     recording.count = len(ticks)
-    return Flight(recording.series(info), end is not None, abort_reason)
+    changes = parameter_changes(log, takeoff)
+    told = transitions(statuses, takeoff)
+    wall = log.wall_seconds(TRUTH)
+    faults = fault_log.records(log.messages(FAULTS), takeoff)
+    series = recording.series(info)
+    return Flight(series, end is not None, abort_reason, changes, told, faults, wall)
+
+
+def parameter_changes(log: Log, takeoff: int) -> list[dict[str, Any]]:
+    """What was asked of the nodes' parameters, in order; takeoff: stamp [ns] of mission time 0.
+
+    time_s: mission time after which it counts; node, by, reason, values: see `changes.Change`.
+    """
+    found = []
+    for data in log.messages(CHANGES):
+        stamp, change = Change.from_message(deserialize_message(data, DiagnosticArray))
+        entry = {
+            "time_s": (stamp - takeoff) / SECOND,
+            "node": change.node,
+            "by": change.by,
+            "accepted": change.accepted,
+            "reason": change.reason,
+            "values": {name: list(pair) for name, pair in change.values.items()},
+        }
+        found.append(entry)
+    return sorted(found, key=lambda entry: entry["time_s"])
 
 
 def adaptation(log: Log, subsystem: str, ticks: np.ndarray, values: np.ndarray) -> None:
@@ -223,16 +268,47 @@ def _truth(log: Log, ticks: np.ndarray, values: np.ndarray) -> None:
     values[:, COLUMNS.block("magnet.")] = magnet[:, [0, 2, 1]]
 
 
+def transitions(
+    statuses: Sequence[tuple[int, MissionStatus]], takeoff: int
+) -> list[dict[str, Any]]:
+    """How the states of the supervisor followed each other: see `outcome.transition`."""
+    found = []
+    for (_, before), (stamp, now) in pairwise(statuses):
+        if now.state != before.state:
+            time = (stamp - takeoff) / SECOND
+            found.append(transition(time, before.state, now.state, now.cause))
+    return found
+
+
 def phases(
-    time: np.ndarray, flying: np.ndarray, scenario: Scenario, aborted: bool
+    ticks: np.ndarray,
+    time: np.ndarray,
+    flying: np.ndarray,
+    scenario: Scenario,
+    statuses: Sequence[tuple[int, MissionStatus]],
 ) -> Iterator[str]:
-    """The phase of each tick; time (m,) [s], flying (m,): position and attitude are controlled."""
+    """The phase of each tick; ticks (m,) [ns], time (m,) [s], flying (m,): position and attitude
+    are controlled.
+
+    The scenario's, unless the mission has left it; then what the mission said last.
+    """
+    left = any(
+        status.state == State.HOLDING.value
+        or (status.state == State.LANDING.value and status.abort_reason)
+        for _, status in statuses
+    )
     flights = np.flatnonzero(flying)
     takeoff = flights[0] if len(flights) else len(time)
+    last = statuses[-1][1] if statuses else MissionStatus()
+    ended = last.phase
+    if ended not in (LANDED, ABORTED):  # the log was cut off
+        ended = ABORTED if last.abort_reason else LANDED
+    stamps = [stamp for stamp, _ in statuses]
     for number, now in enumerate(time.tolist()):
         if flying[number]:
-            yield scenario.phase(max(now, 0.0))
+            told = bisect_right(stamps, ticks[number]) - 1 if left else -1
+            yield statuses[told][1].phase if told >= 0 else scenario.phase(max(now, 0.0))
         elif number < takeoff:
-            yield "waiting"
+            yield WAITING
         else:
-            yield "aborted" if aborted else "landed"
+            yield ended

@@ -9,7 +9,7 @@ from pathlib import Path
 import zstandard
 from mcap.data_stream import ReadDataStream
 from mcap.opcode import Opcode
-from mcap.records import Channel, Chunk, Schema
+from mcap.records import Channel, Chunk, Metadata, Schema
 
 from uam_sim_bridge.flight.mcap_writer import MAGIC, MESSAGE
 
@@ -22,11 +22,12 @@ class UnreadableLog(ValueError):
 
 @dataclass
 class TopicLog:
-    """Messages of one topic in file order: log times [ns] and serialized messages."""
+    """Messages of one topic in file order: log times [ns], serialized messages, wall times [ns]."""
 
     type_name: str
     times: list[int] = field(default_factory=list)
     messages: list[bytes] = field(default_factory=list)
+    published: list[int] = field(default_factory=list)
 
 
 def read_log(path: Path, topics: set[str] | None = None) -> dict[str, TopicLog]:
@@ -50,6 +51,21 @@ def read_log(path: Path, topics: set[str] | None = None) -> dict[str, TopicLog]:
     return reader.found
 
 
+def read_metadata(path: Path) -> dict[str, dict[str, str]]:
+    """The named texts of a log, also of one that was cut off. Raises UnreadableLog, or OSError."""
+    data = path.read_bytes()
+    if not data.startswith(MAGIC):
+        raise UnreadableLog(f"{path} is not an MCAP file")
+    found = {}
+    for opcode, body in _records(memoryview(data)[len(MAGIC) :]):
+        if opcode == Opcode.METADATA:
+            record = Metadata.read(_stream(body))
+            found[record.name] = record.metadata
+        elif opcode == Opcode.DATA_END:
+            break
+    return found
+
+
 class _Pass:
     def __init__(self, topics: set[str] | None):
         self.found: dict[str, TopicLog] = {}
@@ -59,10 +75,11 @@ class _Pass:
 
     def take(self, opcode: int, body: memoryview) -> None:
         if opcode == Opcode.MESSAGE:
-            channel, _, time, _ = _MESSAGE_BODY.unpack_from(body)
+            channel, _, time, published = _MESSAGE_BODY.unpack_from(body)
             log = self._logs.get(channel)
             if log is not None:
                 log.times.append(time)
+                log.published.append(published)
                 log.messages.append(bytes(body[_MESSAGE_BODY.size :]))
         elif opcode == Opcode.SCHEMA:
             schema = Schema.read(_stream(body))

@@ -9,6 +9,8 @@ import re
 from functools import cache
 from pathlib import Path
 
+from uam_msgs_py import tf_message
+
 SEPARATOR = "=" * 80
 # Field line: type, optional bound and array, name. Constants and comments never name a type.
 FIELD = re.compile(r"^\s*([A-Za-z][\w/]*)(?:<=\d+)?(?:\[(?:<=)?\d*\])?\s+[A-Za-z]\w*")
@@ -27,6 +29,8 @@ def definition(type_name: str) -> str:
     """The .msg text of `package/msg/Name`."""
     package, _, name = type_name.partition("/msg/")
     module = importlib.util.find_spec(package)
+    if module is None and package == tf_message.PACKAGE:
+        return tf_message.DEFINITION
     if module is None or module.origin is None:
         raise DefinitionMissing(f"message package {package} is not installed")
     # The same tree holds lib/pythonX.Y/site-packages/<package> and share/<package>, in wheels

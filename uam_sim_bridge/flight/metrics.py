@@ -64,7 +64,8 @@ def compute(
     """The content of metrics.json.
 
     info: PASSED_ON, `wall_s`, `abort_reason` ("" or None when there was none); optionally
-    `drop_point` [x, y] and `landing_point` [x, y] (default the origin) [m], `missed_ticks`.
+    `transitions` (of the supervisor, see `outcome.transition`), `faults`, `drop_point` [x, y] and
+    `landing_point` [x, y] (default the origin) [m], `missed_ticks`.
     latency_s: sensor-to-setpoint latency per tick [s], used when `clock` is "realtime".
     """
     criteria = criteria or Criteria()
@@ -89,6 +90,7 @@ def compute(
         "mission_completed": not shortfalls,
         "shortfalls": shortfalls,
         "abort_reason": info.get("abort_reason") or None,
+        "transitions": info.get("transitions") or [],
         "payload_lifted": payload.lifted,
         "payload_lifted_at_s": payload.lifted_at_s,
         "payload_lift_height_m": payload.lift_height_m,
@@ -96,6 +98,7 @@ def compute(
         "landing_error_m": landing,
         "rms": errors(series, rms),
         "max": errors(series, largest),
+        "faults": info.get("faults") or [],
     }
     if info.get("clock") == "realtime":
         metrics["latency_ms"] = latency_figures(latency_s)

@@ -4,8 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from typing import Any
 
 from uam_sim_bridge.flight.timeseries import Series
+
+
+def transition(time: float, before: str, after: str, cause: str) -> dict[str, Any]:
+    """One change of the supervisor's state, as metrics.json has it; time: mission time [s]."""
+    return {"time_s": round(time, 6), "from": before, "to": after, "cause": cause}
 
 
 @dataclass
@@ -15,7 +21,8 @@ class Outcome:
     series: None when no control tick was recorded. wall_s: from the first tick to the last.
     abort_reason: why the mission was given up. failure: why the flight could not go on, in one
     line, and `details`, the last lines of the log that tell more. latency_s, missed_ticks: realtime
-    only.
+    only. parameter_changes: see `log_reader.parameter_changes`; transitions: see `transition`;
+    faults: see `faults.timeline.record`.
     """
 
     series: Series | None
@@ -27,6 +34,9 @@ class Outcome:
     latency_s: Sequence[float] | None = None
     missed_ticks: int | None = None
     notes: list[str] = field(default_factory=list)
+    parameter_changes: list[dict[str, Any]] = field(default_factory=list)
+    transitions: list[dict[str, Any]] = field(default_factory=list)
+    faults: list[dict[str, Any]] = field(default_factory=list)
 
     @property
     def partial(self) -> bool:

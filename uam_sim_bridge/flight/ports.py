@@ -92,6 +92,27 @@ def busy_port(ports: Ports, own_autopilot: bool = True) -> str | None:
     return None
 
 
+def instances_in_use(folder: Path | None = None) -> list[int]:
+    """The instances that flights of this user have reserved now."""
+    found = []
+    for number in range(INSTANCES):
+        try:
+            lock = os.open(_lock_file(folder, number), os.O_RDONLY | os.O_CLOEXEC | os.O_NOFOLLOW)
+        except OSError:
+            continue
+        try:
+            fcntl.flock(lock, fcntl.LOCK_SH | fcntl.LOCK_NB)
+        except OSError:
+            found.append(number)
+        finally:
+            os.close(lock)
+    return found
+
+
+def _lock_file(folder: Path | None, instance: int) -> Path:
+    return (folder or Path(tempfile.gettempdir())) / f"uam-{os.getuid()}-{instance}.lock"
+
+
 class Reservation:
     """Holds one instance until released. A context manager.
 
@@ -131,7 +152,7 @@ class Reservation:
         raise PortError(f"none of the {INSTANCES} instances is free; the last one: {why}")
 
     def _path(self, instance: int) -> Path:
-        return self._folder / f"uam-{os.getuid()}-{instance}.lock"
+        return _lock_file(self._folder, instance)
 
     @staticmethod
     def _take(path: Path) -> int | None:
@@ -167,3 +188,17 @@ class Reservation:
         trace: TracebackType | None,
     ) -> None:
         self.release()
+
+
+def domain_of_flight(instance: int | None) -> int | None:
+    """The ROS domain of the flight `instance`, None for the one that is under way.
+
+    None where none is: the environment's then. Raises PortError where there are several.
+    """
+    if instance is not None:
+        return ports_of(instance).domain
+    flying = instances_in_use()
+    if len(flying) > 1:
+        numbers = ", ".join(map(str, flying))
+        raise PortError(f"several flights are under way: --instance {numbers}?")
+    return ports_of(flying[0]).domain if flying else None

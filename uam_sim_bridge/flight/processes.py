@@ -64,6 +64,7 @@ class Child:
     process: subprocess.Popen
     log: Path
     may_end: bool = False  # its end is expected: it was asked to stop, or ends with the mission
+    optional: bool = False  # the flight goes on without it
     shared: set[Path] = field(default_factory=set)  # shared-memory files seen in its address space
 
 
@@ -93,10 +94,12 @@ class Processes:
         arguments: Sequence[str] = (),
         may_end: bool = False,
         niceness: int = 0,
+        optional: bool = False,
     ) -> Child:
         """Run `module.main()` as the process `name`.
 
-        may_end: it stops by itself when done; niceness: how far it steps back for the others.
+        may_end: it stops by itself when done; niceness: how far it steps back for the others;
+        optional: its end is no failure of the flight, see `missed`.
         """
         log = self._logs / f"{name}.log"
         runner = [sys.executable, "-m", "uam_sim_bridge.flight.child", str(niceness)]
@@ -110,7 +113,7 @@ class Processes:
                 env=self._environment,
                 process_group=0,
             )
-        child = Child(name, process, log, may_end)
+        child = Child(name, process, log, may_end, optional)
         self._children[name] = child
         return child
 
@@ -123,6 +126,10 @@ class Processes:
         """The process id of a child."""
         return self._children[name].process.pid
 
+    def let_end(self, name: str) -> None:
+        """Whatever ends this child, it is no failure of the flight any more."""
+        self._children[name].optional = True
+
     def running(self, name: str) -> bool:
         """True while the child has not ended."""
         return self._children[name].process.poll() is None
@@ -131,9 +138,17 @@ class Processes:
         """Raise NodeFailed for the first child that ended although nobody asked it to."""
         for child in self._children.values():
             status = child.process.poll()
-            if status is None or (child.may_end and status == 0):
+            if status is None or child.optional or (child.may_end and status == 0):
                 continue
             raise NodeFailed(child.name, status, child.log)
+
+    def missed(self) -> list[NodeFailed]:
+        """What became of optional children that ended by themselves, told once for each."""
+        ended = [c for c in self._children.values() if c.optional and not c.may_end]
+        ended = [child for child in ended if child.process.poll() is not None]
+        for child in ended:
+            child.may_end = True
+        return [NodeFailed(child.name, child.process.returncode, child.log) for child in ended]
 
     def note_shared_memory(self) -> None:
         """Remember which shared-memory files the children use, to remove them should one be killed.
@@ -205,9 +220,19 @@ def environment(domain: int, log_folder: Path) -> dict[str, str]:
 
 
 def ros_environment(domain: int, log_folder: Path) -> dict[str, str]:
-    """The variables by which ROS finds its domain, its transports and the place of its logs.
+    """The variables by which ROS finds its domain, its transports and the place of its logs."""
+    return {
+        **transport_environment(),
+        "ROS_DOMAIN_ID": str(domain),
+        "ROS_LOG_DIR": str(log_folder),
+        "RCUTILS_COLORIZED_OUTPUT": "0",
+    }
 
-    Our transports stay on this machine (config/dds/fastdds.xml). Where the user's own file or
+
+def transport_environment() -> dict[str, str]:
+    """The variables that keep ROS on this machine.
+
+    Our transports do so by themselves (config/dds/fastdds.xml). Where the user's own file or
     another middleware is used, ROS is told to.
     """
     transports = str(configuration.path("dds/fastdds.xml"))
@@ -216,8 +241,5 @@ def ros_environment(domain: int, log_folder: Path) -> dict[str, str]:
     ours = chosen == transports and "fastrtps" in middleware
     return {
         PROFILES_FILE: chosen,
-        "ROS_DOMAIN_ID": str(domain),
         "ROS_AUTOMATIC_DISCOVERY_RANGE": "SYSTEM_DEFAULT" if ours else "LOCALHOST",
-        "ROS_LOG_DIR": str(log_folder),
-        "RCUTILS_COLORIZED_OUTPUT": "0",
     }

@@ -9,22 +9,30 @@ from __future__ import annotations
 
 import json
 import time
-from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
-from uam_sim_bridge.flight import shared_memory, wiring
+from uam_sim_bridge.cockpit import place
+from uam_sim_bridge.faults import LINK, PLANT, PROCESS
+from uam_sim_bridge.faults.timeline import Happened
+from uam_sim_bridge.flight import log_facts, shared_memory, wiring
+from uam_sim_bridge.flight.conclude import asked, command_line
+from uam_sim_bridge.flight.fault_log import FaultTopic
 from uam_sim_bridge.flight.interrupts import Interrupts
+from uam_sim_bridge.flight.limits import time_limit
 from uam_sim_bridge.flight.log_reader import read_flight
 from uam_sim_bridge.flight.mcap_reader import UnreadableLog
 from uam_sim_bridge.flight.outcome import Outcome
 from uam_sim_bridge.flight.ports import Ports, Reservation
+from uam_sim_bridge.flight.process_faults import ProcessFaults
+from uam_sim_bridge.flight.process_table import await_orphans
 from uam_sim_bridge.flight.processes import NodeFailed, Processes, environment
 from uam_sim_bridge.flight.progress import Progress
-from uam_sim_bridge.flight.result_folder import ResultFolder
-from uam_sim_bridge.flight.settings import BUILTIN, FlightSettings
+from uam_sim_bridge.flight.result_folder import ResultFolder, as_json, versions
+from uam_sim_bridge.flight.settings import BUILTIN, ONLOOKERS, FlightSettings
 from uam_sim_bridge.flight.status_listener import StatusListener
 from uam_sim_bridge.flight.warm_up import is_cold, warm_up
+from uam_sim_bridge.nodes.plant_options import NOT_READY
 
 # Executable → module. Started and, at the end, stopped in this order, the recorder last.
 MODULES = {
@@ -36,16 +44,21 @@ MODULES = {
     wiring.ATTITUDE: "uam_control.nodes.attitude_controller",
     wiring.ARM: "uam_control.nodes.arm_controller",
     wiring.BRIDGE: "uam_sim_bridge.nodes.mavlink_bridge",
+    wiring.SCENE: "uam_sim_bridge.nodes.scene",
+    wiring.COCKPIT: "uam_sim_bridge.nodes.cockpit",
 }
 AUTOPILOT = "autopilot"
+FACTS = "facts.json"
 STAND_IN, SITL = "uam_sim_bridge.autopilot.server", "uam_sim_bridge.px4.sitl"
 HITL_ROUTER = "uam_sim_bridge.mavlink.router"
 PX4_LOG = "px4.ulg"
 PX4_LINGER = 4.0  # [s] simulated, after the mission, in which PX4 disarms and closes its log
-START_TIMEOUT = 60.0  # [s] until every node must be connected to the others
+START_TIMEOUT = 20.0  # [s] without progress until every node is connected to the others
+AUTOPILOT_WAIT = 60.0  # [s] of the autopilot for the simulator
+OWN_START_TIMEOUT = 600.0  # [s] the same where the user is to start one by hand
 ANSWER_TIMEOUT = 10.0  # [s] for the answers to one lockstep tick
-OVERTIME = 60.0  # [s] simulated, beyond the scenario's landing, until a flight is ended
-RECORDER_NICENESS = 10  # nobody waits for it, and it has seconds of room
+# Nobody waits for the recorder, which has seconds of room, or for those who only look on.
+NICENESS = {wiring.RECORDER: 10} | dict.fromkeys(ONLOOKERS, 10)
 POLL = 0.1  # [s]
 NOTE_PERIOD = 1.0  # [s] between two looks at the shared memory that the nodes use
 
@@ -63,11 +76,22 @@ def fly(settings: FlightSettings, folder: ResultFolder, progress: Progress) -> O
         if is_cold():
             progress.message("compiling the control path (once)")
             warm_up()
+        await_orphans(progress.message)
         presence.remove_unused(shared_memory.abandoned())
         with Interrupts() as stop:
             ports = reservation.ports
-            folder.write_parameters(parameters(settings, folder, ports))
+            sections = parameters(settings, folder, ports)
+            folder.write_parameters(sections)
+            _write_facts(settings, folder)
+            if wiring.COCKPIT in sections:
+                port = sections[wiring.COCKPIT]["port"]
+                progress.message(f"cockpit: {place.address(place.LOCAL, port)}")
             failure = _supervise(settings, folder, ports, progress, stop, presence)
+            if failure is not None and failure.status == NOT_READY and not settings.foreign:
+                # Seen about once in a hundred starts: the middleware does not connect two of them.
+                progress.message(f"{failure}; starting once more")
+                _keep_logs(folder.path / "logs")
+                failure = _supervise(settings, folder, ports, progress, stop, presence)
     outcome = _outcome(settings, folder, failure, stop.raised)
     last = progress.last
     if outcome.failure and failure is None and last is not None and last.time < 0.0:
@@ -75,13 +99,20 @@ def fly(settings: FlightSettings, folder: ResultFolder, progress: Progress) -> O
     return outcome
 
 
+def _keep_logs(logs: Path) -> None:
+    """Put aside what a start in vain has said."""
+    aside = logs / "first_start"
+    aside.mkdir()
+    for file in logs.glob("*.log"):
+        file.rename(aside / file.name)
+
+
 def parameters(
     settings: FlightSettings, folder: ResultFolder, ports: Ports
 ) -> dict[str, dict[str, Any]]:
     """Every node's parameters: those of the profile, and those of this flight."""
-    sections = {node: _values(values) for node, values in settings.profile.sets.items()}
+    sections = {node: values.to_mapping() for node, values in settings.profile.sets.items()}
     sections[wiring.MISSION]["scenario"] = _scenario(settings)
-    landing = settings.scenario.landing
     sections[wiring.PLANT] = {
         "vehicle_changes": json.dumps(settings.vehicle_changes),
         "payload_mass": float(settings.payload_mass),
@@ -92,36 +123,43 @@ def parameters(
         "autopilot_always_answers": settings.autopilot == BUILTIN,
         "linger": 0.0 if settings.autopilot == BUILTIN else PX4_LINGER,
         "recorded": True,
-        "start_timeout": START_TIMEOUT,
+        "start_timeout": OWN_START_TIMEOUT if settings.foreign else START_TIMEOUT,
+        "foreign": ",".join(settings.foreign),
+        "faults": settings.faults.only(PLANT).to_text(),
         "answer_timeout": ANSWER_TIMEOUT,
-        "time_limit": landing.at + landing.duration + OVERTIME,
+        "time_limit": time_limit(settings.scenario),
         "statistics": str(folder.path / "logs" / "mujoco_sim.json"),
     }
-    sections[wiring.BRIDGE] = settings.profile.section(wiring.BRIDGE) | {
+    sections[wiring.BRIDGE] = settings.profile.bridge() | {
         "clock": settings.clock,
         "local_port": ports.offboard_udp,
         "autopilot_port": ports.autopilot_udp,
         # as PX4 SITL numbers its instances; a flight controller is the first of its kind
         "autopilot_system": 1.0 if _in_the_loop(settings) else float(ports.instance + 1),
         "gcs": settings.gcs,
+        "faults": settings.faults.only(LINK).to_text(),
     }
     if _started(settings):
         sections[wiring.BRIDGE]["autopilot"] = settings.autopilot
+    sections[wiring.SCENE] = {"scenario": _scenario(settings)}
+    if wiring.COCKPIT not in settings.without:
+        sections[wiring.COCKPIT] = {"port": place.free_port(place.LOCAL, place.PORT)}
     sections[wiring.RECORDER] = {
         "file": str(folder.log),
         "statistics": str(folder.path / "logs" / "recorder.json"),
+        "facts": str(folder.path / "logs" / FACTS),
     }
     return sections
 
 
-def _values(parameter_set) -> dict[str, Any]:
-    """A parameter set as ROS parameters; ROS knows no empty list, which stands for the default."""
-    values = asdict(parameter_set)
-    return {
-        name: list(value) if isinstance(value, tuple) else value
-        for name, value in values.items()
-        if value != ()
+def _write_facts(settings: FlightSettings, folder: ResultFolder) -> None:
+    """What the log is to say about the flight, apart from what flies by."""
+    texts = {
+        folder.parameters.name: folder.parameters.read_text(),
+        folder.versions.name: as_json(versions()),
     }
+    known = asked(settings, command_line())
+    log_facts.write(folder.path / "logs" / FACTS, known, _scenario(settings), texts)
 
 
 def _scenario(settings: FlightSettings) -> str:
@@ -149,8 +187,15 @@ def _supervise(
                 f"{len(children.names)} processes in ROS domain {ports.domain}, "
                 f"autopilot on TCP {ports.simulator_tcp}, UDP {ports.autopilot_udp}"
             )
-            with StatusListener(surroundings, ports.domain) as listener:
-                _watch(children, listener, progress, stop)
+            for name in settings.foreign:
+                progress.message(
+                    f"waiting for your {name}, to be started with ROS_DOMAIN_ID={ports.domain}"
+                )
+            with (
+                StatusListener(surroundings, ports.domain) as listener,
+                _process_faults(settings, children, listener, progress) as faults,
+            ):
+                _watch(children, listener, progress, stop, faults)
         except NodeFailed as failure:
             return failure
         finally:
@@ -169,12 +214,15 @@ def _start(
     arguments = ["--ros-args", "--disable-external-lib-logs"]
     arguments += ["--params-file", str(folder.parameters)]
     for name, module in MODULES.items():
+        if name in settings.without:
+            continue
         children.start(
             name,
             module,
             arguments,
             may_end=name == wiring.PLANT,
-            niceness=RECORDER_NICENESS if name == wiring.RECORDER else 0,
+            niceness=NICENESS.get(name, 0),
+            optional=name in ONLOOKERS,
         )
     module, own = _autopilot(settings, folder, ports)
     if module:
@@ -196,7 +244,7 @@ def _autopilot(
 ) -> tuple[str, list[str]]:
     """Module and arguments of the autopilot's process; no module where the user started one."""
     instance = ["--instance", str(ports.instance)]
-    patience = ["--wait", str(START_TIMEOUT)]
+    patience = ["--wait", str(AUTOPILOT_WAIT)]
     if _in_the_loop(settings):
         return HITL_ROUTER, [settings.autopilot, *instance, *patience]
     if settings.px4 is not None:
@@ -208,8 +256,27 @@ def _autopilot(
     return STAND_IN, [*instance, *patience]
 
 
+def _process_faults(
+    settings: FlightSettings, children: Processes, listener: StatusListener, progress: Progress
+) -> ProcessFaults:
+    """What hinders the processes; each time it is said, and told to the log."""
+    schedule = settings.faults.only(PROCESS)
+    topic = FaultTopic(listener.node) if schedule else None
+
+    def tell(one: Happened) -> None:
+        stage = f"begins at {one.begin:.2f} s" if one.active else f"is over at {one.end:.2f} s"
+        progress.message(f"fault {one.fault.NAME} of {one.fault.values['node']} {stage}")
+        topic.tell(listener.stamp, [one])
+
+    return ProcessFaults(children, schedule, tell)
+
+
 def _watch(
-    children: Processes, listener: StatusListener, progress: Progress, stop: Interrupts
+    children: Processes,
+    listener: StatusListener,
+    progress: Progress,
+    stop: Interrupts,
+    faults: ProcessFaults,
 ) -> None:
     """Show the progress until the plant ends or the user stops it. Raises NodeFailed."""
     noted = -NOTE_PERIOD
@@ -218,7 +285,10 @@ def _watch(
             children.note_shared_memory()
             noted = time.monotonic()
         children.check()
+        for failure in children.missed():
+            progress.message(f"{failure}; the flight goes on without it")
         status = listener.poll()
+        faults.update(listener.mission_time)
         if status is not None:
             progress.update(status)
         time.sleep(POLL)
@@ -256,6 +326,8 @@ def _outcome(
         outcome.failure = outcome.failure or f"nothing recorded: {error}"
         return outcome
     outcome.series, outcome.abort_reason = flight.series, flight.abort_reason
+    outcome.parameter_changes, outcome.transitions = flight.parameter_changes, flight.transitions
+    outcome.faults = flight.faults
     if not flight.done and not outcome.partial:
         outcome.failure = numbers.get("ended_by") or "the mission did not end"
     return outcome

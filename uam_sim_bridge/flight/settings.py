@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import importlib.util
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -10,6 +11,7 @@ from uam_control import configuration
 from uam_control.laws.catalogue import LAWS
 from uam_control.mission import Scenario, load_scenario
 from uam_control.profile import Profile, load_profile
+from uam_sim_bridge.faults import Schedule, limits, read_schedule
 from uam_sim_bridge.flight.ports import AUTOPILOT_UDP, INSTANCES
 from uam_sim_bridge.mavlink.transport import ALLOWED, LinkUrl, parse_url
 from uam_sim_bridge.px4.installation import Px4Installation
@@ -17,6 +19,10 @@ from uam_sim_bridge.px4.installation import Px4Installation
 ENGINES = ("ros", "direct")
 CLOCKS = ("lockstep", "realtime")
 BUILTIN, PX4 = "builtin", "px4"
+# Nodes that a user's own can stand in for: their inputs and outputs are all there is to them.
+REPLACEABLE = ("state_estimator", "position_controller", "attitude_controller", "arm_controller")
+COCKPIT = "cockpit"
+ONLOOKERS = ("scene", COCKPIT)  # nodes that only look on: the flight goes on without
 PAYLOAD_MAX = 2.0  # [kg] more than the rotors could ever carry
 
 
@@ -30,7 +36,8 @@ class FlightSettings:
 
     payload_mass [kg]; vehicle_changes: dotted entries of config/vehicle/*.yaml to replace, as
     {"air.wind": [3.0, 0.0, 0.0]}; out: the result folder, None for the default one. autopilot:
-    BUILTIN, PX4, or the URL of one that the user has started; link: that URL, taken apart.
+    BUILTIN, PX4, or the URL of one that the user has started; link: that URL, taken apart. without:
+    nodes left out, see `foreign`.
     """
 
     scenario: Scenario
@@ -49,12 +56,19 @@ class FlightSettings:
     scenario_source: str = ""  # what the user called it: a name or a file
     instance: int | None = None  # of ROS domain and ports; None: the first free one
     vehicle_changes: dict[str, object] = field(default_factory=dict)
+    without: tuple[str, ...] = (COCKPIT,)
+    faults: Schedule = Schedule()
+
+    @property
+    def foreign(self) -> tuple[str, ...]:
+        """Nodes that the user starts in place of the stack's, and that the flight waits for."""
+        return tuple(name for name in self.without if name in REPLACEABLE)
 
 
 def settings(
     scenario: str = "pick_and_place",
     controller: str = "modular",
-    profile: str | None = None,
+    profile: str | Sequence[str] | None = None,
     engine: str = "ros",
     clock: str = "lockstep",
     autopilot: str = BUILTIN,
@@ -66,11 +80,16 @@ def settings(
     video: bool = True,
     vehicle_changes: dict[str, object] | None = None,
     instance: int | None = None,
+    without: Sequence[str] = (),
+    view: bool = False,
+    faults: Sequence[str] = (),
 ) -> FlightSettings:
     """Check the options and load what they name.
 
+    profile: see `load_profile` for several of them; faults: see `faults.read_schedule`; view: serve
+    the cockpit, too.
     Raises SettingsError, and what loading raises (ConfigurationError, ScenarioError, ProfileError,
-    Px4Error, PortError); each is one line for the user.
+    Px4Error, PortError, FaultError); each is one line for the user.
     """
     _choice("controller", controller, LAWS)
     _choice("engine", engine, ENGINES)
@@ -80,6 +99,12 @@ def settings(
     if engine == "direct" and autopilot != BUILTIN:
         raise SettingsError(f"the direct engine flies the stand-in alone: --autopilot {autopilot} "
                             "needs --engine ros")
+    for node in without:
+        _choice("node to fly without", node, REPLACEABLE + ONLOOKERS)
+    if without and engine == "direct":
+        raise SettingsError("the direct engine has no nodes: --without needs --engine ros")
+    if view and engine == "direct":
+        raise SettingsError("the direct engine has no topics to look at: --view needs --engine ros")
     px4 = Px4Installation.find(px4_dir) if autopilot == PX4 else None
     link = None if autopilot in (BUILTIN, PX4) else _link(autopilot)
     if link is not None and link.kind == "serial" and clock != "realtime":
@@ -90,9 +115,8 @@ def settings(
     if not 0 <= seed < 2**31:
         raise SettingsError(f"seed {seed} is outside 0..{2**31 - 1}")
     loaded = load_scenario(str(configuration.named("scenarios", scenario)))
-    flown = load_profile(
-        str(configuration.named("profiles", profile or LAWS[controller].profile))
-    )
+    asked = [profile] if isinstance(profile, str) else profile or [LAWS[controller].profile]
+    flown = load_profile(*(str(configuration.named("profiles", one)) for one in asked))
     for node, law in flown.laws().items():
         if law != controller:
             raise SettingsError(
@@ -102,6 +126,9 @@ def settings(
     mass = loaded.payload_mass if payload_mass is None else payload_mass
     if not 0.0 <= mass <= PAYLOAD_MAX:
         raise SettingsError(f"payload mass {mass:g} kg is outside 0..{PAYLOAD_MAX:g} kg")
+    injected = read_schedule(faults, loaded, seed)
+    left_out = tuple(dict.fromkeys(without if view else (*without, COCKPIT)))
+    limits.check(injected, engine, (*left_out, "autopilot") if link is not None else left_out)
     return FlightSettings(
         scenario=loaded,
         profile=flown,
@@ -119,6 +146,8 @@ def settings(
         scenario_source=scenario,
         instance=_instance_of(link) if instance is None else instance,
         vehicle_changes=dict(vehicle_changes or {}),
+        without=left_out,
+        faults=injected,
     )
 
 

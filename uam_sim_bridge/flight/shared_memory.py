@@ -16,10 +16,12 @@ import time
 from collections.abc import Iterable
 from pathlib import Path
 
+from uam_sim_bridge.flight import process_table
+
 FOLDER = Path("/dev/shm")
 # A participant's segment is named by a random number, a port by its own number.
 NAME = re.compile(r"^(?:fastrtps_[0-9a-f]{16}|fastrtps_port\d+|sem\.fastrtps_port\d+_mutex)$")
-ABANDONED = 60.0  # [s] a file that old and without a user was not just being created
+ABANDONED = 3.0  # [s] a file that old and without a user was not just being created
 
 
 def used_by(pid: int) -> set[Path]:
@@ -60,8 +62,7 @@ def remove_unused(files: Iterable[Path]) -> list[Path]:
     files = set(files)
     if not files:
         return []
-    pids = [int(entry.name) for entry in Path("/proc").glob("[0-9]*")]
-    used = set().union(*(used_by(pid) for pid in pids if pid != os.getpid()))
+    used = set().union(*(used_by(pid) for pid in process_table.pids() if pid != os.getpid()))
     removed = []
     for path in files:
         port = path.with_name(path.name.removeprefix("sem.").removesuffix("_mutex"))

@@ -2,17 +2,15 @@
 
 from __future__ import annotations
 
-import os
 import time
 from collections.abc import Mapping
 
-import rclpy
 from rclpy.node import Node
-from rclpy.signals import SignalHandlerOptions
 
 from uam_msgs_py import topics
 from uam_msgs_py.convert import seconds
 from uam_msgs_py.status import AutopilotState, MissionStatus
+from uam_sim_bridge.flight.guest import Guest
 from uam_sim_bridge.flight.progress import Status
 
 
@@ -21,33 +19,21 @@ class StatusListener:
 
     def __init__(self, environment: Mapping[str, str], domain: int):
         """environment: of the flight's processes, of which ROS reads some variables here too."""
-        before = dict(os.environ)
-        os.environ.update(environment)
-        try:
-            self._context = rclpy.Context()
-            rclpy.init(
-                args=["--ros-args", "--disable-external-lib-logs"],
-                context=self._context,
-                domain_id=domain,
-                signal_handler_options=SignalHandlerOptions.NO,
-            )
-            self._node = Node(
-                "uam_fly",
-                context=self._context,
-                use_global_arguments=False,
-                start_parameter_services=False,
-                enable_rosout=False,
-            )
-        finally:
-            os.environ.clear()
-            os.environ.update(before)
+        self._guest = Guest("uam_fly", environment, domain)
         self._mission = self._listen(topics.MISSION_STATUS)
         self._autopilot = self._listen(topics.AUTOPILOT_STATE)
         self._autopilot_text = ""
         self._last: tuple[float, float] | None = None  # simulated and wall time [s]
+        self.stamp, self.mission_time = 0, None  # [ns], [s] of the newest status after take-off
 
     def _listen(self, topic: topics.Topic):
-        return self._node.create_subscription(topic.type, topic.name, lambda _: None, topic.qos)
+        create = self._guest.node.create_subscription
+        return create(topic.type, topic.name, lambda _: None, topic.qos)
+
+    @property
+    def node(self) -> Node:
+        """The node that listens."""
+        return self._guest.node
 
     def poll(self) -> Status | None:
         """The newest status, None if there is none since the last call."""
@@ -61,6 +47,8 @@ class StatusListener:
         if newest is None:
             return None
         stamp, mission = MissionStatus.from_message(newest)
+        if mission.time >= 0.0:
+            self.stamp, self.mission_time = stamp, mission.time
         return Status(
             phase=mission.phase,
             time=mission.time,
@@ -83,8 +71,7 @@ class StatusListener:
         return self
 
     def __exit__(self, *exception) -> None:
-        self._node.destroy_node()
-        rclpy.shutdown(context=self._context)
+        self._guest.close()
 
 
 def _messages(subscription):

@@ -7,8 +7,8 @@ list with the running nodes.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from collections.abc import Collection, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
 
 from rclpy.node import Node
 
@@ -18,15 +18,20 @@ from uam_msgs_py.connections import READERS, WRITERS, Connections
 ESTIMATOR, MISSION = "state_estimator", "mission"
 POSITION, ATTITUDE, ARM = "position_controller", "attitude_controller", "arm_controller"
 BRIDGE, PLANT, RECORDER = "mavlink_bridge", "mujoco_sim", "recorder"
+SCENE, COCKPIT = "scene", "cockpit"  # only look on, nobody waits for them: in none of WIRES
 
 
 @dataclass(frozen=True)
 class Wire:
-    """One topic from one node to several; the recorder comes on top of them."""
+    """One topic from one node to several; the recorder comes on top of them.
+
+    optional: those who listen can do without.
+    """
 
     topic: topics.Topic
     publisher: str
     subscribers: tuple[str, ...] = ()
+    optional: bool = False
 
     def listeners(self, recorded: bool) -> tuple[str, ...]:
         """The subscribers, the recorder among them if it is there."""
@@ -35,8 +40,8 @@ class Wire:
 
 WIRES = (
     Wire(topics.IMU, PLANT, (ESTIMATOR,)),
-    Wire(topics.JOINTS, PLANT, (ESTIMATOR,)),
-    Wire(topics.MOCAP, PLANT, (ESTIMATOR, BRIDGE)),
+    Wire(topics.JOINTS, PLANT, (ESTIMATOR, MISSION)),
+    Wire(topics.MOCAP, PLANT, (ESTIMATOR, MISSION, BRIDGE)),
     Wire(topics.STATE, ESTIMATOR, (MISSION, POSITION, ATTITUDE, ARM, BRIDGE)),
     Wire(topics.REFERENCE, MISSION, (POSITION, ATTITUDE, ARM)),
     Wire(topics.MAGNET, MISSION, (PLANT,)),
@@ -47,28 +52,47 @@ WIRES = (
     Wire(topics.ARM_EFFORT, ARM, (PLANT,)),
     Wire(topics.SETPOINT, BRIDGE, (PLANT,)),
     Wire(topics.AUTOPILOT_STATE, BRIDGE, (MISSION,)),
+    Wire(topics.AUTOPILOT_BATTERY, BRIDGE, (MISSION,), optional=True),
+    Wire(topics.POSITION_ADAPTATION, POSITION, (MISSION,), optional=True),
+    Wire(topics.ATTITUDE_ADAPTATION, ATTITUDE, (MISSION,), optional=True),
+    Wire(topics.ARM_ADAPTATION, ARM, (MISSION,), optional=True),
     # only recorded
     Wire(topics.CLOCK, PLANT),
     Wire(topics.TRUTH_STATE, PLANT),
     Wire(topics.TRUTH_PAYLOAD, PLANT),
     Wire(topics.TRUTH_ROTORS, PLANT),
     Wire(topics.TRUTH_MAGNET, PLANT),
-    Wire(topics.AUTOPILOT_BATTERY, BRIDGE),
     Wire(topics.ARM_COMMAND, ARM),
     Wire(topics.THRUST, BRIDGE),
-    Wire(topics.POSITION_ADAPTATION, POSITION),
-    Wire(topics.ATTITUDE_ADAPTATION, ATTITUDE),
-    Wire(topics.ARM_ADAPTATION, ARM),
 )
 
 
-def missing(node: Node, recorded: bool) -> list[str]:
-    """Ends of WIRES that the graph, as `node` sees it, does not have yet, in words.
+def with_foreign(node: Node, foreign: Collection[str]) -> Sequence[Wire]:
+    """WIRES where some nodes, by their names in `foreign`, are the user's own.
+
+    Such a node must publish what others listen to; it listens to what it likes, as the graph that
+    `node` sees tells.
+    """
+    if not foreign:
+        return WIRES
+    found = []
+    for wire in WIRES:
+        if wire.publisher in foreign and (wire.optional or not wire.subscribers):
+            continue
+        name = node.resolve_topic_name(wire.topic.name)
+        hearing = {info.node_name for info in node.get_subscriptions_info_by_topic(name)}
+        wanted = tuple(who for who in wire.subscribers if who not in foreign or who in hearing)
+        found.append(replace(wire, subscribers=wanted))
+    return found
+
+
+def missing(node: Node, recorded: bool, wires: Sequence[Wire] = WIRES) -> list[str]:
+    """Ends of `wires` that the graph, as `node` sees it, does not have yet, in words.
 
     recorded: the recorder must listen to each of these topics too.
     """
     found = []
-    for wire in WIRES:
+    for wire in wires:
         name = node.resolve_topic_name(wire.topic.name)
         publishers = {info.node_name for info in node.get_publishers_info_by_topic(name)}
         listeners = {info.node_name for info in node.get_subscriptions_info_by_topic(name)}
@@ -79,10 +103,17 @@ def missing(node: Node, recorded: bool) -> list[str]:
     return found
 
 
-def unconnected(said: Connections, plant: Mapping[str, int], recorded: bool) -> Iterator[str]:
-    """Ends of WIRES that have not found all their counterparts, in words.
+def unconnected(
+    said: Connections,
+    plant: Mapping[str, int],
+    recorded: bool,
+    wires: Sequence[Wire] = WIRES,
+    foreign: Collection[str] = (),
+) -> Iterator[str]:
+    """Ends of `wires` that have not found all their counterparts, in words.
 
-    said: what the other nodes say; plant: what the plant itself knows (`connections.of`).
+    said: what the other nodes say; plant: what the plant itself knows (`connections.of`); foreign:
+    nodes that say nothing about it.
     """
 
     def count(node: str, kind: str, topic: str) -> int:
@@ -90,10 +121,11 @@ def unconnected(said: Connections, plant: Mapping[str, int], recorded: bool) -> 
             return plant.get(kind + topic, 0)
         return said.readers(node, topic) if kind == READERS else said.writers(node, topic)
 
-    for wire in WIRES:
+    for wire in wires:
         name, wanted = wire.topic.name, wire.listeners(recorded)
-        if count(wire.publisher, READERS, name) < len(wanted):
+        silent = wire.publisher in foreign
+        if not silent and count(wire.publisher, READERS, name) < len(wanted):
             yield f"{wire.publisher} to find the listeners of {name}"
         for who in wanted:
-            if count(who, WRITERS, name) < 1:
+            if who not in foreign and count(who, WRITERS, name) < 1:
                 yield f"{who} to find the publisher of {name}"

@@ -9,12 +9,12 @@ from __future__ import annotations
 
 import select
 import socket
-import time as clock
 from dataclasses import dataclass
 
 import numpy as np
 
 from uam_control.parameters import ParameterSet, number
+from uam_sim_bridge.flight.patience import SLICE, Patience
 from uam_sim_bridge.flight.ports import PortError
 from uam_sim_bridge.mavlink.frames import swap_body, swap_quaternion
 from uam_sim_bridge.mavlink.hil_sensors import TEMPERATURE, SlowSensors
@@ -139,13 +139,14 @@ class HilServer:
             p = self.parameters
             timeout = p.answer_timeout if self.answered else p.silent_timeout
         self.answered = False
-        end = clock.monotonic() + timeout
+        patience = Patience(timeout)
         while not self.answered:
-            left = max(0.0, end - clock.monotonic())
-            if not select.select([self._link], [], [], left)[0]:
+            left = patience.left
+            if select.select([self._link], [], [], min(left, SLICE / 2))[0]:
+                if not self._receive():
+                    return self._stop()
+            elif not left:
                 break
-            if not self._receive():
-                return self._stop()
         self._ever = self._ever or self.answered
         self.missed += self._ever and not self.answered
         return self.motors

@@ -22,7 +22,7 @@ from dataclasses import dataclass
 from enum import Enum
 
 from uam_control.parameters import ParameterSet, number
-from uam_sim_bridge.autopilot.modes import Mode, Result, Severity
+from uam_sim_bridge.autopilot.modes import Mode, Result, Severity, result_word
 from uam_sim_bridge.mavlink.advice import with_advice
 
 _KEPT_REASONS = 5
@@ -66,7 +66,8 @@ class OffboardSequence:
     """The state machine.
 
     `phase`; `armed_stamp` [s] or None: when armed was first seen in this flight; `reasons`: what
-    the autopilot said against the last requests and what to do about it, newest last.
+    the autopilot said against the last requests and what to do about it, newest last; `let_go`: set
+    from outside where the autopilot's own failsafe is wanted, then OFFBOARD is not asked for again.
     """
 
     def __init__(self, parameters: OffboardParameters | None = None) -> None:
@@ -74,6 +75,7 @@ class OffboardSequence:
         self.phase = Phase.WAITING
         self.armed_stamp: float | None = None
         self.reasons: tuple[str, ...] = ()
+        self.let_go = False
         self._wanted = False
         self._stream_start = math.inf
         self._asked = -math.inf
@@ -141,11 +143,7 @@ class OffboardSequence:
         """Take a COMMAND_ACK's result for a request; a refusal becomes a reason."""
         if result == Result.ACCEPTED:
             return
-        try:
-            word = Result(result).name.lower().replace("_", " ")
-        except ValueError:
-            word = f"result {result}"
-        self._reason(f"{request.value} refused ({word})")
+        self._reason(f"{request.value} refused ({result_word(result)})")
 
     def text(self, severity: int, text: str) -> None:
         """Take a STATUSTEXT; warnings and worse become reasons."""
@@ -171,7 +169,7 @@ class OffboardSequence:
             self._reason("the autopilot disarmed in flight")
             self.phase = Phase.FAILED
             return None
-        if mode is Mode.OFFBOARD:
+        if mode is Mode.OFFBOARD or self.let_go:
             self._attempts = 0
             return None
         self._reason(f"the autopilot left OFFBOARD for {mode.name}")

@@ -31,7 +31,7 @@ from uam_sim_bridge.flight.ports import PortError
 from uam_sim_bridge.mavlink.hil_thinning import Thinner, sustainable_rate
 from uam_sim_bridge.mavlink.outbox import Outbox
 from uam_sim_bridge.mavlink.pacing import Meter
-from uam_sim_bridge.mavlink.sitl_options import add_port_options, fill_ports
+from uam_sim_bridge.mavlink.sitl_options import add_port_options, fill_ports, number
 from uam_sim_bridge.mavlink.sitl_ports import UdpPort, connect
 from uam_sim_bridge.mavlink.transport import ALLOWED, Transport, open_transport
 from uam_sim_bridge.mavlink.wire import Codec, Framer, Message, mavlink2
@@ -183,19 +183,9 @@ def say(text: str) -> None:
 
 def _stop(*_: object) -> None:
     """End quietly, however often the signal comes."""
-    for number in (signal.SIGINT, signal.SIGTERM):
-        signal.signal(number, signal.SIG_IGN)
+    for each in (signal.SIGINT, signal.SIGTERM):
+        signal.signal(each, signal.SIG_IGN)
     sys.exit(0)
-
-
-def _rate(text: str) -> float:
-    try:
-        value = float(text)
-    except ValueError:
-        value = math.nan
-    if not 1.0 <= value <= 1000.0:
-        raise argparse.ArgumentTypeError(f"{text} is not a rate in Hz (1..1000)")
-    return value
 
 
 def parser() -> argparse.ArgumentParser:
@@ -211,7 +201,7 @@ def parser() -> argparse.ArgumentParser:
         "  hitl_router udp:192.168.1.20:14550 --instance 3      every port + 3\n",
     )
     p.add_argument("link", metavar="LINK", help=f"to the flight controller: {ALLOWED}")
-    p.add_argument("--hil-rate", type=_rate, metavar="HZ",
+    p.add_argument("--hil-rate", type=number("rate in Hz", 1.0, 1000.0), metavar="HZ",
                    help="HIL_SENSOR per second, at most (default: what the line carries, "
                    "up to 250)")
     add_port_options(p)
@@ -222,8 +212,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """Run until the simulator hangs up or a signal comes: 0; wrong use, no port or device: 2."""
     options = parser().parse_args(arguments)
     fill_ports(options)
-    for number in (signal.SIGINT, signal.SIGTERM):
-        signal.signal(number, _stop)
+    for each in (signal.SIGINT, signal.SIGTERM):
+        signal.signal(each, _stop)
     closables = []
     try:
         closables.append(controller := open_transport(options.link))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import math
+from collections.abc import Callable
 
 from uam_sim_bridge.flight.ports import AUTOPILOT_UDP, OFFBOARD_UDP, SIMULATOR_TCP
 from uam_sim_bridge.mavlink.sitl_ports import HOST
@@ -21,14 +22,17 @@ def instance(text: str) -> int:
     return int(text)
 
 
-def seconds(text: str) -> float:
-    try:
-        value = float(text)
-    except ValueError:
-        value = math.nan
-    if not 0.0 <= value <= 86400.0:
-        raise argparse.ArgumentTypeError(f"{text} is not a time in seconds (0..86400)")
-    return value
+def number(what: str, low: float, high: float) -> Callable[[str], float]:
+    """Return an argparse type: a number from `low` to `high`, called `what` when refused."""
+    def read(text: str) -> float:
+        try:
+            value = float(text)
+        except ValueError:
+            value = math.nan
+        if not low <= value <= high:
+            raise argparse.ArgumentTypeError(f"{text} is not a {what} ({low:g}..{high:g})")
+        return value
+    return read
 
 
 def add_port_options(p: argparse.ArgumentParser) -> None:
@@ -42,7 +46,8 @@ def add_port_options(p: argparse.ArgumentParser) -> None:
                    help="own UDP port (default 14580 + N)")
     p.add_argument("--companion-port", type=port, metavar="PORT",
                    help="UDP port told unasked until a peer speaks (default 14540 + N)")
-    p.add_argument("--wait", type=seconds, default=60.0, metavar="SECONDS",
+    p.add_argument("--wait", type=number("time in seconds", 0.0, 86400.0), default=60.0,
+                   metavar="SECONDS",
                    help="how long to wait for the simulator (default %(default)g)")
 
 

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 
-from uam_sim_bridge.autopilot.modes import Result
+from uam_sim_bridge.autopilot.modes import Result, result_word
 from uam_sim_bridge.mavlink.wire import mavlink2
 
 # message id → wanted rate [Hz]
@@ -62,11 +62,7 @@ class StreamCheck:
         if result == Result.ACCEPTED:
             self._refused.pop(number, None)
         else:
-            try:
-                word = Result(result).name.lower().replace("_", " ")
-            except ValueError:
-                word = f"result {result}"
-            self._refused[number] = word
+            self._refused[number] = result_word(result)
 
     def request(self, time: float) -> tuple[int, float] | None:
         """Return message id and interval [us] to ask for at `time` [s], None for nothing now."""

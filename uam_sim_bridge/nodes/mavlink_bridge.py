@@ -9,7 +9,8 @@ setpoint; /uam/setpoint repeats what was sent and acknowledges the tick.
 | good | body rates and thrust from the map |
 | idle (not flying) | rates 0, thrust 0: the stream goes on, the vehicle stays on the ground |
 | not finite or malformed, on the ground | as idle |
-| the same in flight; idle high above the start; in real time none for `stale_after` | level hold \
+| the same in flight; the mission in failsafe; idle high above the start; in real time none for \
+`stale_after` | level hold \
 for `hold_time`, then nothing: the autopilot's failsafe acts |
 """
 
@@ -26,6 +27,7 @@ from rclpy.parameter import Parameter
 
 from uam_control.coordinates import ATTITUDE
 from uam_control.parameters import ParameterError, ParameterSet, choice, number
+from uam_control.supervision import State
 from uam_msgs_py import topics
 from uam_msgs_py.battery import battery_message
 from uam_msgs_py.control import (
@@ -40,7 +42,10 @@ from uam_msgs_py.layouts import BadMessage, stamp_of
 from uam_msgs_py.node import UamNode, run
 from uam_msgs_py.parameters import NodeParameters, given
 from uam_msgs_py.status import OK, WARN, AutopilotState, MissionStatus
+from uam_sim_bridge.faults import LINK, Schedule
+from uam_sim_bridge.flight.fault_log import FaultTopic
 from uam_sim_bridge.flight.ports import PortError
+from uam_sim_bridge.mavlink.faulty_transport import FaultyTransport
 from uam_sim_bridge.mavlink.forwarding import GroundStation
 from uam_sim_bridge.mavlink.hold import HoldParameters, LevelHold
 from uam_sim_bridge.mavlink.link import OffboardLink
@@ -111,6 +116,7 @@ class MavlinkBridgeNode(UamNode):
         self._hold = LevelHold(hold)
         options = self._options
         self._station: GroundStation | None = None
+        self._faulty: FaultyTransport | None = None
         self.link = self._open_link(hold.hold_time)
         self._state = np.zeros((3, 8))
         self._pose: tuple[int, np.ndarray, np.ndarray] | None = None
@@ -147,10 +153,13 @@ class MavlinkBridgeNode(UamNode):
             self.create_timer(WATCH_PERIOD, self._watch, clock=steady)
 
     def _open_link(self, hold_time: float) -> OffboardLink:
-        """Open the links that the parameters name; raises PortError in one line."""
+        """Open the links that the parameters name; raises PortError, FaultError in one line."""
         options = self._options
         system = int(options.autopilot_system)
-        host = self.declare_parameter("autopilot_host", "127.0.0.1").value
+        about = ParameterDescriptor(
+            description="address of the autopilot's UDP port, where `autopilot` names no link",
+            read_only=True)
+        host = self.declare_parameter("autopilot_host", "127.0.0.1", about).value
         url = self._text("autopilot", "link to the autopilot, in place of the UDP port: "
                          "udp:HOST:PORT[:LOCAL_PORT], tcp:HOST:PORT or serial:DEVICE:BAUD")
         station = self._text("gcs", "ground station that watches: udp:HOST:PORT[:LOCAL_PORT]")
@@ -163,6 +172,12 @@ class MavlinkBridgeNode(UamNode):
             transport = open_transport(url)
         else:
             transport = UdpTransport(int(options.local_port), (host, int(options.autopilot_port)))
+        faults = Schedule.from_text(
+            self._text("faults", "JSON, faults of the MAVLink connection and when they come, see "
+                       "docs/faults.md; empty = none")).only(LINK)
+        if faults:
+            transport = self._faulty = FaultyTransport(transport, faults)
+            self._fault_topic = FaultTopic(self)
         if station:
             codec = Codec(system, mavlink2.MAV_COMP_ID_ONBOARD_COMPUTER, signing)
             transport = self._station = GroundStation(station, transport, codec)
@@ -216,6 +231,9 @@ class MavlinkBridgeNode(UamNode):
     def _on_mission(self, message) -> None:
         stamp, status = MissionStatus.from_message(message)
         self.identification.switch(seconds(stamp), status.magnet)
+        self.sequence.let_go = status.state == State.FAILSAFE.value
+        if self._faulty is not None:
+            self._faulty.mission_at(seconds(stamp), status.time)
 
     def _on_mocap(self, data: bytes) -> None:
         self._pose = read_pose(data)
@@ -229,6 +247,7 @@ class MavlinkBridgeNode(UamNode):
         self.take_waiting(self._mission)
         if state is not BAD:
             self._state = state
+        self._update_faults(now)
         self.link.poll(now)
         self._adopt()
         setpoint = self._command(now, state, position, torque)
@@ -238,6 +257,10 @@ class MavlinkBridgeNode(UamNode):
         self._identify(stamp, state, position, thrust)
         self._setpoint.publish(self._writer.fill(stamp, rates, thrust))
         self.done_tick(stamp, begun)
+
+    def _update_faults(self, now: float) -> None:
+        if self._faulty is not None:
+            self._fault_topic.tell(round(now * 1e9), self._faulty.update(now))
 
     def _adopt(self) -> None:
         """Take the autopilot's parameters over where that is wished; never while it is armed."""
@@ -255,9 +278,11 @@ class MavlinkBridgeNode(UamNode):
             self.get_logger().warning(f"the autopilot's parameters are not adopted: {error}")
             return
         names = ("rate_p", "rate_k", "thr_mdl_fac")
-        self.set_parameters([Parameter(name, value=_plain(getattr(new, name))) for name in names])
+        taken = [Parameter(name, value=_plain(getattr(new, name))) for name in names]
+        self.change_parameters(taken, "autopilot")
         for change in changes:
             self.get_logger().info(f"adopted from the autopilot: {change}")
+
     def _identify(self, stamp: int, state, position, thrust: float) -> None:
         """Compare the thrust sent with the acceleration; the factor counts from the next tick."""
         if stamp // THRUST_PERIOD != self.stamp // THRUST_PERIOD:
@@ -272,6 +297,7 @@ class MavlinkBridgeNode(UamNode):
     def _command(self, now: float, state, position, torque) -> tuple[np.ndarray, float] | None:
         """Return body rates (3,) and thrust for this tick, None for no setpoint at all."""
         good = state is not BAD and position is not BAD and torque is not BAD
+        good = good and not self.sequence.let_go
         if good and position.flying and torque[0] is not None:
             try:
                 chi, chi_dot = state[0], state[1]
@@ -325,6 +351,7 @@ class MavlinkBridgeNode(UamNode):
         if self.ticks == 0 or silence < self._options.stale_after:
             return
         now = seconds(self.stamp) + silence
+        self._update_faults(now)
         self.link.poll(now)
         self._send(now, self._without_command(now))
         self._tell(round(now * 1e9))

@@ -29,7 +29,6 @@ from pathlib import Path
 
 import numpy as np
 import rclpy
-from rclpy.node import Node
 from rclpy.signals import SignalHandlerOptions
 
 from uam_control.coordinates import POSITION
@@ -39,9 +38,15 @@ from uam_msgs_py.connections import Connections, of
 from uam_msgs_py.executor import LeanExecutor
 from uam_msgs_py.node import StopSignal, refuse
 from uam_msgs_py.parameters import refuse_unknown
+from uam_msgs_py.tunable import TunableNode
+from uam_sim_bridge.faults import PLANT, Schedule
+from uam_sim_bridge.faults.plant import FaultyPlant
 from uam_sim_bridge.flight import wiring
+from uam_sim_bridge.flight.fault_log import FaultTopic
+from uam_sim_bridge.flight.patience import Patience
 from uam_sim_bridge.mavlink.hil_server import HilParameters, HilServer
-from uam_sim_bridge.nodes.plant_options import Options, Statistics, declare
+from uam_sim_bridge.nodes.plant_health import PlantHealth
+from uam_sim_bridge.nodes.plant_options import NOT_READY, Options, Statistics, declare
 from uam_sim_bridge.nodes.plant_topics import SUSPECTS, Answers, Sensors, TruthTopics, nanoseconds
 from uam_sim_bridge.plant import Plant, Samples, Truth, Vehicle
 
@@ -49,6 +54,7 @@ NAME = "mujoco_sim"
 REPORT_INTERVAL = 5.0  # [s] between two lines that say who is waited for
 DEADLINE_TICKS = 3  # [control periods] 12 ms, about a rotor's time constant
 CATCH_UP = 2.0  # [1] times real time, after a stall of the machine
+FOREIGN_WAIT = 1.0  # [s] for a foreign node to find us as well: it does not say when it has
 LAST_WAIT = 3.0  # [s] for a recorder that has not seen the last tick, and may have lost it
 RECORDER_LAG = 2.0  # [s] half of what fits the queue that config/dds gives each process
 SERVICE_TICKS = 25  # in real time the parameter services are looked after every so many ticks
@@ -58,14 +64,22 @@ class PlantStopped(RuntimeError):
     """The flight cannot go on; the text is one line and says who did not answer."""
 
 
+class NotReady(PlantStopped):
+    """Not everyone came, or found the others."""
+
+
 class Simulator:
     """Plant, topics and autopilot link, tick by tick."""
 
-    def __init__(self, node: Node, options: Options, stop: StopSignal):
+    def __init__(self, node: TunableNode, options: Options, stop: StopSignal):
         self.node, self.options, self._stop = node, options, stop
         vehicle = Vehicle.load(options.vehicle).changed(json.loads(options.vehicle_changes))
-        self.plant = Plant(vehicle, options.payload_mass, options.seed, tuple(options.arm_start))
-        _warm_up(Plant(vehicle, options.payload_mass, options.seed, tuple(options.arm_start)))
+        start = (vehicle, options.payload_mass, options.seed, tuple(options.arm_start))
+        faults = Schedule.from_text(options.faults).only(PLANT)
+        self._faulty = FaultyPlant(*start, faults) if faults else None
+        self.plant = self._faulty or Plant(*start)
+        self._fault_topic = FaultTopic(node) if faults else None
+        _warm_up(Plant(*start))
         self.sensors, self.truth = Sensors(node), TruthTopics(node)
         self.answers = Answers(node)
         self.connections = Connections(node)
@@ -76,6 +90,8 @@ class Simulator:
             waits = HilParameters(answer_timeout=patience, silent_timeout=patience)
         self.hil = HilServer(options.hil_port, parameters=waits, seed=options.seed)
         self.statistics = Statistics(options.clock)
+        self.health = PlantHealth(node, self.answers, self.statistics)
+        self._foreign = tuple(filter(None, options.foreign.split(",")))
         self._setpoint_is_there = False  # as a rule it is the last answer to arrive
         self._complete = False  # every kind of sensor has delivered
         self._stamp: int | None = None  # of this tick's IMU sample [ns]
@@ -87,26 +103,34 @@ class Simulator:
     def wait_for_everyone(self) -> None:
         """Return when all nodes are connected to each other and the autopilot to us."""
         limit = self.options.start_timeout
-        begin, reported, last = time.monotonic(), -math.inf, []
+        patience, missed = Patience(limit or math.inf), []
+        reported, last = -math.inf, []
         while not self._stop.raised:
             self.executor.spin_once(0.05)
             waiting = self._waiting_for()
             if not waiting:
                 break
+            self.health.waiting(_listed(waiting))
             now = time.monotonic()
-            if limit and now - begin > limit:
-                raise PlantStopped(f"not ready after {limit:g} s, waiting for {_listed(waiting)}")
+            if waiting != missed:  # a slow machine gets on, too
+                patience, missed = Patience(limit or math.inf), waiting
+            if patience.over:
+                raise NotReady(f"no progress for {limit:g} s, waiting for {_listed(waiting)}")
             if waiting != last and now - reported > 1.0 or now - reported > REPORT_INTERVAL:
                 print(f"{NAME}: waiting for {_listed(waiting)}", flush=True)
                 reported, last = now, waiting
+        settled = time.monotonic() + (FOREIGN_WAIT if self._foreign else 0.0)
+        while time.monotonic() < settled and not self._stop.raised:
+            self.executor.spin_once(0.05)
         print(f"{NAME}: everyone is there", flush=True)
 
     def _waiting_for(self) -> list[str]:
-        recorded = self.options.recorded
-        waiting = wiring.missing(self.node, recorded)
+        recorded, foreign = self.options.recorded, self._foreign
+        wires = wiring.with_foreign(self.node, foreign)
+        waiting = wiring.missing(self.node, recorded, wires)
         if not waiting:  # the ends exist; have they found each other?
             plant = of(self.sensors.outlets | self.truth.outlets, self.answers.inlets)
-            waiting = list(wiring.unconnected(self.connections, plant, recorded))
+            waiting = list(wiring.unconnected(self.connections, plant, recorded, wires, foreign))
         if not self.hil.accept(0.0):
             waiting.append(f"autopilot to connect to TCP port {self.options.hil_port}")
         return waiting
@@ -119,6 +143,7 @@ class Simulator:
         gc.freeze()  # what exists now stays; later collections need not look at it
         begin = time.monotonic()
         while not self._stop.raised:
+            begun = time.perf_counter()
             samples, truth = self._begin_tick()
             if realtime:
                 self._send_hil(samples, truth)
@@ -129,7 +154,11 @@ class Simulator:
                 self._wait_for_answers()
                 self._send_hil(samples, truth)
                 self._receive_hil()
+            if self._faulty:
+                told = self.answers
+                self._faulty.mission_at(told.mission_stamp * 1e-9, told.mission.time)
             self.plant.step(self.hil.motors, self.answers.effort, self.answers.magnet)
+            self.health.done_tick(begun, self.plant.time)
             if self.answers.mission.done and not self.statistics.ended_by:
                 self.statistics.ended_by = "mission"
                 end = self.plant.time + self.options.linger
@@ -155,9 +184,11 @@ class Simulator:
         """Publish what is due at this tick."""
         plant = self.plant
         self._begun, self._begun_at = time.monotonic(), plant.time
-        now = nanoseconds(plant.time)
+        now = self.node.stamp = nanoseconds(plant.time)
         self.answers.begin()
         samples, truth = plant.sense(), plant.truth()
+        if self._faulty and self._faulty.changed:
+            self._fault_topic.tell(now, self._faulty.changed)
         self.sensors.clock(now)
         # Sensors with latency deliver nothing at first. The estimator cannot begin before all have,
         # and which of the early samples it would have seen by then is chance: they are not sent.
@@ -191,13 +222,13 @@ class Simulator:
                                "; the recorder is silent")
         if self._stamp is None or self._stop.raised:
             return
-        deadline = time.monotonic() + self.options.answer_timeout
+        patience = Patience(self.options.answer_timeout)
         while missing := self.answers.missing(self._stamp):
             self._setpoint_is_there = "setpoint" not in missing
             self.executor.spin_once(0.1)
             if self._stop.raised:
                 return
-            if time.monotonic() > deadline:
+            if patience.over:
                 raise PlantStopped(self._no_answer(missing))
 
     def _recorder_has_caught_up(self, lag: float, patience: float) -> bool:
@@ -205,11 +236,11 @@ class Simulator:
 
         patience: longest wait [s of wall time].
         """
-        deadline = time.monotonic() + patience
+        waiting = Patience(patience)
         while self.options.recorded and not self._stop.raised:
             if self._begun_at - self.connections.recorded_until() <= lag:
                 break
-            if time.monotonic() > deadline:
+            if waiting.over:
                 return False
             self.executor.spin_once(0.1)
         return True
@@ -287,7 +318,7 @@ def main() -> int:
     stop = StopSignal()
     # The context must outlive the signal, as there are statistics to write and links to close.
     rclpy.init(args=sys.argv, signal_handler_options=SignalHandlerOptions.NO)
-    node = Node(NAME)
+    node = TunableNode(NAME)
     simulator = None
     try:
         options = declare(node)
@@ -302,7 +333,7 @@ def main() -> int:
         except PlantStopped as error:
             print(f"{NAME}: {error}", file=sys.stderr, flush=True)
             simulator.statistics.ended_by = str(error)
-            return 1
+            return NOT_READY if isinstance(error, NotReady) else 1
         return 0
     except ParameterError as error:
         return refuse(NAME, error)

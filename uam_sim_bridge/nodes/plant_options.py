@@ -10,6 +10,8 @@ from rclpy.node import Node
 
 from uam_control.parameters import ParameterError
 
+NOT_READY = 3  # exit status: not everyone came, or found the others
+
 
 @dataclass(frozen=True)
 class Options:
@@ -25,6 +27,8 @@ class Options:
     autopilot_always_answers: bool = True
     linger: float = 0.0
     recorded: bool = False
+    foreign: str = ""
+    faults: str = ""
     start_timeout: float = 0.0
     answer_timeout: float = 10.0
     time_limit: float = 0.0
@@ -42,7 +46,9 @@ DESCRIPTIONS = {
     "autopilot_always_answers": "the stand-in does; PX4 is silent while it boots",
     "linger": "how long it goes on after the mission, for an autopilot that has to finish [s]",
     "recorded": "wait for the recorder as well",
-    "start_timeout": "longest wait for the other nodes [s], 0 = for ever",
+    "foreign": "names of nodes that are not the stack's own, with commas between them",
+    "faults": "JSON, faults of the plant and when they come, see docs/faults.md; empty = none",
+    "start_timeout": "longest wait for the other nodes [s] without progress, 0 = for ever",
     "answer_timeout": "longest wait for the answers to a tick [s of wall time]",
     "time_limit": "simulation time at which the flight ends in any case [s], 0 = never",
     "statistics": "JSON file to write at the end, empty = none",

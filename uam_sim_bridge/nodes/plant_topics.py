@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import time
+
 import numpy as np
 from rclpy.event_handler import PublisherEventCallbacks, SubscriptionEventCallbacks
 from rclpy.node import Node
@@ -130,8 +132,9 @@ class Answers:
     def __init__(self, node: Node):
         self.effort = np.zeros(2)
         self.magnet = False
-        self.mission = MissionStatus()
+        self.mission, self.mission_stamp = MissionStatus(), 0  # [ns]
         self.setpoints: dict[int, int] = {}
+        self.arrivals: dict[str, float] = {}  # time.monotonic() of the newest, by topic
         self._arrived: set[str] = set()
         self._setpoint_stamp = -1
 
@@ -166,16 +169,20 @@ class Answers:
 
     def _on_setpoint(self, data: bytes, info: dict | None = None) -> None:
         self._setpoint_stamp = stamp_of(data)
+        self.arrivals[topics.SETPOINT.name] = time.monotonic()
         if info is not None:
             self.setpoints[self._setpoint_stamp] = info["source_timestamp"]
 
     def _on_effort(self, data: bytes, info: dict | None = None) -> None:
         self.effort = read_effort(data, JOINTS)
         self._arrived.add("effort")
+        self.arrivals[topics.ARM_EFFORT.name] = time.monotonic()
 
     def _on_magnet(self, data: bytes, info: dict | None = None) -> None:
         self.magnet = read_switch(data)
         self._arrived.add("magnet")
+        self.arrivals[topics.MAGNET.name] = time.monotonic()
 
     def _on_mission(self, message, info: dict | None = None) -> None:
-        _, self.mission = MissionStatus.from_message(message)
+        self.mission_stamp, self.mission = MissionStatus.from_message(message)
+        self.arrivals[topics.MISSION_STATUS.name] = time.monotonic()

@@ -14,6 +14,7 @@ import json
 import sys
 import time
 from bisect import bisect_right
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -24,10 +25,13 @@ from rclpy.qos import QoSDurabilityPolicy, QoSHistoryPolicy, QoSProfile
 from rclpy.signals import SignalHandlerOptions
 from rclpy.subscription import Subscription
 
+from uam_control.parameters import ParameterError
 from uam_msgs_py import connections, topics
 from uam_msgs_py.convert import type_name
+from uam_msgs_py.health import LoopTime, ages
 from uam_msgs_py.layouts import SECOND, stamp_of
-from uam_msgs_py.node import StopSignal
+from uam_msgs_py.node import StopSignal, refuse
+from uam_msgs_py.parameters import refuse_unknown
 from uam_msgs_py.status import OK, WARN, diagnostic
 from uam_sim_bridge.flight.mcap_writer import McapWriter
 from uam_sim_bridge.flight.message_definitions import schema
@@ -52,6 +56,7 @@ class Track:
     stamped: bool
     channel: int
     one_publisher: bool
+    arrived: float | None = None  # time.monotonic() of the newest message
     last_sequence: int = 0
     lost: int = 0
 
@@ -59,10 +64,19 @@ class Track:
 class Recording:
     """The open file and the subscriptions that feed it."""
 
-    def __init__(self, node: Node, file: Path, chosen: list[topics.Topic], simulated: bool):
-        """Subscribe to `chosen` and create `file`."""
+    def __init__(
+        self,
+        node: Node,
+        file: Path,
+        chosen: list[topics.Topic],
+        simulated: bool,
+        metadata: Mapping[str, Mapping[str, str]] | None = None,
+    ):
+        """Subscribe to `chosen` and create `file`, which begins with the named texts `metadata`."""
         self._simulated = simulated
         self._writer = McapWriter(file)
+        for name, values in (metadata or {}).items():
+            self._writer.add_metadata(name, dict(values))
         self._tracks = [self._track(node, topic) for topic in chosen]
         # The clock comes last in each poll: when it has been taken, every /clock that was
         # published before any message taken in this poll is known.
@@ -90,7 +104,7 @@ class Recording:
 
     def poll(self) -> int:
         """Write everything that has arrived; returns how many messages that was."""
-        batch = []
+        batch, now = [], time.monotonic()
         for track in self._tracks:
             take = track.subscription.handle.take_message
             while (taken := take(track.message_type, True)) is not None:
@@ -102,6 +116,7 @@ class Recording:
                 sequence = info["publication_sequence_number"]
                 self._count_lost(track, sequence)
                 batch.append((track, data, published, sequence))
+                track.arrived = now
         for track, data, published, sequence in batch:
             at = stamp_of(data) if track.stamped else self._sim_time(published)
             self._writer.write(track.channel, max(at, 0), published, data, sequence & 0xFFFFFFFF)
@@ -135,6 +150,11 @@ class Recording:
     def inlets(self) -> dict[str, Subscription]:
         """The subscriptions by topic."""
         return {track.topic: track.subscription for track in self._tracks}
+
+    @property
+    def arrivals(self) -> dict[str, float]:
+        """time.monotonic() at which each topic's newest message was taken, if there was one."""
+        return {t.topic: t.arrived for t in self._tracks if t.arrived is not None}
 
     def flush(self) -> None:
         """Bring what was written to the file."""
@@ -175,11 +195,12 @@ def _qos_text(qos: QoSProfile) -> str:
     )
 
 
-def _health(node: Node, recording: Recording) -> DiagnosticArray:
-    """The node's entry of /diagnostics: to whom it is connected, and what it has lost."""
+def _health(node: Node, recording: Recording, polls: LoopTime) -> DiagnosticArray:
+    """The node's entry of /diagnostics: what it has lost, its loop, to whom it is connected."""
     lost = sum(recording.lost.values())
     summary = f"{lost} messages lost" if lost else "recording"
     values = {"messages lost": lost, connections.RECORDED_UNTIL: recording.until}
+    values |= polls.report("poll") | ages(recording.inlets, recording.arrivals)
     values |= connections.of({}, recording.inlets)
     now = node.get_clock().now().nanoseconds
     return diagnostic(now, node.get_name(), WARN if lost else OK, summary, values)
@@ -193,11 +214,16 @@ def main() -> int:
     node = Node("recorder", start_parameter_services=False)
     file = Path(node.declare_parameter("file", "log.mcap").value)
     statistics = node.declare_parameter("statistics", "").value
+    facts = node.declare_parameter("facts", "").value  # see flight/log_facts.py
     simulated = node.declare_parameter("simulated", True).value
     flush_period = node.declare_parameter("flush_period", 0.5).value
     poll_period = node.declare_parameter("poll_period", 0.02).value
     try:
-        recording = Recording(node, file, topics.ALL, simulated)
+        refuse_unknown(node)
+        known = json.loads(Path(facts).read_text()) if facts else None
+        recording = Recording(node, file, topics.ALL, simulated, known)
+    except ParameterError as error:
+        return refuse("recorder", error)
     except OSError as error:
         print(f"recorder: cannot write {file}: {error.strerror}", flush=True)
         return 1
@@ -206,14 +232,16 @@ def main() -> int:
     )
     print(f"recorder: {len(topics.ALL)} topics to {file}", flush=True)
     polls_per_flush = max(1, round(flush_period / poll_period))
-    polls = 0
+    polls, loop = 0, LoopTime()
     while not stop.raised:
         time.sleep(poll_period)
+        begun = time.perf_counter()
         recording.poll()
+        loop.add(begun)
         polls += 1
         if polls % polls_per_flush == 0:
             recording.flush()
-            health.publish(_health(node, recording))
+            health.publish(_health(node, recording, loop))
     recording.drain()
     recording.close()
     for topic, count in recording.lost.items():

@@ -62,7 +62,7 @@ class Plant:
         self.vehicle = vehicle
         self.period: float = numbers["control_period"]
         self.tick = 0
-        self.model = model = vehicle.compile(payload_mass)
+        self.model = model = self._compile(vehicle, payload_mass)
         self.data = data = mujoco.MjData(model)
         self._steps = round(self.period / model.opt.timestep)
         self._lay_out(payload_mass, arm_start)
@@ -91,6 +91,10 @@ class Plant:
 
         mujoco.mj_forward(model, data)
         self._specific_force = self._sensed_force.copy()
+
+    def _compile(self, vehicle: Vehicle, payload_mass: float) -> mujoco.MjModel:
+        """The model; payload_mass [kg]."""
+        return vehicle.compile(payload_mass)
 
     def _lay_out(self, payload_mass: float, arm_start: tuple[float, float]) -> None:
         """Keep views into MuJoCo's arrays and set the starting pose."""

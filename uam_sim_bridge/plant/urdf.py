@@ -9,7 +9,7 @@ import numpy as np
 
 from uam_sim_bridge.plant.vehicle import Vehicle
 
-ROOT = "base"
+ROOT, BASE_LINK = "base", "base_link"  # of the MJCF; of the URDF, as REP-105 has it
 SHAPES = {
     mujoco.mjtGeom.mjGEOM_BOX: lambda s: ("box", {"size": _text(2.0 * s)}),
     mujoco.mjtGeom.mjGEOM_SPHERE: lambda s: ("sphere", {"radius": _text(s[:1])}),
@@ -25,7 +25,7 @@ SHAPES = {
 }
 
 
-def urdf(vehicle: Vehicle, root_name: str = "base_link") -> str:
+def urdf(vehicle: Vehicle, root_name: str = BASE_LINK) -> str:
     """Return the URDF text: base and arm, inertia and visuals; frames as in the MJCF (FLU)."""
     model = vehicle.compile(0.0)
     robot = ElementTree.Element("robot", name=model.body(ROOT).name)
@@ -67,7 +67,7 @@ def _inertial(link: ElementTree.Element, model: mujoco.MjModel, body: int) -> No
 
 
 def _visual(link: ElementTree.Element, model: mujoco.MjModel, geom: int) -> None:
-    shape = SHAPES.get(model.geom_type[geom])
+    shape = SHAPES.get(mujoco.mjtGeom(model.geom_type[geom]))
     if shape is None:
         return
     visual = ElementTree.SubElement(link, "visual")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from copy import deepcopy
 from dataclasses import dataclass
 from pathlib import Path
@@ -46,10 +47,17 @@ class Vehicle:
         rotors = self.numbers["rotors"]
         return rotors["thrust_coefficient"] * rotors["speed_max"] ** 2
 
-    def compile(self, payload_mass: float) -> mujoco.MjModel:
-        """Return the MuJoCo model with a payload of payload_mass [kg] (0: far away, massless)."""
+    def compile(
+        self, payload_mass: float, extend: Callable[[mujoco.MjSpec], None] | None = None
+    ) -> mujoco.MjModel:
+        """Return the MuJoCo model with a payload of payload_mass [kg] (0: far away, massless).
+
+        extend: adds to the model what only some flights need.
+        """
         spec = mujoco.MjSpec.from_file(str(self.model_path))
         spec.geom("payload").mass = max(payload_mass, 1e-3)
+        if extend is not None:
+            extend(spec)
         model = spec.compile()
         self._vary(model)
         return model

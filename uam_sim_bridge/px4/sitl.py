@@ -20,6 +20,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from uam_control.configuration import ConfigurationError
+from uam_sim_bridge.mavlink.sitl_options import instance
 from uam_sim_bridge.px4 import parameters
 from uam_sim_bridge.px4.installation import WANTED, Px4Error, Px4Installation
 
@@ -104,7 +105,7 @@ def parser() -> argparse.ArgumentParser:
         "  px4_sitl --instance 2 --log flight.ulg\n"
         "  px4_sitl --params mine.yaml       NAME: value lines, PX4's names\n",
     )
-    p.add_argument("-i", "--instance", type=int, default=0, metavar="N",
+    p.add_argument("-i", "--instance", type=instance, default=0, metavar="N",
                    help="PX4 instance number, added to the ports (default %(default)s)")
     p.add_argument("--px4-dir", metavar="DIR", help=WANTED)
     p.add_argument("--params", metavar="FILE", nargs="+",

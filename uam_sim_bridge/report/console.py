@@ -80,6 +80,9 @@ def facts(metrics: Mapping[str, Any], directory: Path | None) -> Table:
     table.add_row("controller", catalogue.label(metrics["controller"]))
     table.add_row("payload", outcome.payload_story(metrics))
     table.add_row("landing", outcome.landing_story(metrics))
+    stepped_in = outcome.supervision_story(metrics)
+    if stepped_in:
+        table.add_row("supervisor", stepped_in)
     factor = metrics.get("real_time_factor")
     speed = f", {factor:.2f} × real time" if factor else ""
     table.add_row("flown", f"{metrics['duration_s']:.1f} s{speed}")

@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
+from uam_control.supervision import ORDINARY
 from uam_sim_bridge.report import paper
 
 
@@ -72,6 +73,16 @@ def landing_story(metrics: Mapping[str, Any]) -> str:
     """Where the vehicle landed, in one line."""
     error = metrics.get("landing_error_m")
     return "not landed" if error is None else f"{distance(error)} from the landing point"
+
+
+def supervision_story(metrics: Mapping[str, Any]) -> str | None:
+    """Where the supervisor stepped in, in one line; None where it did not."""
+    steps = [
+        f"{one['to']} at {one['time_s']:.1f} s ({one['cause']})"
+        for one in metrics.get("transitions") or []
+        if one["cause"] not in ORDINARY.values()
+    ]
+    return ", ".join(steps) or None
 
 
 def clamp_story(metrics: Mapping[str, Any]) -> str:

@@ -12,7 +12,7 @@ import jinja2
 
 from uam_control.laws import catalogue
 from uam_sim_bridge.flight.atomic import write_text
-from uam_sim_bridge.report import outcome, parameters, stability
+from uam_sim_bridge.report import changes, fault_marks, outcome, parameters, stability
 from uam_sim_bridge.report.figures import FIGURES
 from uam_sim_bridge.report.rendering import Rendered, existing
 
@@ -59,6 +59,8 @@ def write_page(directory: Path, rendered: Rendered | None = None) -> Path:
         thrust=outcome.thrust_story(metrics),
         errors=outcome.error_rows(metrics),
         clamps=outcome.clamp_story(metrics) if metrics.get("clamps") else None,
+        changes=changes.rows(info),
+        faults=fault_marks.rows(info),
         facts=[(label, (metrics | {"controller": controller}).get(key)) for key, label in FACTS],
         controller=controller,
         papers_mission=metrics.get("scenario") == PAPER_SCENARIO,

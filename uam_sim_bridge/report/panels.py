@@ -13,13 +13,18 @@ from matplotlib.lines import Line2D
 from matplotlib.ticker import MaxNLocator
 
 from uam_sim_bridge.flight.timeseries import ON_GROUND, Series
-from uam_sim_bridge.report import style
+from uam_sim_bridge.report import changes, fault_marks, style
 
 if TYPE_CHECKING:
     from uam_sim_bridge.analysis.stability import Stability
 
 BUCKETS = 900  # about one per pixel column of a panel
 RIGHT = 0.985  # right edge of the panels as part of the width
+# whether accepted → how a change of parameters is drawn, and its name
+CHANGES = (
+    (True, style.CHANGE, "-", "parameters changed"),
+    (False, style.REFUSED, ":", "change refused"),
+)
 MARGIN_S = 1.0  # shown before take-off and after touchdown
 
 
@@ -139,6 +144,8 @@ def finish(
         bands(axis, first, end)
         for time, colour, _ in events(first):
             axis.axvline(time, color=colour, linewidth=0.9, linestyle=(0, (4, 2.5)), zorder=2.5)
+    mark_changes(axes, first, start, end)
+    fault_marks.shade(axes, first.info, start, end)
     for axis in axes[0]:
         phase_names(figure, axis, first, start, end)
     for axis in axes[-1]:
@@ -180,6 +187,36 @@ def phase_names(figure: Figure, axis: Axes, series: Series, start: float, end: f
         reached = middle + half + per_character
 
 
+def mark_changes(axes: np.ndarray, series: Series, start: float, end: float) -> None:
+    """A thin line where parameters were changed, dotted where that was refused, and its number."""
+    shown = [row for row in changes.rows(series.info) if start <= row.time <= end]
+    for accepted, colour, dashes, _ in CHANGES:
+        times = [row.time for row in shown if row.accepted == accepted]
+        for axis in axes.flat if times else ():
+            axis.vlines(
+                times,
+                0.0,
+                1.0,
+                transform=axis.get_xaxis_transform(),
+                color=colour,
+                linewidth=0.6,
+                linestyle=dashes,
+                zorder=2.4,
+            )
+    for axis in axes[0]:
+        for time, text in changes.labels(shown, apart=0.02 * (end - start)):
+            axis.annotate(
+                text,
+                (time, 1.0),
+                xycoords=("data", "axes fraction"),
+                xytext=(2, -2),
+                textcoords="offset points",
+                va="top",
+                fontsize=6.5,
+                color=style.CHANGE,
+            )
+
+
 def events(series: Series) -> list[tuple[float, str, str]]:
     """(time [s], colour, name) of the magnet's switching."""
     found = []
@@ -200,6 +237,13 @@ def legend(figure: Figure, flights: Sequence[Flight], marked) -> None:
         Line2D([], [], color=colour, linewidth=0.9, linestyle=(0, (4, 2.5)), label=name)
         for name, colour in named
     ]
+    told = {row.accepted for row in changes.rows(flights[0].series.info)}
+    handles += [
+        Line2D([], [], color=colour, linewidth=0.8, linestyle=dashes, label=name)
+        for accepted, colour, dashes, name in CHANGES
+        if accepted in told
+    ]
+    handles += fault_marks.handles(flights[0].series.info)
     corner_legend(figure, handles)
 
 

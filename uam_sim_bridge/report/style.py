@@ -13,6 +13,9 @@ FLIGHTS = ("#1f5fa8", "#d9822b", "#2a9d8f", "#a63d57", "#7b6bb0", "#6b7680")
 GAINS = ("#0b3c6f", "#3f7fbf", "#57a773", "#d9822b")
 PICK = "#2a8a57"
 DROP = "#c2512f"
+CHANGE = "#7b4fa3"
+REFUSED = "#b3412a"
+FAULT = "#c9302c"
 PAYLOAD = "#2a8a57"
 REFERENCE = "#9aa5af"
 

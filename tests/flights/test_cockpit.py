@@ -1,0 +1,121 @@
+"""The cockpit in a real browser, beside a flight."""
+
+import shutil
+from io import BytesIO
+
+import numpy as np
+import pytest
+from PIL import Image
+from playwright.sync_api import expect, sync_playwright
+from rcl_interfaces.srv import GetParameters
+from rclpy.executors import SingleThreadedExecutor
+from websockets.exceptions import InvalidStatus
+from websockets.sync.client import connect
+
+from uam_msgs_py.parameters import plain
+from uam_sim_bridge.flight.guest import Guest
+from uam_sim_bridge.flight.processes import transport_environment
+
+PATIENCE = 60_000  # [ms] only a failing test waits that long
+BROWSERS = ("chromium", "chromium-browser", "google-chrome", "google-chrome-stable")
+BROWSER = next(filter(None, map(shutil.which, BROWSERS)), None)
+# rendered by the processor; nothing is looked for outside of this machine
+SWITCHES = (
+    "--no-sandbox --use-angle=swiftshader --enable-unsafe-swiftshader "
+    "--disable-background-networking --disable-component-update --disable-sync"
+).split()
+pytestmark = [
+    pytest.mark.slow,
+    pytest.mark.skipif(BROWSER is None, reason=f"needs a browser: {' or '.join(BROWSERS)}"),
+]
+
+
+@pytest.fixture
+def flight(fly):
+    """A mission under way, with a cockpit."""
+    flight = fly("--view")
+    flight.until(lambda: "ROS domain" in flight.said, "started")
+    flight.address = flight.said.split("cockpit: ")[1].split()[0]
+    flight.domain = int(flight.said.split("ROS domain ")[1].split(",")[0])
+    flight.until_phase("take-off")
+    return flight
+
+
+@pytest.fixture
+def page(flight):
+    """The page in a browser."""
+    with sync_playwright() as playwright:
+        browser = playwright.chromium.launch(executable_path=BROWSER, args=SWITCHES)
+        page = browser.new_page(viewport={"width": 1440, "height": 900})
+        page.set_default_timeout(PATIENCE)
+        page.goto(flight.address)
+        yield page
+        browser.close()
+
+
+def value_in(flight, node: str, name: str):
+    """A parameter as the running node tells it."""
+    with Guest("asker", transport_environment(), flight.domain) as guest:
+        executor = SingleThreadedExecutor(context=guest.context)
+        executor.add_node(guest.node)
+        client = guest.node.create_client(GetParameters, f"/{node}/get_parameters")
+        assert client.wait_for_service(30.0)
+        future = client.call_async(GetParameters.Request(names=[name]))
+        executor.spin_until_future_complete(future, 30.0)
+        return plain(future.result().values[0])
+
+
+def scene(page) -> np.ndarray:
+    """The picture of the 3-D scene, between the panels."""
+    clip = {"x": 340, "y": 150, "width": 690, "height": 740}
+    return np.asarray(Image.open(BytesIO(page.screenshot(clip=clip))).convert("RGB"), dtype=int)
+
+
+def test_a_browser_sees_and_steers_a_flight_and_strangers_do_not(flight, page):
+    def until(condition, what: str) -> None:
+        for _ in range(PATIENCE // 250):
+            if condition():
+                return
+            page.wait_for_timeout(250)
+        pytest.fail(f"{what}: not in time\n{page.inner_text('body')}")
+
+    expect(page.locator("#uam-state")).to_contain_text("APPROACH", timeout=PATIENCE)
+    expect(page.locator("#uam-errors")).to_contain_text("cm")
+    expect(page.get_by_text("OFFBOARD, armed")).to_be_visible()
+
+    first = scene(page)
+    page.wait_for_timeout(500)
+    until(lambda: np.sum(np.abs(scene(page) - first).sum(axis=2) > 60) > 200, "the scene moves")
+
+    page.get_by_role("tab", name="Position", exact=True).click()
+    before = value_in(flight, "position_controller", "lambda_1")
+    slider = page.get_by_role("slider").first
+    slider.focus()
+    for _ in range(20):
+        page.keyboard.press("ArrowRight")
+    until(lambda: value_in(flight, "position_controller", "lambda_1")[0] > before[0],
+          "the slider counts")
+    assert value_in(flight, "position_controller", "lambda_1")[1:] == before[1:]
+
+    after = value_in(flight, "position_controller", "lambda_1")
+    field = page.locator("form input").first
+    field.fill("-1, 1, 1")
+    field.press("Enter")
+    expect(page.get_by_text("refused:").first).to_contain_text("lambda_1")
+    assert value_in(flight, "position_controller", "lambda_1") == after
+
+    state = page.locator("#uam-state")
+    page.get_by_role("button", name="Hold").click()
+    expect(state).to_contain_text("HOLDING", timeout=PATIENCE)
+    page.get_by_role("button", name="Resume").click()
+    expect(state).not_to_contain_text("HOLDING", timeout=PATIENCE)
+
+    page.get_by_role("button", name="Freeze adaptation").click()
+    until(lambda: value_in(flight, "arm_controller", "adapt") is False, "adaptation is frozen")
+    expect(page.get_by_text("frozen: arm_controller, attitude_controller")).to_be_visible()
+
+    url = flight.address.replace("http", "ws")
+    with connect(url, origin=flight.address, subprotocols=["viser-v0"]):
+        pass
+    with pytest.raises(InvalidStatus, match="403"):
+        connect(url, origin="http://elsewhere.example", subprotocols=["viser-v0"])

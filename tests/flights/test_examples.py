@@ -1,0 +1,53 @@
+"""The examples do what their texts say."""
+
+import json
+import os
+import subprocess
+import sys
+
+import pytest
+from whole_flight import PATIENCE, ROOT
+
+EXAMPLES = ROOT / "examples"
+
+
+@pytest.fixture
+def own_controller(tmp_path):
+    """own_controller(domain) starts the example; it ends with the test."""
+    running = []
+
+    def start(domain: str) -> subprocess.Popen:
+        surroundings = os.environ | {"ROS_DOMAIN_ID": domain, "ROS_LOG_DIR": str(tmp_path)}
+        program = [sys.executable, EXAMPLES / "own_controller.py"]
+        running.append(subprocess.Popen(program, env=surroundings))
+        return running[-1]
+
+    yield start
+    for process in running:
+        process.kill()
+        process.wait()
+
+
+def test_a_controller_of_ones_own_flies_and_its_log_is_read(fly, short_scenario, own_controller):
+    flight = fly("--scenario", str(short_scenario), "--without", "arm_controller")
+    flight.until(lambda: "ROS_DOMAIN_ID=" in flight.said, "the domain to be named")
+    own_controller(flight.said.split("ROS_DOMAIN_ID=")[1].split()[0])
+    assert flight.wait() == 0, flight.said + flight.complained
+    assert "arm_controller" not in {file.stem for file in (flight.out / "logs").glob("*.log")}
+    found = json.loads((flight.out / "metrics.json").read_text())
+    assert found["mission_completed"]
+
+    pytest.importorskip("pandas")
+    read = [sys.executable, EXAMPLES / "read_log.py", flight.out / "log.mcap"]
+    done = subprocess.run(read, capture_output=True, text=True, timeout=PATIENCE, check=False)
+    assert done.returncode == 0, done.stderr
+    rms = {words[0]: float(words[1]) for words in map(str.split, done.stdout.splitlines()[2:])}
+    assert set(rms) == {"x", "y", "z", "yaw", "alpha_1", "alpha_2"}
+    assert rms["z"] < 0.1 and rms["alpha_1"] < 5.0 and rms["alpha_2"] < 5.0, done.stdout
+
+
+def test_the_scenario_of_ones_own_is_flown(fly):
+    flight = fly("--scenario", str(EXAMPLES / "own_scenario.yaml"), "--engine", "direct")
+    assert flight.wait() == 0, flight.said + flight.complained
+    found = json.loads((flight.out / "metrics.json").read_text())
+    assert found["mission_completed"] and found["scenario"] == "own_scenario"

@@ -1,0 +1,145 @@
+"""Faults in whole flights of the direct engine, and a small matrix from the command line."""
+
+from __future__ import annotations
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from uam_control.mission import load_scenario
+from uam_control.profile import load_profile
+from uam_sim_bridge.campaign.fault_outcome import classify
+from uam_sim_bridge.cli.main import main
+from uam_sim_bridge.faults import read_schedule
+from uam_sim_bridge.flight import metrics
+from uam_sim_bridge.flight.direct import DirectFlight
+from uam_sim_bridge.plant import Vehicle
+
+SCENARIO = load_scenario("hover")
+
+
+def flown(*texts, seed=1):
+    """A hover with faults: flight, series, metrics."""
+    faults = read_schedule(texts, SCENARIO, seed)
+    flight = DirectFlight(SCENARIO, load_profile("s500"), Vehicle.load(), 0.0, seed, faults)
+    flight.run()
+    series = flight.recording.series()
+    reason = flight.mission.output.abort_reason or flight.ended_by
+    info = {"abort_reason": reason, "faults": flight.fault_records, "payload_mass_kg": 0.0}
+    return flight, series, metrics.compute(series, info)
+
+
+@pytest.fixture(scope="module")
+def nominal():
+    return flown()
+
+
+def test_a_short_dropout_of_the_motion_capture_is_survived(nominal):
+    _, series, figures = flown("mocap_dropout@hover+1+0.3")
+    assert figures["mission_completed"], figures["shortfalls"]
+    (fault,) = figures["faults"]
+    assert (fault["begin_s"], fault["end_s"]) == pytest.approx((4.0, 4.3), abs=0.005)
+    before = series.time < 3.99
+    assert np.array_equal(series.values[before], nominal[1].values[before], equal_nan=True)
+    assert figures["max"] != nominal[2]["max"]
+
+
+def test_a_gap_of_the_imu_is_flown_with_the_last_commands(nominal):
+    _, series, figures = flown("imu_dropout@hover+1+0.1")
+    assert figures["mission_completed"], figures["shortfalls"]
+    np.testing.assert_allclose(np.diff(series.time), 0.004, atol=1e-9)
+    gap = (series.time > 4.01) & (series.time < 4.09)
+    assert np.ptp(series["tau_p.z"][gap]) == 0.0 and np.ptp(series["truth.x"][gap]) > 0.0
+    assert len(series) == pytest.approx(len(nominal[1]), abs=300)
+
+
+def test_a_flight_without_a_motor_is_lost():
+    _, series, figures = flown("motor_loss@hover+1:remaining=0")
+    assert not figures["mission_completed"]
+    assert classify(series, figures) == "lost"
+    assert figures["faults"][0]["end_s"] is None
+
+
+def test_without_imu_or_link_the_autopilot_brings_it_down_and_the_flight_ends():
+    for text in ("imu_dropout@hover+1", "mavlink_cut@hover+1"):
+        flight, series, figures = flown(text)
+        assert not flight.bridge.autopilot.commander.armed
+        assert classify(series, figures) == "failsafe", text
+        assert figures["shortfalls"]
+
+
+def test_the_same_seed_gives_the_same_flight_with_random_faults():
+    spec = "mocap_outliers@hover+1+2:share=0.1,distance=0.1"
+    first, again, other = flown(spec), flown(spec), flown(spec, seed=2)
+    assert np.array_equal(first[1].values, again[1].values, equal_nan=True)
+    assert first[2]["max"] != other[2]["max"]
+
+
+def test_a_matrix_from_the_command_line(tmp_path, capsys):
+    file = tmp_path / "small.yaml"
+    file.write_text(
+        "scenario: hover\n"
+        "moments: {up: {at: take-off, after: 2}, down: {at: land, after: 2}}\n"
+        "faults:\n"
+        "  - {fault: mocap_dropout, duration: 0.2}\n"
+        "  - {fault: motor_loss, remaining: 0}\n"
+        "  - {fault: node_kill}\n")
+    out = tmp_path / "out"
+    assert main(["faults", "--matrix", str(file), "--jobs", "2", "--out", str(out)]) == 0
+    said = capsys.readouterr().out
+    assert "4 flights with a fault: 2 completed" in said and "Only with --engine ros" in said
+    told = json.loads((out / "faults.json").read_text())["flights"]
+    assert [(f["fault"], f["moment"]) for f in told][:3] == [
+        ("no fault", ""), ("mocap_dropout 0.2 s", "up"), ("mocap_dropout 0.2 s", "down")]
+    assert told[0]["outcome"] == "completed" and told[3]["outcome"] == "lost"
+    assert {p.name for p in out.iterdir()} == {
+        "faults.json", "flights.csv", "matrix.png", "report.html", "summary.md"}
+
+
+def test_ctrl_c_ends_the_matrix_at_once_and_leaves_no_process(tmp_path):
+    command = [sys.executable, "-m", "uam_sim_bridge.cli.main", "faults", "--jobs", "1",
+               "--moment", "transit", "--out", str(tmp_path / "out")]
+    running = subprocess.Popen(
+        command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True,
+        cwd=Path(__file__).resolve().parents[2], start_new_session=True,
+        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.default_int_handler))
+    try:
+        while "faults: 2 of" not in (line := running.stdout.readline()):
+            assert line, "it ended before it was interrupted"
+        begin = time.monotonic()
+        os.killpg(running.pid, signal.SIGINT)  # as a terminal does: to the workers, too
+        said = running.communicate(timeout=60)[0]
+        assert running.returncode == 130 and said.splitlines()[-1] == "uam faults: interrupted"
+        assert time.monotonic() - begin < 20.0
+    finally:
+        running.kill()
+        running.wait()
+    deadline = time.monotonic() + 20.0
+    while _group_is_there(running.pid):
+        assert time.monotonic() < deadline, "a process was left behind"
+        time.sleep(0.05)
+
+
+def _group_is_there(group: int) -> bool:
+    try:
+        os.killpg(group, 0)
+    except ProcessLookupError:
+        return False
+    return True
+
+
+def test_a_fault_that_cannot_be_flown_is_refused_in_one_line(tmp_path, capsys, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    for text, said in (("node_kill@3", "needs --engine ros"), ("mocap@3", "unknown fault 'mocap'"),
+                       ("mocap_dropout@pick", "no phase 'pick' in the scenario, which has: take-")):
+        assert main(["fly", "--engine", "direct", "--scenario", "hover", "--fault", text]) == 2
+        err = capsys.readouterr().err
+        assert said in err and err.count("\n") == 1
+    assert not any(tmp_path.iterdir())

@@ -1,0 +1,50 @@
+"""Faults in flights of the ROS engine: where the direct engine has them, and told by the log."""
+
+import json
+import shutil
+
+import pytest
+from whole_flight import assert_nothing_left
+
+from uam_control.mission import load_scenario
+from uam_control.profile import load_profile
+from uam_sim_bridge.faults import read_schedule
+from uam_sim_bridge.flight.direct import DirectFlight
+from uam_sim_bridge.plant import Vehicle
+from uam_sim_bridge.report.rebuild import rebuild
+
+IN_BOTH = ("wind_gust@take-off+0+1.5:speed=2", "imu_dropout@hover+0+0.06",
+           "mavlink_corruption@0.5+1:share=0.1")
+IN_NODES = ("mavlink_delay@1+0.5:delay=0.01", "node_stall@hover+0+0.3:node=mission",
+            "node_kill@take-off+0.5:node=scene")
+
+
+def test_faults_come_when_they_should_and_the_log_knows_them(fly, short_scenario, tmp_path):
+    options = [word for text in (*IN_BOTH, *IN_NODES) for word in ("--fault", text)]
+    flight = fly("--scenario", str(short_scenario), *options)
+    assert flight.wait() == 0, flight.said + flight.complained
+    assert "scene was killed by SIGKILL; the flight goes on without it" in flight.said
+    figures = json.loads((flight.out / "metrics.json").read_text())
+    found = {fault["fault"]: fault for fault in figures["faults"]}
+    assert len(found) == len(IN_BOTH + IN_NODES)
+
+    scenario = load_scenario(str(short_scenario))
+    direct = DirectFlight(scenario, load_profile("s500"), Vehicle.load(), 0.0, 1,
+                          read_schedule(IN_BOTH, scenario, 1))
+    direct.run()
+    for fault in direct.fault_records:
+        own = found[fault["fault"]]
+        same = 1e-6 if fault["fault"] != "mavlink_corruption" else 0.005  # heard a tick later
+        for key in ("begin_s", "end_s"):
+            assert own[key] == pytest.approx(fault[key], abs=same), fault["fault"]
+        assert own["parameters"] == fault["parameters"]
+    assert found["node_kill"]["end_s"] is None and found["node_stall"]["end_s"] is not None
+    assert 0.5 <= found["node_kill"]["begin_s"] <= 2.5
+
+    page = (flight.out / "report.html").read_text()
+    assert "Faults put into this flight" in page
+    alone = tmp_path / "alone"
+    alone.mkdir()
+    shutil.copy(flight.out / "log.mcap", alone)
+    assert rebuild(alone, tmp_path / "again")["faults"] == figures["faults"]
+    assert_nothing_left(flight, [], set())

@@ -1,0 +1,107 @@
+"""Supervised flights in the direct engine: held, resumed, landed, left to the autopilot."""
+
+from __future__ import annotations
+
+import dataclasses
+
+import numpy as np
+import pytest
+
+from uam_control.mission import load_scenario
+from uam_control.profile import load_profile
+from uam_control.supervision import Command, State
+from uam_sim_bridge.flight.direct import DirectFlight
+from uam_sim_bridge.flight.metrics import compute
+from uam_sim_bridge.plant import Vehicle
+
+
+def flight(scenario="pick_and_place", payload=0.2, **mission):
+    profile = load_profile("s500")
+    changed = dataclasses.replace(profile.sets["mission"], **mission).validated()
+    profile = dataclasses.replace(profile, sets=profile.sets | {"mission": changed})
+    return DirectFlight(load_scenario(scenario), profile, Vehicle.load(), payload, seed=1)
+
+
+def until(a_flight, condition, limit=150.0):
+    while not condition(a_flight.mission.output):
+        a_flight.tick()
+        assert a_flight.plant.time < limit, a_flight.mission.changes
+    return a_flight.mission.output
+
+
+def states(a_flight):
+    return [change.target for change in a_flight.mission.changes]
+
+
+def landed_softly(a_flight):
+    """On its legs, where and how fast it came down."""
+    series = a_flight.recording.series()
+    assert abs(series["truth.z"][-1] - series["truth.z"][0]) < 0.05
+    assert np.hypot(series["truth.roll"][-1], series["truth.pitch"][-1]) < 0.1
+    assert np.min(series["truth.z_dot"]) > -1.0
+    return series["truth.x"][-1], series["truth.y"][-1]
+
+
+def test_a_mission_that_is_held_with_the_payload_and_resumed_is_completed():
+    made = flight()
+    until(made, lambda o: o.time > 50.0)
+    assert made.mission.request(Command.HOLD)[0]
+    until(made, lambda o: o.time > 53.0)
+    series = made.recording.series()
+    held = series.row_at(52.0)
+    assert np.max(np.abs(series["truth.x_dot"][held:])) < 0.02 and made.mission.output.magnet
+    assert made.mission.request(Command.RESUME)[0]
+    until(made, lambda o: o.done)
+    assert made.mission.output.time > 90.0
+    point = made.mission.scenario.drop_point
+    result = compute(
+        made.recording.series(), {"payload_mass_kg": 0.2, "drop_point": point, "abort_reason": ""})
+    assert result["mission_completed"], result["shortfalls"]
+    assert max(result["max"]["position_m"]) < 0.15
+
+
+def test_a_command_to_land_is_followed_where_the_vehicle_is_with_the_payload_released():
+    made = flight(magnet_landing="release")
+    until(made, lambda o: o.time > 45.0)
+    x = made.recording.series()["truth.x"][-1]
+    assert made.mission.request(Command.LAND)[0]
+    output = until(made, lambda o: o.done)
+    assert output.abort_reason == "land by command" and output.phase == "landed"
+    at, _ = landed_softly(made)
+    assert at == pytest.approx(x, abs=0.15)
+    assert made.recording.series()["magnet.on"][-1000] == 0.0
+
+
+def test_a_fence_left_is_landed_at():
+    made = flight(geofence_low=(-0.5, -5.0, -1.0))
+    output = until(made, lambda o: o.done)
+    assert output.abort_reason.startswith("geofence left by 0.1") and output.phase == "landed"
+    x, _ = landed_softly(made)
+    assert -0.75 < x < -0.55
+    assert states(made)[-2:] == [State.LANDING, State.DISARMED]
+
+
+def test_without_mocap_it_holds_on_the_imu_then_the_autopilot_brings_it_down():
+    made = flight("hover", payload=0.0)
+    until(made, lambda o: o.time > 5.0)
+    sense = made.plant.sense
+
+    def blind():
+        return dataclasses.replace(sense(), mocap=None)
+
+    made.plant.sense = blind
+    output = until(made, lambda o: o.done)
+    assert states(made)[-2:] == [State.HOLDING, State.FAILSAFE]
+    assert output.abort_reason.startswith("mocap pose is 1.") and output.phase == "aborted"
+    assert not made.bridge.autopilot.commander.armed and not output.arm
+    x, y = landed_softly(made)
+    assert np.hypot(x, y) < 1.0
+
+
+def test_motors_that_are_switched_off_by_the_autopilot_end_it():
+    made = flight("hover", payload=0.0)
+    until(made, lambda o: o.time > 4.0)
+    made.bridge.autopilot.commander.armed = False
+    output = until(made, lambda o: o.done)
+    assert output.abort_reason == "the autopilot disarmed in flight"
+    assert not made.bridge.autopilot.commander.armed

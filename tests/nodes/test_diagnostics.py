@@ -1,0 +1,93 @@
+"""What every node says under /diagnostics: level, loop time, ages of its inputs."""
+
+import socket
+
+import numpy as np
+import pytest
+
+from uam_control.coordinates import COORDINATES, SIZE
+from uam_msgs_py import topics
+from uam_msgs_py.convert import TrajectoryWriter
+from uam_msgs_py.status import OK, STALE
+
+NODES = {
+    "uam_control.nodes.position_controller": "/uam/state",
+    "uam_control.nodes.attitude_controller": "/uam/position/command",
+    "uam_control.nodes.arm_controller": "/uam/reference",
+    "uam_control.nodes.state_estimator": "/imu/data",
+    "uam_control.nodes.mission": "/uam/state",
+    "uam_sim_bridge.nodes.mavlink_bridge": "/uam/attitude/command",
+    "uam_sim_bridge.nodes.mujoco_sim": "/uam/setpoint",
+    "uam_sim_bridge.nodes.scene": "/uam/mission/status",
+    "uam_sim_bridge.nodes.recorder": "/uam/state",
+}
+
+
+def free_port(kind=socket.SOCK_STREAM):
+    with socket.socket(type=kind) as probe:
+        probe.bind(("127.0.0.1", 0))
+        return probe.getsockname()[1]
+
+
+def arguments(name, folder):
+    """What keeps a node away from the ports and files of others."""
+    own = {
+        "mujoco_sim": [f"hil_port:={free_port()}"],
+        "mavlink_bridge": [f"local_port:={free_port(socket.SOCK_DGRAM)}"],
+        "recorder": [f"file:={folder / 'log.mcap'}"],
+    }.get(name, [])
+    return ["--ros-args", *(word for value in own for word in ("-p", value))]
+
+
+class Said:
+    """The newest entry of one node."""
+
+    def __init__(self, probe, name):
+        self._name, self._heard = name, probe.collect(topics.DIAGNOSTICS)
+
+    @property
+    def status(self):
+        found = [s for m in self._heard for s in m.status if s.name == self._name]
+        return found[-1] if found else None
+
+    @property
+    def values(self):
+        return {pair.key: pair.value for pair in self.status.values} if self.status else {}
+
+
+@pytest.mark.parametrize("module", NODES)
+def test_every_node_says_level_loop_time_and_ages(start, probe, tmp_path, module):
+    name = module.rpartition(".")[2]
+    said = Said(probe, name)
+    start(module, *arguments(name, tmp_path))
+    probe.until(lambda: said.status, f"diagnostics of {name}")
+    loop = "poll" if name == "recorder" else "tick"
+    assert {f"{loop} mean [ms]", f"{loop} max [ms]"} <= set(said.values)
+    assert said.values[f"age of {NODES[module]} [ms]"] == "", "nothing has come yet"
+    if name != "recorder":
+        probe.until(lambda: said.status.level == STALE, f"{name} says that it waits")
+        assert "waiting for" in said.status.message
+
+
+def test_loop_time_and_age_are_those_of_the_work(start, probe):
+    """A mission that is fed: it runs, a tick takes a fraction of a period, its input is new."""
+    said = Said(probe, "mission")
+    start("uam_control.nodes.mission")
+    outlet, writer = probe.publisher(topics.STATE), TrajectoryWriter(COORDINATES)
+    probe.until_connected("mission", [outlet])
+    stamp = 0
+
+    def fed():
+        nonlocal stamp
+        stamp += 4_000_000
+        outlet.publish(writer.fill(stamp, np.zeros((3, SIZE))))
+        status = said.status
+        return status and status.level == OK and said.values["tick mean [ms]"]
+
+    probe.until(fed, "a report of work")
+    mean, most = (float(said.values[f"tick {kind} [ms]"]) for kind in ("mean", "max"))
+    assert 0.0 < mean <= most
+    assert 0.0 <= float(said.values["age of /uam/state [ms]"]) < 1000.0
+    assert said.values["age of /uam/autopilot/state [ms]"] == ""
+    probe.until(lambda: said.status.level == STALE, "it waits again")
+    assert float(said.values["age of /uam/state [ms]"]) > 1000.0

@@ -1,0 +1,118 @@
+"""The mission node's services, answered and followed, and what it tells of its states."""
+
+import numpy as np
+import pytest
+from diagnostic_msgs.msg import DiagnosticArray
+from sensor_msgs.msg import BatteryState
+from std_srvs.srv import SetBool, Trigger
+
+from uam_control.coordinates import COORDINATES
+from uam_msgs_py import topics
+from uam_msgs_py.control import read_reference
+from uam_msgs_py.convert import TrajectoryWriter
+from uam_msgs_py.status import AutopilotState, MissionStatus
+
+PERIOD = 4_000_000  # [ns]
+
+
+class Vehicle:
+    """One that follows its reference perfectly, a tick later."""
+
+    def __init__(self, probe):
+        self.probe, self.stamp = probe, 0
+        self.states = probe.publisher(topics.STATE)
+        self.autopilot = probe.publisher(topics.AUTOPILOT_STATE)
+        self.battery = probe.publisher(topics.AUTOPILOT_BATTERY)
+        self.references = probe.collect(topics.REFERENCE)
+        self.magnet = probe.collect(topics.MAGNET)
+        self.told = probe.collect(topics.MISSION_STATUS)
+        self.writer = TrajectoryWriter(COORDINATES)
+        self.state = np.zeros((3, 8))
+        self.state[0, 2], self.state[0, 7] = 0.28, np.pi / 2
+        probe.until_connected(
+            "mission", [self.states, self.autopilot, self.battery],
+            [topics.REFERENCE, topics.MAGNET, topics.MISSION_STATUS])
+
+    def arm(self):
+        self.autopilot.publish(AutopilotState(True, "OFFBOARD", True, 1).to_message(1))
+
+    def fly(self, ticks):
+        for _ in range(ticks):
+            self.stamp += PERIOD
+            before = len(self.magnet)
+            self.states.publish(self.writer.fill(self.stamp, self.state))
+            self.probe.until(lambda n=before: len(self.magnet) > n, "an answered tick")
+            _, reference = read_reference(self.references[-1])
+            if reference.flying:
+                self.state[:2] = reference.values[:2]
+                self.state[0, 2] = max(self.state[0, 2], 0.28)
+
+    def until_state(self, state):
+        for _ in range(3000):
+            self.fly(1)
+            if self.status.state == state:
+                return
+        raise AssertionError(f"still {self.status}")
+
+    @property
+    def status(self) -> MissionStatus:
+        return MissionStatus.from_message(self.told[-1])[1]
+
+    def ask(self, name, on=None):
+        kind = Trigger if on is None else SetBool
+        request = Trigger.Request() if on is None else SetBool.Request(data=on)
+        answer = self.probe.call(kind, f"/mission/{name}", request)
+        return answer.success, answer.message
+
+
+@pytest.fixture
+def vehicle(start, probe):
+    node = start("uam_control.nodes.mission", "--ros-args", "-p", "scenario:=hover")
+    made = Vehicle(probe)
+    made.node = node
+    made.fly(1)
+    return made
+
+
+def take_off(vehicle):
+    vehicle.arm()
+    vehicle.until_state("taking off")
+    assert vehicle.ask("hold") == (False, "refused: not while taking off")
+    vehicle.until_state("flying")
+
+
+def test_hold_resume_land_and_disarm_answer_and_are_followed(vehicle):
+    take_off(vehicle)
+    assert vehicle.ask("resume") == (False, "refused: not while flying")
+    assert vehicle.ask("disarm") == (False, "refused: flying and not on the ground: land first")
+    assert vehicle.ask("hold") == (True, "hold by command")
+    vehicle.until_state("holding")
+    assert vehicle.status.cause == "hold by command" and vehicle.status.phase == "hold"
+    assert vehicle.ask("magnet", True)[0]
+    vehicle.fly(2)
+    vehicle.probe.until(lambda: vehicle.magnet[-1].data and vehicle.status.magnet, "the magnet")
+    assert vehicle.ask("resume")[0]
+    vehicle.until_state("flying")
+    assert vehicle.ask("land") == (True, "land by command")
+    vehicle.until_state("disarmed")
+    assert vehicle.status.abort_reason == "land by command" and vehicle.status.phase == "landed"
+    assert vehicle.ask("hold") == (False, "refused: not while disarmed")
+    assert "holding: hold by command" in vehicle.node.output
+
+
+def test_an_empty_battery_lands_and_the_diagnostics_say_why(vehicle, probe):
+    said = []
+    probe.node.create_subscription(
+        DiagnosticArray, topics.DIAGNOSTICS.name, said.append, topics.DIAGNOSTICS.qos)
+    take_off(vehicle)
+    vehicle.battery.publish(BatteryState(percentage=0.1))
+    vehicle.until_state("landing")
+    assert vehicle.status.cause == "battery 0.10 full, below 0.15"
+
+    def told():
+        vehicle.fly(1)
+        found = [s for m in said for s in m.status if s.name == "mission"]
+        values = {pair.key: pair.value for pair in found[-1].values} if found else {}
+        return values.get("state") == "landing" and "battery" in values["cause"]
+
+    probe.until(told, "diagnostics of the landing")

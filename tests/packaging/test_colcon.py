@@ -1,0 +1,95 @@
+"""`colcon build`, sourcing install/setup.sh, and what `ros2 run` and `ros2 pkg` then look for."""
+
+import os
+import re
+import subprocess
+import tomllib
+import xml.etree.ElementTree as xml
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parents[2]
+PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
+NODES = set(PROJECT["scripts"]) - {"uam"}
+PACKAGES = {"uam_control", "uam_sim_bridge"}  # uam_msgs_py has no executables
+HELPFUL = {"autopilot", "px4_sitl", "hitl_router"}  # command lines without ROS
+PATIENCE = 240.0  # [s] only a failing test waits that long
+
+
+def executables(workspace):
+    """node → its path, as `ros2 pkg executables` finds it: everything in lib/<package>."""
+    found = {}
+    for package in PACKAGES:
+        said = workspace.python(
+            f"import ament_index_python as a; print(a.get_package_prefix('{package}'))"
+        )
+        for file in (Path(said) / "lib" / package).iterdir():
+            found[file.name] = file
+    return found
+
+
+def test_the_index_names_every_package_and_its_manifest(workspace):
+    for package in (*PACKAGES, "uam", "uam_msgs_py"):
+        marker = workspace.prefix / "share/ament_index/resource_index/packages" / package
+        assert marker.is_file()
+        manifest = xml.parse(workspace.prefix / "share" / package / "package.xml").getroot()
+        assert manifest.findtext("name") == package
+        assert manifest.findtext("version") == PROJECT["version"]
+
+
+def test_every_node_is_found_and_may_be_run(workspace):
+    found = executables(workspace)
+    assert set(found) == NODES
+    for file in found.values():
+        assert file.is_relative_to(workspace.prefix) and os.access(file, os.X_OK)
+
+
+def test_code_and_configuration_are_those_of_the_workspace(workspace):
+    program = "import uam_control as u; from uam_control.configuration import root; "
+    code, config = workspace.python(program + "print(u.__file__, root())").split()
+    assert Path(code).is_relative_to(workspace.folder)
+    assert Path(config).is_relative_to(workspace.folder)
+    assert (Path(config) / "profiles" / "s500.yaml").is_file()
+
+
+def test_the_dependencies_are_told_for_the_doctor(workspace):
+    program = "from importlib import metadata; print(*metadata.requires('uam'), sep='\\n')"
+    said = workspace.python(program).splitlines()
+    assert {re.split("[<>=]", line)[0] for line in said} == {
+        re.split("[<>=]", line)[0] for line in PROJECT["dependencies"]
+    }
+
+
+def test_every_node_starts(workspace):
+    """With a parameter that no node knows, which each refuses by name; or its help."""
+    wrong = ["--ros-args", "-p", "no_such_parameter:=1"]
+    wrong += ["-p", "autopilot:=udp:127.0.0.1:9"]  # the bridge's port may be another flight's
+    surroundings = workspace.environment | {
+        "ROS_AUTOMATIC_DISCOVERY_RANGE": "OFF", "ROS_LOG_DIR": str(workspace.folder / "log")
+    }
+    running = {
+        name: subprocess.Popen(
+            [file, *(["--help"] if name in HELPFUL else wrong)], env=surroundings,
+            stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True,
+        )
+        for name, file in executables(workspace).items()
+    }
+    try:
+        said = {name: node.communicate(timeout=PATIENCE)[0] for name, node in running.items()}
+    finally:
+        for node in running.values():
+            node.kill()
+            node.wait()
+    for name, text in said.items():
+        if name in HELPFUL:
+            assert text.startswith("usage: ") and running[name].returncode == 0, text
+        else:
+            assert f"{name}: no_such_parameter: unknown" in text, text
+            assert running[name].returncode == 2
+
+
+def test_no_wheel_of_ros_is_pulled_where_ros_is_there():
+    """Only the extra `ros` names them; `make setup` leaves it out beside a sourced installation."""
+    extras = PROJECT["optional-dependencies"]
+    others = [line for name, lines in extras.items() if name != "ros" for line in lines]
+    assert [line for line in (*PROJECT["dependencies"], *others) if line.startswith("ros-")] == []
+    assert 'test -n "$$ROS_DISTRO" && extras=test' in (ROOT / "Makefile").read_text()

@@ -1,0 +1,177 @@
+"""The cockpit's parts that need neither ROS graph nor browser."""
+
+import math
+import socket
+
+import numpy as np
+import pytest
+from diagnostic_msgs.msg import DiagnosticArray
+from hypothesis import given
+from hypothesis import strategies as st
+
+from uam_msgs_py.layouts import BadMessage
+from uam_msgs_py.status import ERROR, OK, AutopilotState, MissionStatus, diagnostic
+from uam_msgs_py.transforms import Transform, read_transforms, transforms_message
+from uam_sim_bridge.cockpit import place
+from uam_sim_bridge.cockpit.entry import axes, bounds, reach, text_of, value_of
+from uam_sim_bridge.cockpit.headline import headline
+from uam_sim_bridge.cockpit.health import BAD, CAUTION, GOOD, UNKNOWN, Health, grade
+from uam_sim_bridge.cockpit.remote_parameters import About
+from uam_sim_bridge.cockpit.urdf_shapes import shapes
+from uam_sim_bridge.plant import Vehicle
+from uam_sim_bridge.plant.urdf import BASE_LINK, urdf
+
+LIMITS = {
+    "position_error": [0.05, 0.2],
+    "attitude_error": [0.05, 0.2],
+    "arm_error": [0.05, 0.2],
+    "battery": [0.3, 0.15],
+}
+numbers = st.floats(-1e6, 1e6)
+
+
+def about(constraints: str, low=None, high=None) -> About:
+    return About("gain", "a gain [1/s]", constraints, (), low, high, False)
+
+
+@given(st.one_of(numbers, st.lists(numbers, min_size=1, max_size=4), st.booleans()))
+def test_what_is_typed_is_what_was_shown(value):
+    read = value_of(text_of(value), value)
+    assert type(read) is type(value)
+    assert np.allclose(read, value, rtol=1e-5)
+
+
+@pytest.mark.parametrize(
+    ("text", "like"), [("1, two, 3", [1.0] * 3), ("", 1.0), ("yes", True), ("1,,3", [1.0] * 3)]
+)
+def test_what_cannot_be_read_is_refused(text, like):
+    with pytest.raises(ValueError, match="expected"):
+        value_of(text, like)
+
+
+@given(st.floats(0.0, 1e3), st.floats(0.0, 1e3), st.floats(0.0, 1.0))
+def test_a_slider_stays_within_the_range_and_holds_the_value(low, width, share):
+    high = low + width
+    value = min(high, low + share * width)
+    least, most, step = reach(about("", low, high), value)
+    assert low <= least <= value <= most <= high
+    assert step > 0.0
+
+
+def test_the_range_of_a_vectors_entries_is_that_of_its_node():
+    told = about("each 1e-09 to 1e+06 1/s^2; x, y, z")
+    assert bounds(told) == (1e-9, 1e6)
+    assert list(axes(told, 3)) == ["x", "y", "z"]
+    assert list(axes(told, 2)) == ["0", "1"]
+    assert bounds(about("")) == (-math.inf, math.inf)
+
+
+def test_grades():
+    assert [grade(v, 0.05, 0.2) for v in (0.01, 0.05, 0.2, math.nan)] == [
+        GOOD, CAUTION, BAD, UNKNOWN]
+    assert [grade(v, 0.3, 0.15) for v in (0.9, 0.3, 0.1)] == [GOOD, CAUTION, BAD]
+
+
+def told(name: str, level: bytes, summary: str, **values) -> DiagnosticArray:
+    return diagnostic(0, name, level, summary, values)
+
+
+def test_the_headline_says_how_it_is():
+    health = Health(silent_after=3.0)
+    assert "WAITING FOR A FLIGHT" in headline(health, LIMITS)
+    health.silence = 0.1
+    health.hear(MissionStatus("approach", 12.0, 0.004, 0.1, 0.3))
+    health.autopilot = AutopilotState(True, "OFFBOARD", True, 0, "")
+    health.diagnose(told("arm_controller", OK, "running", saturated=True))
+    page = headline(health, LIMITS)
+    assert health.state() == (GOOD, "approach", "")
+    for part in ("APPROACH", "T +12.0 s", ">0.4<", "OFFBOARD, armed", "all 1 healthy", "saturated"):
+        assert part in page, part
+    health.diagnose(told("arm_controller", ERROR, "<b>no</b> joints", saturated=False))
+    page = headline(health, LIMITS)
+    assert "&lt;b&gt;no&lt;/b&gt; joints" in page
+    assert "<b>no" not in page
+    assert "saturated" not in page
+    for status, said in (
+        (MissionStatus("hold", state="holding", cause="by command"),
+         (CAUTION, "holding", "by command")),
+        (MissionStatus("land", abort_reason="battery", state="landing", cause="battery"),
+         (BAD, "land", "battery")),
+        (MissionStatus("aborted", abort_reason="tilt", state="failsafe", cause="tilt"),
+         (BAD, "failsafe", "tilt")),
+    ):
+        health.hear(status)
+        assert health.state() == said
+        assert said[1].upper() in headline(health, LIMITS)
+        assert said[2] in headline(health, LIMITS)
+    health.silence = 7.0
+    health.hear(MissionStatus("approach", 12.0))
+    assert health.state() == (BAD, "no signal for 7 s", "")
+    health.hear(MissionStatus("landed", 90.0, done=True))
+    assert health.state() == (GOOD, "flight over", "")
+    health.hear(MissionStatus("aborted", 90.0, abort_reason="tilt 90 deg", done=True))
+    assert health.state() == (BAD, "flight over", "tilt 90 deg")
+
+
+def test_errors_come_from_tracking_once_it_is_there():
+    health = Health(silent_after=3.0)
+    health.hear(MissionStatus("approach", 1.0, 0.5, 0.5, 0.5))
+    assert health.errors == (0.5, 0.5, 0.5)
+    health.track(np.array([0.3, 0.4, 0.0, 0.1, 0.0, 0.0, 0.0, 0.2]))
+    health.hear(MissionStatus("approach", 1.5, 0.9, 0.9, 0.9))
+    assert health.errors == pytest.approx((0.5, 0.1, 0.2))
+
+
+def test_a_node_that_says_nothing_more_is_told():
+    health = Health(silent_after=0.0)
+    health.diagnose(told("mission", OK, "running"))
+    ((name, level, words),) = health.ailing()
+    assert (name, level) == ("mission", BAD)
+    assert words.startswith("silent")
+
+
+def test_the_robot_has_the_shapes_of_its_urdf():
+    found = shapes(urdf(Vehicle.load("s500_arm")))
+    assert {shape.kind for shape in found} <= {"box", "cylinder", "sphere"}
+    assert {BASE_LINK, "link_1", "link_2", "magnet"} <= {shape.link for shape in found}
+    assert all(np.all(shape.size > 0.0) for shape in found)
+    assert all(abs(np.linalg.norm(shape.quaternion) - 1.0) < 1e-9 for shape in found)
+    assert shapes("no URDF") == []
+    assert shapes('<robot><link name="a"><visual><geometry><box size="x"/></geometry>'
+                  "</visual></link></robot>") == []
+
+
+frames = st.builds(
+    Transform,
+    st.integers(0, 2**31 * 10**9 - 1),
+    st.text(st.characters(codec="utf-8", exclude_characters="\0"), max_size=9),
+    st.text(st.characters(codec="utf-8", exclude_characters="\0"), max_size=9),
+    st.lists(numbers, min_size=3, max_size=3).map(np.array),
+    st.lists(numbers, min_size=4, max_size=4).map(np.array),
+)
+
+
+@given(st.lists(frames, max_size=4))
+def test_transforms_are_read_as_they_were_written(sent):
+    read = read_transforms(transforms_message(sent))
+    assert len(read) == len(sent)
+    for one, other in zip(read, sent, strict=True):
+        assert (one.stamp, one.parent, one.child) == (other.stamp, other.parent, other.child)
+        assert np.array_equal(one.position, other.position)
+        assert np.array_equal(one.quaternion, other.quaternion)
+
+
+@given(st.binary(max_size=120))
+def test_what_is_no_list_of_transforms_is_refused_or_read(data):
+    try:
+        read_transforms(data)
+    except BadMessage:
+        pass
+
+
+def test_the_next_port_is_taken_where_one_is_in_use():
+    with socket.create_server((place.LOCAL, 0)) as taken:
+        port = taken.getsockname()[1]
+        assert place.free_port(place.LOCAL, port) > port
+    with pytest.raises(place.PlaceError, match="cannot serve on 203.0.113.7"):
+        place.free_port("203.0.113.7", 8080)

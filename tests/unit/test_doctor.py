@@ -1,0 +1,124 @@
+"""uam doctor: verdicts, the whole, and its command line."""
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+from importlib import metadata
+
+import pytest
+
+from uam_sim_bridge.cli import doctor as command
+from uam_sim_bridge.cli.main import main
+from uam_sim_bridge.doctor import installation, run
+from uam_sim_bridge.doctor.child import TOO_LATE, Child
+from uam_sim_bridge.doctor.finding import Verdict, fail, ok, warn
+
+OK, WARN, FAIL = Verdict
+
+
+def test_the_worst_verdict_counts():
+    assert run.worst([]) is OK
+    assert run.worst([OK, WARN, OK]) is WARN
+    assert run.worst([WARN, FAIL, OK]) is FAIL
+
+
+def test_a_finding_is_one_line_whatever_it_quotes():
+    found = fail("x", "two\nlines", "do\n this")
+    assert (found.found, found.advice) == ("two lines", "do this")
+
+
+@pytest.mark.parametrize(
+    ("findings", "status"), [([ok("a", "b")], 0), ([warn("a", "b", "c")], 0),
+                             ([ok("a", "b"), fail("a", "b", "c")], 1)]
+)
+def test_exit_status_text_and_json(capsys, monkeypatch, findings, status):
+    examined = [("machine", finding) for finding in findings]
+    monkeypatch.setattr(command, "examine", lambda url: iter(examined))
+    assert main(["doctor"]) == status
+    text = capsys.readouterr().out
+    assert all(f"{finding.verdict.value}" in text for finding in findings)
+    assert ("→ c" in text) == (findings[-1].verdict is not OK)
+    assert main(["doctor", "--json"]) == status
+    document = json.loads(capsys.readouterr().out)
+    assert document["verdict"] == findings[-1].verdict.value
+    assert [row["check"] for row in document["findings"]] == ["a"] * len(findings)
+
+
+def test_a_wrong_url_is_refused_in_one_line(capsys):
+    assert main(["doctor", "--autopilot", "pigeon:coop:1"]) == 2
+    out, err = capsys.readouterr()
+    assert out == "" and err.count("\n") == 1 and "unknown kind of link" in err
+
+
+def test_a_check_that_breaks_is_a_finding(monkeypatch):
+    monkeypatch.setattr(run, "GROUPS", ("no_such_group",))
+    ((group, finding),) = run.examine()
+    assert group == "no_such_group" and finding.verdict is FAIL
+    assert "ModuleNotFoundError" in finding.found
+
+
+def test_an_old_python_fails():
+    assert installation.python((3, 10, 2)).verdict is FAIL
+    assert installation.python((3, 13, 0)).verdict is OK
+
+
+def test_packages_missing_or_old_are_named_with_what_to_do():
+    have = metadata.version("numpy")
+    found = installation.packages(
+        ["numpy>=1", "no-such-package>=2", 'also-not-there; extra == "x"', "pyyaml>=999"]
+    )
+    assert found.verdict is FAIL
+    assert "missing: no-such-package>=2" in found.found and "also-not" not in found.found
+    assert "wanted >=999" in found.found and "numpy" not in found.found, have
+    assert '"no-such-package>=2" "pyyaml>=999"' in found.advice
+    assert installation.packages(["numpy>=1"]).verdict is OK
+    assert installation.packages(None).verdict is WARN
+
+
+def test_the_configuration_of_this_checkout_is_found():
+    assert installation.config().verdict is OK
+
+
+def test_a_child_that_hangs_is_ended_in_time(tmp_path):
+    (tmp_path / "hangs.py").write_text(
+        "import os, time\nprint('{\"pid\": %d}' % os.getpid(), flush=True)\ntime.sleep(60)\n"
+    )
+    path = os.pathsep.join([str(tmp_path), *sys.path])
+    begun = time.monotonic()
+    with Child("hangs", environment={"PYTHONPATH": path}) as child:
+        said = child.wait(3.0)
+    assert said.problem.startswith(TOO_LATE) and time.monotonic() - begun < 30.0
+    if "pid" in said.facts:
+        with pytest.raises(ProcessLookupError):
+            os.kill(said.facts["pid"], 0)
+
+
+def test_a_child_says_facts_and_why_it_failed(tmp_path):
+    (tmp_path / "fails.py").write_text("print('{\"a\": 1}')\nraise SystemExit('no libEGL')\n")
+    path = os.pathsep.join([str(tmp_path), *sys.path])
+    with Child("fails", environment={"PYTHONPATH": path}) as child:
+        said = child.wait(60.0)
+    assert said.facts == {"a": 1} and said.problem == "no libEGL"
+
+
+def test_an_interrupt_is_one_line(tmp_path):
+    program = (
+        "import time\n"
+        "from uam_sim_bridge.cli import doctor, main\n"
+        "def examine(url):\n"
+        "    print('begun', flush=True)\n"
+        "    time.sleep(60)\n"
+        "    yield\n"
+        "doctor.examine = examine\n"
+        "raise SystemExit(main.main(['doctor']))\n"
+    )
+    running = subprocess.Popen(
+        [sys.executable, "-c", program], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+    )
+    assert running.stdout.readline() == "begun\n"
+    running.send_signal(signal.SIGINT)
+    _, err = running.communicate(timeout=60.0)
+    assert running.returncode == 130 and err == "uam doctor: interrupted\n"

@@ -1,0 +1,57 @@
+"""uam doctor: cores, memory, timer, pictures."""
+
+import numpy as np
+import pytest
+
+from uam_sim_bridge.doctor import machine, rendering
+from uam_sim_bridge.doctor.child import TOO_LATE, Said
+from uam_sim_bridge.doctor.finding import Verdict
+
+OK, WARN, FAIL = Verdict
+
+
+@pytest.mark.parametrize(
+    ("count", "load", "verdict"), [(1, 0.0, WARN), (2, 0.5, OK), (2, 5.0, WARN), (8, 5.0, OK)]
+)
+def test_cores(count, load, verdict):
+    assert machine.cores(count, load).verdict is verdict
+
+
+@pytest.mark.parametrize(
+    ("text", "verdict"), [("MemTotal: 1 kB\nMemAvailable: 8388608 kB\n", OK),
+                          ("MemAvailable: 524288 kB\n", WARN), ("nothing\n", WARN)]
+)
+def test_memory(tmp_path, text, verdict):
+    (tmp_path / "meminfo").write_text(text)
+    assert machine.memory(tmp_path / "meminfo").verdict is verdict
+
+
+def test_a_timer_that_oversleeps_a_control_period_is_no_real_time():
+    late = np.full(250, 1e-4)
+    assert machine.timer(late).verdict is OK
+    late[:10] = 0.02
+    found = machine.timer(late)
+    assert found.verdict is WARN and "miss ticks" in found.advice
+
+
+def test_sleeps_never_end_early():
+    assert (machine.oversleep(count=5, tick=0.001) > -1e-4).all()
+
+
+def test_a_frame_is_drawn_or_the_packages_are_named():
+    (found,) = rendering.checks()
+    assert found.verdict is OK or "apt install libegl1" in found.advice or TOO_LATE in found.found
+
+
+def test_an_empty_picture_is_a_warning():
+    facts = {"frame_s": 0.1, "contrast": 0.0, "device": "llvmpipe (LLVM 15)"}
+    assert rendering.drawn("egl", Said(facts)).verdict is WARN
+    found = rendering.drawn("egl", Said(facts | {"contrast": 40.0}))
+    assert found.verdict is OK and "in software" in found.found
+
+
+def test_without_opengl_flights_still_work(monkeypatch):
+    monkeypatch.setattr(rendering, "PLATFORM", "no-such-platform")
+    monkeypatch.delenv("MUJOCO_GL", raising=False)
+    (found,) = rendering.checks()
+    assert found.verdict is WARN

@@ -1,0 +1,36 @@
+"""docs/faults.md says what the code has."""
+
+from __future__ import annotations
+
+import re
+import shlex
+from pathlib import Path
+
+from uam_control.mission import load_scenario
+from uam_sim_bridge.campaign.fault_outcome import OUTCOMES
+from uam_sim_bridge.cli.main import parser
+from uam_sim_bridge.faults import FAULTS, catalogue, read_schedule
+
+TEXT = (Path(__file__).resolve().parents[2] / "docs/faults.md").read_text()
+
+
+def test_the_catalogue_is_that_of_the_code():
+    assert catalogue.table() in TEXT
+
+
+def test_the_outcomes_are_those_of_the_code():
+    assert "".join(f"| {name} | {about} |\n" for name, about in OUTCOMES.items()) in TEXT
+
+
+def test_the_examples_can_be_typed():
+    lines = re.findall(r"^\.venv/bin/uam (.*?)(?: {2,}#.*)?$", TEXT, re.M)
+    asked = [vars(parser().parse_args(shlex.split(line))).get("fault") or [] for line in lines]
+    words = [text for found in asked for text in found if not text.endswith(".yaml")]
+    assert len(lines) == 5 and len(words) == 3
+    read_schedule(words, load_scenario("pick_and_place"), 1)
+
+
+def test_every_fault_is_listed_for_the_terminal():
+    listing = catalogue.listing()
+    for name, kind in FAULTS.items():
+        assert name in listing and all(f" {parameter}: " in listing for parameter in kind.specs())

@@ -1,0 +1,169 @@
+"""Faults as messages, in the figures and on the page, and the matrix of a campaign."""
+
+from __future__ import annotations
+
+import json
+
+import numpy as np
+import pytest
+
+from uam_control import configuration
+from uam_sim_bridge.campaign import fault_matrix, fault_report
+from uam_sim_bridge.campaign.fault_outcome import OUTCOMES, classify
+from uam_sim_bridge.campaign.fault_trial import FaultResult
+from uam_sim_bridge.cli.main import main
+from uam_sim_bridge.faults import FAULTS, FaultError
+from uam_sim_bridge.flight import metrics
+from uam_sim_bridge.flight.timeseries import COLUMNS
+from uam_sim_bridge.report import fault_marks, figures, page
+from uam_sim_bridge.report.figures import draw
+from uam_sim_bridge.report.panels import Flight
+
+MATRIX = configuration.path("campaign/faults.yaml")
+
+
+def record(begin, end, name="motor_loss", **values):
+    return {"fault": name, "begin_s": begin, "end_s": end, "parameters": values}
+
+
+def test_an_event_is_read_back_from_its_message_and_a_log():
+    pytest.importorskip("rclpy")
+    from rclpy.serialization import serialize_message
+
+    from uam_msgs_py.faults import FaultEvent
+    from uam_sim_bridge.flight import fault_log
+
+    first = FaultEvent("motor_loss", "plant", 0, True, {"motor": 2.0, "remaining": 0.7})
+    other = FaultEvent("mavlink_cut", "MAVLink", 0, True, {"direction": "both"})
+    over = FaultEvent("motor_loss", "plant", 0, False, {"motor": 2.0, "remaining": 0.7})
+    told = [(3_000_000_000, other), (2_000_000_000, first), (5_500_000_000, over)]
+    for stamp, event in told:
+        assert FaultEvent.from_message(event.to_message(stamp)) == (stamp, event)
+    logged = [serialize_message(event.to_message(stamp)) for stamp, event in told]
+    assert fault_log.records(logged, 1_000_000_000) == [
+        record(1.0, 4.5, motor=2.0, remaining=0.7),
+        record(2.0, None, "mavlink_cut", direction="both")]
+
+
+def test_faults_are_shaded_and_listed(flight_folder, flight, make_flight):
+    faults = [record(10.0, 12.0, motor=2.0), record(50.0, None, "clock_jump", step=0.5),
+              record(50.1, 60.0, "mocap_dropout"), record(500.0, None)]
+    marked = make_flight(info={"faults": faults})
+    figure = figures.arm_inputs([Flight("x", marked)])
+    axis = figure.axes[0]
+    assert {"A", "B C"} <= {text.get_text() for text in axis.texts}
+    assert not any("D" == text.get_text() for text in axis.texts)
+    spans = {tuple(np.round([p.get_x(), p.get_x() + p.get_width()], 3)) for p in axis.patches}
+    end = round(axis.get_xlim()[1], 3)
+    assert {(10.0, 12.0), (50.0, end), (50.1, 60.0)} <= spans
+    assert [t.get_text() for t in figure.legends[0].texts][-1] == "fault"
+    draw([Flight("x", marked)], flight_folder / "figures", names=["arm_inputs"])
+    (flight_folder / "info.json").write_text(json.dumps(marked.info))
+    html = page.write_page(flight_folder).read_text()
+    assert "Faults put into this flight" in html and "<code>clock_jump</code>" in html
+    assert fault_marks.handles(flight.info) == []
+
+
+def test_letters_go_on_after_z():
+    assert [fault_marks.letter(n) for n in (0, 25, 26, 27, 701, 702)] == [
+        "A", "Z", "AA", "AB", "ZZ", "AAA"]
+
+
+def test_metrics_have_the_faults(flight):
+    faults = [record(10.0, 12.0, motor=2.0)]
+    assert metrics.compute(flight, {"faults": faults})["faults"] == faults
+    assert metrics.compute(flight, {})["faults"] == []
+
+
+def ended(make_flight, height=0.0, tilt=0.0, down=0.0, landed=True):
+    """A made-up flight whose last second is changed."""
+    series = make_flight()
+    last = slice(-25, None)
+    series.values[:, COLUMNS["truth.z"]] -= series["truth.z"][-1] - 0.285
+    series.values[0, COLUMNS["truth.z"]] = 0.285
+    series.values[last, COLUMNS["truth.z"]] = 0.285 + height
+    series.values[last, COLUMNS["truth.roll"]] = tilt
+    for column in ("truth.x_dot", "truth.y_dot", "truth.z_dot"):
+        series.values[last, COLUMNS[column]] = 0.0
+    series.values[-20, COLUMNS["truth.z_dot"]] = -down
+    if not landed:
+        series.phases[series.in_phase("landed")] = 0
+    return series
+
+
+@pytest.mark.parametrize(("end", "outcome"), [
+    ({}, "landed"),
+    ({"landed": False}, "failsafe"),
+    ({"height": 0.8, "landed": False}, "held"),
+    ({"tilt": 1.2}, "lost"),
+    ({"down": 3.0}, "lost"),
+    ({"down": 3.0, "height": 0.8}, "held"),
+])
+def test_how_a_flight_ended(make_flight, end, outcome):
+    series = ended(make_flight, **end)
+    assert classify(series, {"mission_completed": False}) == outcome
+    assert classify(series, {"mission_completed": True}) == "completed"
+    assert outcome in OUTCOMES
+
+
+def test_the_matrix_of_the_configuration_has_every_fault_and_moment():
+    ros, direct = (fault_matrix.read(MATRIX, engine) for engine in ("ros", "direct"))
+    assert {entry["fault"] for entry in ros.faults} >= set(FAULTS) - {"node_slow"}
+    assert len(direct.cells(1)) == 1 + len(direct.faults) * 4
+    assert set(ros.rows) - set(direct.rows) == set(direct.left_out)
+    assert list(direct.moments) == ["take-off", "transit", "with payload", "landing"]
+    assert len(set(ros.rows)) == len(ros.rows)
+    (one,) = fault_matrix.read(MATRIX, "direct", ["servo_jam"], ["landing"]).cells(3)[1:]
+    assert (one.schedule.faults[0].at, one.schedule.seed) == (83.5, 3)
+
+
+@pytest.mark.parametrize(("text", "said"), [
+    ("scenario: hover", "a mapping of scenario, moments, faults expected"),
+    ("{scenario: hover, moments: {a: 3}, faults: []}", "moments: names with"),
+    ("{scenario: hover, moments: {a: {at: pick}}, faults: []}", "no phase 'pick'"),
+    ("{scenario: hover, moments: {a: {at: 3}}, faults: 3}", "a list of faults expected"),
+    ("{scenario: hover, moments: {a: {at: 3}}, faults: [{fault: wind}]}", "unknown fault 'wind'"),
+    ("{scenario: hover, moments: {a: {at: 3}}, faults: [{fault: servo_jam, at: 2}]}",
+     "at: the moments say when"),
+    ("{scenario: hover, moments: {a: {at: 3}}, faults: [{fault: node_kill}]}", "nothing to fly"),
+])
+def test_a_bad_matrix_is_refused_in_one_line(tmp_path, text, said):
+    file = tmp_path / "mine.yaml"
+    file.write_text(text)
+    with pytest.raises(FaultError, match=f"mine.yaml: .*{said}"):
+        fault_matrix.read(file, "direct")
+
+
+@pytest.mark.parametrize(("options", "said"), [
+    (["--only", "wind"], "unknown fault 'wind'; there are: mocap_dropout"),
+    (["--moment", "tea"], "unknown moment 'tea'; there are: take-off"),
+    (["--matrix", "no"], "unknown campaign 'no'; there are: faults"),
+    (["--engine", "fast"], "unknown engine 'fast'"),
+    (["--clock", "realtime"], "the direct engine has no clock"),
+    (["--jobs", "0"], "--jobs is 1 or more"),
+])
+def test_wrong_use_is_one_line(capsys, monkeypatch, tmp_path, options, said):
+    monkeypatch.chdir(tmp_path)
+    assert main(["faults", *options]) == 2
+    out, err = capsys.readouterr()
+    assert said in err and err.count("\n") == 1 and not out
+    assert not any(tmp_path.iterdir())
+
+
+def test_the_report_of_a_campaign(tmp_path):
+    matrix = fault_matrix.read(MATRIX, "direct", ["servo_jam", "motor_loss"], ["landing"])
+    worst = {"position_m": [0.1, 0.2, None], "attitude_deg": [1, 2, 3], "arm_deg": [4, 5]}
+    results = [
+        FaultResult(cell.fault, cell.moment, outcome, "why, not <so>", 12.0, worst)
+        for cell, outcome in zip(
+            matrix.cells(1), ["completed", "held", "lost", "lost"], strict=True)
+    ]
+    summary, written = fault_report.write(tmp_path, matrix, results, "uam faults")
+    assert summary.startswith("3 flights with a fault: 1 held, 2 lost. Without a fault: completed.")
+    assert "| servo_jam (joint 1) | held 0.20 m |" in summary
+    html = written.read_text()
+    assert "why, not &lt;so&gt;" in html and "node_kill" not in html
+    lines = (tmp_path / "flights.csv").read_text().splitlines()
+    assert len(lines) == 5 and lines[1].startswith("no fault,,completed,0.2,3,5,12.00")
+    assert (tmp_path / "matrix.png").stat().st_size > 5000
+    assert json.loads((tmp_path / "faults.json").read_text())["flights"][1]["outcome"] == "held"

@@ -1,0 +1,200 @@
+"""Faults are read from words, files and scenarios, and refused in one line."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+import re
+
+import pytest
+import yaml
+from hypothesis import given
+from hypothesis import strategies as st
+
+from uam_control import configuration
+from uam_control.mission import ScenarioError, load_scenario
+from uam_control.parameters import Bound, Choice
+from uam_sim_bridge.faults import (
+    FAULTS,
+    LINK,
+    PLANT,
+    PROCESS,
+    FaultError,
+    Schedule,
+    catalogue,
+    limits,
+    read_schedule,
+)
+from uam_sim_bridge.faults.schedule import WORDS, TimedFault, in_words
+from uam_sim_bridge.faults.timeline import Timeline
+
+SCENARIO = load_scenario("pick_and_place")
+times = st.floats(0.0, 1000.0).map(lambda value: round(value, 3))
+
+
+def one(text):
+    (found,) = read_schedule([text], SCENARIO, 1).faults
+    return found
+
+
+@st.composite
+def faults(draw):
+    """Any fault with any allowed parameters."""
+    kind = FAULTS[draw(st.sampled_from(sorted(FAULTS)))]
+    values = {}
+    for name, spec in kind.specs().items():
+        if isinstance(spec, Choice):
+            values[name] = draw(st.sampled_from(spec.choices))
+        elif name in catalogue.WHOLE:
+            values[name] = draw(st.integers(round(spec.low), round(spec.high)))
+        else:
+            values[name] = draw(st.floats(spec.low, spec.high))
+    return kind.from_mapping(values)
+
+
+@given(st.lists(st.builds(TimedFault, faults(), times, times | st.just(math.inf)), max_size=4))
+def test_a_schedule_is_read_back_from_the_parameter_of_a_node_and_from_a_file(found):
+    made = Schedule(tuple(found), 7)
+    assert Schedule.from_text(made.to_text()) == (made if found else Schedule())
+    entries = yaml.safe_load(yaml.safe_dump(made.entries))
+    again = read_schedule([], dataclasses.replace(SCENARIO, faults=tuple(entries)), 7)
+    assert again == made
+
+
+@given(faults(), times, times | st.none())
+def test_words_say_the_same_as_an_entry(fault, at, duration):
+    lasting = "" if duration is None else f"+{duration!r}"
+    values = ",".join(f"{name}={value}" for name, value in fault.values.items())
+    found = one(f"{fault.NAME}@{at!r}{lasting}" + (f":{values}" if values else ""))
+    assert found == TimedFault(fault, at, math.inf if duration is None else duration)
+
+
+@given(st.text(max_size=40))
+def test_any_words_are_understood_or_refused_in_one_line(text):
+    try:
+        read_schedule([text], SCENARIO, 1)
+    except FaultError as error:
+        assert str(error)
+
+
+@pytest.mark.parametrize("name", FAULTS)
+def test_every_fault_can_be_asked_for_by_its_name(name):
+    found = one(f"{name}@20+3")
+    assert (type(found.fault), found.at, found.duration) == (FAULTS[name], 20.0, 3.0)
+    assert FAULTS[name].ABOUT and FAULTS[name].PLACE in (PLANT, LINK, PROCESS)
+
+
+@pytest.mark.parametrize(
+    ("name", "parameter"), [(n, p) for n, kind in FAULTS.items() for p in kind.specs()])
+def test_every_parameter_has_a_range_that_is_kept(name, parameter):
+    spec = FAULTS[name].specs()[parameter]
+    assert parameter not in WORDS
+    bad = "nonsense"
+    if isinstance(spec, Bound):
+        assert spec.unit and spec.low <= getattr(FAULTS[name](), parameter) <= spec.high
+        bad = spec.high + 1
+    for value in (bad, "nan", "true"):
+        with pytest.raises(FaultError, match=f"{name}: {parameter}: "):
+            one(f"{name}@20:{parameter}={value}")
+
+
+def test_a_phase_means_its_beginning():
+    found = one("motor_loss@pick+1:motor=2,remaining=0.7")
+    assert (found.at, found.duration) == (31.0, math.inf)
+    assert (found.fault.motor, found.fault.remaining) == (2.0, 0.7)
+    assert one("mocap_dropout@take-off").at == 0.0
+    found = one("mocap_dropout@land+0.5+2")
+    assert (found.at, found.duration) == (82.5, 2.0)
+
+
+REFUSED = {
+    "mocap_dropot@20": "unknown fault 'mocap_dropot'; there are: mocap_dropout, mocap_freeze",
+    "mocap_dropout": "NAME@SECONDS[+DURATION] or",
+    "mocap_dropout@": "NAME@SECONDS[+DURATION] or",
+    "mocap_dropout@20+3+4": "NAME@SECONDS[+DURATION] or",
+    "mocap_dropout@picking": "no phase 'picking' in the scenario, which has: take-off, approach",
+    "mocap_dropout@-1": "at: -1.0 is not a time within 0 to",
+    "mocap_dropout@20+-3": "duration: -3.0 is not a time",
+    "mocap_dropout@20+long": "duration: 'long' is not a time",
+    "mocap_dropout@pick+nan": "after: nan is not a time",
+    "mocap_dropout@inf": "at: inf is not a time",
+    "mocap_dropout@20:": "NAME@SECONDS[+DURATION] or",
+    "mocap_dropout@20:speed=3": "speed: unknown parameter; there are: none",
+    "motor_loss@20:motor=2.5": "motor: 2.5 is not a whole number",
+    "motor_loss@20:motor=5": "motor: 5.0 is outside 1 to 4",
+    "motor_loss@20:motor": "'motor' is not one parameter=value",
+    "motor_loss@20:motor=1,motor=2": "'motor=2' is not one parameter=value",
+    "motor_loss@20:at=3": "'at=3' is not one parameter=value",
+    "motor_loss@20:after=3": "after: only together with a phase",
+    "node_kill@20:node=plant": "'plant' is not one of state_estimator",
+    "no.yaml": "no.yaml: no such file",
+}
+
+
+@pytest.mark.parametrize("text", REFUSED)
+def test_what_is_refused_is_named(text):
+    with pytest.raises(FaultError, match=re.escape(REFUSED[text])) as refusal:
+        one(text)
+    assert "\n" not in str(refusal.value)
+
+
+@pytest.mark.parametrize("text", ["faults: 3", "- mocap_dropout@20", "a: [", "faults: [[]]"])
+def test_a_bad_file_is_named(tmp_path, text):
+    file = tmp_path / "mine.yaml"
+    file.write_text(text)
+    with pytest.raises(FaultError, match="mine.yaml: "):
+        read_schedule([str(file)], SCENARIO, 1)
+
+
+def test_files_words_and_the_scenario_add_up(tmp_path):
+    file = tmp_path / "mine.yaml"
+    file.write_text("- {fault: servo_jam, at: carry, after: 2, duration: 5, joint: 2}\n")
+    text = configuration.path("scenarios/hover.yaml").read_text()
+    own = tmp_path / "own.yaml"
+    own.write_text(text + "faults:\n  - {fault: wind_gust, at: hover}\n")
+    flown = dataclasses.replace(load_scenario(str(own)), phases=SCENARIO.phases + ((99, "hover"),))
+    found = read_schedule([str(file), "clock_jump@3"], flown, 1).faults
+    assert [(f.fault.NAME, f.at) for f in found] == [
+        ("wind_gust", 99.0), ("servo_jam", 37.0), ("clock_jump", 3.0)]
+    own.write_text(text + "faults: 3\n")
+    with pytest.raises(ScenarioError, match="'faults' is not a list"):
+        load_scenario(str(own))
+
+
+@pytest.mark.parametrize(("text", "why"), [
+    ("node_kill@20", "has no processes: needs --engine ros"),
+    ("mavlink_delay@20", "no MAVLink connection to delay: needs --engine ros"),
+    ("mavlink_cut@20:direction=from_autopilot", "connection from the autopilot: needs"),
+])
+def test_the_direct_engine_says_what_it_cannot_have(text, why):
+    found = read_schedule([text], SCENARIO, 1)
+    with pytest.raises(FaultError, match=why):
+        limits.check(found, "direct")
+    limits.check(found, "ros")
+
+
+def test_a_process_that_is_not_started_cannot_be_killed():
+    found = read_schedule(["node_stall@20+1:node=scene"], SCENARIO, 1)
+    with pytest.raises(FaultError, match="node_stall: this flight does not start scene"):
+        limits.check(found, "ros", ("scene",))
+
+
+@given(times, times, st.floats(0.0, 50.0))
+def test_a_fault_lasts_from_its_time_to_its_end(at, duration, takeoff):
+    line = Timeline(Schedule((TimedFault(FAULTS["mocap_dropout"](), at, duration),)))
+    line.update(takeoff + at)
+    assert line.records == []  # nobody has told the mission's time
+    line.mission_at(takeoff - 1.0, -1.0)
+    line.mission_at(takeoff + 0.25, 0.25)
+    line.mission_at(takeoff + 9.0, 1.0)  # held: its own clock stood still
+    step = max(0.5, (at + duration) / 200.0)
+    for tick in range(int((at + duration) / step) + 3):
+        line.update(takeoff + tick * step)
+    (record,) = line.records
+    assert at - 1e-5 <= record["begin_s"] <= at + step + 1e-5
+    assert 0.0 <= record["end_s"] - at - duration + 1e-5 <= 2.0 * step + 1e-5
+
+
+def test_a_word_of_numbers_keeps_its_form():
+    assert in_words("x@1e1+2:a=3,b=c") == {"fault": "x", "at": 10.0, "duration": 2.0, "a": 3.0,
+                                           "b": "c"}

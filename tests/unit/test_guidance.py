@@ -1,0 +1,136 @@
+"""Stopping, going on and descending: smooth, within limits, from wherever it begins."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import Phase, given, settings
+from hypothesis import strategies as st
+
+from uam_control.mission import load_scenario
+from uam_control.mission.guidance import Guidance, PathClock, Segment
+from uam_control.supervision import SupervisionParameters
+
+START = np.array([0.0, 0.0, 0.28, 0.0, 0.0, 0.0, 0.0, np.pi / 2])
+DT = 0.01
+NO_SHRINKING = (Phase.explicit, Phase.reuse, Phase.generate)  # flights are long
+
+
+def guidance(**parameters):
+    scenario = load_scenario("pick_and_place")
+    made = SupervisionParameters(**parameters)
+    return Guidance(
+        scenario.trajectory(START), 100.0, np.zeros((3, 8)), scenario.arm_start, made)
+
+
+def fly(guide, begin, end, at=()):
+    """References (n, 3, 8) from `begin` to `end` [s]; at: (time, function of the stamp)."""
+    found, due = [], sorted(at, key=lambda item: item[0])
+    for k in range(round(begin / DT), round(end / DT)):
+        stamp = 100.0 + k * DT
+        guide.advance(stamp)
+        guide.write(stamp)
+        while due and stamp >= 100.0 + due[0][0]:
+            due.pop(0)[1](stamp)
+        found.append(guide.reference.copy())
+    return np.array(found)
+
+
+def assert_smooth(references):
+    """Rows are derivatives of each other, without jumps, and bounded: vehicle, joints."""
+    assert np.all(np.isfinite(references))
+    middle = references[1:-1]
+    np.testing.assert_allclose(
+        (references[2:, 0] - references[:-2, 0]) / (2 * DT), middle[:, 1], atol=3e-3)
+    np.testing.assert_allclose(
+        (references[2:, 1] - references[:-2, 1]) / (2 * DT), middle[:, 2], atol=0.12)
+    for part, rate, acceleration in ((slice(0, 6), 0.6, 1.0), (slice(6, 8), 1.6, 4.0)):
+        assert np.max(np.abs(middle[:, 1, part])) < rate
+        assert np.max(np.abs(middle[:, 2, part])) < acceleration
+
+
+def test_undisturbed_it_is_the_trajectory_itself_bit_for_bit():
+    guide, expected = guidance(), np.zeros((3, 8))
+    trajectory = load_scenario("pick_and_place").trajectory(START)
+    for k in range(0, 8800, 17):
+        stamp = 100.0 + k * DT
+        guide.advance(stamp)
+        guide.write(stamp)
+        trajectory.write(stamp - 100.0, expected)
+        np.testing.assert_array_equal(guide.reference, expected)
+
+
+@settings(deadline=None, max_examples=20, phases=NO_SHRINKING)
+@given(
+    st.floats(0.5, 80.0), st.floats(0.1, 6.0), st.floats(0.1, 4.0), st.booleans()
+)
+def test_hold_and_resume_are_smooth_and_come_to_rest_whenever_they_come(at, held, again, stow):
+    guide = guidance()
+    references = fly(guide, at - 0.1, at + held + again + 14.0, [
+        (at, lambda stamp: guide.stop(stamp, stow)),
+        (at + held, guide.go_on),
+        (at + held + again, lambda stamp: guide.stop(stamp, False)),
+    ])  # fmt: skip
+    assert_smooth(references)
+    np.testing.assert_allclose(references[-1, 1:], 0.0, atol=1e-12)
+
+
+def test_after_a_hold_with_stowed_arm_the_scenario_is_flown_as_if_it_were_later():
+    guide = guidance()
+    references = fly(guide, 15.0, 45.0, [
+        (20.0, lambda stamp: guide.stop(stamp, True)), (30.0, guide.go_on)])  # fmt: skip
+    assert_smooth(references)
+    held = references[round((29.0 - 15.0) / DT), 0]
+    assert held[6:] == pytest.approx(START[6:])
+    expected = np.zeros((3, 8))
+    load_scenario("pick_and_place").trajectory(START).write(guide.scenario_time, expected)
+    np.testing.assert_allclose(references[-1], expected, atol=1e-9)
+    assert 9.0 < 45.0 - guide.scenario_time < 14.0
+
+
+@settings(deadline=None, max_examples=20, phases=NO_SHRINKING)
+@given(
+    st.floats(0.5, 80.0), st.floats(-1.5, 1.5), st.floats(-1.5, 1.5),
+    st.sampled_from([0.0, np.nan, np.inf]), st.booleans(),
+)
+def test_a_descent_is_smooth_from_anywhere_and_ends_below_the_vehicle(at, dx, dy, strange, stow):
+    guide, state = guidance(), np.zeros((3, 8))
+
+    def descend(stamp):
+        state[0, :3] = guide.reference[0, :3] + [dx, dy, strange]
+        guide.descend(stamp, state, START[2], stow)
+
+    references = fly(guide, at - 0.1, at + 20.0, [(at, descend)])
+    assert_smooth(references)
+    end = references[-1]
+    np.testing.assert_array_equal(end[1:], 0.0)
+    assert end[0, 2] == pytest.approx(START[2] - 0.03)
+    before = references[10, 0]
+    moved = end[0, :2] - before[:2] - ([dx, dy] if strange == 0.0 else [0.0, 0.0])
+    assert np.max(np.abs(moved)) < 0.15
+    if stow:
+        assert end[0, 6:] == pytest.approx(START[6:])
+
+
+@given(st.lists(st.tuples(st.floats(0.01, 3.0), st.sampled_from([0.0, 1.0])), max_size=6))
+def test_a_clock_never_jumps_however_it_is_changed(changes):
+    clock, stamp = PathClock(0.0), 1.0
+    before = clock.at(stamp)
+    for wait, goal in changes:
+        clock.change(stamp, goal, 1.0)
+        assert clock.at(stamp) == pytest.approx(before, abs=1e-9)
+        stamp += wait
+        before = clock.at(stamp)
+        later = clock.at(stamp + 1e-6)
+        assert (later[0] - before[0]) / 1e-6 == pytest.approx(before[1], abs=1e-3)
+        assert (later[1] - before[1]) / 1e-6 == pytest.approx(before[2], abs=1e-3)
+    assert clock.at(stamp + 5.0)[1] in (0.0, 1.0)
+
+
+def test_a_segment_takes_its_own_time_for_each_coordinate():
+    start, goal = np.zeros((3, 8)), np.arange(8.0)
+    segment = Segment(5.0, start, goal, np.arange(1.0, 9.0))
+    reference = np.zeros((3, 8))
+    segment.write(7.0, reference)
+    np.testing.assert_array_equal(reference[0, :2], goal[:2])
+    assert reference[0, 3] == pytest.approx(1.5) and segment.end == 13.0

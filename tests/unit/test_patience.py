@@ -1,0 +1,38 @@
+"""Waiting on a machine that stands still now and then."""
+
+import math
+
+import pytest
+
+from uam_sim_bridge.flight import patience
+from uam_sim_bridge.flight.patience import SLICE, Patience
+
+
+@pytest.fixture
+def clock(monkeypatch):
+    """A clock that the test sets: clock[0] [s]."""
+    now = [100.0]
+    monkeypatch.setattr(patience.time, "monotonic", lambda: now[0])
+    return now
+
+
+def test_it_runs_out_after_its_seconds(clock):
+    waiting = Patience(1.0)
+    for _ in range(9):
+        clock[0] += 0.1
+        assert not waiting.over
+    clock[0] += 0.11
+    assert waiting.over
+    assert waiting.left == 0.0
+
+
+def test_a_machine_that_stood_still_does_not_use_it_up(clock):
+    waiting = Patience(10.0)
+    clock[0] += 3600.0
+    assert waiting.left == pytest.approx(10.0 - SLICE)
+
+
+def test_it_may_be_endless(clock):
+    waiting = Patience(math.inf)
+    clock[0] += 1e9
+    assert not waiting.over

@@ -1,0 +1,333 @@
+"""The supervisor: its table, its limits, and what no sequence of inputs makes it do."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from hypothesis.stateful import RuleBasedStateMachine, invariant, rule
+
+from uam_control.parameters import ParameterError
+from uam_control.supervision import (
+    Command,
+    Event,
+    Guide,
+    Inputs,
+    Observation,
+    Readings,
+    State,
+    SupervisionParameters,
+    Supervisor,
+)
+from uam_control.supervision.checks import CHECKS, MEASURED, Checks
+from uam_control.supervision.monitor import Level, Monitor
+from uam_control.supervision.states import TARGETS, TRANSITIONS, mermaid
+
+DOCS = Path(__file__).resolve().parents[2] / "docs" / "supervision.md"
+
+
+def test_the_diagram_in_the_docs_is_the_table():
+    assert f"```mermaid\n{mermaid()}\n```" in DOCS.read_text(), mermaid()
+
+
+def test_the_docs_name_every_state_in_the_policy():
+    text = DOCS.read_text()
+    for state in State:
+        assert f"\n| {state.value} |" in text
+
+
+def test_the_table_is_unambiguous_and_every_state_can_be_reached_and_left():
+    assert len(TARGETS) == len(TRANSITIONS)
+    reached = {State.GROUNDED} | {target for _, _, target in TRANSITIONS}
+    assert reached == set(State)
+    assert {source for source, _, _ in TRANSITIONS} == set(State) - {State.DISARMED}
+    assert {event for _, event, _ in TRANSITIONS} == set(Event)
+
+
+def test_nothing_leads_out_of_failsafe_but_a_command_and_motors_go_off_on_the_ground():
+    ways_out = [event for source, event, _ in TRANSITIONS if source is State.FAILSAFE]
+    assert ways_out == [Event.DISARM]
+    aloft = {State.FLYING, State.HOLDING}
+    off = {e for s, e, target in TRANSITIONS if s in aloft and target is State.DISARMED}
+    assert off == {Event.LOST_ARMING}  # what the autopilot did, not we
+
+
+def test_as_many_quantities_are_measured_as_are_named():
+    assert len(CHECKS) == MEASURED + 6
+    seen = observation()
+    checks = Checks(SupervisionParameters())
+    assert checks.update(0.0, seen, True) is None
+
+
+@pytest.mark.parametrize(
+    ("changes", "text"),
+    [
+        ({"tilt_hold": 1.2}, "tilt_hold: 1.2 is not below tilt_failsafe, 1.05"),
+        ({"position_error_land": 4.0}, "position_error_land: 4 is not below position_error_fail"),
+        ({"geofence_low": (0.0, 6.0, 0.0)}, "geofence_low: 6 in y is not below geofence_high, 5"),
+        ({"arm_holding": "wave"}, "arm_holding: 'wave' is not one of stay, stow"),
+        ({"battery_land": math.nan}, "battery_land: nan is outside 0 to 1"),
+    ],
+)
+def test_limits_that_do_not_escalate_are_refused(changes, text):
+    with pytest.raises(ParameterError, match=text):
+        dataclasses.replace(SupervisionParameters(), **changes).validated()
+
+
+LIMITS, AFTER = (1.0, 2.0, math.inf), (0.25, 0.05, 0.0)
+
+
+def run(monitor, values, begin=0.0, step=0.1):
+    """Levels over values that come every `step` s."""
+    return [
+        monitor.update(begin + step * k, value, LIMITS, AFTER, 0.5, 0.2)
+        for k, value in enumerate(values)
+    ]
+
+
+def test_a_monitor_waits_rises_and_falls_with_hysteresis_in_value_and_time():
+    monitor = Monitor()
+    assert run(monitor, [1.1, 1.1, 1.1]) == [Level.FINE] * 3
+    assert run(monitor, [1.1, 2.1, 2.1, 2.1], 0.3) == [1, 1, 2, 2]
+    # below the limit, but not by the hysteresis: nothing changes
+    assert run(monitor, [1.7] * 10, 0.8) == [2] * 10
+    # clear of the second limit, for long enough: the first one still holds
+    assert run(monitor, [1.5] * 8, 2.0)[-1] is Level.HOLD
+    levels = run(monitor, [0.7] * 8, 3.0)
+    assert levels[0] is Level.HOLD and levels[-1] is Level.FINE and monitor.quiet
+
+
+@given(st.lists(st.floats(0.81, 1.5), min_size=5, max_size=60))
+def test_noise_about_a_limit_does_not_toggle(values):
+    """Once held, the level stays as long as nothing is clear of the limit by the hysteresis."""
+    monitor = Monitor()
+    run(monitor, [1.2] * 10)
+    assert set(run(monitor, values, 1.0)) == {Level.HOLD}
+
+
+def test_a_short_excess_and_one_that_is_not_known_do_nothing():
+    monitor = Monitor()
+    assert set(run(monitor, [5.0, 0.1] * 20)) == {Level.FINE}
+    assert not any(run(Monitor(), [-math.inf] * 20))
+    assert run(Monitor(), [math.nan] * 3)[-1] is Level.LAND
+
+
+def observation(**changes):
+    """A vehicle that is where it should be, 1 m above its start."""
+    state, reference = np.zeros((3, 8)), np.zeros((3, 8))
+    state[0, 2] = reference[0, 2] = 1.0
+    seen = Observation(state, reference, 0.0, armed=True, ready=True)
+    for name, value in changes.items():
+        setattr(seen, name, value)
+    return seen
+
+
+def flying(**parameters):
+    """A supervisor that has taken off, and a clock."""
+    made = Supervisor(dataclasses.replace(SupervisionParameters(), **parameters).validated())
+    for stamp in (0.0, 0.01):
+        made.step(stamp, observation())
+    assert made.state is State.FLYING
+    return made
+
+
+def watch(supervisor, seen, seconds, begin=1.0):
+    """Step for a while; the last decision."""
+    for k in range(round(seconds / 0.01) + 1):
+        decision = supervisor.step(begin + 0.01 * k, seen)
+    return decision
+
+
+def with_state(entry, value):
+    seen = observation()
+    seen.state[entry] = value
+    return seen
+
+
+@pytest.mark.parametrize(
+    ("seen", "state", "cause"),
+    [
+        (with_state((0, 0), 1.2), State.HOLDING, "position error 1.20 m exceeds 1 m"),
+        (with_state((0, 0), 2.0), State.LANDING, "position error 2.00 m exceeds 1.5 m"),
+        (with_state((0, 0), 3.5), State.FAILSAFE, "position error 3.50 m exceeds 3 m"),
+        (with_state((0, 4), -0.9), State.HOLDING, "tilt 0.90 rad exceeds 0.8 rad"),
+        (with_state((0, 3), 1.2), State.FAILSAFE, "tilt 1.20 rad exceeds 1.05 rad"),
+        (with_state((1, 5), 9.0), State.HOLDING, "body rate 9.0 rad/s exceeds 8 rad/s"),
+        (with_state((1, 3), -20.0), State.FAILSAFE, "body rate 20.0 rad/s exceeds 15 rad/s"),
+        (with_state((0, 6), -2.0), State.HOLDING, "joint angle at 1.05 of its limit"),
+        (with_state((0, 7), math.nan), State.FAILSAFE, "estimate is not finite"),
+        (with_state((2, 1), math.inf), State.FAILSAFE, "estimate is not finite"),
+        (observation(ground=-4.5), State.HOLDING, "altitude 5.50 m exceeds 5 m"),
+        (observation(readings=Readings(battery=0.1)), State.LANDING, "battery 0.10 full, below"),
+        (observation(readings=Readings(mocap_age=0.3)), State.HOLDING, "mocap pose is 0.30 s old"),
+        (observation(readings=Readings(mocap_age=1.1)), State.FAILSAFE, "mocap pose is 1.10 s"),
+        (observation(readings=Readings(joint_age=0.3)), State.HOLDING, "joint angles are 0.30 s"),
+        (observation(readings=Readings(missed_ticks=130)), State.HOLDING, "130 control ticks"),
+        (observation(readings=Readings(joint_effort=np.array([0.0, -2.9]))), State.HOLDING,
+         "joint torque at 1.04 of its limit"),
+        (observation(readings=Readings(gains=np.array([math.nan, 150.0, 3.0]))), State.HOLDING,
+         "adapted gain at 1.50 of its limit"),
+        (observation(armed=False), State.DISARMED, "the autopilot disarmed in flight"),
+    ],
+)
+def test_what_is_beyond_a_limit_has_its_reaction_and_says_so(seen, state, cause):
+    supervisor = flying()
+    decision = watch(supervisor, seen, 0.6)
+    assert decision.state is state and decision.cause.startswith(cause)
+
+
+def test_a_fence_left_is_a_landing():
+    seen = observation()
+    seen.state[0, 0] = seen.reference[0, 0] = 5.2
+    decision = watch(flying(), seen, 0.4)
+    assert decision.state is State.LANDING and decision.guide is Guide.DESCEND
+    assert decision.cause == "geofence left by 0.20 m, 0.1 m allowed"
+
+
+def test_a_limit_that_is_not_on_any_more_lets_it_go_on_only_when_that_is_wanted():
+    far, near = with_state((0, 0), 1.2), observation()
+    for automatic, expected in ((False, State.HOLDING), (True, State.FLYING)):
+        supervisor = flying(resume_automatically=automatic)
+        assert watch(supervisor, far, 0.6).state is State.HOLDING
+        assert supervisor.refusal(Command.RESUME, far).startswith("position error")
+        assert watch(supervisor, near, 0.9, 2.0).state is State.HOLDING
+        assert watch(supervisor, near, 3.0, 3.0).state is expected
+    supervisor = flying()
+    watch(supervisor, far, 0.6)
+    watch(supervisor, near, 2.0, 2.0)
+    assert supervisor.step(5.0, near, Command.RESUME).state is State.FLYING
+
+
+def test_a_hold_by_command_is_not_ended_by_itself():
+    supervisor = flying(resume_automatically=True)
+    supervisor.step(1.0, observation(), Command.HOLD)
+    assert watch(supervisor, observation(), 60.0, 2.0).state is State.HOLDING
+
+
+def test_a_hard_limit_on_the_ground_stops_the_motors_there():
+    supervisor = Supervisor(SupervisionParameters())
+    seen = observation(on_ground=True)
+    seen.state[0, 2] = 0.0
+    supervisor.step(0.0, seen)
+    assert supervisor.state is State.TAKING_OFF
+    seen.state[0, 3] = 1.3
+    decision = watch(supervisor, seen, 0.2)
+    assert decision.state is State.DISARMED and not decision.arm
+
+
+@pytest.mark.parametrize("keep", ["keep", "release"])
+def test_arm_and_magnet_follow_the_policy(keep):
+    supervisor = flying(arm_holding="stow", arm_landing="stay", magnet_holding=keep)
+    decision = supervisor.step(1.0, observation(), Command.HOLD)
+    assert decision.stow and decision.keep_magnet is (keep == "keep")
+    decision = supervisor.step(1.1, observation(), Command.LAND)
+    assert not decision.stow and decision.keep_magnet
+
+
+def test_inputs_tell_ages_by_stamps_and_count_missed_ticks_of_a_second():
+    inputs = Inputs(0.004)
+    assert math.isnan(inputs.at(1.0).mocap_age)
+    inputs.mocap(0.99)
+    inputs.joints(1.0, np.array([0.1, 0.2]))
+    inputs.gains("arm", ["K0", "zeta", "rho"], np.array([-3.0, 0.1, 99.0]))
+    inputs.gains("position", ["D0", "s_norm"], np.array([5.0, 9.0]))
+    readings = inputs.at(1.02)  # four ticks were missed
+    assert readings.mocap_age == pytest.approx(0.03) and readings.missed_ticks == 4.0
+    assert readings.gains[2] == 3.0 and np.isnan(readings.gains[:2]).all()
+    assert inputs.at(1.024).missed_ticks == 4.0
+    for tick in range(300):
+        readings = inputs.at(1.028 + 0.004 * tick)
+    assert readings.missed_ticks == 0.0
+
+
+NUMBERS = st.floats(-1e3, 1e3) | st.sampled_from([math.nan, math.inf, -math.inf, 0.0])
+READINGS = st.builds(
+    Readings, NUMBERS, NUMBERS, NUMBERS, NUMBERS,
+    st.builds(np.array, st.tuples(NUMBERS, NUMBERS)),
+    st.builds(np.array, st.tuples(NUMBERS, NUMBERS, NUMBERS)),
+)  # fmt: skip
+
+
+class AnySequence(RuleBasedStateMachine):
+    """Whatever comes, in whatever order, the supervisor keeps its promises."""
+
+    def __init__(self):
+        super().__init__()
+        self.supervisor = Supervisor(SupervisionParameters())
+        self.seen = observation(ready=False)
+        self.stamp = 0.0
+        self.decision = self.supervisor.decision
+        self.before = State.GROUNDED
+
+    def step(self, stamp, command=None):
+        self.before = self.supervisor.state
+        armed, changes = self.decision.arm, len(self.supervisor.changes)
+        self.decision = self.supervisor.step(stamp, self.seen, command)
+        assert armed or not self.decision.arm  # never arms
+        if self.before is State.FAILSAFE and self.decision.state is not State.FAILSAFE:
+            assert command is Command.DISARM
+        new = self.supervisor.changes[changes:]
+        assert len(new) <= 1
+        for change in new:
+            assert TARGETS[change.source, change.event] is change.target
+            assert change.source is not State.DISARMED and change.cause
+            assert not math.isnan(change.stamp)
+            if change.target is State.DISARMED:
+                seen = self.seen
+                on_ground = seen.on_ground or seen.touchdown
+                assert on_ground or not seen.armed or command is Command.DISARM
+
+    @rule(seconds=st.sampled_from([0.004, 0.05, 0.6, 2.0]), ticks=st.integers(1, 20))
+    def time_passes(self, seconds, ticks):
+        for _ in range(ticks):
+            self.stamp += seconds
+            self.step(self.stamp)
+
+    @rule(stamp=NUMBERS)
+    def a_strange_stamp(self, stamp):
+        self.step(stamp)
+        if math.isfinite(stamp):
+            self.stamp = max(self.stamp, stamp)
+
+    @rule(command=st.sampled_from(Command))
+    def a_command(self, command):
+        self.stamp += 0.004
+        refusal = self.supervisor.refusal(command, self.seen)
+        self.step(self.stamp, command)
+        assert isinstance(refusal, str) and "\n" not in refusal
+
+    @rule(row=st.integers(0, 2), column=st.integers(0, 7), value=NUMBERS)
+    def an_estimate(self, row, column, value):
+        self.seen.state[row, column] = value
+
+    @rule()
+    def all_well(self):
+        self.seen = observation(readings=Readings())
+
+    @rule(readings=READINGS)
+    def other_readings(self, readings):
+        self.seen.readings = readings
+
+    @rule(name=st.sampled_from(
+        ["armed", "ready", "landing_due", "on_ground", "touchdown", "overdue"]), on=st.booleans())
+    def the_mission_says(self, name, on):
+        setattr(self.seen, name, on)
+
+    @invariant()
+    def what_the_state_means(self):
+        decision = self.decision
+        if decision.state in (State.GROUNDED, State.FAILSAFE, State.DISARMED):
+            assert decision.guide is Guide.NOTHING
+        else:
+            assert decision.guide is not Guide.NOTHING and decision.arm
+        assert decision.arm or decision.state in (State.DISARMED, State.FAILSAFE)
+        assert decision.state is not State.DISARMED or not (decision.arm or decision.keep_magnet)
+
+
+TestAnySequence = AnySequence.TestCase
+TestAnySequence.settings = settings(max_examples=60, stateful_step_count=40, deadline=None)

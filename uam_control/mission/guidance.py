@@ -1,0 +1,214 @@
+"""The reference under supervision: along the scenario, to a stop on it, on again, or down.
+
+Everything begins at the reference that holds now, with its rates and accelerations, so that nothing
+the controllers follow ever jumps, whatever comes when.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+
+from uam_control.coordinates import ARM, POSITION, SIZE
+from uam_control.mission.scenario import SINK
+from uam_control.mission.trajectory import Trajectory
+from uam_control.supervision import SupervisionParameters
+
+_PEAK = 1.875  # largest rate of a quintic from rest to rest, times its mean rate
+_RAMP = 1.5  # largest slope of a cubic from rest to rest, times its mean slope
+
+
+class PathClock:
+    """Scenario time: goes with the stamps, or slows down to a stop, and up again.
+
+    Its rate is a cubic of the stamp while it changes; rate and slope never jump.
+    """
+
+    def __init__(self, stamp: float) -> None:
+        """stamp [s] at which the scenario begins."""
+        self._begin = stamp
+        self._ramp: tuple[float, float, float, float, float, float] | None = None
+
+    def at(self, stamp: float) -> tuple[float, float, float]:
+        """Return scenario time [s], its rate [1] and the slope of the rate [1/s]."""
+        if self._ramp is None:
+            return stamp - self._begin, 1.0, 0.0
+        begin, length, time, rate, slope, goal = self._ramp
+        u = min(max((stamp - begin) / length, 0.0), 1.0)
+        after = max(stamp - begin - length, 0.0)
+        time += goal * after + length * (
+            rate * (u - u**3 + u**4 / 2)
+            + length * slope * (u**2 / 2 - 2 * u**3 / 3 + u**4 / 4)
+            + goal * (u**3 - u**4 / 2)
+        )
+        now = rate * (1 - 3 * u**2 + 2 * u**3) + goal * (3 * u**2 - 2 * u**3)
+        now += length * slope * (u - 2 * u**2 + u**3)
+        change = (goal - rate) * 6 * (u - u**2) / length + slope * (1 - 4 * u + 3 * u**2)
+        return time, now, change
+
+    @property
+    def settled(self) -> float:
+        """Stamp [s] from which on the rate does not change any more."""
+        return -math.inf if self._ramp is None else self._ramp[0] + self._ramp[1]
+
+    def change(self, stamp: float, goal: float, length: float) -> None:
+        """From `stamp` [s] on go to the rate `goal` within `length` [s]."""
+        self._ramp = (stamp, length, *self.at(stamp), goal)
+
+
+class Segment:
+    """Quintics from a reference to rest at a goal; each coordinate takes its own time."""
+
+    def __init__(
+        self, stamp: float, start: np.ndarray, goal: np.ndarray, lengths: np.ndarray
+    ) -> None:
+        """start (3, 8), goal (8,), lengths (8,) [s], from `stamp` [s] on."""
+        self._stamp, self._lengths, self._goal = stamp, lengths, goal.copy()
+        p, v, a = start[0], start[1] * lengths, start[2] * lengths**2  # per length
+        d = goal - p
+        self._powers = np.array([
+            p, v, a / 2,
+            10 * d - 6 * v - 1.5 * a,
+            -15 * d + 8 * v + 1.5 * a,
+            6 * d - 3 * v - 0.5 * a,
+        ])  # fmt: skip
+
+    @property
+    def end(self) -> float:
+        """Stamp [s] at which all coordinates are at rest."""
+        return self._stamp + float(np.max(self._lengths))
+
+    def write(self, stamp: float, reference: np.ndarray) -> None:
+        """Write the reference (3, 8) at `stamp` [s]."""
+        u = np.clip((stamp - self._stamp) / self._lengths, 0.0, 1.0)
+        c = self._powers
+        reference[0] = c[0] + u * (c[1] + u * (c[2] + u * (c[3] + u * (c[4] + u * c[5]))))
+        rate = c[1] + u * (2 * c[2] + u * (3 * c[3] + u * (4 * c[4] + u * 5 * c[5])))
+        reference[1] = rate / self._lengths
+        second = 2 * c[2] + u * (6 * c[3] + u * (12 * c[4] + u * 20 * c[5]))
+        reference[2] = second / self._lengths**2
+        there = u >= 1.0  # exactly, not but for rounding
+        reference[0, there] = self._goal[there]
+        reference[1:, there] = 0.0
+
+
+class Guidance:
+    """Writes the reference of a flight; told by the mission when to stop, go on, descend and rest.
+
+    `reference` (3, 8) is rewritten by every `write`; `scenario_time` [s] is where on the scenario
+    it is, which stands still while it holds. `end`: stamp [s] at which a descent will be at the
+    ground, infinite without one.
+    """
+
+    def __init__(
+        self,
+        trajectory: Trajectory,
+        stamp: float,
+        reference: np.ndarray,
+        stowed: Sequence[float],
+        parameters: SupervisionParameters,
+    ) -> None:
+        """stamp [s]: of the take-off; stowed (2,): angles of the arm on the ground [rad]."""
+        self.parameters = parameters
+        self.reference = reference
+        self.scenario_time = 0.0
+        self._trajectory, self._stowed = trajectory, np.array(stowed, dtype=float)
+        self._clock = PathClock(stamp)
+        self._rate, self._slope = 1.0, 0.0  # of the clock
+        self._path = np.zeros((3, SIZE))
+        self._arm: Segment | None = None  # in place of the path's, while holding
+        self._go_on_at = math.inf  # stamp at which the arm is back and the path goes on
+        self._last: Segment | None = None  # in place of the path, to the end of the flight
+
+    @property
+    def end(self) -> float:
+        """See the class."""
+        return math.inf if self._last is None else self._last.end
+
+    def advance(self, stamp: float) -> None:
+        """Go to `stamp` [s] on the path, before `write`; off the path the scenario stands still."""
+        if self._last is not None:
+            return
+        if stamp >= self._go_on_at:
+            self._arm, self._go_on_at = None, math.inf
+            self._clock.change(stamp, 1.0, self._ramp_length())
+        self.scenario_time, self._rate, self._slope = self._clock.at(stamp)
+
+    def write(self, stamp: float) -> None:
+        """Write the reference at `stamp` [s]."""
+        if self._last is not None:
+            self._last.write(stamp, self.reference)
+            return
+        rate, slope = self._rate, self._slope
+        self._trajectory.write(self.scenario_time, self.reference)
+        if rate != 1.0 or slope != 0.0:
+            self.reference[2] = rate * rate * self.reference[2] + slope * self.reference[1]
+            self.reference[1] *= rate
+        if self._arm is not None:
+            self._arm.write(stamp, self._path)
+            self.reference[:, ARM] = self._path[:, ARM]
+
+    def stop(self, stamp: float, stow: bool) -> None:
+        """Slow down to a stop on the path; stow: the arm goes to its place meanwhile."""
+        self._clock.change(stamp, 0.0, self._ramp_length())
+        self._go_on_at = math.inf
+        if stow:
+            self._arm = self._arm_segment(stamp, self._stowed)
+
+    def go_on(self, stamp: float) -> None:
+        """Go on along the path once it has stopped and the arm is back where it belongs there."""
+        self._go_on_at = max(stamp, self._clock.settled)
+        if self._arm is not None:
+            time, _, _ = self._clock.at(self._go_on_at)
+            self._trajectory.write(time, self._path)
+            self._arm = self._arm_segment(stamp, self._path[0, ARM])
+            self._go_on_at = max(self._go_on_at, self._arm.end)
+
+    def descend(self, stamp: float, state: np.ndarray, ground: float, stow: bool) -> None:
+        """Go straight down from where the vehicle is; state (3, 8), ground [m]: height there."""
+        p, now = self.parameters, self.reference
+        offset = state[0, POSITION] - now[0, POSITION]
+        if not np.all(np.isfinite(offset)):  # then from where it should be
+            offset = np.zeros(3)
+        goal, lengths = self._at_rest(stow)
+        across = float(np.hypot(offset[0], offset[1]))
+        lengths[:2] = max(lengths[0], _PEAK * across / p.travel_speed)
+        goal[:2] += offset[:2]
+        goal[2] = ground - SINK
+        way = abs(goal[2] - now[0, 2])
+        # the ground is met when all else is at rest
+        lengths[2] = max(np.max(lengths) + p.stop_time, _PEAK * way / p.travel_speed)
+        self._last = Segment(stamp, now, goal, lengths)
+
+    def rest(self, stamp: float, stow: bool) -> None:
+        """Come to rest; what counts, while the autopilot flies by itself, is the arm."""
+        self._last = Segment(stamp, self.reference, *self._at_rest(stow))
+
+    def _at_rest(self, stow: bool) -> tuple[np.ndarray, np.ndarray]:
+        """Where and in which times each coordinate can come to rest (8,), the arm at its place."""
+        p, now = self.parameters, self.reference
+        speed = float(np.linalg.norm(now[1, POSITION]))
+        length = max(p.stop_time, 2.0 * _RAMP * speed / p.stop_acceleration)
+        goal, lengths = now[0] + now[1] * length / 2, np.full(SIZE, length)
+        if stow:
+            goal[ARM] = self._stowed
+            lengths[ARM] = self._arm_length(self._stowed)
+        return goal, lengths
+
+    def _arm_segment(self, stamp: float, angles: np.ndarray) -> Segment:
+        goal = self.reference[0].copy()
+        goal[ARM] = angles
+        return Segment(stamp, self.reference, goal, np.full(SIZE, self._arm_length(angles)))
+
+    def _arm_length(self, angles: np.ndarray) -> float:
+        """Time [s] in which the arm can go to `angles` (2,) [rad]."""
+        way = float(np.max(np.abs(angles - self.reference[0, ARM])))
+        return max(self.parameters.stop_time, _PEAK * way / self.parameters.stow_rate)
+
+    def _ramp_length(self) -> float:
+        """Time [s] in which the path may be stopped, or gone on with."""
+        self._trajectory.write(self.scenario_time, self._path)
+        speed = float(np.linalg.norm(self._path[1, POSITION]))
+        return max(self.parameters.stop_time, _RAMP * speed / self.parameters.stop_acceleration)

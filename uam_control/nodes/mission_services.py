@@ -1,0 +1,43 @@
+"""Services of the mission node: what may be asked for in flight.
+
+| service | type | does |
+|---|---|---|
+| `~/hold` | std_srvs/Trigger | stops on the path and waits there |
+| `~/resume` | std_srvs/Trigger | goes on from there |
+| `~/land` | std_srvs/Trigger | goes straight down and disarms |
+| `~/disarm` | std_srvs/Trigger | motors off: on the ground, or in failsafe |
+| `~/magnet` | std_srvs/SetBool | on or off until the scenario switches it next |
+
+An answer says what will be done at the next tick, or why it is refused.
+"""
+
+from functools import partial
+
+from rclpy.node import Node
+from std_srvs.srv import SetBool, Trigger
+
+from uam_control.mission import Mission
+from uam_control.supervision import Command
+
+COMMANDS = {command.name.lower(): command for command in Command}
+MAGNET = "magnet"
+
+
+def offer(node: Node, mission: Mission) -> None:
+    """Have `node` offer the services, for `mission`; they are served between two ticks."""
+
+    def answer(what: str, response, result: tuple[bool, str]):
+        response.success, response.message = result
+        node.get_logger().info(f"asked for {what}: {response.message}")
+        return response
+
+    def on_command(name: str, command: Command, request, response):
+        return answer(name, response, mission.request(command))
+
+    def on_magnet(request, response):
+        what = f"{MAGNET} {'on' if request.data else 'off'}"
+        return answer(what, response, mission.switch_magnet(request.data))
+
+    for name, command in COMMANDS.items():
+        node.create_service(Trigger, f"~/{name}", partial(on_command, name, command))
+    node.create_service(SetBool, f"~/{MAGNET}", on_magnet)

@@ -1,0 +1,22 @@
+"""What watches over a flight: limits, states, and what each of them means for the vehicle."""
+
+from uam_control.supervision.inputs import Inputs
+from uam_control.supervision.observation import Command, Observation, Readings
+from uam_control.supervision.parameters import SupervisionParameters
+from uam_control.supervision.states import ORDINARY, Event, State
+from uam_control.supervision.supervisor import Change, Decision, Guide, Supervisor
+
+__all__ = [
+    "ORDINARY",
+    "Change",
+    "Command",
+    "Decision",
+    "Event",
+    "Guide",
+    "Inputs",
+    "Observation",
+    "Readings",
+    "State",
+    "SupervisionParameters",
+    "Supervisor",
+]

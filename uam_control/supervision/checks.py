@@ -1,0 +1,183 @@
+"""Every quantity that is watched, against its limits.
+
+Nearly always all is in order, and the monitors are asked only otherwise.
+"""
+
+from __future__ import annotations
+
+import math
+from operator import lt
+from typing import NamedTuple
+
+import numpy as np
+
+from uam_control.compiled import jit
+from uam_control.supervision.monitor import Level, Monitor
+from uam_control.supervision.observation import Observation
+from uam_control.supervision.parameters import SupervisionParameters
+
+NONE = math.inf
+
+
+class Check(NamedTuple):
+    """A quantity: its name, a format for value and limit in a cause, and its limits.
+
+    A limit is a parameter's name or a number. in_flight: means nothing on the ground.
+    sign -1: less is worse.
+    """
+
+    name: str
+    form: str
+    hold: str | float = NONE
+    land: str | float = NONE
+    failsafe: str | float = NONE
+    in_flight: bool = False
+    sign: int = 1
+
+
+# as many as `measure` writes, in its order; then the readings
+CHECKS = (
+    Check("estimate", "{name} is not finite", failsafe=0.5),
+    Check(
+        "position error", "{name} {value:.2f} m exceeds {limit:g} m",
+        "position_error_hold", "position_error_land", "position_error_failsafe", in_flight=True,
+    ),
+    Check("tilt", "{name} {value:.2f} rad exceeds {limit:g} rad", "tilt_hold",
+          failsafe="tilt_failsafe"),
+    Check("body rate", "{name} {value:.1f} rad/s exceeds {limit:g} rad/s", "body_rate_hold",
+          failsafe="body_rate_failsafe"),
+    Check("altitude", "{name} {value:.2f} m exceeds {limit:g} m", "altitude_hold", in_flight=True),
+    Check("geofence", "{name} left by {value:.2f} m, {limit:g} m allowed",
+          land="geofence_land", failsafe="geofence_failsafe"),
+    Check("joint angle", "{name} at {value:.2f} of its limit", 1.0),
+    Check("battery", "{name} {value:.2f} full, below {limit:g}", land="battery_land", sign=-1),
+    Check("mocap", "{name} pose is {value:.2f} s old, {limit:g} s allowed", "mocap_age_hold",
+          failsafe="mocap_age_failsafe"),
+    Check("joint angles", "{name} are {value:.2f} s old, {limit:g} s allowed", "joint_age_hold"),
+    Check("control ticks", "{value:.0f} {name} missed within a second, {limit:g} allowed",
+          "missed_ticks_hold"),
+    Check("joint torque", "{name} at {value:.2f} of its limit", 1.0),
+    Check("adapted gain", "{name} at {value:.2f} of its limit", 1.0),
+)  # fmt: skip
+MEASURED = 7  # by `measure`; the others are readings
+
+
+class Finding(NamedTuple):
+    """What is beyond a limit for long enough: how bad, and in words."""
+
+    level: Level
+    cause: str
+
+
+class Checks:
+    """The monitors of all quantities.
+
+    `finding`: the worst that is beyond a limit for long enough; `quiet`: nothing is, however short.
+    """
+
+    def __init__(self, parameters: SupervisionParameters) -> None:
+        self._monitors = [Monitor() for _ in CHECKS]
+        self.quiet = True
+        self._values = np.zeros(MEASURED)
+        self.finding: Finding | None = None
+        self.configure(parameters)
+
+    def configure(self, parameters: SupervisionParameters) -> None:
+        """Use `parameters` (validated) from the next tick on."""
+        p = self._parameters = parameters
+        self._limits = tuple(
+            tuple(_limit(p, check, limit) for limit in (check.hold, check.land, check.failsafe))
+            for check in CHECKS
+        )
+        self._after = (p.hold_after, p.land_after, p.failsafe_after)
+        # below these a monitor has nothing to do unless something was beyond a limit before
+        first = [min(limits) for limits in self._limits]
+        self._calm = tuple(limit - p.hysteresis * abs(limit) for limit in first)
+        self._box = np.array([p.geofence_low, p.geofence_high])
+        self._joints = np.array(p.joint_angle_hold)
+        self._efforts, self._gains = np.array(p.joint_effort_hold), np.array(p.gain_hold)
+
+    def update(self, stamp: float, seen: Observation, in_flight: bool) -> Finding | None:
+        """Look at a tick at `stamp` [s]; return the worst that is beyond a limit, None for nothing.
+
+        in_flight: whether the reference is one that the vehicle follows.
+        """
+        measure(
+            seen.state, seen.reference, seen.ground, self._box, self._joints, self._values
+        )
+        values = (*self._values.tolist(), *self._read(seen))
+        if self.quiet and all(map(lt, values, self._calm)):
+            return None
+        p, worst = self._parameters, None
+        for check, monitor, value, limits in zip(
+            CHECKS, self._monitors, values, self._limits, strict=True
+        ):
+            if check.in_flight and not in_flight:
+                value = -math.inf
+            level = monitor.update(stamp, value, limits, self._after, p.clear_after, p.hysteresis)
+            if level and (worst is None or level > worst.level):
+                worst = Finding(level, _cause(check, value, limits[level - 1]))
+        self.quiet = all(monitor.quiet for monitor in self._monitors)
+        self.finding = worst
+        return worst
+
+    def _read(self, seen: Observation) -> tuple[float, ...]:
+        """The readings in the order of CHECKS, larger is worse; unknown ones are in order."""
+        readings = seen.readings
+        values = (
+            -readings.battery,
+            readings.mocap_age,
+            readings.joint_age,
+            readings.missed_ticks,
+            _largest(readings.joint_effort, self._efforts),
+            _largest(readings.gains, self._gains),
+        )
+        return tuple(-math.inf if math.isnan(value) else value for value in values)
+
+
+def _limit(parameters: SupervisionParameters, check: Check, limit: str | float) -> float:
+    if isinstance(limit, str):
+        return check.sign * getattr(parameters, limit)
+    return limit
+
+
+def _cause(check: Check, value: float, limit: float) -> str:
+    return check.form.format(name=check.name, value=check.sign * value, limit=check.sign * limit)
+
+
+@jit
+def _largest(values, limits):
+    """The largest |value| / limit, NaN where all are unknown."""
+    found = math.nan
+    for i in range(len(limits)):
+        ratio = abs(values[i]) / limits[i]
+        if not math.isnan(ratio) and not ratio <= found:
+            found = ratio
+    return found
+
+
+@jit
+def measure(state, reference, ground, box, joints, values):
+    """Write the first quantities of CHECKS into values (7,); only the first where the state is not
+    finite.
+
+    box (2, 3): low and high corner [m]; joints (2,): limits of the angles [rad].
+    """
+    values[0] = 0.0
+    for i in range(3):
+        for j in range(8):
+            if not math.isfinite(state[i, j]):
+                values[0] = 1.0
+                return
+    squared, outside, rate = 0.0, -math.inf, 0.0
+    for i in range(3):
+        squared += (state[0, i] - reference[0, i]) ** 2
+        outside = max(outside, box[0, i] - state[0, i], state[0, i] - box[1, i])
+        rate = max(rate, abs(state[1, 3 + i]))
+    cosine = math.cos(state[0, 3]) * math.cos(state[0, 4])
+    values[1] = math.sqrt(squared)
+    values[2] = math.acos(min(1.0, max(-1.0, cosine)))
+    values[3] = rate
+    values[4] = state[0, 2] - ground
+    values[5] = outside
+    values[6] = max(abs(state[0, 6]) / joints[0], abs(state[0, 7]) / joints[1])

@@ -1,0 +1,65 @@
+"""What the supervisor knows besides state and reference, gathered message by message."""
+
+from __future__ import annotations
+
+import math
+from collections import deque
+from collections.abc import Sequence
+
+import numpy as np
+
+from uam_control.supervision.observation import Readings
+
+WATCHED = ("K", "zeta")  # how the names of gains with a limit begin
+SUBSYSTEMS = ("position", "attitude", "arm")
+
+
+class Inputs:
+    """Newest values and their stamps; ages are by stamps, hence the same however late a message
+    was delivered."""
+
+    def __init__(self, period: float) -> None:
+        """period [s]: of control ticks."""
+        self._readings = Readings()
+        self._period = period
+        self._mocap = self._joints = math.nan  # stamps [s]
+        self._last: float | None = None
+        self._gaps: deque[tuple[float, int]] = deque()  # stamp [s], ticks missed before it
+        self._watched: dict[tuple[str, ...], list[int]] = {}
+
+    def mocap(self, stamp: float) -> None:
+        """Note a pose that was exposed at `stamp` [s]."""
+        self._mocap = stamp
+
+    def joints(self, stamp: float, effort: np.ndarray) -> None:
+        """Note joint readings; effort (2,): measured torques [N m]."""
+        self._joints = stamp
+        self._readings.joint_effort[:] = effort  # as compiled maths wants it, writable
+
+    def battery(self, left: float) -> None:
+        """Note the charge left, 0..1; NaN where nobody knows."""
+        self._readings.battery = left
+
+    def gains(self, subsystem: str, names: Sequence[str], values: np.ndarray) -> None:
+        """Note the published gains (n,) of one of SUBSYSTEMS and their names."""
+        key = tuple(names)
+        if key not in self._watched:
+            self._watched[key] = [i for i, n in enumerate(names) if n.startswith(WATCHED)]
+        watched = self._watched[key]
+        largest = float(np.max(np.abs(values[watched]))) if watched else math.nan
+        self._readings.gains[SUBSYSTEMS.index(subsystem)] = largest
+
+    def at(self, stamp: float) -> Readings:
+        """Return what is known at the tick `stamp` [s]; the object is reused by the next call."""
+        readings, gaps = self._readings, self._gaps
+        if self._last is not None:
+            missed = round((stamp - self._last) / self._period) - 1
+            if missed > 0:
+                gaps.append((stamp, missed))
+        self._last = stamp
+        while gaps and stamp - gaps[0][0] > 1.0:
+            gaps.popleft()
+        readings.missed_ticks = float(sum(missed for _, missed in gaps))
+        readings.mocap_age = stamp - self._mocap
+        readings.joint_age = stamp - self._joints
+        return readings

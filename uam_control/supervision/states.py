@@ -1,0 +1,116 @@
+"""The states of a supervised flight and every way from one to another, as data.
+
+`TRANSITIONS` is all there is: what it does not list does not happen. docs/supervision.md shows it
+as a diagram, which a test compares with `mermaid()`.
+"""
+
+from __future__ import annotations
+
+from enum import Enum
+from typing import NamedTuple
+
+
+class State(Enum):
+    """Where the flight is; the value is for people and messages."""
+
+    GROUNDED = "grounded"
+    TAKING_OFF = "taking off"
+    FLYING = "flying"
+    HOLDING = "holding"
+    LANDING = "landing"
+    FAILSAFE = "failsafe"
+    DISARMED = "disarmed"
+
+
+class Event(Enum):
+    """Why a state is left; the value is for people."""
+
+    READY = "armed, nothing against it"
+    AIRBORNE = "airborne"
+    LANDING_DUE = "the scenario lands"
+    TOUCHDOWN = "touchdown"
+    HOLD_LIMIT = "a limit to hold"
+    LAND_LIMIT = "a limit to land"
+    HARD_LIMIT = "a hard limit"
+    HARD_LIMIT_ON_GROUND = "a hard limit on the ground"
+    HELD_TOO_LONG = "beyond a limit for too long"
+    CLEAR = "clear again, resume_automatically"
+    NO_TOUCHDOWN = "no touchdown"
+    LOST_ARMING = "the autopilot disarmed"
+    GIVEN_UP = "given up before take-off"
+    HOLD = "hold by command"
+    RESUME = "resume by command"
+    LAND = "land by command"
+    DISARM = "disarm by command"
+    DISARM_ON_GROUND = "disarm by command, on the ground"
+
+
+class Transition(NamedTuple):
+    """One way from a state to another."""
+
+    source: State
+    event: Event
+    target: State
+
+
+_S, _E = State, Event
+TRANSITIONS = (
+    Transition(_S.GROUNDED, _E.READY, _S.TAKING_OFF),
+    Transition(_S.GROUNDED, _E.GIVEN_UP, _S.DISARMED),
+    Transition(_S.GROUNDED, _E.DISARM, _S.DISARMED),
+    Transition(_S.TAKING_OFF, _E.AIRBORNE, _S.FLYING),
+    Transition(_S.TAKING_OFF, _E.HOLD_LIMIT, _S.LANDING),
+    Transition(_S.TAKING_OFF, _E.LAND_LIMIT, _S.LANDING),
+    Transition(_S.TAKING_OFF, _E.LAND, _S.LANDING),
+    Transition(_S.TAKING_OFF, _E.LANDING_DUE, _S.LANDING),
+    Transition(_S.TAKING_OFF, _E.HARD_LIMIT, _S.FAILSAFE),
+    Transition(_S.TAKING_OFF, _E.HARD_LIMIT_ON_GROUND, _S.DISARMED),
+    Transition(_S.TAKING_OFF, _E.DISARM_ON_GROUND, _S.DISARMED),
+    Transition(_S.TAKING_OFF, _E.LOST_ARMING, _S.DISARMED),
+    Transition(_S.FLYING, _E.HOLD_LIMIT, _S.HOLDING),
+    Transition(_S.FLYING, _E.HOLD, _S.HOLDING),
+    Transition(_S.FLYING, _E.LAND_LIMIT, _S.LANDING),
+    Transition(_S.FLYING, _E.LAND, _S.LANDING),
+    Transition(_S.FLYING, _E.LANDING_DUE, _S.LANDING),
+    Transition(_S.FLYING, _E.HARD_LIMIT, _S.FAILSAFE),
+    Transition(_S.FLYING, _E.LOST_ARMING, _S.DISARMED),
+    Transition(_S.HOLDING, _E.RESUME, _S.FLYING),
+    Transition(_S.HOLDING, _E.CLEAR, _S.FLYING),
+    Transition(_S.HOLDING, _E.HELD_TOO_LONG, _S.LANDING),
+    Transition(_S.HOLDING, _E.LAND_LIMIT, _S.LANDING),
+    Transition(_S.HOLDING, _E.LAND, _S.LANDING),
+    Transition(_S.HOLDING, _E.HARD_LIMIT, _S.FAILSAFE),
+    Transition(_S.HOLDING, _E.LOST_ARMING, _S.DISARMED),
+    Transition(_S.LANDING, _E.TOUCHDOWN, _S.DISARMED),
+    Transition(_S.LANDING, _E.HARD_LIMIT, _S.FAILSAFE),
+    Transition(_S.LANDING, _E.HARD_LIMIT_ON_GROUND, _S.DISARMED),
+    Transition(_S.LANDING, _E.NO_TOUCHDOWN, _S.FAILSAFE),
+    Transition(_S.LANDING, _E.DISARM_ON_GROUND, _S.DISARMED),
+    Transition(_S.LANDING, _E.LOST_ARMING, _S.DISARMED),
+    Transition(_S.FAILSAFE, _E.DISARM, _S.DISARMED),
+)
+TARGETS = {(source, event): target for source, event, target in TRANSITIONS}
+# causes in a flight that goes as planned
+ORDINARY = {
+    Event.READY: "armed",
+    Event.AIRBORNE: "airborne",
+    Event.LANDING_DUE: "as planned",
+    Event.TOUCHDOWN: "touchdown",
+}
+AIRBORNE_STATES = (State.TAKING_OFF, State.FLYING, State.HOLDING, State.LANDING)
+
+
+def mermaid() -> str:
+    """The table as a mermaid state diagram, events between the same two states on one arrow."""
+    arrows: dict[tuple[State, State], list[str]] = {}
+    for source, event, target in TRANSITIONS:
+        arrows.setdefault((source, target), []).append(event.value)
+    lines = ["stateDiagram-v2"]
+    lines += [f'    state "{state.value}" as {state.name}' for state in State]
+    lines.append(f"    [*] --> {State.GROUNDED.name}")
+    lines += [
+        f"    {source.name} --> {target.name}: {' / '.join(events)}"
+        for (source, target), events in arrows.items()
+    ]
+    lines.append(f"    {State.DISARMED.name} --> [*]")
+    return "\n".join(lines)

@@ -1,0 +1,212 @@
+"""The supervisor: observation and command in, state and what follows from it out.
+
+It never arms: `Decision.arm` goes from true to false once and never back. It never leaves failsafe
+without a command. Motors go off on the ground, by a command in failsafe, or when the autopilot has
+disarmed by itself; in the air the worst is failsafe, in which the autopilot descends on its own.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from enum import Enum
+from typing import NamedTuple
+
+from uam_control.supervision.checks import Checks
+from uam_control.supervision.monitor import Level
+from uam_control.supervision.observation import Command, Observation
+from uam_control.supervision.parameters import SupervisionParameters
+from uam_control.supervision.states import AIRBORNE_STATES, ORDINARY, TARGETS, Event, State
+
+
+class Guide(Enum):
+    """What the reference does."""
+
+    NOTHING = "nothing is asked of position and attitude"
+    SCENARIO = "follows the scenario"
+    STOP = "stops on the scenario's path and waits there"
+    DESCEND = "goes straight down"
+
+
+class Decision(NamedTuple):
+    """What holds now.
+
+    cause: why the state was entered. arm: the autopilot is to be armed. keep_magnet: an energised
+    magnet stays so; stow: the arm goes to its place for landing. Both only where the guide is not
+    the scenario.
+    """
+
+    state: State
+    cause: str
+    guide: Guide
+    arm: bool
+    keep_magnet: bool
+    stow: bool
+
+
+class Change(NamedTuple):
+    """One transition; stamp [s]."""
+
+    stamp: float
+    source: State
+    target: State
+    event: Event
+    cause: str
+
+
+class Supervisor:
+    """The state machine of `states.TRANSITIONS`; no clock but the stamps it is given.
+
+    `state`, `cause`, `decision` as of the last step; `changes`: all transitions so far, in order.
+    """
+
+    def __init__(self, parameters: SupervisionParameters) -> None:
+        self.state = State.GROUNDED
+        self.cause = "waiting to take off"
+        self.changes: list[Change] = []
+        self._arm = True
+        self._planned = False  # whether a landing is the scenario's
+        self._stamp = -math.inf
+        self._beyond_since: float | None = None  # while holding
+        self._checks = Checks(parameters)
+        self._parameters = parameters
+        self.decision = self._decide()
+
+    def configure(self, parameters: SupervisionParameters) -> None:
+        """Use `parameters` (validated) from the next tick on."""
+        self._parameters = parameters
+        self._checks.configure(parameters)
+        self.decision = self._decide()
+
+    def step(
+        self, stamp: float, seen: Observation, command: Command | None = None
+    ) -> Decision:
+        """Return what holds at `stamp` [s]; at most one transition per call.
+
+        A stamp that is not finite or runs backwards counts as the last one.
+        """
+        if stamp > self._stamp and math.isfinite(stamp):
+            self._stamp = stamp
+        self._checks.update(self._stamp, seen, self.state in AIRBORNE_STATES)
+        for event, cause in self._events(seen, command):
+            if (self.state, event) in TARGETS:
+                self._go(event, cause)
+                break
+        if self._arm and self.state is State.FAILSAFE and not seen.armed:
+            self._arm = False
+            self.decision = self._decide()
+        return self.decision
+
+    def give_up(self, stamp: float, reason: str) -> Decision:
+        """End a flight that has not begun; does nothing in one that has."""
+        if stamp > self._stamp:
+            self._stamp = stamp
+        if (self.state, Event.GIVEN_UP) in TARGETS:
+            self._go(Event.GIVEN_UP, reason)
+        return self.decision
+
+    def refusal(self, command: Command, seen: Observation) -> str:
+        """Return why `command` would do nothing now, "" if it would be followed."""
+        event = self._event(command, seen)
+        if (self.state, event) not in TARGETS:
+            if command is Command.DISARM and self.state in AIRBORNE_STATES:
+                return f"{self.state.value} and not on the ground: land first"
+            return f"not while {self.state.value}"
+        finding = self._checks.finding
+        if command is Command.RESUME and finding is not None:
+            return finding.cause
+        return ""
+
+    @property
+    def beyond(self) -> str:
+        """What is beyond a limit now, "" where nothing is."""
+        finding = self._checks.finding
+        return finding.cause if finding else ""
+
+    def _decide(self) -> Decision:
+        """What follows from the state; the policy of docs/supervision.md."""
+        p, state = self._parameters, self.state
+        guide, keep, stow = Guide.NOTHING, True, False
+        if state in (State.TAKING_OFF, State.FLYING) or self._planned:
+            guide = Guide.SCENARIO
+        elif state is State.HOLDING:
+            guide, keep = Guide.STOP, p.magnet_holding == "keep"
+            stow = p.arm_holding == "stow"
+        elif state is State.LANDING:
+            guide, keep = Guide.DESCEND, p.magnet_landing == "keep"
+            stow = p.arm_landing == "stow"
+        elif state is State.FAILSAFE:
+            keep, stow = p.magnet_failsafe == "keep", p.arm_failsafe == "stow"
+        elif state is State.DISARMED:
+            keep = False
+        return Decision(state, self.cause, guide, self._arm, keep, stow)
+
+    def _events(
+        self, seen: Observation, command: Command | None
+    ) -> Iterator[tuple[Event, str]]:
+        """What happens at this tick, and why; what saves the vehicle first."""
+        finding, p = self._checks.finding, self._parameters
+        level, cause = finding or (Level.FINE, "")
+        if not seen.armed:
+            if seen.on_ground:
+                yield _planned(Event.TOUCHDOWN)
+            still = self.state is State.TAKING_OFF
+            when = "before it was airborne" if still else "in flight"
+            yield Event.LOST_ARMING, f"the autopilot disarmed {when}"
+        if level is Level.FAILSAFE:
+            if seen.on_ground:
+                yield Event.HARD_LIMIT_ON_GROUND, cause
+            yield Event.HARD_LIMIT, cause
+        if command is not None and not self.refusal(command, seen):
+            event = self._event(command, seen)
+            yield event, event.value
+        if level is Level.LAND:
+            yield Event.LAND_LIMIT, cause
+        if seen.touchdown:
+            yield _planned(Event.TOUCHDOWN)
+        if seen.overdue:
+            yield Event.NO_TOUCHDOWN, "no touchdown in time"
+        if self._held_too_long(level):
+            yield Event.HELD_TOO_LONG, f"{cause} for {p.hold_timeout:g} s"
+        if level is Level.HOLD:
+            yield Event.HOLD_LIMIT, cause
+        if level is Level.FINE:
+            if p.resume_automatically and self.changes and self._held_by_limit():
+                yield Event.CLEAR, "clear again"
+            if seen.ready and self._checks.quiet:
+                yield _planned(Event.READY)
+        if seen.landing_due:
+            yield _planned(Event.LANDING_DUE)
+        if seen.state[0, 2] - seen.ground > p.airborne_height:
+            yield _planned(Event.AIRBORNE)
+
+    def _held_too_long(self, level: Level) -> bool:
+        if self.state is not State.HOLDING or level is Level.FINE:
+            self._beyond_since = None
+            return False
+        if self._beyond_since is None:
+            self._beyond_since = self._stamp
+        return self._stamp - self._beyond_since >= self._parameters.hold_timeout
+
+    def _held_by_limit(self) -> bool:
+        return self.changes[-1].event is Event.HOLD_LIMIT
+
+    def _go(self, event: Event, cause: str) -> None:
+        source, self.state = self.state, TARGETS[self.state, event]
+        self.cause = cause
+        self._planned = event is Event.LANDING_DUE
+        self._beyond_since = None
+        self._arm = self._arm and self.state is not State.DISARMED
+        self.decision = self._decide()
+        self.changes.append(Change(self._stamp, source, self.state, event, cause))
+
+    def _event(self, command: Command, seen: Observation) -> Event:
+        """The event of a command; on the ground disarming is another one where it matters."""
+        event = command.value
+        if command is Command.DISARM and seen.on_ground and (self.state, event) not in TARGETS:
+            return Event.DISARM_ON_GROUND
+        return event
+
+
+def _planned(event: Event) -> tuple[Event, str]:
+    return event, ORDINARY[event]

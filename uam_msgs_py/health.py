@@ -1,0 +1,41 @@
+"""What a node says of its own health: how long its ticks take, how old its inputs are."""
+
+import time
+from collections.abc import Iterable, Mapping
+
+
+class LoopTime:
+    """Mean and largest processing time since the last report."""
+
+    def __init__(self) -> None:
+        self._sum = self._max = 0.0  # [s]
+        self._count = 0
+
+    def add(self, begun: float) -> None:
+        """Note that what began at time.perf_counter() `begun` is finished."""
+        spent = time.perf_counter() - begun
+        self._sum += spent
+        self._max = max(self._max, spent)
+        self._count += 1
+
+    def report(self, what: str = "tick") -> dict[str, str]:
+        """Return the diagnostic values, "" where nothing was done, and begin anew."""
+        count, total, most = self._count, self._sum, self._max
+        self._sum = self._max = 0.0
+        self._count = 0
+        return {
+            f"{what} mean [ms]": f"{1e3 * total / count:.3f}" if count else "",
+            f"{what} max [ms]": f"{1e3 * most:.3f}" if count else "",
+        }
+
+
+def ages(inputs: Iterable[str], arrivals: Mapping[str, float]) -> dict[str, str]:
+    """Return the diagnostic values: how long ago [wall time] each input had its last good message.
+
+    arrivals: time.monotonic() [s] by topic; "" stands for never.
+    """
+    now = time.monotonic()
+    return {
+        f"age of {name} [ms]": f"{1e3 * (now - arrivals[name]):.1f}" if name in arrivals else ""
+        for name in inputs
+    }

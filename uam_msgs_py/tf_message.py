@@ -1,0 +1,220 @@
+"""tf2_msgs/msg/TFMessage, also where the package tf2_msgs is not installed.
+
+RViz and Foxglove place what they draw by /tf, whose type comes with ROS from apt but is not among
+the wheels of PyPI. It is a sequence of TransformStamped and nothing else, so that its C type
+support can be put together from what common_interfaces brings: the descriptions of a sequence of
+messages (MarkerArray) under another name and with other elements. Such a type can only be sent and
+received serialized, which is all this stack does; the middleware sees no difference.
+
+The structures below are those of ROS 2 Jazzy, whose binary interface does not change any more.
+"""
+
+import ctypes
+from ctypes import POINTER, c_bool, c_char_p, c_size_t, c_uint8, c_uint32, c_uint64, c_void_p
+
+from geometry_msgs.msg import TransformStamped
+from visualization_msgs.msg import MarkerArray
+
+PACKAGE, NAME, FIELD = "tf2_msgs", "TFMessage", "transforms"
+DEFINITION = "geometry_msgs/TransformStamped[] transforms\n"
+# sha256 of the type's description, by which both ends of a topic see that they mean the same
+HASH = bytes.fromhex("e369d0f05a23ae52508854b66f6aa0437f3449d652e8cbf22d5abe85d020f087")
+FASTRTPS, INTROSPECTION = b"rosidl_typesupport_fastrtps_c", b"rosidl_typesupport_introspection_c"
+NESTED_SEQUENCE = 145  # type_description_interfaces/msg/FieldType: messages, as many as there are
+
+
+class _Hash(ctypes.Structure):
+    _fields_ = [("version", c_uint8), ("value", c_uint8 * 32)]
+
+
+class _String(ctypes.Structure):
+    _fields_ = [("data", c_char_p), ("size", c_size_t), ("capacity", c_size_t)]
+
+    @classmethod
+    def of(cls, text: str) -> "_String":
+        data = text.encode()
+        return cls(data, len(data), len(data) + 1)
+
+
+class _Sequence(ctypes.Structure):
+    _fields_ = [("data", c_void_p), ("size", c_size_t), ("capacity", c_size_t)]
+
+    @classmethod
+    def of(cls, array: ctypes.Array) -> "_Sequence":
+        return cls(ctypes.addressof(array), len(array), len(array))
+
+
+class _FieldType(ctypes.Structure):
+    _fields_ = [
+        ("type_id", c_uint8), ("capacity", c_uint64), ("string_capacity", c_uint64),
+        ("nested_type_name", _String),
+    ]
+
+
+class _Field(ctypes.Structure):
+    _fields_ = [("name", _String), ("type", _FieldType), ("default_value", _String)]
+
+
+class _IndividualDescription(ctypes.Structure):
+    _fields_ = [("type_name", _String), ("fields", _Sequence)]
+
+
+class _Description(ctypes.Structure):
+    _fields_ = [("own", _IndividualDescription), ("referenced", _Sequence)]
+
+
+class _Support(ctypes.Structure):
+    """rosidl_message_type_support_t."""
+
+
+_FIND = ctypes.CFUNCTYPE(c_void_p, POINTER(_Support), c_char_p)
+_GET = ctypes.CFUNCTYPE(c_void_p, POINTER(_Support))
+_Support._fields_ = [
+    ("identifier", c_char_p), ("data", c_void_p), ("find", _FIND),
+    ("hash", _GET), ("description", _GET), ("sources", _GET),
+]
+
+
+class _Callbacks(ctypes.Structure):
+    """message_type_support_callbacks_t of rosidl_typesupport_fastrtps."""
+
+    _fields_ = [
+        ("namespace", c_char_p), ("name", c_char_p), ("serialize", c_void_p),
+        ("deserialize", c_void_p), ("serialized_size", c_void_p),
+        ("max_serialized_size", c_void_p), ("key_callbacks", c_void_p),
+    ]
+
+
+class _Member(ctypes.Structure):
+    """rosidl_typesupport_introspection_c__MessageMember."""
+
+    _fields_ = [
+        ("name", c_char_p), ("type_id", c_uint8), ("string_bound", c_size_t),
+        ("members", c_void_p), ("is_key", c_bool), ("is_array", c_bool), ("array_size", c_size_t),
+        ("is_bounded", c_bool), ("offset", c_uint32), ("default", c_void_p),
+        ("functions", c_void_p * 6),
+    ]
+
+
+class _Members(ctypes.Structure):
+    """rosidl_typesupport_introspection_c__MessageMembers."""
+
+    _fields_ = [
+        ("namespace", c_char_p), ("name", c_char_p), ("count", c_uint32), ("size", c_size_t),
+        ("has_key", c_bool), ("members", POINTER(_Member)), ("init", c_void_p), ("fini", c_void_p),
+    ]
+
+
+_capsule_name = ctypes.pythonapi.PyCapsule_GetName
+_capsule_name.restype, _capsule_name.argtypes = c_char_p, [ctypes.py_object]
+_capsule_pointer = ctypes.pythonapi.PyCapsule_GetPointer
+_capsule_pointer.restype, _capsule_pointer.argtypes = c_void_p, [ctypes.py_object, c_char_p]
+_capsule = ctypes.pythonapi.PyCapsule_New
+_capsule.restype, _capsule.argtypes = ctypes.py_object, [c_void_p, c_char_p, c_void_p]
+
+
+def _capsule_of(message_type: type):
+    """The type support of a generated message class, as rclpy holds it."""
+    if type(message_type)._TYPE_SUPPORT is None:
+        type(message_type).__import_type_support__()
+    return type(message_type)._TYPE_SUPPORT
+
+
+def _support_of(message_type: type) -> _Support:
+    capsule = _capsule_of(message_type)
+    return _Support.from_address(_capsule_pointer(capsule, _capsule_name(capsule)))
+
+
+def _found(support: _Support, identifier: bytes) -> _Support:
+    """The type support of one middleware; raises ImportError where there is none."""
+    address = support.find(ctypes.byref(support), identifier)
+    if not address:
+        raise ImportError(f"no {identifier.decode()} to make {PACKAGE} from")
+    return _Support.from_address(address)
+
+
+def _getter(held: ctypes.Structure):
+    """A function for C that returns where `held` is, whatever it is asked about."""
+    address = ctypes.addressof(held)
+    return _GET(lambda _: address)
+
+
+class _Assembled:
+    """The type support of TFMessage. It must live as long as the process."""
+
+    def __init__(self):
+        array, element = _support_of(MarkerArray), _support_of(TransformStamped)
+        self._describe(_Description.from_address(element.description(ctypes.byref(element))))
+        self._hash = _Hash(1, (c_uint8 * 32)(*HASH))
+        self._sources = _Sequence()
+        self._getters = [
+            _getter(held) for held in (self._hash, self._description, self._sources)
+        ]
+        fast = _found(array, FASTRTPS)
+        self._callbacks = _Callbacks()
+        ctypes.pointer(self._callbacks)[0] = _Callbacks.from_address(fast.data)
+        self._callbacks.namespace, self._callbacks.name = b"tf2_msgs::msg", NAME.encode()
+
+        known = _found(array, INTROSPECTION)
+        self._members = _Members()
+        ctypes.pointer(self._members)[0] = _Members.from_address(known.data)
+        self._member = _Member()
+        ctypes.pointer(self._member)[0] = self._members.members[0]
+        self._member.name = FIELD.encode()
+        self._member.members = ctypes.addressof(_found(element, INTROSPECTION))
+        self._members.namespace, self._members.name = b"tf2_msgs__msg", NAME.encode()
+        self._members.members = ctypes.pointer(self._member)
+
+        self._find = _FIND(self._support)
+        self._supports = {
+            identifier: _Support(identifier, ctypes.addressof(data), self._find, *self._getters)
+            for identifier, data in ((FASTRTPS, self._callbacks), (INTROSPECTION, self._members))
+        }
+        self._handle = _Support(b"rosidl_typesupport_c", None, self._find, *self._getters)
+        self._capsule_name = _capsule_name(_capsule_of(TransformStamped))
+        self.capsule = _capsule(ctypes.addressof(self._handle), self._capsule_name, None)
+
+    def _describe(self, element: _Description) -> None:
+        """Note the type's description for whoever asks a node for it."""
+        known = (_IndividualDescription * element.referenced.size).from_address(
+            element.referenced.data)
+        parts = sorted([*known, element.own], key=lambda part: part.type_name.data)
+        self._referenced = (_IndividualDescription * len(parts))(*parts)
+        kind = _FieldType(
+            NESTED_SEQUENCE, 0, 0, _String.of("geometry_msgs/msg/TransformStamped"))
+        self._fields = (_Field * 1)(_Field(_String.of(FIELD), kind, _String.of("")))
+        own = _IndividualDescription(
+            _String.of(f"{PACKAGE}/msg/{NAME}"), _Sequence.of(self._fields))
+        self._description = _Description(own, _Sequence.of(self._referenced))
+
+    def _support(self, _, identifier: bytes) -> int | None:
+        support = self._supports.get(identifier)
+        return None if support is None else ctypes.addressof(support)
+
+
+class _Metaclass(type):
+    """What rclpy looks for at a message class."""
+
+    # rclpy wants them, but calls them for messages that are not serialized alone: it raises then.
+    _CREATE_ROS_MESSAGE = _CONVERT_FROM_PY = _CONVERT_TO_PY = _DESTROY_ROS_MESSAGE = "none"
+    _TYPE_SUPPORT = None
+    _assembled: _Assembled | None = None
+
+    @classmethod
+    def __import_type_support__(cls) -> None:
+        cls._assembled = _Assembled()
+        cls._TYPE_SUPPORT = cls._assembled.capsule
+
+
+class TFMessage(metaclass=_Metaclass):
+    """Names the type to rclpy; has no instances, as its messages stay serialized."""
+
+    _fields_and_field_types = {FIELD: "sequence<geometry_msgs/TransformStamped>"}
+
+    @classmethod
+    def get_fields_and_field_types(cls) -> dict[str, str]:
+        """The fields, as of a generated class."""
+        return dict(cls._fields_and_field_types)
+
+
+TFMessage.__module__ = f"{PACKAGE}.msg"

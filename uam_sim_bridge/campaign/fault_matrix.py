@@ -1,0 +1,119 @@
+"""The cells of a matrix fault × moment, read from config/campaign/faults.yaml or another file."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import yaml
+
+from uam_control.mission import Scenario, load_scenario
+from uam_sim_bridge.faults import FAULTS, FaultError, Schedule, TimedFault
+from uam_sim_bridge.faults.limits import needs_nodes
+from uam_sim_bridge.faults.schedule import beginnings, listed, timed
+
+NOMINAL = "no fault"
+KEYS = ("scenario", "moments", "faults")
+
+
+@dataclass(frozen=True)
+class Cell:
+    """One flight. fault: the row; moment: the column, "" for the flight without any fault."""
+
+    fault: str
+    moment: str
+    schedule: Schedule
+
+
+@dataclass(frozen=True)
+class Matrix:
+    """What is flown. moments: mission times [s] by name; left_out: rows the engine cannot have."""
+
+    scenario: str
+    moments: dict[str, float]
+    faults: tuple[dict[str, Any], ...]
+    left_out: tuple[str, ...] = ()
+
+    @property
+    def rows(self) -> tuple[str, ...]:
+        """Names of the rows."""
+        return tuple(label(entry) for entry in self.faults)
+
+    def cells(self, seed: int) -> list[Cell]:
+        """Every flight, the one without any fault first; seed: of what is random in the faults."""
+        found = [Cell(NOMINAL, "", Schedule(seed=seed))]
+        for entry in self.faults:
+            for moment, at in self.moments.items():
+                one = timed({**entry, "at": at}, {}, moment)
+                found.append(Cell(label(entry), moment, Schedule((one,), seed)))
+        return found
+
+
+def label(entry: dict[str, Any]) -> str:
+    """A row's name: the fault, its duration, and the parameters that are given."""
+    shown = {key: value for key, value in entry.items() if key not in ("fault", "duration")}
+    lasting = f" {entry['duration']:g} s" if "duration" in entry else ""
+    values = ", ".join(f"{k} {v:g}" if isinstance(v, int | float) else f"{k} {v}"
+                       for k, v in shown.items())
+    return entry["fault"] + lasting + (f" ({values})" if values else "")
+
+
+def read(
+    file: Path, engine: str, only: Collection[str] = (), moments: Sequence[str] = (),
+    scenario: str | None = None,
+) -> Matrix:
+    """Read a matrix for an engine; raises FaultError and what loading a scenario raises.
+
+    only: names of faults, () for all; moments: names of columns, () for all; scenario: in place of
+    the file's.
+    """
+    document = _document(file)
+    name = scenario or str(document["scenario"])
+    times = _moments(document["moments"], load_scenario(name), str(file))
+    entries = listed(document["faults"], str(file))
+    rows = [_checked(dict(entry), str(file)) for entry in entries]
+    for asked, known in ((only, FAULTS), (moments, times)):
+        for one in asked:
+            if one not in known:
+                raise FaultError(f"unknown {'fault' if asked is only else 'moment'} '{one}'; "
+                                 f"there are: {', '.join(known)}")
+    wanted = [(entry, one) for entry, one in rows if not only or entry["fault"] in only]
+    out = [label(entry) for entry, one in wanted if engine == "direct" and needs_nodes(one.fault)]
+    kept = tuple(entry for entry, _ in wanted if label(entry) not in out)
+    if not kept:
+        raise FaultError(f"{file}: nothing to fly with the {engine} engine")
+    chosen = {k: v for k, v in times.items() if not moments or k in moments}
+    return Matrix(name, chosen, kept, tuple(out))
+
+
+def _document(file: Path) -> dict[str, Any]:
+    try:
+        document = yaml.safe_load(file.read_text())
+    except OSError as error:
+        raise FaultError(f"{file}: {(error.strerror or str(error)).lower()}") from None
+    except (yaml.YAMLError, UnicodeDecodeError):
+        raise FaultError(f"{file}: not valid YAML") from None
+    if not isinstance(document, dict) or sorted(document) != sorted(KEYS):
+        raise FaultError(f"{file}: a mapping of {', '.join(KEYS)} expected")
+    return document
+
+
+def _moments(given: Any, scenario: Scenario, where: str) -> dict[str, float]:
+    """Mission times [s]; a moment is a time of any fault."""
+    if not isinstance(given, dict) or not all(isinstance(v, dict) for v in given.values()):
+        raise FaultError(f"{where}: moments: names with {{at: ..., after: ...}} each expected")
+    phases = beginnings(scenario)
+    any_fault = next(iter(FAULTS))
+    return {
+        str(name): timed({**when, "fault": any_fault}, phases, f"{where}: moments: {name}").at
+        for name, when in given.items()
+    }
+
+
+def _checked(entry: dict[str, Any], where: str) -> tuple[dict[str, Any], TimedFault]:
+    for key in ("at", "after"):
+        if key in entry:
+            raise FaultError(f"{where}: {key}: the moments say when")
+    return entry, timed({**entry, "at": 0.0}, {}, where)

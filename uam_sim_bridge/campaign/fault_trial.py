@@ -1,0 +1,108 @@
+"""One flight of a fault matrix, in either engine, and what is kept of it."""
+
+from __future__ import annotations
+
+import os
+import tempfile
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from rich.console import Console
+
+from uam_control.mission import load_scenario
+from uam_control.profile import Profile
+from uam_sim_bridge.campaign.fault_matrix import Cell
+from uam_sim_bridge.campaign.fault_outcome import LOST, classify
+from uam_sim_bridge.flight import metrics
+from uam_sim_bridge.flight.direct import DirectFlight
+from uam_sim_bridge.flight.progress import Progress
+from uam_sim_bridge.flight.result_folder import ResultFolder
+from uam_sim_bridge.flight.settings import ONLOOKERS, FlightSettings
+from uam_sim_bridge.flight.timeseries import Series
+from uam_sim_bridge.plant import Vehicle
+
+
+@dataclass(frozen=True)
+class FaultTrial:
+    """What is flown. scenario: name or file; payload_mass [kg]."""
+
+    cell: Cell
+    scenario: str
+    profile: Profile
+    payload_mass: float
+    seed: int
+    engine: str = "direct"
+    clock: str = "lockstep"
+
+
+@dataclass(frozen=True)
+class FaultResult:
+    """What is kept. why: what kept the mission from being completed.
+
+    worst: largest errors over the flight, the keys of `max` in metrics.json. happened: the faults
+    as they were, see `faults.timeline.record`.
+    """
+
+    fault: str
+    moment: str
+    outcome: str
+    why: str
+    duration_s: float
+    worst: Mapping[str, list[float | None]] = field(default_factory=dict)
+    happened: tuple[dict[str, Any], ...] = ()
+
+
+def fly(trial: FaultTrial) -> FaultResult:
+    """Fly it; raises what loading a scenario raises."""
+    return _ros(trial) if trial.engine == "ros" else _direct(trial)
+
+
+def _direct(trial: FaultTrial) -> FaultResult:
+    scenario = load_scenario(trial.scenario)
+    flight = DirectFlight(
+        scenario, trial.profile, Vehicle.load(), trial.payload_mass, trial.seed,
+        trial.cell.schedule,
+    )
+    flight.run()
+    reason = flight.mission.output.abort_reason or flight.ended_by
+    return _result(trial, flight.recording.series(), reason, flight.fault_records)
+
+
+def _ros(trial: FaultTrial) -> FaultResult:
+    from uam_sim_bridge.flight import ros_engine
+
+    settings = FlightSettings(
+        scenario=load_scenario(trial.scenario), profile=trial.profile, clock=trial.clock,
+        payload_mass=trial.payload_mass, seed=trial.seed, scenario_source=trial.scenario,
+        without=ONLOOKERS, faults=trial.cell.schedule,
+    )
+    with (
+        tempfile.TemporaryDirectory(prefix="uam-fault-") as folder,
+        open(os.devnull, "w") as nowhere,
+        Progress(Console(file=nowhere)) as progress,
+    ):
+        outcome = ros_engine.fly(settings, ResultFolder(Path(folder)), progress)
+    if outcome.series is None:
+        return FaultResult(trial.cell.fault, trial.cell.moment, LOST, outcome.reason, 0.0)
+    return _result(trial, outcome.series, outcome.reason, outcome.faults)
+
+
+def _result(
+    trial: FaultTrial, series: Series, reason: str, happened: list[dict[str, Any]]
+) -> FaultResult:
+    info = {
+        "payload_mass_kg": trial.payload_mass, "abort_reason": reason, "faults": happened,
+        "drop_point": load_scenario(trial.scenario).drop_point,
+    }
+    figures = metrics.compute(series, info)
+    return FaultResult(
+        fault=trial.cell.fault,
+        moment=trial.cell.moment,
+        outcome=classify(series, figures),
+        why="; ".join(figures["shortfalls"]),
+        duration_s=figures["duration_s"],
+        worst=figures["max"],
+        happened=tuple(happened),
+    )

@@ -1,0 +1,81 @@
+"""Which instances (ports and ROS domains of a flight) are free, and who has the others."""
+
+from __future__ import annotations
+
+import fcntl
+import os
+import socket
+import tempfile
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+from uam_sim_bridge.doctor import holders
+from uam_sim_bridge.doctor.finding import Finding, fail, ok, warn
+from uam_sim_bridge.flight.ports import INSTANCES, in_use, ports_of
+
+SHOWN = 4  # busy ports named in the line
+
+
+@dataclass(frozen=True)
+class Busy:
+    """An instance that a flight cannot have. who: who holds it, in words; flight: another one."""
+
+    instance: int
+    who: str
+    flight: bool
+
+
+def checks(folder: Path | None = None) -> Iterator[Finding]:
+    """The finding; folder: where flights keep their locks."""
+    busy = [found for number in range(INSTANCES) if (found := look(number, folder))]
+    free = INSTANCES - len(busy)
+    first = next(n for n in range(INSTANCES + 1) if n not in {b.instance for b in busy})
+    text = f"{free} of {INSTANCES} instances are free" + (f", the first is {first}" if free else "")
+    flights = sum(b.flight for b in busy)
+    others = [b for b in busy if not b.flight]
+    if flights:
+        text += f"; flights have {flights}"
+    if others:
+        named = [f"{b.instance}: {b.who}" for b in others[:SHOWN]]
+        text += "; " + ", ".join(named)
+        if len(others) > SHOWN:
+            text += f" and {len(others) - SHOWN} more"
+    if not free:
+        yield fail("instances", text, "end flights or the programs named here")
+    elif others:
+        yield warn("instances", text, "flights take a free one; end these programs if they are "
+                   "left over")
+    else:
+        yield ok("instances", text)
+
+
+def look(instance: int, folder: Path | None = None) -> Busy | None:
+    """Who has an instance; None: it is free. Takes nothing."""
+    lock = (folder or Path(tempfile.gettempdir())) / f"uam-{os.getuid()}-{instance}.lock"
+    if held(lock):
+        return Busy(instance, ", ".join(holders.of_file(lock)) or "a flight", True)
+    ports = ports_of(instance)
+    discovery = 7400 + 250 * ports.domain + 10  # as in flight.ports
+    for protocol, kind, port in (
+        ("tcp", socket.SOCK_STREAM, ports.simulator_tcp),
+        ("udp", socket.SOCK_DGRAM, ports.offboard_udp),
+        ("udp", socket.SOCK_DGRAM, ports.autopilot_udp),
+        ("udp", socket.SOCK_DGRAM, discovery),
+    ):
+        if in_use(kind, port):
+            who = ", ".join(holders.of_port(protocol, port)) or "an unknown program"
+            return Busy(instance, f"{protocol.upper()} {port} held by {who}", False)
+    return None
+
+
+def held(lock: Path) -> bool:
+    """Whether some process holds the lock; a file that nobody locks is none."""
+    try:
+        with lock.open() as file:
+            fcntl.flock(file, fcntl.LOCK_SH | fcntl.LOCK_NB)
+    except BlockingIOError:
+        return True
+    except OSError:
+        return False
+    return False

@@ -1,0 +1,54 @@
+"""What crashed flights left: locks, shared memory, processes without their orchestrator."""
+
+from __future__ import annotations
+
+import os
+import re
+import tempfile
+from collections.abc import Iterator
+from pathlib import Path
+
+from uam_sim_bridge.doctor import holders
+from uam_sim_bridge.doctor.finding import Finding, ok, warn
+from uam_sim_bridge.doctor.instances import held
+from uam_sim_bridge.flight import process_table, shared_memory
+
+
+def checks(folder: Path | None = None) -> Iterator[Finding]:
+    """Findings about leftovers; folder: where flights keep their locks."""
+    yield locks(folder or Path(tempfile.gettempdir()))
+    yield shared()
+    yield orphans()
+
+
+def locks(folder: Path) -> Finding:
+    """Lock files that nobody holds: harmless, the next flight takes them over."""
+    name = re.compile(rf"uam-{os.getuid()}-\d+\.lock")
+    ours = (file for file in sorted(folder.glob("uam-*.lock")) if name.fullmatch(file.name))
+    left = [file for file in ours if not held(file)]
+    if left:
+        names = ", ".join(file.name for file in left)
+        return warn("locks", f"without a flight: {names} in {folder}",
+                    "nothing to do: the next flights use them again and remove them")
+    return ok("locks", f"none left in {folder}")
+
+
+def shared() -> Finding:
+    """Shared memory of ROS that no process uses any more; mutexes stay behind clean ends, too."""
+    files = {file for file in shared_memory.abandoned() if not file.name.startswith("sem.")}
+    used = set().union(*map(shared_memory.used_by, process_table.pids())) if files else set()
+    left = files - used
+    if left:
+        size = sum(file.stat().st_size for file in left if file.exists()) / 2**20
+        return warn("ROS memory", f"{len(left)} files in {shared_memory.FOLDER} that nobody uses, "
+                    f"{size:.0f} MiB", "nothing to do: the next flight removes them")
+    return ok("ROS memory", f"nothing left in {shared_memory.FOLDER}")
+
+
+def orphans() -> Finding:
+    """Nodes whose `uam fly` has gone; they end by themselves within seconds, as a rule."""
+    left = process_table.orphans()
+    if left:
+        return warn("processes", ", ".join(map(holders.name_of, left)) + " without a flight",
+                    f"kill {' '.join(map(str, left))}")
+    return ok("processes", "no node without its flight")

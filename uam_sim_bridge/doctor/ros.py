@@ -1,0 +1,106 @@
+"""ROS: which installation, whether two processes reach each other, room in shared memory."""
+
+from __future__ import annotations
+
+import importlib.util
+import os
+import tempfile
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+
+from uam_sim_bridge.doctor import environment
+from uam_sim_bridge.doctor.child import Child, Said
+from uam_sim_bridge.doctor.finding import Finding, fail, ok, warn
+from uam_sim_bridge.flight import shared_memory
+from uam_sim_bridge.flight.ports import PortError, Reservation
+from uam_sim_bridge.flight.processes import ros_environment
+
+MODULE = "uam_sim_bridge.doctor.round_trip"
+PATIENCE = 40.0  # [s] for both processes: import, discovery, messages
+WANTED, WANTED_RMW = "jazzy", "rmw_fastrtps_cpp"
+SLOW = 0.05  # [s] a round trip that long: control at 250 Hz in real time is out of the question
+ROOM = 16 * 5  # [MiB]: config/dds gives each of a flight's processes 4 for content and its queue
+INSTALL = "make setup brings the wheels (x86-64); else source /opt/ros/jazzy/setup.bash"
+
+
+def checks(surroundings: Mapping[str, str] = os.environ) -> Iterator[Finding]:
+    """Findings about ROS."""
+    spec = importlib.util.find_spec("rclpy")
+    if spec is None or spec.origin is None:
+        yield fail("rclpy", "not installed: --engine direct alone can fly", INSTALL)
+        return
+    yield from environment.checks(surroundings)
+    yield room()
+    try:
+        with Reservation() as reservation:
+            said = measure(reservation.ports.domain)
+            yield installation(Path(spec.origin), said, surroundings)
+            yield round_trip(said, reservation.ports.domain)
+    except PortError as error:
+        yield warn("round trip", f"not tried: {error}", "end another flight and try again")
+
+
+def measure(domain: int) -> Said:
+    """Let two processes exchange messages in `domain`; what the asking one said."""
+    with tempfile.TemporaryDirectory(prefix="uam-doctor-") as logs:
+        own = ros_environment(domain, Path(logs))
+        with Child(MODULE, ["answer"], own), Child(MODULE, ["ask"], own) as asking:
+            return asking.wait(PATIENCE)
+
+
+def installation(origin: Path, said: Said, surroundings: Mapping[str, str]) -> Finding:
+    """Which rclpy this is and with which middleware; origin: its file."""
+    if "file" not in said.facts:
+        return fail("rclpy", f"{origin.parent} cannot be imported: {said.problem}", INSTALL)
+    kind, rmw = kind_of(origin), said.facts["rmw"]
+    found = f"{kind}, {rmw}, {origin.parent}"
+    distribution = surroundings.get("ROS_DISTRO", "")
+    if distribution and distribution != WANTED:
+        return warn("rclpy", f"{found}; ROS_DISTRO is {distribution}",
+                    f"the stack is made for ROS 2 {WANTED}: source that one")
+    if distribution and kind == "wheels":
+        return warn("rclpy", f"{found}, with an installation sourced beside it ({distribution})",
+                    "use one of them: a shell without the sourced one, or a venv without wheels")
+    if rmw != WANTED_RMW:
+        return warn("rclpy", found, f"config/dds speaks to {WANTED_RMW} alone: with others watch "
+                    "for lost messages in the report")
+    return ok("rclpy", found)
+
+
+def kind_of(origin: Path) -> str:
+    """Where an rclpy comes from, by its file."""
+    parts = origin.parts
+    if parts[:3] == ("/", "opt", "ros"):
+        return f"apt, ROS 2 {parts[3]}"
+    if "site-packages" in parts and any(origin.parents[1].glob("ros_jazzy_rclpy-*.dist-info")):
+        return "wheels"
+    return "a workspace"
+
+
+def round_trip(said: Said, domain: int) -> Finding:
+    """Whether messages came through."""
+    if "median_s" not in said.facts:
+        return fail("round trip", f"domain {domain}: {said.problem or 'no messages'}",
+                    "look at the variables and shared memory above, then at firewall and container")
+    median, longest = (1e3 * said.facts[name] for name in ("median_s", "longest_s"))
+    found = (f"two processes in domain {domain}: found in {said.facts['discovery_s']:.1f} s, "
+             f"there and back {median:.1f} ms (median), {longest:.1f} ms (longest of 50)")
+    if median > 1e3 * SLOW:
+        return warn("round trip", found, "the machine is busy or slow: fly --clock lockstep")
+    return ok("round trip", found)
+
+
+def room(folder: Path = shared_memory.FOLDER) -> Finding:
+    """Whether a flight's messages fit into shared memory."""
+    try:
+        status = os.statvfs(folder)
+    except OSError as error:
+        return warn("shared memory", f"{folder}: {error.strerror}",
+                    "ROS falls back to UDP; in a container mount /dev/shm")
+    free = status.f_bavail * status.f_frsize // 2**20
+    if not os.access(folder, os.W_OK):
+        return fail("shared memory", f"{folder} is not writable", f"chmod 1777 {folder}")
+    if free < ROOM:
+        return fail("shared memory", f"{folder} has {free} MiB free, a flight needs {ROOM}",
+                    f"remove what is left in {folder}; in a container: --shm-size 256m")
+    return ok("shared memory", f"{folder} has {free} MiB free, a flight needs {ROOM}")

@@ -1,0 +1,162 @@
+"""Motors, battery, servos and magnet that do less than they should; and the wind."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
+
+from uam_control.parameters import number
+from uam_sim_bridge.faults.fault import Effect, PlantFault
+
+JOINT = "which joint"
+
+
+class ActEffect(Effect):
+    """Calls `action(plant, commands)` at each tick."""
+
+    def __init__(self, action):
+        self._action = action
+
+    def act(self, plant, commands):
+        self._action(plant, commands)
+
+
+@dataclass(frozen=True)
+class MotorLoss(PlantFault):
+    NAME: ClassVar[str] = "motor_loss"
+    ABOUT: ClassVar[str] = "a motor gives a part of its thrust, as with a broken propeller"
+
+    motor: float = number(1, "which one, in PX4's order", "1", 1, 4)
+    remaining: float = number(0.5, "part of the thrust that is left", "1", 0.0, 1.0)
+
+    def effect(self, noise):
+        thrust = np.ones(4)
+        thrust[int(self.motor) - 1] = self.remaining
+        return ActEffect(lambda plant, _: plant.weaken_rotors(thrust))
+
+
+@dataclass(frozen=True)
+class BatterySag(PlantFault):
+    NAME: ClassVar[str] = "battery_sag"
+    ABOUT: ClassVar[str] = "the battery's voltage falls, and with it the thrust of all motors"
+
+    remaining: float = number(0.8, "part of the thrust that is left", "1", 0.1, 1.0)
+    over: float = number(2.0, "how long it takes to get there", "s", 0.0, 1000.0)
+
+    def effect(self, noise):
+        return Sag(self.remaining, self.over)
+
+
+class Sag(Effect):
+    """Thrust that falls linearly with time."""
+
+    def __init__(self, remaining: float, over: float):
+        self._remaining, self._over = remaining, over
+        self._since = 0.0
+
+    def act(self, plant, commands):
+        done = 1.0 if self._since >= self._over else self._since / self._over
+        plant.weaken_rotors(np.full(4, 1.0 + done * (self._remaining - 1.0)))
+        self._since += plant.period
+
+
+@dataclass(frozen=True)
+class ServoWeak(PlantFault):
+    NAME: ClassVar[str] = "servo_weak"
+    ABOUT: ClassVar[str] = "a servo gives a part of the torque that it is told"
+
+    joint: float = number(1, JOINT, "1", 1, 2)
+    remaining: float = number(0.0, "part of the torque that is left", "1", 0.0, 1.0)
+
+    def effect(self, noise):
+        def weaken(plant, commands):
+            commands.effort[int(self.joint) - 1] *= self.remaining
+
+        return ActEffect(weaken)
+
+
+@dataclass(frozen=True)
+class ServoJam(PlantFault):
+    NAME: ClassVar[str] = "servo_jam"
+    ABOUT: ClassVar[str] = "a joint's gear holds the angle that it has"
+
+    joint: float = number(1, JOINT, "1", 1, 2)
+    torque: float = number(20.0, "that it takes to move it", "N m", 0.1, 1000.0)
+
+    def effect(self, noise):
+        return ActEffect(lambda plant, _: plant.brake_joint(int(self.joint) - 1, self.torque))
+
+
+@dataclass(frozen=True)
+class MagnetWeak(PlantFault):
+    NAME: ClassVar[str] = "magnet_weak"
+    ABOUT: ClassVar[str] = "the magnet holds with a part of its force, or not at all"
+
+    remaining: float = number(0.0, "part of the force that is left", "1", 0.0, 1.0)
+
+    def effect(self, noise):
+        return ActEffect(lambda plant, _: plant.weaken_magnet(self.remaining))
+
+
+@dataclass(frozen=True)
+class MagnetStuck(PlantFault):
+    NAME: ClassVar[str] = "magnet_stuck"
+    ABOUT: ClassVar[str] = "the magnet, once it is on, does not release when switched off"
+
+    def effect(self, noise):
+        return Remanent()
+
+
+class Remanent(Effect):
+    """Keeps the magnet on as soon as it has been."""
+
+    def __init__(self):
+        self._on = False
+
+    def act(self, plant, commands):
+        self._on = commands.magnet = commands.magnet or self._on
+
+
+@dataclass(frozen=True)
+class PayloadSwing(PlantFault):
+    NAME: ClassVar[str] = "payload_swing"
+    ABOUT: ClassVar[str] = (
+        "the payload no longer sits flat on the magnet but swings freely about one point of it"
+    )
+
+    rate: float = number(5.0, "pitch rate of the payload at the beginning", "rad/s", -20.0, 20.0)
+
+    def effect(self, noise):
+        return ActEffect(lambda plant, commands: plant.swing_payload(commands, self.rate))
+
+
+@dataclass(frozen=True)
+class WindGust(PlantFault):
+    NAME: ClassVar[str] = "wind_gust"
+    ABOUT: ClassVar[str] = "wind on top of what there is, rising softly"
+
+    speed: float = number(4.0, "horizontal speed", "m/s", 0.0, 40.0)
+    towards: float = number(0.0, "where it blows to, from x to y", "deg", -360.0, 360.0)
+    up: float = number(0.0, "vertical speed", "m/s", -20.0, 20.0)
+    rise: float = number(0.5, "how long it rises", "s", 0.0, 100.0)
+
+    def effect(self, noise):
+        angle = math.radians(self.towards)
+        full = [self.speed * math.cos(angle), self.speed * math.sin(angle), self.up]
+        return Gust(np.array(full), self.rise)
+
+
+class Gust(Effect):
+    """Wind (3,) [m/s] that comes up as half a cosine."""
+
+    def __init__(self, full: np.ndarray, rise: float):
+        self._full, self._rise = full, rise
+        self._since = 0.0
+
+    def act(self, plant, commands):
+        risen = 1.0 if self._since >= self._rise else self._since / self._rise
+        plant.add_wind(0.5 * (1.0 - math.cos(math.pi * risen)) * self._full)
+        self._since += plant.period

@@ -1,0 +1,35 @@
+"""Which faults a flight cannot have."""
+
+from __future__ import annotations
+
+from collections.abc import Collection
+
+from uam_sim_bridge.faults.fault import PROCESS, Fault, FaultError
+from uam_sim_bridge.faults.link_faults import LinkFault, MavlinkDelay
+from uam_sim_bridge.faults.process_faults import ProcessFault
+from uam_sim_bridge.faults.schedule import Schedule
+
+
+def check(schedule: Schedule, engine: str, absent: Collection[str] = ()) -> None:
+    """Raise FaultError for the first fault that this flight cannot have.
+
+    engine: ros or direct; absent: processes that the flight does not start itself.
+    """
+    for one in schedule.faults:
+        fault = one.fault
+        why = needs_nodes(fault) if engine == "direct" else ""
+        if why:
+            raise FaultError(f"{fault.NAME}: {why}: needs --engine ros")
+        if isinstance(fault, ProcessFault) and fault.node in absent:
+            raise FaultError(f"{fault.NAME}: this flight does not start {fault.node}")
+
+
+def needs_nodes(fault: Fault) -> str:
+    """Why the direct engine cannot have this fault; "" where it can."""
+    if fault.PLACE == PROCESS:
+        return "the direct engine has no processes"
+    if isinstance(fault, MavlinkDelay):
+        return "the direct engine has no MAVLink connection to delay"
+    if isinstance(fault, LinkFault) and not fault.outwards:
+        return "the direct engine has no MAVLink connection from the autopilot"
+    return ""

@@ -1,0 +1,52 @@
+"""A MAVLink connection between bridge and autopilot that is cut, late or noisy."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import ClassVar
+
+from uam_control.parameters import choice, number
+from uam_sim_bridge.faults.fault import LINK, Fault
+
+BOTH, TO, FROM = "both", "to_autopilot", "from_autopilot"
+
+
+@dataclass(frozen=True)
+class LinkFault(Fault):
+    """A fault of the bridge's transport."""
+
+    PLACE: ClassVar[str] = LINK
+
+    direction: str = choice(BOTH, "which way", (BOTH, TO, FROM))
+
+    @property
+    def outwards(self) -> bool:
+        """Whether it concerns what goes to the autopilot."""
+        return self.direction != FROM
+
+    @property
+    def inwards(self) -> bool:
+        """Whether it concerns what comes from the autopilot."""
+        return self.direction != TO
+
+
+@dataclass(frozen=True)
+class MavlinkCut(LinkFault):
+    NAME: ClassVar[str] = "mavlink_cut"
+    ABOUT: ClassVar[str] = "nothing gets through"
+
+
+@dataclass(frozen=True)
+class MavlinkDelay(LinkFault):
+    NAME: ClassVar[str] = "mavlink_delay"
+    ABOUT: ClassVar[str] = "everything gets through later"
+
+    delay: float = number(0.05, "by how much", "s", 0.0, 10.0)
+
+
+@dataclass(frozen=True)
+class MavlinkCorruption(LinkFault):
+    NAME: ClassVar[str] = "mavlink_corruption"
+    ABOUT: ClassVar[str] = "one byte is wrong in some of the packets, which are then not used"
+
+    share: float = number(0.2, "part of the packets", "1", 0.0, 1.0)

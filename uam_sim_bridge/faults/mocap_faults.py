@@ -1,0 +1,136 @@
+"""Motion capture that is silent, stuck, displaced, late or wrong now and then."""
+
+from __future__ import annotations
+
+import math
+from collections import deque
+from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
+
+from uam_control.parameters import choice, number
+from uam_control.rotations import quaternion_from_rotation_vector, quaternion_multiply
+from uam_sim_bridge.faults.fault import Effect, PlantFault
+
+AXES = {"xy": [1, 0, 2], "xz": [2, 1, 0], "yz": [0, 2, 1]}
+
+
+class PoseEffect(Effect):
+    """Alters each pose that arrives."""
+
+    def __init__(self, alter):
+        self._alter = alter
+
+    def sense(self, samples):
+        if samples.mocap is not None:
+            samples.mocap = self._alter(*samples.mocap)
+
+
+@dataclass(frozen=True)
+class MocapDropout(PlantFault):
+    NAME: ClassVar[str] = "mocap_dropout"
+    ABOUT: ClassVar[str] = "no poses of the motion capture arrive"
+
+    def effect(self, noise):
+        return PoseEffect(lambda *pose: None)
+
+
+@dataclass(frozen=True)
+class MocapFreeze(PlantFault):
+    NAME: ClassVar[str] = "mocap_freeze"
+    ABOUT: ClassVar[str] = "poses go on arriving with new stamps, but always the same one"
+
+    def effect(self, noise):
+        held = []
+
+        def repeat(stamp, *pose):
+            held[:] = held or pose
+            return (stamp, *held)
+
+        return PoseEffect(repeat)
+
+
+@dataclass(frozen=True)
+class MocapJump(PlantFault):
+    NAME: ClassVar[str] = "mocap_jump"
+    ABOUT: ClassVar[str] = "poses are displaced and turned, as after a shifted origin"
+
+    x: float = number(0.3, "displacement", "m", -10.0, 10.0)
+    y: float = number(0.0, "displacement", "m", -10.0, 10.0)
+    z: float = number(0.0, "displacement", "m", -10.0, 10.0)
+    yaw: float = number(0.0, "turn about the vertical", "rad", -math.pi, math.pi)
+
+    def effect(self, noise):
+        offset = np.array([self.x, self.y, self.z])
+        turn = quaternion_from_rotation_vector(np.array([0.0, 0.0, self.yaw]))
+        return PoseEffect(
+            lambda stamp, position, q: (stamp, position + offset, quaternion_multiply(turn, q))
+        )
+
+
+@dataclass(frozen=True)
+class MocapSwap(PlantFault):
+    NAME: ClassVar[str] = "mocap_swap"
+    ABOUT: ClassVar[str] = "two axes of the position are exchanged, as after a wrong calibration"
+
+    axes: str = choice("xy", "which two", tuple(AXES))
+
+    def effect(self, noise):
+        order = AXES[self.axes]
+        return PoseEffect(lambda stamp, position, q: (stamp, position[order], q))
+
+
+@dataclass(frozen=True)
+class MocapLatency(PlantFault):
+    NAME: ClassVar[str] = "mocap_latency"
+    ABOUT: ClassVar[str] = "poses arrive later, still with the stamp of their exposure"
+
+    delay: float = number(0.1, "on top of the usual latency", "s", 0.0, 5.0)
+
+    def effect(self, noise):
+        return Late(self.delay)
+
+
+class Late(Effect):
+    """Hands poses on when `delay` [s] have passed by the clock of the autopilot's IMU."""
+
+    def __init__(self, delay: float):
+        self._delay = delay
+        self._waiting: deque[tuple[float, tuple]] = deque()
+
+    def sense(self, samples):
+        now = samples.hil[0]
+        if samples.mocap is not None:
+            self._waiting.append((now + self._delay, samples.mocap))
+        due = self._waiting and self._waiting[0][0] <= now + 1e-9
+        samples.mocap = self._waiting.popleft()[1] if due else None
+
+
+@dataclass(frozen=True)
+class MocapOutliers(PlantFault):
+    NAME: ClassVar[str] = "mocap_outliers"
+    ABOUT: ClassVar[str] = "single poses are far off, in random directions"
+
+    share: float = number(0.05, "part of the poses that are", "1", 0.0, 1.0)
+    distance: float = number(0.5, "how far", "m", 0.0, 100.0)
+
+    def effect(self, noise):
+        def alter(stamp, position, quaternion):
+            direction, drawn = noise.standard_normal(3), noise.random()
+            if drawn < self.share:
+                position = position + self.distance * direction / np.linalg.norm(direction)
+            return stamp, position, quaternion
+
+        return PoseEffect(alter)
+
+
+@dataclass(frozen=True)
+class ClockJump(PlantFault):
+    NAME: ClassVar[str] = "clock_jump"
+    ABOUT: ClassVar[str] = "the clock of the motion capture's computer is off: wrong stamps"
+
+    step: float = number(0.5, "by how much, ahead or behind", "s", -100.0, 100.0)
+
+    def effect(self, noise):
+        return PoseEffect(lambda stamp, *pose: (max(0.0, stamp + self.step), *pose))

@@ -1,0 +1,128 @@
+"""The plant with faults: samples and commands are altered at its edge, tick by tick.
+
+Only flights with such faults have it; all others fly the `Plant` itself.
+"""
+
+from __future__ import annotations
+
+import mujoco
+import numpy as np
+
+from uam_sim_bridge.faults.fault import Commands, Effect
+from uam_sim_bridge.faults.schedule import Schedule
+from uam_sim_bridge.faults.timeline import Happened, Timeline
+from uam_sim_bridge.plant import Plant, Samples, Vehicle
+from uam_sim_bridge.plant.payload_hinge import PayloadHinge, add_to
+
+STIFF = 0.9999  # impedance of a friction that does not creep, see MuJoCo's solimp
+
+
+class FaultyPlant(Plant):
+    """A Plant whose faults begin and end at mission times; `mission_at` tells it that time."""
+
+    def __init__(
+        self,
+        vehicle: Vehicle,
+        payload_mass: float,
+        seed: int,
+        arm_start: tuple[float, float],
+        schedule: Schedule,
+    ) -> None:
+        """See `Plant`; schedule: faults of the plant alone."""
+        super().__init__(vehicle, payload_mass, seed, arm_start)
+        self.timeline = Timeline(schedule)
+        self.changed: list[Happened] = []  # what came or went with this tick
+        self._effects: dict[int, Effect] = {}
+        self._touched = False
+        streams = np.random.SeedSequence(schedule.seed, spawn_key=(0xFA,)).spawn(
+            len(schedule.faults)
+        )
+        self._noise = [np.random.default_rng(stream) for stream in streams]
+        model = self.model
+        self._arm_dofs = [model.joint(name).dofadr[0] for name in ("alpha_1", "alpha_2")]
+        self._magnet_id = model.actuator("magnet").id
+        self._usual = (
+            self.rotors.efficiency.copy(),
+            model.dof_frictionloss[self._arm_dofs].copy(),
+            model.dof_solimp[self._arm_dofs].copy(),
+            self._magnet_gain,
+        )
+        self._added_wind, self._wanted_wind = np.zeros(3), np.zeros(3)
+        self._hinge = PayloadHinge(model, self.data)
+        self._swinging = False
+
+    def _compile(self, vehicle: Vehicle, payload_mass: float) -> mujoco.MjModel:
+        return vehicle.compile(payload_mass, add_to)
+
+    def mission_at(self, stamp: float, time: float) -> None:
+        """See `Timeline.mission_at`."""
+        self.timeline.mission_at(stamp, time)
+
+    def sense(self) -> Samples:
+        """As `Plant.sense`, with what the faults make of it."""
+        self.changed = self.timeline.update(self.time)
+        for one in self.changed:
+            if one.active:
+                self._effects[one.number] = one.fault.effect(self._noise[one.number])
+            else:
+                del self._effects[one.number]
+        samples = super().sense()
+        for effect in self._effects.values():
+            effect.sense(samples)
+        return samples
+
+    def step(self, motor_commands: np.ndarray, arm_effort: np.ndarray, magnet: bool) -> None:
+        """As `Plant.step`, with what the faults make of it."""
+        if self._effects or self._touched:
+            commands = Commands(np.array(motor_commands), np.array(arm_effort), bool(magnet))
+            self._as_usual()
+            for effect in self._effects.values():
+                effect.act(self, commands)
+            self._settle()
+            motor_commands, arm_effort = commands.motors, commands.effort
+            magnet = commands.magnet
+            self._touched = bool(self._effects)
+        super().step(motor_commands, arm_effort, magnet)
+
+    def weaken_rotors(self, parts: np.ndarray) -> None:
+        """Leave parts (4,) of the rotors' thrust for this period."""
+        self.rotors.efficiency *= parts
+
+    def brake_joint(self, joint: int, torque: float) -> None:
+        """Let it take `torque` [N m] to move joint 0 or 1 for this period."""
+        self.model.dof_frictionloss[self._arm_dofs[joint]] += torque
+        self.model.dof_solimp[self._arm_dofs[joint], 0:2] = STIFF
+
+    def weaken_magnet(self, part: float) -> None:
+        """Leave a part of the magnet's holding force for this period."""
+        self._magnet_gain *= part
+
+    def add_wind(self, wind: np.ndarray) -> None:
+        """Add wind (3,) [m/s, ENU] for this period."""
+        self._wanted_wind += wind
+
+    def swing_payload(self, commands: Commands, rate: float) -> None:
+        """Hang the payload on a hinge while the magnet is on; rate [rad/s]: at the beginning."""
+        self._swinging = commands.magnet and (self._hinge.closed or self._hinge.close(rate))
+        if self._swinging:
+            commands.magnet = False  # the hinge holds it instead, at one point alone
+
+    def _as_usual(self) -> None:
+        """Undo what the faults did to this plant in the last period."""
+        efficiency, friction, softness, gain = self._usual
+        self.rotors.efficiency[:] = efficiency
+        self.model.dof_frictionloss[self._arm_dofs] = friction
+        self.model.dof_solimp[self._arm_dofs] = softness
+        self._magnet_gain = gain
+        self._wanted_wind[:] = 0.0
+        self._swinging = False
+
+    def _settle(self) -> None:
+        """Give MuJoCo what the faults left of it."""
+        self.model.actuator_gainprm[self._magnet_id, 0] = self._magnet_gain
+        change = self._wanted_wind - self._added_wind
+        self.wind += change
+        self._wind_mean += change
+        self._added_wind += change
+        if not self._swinging and self._hinge.closed:
+            self._hinge.open()

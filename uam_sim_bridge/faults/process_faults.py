@@ -1,0 +1,52 @@
+"""Nodes that are killed, stopped for a while, or slow. They need processes: the ROS engine."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import ClassVar
+
+from uam_control.parameters import choice, number
+from uam_sim_bridge.faults.fault import PROCESS, Fault
+
+NODES = (
+    "state_estimator",
+    "mission",
+    "position_controller",
+    "attitude_controller",
+    "arm_controller",
+    "mavlink_bridge",
+    "autopilot",
+    "scene",
+    "recorder",
+)
+NODE = "which process"
+
+
+@dataclass(frozen=True)
+class ProcessFault(Fault):
+    """A fault of one process; times are those of the wall clock."""
+
+    PLACE: ClassVar[str] = PROCESS
+
+    node: str = choice("arm_controller", NODE, NODES)
+
+
+@dataclass(frozen=True)
+class NodeKill(ProcessFault):
+    NAME: ClassVar[str] = "node_kill"
+    ABOUT: ClassVar[str] = "a process is killed (SIGKILL) and does not come back"
+
+
+@dataclass(frozen=True)
+class NodeStall(ProcessFault):
+    NAME: ClassVar[str] = "node_stall"
+    ABOUT: ClassVar[str] = "a process is stopped (SIGSTOP), and goes on when the fault ends"
+
+
+@dataclass(frozen=True)
+class NodeSlow(ProcessFault):
+    NAME: ClassVar[str] = "node_slow"
+    ABOUT: ClassVar[str] = "a process is stopped for a part of each cycle, as on a busy computer"
+
+    stopped: float = number(0.5, "part of the time in which it is stopped", "1", 0.0, 0.95)
+    cycle: float = number(0.02, "length of a cycle", "s", 0.005, 1.0)

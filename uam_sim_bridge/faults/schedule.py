@@ -1,0 +1,190 @@
+"""Which faults a flight has, and when: read from words, files and scenarios, checked at the door.
+
+    NAME@SECONDS[+DURATION][:parameter=value,...]        mocap_dropout@20+3
+    NAME@PHASE[+AFTER[+DURATION]][:parameter=value,...]  motor_loss@pick+1:motor=2,remaining=0.7
+
+or, in a file (a list, or a mapping with the list `faults`) and in a scenario's `faults`:
+
+    - {fault: motor_loss, at: pick, after: 1, duration: 5, motor: 2, remaining: 0.7}
+
+Without a duration a fault stays for good.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import yaml
+
+from uam_control.mission import Scenario
+from uam_sim_bridge.faults.catalogue import make
+from uam_sim_bridge.faults.fault import Fault, FaultError
+
+FORM = "NAME@SECONDS[+DURATION] or NAME@PHASE[+AFTER[+DURATION]], then :parameter=value,..."
+WORDS = ("fault", "at", "after", "duration")
+LATEST = 1e5  # [s] of mission time
+SUFFIXES = (".yaml", ".yml")
+
+
+@dataclass(frozen=True)
+class TimedFault:
+    """A fault from mission time `at` [s], for `duration` [s] or, with infinity, for good."""
+
+    fault: Fault
+    at: float
+    duration: float = math.inf
+
+    @property
+    def entry(self) -> dict[str, Any]:
+        """As an entry of a file."""
+        lasting = {} if math.isinf(self.duration) else {"duration": self.duration}
+        return {"fault": self.fault.NAME, "at": self.at, **lasting, **self.fault.values}
+
+
+@dataclass(frozen=True)
+class Schedule:
+    """All faults of a flight; seed: of what is random in them."""
+
+    faults: tuple[TimedFault, ...] = ()
+    seed: int = 1
+
+    def __bool__(self) -> bool:
+        return bool(self.faults)
+
+    def only(self, place: str) -> Schedule:
+        """Those that act on `place`: PLANT, LINK or PROCESS."""
+        chosen = tuple(one for one in self.faults if one.fault.PLACE == place)
+        return Schedule(chosen, self.seed)
+
+    @property
+    def entries(self) -> list[dict[str, Any]]:
+        """All as entries of a file."""
+        return [one.entry for one in self.faults]
+
+    def to_text(self) -> str:
+        """As a parameter of a node; "" without any fault."""
+        return json.dumps({"seed": self.seed, "faults": self.entries}) if self else ""
+
+    @classmethod
+    def from_text(cls, text: str) -> Schedule:
+        """Read what `to_text` wrote; raises FaultError in one line."""
+        if not text:
+            return cls()
+        try:
+            document = json.loads(text)
+            entries, seed = document["faults"], int(document["seed"])
+        except (ValueError, KeyError, TypeError):
+            raise FaultError('faults: {"seed": N, "faults": [...]} expected, as JSON') from None
+        where = "faults"
+        return cls(tuple(timed(entry, {}, where) for entry in listed(entries, where)), seed)
+
+
+def read_schedule(given: Sequence[str], scenario: Scenario, seed: int) -> Schedule:
+    """The scenario's own faults and those `given`: in words, or files of them.
+
+    Raises FaultError in one line.
+    """
+    phases = beginnings(scenario)
+    found = [
+        timed(entry, phases, f"scenario {scenario.name}")
+        for entry in listed(list(scenario.faults), f"scenario {scenario.name}")
+    ]
+    for text in given:
+        if Path(text).suffix in SUFFIXES:
+            found += [timed(entry, phases, text) for entry in from_file(Path(text))]
+        else:
+            found.append(timed(in_words(text), phases, f"fault '{text}'"))
+    return Schedule(tuple(found), seed)
+
+
+def beginnings(scenario: Scenario) -> dict[str, float]:
+    """Phases by name, and the mission time [s] at which each begins for the first time."""
+    found: dict[str, float] = {}
+    for start, name in scenario.phases:
+        found.setdefault(name, start)
+    return found
+
+
+def from_file(file: Path) -> list[Mapping[str, Any]]:
+    """Entries of a YAML file; raises FaultError."""
+    try:
+        document = yaml.safe_load(file.read_text())
+    except OSError as error:
+        raise FaultError(f"{file}: {(error.strerror or str(error)).lower()}") from None
+    except (yaml.YAMLError, UnicodeDecodeError):
+        raise FaultError(f"{file}: not valid YAML") from None
+    entries = document.get("faults") if isinstance(document, dict) else document
+    return listed(entries, str(file))
+
+
+def listed(entries: Any, where: str) -> list[Mapping[str, Any]]:
+    """The same, if it is a list of mappings; raises FaultError otherwise."""
+    good = isinstance(entries, list) and all(isinstance(entry, dict) for entry in entries)
+    if not good:
+        raise FaultError(f"{where}: a list of faults expected, each as {{fault: NAME, at: ...}}")
+    return entries
+
+
+def in_words(text: str) -> dict[str, Any]:
+    """Take SPEC apart into an entry; raises FaultError where it has another form."""
+    head, colon, tail = text.partition(":")
+    name, at, when = head.partition("@")
+    first, *numbers = when.split("+")
+    if not name or not at or not first or (colon and not tail):
+        raise FaultError(f"fault '{text}': {FORM} expected")
+    begins = _number(first)
+    keys = ("after", "duration") if begins is None else ("duration",)
+    if len(numbers) > len(keys):
+        raise FaultError(f"fault '{text}': {FORM} expected")
+    entry: dict[str, Any] = {"fault": name, "at": first if begins is None else begins}
+    for key, value in zip(keys, numbers, strict=False):
+        entry[key] = value if (number := _number(value)) is None else number
+    for pair in tail.split(",") if tail else ():
+        parameter, equals, value = pair.partition("=")
+        if not equals or parameter in entry:
+            raise FaultError(f"fault '{text}': '{pair}' is not one parameter=value")
+        entry[parameter] = value if (number := _number(value)) is None else number
+    return entry
+
+
+def timed(entry: Mapping[str, Any], phases: Mapping[str, float], where: str) -> TimedFault:
+    """Check an entry; raises FaultError that begins with `where`."""
+    values = {key: value for key, value in entry.items() if key not in WORDS}
+    try:
+        fault = make(entry.get("fault"), values)
+        at = entry.get("at")
+        if isinstance(at, str):
+            if at not in phases:
+                raise FaultError(f"at: no phase '{at}' in the scenario, which has: "
+                                 + ", ".join(phases))
+            at = phases[at] + _span(entry, "after", 0.0)
+        elif "after" in entry:
+            raise FaultError("after: only together with a phase")
+        else:
+            at = _span(entry, "at", None)
+        duration = _span(entry, "duration", math.inf)
+    except FaultError as error:
+        raise FaultError(f"{where}: {error}") from None
+    return TimedFault(fault, at, duration)
+
+
+def _span(entry: Mapping[str, Any], key: str, default: float | None) -> float:
+    value = entry.get(key, default)
+    if key not in entry and default is not None:
+        return default
+    good = isinstance(value, int | float) and not isinstance(value, bool)
+    if not good or not 0.0 <= value <= LATEST:
+        raise FaultError(f"{key}: {value!r} is not a time within 0 to {LATEST:g} s")
+    return float(value)
+
+
+def _number(text: str) -> float | None:
+    try:
+        return float(text)
+    except ValueError:
+        return None

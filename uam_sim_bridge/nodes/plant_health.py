@@ -1,0 +1,67 @@
+"""The plant's entry of /diagnostics, once a second of wall time."""
+
+from __future__ import annotations
+
+import time
+
+from rclpy.node import Node
+
+from uam_msgs_py import topics
+from uam_msgs_py.health import LoopTime, ages
+from uam_msgs_py.node import DIAGNOSTICS_PERIOD
+from uam_msgs_py.status import OK, STALE, WARN, diagnostic
+from uam_sim_bridge.nodes.plant_options import Statistics
+from uam_sim_bridge.nodes.plant_topics import Answers, nanoseconds
+
+
+class PlantHealth:
+    """Says how fast the simulation runs, how long a tick takes, and how old the answers are.
+
+    A tick is everything from its sensors to the next state: in lockstep the answers of all nodes,
+    in real time the control period and what it was overrun by.
+    """
+
+    def __init__(self, node: Node, answers: Answers, statistics: Statistics):
+        topic = topics.DIAGNOSTICS
+        self._publisher = node.create_publisher(topic.type, topic.name, topic.qos)
+        self._name, self._answers, self._statistics = node.get_name(), answers, statistics
+        self._loop = LoopTime()
+        self._ticks = 0
+        self._missed = 0
+        self._last = (time.monotonic(), 0.0)  # wall and simulated time of the last report [s]
+
+    def waiting(self, for_whom: str) -> None:
+        """Before the first tick."""
+        if self._due():
+            self._publish(0.0, STALE, f"waiting for {for_whom}")
+
+    def done_tick(self, begun: float, simulated: float) -> None:
+        """A tick that began at time.perf_counter() `begun` [s] led to `simulated` time [s]."""
+        self._loop.add(begun)
+        self._ticks += 1
+        if not self._due():
+            return
+        missed = self._statistics.missed_ticks - self._missed
+        self._missed = self._statistics.missed_ticks
+        if missed:
+            self._publish(simulated, WARN, f"{missed} ticks missed in the last second")
+        else:
+            self._publish(simulated, OK, "running")
+
+    def _due(self) -> bool:
+        return time.monotonic() - self._last[0] >= DIAGNOSTICS_PERIOD
+
+    def _publish(self, simulated: float, level: bytes, summary: str) -> None:
+        wall, before = self._last
+        now = time.monotonic()
+        self._last = now, simulated
+        values = {
+            "ticks": self._ticks,
+            "real time factor": f"{(simulated - before) / (now - wall):.2f}",
+            "ticks missed": self._statistics.missed_ticks,
+            "late motor commands": self._statistics.late_motor_commands,
+        }
+        values |= self._loop.report() | ages(self._answers.inlets, self._answers.arrivals)
+        self._publisher.publish(
+            diagnostic(nanoseconds(simulated), self._name, level, summary, values)
+        )

@@ -1,0 +1,79 @@
+"""The vehicle's frames, from the compiled MJCF as the URDF: arm, magnet, and what they hold."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import mujoco
+import numpy as np
+
+from uam_control.rotations import quaternion_from_rotation_vector, quaternion_multiply
+from uam_sim_bridge.plant.urdf import BASE_LINK, ROOT
+
+SWING = "magnet_swing"  # the joint that nothing measures
+
+
+@dataclass(frozen=True)
+class Frame:
+    """A body in the frame of the body that carries it; named as its link in the URDF.
+
+    position (3,) [m]; quaternion [w x y z], body → parent, at joint angle 0; axis (3,) of the
+    hinge; joint: its name, "" where the body is fixed.
+    """
+
+    name: str
+    parent: str
+    position: np.ndarray
+    quaternion: np.ndarray
+    axis: np.ndarray
+    joint: str = ""
+
+    def turned(self, angle: float) -> np.ndarray:
+        """The quaternion [w x y z] at a joint angle [rad]."""
+        turn = quaternion_from_rotation_vector(self.axis * angle)
+        return quaternion_multiply(self.quaternion, turn)
+
+
+@dataclass(frozen=True)
+class Box:
+    """A box in the frame of its body: centre (3,) and edges (3,) [m]."""
+
+    centre: np.ndarray
+    edges: np.ndarray
+
+
+def frames(model: mujoco.MjModel) -> list[Frame]:
+    """The frames that hang on the vehicle's base, parents first."""
+    root = model.body(ROOT).id
+    return [
+        _frame(model, body, root)
+        for body in range(root + 1, model.nbody)
+        if model.body_rootid[body] == root
+    ]
+
+
+def _frame(model: mujoco.MjModel, body: int, root: int) -> Frame:
+    parent = model.body_parentid[body]
+    hinge, index = model.body_jntnum[body] > 0, model.body_jntadr[body]
+    return Frame(
+        name=model.body(body).name,
+        parent=BASE_LINK if parent == root else model.body(parent).name,
+        position=model.body_pos[body].copy(),
+        quaternion=model.body_quat[body].copy(),
+        axis=model.jnt_axis[index].copy() if hinge else np.zeros(3),
+        joint=model.joint(index).name if hinge else "",
+    )
+
+
+def box(model: mujoco.MjModel, name: str) -> Box:
+    """The geom `name`, which is a box."""
+    geom = model.geom(name)
+    return Box(geom.pos.copy(), 2.0 * geom.size)
+
+
+def hanging(pitch: float, alpha: np.ndarray) -> float:
+    """Angle of the magnet's pivot [rad] at which its face is level, as its weight makes it.
+
+    pitch [rad] of the vehicle; alpha (2,) [rad]. Joints turn the other way than pitch.
+    """
+    return float(pitch - alpha.sum())
