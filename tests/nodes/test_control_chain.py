@@ -142,6 +142,7 @@ def test_the_nodes_compute_what_the_maths_does_bit_for_bit(start, probe):
     plant.wait_for_connections()
     for number, sample in enumerate(samples()):
         plant.tick(number, *sample)
+    probe.until(lambda: len(plant.references) > TICKS, "the reference of the tick after the last")
 
     airborne = 0
     for i, (state, tau_p, tau_q, tau_alpha) in enumerate(expected()):
