@@ -25,7 +25,7 @@ test: setup      ## all tests; options: make test ARGS="tests/unit -x"
 	@$(if $(ARGS),$(BIN)/python -m pytest $(ARGS),\
 	$(BIN)/python -m pytest -n 2 --dist loadfile tests/unit && \
 	$(BIN)/python -m pytest -n 2 --dist loadfile tests/nodes tests/packaging && \
-	$(BIN)/python -m pytest tests/flights tests/px4)
+	$(BIN)/python -m pytest -n 2 --dist loadgroup --maxschedchunk 1 tests/flights tests/px4)
 
 lint: setup      ## style and errors that need no run
 	@$(BIN)/ruff check .

@@ -6,6 +6,18 @@ import pytest
 from whole_flight import SHORT, Flight
 
 
+SHARED = {"two_flights", "mission", "nominal"}  # fixtures: flights that several tests look at
+
+
+@pytest.hookimpl(tryfirst=True)
+def pytest_collection_modifyitems(items):
+    """Have several workers share the work well: long flights first, no shared flight flown twice."""
+    items.sort(key=lambda item: item.get_closest_marker("slow") is None)
+    for item in items:
+        for name in SHARED.intersection(getattr(item, "fixturenames", ())):
+            item.add_marker(pytest.mark.xdist_group(name))
+
+
 @pytest.fixture(scope="session")
 def short_scenario(tmp_path_factory) -> Path:
     """A scenario file of a few seconds."""
