@@ -10,7 +10,7 @@ ARGS ?=
 INSTALLED_FROM := pyproject.toml package.xml Makefile $(shell find ros -type f)
 
 .DEFAULT_GOAL := help
-.PHONY: help setup fly test lint clean
+.PHONY: help setup fly test slow lint clean
 
 help:            ## this list
 	@sed -n 's/^\([a-z]*\):.*##/  make \1\t/p' Makefile
@@ -21,11 +21,19 @@ setup: $(STAMP)  ## virtual environment, dependencies and the project in .venv
 fly: setup       ## fly the pick-and-place mission; options: make fly ARGS="--controller asmc1"
 	@$(BIN)/uam fly $(ARGS)
 
-test: setup      ## all tests; options: make test ARGS="tests/unit -x"
+# Flights that fail on purpose are flown alone: they look at what is left on the machine.
+ALONE := tests/flights/test_ros_failures.py
+PYTEST = $(BIN)/python -m pytest -m "not slow"
+
+test: setup      ## the tests but the slow ones; options: make test ARGS="tests/unit -x"
 	@$(if $(ARGS),$(BIN)/python -m pytest $(ARGS),\
-	$(BIN)/python -m pytest -n 2 --dist loadfile tests/unit && \
-	$(BIN)/python -m pytest -n 2 --dist loadfile tests/nodes tests/packaging && \
-	$(BIN)/python -m pytest -n 2 --dist loadgroup --maxschedchunk 1 tests/flights tests/px4)
+	$(PYTEST) -n 2 --dist loadfile tests/unit && \
+	$(PYTEST) -n 2 --dist loadfile tests/nodes tests/packaging && \
+	$(PYTEST) -n 2 --dist loadgroup --maxschedchunk 1 tests/flights tests/px4 --ignore $(ALONE) && \
+	$(PYTEST) $(ALONE))
+
+slow: setup      ## the slow tests: whole missions, browser, PX4 if it is there; a quarter of an hour
+	@$(BIN)/python -m pytest -m slow tests
 
 lint: setup      ## style and errors that need no run
 	@$(BIN)/ruff check .

@@ -60,6 +60,7 @@ def started():
         process.wait(20)
 
 
+@pytest.mark.slow
 def test_an_autopilot_that_the_user_has_started_flies_by_its_udp_link(
         fly, short_scenario, started):
     with Reservation() as free:

@@ -9,7 +9,7 @@ from uam_control.profile import load_profile
 from uam_sim_bridge.campaign.variations import common, draw, ranges
 from uam_sim_bridge.cli.main import main
 
-FLIGHTS = 6
+FLIGHTS = 4
 
 
 def test_a_draw_repeats_and_a_longer_one_begins_alike():

@@ -27,7 +27,10 @@ def kept(flight):
     return figures
 
 
-@pytest.mark.parametrize("victim", ["position_controller", "autopilot", "recorder"])
+@pytest.mark.parametrize("victim", [
+    "position_controller",
+    *(pytest.param(name, marks=pytest.mark.slow) for name in ("autopilot", "recorder")),
+])
 def test_a_killed_node_ends_the_flight_and_is_named(fly, short_scenario, victim):
     flight = fly("--scenario", str(short_scenario))
     flight.until_phase("take-off")
@@ -42,6 +45,7 @@ def test_a_killed_node_ends_the_flight_and_is_named(fly, short_scenario, victim)
         assert f"{victim} was killed by SIGKILL" in kept(flight)["abort_reason"]
 
 
+@pytest.mark.slow
 def test_a_killed_scene_is_announced_and_the_flight_goes_on(fly, short_scenario):
     flight = fly("--scenario", str(short_scenario))
     flight.until_phase("take-off")
@@ -53,6 +57,7 @@ def test_a_killed_scene_is_announced_and_the_flight_goes_on(fly, short_scenario)
     assert_nothing_left(flight, [], set())
 
 
+@pytest.mark.slow
 def test_a_recorder_without_processor_time_loses_nothing(fly, short_scenario):
     flight = fly("--scenario", str(short_scenario))
     flight.until_phase("take-off")

@@ -88,7 +88,7 @@ def fly(settings: FlightSettings, folder: ResultFolder, progress: Progress) -> O
                 progress.message(f"cockpit: {place.address(place.LOCAL, port)}")
             failure = _supervise(settings, folder, ports, progress, stop, presence)
             if failure is not None and failure.status == NOT_READY and not settings.foreign:
-                # Seen about once in a hundred starts: the middleware does not connect two of them.
+                # on a machine without processor time the middleware may not connect all of them
                 progress.message(f"{failure}; starting once more")
                 _keep_logs(folder.path / "logs")
                 failure = _supervise(settings, folder, ports, progress, stop, presence)
