@@ -74,9 +74,14 @@ class Probe:
             lambda: all(
                 p.get_subscription_count() and said.writers(node, p.topic_name) for p in publishers
             )
-            and all(said.readers(node, topic.name) for topic in hears),
+            and all(said.readers(node, topic.name) and self.has_writers(topic) for topic in hears),
             f"{node} to be connected",
         )
+
+    def has_writers(self, topic) -> bool:
+        """Whether every listener of ours to `topic` has found who publishes it."""
+        ours = [s for s in self.node.subscriptions if s.topic_name == topic.name]
+        return all(listener.get_publisher_count() for listener in ours)
 
     def call(self, kind, name: str, request):
         """Call a service and return its response."""

@@ -97,10 +97,17 @@ class Plant:
         self.status = probe.collect(topics.MISSION_STATUS)
         self.arming = probe.collect(topics.ARMING)
         self.adaptation = probe.collect(topics.ATTITUDE_ADAPTATION)
+        self.heard = (
+            *(topics.STATE, topics.REFERENCE, topics.POSITION_COMMAND, topics.ATTITUDE_COMMAND),
+            *(topics.ARM_EFFORT, topics.MAGNET),
+        )
         self.pose, self.joint, self.imu_writer = PoseWriter(), JointStateWriter(JOINTS), ImuWriter()
 
     def wait_for_connections(self):
-        """Return when every publisher has found its listeners, and they it."""
+        """Return when every publisher has found its listeners, and they it.
+
+        One end is not enough: what comes from a writer not yet known is dropped.
+        """
         said = self.connections
         readers = {  # the probe listens to all but the sensors
             ("state_estimator", topics.STATE.name): 5,
@@ -110,12 +117,19 @@ class Plant:
             ("attitude_controller", topics.ATTITUDE_COMMAND.name): 1,
             ("arm_controller", topics.ARM_EFFORT.name): 1,
         }
-        sensors = (topics.IMU, topics.JOINTS, topics.MOCAP)
+        both = (topics.STATE, topics.REFERENCE)
+        hears = {
+            "state_estimator": (topics.IMU, topics.JOINTS, topics.MOCAP),
+            "mission": (topics.STATE, topics.AUTOPILOT_STATE),
+            "position_controller": both,
+            "attitude_controller": (*both, topics.POSITION_COMMAND),
+            "arm_controller": (*both, topics.POSITION_COMMAND),
+        }
         self.probe.until(
             lambda: all(said.readers(*who) >= count for who, count in readers.items())
-            and all(said.writers("state_estimator", t.name) for t in sensors)
-            and said.writers("mission", topics.AUTOPILOT_STATE.name)
-            and all(p.get_subscription_count() for p in (self.imu, self.joints, self.mocap)),
+            and all(said.writers(node, t.name) for node, heard in hears.items() for t in heard)
+            and all(p.get_subscription_count() for p in (self.imu, self.joints, self.mocap))
+            and all(self.probe.has_writers(topic) for topic in self.heard),
             "connections",
         )
 
