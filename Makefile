@@ -21,15 +21,16 @@ setup: $(STAMP)  ## virtual environment, dependencies and the project in .venv
 fly: setup       ## fly the pick-and-place mission; options: make fly ARGS="--controller asmc1"
 	@$(BIN)/uam fly $(ARGS)
 
-# Flights that fail on purpose are flown alone: they look at what is left on the machine.
-ALONE := tests/flights/test_ros_failures.py
+# Flights that fail on purpose are flown alone: they look at what is left on the machine. And those
+# that share two flights, flown at once, in one process.
+ALONE := $(patsubst %,tests/flights/test_%.py,ros_failures ros_flight recorded_scene report_again)
 PYTEST = $(BIN)/python -m pytest -m "not slow"
 
 test: setup      ## the tests but the slow ones; options: make test ARGS="tests/unit -x"
 	@$(if $(ARGS),$(BIN)/python -m pytest $(ARGS),\
 	$(PYTEST) -n 2 --dist loadfile tests/unit && \
 	$(PYTEST) -n 2 --dist loadfile tests/nodes tests/packaging && \
-	$(PYTEST) -n 2 --dist loadgroup --maxschedchunk 1 tests/flights tests/px4 --ignore $(ALONE) && \
+	$(PYTEST) -n 2 --maxschedchunk 1 tests/flights tests/px4 $(ALONE:%=--ignore=%) && \
 	$(PYTEST) $(ALONE))
 
 slow: setup      ## the slow tests: whole missions, browser, PX4 if it is there; a quarter of an hour

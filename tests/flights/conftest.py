@@ -5,16 +5,6 @@ from pathlib import Path
 import pytest
 from whole_flight import SHORT, Flight
 
-SHARED = {"two_flights", "mission", "nominal"}  # fixtures: flights that several tests look at
-
-
-@pytest.hookimpl(tryfirst=True)
-def pytest_collection_modifyitems(items):
-    """Have several workers share the work: no shared flight is flown twice."""
-    for item in items:
-        for name in SHARED.intersection(getattr(item, "fixturenames", ())):
-            item.add_marker(pytest.mark.xdist_group(name))
-
 
 @pytest.fixture(scope="session")
 def short_scenario(tmp_path_factory) -> Path:

@@ -41,6 +41,7 @@ def test_wrong_use_is_refused_in_one_line(options, said, tmp_path, capsys):
     assert said in error and error.count("\n") == 1
 
 
+@pytest.mark.slow
 def test_a_trial_through_the_nodes_is_the_trial_of_the_direct_engine():
     (proposed,) = plan.entries(["proposed"])
     asked = trial.Trial(proposed.label, proposed.profile, 0.0, 1, scenario="hover")
