@@ -74,6 +74,7 @@ def test_an_autopilot_that_the_user_has_started_flies_by_its_udp_link(
     assert autopilot.wait(20) == 0  # the plant hung up
 
 
+@pytest.mark.slow
 def test_a_flight_controller_on_a_serial_line_flies_the_simulated_vehicle(
         fly, short_scenario, started):
     line = SerialLine()

@@ -16,6 +16,7 @@ def compare(out, *options):
     return json.loads((out / "comparison.json").read_text())
 
 
+@pytest.mark.slow
 def test_a_comparison_is_written_and_repeats(tmp_path, capsys):
     first = compare(tmp_path / "a")
     (row,) = first["rows"].values()

@@ -103,6 +103,7 @@ def test_a_matrix_from_the_command_line(tmp_path, capsys):
         "faults.json", "flights.csv", "matrix.png", "report.html", "summary.md"}
 
 
+@pytest.mark.slow
 def test_ctrl_c_ends_the_matrix_at_once_and_leaves_no_process(tmp_path):
     command = [sys.executable, "-m", "uam_sim_bridge.cli.main", "faults", "--jobs", "1",
                "--moment", "transit", "--out", str(tmp_path / "out")]

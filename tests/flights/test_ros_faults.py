@@ -19,6 +19,7 @@ IN_NODES = ("mavlink_delay@1+0.5:delay=0.01", "node_stall@hover+0+0.3:node=missi
             "node_kill@take-off+0.5:node=scene")
 
 
+@pytest.mark.slow
 def test_faults_come_when_they_should_and_the_log_knows_them(fly, short_scenario, tmp_path):
     options = [word for text in (*IN_BOTH, *IN_NODES) for word in ("--fault", text)]
     flight = fly("--scenario", str(short_scenario), *options)
