@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Callable, Iterator
+from functools import cache
 from pathlib import Path
 from types import ModuleType
 from typing import Any
@@ -48,6 +49,7 @@ class _Files(IndexDataCacheFile):
     def __init__(self, folder: str, base: str, function: Callable):
         super().__init__(folder, base, None)
         self._base, self._function = base, function
+        _content(Path(function.__code__.co_filename))  # now, not at the first call, after an edit
 
     def _name(self, key: Any) -> str:
         signature = hashlib.sha256(repr((numba.__version__, key)).encode()).hexdigest()
@@ -80,8 +82,14 @@ def _sources(function: Callable) -> str:
             constants.add(part)
     digest = hashlib.sha256(repr(sorted(constants)).encode())
     for file in sorted(files):
-        digest.update(file.read_bytes())
+        digest.update(_content(file))
     return digest.hexdigest()[:16]
+
+
+@cache
+def _content(file: Path) -> bytes:
+    """A digest of a source file as it was when this process had imported it."""
+    return hashlib.sha256(file.read_bytes()).digest()
 
 
 def _parts(function: Callable, seen: set[Callable]) -> Iterator[Path | str]:

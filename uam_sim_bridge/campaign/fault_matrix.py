@@ -7,12 +7,10 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-import yaml
-
 from uam_control.mission import Scenario, load_scenario
 from uam_sim_bridge.faults import FAULTS, FaultError, Schedule, TimedFault
 from uam_sim_bridge.faults.limits import needs_nodes
-from uam_sim_bridge.faults.schedule import beginnings, listed, timed
+from uam_sim_bridge.faults.schedule import beginnings, listed, read_yaml, timed
 
 NOMINAL = "no fault"
 KEYS = ("scenario", "moments", "faults")
@@ -89,12 +87,7 @@ def read(
 
 
 def _document(file: Path) -> dict[str, Any]:
-    try:
-        document = yaml.safe_load(file.read_text())
-    except OSError as error:
-        raise FaultError(f"{file}: {(error.strerror or str(error)).lower()}") from None
-    except (yaml.YAMLError, UnicodeDecodeError):
-        raise FaultError(f"{file}: not valid YAML") from None
+    document = read_yaml(file)
     if not isinstance(document, dict) or sorted(document) != sorted(KEYS):
         raise FaultError(f"{file}: a mapping of {', '.join(KEYS)} expected")
     return document

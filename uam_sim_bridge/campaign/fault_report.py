@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-import base64
 import math
 from collections import Counter
 from collections.abc import Sequence
 from pathlib import Path
 
-import jinja2
 from matplotlib.colors import to_rgb
 from matplotlib.figure import Figure
 
@@ -24,7 +22,7 @@ from uam_sim_bridge.campaign.fault_outcome import (
 from uam_sim_bridge.campaign.fault_trial import FaultResult
 from uam_sim_bridge.flight.atomic import replacing, write_rows, write_text
 from uam_sim_bridge.flight.result_folder import as_json, versions
-from uam_sim_bridge.report import style
+from uam_sim_bridge.report import html, style
 
 COLOURS = {
     COMPLETED: "#5aa469", HELD: "#8fb8de", LANDED: "#e3c567", FAILSAFE: "#e39b50", LOST: "#cf5b4a",
@@ -125,13 +123,8 @@ def _shown(value: float) -> str:
 
 
 def _page(out: Path, matrix: Matrix, results: Sequence[FaultResult], command: str) -> str:
-    environment = jinja2.Environment(
-        loader=jinja2.PackageLoader("uam_sim_bridge.campaign", "."), autoescape=True,
-        trim_blocks=True, lstrip_blocks=True, undefined=jinja2.StrictUndefined,
-    )
-    data = base64.b64encode((out / "matrix.png").read_bytes()).decode()
-    return environment.get_template("faults.html.j2").render(
+    return html.template("uam_sim_bridge.campaign", "faults.html.j2").render(
         sentence=sentence(results), matrix=matrix, outcomes=OUTCOMES, colours=COLOURS,
-        picture=data, command=command,
+        picture=html.embedded(out / "matrix.png"), command=command,
         rows=[(r, [_shown(worst(r, key)) for key in HEAD[3:6]]) for r in results],
     )

@@ -14,10 +14,9 @@ from rcl_interfaces.srv import (
 )
 from rclpy.parameter import Parameter
 
+from uam_control.parameter_file import ROS_OWN
 from uam_msgs_py.parameters import plain
 from uam_sim_bridge.cockpit.services import Services
-
-OF_ROS = ("use_sim_time", "qos_overrides.", "start_type_description_service")
 
 
 @dataclass(frozen=True)
@@ -57,7 +56,7 @@ class RemoteParameters:
             if why:
                 done(why)
                 return
-            names = sorted(n for n in response.result.names if not n.startswith(OF_ROS))
+            names = sorted(n for n in response.result.names if not n.startswith(ROS_OWN))
             request = DescribeParameters.Request(names=names)
             self._call(DescribeParameters, "describe_parameters", request, described)
 

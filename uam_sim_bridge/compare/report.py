@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-import base64
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-import jinja2
 import numpy as np
 from matplotlib.figure import Figure
 
@@ -18,7 +16,7 @@ from uam_sim_bridge.compare.modularity import Evidence
 from uam_sim_bridge.flight import timeseries
 from uam_sim_bridge.flight.atomic import replacing, write_rows, write_text
 from uam_sim_bridge.flight.result_folder import as_json, versions
-from uam_sim_bridge.report import figures, style
+from uam_sim_bridge.report import figures, html, style
 
 # The paper's five figures; the rows that they overlay.
 PAPERS_FIGURES = ("position_errors", "attitude_errors", "arm_errors", "vehicle_inputs",
@@ -155,14 +153,7 @@ def _markdown(head: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
 
 
 def _page(found, claims, modular: Evidence, drawn, out: Path, facts) -> str:
-    environment = jinja2.Environment(
-        loader=jinja2.PackageLoader("uam_sim_bridge.compare", "."),
-        autoescape=True, trim_blocks=True, lstrip_blocks=True, undefined=jinja2.StrictUndefined,
-    )
-    pictures = [
-        (name, base64.b64encode((out / "figures" / f"{name}.png").read_bytes()).decode())
-        for name in drawn
-    ]
+    pictures = [(name, html.embedded(out / "figures" / f"{name}.png")) for name in drawn]
     shown = [
         {
             "title": title,
@@ -172,7 +163,7 @@ def _page(found, claims, modular: Evidence, drawn, out: Path, facts) -> str:
         }
         for title, columns in tables.TABLES
     ]
-    return environment.get_template("report.html.j2").render(
+    return html.template("uam_sim_bridge.compare", "report.html.j2").render(
         tables=shown, claims=claims, modularity=modular.tables(), pictures=pictures, facts=facts,
         confidence=tables.CONFIDENCE, shown=OVERLAID,
     )

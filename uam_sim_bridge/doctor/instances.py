@@ -2,17 +2,14 @@
 
 from __future__ import annotations
 
-import fcntl
-import os
 import socket
-import tempfile
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
 from uam_sim_bridge.doctor import holders
 from uam_sim_bridge.doctor.finding import Finding, fail, ok, warn
-from uam_sim_bridge.flight.ports import INSTANCES, in_use, ports_of
+from uam_sim_bridge.flight.ports import INSTANCES, held, in_use, lock_file, ports_of
 
 SHOWN = 4  # busy ports named in the line
 
@@ -52,7 +49,7 @@ def checks(folder: Path | None = None) -> Iterator[Finding]:
 
 def look(instance: int, folder: Path | None = None) -> Busy | None:
     """Who has an instance; None: it is free. Takes nothing."""
-    lock = (folder or Path(tempfile.gettempdir())) / f"uam-{os.getuid()}-{instance}.lock"
+    lock = lock_file(folder, instance)
     if held(lock):
         return Busy(instance, ", ".join(holders.of_file(lock)) or "a flight", True)
     ports = ports_of(instance)
@@ -67,15 +64,3 @@ def look(instance: int, folder: Path | None = None) -> Busy | None:
             who = ", ".join(holders.of_port(protocol, port)) or "an unknown program"
             return Busy(instance, f"{protocol.upper()} {port} held by {who}", False)
     return None
-
-
-def held(lock: Path) -> bool:
-    """Whether some process holds the lock; a file that nobody locks is none."""
-    try:
-        with lock.open() as file:
-            fcntl.flock(file, fcntl.LOCK_SH | fcntl.LOCK_NB)
-    except BlockingIOError:
-        return True
-    except OSError:
-        return False
-    return False

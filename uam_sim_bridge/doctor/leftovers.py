@@ -10,8 +10,8 @@ from pathlib import Path
 
 from uam_sim_bridge.doctor import holders
 from uam_sim_bridge.doctor.finding import Finding, ok, warn
-from uam_sim_bridge.doctor.instances import held
 from uam_sim_bridge.flight import process_table, shared_memory
+from uam_sim_bridge.flight.ports import held
 
 
 def checks(folder: Path | None = None) -> Iterator[Finding]:

@@ -112,14 +112,19 @@ def beginnings(scenario: Scenario) -> dict[str, float]:
 
 def from_file(file: Path) -> list[Mapping[str, Any]]:
     """Entries of a YAML file; raises FaultError."""
+    document = read_yaml(file)
+    entries = document.get("faults") if isinstance(document, dict) else document
+    return listed(entries, str(file))
+
+
+def read_yaml(file: Path) -> Any:
+    """What a YAML file holds; raises FaultError."""
     try:
-        document = yaml.safe_load(file.read_text())
+        return yaml.safe_load(file.read_text())
     except OSError as error:
         raise FaultError(f"{file}: {(error.strerror or str(error)).lower()}") from None
     except (yaml.YAMLError, UnicodeDecodeError):
         raise FaultError(f"{file}: not valid YAML") from None
-    entries = document.get("faults") if isinstance(document, dict) else document
-    return listed(entries, str(file))
 
 
 def listed(entries: Any, where: str) -> list[Mapping[str, Any]]:

@@ -94,22 +94,26 @@ def busy_port(ports: Ports, own_autopilot: bool = True) -> str | None:
 
 def instances_in_use(folder: Path | None = None) -> list[int]:
     """The instances that flights of this user have reserved now."""
-    found = []
-    for number in range(INSTANCES):
-        try:
-            lock = os.open(_lock_file(folder, number), os.O_RDONLY | os.O_CLOEXEC | os.O_NOFOLLOW)
-        except OSError:
-            continue
-        try:
-            fcntl.flock(lock, fcntl.LOCK_SH | fcntl.LOCK_NB)
-        except OSError:
-            found.append(number)
-        finally:
-            os.close(lock)
-    return found
+    return [number for number in range(INSTANCES) if held(lock_file(folder, number))]
 
 
-def _lock_file(folder: Path | None, instance: int) -> Path:
+def held(lock: Path) -> bool:
+    """Whether some process holds the lock; a file that nobody locks is none."""
+    try:
+        opened = os.open(lock, os.O_RDONLY | os.O_CLOEXEC | os.O_NOFOLLOW)
+    except OSError:
+        return False
+    try:
+        fcntl.flock(opened, fcntl.LOCK_SH | fcntl.LOCK_NB)
+    except OSError:
+        return True
+    finally:
+        os.close(opened)
+    return False
+
+
+def lock_file(folder: Path | None, instance: int) -> Path:
+    """Where the flight of an instance has its lock; folder: None for the temporary one."""
     return (folder or Path(tempfile.gettempdir())) / f"uam-{os.getuid()}-{instance}.lock"
 
 
@@ -152,7 +156,7 @@ class Reservation:
         raise PortError(f"none of the {INSTANCES} instances is free; the last one: {why}")
 
     def _path(self, instance: int) -> Path:
-        return _lock_file(self._folder, instance)
+        return lock_file(self._folder, instance)
 
     @staticmethod
     def _take(path: Path) -> int | None:

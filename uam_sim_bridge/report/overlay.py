@@ -2,15 +2,12 @@
 
 from __future__ import annotations
 
-import base64
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
-import jinja2
-
 from uam_sim_bridge.flight import metrics
 from uam_sim_bridge.flight.atomic import write_text
-from uam_sim_bridge.report import figures, paper
+from uam_sim_bridge.report import figures, html, paper
 from uam_sim_bridge.report.panels import Flight
 
 
@@ -20,17 +17,13 @@ def build_overlay(
     """Write figures/ and report.html to `out`; return the page."""
     drawn = figures.draw(flights, out / "figures", progress)
     progress("page")
-    environment = jinja2.Environment(
-        loader=jinja2.PackageLoader("uam_sim_bridge.report", "."),
-        autoescape=True,
-        trim_blocks=True,
-        lstrip_blocks=True,
-        undefined=jinja2.StrictUndefined,
-    )
-    text = environment.get_template("overlay.html.j2").render(
+    text = html.template("uam_sim_bridge.report", "overlay.html.j2").render(
         labels=[flight.label for flight in flights],
         tables=[_table(flights, *table) for table in paper.TABLES],
-        figures=[(name, figures.FIGURES[name][1], _embedded(out, name)) for name in drawn],
+        figures=[
+            (name, figures.FIGURES[name][1], html.embedded(out / "figures" / f"{name}.png"))
+            for name in drawn
+        ],
     )
     write_text(out / "report.html", text)
     return out / "report.html"
@@ -52,7 +45,3 @@ def _table(flights: Sequence[Flight], group, heading, unit, digits, names) -> di
         found = metrics.errors(flight.series)[group]
         rows.append((flight.label, [f"{value:.{digits}f}" for value in found]))
     return {"heading": heading, "unit": unit, "names": names, "rows": rows}
-
-
-def _embedded(out: Path, name: str) -> str:
-    return base64.b64encode((out / "figures" / f"{name}.png").read_bytes()).decode()

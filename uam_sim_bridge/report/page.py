@@ -2,21 +2,17 @@
 
 from __future__ import annotations
 
-import base64
 import json
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-import jinja2
-
 from uam_control.laws import catalogue
 from uam_sim_bridge.flight.atomic import write_text
-from uam_sim_bridge.report import changes, fault_marks, outcome, parameters, stability
+from uam_sim_bridge.report import changes, fault_marks, html, outcome, parameters, stability
 from uam_sim_bridge.report.figures import FIGURES
 from uam_sim_bridge.report.rendering import Rendered, existing
 
-MEDIA = {".png": "image/png", ".mp4": "video/mp4"}
 PAPER_SCENARIO = "pick_and_place"
 FACTS = (
     ("controller", "controller"),
@@ -43,14 +39,7 @@ def write_page(directory: Path, rendered: Rendered | None = None) -> Path:
         comparison, no_parameters = parameters.compare(directory / "parameters.yaml"), ""
     except parameters.ProfileError as error:
         comparison, no_parameters = None, str(error)
-    environment = jinja2.Environment(
-        loader=jinja2.PackageLoader("uam_sim_bridge.report", "."),
-        autoescape=True,
-        trim_blocks=True,
-        lstrip_blocks=True,
-        undefined=jinja2.StrictUndefined,
-    )
-    text = environment.get_template("page.html.j2").render(
+    text = html.template("uam_sim_bridge.report", "page.html.j2").render(
         metrics=metrics,
         info={"notes": [], "vehicle_changes": {}} | info,
         verdict=outcome.verdict(metrics),
@@ -100,10 +89,8 @@ def _stability(file: Path) -> dict[str, Any] | None:
 
 
 def _embedded(file: Path | None) -> str | None:
-    """The file as a data URI."""
-    if file is None:
-        return None
-    return f"data:{MEDIA[file.suffix]};base64,{base64.b64encode(file.read_bytes()).decode()}"
+    """The file as a data URI, if there is one."""
+    return None if file is None else html.embedded(file)
 
 
 def _json(file: Path) -> Mapping[str, Any]:
