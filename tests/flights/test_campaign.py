@@ -32,9 +32,10 @@ def test_what_failures_have_in_common_is_found():
 def test_most_random_flights_are_flown_to_the_end(tmp_path, capsys):
     assert main(["campaign", "--flights", str(FLIGHTS), "--out", str(tmp_path)]) == 0
     found = json.loads((tmp_path / "campaign.json").read_text())
-    assert found["flights"] == FLIGHTS and found["lost"] == 0
-    assert found["completed"] >= FLIGHTS // 2
-    assert f"{found['completed']} of {FLIGHTS} flights completed" in capsys.readouterr().out
+    assert found["flights"] == FLIGHTS and found["outcomes"]["lost"] == 0
+    completed = found["outcomes"]["completed"]
+    assert completed >= FLIGHTS // 2 and sum(found["outcomes"].values()) == FLIGHTS
+    assert f"{completed} of {FLIGHTS} flights completed" in capsys.readouterr().out
     rows = list(csv.DictReader((tmp_path / "flights.csv").open()))
     assert len(rows) == FLIGHTS
     assert all(np.isfinite(float(row["rms x"])) for row in rows)

@@ -24,7 +24,7 @@ from uam_control.supervision import (
     SupervisionParameters,
     Supervisor,
 )
-from uam_control.supervision.checks import CHECKS, MEASURED, Checks
+from uam_control.supervision.checks import CHECKS, Checks, measure, read
 from uam_control.supervision.monitor import Level, Monitor
 from uam_control.supervision.states import TARGETS, TRANSITIONS, mermaid
 
@@ -58,8 +58,11 @@ def test_nothing_leads_out_of_failsafe_but_a_command_and_motors_go_off_on_the_gr
 
 
 def test_as_many_quantities_are_measured_as_are_named():
-    assert len(CHECKS) == MEASURED + 6
-    seen = observation()
+    values, seen, two, three = np.full(len(CHECKS), np.nan), observation(), np.ones(2), np.ones(3)
+    measure(seen.state, seen.reference, 0.0, np.zeros((2, 3)), two, values)
+    assert np.isnan(values).sum() == 6
+    read(1.0, 0.0, 0.0, 0.0, two, two, three, three, values)
+    assert not np.isnan(values).any()
     checks = Checks(SupervisionParameters())
     assert checks.update(0.0, seen, True) is None
 

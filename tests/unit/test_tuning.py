@@ -27,8 +27,8 @@ FLIGHT = Result(
     rms=np.full(8, 2.0),
     largest=np.full(8, 10.0),
     flown=1.0,
-    lost=False,
-    completed=True,
+    cut_short=False,
+    outcome="completed",
     why="",
     place_error=0.01,
     restless=(2.0, 8.0),
@@ -56,8 +56,8 @@ SPACE = {
 def test_cost_worked_by_hand():
     # mean (2/1)^2 = 4; peak (10/5)^2 = 4, half of it 2; restless 0.1 (1 + 4) = 0.5
     assert COST.of(FLIGHT) == pytest.approx(6.5)
-    assert COST.of(dataclasses.replace(FLIGHT, completed=False)) == pytest.approx(9.5)
-    lost = dataclasses.replace(FLIGHT, lost=True, flown=0.25)
+    assert COST.of(dataclasses.replace(FLIGHT, outcome="landed")) == pytest.approx(9.5)
+    lost = dataclasses.replace(FLIGHT, cut_short=True, outcome="lost", flown=0.25)
     assert COST.of(lost) == pytest.approx(175.0)
     nothing = dataclasses.replace(FLIGHT, rms=np.full(8, np.nan), flown=0.0)
     assert COST.of(nothing) == pytest.approx(200.0)

@@ -155,9 +155,8 @@ class Mission:
             seen.ready = armed and stamp >= armed_since + p.takeoff_delay
             seen.on_ground = True
             return seen
-        seen.on_ground = bool(
-            state[0, 2] < self._ground + p.touchdown_height and abs(state[1, 2]) < p.touchdown_speed
-        )
+        low = state[0, 2] < self._ground + p.touchdown_height
+        seen.on_ground = bool(low and abs(state[1, 2]) < p.touchdown_speed)
         landing, time = self.scenario.landing, guidance.scenario_time
         seen.landing_due = time >= landing.at
         if time >= landing.at + 0.5 * landing.duration or stamp >= self._half_down:

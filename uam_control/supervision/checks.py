@@ -6,7 +6,6 @@ Nearly always all is in order, and the monitors are asked only otherwise.
 from __future__ import annotations
 
 import math
-from operator import lt
 from typing import NamedTuple
 
 import numpy as np
@@ -35,7 +34,7 @@ class Check(NamedTuple):
     sign: int = 1
 
 
-# as many as `measure` writes, in its order; then the readings
+# in the order in which `measure` writes them
 CHECKS = (
     Check("estimate", "{name} is not finite", failsafe=0.5),
     Check(
@@ -59,7 +58,6 @@ CHECKS = (
     Check("joint torque", "{name} at {value:.2f} of its limit", 1.0),
     Check("adapted gain", "{name} at {value:.2f} of its limit", 1.0),
 )  # fmt: skip
-MEASURED = 7  # by `measure`; the others are readings
 
 
 class Finding(NamedTuple):
@@ -78,7 +76,7 @@ class Checks:
     def __init__(self, parameters: SupervisionParameters) -> None:
         self._monitors = [Monitor() for _ in CHECKS]
         self.quiet = True
-        self._values = np.zeros(MEASURED)
+        self._values = np.zeros(len(CHECKS))
         self.finding: Finding | None = None
         self.configure(parameters)
 
@@ -92,7 +90,7 @@ class Checks:
         self._after = (p.hold_after, p.land_after, p.failsafe_after)
         # below these a monitor has nothing to do unless something was beyond a limit before
         first = [min(limits) for limits in self._limits]
-        self._calm = tuple(limit - p.hysteresis * abs(limit) for limit in first)
+        self._calm = np.array([limit - p.hysteresis * abs(limit) for limit in first])
         self._box = np.array([p.geofence_low, p.geofence_high])
         self._joints = np.array(p.joint_angle_hold)
         self._efforts, self._gains = np.array(p.joint_effort_hold), np.array(p.gain_hold)
@@ -102,15 +100,24 @@ class Checks:
 
         in_flight: whether the reference is one that the vehicle follows.
         """
-        measure(
-            seen.state, seen.reference, seen.ground, self._box, self._joints, self._values
+        readings, values = seen.readings, self._values
+        measure(seen.state, seen.reference, seen.ground, self._box, self._joints, values)
+        read(
+            readings.battery,
+            readings.mocap_age,
+            readings.joint_age,
+            readings.missed_ticks,
+            readings.joint_effort,
+            self._efforts,
+            readings.gains,
+            self._gains,
+            values,
         )
-        values = (*self._values.tolist(), *self._read(seen))
-        if self.quiet and all(map(lt, values, self._calm)):
+        if self.quiet and _below(values, self._calm):
             return None
         p, worst = self._parameters, None
         for check, monitor, value, limits in zip(
-            CHECKS, self._monitors, values, self._limits, strict=True
+            CHECKS, self._monitors, values.tolist(), self._limits, strict=True
         ):
             if check.in_flight and not in_flight:
                 value = -math.inf
@@ -120,19 +127,6 @@ class Checks:
         self.quiet = all(monitor.quiet for monitor in self._monitors)
         self.finding = worst
         return worst
-
-    def _read(self, seen: Observation) -> tuple[float, ...]:
-        """The readings in the order of CHECKS, larger is worse; unknown ones are in order."""
-        readings = seen.readings
-        values = (
-            -readings.battery,
-            readings.mocap_age,
-            readings.joint_age,
-            readings.missed_ticks,
-            _largest(readings.joint_effort, self._efforts),
-            _largest(readings.gains, self._gains),
-        )
-        return tuple(-math.inf if math.isnan(value) else value for value in values)
 
 
 def _limit(parameters: SupervisionParameters, check: Check, limit: str | float) -> float:
@@ -146,19 +140,8 @@ def _cause(check: Check, value: float, limit: float) -> str:
 
 
 @jit
-def _largest(values, limits):
-    """The largest |value| / limit, NaN where all are unknown."""
-    found = math.nan
-    for i in range(len(limits)):
-        ratio = abs(values[i]) / limits[i]
-        if not math.isnan(ratio) and not ratio <= found:
-            found = ratio
-    return found
-
-
-@jit
 def measure(state, reference, ground, box, joints, values):
-    """Write the first quantities of CHECKS into values (7,); only the first where the state is not
+    """Write what state and reference tell into values[:7]; only the first where the state is not
     finite.
 
     box (2, 3): low and high corner [m]; joints (2,): limits of the angles [rad].
@@ -181,3 +164,37 @@ def measure(state, reference, ground, box, joints, values):
     values[4] = state[0, 2] - ground
     values[5] = outside
     values[6] = max(abs(state[0, 6]) / joints[0], abs(state[0, 7]) / joints[1])
+
+
+@jit
+def read(battery, mocap, joints, missed, effort, effort_limits, gains, gain_limits, values):
+    """Write the readings (see `Readings`) into values[7:]; unknown ones are in order."""
+    values[7] = _known(-battery)
+    values[8], values[9], values[10] = _known(mocap), _known(joints), _known(missed)
+    values[11] = _largest(effort, effort_limits)
+    values[12] = _largest(gains, gain_limits)
+
+
+@jit
+def _known(value):
+    return -math.inf if math.isnan(value) else value
+
+
+@jit
+def _largest(values, limits):
+    """The largest |value| / limit of those that are known."""
+    found = -math.inf
+    for i in range(len(limits)):
+        ratio = abs(values[i]) / limits[i]
+        if ratio > found:
+            found = ratio
+    return found
+
+
+@jit
+def _below(values, limits):
+    """Whether every value is below its limit; one that is not a number is not."""
+    for i in range(len(limits)):
+        if not values[i] < limits[i]:
+            return False
+    return True

@@ -87,7 +87,9 @@ class Supervisor:
         """
         if stamp > self._stamp and math.isfinite(stamp):
             self._stamp = stamp
-        self._checks.update(self._stamp, seen, self.state in AIRBORNE_STATES)
+        finding = self._checks.update(self._stamp, seen, self.state in AIRBORNE_STATES)
+        if finding is None and command is None and self._as_usual(seen):
+            return self.decision
         for event, cause in self._events(seen, command):
             if (self.state, event) in TARGETS:
                 self._go(event, cause)
@@ -96,6 +98,10 @@ class Supervisor:
             self._arm = False
             self.decision = self._decide()
         return self.decision
+
+    def _as_usual(self, seen: Observation) -> bool:
+        """Whether a tick without finding and command is like nearly all: flying, nothing due."""
+        return self.state is State.FLYING and seen.armed and not seen.landing_due
 
     def give_up(self, stamp: float, reason: str) -> Decision:
         """End a flight that has not begun; does nothing in one that has."""

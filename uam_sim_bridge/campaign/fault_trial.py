@@ -17,6 +17,7 @@ from uam_sim_bridge.campaign.fault_matrix import Cell
 from uam_sim_bridge.campaign.fault_outcome import LOST, classify
 from uam_sim_bridge.flight import metrics
 from uam_sim_bridge.flight.direct import DirectFlight
+from uam_sim_bridge.flight.outcome import transitions
 from uam_sim_bridge.flight.progress import Progress
 from uam_sim_bridge.flight.result_folder import ResultFolder
 from uam_sim_bridge.flight.settings import ONLOOKERS, FlightSettings
@@ -67,7 +68,8 @@ def _direct(trial: FaultTrial) -> FaultResult:
     )
     flight.run()
     reason = flight.mission.output.abort_reason or flight.ended_by
-    return _result(trial, flight.recording.series(), reason, flight.fault_records)
+    happened, told = flight.fault_records, transitions(flight.mission.changes)
+    return _result(trial, flight.recording.series(), reason, happened, told)
 
 
 def _ros(trial: FaultTrial) -> FaultResult:
@@ -86,15 +88,19 @@ def _ros(trial: FaultTrial) -> FaultResult:
         outcome = ros_engine.fly(settings, ResultFolder(Path(folder)), progress)
     if outcome.series is None:
         return FaultResult(trial.cell.fault, trial.cell.moment, LOST, outcome.reason, 0.0)
-    return _result(trial, outcome.series, outcome.reason, outcome.faults)
+    return _result(trial, outcome.series, outcome.reason, outcome.faults, outcome.transitions)
 
 
 def _result(
-    trial: FaultTrial, series: Series, reason: str, happened: list[dict[str, Any]]
+    trial: FaultTrial,
+    series: Series,
+    reason: str,
+    happened: list[dict[str, Any]],
+    told: list[dict[str, Any]],
 ) -> FaultResult:
     info = {
         "payload_mass_kg": trial.payload_mass, "abort_reason": reason, "faults": happened,
-        "drop_point": load_scenario(trial.scenario).drop_point,
+        "drop_point": load_scenario(trial.scenario).drop_point, "transitions": told,
     }
     figures = metrics.compute(series, info)
     return FaultResult(

@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 from matplotlib.figure import Figure
 
+from uam_sim_bridge.campaign.fault_outcome import COMPLETED, OUTCOMES
 from uam_sim_bridge.campaign.trial import ERRORS, Result
 from uam_sim_bridge.campaign.variations import Draw, common
 from uam_sim_bridge.flight.atomic import replacing, write_rows, write_text
@@ -26,7 +27,7 @@ def write(out: Path, draws: Sequence[Draw], results: Sequence[Result], command: 
     write_text(out / "summary.md", summary)
     write_text(out / "campaign.json", as_json({
         "command": command, "versions": versions(), "flights": len(results),
-        "completed": len(results) - sum(failed), "lost": sum(r.lost for r in results),
+        "outcomes": _outcomes(results),
         "rms_percentiles": {str(p): np.percentile(rms, p, axis=0) for p in PERCENTILES},
         "columns": ERRORS,
         "failures_have_in_common": common(draws, failed),
@@ -38,20 +39,23 @@ def write(out: Path, draws: Sequence[Draw], results: Sequence[Result], command: 
 
 
 def _flights(file: Path, draws: Sequence[Draw], results: Sequence[Result]) -> None:
-    head = ["flight", *draws[0].values, *(f"rms {n}" for n in ERRORS), "completed", "lost", "why"]
+    head = ["flight", *draws[0].values, *(f"rms {n}" for n in ERRORS), "outcome", "why"]
     write_rows(file, head, (
         [i, *(f"{x:.4g}" for x in draw.values.values()), *(f"{x:.4g}" for x in r.rms),
-         r.completed, r.lost, r.why]
+         r.outcome, r.why]
         for i, (draw, r) in enumerate(zip(draws, results, strict=True))
     ))
 
 
 def _summary(draws, results, failed, rms, command: str) -> str:
     count, bad = len(results), sum(failed)
+    others = {o: n for o, n in _outcomes(results).items() if n and o != COMPLETED}
+    told = ", ".join(f"{number} {outcome}" for outcome, number in others.items())
     lines = [
         f"{count - bad} of {count} flights completed the mission "
-        f"({100.0 * (count - bad) / count:.1f} %); {sum(r.lost for r in results)} were lost in "
-        "the air.",
+        f"({100.0 * (count - bad) / count:.1f} %); {told or 'none lost'}.",
+        "",
+        *(f"- {outcome}: {OUTCOMES[outcome]}" for outcome in others),
         "",
         "| RMS error | " + " | ".join(f"{p} % of flights below" for p in PERCENTILES) + " |",
         "|---|" + "---|" * len(PERCENTILES),
@@ -71,6 +75,11 @@ def _summary(draws, results, failed, rms, command: str) -> str:
             f"{kind}: {sum(_kind(r.why) == kind for r in results if not r.completed)}"
             for kind in reasons) + "."]
     return "\n".join([*lines, "", f"Made by `{command}`."]) + "\n"
+
+
+def _outcomes(results: Sequence[Result]) -> dict[str, int]:
+    """How many flights ended in each way, in the order of OUTCOMES."""
+    return {outcome: sum(r.outcome == outcome for r in results) for outcome in OUTCOMES}
 
 
 def _kind(why: str) -> str:

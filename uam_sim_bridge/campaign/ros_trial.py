@@ -43,4 +43,6 @@ def fly(trial: Trial) -> Result:
         raise NotFlown(f"{trial.label}, {trial.payload_mass:g} kg, seed {trial.seed}: "
                        f"{outcome.reason or 'nothing was recorded'}")
     outcome.series.info["controller"] = trial.label
-    return direct.result(trial, scenario, outcome.series, outcome.abort_reason)
+    return direct.result(
+        trial, scenario, outcome.series, outcome.abort_reason, outcome.transitions
+    )

@@ -4,13 +4,16 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from uam_control.mission import Scenario, load_scenario
 from uam_control.profile import Profile
+from uam_sim_bridge.campaign.fault_outcome import COMPLETED, LOST, classify
 from uam_sim_bridge.flight import metrics
 from uam_sim_bridge.flight.direct import DirectFlight
+from uam_sim_bridge.flight.outcome import transitions
 from uam_sim_bridge.flight.timeseries import COLUMNS, Series
 from uam_sim_bridge.plant import Vehicle
 
@@ -35,7 +38,8 @@ class Trial:
 class Result:
     """What is kept of a flight. rms, largest (8,): ERRORS in m and deg, NaN if it never flew.
 
-    flown: from take-off as a share of what was planned; lost: ended in the air, before landing.
+    flown: from take-off as a share of what was planned; cut_short: not landed by the mission.
+    outcome: one of `fault_outcome.OUTCOMES`; why: what kept the mission from being completed.
     restless: RMS change from tick to tick of body-rate setpoints [rad/s] and joint torques [N m].
     peaks: the largest value of each adaptation column.
     """
@@ -46,12 +50,22 @@ class Result:
     rms: np.ndarray
     largest: np.ndarray
     flown: float
-    lost: bool
-    completed: bool
+    cut_short: bool
+    outcome: str
     why: str
     place_error: float | None
     restless: tuple[float, float]
     peaks: dict[str, float]
+
+    @property
+    def completed(self) -> bool:
+        """Whether the whole mission was."""
+        return self.outcome == COMPLETED
+
+    @property
+    def lost(self) -> bool:
+        """Whether it fell, landed hard or was out of control."""
+        return self.outcome == LOST
 
 
 def fly(trial: Trial) -> tuple[Result, Series]:
@@ -61,11 +75,21 @@ def fly(trial: Trial) -> tuple[Result, Series]:
     flight = DirectFlight(scenario, trial.profile, vehicle, trial.payload_mass, trial.seed)
     flight.run()
     series = flight.recording.series({"controller": trial.label})
-    return result(trial, scenario, series, flight.mission.output.abort_reason), series
+    reason, told = flight.mission.output.abort_reason, transitions(flight.mission.changes)
+    return result(trial, scenario, series, reason, told), series
 
 
-def result(trial: Trial, scenario: Scenario, series: Series, abort_reason: str) -> Result:
-    """Take the figures of a flight that was flown; writes its series where they are to be kept."""
+def result(
+    trial: Trial,
+    scenario: Scenario,
+    series: Series,
+    abort_reason: str,
+    told: list[dict[str, Any]],
+) -> Result:
+    """Take the figures of a flight that was flown; writes its series where they are to be kept.
+
+    told: the supervisor's transitions, see `flight.outcome`.
+    """
     if trial.keep is not None:
         series.write(trial.keep)
     figures = metrics.compute(
@@ -74,6 +98,7 @@ def result(trial: Trial, scenario: Scenario, series: Series, abort_reason: str) 
             "payload_mass_kg": trial.payload_mass,
             "drop_point": scenario.drop_point,
             "abort_reason": abort_reason,
+            "transitions": told,
         },
     )
     flown = series.flown
@@ -85,8 +110,8 @@ def result(trial: Trial, scenario: Scenario, series: Series, abort_reason: str) 
         rms=_row(figures["rms"]),
         largest=_row(figures["max"]),
         flown=min(1.0, figures["duration_s"] / planned),
-        lost=not bool(series.in_phase("landed").any()),
-        completed=figures["mission_completed"],
+        cut_short=not bool(series.in_phase("landed").any()),
+        outcome=classify(series, figures),
         why="; ".join(figures["shortfalls"]),
         place_error=figures["payload_place_error_m"],
         restless=(

@@ -81,10 +81,10 @@ def write(
 
 
 def _flights(file: Path, results: Sequence[Result]) -> None:
-    head = ["controller", "payload_kg", "seed", *(f"rms {n}" for n in ERRORS), "completed", "lost",
+    head = ["controller", "payload_kg", "seed", *(f"rms {n}" for n in ERRORS), "outcome",
             "place_error_m", "why"]
     write_rows(file, head, (
-        [r.label, r.payload_mass, r.seed, *(f"{x:.6g}" for x in r.rms), r.completed, r.lost,
+        [r.label, r.payload_mass, r.seed, *(f"{x:.6g}" for x in r.rms), r.outcome,
          "" if r.place_error is None else f"{r.place_error:.4f}", r.why]
         for r in results
     ))
@@ -180,5 +180,4 @@ def _html_row(row: tables.Row, found: Sequence[tables.Row], columns: slice, titl
             worse = f"{tables.degradation(row.mean, proposed.mean)[i]:.0f} %"
         cells.append({"ours": tables.cell(row.mean[i], row.half_width[i], digits),
                       "paper": f"{papers[i]:g}" if papers else "", "worse": worse})
-    lost = f"{row.lost} of {row.flights} lost" if row.lost else ""
-    return {"label": row.label, "lost": lost, "cells": cells}
+    return {"label": row.label, "shortfall": row.shortfall, "cells": cells}

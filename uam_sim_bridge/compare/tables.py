@@ -40,6 +40,12 @@ class Row:
     worst: np.ndarray
     why: tuple[str, ...]
 
+    @property
+    def shortfall(self) -> str:
+        """How many flights were not completed, "" if all were."""
+        short = self.flights - self.completed
+        return f"{short} of {self.flights} not completed" if short else ""
+
 
 def rows(results: Sequence[Result]) -> list[Row]:
     """One row per label, in the order in which labels first occur."""
@@ -48,7 +54,7 @@ def rows(results: Sequence[Result]) -> list[Row]:
 
 
 def row(label: str, results: Sequence[Result]) -> Row:
-    """The row of these flights; what was lost counts up to where it was lost."""
+    """The row of these flights; one that ended early counts up to its end."""
     rms = np.array([result.rms for result in results])
     return Row(
         label=label,
@@ -95,8 +101,7 @@ def claims(found: Sequence[Row]) -> list[str]:
         said.append(_limit("half of it", proposed, AIM))
     for row in found:
         if row.completed < row.flights:
-            said.append(f"{row.label}: {row.flights - row.completed} of {row.flights} flights not "
-                        f"completed, {row.lost} of them lost ({row.why[0]}).")
+            said.append(f"{row.label}: {row.shortfall}, {row.lost} of them lost ({row.why[0]}).")
         elif row.label == PROPOSED:
             said.append(f"{row.label}: all {row.flights} flights completed, none lost.")
     return said
@@ -150,7 +155,7 @@ def as_markdown(found: Sequence[Row]) -> str:
 
 
 def _name(row: Row) -> str:
-    return row.label + (f" ({row.lost} of {row.flights} lost)" if row.lost else "")
+    return row.label + (f" ({row.shortfall})" if row.shortfall else "")
 
 
 def cell(mean: float, half: float, digits: int) -> str:

@@ -3,17 +3,14 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Sequence
-from typing import Any
 
 import numpy as np
 
 from uam_control.coordinates import ARM, ATTITUDE, POSITION, SIZE
 from uam_control.rotations import wrap_angle
-from uam_control.supervision import Change, State
 from uam_sim_bridge.flight.direct import DirectFlight
 from uam_sim_bridge.flight.interrupts import Interrupts
-from uam_sim_bridge.flight.outcome import Outcome, transition
+from uam_sim_bridge.flight.outcome import Outcome, transitions
 from uam_sim_bridge.flight.progress import Progress, Status
 from uam_sim_bridge.flight.result_folder import ResultFolder
 from uam_sim_bridge.flight.settings import FlightSettings
@@ -48,18 +45,9 @@ def fly(settings: FlightSettings, folder: ResultFolder, progress: Progress) -> O
         abort_reason=output.abort_reason,
         failure=flight.ended_by,
         interrupted=stop.raised and not output.done,
-        transitions=_transitions(flight.mission.changes),
+        transitions=transitions(flight.mission.changes),
         faults=flight.fault_records,
     )
-
-
-def _transitions(changes: Sequence[Change]) -> list[dict[str, Any]]:
-    """The supervisor's changes in mission time; from the last one where nothing took off."""
-    takeoff = [change.stamp for change in changes if change.target is State.TAKING_OFF]
-    begin = takeoff[0] if takeoff else changes[-1].stamp if changes else 0.0
-    return [
-        transition(c.stamp - begin, c.source.value, c.target.value, c.cause) for c in changes
-    ]
 
 
 class _Stopped(Exception):

@@ -6,12 +6,22 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
+from uam_control.supervision import Change, State
 from uam_sim_bridge.flight.timeseries import Series
 
 
 def transition(time: float, before: str, after: str, cause: str) -> dict[str, Any]:
     """One change of the supervisor's state, as metrics.json has it; time: mission time [s]."""
     return {"time_s": round(time, 6), "from": before, "to": after, "cause": cause}
+
+
+def transitions(changes: Sequence[Change]) -> list[dict[str, Any]]:
+    """The supervisor's changes in mission time; from the last one where nothing took off."""
+    takeoff = [change.stamp for change in changes if change.target is State.TAKING_OFF]
+    begin = takeoff[0] if takeoff else changes[-1].stamp if changes else 0.0
+    return [
+        transition(c.stamp - begin, c.source.value, c.target.value, c.cause) for c in changes
+    ]
 
 
 @dataclass

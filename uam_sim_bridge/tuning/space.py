@@ -62,7 +62,7 @@ class Cost:
 
     def of(self, result) -> float:
         """The cost of a campaign.trial.Result; finite in any case."""
-        if result.lost or not all(map(math.isfinite, result.rms)):
+        if result.cut_short or not all(map(math.isfinite, result.rms)):
             return self.lost * (2.0 - result.flown)
         share = [(value / aim) ** 2 for value, aim in zip(result.rms, self.aim, strict=True)]
         peak = [
