@@ -37,7 +37,7 @@ slow: setup      ## the slow tests: whole missions, browser, PX4 if it is there;
 	@$(BIN)/python -m pytest -m slow tests
 
 lint: setup      ## style and errors that need no run
-	@$(BIN)/ruff check .
+	@$(BIN)/ruff check . && $(BIN)/ruff format --check --quiet .
 
 clean:           ## remove what setup, tests and colcon made; results/ stays
 	rm -rf $(VENV) build install log .pytest_cache .hypothesis .ruff_cache

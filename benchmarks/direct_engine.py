@@ -27,8 +27,9 @@ STRETCH = 250  # ticks
 
 def new_flight() -> DirectFlight:
     """The paper's mission."""
-    return DirectFlight(load_scenario("pick_and_place"), load_profile("s500"), Vehicle.load(), 0.2,
-                        seed=1)
+    return DirectFlight(
+        load_scenario("pick_and_place"), load_profile("s500"), Vehicle.load(), 0.2, seed=1
+    )
 
 
 def measure() -> tuple[float, float, float]:

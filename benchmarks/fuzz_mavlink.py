@@ -96,10 +96,19 @@ class Campaign:
 
     def save(self, file: Path) -> None:
         """Write the seed and the latest inputs, oldest first."""
-        file.write_text(json.dumps({
-            "seed": self.seed, "stage": self.stage, "bytes": self.bytes,
-            "messages": self.messages, "error": traceback.format_exc(),
-            "inputs": [[data.hex() for data in chunks] for chunks in self.inputs]}, indent=1))
+        file.write_text(
+            json.dumps(
+                {
+                    "seed": self.seed,
+                    "stage": self.stage,
+                    "bytes": self.bytes,
+                    "messages": self.messages,
+                    "error": traceback.format_exc(),
+                    "inputs": [[data.hex() for data in chunks] for chunks in self.inputs],
+                },
+                indent=1,
+            )
+        )
 
     def close(self) -> None:
         """Give the sockets back."""
@@ -113,8 +122,9 @@ def resident() -> float:
     return pages * os.sysconf("SC_PAGE_SIZE") / 1e6
 
 
-def run(total_bytes: int, messages: int, seed: int, say: Callable[[str], None]) -> tuple[
-        Campaign, float]:
+def run(
+    total_bytes: int, messages: int, seed: int, say: Callable[[str], None]
+) -> tuple[Campaign, float]:
     """Feed everything to a new campaign; return it and the growth of the memory [MB].
 
     Raises what a target raises, with `campaign` as its attribute.
@@ -146,13 +156,24 @@ def main() -> int:
     """Run; return the exit status."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--bytes", type=float, default=1e6, help="random bytes (default 1e6)")
-    parser.add_argument("--messages", type=float, default=1e4,
-                        help="mutated messages (default 1e4)")
+    parser.add_argument(
+        "--messages", type=float, default=1e4, help="mutated messages (default 1e4)"
+    )
     parser.add_argument("--seed", type=int, default=1, help="default 1")
-    parser.add_argument("--memory", type=float, default=8.0, metavar="MB",
-                        help="growth of the memory that is allowed (default 8)")
-    parser.add_argument("--save", type=Path, default=Path("fuzz_failure.json"), metavar="FILE",
-                        help="where a failure is written (default %(default)s)")
+    parser.add_argument(
+        "--memory",
+        type=float,
+        default=8.0,
+        metavar="MB",
+        help="growth of the memory that is allowed (default 8)",
+    )
+    parser.add_argument(
+        "--save",
+        type=Path,
+        default=Path("fuzz_failure.json"),
+        metavar="FILE",
+        help="where a failure is written (default %(default)s)",
+    )
     options = parser.parse_args()
     begin = shown = time.monotonic()
 
@@ -168,14 +189,19 @@ def main() -> int:
     except Exception as error:
         campaign = error.campaign
         campaign.save(options.save)
-        print(f"fuzz_mavlink: FAILED with seed {campaign.seed} at {campaign.stage}: "
-              f"{type(error).__name__}: {error}; inputs in {options.save}", file=sys.stderr)
+        print(
+            f"fuzz_mavlink: FAILED with seed {campaign.seed} at {campaign.stage}: "
+            f"{type(error).__name__}: {error}; inputs in {options.save}",
+            file=sys.stderr,
+        )
         return 1
     print("; ".join(f"{what} {count}" for what, count in sorted(campaign.counts.items())))
     flat = grown <= options.memory
-    print(f"fuzz_mavlink: {campaign.bytes} random bytes, {campaign.messages} mutated messages, "
-          f"seed {options.seed}: no failure, memory {grown:+.1f} MB"
-          f"{'' if flat else ' MORE THAN ALLOWED'}, {time.monotonic() - begin:.0f} s")
+    print(
+        f"fuzz_mavlink: {campaign.bytes} random bytes, {campaign.messages} mutated messages, "
+        f"seed {options.seed}: no failure, memory {grown:+.1f} MB"
+        f"{'' if flat else ' MORE THAN ALLOWED'}, {time.monotonic() - begin:.0f} s"
+    )
     return 0 if flat else 1
 
 

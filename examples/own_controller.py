@@ -20,6 +20,7 @@ PERIOD, TORQUE_MAX = 0.004, 2.5  # [s], [N m]
 
 class OwnArmController(Node):
     """PID on the joint angles; the integral carries the arm's weight."""
+
     def __init__(self):
         super().__init__("arm_controller")
         self.reference, self.integral = None, [0.0, 0.0]
@@ -36,14 +37,16 @@ class OwnArmController(Node):
         tau = [0.0, 0.0]
         if self.reference is not None:
             for i, ((a, a_dot), (wanted, wanted_dot)) in enumerate(
-                    zip(arm(message), self.reference, strict=True)):
+                zip(arm(message), self.reference, strict=True)
+            ):
                 self.integral[i] += K_I * PERIOD * (wanted - a)
                 total = K_P * (wanted - a) + K_D * (wanted_dot - a_dot) + self.integral[i]
                 tau[i] = max(-TORQUE_MAX, min(TORQUE_MAX, total))
         self.effort.publish(Float64MultiArray(data=tau))
         points = [JointTrajectoryPoint(effort=tau)]
-        self.command.publish(JointTrajectory(
-            header=message.header, joint_names=JOINTS, points=points))
+        self.command.publish(
+            JointTrajectory(header=message.header, joint_names=JOINTS, points=points)
+        )
 
 
 def arm(message):

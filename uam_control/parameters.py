@@ -64,9 +64,7 @@ def vector(
     return field(default=default, metadata={"spec": spec})
 
 
-def choice(
-    default: str, description: str, choices: tuple[str, ...], fixed: bool = False
-) -> Any:
+def choice(default: str, description: str, choices: tuple[str, ...], fixed: bool = False) -> Any:
     """Declare a field that is one of `choices`; `fixed` once the node runs."""
     return field(default=default, metadata={"spec": Choice(description, choices, fixed)})
 

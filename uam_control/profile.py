@@ -39,8 +39,10 @@ BRIDGE_LINKS = (
     *("autopilot", "gcs"),
 )
 # Parameters that a node has but a profile has not: they belong to a flight.
-FLIGHT_OWN = {**dict.fromkeys(CONTROLLERS, ("control_period",)),
-              "mission": ("control_period", "scenario")}
+FLIGHT_OWN = {
+    **dict.fromkeys(CONTROLLERS, ("control_period",)),
+    "mission": ("control_period", "scenario"),
+}
 
 
 @dataclass(frozen=True)

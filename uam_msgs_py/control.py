@@ -48,9 +48,7 @@ class ReferenceWriter:
     def __init__(self):
         self._whole, self._arm = TrajectoryWriter(ALL), TrajectoryWriter(ARM_NAMES)
 
-    def fill(
-        self, stamp: int, reference: np.ndarray, flying: bool, mission_time: int
-    ) -> bytes:
+    def fill(self, stamp: int, reference: np.ndarray, flying: bool, mission_time: int) -> bytes:
         """Return the message; reference (3, 8), mission_time [ns] (not negative)."""
         if flying:
             return self._whole.fill(stamp, reference, mission_time)

@@ -46,7 +46,9 @@ class _Sequence(ctypes.Structure):
 
 class _FieldType(ctypes.Structure):
     _fields_ = [
-        ("type_id", c_uint8), ("capacity", c_uint64), ("string_capacity", c_uint64),
+        ("type_id", c_uint8),
+        ("capacity", c_uint64),
+        ("string_capacity", c_uint64),
         ("nested_type_name", _String),
     ]
 
@@ -70,8 +72,12 @@ class _Support(ctypes.Structure):
 _FIND = ctypes.CFUNCTYPE(c_void_p, POINTER(_Support), c_char_p)
 _GET = ctypes.CFUNCTYPE(c_void_p, POINTER(_Support))
 _Support._fields_ = [
-    ("identifier", c_char_p), ("data", c_void_p), ("find", _FIND),
-    ("hash", _GET), ("description", _GET), ("sources", _GET),
+    ("identifier", c_char_p),
+    ("data", c_void_p),
+    ("find", _FIND),
+    ("hash", _GET),
+    ("description", _GET),
+    ("sources", _GET),
 ]
 
 
@@ -79,9 +85,13 @@ class _Callbacks(ctypes.Structure):
     """message_type_support_callbacks_t of rosidl_typesupport_fastrtps."""
 
     _fields_ = [
-        ("namespace", c_char_p), ("name", c_char_p), ("serialize", c_void_p),
-        ("deserialize", c_void_p), ("serialized_size", c_void_p),
-        ("max_serialized_size", c_void_p), ("key_callbacks", c_void_p),
+        ("namespace", c_char_p),
+        ("name", c_char_p),
+        ("serialize", c_void_p),
+        ("deserialize", c_void_p),
+        ("serialized_size", c_void_p),
+        ("max_serialized_size", c_void_p),
+        ("key_callbacks", c_void_p),
     ]
 
 
@@ -89,9 +99,16 @@ class _Member(ctypes.Structure):
     """rosidl_typesupport_introspection_c__MessageMember."""
 
     _fields_ = [
-        ("name", c_char_p), ("type_id", c_uint8), ("string_bound", c_size_t),
-        ("members", c_void_p), ("is_key", c_bool), ("is_array", c_bool), ("array_size", c_size_t),
-        ("is_bounded", c_bool), ("offset", c_uint32), ("default", c_void_p),
+        ("name", c_char_p),
+        ("type_id", c_uint8),
+        ("string_bound", c_size_t),
+        ("members", c_void_p),
+        ("is_key", c_bool),
+        ("is_array", c_bool),
+        ("array_size", c_size_t),
+        ("is_bounded", c_bool),
+        ("offset", c_uint32),
+        ("default", c_void_p),
         ("functions", c_void_p * 6),
     ]
 
@@ -100,8 +117,14 @@ class _Members(ctypes.Structure):
     """rosidl_typesupport_introspection_c__MessageMembers."""
 
     _fields_ = [
-        ("namespace", c_char_p), ("name", c_char_p), ("count", c_uint32), ("size", c_size_t),
-        ("has_key", c_bool), ("members", POINTER(_Member)), ("init", c_void_p), ("fini", c_void_p),
+        ("namespace", c_char_p),
+        ("name", c_char_p),
+        ("count", c_uint32),
+        ("size", c_size_t),
+        ("has_key", c_bool),
+        ("members", POINTER(_Member)),
+        ("init", c_void_p),
+        ("fini", c_void_p),
     ]
 
 
@@ -147,9 +170,7 @@ class _Assembled:
         self._describe(_Description.from_address(element.description(ctypes.byref(element))))
         self._hash = _Hash(1, (c_uint8 * 32)(*HASH))
         self._sources = _Sequence()
-        self._getters = [
-            _getter(held) for held in (self._hash, self._description, self._sources)
-        ]
+        self._getters = [_getter(held) for held in (self._hash, self._description, self._sources)]
         fast = _found(array, FASTRTPS)
         self._callbacks = _Callbacks()
         ctypes.pointer(self._callbacks)[0] = _Callbacks.from_address(fast.data)
@@ -177,14 +198,15 @@ class _Assembled:
     def _describe(self, element: _Description) -> None:
         """Note the type's description for whoever asks a node for it."""
         known = (_IndividualDescription * element.referenced.size).from_address(
-            element.referenced.data)
+            element.referenced.data
+        )
         parts = sorted([*known, element.own], key=lambda part: part.type_name.data)
         self._referenced = (_IndividualDescription * len(parts))(*parts)
-        kind = _FieldType(
-            NESTED_SEQUENCE, 0, 0, _String.of("geometry_msgs/msg/TransformStamped"))
+        kind = _FieldType(NESTED_SEQUENCE, 0, 0, _String.of("geometry_msgs/msg/TransformStamped"))
         self._fields = (_Field * 1)(_Field(_String.of(FIELD), kind, _String.of("")))
         own = _IndividualDescription(
-            _String.of(f"{PACKAGE}/msg/{NAME}"), _Sequence.of(self._fields))
+            _String.of(f"{PACKAGE}/msg/{NAME}"), _Sequence.of(self._fields)
+        )
         self._description = _Description(own, _Sequence.of(self._referenced))
 
     def _support(self, _, identifier: bytes) -> int | None:

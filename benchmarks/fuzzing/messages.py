@@ -12,19 +12,58 @@ from uam_sim_bridge.autopilot.params import DEFINITIONS
 from uam_sim_bridge.mavlink.wire import mavlink2
 
 # Numbers and words that lead deeper into the handlers than random ones do.
-FLOATS = (math.nan, math.inf, -math.inf, 0.0, -0.0, 1.0, -1.0, 0.5, 1e-45, 3.4e38, -3.4e38, 1e10,
-          6.0, 21196.0, 30.0, 31.0, 4000.0)
+FLOATS = (
+    math.nan,
+    math.inf,
+    -math.inf,
+    0.0,
+    -0.0,
+    1.0,
+    -1.0,
+    0.5,
+    1e-45,
+    3.4e38,
+    -3.4e38,
+    1e10,
+    6.0,
+    21196.0,
+    30.0,
+    31.0,
+    4000.0,
+)
 INTEGERS = (0, 1, 2, 3, 4, 6, 8, 16, 20, 21, 32, 63, 127, 128, 129, 176, 191, 255, 400, 511, 512)
 WORDS = tuple(name.encode() for name in DEFINITIONS)
-RANGES = {"b": (1, True), "B": (1, False), "h": (2, True), "H": (2, False), "i": (4, True),
-          "I": (4, False), "q": (8, True), "Q": (8, False)}
+RANGES = {
+    "b": (1, True),
+    "B": (1, False),
+    "h": (2, True),
+    "H": (2, False),
+    "i": (4, True),
+    "I": (4, False),
+    "q": (8, True),
+    "Q": (8, False),
+}
 SPOKEN = {  # what each target has a handler for
-    "bridge": ("HEARTBEAT", "COMMAND_ACK", "EXTENDED_SYS_STATE", "STATUSTEXT", "PARAM_VALUE",
-               "TIMESYNC"),
+    "bridge": (
+        "HEARTBEAT",
+        "COMMAND_ACK",
+        "EXTENDED_SYS_STATE",
+        "STATUSTEXT",
+        "PARAM_VALUE",
+        "TIMESYNC",
+    ),
     "autopilot, UDP": (
-        "SET_ATTITUDE_TARGET", "VISION_POSITION_ESTIMATE", "ODOMETRY", "COMMAND_LONG",
-        "COMMAND_INT", "SET_MODE", "PARAM_REQUEST_READ", "PARAM_REQUEST_LIST", "PARAM_SET",
-        "TIMESYNC"),
+        "SET_ATTITUDE_TARGET",
+        "VISION_POSITION_ESTIMATE",
+        "ODOMETRY",
+        "COMMAND_LONG",
+        "COMMAND_INT",
+        "SET_MODE",
+        "PARAM_REQUEST_READ",
+        "PARAM_REQUEST_LIST",
+        "PARAM_SET",
+        "TIMESYNC",
+    ),
     "autopilot, TCP": ("HIL_SENSOR", "VISION_POSITION_ESTIMATE", "ODOMETRY"),
     "plant": ("HIL_ACTUATOR_CONTROLS",),
 }
@@ -33,8 +72,11 @@ KINDS = {kind.msgname: kind for kind in mavlink2.mavlink_map.values()}
 
 def number(rng: random.Random) -> float:
     """A wild number."""
-    return rng.choice(FLOATS) if rng.random() < 0.5 else rng.gauss(0.0, 1.0) * 10.0 ** rng.randint(
-        -300, 300)
+    return (
+        rng.choice(FLOATS)
+        if rng.random() < 0.5
+        else rng.gauss(0.0, 1.0) * 10.0 ** rng.randint(-300, 300)
+    )
 
 
 class Messages:
@@ -45,7 +87,8 @@ class Messages:
         self._spoken = [KINDS[name] for name in SPOKEN[target]]
         self._all = list(KINDS.values())
         self._formats = {
-            kind: re.findall(r"(\d*)([a-zA-Z])", kind.unpacker.format) for kind in self._all}
+            kind: re.findall(r"(\d*)([a-zA-Z])", kind.unpacker.format) for kind in self._all
+        }
         self._sequence = 0
         self._last = b""
         self._late: list[bytes] = []
@@ -64,8 +107,10 @@ class Messages:
         else:
             payload = payload.rstrip(b"\0") or b"\0"
             number = kind.id.to_bytes(3, "little")
-            head = struct.pack(
-                "<BBBBBB", len(payload), 0, 0, self._sequence, system, component) + number
+            head = (
+                struct.pack("<BBBBBB", len(payload), 0, 0, self._sequence, system, component)
+                + number
+            )
             marker = b"\xfd"
         crc = mavlink2.x25crc(head + payload + bytes((kind.crc_extra,))).crc
         return marker + head + payload + struct.pack("<H", crc)
@@ -110,7 +155,7 @@ class Messages:
                 data[rng.randrange(len(data))] ^= 1 << rng.randrange(8)
             frame = bytes(data)
         elif draw < 0.7:
-            how, frame = "truncated", frame[:rng.randrange(len(frame))]
+            how, frame = "truncated", frame[: rng.randrange(len(frame))]
         elif draw < 0.8:
             how, frame = "extended", frame + rng.randbytes(rng.randint(1, 40))
         elif draw < 0.88:

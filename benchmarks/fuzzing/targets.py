@@ -23,6 +23,7 @@ LONGEST_FRAME = 280
 REBORN = 2000  # ticks of one object; then a new one, as a wild value may have silenced it
 FLOAT32 = 1.0 + 1e-6  # limits after rounding to the wire's floats
 
+
 class Violation(AssertionError):
     """Something that must never happen did."""
 
@@ -109,8 +110,12 @@ class Bridge:
         if wild:
             self._identification.switch(number(rng), rng.random() < 0.5)
         factor = self._map.thrust_factor = self._identification.update(
-            number(rng) if rng.random() < 0.01 else now, state, thrust,
-            self._map.assumed_thrust(thrust), rng.random() < 0.9)
+            number(rng) if rng.random() < 0.01 else now,
+            state,
+            thrust,
+            self._map.assumed_thrust(thrust),
+            rng.random() < 0.9,
+        )
         p = self._identification.parameters
         require(p.factor_min <= factor <= p.factor_max, f"thrust factor {factor}")
         self._link.send_setpoint(rates, thrust, now)
@@ -213,7 +218,8 @@ class StandIn:
     def _usual(self):
         yield self._vision
         yield mavlink2.MAVLink_set_attitude_target_message(
-            0, 1, 1, 128, [1, 0, 0, 0], 0.1, 0.0, 0.0, 0.6)
+            0, 1, 1, 128, [1, 0, 0, 0], 0.1, 0.0, 0.0, 0.6
+        )
         if self._ticks % 100 == 0:
             yield mavlink2.MAVLink_command_long_message(1, 1, 176, 0, 1, 6, 0, 0, 0, 0, 0)
             yield mavlink2.MAVLink_command_long_message(1, 1, 400, 0, 1, 0, 0, 0, 0, 0, 0)
@@ -221,8 +227,21 @@ class StandIn:
     def _sensor(self):
         noise = [self._rng.gauss(0.0, 0.1) for _ in range(6)]
         return mavlink2.MAVLink_hil_sensor_message(
-            self._ticks * 4000, noise[0], noise[1], noise[2] - 9.81, *noise[3:],
-            0.2, 0.0, 0.4, 1013.0, 0.0, 0.0, 20.0, 0x1FFF, 0)
+            self._ticks * 4000,
+            noise[0],
+            noise[1],
+            noise[2] - 9.81,
+            *noise[3:],
+            0.2,
+            0.0,
+            0.4,
+            1013.0,
+            0.0,
+            0.0,
+            20.0,
+            0x1FFF,
+            0,
+        )
 
     def _check(self) -> None:
         for data in self._simulator.sent:
@@ -257,7 +276,7 @@ class Plant:
         server = self._server
         for data in chunks:
             for k in range(0, len(data), 60000):
-                self._far.send(data[k:k + 60000])
+                self._far.send(data[k : k + 60000])
                 motors = server.receive(0.0)
                 self._counts["motor commands"] += 1
                 require(bool(np.all((motors >= 0.0) & (motors <= 1.0))), f"motors {motors}")

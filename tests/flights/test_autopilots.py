@@ -61,8 +61,7 @@ def started():
 
 
 @pytest.mark.slow
-def test_an_autopilot_that_the_user_has_started_flies_by_its_udp_link(
-        fly, short_scenario, started):
+def test_an_autopilot_that_the_user_has_started_flies_by_its_udp_link(fly, short_scenario, started):
     with Reservation() as free:
         instance = free.ports.instance
     autopilot = started("--instance", str(instance), "--wait", "120")
@@ -76,12 +75,19 @@ def test_an_autopilot_that_the_user_has_started_flies_by_its_udp_link(
 
 @pytest.mark.slow
 def test_a_flight_controller_on_a_serial_line_flies_the_simulated_vehicle(
-        fly, short_scenario, started):
+    fly, short_scenario, started
+):
     line = SerialLine()
     try:
         started("--serial", f"{line.far}:921600")
-        flight = fly("--scenario", str(short_scenario), "--clock", "realtime",
-                     "--autopilot", f"serial:{line.near}:921600")
+        flight = fly(
+            "--scenario",
+            str(short_scenario),
+            "--clock",
+            "realtime",
+            "--autopilot",
+            f"serial:{line.near}:921600",
+        )
         assert flight.wait() in (0, 1), flight.said + flight.complained
         found = json.loads((flight.out / "metrics.json").read_text())
         # how well it flies in real time depends on the machine; that it armed and took off does not
@@ -92,13 +98,16 @@ def test_a_flight_controller_on_a_serial_line_flies_the_simulated_vehicle(
         line.close()
 
 
-@pytest.mark.parametrize("options, said", [
-    (["--autopilot", "ardupilot"], "builtin, px4, or a link"),
-    (["--autopilot", "udp:127.0.0.1:0"], "port 0 is not in 1..65535"),
-    (["--autopilot", "serial:/dev/null:921600"], "needs --clock realtime"),
-    (["--autopilot", "udp:127.0.0.1:14580", "--engine", "direct"], "needs --engine ros"),
-    (["--gcs", "tcp:127.0.0.1:14550"], "--gcs is udp:HOST:PORT"),
-])
+@pytest.mark.parametrize(
+    "options, said",
+    [
+        (["--autopilot", "ardupilot"], "builtin, px4, or a link"),
+        (["--autopilot", "udp:127.0.0.1:0"], "port 0 is not in 1..65535"),
+        (["--autopilot", "serial:/dev/null:921600"], "needs --clock realtime"),
+        (["--autopilot", "udp:127.0.0.1:14580", "--engine", "direct"], "needs --engine ros"),
+        (["--gcs", "tcp:127.0.0.1:14550"], "--gcs is udp:HOST:PORT"),
+    ],
+)
 def test_a_wrong_autopilot_is_refused_in_one_line(fly, options, said):
     flight = fly(*options)
     assert flight.wait() == 2

@@ -93,8 +93,10 @@ def test_a_browser_sees_and_steers_a_flight_and_strangers_do_not(flight, page):
     slider.focus()
     for _ in range(20):
         page.keyboard.press("ArrowRight")
-    until(lambda: value_in(flight, "position_controller", "lambda_1")[0] > before[0],
-          "the slider counts")
+    until(
+        lambda: value_in(flight, "position_controller", "lambda_1")[0] > before[0],
+        "the slider counts",
+    )
     assert value_in(flight, "position_controller", "lambda_1")[1:] == before[1:]
 
     after = value_in(flight, "position_controller", "lambda_1")

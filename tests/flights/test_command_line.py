@@ -19,8 +19,11 @@ OPTIONS = [
     (["--scenario", "no.csv"], "scenario file no.csv does not exist", ""),
     (["--profile", "mine"], "unknown profile 'mine'; there are: ", "s500"),
     (["--controller", "pid"], "unknown controller 'pid'; there are: modular", ""),
-    (["--profile", "asmc1"], "profile asmc1 has the law asmc1 for position_controller",
-     "--controller asmc1"),
+    (
+        ["--profile", "asmc1"],
+        "profile asmc1 has the law asmc1 for position_controller",
+        "--controller asmc1",
+    ),
     (["--controller", "asmc2", "--profile", "s500"], "profile s500 has the law modular", "asmc2"),
     (["--engine", "fast"], "unknown engine 'fast'; there are: ros, direct", ""),
     (["--clock", "wall"], "unknown clock 'wall'; there are: lockstep, realtime", ""),

@@ -10,8 +10,20 @@ from uam_sim_bridge.compare import plan
 
 
 def compare(out, *options):
-    status = main(["compare", "--rows", "proposed", "--seeds", "1", "--payload-mass", "0.2",
-                   "--out", str(out), *options])
+    status = main(
+        [
+            "compare",
+            "--rows",
+            "proposed",
+            "--seeds",
+            "1",
+            "--payload-mass",
+            "0.2",
+            "--out",
+            str(out),
+            *options,
+        ]
+    )
     assert status == 0
     return json.loads((out / "comparison.json").read_text())
 
@@ -31,11 +43,14 @@ def test_a_comparison_is_written_and_repeats(tmp_path, capsys):
     assert compare(tmp_path / "b", "--jobs", "1")["rows"] == first["rows"]
 
 
-@pytest.mark.parametrize("options, said", [
-    (["--seeds", "0"], "1 or more"),
-    (["--payload-mass", "3"], "0 to 2 kg"),
-    (["--profile", "mine"], "LABEL=FILE"),
-])
+@pytest.mark.parametrize(
+    "options, said",
+    [
+        (["--seeds", "0"], "1 or more"),
+        (["--payload-mass", "3"], "0 to 2 kg"),
+        (["--profile", "mine"], "LABEL=FILE"),
+    ],
+)
 def test_wrong_use_is_refused_in_one_line(options, said, tmp_path, capsys):
     assert main(["compare", "--out", str(tmp_path), *options]) == 2
     error = capsys.readouterr().err

@@ -90,27 +90,51 @@ def test_a_matrix_from_the_command_line(tmp_path, capsys):
         "faults:\n"
         "  - {fault: mocap_dropout, duration: 0.2}\n"
         "  - {fault: motor_loss, remaining: 0}\n"
-        "  - {fault: node_kill}\n")
+        "  - {fault: node_kill}\n"
+    )
     out = tmp_path / "out"
     assert main(["faults", "--matrix", str(file), "--jobs", "2", "--out", str(out)]) == 0
     said = capsys.readouterr().out
     assert "4 flights with a fault: 2 completed" in said and "Only with --engine ros" in said
     told = json.loads((out / "faults.json").read_text())["flights"]
     assert [(f["fault"], f["moment"]) for f in told][:3] == [
-        ("no fault", ""), ("mocap_dropout 0.2 s", "up"), ("mocap_dropout 0.2 s", "down")]
+        ("no fault", ""),
+        ("mocap_dropout 0.2 s", "up"),
+        ("mocap_dropout 0.2 s", "down"),
+    ]
     assert told[0]["outcome"] == "completed" and told[3]["outcome"] == "lost"
     assert {p.name for p in out.iterdir()} == {
-        "faults.json", "flights.csv", "matrix.png", "report.html", "summary.md"}
+        "faults.json",
+        "flights.csv",
+        "matrix.png",
+        "report.html",
+        "summary.md",
+    }
 
 
 @pytest.mark.slow
 def test_ctrl_c_ends_the_matrix_at_once_and_leaves_no_process(tmp_path):
-    command = [sys.executable, "-m", "uam_sim_bridge.cli.main", "faults", "--jobs", "1",
-               "--moment", "transit", "--out", str(tmp_path / "out")]
+    command = [
+        sys.executable,
+        "-m",
+        "uam_sim_bridge.cli.main",
+        "faults",
+        "--jobs",
+        "1",
+        "--moment",
+        "transit",
+        "--out",
+        str(tmp_path / "out"),
+    ]
     running = subprocess.Popen(
-        command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True,
-        cwd=Path(__file__).resolve().parents[2], start_new_session=True,
-        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.default_int_handler))
+        command,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.STDOUT,
+        text=True,
+        cwd=Path(__file__).resolve().parents[2],
+        start_new_session=True,
+        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.default_int_handler),
+    )
     try:
         while "faults: 2 of" not in (line := running.stdout.readline()):
             assert line, "it ended before it was interrupted"
@@ -138,8 +162,11 @@ def _group_is_there(group: int) -> bool:
 
 def test_a_fault_that_cannot_be_flown_is_refused_in_one_line(tmp_path, capsys, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    for text, said in (("node_kill@3", "needs --engine ros"), ("mocap@3", "unknown fault 'mocap'"),
-                       ("mocap_dropout@pick", "no phase 'pick' in the scenario, which has: take-")):
+    for text, said in (
+        ("node_kill@3", "needs --engine ros"),
+        ("mocap@3", "unknown fault 'mocap'"),
+        ("mocap_dropout@pick", "no phase 'pick' in the scenario, which has: take-"),
+    ):
         assert main(["fly", "--engine", "direct", "--scenario", "hover", "--fault", text]) == 2
         err = capsys.readouterr().err
         assert said in err and err.count("\n") == 1

@@ -142,9 +142,7 @@ def test_five_hundred_changes_in_a_flight(fly):
     logged = info["parameter_changes"]
     assert len(logged) == COUNT
     assert 100 < sum(one["accepted"] for one in logged) < 400
-    found = Counter(
-        (one["node"], *one["values"], one["accepted"], one["reason"]) for one in logged
-    )
+    found = Counter((one["node"], *one["values"], one["accepted"], one["reason"]) for one in logged)
     assert found == expected
     for node in NODES:  # in the order in which they were asked, with what was asked
         asked = [r for r in requests if r[0] == node]

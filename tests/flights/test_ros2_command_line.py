@@ -87,8 +87,11 @@ def test_nodes_parameters_and_services(flight, ros2, tmp_path):
     assert flight.wait() == 130  # as every program that Ctrl-C has ended
     changes = json.loads((flight.out / "info.json").read_text())["parameter_changes"]
     for node in CONTROLLERS:
-        values = [c["values"]["varpi"][1] for c in changes
-                  if c["node"] == node and "varpi" in c["values"] and c["accepted"]]
+        values = [
+            c["values"]["varpi"][1]
+            for c in changes
+            if c["node"] == node and "varpi" in c["values"] and c["accepted"]
+        ]
         refused = [c for c in changes if c["node"] == node and not c["accepted"]]
         assert values[0] == 0.3
         assert any("varpi: -1.0 is outside" in c["reason"] for c in refused)

@@ -27,10 +27,13 @@ def kept(flight):
     return figures
 
 
-@pytest.mark.parametrize("victim", [
-    "position_controller",
-    *(pytest.param(name, marks=pytest.mark.slow) for name in ("autopilot", "recorder")),
-])
+@pytest.mark.parametrize(
+    "victim",
+    [
+        "position_controller",
+        *(pytest.param(name, marks=pytest.mark.slow) for name in ("autopilot", "recorder")),
+    ],
+)
 def test_a_killed_node_ends_the_flight_and_is_named(fly, short_scenario, victim):
     flight = fly("--scenario", str(short_scenario))
     flight.until_phase("take-off")

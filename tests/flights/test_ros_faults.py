@@ -13,10 +13,16 @@ from uam_sim_bridge.flight.direct import DirectFlight
 from uam_sim_bridge.plant import Vehicle
 from uam_sim_bridge.report.rebuild import rebuild
 
-IN_BOTH = ("wind_gust@take-off+0+1.5:speed=2", "imu_dropout@hover+0+0.06",
-           "mavlink_corruption@0.5+1:share=0.1")
-IN_NODES = ("mavlink_delay@1+0.5:delay=0.01", "node_stall@hover+0+0.3:node=mission",
-            "node_kill@take-off+0.5:node=scene")
+IN_BOTH = (
+    "wind_gust@take-off+0+1.5:speed=2",
+    "imu_dropout@hover+0+0.06",
+    "mavlink_corruption@0.5+1:share=0.1",
+)
+IN_NODES = (
+    "mavlink_delay@1+0.5:delay=0.01",
+    "node_stall@hover+0+0.3:node=mission",
+    "node_kill@take-off+0.5:node=scene",
+)
 
 
 @pytest.mark.slow
@@ -30,8 +36,9 @@ def test_faults_come_when_they_should_and_the_log_knows_them(fly, short_scenario
     assert len(found) == len(IN_BOTH + IN_NODES)
 
     scenario = load_scenario(str(short_scenario))
-    direct = DirectFlight(scenario, load_profile("s500"), Vehicle.load(), 0.0, 1,
-                          read_schedule(IN_BOTH, scenario, 1))
+    direct = DirectFlight(
+        scenario, load_profile("s500"), Vehicle.load(), 0.0, 1, read_schedule(IN_BOTH, scenario, 1)
+    )
     direct.run()
     for fault in direct.fault_records:
         own = found[fault["fault"]]

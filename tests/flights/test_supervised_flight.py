@@ -55,7 +55,8 @@ def test_a_mission_that_is_held_with_the_payload_and_resumed_is_completed():
     assert made.mission.output.time > 90.0
     point = made.mission.scenario.drop_point
     result = compute(
-        made.recording.series(), {"payload_mass_kg": 0.2, "drop_point": point, "abort_reason": ""})
+        made.recording.series(), {"payload_mass_kg": 0.2, "drop_point": point, "abort_reason": ""}
+    )
     assert result["mission_completed"], result["shortfalls"]
     assert max(result["max"]["position_m"]) < 0.15
 

@@ -71,10 +71,15 @@ class Probe:
         """
         said = self._said
         self.until(
-            lambda: all(
-                p.get_subscription_count() and said.writers(node, p.topic_name) for p in publishers
-            )
-            and all(said.readers(node, topic.name) and self.has_writers(topic) for topic in hears),
+            lambda: (
+                all(
+                    p.get_subscription_count() and said.writers(node, p.topic_name)
+                    for p in publishers
+                )
+                and all(
+                    said.readers(node, topic.name) and self.has_writers(topic) for topic in hears
+                )
+            ),
             f"{node} to be connected",
         )
 
@@ -113,7 +118,9 @@ class Running:
         with log.open("wb") as output:
             self.process = subprocess.Popen(
                 [sys.executable, "-c", code, *arguments],
-                stdin=subprocess.DEVNULL, stdout=output, stderr=subprocess.STDOUT,
+                stdin=subprocess.DEVNULL,
+                stdout=output,
+                stderr=subprocess.STDOUT,
             )
 
     @property

@@ -33,7 +33,10 @@ def free_port(kind):
 def start(*arguments):
     return subprocess.Popen(
         [sys.executable, "-m", "uam_sim_bridge.autopilot.server", *map(str, arguments)],
-        stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+    )
 
 
 class Flight:
@@ -43,11 +46,22 @@ class Flight:
         self.tcp, self.udp = free_port(socket.SOCK_STREAM), free_port(socket.SOCK_DGRAM)
         self.local = free_port(socket.SOCK_DGRAM)
         self.hil = HilServer(self.tcp, parameters=PATIENT)
-        self.process = start("--sim-port", self.tcp, "--mavlink-port", self.udp,
-                             "--companion-port", self.local, *arguments)
+        self.process = start(
+            "--sim-port",
+            self.tcp,
+            "--mavlink-port",
+            self.udp,
+            "--companion-port",
+            self.local,
+            *arguments,
+        )
         self.sequence = OffboardSequence()
-        self.link = OffboardLink(UdpTransport(self.local, ("127.0.0.1", self.udp)), self.sequence,
-                                 RateThrustParameters(), signing=signing)
+        self.link = OffboardLink(
+            UdpTransport(self.local, ("127.0.0.1", self.udp)),
+            self.sequence,
+            RateThrustParameters(),
+            signing=signing,
+        )
         self.body = Quadrotor()
         self.streaming = self.vision = True
         self.heard = []
@@ -64,8 +78,7 @@ class Flight:
             link.send_vision(body.time, body.position, body.quaternion, 0.005, 0.02)
         if self.streaming and self.sequence.streaming:
             link.send_setpoint(np.array(rates, float), thrust, body.time)
-        motors = self.hil.exchange(
-            body.time, body.gyro, body.accel, body.position, body.quaternion)
+        motors = self.hil.exchange(body.time, body.gyro, body.accel, body.position, body.quaternion)
         assert self.hil.answered
         body.step(motors)
 
@@ -103,8 +116,7 @@ def test_arms_flies_and_tracks_rate_steps(flight):
     assert flight.hil.armed and flight.link.mode is Mode.OFFBOARD
     assert 1.0 < flight.sequence.armed_stamp < 1.2
     # hover thrust from the map carries the weight
-    _, thrust = RateThrustMap().map(
-        np.array([0, 0, HOVER]), np.zeros(3), np.zeros(3), np.zeros(3))
+    _, thrust = RateThrustMap().map(np.array([0, 0, HOVER]), np.zeros(3), np.zeros(3), np.zeros(3))
     flight.run(1.0, thrust=thrust)
     assert flight.body.thrusts.sum() == pytest.approx(HOVER, rel=2e-3)
     # roll step of 1 rad/s (FLU): 10 - 90 % quickly, little overshoot, no coupling
@@ -185,7 +197,7 @@ def test_garbage_and_truncated_bytes_are_survived(flight):
     kill = good.encode(mavlink2.MAVLink_command_long_message(1, 1, 400, 0, 0, 21196, 0, 0, 0, 0, 0))
     for _ in range(200):
         flight.link._transport.send(noise.randbytes(noise.randrange(1, 300)))
-        flight.link._transport.send(kill[:noise.randrange(1, len(kill))])
+        flight.link._transport.send(kill[: noise.randrange(1, len(kill))])
         stranger.sendto(kill, ("127.0.0.1", flight.udp))  # not the first peer
         flight.tick(thrust=HOVER / 41.36)
     assert flight.hil.armed and flight.link.mode is Mode.OFFBOARD
@@ -278,8 +290,13 @@ class FakeAutopilot:
         return self.framer.stream(self.socket.recv(65536))
 
     def answer(self, microseconds, motors, mode):
-        self.socket.sendall(self.codec.encode(mavlink2.MAVLink_hil_actuator_controls_message(
-            microseconds, [*motors, *[0.0] * 12], mode, 1)))
+        self.socket.sendall(
+            self.codec.encode(
+                mavlink2.MAVLink_hil_actuator_controls_message(
+                    microseconds, [*motors, *[0.0] * 12], mode, 1
+                )
+            )
+        )
 
 
 @pytest.fixture
@@ -292,8 +309,12 @@ def pair():
     server.close()
 
 
-BODY = (np.array([0.1, 0.2, 0.3]), np.array([0.0, 0.0, 9.81]), np.zeros(3),
-        np.array([1.0, 0.0, 0.0, 0.0]))
+BODY = (
+    np.array([0.1, 0.2, 0.3]),
+    np.array([0.0, 0.0, 9.81]),
+    np.zeros(3),
+    np.array([1.0, 0.0, 0.0, 0.0]),
+)
 
 
 def test_sensor_message_is_frd_with_slow_sensors_at_50_hz(pair):
@@ -323,7 +344,8 @@ def test_motors_count_only_while_armed_and_finite(pair):
     fake.answer(0, [0.1, 0.2, 0.3, 1.4], 129)
     assert server.receive(1.0) == pytest.approx([0.1, 0.2, 0.3, 1.0]) and server.armed
     for k, (motors, mode) in enumerate(
-            [([0.5] * 4, 1), ([0.5, float("nan"), 0.5, 0.5], 129)], start=1):
+        [([0.5] * 4, 1), ([0.5, float("nan"), 0.5, 0.5], 129)], start=1
+    ):
         server.send(0.004 * k, *BODY)
         fake.answer(4000 * k, motors, mode)
         assert np.all(server.receive(1.0) == 0.0)

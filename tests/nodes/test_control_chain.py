@@ -30,8 +30,13 @@ from uam_msgs_py.status import AutopilotState, MissionStatus
 PERIOD = 4_000_000  # [ns]
 ARMED_AT = 40 * PERIOD  # take-off follows 0.5 s later
 TICKS = 200
-NODES = ("state_estimator", "mission", "position_controller", "attitude_controller",
-         "arm_controller")
+NODES = (
+    "state_estimator",
+    "mission",
+    "position_controller",
+    "attitude_controller",
+    "arm_controller",
+)
 
 
 def samples():
@@ -126,10 +131,12 @@ class Plant:
             "arm_controller": (*both, topics.POSITION_COMMAND),
         }
         self.probe.until(
-            lambda: all(said.readers(*who) >= count for who, count in readers.items())
-            and all(said.writers(node, t.name) for node, heard in hears.items() for t in heard)
-            and all(p.get_subscription_count() for p in (self.imu, self.joints, self.mocap))
-            and all(self.probe.has_writers(topic) for topic in self.heard),
+            lambda: (
+                all(said.readers(*who) >= count for who, count in readers.items())
+                and all(said.writers(node, t.name) for node, heard in hears.items() for t in heard)
+                and all(p.get_subscription_count() for p in (self.imu, self.joints, self.mocap))
+                and all(self.probe.has_writers(topic) for topic in self.heard)
+            ),
             "connections",
         )
 

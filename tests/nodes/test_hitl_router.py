@@ -77,12 +77,21 @@ class Bench:
         self.hil = HilServer(tcp, parameters=hil)
         self.autopilot = start(AUTOPILOT, "--serial", f"{self.cable.ends[1]}:921600")
         self.autopilot.until_said("on the serial line")
-        self.router = start(ROUTER, f"serial:{self.cable.ends[0]}:921600", "--sim-port", str(tcp),
-                            "--mavlink-port", str(self.udp), "--companion-port", str(local),
-                            *arguments)
+        self.router = start(
+            ROUTER,
+            f"serial:{self.cable.ends[0]}:921600",
+            "--sim-port",
+            str(tcp),
+            "--mavlink-port",
+            str(self.udp),
+            "--companion-port",
+            str(local),
+            *arguments,
+        )
         self.sequence = OffboardSequence()
         self.link = OffboardLink(
-            UdpTransport(local, ("127.0.0.1", self.udp)), self.sequence, RateThrustParameters())
+            UdpTransport(local, ("127.0.0.1", self.udp)), self.sequence, RateThrustParameters()
+        )
         self.body = Quadrotor()
         self.ticks = self.answered = 0
         assert self.hil.accept(PATIENCE), self.router.output
@@ -97,8 +106,7 @@ class Bench:
             link.send_vision(body.time, body.position, body.quaternion, 0.005, 0.02)
         if self.sequence.streaming:
             link.send_setpoint(np.zeros(3), thrust, body.time)
-        motors = self.hil.exchange(
-            body.time, body.gyro, body.accel, body.position, body.quaternion)
+        motors = self.hil.exchange(body.time, body.gyro, body.accel, body.position, body.quaternion)
         self.answered += self.hil.answered
         body.step(motors)
 
@@ -107,7 +115,8 @@ class Bench:
         end = time.monotonic() + PATIENCE
         while not condition():
             assert time.monotonic() < end, f"{what}: not within {PATIENCE:g} s\n" + (
-                self.router.output + self.autopilot.output)
+                self.router.output + self.autopilot.output
+            )
             self.tick(thrust)
 
     def arm(self):
@@ -189,9 +198,16 @@ class Wires:
         self.bridge.bind(("127.0.0.1", 0))
         self.bridge.settimeout(PATIENCE)
         self.router = start(
-            ROUTER, f"serial:{device}:{baud}", "--sim-port", str(port),
-            "--mavlink-port", str(self.udp), "--companion-port",
-            str(self.bridge.getsockname()[1]), *arguments)
+            ROUTER,
+            f"serial:{device}:{baud}",
+            "--sim-port",
+            str(port),
+            "--mavlink-port",
+            str(self.udp),
+            "--companion-port",
+            str(self.bridge.getsockname()[1]),
+            *arguments,
+        )
         self.listener.settimeout(PATIENCE)
         self.plant, _ = self.listener.accept()
         self.plant.settimeout(PATIENCE)
@@ -275,8 +291,9 @@ def test_no_commands_at_all_are_no_trouble(wires):
     for k in range(200):
         w.plant.sendall(w.codec.encode(sensor(4_000 * k)))
         time.sleep(0.0005)
-    w.until(lambda: [m for m in w.hear() if m.get_type() == "HIL_SENSOR"
-                     and m.time_usec == 199 * 4_000])
+    w.until(
+        lambda: [m for m in w.hear() if m.get_type() == "HIL_SENSOR" and m.time_usec == 199 * 4_000]
+    )
     assert w.router.process.poll() is None
 
 

@@ -53,12 +53,25 @@ class Rig:
         self.probe, self.count = probe, 0
         self.setpoints = probe.collect(topics.SETPOINT)
         self.states = probe.collect(topics.AUTOPILOT_STATE)
-        self.out = {t.name: probe.publisher(t) for t in (
-            topics.STATE, topics.POSITION_COMMAND, topics.ATTITUDE_COMMAND, topics.MOCAP,
-            topics.ARMING)}
-        self.node = start(MODULE, "--ros-args", "-p", f"local_port:={self.local}", "-p",
-                          f"autopilot_port:={self.remote}",
-                          *(a.format(local=self.local, remote=self.remote) for a in arguments))
+        self.out = {
+            t.name: probe.publisher(t)
+            for t in (
+                topics.STATE,
+                topics.POSITION_COMMAND,
+                topics.ATTITUDE_COMMAND,
+                topics.MOCAP,
+                topics.ARMING,
+            )
+        }
+        self.node = start(
+            MODULE,
+            "--ros-args",
+            "-p",
+            f"local_port:={self.local}",
+            "-p",
+            f"autopilot_port:={self.remote}",
+            *(a.format(local=self.local, remote=self.remote) for a in arguments),
+        )
         self.state, self.pose = TrajectoryWriter(NAMES), PoseWriter()
         self.position, self.torque = PositionCommandWriter(), TorqueWriter(ATTITUDE_NAMES)
         hears = (topics.SETPOINT, topics.AUTOPILOT_STATE)
@@ -80,10 +93,14 @@ class Rig:
             self.publish(topics.POSITION_COMMAND, self.position.idle(stamp))
             self.publish(topics.ATTITUDE_COMMAND, self.torque.idle(stamp))
         else:
-            self.publish(topics.POSITION_COMMAND, self.position.fill(
-                stamp, chi, np.zeros((3, 3)), np.array(tau_p, float)))
-            self.publish(topics.ATTITUDE_COMMAND,
-                         self.torque.fill(stamp, np.array(tau_q or (0, 0, 0), float)))
+            self.publish(
+                topics.POSITION_COMMAND,
+                self.position.fill(stamp, chi, np.zeros((3, 3)), np.array(tau_p, float)),
+            )
+            self.publish(
+                topics.ATTITUDE_COMMAND,
+                self.torque.fill(stamp, np.array(tau_q or (0, 0, 0), float)),
+            )
 
     def hear(self):
         """Let the autopilot take what has arrived; return the messages."""
@@ -150,8 +167,9 @@ def make_rig(probe, start):
 
 def test_alone_it_waits_and_stops(start):
     node = start(MODULE, "--ros-args", "-p", f"local_port:={free_port()}")
-    node.until_said("waiting for /vrpn_mocap/uam/pose, /uam/state, /uam/position/command, "
-                    "/uam/attitude/command")
+    node.until_said(
+        "waiting for /vrpn_mocap/uam/pose, /uam/state, /uam/position/command, /uam/attitude/command"
+    )
     assert node.interrupt(times=3) == 0
     assert "Traceback" not in node.output
 
@@ -202,7 +220,8 @@ def test_from_the_ground_to_hover_and_back(make_rig):
     assert (sent.body_roll_rate, sent.body_pitch_rate) == pytest.approx((rates[0], 0.0), rel=1e-5)
     assert sent.thrust == pytest.approx(thrust)
     assert {"HEARTBEAT", "VISION_POSITION_ESTIMATE", "COMMAND_LONG", "PARAM_REQUEST_READ"} <= (
-        rig.kinds())
+        rig.kinds()
+    )
     # landed: idle commands, then disarm
     rig.body.position[2] = 0.0
     rig.body.velocity[:] = rig.body.gyro[:] = 0.0
@@ -398,8 +417,9 @@ def test_a_ground_station_watches_and_may_speak(make_rig):
             rig.tick((0, 0, WEIGHT))
             if any(m.get_srcSystem() == 255 for m in rig.received):
                 break
-        assert any(m.get_srcSystem() == 255 and m.get_type() == "PARAM_REQUEST_READ"
-                   for m in rig.received)
+        assert any(
+            m.get_srcSystem() == 255 and m.get_type() == "PARAM_REQUEST_READ" for m in rig.received
+        )
         assert rig.autopilot.status.armed and rig.autopilot.status.mode is Mode.OFFBOARD
         states = [AutopilotState.from_message(m)[1] for m in rig.states]
         assert states[-1].armed and states[-1].mode == "OFFBOARD"
@@ -427,6 +447,8 @@ def test_signed_on_both_sides_and_nothing_else_is_taken(make_rig, tmp_path):
 
     rig.probe.until(refused, "refusals under /diagnostics")
     assert key not in rig.node.output
+
+
 def test_mapping_parameters_of_the_autopilot_are_adopted(make_rig):
     rig = make_rig("-p", "autopilot_parameters:=adopt")
     rig.autopilot.set_parameter("THR_MDL_FAC", 0.3)
@@ -437,8 +459,9 @@ def test_mapping_parameters_of_the_autopilot_are_adopted(make_rig):
     assert rates == pytest.approx([0.1 / (5.00105 * 0.3), 0, 0], rel=1e-3, abs=1e-9)
     # never in flight
     rig.autopilot.set_parameter("MC_PITCHRATE_P", 0.3)
-    rig.companion.handle(rig.body.time, mavlink2.MAVLink_param_request_read_message(
-        1, 1, b"MC_PITCHRATE_P", -1))
+    rig.companion.handle(
+        rig.body.time, mavlink2.MAVLink_param_request_read_message(1, 1, b"MC_PITCHRATE_P", -1)
+    )
     for _ in range(20):
         rig.tick((0, 0, WEIGHT))
     rig.node.until_said("MC_PITCHRATE_P is 0.3 on the autopilot, the bridge assumes 0.15")
@@ -456,13 +479,22 @@ def test_battery_and_health_are_published(make_rig, probe):
     assert len(batteries) >= 2 and not batteries[-1].present
     assert math.isnan(batteries[-1].voltage) and math.isnan(batteries[-1].percentage)
     rig.socket.sendto(
-        rig.codec.encode(mavlink2.MAVLink_battery_status_message(
-            0, 0, 1, 2500, [4000] * 4 + [65535] * 6, 500, 100, -1, 75)),
-        ("127.0.0.1", rig.local))
+        rig.codec.encode(
+            mavlink2.MAVLink_battery_status_message(
+                0, 0, 1, 2500, [4000] * 4 + [65535] * 6, 500, 100, -1, 75
+            )
+        ),
+        ("127.0.0.1", rig.local),
+    )
     for _ in range(260):
         rig.tick()
-    assert any(b.present and b.voltage == pytest.approx(16.0) and b.current == pytest.approx(-5.0)
-               and b.percentage == pytest.approx(0.75) for b in batteries)
+    assert any(
+        b.present
+        and b.voltage == pytest.approx(16.0)
+        and b.current == pytest.approx(-5.0)
+        and b.percentage == pytest.approx(0.75)
+        for b in batteries
+    )
 
     def values():
         found = [s for m in reports for s in m.status if s.name == "mavlink_bridge"]

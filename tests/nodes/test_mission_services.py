@@ -30,8 +30,10 @@ class Vehicle:
         self.state = np.zeros((3, 8))
         self.state[0, 2], self.state[0, 7] = 0.28, np.pi / 2
         probe.until_connected(
-            "mission", [self.states, self.autopilot, self.battery],
-            [topics.REFERENCE, topics.MAGNET, topics.MISSION_STATUS])
+            "mission",
+            [self.states, self.autopilot, self.battery],
+            [topics.REFERENCE, topics.MAGNET, topics.MISSION_STATUS],
+        )
 
     def arm(self):
         self.autopilot.publish(AutopilotState(True, "OFFBOARD", True, 1).to_message(1))
@@ -103,7 +105,8 @@ def test_hold_resume_land_and_disarm_answer_and_are_followed(vehicle):
 def test_an_empty_battery_lands_and_the_diagnostics_say_why(vehicle, probe):
     said = []
     probe.node.create_subscription(
-        DiagnosticArray, topics.DIAGNOSTICS.name, said.append, topics.DIAGNOSTICS.qos)
+        DiagnosticArray, topics.DIAGNOSTICS.name, said.append, topics.DIAGNOSTICS.qos
+    )
     take_off(vehicle)
     vehicle.battery.publish(BatteryState(percentage=0.1))
     vehicle.until_state("landing")

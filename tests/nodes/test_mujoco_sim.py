@@ -78,9 +78,16 @@ def test_its_topics_are_those_of_the_contract(start, probe):
 
 def test_the_list_of_wires_is_that_of_the_running_nodes(start, probe, tmp_path):
     """All nodes run, idle; what they publish and hear is what `wiring` says, both ways."""
-    modules = ["uam_control.nodes." + name for name in (
-        "state_estimator", "mission", "position_controller", "attitude_controller",
-        "arm_controller")]
+    modules = [
+        "uam_control.nodes." + name
+        for name in (
+            "state_estimator",
+            "mission",
+            "position_controller",
+            "attitude_controller",
+            "arm_controller",
+        )
+    ]
     nodes = [start(module) for module in modules]
     ports = ["--ros-args", "-p", f"local_port:={free_port()}"]
     nodes += [start(MODULE, *options()), start("uam_sim_bridge.nodes.mavlink_bridge", *ports)]

@@ -22,9 +22,7 @@ TICK = 4_000_000
 def recorder(start, tmp_path, probe):
     """A recorder that hears the probe: (process, file, statistics file)."""
     file, statistics = tmp_path / "log.mcap", tmp_path / "recorder.json"
-    running = start(
-        MODULE, "--ros-args", "-p", f"file:={file}", "-p", f"statistics:={statistics}"
-    )
+    running = start(MODULE, "--ros-args", "-p", f"file:={file}", "-p", f"statistics:={statistics}")
     running.until_said("recorder: ")
     return running, file, statistics
 

@@ -160,8 +160,11 @@ def test_a_dry_run_changes_nothing_and_tells_nothing(flying, probe):
 @pytest.mark.parametrize("node", NODES)
 def test_every_parameter_of_every_node_says_what_it_is(start, probe, node):
     start(f"uam_control.nodes.{node}")
-    names = [n for n in list_names(probe, node) if "." not in n and n not in
-             ("use_sim_time", "start_type_description_service")]
+    names = [
+        n
+        for n in list_names(probe, node)
+        if "." not in n and n not in ("use_sim_time", "start_type_description_service")
+    ]
     request = DescribeParameters.Request(names=names)
     found = probe.call(DescribeParameters, f"/{node}/describe_parameters", request).descriptors
     values = get(probe, node, *names)
@@ -229,8 +232,10 @@ def test_a_profile_is_taken_by_all_nodes_or_by_none(start, probe, switch, tmp_pa
     changes = changes_of(probe)
     assert switch.switch(load_profile("s500")) == {}
     file = tmp_path / "mine.yaml"
-    file.write_text("arm_controller: {ros__parameters: {varpi: 0.9, nu: [1.0, 2.0, 3.0, 4.0]}}\n"
-                    "position_controller: {ros__parameters: {thrust_max: 30.0}}\n")
+    file.write_text(
+        "arm_controller: {ros__parameters: {varpi: 0.9, nu: [1.0, 2.0, 3.0, 4.0]}}\n"
+        "position_controller: {ros__parameters: {thrust_max: 30.0}}\n"
+    )
     changed = switch.switch(load_profile("s500", str(file)))
     assert changed["position_controller"] == {"thrust_max": (36.0, 30.0)}
     assert set(changed["arm_controller"]) == {"varpi", "nu"}

@@ -33,7 +33,11 @@ class Workspace:
         """Output of a Python program that runs after sourcing."""
         command = [sys.executable, "-c", program]
         done = subprocess.run(
-            command, env=self.environment, cwd=self.folder, capture_output=True, text=True,
+            command,
+            env=self.environment,
+            cwd=self.folder,
+            capture_output=True,
+            text=True,
             timeout=PATIENCE,
         )
         assert done.returncode == 0, done.stderr
@@ -52,13 +56,22 @@ def workspace(request, tmp_path_factory) -> Workspace:
     offline = {"http_proxy": NOWHERE, "https_proxy": NOWHERE, "PIP_NO_INDEX": "1"}
     options = ["--symlink-install"] if request.param == "symlink" else []
     built = subprocess.run(
-        [sys.executable, "-m", "colcon", "build", *options], cwd=folder, env=clean | offline,
-        stdin=subprocess.DEVNULL, capture_output=True, text=True, timeout=PATIENCE,
+        [sys.executable, "-m", "colcon", "build", *options],
+        cwd=folder,
+        env=clean | offline,
+        stdin=subprocess.DEVNULL,
+        capture_output=True,
+        text=True,
+        timeout=PATIENCE,
     )
     assert built.returncode == 0, built.stdout + built.stderr
     sourced = subprocess.run(
-        ["sh", "-c", ". install/setup.sh && env -0"], cwd=folder, env=clean,
-        capture_output=True, text=True, check=True,
+        ["sh", "-c", ". install/setup.sh && env -0"],
+        cwd=folder,
+        env=clean,
+        capture_output=True,
+        text=True,
+        check=True,
     )
     pairs = (entry.partition("=") for entry in sourced.stdout.split("\0") if "=" in entry)
     return Workspace(folder, {name: value for name, _, value in pairs})

@@ -64,12 +64,17 @@ def test_every_node_starts(workspace):
     wrong = ["--ros-args", "-p", "no_such_parameter:=1"]
     wrong += ["-p", "autopilot:=udp:127.0.0.1:9"]  # the bridge's port may be another flight's
     surroundings = workspace.environment | {
-        "ROS_AUTOMATIC_DISCOVERY_RANGE": "OFF", "ROS_LOG_DIR": str(workspace.folder / "log")
+        "ROS_AUTOMATIC_DISCOVERY_RANGE": "OFF",
+        "ROS_LOG_DIR": str(workspace.folder / "log"),
     }
     running = {
         name: subprocess.Popen(
-            [file, *(["--help"] if name in HELPFUL else wrong)], env=surroundings,
-            stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True,
+            [file, *(["--help"] if name in HELPFUL else wrong)],
+            env=surroundings,
+            stdin=subprocess.DEVNULL,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.STDOUT,
+            text=True,
         )
         for name, file in executables(workspace).items()
     }

@@ -61,8 +61,17 @@ def test_garbage_on_the_link_changes_nothing(hovering):
 
 def test_another_mode_from_a_ground_station_is_taken_back(hovering):
     command = mavlink2.MAVLink_command_long_message(
-        hovering.system, mavlink2.MAV_COMP_ID_AUTOPILOT1, Command.DO_SET_MODE, 0,
-        CUSTOM_MODE_ENABLED, *Mode.LAND.value, 0, 0, 0, 0)
+        hovering.system,
+        mavlink2.MAV_COMP_ID_AUTOPILOT1,
+        Command.DO_SET_MODE,
+        0,
+        CUSTOM_MODE_ENABLED,
+        *Mode.LAND.value,
+        0,
+        0,
+        0,
+        0,
+    )
     hovering.send_raw(Codec(255, mavlink2.MAV_COMP_ID_MISSIONPLANNER).encode(command))
     hovering.hover(4.0)
     assert Mode.LAND in hovering.modes_seen

@@ -56,19 +56,30 @@ def test_texts_of_px4(text, part):
 
 def test_every_event_in_the_table_has_advice():
     texts = [text for text, _ in (*CHECKS.values(), *OTHERS.values())]
-    filled = [re.sub(r"{\d[^}]*}", "1", text).replace("{cause}", "GCS connection loss")
-              for text in texts]
+    filled = [
+        re.sub(r"{\d[^}]*}", "1", text).replace("{cause}", "GCS connection loss") for text in texts
+    ]
     assert [text for text in filled if advice(text) is None] == []
 
 
 def test_every_pattern_is_reachable():
     """A pattern that an earlier one always beats is a mistake: each is some text's first match."""
-    events = [re.sub(r"{\d[^}]*}", "1", text).replace("{cause}", "generic")
-              for text, _ in (*CHECKS.values(), *OTHERS.values())]
-    said = [text for text, _ in TEXTS] + events + [
-        "Imbalanced propeller detected", "Arm auth: Denied",
-        "arming refused (temporarily rejected)", "arming refused (denied)",
-        "the autopilot disarmed in flight", "Missing FMU SD Card"]
+    events = [
+        re.sub(r"{\d[^}]*}", "1", text).replace("{cause}", "generic")
+        for text, _ in (*CHECKS.values(), *OTHERS.values())
+    ]
+    said = (
+        [text for text, _ in TEXTS]
+        + events
+        + [
+            "Imbalanced propeller detected",
+            "Arm auth: Denied",
+            "arming refused (temporarily rejected)",
+            "arming refused (denied)",
+            "the autopilot disarmed in flight",
+            "Missing FMU SD Card",
+        ]
+    )
     used = {advice(text) for text in said}
     assert [pattern for pattern, what in ADVICE if what not in used] == []
 
@@ -84,6 +95,8 @@ def test_the_sequences_reasons_carry_it():
     s = OffboardSequence()
     s.text(2, "Preflight Fail: ekf2 missing data\t")
     s.answer(Request.ARM, Result.TEMPORARILY_REJECTED)
-    assert s.reasons[0] == ("Preflight Fail: ekf2 missing data → the estimator has no vision pose "
-                            "yet: check mocap and EKF2_EV_CTRL")
+    assert s.reasons[0] == (
+        "Preflight Fail: ekf2 missing data → the estimator has no vision pose "
+        "yet: check mocap and EKF2_EV_CTRL"
+    )
     assert s.reasons[1].startswith("arming refused (temporarily rejected) → an arming check failed")

@@ -46,7 +46,8 @@ def test_mixer_does_not_depend_on_the_size():
 def test_torque_scale_by_hand():
     # 4 rotors, each sqrt(1/2) of 10.34 N at 0.171 m; 4 rotors at 0.016 m
     assert torque_scale(PX, PY, KM, 10.34) == pytest.approx(
-        [4 * HALF * 10.34 * 0.171, 4 * HALF * 10.34 * 0.171, 4 * 10.34 * 0.016])
+        [4 * HALF * 10.34 * 0.171, 4 * HALF * 10.34 * 0.171, 4 * 10.34 * 0.016]
+    )
 
 
 def test_singular_geometry_is_refused():

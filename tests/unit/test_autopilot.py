@@ -179,7 +179,8 @@ def test_a_torque_through_the_map_is_the_torque_that_acts():
     bench = airborne()
     tau_q = np.array([0.2, -0.15, 0.0])
     rates, thrust = RateThrustMap().map(
-        np.array([0.0, 0.0, MASS * 9.81]), tau_q, np.zeros(3), bench.body.gyro)
+        np.array([0.0, 0.0, MASS * 9.81]), tau_q, np.zeros(3), bench.body.gyro
+    )
     bench.autopilot.set_parameter("MC_ROLLRATE_I", 0.0)
     motors = bench.autopilot
     bench.tick((rates, thrust))
@@ -283,8 +284,13 @@ def test_integral_is_frozen_on_the_ground_and_cleared_when_disarmed():
 
 def test_parameters_are_checked_and_take_effect():
     autopilot = Autopilot()
-    for name, value in (("MC_ROLLRATE_P", -1.0), ("NOT_THERE", 1.0), ("THR_MDL_FAC", math.nan),
-                        ("MAV_SYS_ID", 1.5), ("COM_OF_LOSS_T", True)):
+    for name, value in (
+        ("MC_ROLLRATE_P", -1.0),
+        ("NOT_THERE", 1.0),
+        ("THR_MDL_FAC", math.nan),
+        ("MAV_SYS_ID", 1.5),
+        ("COM_OF_LOSS_T", True),
+    ):
         with pytest.raises(ParameterError, match=name):
             autopilot.set_parameter(name, value)
     autopilot.set_parameter("MC_ROLLRATE_K", 2.0)
@@ -298,8 +304,12 @@ def test_parameter_files(tmp_path):
     bad = tmp_path / "bad.yaml"
     with pytest.raises(ParameterError, match="No such file"):
         Parameters.load(bad)
-    for text, message in (("[1, 2]", "NAME: value"), ("MC_ROLLRATE_P: x", "not a number"),
-                          ("A: [", "not YAML"), ("FOO: 1", "unknown")):
+    for text, message in (
+        ("[1, 2]", "NAME: value"),
+        ("MC_ROLLRATE_P: x", "not a number"),
+        ("A: [", "not YAML"),
+        ("FOO: 1", "unknown"),
+    ):
         bad.write_text(text)
         with pytest.raises(ParameterError, match=message) as error:
             Parameters.load(bad)

@@ -23,8 +23,17 @@ LEVEL = np.array([1.0, 0.0, 0.0, 0.0])
 def status(voltages, extra=(), current=1234, left=57, consumed=800, temperature=2500):
     cells = [*voltages, *[0xFFFF] * (10 - len(voltages))]
     return mavlink2.MAVLink_battery_status_message(
-        0, 0, 1, temperature, cells, current, consumed, -1, left,
-        voltages_ext=[*extra, *[0] * (4 - len(extra))])
+        0,
+        0,
+        1,
+        temperature,
+        cells,
+        current,
+        consumed,
+        -1,
+        left,
+        voltages_ext=[*extra, *[0] * (4 - len(extra))],
+    )
 
 
 def test_cells():
@@ -45,8 +54,12 @@ def test_only_the_sum():
 def test_unknown_is_nan():
     battery = from_battery_status(status([], current=-1, left=-1, consumed=-1, temperature=32767))
     assert not battery.known
-    assert all(map(math.isnan, (battery.voltage, battery.current, battery.left,
-                                battery.consumed, battery.temperature)))
+    assert all(
+        map(
+            math.isnan,
+            (battery.voltage, battery.current, battery.left, battery.consumed, battery.temperature),
+        )
+    )
 
 
 def test_sys_status_has_it_as_well():
@@ -66,7 +79,9 @@ def test_the_stand_in_has_no_battery():
 def test_the_stand_ins_estimate_needs_vision():
     autopilot = Autopilot()
     assert estimate_faults(estimator_status(autopilot, 0.0).flags) == (
-        "no horizontal position estimate", "no height estimate")
+        "no horizontal position estimate",
+        "no height estimate",
+    )
     autopilot.vision(0.0, np.zeros(3), LEVEL)
     m = estimator_status(autopilot, 0.1)
     assert estimate_faults(m.flags) == () and m.time_usec == 100_000
@@ -75,7 +90,10 @@ def test_the_stand_ins_estimate_needs_vision():
 def test_flags_have_names():
     assert names(1 | 8 | 128, ESTIMATOR_FLAGS) == ("attitude", "pos_horiz_rel", "const_pos_mode")
     assert estimate_faults(0) == (
-        "no valid attitude estimate", "no horizontal position estimate", "no height estimate")
+        "no valid attitude estimate",
+        "no horizontal position estimate",
+        "no height estimate",
+    )
     assert "accelerometer data are bad" in estimate_faults(0xFFFF)
     assert SENSORS[1] == "3d_gyro" and SENSORS[128] == "vision_position"
     assert unhealthy(1 | 2 | 128, 1 | 2 | 128, 1 | 2) == ("vision_position",)

@@ -68,7 +68,11 @@ def test_the_range_of_a_vectors_entries_is_that_of_its_node():
 
 def test_grades():
     assert [grade(v, 0.05, 0.2) for v in (0.01, 0.05, 0.2, math.nan)] == [
-        GOOD, CAUTION, BAD, UNKNOWN]
+        GOOD,
+        CAUTION,
+        BAD,
+        UNKNOWN,
+    ]
     assert [grade(v, 0.3, 0.15) for v in (0.9, 0.3, 0.1)] == [GOOD, CAUTION, BAD]
 
 
@@ -93,12 +97,18 @@ def test_the_headline_says_how_it_is():
     assert "<b>no" not in page
     assert "saturated" not in page
     for status, said in (
-        (MissionStatus("hold", state="holding", cause="by command"),
-         (CAUTION, "holding", "by command")),
-        (MissionStatus("land", abort_reason="battery", state="landing", cause="battery"),
-         (BAD, "land", "battery")),
-        (MissionStatus("aborted", abort_reason="tilt", state="failsafe", cause="tilt"),
-         (BAD, "failsafe", "tilt")),
+        (
+            MissionStatus("hold", state="holding", cause="by command"),
+            (CAUTION, "holding", "by command"),
+        ),
+        (
+            MissionStatus("land", abort_reason="battery", state="landing", cause="battery"),
+            (BAD, "land", "battery"),
+        ),
+        (
+            MissionStatus("aborted", abort_reason="tilt", state="failsafe", cause="tilt"),
+            (BAD, "failsafe", "tilt"),
+        ),
     ):
         health.hear(status)
         assert health.state() == said
@@ -137,8 +147,13 @@ def test_the_robot_has_the_shapes_of_its_urdf():
     assert all(np.all(shape.size > 0.0) for shape in found)
     assert all(abs(np.linalg.norm(shape.quaternion) - 1.0) < 1e-9 for shape in found)
     assert shapes("no URDF") == []
-    assert shapes('<robot><link name="a"><visual><geometry><box size="x"/></geometry>'
-                  "</visual></link></robot>") == []
+    assert (
+        shapes(
+            '<robot><link name="a"><visual><geometry><box size="x"/></geometry>'
+            "</visual></link></robot>"
+        )
+        == []
+    )
 
 
 frames = st.builds(

@@ -46,13 +46,17 @@ class Rig:
         return [m for m in self.tick(ticks) if m.get_type() == kind]
 
     def command(self, command, *parameters):
-        self.send(mavlink2.MAVLink_command_long_message(
-            1, 1, command, 0, *(*parameters, *[0.0] * 7)[:7]))
+        self.send(
+            mavlink2.MAVLink_command_long_message(1, 1, command, 0, *(*parameters, *[0.0] * 7)[:7])
+        )
         return self.heard("COMMAND_ACK")[0].result
 
     def setpoint(self, *rates, thrust=0.0, mask=128):
-        self.send(mavlink2.MAVLink_set_attitude_target_message(
-            0, 1, 1, mask, [1, 0, 0, 0], *rates, thrust))
+        self.send(
+            mavlink2.MAVLink_set_attitude_target_message(
+                0, 1, 1, mask, [1, 0, 0, 0], *rates, thrust
+            )
+        )
 
 
 def test_heartbeat_is_a_px4_quadrotor_at_1_hz():
@@ -81,8 +85,11 @@ def test_message_intervals():
 def test_request_message():
     rig = Rig()
     rig.tick(10)
-    rig.send(mavlink2.MAVLink_command_long_message(
-        1, 1, Command.REQUEST_MESSAGE, 0, mavlink2.MAVLINK_MSG_ID_ODOMETRY, 0, 0, 0, 0, 0, 0))
+    rig.send(
+        mavlink2.MAVLink_command_long_message(
+            1, 1, Command.REQUEST_MESSAGE, 0, mavlink2.MAVLINK_MSG_ID_ODOMETRY, 0, 0, 0, 0, 0, 0
+        )
+    )
     kinds = [m.get_type() for m in rig.tick()]
     assert "ODOMETRY" in kinds and "COMMAND_ACK" in kinds
     assert rig.command(Command.REQUEST_MESSAGE, 9999.0) == Result.UNSUPPORTED
@@ -102,8 +109,7 @@ def test_parameters_read_list_set():
     assert rig.heard("PARAM_VALUE")[0].param_value == pytest.approx(0.2)
     rig.send(mavlink2.MAVLink_param_set_message(1, 1, b"MC_ROLLRATE_P", -3.0, 9))
     answer = rig.tick()
-    assert [m.param_value for m in answer if m.get_type() == "PARAM_VALUE"] == [
-        pytest.approx(0.2)]
+    assert [m.param_value for m in answer if m.get_type() == "PARAM_VALUE"] == [pytest.approx(0.2)]
     assert any("out of range" in clean_text(m.text) for m in answer if m.get_type() == "STATUSTEXT")
     rig.send(mavlink2.MAVLink_param_request_read_message(1, 1, b"NOT_THERE", -1))
     assert rig.heard("PARAM_VALUE") == []
@@ -137,8 +143,11 @@ def test_vision_reaches_the_estimate(odometry):
         else:
             rig.send(vision_message(rig.time, position, q, 0.01, 0.01))
         rig.tick()
-    rig.send(mavlink2.MAVLink_command_long_message(
-        1, 1, Command.REQUEST_MESSAGE, 0, mavlink2.MAVLINK_MSG_ID_ODOMETRY, 0, 0, 0, 0, 0, 0))
+    rig.send(
+        mavlink2.MAVLink_command_long_message(
+            1, 1, Command.REQUEST_MESSAGE, 0, mavlink2.MAVLINK_MSG_ID_ODOMETRY, 0, 0, 0, 0, 0, 0
+        )
+    )
     found = rig.heard("ODOMETRY")[0]
     assert (found.x, found.y, found.z) == pytest.approx((2.0, 1.0, -3.0), abs=1e-3)
     ned_yaw = 2 * math.atan2(found.q[3], found.q[0])
@@ -158,8 +167,9 @@ def test_only_body_rates_are_flown():
 
 def test_messages_for_another_system_are_ignored():
     rig = Rig()
-    rig.send(mavlink2.MAVLink_set_attitude_target_message(
-        0, 9, 1, 128, [1, 0, 0, 0], 0.1, 0.2, 0.3, 0.5))
+    rig.send(
+        mavlink2.MAVLink_set_attitude_target_message(0, 9, 1, 128, [1, 0, 0, 0], 0.1, 0.2, 0.3, 0.5)
+    )
     assert np.all(rig.autopilot._setpoint == 0.0)
 
 
@@ -187,7 +197,7 @@ def test_mutated_messages_never_change_flight_into_nonsense():
         for _ in range(random.randrange(3)):
             at = random.randrange(10, len(frame) - 2)
             size = min(4, len(frame) - 2 - at)
-            frame[at:at + size] = struct.pack("<f", random.choice(floats))[:size]
+            frame[at : at + size] = struct.pack("<f", random.choice(floats))[:size]
         extra = message.crc_extra
         crc = mavlink2.x25crc(bytes(frame[1:-2]) + bytes([extra])).crc
         frame[-2:] = struct.pack("<H", crc)

@@ -10,14 +10,29 @@ from uam_sim_bridge.compare.plan import ASMC1, ASMC2, PROPOSED
 
 def flight(label, seed, rms, mass=0.2, outcome="completed"):
     why = "" if outcome == "completed" else "fell"
-    return Result(label, mass, seed, np.full(8, float(rms)), np.full(8, float(rms)), 1.0,
-                  outcome == "lost", outcome, why, 0.0, (0.0, 0.0), {})
+    return Result(
+        label,
+        mass,
+        seed,
+        np.full(8, float(rms)),
+        np.full(8, float(rms)),
+        1.0,
+        outcome == "lost",
+        outcome,
+        why,
+        0.0,
+        (0.0, 0.0),
+        {},
+    )
 
 
 def test_a_row_is_the_mean_with_students_interval_over_seeds():
     # seeds' means: (1 + 3) / 2 = 2, (3 + 5) / 2 = 4, (5 + 7) / 2 = 6; s = 2, t(0.975, 2) = 4.3027
-    flights = [flight(PROPOSED, seed, 2 * seed + k, mass) for seed in (1, 2, 3)
-               for k, mass in ((-1, 0.1), (1, 0.3))]
+    flights = [
+        flight(PROPOSED, seed, 2 * seed + k, mass)
+        for seed in (1, 2, 3)
+        for k, mass in ((-1, 0.1), (1, 0.3))
+    ]
     (row,) = tables.rows(flights)
     assert row.mean[0] == pytest.approx(4.0) and row.worst[7] == pytest.approx(7.0)
     assert row.half_width[0] == pytest.approx(4.3027 * 2.0 / np.sqrt(3.0), rel=1e-4)
@@ -50,5 +65,6 @@ def test_the_tables_have_our_figures_the_papers_and_the_degradation():
     text = tables.as_markdown(tables.rows([flight(ASMC1, 1, 0.4), flight(PROPOSED, 1, 0.1)]))
     position, attitude, arm = text.strip().split("\n\n")
     assert "| ASMC-1 (reconstructed) | 0.4000 | 0.4000 | 0.4000 | 0.15 | 0.08 | 0.31 | 75 |" in (
-        position)
+        position
+    )
     assert "RMS attitude error [deg]" in attitude and "alpha_2" in arm

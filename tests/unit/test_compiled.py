@@ -18,7 +18,9 @@ print(json.dumps(matrix_from_euler(np.array([0.1, -0.2, 0.3])).tolist()))
 def run(without_numba: bool) -> list:
     out = subprocess.run(
         [sys.executable, "-c", PROGRAM.format(without_numba=without_numba)],
-        capture_output=True, text=True, check=True,
+        capture_output=True,
+        text=True,
+        check=True,
     ).stdout
     return json.loads(out)
 

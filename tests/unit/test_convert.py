@@ -95,8 +95,9 @@ def test_unit_quaternions_pass_unchanged(raw):
     np.testing.assert_array_equal(read, quaternion)
 
 
-@pytest.mark.parametrize("quaternion", [(0.0, 0.0, 0.0, 0.0), (2.0, 0.0, 0.0, 0.0),
-                                        (math.nan, 0.0, 0.0, 0.0)])
+@pytest.mark.parametrize(
+    "quaternion", [(0.0, 0.0, 0.0, 0.0), (2.0, 0.0, 0.0, 0.0), (math.nan, 0.0, 0.0, 0.0)]
+)
 def test_what_is_no_rotation_is_refused(quaternion):
     with pytest.raises(BadMessage, match="orientation has norm"):
         read_pose(PoseWriter().fill(0, np.zeros(3), np.array(quaternion)))
@@ -126,8 +127,9 @@ def test_imu_with_infinity_is_refused():
 
 
 def test_joints_are_found_by_name_among_others():
-    message = JointState(name=["rotor", "alpha_2", "alpha_1"], position=[9.0, 2.0, 1.0],
-                         velocity=[8.0, 0.2, 0.1])
+    message = JointState(
+        name=["rotor", "alpha_2", "alpha_1"], position=[9.0, 2.0, 1.0], velocity=[8.0, 0.2, 0.1]
+    )
     _, position, velocity = read_joints(serialize_message(message), list(JOINTS))
     np.testing.assert_array_equal(position, [1.0, 2.0])
     np.testing.assert_array_equal(velocity, [0.1, 0.2])
@@ -136,11 +138,15 @@ def test_joints_are_found_by_name_among_others():
 @pytest.mark.parametrize(
     ("message", "complaint"),
     [
-        (JointState(name=["alpha_1"], position=[1.0], velocity=[1.0]),
-         "joint names alpha_1; expected alpha_1, alpha_2"),
+        (
+            JointState(name=["alpha_1"], position=[1.0], velocity=[1.0]),
+            "joint names alpha_1; expected alpha_1, alpha_2",
+        ),
         (JointState(name=["alpha_1", "alpha_2"], position=[1.0, 1.0]), "0 velocities for 2 joints"),
-        (JointState(name=["alpha_1", "alpha_2"], position=[1.0, math.nan], velocity=[0.0, 0.0]),
-         "positions of alpha_2 is nan"),
+        (
+            JointState(name=["alpha_1", "alpha_2"], position=[1.0, math.nan], velocity=[0.0, 0.0]),
+            "positions of alpha_2 is nan",
+        ),
     ],
 )
 def test_bad_joint_states_are_refused(message, complaint):
@@ -163,8 +169,10 @@ def test_joint_state_writer():
         (lambda m: m.joint_names.__setitem__(0, "u"), "joint names u, y"),
         (lambda m: m.points.clear(), "0 points, 1 expected"),
         (lambda m: setattr(m.points[0], "velocities", [1.0]), "1 velocities, 8 expected"),
-        (lambda m: m.points[0].accelerations.__setitem__(3, math.nan),
-         "accelerations of roll is nan"),
+        (
+            lambda m: m.points[0].accelerations.__setitem__(3, math.nan),
+            "accelerations of roll is nan",
+        ),
     ],
 )
 def test_bad_states_are_refused(change, complaint):
@@ -253,8 +261,9 @@ def test_what_ends_early_or_is_garbled_is_refused_or_read_never_worse(length, da
 
 
 def test_rows_of_other_lengths_but_the_same_size_are_told_apart():
-    good = deserialize_message(TrajectoryWriter(COORDINATES).fill(0, np.ones((3, 8))),
-                               JointTrajectory)
+    good = deserialize_message(
+        TrajectoryWriter(COORDINATES).fill(0, np.ones((3, 8))), JointTrajectory
+    )
     read_state(serialize_message(good))
     good.points[0].effort, good.points[0].accelerations = good.points[0].accelerations, []
     with pytest.raises(BadMessage, match="0 accelerations, 8 expected"):

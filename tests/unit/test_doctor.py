@@ -31,8 +31,8 @@ def test_a_finding_is_one_line_whatever_it_quotes():
 
 
 @pytest.mark.parametrize(
-    ("findings", "status"), [([ok("a", "b")], 0), ([warn("a", "b", "c")], 0),
-                             ([ok("a", "b"), fail("a", "b", "c")], 1)]
+    ("findings", "status"),
+    [([ok("a", "b")], 0), ([warn("a", "b", "c")], 0), ([ok("a", "b"), fail("a", "b", "c")], 1)],
 )
 def test_exit_status_text_and_json(capsys, monkeypatch, findings, status):
     examined = [("machine", finding) for finding in findings]

@@ -64,7 +64,8 @@ def stand_in():
 
 def heartbeat(kind=mavlink2.MAV_AUTOPILOT_PX4, base_mode=1, mode=Mode.HOLD):
     return mavlink2.MAVLink_heartbeat_message(
-        mavlink2.MAV_TYPE_QUADROTOR, kind, base_mode, mode.custom_mode, 4, 3)
+        mavlink2.MAV_TYPE_QUADROTOR, kind, base_mode, mode.custom_mode, 4, 3
+    )
 
 
 def px4(message):
@@ -73,7 +74,8 @@ def px4(message):
         assert message.param1 == mavlink2.MAVLINK_MSG_ID_AUTOPILOT_VERSION
         assert message.target_system == 3
         yield mavlink2.MAVLink_autopilot_version_message(
-            0, 0x011002FF, 0, 0, 0, [0] * 8, [0] * 8, [0] * 8, 0, 0, 0)
+            0, 0x011002FF, 0, 0, 0, [0] * 8, [0] * 8, [0] * 8, 0, 0, 0
+        )
     else:
         yield heartbeat()
 
@@ -117,8 +119,13 @@ def test_a_link_that_cannot_be_opened_fails():
 
 
 @pytest.mark.parametrize(
-    ("number", "text"), [(0x011000FF, "1.16.0"), (0x010F0180, "1.15.1 beta"),
-                         (0x010E00C0, "1.14.0 rc"), (0x01110000, "1.17.0 dev")]
+    ("number", "text"),
+    [
+        (0x011000FF, "1.16.0"),
+        (0x010F0180, "1.15.1 beta"),
+        (0x010E00C0, "1.14.0 rc"),
+        (0x01110000, "1.17.0 dev"),
+    ],
 )
 def test_versions_in_words(number, text):
     assert autopilot.version(number) == text

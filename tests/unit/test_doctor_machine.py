@@ -18,8 +18,12 @@ def test_cores(count, load, verdict):
 
 
 @pytest.mark.parametrize(
-    ("text", "verdict"), [("MemTotal: 1 kB\nMemAvailable: 8388608 kB\n", OK),
-                          ("MemAvailable: 524288 kB\n", WARN), ("nothing\n", WARN)]
+    ("text", "verdict"),
+    [
+        ("MemTotal: 1 kB\nMemAvailable: 8388608 kB\n", OK),
+        ("MemAvailable: 524288 kB\n", WARN),
+        ("nothing\n", WARN),
+    ],
 )
 def test_memory(tmp_path, text, verdict):
     (tmp_path / "meminfo").write_text(text)

@@ -56,16 +56,26 @@ def test_a_denied_arming_in_px4s_order():
     px4 = Autopilot()
     assert px4.summary(can_arm=MANUAL) is None
     assert px4.check("check_estimator_missing_data", INFO) == (
-        Severity.WARNING, "Waiting for estimator to initialize")
+        Severity.WARNING,
+        "Waiting for estimator to initialize",
+    )
     assert px4.check("check_modes_attitude", CRITICAL) == (
-        Severity.CRITICAL, "No valid attitude estimate")
+        Severity.CRITICAL,
+        "No valid attitude estimate",
+    )
     assert px4.check("check_accel_missing", ERROR, 1, layout="B") == (
-        ERROR, "Accelerometer sensor 1 missing")
+        ERROR,
+        "Accelerometer sensor 1 missing",
+    )
     assert px4.check("check_cpuload_too_high", ERROR, 97.25, layout="f") == (
-        ERROR, "CPU load too high: 97.2%")
+        ERROR,
+        "CPU load too high: 97.2%",
+    )
     assert px4.send(HEALTH_SUMMARY, PROTOCOL, bytes(13)) is None
     assert px4.send("commander_arm_denied_resolve_failures", CRITICAL) == (
-        CRITICAL, "Arming denied: Resolve system health failures first")
+        CRITICAL,
+        "Arming denied: Resolve system health failures first",
+    )
 
 
 def test_what_does_not_concern_offboard_is_silent():
@@ -75,7 +85,9 @@ def test_what_does_not_concern_offboard_is_silent():
     assert px4.check("check_modes_manual_control", WARNING) is None  # told for all, blocks none
     assert px4.check("check_modes_manual_control", ERROR) is not None
     assert px4.check("check_modes_offboard_signal", ERROR, modes=OFFBOARD) == (
-        ERROR, "No offboard signal")
+        ERROR,
+        "No offboard signal",
+    )
 
 
 def test_checks_are_silent_where_offboard_may_be_armed():
@@ -84,14 +96,25 @@ def test_checks_are_silent_where_offboard_may_be_armed():
     assert px4.check("check_battery_low", WARNING) is None
 
 
-@pytest.mark.parametrize(("name", "layout", "values", "text"), [
-    ("commander_failsafe_enter", "IBB", (0, 7, 2), "GCS connection loss: switching to Land"),
-    ("commander_failsafe_enter_generic", "IB", (0, 8),
-     "Failsafe activated: switching to Descend"),
-    ("commander_failsafe_enter_hold", "IBHB", (0, 6, 5, 1),
-     "Manual control loss: switching to RTL in 5 seconds"),
-    ("commander_failsafe_enter_generic", "IB", (0, 99), "Failsafe activated: switching to 99"),
-])
+@pytest.mark.parametrize(
+    ("name", "layout", "values", "text"),
+    [
+        ("commander_failsafe_enter", "IBB", (0, 7, 2), "GCS connection loss: switching to Land"),
+        (
+            "commander_failsafe_enter_generic",
+            "IB",
+            (0, 8),
+            "Failsafe activated: switching to Descend",
+        ),
+        (
+            "commander_failsafe_enter_hold",
+            "IBHB",
+            (0, 6, 5, 1),
+            "Manual control loss: switching to RTL in 5 seconds",
+        ),
+        ("commander_failsafe_enter_generic", "IB", (0, 99), "Failsafe activated: switching to 99"),
+    ],
+)
 def test_failsafes_say_cause_and_action(name, layout, values, text):
     assert Autopilot().send(name, CRITICAL, struct.pack("<" + layout, *values)) == (CRITICAL, text)
 

@@ -42,12 +42,17 @@ def test_an_event_is_read_back_from_its_message_and_a_log():
     logged = [serialize_message(event.to_message(stamp)) for stamp, event in told]
     assert fault_log.records(logged, 1_000_000_000) == [
         record(1.0, 4.5, motor=2.0, remaining=0.7),
-        record(2.0, None, "mavlink_cut", direction="both")]
+        record(2.0, None, "mavlink_cut", direction="both"),
+    ]
 
 
 def test_faults_are_shaded_and_listed(flight_folder, flight, make_flight):
-    faults = [record(10.0, 12.0, motor=2.0), record(50.0, None, "clock_jump", step=0.5),
-              record(50.1, 60.0, "mocap_dropout"), record(500.0, None)]
+    faults = [
+        record(10.0, 12.0, motor=2.0),
+        record(50.0, None, "clock_jump", step=0.5),
+        record(50.1, 60.0, "mocap_dropout"),
+        record(500.0, None),
+    ]
     marked = make_flight(info={"faults": faults})
     figure = figures.arm_inputs([Flight("x", marked)])
     axis = figure.axes[0]
@@ -66,7 +71,13 @@ def test_faults_are_shaded_and_listed(flight_folder, flight, make_flight):
 
 def test_letters_go_on_after_z():
     assert [fault_marks.letter(n) for n in (0, 25, 26, 27, 701, 702)] == [
-        "A", "Z", "AA", "AB", "ZZ", "AAA"]
+        "A",
+        "Z",
+        "AA",
+        "AB",
+        "ZZ",
+        "AAA",
+    ]
 
 
 def test_metrics_have_the_faults(flight):
@@ -91,14 +102,17 @@ def ended(make_flight, height=0.0, tilt=0.0, down=0.0, landed=True):
     return series
 
 
-@pytest.mark.parametrize(("end", "outcome"), [
-    ({}, "landed"),
-    ({"landed": False}, "failsafe"),
-    ({"height": 0.8, "landed": False}, "held"),
-    ({"tilt": 1.2}, "lost"),
-    ({"down": 3.0}, "lost"),
-    ({"down": 3.0, "height": 0.8}, "held"),
-])
+@pytest.mark.parametrize(
+    ("end", "outcome"),
+    [
+        ({}, "landed"),
+        ({"landed": False}, "failsafe"),
+        ({"height": 0.8, "landed": False}, "held"),
+        ({"tilt": 1.2}, "lost"),
+        ({"down": 3.0}, "lost"),
+        ({"down": 3.0, "height": 0.8}, "held"),
+    ],
+)
 def test_how_a_flight_ended(make_flight, end, outcome):
     series = ended(make_flight, **end)
     assert classify(series, {"mission_completed": False}) == outcome
@@ -117,16 +131,27 @@ def test_the_matrix_of_the_configuration_has_every_fault_and_moment():
     assert (one.schedule.faults[0].at, one.schedule.seed) == (83.5, 3)
 
 
-@pytest.mark.parametrize(("text", "said"), [
-    ("scenario: hover", "a mapping of scenario, moments, faults expected"),
-    ("{scenario: hover, moments: {a: 3}, faults: []}", "moments: names with"),
-    ("{scenario: hover, moments: {a: {at: pick}}, faults: []}", "no phase 'pick'"),
-    ("{scenario: hover, moments: {a: {at: 3}}, faults: 3}", "a list of faults expected"),
-    ("{scenario: hover, moments: {a: {at: 3}}, faults: [{fault: wind}]}", "unknown fault 'wind'"),
-    ("{scenario: hover, moments: {a: {at: 3}}, faults: [{fault: servo_jam, at: 2}]}",
-     "at: the moments say when"),
-    ("{scenario: hover, moments: {a: {at: 3}}, faults: [{fault: node_kill}]}", "nothing to fly"),
-])
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("scenario: hover", "a mapping of scenario, moments, faults expected"),
+        ("{scenario: hover, moments: {a: 3}, faults: []}", "moments: names with"),
+        ("{scenario: hover, moments: {a: {at: pick}}, faults: []}", "no phase 'pick'"),
+        ("{scenario: hover, moments: {a: {at: 3}}, faults: 3}", "a list of faults expected"),
+        (
+            "{scenario: hover, moments: {a: {at: 3}}, faults: [{fault: wind}]}",
+            "unknown fault 'wind'",
+        ),
+        (
+            "{scenario: hover, moments: {a: {at: 3}}, faults: [{fault: servo_jam, at: 2}]}",
+            "at: the moments say when",
+        ),
+        (
+            "{scenario: hover, moments: {a: {at: 3}}, faults: [{fault: node_kill}]}",
+            "nothing to fly",
+        ),
+    ],
+)
 def test_a_bad_matrix_is_refused_in_one_line(tmp_path, text, said):
     file = tmp_path / "mine.yaml"
     file.write_text(text)
@@ -134,14 +159,17 @@ def test_a_bad_matrix_is_refused_in_one_line(tmp_path, text, said):
         fault_matrix.read(file, "direct")
 
 
-@pytest.mark.parametrize(("options", "said"), [
-    (["--only", "wind"], "unknown fault 'wind'; there are: mocap_dropout"),
-    (["--moment", "tea"], "unknown moment 'tea'; there are: take-off"),
-    (["--matrix", "no"], "unknown campaign 'no'; there are: faults"),
-    (["--engine", "fast"], "unknown engine 'fast'"),
-    (["--clock", "realtime"], "the direct engine has no clock"),
-    (["--jobs", "0"], "--jobs is 1 or more"),
-])
+@pytest.mark.parametrize(
+    ("options", "said"),
+    [
+        (["--only", "wind"], "unknown fault 'wind'; there are: mocap_dropout"),
+        (["--moment", "tea"], "unknown moment 'tea'; there are: take-off"),
+        (["--matrix", "no"], "unknown campaign 'no'; there are: faults"),
+        (["--engine", "fast"], "unknown engine 'fast'"),
+        (["--clock", "realtime"], "the direct engine has no clock"),
+        (["--jobs", "0"], "--jobs is 1 or more"),
+    ],
+)
 def test_wrong_use_is_one_line(capsys, monkeypatch, tmp_path, options, said):
     monkeypatch.chdir(tmp_path)
     assert main(["faults", *options]) == 2
@@ -156,7 +184,8 @@ def test_the_report_of_a_campaign(tmp_path):
     results = [
         FaultResult(cell.fault, cell.moment, outcome, "why, not <so>", 12.0, worst)
         for cell, outcome in zip(
-            matrix.cells(1), ["completed", "held", "lost", "lost"], strict=True)
+            matrix.cells(1), ["completed", "held", "lost", "lost"], strict=True
+        )
     ]
     summary, written = fault_report.write(tmp_path, matrix, results, "uam faults")
     assert summary.startswith("3 flights with a fault: 1 held, 2 lost. Without a fault: completed.")

@@ -85,7 +85,8 @@ def test_every_fault_can_be_asked_for_by_its_name(name):
 
 
 @pytest.mark.parametrize(
-    ("name", "parameter"), [(n, p) for n, kind in FAULTS.items() for p in kind.specs()])
+    ("name", "parameter"), [(n, p) for n, kind in FAULTS.items() for p in kind.specs()]
+)
 def test_every_parameter_has_a_range_that_is_kept(name, parameter):
     spec = FAULTS[name].specs()[parameter]
     assert parameter not in WORDS
@@ -155,17 +156,23 @@ def test_files_words_and_the_scenario_add_up(tmp_path):
     flown = dataclasses.replace(load_scenario(str(own)), phases=SCENARIO.phases + ((99, "hover"),))
     found = read_schedule([str(file), "clock_jump@3"], flown, 1).faults
     assert [(f.fault.NAME, f.at) for f in found] == [
-        ("wind_gust", 99.0), ("servo_jam", 37.0), ("clock_jump", 3.0)]
+        ("wind_gust", 99.0),
+        ("servo_jam", 37.0),
+        ("clock_jump", 3.0),
+    ]
     own.write_text(text + "faults: 3\n")
     with pytest.raises(ScenarioError, match="'faults' is not a list"):
         load_scenario(str(own))
 
 
-@pytest.mark.parametrize(("text", "why"), [
-    ("node_kill@20", "has no processes: needs --engine ros"),
-    ("mavlink_delay@20", "no MAVLink connection to delay: needs --engine ros"),
-    ("mavlink_cut@20:direction=from_autopilot", "connection from the autopilot: needs"),
-])
+@pytest.mark.parametrize(
+    ("text", "why"),
+    [
+        ("node_kill@20", "has no processes: needs --engine ros"),
+        ("mavlink_delay@20", "no MAVLink connection to delay: needs --engine ros"),
+        ("mavlink_cut@20:direction=from_autopilot", "connection from the autopilot: needs"),
+    ],
+)
 def test_the_direct_engine_says_what_it_cannot_have(text, why):
     found = read_schedule([text], SCENARIO, 1)
     with pytest.raises(FaultError, match=why):
@@ -196,5 +203,10 @@ def test_a_fault_lasts_from_its_time_to_its_end(at, duration, takeoff):
 
 
 def test_a_word_of_numbers_keeps_its_form():
-    assert in_words("x@1e1+2:a=3,b=c") == {"fault": "x", "at": 10.0, "duration": 2.0, "a": 3.0,
-                                           "b": "c"}
+    assert in_words("x@1e1+2:a=3,b=c") == {
+        "fault": "x",
+        "at": 10.0,
+        "duration": 2.0,
+        "a": 3.0,
+        "b": "c",
+    }

@@ -60,8 +60,11 @@ def equal(a, b):
 
 
 PLANT_FAULTS = [name for name, kind in FAULTS.items() if kind.PLACE == PLANT]
-VALUES = {"imu_saturation": "gyro=0.001,accelerometer=1", "mocap_outliers": "share=1",
-          "servo_weak": "joint=2"}
+VALUES = {
+    "imu_saturation": "gyro=0.001,accelerometer=1",
+    "mocap_outliers": "share=1",
+    "servo_weak": "joint=2",
+}
 NEEDS_THE_MAGNET = ("magnet_weak", "magnet_stuck", "payload_swing")
 
 
@@ -71,8 +74,9 @@ def test_before_its_beginning_a_fault_changes_not_one_bit(name):
     for (_, ours, truth), (_, usual, true) in zip(
         ticks(told, 0.0, BEGIN), ticks(NOMINAL, 0.0, BEGIN), strict=True
     ):
-        assert all(equal(getattr(ours, k), getattr(usual, k))
-                   for k in ("imu", "joints", "mocap", "hil"))
+        assert all(
+            equal(getattr(ours, k), getattr(usual, k)) for k in ("imu", "joints", "mocap", "hil")
+        )
         assert np.array_equal(truth.state, true.state)
 
 
@@ -135,8 +139,10 @@ def test_poses_come_late_and_none_twice():
 
 def test_some_poses_are_far_off_the_same_ones_for_the_same_seed():
     first, again = faulty("mocap_outliers", "share=0.5"), faulty("mocap_outliers", "share=0.5")
-    distances = [np.linalg.norm(a[1] - b[1])
-                 for a, b in zip(poses(during(first)), poses(during(NOMINAL)), strict=True)]
+    distances = [
+        np.linalg.norm(a[1] - b[1])
+        for a, b in zip(poses(during(first)), poses(during(NOMINAL)), strict=True)
+    ]
     off = [d for d in distances if d > 0.0]
     assert 0 < len(off) < len(distances) and np.allclose(off, 0.5)
     assert all(equal(a, b) for a, b in zip(poses(first), poses(again), strict=True))
@@ -148,8 +154,9 @@ def test_stamps_are_off():
         assert ours[0] == usual[0] + 2.5 and equal(ours[1:], usual[1:])
 
 
-@pytest.mark.parametrize(("unit", "felt"), [
-    ("both", ("imu", "hil")), ("companion", ("imu",)), ("autopilot", ("hil",))])
+@pytest.mark.parametrize(
+    ("unit", "felt"), [("both", ("imu", "hil")), ("companion", ("imu",)), ("autopilot", ("hil",))]
+)
 def test_an_imu_is_biased(unit, felt):
     told = faulty("imu_bias", f"gyro=0.5,accelerometer=2,axis=y,unit={unit}")
     for (_, ours, _), (_, usual, _) in zip(during(told), during(NOMINAL), strict=True):
@@ -209,8 +216,11 @@ def test_a_motor_gives_a_part_of_its_thrust():
 
 
 def test_two_faults_of_one_motor_multiply_and_end_one_by_one():
-    both = read_schedule([f"motor_loss@{BEGIN}+0.1:remaining=0.5",
-                          f"motor_loss@{BEGIN}+0.2:remaining=0.3"], SCENARIO, 1)
+    both = read_schedule(
+        [f"motor_loss@{BEGIN}+0.1:remaining=0.5", f"motor_loss@{BEGIN}+0.2:remaining=0.3"],
+        SCENARIO,
+        1,
+    )
     plant = FaultyPlant(*START, both)
     plant.mission_at(0.0, 0.0)
     efficiency = {}
@@ -246,8 +256,9 @@ def test_wind_comes_softly_and_goes():
 def test_gusts_go_on_around_the_wind_that_a_fault_adds():
     gusty = Vehicle.load().changed({"air.gust": 1.0})
     usual = Plant(gusty, 0.2, 3, (0.3, 0.4))
-    added = FaultyPlant(gusty, 0.2, 3, (0.3, 0.4),
-                        read_schedule(["wind_gust@0.1:speed=5,rise=0"], SCENARIO, 1))
+    added = FaultyPlant(
+        gusty, 0.2, 3, (0.3, 0.4), read_schedule(["wind_gust@0.1:speed=5,rise=0"], SCENARIO, 1)
+    )
     added.mission_at(0.0, 0.0)
     run(usual, 0.4)
     run(added, 0.4)
@@ -260,7 +271,8 @@ def test_nothing_happens_before_the_mission_begins():
     plant.mission_at(0.2, 0.0)
     assert poses(run(plant, 0.4)) == []
     assert plant.timeline.records == [
-        {"fault": "mocap_dropout", "begin_s": 0.0, "end_s": None, "parameters": {}}]
+        {"fault": "mocap_dropout", "begin_s": 0.0, "end_s": None, "parameters": {}}
+    ]
 
 
 def lifted(text, until=1.5):
@@ -307,8 +319,11 @@ def test_a_payload_swings_but_stays_until_the_magnet_is_off():
     _, swinging = lifted("payload_swing@0.5:rate=4")
 
     def tilt(told, begin, end):
-        upright = [1.0 - 2.0 * float(np.sum(truth.payload_quaternion[1:3] ** 2))
-                   for t, truth in told if begin < t < end]
+        upright = [
+            1.0 - 2.0 * float(np.sum(truth.payload_quaternion[1:3] ** 2))
+            for t, truth in told
+            if begin < t < end
+        ]
         return np.degrees(np.arccos(np.clip(min(upright), -1.0, 1.0)))
 
     assert tilt(flat, 0.1, 1.0) < 3.0 and tilt(swinging, 0.1, 0.5) < 3.0

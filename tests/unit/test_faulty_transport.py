@@ -107,8 +107,9 @@ def test_what_is_not_a_fault_is_passed_on():
 
 
 def test_the_direct_engine_skips_what_a_cut_or_corruption_loses():
-    link = DirectLink(read_schedule(
-        ["mavlink_cut@1+1", "mavlink_corruption@3+1:share=0.5"], SCENARIO, 1))
+    link = DirectLink(
+        read_schedule(["mavlink_cut@1+1", "mavlink_corruption@3+1:share=0.5"], SCENARIO, 1)
+    )
     link.timeline.mission_at(0.0, 0.0)
     passed = {}
     for second in range(5):

@@ -54,8 +54,12 @@ class Rig:
         self.socket.settimeout(PATIENCE)
         self.now = 0.0
         self.line = Line(bytes_per_second)
-        self.gcs = GroundStation(f"udp:localhost:{self.socket.getsockname()[1]}", self.line,
-                                 Codec(1, 191, signing), lambda: self.now)
+        self.gcs = GroundStation(
+            f"udp:localhost:{self.socket.getsockname()[1]}",
+            self.line,
+            Codec(1, 191, signing),
+            lambda: self.now,
+        )
         self.line.arriving = [b"hello"]
         self.gcs.receive()
         _, self.place = self.socket.recvfrom(100)

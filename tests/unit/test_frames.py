@@ -16,9 +16,7 @@ from uam_sim_bridge.mavlink import frames
 
 small = st.floats(-100.0, 100.0)
 vectors = st.tuples(small, small, small).map(np.array)
-eulers = st.tuples(
-    st.floats(-3.1, 3.1), st.floats(-1.5, 1.5), st.floats(-3.1, 3.1)
-).map(np.array)
+eulers = st.tuples(st.floats(-3.1, 3.1), st.floats(-1.5, 1.5), st.floats(-3.1, 3.1)).map(np.array)
 
 HALF = math.sqrt(0.5)
 

@@ -89,9 +89,12 @@ def test_parameters_that_nobody_asked_for_are_not_kept():
     """Found: every new name of a PARAM_VALUE took memory for good."""
     codec = Codec(1, 1)
     names = [f"P{k}".encode() for k in range(500)] + [b"MC_ROLLRATE_P"]
-    transport = Silence(*(
-        codec.encode(mavlink2.MAVLink_param_value_message(name, 0.15, 9, 501, 0))
-        for name in names))
+    transport = Silence(
+        *(
+            codec.encode(mavlink2.MAVLink_param_value_message(name, 0.15, 9, 501, 0))
+            for name in names
+        )
+    )
     link = OffboardLink(transport, OffboardSequence(), RateThrustParameters())
     link.poll(0.0)
     assert list(link.values) == ["MC_ROLLRATE_P"]
@@ -103,8 +106,11 @@ def test_a_sample_from_the_end_of_time_does_not_end_the_autopilot(microseconds):
     codec = Codec(1, 200)
 
     def sample(time):
-        return codec.encode(mavlink2.MAVLink_hil_sensor_message(
-            time, 0, 0, -9.81, 0, 0, 0, 0.2, 0, 0.4, 1013, 0, 0, 20, 0x1FFF, 0))
+        return codec.encode(
+            mavlink2.MAVLink_hil_sensor_message(
+                time, 0, 0, -9.81, 0, 0, 0, 0.2, 0, 0.4, 1013, 0, 0, 20, 0x1FFF, 0
+            )
+        )
 
     class Udp(Silence):
         def send(self, messages):

@@ -19,8 +19,7 @@ NO_SHRINKING = (Phase.explicit, Phase.reuse, Phase.generate)  # flights are long
 def guidance(**parameters):
     scenario = load_scenario("pick_and_place")
     made = SupervisionParameters(**parameters)
-    return Guidance(
-        scenario.trajectory(START), 100.0, np.zeros((3, 8)), scenario.arm_start, made)
+    return Guidance(scenario.trajectory(START), 100.0, np.zeros((3, 8)), scenario.arm_start, made)
 
 
 def fly(guide, begin, end, at=()):
@@ -41,9 +40,11 @@ def assert_smooth(references):
     assert np.all(np.isfinite(references))
     middle = references[1:-1]
     np.testing.assert_allclose(
-        (references[2:, 0] - references[:-2, 0]) / (2 * DT), middle[:, 1], atol=3e-3)
+        (references[2:, 0] - references[:-2, 0]) / (2 * DT), middle[:, 1], atol=3e-3
+    )
     np.testing.assert_allclose(
-        (references[2:, 1] - references[:-2, 1]) / (2 * DT), middle[:, 2], atol=0.12)
+        (references[2:, 1] - references[:-2, 1]) / (2 * DT), middle[:, 2], atol=0.12
+    )
     for part, rate, acceleration in ((slice(0, 6), 0.6, 1.0), (slice(6, 8), 1.6, 4.0)):
         assert np.max(np.abs(middle[:, 1, part])) < rate
         assert np.max(np.abs(middle[:, 2, part])) < acceleration
@@ -61,9 +62,7 @@ def test_undisturbed_it_is_the_trajectory_itself_bit_for_bit():
 
 
 @settings(deadline=None, max_examples=20, phases=NO_SHRINKING)
-@given(
-    st.floats(0.5, 80.0), st.floats(0.1, 6.0), st.floats(0.1, 4.0), st.booleans()
-)
+@given(st.floats(0.5, 80.0), st.floats(0.1, 6.0), st.floats(0.1, 4.0), st.booleans())
 def test_hold_and_resume_are_smooth_and_come_to_rest_whenever_they_come(at, held, again, stow):
     guide = guidance()
     references = fly(guide, at - 0.1, at + held + again + 14.0, [
@@ -90,8 +89,11 @@ def test_after_a_hold_with_stowed_arm_the_scenario_is_flown_as_if_it_were_later(
 
 @settings(deadline=None, max_examples=20, phases=NO_SHRINKING)
 @given(
-    st.floats(0.5, 80.0), st.floats(-1.5, 1.5), st.floats(-1.5, 1.5),
-    st.sampled_from([0.0, np.nan, np.inf]), st.booleans(),
+    st.floats(0.5, 80.0),
+    st.floats(-1.5, 1.5),
+    st.floats(-1.5, 1.5),
+    st.sampled_from([0.0, np.nan, np.inf]),
+    st.booleans(),
 )
 def test_a_descent_is_smooth_from_anywhere_and_ends_below_the_vehicle(at, dx, dy, strange, stow):
     guide, state = guidance(), np.zeros((3, 8))

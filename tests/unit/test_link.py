@@ -51,7 +51,8 @@ class Rig:
     def __init__(self, hold_time=1.0):
         self.memory, self.sequence = Memory(), OffboardSequence()
         self.link = OffboardLink(
-            self.memory, self.sequence, RateThrustParameters(), hold_time=hold_time)
+            self.memory, self.sequence, RateThrustParameters(), hold_time=hold_time
+        )
         self.codec, self.framer = Codec(1, 1), Framer(Codec(1, 1))
         self.ticks, self.cut, self.vision = 0, False, True
         self.deaf = ()
@@ -280,14 +281,18 @@ def test_differences_and_a_short_loss_time_are_warnings():
     rig.run(1.0)
     assert rig.link.warnings == (
         "MC_ROLLRATE_P is 0.3 on the autopilot, the bridge assumes 0.15",
-        "COM_OF_LOSS_T is 1 s on the autopilot, shorter than the bridge's hold_time of 2 s")
+        "COM_OF_LOSS_T is 1 s on the autopilot, shorter than the bridge's hold_time of 2 s",
+    )
 
 
 def test_integer_parameters_are_read_by_type(rig):
     rig.run(0.1)
     value = struct.unpack("<f", struct.pack("<i", 7))[0]
-    rig.say(mavlink2.MAVLink_param_value_message(
-        b"MC_ROLLRATE_P", value, mavlink2.MAV_PARAM_TYPE_INT32, 900, 17))
+    rig.say(
+        mavlink2.MAVLink_param_value_message(
+            b"MC_ROLLRATE_P", value, mavlink2.MAV_PARAM_TYPE_INT32, 900, 17
+        )
+    )
     rig.run(0.1)
     assert rig.link.values["MC_ROLLRATE_P"] == 7
 
@@ -299,9 +304,12 @@ def test_a_refused_arming_is_asked_to_be_explained(rig):
     asked = [c for c, _ in rig.commands()]
     assert asked.count(Command.RUN_PREARM_CHECKS) == 1 < asked.count(Command.ARM_DISARM)
     summary = struct.pack("<BIIII", 0, 0, 0, 1, 1)
-    rig.say(EventMessage(0, 0, event_id(SUMMARY), 0, 1, 8, summary),
-            EventMessage(0, 0, event_id("check_modes_attitude"), 0, 2, 2,
-                         struct.pack("<IB", 0xFFFFFFFF, 16)))
+    rig.say(
+        EventMessage(0, 0, event_id(SUMMARY), 0, 1, 8, summary),
+        EventMessage(
+            0, 0, event_id("check_modes_attitude"), 0, 2, 2, struct.pack("<IB", 0xFFFFFFFF, 16)
+        ),
+    )
     rig.run(0.1)
     assert "No valid attitude estimate → hold the vehicle still" in rig.reasons()
 
@@ -309,8 +317,11 @@ def test_a_refused_arming_is_asked_to_be_explained(rig):
 def test_answers_to_others_are_not_ours(rig):
     rig.sequence.want(True)
     rig.run(0.02)
-    rig.say(mavlink2.MAVLink_command_ack_message(
-        Command.ARM_DISARM, Result.DENIED, 0, 0, 255, mavlink2.MAV_COMP_ID_MISSIONPLANNER))
+    rig.say(
+        mavlink2.MAVLink_command_ack_message(
+            Command.ARM_DISARM, Result.DENIED, 0, 0, 255, mavlink2.MAV_COMP_ID_MISSIONPLANNER
+        )
+    )
     rig.run(2.0)
     assert "denied" not in rig.reasons() and rig.sequence.phase is Phase.FLYING
 

@@ -304,7 +304,9 @@ def test_the_magnet_is_as_asked_for_until_the_scenario_switches_it():
     flight = Flight("pick_and_place")
     flight.until(lambda o: o.time > 10.0)
     assert flight.mission.switch_magnet(True) == (
-        True, "magnet on until the scenario switches it next")
+        True,
+        "magnet on until the scenario switches it next",
+    )
     assert flight.step().magnet
     assert flight.until(lambda o: o.time > 36.0).magnet
     flight.mission.switch_magnet(False)

@@ -37,15 +37,20 @@ def test_values_by_type():
 
 def test_the_same_values_change_nothing():
     mapping = RateThrustParameters()
-    values = {name: struct.unpack("<f", struct.pack("<f", value))[0]
-              for name, value in expected(mapping).items()}
+    values = {
+        name: struct.unpack("<f", struct.pack("<f", value))[0]
+        for name, value in expected(mapping).items()
+    }
     assert adopted(mapping, values) is mapping
     assert adopted(mapping, {}) is mapping
 
 
 def test_adopted():
-    values = {"MC_ROLLRATE_P": 0.3, "MC_YAWRATE_K": 2.0,
-              "THR_MDL_FAC": struct.unpack("<f", struct.pack("<f", 0.1))[0]}
+    values = {
+        "MC_ROLLRATE_P": 0.3,
+        "MC_YAWRATE_K": 2.0,
+        "THR_MDL_FAC": struct.unpack("<f", struct.pack("<f", 0.1))[0],
+    }
     new = adopted(RateThrustParameters(), values)
     assert new.rate_p == (0.3, 0.15, 0.2) and new.rate_k == (1.0, 1.0, 2.0)
     assert new.thr_mdl_fac == 0.1
@@ -63,10 +68,12 @@ def test_loss_of_the_stream():
     assert list(stream_loss({}, 1.0)) == []
     assert list(stream_loss({"COM_OF_LOSS_T": 1.0}, 1.0)) == []
     assert list(stream_loss({"COM_OF_LOSS_T": 0.5}, 1.0)) == [
-        "COM_OF_LOSS_T is 0.5 s on the autopilot, shorter than the bridge's hold_time of 1 s"]
+        "COM_OF_LOSS_T is 0.5 s on the autopilot, shorter than the bridge's hold_time of 1 s"
+    ]
     assert "COM_OF_LOSS_T is 0 on the autopilot" in next(stream_loss({"COM_OF_LOSS_T": 0.0}, 1.0))
 
 
 def test_untold():
     assert list(untold(["THR_MDL_FAC"], 10)) == [
-        "THR_MDL_FAC was not told by the autopilot in 10 requests"]
+        "THR_MDL_FAC was not told by the autopilot in 10 requests"
+    ]

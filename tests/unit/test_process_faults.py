@@ -51,7 +51,8 @@ def faults(children, *texts):
     told, clock = [], [0.0]
     schedule = read_schedule(texts, SCENARIO, 1)
     made = ProcessFaults(
-        children, schedule, lambda one: told.append((one.number, one.active)), lambda: clock[0])
+        children, schedule, lambda one: told.append((one.number, one.active)), lambda: clock[0]
+    )
     return made, told, clock
 
 

@@ -156,10 +156,13 @@ def test_the_environment_is_private_and_local(tmp_path, monkeypatch):
     assert made["OMP_NUM_THREADS"] == made["NUMBA_NUM_THREADS"] == "1"
 
 
-@pytest.mark.parametrize("name, value", [
-    (processes.PROFILES_FILE, "/home/me/mine.xml"), ("RMW_IMPLEMENTATION", "rmw_cyclonedds_cpp")])
+@pytest.mark.parametrize(
+    "name, value",
+    [(processes.PROFILES_FILE, "/home/me/mine.xml"), ("RMW_IMPLEMENTATION", "rmw_cyclonedds_cpp")],
+)
 def test_with_the_users_own_middleware_ros_keeps_it_on_this_machine(
-        name, value, tmp_path, monkeypatch):
+    name, value, tmp_path, monkeypatch
+):
     monkeypatch.setenv(name, value)
     made = processes.environment(42, tmp_path)
     assert made[name] == value and made["ROS_AUTOMATIC_DISCOVERY_RANGE"] == "LOCALHOST"
@@ -178,9 +181,7 @@ def test_shared_memory_is_removed_once_nobody_uses_it(tmp_path, monkeypatch):
     file = segment(tmp_path, "fastrtps_0123456789abcdef")
     other = segment(tmp_path, "fastrtps_fedcba9876543210")
     hold = "import mmap; f = open('{}', 'r+b'); m = mmap.mmap(f.fileno(), 4096); input()"
-    user = subprocess.Popen(
-        [sys.executable, "-c", hold.format(file)], stdin=subprocess.PIPE
-    )
+    user = subprocess.Popen([sys.executable, "-c", hold.format(file)], stdin=subprocess.PIPE)
     while not shared_memory.used_by(user.pid):
         assert user.poll() is None
         time.sleep(0.01)

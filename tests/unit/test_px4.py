@@ -66,11 +66,17 @@ def test_px4_flies_with_the_stand_ins_rate_loop_and_mocap_alone():
     assert passed["PX4_PARAM_MC_ROLLRATE_P"] == "0.15"
 
 
-@pytest.mark.parametrize("text, said", [
-    ("[1, 2]", "NAME: value"), ("mc_roll_p: 1.0", "no name"), ("MC_ROLL_P: high", "not a number"),
-    ("MC_ROLL_P: .nan", "not a number"), ("A: [", "not valid YAML"),
-    ("A_NAME_THAT_IS_TOO_LONG: 1", "no name"),
-])
+@pytest.mark.parametrize(
+    "text, said",
+    [
+        ("[1, 2]", "NAME: value"),
+        ("mc_roll_p: 1.0", "no name"),
+        ("MC_ROLL_P: high", "not a number"),
+        ("MC_ROLL_P: .nan", "not a number"),
+        ("A: [", "not valid YAML"),
+        ("A_NAME_THAT_IS_TOO_LONG: 1", "no name"),
+    ],
+)
 def test_bad_parameters_are_refused(text, said, tmp_path):
     file = tmp_path / "mine.yaml"
     file.write_text(text)
@@ -83,13 +89,28 @@ def test_nothing_is_left_but_the_logs(build, tmp_path, signum):
     log, output = tmp_path / "flight.ulg", tmp_path / "output"
     with output.open("w") as out:
         process = subprocess.Popen(
-            [sys.executable, "-m", "uam_sim_bridge.px4.sitl", "-i", "7", "--px4-dir", str(build),
-             "--log", str(log)],
+            [
+                sys.executable,
+                "-m",
+                "uam_sim_bridge.px4.sitl",
+                "-i",
+                "7",
+                "--px4-dir",
+                str(build),
+                "--log",
+                str(log),
+            ],
             env=os.environ | {"PX4_PARAM_MC_ROLL_P": "99", "TMPDIR": str(tmp_path)},
-            stdout=out, stderr=out)
-    folder = _until(lambda: [f for f in tmp_path.glob("uam-px4-*")
-                             if (f / "log/today/2.ulg").exists()
-                             and (f / "log/today/2.ulg").read_text()])[0]
+            stdout=out,
+            stderr=out,
+        )
+    folder = _until(
+        lambda: [
+            f
+            for f in tmp_path.glob("uam-px4-*")
+            if (f / "log/today/2.ulg").exists() and (f / "log/today/2.ulg").read_text()
+        ]
+    )[0]
     seen = (folder / "seen").read_text()
     assert "PX4_PARAM_THR_MDL_FAC=0.3" in seen and "MC_ROLL_P" not in seen
     assert f"arguments -i 7 -d {build / 'etc'}" in _until(output.read_text)

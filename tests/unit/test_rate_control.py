@@ -65,8 +65,9 @@ def test_pid_by_hand():
     memory[rc.RATES] = [0.2, 0.0, 0.0]
     memory[rc.ACCELERATION] = [5.0, 0.0, 0.0]
     memory[rc.INTEGRAL] = [0.05, 0.0, 0.0]
-    rc.rate_torque(np.array([1.0, 0, 0, 0]), DT, NO_FILTER, gains(0.15, 0.2, 0.003, 0.01),
-                   False, memory)
+    rc.rate_torque(
+        np.array([1.0, 0, 0, 0]), DT, NO_FILTER, gains(0.15, 0.2, 0.003, 0.01), False, memory
+    )
     assert memory[rc.TORQUE, 0] == pytest.approx(0.15 * 0.8 + 0.05 - 0.003 * 5.0 + 0.01)
     factor = 1.0 - (0.8 / math.radians(400.0)) ** 2
     assert memory[rc.INTEGRAL, 0] == pytest.approx(0.05 + factor * 0.2 * 0.8 * DT)

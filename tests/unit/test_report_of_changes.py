@@ -11,8 +11,14 @@ from uam_sim_bridge.report.panels import Flight
 
 
 def entry(time, accepted=True, **values):
-    return {"time_s": time, "node": "arm_controller", "by": "parameter service",
-            "accepted": accepted, "reason": "" if accepted else "varpi: <no>", "values": values}
+    return {
+        "time_s": time,
+        "node": "arm_controller",
+        "by": "parameter service",
+        "accepted": accepted,
+        "reason": "" if accepted else "varpi: <no>",
+        "values": values,
+    }
 
 
 def test_a_change_is_read_back_from_its_message():
@@ -43,7 +49,9 @@ def test_changes_are_drawn_and_listed(flight_folder, flight, make_flight):
     assert [line.get_segments()[0][0][0] for line in lines] == [10.0, 20.0]
     assert {"1", "2"} <= {text.get_text() for text in axis.texts}
     assert [t.get_text() for t in figure.legends[0].texts][-2:] == [
-        "parameters changed", "change refused"]
+        "parameters changed",
+        "change refused",
+    ]
     draw([Flight("x", marked)], flight_folder / "figures", names=["arm_inputs"])
     (flight_folder / "info.json").write_text(json.dumps(marked.info))
     html = page.write_page(flight_folder).read_text()

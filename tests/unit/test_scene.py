@@ -98,7 +98,8 @@ def test_transforms_are_decoded_as_they_were_sent(tmp_path):
 def test_the_hash_of_the_type_is_that_of_its_description():
     """As rosidl computes it: over the description as JSON, without default values."""
     share = next(
-        p / "share" for p in Path(geometry_msgs.__file__).parents
+        p / "share"
+        for p in Path(geometry_msgs.__file__).parents
         if (p / "share/geometry_msgs/msg").is_dir()
     )
     known = json.loads((share / "geometry_msgs/msg/TransformStamped.json").read_text())
@@ -108,7 +109,9 @@ def test_the_hash_of_the_type_is_that_of_its_description():
         for field in part["fields"]:
             del field["default_value"]
     kind = {
-        "type_id": tf_message.NESTED_SEQUENCE, "capacity": 0, "string_capacity": 0,
+        "type_id": tf_message.NESTED_SEQUENCE,
+        "capacity": 0,
+        "string_capacity": 0,
         "nested_type_name": "geometry_msgs/msg/TransformStamped",
     }
     own = {

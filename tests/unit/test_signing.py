@@ -42,7 +42,7 @@ def test_signed_passes_in_datagrams_and_streams():
     found = [m.tc1 for f in frames[:2] for m in framer.datagram(f)]
     rest = b"".join(frames[2:])
     for i in range(0, len(rest), 5):
-        found += [m.tc1 for m in framer.stream(rest[i:i + 5])]
+        found += [m.tc1 for m in framer.stream(rest[i : i + 5])]
     assert found == [1, 2, 3, 4, 5] and refused(framer) == 0 and framer.bad_bytes == 0
 
 
@@ -133,8 +133,15 @@ def test_a_bad_key_is_refused_without_repeating_it(tmp_path):
     file.write_bytes(b"\xff" * 64)
     short = tmp_path / "short"
     short.write_text("abcd")
-    for text in (KEY.hex()[:-1], KEY.hex() + "0", "x" * 5000, "\x00", str(file), str(short),
-                 str(tmp_path)):
+    for text in (
+        KEY.hex()[:-1],
+        KEY.hex() + "0",
+        "x" * 5000,
+        "\x00",
+        str(file),
+        str(short),
+        str(tmp_path),
+    ):
         with pytest.raises(PortError, match="signing key") as error:
             Signing.from_text(text)
         assert text not in str(error.value) and "\n" not in str(error.value)

@@ -80,9 +80,7 @@ def test_v_and_bound_worked_by_hand():
     gains = np.array([[1.0, 0, 0, 0], [3.0, 1, 0, 0]])
     zeta, star = np.array([0.2, 0.1]), np.array([2.0, 0, 0, 1.0])
     parts = lyapunov.parts("position", record, tracking_of(e, e_dot), gains, zeta, star)
-    np.testing.assert_allclose(
-        parts.tracking, [0.5 * (4 * 1.125 + 2 * 2 * 0.125 + 0.15625), 0.0]
-    )
+    np.testing.assert_allclose(parts.tracking, [0.5 * (4 * 1.125 + 2 * 2 * 0.125 + 0.15625), 0.0])
     np.testing.assert_allclose(parts.gains, [1.0, 1.5])
     np.testing.assert_allclose(parts.zeta, [2.0, 1.0])
     matrix = np.array([[1.125, 0.125], [0.125, 0.15625]])

@@ -70,8 +70,11 @@ def test_refusals_are_said():
 
 def test_somewhat_slow_is_enough():
     streams = StreamCheck()
-    run(streams, 3 * WINDOW, rates={n: 0.7 * rate for n, rate in RATES.items()} | {
-        HEARTBEAT: 1.0, BATTERY: 1.0})
+    run(
+        streams,
+        3 * WINDOW,
+        rates={n: 0.7 * rate for n, rate in RATES.items()} | {HEARTBEAT: 1.0, BATTERY: 1.0},
+    )
     assert streams.warnings == ()
 
 

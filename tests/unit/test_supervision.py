@@ -171,10 +171,16 @@ def with_state(entry, value):
         (observation(readings=Readings(mocap_age=1.1)), State.FAILSAFE, "mocap pose is 1.10 s"),
         (observation(readings=Readings(joint_age=0.3)), State.HOLDING, "joint angles are 0.30 s"),
         (observation(readings=Readings(missed_ticks=130)), State.HOLDING, "130 control ticks"),
-        (observation(readings=Readings(joint_effort=np.array([0.0, -2.9]))), State.HOLDING,
-         "joint torque at 1.04 of its limit"),
-        (observation(readings=Readings(gains=np.array([math.nan, 150.0, 3.0]))), State.HOLDING,
-         "adapted gain at 1.50 of its limit"),
+        (
+            observation(readings=Readings(joint_effort=np.array([0.0, -2.9]))),
+            State.HOLDING,
+            "joint torque at 1.04 of its limit",
+        ),
+        (
+            observation(readings=Readings(gains=np.array([math.nan, 150.0, 3.0]))),
+            State.HOLDING,
+            "adapted gain at 1.50 of its limit",
+        ),
         (observation(armed=False), State.DISARMED, "the autopilot disarmed in flight"),
     ],
 )
@@ -316,8 +322,12 @@ class AnySequence(RuleBasedStateMachine):
     def other_readings(self, readings):
         self.seen.readings = readings
 
-    @rule(name=st.sampled_from(
-        ["armed", "ready", "landing_due", "on_ground", "touchdown", "overdue"]), on=st.booleans())
+    @rule(
+        name=st.sampled_from(
+            ["armed", "ready", "landing_due", "on_ground", "touchdown", "overdue"]
+        ),
+        on=st.booleans(),
+    )
     def the_mission_says(self, name, on):
         setattr(self.seen, name, on)
 

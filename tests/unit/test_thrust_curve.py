@@ -54,7 +54,8 @@ def test_newtons_come_back(motor, model, battery, share):
     command = command_of_thrust(newtons, FULL, battery, motor, model)
     assert 0.0 <= command <= 1.0
     assert thrust_of_command(command, FULL, battery, motor, model) == pytest.approx(
-        newtons, abs=1e-6)
+        newtons, abs=1e-6
+    )
 
 
 @given(factors, factors, unit, unit)
@@ -62,7 +63,8 @@ def test_monotone(motor, model, a, b):
     low, high = sorted((a, b))
     if high - low > 1e-6:
         assert command_of_thrust(low * FULL, FULL, 1.0, motor, model) < command_of_thrust(
-            high * FULL, FULL, 1.0, motor, model)
+            high * FULL, FULL, 1.0, motor, model
+        )
 
 
 @given(st.floats(0.0, 0.9), st.floats(0.0, 0.9), st.floats(0.1, 0.9))

@@ -61,18 +61,19 @@ def test_it_converges_while_tilted_and_turned():
     hover.state[0, 3:6] = 0.1, -0.05, 2.0
     # what stays of the thrust along z carries the weight; the share across it accelerates
     roll, pitch, yaw = hover.state[0, 3:6]
-    axis = np.array([
-        math.cos(yaw) * math.sin(pitch) * math.cos(roll) + math.sin(yaw) * math.sin(roll),
-        math.sin(yaw) * math.sin(pitch) * math.cos(roll) - math.cos(yaw) * math.sin(roll),
-        math.cos(pitch) * math.cos(roll)])
-    hover.identification.configure(
-        ThrustIdentificationParameters(identification_acceleration=2.0))
+    axis = np.array(
+        [
+            math.cos(yaw) * math.sin(pitch) * math.cos(roll) + math.sin(yaw) * math.sin(roll),
+            math.sin(yaw) * math.sin(pitch) * math.cos(roll) - math.cos(yaw) * math.sin(roll),
+            math.cos(pitch) * math.cos(roll),
+        ]
+    )
+    hover.identification.configure(ThrustIdentificationParameters(identification_acceleration=2.0))
     thrust = MASS * GRAVITY
     acceleration = axis * GRAVITY - np.array([0.0, 0.0, GRAVITY])
     for k in range(15000):
         hover.state[2, :3] = acceleration
-        hover.identification.update(
-            1.0 + k * DT, hover.state, 0.6, thrust / hover.truth, True)
+        hover.identification.update(1.0 + k * DT, hover.state, 0.6, thrust / hover.truth, True)
     assert hover.factor == pytest.approx(0.85, abs=0.01)
 
 
@@ -82,8 +83,7 @@ def test_the_slew_limit_holds():
     assert before - hover.fly(2.0) == pytest.approx(0.02, rel=0.02)
 
 
-@pytest.mark.parametrize(
-    ("truth", "bound"), [(0.2, 0.5), (2.5, 1.3)])
+@pytest.mark.parametrize(("truth", "bound"), [(0.2, 0.5), (2.5, 1.3)])
 def test_it_stops_at_its_bounds(truth, bound):
     assert Hover(truth).fly(120.0) == pytest.approx(bound, abs=5e-3)
 
@@ -189,9 +189,13 @@ def test_a_gap_in_time_is_no_measurement():
 anything = st.floats(allow_nan=True, allow_infinity=True)
 sane = st.floats(-2.0, 2.0)
 tick = st.tuples(
-    st.one_of(st.just(DT), anything), st.lists(st.one_of(sane, anything), min_size=6, max_size=6),
-    st.one_of(st.floats(0.0, 1.0), anything), st.one_of(st.floats(0.0, 50.0), anything),
-    st.booleans(), st.booleans())
+    st.one_of(st.just(DT), anything),
+    st.lists(st.one_of(sane, anything), min_size=6, max_size=6),
+    st.one_of(st.floats(0.0, 1.0), anything),
+    st.one_of(st.floats(0.0, 50.0), anything),
+    st.booleans(),
+    st.booleans(),
+)
 
 
 @settings(max_examples=200, deadline=None)
@@ -213,8 +217,10 @@ def test_whatever_comes_in_the_factor_stays_within_bounds_and_slew(ticks):
             time = 0.0
 
 
-@given(st.sampled_from([(0, 3), (0, 4), (0, 5), (2, 0), (2, 1), (2, 2), (0, 2)]),
-       st.sampled_from([math.nan, math.inf, -math.inf]))
+@given(
+    st.sampled_from([(0, 3), (0, 4), (0, 5), (2, 0), (2, 1), (2, 2), (0, 2)]),
+    st.sampled_from([math.nan, math.inf, -math.inf]),
+)
 def test_what_is_not_finite_leaves_it_unchanged(where, bad):
     hover = Hover()
     hover.fly(1.0)

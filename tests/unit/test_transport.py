@@ -239,9 +239,14 @@ def test_serial_carries_frames_in_chunks(line):
     frames = b"".join(codec.encode(sample(k)) for k in range(20))
     framer, found = Framer(Codec(2, 2)), []
     for i in range(0, len(frames), 7):
-        os.write(far, frames[i:i + 7])
-    until(lambda: (found.extend(m for c in link.receive() for m in framer.take(c, link.stream)),
-                   len(found) == 20)[1], "all frames")
+        os.write(far, frames[i : i + 7])
+    until(
+        lambda: (
+            found.extend(m for c in link.receive() for m in framer.take(c, link.stream)),
+            len(found) == 20,
+        )[1],
+        "all frames",
+    )
     assert link.send(b"there") and os.read(far, 10) == b"there"
     os.close(far)
 

@@ -46,8 +46,13 @@ SPACE = {
         "lost": 100.0,
     },
     "knobs": [
-        {"node": "position_controller", "parameter": "lambda_1", "entries": [0, 1], "low": 0.5,
-         "high": 6.0},
+        {
+            "node": "position_controller",
+            "parameter": "lambda_1",
+            "entries": [0, 1],
+            "low": 0.5,
+            "high": 6.0,
+        },
         {"node": "arm_controller", "parameter": "varpi", "low": 0.1, "high": 10.0},
     ],
 }

@@ -45,7 +45,7 @@ def test_stream_survives_garbage_between_messages(garbage, step):
     framer = Framer(Codec(2, 2))
     found = []
     for i in range(0, len(data), step):
-        found += framer.stream(data[i:i + step])
+        found += framer.stream(data[i : i + step])
     assert numbers(found) == list(range(len(garbage)))
 
 

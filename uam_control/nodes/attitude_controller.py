@@ -25,9 +25,7 @@ class AttitudeControllerNode(ControllerNode):
     def tick(self, stamp, dt, state, reference, position):
         flying = reference.flying and position.flying
         tau = self.controller.update(state, reference.values, position.attitude, flying, dt)
-        self._command.publish(
-            self._writer.fill(stamp, tau) if flying else self._writer.idle(stamp)
-        )
+        self._command.publish(self._writer.fill(stamp, tau) if flying else self._writer.idle(stamp))
 
     def evaluate(self, controller, dt, state, reference, attitude, flying):
         return controller.update(state, reference, attitude, flying, dt)

@@ -128,8 +128,14 @@ class MissionNode(UamNode):
         """Where the mission is now."""
         output = self._mission.output
         return MissionStatus(
-            output.phase, output.time, *self._errors, output.done, output.abort_reason,
-            bool(output.magnet), output.state.value, output.cause,
+            output.phase,
+            output.time,
+            *self._errors,
+            output.done,
+            output.abort_reason,
+            bool(output.magnet),
+            output.state.value,
+            output.cause,
         )
 
     def _log(self) -> None:

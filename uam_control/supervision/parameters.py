@@ -21,17 +21,13 @@ class Limits(ParameterSet):
         3.0, "position error to leave it to the autopilot at", "m", 0.05, 100.0
     )
     tilt_hold: float = number(0.8, "tilt to hold at", "rad", 0.05, 3.2)
-    tilt_failsafe: float = number(
-        1.05, "tilt to leave it to the autopilot at", "rad", 0.05, 3.2
-    )
+    tilt_failsafe: float = number(1.05, "tilt to leave it to the autopilot at", "rad", 0.05, 3.2)
     body_rate_hold: float = number(8.0, "body rate about any axis to hold at", "rad/s", 0.1, 100.0)
     body_rate_failsafe: float = number(
         15.0, "body rate about any axis to leave it to the autopilot at", "rad/s", 0.1, 100.0
     )
     altitude_hold: float = number(5.0, "height above the take-off to hold at", "m", 0.1, 1000.0)
-    geofence_low: tuple = vector(
-        (-5.0, -5.0, -1.0), _BOX + "smallest x, y, z", "m", -1e4, 1e4, 3
-    )
+    geofence_low: tuple = vector((-5.0, -5.0, -1.0), _BOX + "smallest x, y, z", "m", -1e4, 1e4, 3)
     geofence_high: tuple = vector((5.0, 5.0, 6.0), _BOX + "largest x, y, z", "m", -1e4, 1e4, 3)
     geofence_land: float = number(0.1, "distance outside the box to land at", "m", 0.0, 100.0)
     geofence_failsafe: float = number(

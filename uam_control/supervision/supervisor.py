@@ -78,9 +78,7 @@ class Supervisor:
         self._checks.configure(parameters)
         self.decision = self._decide()
 
-    def step(
-        self, stamp: float, seen: Observation, command: Command | None = None
-    ) -> Decision:
+    def step(self, stamp: float, seen: Observation, command: Command | None = None) -> Decision:
         """Return what holds at `stamp` [s]; at most one transition per call.
 
         A stamp that is not finite or runs backwards counts as the last one.
@@ -147,9 +145,7 @@ class Supervisor:
             keep = False
         return Decision(state, self.cause, guide, self._arm, keep, stow)
 
-    def _events(
-        self, seen: Observation, command: Command | None
-    ) -> Iterator[tuple[Event, str]]:
+    def _events(self, seen: Observation, command: Command | None) -> Iterator[tuple[Event, str]]:
         """What happens at this tick, and why; what saves the vehicle first."""
         finding, p = self._checks.finding, self._parameters
         level, cause = finding or (Level.FINE, "")

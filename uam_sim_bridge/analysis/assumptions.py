@@ -36,8 +36,9 @@ def mass_matrix(dynamics: Dynamics, sets: dict) -> dict[str, Any]:
     """
     inertia, mass = nominal_inertia(sets), dynamics.mass
     identity = np.eye(mass.shape[1])
-    whole = np.linalg.eigvals(identity - np.linalg.solve(mass, np.broadcast_to(
-        np.diag(inertia), mass.shape)))
+    whole = np.linalg.eigvals(
+        identity - np.linalg.solve(mass, np.broadcast_to(np.diag(inertia), mass.shape))
+    )
     norms = {}
     for name, columns in COLUMNS_OF.items():
         own = mass[:, columns, columns] / inertia[columns]

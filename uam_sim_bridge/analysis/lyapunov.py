@@ -70,9 +70,7 @@ def parts(
     columns = COLUMNS_OF[subsystem]
     e, e_dot = truth.e[:, columns], truth.e_dot[:, columns]
     square = e**2 @ record["p11"] + 2.0 * (e * e_dot) @ record["p12"] + e_dot**2 @ record["p22"]
-    return Parts(
-        0.5 * square, 0.5 * np.sum((gains - constants) ** 2, axis=1), zeta / np.min(zeta)
-    )
+    return Parts(0.5 * square, 0.5 * np.sum((gains - constants) ** 2, axis=1), zeta / np.min(zeta))
 
 
 def decrease(

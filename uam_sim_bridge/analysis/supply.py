@@ -31,9 +31,7 @@ class Supply:
     applied: np.ndarray  # what rotors made; for the arm, whose torque is not recorded, asked
 
 
-def along(
-    series: Series, rows: np.ndarray, estimate: Tracking, sets: dict, body: Body
-) -> Supply:
+def along(series: Series, rows: np.ndarray, estimate: Tracking, sets: dict, body: Body) -> Supply:
     """The terms at `rows` (m,). estimate: the errors that the law saw; sets: of the profile."""
     shape = (len(rows), SIZE)
     feedforward, feedback, adaptive, weight = (np.zeros(shape) for _ in range(4))

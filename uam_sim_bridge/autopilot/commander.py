@@ -52,8 +52,10 @@ class Commander:
         """Handle a request for a mode."""
         if mode is Mode.OFFBOARD:
             if not self.streaming(time):
-                self._say(Severity.CRITICAL, "Switching to mode 'Offboard' is currently not "
-                          "possible: no offboard signal")
+                self._say(
+                    Severity.CRITICAL,
+                    "Switching to mode 'Offboard' is currently not possible: no offboard signal",
+                )
                 return Result.TEMPORARILY_REJECTED
         elif mode not in (Mode.LAND, Mode.HOLD) or (mode is Mode.HOLD and self.armed):
             self._say(Severity.CRITICAL, f"Mode {mode.name.title()} is not available")
@@ -68,8 +70,10 @@ class Commander:
             return Result.ACCEPTED
         reasons = list(faults)
         if self.mode is not Mode.OFFBOARD:
-            reasons.append(f"Preflight Fail: mode {self.mode.name.title()} needs radio control or "
-                           "position; switch to Offboard")
+            reasons.append(
+                f"Preflight Fail: mode {self.mode.name.title()} needs radio control or "
+                "position; switch to Offboard"
+            )
         elif not self.streaming(time):
             reasons.append("Preflight Fail: no offboard signal")
         if reasons:

@@ -111,13 +111,17 @@ class Companion:
                 self.out.append(message)
         else:
             result = self._autopilot.command(time, m.command, parameters)
-        self.out.append(mavlink2.MAVLink_command_ack_message(
-            m.command, result, 0, 0, m.get_srcSystem(), m.get_srcComponent()))
+        self.out.append(
+            mavlink2.MAVLink_command_ack_message(
+                m.command, result, 0, 0, m.get_srcSystem(), m.get_srcComponent()
+            )
+        )
 
     def _set_mode(self, time: float, m: Message) -> None:
         main, sub = m.custom_mode >> 16 & 0xFF, m.custom_mode >> 24 & 0xFF
         self._autopilot.command(
-            time, Command.DO_SET_MODE, (float(m.base_mode), float(main), float(sub), 0, 0, 0, 0))
+            time, Command.DO_SET_MODE, (float(m.base_mode), float(main), float(sub), 0, 0, 0, 0)
+        )
 
     def _parameter_read(self, time: float, m: Message) -> None:
         names = self._autopilot.parameters.names
@@ -148,8 +152,11 @@ class Companion:
         value, kind = parameters[name], _REAL
         if definition.integer:
             value, kind = struct.unpack("<f", struct.pack("<i", int(value)))[0], _INTEGER
-        self.out.append(mavlink2.MAVLink_param_value_message(
-            name.encode(), value, kind, len(parameters.names), parameters.names.index(name)))
+        self.out.append(
+            mavlink2.MAVLink_param_value_message(
+                name.encode(), value, kind, len(parameters.names), parameters.names.index(name)
+            )
+        )
 
     def _timesync(self, time: float, m: Message) -> None:
         if m.tc1 == 0:

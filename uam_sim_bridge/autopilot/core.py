@@ -187,14 +187,30 @@ class Autopilot:
         else:
             self._descent.reset()
         control_tick(
-            gyro, dt, commander.armed, landing.maybe_landed, setpoint, self._model_factor,
-            self._filters, self._gains, self._mixer, self._inverse, self._memory, self.motors)
+            gyro,
+            dt,
+            commander.armed,
+            landing.maybe_landed,
+            setpoint,
+            self._model_factor,
+            self._filters,
+            self._gains,
+            self._mixer,
+            self._inverse,
+            self._memory,
+            self.motors,
+        )
         if commander.armed:
             memory, estimator = self._memory, self.estimator
             velocity = tuple(estimator.estimate[7:10].tolist()) if estimator.aided(time) else None
             landing.update(
-                time, True, descending, float(setpoint[3]),
-                (float(memory[RATES, 0]), float(memory[RATES, 1])), velocity)
+                time,
+                True,
+                descending,
+                float(setpoint[3]),
+                (float(memory[RATES, 0]), float(memory[RATES, 1])),
+                velocity,
+            )
         else:
             landing.update(time, False, False, 0.0, (0.0, 0.0), (0.0, 0.0, 0.0))
         return self.motors
@@ -216,12 +232,17 @@ class Autopilot:
         self._mixer, self._inverse = mixer, np.ascontiguousarray(np.linalg.pinv(mixer))
         axes = ("ROLLRATE", "PITCHRATE", "YAWRATE")
         k = np.array([p[f"MC_{axis}_K"] for axis in axes])
-        self._gains = np.array([[p[f"MC_{axis}_{what}"] for axis in axes] for what in "PID"] + [
-            [p[f"MC_{axis}_FF"] for axis in axes],
-            p.vector("MC_RR_INT_LIM", "MC_PR_INT_LIM", "MC_YR_INT_LIM")])
+        self._gains = np.array(
+            [[p[f"MC_{axis}_{what}"] for axis in axes] for what in "PID"]
+            + [
+                [p[f"MC_{axis}_FF"] for axis in axes],
+                p.vector("MC_RR_INT_LIM", "MC_PR_INT_LIM", "MC_YR_INT_LIM"),
+            ]
+        )
         self._gains[:3] *= k
         self._filters = filter_coefficients(
-            self._sample_rate, p["IMU_GYRO_CUTOFF"], p["IMU_DGYRO_CUTOFF"], p["MC_YAW_TQ_CUTOFF"])
+            self._sample_rate, p["IMU_GYRO_CUTOFF"], p["IMU_DGYRO_CUTOFF"], p["MC_YAW_TQ_CUTOFF"]
+        )
         self._model_factor = p["THR_MDL_FAC"]
         self.landing.configure(p)
         self._descent.configure(p)

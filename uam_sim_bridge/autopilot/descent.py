@@ -43,9 +43,18 @@ class Descent:
 
     def configure(self, parameters: Parameters) -> None:
         """Take the gains from the autopilot's parameters."""
-        self._gains = np.array(parameters.vector(
-            "MC_ROLL_P", "MC_PITCH_P", "MPC_LAND_SPEED", "MPC_Z_VEL_P_ACC", "MPC_Z_VEL_I_ACC",
-            "MPC_THR_HOVER", "MPC_THR_MIN", "MPC_THR_MAX"))
+        self._gains = np.array(
+            parameters.vector(
+                "MC_ROLL_P",
+                "MC_PITCH_P",
+                "MPC_LAND_SPEED",
+                "MPC_Z_VEL_P_ACC",
+                "MPC_Z_VEL_I_ACC",
+                "MPC_THR_HOVER",
+                "MPC_THR_MIN",
+                "MPC_THR_MAX",
+            )
+        )
 
     def reset(self) -> None:
         """Forget the integral."""
@@ -54,6 +63,5 @@ class Descent:
     def update(self, estimate: np.ndarray, dt: float) -> np.ndarray:
         """Return the setpoint (4,) for the estimate (10,) of `Estimator`."""
         euler = euler_from_quaternion(estimate[ATTITUDE])
-        self._integral = descend(
-            euler, estimate[9], self._integral, dt, self._gains, self.setpoint)
+        self._integral = descend(euler, estimate[9], self._integral, dt, self._gains, self.setpoint)
         return self.setpoint

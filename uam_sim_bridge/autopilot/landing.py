@@ -63,7 +63,8 @@ class LandDetector:
         still = math.hypot(*rates) <= wider * self._rotation
         none = thrust <= (self._none_descending if descending else self._none)
         self.maybe_landed = self._stage(
-            1, time, self._contact and still and none, self.maybe_landed)
+            1, time, self._contact and still and none, self.maybe_landed
+        )
         self.landed = self._stage(2, time, self.maybe_landed, self.landed)
 
     def _stage(self, stage: int, time: float, evidence: bool, now: bool) -> bool:

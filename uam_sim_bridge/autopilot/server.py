@@ -41,7 +41,9 @@ class Server:
     """Autopilot, companion side and simulator side together."""
 
     def __init__(
-        self, autopilot: Autopilot, simulator: socket.socket | SerialLine,
+        self,
+        autopilot: Autopilot,
+        simulator: socket.socket | SerialLine,
         udp: UdpPort | SerialLine,
     ) -> None:
         """simulator, udp: where HIL messages and those of the companion come from; may be one."""
@@ -89,7 +91,8 @@ class Server:
         self._udp.send(self._companion.tick(time))
         mode = _CUSTOM_MODE | (_ARMED if self._autopilot.status.armed else 0)
         answer = mavlink2.MAVLink_hil_actuator_controls_message(
-            m.time_usec, [*motors.tolist(), *[0.0] * 12], mode, _LOCKSTEP)
+            m.time_usec, [*motors.tolist(), *[0.0] * 12], mode, _LOCKSTEP
+        )
         try:
             self._simulator.sendall(self._codec.encode(answer))
         except ConnectionError:
@@ -117,12 +120,20 @@ def parser() -> argparse.ArgumentParser:
         "  autopilot --serial /dev/ttyUSB0:921600  at the far end of hitl_router's line\n",
     )
     add_port_options(p)
-    p.add_argument("--params", metavar="FILE",
-                   help="parameters (default: config/autopilot/s500.yaml)")
-    p.add_argument("--serial", metavar="DEVICE:BAUD",
-                   help="everything over this line instead of TCP and UDP, as in HITL")
-    p.add_argument("--signing-key", default="", metavar="KEY",
-                   help="sign on UDP and refuse what is not: 64 hex digits, or a file of them")
+    p.add_argument(
+        "--params", metavar="FILE", help="parameters (default: config/autopilot/s500.yaml)"
+    )
+    p.add_argument(
+        "--serial",
+        metavar="DEVICE:BAUD",
+        help="everything over this line instead of TCP and UDP, as in HITL",
+    )
+    p.add_argument(
+        "--signing-key",
+        default="",
+        metavar="KEY",
+        help="sign on UDP and refuse what is not: 64 hex digits, or a file of them",
+    )
     return p
 
 
@@ -139,9 +150,11 @@ def main(arguments: Sequence[str] | None = None) -> int:
         autopilot = Autopilot(Parameters.load(file))
         # as PX4 SITL does; the highest instances do not fit MAVLink's one byte
         autopilot.set_parameter("MAV_SYS_ID", min(options.instance + 1, 250))
-        codec = Codec(int(autopilot.parameters["MAV_SYS_ID"]),
-                      int(autopilot.parameters["MAV_COMP_ID"]),
-                      Signing.from_text(options.signing_key))
+        codec = Codec(
+            int(autopilot.parameters["MAV_SYS_ID"]),
+            int(autopilot.parameters["MAV_COMP_ID"]),
+            Signing.from_text(options.signing_key),
+        )
         if options.serial:
             link = udp = SerialLine(options.serial, codec)
             warm_up()
@@ -152,8 +165,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
         udp = UdpPort(options.mavlink_port, options.companion_port, codec)
         warm_up()
         link = connect("autopilot", options.sim_host, options.sim_port, options.wait)
-        print(f"autopilot: connected to the simulator at {options.sim_host}:{options.sim_port}",
-              flush=True)
+        print(
+            f"autopilot: connected to the simulator at {options.sim_host}:{options.sim_port}",
+            flush=True,
+        )
         Server(autopilot, link, udp).run()
         print("autopilot: the simulator closed the link", flush=True)
         return 0

@@ -15,9 +15,13 @@ _LANDED, _IN_AIR, _LANDING = 1, 2, 4  # MAV_LANDED_STATE
 _STANDBY, _ACTIVE, _CRITICAL = 3, 4, 5  # MAV_STATE
 _GYRO, _ACCELEROMETER, _VISION = 1, 2, 128  # MAV_SYS_STATUS_SENSOR
 _NO_VOLTAGE, _NO_TEMPERATURE = 65535, 32767  # what MAVLink defines as unknown
-_AIDED = (mavlink2.ESTIMATOR_VELOCITY_HORIZ | mavlink2.ESTIMATOR_VELOCITY_VERT
-          | mavlink2.ESTIMATOR_POS_HORIZ_REL | mavlink2.ESTIMATOR_POS_VERT_ABS
-          | mavlink2.ESTIMATOR_PRED_POS_HORIZ_REL)
+_AIDED = (
+    mavlink2.ESTIMATOR_VELOCITY_HORIZ
+    | mavlink2.ESTIMATOR_VELOCITY_VERT
+    | mavlink2.ESTIMATOR_POS_HORIZ_REL
+    | mavlink2.ESTIMATOR_POS_VERT_ABS
+    | mavlink2.ESTIMATOR_PRED_POS_HORIZ_REL
+)
 FASTEST = 0.004  # s
 
 
@@ -27,8 +31,13 @@ def heartbeat(autopilot: Autopilot, time: float) -> Message:
     state = _CRITICAL if status.failsafe else _ACTIVE if status.armed else _STANDBY
     armed = mavlink2.MAV_MODE_FLAG_SAFETY_ARMED if status.armed else 0
     return mavlink2.MAVLink_heartbeat_message(
-        mavlink2.MAV_TYPE_QUADROTOR, mavlink2.MAV_AUTOPILOT_PX4,
-        mavlink2.MAV_MODE_FLAG_CUSTOM_MODE_ENABLED | armed, status.mode.custom_mode, state, 3)
+        mavlink2.MAV_TYPE_QUADROTOR,
+        mavlink2.MAV_AUTOPILOT_PX4,
+        mavlink2.MAV_MODE_FLAG_CUSTOM_MODE_ENABLED | armed,
+        status.mode.custom_mode,
+        state,
+        3,
+    )
 
 
 def sys_status(autopilot: Autopilot, time: float) -> Message:
@@ -36,7 +45,8 @@ def sys_status(autopilot: Autopilot, time: float) -> Message:
     there = _GYRO | _ACCELEROMETER | _VISION
     healthy = there if autopilot.estimator.aided(time) else _GYRO | _ACCELEROMETER
     return mavlink2.MAVLink_sys_status_message(
-        there, there, healthy, 0, _NO_VOLTAGE, -1, -1, 0, 0, 0, 0, 0, 0)
+        there, there, healthy, 0, _NO_VOLTAGE, -1, -1, 0, 0, 0, 0, 0, 0
+    )
 
 
 def extended_sys_state(autopilot: Autopilot, time: float) -> Message:
@@ -57,24 +67,38 @@ def odometry(autopilot: Autopilot, time: float) -> Message:
     estimate = autopilot.estimator.estimate
     velocity = rotate_back(matrix_from_quaternion(estimate[0:4]), estimate[7:10])
     return mavlink2.MAVLink_odometry_message(
-        round(time * 1e6), mavlink2.MAV_FRAME_LOCAL_NED, mavlink2.MAV_FRAME_BODY_FRD,
-        *estimate[4:7].tolist(), estimate[0:4].tolist(), *velocity.tolist(),
-        *autopilot.rates.tolist(), _NO_COVARIANCE, _NO_COVARIANCE)
+        round(time * 1e6),
+        mavlink2.MAV_FRAME_LOCAL_NED,
+        mavlink2.MAV_FRAME_BODY_FRD,
+        *estimate[4:7].tolist(),
+        estimate[0:4].tolist(),
+        *velocity.tolist(),
+        *autopilot.rates.tolist(),
+        _NO_COVARIANCE,
+        _NO_COVARIANCE,
+    )
 
 
 def battery_status(autopilot: Autopilot, time: float) -> Message:
     """BATTERY_STATUS: no battery is simulated, every field says "unknown"."""
     return mavlink2.MAVLink_battery_status_message(
-        0, mavlink2.MAV_BATTERY_FUNCTION_ALL, mavlink2.MAV_BATTERY_TYPE_LIPO, _NO_TEMPERATURE,
-        [_NO_VOLTAGE] * 10, -1, -1, -1, -1)
+        0,
+        mavlink2.MAV_BATTERY_FUNCTION_ALL,
+        mavlink2.MAV_BATTERY_TYPE_LIPO,
+        _NO_TEMPERATURE,
+        [_NO_VOLTAGE] * 10,
+        -1,
+        -1,
+        -1,
+        -1,
+    )
 
 
 def estimator_status(autopilot: Autopilot, time: float) -> Message:
     """ESTIMATOR_STATUS: positions and velocities with vision, constant-position mode without."""
     flags = mavlink2.ESTIMATOR_ATTITUDE
     flags |= _AIDED if autopilot.estimator.aided(time) else mavlink2.ESTIMATOR_CONST_POS_MODE
-    return mavlink2.MAVLink_estimator_status_message(
-        round(time * 1e6), flags, *[_NAN] * 8)
+    return mavlink2.MAVLink_estimator_status_message(round(time * 1e6), flags, *[_NAN] * 8)
 
 
 def timesync(autopilot: Autopilot, time: float) -> Message:

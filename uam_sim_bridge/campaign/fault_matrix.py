@@ -53,13 +53,17 @@ def label(entry: dict[str, Any]) -> str:
     """A row's name: the fault, its duration, and the parameters that are given."""
     shown = {key: value for key, value in entry.items() if key not in ("fault", "duration")}
     lasting = f" {entry['duration']:g} s" if "duration" in entry else ""
-    values = ", ".join(f"{k} {v:g}" if isinstance(v, int | float) else f"{k} {v}"
-                       for k, v in shown.items())
+    values = ", ".join(
+        f"{k} {v:g}" if isinstance(v, int | float) else f"{k} {v}" for k, v in shown.items()
+    )
     return entry["fault"] + lasting + (f" ({values})" if values else "")
 
 
 def read(
-    file: Path, engine: str, only: Collection[str] = (), moments: Sequence[str] = (),
+    file: Path,
+    engine: str,
+    only: Collection[str] = (),
+    moments: Sequence[str] = (),
     scenario: str | None = None,
 ) -> Matrix:
     """Read a matrix for an engine; raises FaultError and what loading a scenario raises.
@@ -75,8 +79,10 @@ def read(
     for asked, known in ((only, FAULTS), (moments, times)):
         for one in asked:
             if one not in known:
-                raise FaultError(f"unknown {'fault' if asked is only else 'moment'} '{one}'; "
-                                 f"there are: {', '.join(known)}")
+                raise FaultError(
+                    f"unknown {'fault' if asked is only else 'moment'} '{one}'; "
+                    f"there are: {', '.join(known)}"
+                )
     wanted = [(entry, one) for entry, one in rows if not only or entry["fault"] in only]
     out = [label(entry) for entry, one in wanted if engine == "direct" and needs_nodes(one.fault)]
     kept = tuple(entry for entry, _ in wanted if label(entry) not in out)

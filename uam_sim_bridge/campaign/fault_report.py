@@ -25,7 +25,11 @@ from uam_sim_bridge.flight.result_folder import as_json, versions
 from uam_sim_bridge.report import html, style
 
 COLOURS = {
-    COMPLETED: "#5aa469", HELD: "#8fb8de", LANDED: "#e3c567", FAILSAFE: "#e39b50", LOST: "#cf5b4a",
+    COMPLETED: "#5aa469",
+    HELD: "#8fb8de",
+    LANDED: "#e3c567",
+    FAILSAFE: "#e39b50",
+    LOST: "#cf5b4a",
 }
 HEAD = ("fault", "moment", "outcome", "position_m", "attitude_deg", "arm_deg", "duration_s", "why")
 
@@ -34,19 +38,36 @@ def write(
     out: Path, matrix: Matrix, results: Sequence[FaultResult], command: str
 ) -> tuple[str, Path]:
     """Write flights.csv, faults.json, summary.md, matrix.png and report.html; (summary, page)."""
-    write_rows(out / "flights.csv", HEAD, (
-        [r.fault, r.moment, r.outcome, *(_shown(worst(r, key)) for key in HEAD[3:6]),
-         f"{r.duration_s:.2f}", r.why] for r in results
-    ))
-    write_text(out / "faults.json", as_json({
-        "command": command, "versions": versions(), "matrix": vars(matrix),
-        "flights": [vars(result) for result in results],
-    }))
+    write_rows(
+        out / "flights.csv",
+        HEAD,
+        (
+            [
+                r.fault,
+                r.moment,
+                r.outcome,
+                *(_shown(worst(r, key)) for key in HEAD[3:6]),
+                f"{r.duration_s:.2f}",
+                r.why,
+            ]
+            for r in results
+        ),
+    )
+    write_text(
+        out / "faults.json",
+        as_json(
+            {
+                "command": command,
+                "versions": versions(),
+                "matrix": vars(matrix),
+                "flights": [vars(result) for result in results],
+            }
+        ),
+    )
     summary = markdown(matrix, results, command)
     write_text(out / "summary.md", summary)
     with style.styled(), replacing(out / "matrix.png") as temporary:
-        picture(matrix, results).savefig(
-            temporary, format="png", dpi=style.PIXELS_PER_INCH)
+        picture(matrix, results).savefig(temporary, format="png", dpi=style.PIXELS_PER_INCH)
     page = out / "report.html"
     write_text(page, _page(out, matrix, results, command))
     return summary, page
@@ -63,20 +84,30 @@ def sentence(results: Sequence[FaultResult]) -> str:
     counted = Counter(result.outcome for result in results if result.fault != NOMINAL)
     parts = [f"{counted[outcome]} {outcome}" for outcome in OUTCOMES if counted[outcome]]
     nominal = next((r.outcome for r in results if r.fault == NOMINAL), "not flown")
-    return (f"{sum(counted.values())} flights with a fault: {', '.join(parts)}. "
-            f"Without a fault: {nominal}.")
+    return (
+        f"{sum(counted.values())} flights with a fault: {', '.join(parts)}. "
+        f"Without a fault: {nominal}."
+    )
 
 
 def markdown(matrix: Matrix, results: Sequence[FaultResult], command: str) -> str:
     """The matrix as a table: outcome and largest position error."""
     cells = {(r.fault, r.moment): r for r in results}
-    lines = [sentence(results), "", f"| fault | {' | '.join(matrix.moments)} |",
-             "|---|" + "---|" * len(matrix.moments)]
+    lines = [
+        sentence(results),
+        "",
+        f"| fault | {' | '.join(matrix.moments)} |",
+        "|---|" + "---|" * len(matrix.moments),
+    ]
     for row in matrix.rows:
         shown = [_cell(cells[row, moment]) for moment in matrix.moments]
         lines.append(f"| {row} | {' | '.join(shown)} |")
-    lines += ["", "In each cell: how it ended, and the largest position error. "
-              + "; ".join(f"{name}: {about}" for name, about in OUTCOMES.items()) + "."]
+    lines += [
+        "",
+        "In each cell: how it ended, and the largest position error. "
+        + "; ".join(f"{name}: {about}" for name, about in OUTCOMES.items())
+        + ".",
+    ]
     if matrix.left_out:
         lines += ["", f"Only with --engine ros: {'; '.join(matrix.left_out)}."]
     return "\n".join([*lines, "", f"Made by `{command}`."]) + "\n"
@@ -95,8 +126,15 @@ def picture(matrix: Matrix, results: Sequence[FaultResult]) -> Figure:
     for i, row in enumerate(rows):
         for j, column in enumerate(columns):
             result = cells[row, column]
-            axis.text(j, i, f"{result.outcome}  {_metres(result)}", ha="center", va="center",
-                      fontsize=7.5, color=style.INK)
+            axis.text(
+                j,
+                i,
+                f"{result.outcome}  {_metres(result)}",
+                ha="center",
+                va="center",
+                fontsize=7.5,
+                color=style.INK,
+            )
     axis.set_xticks(range(len(columns)), columns)
     axis.set_yticks(range(len(rows)), rows)
     axis.tick_params(length=0, labeltop=True, labelbottom=False)
@@ -124,7 +162,11 @@ def _shown(value: float) -> str:
 
 def _page(out: Path, matrix: Matrix, results: Sequence[FaultResult], command: str) -> str:
     return html.template("uam_sim_bridge.campaign", "faults.html.j2").render(
-        sentence=sentence(results), matrix=matrix, outcomes=OUTCOMES, colours=COLOURS,
-        picture=html.embedded(out / "matrix.png"), command=command,
+        sentence=sentence(results),
+        matrix=matrix,
+        outcomes=OUTCOMES,
+        colours=COLOURS,
+        picture=html.embedded(out / "matrix.png"),
+        command=command,
         rows=[(r, [_shown(worst(r, key)) for key in HEAD[3:6]]) for r in results],
     )

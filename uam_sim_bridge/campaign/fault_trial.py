@@ -63,7 +63,11 @@ def fly(trial: FaultTrial) -> FaultResult:
 def _direct(trial: FaultTrial) -> FaultResult:
     scenario = load_scenario(trial.scenario)
     flight = DirectFlight(
-        scenario, trial.profile, Vehicle.load(), trial.payload_mass, trial.seed,
+        scenario,
+        trial.profile,
+        Vehicle.load(),
+        trial.payload_mass,
+        trial.seed,
         trial.cell.schedule,
     )
     flight.run()
@@ -76,9 +80,14 @@ def _ros(trial: FaultTrial) -> FaultResult:
     from uam_sim_bridge.flight import ros_engine
 
     settings = FlightSettings(
-        scenario=load_scenario(trial.scenario), profile=trial.profile, clock=trial.clock,
-        payload_mass=trial.payload_mass, seed=trial.seed, scenario_source=trial.scenario,
-        without=ONLOOKERS, faults=trial.cell.schedule,
+        scenario=load_scenario(trial.scenario),
+        profile=trial.profile,
+        clock=trial.clock,
+        payload_mass=trial.payload_mass,
+        seed=trial.seed,
+        scenario_source=trial.scenario,
+        without=ONLOOKERS,
+        faults=trial.cell.schedule,
     )
     with (
         tempfile.TemporaryDirectory(prefix="uam-fault-") as folder,
@@ -99,8 +108,11 @@ def _result(
     told: list[dict[str, Any]],
 ) -> FaultResult:
     info = {
-        "payload_mass_kg": trial.payload_mass, "abort_reason": reason, "faults": happened,
-        "drop_point": load_scenario(trial.scenario).drop_point, "transitions": told,
+        "payload_mass_kg": trial.payload_mass,
+        "abort_reason": reason,
+        "faults": happened,
+        "drop_point": load_scenario(trial.scenario).drop_point,
+        "transitions": told,
     }
     figures = metrics.compute(series, info)
     return FaultResult(

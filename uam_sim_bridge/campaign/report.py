@@ -25,26 +25,43 @@ def write(out: Path, draws: Sequence[Draw], results: Sequence[Result], command: 
     _flights(out / "flights.csv", draws, results)
     summary = _summary(draws, results, failed, rms, command)
     write_text(out / "summary.md", summary)
-    write_text(out / "campaign.json", as_json({
-        "command": command, "versions": versions(), "flights": len(results),
-        "outcomes": _outcomes(results),
-        "rms_percentiles": {str(p): np.percentile(rms, p, axis=0) for p in PERCENTILES},
-        "columns": ERRORS,
-        "failures_have_in_common": common(draws, failed),
-    }))
+    write_text(
+        out / "campaign.json",
+        as_json(
+            {
+                "command": command,
+                "versions": versions(),
+                "flights": len(results),
+                "outcomes": _outcomes(results),
+                "rms_percentiles": {str(p): np.percentile(rms, p, axis=0) for p in PERCENTILES},
+                "columns": ERRORS,
+                "failures_have_in_common": common(draws, failed),
+            }
+        ),
+    )
     with style.styled(), replacing(out / "campaign.png") as temporary:
         _figure(draws, results, failed, rms).savefig(
-            temporary, format="png", dpi=style.PIXELS_PER_INCH)
+            temporary, format="png", dpi=style.PIXELS_PER_INCH
+        )
     return summary
 
 
 def _flights(file: Path, draws: Sequence[Draw], results: Sequence[Result]) -> None:
     head = ["flight", *draws[0].values, *(f"rms {n}" for n in ERRORS), "outcome", "why"]
-    write_rows(file, head, (
-        [i, *(f"{x:.4g}" for x in draw.values.values()), *(f"{x:.4g}" for x in r.rms),
-         r.outcome, r.why]
-        for i, (draw, r) in enumerate(zip(draws, results, strict=True))
-    ))
+    write_rows(
+        file,
+        head,
+        (
+            [
+                i,
+                *(f"{x:.4g}" for x in draw.values.values()),
+                *(f"{x:.4g}" for x in r.rms),
+                r.outcome,
+                r.why,
+            ]
+            for i, (draw, r) in enumerate(zip(draws, results, strict=True))
+        ),
+    )
 
 
 def _summary(draws, results, failed, rms, command: str) -> str:
@@ -67,13 +84,24 @@ def _summary(draws, results, failed, rms, command: str) -> str:
     shared = common(draws, failed)
     if shared:
         head = ("", "their mean", "mean of the others", "apart [standard deviations]")
-        lines += ["", "What the flights that were not completed have in common, the most telling "
-                  "first:", "", f"| {' | '.join(head)} |", "|---|---|---|---|"]
+        lines += [
+            "",
+            "What the flights that were not completed have in common, the most telling first:",
+            "",
+            f"| {' | '.join(head)} |",
+            "|---|---|---|---|",
+        ]
         lines += [f"| {n} | {a:.3g} | {b:.3g} | {d:+.2f} |" for n, a, b, d in shared]
         reasons = sorted({_kind(r.why) for r in results if not r.completed})
-        lines += ["", "Reasons: " + "; ".join(
-            f"{kind}: {sum(_kind(r.why) == kind for r in results if not r.completed)}"
-            for kind in reasons) + "."]
+        lines += [
+            "",
+            "Reasons: "
+            + "; ".join(
+                f"{kind}: {sum(_kind(r.why) == kind for r in results if not r.completed)}"
+                for kind in reasons
+            )
+            + ".",
+        ]
     return "\n".join([*lines, "", f"Made by `{command}`."]) + "\n"
 
 
@@ -95,8 +123,13 @@ def _figure(draws, results, failed, rms) -> Figure:
     axis = top.subplots()
     axis.violinplot(np.log10(rms), showmedians=True, widths=0.85)
     ticks = range(int(np.floor(np.log10(rms.min()))), int(np.ceil(np.log10(rms.max()))) + 1)
-    axis.set(xticks=range(1, len(ERRORS) + 1), xticklabels=ERRORS, ylabel="RMS error [m, deg]",
-             yticks=list(ticks), yticklabels=[f"{10.0**k:g}" for k in ticks])
+    axis.set(
+        xticks=range(1, len(ERRORS) + 1),
+        xticklabels=ERRORS,
+        ylabel="RMS error [m, deg]",
+        yticks=list(ticks),
+        yticklabels=[f"{10.0**k:g}" for k in ticks],
+    )
     axis.set_title(f"{len(results)} random flights, {sum(failed)} not completed", loc="left")
     names = list(draws[0].values)
     failed = np.array(failed)

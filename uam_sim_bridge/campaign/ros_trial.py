@@ -40,9 +40,9 @@ def fly(trial: Trial) -> Result:
     ):
         outcome = ros_engine.fly(settings, ResultFolder(Path(folder)), progress)
     if outcome.partial or outcome.series is None:
-        raise NotFlown(f"{trial.label}, {trial.payload_mass:g} kg, seed {trial.seed}: "
-                       f"{outcome.reason or 'nothing was recorded'}")
+        raise NotFlown(
+            f"{trial.label}, {trial.payload_mass:g} kg, seed {trial.seed}: "
+            f"{outcome.reason or 'nothing was recorded'}"
+        )
     outcome.series.info["controller"] = trial.label
-    return direct.result(
-        trial, scenario, outcome.series, outcome.abort_reason, outcome.transitions
-    )
+    return direct.result(trial, scenario, outcome.series, outcome.abort_reason, outcome.transitions)

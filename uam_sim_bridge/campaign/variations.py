@@ -28,12 +28,15 @@ def ranges(file: Path | None = None) -> dict[str, tuple[float, float]]:
     return {name: (float(low), float(high)) for name, (low, high) in document.items()}
 
 
-def draw(profile: Profile, count: int, seed: int, allowed: dict[str, tuple[float, float]] | None
-         = None) -> list[Draw]:
+def draw(
+    profile: Profile, count: int, seed: int, allowed: dict[str, tuple[float, float]] | None = None
+) -> list[Draw]:
     """`count` random flights; the same seed gives the same, and a longer campaign begins alike."""
     allowed = allowed or ranges()
-    return [_one(profile, np.random.default_rng([seed, i]), seed * 100_000 + i, allowed)
-            for i in range(count)]
+    return [
+        _one(profile, np.random.default_rng([seed, i]), seed * 100_000 + i, allowed)
+        for i in range(count)
+    ]
 
 
 def _one(profile: Profile, random: np.random.Generator, seed: int, allowed) -> Draw:

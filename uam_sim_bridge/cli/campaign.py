@@ -40,10 +40,16 @@ def add(commands) -> None:
     option("--flights", type=int, default=1000, metavar="N", help="(default %(default)s)")
     option("--profile", default="s500", metavar="NAME|FILE", help="(default %(default)s)")
     option("--seed", type=int, default=1, metavar="N", help="of the draw (default %(default)s)")
-    option("--jobs", type=int, default=cores(), metavar="N",
-           help="processes (default: one per core, %(default)s)")
-    option("--out", type=Path, metavar="DIR",
-           help="result folder (default results/<time>-campaign)")
+    option(
+        "--jobs",
+        type=int,
+        default=cores(),
+        metavar="N",
+        help="processes (default: one per core, %(default)s)",
+    )
+    option(
+        "--out", type=Path, metavar="DIR", help="result folder (default results/<time>-campaign)"
+    )
     parser.set_defaults(run=run)
 
 

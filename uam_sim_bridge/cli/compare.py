@@ -41,18 +41,37 @@ def add(commands) -> None:
     )
     option = parser.add_argument
     option("--seeds", type=int, default=5, metavar="N", help="seeds 1..N (default %(default)s)")
-    option("--payload-mass", type=float, nargs="+", metavar="KG",
-           help="payloads (default 0.1 0.2 0.3)")
-    option("--engine", choices=ENGINES, default="direct",
-           help="nodes and sockets, or one loop without them (default %(default)s)")
-    option("--rows", nargs="+", metavar="NAME", choices=tuple(plan.ROWS), default=tuple(plan.ROWS),
-           help=f"what is flown: {', '.join(plan.ROWS)} (default: all)")
-    option("--profile", action="append", default=[], metavar="LABEL=FILE",
-           help="a further row; may be given again")
-    option("--jobs", type=int, metavar="N",
-           help=f"flights at a time (default: one per core, {cores()}; with --engine ros 1)")
-    option("--out", type=Path, metavar="DIR",
-           help="result folder (default results/<time>-compare)")
+    option(
+        "--payload-mass", type=float, nargs="+", metavar="KG", help="payloads (default 0.1 0.2 0.3)"
+    )
+    option(
+        "--engine",
+        choices=ENGINES,
+        default="direct",
+        help="nodes and sockets, or one loop without them (default %(default)s)",
+    )
+    option(
+        "--rows",
+        nargs="+",
+        metavar="NAME",
+        choices=tuple(plan.ROWS),
+        default=tuple(plan.ROWS),
+        help=f"what is flown: {', '.join(plan.ROWS)} (default: all)",
+    )
+    option(
+        "--profile",
+        action="append",
+        default=[],
+        metavar="LABEL=FILE",
+        help="a further row; may be given again",
+    )
+    option(
+        "--jobs",
+        type=int,
+        metavar="N",
+        help=f"flights at a time (default: one per core, {cores()}; with --engine ros 1)",
+    )
+    option("--out", type=Path, metavar="DIR", help="result folder (default results/<time>-compare)")
     parser.set_defaults(run=run)
 
 
@@ -98,9 +117,7 @@ def compare(rows, payloads, seeds, engine: str, jobs: int, out: Path) -> int:
     with Counting("compare", len(trials) + len(extra)) as counting:
 
         def show(done: int, result) -> None:
-            counting.show(
-                done, f"{result.label}, {result.payload_mass:g} kg, seed {result.seed}"
-            )
+            counting.show(done, f"{result.label}, {result.payload_mass:g} kg, seed {result.seed}")
 
         results = fly_all(trials, jobs, _work(engine), progress=show)
         # of the laws alone, which are the same in both engines

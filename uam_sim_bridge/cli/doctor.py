@@ -35,8 +35,7 @@ def add(commands) -> None:
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
     option = parser.add_argument
-    option("--autopilot", default="", metavar="URL",
-           help=f"look for an autopilot there: {ALLOWED}")
+    option("--autopilot", default="", metavar="URL", help=f"look for an autopilot there: {ALLOWED}")
     option("--json", action="store_true", help="for programs")
     parser.set_defaults(run=run)
 

@@ -45,20 +45,42 @@ def add(commands) -> None:
     )
     option = parser.add_argument
     option("--list", action="store_true", help="say what faults there are, and fly nothing")
-    option("--matrix", default="faults", metavar="NAME|FILE",
-           help="faults and moments, as config/campaign/faults.yaml (default %(default)s)")
-    option("--only", action="append", default=[], metavar="FAULT",
-           help="of the matrix only this fault; may be given again")
-    option("--moment", action="append", default=[], metavar="NAME",
-           help="of the matrix only this moment; may be given again")
+    option(
+        "--matrix",
+        default="faults",
+        metavar="NAME|FILE",
+        help="faults and moments, as config/campaign/faults.yaml (default %(default)s)",
+    )
+    option(
+        "--only",
+        action="append",
+        default=[],
+        metavar="FAULT",
+        help="of the matrix only this fault; may be given again",
+    )
+    option(
+        "--moment",
+        action="append",
+        default=[],
+        metavar="NAME",
+        help="of the matrix only this moment; may be given again",
+    )
     option("--scenario", metavar="NAME|FILE", help="default: that of the matrix")
     option("--profile", default="s500", metavar="NAME|FILE", help="(default %(default)s)")
     option("--engine", default="direct", metavar="ros|direct", help="(default %(default)s)")
-    option("--clock", default="lockstep", metavar="lockstep|realtime",
-           help="of the ROS engine (default %(default)s)")
+    option(
+        "--clock",
+        default="lockstep",
+        metavar="lockstep|realtime",
+        help="of the ROS engine (default %(default)s)",
+    )
     option("--seed", type=int, default=1, metavar="N", help="of all noise (default %(default)s)")
-    option("--jobs", type=int, metavar="N",
-           help=f"flights at once (default: one per core, {cores()}; 1 with --engine ros)")
+    option(
+        "--jobs",
+        type=int,
+        metavar="N",
+        help=f"flights at once (default: one per core, {cores()}; 1 with --engine ros)",
+    )
     option("--out", type=Path, metavar="DIR", help="result folder (default results/<time>-faults)")
     parser.set_defaults(run=run)
 
@@ -70,8 +92,16 @@ def run(options: argparse.Namespace) -> int:
         return 0
     try:
         return campaign(options)
-    except (ConfigurationError, ProfileError, ScenarioError, FaultError, SettingsError, PortError,
-            ResultFolderError, OSError) as error:
+    except (
+        ConfigurationError,
+        ProfileError,
+        ScenarioError,
+        FaultError,
+        SettingsError,
+        PortError,
+        ResultFolderError,
+        OSError,
+    ) as error:
         print(f"uam faults: {error}", file=sys.stderr)
         return WRONG_USE
     except KeyboardInterrupt:
@@ -90,7 +120,8 @@ def campaign(options: argparse.Namespace) -> int:
     mass = load_scenario(matrix.scenario).payload_mass
     trials = [
         fault_trial.FaultTrial(
-            cell, matrix.scenario, profile, mass, options.seed, options.engine, options.clock)
+            cell, matrix.scenario, profile, mass, options.seed, options.engine, options.clock
+        )
         for cell in matrix.cells(options.seed)
     ]
     out = make_folder(options.out, "faults")
@@ -113,7 +144,8 @@ def _check(options: argparse.Namespace) -> None:
     if options.seed < 0 or (options.jobs is not None and options.jobs < 1):
         raise SettingsError("--jobs is 1 or more, --seed 0 or more")
     for name, value, allowed in (
-        ("engine", options.engine, ENGINES), ("clock", options.clock, CLOCKS)
+        ("engine", options.engine, ENGINES),
+        ("clock", options.clock, CLOCKS),
     ):
         if value not in allowed:
             raise SettingsError(f"unknown {name} '{value}'; there are: {', '.join(allowed)}")

@@ -27,8 +27,16 @@ from uam_sim_bridge.report.build import build_report
 from uam_sim_bridge.report.console import reporting, summary
 
 COMPLETED, NOT_COMPLETED, WRONG_USE, INTERRUPTED = 0, 1, 2, 130
-USER_ERRORS = (SettingsError, ScenarioError, ProfileError, ConfigurationError, PortError,
-               Px4Error, ResultFolderError, FaultError)
+USER_ERRORS = (
+    SettingsError,
+    ScenarioError,
+    ProfileError,
+    ConfigurationError,
+    PortError,
+    Px4Error,
+    ResultFolderError,
+    FaultError,
+)
 
 EXAMPLES = """\
 examples:
@@ -62,56 +70,125 @@ def add(commands) -> None:
     scenarios = ", ".join(configuration.names("scenarios"))
     profiles = ", ".join(configuration.names("profiles"))
     option = parser.add_argument
-    option("--controller", default="modular", metavar="NAME",
-           help="; ".join(f"{name}: {entry.label}" for name, entry in LAWS.items())
-           + " (default %(default)s)")
-    option("--profile", metavar="NAME|FILE", action="append",
-           help=f"parameters: {profiles}, or a ROS parameter file, as ros2 param dump writes it; "
-           "given again, the later one counts (default: the controller's)")
-    option("--scenario", default="pick_and_place", metavar="NAME|FILE",
-           help=f"{scenarios}, or a .yaml or .csv file (default %(default)s)")
-    option("--engine", default="ros", metavar="ros|direct",
-           help="nodes and sockets, or one loop without them (default %(default)s)")
-    option("--clock", default="lockstep", metavar="lockstep|realtime",
-           help="simulated time, the same flight for the same seed; or the wall clock "
-           "(default %(default)s)")
-    option("--autopilot", default="builtin", metavar="builtin|px4|URL",
-           help="the stand-in; PX4 in software; or one that you started, by its link: "
-           f"{ALLOWED}; serial: a flight controller in HITL mode (default %(default)s)")
-    option("--px4-dir", metavar="DIR",
-           help="PX4's build directory, with bin/px4 and etc/ (default: $PX4_SITL_DIR)")
-    option("--gcs", default="", metavar="URL",
-           help="ground station that watches, as udp:127.0.0.1:14550 (default: none)")
-    option("--payload-mass", type=_number("mass", "kg", 0.0), metavar="KG",
-           help="default: the scenario's")
-    option("--wind", type=_number("wind", "m/s"), nargs=3, metavar=("X", "Y", "Z"),
-           help="mean wind [m/s, ENU] (default: calm)")
-    option("--gust", type=_number("gust", "m/s", 0.0), metavar="M/S",
-           help="standard deviation of the gusts per axis (default: none)")
-    option("--noise", type=_number("noise", "", 0.0), metavar="FACTOR",
-           help="multiplies noise and bias of the sensors (default 1)")
-    option("--seed", type=_seed, default=1, metavar="N",
-           help="of all noise (default %(default)s)")
-    option("--without", action="append", default=[], metavar="NODE",
-           help=f"leave a node out and wait for yours of that name: {', '.join(REPLACEABLE)}; "
-           f"or leave out what only looks on: {', '.join(ONLOOKERS)}; may be given again")
-    option("--view", action="store_true",
-           help="serve the cockpit, a local web page: the scene, charts, gains, commands")
-    option("--fault", action="append", default=[], metavar="SPEC|FILE",
-           help="inject a fault: NAME@SECONDS[+DURATION] or NAME@PHASE[+AFTER[+DURATION]], then "
-           ":parameter=value,...; or a YAML file of several; may be given again; "
-           "uam faults --list tells what there is")
-    option("--out", type=Path, metavar="DIR",
-           help="result folder (default results/<time>-<scenario>-<controller>)")
+    option(
+        "--controller",
+        default="modular",
+        metavar="NAME",
+        help="; ".join(f"{name}: {entry.label}" for name, entry in LAWS.items())
+        + " (default %(default)s)",
+    )
+    option(
+        "--profile",
+        metavar="NAME|FILE",
+        action="append",
+        help=f"parameters: {profiles}, or a ROS parameter file, as ros2 param dump writes it; "
+        "given again, the later one counts (default: the controller's)",
+    )
+    option(
+        "--scenario",
+        default="pick_and_place",
+        metavar="NAME|FILE",
+        help=f"{scenarios}, or a .yaml or .csv file (default %(default)s)",
+    )
+    option(
+        "--engine",
+        default="ros",
+        metavar="ros|direct",
+        help="nodes and sockets, or one loop without them (default %(default)s)",
+    )
+    option(
+        "--clock",
+        default="lockstep",
+        metavar="lockstep|realtime",
+        help="simulated time, the same flight for the same seed; or the wall clock "
+        "(default %(default)s)",
+    )
+    option(
+        "--autopilot",
+        default="builtin",
+        metavar="builtin|px4|URL",
+        help="the stand-in; PX4 in software; or one that you started, by its link: "
+        f"{ALLOWED}; serial: a flight controller in HITL mode (default %(default)s)",
+    )
+    option(
+        "--px4-dir",
+        metavar="DIR",
+        help="PX4's build directory, with bin/px4 and etc/ (default: $PX4_SITL_DIR)",
+    )
+    option(
+        "--gcs",
+        default="",
+        metavar="URL",
+        help="ground station that watches, as udp:127.0.0.1:14550 (default: none)",
+    )
+    option(
+        "--payload-mass",
+        type=_number("mass", "kg", 0.0),
+        metavar="KG",
+        help="default: the scenario's",
+    )
+    option(
+        "--wind",
+        type=_number("wind", "m/s"),
+        nargs=3,
+        metavar=("X", "Y", "Z"),
+        help="mean wind [m/s, ENU] (default: calm)",
+    )
+    option(
+        "--gust",
+        type=_number("gust", "m/s", 0.0),
+        metavar="M/S",
+        help="standard deviation of the gusts per axis (default: none)",
+    )
+    option(
+        "--noise",
+        type=_number("noise", "", 0.0),
+        metavar="FACTOR",
+        help="multiplies noise and bias of the sensors (default 1)",
+    )
+    option("--seed", type=_seed, default=1, metavar="N", help="of all noise (default %(default)s)")
+    option(
+        "--without",
+        action="append",
+        default=[],
+        metavar="NODE",
+        help=f"leave a node out and wait for yours of that name: {', '.join(REPLACEABLE)}; "
+        f"or leave out what only looks on: {', '.join(ONLOOKERS)}; may be given again",
+    )
+    option(
+        "--view",
+        action="store_true",
+        help="serve the cockpit, a local web page: the scene, charts, gains, commands",
+    )
+    option(
+        "--fault",
+        action="append",
+        default=[],
+        metavar="SPEC|FILE",
+        help="inject a fault: NAME@SECONDS[+DURATION] or NAME@PHASE[+AFTER[+DURATION]], then "
+        ":parameter=value,...; or a YAML file of several; may be given again; "
+        "uam faults --list tells what there is",
+    )
+    option(
+        "--out",
+        type=Path,
+        metavar="DIR",
+        help="result folder (default results/<time>-<scenario>-<controller>)",
+    )
     option("--no-video", action="store_true", help="leave out the video, which takes longest")
-    option("--instance", type=int, metavar="N",
-           help=f"ROS domain and ports of this instance, 0..{INSTANCES - 1}, numbered as PX4 does "
-           "(default: the first that is free)")
+    option(
+        "--instance",
+        type=int,
+        metavar="N",
+        help=f"ROS domain and ports of this instance, 0..{INSTANCES - 1}, numbered as PX4 does "
+        "(default: the first that is free)",
+    )
     parser.set_defaults(run=run)
 
 
 def _number(name: str, unit: str, low: float = -math.inf):
     """An argparse type: a finite number not below `low`."""
+
     def read(text: str) -> float:
         try:
             value = float(text)
@@ -123,6 +200,7 @@ def _number(name: str, unit: str, low: float = -math.inf):
                 f"'{text}' is not a {name}: a number{f' in {unit}' if unit else ''}{least}"
             )
         return value
+
     return read
 
 

@@ -36,10 +36,18 @@ def add(commands) -> None:
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
     option = parser.add_argument
-    option("profile", nargs="+", metavar="NAME|FILE",
-           help=f"{', '.join(configuration.names('profiles'))}, or a ROS parameter file")
-    option("--instance", type=int, metavar="N",
-           help=f"of the flight, 0..{INSTANCES - 1} (default: the one that is under way)")
+    option(
+        "profile",
+        nargs="+",
+        metavar="NAME|FILE",
+        help=f"{', '.join(configuration.names('profiles'))}, or a ROS parameter file",
+    )
+    option(
+        "--instance",
+        type=int,
+        metavar="N",
+        help=f"of the flight, 0..{INSTANCES - 1} (default: the one that is under way)",
+    )
     parser.set_defaults(run=run)
 
 
@@ -75,8 +83,11 @@ def switch(profile: Profile, domain: int | None) -> int:
         for name, (old, new) in values.items():
             print(f"{node}: {name}: {_text(old)} -> {_text(new)}")
     count = sum(map(len, changed.values()))
-    print(f"{profile.name} flies: {count} values changed" if count else
-          f"{profile.name} flies already")
+    print(
+        f"{profile.name} flies: {count} values changed"
+        if count
+        else f"{profile.name} flies already"
+    )
     return CHANGED
 
 

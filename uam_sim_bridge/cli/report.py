@@ -35,8 +35,12 @@ def add(commands) -> None:
     )
     option = parser.add_argument
     option("directories", nargs="+", type=Path, metavar="DIR", help="result folder of a flight")
-    option("--out", type=Path, metavar="DIR",
-           help="where to (default: the folder itself; of several results/<time>-report)")
+    option(
+        "--out",
+        type=Path,
+        metavar="DIR",
+        help="where to (default: the folder itself; of several results/<time>-report)",
+    )
     option("--scenario", metavar="NAME|FILE", help="what was flown, for a log that does not say")
     option("--no-video", action="store_true", help="leave out the video, which takes longest")
     option("--no-pictures", action="store_true", help="leave out snapshots and video")
@@ -50,8 +54,16 @@ def run(options: argparse.Namespace) -> int:
 
     try:
         return several(options) if len(options.directories) > 1 else one(options)
-    except (NothingToReport, UnreadableLog, UnreadableFlight, SettingsError, ScenarioError,
-            ConfigurationError, ResultFolderError, OSError) as error:
+    except (
+        NothingToReport,
+        UnreadableLog,
+        UnreadableFlight,
+        SettingsError,
+        ScenarioError,
+        ConfigurationError,
+        ResultFolderError,
+        OSError,
+    ) as error:
         print(f"uam report: {error}", file=sys.stderr)
         return WRONG_USE
     except KeyboardInterrupt:

@@ -44,27 +44,62 @@ def add(commands) -> None:
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
     option = parser.add_argument
-    option("--controller", default="modular", metavar="NAME",
-           help="which space of config/tuning: " + ", ".join(configuration.names("tuning"))
-           + " (default %(default)s)")
+    option(
+        "--controller",
+        default="modular",
+        metavar="NAME",
+        help="which space of config/tuning: "
+        + ", ".join(configuration.names("tuning"))
+        + " (default %(default)s)",
+    )
     option("--space", metavar="FILE", help="a space of your own instead")
-    option("--profile", metavar="NAME|FILE",
-           help="where the search starts (default: what the space says)")
-    option("--evaluations", type=_count, default=200, metavar="N",
-           help="stop after this many, earlier ones of the study included (default %(default)s)")
-    option("--jobs", type=_count, default=cores(), metavar="N",
-           help="processes (default: one per core, %(default)s)")
-    option("--seed", type=int, default=1, metavar="N",
-           help="of the optimiser; with --jobs 1 the search repeats (default %(default)s)")
-    option("--step", type=float, default=0.1, metavar="SHARE",
-           help="how far from the start the search looks at first, of the logarithmic range; "
-           "smaller from a good start (default %(default)s)")
-    option("--out", type=Path, metavar="DIR",
-           help="result folder, of a stopped search to go on with it (default "
-           "results/<time>-tune-<controller>)")
-    option("--storage", metavar="FILE|URL",
-           help="where the study is kept: a journal file, or a database as Optuna names it "
-           "(default <out>/study.journal)")
+    option(
+        "--profile",
+        metavar="NAME|FILE",
+        help="where the search starts (default: what the space says)",
+    )
+    option(
+        "--evaluations",
+        type=_count,
+        default=200,
+        metavar="N",
+        help="stop after this many, earlier ones of the study included (default %(default)s)",
+    )
+    option(
+        "--jobs",
+        type=_count,
+        default=cores(),
+        metavar="N",
+        help="processes (default: one per core, %(default)s)",
+    )
+    option(
+        "--seed",
+        type=int,
+        default=1,
+        metavar="N",
+        help="of the optimiser; with --jobs 1 the search repeats (default %(default)s)",
+    )
+    option(
+        "--step",
+        type=float,
+        default=0.1,
+        metavar="SHARE",
+        help="how far from the start the search looks at first, of the logarithmic range; "
+        "smaller from a good start (default %(default)s)",
+    )
+    option(
+        "--out",
+        type=Path,
+        metavar="DIR",
+        help="result folder, of a stopped search to go on with it (default "
+        "results/<time>-tune-<controller>)",
+    )
+    option(
+        "--storage",
+        metavar="FILE|URL",
+        help="where the study is kept: a journal file, or a database as Optuna names it "
+        "(default <out>/study.journal)",
+    )
     option("--study", metavar="NAME", help="its name in the storage (default: the space's)")
     parser.set_defaults(run=run)
 
@@ -85,8 +120,14 @@ def run(options: argparse.Namespace) -> int:
             start = load_profile(str(configuration.named("profiles", options.profile)))
         space = load_space(options.space or options.controller, start)
         return tune(options, space)
-    except (TuningError, ProfileError, ScenarioError, ConfigurationError, ResultFolderError,
-            OSError) as error:
+    except (
+        TuningError,
+        ProfileError,
+        ScenarioError,
+        ConfigurationError,
+        ResultFolderError,
+        OSError,
+    ) as error:
         print(f"uam tune: {error}", file=sys.stderr)
         return WRONG_USE
 
@@ -101,8 +142,9 @@ def tune(options: argparse.Namespace, space) -> int:
         raise TuningError(f"--step {options.step:g} is outside 0 to 0.5")
     out = make_folder(options.out, "tune", space.name)
     storage = options.storage or str(out / "study.journal")
-    task = Task(space, options.study or space.name, storage, options.evaluations, options.seed,
-                options.step)
+    task = Task(
+        space, options.study or space.name, storage, options.evaluations, options.seed, options.step
+    )
     if is_cold():
         print("compiling the control path (once)")
         warm_up()
@@ -117,8 +159,12 @@ def tune(options: argparse.Namespace, space) -> int:
             search(task, options.jobs, show)
     except KeyboardInterrupt:
         status = INTERRUPTED
-        print("uam tune: interrupted; the same command goes on" if options.out else
-              f"uam tune: interrupted; --out {out} goes on", file=sys.stderr)
+        print(
+            "uam tune: interrupted; the same command goes on"
+            if options.out
+            else f"uam tune: interrupted; --out {out} goes on",
+            file=sys.stderr,
+        )
     study = open_study(task)
     if not any(trial.value is not None for trial in study.trials):
         return status or 1
@@ -127,8 +173,10 @@ def tune(options: argparse.Namespace, space) -> int:
     outcome.write_evaluations(out / "evaluations.csv", space, study)
     outcome.plot(out / "search.png", space, study)
     best = study.best_trial
-    print(f"best      evaluation {best.number}, cost {best.value:.4g}; start "
-          f"{study.trials[0].value:.4g}")
+    print(
+        f"best      evaluation {best.number}, cost {best.value:.4g}; start "
+        f"{study.trials[0].value:.4g}"
+    )
     print(f"profile   {out / 'best.yaml'}   (uam fly --profile {out / 'best.yaml'})")
     print(f"plot      {out / 'search.png'}")
     return status

@@ -34,14 +34,32 @@ def add(commands) -> None:
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
     option = parser.add_argument
-    option("--instance", type=int, metavar="N",
-           help=f"of the flight, 0..{INSTANCES - 1} (default: the one that is under way)")
-    option("--host", default="127.0.0.1", metavar="ADDRESS",
-           help="address to listen on (default %(default)s: this computer alone)")
-    option("--port", type=_port, default=8080, metavar="PORT",
-           help="the first free one from this on (default %(default)s)")
-    option("--origin", action="append", default=[], metavar="URL",
-           help="of other pages that may connect; may be given again")
+    option(
+        "--instance",
+        type=int,
+        metavar="N",
+        help=f"of the flight, 0..{INSTANCES - 1} (default: the one that is under way)",
+    )
+    option(
+        "--host",
+        default="127.0.0.1",
+        metavar="ADDRESS",
+        help="address to listen on (default %(default)s: this computer alone)",
+    )
+    option(
+        "--port",
+        type=_port,
+        default=8080,
+        metavar="PORT",
+        help="the first free one from this on (default %(default)s)",
+    )
+    option(
+        "--origin",
+        action="append",
+        default=[],
+        metavar="URL",
+        help="of other pages that may connect; may be given again",
+    )
     parser.set_defaults(run=run)
 
 

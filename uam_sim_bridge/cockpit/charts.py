@@ -74,8 +74,16 @@ class Charts:
 
     def draw(self) -> None:
         """Send the page what is new."""
-        fixed = (self._position, self._attitude, self._arm, self._force, self._torque,
-                 self._effort, self._thrust, self._rates)
+        fixed = (
+            self._position,
+            self._attitude,
+            self._arm,
+            self._force,
+            self._torque,
+            self._effort,
+            self._thrust,
+            self._rates,
+        )
         for chart in (*fixed, *self._adaptation.values()):
             chart.draw()
 

@@ -54,14 +54,19 @@ BUTTONS = (
 class Commands:
     """Puts the buttons on the page. A click is worked on by whoever `later` gives it to."""
 
-    def __init__(self, gui: viser.GuiApi, services: Services, later: Later,
-                 said: Callable[[bool, str], None]):
+    def __init__(
+        self, gui: viser.GuiApi, services: Services, later: Later, said: Callable[[bool, str], None]
+    ):
         """said(whether it was done, what was answered)."""
         self._gui, self._services, self._said = gui, services, said
         self._handles = []
         for button in BUTTONS:
-            handle = gui.add_button(button.label, icon=getattr(viser.Icon, button.icon),
-                                    hint=button.hint, color=button.colour)
+            handle = gui.add_button(
+                button.label,
+                icon=getattr(viser.Icon, button.icon),
+                hint=button.hint,
+                color=button.colour,
+            )
             handle.on_click(lambda _, chosen=button: later(lambda: self._pressed(chosen)))
             self._handles.append((button, handle))
         self._later = later

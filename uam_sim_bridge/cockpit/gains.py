@@ -20,8 +20,9 @@ Said = Callable[[bool, str], None]
 class ParameterEntry:
     """One parameter: a folder with its meaning, a field, and a slider for each number."""
 
-    def __init__(self, gui: viser.GuiApi, about: About, remote: RemoteParameters, later: Later,
-                 said: Said):
+    def __init__(
+        self, gui: viser.GuiApi, about: About, remote: RemoteParameters, later: Later, said: Said
+    ):
         self._about, self._remote, self._later, self._said = about, remote, later, said
         self._name = about.name
         self._sent = 0.0
@@ -129,8 +130,14 @@ class ParameterEntry:
 class NodeGains:
     """A tab with all parameters of a node that may change in flight."""
 
-    def __init__(self, gui: viser.GuiApi, tab: viser.GuiTabHandle, remote: RemoteParameters,
-                 later: Later, said: Said):
+    def __init__(
+        self,
+        gui: viser.GuiApi,
+        tab: viser.GuiTabHandle,
+        remote: RemoteParameters,
+        later: Later,
+        said: Said,
+    ):
         """remote: loaded."""
         self.remote = remote
         self._entries: dict[str, ParameterEntry] = {}

@@ -15,8 +15,9 @@ SHOWN = 4  # nodes that are not well
 
 def headline(health: Health, limits: Mapping[str, list[float]]) -> str:
     """The HTML; limits: pairs of config/views/cockpit.yaml by name."""
-    return "".join((_banner(health), _errors(health, limits), _facts(health, limits),
-                    _nodes(health)))
+    return "".join(
+        (_banner(health), _errors(health, limits), _facts(health, limits), _nodes(health))
+    )
 
 
 def _banner(health: Health) -> str:

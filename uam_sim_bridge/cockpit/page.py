@@ -45,8 +45,9 @@ LEFT_WIDTH, RIGHT_WIDTH = 330, 400  # [px]
 class Page:
     """One page for one ROS domain; `look` is called again and again, by one thread."""
 
-    def __init__(self, server: viser.ViserServer, watch: Watch, services: Services,
-                 options: dict[str, Any]):
+    def __init__(
+        self, server: viser.ViserServer, watch: Watch, services: Services, options: dict[str, Any]
+    ):
         """options: config/views/cockpit.yaml."""
         self._server, self._options = server, options
         self._todo: queue.SimpleQueue[Callable[[], None]] = queue.SimpleQueue()

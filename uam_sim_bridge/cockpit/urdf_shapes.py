@@ -40,8 +40,11 @@ def shapes(urdf: str) -> list[Shape]:
 
 def _of_link(link: ElementTree.Element) -> Iterator[Shape]:
     for visual in link.iter("visual"):
-        for kind, names in (("box", ("size",)), ("cylinder", ("radius", "length")),
-                            ("sphere", ("radius",))):
+        for kind, names in (
+            ("box", ("size",)),
+            ("cylinder", ("radius", "length")),
+            ("sphere", ("radius",)),
+        ):
             geometry = visual.find(f"geometry/{kind}")
             if geometry is not None:
                 size = np.concatenate([_numbers(geometry.get(name), 0) for name in names])

@@ -56,8 +56,10 @@ def trials(profile: Profile, payload_mass: float, seed: int, keep: Path) -> list
     """The flight as it is (its series goes to `keep`), then one with each subsystem changed."""
     return [
         Trial("as it is", profile, payload_mass, seed, keep=keep),
-        *(Trial(f"{name} gains x {FACTOR:g}", changed(profile, name), payload_mass, seed)
-          for name in SUBSYSTEMS),
+        *(
+            Trial(f"{name} gains x {FACTOR:g}", changed(profile, name), payload_mass, seed)
+            for name in SUBSYSTEMS
+        ),
     ]
 
 
@@ -67,8 +69,11 @@ def untouched(profile: Profile, series: Series, period: float) -> list[Untouched
     found = []
     for name in SUBSYSTEMS:
         other = _replay(changed(profile, name), series, period)
-        found.append(Untouched(
-            name, {key: float(np.max(np.abs(plain[key] - other[key]))) for key in SUBSYSTEMS}))
+        found.append(
+            Untouched(
+                name, {key: float(np.max(np.abs(plain[key] - other[key]))) for key in SUBSYSTEMS}
+            )
+        )
     return found
 
 
@@ -78,9 +83,7 @@ def _replay(profile: Profile, series: Series, period: float) -> dict[str, np.nda
     states = series.block("estimate.")[rows].reshape(-1, 3, SIZE)
     references = series.block("reference.")[rows].reshape(-1, 3, SIZE)
     attitude = slice(COORDINATES.index("roll"), COORDINATES.index("yaw") + 1)
-    controllers = {
-        name: kind(profile.sets[node]) for name, (node, kind) in SUBSYSTEMS.items()
-    }
+    controllers = {name: kind(profile.sets[node]) for name, (node, kind) in SUBSYSTEMS.items()}
     out: dict[str, list[np.ndarray]] = {name: [] for name in controllers}
     for state, reference in zip(states, references, strict=True):
         asked = np.ascontiguousarray(reference[:, attitude])
@@ -109,25 +112,39 @@ class Evidence:
     def claim(self) -> str:
         """What is found, in a sentence."""
         if all(replay.holds for replay in self.replays):
-            return ("Changing one subsystem's gains leaves the other two laws and their adapted "
-                    "gains untouched: not one bit differs along the same flight.")
+            return (
+                "Changing one subsystem's gains leaves the other two laws and their adapted "
+                "gains untouched: not one bit differs along the same flight."
+            )
         broken = [replay.changed for replay in self.replays if not replay.holds]
         return f"Changing the gains of {', '.join(broken)} is felt by another subsystem's law."
 
     def tables(self) -> list[tuple[list[str], list[list[str]]]]:
         """(head, rows) of the two tables."""
         replays = [
-            [replay.changed, *(f"{replay.differences[name]:.3g}" for name in SUBSYSTEMS),
-             "yes" if replay.holds else "no"]
+            [
+                replay.changed,
+                *(f"{replay.differences[name]:.3g}" for name in SUBSYSTEMS),
+                "yes" if replay.holds else "no",
+            ]
             for replay in self.replays
         ]
         flights = [
-            [flight.label, *(f"{value:.3g}" for value in flight.rms),
-             "yes" if flight.completed else "no"]
+            [
+                flight.label,
+                *(f"{value:.3g}" for value in flight.rms),
+                "yes" if flight.completed else "no",
+            ]
             for flight in self.flights
         ]
         return [
-            (["gains changed of", *(f"largest change of {name}" for name in SUBSYSTEMS),
-              "others untouched"], replays),
+            (
+                [
+                    "gains changed of",
+                    *(f"largest change of {name}" for name in SUBSYSTEMS),
+                    "others untouched",
+                ],
+                replays,
+            ),
             (["RMS error [m, deg]", *ERRORS, "completed"], flights),
         ]

@@ -19,8 +19,13 @@ from uam_sim_bridge.flight.result_folder import as_json, versions
 from uam_sim_bridge.report import figures, html, style
 
 # The paper's five figures; the rows that they overlay.
-PAPERS_FIGURES = ("position_errors", "attitude_errors", "arm_errors", "vehicle_inputs",
-                  "arm_inputs")
+PAPERS_FIGURES = (
+    "position_errors",
+    "attitude_errors",
+    "arm_errors",
+    "vehicle_inputs",
+    "arm_inputs",
+)
 OVERLAID = (plan.ASMC1, plan.ASMC2, plan.PROPOSED)
 
 
@@ -64,16 +69,29 @@ def write(
     _flights(out / "flights.csv", results)
     numbers = {
         row.label: {
-            "flights": row.flights, "completed": row.completed, "lost": row.lost,
-            "mean": row.mean, "half_width": row.half_width, "worst": row.worst,
+            "flights": row.flights,
+            "completed": row.completed,
+            "lost": row.lost,
+            "mean": row.mean,
+            "half_width": row.half_width,
+            "worst": row.worst,
         }
         for row in found
     }
-    write_text(out / "comparison.json", as_json(
-        {"columns": ERRORS, **facts, "versions": versions(), "rows": numbers, "claims": claims}))
-    write_text(out / "tables.md", markdown + "\n" + "\n".join(f"- {claim}" for claim in claims)
-               + f"\n\nMade by `{facts['command']}`; ± is the {tables.CONFIDENCE:.0%} confidence "
-               "interval over seeds.\n")
+    write_text(
+        out / "comparison.json",
+        as_json(
+            {"columns": ERRORS, **facts, "versions": versions(), "rows": numbers, "claims": claims}
+        ),
+    )
+    write_text(
+        out / "tables.md",
+        markdown
+        + "\n"
+        + "\n".join(f"- {claim}" for claim in claims)
+        + f"\n\nMade by `{facts['command']}`; ± is the {tables.CONFIDENCE:.0%} confidence "
+        "interval over seeds.\n",
+    )
     drawn = _draw(out, trials, results)
     page = out / "report.html"
     write_text(page, _page(found, claims, modular, drawn, out, facts))
@@ -81,19 +99,38 @@ def write(
 
 
 def _flights(file: Path, results: Sequence[Result]) -> None:
-    head = ["controller", "payload_kg", "seed", *(f"rms {n}" for n in ERRORS), "outcome",
-            "place_error_m", "why"]
-    write_rows(file, head, (
-        [r.label, r.payload_mass, r.seed, *(f"{x:.6g}" for x in r.rms), r.outcome,
-         "" if r.place_error is None else f"{r.place_error:.4f}", r.why]
-        for r in results
-    ))
+    head = [
+        "controller",
+        "payload_kg",
+        "seed",
+        *(f"rms {n}" for n in ERRORS),
+        "outcome",
+        "place_error_m",
+        "why",
+    ]
+    write_rows(
+        file,
+        head,
+        (
+            [
+                r.label,
+                r.payload_mass,
+                r.seed,
+                *(f"{x:.6g}" for x in r.rms),
+                r.outcome,
+                "" if r.place_error is None else f"{r.place_error:.4f}",
+                r.why,
+            ]
+            for r in results
+        ),
+    )
 
 
 def _draw(out: Path, trials: Sequence[Trial], results: Sequence[Result]) -> list[str]:
     kept = {trial.label: trial.keep for trial in trials if trial.keep is not None}
-    flights = [figures.Flight(label, timeseries.read(kept[label]))
-               for label in OVERLAID if label in kept]
+    flights = [
+        figures.Flight(label, timeseries.read(kept[label])) for label in OVERLAID if label in kept
+    ]
     drawn = figures.draw(flights, out / "figures", names=PAPERS_FIGURES)
     with style.styled():
         for name, figure in (("rms", _rms(tables.rows(results))), ("gains", _gains(results))):
@@ -113,8 +150,16 @@ def _rms(found: Sequence[tables.Row]) -> Figure:
         colour = style.FLIGHTS[number % len(style.FLIGHTS)]
         x = at + (number - 0.5 * (len(found) - 1)) * width
         error = np.nan_to_num(row.half_width)
-        axis.bar(x, row.mean, width, yerr=error, color=colour, label=row.label, ecolor=style.INK,
-                 error_kw={"linewidth": 0.7})
+        axis.bar(
+            x,
+            row.mean,
+            width,
+            yerr=error,
+            color=colour,
+            label=row.label,
+            ecolor=style.INK,
+            error_kw={"linewidth": 0.7},
+        )
         if row.label in tables.PAPER:
             axis.plot(x, tables.PAPER[row.label], "_", color=style.INK, markersize=9)
     axis.plot([], [], "_", color=style.INK, label="the paper's")
@@ -135,13 +180,18 @@ def _gains(results: Sequence[Result]) -> Figure:
         own = [r for r in flights if r.payload_mass == mass]
         for i, name in enumerate(names):
             values = [r.peaks[name] for r in own if name in r.peaks]
-            axis.plot([i + 0.2 * (number - 1)] * len(values), values, ".",
-                      color=style.FLIGHTS[number % len(style.FLIGHTS)],
-                      label=f"{mass:g} kg" if i == 0 else None)
+            axis.plot(
+                [i + 0.2 * (number - 1)] * len(values),
+                values,
+                ".",
+                color=style.FLIGHTS[number % len(style.FLIGHTS)],
+                label=f"{mass:g} kg" if i == 0 else None,
+            )
     axis.set(yscale="log", xticks=range(len(names)), ylabel="largest value in a flight")
     axis.set_xticklabels(names, rotation=40, ha="right", fontsize=7.5)
-    axis.set_title("Adapted gains of the proposed law stay bounded: the largest of each flight",
-                   loc="left")
+    axis.set_title(
+        "Adapted gains of the proposed law stay bounded: the largest of each flight", loc="left"
+    )
     if names:
         axis.legend(ncols=3)
     return figure
@@ -164,8 +214,13 @@ def _page(found, claims, modular: Evidence, drawn, out: Path, facts) -> str:
         for title, columns in tables.TABLES
     ]
     return html.template("uam_sim_bridge.compare", "report.html.j2").render(
-        tables=shown, claims=claims, modularity=modular.tables(), pictures=pictures, facts=facts,
-        confidence=tables.CONFIDENCE, shown=OVERLAID,
+        tables=shown,
+        claims=claims,
+        modularity=modular.tables(),
+        pictures=pictures,
+        facts=facts,
+        confidence=tables.CONFIDENCE,
+        shown=OVERLAID,
     )
 
 
@@ -178,6 +233,11 @@ def _html_row(row: tables.Row, found: Sequence[tables.Row], columns: slice, titl
         worse = ""
         if proposed is not None and row is not proposed:
             worse = f"{tables.degradation(row.mean, proposed.mean)[i]:.0f} %"
-        cells.append({"ours": tables.cell(row.mean[i], row.half_width[i], digits),
-                      "paper": f"{papers[i]:g}" if papers else "", "worse": worse})
+        cells.append(
+            {
+                "ours": tables.cell(row.mean[i], row.half_width[i], digits),
+                "paper": f"{papers[i]:g}" if papers else "",
+                "worse": worse,
+            }
+        )
     return {"label": row.label, "shortfall": row.shortfall, "cells": cells}

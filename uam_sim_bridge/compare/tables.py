@@ -49,8 +49,10 @@ class Row:
 
 def rows(results: Sequence[Result]) -> list[Row]:
     """One row per label, in the order in which labels first occur."""
-    return [row(label, [r for r in results if r.label == label])
-            for label in dict.fromkeys(r.label for r in results)]
+    return [
+        row(label, [r for r in results if r.label == label])
+        for label in dict.fromkeys(r.label for r in results)
+    ]
 
 
 def row(label: str, results: Sequence[Result]) -> Row:
@@ -127,7 +129,8 @@ def _limit(what: str, row: Row, limit: Sequence[float]) -> str:
     missed = [name for i, name in enumerate(ERRORS) if not row.worst[i] <= limit[i]]
     return (
         f"Worst RMS of any {row.label} flight against {what}: "
-        + ("met in every column" if not missed else f"missed in {', '.join(missed)}") + "."
+        + ("met in every column" if not missed else f"missed in {', '.join(missed)}")
+        + "."
     )
 
 
@@ -137,18 +140,27 @@ def as_markdown(found: Sequence[Row]) -> str:
     parts = []
     for title, columns in TABLES:
         names, unit = ERRORS[columns], "m" if title == "position" else "deg"
-        head = [f"RMS {title} error [{unit}]", *names, *(f"paper {name}" for name in names),
-                *(f"degradation {name} [%]" for name in names)]
+        head = [
+            f"RMS {title} error [{unit}]",
+            *names,
+            *(f"paper {name}" for name in names),
+            *(f"degradation {name} [%]" for name in names),
+        ]
         lines = ["| " + " | ".join(head) + " |", "|" + "---|" * len(head)]
         for row in found:
             digits = 4 if unit == "m" else 3
-            cells = [cell(m, w, digits) for m, w in
-                     zip(row.mean[columns], row.half_width[columns], strict=True)]
+            cells = [
+                cell(m, w, digits)
+                for m, w in zip(row.mean[columns], row.half_width[columns], strict=True)
+            ]
             papers = PAPER.get(row.label)
             cells += [f"{x:g}" for x in papers[columns]] if papers else ["" for _ in names]
             worse = proposed is not None and row.label != PROPOSED
-            cells += ([f"{x:.0f}" for x in degradation(row.mean, proposed.mean)[columns]]
-                      if worse else ["" for _ in names])
+            cells += (
+                [f"{x:.0f}" for x in degradation(row.mean, proposed.mean)[columns]]
+                if worse
+                else ["" for _ in names]
+            )
             lines.append("| " + " | ".join([_name(row), *cells]) + " |")
         parts.append("\n".join(lines))
     return "\n\n".join(parts) + "\n"

@@ -47,8 +47,9 @@ def px4(directory: str | None = None) -> Finding:
     try:
         return ok("PX4", f"{VARIABLE}: {Px4Installation.find(given).directory}")
     except Px4Error as error:
-        return warn("PX4", str(error), f"build PX4, or unset {VARIABLE}: other flights do not "
-                    "need it")
+        return warn(
+            "PX4", str(error), f"build PX4, or unset {VARIABLE}: other flights do not need it"
+        )
 
 
 def link(url: str, patience: float = PATIENCE) -> Finding:
@@ -106,10 +107,15 @@ def describe(url: str, heard: Heard) -> Finding:
     armed = "armed" if beat.base_mode & mavlink2.MAV_MODE_FLAG_SAFETY_ARMED else "disarmed"
     px4_like = beat.autopilot == mavlink2.MAV_AUTOPILOT_PX4
     mode = Mode.from_custom_mode(beat.custom_mode).name if px4_like else f"{beat.custom_mode}"
-    firmware = f"firmware {version(heard.version.flight_sw_version)}" if heard.version else (
-        "no word about its firmware")
-    found = (f"{url}: system {heard.system}, {kind}, {_name('MAV_TYPE', beat.type)}, mode {mode}, "
-             f"{armed}, {firmware}")
+    firmware = (
+        f"firmware {version(heard.version.flight_sw_version)}"
+        if heard.version
+        else ("no word about its firmware")
+    )
+    found = (
+        f"{url}: system {heard.system}, {kind}, {_name('MAV_TYPE', beat.type)}, mode {mode}, "
+        f"{armed}, {firmware}"
+    )
     if not px4_like:
         return warn("autopilot", found, "the bridge speaks PX4's modes and parameters: docs/px4.md")
     if armed == "armed":
@@ -146,11 +152,26 @@ def _name(table: str, value: int) -> str:
 
 def _heartbeat() -> Message:
     return mavlink2.MAVLink_heartbeat_message(
-        mavlink2.MAV_TYPE_ONBOARD_CONTROLLER, mavlink2.MAV_AUTOPILOT_INVALID, 0, 0,
-        mavlink2.MAV_STATE_ACTIVE, 3)
+        mavlink2.MAV_TYPE_ONBOARD_CONTROLLER,
+        mavlink2.MAV_AUTOPILOT_INVALID,
+        0,
+        0,
+        mavlink2.MAV_STATE_ACTIVE,
+        3,
+    )
 
 
 def _request(system: int) -> Message:
     return mavlink2.MAVLink_command_long_message(
-        system, mavlink2.MAV_COMP_ID_AUTOPILOT1, Command.REQUEST_MESSAGE, 0,
-        mavlink2.MAVLINK_MSG_ID_AUTOPILOT_VERSION, 0, 0, 0, 0, 0, 0)
+        system,
+        mavlink2.MAV_COMP_ID_AUTOPILOT1,
+        Command.REQUEST_MESSAGE,
+        0,
+        mavlink2.MAVLINK_MSG_ID_AUTOPILOT_VERSION,
+        0,
+        0,
+        0,
+        0,
+        0,
+        0,
+    )

@@ -1,6 +1,6 @@
 """Child of the rendering check: one picture of the vehicle, without a screen.
 
-    MUJOCO_GL=egl python -m uam_sim_bridge.doctor.frame
+MUJOCO_GL=egl python -m uam_sim_bridge.doctor.frame
 """
 
 from __future__ import annotations
@@ -30,8 +30,11 @@ def main() -> int:
         begun = time.perf_counter()
         for _ in range(FRAMES):
             picture = renderer.render()
-        say(frame_s=(time.perf_counter() - begun) / FRAMES, contrast=float(picture.std()),
-            device=_device())
+        say(
+            frame_s=(time.perf_counter() - begun) / FRAMES,
+            contrast=float(picture.std()),
+            device=_device(),
+        )
         renderer.close()
     except Exception as error:  # MuJoCo, PyOpenGL and GLFW each have their own
         print(f"{type(error).__name__}: {error}".splitlines()[0])

@@ -36,8 +36,11 @@ def _with_open(targets: set[str]) -> list[str]:
 def name_of(pid: int) -> str:
     """As "mujoco_sim (process 4711)"."""
     words = command(pid)
-    known = [word.rsplit(".", 1)[-1] for word in words[1:] if word.startswith("uam_sim_bridge.")
-             or word.startswith("uam_control.")]
+    known = [
+        word.rsplit(".", 1)[-1]
+        for word in words[1:]
+        if word.startswith("uam_sim_bridge.") or word.startswith("uam_control.")
+    ]
     name = known[-1] if known else Path(words[0]).name if words else "a program"
     return f"{name} (process {pid})"
 

@@ -89,12 +89,18 @@ def control_path() -> Finding:
     from uam_sim_bridge.flight.warm_up import compiled_functions, is_cold
 
     if compiled.numba is None:
-        return warn("compiled", "numba is missing: the control path runs as plain Python",
-                    "flights work, slower: pip install numba")
+        return warn(
+            "compiled",
+            "numba is missing: the control path runs as plain Python",
+            "flights work, slower: pip install numba",
+        )
     count = sum(1 for _ in compiled_functions())
     if count == 0:
         return warn("compiled", "compilation is switched off", "unset NUMBA_DISABLE_JIT")
     if is_cold():
-        return warn("compiled", "the control path is not compiled yet",
-                    "nothing to do: the next flight compiles it once, in a minute or so")
+        return warn(
+            "compiled",
+            "the control path is not compiled yet",
+            "nothing to do: the next flight compiles it once, in a minute or so",
+        )
     return ok("compiled", f"{count} functions of the control path are compiled")

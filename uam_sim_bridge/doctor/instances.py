@@ -41,8 +41,9 @@ def checks(folder: Path | None = None) -> Iterator[Finding]:
     if not free:
         yield fail("instances", text, "end flights or the programs named here")
     elif others:
-        yield warn("instances", text, "flights take a free one; end these programs if they are "
-                   "left over")
+        yield warn(
+            "instances", text, "flights take a free one; end these programs if they are left over"
+        )
     else:
         yield ok("instances", text)
 

@@ -28,8 +28,11 @@ def locks(folder: Path) -> Finding:
     left = [file for file in ours if not held(file)]
     if left:
         names = ", ".join(file.name for file in left)
-        return warn("locks", f"without a flight: {names} in {folder}",
-                    "nothing to do: the next flights use them again and remove them")
+        return warn(
+            "locks",
+            f"without a flight: {names} in {folder}",
+            "nothing to do: the next flights use them again and remove them",
+        )
     return ok("locks", f"none left in {folder}")
 
 
@@ -40,8 +43,11 @@ def shared() -> Finding:
     left = files - used
     if left:
         size = sum(file.stat().st_size for file in left if file.exists()) / 2**20
-        return warn("ROS memory", f"{len(left)} files in {shared_memory.FOLDER} that nobody uses, "
-                    f"{size:.0f} MiB", "nothing to do: the next flight removes them")
+        return warn(
+            "ROS memory",
+            f"{len(left)} files in {shared_memory.FOLDER} that nobody uses, {size:.0f} MiB",
+            "nothing to do: the next flight removes them",
+        )
     return ok("ROS memory", f"nothing left in {shared_memory.FOLDER}")
 
 
@@ -49,6 +55,9 @@ def orphans() -> Finding:
     """Nodes whose `uam fly` has gone; they end by themselves within seconds, as a rule."""
     left = process_table.orphans()
     if left:
-        return warn("processes", ", ".join(map(holders.name_of, left)) + " without a flight",
-                    f"kill {' '.join(map(str, left))}")
+        return warn(
+            "processes",
+            ", ".join(map(holders.name_of, left)) + " without a flight",
+            f"kill {' '.join(map(str, left))}",
+        )
     return ok("processes", "no node without its flight")

@@ -31,8 +31,11 @@ def cores(count: int, load: float) -> Finding:
     if count < CORES:
         return warn("cores", found, f"real time needs {CORES}: fly --clock lockstep")
     if load > count:
-        return warn("cores", f"{found}: others keep it busy",
-                    "real-time flights will miss ticks; lockstep flights take longer")
+        return warn(
+            "cores",
+            f"{found}: others keep it busy",
+            "real-time flights will miss ticks; lockstep flights take longer",
+        )
     return ok("cores", found)
 
 
@@ -45,8 +48,11 @@ def memory(meminfo: Path) -> Finding:
         return warn("memory", f"{meminfo} does not tell", f"see that {MEMORY:g} GiB are free")
     found = f"{free:.1f} GiB available"
     if free < MEMORY:
-        return warn("memory", found, f"a flight with its report wants {MEMORY:g} GiB: --no-video, "
-                    "or end other programs")
+        return warn(
+            "memory",
+            found,
+            f"a flight with its report wants {MEMORY:g} GiB: --no-video, or end other programs",
+        )
     return ok("memory", found)
 
 
@@ -63,9 +69,14 @@ def oversleep(count: int = SLEEPS, tick: float = TICK) -> np.ndarray:
 def timer(late: np.ndarray) -> Finding:
     """Whether real time is sensible; late (n,) [s]."""
     median, most = 1e3 * np.quantile(late, (0.5, 0.99))
-    found = (f"a {1e3 * TICK:g} ms sleep ends {median:.2f} ms late (median), {most:.2f} ms "
-             f"(99th percentile of {len(late)})")
+    found = (
+        f"a {1e3 * TICK:g} ms sleep ends {median:.2f} ms late (median), {most:.2f} ms "
+        f"(99th percentile of {len(late)})"
+    )
     if most > 1e3 * TICK:
-        return warn("timer", f"{found}: more than a control period",
-                    "--clock realtime will miss ticks here; lockstep does not mind")
+        return warn(
+            "timer",
+            f"{found}: more than a control period",
+            "--clock realtime will miss ticks here; lockstep does not mind",
+        )
     return ok("timer", f"{found}: real time is sensible")

@@ -25,8 +25,11 @@ def checks() -> Iterator[Finding]:
             return
         problem = problem or f"MUJOCO_GL={platform}: {said.problem}"
     if TOO_LATE in problem:
-        yield warn("rendering", problem, "a busy machine, or a driver that hangs: try again, or "
-                   "another MUJOCO_GL")
+        yield warn(
+            "rendering",
+            problem,
+            "a busy machine, or a driver that hangs: try again, or another MUJOCO_GL",
+        )
         return
     what, _, how = HOW_TO_GET_ONE.partition("; ")
     yield warn("rendering", f"{what} ({problem[:160]})", how)

@@ -56,14 +56,24 @@ def installation(origin: Path, said: Said, surroundings: Mapping[str, str]) -> F
     found = f"{kind}, {rmw}, {origin.parent}"
     distribution = surroundings.get("ROS_DISTRO", "")
     if distribution and distribution != WANTED:
-        return warn("rclpy", f"{found}; ROS_DISTRO is {distribution}",
-                    f"the stack is made for ROS 2 {WANTED}: source that one")
+        return warn(
+            "rclpy",
+            f"{found}; ROS_DISTRO is {distribution}",
+            f"the stack is made for ROS 2 {WANTED}: source that one",
+        )
     if distribution and kind == "wheels":
-        return warn("rclpy", f"{found}, with an installation sourced beside it ({distribution})",
-                    "use one of them: a shell without the sourced one, or a venv without wheels")
+        return warn(
+            "rclpy",
+            f"{found}, with an installation sourced beside it ({distribution})",
+            "use one of them: a shell without the sourced one, or a venv without wheels",
+        )
     if rmw != WANTED_RMW:
-        return warn("rclpy", found, f"config/dds speaks to {WANTED_RMW} alone: with others watch "
-                    "for lost messages in the report")
+        return warn(
+            "rclpy",
+            found,
+            f"config/dds speaks to {WANTED_RMW} alone: with others watch "
+            "for lost messages in the report",
+        )
     return ok("rclpy", found)
 
 
@@ -80,11 +90,16 @@ def kind_of(origin: Path) -> str:
 def round_trip(said: Said, domain: int) -> Finding:
     """Whether messages came through."""
     if "median_s" not in said.facts:
-        return fail("round trip", f"domain {domain}: {said.problem or 'no messages'}",
-                    "look at the variables and shared memory above, then at firewall and container")
+        return fail(
+            "round trip",
+            f"domain {domain}: {said.problem or 'no messages'}",
+            "look at the variables and shared memory above, then at firewall and container",
+        )
     median, longest = (1e3 * said.facts[name] for name in ("median_s", "longest_s"))
-    found = (f"two processes in domain {domain}: found in {said.facts['discovery_s']:.1f} s, "
-             f"there and back {median:.1f} ms (median), {longest:.1f} ms (longest of 50)")
+    found = (
+        f"two processes in domain {domain}: found in {said.facts['discovery_s']:.1f} s, "
+        f"there and back {median:.1f} ms (median), {longest:.1f} ms (longest of 50)"
+    )
     if median > 1e3 * SLOW:
         return warn("round trip", found, "the machine is busy or slow: fly --clock lockstep")
     return ok("round trip", found)
@@ -95,12 +110,18 @@ def room(folder: Path = shared_memory.FOLDER) -> Finding:
     try:
         status = os.statvfs(folder)
     except OSError as error:
-        return warn("shared memory", f"{folder}: {error.strerror}",
-                    "ROS falls back to UDP; in a container mount /dev/shm")
+        return warn(
+            "shared memory",
+            f"{folder}: {error.strerror}",
+            "ROS falls back to UDP; in a container mount /dev/shm",
+        )
     free = status.f_bavail * status.f_frsize // 2**20
     if not os.access(folder, os.W_OK):
         return fail("shared memory", f"{folder} is not writable", f"chmod 1777 {folder}")
     if free < ROOM:
-        return fail("shared memory", f"{folder} has {free} MiB free, a flight needs {ROOM}",
-                    f"remove what is left in {folder}; in a container: --shm-size 256m")
+        return fail(
+            "shared memory",
+            f"{folder} has {free} MiB free, a flight needs {ROOM}",
+            f"remove what is left in {folder}; in a container: --shm-size 256m",
+        )
     return ok("shared memory", f"{folder} has {free} MiB free, a flight needs {ROOM}")

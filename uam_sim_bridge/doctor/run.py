@@ -39,8 +39,13 @@ def as_json(found: Iterable[tuple[str, Finding]]) -> str:
     """All findings as one JSON document."""
     found = list(found)
     rows = [
-        {"group": group, "check": finding.check, "verdict": finding.verdict.value,
-         "found": finding.found, "advice": finding.advice}
+        {
+            "group": group,
+            "check": finding.check,
+            "verdict": finding.verdict.value,
+            "found": finding.found,
+            "advice": finding.advice,
+        }
         for group, finding in found
     ]
     verdict = worst(finding.verdict for _, finding in found)

@@ -5,6 +5,13 @@ from uam_sim_bridge.faults.fault import LINK, PLANT, PROCESS, Fault, FaultError
 from uam_sim_bridge.faults.schedule import Schedule, TimedFault, read_schedule
 
 __all__ = [
-    "FAULTS", "LINK", "PLANT", "PROCESS", "Fault", "FaultError", "Schedule", "TimedFault",
+    "FAULTS",
+    "LINK",
+    "PLANT",
+    "PROCESS",
+    "Fault",
+    "FaultError",
+    "Schedule",
+    "TimedFault",
     "read_schedule",
 ]

@@ -165,8 +165,9 @@ def timed(entry: Mapping[str, Any], phases: Mapping[str, float], where: str) -> 
         at = entry.get("at")
         if isinstance(at, str):
             if at not in phases:
-                raise FaultError(f"at: no phase '{at}' in the scenario, which has: "
-                                 + ", ".join(phases))
+                raise FaultError(
+                    f"at: no phase '{at}' in the scenario, which has: " + ", ".join(phases)
+                )
             at = phases[at] + _span(entry, "after", 0.0)
         elif "after" in entry:
             raise FaultError("after: only together with a phase")

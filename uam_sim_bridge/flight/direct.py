@@ -146,9 +146,7 @@ class DirectFlight:
         tau_q = self.attitude.update(state, reference, attitude_reference, flying, dt)
         tau_alpha = self.arm.update(state, reference, attitude_reference, flying, dt)
         self.bridge.identification.switch(stamp, magnet)
-        self.bridge.send(
-            stamp, plant.time, tau_p, tau_q, state, flying, output, samples.mocap
-        )
+        self.bridge.send(stamp, plant.time, tau_p, tau_q, state, flying, output, samples.mocap)
         motors = self.bridge.autopilot_tick(samples.hil)
 
         truth = self._truth_at(stamp)
@@ -263,9 +261,7 @@ class Bridge:
     def __init__(self, section: Mapping[str, Any]) -> None:
         """section: what the profile says of the mavlink_bridge node; {} for its defaults."""
         self.map = RateThrustMap(RateThrustParameters.among(section))
-        self.identification = ThrustIdentification(
-            ThrustIdentificationParameters.among(section)
-        )
+        self.identification = ThrustIdentification(ThrustIdentificationParameters.among(section))
         self.sequence = OffboardSequence(OffboardParameters.among(section))
         self._hold = LevelHold(HoldParameters.among(section))
         self.autopilot = Autopilot(Parameters.load(configuration.path("autopilot/s500.yaml")))

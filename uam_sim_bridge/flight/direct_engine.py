@@ -26,12 +26,14 @@ def fly(settings: FlightSettings, folder: ResultFolder, progress: Progress) -> O
         warm_up()
     vehicle = Vehicle.load().changed(settings.vehicle_changes)
     flight = DirectFlight(
-        settings.scenario, settings.profile, vehicle, settings.payload_mass, settings.seed,
+        settings.scenario,
+        settings.profile,
+        vehicle,
+        settings.payload_mass,
+        settings.seed,
         settings.faults,
     )
-    folder.write_parameters(
-        {node: vars(values) for node, values in settings.profile.sets.items()}
-    )
+    folder.write_parameters({node: vars(values) for node, values in settings.profile.sets.items()})
     begin = time.monotonic()
     with Interrupts() as stop:
         try:

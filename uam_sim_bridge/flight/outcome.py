@@ -19,9 +19,7 @@ def transitions(changes: Sequence[Change]) -> list[dict[str, Any]]:
     """The supervisor's changes in mission time; from the last one where nothing took off."""
     takeoff = [change.stamp for change in changes if change.target is State.TAKING_OFF]
     begin = takeoff[0] if takeoff else changes[-1].stamp if changes else 0.0
-    return [
-        transition(c.stamp - begin, c.source.value, c.target.value, c.cause) for c in changes
-    ]
+    return [transition(c.stamp - begin, c.source.value, c.target.value, c.cause) for c in changes]
 
 
 @dataclass

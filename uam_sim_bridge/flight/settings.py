@@ -97,8 +97,10 @@ def settings(
     if engine == "direct" and clock == "realtime":
         raise SettingsError("the direct engine has no clock: --clock realtime needs --engine ros")
     if engine == "direct" and autopilot != BUILTIN:
-        raise SettingsError(f"the direct engine flies the stand-in alone: --autopilot {autopilot} "
-                            "needs --engine ros")
+        raise SettingsError(
+            f"the direct engine flies the stand-in alone: --autopilot {autopilot} "
+            "needs --engine ros"
+        )
     for node in without:
         _choice("node to fly without", node, REPLACEABLE + ONLOOKERS)
     if without and engine == "direct":
@@ -108,8 +110,10 @@ def settings(
     px4 = Px4Installation.find(px4_dir) if autopilot == PX4 else None
     link = None if autopilot in (BUILTIN, PX4) else _link(autopilot)
     if link is not None and link.kind == "serial" and clock != "realtime":
-        raise SettingsError("a flight controller has a clock of its own: --autopilot serial:... "
-                            "needs --clock realtime")
+        raise SettingsError(
+            "a flight controller has a clock of its own: --autopilot serial:... "
+            "needs --clock realtime"
+        )
     if gcs and (parse_url(gcs).kind != "udp" or engine == "direct"):
         raise SettingsError("--gcs is udp:HOST:PORT, and needs --engine ros")
     if not 0 <= seed < 2**31:
@@ -162,8 +166,9 @@ def require_ros() -> None:
 
 def _link(autopilot: str) -> LinkUrl:
     if ":" not in autopilot:
-        raise SettingsError(f"unknown autopilot '{autopilot}'; there are: {BUILTIN}, {PX4}, or a "
-                            f"link: {ALLOWED}")
+        raise SettingsError(
+            f"unknown autopilot '{autopilot}'; there are: {BUILTIN}, {PX4}, or a link: {ALLOWED}"
+        )
     return parse_url(autopilot)
 
 

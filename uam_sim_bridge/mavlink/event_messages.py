@@ -18,10 +18,24 @@ class EventMessage(mavlink2.MAVLink_message):
 
     id = 410
     msgname = "EVENT"
-    fieldnames = ["destination_component", "destination_system", "id", "event_time_boot_ms",
-                  "sequence", "log_levels", "arguments"]
-    ordered_fieldnames = ["id", "event_time_boot_ms", "sequence", "destination_component",
-                          "destination_system", "log_levels", "arguments"]
+    fieldnames = [
+        "destination_component",
+        "destination_system",
+        "id",
+        "event_time_boot_ms",
+        "sequence",
+        "log_levels",
+        "arguments",
+    ]
+    ordered_fieldnames = [
+        "id",
+        "event_time_boot_ms",
+        "sequence",
+        "destination_component",
+        "destination_system",
+        "log_levels",
+        "arguments",
+    ]
     fieldtypes = ["uint8_t", "uint8_t", "uint32_t", "uint32_t", "uint16_t", "uint8_t", "uint8_t"]
     fielddisplays_by_name: dict[str, str] = {}
     fieldenums_by_name: dict[str, str] = {}
@@ -35,8 +49,16 @@ class EventMessage(mavlink2.MAVLink_message):
     instance_field = None
     instance_offset = -1
 
-    def __init__(self, destination_component: int, destination_system: int, id: int,
-                 event_time_boot_ms: int, sequence: int, log_levels: int, arguments: bytes):
+    def __init__(
+        self,
+        destination_component: int,
+        destination_system: int,
+        id: int,
+        event_time_boot_ms: int,
+        sequence: int,
+        log_levels: int,
+        arguments: bytes,
+    ):
         super().__init__(EventMessage.id, EventMessage.msgname)
         self._fieldnames = EventMessage.fieldnames
         self._instance_field, self._instance_offset = None, -1
@@ -51,8 +73,14 @@ class EventMessage(mavlink2.MAVLink_message):
     def pack(self, mav: mavlink2.MAVLink, force_mavlink1: bool = False) -> bytes:
         """Return the frame."""
         payload = self.unpacker.pack(
-            self.event, self.event_time_boot_ms, self.sequence, self.destination_component,
-            self.destination_system, self.log_levels, self.arguments)
+            self.event,
+            self.event_time_boot_ms,
+            self.sequence,
+            self.destination_component,
+            self.destination_system,
+            self.log_levels,
+            self.arguments,
+        )
         return self._pack(mav, self.crc_extra, payload, force_mavlink1=force_mavlink1)
 
 

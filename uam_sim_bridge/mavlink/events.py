@@ -107,15 +107,35 @@ CHECKS: dict[str, tuple[str, str]] = {
 # concern all modes, but keep OFFBOARD from being armed only where PX4 calls them an error
 _OPTIONAL = {"check_modes_manual_control", "check_rc_dl_no_dllink"}
 
-_ACTIONS = ("none", "warning", "Position mode", "Altitude mode", "Stabilized mode", "Hold", "RTL",
-            "Land", "Descend", "disarm", "terminate")
-_CAUSES = ("generic", "Manual control loss", "GCS connection loss", "Low battery level",
-           "Critical battery level", "Emergency battery level", "Remaining flight time low")
+_ACTIONS = (
+    "none",
+    "warning",
+    "Position mode",
+    "Altitude mode",
+    "Stabilized mode",
+    "Hold",
+    "RTL",
+    "Land",
+    "Descend",
+    "disarm",
+    "terminate",
+)
+_CAUSES = (
+    "generic",
+    "Manual control loss",
+    "GCS connection loss",
+    "Low battery level",
+    "Critical battery level",
+    "Emergency battery level",
+    "Remaining flight time low",
+)
 
 # other events: name → text and struct format of its arguments
 OTHERS: dict[str, tuple[str, str]] = {
     "commander_arm_denied_resolve_failures": (
-        "Arming denied: Resolve system health failures first", ""),
+        "Arming denied: Resolve system health failures first",
+        "",
+    ),
     "commander_arm_denied_calibrating": ("Arming denied: calibrating", ""),
     "commander_arm_denied_throttle_center": ("Arming denied: throttle above center", ""),
     "commander_arm_denied_throttle_high": ("Arming denied: high throttle", ""),
@@ -124,15 +144,18 @@ OTHERS: dict[str, tuple[str, str]] = {
     "commander_modeswitch_not_avail": ("Switching to the mode is currently not possible", ""),
     "commander_kill_sw_engaged": ("Kill engaged", ""),
     "commander_failsafe_enter_generic_hold": (
-        "Failsafe activated: switching to {action} in {2} seconds", "IBH"),
+        "Failsafe activated: switching to {action} in {2} seconds",
+        "IBH",
+    ),
     "commander_failsafe_enter_hold": ("{cause}: switching to {action} in {2} seconds", "IBHB"),
     "commander_failsafe_enter_autopilot_disengaged": (
-        "Failsafe activated: Autopilot disengaged, switching to {action}", "IB"),
+        "Failsafe activated: Autopilot disengaged, switching to {action}",
+        "IB",
+    ),
     "commander_failsafe_enter_generic": ("Failsafe activated: switching to {action}", "IB"),
     "commander_failsafe_enter": ("{cause}: switching to {action}", "IBB"),
     "commander_failsafe_enter_crit_bat_warn": ("Critical battery level, land now", ""),
-    "commander_failsafe_enter_crit_low_bat_warn": (
-        "Emergency battery level, land immediately", ""),
+    "commander_failsafe_enter_crit_low_bat_warn": ("Emergency battery level, land immediately", ""),
     "check_estimator_gnss_fusion_stopped": ("GNSS data fusion stopped", ""),
     "commander_mission_comp_lost": ("Connection to mission computer lost", ""),
     "commander_rc_override": ("Pilot took over using sticks", ""),

@@ -25,7 +25,10 @@ class GroundStation:
     """A transport around the autopilot's; `forwarded` and `held_back` count messages to it."""
 
     def __init__(
-        self, url: str, autopilot: Transport, codec: Codec,
+        self,
+        url: str,
+        autopilot: Transport,
+        codec: Codec,
         clock: Callable[[], float] = time.monotonic,
     ) -> None:
         """url: udp:HOST:PORT; codec: decides what a valid message is; clock [s] of wall time.
@@ -62,7 +65,7 @@ class GroundStation:
         chunks = self._autopilot.receive()
         for chunk in chunks:
             for at in range(0, len(chunk), DATAGRAM):
-                self._station.send(chunk[at:at + DATAGRAM])
+                self._station.send(chunk[at : at + DATAGRAM])
         return chunks
 
     def forward(self) -> None:

@@ -10,14 +10,18 @@ from uam_sim_bridge.mavlink.wire import mavlink2
 
 
 def _names(enum: str, prefix: str) -> dict[int, str]:
-    return {bit: entry.name.removeprefix(prefix).lower()
-            for bit, entry in mavlink2.enums[enum].items()
-            if bit & (bit - 1) == 0 and not entry.name.endswith("ENUM_END")}
+    return {
+        bit: entry.name.removeprefix(prefix).lower()
+        for bit, entry in mavlink2.enums[enum].items()
+        if bit & (bit - 1) == 0 and not entry.name.endswith("ENUM_END")
+    }
 
 
 ESTIMATOR_FLAGS = _names("ESTIMATOR_STATUS_FLAGS", "ESTIMATOR_")
-SENSORS = {bit: name.removeprefix("sensor_")
-           for bit, name in _names("MAV_SYS_STATUS_SENSOR", "MAV_SYS_STATUS_").items()}
+SENSORS = {
+    bit: name.removeprefix("sensor_")
+    for bit, name in _names("MAV_SYS_STATUS_SENSOR", "MAV_SYS_STATUS_").items()
+}
 
 ATTITUDE = mavlink2.ESTIMATOR_ATTITUDE
 _HORIZONTAL = mavlink2.ESTIMATOR_POS_HORIZ_REL | mavlink2.ESTIMATOR_POS_HORIZ_ABS

@@ -35,9 +35,11 @@ class HilParameters(ParameterSet):
     """Waiting times of the HIL link (wall time)."""
 
     answer_timeout: float = number(
-        2.0, "wait for the answer of an autopilot that answered the last tick", "s", 0.001, 60.0)
+        2.0, "wait for the answer of an autopilot that answered the last tick", "s", 0.001, 60.0
+    )
     silent_timeout: float = number(
-        0.05, "wait for the answer of one that did not", "s", 0.0005, 10.0)
+        0.05, "wait for the answer of one that did not", "s", 0.0005, 10.0
+    )
 
 
 class HilServer:
@@ -78,8 +80,10 @@ class HilServer:
         except (OSError, OverflowError) as error:
             self._listener.close()
             reason = getattr(error, "strerror", None) or str(error)
-            raise HilError(f"TCP port {port} for the autopilot: {reason}; stop the program that "
-                           "uses it or choose another instance") from None
+            raise HilError(
+                f"TCP port {port} for the autopilot: {reason}; stop the program that "
+                "uses it or choose another instance"
+            ) from None
 
     @property
     def connected(self) -> bool:
@@ -152,12 +156,17 @@ class HilServer:
         return self.motors
 
     def send_vision(
-        self, stamp: float, position: np.ndarray, quaternion: np.ndarray,
-        position_deviation: float, attitude_deviation: float,
+        self,
+        stamp: float,
+        position: np.ndarray,
+        quaternion: np.ndarray,
+        position_deviation: float,
+        attitude_deviation: float,
     ) -> None:
         """Send a mocap pose (ENU, FLU → ENU) to the autopilot over this link; stamp [s]."""
-        if self._link is not None and not self._send(vision_message(
-                stamp, position, quaternion, position_deviation, attitude_deviation)):
+        if self._link is not None and not self._send(
+            vision_message(stamp, position, quaternion, position_deviation, attitude_deviation)
+        ):
             self._stop()
 
     def close(self) -> None:
@@ -166,7 +175,11 @@ class HilServer:
         self._listener.close()
 
     def _sensor(
-        self, time: float, gyro: np.ndarray, accel: np.ndarray, position: np.ndarray,
+        self,
+        time: float,
+        gyro: np.ndarray,
+        accel: np.ndarray,
+        position: np.ndarray,
         quaternion: np.ndarray,
     ) -> Message:
         fields = _IMU
@@ -176,8 +189,17 @@ class HilServer:
             self._mag = self._slow.magnetometer(swap_quaternion(quaternion))
             self._baro = self._slow.barometer(float(position[2]))
         return mavlink2.MAVLink_hil_sensor_message(
-            self._stamp, *swap_body(accel).tolist(), *swap_body(gyro).tolist(), *self._mag,
-            self._baro[0], 0.0, self._baro[1], TEMPERATURE, fields, 0)
+            self._stamp,
+            *swap_body(accel).tolist(),
+            *swap_body(gyro).tolist(),
+            *self._mag,
+            self._baro[0],
+            0.0,
+            self._baro[1],
+            TEMPERATURE,
+            fields,
+            0,
+        )
 
     def _send(self, message: Message) -> bool:
         try:

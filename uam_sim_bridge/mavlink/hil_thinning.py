@@ -23,8 +23,10 @@ def sustainable_rate(bytes_per_second: float | None) -> float:
     rate = (USABLE * bytes_per_second - others) / SENSOR_BYTES
     if rate < LEAST_RATE:
         needed = (LEAST_RATE * SENSOR_BYTES + others) / USABLE
-        raise ValueError(f"{bytes_per_second:.0f} bytes/s do not carry setpoints, vision and "
-                         f"sensors, {needed:.0f} are needed; or choose --hil-rate")
+        raise ValueError(
+            f"{bytes_per_second:.0f} bytes/s do not carry setpoints, vision and "
+            f"sensors, {needed:.0f} are needed; or choose --hil-rate"
+        )
     return min(FULL_RATE, rate)
 
 

@@ -20,14 +20,23 @@ class HoldParameters(ParameterSet):
     """The reaction to missing or bad commands in flight."""
 
     hold_time: float = number(
-        1.0, "how long level setpoints go out in place of commands, before the stream stops",
-        "s", 0.0, 10.0)
+        1.0,
+        "how long level setpoints go out in place of commands, before the stream stops",
+        "s",
+        0.0,
+        10.0,
+    )
     hold_gain: float = number(3.0, "tilt → body rate while holding level", "1/s", 0.0, 10.0)
     hold_rate_limit: float = number(
-        2.0, "largest body rate while holding level", "rad/s", 0.1, 10.0)
+        2.0, "largest body rate while holding level", "rad/s", 0.1, 10.0
+    )
     ground_margin: float = number(
-        0.3, "height above the start, from which an idle command means hold instead of thrust 0",
-        "m", 0.01, 10.0)
+        0.3,
+        "height above the start, from which an idle command means hold instead of thrust 0",
+        "m",
+        0.01,
+        10.0,
+    )
 
 
 class LevelHold:

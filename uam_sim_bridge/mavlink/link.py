@@ -156,9 +156,16 @@ class OffboardLink:
         """Send what is due besides setpoints: heartbeat, requests of the sequence, questions."""
         if time - self._beat >= HEARTBEAT_PERIOD - 1e-9:
             self._beat = time
-            self._send(mavlink2.MAVLink_heartbeat_message(
-                mavlink2.MAV_TYPE_ONBOARD_CONTROLLER, mavlink2.MAV_AUTOPILOT_INVALID, 0, 0,
-                mavlink2.MAV_STATE_ACTIVE, 3))
+            self._send(
+                mavlink2.MAVLink_heartbeat_message(
+                    mavlink2.MAV_TYPE_ONBOARD_CONTROLLER,
+                    mavlink2.MAV_AUTOPILOT_INVALID,
+                    0,
+                    0,
+                    mavlink2.MAV_STATE_ACTIVE,
+                    3,
+                )
+            )
         connected = self.connected(time)
         if connected and not self._met:
             self._meet()
@@ -174,17 +181,32 @@ class OffboardLink:
         roll, pitch, yaw = swap_body(rates).tolist()
         if not math.isfinite(roll + pitch + yaw + thrust) or not 0.0 <= thrust <= 1.0:
             raise ValueError(f"setpoint rates {rates} thrust {thrust} must not be sent")
-        self._send(mavlink2.MAVLink_set_attitude_target_message(
-            round(time * 1e3) & 0xFFFFFFFF, self._target, mavlink2.MAV_COMP_ID_AUTOPILOT1,
-            ATTITUDE_IGNORED, _NO_ATTITUDE, roll, pitch, yaw, thrust))
+        self._send(
+            mavlink2.MAVLink_set_attitude_target_message(
+                round(time * 1e3) & 0xFFFFFFFF,
+                self._target,
+                mavlink2.MAV_COMP_ID_AUTOPILOT1,
+                ATTITUDE_IGNORED,
+                _NO_ATTITUDE,
+                roll,
+                pitch,
+                yaw,
+                thrust,
+            )
+        )
 
     def send_vision(
-        self, stamp: float, position: np.ndarray, quaternion: np.ndarray,
-        position_deviation: float, attitude_deviation: float,
+        self,
+        stamp: float,
+        position: np.ndarray,
+        quaternion: np.ndarray,
+        position_deviation: float,
+        attitude_deviation: float,
     ) -> None:
         """Send a mocap pose: stamp [s], position (3,) [m, ENU], quaternion FLU → ENU."""
-        self._send(vision_message(
-            stamp, position, quaternion, position_deviation, attitude_deviation))
+        self._send(
+            vision_message(stamp, position, quaternion, position_deviation, attitude_deviation)
+        )
 
     def close(self) -> None:
         """Close the transport."""
@@ -192,9 +214,9 @@ class OffboardLink:
 
     def _for_us(self, m: Message) -> bool:
         """Whether it is for everybody or for us: a ground station gets answers of its own."""
-        return (getattr(m, "target_system", 0) in (0, self._target)
-                and getattr(m, "target_component", 0)
-                in (0, mavlink2.MAV_COMP_ID_ONBOARD_COMPUTER))
+        return getattr(m, "target_system", 0) in (0, self._target) and getattr(
+            m, "target_component", 0
+        ) in (0, mavlink2.MAV_COMP_ID_ONBOARD_COMPUTER)
 
     def _send(self, message: Message) -> None:
         self._transport.send(self._codec.encode(message))
@@ -205,8 +227,11 @@ class OffboardLink:
         if kind == "HEARTBEAT":
             if m.autopilot != mavlink2.MAV_AUTOPILOT_INVALID:
                 self._heard = time
-                self._take_state(time, Mode.from_custom_mode(m.custom_mode),
-                                 bool(m.base_mode & mavlink2.MAV_MODE_FLAG_SAFETY_ARMED))
+                self._take_state(
+                    time,
+                    Mode.from_custom_mode(m.custom_mode),
+                    bool(m.base_mode & mavlink2.MAV_MODE_FLAG_SAFETY_ARMED),
+                )
         elif kind == "COMMAND_ACK":
             self._acknowledged(time, m.command, m.result)
         elif kind == "EXTENDED_SYS_STATE":
@@ -234,8 +259,10 @@ class OffboardLink:
             self.battery = from_battery_status(m)
         elif kind == "SYS_STATUS":
             self.unhealthy = unhealthy(
-                m.onboard_control_sensors_present, m.onboard_control_sensors_enabled,
-                m.onboard_control_sensors_health)
+                m.onboard_control_sensors_present,
+                m.onboard_control_sensors_enabled,
+                m.onboard_control_sensors_health,
+            )
             self.load = 1e-3 * m.load
             if self.battery is None or not self.battery.known:
                 self.battery = from_sys_status(m)
@@ -273,8 +300,10 @@ class OffboardLink:
     def _compare(self) -> None:
         missing = self._missing if self._parameter_attempts > PARAMETER_ATTEMPTS else []
         self._parameter_warnings = (
-            *differences(self._mapping, self.values), *stream_loss(self.values, self._hold_time),
-            *untold(missing, PARAMETER_ATTEMPTS))
+            *differences(self._mapping, self.values),
+            *stream_loss(self.values, self._hold_time),
+            *untold(missing, PARAMETER_ATTEMPTS),
+        )
 
     def _take_state(self, time: float, mode: Mode, armed: bool) -> None:
         if armed and not self.armed:
@@ -313,8 +342,11 @@ class OffboardLink:
 
     def _command(self, command: int, *parameters: float) -> None:
         values = (*parameters, *[0.0] * (7 - len(parameters)))
-        self._send(mavlink2.MAVLink_command_long_message(
-            self._target, mavlink2.MAV_COMP_ID_AUTOPILOT1, command, 0, *values))
+        self._send(
+            mavlink2.MAVLink_command_long_message(
+                self._target, mavlink2.MAV_COMP_ID_AUTOPILOT1, command, 0, *values
+            )
+        )
 
     def _ask_set_up(self, time: float) -> None:
         ts1 = self.time_sync.request(time)
@@ -334,8 +366,11 @@ class OffboardLink:
             self._compare()
             return
         for name in missing:
-            self._send(mavlink2.MAVLink_param_request_read_message(
-                self._target, mavlink2.MAV_COMP_ID_AUTOPILOT1, name.encode(), -1))
+            self._send(
+                mavlink2.MAVLink_param_request_read_message(
+                    self._target, mavlink2.MAV_COMP_ID_AUTOPILOT1, name.encode(), -1
+                )
+            )
 
     @property
     def _missing(self) -> list[str]:

@@ -54,12 +54,13 @@ class OffboardParameters(ParameterSet):
     """Times and patience of the sequence."""
 
     stream_time: float = number(
-        1.0, "stream of setpoints before OFFBOARD is asked for", "s", 0.0, 30.0)
+        1.0, "stream of setpoints before OFFBOARD is asked for", "s", 0.0, 30.0
+    )
     retry_interval: float = number(0.5, "time between two requests", "s", 0.05, 10.0)
-    attempts: float = number(
-        40.0, "requests without success before giving up", "1", 1.0, 10000.0)
+    attempts: float = number(40.0, "requests without success before giving up", "1", 1.0, 10000.0)
     recovery_attempts: float = number(
-        6.0, "requests for OFFBOARD after it was lost in flight", "1", 0.0, 10000.0)
+        6.0, "requests for OFFBOARD after it was lost in flight", "1", 0.0, 10000.0
+    )
 
 
 class OffboardSequence:

@@ -23,8 +23,7 @@ class Outbox:
 
     def put(self, kind: str, frame: bytes) -> None:
         """Queue a frame whose message is called `kind`."""
-        queue, kept = ((self._urgent, URGENT_KEPT) if kind in URGENT
-                       else (self._others, OTHERS_KEPT))
+        queue, kept = (self._urgent, URGENT_KEPT) if kind in URGENT else (self._others, OTHERS_KEPT)
         if len(queue) >= kept:
             queue.popleft()
             self.dropped += 1

@@ -49,7 +49,8 @@ def differences(mapping: RateThrustParameters, values: dict[str, float]) -> Iter
     for name, wanted in expected(mapping).items():
         found = values.get(name)
         if found is not None and not math.isclose(
-                found, wanted, rel_tol=_TOLERANCE, abs_tol=_TOLERANCE):
+            found, wanted, rel_tol=_TOLERANCE, abs_tol=_TOLERANCE
+        ):
             yield f"{name} is {found:g} on the autopilot, the bridge assumes {wanted:g}"
 
 
@@ -67,8 +68,11 @@ def adopted(mapping: RateThrustParameters, values: dict[str, float]) -> RateThru
         return tuple(float(f"{taken[f'MC_{axis}_{what}']:.7g}") for axis in _AXES)
 
     return replace(
-        mapping, rate_p=axes("P"), rate_k=axes("K"),
-        thr_mdl_fac=float(f"{taken['THR_MDL_FAC']:.7g}")).validated()
+        mapping,
+        rate_p=axes("P"),
+        rate_k=axes("K"),
+        thr_mdl_fac=float(f"{taken['THR_MDL_FAC']:.7g}"),
+    ).validated()
 
 
 def stream_loss(values: dict[str, float], hold_time: float) -> Iterator[str]:
@@ -83,8 +87,10 @@ def stream_loss(values: dict[str, float], hold_time: float) -> Iterator[str]:
     if wait <= 0.0:
         yield "COM_OF_LOSS_T is 0 on the autopilot: any late setpoint is a failsafe"
     elif wait < hold_time * (1.0 - _TOLERANCE):
-        yield (f"COM_OF_LOSS_T is {wait:g} s on the autopilot, shorter than the bridge's hold_time "
-               f"of {hold_time:g} s")
+        yield (
+            f"COM_OF_LOSS_T is {wait:g} s on the autopilot, shorter than the bridge's hold_time "
+            f"of {hold_time:g} s"
+        )
 
 
 def untold(names: Iterable[str], attempts: int) -> Iterator[str]:

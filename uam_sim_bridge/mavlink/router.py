@@ -155,8 +155,9 @@ class Router:
         self._outbox.clear()
         self._commands = None
         self._from_controller = Framer(self._as_autopilot)
-        return self._to_plant(mavlink2.MAVLink_hil_actuator_controls_message(
-            self._stamp, [0.0] * 16, 0, 0))
+        return self._to_plant(
+            mavlink2.MAVLink_hil_actuator_controls_message(self._stamp, [0.0] * 16, 0, 0)
+        )
 
     def _watch(self, now: float) -> None:
         """Warn when the line is nearly full."""
@@ -166,14 +167,18 @@ class Router:
                 continue
             if now - self._warned[direction] >= WARN_PERIOD:
                 self._warned[direction] = now
-                say(f"{meter.rate:.0f} bytes/s {direction}, {100.0 * meter.rate / capacity:.0f} % "
-                    f"of the line ({self._outbox.dropped} messages dropped so far)")
+                say(
+                    f"{meter.rate:.0f} bytes/s {direction}, {100.0 * meter.rate / capacity:.0f} % "
+                    f"of the line ({self._outbox.dropped} messages dropped so far)"
+                )
 
     def summary(self) -> str:
         """Return in one line what the link carried."""
         rates = ", ".join(f"{m.highest:.0f} bytes/s {d}" for d, m in self.meters.items())
-        return (f"at most {rates}; {self._outbox.dropped} messages dropped, "
-                f"{self._from_controller.bad_bytes} bytes of garbage")
+        return (
+            f"at most {rates}; {self._outbox.dropped} messages dropped, "
+            f"{self._from_controller.bad_bytes} bytes of garbage"
+        )
 
 
 def say(text: str) -> None:
@@ -201,9 +206,12 @@ def parser() -> argparse.ArgumentParser:
         "  hitl_router udp:192.168.1.20:14550 --instance 3      every port + 3\n",
     )
     p.add_argument("link", metavar="LINK", help=f"to the flight controller: {ALLOWED}")
-    p.add_argument("--hil-rate", type=number("rate in Hz", 1.0, 1000.0), metavar="HZ",
-                   help="HIL_SENSOR per second, at most (default: what the line carries, "
-                   "up to 250)")
+    p.add_argument(
+        "--hil-rate",
+        type=number("rate in Hz", 1.0, 1000.0),
+        metavar="HZ",
+        help="HIL_SENSOR per second, at most (default: what the line carries, up to 250)",
+    )
     add_port_options(p)
     return p
 
@@ -218,12 +226,14 @@ def main(arguments: Sequence[str] | None = None) -> int:
     try:
         closables.append(controller := open_transport(options.link))
         rate = options.hil_rate or sustainable_rate(controller.bytes_per_second)
-        closables.append(bridge := UdpPort(
-            options.mavlink_port, options.companion_port, Codec(*AUTOPILOT_IDS)))
-        closables.append(plant := connect(
-            NAME, options.sim_host, options.sim_port, options.wait))
-        say(f"connected to the simulator at {options.sim_host}:{options.sim_port}; HIL_SENSOR at "
-            f"{rate:.0f} Hz to {options.link}")
+        closables.append(
+            bridge := UdpPort(options.mavlink_port, options.companion_port, Codec(*AUTOPILOT_IDS))
+        )
+        closables.append(plant := connect(NAME, options.sim_host, options.sim_port, options.wait))
+        say(
+            f"connected to the simulator at {options.sim_host}:{options.sim_port}; HIL_SENSOR at "
+            f"{rate:.0f} Hz to {options.link}"
+        )
         router = Router(controller, plant, bridge, rate)
         router.run()
         say(f"the simulator closed the link; {router.summary()}")

@@ -20,9 +20,7 @@ BITS_PER_BYTE = 10  # start, eight data bits, stop
 class SerialTransport(StreamTransport):
     """A device of this program alone; opened again when it comes back after unplugging."""
 
-    def __init__(
-        self, device: str, baud: int, clock: Callable[[], float] = time.monotonic
-    ) -> None:
+    def __init__(self, device: str, baud: int, clock: Callable[[], float] = time.monotonic) -> None:
         """Raises PortError in one line where the device cannot be opened now."""
         super().__init__(clock)
         self._device, self._baud = device, baud

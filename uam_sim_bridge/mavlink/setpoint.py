@@ -66,37 +66,55 @@ class RateThrustParameters(ParameterSet):
     """What the map needs to know of vehicle and autopilot; defaults: S-500 with PX4 gains."""
 
     rotor_thrust_max: float = number(
-        10.34, "thrust of one rotor at full command and full battery", "N", 0.1, 1000.0)
+        10.34, "thrust of one rotor at full command and full battery", "N", 0.1, 1000.0
+    )
     motor_curve_factor: float = number(
-        0.3, "f in thrust/full thrust = f u^2 + (1 - f) u of motor command u", "1", 0.0, 1.0)
+        0.3, "f in thrust/full thrust = f u^2 + (1 - f) u of motor command u", "1", 0.0, 1.0
+    )
     battery_factor: float = number(
-        1.0, "full thrust now / full thrust with a full battery", "1", 0.2, 1.5)
+        1.0, "full thrust now / full thrust with a full battery", "1", 0.2, 1.5
+    )
     thr_mdl_fac: float = number(0.3, "THR_MDL_FAC of the autopilot", "1", 0.0, 1.0)
     rotor_arm_x: float = number(0.171, "rotor offset forward", "m", 0.01, 5.0)
     rotor_arm_y: float = number(0.171, "rotor offset to the side", "m", 0.01, 5.0)
     rotor_moment_ratio: float = number(
-        0.016, "reaction torque per thrust of a rotor", "m", 1e-4, 1.0)
+        0.016, "reaction torque per thrust of a rotor", "m", 1e-4, 1.0
+    )
     rate_p: tuple = vector(
-        (0.15, 0.15, 0.2), "MC_ROLLRATE_P, MC_PITCHRATE_P, MC_YAWRATE_P of the autopilot",
-        "1/(rad/s)", 0.001, 10.0, 3)
+        (0.15, 0.15, 0.2),
+        "MC_ROLLRATE_P, MC_PITCHRATE_P, MC_YAWRATE_P of the autopilot",
+        "1/(rad/s)",
+        0.001,
+        10.0,
+        3,
+    )
     rate_k: tuple = vector(
-        (1.0, 1.0, 1.0), "MC_ROLLRATE_K, MC_PITCHRATE_K, MC_YAWRATE_K of the autopilot",
-        "1", 0.01, 10.0, 3)
+        (1.0, 1.0, 1.0),
+        "MC_ROLLRATE_K, MC_PITCHRATE_K, MC_YAWRATE_K of the autopilot",
+        "1",
+        0.01,
+        10.0,
+        3,
+    )
     rate_limit: tuple = vector(
-        (6.0, 6.0, 3.0), "largest body-rate setpoint about roll, pitch, yaw", "rad/s",
-        0.05, 50.0, 3)
+        (6.0, 6.0, 3.0), "largest body-rate setpoint about roll, pitch, yaw", "rad/s", 0.05, 50.0, 3
+    )
     thrust_min: float = number(1.0, "smallest collective sent in flight", "N", 0.0, 1000.0)
     thrust_max: float = number(40.0, "largest collective sent", "N", 0.1, 4000.0)
     command_max: float = number(
-        1.0, "largest normalised thrust sent; below 1 leaves room for torques", "1", 0.1, 1.0)
+        1.0, "largest normalised thrust sent; below 1 leaves room for torques", "1", 0.1, 1.0
+    )
 
     @property
     def torque_scale(self) -> np.ndarray:
         """Torque (3,) [N m] of a normalised torque of 1 about roll, pitch, yaw (PX4 allocation)."""
         x, y, m = self.rotor_arm_x, self.rotor_arm_y, self.rotor_moment_ratio
         return torque_scale(
-            np.array([x, -x, x, -x]), np.array([y, -y, -y, y]), np.array([m, m, -m, -m]),
-            self.rotor_thrust_max)
+            np.array([x, -x, x, -x]),
+            np.array([y, -y, -y, y]),
+            np.array([m, m, -m, -m]),
+            self.rotor_thrust_max,
+        )
 
     def flat(self) -> np.ndarray:
         """Return the array that the compiled map reads."""
@@ -108,8 +126,8 @@ class RateThrustParameters(ParameterSet):
         p[_MIN] = self.thrust_min
         p[_MAX] = self.thrust_max
         p[_COMMAND_MAX] = self.command_max
-        p[_GAIN:_GAIN + 3] = self.torque_scale * np.array(self.rate_p) * np.array(self.rate_k)
-        p[_LIMIT:_LIMIT + 3] = self.rate_limit
+        p[_GAIN : _GAIN + 3] = self.torque_scale * np.array(self.rate_p) * np.array(self.rate_k)
+        p[_LIMIT : _LIMIT + 3] = self.rate_limit
         return p
 
 
@@ -197,7 +215,8 @@ class RateThrustMap:
         """Return the collective [N] of a normalised thrust by the curve, without the factor."""
         p = self._flat
         return thrust_of_command(
-            command, p[_FULL], self.parameters.battery_factor, p[_MOTOR], p[_MODEL])
+            command, p[_FULL], self.parameters.battery_factor, p[_MOTOR], p[_MODEL]
+        )
 
     def thrust_command(self, newtons: float) -> float:
         """Return the normalised thrust of a collective [N], unclamped by thrust_min/max."""

@@ -48,8 +48,9 @@ class Signing:
                     text = file.read(_FILE_LIMIT).decode("ascii").strip()
             except (OSError, ValueError, RuntimeError) as error:
                 reason = getattr(error, "strerror", None) or "not a text"
-                raise PortError("signing key: not 64 hex digits, and as a file: "
-                                f"{reason}") from None
+                raise PortError(
+                    f"signing key: not 64 hex digits, and as a file: {reason}"
+                ) from None
             if not _KEY.fullmatch(text):
                 raise PortError("signing key: the file does not hold 64 hex digits")
         return cls(bytes.fromhex(text), link_id)

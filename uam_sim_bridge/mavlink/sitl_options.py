@@ -24,6 +24,7 @@ def instance(text: str) -> int:
 
 def number(what: str, low: float, high: float) -> Callable[[str], float]:
     """Return an argparse type: a number from `low` to `high`, called `what` when refused."""
+
     def read(text: str) -> float:
         try:
             value = float(text)
@@ -32,23 +33,40 @@ def number(what: str, low: float, high: float) -> Callable[[str], float]:
         if not low <= value <= high:
             raise argparse.ArgumentTypeError(f"{text} is not a {what} ({low:g}..{high:g})")
         return value
+
     return read
 
 
 def add_port_options(p: argparse.ArgumentParser) -> None:
     """Add the options of simulator and companion ports to a command line."""
-    p.add_argument("-i", "--instance", type=instance, default=0, metavar="N",
-                   help="PX4 instance number, added to the default ports")
-    p.add_argument("--sim-host", default=HOST, metavar="HOST",
-                   help="simulator (default %(default)s)")
+    p.add_argument(
+        "-i",
+        "--instance",
+        type=instance,
+        default=0,
+        metavar="N",
+        help="PX4 instance number, added to the default ports",
+    )
+    p.add_argument(
+        "--sim-host", default=HOST, metavar="HOST", help="simulator (default %(default)s)"
+    )
     p.add_argument("--sim-port", type=port, metavar="PORT", help="simulator (default 4560 + N)")
-    p.add_argument("--mavlink-port", type=port, metavar="PORT",
-                   help="own UDP port (default 14580 + N)")
-    p.add_argument("--companion-port", type=port, metavar="PORT",
-                   help="UDP port told unasked until a peer speaks (default 14540 + N)")
-    p.add_argument("--wait", type=number("time in seconds", 0.0, 86400.0), default=60.0,
-                   metavar="SECONDS",
-                   help="how long to wait for the simulator (default %(default)g)")
+    p.add_argument(
+        "--mavlink-port", type=port, metavar="PORT", help="own UDP port (default 14580 + N)"
+    )
+    p.add_argument(
+        "--companion-port",
+        type=port,
+        metavar="PORT",
+        help="UDP port told unasked until a peer speaks (default 14540 + N)",
+    )
+    p.add_argument(
+        "--wait",
+        type=number("time in seconds", 0.0, 86400.0),
+        default=60.0,
+        metavar="SECONDS",
+        help="how long to wait for the simulator (default %(default)g)",
+    )
 
 
 def fill_ports(options: argparse.Namespace) -> None:

@@ -24,8 +24,10 @@ class UdpPort:
             self._socket.bind((HOST, local))
         except OSError as error:
             self._socket.close()
-            raise PortError(f"UDP port {local} for the companion computer: {error.strerror}; "
-                            "choose another instance or --mavlink-port") from None
+            raise PortError(
+                f"UDP port {local} for the companion computer: {error.strerror}; "
+                "choose another instance or --mavlink-port"
+            ) from None
         self._socket.setblocking(False)
         self._codec = codec
         self._framer = Framer(codec)
@@ -85,8 +87,10 @@ def connect(name: str, host: str, port: int, patience: float) -> socket.socket:
             raise PortError(f"simulator host {host}: {error.strerror}") from None
         except OSError as error:
             if clock.monotonic() > end:
-                raise PortError(f"no simulator at {host}:{port} within {patience:g} s "
-                                f"({error.strerror or 'no answer'})") from None
+                raise PortError(
+                    f"no simulator at {host}:{port} within {patience:g} s "
+                    f"({error.strerror or 'no answer'})"
+                ) from None
             if not said:
                 print(f"{name}: waiting for the simulator at {host}:{port}", flush=True)
                 said = True

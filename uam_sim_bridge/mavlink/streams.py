@@ -82,13 +82,20 @@ class StreamCheck:
             self._begin(time)
         if time - self._window < WINDOW:
             return
-        self.rates = {number: count / (time - self._window)
-                      for number, count in self._counts.items()}
-        slow = [number for number, rate in RATES.items()
-                if self.rates[number] < ENOUGH * rate or number in self._refused]
+        self.rates = {
+            number: count / (time - self._window) for number, count in self._counts.items()
+        }
+        slow = [
+            number
+            for number, rate in RATES.items()
+            if self.rates[number] < ENOUGH * rate or number in self._refused
+        ]
         self.warnings = tuple(self._words(number) for number in slow)
-        self._queue = [number for number in slow
-                       if number not in ONLY_COUNTED and self._attempts[number] < ATTEMPTS]
+        self._queue = [
+            number
+            for number in slow
+            if number not in ONLY_COUNTED and self._attempts[number] < ATTEMPTS
+        ]
         self._begin(time)
         if self._queue:
             self._window = None
@@ -102,6 +109,9 @@ class StreamCheck:
         rate, wanted = self.rates[number], RATES[number]
         came = f"comes at {rate:.1f} Hz" if rate > 0.0 else "does not come"
         refused = self._refused.get(number)
-        asked = f"asked for {wanted:g} Hz" if refused is None else (
-            f"{wanted:g} Hz were refused ({refused})")
+        asked = (
+            f"asked for {wanted:g} Hz"
+            if refused is None
+            else (f"{wanted:g} Hz were refused ({refused})")
+        )
         return f"{name} {came}, {asked}"

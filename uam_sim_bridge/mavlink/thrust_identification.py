@@ -50,31 +50,52 @@ class ThrustIdentificationParameters(ParameterSet):
     """When to trust a comparison of thrust and acceleration, and how fast to follow it."""
 
     thrust_identification: str = choice(
-        "on", "on: identify true thrust / assumed thrust in flight; freeze: hold it; off: 1",
-        ("off", "on", "freeze"))
+        "on",
+        "on: identify true thrust / assumed thrust in flight; freeze: hold it; off: 1",
+        ("off", "on", "freeze"),
+    )
     identification_mass: float = number(
-        2.2, "mass of the vehicle with its arm, without payload", "kg", 0.05, 500.0)
+        2.2, "mass of the vehicle with its arm, without payload", "kg", 0.05, 500.0
+    )
     identification_time: float = number(
-        30.0, "time constant with which the factor follows the measurement in the long run",
-        "s", 0.5, 3600.0)
+        30.0,
+        "time constant with which the factor follows the measurement in the long run",
+        "s",
+        0.5,
+        3600.0,
+    )
     identification_start: float = number(
-        4.0, "the same at the beginning of the first flight", "s", 0.5, 600.0)
+        4.0, "the same at the beginning of the first flight", "s", 0.5, 600.0
+    )
     identification_lag: float = number(
-        0.05, "lag of motors and acceleration filter behind the thrust command", "s", 0.0, 0.5)
+        0.05, "lag of motors and acceleration filter behind the thrust command", "s", 0.0, 0.5
+    )
     identification_height: float = number(
-        0.3, "height above the start from which on thrust is compared", "m", 0.05, 100.0)
+        0.3, "height above the start from which on thrust is compared", "m", 0.05, 100.0
+    )
     identification_tilt: float = number(
-        0.15, "tilt up to which thrust is compared", "rad", 0.01, 1.0)
+        0.15, "tilt up to which thrust is compared", "rad", 0.01, 1.0
+    )
     identification_acceleration: float = number(
-        1.0, "acceleration of the vehicle up to which thrust is compared", "m/s^2", 0.05, 20.0)
+        1.0, "acceleration of the vehicle up to which thrust is compared", "m/s^2", 0.05, 20.0
+    )
     identification_settling: float = number(
-        0.5, "how long all that must have been so without a break", "s", 0.0, 60.0)
+        0.5, "how long all that must have been so without a break", "s", 0.0, 60.0
+    )
     identification_release: float = number(
-        1.0, "wait after the magnet went off, before it is judged whether something hangs",
-        "s", 0.1, 60.0)
+        1.0,
+        "wait after the magnet went off, before it is judged whether something hangs",
+        "s",
+        0.1,
+        60.0,
+    )
     hanging_mass: float = number(
-        0.05, "payload from which on it counts as hanging after the magnet went off", "kg",
-        1e-3, 50.0)
+        0.05,
+        "payload from which on it counts as hanging after the magnet went off",
+        "kg",
+        1e-3,
+        50.0,
+    )
     factor_min: float = number(0.5, "smallest factor", "1", 0.2, 1.0)
     factor_max: float = number(1.3, "largest factor", "1", 1.0, 2.0)
     factor_slew: float = number(0.05, "largest change of the factor", "1/s", 1e-4, 1.0)
@@ -159,7 +180,8 @@ class ThrustIdentification:
             return self.factor
         p = self.parameters
         self._assumed += (1.0 - math.exp(-dt / max(p.identification_lag, 1e-3))) * (
-            assumed - self._assumed)
+            assumed - self._assumed
+        )
         self._follow_magnet(time)
         if p.thrust_identification == "off":
             self._learnt = 0.0

@@ -48,8 +48,10 @@ class UdpTransport:
         except (OSError, OverflowError) as error:
             self._socket.close()
             reason = getattr(error, "strerror", None) or str(error)
-            raise PortError(f"UDP port {local_port} for MAVLink: {reason}; stop the program that "
-                            "uses it or choose another instance") from None
+            raise PortError(
+                f"UDP port {local_port} for MAVLink: {reason}; stop the program that "
+                "uses it or choose another instance"
+            ) from None
         self._socket.setblocking(False)
 
     def send(self, data: bytes) -> bool:

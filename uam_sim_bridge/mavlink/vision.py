@@ -21,19 +21,30 @@ def covariance(position_deviation: float, attitude_deviation: float) -> list[flo
 
 
 def vision_message(
-    stamp: float, position: np.ndarray, quaternion: np.ndarray,
-    position_deviation: float, attitude_deviation: float,
+    stamp: float,
+    position: np.ndarray,
+    quaternion: np.ndarray,
+    position_deviation: float,
+    attitude_deviation: float,
 ) -> Message:
     """Return the message of a pose at `stamp` [s]: position (3,) [m, ENU], FLU → ENU [w x y z]."""
     return mavlink2.MAVLink_vision_position_estimate_message(
-        round(stamp * 1e6), *swap_world(position).tolist(),
+        round(stamp * 1e6),
+        *swap_world(position).tolist(),
         *swap_euler(euler_from_quaternion(quaternion)).tolist(),
-        covariance(position_deviation, attitude_deviation), 0)
+        covariance(position_deviation, attitude_deviation),
+        0,
+    )
 
 
 def odometry_message(
-    stamp: float, position: np.ndarray, quaternion: np.ndarray, velocity: np.ndarray,
-    rates: np.ndarray, position_deviation: float, attitude_deviation: float,
+    stamp: float,
+    position: np.ndarray,
+    quaternion: np.ndarray,
+    velocity: np.ndarray,
+    rates: np.ndarray,
+    position_deviation: float,
+    attitude_deviation: float,
     velocity_deviation: float,
 ) -> Message:
     """Return an ODOMETRY (EKF2_EV_CTRL = 15): the pose as above with velocity.
@@ -41,8 +52,13 @@ def odometry_message(
     velocity (3,) [m/s] and rates (3,) [rad/s] in the body, FLU.
     """
     return mavlink2.MAVLink_odometry_message(
-        round(stamp * 1e6), mavlink2.MAV_FRAME_LOCAL_NED, mavlink2.MAV_FRAME_BODY_FRD,
-        *swap_world(position).tolist(), swap_quaternion(quaternion).tolist(),
-        *swap_body(velocity).tolist(), *swap_body(rates).tolist(),
+        round(stamp * 1e6),
+        mavlink2.MAV_FRAME_LOCAL_NED,
+        mavlink2.MAV_FRAME_BODY_FRD,
+        *swap_world(position).tolist(),
+        swap_quaternion(quaternion).tolist(),
+        *swap_body(velocity).tolist(),
+        *swap_body(rates).tolist(),
         covariance(position_deviation, attitude_deviation),
-        covariance(velocity_deviation, attitude_deviation))
+        covariance(velocity_deviation, attitude_deviation),
+    )

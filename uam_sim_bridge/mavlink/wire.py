@@ -136,7 +136,7 @@ def message_number(data: bytes, at: int) -> int:
     """Return the message id of the frame that begins at data[at], at least 10 bytes of it there."""
     if data[at] == MARKER_1:
         return data[at + 5]
-    return int.from_bytes(data[at + 7:at + 10], "little")
+    return int.from_bytes(data[at + 7 : at + 10], "little")
 
 
 def checksum_fits(data: bytes, at: int, end: int) -> bool:
@@ -154,7 +154,7 @@ def checksum_fits(data: bytes, at: int, end: int) -> bool:
     extra = UNREAD.get(number) if kind is None else kind.crc_extra
     if extra is None:
         return False
-    checksum = mavlink2.x25crc(data[at + 1:tail] + bytes((extra,))).crc
+    checksum = mavlink2.x25crc(data[at + 1 : tail] + bytes((extra,))).crc
     return checksum == data[tail] | data[tail + 1] << 8
 
 
@@ -173,7 +173,7 @@ def _frame_end(data: bytes, at: int) -> int | None:
 def text_chunks(severity: int, text: str, number: int) -> list[Message]:
     """Return the STATUSTEXT messages of `text`, in pieces of 50 bytes; number: its id if long."""
     raw = text.encode()
-    pieces = [raw[i:i + 50] for i in range(0, len(raw), 50)] or [b""]
+    pieces = [raw[i : i + 50] for i in range(0, len(raw), 50)] or [b""]
     if len(pieces) > 1 and len(pieces[-1]) == 50:
         pieces.append(b"")  # a piece that is not full says that the text ends
     identity = number % 65535 + 1 if len(pieces) > 1 else 0

@@ -76,25 +76,32 @@ class BridgeParameters(ParameterSet):
     """Ports and rates of the bridge; fixed once the node runs."""
 
     clock: str = choice(
-        "lockstep", "lockstep: ticks alone; realtime: a watchdog on wall time as well",
-        ("lockstep", "realtime"))
+        "lockstep",
+        "lockstep: ticks alone; realtime: a watchdog on wall time as well",
+        ("lockstep", "realtime"),
+    )
     local_port: float = number(14540, "own UDP port (14540 + instance)", "1", 1, 65535)
     autopilot_port: float = number(
-        14580, "UDP port of the autopilot (14580 + instance)", "1", 1, 65535)
+        14580, "UDP port of the autopilot (14580 + instance)", "1", 1, 65535
+    )
     autopilot_system: float = number(1, "MAVLink system id of the autopilot", "1", 1, 255)
-    signing_link_id: float = number(
-        0, "number of this link in MAVLink 2 signatures", "1", 0, 255)
-    vision_interval: float = number(
-        0.02, "least time between two vision poses sent", "s", 0.0, 1.0)
+    signing_link_id: float = number(0, "number of this link in MAVLink 2 signatures", "1", 0, 255)
+    vision_interval: float = number(0.02, "least time between two vision poses sent", "s", 0.0, 1.0)
     vision_position_deviation: float = number(
-        0.005, "standard deviation told with a vision pose", "m", 1e-4, 1.0)
+        0.005, "standard deviation told with a vision pose", "m", 1e-4, 1.0
+    )
     vision_attitude_deviation: float = number(
-        0.02, "standard deviation told with a vision pose", "rad", 1e-4, 1.0)
+        0.02, "standard deviation told with a vision pose", "rad", 1e-4, 1.0
+    )
     autopilot_parameters: str = choice(
-        "warn", "where the autopilot's MC_*RATE_P/K or THR_MDL_FAC differ from the mapping: warn, "
-        "or adopt them before arming", ("warn", "adopt"))
+        "warn",
+        "where the autopilot's MC_*RATE_P/K or THR_MDL_FAC differ from the mapping: warn, "
+        "or adopt them before arming",
+        ("warn", "adopt"),
+    )
     stale_after: float = number(
-        0.1, "real time without a tick, after which the commands count as lost", "s", 0.01, 5.0)
+        0.1, "real time without a tick, after which the commands count as lost", "s", 0.01, 5.0
+    )
 
 
 class MavlinkBridgeNode(UamNode):
@@ -158,23 +165,36 @@ class MavlinkBridgeNode(UamNode):
         system = int(options.autopilot_system)
         about = ParameterDescriptor(
             description="address of the autopilot's UDP port, where `autopilot` names no link",
-            read_only=True)
+            read_only=True,
+        )
         host = self.declare_parameter("autopilot_host", "127.0.0.1", about).value
-        url = self._text("autopilot", "link to the autopilot, in place of the UDP port: "
-                         "udp:HOST:PORT[:LOCAL_PORT], tcp:HOST:PORT or serial:DEVICE:BAUD")
+        url = self._text(
+            "autopilot",
+            "link to the autopilot, in place of the UDP port: "
+            "udp:HOST:PORT[:LOCAL_PORT], tcp:HOST:PORT or serial:DEVICE:BAUD",
+        )
         station = self._text("gcs", "ground station that watches: udp:HOST:PORT[:LOCAL_PORT]")
         signing = Signing.from_text(
-            self._text("signing_key", "MAVLink 2 signing: 64 hex digits, or a file that holds "
-                       "them; read as 'set' from outside", secret=True),
-            int(options.signing_link_id))
+            self._text(
+                "signing_key",
+                "MAVLink 2 signing: 64 hex digits, or a file that holds "
+                "them; read as 'set' from outside",
+                secret=True,
+            ),
+            int(options.signing_link_id),
+        )
         transport: Transport
         if url:
             transport = open_transport(url)
         else:
             transport = UdpTransport(int(options.local_port), (host, int(options.autopilot_port)))
         faults = Schedule.from_text(
-            self._text("faults", "JSON, faults of the MAVLink connection and when they come, see "
-                       "docs/faults.md; empty = none")).only(LINK)
+            self._text(
+                "faults",
+                "JSON, faults of the MAVLink connection and when they come, see "
+                "docs/faults.md; empty = none",
+            )
+        ).only(LINK)
         if faults:
             transport = self._faulty = FaultyTransport(transport, faults)
             self._fault_topic = FaultTopic(self)
@@ -182,7 +202,8 @@ class MavlinkBridgeNode(UamNode):
             codec = Codec(system, mavlink2.MAV_COMP_ID_ONBOARD_COMPUTER, signing)
             transport = self._station = GroundStation(station, transport, codec)
         return OffboardLink(
-            transport, self.sequence, self.map.parameters, system, hold_time, signing)
+            transport, self.sequence, self.map.parameters, system, hold_time, signing
+        )
 
     def _text(self, name: str, description: str, secret: bool = False) -> str:
         """Declare a read-only text, '' by default, and return it; a secret one is not shown.
@@ -291,8 +312,12 @@ class MavlinkBridgeNode(UamNode):
         if state is BAD or position is BAD:
             return
         self.map.thrust_factor = self.identification.update(
-            seconds(stamp), state, thrust, self.map.assumed_thrust(thrust),
-            position.flying and self.link.armed)
+            seconds(stamp),
+            state,
+            thrust,
+            self.map.assumed_thrust(thrust),
+            position.flying and self.link.armed,
+        )
 
     def _command(self, now: float, state, position, torque) -> tuple[np.ndarray, float] | None:
         """Return body rates (3,) and thrust for this tick, None for no setpoint at all."""
@@ -302,7 +327,8 @@ class MavlinkBridgeNode(UamNode):
             try:
                 chi, chi_dot = state[0], state[1]
                 rates, thrust = self.map.map(
-                    position.tau, torque[0], chi[ATTITUDE], chi_dot[ATTITUDE])
+                    position.tau, torque[0], chi[ATTITUDE], chi_dot[ATTITUDE]
+                )
             except SetpointRefused as error:
                 self.say(f"setpoint refused: {error}")
             else:
@@ -324,8 +350,11 @@ class MavlinkBridgeNode(UamNode):
         if not self.link.armed or (self.link.landed and not self._high()):
             return self._idle, 0.0
         setpoint = self._hold.setpoint(now, self._state[0, ATTITUDE])
-        self.say("no usable commands in flight: "
-                 + ("holding level" if setpoint else "stream stopped, the failsafe acts"), "hold")
+        self.say(
+            "no usable commands in flight: "
+            + ("holding level" if setpoint else "stream stopped, the failsafe acts"),
+            "hold",
+        )
         return setpoint
 
     def _send(self, now: float, setpoint: tuple[np.ndarray, float] | None) -> None:
@@ -338,8 +367,12 @@ class MavlinkBridgeNode(UamNode):
             if exposed - self._pose_sent >= options.vision_interval - 1e-9:
                 self._pose, self._pose_sent = None, exposed
                 link.send_vision(
-                    exposed, position, quaternion,
-                    options.vision_position_deviation, options.vision_attitude_deviation)
+                    exposed,
+                    position,
+                    quaternion,
+                    options.vision_position_deviation,
+                    options.vision_attitude_deviation,
+                )
         if setpoint is not None and self.sequence.streaming:
             link.send_setpoint(*setpoint, now)
         if self._station is not None:
@@ -373,14 +406,20 @@ class MavlinkBridgeNode(UamNode):
             return
         if what != self._told:
             text = f"{sequence.phase.value}; autopilot {link.mode.name}, " + (
-                "armed" if link.armed else "disarmed")
+                "armed" if link.armed else "disarmed"
+            )
             self.get_logger().info("; ".join((text, *sequence.reasons)))
         self._told, self._told_at = what, stamp
         since = link.armed_since
-        self._autopilot_state.publish(AutopilotState(
-            connected, link.mode.name, link.armed,
-            None if since is None else round(since * 1e6) * 1000,
-            "; ".join(sequence.reasons)).to_message(stamp))
+        self._autopilot_state.publish(
+            AutopilotState(
+                connected,
+                link.mode.name,
+                link.armed,
+                None if since is None else round(since * 1e6) * 1000,
+                "; ".join(sequence.reasons),
+            ).to_message(stamp)
+        )
 
     def diagnose(self):
         link, sequence = self.link, self.sequence

@@ -218,8 +218,10 @@ class Simulator:
 
     def _wait_for_answers(self) -> None:
         if not self._recorder_has_caught_up(RECORDER_LAG, self.options.answer_timeout):
-            raise PlantStopped(f"nothing recorded since {self.connections.recorded_until():g} s"
-                               "; the recorder is silent")
+            raise PlantStopped(
+                f"nothing recorded since {self.connections.recorded_until():g} s"
+                "; the recorder is silent"
+            )
         if self._stamp is None or self._stop.raised:
             return
         patience = Patience(self.options.answer_timeout)

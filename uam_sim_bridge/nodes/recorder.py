@@ -98,9 +98,7 @@ class Recording:
         metadata = {"offered_qos_profiles": _qos_text(topic.qos)}
         channel = self._writer.add_channel(topic.name, name, schema(name), metadata)
         stamped = begins_with_stamp(topic.type) and topic.one_publisher
-        return Track(
-            topic.name, subscription, topic.type, stamped, channel, topic.one_publisher
-        )
+        return Track(topic.name, subscription, topic.type, stamped, channel, topic.one_publisher)
 
     def poll(self) -> int:
         """Write everything that has arrived; returns how many messages that was."""

@@ -191,9 +191,7 @@ class SceneNode(UamNode):
         ahead = self._path.ahead(0.0 if status.time < 0.0 else mission_time)
         if status.done or status.abort_reason:
             ahead = ahead[:0]
-        self._markers.publish(
-            self._maker.message(stamp, status, ahead, self._flown.points, now[2])
-        )
+        self._markers.publish(self._maker.message(stamp, status, ahead, self._flown.points, now[2]))
 
     def diagnose(self):
         """Phase as the mission says it; and what is shown."""

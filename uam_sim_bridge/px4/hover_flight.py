@@ -59,7 +59,8 @@ class HoverFlight:
         self._transport = UdpTransport(ports.offboard_udp, (HOST, ports.autopilot_udp))
         self.system = ports.instance + 1  # MAVLink system id of the autopilot
         self._link = OffboardLink(
-            self._transport, self._sequence, self._map.parameters, self.system)
+            self._transport, self._sequence, self._map.parameters, self.system
+        )
         self._reference = empty_reference()
         self._reference[0, 6:8] = ARM
         self._state = np.zeros((3, 8))
@@ -165,7 +166,8 @@ class HoverFlight:
         if link:
             self._send(now, quaternion, vision)
         motors = self._hil.exchange(
-            now, samples.hil[1], samples.hil[2], state[0, POSITION], quaternion)
+            now, samples.hil[1], samples.hil[2], state[0, POSITION], quaternion
+        )
         if not self._hil.connected:
             raise NotFlown(f"the autopilot hung up at t = {now:.3f} s")
         plant.step(motors, effort, False)
@@ -181,8 +183,9 @@ class HoverFlight:
         link = self._link
         link.tick(now)
         if vision and self.plant.tick % VISION_TICKS == 0:
-            link.send_vision(now, self._state[0, POSITION], quaternion,
-                             POSITION_DEVIATION, ATTITUDE_DEVIATION)
+            link.send_vision(
+                now, self._state[0, POSITION], quaternion, POSITION_DEVIATION, ATTITUDE_DEVIATION
+            )
         if self._sequence.streaming:
             link.send_setpoint(self._setpoint[:3], self._setpoint[3], now)
 

@@ -56,8 +56,10 @@ def responses(
     for step in steps(numbers):
         flight.hover(numbers["recover"] - numbers["before"])
         rates = [flight.tick()[step.axis] for _ in range(before)]
-        rates += [flight.tick((step.axis, step.size))[step.axis]
-                  for _ in range(round(step.duration / period))]
+        rates += [
+            flight.tick((step.axis, step.size))[step.axis]
+            for _ in range(round(step.duration / period))
+        ]
         if not flight.armed:
             raise NotFlown("the autopilot disarmed")
         found[AXES[step.axis]].append(np.array(rates) / step.size)

@@ -92,14 +92,16 @@ def write(out: Path, stand_in: Responses, px4: Responses, found: dict[str, dict]
 
     with style.styled():
         figure, axes = plt.subplots(
-            1, len(AXES), figsize=(style.WIDTH, 2.9), sharey=True, layout="constrained")
+            1, len(AXES), figsize=(style.WIDTH, 2.9), sharey=True, layout="constrained"
+        )
         for place, axis in zip(axes, AXES, strict=True):
             time = 1000.0 * stand_in[axis][0]
             place.step(time, time >= 0.0, where="post", color=style.REFERENCE, label="setpoint")
             place.plot(time, stand_in[axis][1], color=style.FLIGHTS[0], label=STAND_IN)
             place.plot(time, px4[axis][1], color=style.FLIGHTS[1], label=PX4)
-            place.set_title(f"{axis}: {100.0 * found[axis]['distance']:.1f} % apart (RMS)",
-                            loc="left")
+            place.set_title(
+                f"{axis}: {100.0 * found[axis]['distance']:.1f} % apart (RMS)", loc="left"
+            )
             place.set_xlabel("time from the step [ms]")
         axes[0].set_ylabel("body rate / step")
         axes[0].legend(loc="lower right")
@@ -111,12 +113,15 @@ def write(out: Path, stand_in: Responses, px4: Responses, found: dict[str, dict]
 def main() -> int:
     """Compare: 0 all axes within LIMIT, 1 not; 2 where nothing could be flown."""
     parser = argparse.ArgumentParser(
-        prog="python -m uam_sim_bridge.px4.rate_steps", description=__doc__.splitlines()[0],
+        prog="python -m uam_sim_bridge.px4.rate_steps",
+        description=__doc__.splitlines()[0],
         epilog="example: python -m uam_sim_bridge.px4.rate_steps --px4-dir "
-        "~/PX4-Autopilot/build/px4_sitl_default --out results/rate-steps")
+        "~/PX4-Autopilot/build/px4_sitl_default --out results/rate-steps",
+    )
     parser.add_argument("--px4-dir", metavar="DIR", help=WANTED)
-    parser.add_argument("--out", type=Path, metavar="DIR",
-                        help="result folder (default results/<time>-rate-steps)")
+    parser.add_argument(
+        "--out", type=Path, metavar="DIR", help="result folder (default results/<time>-rate-steps)"
+    )
     options = parser.parse_args()
     try:
         px4 = Px4Installation.find(options.px4_dir)
@@ -137,10 +142,12 @@ def main() -> int:
     print("axis    apart   time constant [ms]   overshoot     final")
     for axis, row in found.items():
         ours, theirs = row[STAND_IN], row[PX4]
-        print(f"{axis:<6} {100.0 * row['distance']:5.1f} %   "
-              f"{1000.0 * ours['time_constant']:6.1f} / {1000.0 * theirs['time_constant']:6.1f}"
-              f"     {ours['overshoot']:.2f} / {theirs['overshoot']:.2f}"
-              f"   {ours['final']:.2f} / {theirs['final']:.2f}   ({STAND_IN} / {PX4})")
+        print(
+            f"{axis:<6} {100.0 * row['distance']:5.1f} %   "
+            f"{1000.0 * ours['time_constant']:6.1f} / {1000.0 * theirs['time_constant']:6.1f}"
+            f"     {ours['overshoot']:.2f} / {theirs['overshoot']:.2f}"
+            f"   {ours['final']:.2f} / {theirs['final']:.2f}   ({STAND_IN} / {PX4})"
+        )
     print(f"results {out}")
     return 0 if all(row["distance"] <= LIMIT for row in found.values()) else 1
 

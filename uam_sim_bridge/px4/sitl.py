@@ -105,13 +105,27 @@ def parser() -> argparse.ArgumentParser:
         "  px4_sitl --instance 2 --log flight.ulg\n"
         "  px4_sitl --params mine.yaml       NAME: value lines, PX4's names\n",
     )
-    p.add_argument("-i", "--instance", type=instance, default=0, metavar="N",
-                   help="PX4 instance number, added to the ports (default %(default)s)")
+    p.add_argument(
+        "-i",
+        "--instance",
+        type=instance,
+        default=0,
+        metavar="N",
+        help="PX4 instance number, added to the ports (default %(default)s)",
+    )
     p.add_argument("--px4-dir", metavar="DIR", help=WANTED)
-    p.add_argument("--params", metavar="FILE", nargs="+",
-                   help=f"parameters (default: {', '.join(parameters.FILES)} of config/)")
-    p.add_argument("--log", type=Path, metavar="FILE",
-                   help=f"keep PX4's log as FILE{LOG_SUFFIX} (default: it is thrown away)")
+    p.add_argument(
+        "--params",
+        metavar="FILE",
+        nargs="+",
+        help=f"parameters (default: {', '.join(parameters.FILES)} of config/)",
+    )
+    p.add_argument(
+        "--log",
+        type=Path,
+        metavar="FILE",
+        help=f"keep PX4's log as FILE{LOG_SUFFIX} (default: it is thrown away)",
+    )
     return p
 
 

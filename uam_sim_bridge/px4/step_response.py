@@ -32,7 +32,7 @@ def figures(time: np.ndarray, response: np.ndarray) -> StepFigures:
         reached = t[i]
         if i > 0:  # between two samples
             reached = t[i - 1] + (t[i] - t[i - 1]) * (REACHED - y[i - 1]) / (y[i] - y[i - 1])
-    last = y[-max(1, len(y) // 4):]
+    last = y[-max(1, len(y) // 4) :]
     return StepFigures(float(reached), float(max(0.0, y.max() - 1.0)), float(last.mean()))
 
 

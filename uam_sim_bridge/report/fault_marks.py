@@ -58,8 +58,14 @@ def shade(axes: np.ndarray, info: Mapping[str, Any], start: float, end: float) -
     for axis in axes[0]:
         for at, letters in _together(shown, start, APART * (end - start)):
             axis.annotate(
-                letters, (at, 0.0), xycoords=("data", "axes fraction"), xytext=(2, 2),
-                textcoords="offset points", fontsize=7.0, fontweight="bold", color=style.FAULT,
+                letters,
+                (at, 0.0),
+                xycoords=("data", "axes fraction"),
+                xytext=(2, 2),
+                textcoords="offset points",
+                fontsize=7.0,
+                fontweight="bold",
+                color=style.FAULT,
             )
 
 

@@ -63,9 +63,7 @@ def caveats(found: Mapping[str, Any]) -> list[str]:
         f"Acceleration: the ‖chi_ddot‖ that K3 sees was below the true one at {_percent(max(seen))}"
         " of the ticks: estimate, limit and filter lie between.",
         "Limits cut tau at " + _list(a["saturated"], "{:.1f} %", 100.0) + " of the ticks.",
-        "A ceiling held a gain down at "
-        + _list(ceilings, "{:.1f} %", 100.0)
-        + " of the ticks.",
+        "A ceiling held a gain down at " + _list(ceilings, "{:.1f} %", 100.0) + " of the ticks.",
         f"Estimator: ‖xi‖ is {_number(a['estimator']['rms_xi'])} RMS, the error of its estimate "
         f"{_number(a['estimator']['rms_error'])}.",
         f"Attitude error: e_q_dot is the derivative of e_q to within {_percent(a['error_rate'])}.",

@@ -42,11 +42,18 @@ def write_best(file: Path, space: Space, study: optuna.Study, command: str) -> N
 def write_evaluations(file: Path, space: Space, study: optuna.Study) -> None:
     """Write one row per evaluation: number, cost, values of the knobs."""
     names = [knob.name for knob in space.knobs]
-    write_rows(file, ["evaluation", "cost", *names], (
-        [trial.number, f"{trial.value:.6g}",
-         *(f"{trial.params.get(name, np.nan):.6g}" for name in names)]
-        for trial in study.get_trials(deepcopy=False, states=DONE)
-    ))
+    write_rows(
+        file,
+        ["evaluation", "cost", *names],
+        (
+            [
+                trial.number,
+                f"{trial.value:.6g}",
+                *(f"{trial.params.get(name, np.nan):.6g}" for name in names),
+            ]
+            for trial in study.get_trials(deepcopy=False, states=DONE)
+        ),
+    )
 
 
 def plot(file: Path, space: Space, study: optuna.Study) -> None:
@@ -64,8 +71,11 @@ def plot(file: Path, space: Space, study: optuna.Study) -> None:
         best_so_far = np.minimum.accumulate(costs)
         axis.step(numbers, best_so_far, where="post", color=style.INK, label="best so far")
         axis.set(yscale="log", xlabel="evaluation", ylabel="cost")
-        axis.set_title(f"Search {study.study_name}: {len(costs)} evaluations, best "
-                       f"{costs.min():.3g}, start {costs[0]:.3g}", loc="left")
+        axis.set_title(
+            f"Search {study.study_name}: {len(costs)} evaluations, best "
+            f"{costs.min():.3g}, start {costs[0]:.3g}",
+            loc="left",
+        )
         axis.legend(loc="upper right")
         for knob, small in zip(space.knobs, bottom.subplots(rows, columns).flat, strict=False):
             values = [trial.params[knob.name] for trial in trials]

@@ -72,8 +72,10 @@ def open_study(task: Task) -> optuna.Study:
 
 def evaluate(space: Space, trial: optuna.Trial, best: float | None) -> float:
     """Fly one candidate; the mean cost of its flights. Pruned once it cannot be good any more."""
-    values = {knob.name: trial.suggest_float(knob.name, knob.low, knob.high, log=True)
-              for knob in space.knobs}
+    values = {
+        knob.name: trial.suggest_float(knob.name, knob.low, knob.high, log=True)
+        for knob in space.knobs
+    }
     costs: list[float] = []
     trials = space.trials(space.profile(values))
     for number, flight in enumerate(trials):
@@ -104,9 +106,7 @@ def _best(study: optuna.Study) -> float | None:
         return None
 
 
-def search(
-    task: Task, jobs: int, progress: Callable[[int, float | None], None]
-) -> optuna.Study:
+def search(task: Task, jobs: int, progress: Callable[[int, float | None], None]) -> optuna.Study:
     """Work on the study with `jobs` processes until it has task.evaluations, or Ctrl-C.
 
     progress: called about once a second with the evaluations done and the best cost. Raises

@@ -148,8 +148,10 @@ def load_space(name_or_file: str, start: Profile | None = None) -> Space:
     except (KeyError, TypeError) as error:
         raise TuningError(f"{name_or_file}: {error.args[0]} is missing or not allowed") from None
     if len(space.cost.aim) != len(ERRORS):
-        raise TuningError(f"{file}: cost.aim has {len(space.cost.aim)} numbers, {len(ERRORS)} are "
-                          f"expected: {', '.join(ERRORS)}")
+        raise TuningError(
+            f"{file}: cost.aim has {len(space.cost.aim)} numbers, {len(ERRORS)} are "
+            f"expected: {', '.join(ERRORS)}"
+        )
     if not flights or not knobs:
         raise TuningError(f"{file}: at least one flight and one knob are expected")
     return space
@@ -174,5 +176,8 @@ def _check(knob: Knob, value: Any) -> None:
     if value is None or isinstance(value, str | bool):
         raise TuningError(f"{knob.name}: no such parameter, or not a number")
     if bool(length) != bool(knob.entries) or any(not 0 <= i < length for i in knob.entries):
-        raise TuningError(f"{knob.name}: entries 0 to {length - 1} are expected" if length
-                          else f"{knob.name}: one number, has no entries")
+        raise TuningError(
+            f"{knob.name}: entries 0 to {length - 1} are expected"
+            if length
+            else f"{knob.name}: one number, has no entries"
+        )
