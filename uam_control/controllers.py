@@ -129,7 +129,14 @@ class Controller:
         """Rows e, e_dot, chi_d_ddot (3, 8) of the last tick."""
         return self._errors
 
-    def _law_output(self, state, reference, attitude_reference, flying, dt):
+    def _law_output(
+        self,
+        state: np.ndarray,
+        reference: np.ndarray,
+        attitude_reference: np.ndarray,
+        flying: bool,
+        dt: float,
+    ) -> np.ndarray:
         tracking_errors(
             state, reference, attitude_reference, flying, self._printed, self._errors, self._norms
         )
@@ -160,7 +167,9 @@ class PositionController(Controller):
         """Rows q_d (roll, pitch, yaw), Omega_d, Omega_d_dot (3, 3); see `thrust_direction`."""
         return self._attitude.value
 
-    def update(self, state: np.ndarray, reference: np.ndarray, flying: bool, dt: float):
+    def update(
+        self, state: np.ndarray, reference: np.ndarray, flying: bool, dt: float
+    ) -> np.ndarray:
         """Return tau_p (3,) [N, world]; zero, and the law at its start, while not flying.
 
         state, reference: (3, 8), see `coordinates`. ||xi|| uses the attitude asked for in the last
@@ -198,7 +207,14 @@ class TorqueController(Controller):
         super().set_parameters(parameters)
         self._torque_max = np.array(parameters.torque_max)
 
-    def _torque(self, state, reference, attitude_reference, flying, dt):
+    def _torque(
+        self,
+        state: np.ndarray,
+        reference: np.ndarray,
+        attitude_reference: np.ndarray,
+        flying: bool,
+        dt: float,
+    ) -> np.ndarray:
         tau = self._law_output(state, reference, attitude_reference, flying, dt)
         self.saturated = limit_torque(tau, self._torque_max, self._tau)
         return self._tau
@@ -209,7 +225,14 @@ class AttitudeController(TorqueController):
 
     columns = ATTITUDE
 
-    def update(self, state, reference, attitude_reference, flying: bool, dt: float) -> np.ndarray:
+    def update(
+        self,
+        state: np.ndarray,
+        reference: np.ndarray,
+        attitude_reference: np.ndarray,
+        flying: bool,
+        dt: float,
+    ) -> np.ndarray:
         """Return tau_q (3,) [N m, FLU]; zero, and the law at its start, while not flying.
 
         attitude_reference: (3, 3) from the position controller, same tick.
@@ -226,13 +249,27 @@ class ArmController(TorqueController):
 
     columns = ARM
 
-    def update(self, state, reference, attitude_reference, flying: bool, dt: float) -> np.ndarray:
+    def update(
+        self,
+        state: np.ndarray,
+        reference: np.ndarray,
+        attitude_reference: np.ndarray,
+        flying: bool,
+        dt: float,
+    ) -> np.ndarray:
         """Return tau_alpha (n,) [N m]."""
         return self._torque(state, reference, attitude_reference, flying, dt)
 
 
 @jit
-def limit_force(tau, weight, thrust_min, thrust_max, tilt_max, limited):
+def limit_force(
+    tau: np.ndarray,
+    weight: float,
+    thrust_min: float,
+    thrust_max: float,
+    tilt_max: float,
+    limited: np.ndarray,
+) -> bool:
     """Write tau + weight e3 within the limits to limited (3,); return whether anything was cut.
 
     The vertical part goes first: altitude is kept while the horizontal part is reduced.
@@ -251,7 +288,7 @@ def limit_force(tau, weight, thrust_min, thrust_max, tilt_max, limited):
 
 
 @jit
-def limit_torque(tau, torque_max, limited):
+def limit_torque(tau: np.ndarray, torque_max: np.ndarray, limited: np.ndarray) -> bool:
     """Write tau within ±torque_max to limited (n,); return whether anything was cut."""
     cut = False
     for i in range(len(tau)):

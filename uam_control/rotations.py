@@ -13,7 +13,7 @@ from uam_control.compiled import jit
 
 
 @jit
-def matrix_from_euler(euler):
+def matrix_from_euler(euler: np.ndarray) -> np.ndarray:
     """Return R_B^W (3, 3) of roll, pitch, yaw [rad] in `euler` (3,)."""
     cr, sr = math.cos(euler[0]), math.sin(euler[0])
     cp, sp = math.cos(euler[1]), math.sin(euler[1])
@@ -32,7 +32,7 @@ def matrix_from_euler(euler):
 
 
 @jit
-def rotate(matrix, v):
+def rotate(matrix: np.ndarray, v: np.ndarray) -> np.ndarray:
     """Return matrix (3, 3) times v (3,)."""
     out = np.empty(3)
     for i in range(3):
@@ -41,7 +41,7 @@ def rotate(matrix, v):
 
 
 @jit
-def rotate_back(matrix, v):
+def rotate_back(matrix: np.ndarray, v: np.ndarray) -> np.ndarray:
     """Return the transpose of matrix (3, 3) times v (3,)."""
     out = np.empty(3)
     for i in range(3):
@@ -50,7 +50,7 @@ def rotate_back(matrix, v):
 
 
 @jit
-def relative_rotation(a, b):
+def relative_rotation(a: np.ndarray, b: np.ndarray) -> np.ndarray:
     """Return a^T b of two rotation matrices (3, 3)."""
     out = np.empty((3, 3))
     for i in range(3):
@@ -60,7 +60,7 @@ def relative_rotation(a, b):
 
 
 @jit
-def matrix_from_quaternion(q):
+def matrix_from_quaternion(q: np.ndarray) -> np.ndarray:
     """Return R (3, 3) of the unit quaternion q = [w x y z]."""
     w, x, y, z = q[0], q[1], q[2], q[3]
     matrix = np.empty((3, 3))
@@ -77,7 +77,7 @@ def matrix_from_quaternion(q):
 
 
 @jit
-def euler_from_quaternion(q):
+def euler_from_quaternion(q: np.ndarray) -> np.ndarray:
     """Return roll, pitch, yaw [rad] (3,) of the unit quaternion q = [w x y z]; |pitch| <= pi/2."""
     w, x, y, z = q[0], q[1], q[2], q[3]
     euler = np.empty(3)
@@ -88,7 +88,7 @@ def euler_from_quaternion(q):
 
 
 @jit
-def quaternion_from_euler(euler):
+def quaternion_from_euler(euler: np.ndarray) -> np.ndarray:
     """Return the unit quaternion [w x y z] of roll, pitch, yaw [rad]; w >= 0."""
     cr, sr = math.cos(euler[0] / 2.0), math.sin(euler[0] / 2.0)
     cp, sp = math.cos(euler[1] / 2.0), math.sin(euler[1] / 2.0)
@@ -104,7 +104,7 @@ def quaternion_from_euler(euler):
 
 
 @jit
-def quaternion_multiply(a, b):
+def quaternion_multiply(a: np.ndarray, b: np.ndarray) -> np.ndarray:
     """Return the Hamilton product a ⊗ b of two quaternions [w x y z]."""
     q = np.empty(4)
     q[0] = a[0] * b[0] - a[1] * b[1] - a[2] * b[2] - a[3] * b[3]
@@ -115,7 +115,7 @@ def quaternion_multiply(a, b):
 
 
 @jit
-def quaternion_from_rotation_vector(v):
+def quaternion_from_rotation_vector(v: np.ndarray) -> np.ndarray:
     """Return the unit quaternion of the rotation vector v (3,) [rad] (exponential map)."""
     angle = math.sqrt(v[0] * v[0] + v[1] * v[1] + v[2] * v[2])
     q = np.empty(4)
@@ -129,7 +129,7 @@ def quaternion_from_rotation_vector(v):
 
 
 @jit
-def rotation_error(reference, actual):
+def rotation_error(reference: np.ndarray, actual: np.ndarray) -> np.ndarray:
     """Return the rotation vector (3,) [rad] from `actual` to `reference`, in the actual body frame.
 
     Both are unit quaternions [w x y z]; exact for small angles, monotone up to pi.
@@ -144,6 +144,6 @@ def rotation_error(reference, actual):
     return sign * difference[1:4]
 
 
-def wrap_angle(angle):
+def wrap_angle(angle: float | np.ndarray) -> float | np.ndarray:
     """Return `angle` [rad] (number or array) wrapped to [-pi, pi)."""
     return (np.asarray(angle) + math.pi) % (2.0 * math.pi) - math.pi

@@ -41,7 +41,14 @@ class AttitudeReference:
 
 
 @jit
-def attitude_reference_step(tau_p, reference, cutoff, dt, filtered, value):
+def attitude_reference_step(
+    tau_p: np.ndarray,
+    reference: np.ndarray,
+    cutoff: float,
+    dt: float,
+    filtered: np.ndarray,
+    value: np.ndarray,
+) -> None:
     """Advance the filter and write q_d, Omega_d, Omega_d_dot into value (3, 3)."""
     yaw, yaw_rate, yaw_acceleration = reference[0, 5], reference[1, 5], reference[2, 5]
     cy, sy = math.cos(yaw), math.sin(yaw)

@@ -135,19 +135,19 @@ class StateEstimator:
 
 @jit
 def assemble(
-    position,
-    velocity,
-    quaternion,
-    rates,
-    acceleration,
-    joints,
-    period,
-    angular_cutoff,
-    linear_cutoff,
-    rates_filter,
-    filtered,
-    state,
-):
+    position: np.ndarray,
+    velocity: np.ndarray,
+    quaternion: np.ndarray,
+    rates: np.ndarray,
+    acceleration: np.ndarray,
+    joints: np.ndarray,
+    period: float,
+    angular_cutoff: float,
+    linear_cutoff: float,
+    rates_filter: np.ndarray,
+    filtered: np.ndarray,
+    state: np.ndarray,
+) -> None:
     """Filter the accelerations over `period` [s] and gather the state (3, 8)."""
     if period > 0.0:
         derivative_step(rates, angular_cutoff, period, rates_filter, state[2, 3:6])

@@ -4,11 +4,15 @@ from __future__ import annotations
 
 import math
 
+import numpy as np
+
 from uam_control.compiled import jit
 
 
 @jit
-def derivative_step(value, cutoff, dt, state, derivative):
+def derivative_step(
+    value: np.ndarray, cutoff: float, dt: float, state: np.ndarray, derivative: np.ndarray
+) -> None:
     """Differentiate value (n,) through a critically damped second-order low-pass at cutoff [Hz].
 
     state (2, n): filtered value and its rate, advanced exactly by dt; the rate goes to derivative.
@@ -24,7 +28,7 @@ def derivative_step(value, cutoff, dt, state, derivative):
 
 
 @jit
-def low_pass_step(value, cutoff, dt, state):
+def low_pass_step(value: np.ndarray, cutoff: float, dt: float, state: np.ndarray) -> None:
     """First-order low-pass of value (n,) at cutoff [Hz] into state (n,), exact over dt."""
     keep = math.exp(-2.0 * math.pi * cutoff * dt)
     for i in range(len(value)):
@@ -32,7 +36,14 @@ def low_pass_step(value, cutoff, dt, state):
 
 
 @jit
-def joint_step(angle, velocity, bandwidth, velocity_weight, dt, state):
+def joint_step(
+    angle: np.ndarray,
+    velocity: np.ndarray,
+    bandwidth: float,
+    velocity_weight: float,
+    dt: float,
+    state: np.ndarray,
+) -> None:
     """Tracking observer of joint angle and velocity from quantised encoder readings.
 
     state (2, n): angle [rad], velocity [rad/s]. bandwidth [rad/s] of the correction by the angle,

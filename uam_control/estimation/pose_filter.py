@@ -54,7 +54,9 @@ class PoseFilter:
         self.position[:] = position
         self.quaternion[:] = quaternion
 
-    def predict(self, stamp: float, dt: float, gyro: np.ndarray, specific_force: np.ndarray):
+    def predict(
+        self, stamp: float, dt: float, gyro: np.ndarray, specific_force: np.ndarray
+    ) -> None:
         """Integrate one IMU sample over dt [s]; gyro [rad/s], specific force [m/s^2], FLU."""
         row = self._count % HISTORY
         self._count += 1
@@ -95,7 +97,7 @@ class PoseFilter:
 
 
 @jit
-def nearest(stamps, stamp):
+def nearest(stamps: np.ndarray, stamp: float) -> int:
     """Return the row of the stamp nearest to `stamp`."""
     best = 0
     for row in range(len(stamps)):
@@ -106,18 +108,18 @@ def nearest(stamps, stamp):
 
 @jit
 def predict(
-    dt,
-    gyro,
-    specific_force,
-    position,
-    velocity,
-    quaternion,
-    rates,
-    acceleration,
-    gyro_bias,
-    accelerometer_bias,
-    pose,
-):
+    dt: float,
+    gyro: np.ndarray,
+    specific_force: np.ndarray,
+    position: np.ndarray,
+    velocity: np.ndarray,
+    quaternion: np.ndarray,
+    rates: np.ndarray,
+    acceleration: np.ndarray,
+    gyro_bias: np.ndarray,
+    accelerometer_bias: np.ndarray,
+    pose: np.ndarray,
+) -> None:
     """Advance the pose by dt and write it, with its quaternion, into pose (7,)."""
     for i in range(3):
         rates[i] = gyro[i] - gyro_bias[i]
@@ -136,17 +138,17 @@ def predict(
 
 @jit
 def correct(
-    dt,
-    bandwidths,
-    measured_position,
-    measured_quaternion,
-    pose,
-    position,
-    velocity,
-    quaternion,
-    gyro_bias,
-    accelerometer_bias,
-):
+    dt: float,
+    bandwidths: np.ndarray,
+    measured_position: np.ndarray,
+    measured_quaternion: np.ndarray,
+    pose: np.ndarray,
+    position: np.ndarray,
+    velocity: np.ndarray,
+    quaternion: np.ndarray,
+    gyro_bias: np.ndarray,
+    accelerometer_bias: np.ndarray,
+) -> None:
     """Observer gains 3w, 3w^2, w^3 (triple pole) for position, 2w, w^2 for attitude."""
     w = bandwidths[0]
     for i in range(3):

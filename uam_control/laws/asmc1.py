@@ -64,7 +64,18 @@ class Asmc1Parameters(LawParameters):
 
 
 @jit
-def asmc1_step(record, e, e_dot, acceleration_d, norms, saturated, frozen, dt, adaptation, tau):
+def asmc1_step(
+    record: np.ndarray,
+    e: np.ndarray,
+    e_dot: np.ndarray,
+    acceleration_d: np.ndarray,
+    norms: np.ndarray,
+    saturated: bool,
+    frozen: bool,
+    dt: float,
+    adaptation: np.ndarray,
+    tau: np.ndarray,
+) -> None:
     """One tick of ASMC-1: writes tau (n,) and advances adaptation (n + 1,) in place.
 
     Dhat does not act on its own derivative: over a tick of constant s the sum is exact.

@@ -77,7 +77,18 @@ class Asmc2Parameters(LawParameters):
 
 
 @jit
-def asmc2_step(record, e, e_dot, acceleration_d, norms, saturated, frozen, dt, adaptation, tau):
+def asmc2_step(
+    record: np.ndarray,
+    e: np.ndarray,
+    e_dot: np.ndarray,
+    acceleration_d: np.ndarray,
+    norms: np.ndarray,
+    saturated: bool,
+    frozen: bool,
+    dt: float,
+    adaptation: np.ndarray,
+    tau: np.ndarray,
+) -> None:
     """One tick of ASMC-2: writes tau (n,) and advances adaptation (7,) in place."""
     p = record[0]
     n = len(tau)
@@ -125,7 +136,9 @@ def asmc2_step(record, e, e_dot, acceleration_d, norms, saturated, frozen, dt, a
 
 
 @jit
-def adapt(p, w_norm, rate, saturated, dt, adaptation):
+def adapt(
+    p: np.void, w_norm: float, rate: float, saturated: bool, dt: float, adaptation: np.ndarray
+) -> None:
     """Advance theta by dt, exactly for inputs that are constant over the tick.
 
     theta' = gamma (u - sigma theta) is linear in theta, so theta >= 0 holds for every dt.

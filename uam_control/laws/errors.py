@@ -9,6 +9,8 @@ from __future__ import annotations
 
 import math
 
+import numpy as np
+
 from uam_control.compiled import jit
 from uam_control.rotations import (
     matrix_from_euler,
@@ -21,7 +23,15 @@ ERROR_RATE_FORMS = ("lee", "printed")
 
 
 @jit
-def tracking_errors(state, reference, attitude_reference, flying, printed, errors, norms):
+def tracking_errors(
+    state: np.ndarray,
+    reference: np.ndarray,
+    attitude_reference: np.ndarray,
+    flying: bool,
+    printed: bool,
+    errors: np.ndarray,
+    norms: np.ndarray,
+) -> None:
     """Write e, e_dot and the acceleration feedforward into errors (3, 8), norms into norms (3,).
 
     state, reference: (3, 8) as in `coordinates`; attitude_reference: (3, 3) rows q_d (Euler) [rad],
@@ -52,7 +62,9 @@ def tracking_errors(state, reference, attitude_reference, flying, printed, error
 
 
 @jit
-def attitude_errors(state, attitude_reference, printed, errors):
+def attitude_errors(
+    state: np.ndarray, attitude_reference: np.ndarray, printed: bool, errors: np.ndarray
+) -> None:
     """Write e_q, e_q_dot and the attitude feedforward into columns 3:6 of errors (3, 8)."""
     actual = matrix_from_euler(state[0, 3:6])
     desired = matrix_from_euler(attitude_reference[0])

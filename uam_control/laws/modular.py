@@ -12,8 +12,11 @@ from __future__ import annotations
 
 import math
 
+import numpy as np
+
 from uam_control.compiled import jit
 from uam_control.laws.law import Law
+from uam_control.laws.parameters import ModularParameters
 
 # what it publishes
 ADAPTATION = ("K0", "K1", "K2", "K3", "zeta", "rho", "r_norm")
@@ -21,7 +24,18 @@ ZETA, RHO, R_NORM, ACCELERATION = 4, 5, 6, 7
 
 
 @jit
-def law_step(record, e, e_dot, acceleration_d, norms, saturated, frozen, dt, adaptation, tau):
+def law_step(
+    record: np.ndarray,
+    e: np.ndarray,
+    e_dot: np.ndarray,
+    acceleration_d: np.ndarray,
+    norms: np.ndarray,
+    saturated: bool,
+    frozen: bool,
+    dt: float,
+    adaptation: np.ndarray,
+    tau: np.ndarray,
+) -> None:
     """One tick of the law: writes tau (n,) and advances adaptation (8,) in place.
 
     Equations (ct1), (del_p), (rho_p) and (adaptive_law_p) of the paper and their twins for q,
@@ -64,7 +78,16 @@ def law_step(record, e, e_dot, acceleration_d, norms, saturated, frozen, dt, ada
 
 
 @jit
-def adapt(p, r_norm, xi_norm, acceleration, bound, saturated, dt, adaptation):
+def adapt(
+    p: np.void,
+    r_norm: float,
+    xi_norm: float,
+    acceleration: float,
+    bound: float,
+    saturated: bool,
+    dt: float,
+    adaptation: np.ndarray,
+) -> None:
     """Advance K0..K3 and zeta by dt, exactly for inputs that are constant over the tick.
 
     Each law is linear in its own gain, K' = u - nu K, so K(dt) = K e^(-nu dt) + (1 - e^(-nu dt))
@@ -92,7 +115,7 @@ class ModularLaw(Law):
 
     step = law_step
 
-    def __init__(self, parameters) -> None:
+    def __init__(self, parameters: ModularParameters) -> None:
         super().__init__(parameters, ADAPTATION, memory=1)
 
     def reset_adaptation(self) -> None:

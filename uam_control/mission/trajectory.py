@@ -55,7 +55,7 @@ class Moves:
 
 
 @jit
-def write_moves(time, start, rows, reference):
+def write_moves(time: float, start: np.ndarray, rows: np.ndarray, reference: np.ndarray) -> None:
     """Evaluate the moves; rows (m, 5): coordinate, start, end, from, to; sorted by start."""
     reference[:] = 0.0
     reference[0] = start

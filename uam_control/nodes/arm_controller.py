@@ -1,9 +1,11 @@
 """Node: arm law. state + reference + the attitude asked by the position law → joint efforts."""
 
+import numpy as np
+
 from uam_control.controllers import ArmController
 from uam_control.nodes.controller_node import ControllerNode
 from uam_msgs_py import topics
-from uam_msgs_py.control import ARM_NAMES, TorqueWriter
+from uam_msgs_py.control import ARM_NAMES, PositionCommand, Reference, TorqueWriter
 from uam_msgs_py.convert import EffortWriter
 from uam_msgs_py.node import run
 
@@ -28,13 +30,28 @@ class ArmControllerNode(ControllerNode):
         self._effort_writer = EffortWriter(len(ARM_NAMES))
         self._writer = TorqueWriter(ARM_NAMES)
 
-    def tick(self, stamp, dt, state, reference, position):
+    def tick(
+        self,
+        stamp: int,
+        dt: float,
+        state: np.ndarray,
+        reference: Reference,
+        position: PositionCommand,
+    ) -> None:
         flying = reference.flying and position.flying
         tau = self.controller.update(state, reference.values, position.attitude, flying, dt)
         self._effort.publish(self._effort_writer.fill(tau))
         self._command.publish(self._writer.fill(stamp, tau))
 
-    def evaluate(self, controller, dt, state, reference, attitude, flying):
+    def evaluate(
+        self,
+        controller: ArmController,
+        dt: float,
+        state: np.ndarray,
+        reference: np.ndarray,
+        attitude: np.ndarray,
+        flying: bool,
+    ) -> np.ndarray:
         return controller.update(state, reference, attitude, flying, dt)
 
 

@@ -1,9 +1,11 @@
 """Node: attitude law. state + reference + the attitude asked by the position law → tau_q."""
 
+import numpy as np
+
 from uam_control.controllers import AttitudeController
 from uam_control.nodes.controller_node import ControllerNode
 from uam_msgs_py import topics
-from uam_msgs_py.control import ATTITUDE_NAMES, TorqueWriter
+from uam_msgs_py.control import ATTITUDE_NAMES, PositionCommand, Reference, TorqueWriter
 from uam_msgs_py.node import run
 
 NAME = "attitude_controller"
@@ -22,12 +24,27 @@ class AttitudeControllerNode(ControllerNode):
         self._command = self.publisher(topics.ATTITUDE_COMMAND)
         self._writer = TorqueWriter(ATTITUDE_NAMES)
 
-    def tick(self, stamp, dt, state, reference, position):
+    def tick(
+        self,
+        stamp: int,
+        dt: float,
+        state: np.ndarray,
+        reference: Reference,
+        position: PositionCommand,
+    ) -> None:
         flying = reference.flying and position.flying
         tau = self.controller.update(state, reference.values, position.attitude, flying, dt)
         self._command.publish(self._writer.fill(stamp, tau) if flying else self._writer.idle(stamp))
 
-    def evaluate(self, controller, dt, state, reference, attitude, flying):
+    def evaluate(
+        self,
+        controller: AttitudeController,
+        dt: float,
+        state: np.ndarray,
+        reference: np.ndarray,
+        attitude: np.ndarray,
+        flying: bool,
+    ) -> np.ndarray:
         return controller.update(state, reference, attitude, flying, dt)
 
 

@@ -77,7 +77,15 @@ class ControllerNode(UamNode):
         """Control at `stamp` [ns], dt [s] after the last tick; publish the command."""
         raise NotImplementedError
 
-    def evaluate(self, controller: Controller, dt: float, state, reference, attitude, flying: bool):
+    def evaluate(
+        self,
+        controller: Controller,
+        dt: float,
+        state: np.ndarray,
+        reference: np.ndarray,
+        attitude: np.ndarray,
+        flying: bool,
+    ) -> np.ndarray:
         """Return the controller's output; used to compile it before the flight."""
         raise NotImplementedError
 
@@ -87,7 +95,7 @@ class ControllerNode(UamNode):
         for flying in (False, True):
             self.evaluate(spare, dt, nothing, nothing, np.zeros((3, 3)), flying)
 
-    def _on_reset(self, request, response):
+    def _on_reset(self, request: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
         controller = self.controller
         old = self._adapted()
         controller.reset_adaptation()
@@ -98,7 +106,7 @@ class ControllerNode(UamNode):
         response.message = f"adapted gains at their initial values: {_listed(new)}"
         return response
 
-    def _on_freeze(self, request, response):
+    def _on_freeze(self, request: SetBool.Request, response: SetBool.Response) -> SetBool.Response:
         """The parameter `adapt` by another name, so that the two cannot disagree."""
         result = self.change_parameters([Parameter("adapt", value=not request.data)], FREEZE)
         frozen = "frozen at" if request.data else "free, from"
@@ -109,7 +117,7 @@ class ControllerNode(UamNode):
     def _adapted(self) -> dict[str, float]:
         return dict(zip(self.controller.names, self.controller.adaptation.tolist(), strict=True))
 
-    def diagnose(self):
+    def diagnose(self) -> tuple[bytes, str, dict[str, object]]:
         level, summary, values = super().diagnose()
         gains = {name: f"{value:.4g}" for name, value in self._adapted().items()}
         return level, summary, values | gains | {"saturated": self.controller.saturated}

@@ -9,6 +9,8 @@ from collections.abc import Callable
 from functools import partial
 from typing import Any
 
+from sensor_msgs.msg import BatteryState
+
 from uam_control.coordinates import JOINTS
 from uam_control.supervision import Inputs, Readings
 from uam_msgs_py import topics
@@ -75,7 +77,7 @@ class MissionInputs:
                 check_names(names, NAMES)
         self._inputs.joints(seconds(stamp), effort)
 
-    def _on_battery(self, message) -> None:
+    def _on_battery(self, message: BatteryState) -> None:
         self._inputs.battery(message.percentage)
 
     def _on_gains(self, subsystem: str, data: bytes) -> None:

@@ -26,15 +26,19 @@ MAGNET = "magnet"
 def offer(node: Node, mission: Mission) -> None:
     """Have `node` offer the services, for `mission`; they are served between two ticks."""
 
-    def answer(what: str, response, result: tuple[bool, str]):
+    def answer(
+        what: str, response: Trigger.Response | SetBool.Response, result: tuple[bool, str]
+    ) -> Trigger.Response | SetBool.Response:
         response.success, response.message = result
         node.get_logger().info(f"asked for {what}: {response.message}")
         return response
 
-    def on_command(name: str, command: Command, request, response):
+    def on_command(
+        name: str, command: Command, request: Trigger.Request, response: Trigger.Response
+    ) -> Trigger.Response:
         return answer(name, response, mission.request(command))
 
-    def on_magnet(request, response):
+    def on_magnet(request: SetBool.Request, response: SetBool.Response) -> SetBool.Response:
         what = f"{MAGNET} {'on' if request.data else 'off'}"
         return answer(what, response, mission.switch_magnet(request.data))
 

@@ -1,9 +1,11 @@
 """Node: position law. state + reference → tau_p and the attitude that points the thrust so."""
 
+import numpy as np
+
 from uam_control.controllers import PositionController
 from uam_control.nodes.controller_node import ControllerNode
 from uam_msgs_py import topics
-from uam_msgs_py.control import PositionCommandWriter
+from uam_msgs_py.control import PositionCommandWriter, Reference
 from uam_msgs_py.node import run
 
 NAME = "position_controller"
@@ -22,7 +24,7 @@ class PositionControllerNode(ControllerNode):
         self._command = self.publisher(topics.POSITION_COMMAND)
         self._writer = PositionCommandWriter()
 
-    def tick(self, stamp, dt, state, reference):
+    def tick(self, stamp: int, dt: float, state: np.ndarray, reference: Reference) -> None:
         tau = self.controller.update(state, reference.values, reference.flying, dt)
         if reference.flying:
             attitude = self.controller.attitude_reference
@@ -31,7 +33,15 @@ class PositionControllerNode(ControllerNode):
             message = self._writer.idle(stamp)
         self._command.publish(message)
 
-    def evaluate(self, controller, dt, state, reference, attitude, flying):
+    def evaluate(
+        self,
+        controller: PositionController,
+        dt: float,
+        state: np.ndarray,
+        reference: np.ndarray,
+        attitude: np.ndarray,
+        flying: bool,
+    ) -> np.ndarray:
         return controller.update(state, reference, flying, dt)
 
 
