@@ -7,8 +7,11 @@ This is the only place where quaternions change between [w x y z] (maths) and x,
 Stamps are integer nanoseconds.
 """
 
+from __future__ import annotations
+
 import math
 from collections.abc import Sequence
+from typing import TYPE_CHECKING
 
 import numpy as np
 from geometry_msgs.msg import PoseStamped, TwistStamped
@@ -29,6 +32,9 @@ from uam_msgs_py.layouts import (
     stamp_of,
 )
 
+if TYPE_CHECKING:
+    from builtin_interfaces.msg import Time
+
 WORLD = "world"  # frame of poses and states, ENU
 BODY = "base_link"  # frame of rates, forces and torques, FLU
 
@@ -48,7 +54,7 @@ def stays_serialized(message_type: type) -> bool:
     return message_type in LAYOUTS
 
 
-def set_stamp(stamp, nanoseconds: int) -> None:
+def set_stamp(stamp: Time, nanoseconds: int) -> None:
     """Integer nanoseconds → builtin_interfaces/Time, in place."""
     stamp.sec, stamp.nanosec = divmod(nanoseconds, SECOND)
 
@@ -61,7 +67,16 @@ def seconds(nanoseconds: int) -> float:
 class Template:
     """A serialized message; `values` holds a view for each of its fields of numbers."""
 
-    def __init__(self, message):
+    def __init__(
+        self,
+        message: JointTrajectory
+        | JointState
+        | Imu
+        | PoseStamped
+        | TwistStamped
+        | Float64MultiArray
+        | Clock,
+    ):
         """message: of a type in LAYOUTS, with its names and with arrays as long as they will be."""
         data = serialize_message(message)
         layout = LAYOUTS[type(message)].of(data)

@@ -17,6 +17,7 @@ from collections.abc import Callable, Iterable
 
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
+from rclpy.service import Service
 
 try:
     from rclpy.impl.implementation_singleton import rclpy_implementation
@@ -129,7 +130,7 @@ class LeanExecutor:
         return bool(handed or services)
 
     @staticmethod
-    def _answer(service) -> None:
+    def _answer(service: Service) -> None:
         """Take one request and send the response."""
         request, header = service.handle.service_take_request(service.srv_type.Request)
         if header is not None:

@@ -83,7 +83,7 @@ class UamNode(TunableNode):
         if required:
             self._required[name] = 0
 
-        def callback(message):
+        def callback(message: Any) -> None:
             try:
                 handle(message)
             except BadMessage as error:

@@ -1,7 +1,7 @@
 """States that travel as diagnostic_msgs/DiagnosticArray: one status with key-value pairs."""
 
 from dataclasses import dataclass, fields
-from typing import ClassVar
+from typing import ClassVar, Self
 
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 
@@ -46,7 +46,7 @@ class _Status:
         return diagnostic(stamp, self.NAME, self.level, self.summary, values)
 
     @classmethod
-    def from_message(cls, message: DiagnosticArray):
+    def from_message(cls, message: DiagnosticArray) -> tuple[int, Self]:
         """Return (stamp [ns], status); raises BadMessage where an entry is missing or strange."""
         found = [status for status in message.status if status.name == cls.NAME]
         if not found:

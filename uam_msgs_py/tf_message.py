@@ -209,7 +209,7 @@ class _Assembled:
         )
         self._description = _Description(own, _Sequence.of(self._referenced))
 
-    def _support(self, _, identifier: bytes) -> int | None:
+    def _support(self, _: ctypes._Pointer, identifier: bytes) -> int | None:
         support = self._supports.get(identifier)
         return None if support is None else ctypes.addressof(support)
 

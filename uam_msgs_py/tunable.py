@@ -70,7 +70,9 @@ class TunableNode(Node):
         """Publish a change, with the stamp of the newest tick."""
         self._changes.publish(change.to_message(self.stamp))
 
-    def _on_check(self, request, response):
+    def _on_check(
+        self, request: SetParametersAtomically.Request, response: SetParametersAtomically.Response
+    ) -> SetParametersAtomically.Response:
         changes = [Parameter.from_parameter_msg(item) for item in request.parameters]
         response.result = self.check_parameters(changes)
         return response
