@@ -18,6 +18,7 @@ from typing import Any
 import numpy as np
 
 from uam_control.coordinates import ATTITUDE, POSITION
+from uam_control.laws.parameters import ModularParameters
 from uam_sim_bridge.analysis import ticks
 from uam_sim_bridge.analysis.coupling import nominal_inertia
 from uam_sim_bridge.analysis.dynamics import Dynamics
@@ -73,7 +74,9 @@ def at_ceiling(gains: np.ndarray, ceiling: tuple) -> list[float]:
     return np.where(limit > 0.0, np.mean(gains >= AT * limit, axis=0), 0.0).tolist()
 
 
-def acceleration(series: Series, rows: np.ndarray, truth: Tracking, parameters) -> dict[str, float]:
+def acceleration(
+    series: Series, rows: np.ndarray, truth: Tracking, parameters: ModularParameters
+) -> dict[str, float]:
     """||chi_ddot|| that K_j3 saw, beside the true one: fraction of ticks below it, its mean, peak.
 
     The law's limit and low-pass are run again on the recorded estimate, from the first tick on.

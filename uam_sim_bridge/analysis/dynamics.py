@@ -85,7 +85,16 @@ class Body:
         qpos[6] = cr * cp * sy - sr * sp * cy
         qpos[7:9], qpos[9] = chi[6:8], swing
 
-    def evaluate(self, chi, chi_dot, swing, mass, coriolis, gravity, pivot) -> None:
+    def evaluate(
+        self,
+        chi: np.ndarray,
+        chi_dot: np.ndarray,
+        swing: np.ndarray,
+        mass: np.ndarray,
+        coriolis: np.ndarray,
+        gravity: np.ndarray,
+        pivot: np.ndarray,
+    ) -> None:
         """Write M (8, 8), C chi_dot, g, pivot (8,) of one state into the last four.
 
         swing (3,): angle, rate, acceleration of the pivot.

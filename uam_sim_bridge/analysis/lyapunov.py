@@ -18,6 +18,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from uam_control.laws.parameters import ModularParameters
 from uam_sim_bridge.analysis.supply import COLUMNS_OF
 from uam_sim_bridge.analysis.tracking import Tracking
 
@@ -75,7 +76,7 @@ def parts(
 
 def decrease(
     subsystem: str,
-    parameters,
+    parameters: ModularParameters,
     truth: Tracking,
     gains: np.ndarray,
     zeta: np.ndarray,
@@ -95,7 +96,9 @@ def decrease(
     return -0.5 * (square + pulled) + parameters.epsilon / float(zeta.min())
 
 
-def comparison(parameters, zeta: np.ndarray, constants: np.ndarray) -> Comparison:
+def comparison(
+    parameters: ModularParameters, zeta: np.ndarray, constants: np.ndarray
+) -> Comparison:
     """rate_j and growth_j of one subsystem; its ModularParameters, zeta (m,), constants K*.
 
     zeta_min and zeta_max are those of the flight.

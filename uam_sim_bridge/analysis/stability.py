@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from uam_control.coordinates import SIZE
+from uam_control.laws.parameters import ModularParameters
 from uam_sim_bridge.analysis import (
     assumptions,
     constants,
@@ -140,7 +141,11 @@ def rms(values: np.ndarray) -> np.ndarray:
 
 
 def analyse(
-    series: Series, sets: dict, vehicle: Vehicle, payload_mass: float, frequency=ticks.FREQUENCY
+    series: Series,
+    sets: dict,
+    vehicle: Vehicle,
+    payload_mass: float,
+    frequency: float = ticks.FREQUENCY,
 ) -> Stability | None:
     """The analysis of a flight of the modular law; None where it hardly left the ground.
 
@@ -181,7 +186,15 @@ def analyse(
     return Stability(rows, series.time[rows], truth, terms, forces, subsystems, margins)
 
 
-def _subsystem(name, series, rows, truth, parameters, best, printed_ones) -> Subsystem:
+def _subsystem(
+    name: str,
+    series: Series,
+    rows: np.ndarray,
+    truth: tracking.Tracking,
+    parameters: ModularParameters,
+    best: np.ndarray,
+    printed_ones: np.ndarray,
+) -> Subsystem:
     """V_j with the constants `best` (4,) and its bound; parameters: the subsystem's own set."""
     columns = COLUMNS_OF[name]
     gains = np.column_stack([series[f"adaptation.{name}.K{i}"][rows] for i in range(4)])

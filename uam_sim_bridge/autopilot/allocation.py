@@ -63,7 +63,9 @@ def torque_scale(
 
 
 @jit
-def _desaturate(motors, mixer, axis, upper, down_only):
+def _desaturate(
+    motors: np.ndarray, mixer: np.ndarray, axis: int, upper: float, down_only: bool
+) -> None:
     """Move `motors` along one mixer column so that the sum of both saturations gets smallest."""
     for attempt in range(2):
         low = 0.0
@@ -89,7 +91,7 @@ def _desaturate(motors, mixer, axis, upper, down_only):
 
 
 @jit
-def allocate(torque, thrust, mixer, motors):
+def allocate(torque: np.ndarray, thrust: float, mixer: np.ndarray, motors: np.ndarray) -> None:
     """Write the motor thrusts 0..1 into `motors` (n,).
 
     torque (3,): normalised, FRD; thrust: normalised collective, up; mixer: `normalised_mixer`.
@@ -111,7 +113,9 @@ def allocate(torque, thrust, mixer, motors):
 
 
 @jit
-def unallocated_torque(torque, motors, inverse_mixer, out):
+def unallocated_torque(
+    torque: np.ndarray, motors: np.ndarray, inverse_mixer: np.ndarray, out: np.ndarray
+) -> None:
     """Write into out (3,) the part of `torque` that `motors` do not make (normalised).
 
     inverse_mixer (4, n): pseudo-inverse of the normalised mixer. All three are zero where the sum

@@ -48,8 +48,19 @@ class AutopilotStatus:
 
 @jit
 def control_tick(
-    gyro, dt, armed, landed, setpoint, model_factor, filters, gains, mixer, inverse, memory, motors
-):
+    gyro: np.ndarray,
+    dt: float,
+    armed: bool,
+    landed: bool,
+    setpoint: np.ndarray,
+    model_factor: float,
+    filters: np.ndarray,
+    gains: np.ndarray,
+    mixer: np.ndarray,
+    inverse: np.ndarray,
+    memory: np.ndarray,
+    motors: np.ndarray,
+) -> None:
     """One cycle of the rate loop: gyro (3,) and setpoint (4,) → motors (4,), FRD."""
     filter_gyro(gyro, dt, filters, memory)
     if not armed:
@@ -69,7 +80,7 @@ def control_tick(
 
 
 @jit
-def magnitude_of_usable(position, quaternion):
+def magnitude_of_usable(position: np.ndarray, quaternion: np.ndarray) -> float:
     """Return the norm of the quaternion (4,) of an external pose, 0 where the pose is nonsense."""
     for i in range(3):
         if not abs(position[i]) < FARTHEST_VISION:  # true for NaN

@@ -15,7 +15,14 @@ _MIN_COSINE = 0.5  # of the tilt, when thrust makes up for it
 
 
 @jit
-def descend(euler, sink_rate, integral, dt, gains, setpoint):
+def descend(
+    euler: np.ndarray,
+    sink_rate: float,
+    integral: float,
+    dt: float,
+    gains: np.ndarray,
+    setpoint: np.ndarray,
+) -> float:
     """Write body rates (3,) FRD [rad/s] and thrust into setpoint (4,); return the new integral.
 
     euler (3,) FRD in NED; sink_rate [m/s] down; integral: acceleration [m/s^2] down; gains (8,):

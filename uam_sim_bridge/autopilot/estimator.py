@@ -43,7 +43,15 @@ _VELOCITY_KEPT = 5.0  # s without vision, after which the integrated velocity is
 
 
 @jit
-def predict(gyro, accel, dt, aided, estimate, bias, mean_force):
+def predict(
+    gyro: np.ndarray,
+    accel: np.ndarray,
+    dt: float,
+    aided: bool,
+    estimate: np.ndarray,
+    bias: np.ndarray,
+    mean_force: np.ndarray,
+) -> None:
     """Advance `estimate` by dt with gyro (3,) [rad/s] and specific force (3,) [m/s^2], FRD.
 
     bias (3,): of the acceleration, NED [m/s^2], learnt from vision: without it a descent that has
@@ -75,7 +83,13 @@ def predict(gyro, accel, dt, aided, estimate, bias, mean_force):
 
 
 @jit
-def correct(position, quaternion, interval, estimate, bias):
+def correct(
+    position: np.ndarray,
+    quaternion: np.ndarray,
+    interval: float,
+    estimate: np.ndarray,
+    bias: np.ndarray,
+) -> None:
     """Pull `estimate` towards a vision pose (NED; FRD → NED), `interval` [s] after the last one.
 
     bias (3,): see `predict`.

@@ -66,7 +66,7 @@ def alpha(sample_rate: float, cutoff: float) -> float:
 
 
 @jit
-def filter_gyro(gyro, dt, filters, memory):
+def filter_gyro(gyro: np.ndarray, dt: float, filters: np.ndarray, memory: np.ndarray) -> None:
     """Advance the rows DELAY, RATES, ACCELERATION of `memory` by one gyro sample (3,) [rad/s]."""
     for axis in range(3):
         d1 = memory[DELAY_1, axis]
@@ -91,7 +91,14 @@ def reset_filters(gyro: np.ndarray, filters: np.ndarray, memory: np.ndarray) -> 
 
 
 @jit
-def rate_torque(setpoint, dt, filters, gains, landed, memory):
+def rate_torque(
+    setpoint: np.ndarray,
+    dt: float,
+    filters: np.ndarray,
+    gains: np.ndarray,
+    landed: bool,
+    memory: np.ndarray,
+) -> None:
     """Advance TORQUE and INTEGRAL of `memory`.
 
     setpoint (>= 3,): wanted body rates FRD [rad/s] first; gains (5, 3): rows P, I, D (times K), FF,

@@ -64,7 +64,13 @@ def _flights(file: Path, draws: Sequence[Draw], results: Sequence[Result]) -> No
     )
 
 
-def _summary(draws, results, failed, rms, command: str) -> str:
+def _summary(
+    draws: Sequence[Draw],
+    results: Sequence[Result],
+    failed: Sequence[bool],
+    rms: np.ndarray,
+    command: str,
+) -> str:
     count, bad = len(results), sum(failed)
     others = {o: n for o, n in _outcomes(results).items() if n and o != COMPLETED}
     told = ", ".join(f"{number} {outcome}" for outcome, number in others.items())
@@ -116,7 +122,9 @@ def _kind(why: str) -> str:
     return " ".join(words)
 
 
-def _figure(draws, results, failed, rms) -> Figure:
+def _figure(
+    draws: Sequence[Draw], results: Sequence[Result], failed: Sequence[bool], rms: np.ndarray
+) -> Figure:
     """Above: distribution of every RMS error. Below: each variation, completed or not."""
     figure = Figure(figsize=(style.WIDTH, 5.6), layout="constrained")
     top, bottom = figure.subfigures(2, 1, height_ratios=(1.0, 1.2))

@@ -39,7 +39,12 @@ def draw(
     ]
 
 
-def _one(profile: Profile, random: np.random.Generator, seed: int, allowed) -> Draw:
+def _one(
+    profile: Profile,
+    random: np.random.Generator,
+    seed: int,
+    allowed: dict[str, tuple[float, float]],
+) -> Draw:
     drawn = {name: float(random.uniform(low, high)) for name, (low, high) in allowed.items()}
     direction = random.uniform(0.0, 2.0 * np.pi)
     efficiency = random.uniform(*allowed["efficiency"], size=4)

@@ -9,8 +9,9 @@ from pathlib import Path
 
 from uam_control import configuration
 from uam_control.configuration import ConfigurationError
-from uam_control.profile import ProfileError, load_profile
+from uam_control.profile import Profile, ProfileError, load_profile
 from uam_sim_bridge.campaign.pool import cores, fly_all
+from uam_sim_bridge.campaign.trial import Result
 from uam_sim_bridge.cli.counting import Counting
 from uam_sim_bridge.flight.result_folder import ResultFolderError, make_folder
 
@@ -26,7 +27,7 @@ campaign.png. The same seed gives the same flights.
 """
 
 
-def add(commands) -> None:
+def add(commands: argparse._SubParsersAction) -> None:
     """Add the subcommand to the command line."""
     parser = commands.add_parser(
         "campaign",
@@ -68,7 +69,7 @@ def run(options: argparse.Namespace) -> int:
         return INTERRUPTED
 
 
-def campaign(options: argparse.Namespace, profile, out: Path) -> int:
+def campaign(options: argparse.Namespace, profile: Profile, out: Path) -> int:
     """Fly, then write everything; returns the exit status."""
     from uam_sim_bridge.campaign import report
     from uam_sim_bridge.campaign.variations import draw
@@ -77,7 +78,7 @@ def campaign(options: argparse.Namespace, profile, out: Path) -> int:
     bad = 0
     with Counting("campaign", len(draws)) as counting:
 
-        def show(done: int, result) -> None:
+        def show(done: int, result: Result) -> None:
             nonlocal bad
             bad += not result.completed
             counting.show(done, f"{bad} not completed")

@@ -5,12 +5,14 @@ from __future__ import annotations
 import argparse
 import shlex
 import sys
+from collections.abc import Sequence
 from pathlib import Path
 
 from uam_control import configuration
 from uam_control.configuration import ConfigurationError
 from uam_control.profile import ProfileError, load_profile
 from uam_sim_bridge.campaign.pool import cores, figures_of, fly_all
+from uam_sim_bridge.campaign.trial import Result
 from uam_sim_bridge.cli.counting import Counting
 from uam_sim_bridge.compare import plan
 from uam_sim_bridge.flight.result_folder import ResultFolderError, make_folder
@@ -29,7 +31,7 @@ reconstructions (docs/law.md). The same command gives the same tables.
 """
 
 
-def add(commands) -> None:
+def add(commands: argparse._SubParsersAction) -> None:
     """Add the subcommand to the command line."""
     parser = commands.add_parser(
         "compare",
@@ -106,7 +108,14 @@ def _further(text: str):
     return plan.Entry(label, load_profile(str(configuration.named("profiles", file))))
 
 
-def compare(rows, payloads, seeds, engine: str, jobs: int, out: Path) -> int:
+def compare(
+    rows: Sequence[plan.Entry],
+    payloads: Sequence[float],
+    seeds: Sequence[int],
+    engine: str,
+    jobs: int,
+    out: Path,
+) -> int:
     """Fly, then write everything; returns the exit status."""
     from uam_sim_bridge.compare import modularity, report
 
@@ -116,7 +125,7 @@ def compare(rows, payloads, seeds, engine: str, jobs: int, out: Path) -> int:
     extra = modularity.trials(proposed, plan.middle(payloads), seeds[0], kept)
     with Counting("compare", len(trials) + len(extra)) as counting:
 
-        def show(done: int, result) -> None:
+        def show(done: int, result: Result) -> None:
             counting.show(done, f"{result.label}, {result.payload_mass:g} kg, seed {result.seed}")
 
         results = fly_all(trials, jobs, _work(engine), progress=show)

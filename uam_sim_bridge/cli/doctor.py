@@ -25,7 +25,7 @@ Exit status: 0 all OK, or WARN: flights work; 1 at least one FAIL; 2 wrong use.
 """
 
 
-def add(commands) -> None:
+def add(commands: argparse._SubParsersAction) -> None:
     """Add the subcommand to the command line."""
     parser = commands.add_parser(
         "doctor",

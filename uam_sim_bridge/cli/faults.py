@@ -34,7 +34,7 @@ matrix.png. The same seed gives the same flights.
 """
 
 
-def add(commands) -> None:
+def add(commands: argparse._SubParsersAction) -> None:
     """Add the subcommand to the command line."""
     parser = commands.add_parser(
         "faults",

@@ -58,7 +58,7 @@ move, alpha_1,alpha_2. Exit status: 0 mission completed, 1 flown but not complet
 """
 
 
-def add(commands) -> None:
+def add(commands: argparse._SubParsersAction) -> None:
     """Add the subcommand to the command line."""
     parser = commands.add_parser(
         "fly",

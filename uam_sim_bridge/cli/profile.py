@@ -25,7 +25,7 @@ gains make of the same errors (docs/tuning.md). What changed is recorded in the 
 """
 
 
-def add(commands) -> None:
+def add(commands: argparse._SubParsersAction) -> None:
     """Add the subcommand to the command line."""
     parser = commands.add_parser(
         "profile",

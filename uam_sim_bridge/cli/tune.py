@@ -7,6 +7,7 @@ import shlex
 import signal
 import sys
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from uam_control import configuration
 from uam_control.configuration import ConfigurationError
@@ -16,6 +17,9 @@ from uam_sim_bridge.campaign.pool import cores
 from uam_sim_bridge.cli.counting import Counting
 from uam_sim_bridge.flight.result_folder import ResultFolderError, make_folder
 from uam_sim_bridge.flight.warm_up import is_cold, warm_up
+
+if TYPE_CHECKING:
+    from uam_sim_bridge.tuning.space import Space
 
 INTERRUPTED, WRONG_USE = 130, 2
 EXAMPLES = """\
@@ -33,7 +37,7 @@ study.journal.
 """
 
 
-def add(commands) -> None:
+def add(commands: argparse._SubParsersAction) -> None:
     """Add the subcommand to the command line."""
     parser = commands.add_parser(
         "tune",
@@ -132,7 +136,7 @@ def run(options: argparse.Namespace) -> int:
         return WRONG_USE
 
 
-def tune(options: argparse.Namespace, space) -> int:
+def tune(options: argparse.Namespace, space: Space) -> int:
     """Search, show how far it is, write what was found."""
     from uam_sim_bridge.tuning import outcome
     from uam_sim_bridge.tuning.search import Task, open_study, search

@@ -24,7 +24,7 @@ Ctrl-C ends it; the flight goes on.
 """
 
 
-def add(commands) -> None:
+def add(commands: argparse._SubParsersAction) -> None:
     """Add the subcommand to the command line."""
     parser = commands.add_parser(
         "view",

@@ -7,6 +7,9 @@ from collections.abc import Sequence
 from typing import Any
 
 import viser
+from geometry_msgs.msg import TwistStamped
+from sensor_msgs.msg import JointState
+from trajectory_msgs.msg import JointTrajectory
 
 from uam_msgs_py import topics
 from uam_msgs_py.topics import Topic
@@ -64,7 +67,7 @@ class Charts:
         elif topic in ADAPTATION:
             self._adapted(topic, message)
 
-    def _adapted(self, topic: Topic, message) -> None:
+    def _adapted(self, topic: Topic, message: JointState) -> None:
         """The gains go by the names that their law gives them."""
         if topic not in self._adaptation:
             with self._adaptation_tab:
@@ -88,11 +91,11 @@ class Charts:
             chart.draw()
 
 
-def _time(message) -> float:
+def _time(message: JointState | JointTrajectory | TwistStamped) -> float:
     """The stamp [s]."""
     return message.header.stamp.sec + 1e-9 * message.header.stamp.nanosec
 
 
-def _effort(message, count: int) -> list[float]:
+def _effort(message: JointTrajectory, count: int) -> list[float]:
     """The first `count` efforts of a trajectory's point; none while nothing is commanded."""
     return list(message.points[0].effort[:count]) if message.points else []

@@ -88,7 +88,7 @@ class Commands:
             yes = self._gui.add_button(button.label, color=button.colour)
             no = self._gui.add_button("Cancel")
 
-        def agreed(_) -> None:
+        def agreed(_: viser.GuiEvent) -> None:
             modal.close()
             self._later(lambda: self._call(button))
 
@@ -103,7 +103,7 @@ class Commands:
                 self._services.call(kind, name, request, self._answer(button, name))
 
     def _answer(self, button: Button, name: str):
-        def answered(response, why: str) -> None:
+        def answered(response: Trigger.Response | SetBool.Response | None, why: str) -> None:
             done = response is not None and response.success
             said = why or response.message or ("done" if done else "refused")
             node = name.strip("/").partition("/")[0]

@@ -7,6 +7,7 @@ import time
 from dataclasses import dataclass, field
 
 import numpy as np
+from diagnostic_msgs.msg import DiagnosticArray
 
 from uam_control.coordinates import ARM, ATTITUDE, POSITION
 from uam_control.supervision import State
@@ -53,7 +54,7 @@ class Health:
         self._tracked = True
         self.errors = tuple(float(np.linalg.norm(error[p])) for p in (POSITION, ATTITUDE, ARM))
 
-    def diagnose(self, message) -> None:
+    def diagnose(self, message: DiagnosticArray) -> None:
         """Take a message of /diagnostics."""
         for status in message.status:
             level = LEVELS.get(status.level, BAD)

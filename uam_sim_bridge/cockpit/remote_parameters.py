@@ -6,6 +6,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
+from rcl_interfaces.msg import ParameterDescriptor
 from rcl_interfaces.srv import (
     DescribeParameters,
     GetParameters,
@@ -16,7 +17,7 @@ from rclpy.parameter import Parameter
 
 from uam_control.parameter_file import ROS_OWN
 from uam_msgs_py.parameters import plain
-from uam_sim_bridge.cockpit.services import Services
+from uam_sim_bridge.cockpit.services import Answer, Services
 
 
 @dataclass(frozen=True)
@@ -41,7 +42,7 @@ class RemoteParameters:
         self.values: dict[str, Any] = {}
         self._services = services
 
-    def _call(self, kind: type, service: str, request: Any, answer) -> None:
+    def _call(self, kind: type, service: str, request: Any, answer: Answer) -> None:
         self._services.call(kind, f"/{self.node}/{service}", request, answer)
 
     @property
@@ -52,7 +53,7 @@ class RemoteParameters:
     def load(self, done: Callable[[str], None]) -> None:
         """Ask for everything; done("") when it is there, or done(why not)."""
 
-        def listed(response, why: str) -> None:
+        def listed(response: ListParameters.Response | None, why: str) -> None:
             if why:
                 done(why)
                 return
@@ -60,7 +61,7 @@ class RemoteParameters:
             request = DescribeParameters.Request(names=names)
             self._call(DescribeParameters, "describe_parameters", request, described)
 
-        def described(response, why: str) -> None:
+        def described(response: DescribeParameters.Response | None, why: str) -> None:
             if why:
                 done(why)
                 return
@@ -73,7 +74,7 @@ class RemoteParameters:
         """Ask for the values anew."""
         names = list(self.known)
 
-        def got(response, why: str) -> None:
+        def got(response: GetParameters.Response | None, why: str) -> None:
             if not why:
                 for name, value in zip(names, response.values, strict=True):
                     self.values[name] = plain(value)
@@ -84,7 +85,7 @@ class RemoteParameters:
     def set(self, changes: Mapping[str, Any], done: Callable[[str], None]) -> None:
         """Ask for changes as a whole; done("") when they count, or done(the reason)."""
 
-        def answered(response, why: str) -> None:
+        def answered(response: SetParametersAtomically.Response | None, why: str) -> None:
             if not why and not response.result.successful:
                 why = response.result.reason or "refused without a reason"
             if not why:
@@ -96,7 +97,7 @@ class RemoteParameters:
         self._call(SetParametersAtomically, "set_parameters_atomically", request, answered)
 
 
-def _about(said) -> About:
+def _about(said: ParameterDescriptor) -> About:
     span = said.floating_point_range
     _, marked, words = said.additional_constraints.partition("one of: ")
     return About(

@@ -6,7 +6,8 @@ from typing import Any
 
 import numpy as np
 import viser
-from visualization_msgs.msg import Marker
+from std_msgs.msg import String
+from visualization_msgs.msg import Marker, MarkerArray
 
 from uam_msgs_py.convert import WORLD
 from uam_msgs_py.transforms import Transform
@@ -34,7 +35,7 @@ class VehicleView:
             f"/{WORLD}/ground", width=GROUND, height=GROUND, cell_size=CELL, section_size=1.0
         )
 
-    def describe(self, message) -> None:
+    def describe(self, message: String) -> None:
         """std_msgs/String: the URDF."""
         by_link: dict[str, list[Shape]] = {}
         for shape in shapes(message.data):
@@ -86,7 +87,7 @@ class VehicleView:
             else:
                 self._scene.add_icosphere(name, radius=shape.size[0], **look)
 
-    def markers(self, message) -> None:
+    def markers(self, message: MarkerArray) -> None:
         """visualization_msgs/MarkerArray, as far as the stack's scene node uses it."""
         for marker in message.markers:
             name, frame = marker.ns, marker.header.frame_id

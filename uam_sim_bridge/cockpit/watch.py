@@ -8,6 +8,7 @@ from typing import Any
 
 from rclpy.node import Node
 from rclpy.qos import QoSProfile
+from rclpy.subscription import Subscription
 
 from uam_msgs_py import topics
 from uam_msgs_py.topics import Topic
@@ -86,7 +87,7 @@ class Watch:
         return time.monotonic() - max(arrivals) if arrivals else None
 
 
-def _waiting(subscription) -> Iterator[Any]:
+def _waiting(subscription: Subscription) -> Iterator[Any]:
     kind, raw = subscription.msg_type, subscription.raw
     while (taken := subscription.handle.take_message(kind, raw)) is not None:
         yield taken[0]

@@ -202,7 +202,14 @@ def _markdown(head: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
     return "".join(f"| {' | '.join(cells)} |\n" for cells in lines)
 
 
-def _page(found, claims, modular: Evidence, drawn, out: Path, facts) -> str:
+def _page(
+    found: Sequence[tables.Row],
+    claims: Sequence[str],
+    modular: Evidence,
+    drawn: Sequence[str],
+    out: Path,
+    facts: Mapping[str, Any],
+) -> str:
     pictures = [(name, html.embedded(out / "figures" / f"{name}.png")) for name in drawn]
     shown = [
         {

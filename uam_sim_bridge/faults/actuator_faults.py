@@ -3,13 +3,18 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
-from typing import ClassVar
+from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 
 from uam_control.parameters import number
 from uam_sim_bridge.faults.fault import Effect, PlantFault
+
+if TYPE_CHECKING:
+    from uam_sim_bridge.faults.fault import Commands
+    from uam_sim_bridge.faults.plant import FaultyPlant
 
 JOINT = "which joint"
 
@@ -17,10 +22,10 @@ JOINT = "which joint"
 class ActEffect(Effect):
     """Calls `action(plant, commands)` at each tick."""
 
-    def __init__(self, action):
+    def __init__(self, action: Callable[[FaultyPlant, Commands], None]):
         self._action = action
 
-    def act(self, plant, commands):
+    def act(self, plant: FaultyPlant, commands: Commands) -> None:
         self._action(plant, commands)
 
 
@@ -32,7 +37,7 @@ class MotorLoss(PlantFault):
     motor: float = number(1, "which one, in PX4's order", "1", 1, 4)
     remaining: float = number(0.5, "part of the thrust that is left", "1", 0.0, 1.0)
 
-    def effect(self, noise):
+    def effect(self, noise: np.random.Generator) -> Effect:
         thrust = np.ones(4)
         thrust[int(self.motor) - 1] = self.remaining
         return ActEffect(lambda plant, _: plant.weaken_rotors(thrust))
@@ -46,7 +51,7 @@ class BatterySag(PlantFault):
     remaining: float = number(0.8, "part of the thrust that is left", "1", 0.1, 1.0)
     over: float = number(2.0, "how long it takes to get there", "s", 0.0, 1000.0)
 
-    def effect(self, noise):
+    def effect(self, noise: np.random.Generator) -> Effect:
         return Sag(self.remaining, self.over)
 
 
@@ -57,7 +62,7 @@ class Sag(Effect):
         self._remaining, self._over = remaining, over
         self._since = 0.0
 
-    def act(self, plant, commands):
+    def act(self, plant: FaultyPlant, commands: Commands) -> None:
         done = 1.0 if self._since >= self._over else self._since / self._over
         plant.weaken_rotors(np.full(4, 1.0 + done * (self._remaining - 1.0)))
         self._since += plant.period
@@ -71,8 +76,8 @@ class ServoWeak(PlantFault):
     joint: float = number(1, JOINT, "1", 1, 2)
     remaining: float = number(0.0, "part of the torque that is left", "1", 0.0, 1.0)
 
-    def effect(self, noise):
-        def weaken(plant, commands):
+    def effect(self, noise: np.random.Generator) -> Effect:
+        def weaken(plant: FaultyPlant, commands: Commands) -> None:
             commands.effort[int(self.joint) - 1] *= self.remaining
 
         return ActEffect(weaken)
@@ -86,7 +91,7 @@ class ServoJam(PlantFault):
     joint: float = number(1, JOINT, "1", 1, 2)
     torque: float = number(20.0, "that it takes to move it", "N m", 0.1, 1000.0)
 
-    def effect(self, noise):
+    def effect(self, noise: np.random.Generator) -> Effect:
         return ActEffect(lambda plant, _: plant.brake_joint(int(self.joint) - 1, self.torque))
 
 
@@ -97,7 +102,7 @@ class MagnetWeak(PlantFault):
 
     remaining: float = number(0.0, "part of the force that is left", "1", 0.0, 1.0)
 
-    def effect(self, noise):
+    def effect(self, noise: np.random.Generator) -> Effect:
         return ActEffect(lambda plant, _: plant.weaken_magnet(self.remaining))
 
 
@@ -106,7 +111,7 @@ class MagnetStuck(PlantFault):
     NAME: ClassVar[str] = "magnet_stuck"
     ABOUT: ClassVar[str] = "the magnet, once it is on, does not release when switched off"
 
-    def effect(self, noise):
+    def effect(self, noise: np.random.Generator) -> Effect:
         return Remanent()
 
 
@@ -116,7 +121,7 @@ class Remanent(Effect):
     def __init__(self):
         self._on = False
 
-    def act(self, plant, commands):
+    def act(self, plant: FaultyPlant, commands: Commands) -> None:
         self._on = commands.magnet = commands.magnet or self._on
 
 
@@ -129,7 +134,7 @@ class PayloadSwing(PlantFault):
 
     rate: float = number(5.0, "pitch rate of the payload at the beginning", "rad/s", -20.0, 20.0)
 
-    def effect(self, noise):
+    def effect(self, noise: np.random.Generator) -> Effect:
         return ActEffect(lambda plant, commands: plant.swing_payload(commands, self.rate))
 
 
@@ -143,7 +148,7 @@ class WindGust(PlantFault):
     up: float = number(0.0, "vertical speed", "m/s", -20.0, 20.0)
     rise: float = number(0.5, "how long it rises", "s", 0.0, 100.0)
 
-    def effect(self, noise):
+    def effect(self, noise: np.random.Generator) -> Effect:
         angle = math.radians(self.towards)
         full = [self.speed * math.cos(angle), self.speed * math.sin(angle), self.up]
         return Gust(np.array(full), self.rise)
@@ -156,7 +161,7 @@ class Gust(Effect):
         self._full, self._rise = full, rise
         self._since = 0.0
 
-    def act(self, plant, commands):
+    def act(self, plant: FaultyPlant, commands: Commands) -> None:
         risen = 1.0 if self._since >= self._rise else self._since / self._rise
         plant.add_wind(0.5 * (1.0 - math.cos(math.pi * risen)) * self._full)
         self._since += plant.period

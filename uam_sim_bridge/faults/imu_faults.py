@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
-from typing import ClassVar
+from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 
 from uam_control.parameters import choice, number
 from uam_sim_bridge.faults.fault import Effect, PlantFault
+
+if TYPE_CHECKING:
+    from uam_sim_bridge.plant import Samples
 
 COMPANION, AUTOPILOT, BOTH = "companion", "autopilot", "both"
 UNIT = "the companion computer's IMU, the autopilot's, or both"
@@ -19,10 +23,14 @@ AXES = ("x", "y", "z")
 class ImuEffect(Effect):
     """Alters the samples (stamp, gyro, specific force) of one IMU or both."""
 
-    def __init__(self, unit: str, alter):
+    def __init__(
+        self,
+        unit: str,
+        alter: Callable[[float, np.ndarray, np.ndarray], tuple[float, np.ndarray, np.ndarray]],
+    ):
         self._unit, self._alter = unit, alter
 
-    def sense(self, samples):
+    def sense(self, samples: Samples) -> None:
         if self._unit != AUTOPILOT and samples.imu is not None:
             samples.imu = self._alter(*samples.imu)
         if self._unit != COMPANION:
@@ -39,7 +47,7 @@ class ImuBias(PlantFault):
     axis: str = choice("x", "axis, FLU", AXES)
     unit: str = choice(BOTH, UNIT, UNITS)
 
-    def effect(self, noise):
+    def effect(self, noise: np.random.Generator) -> Effect:
         along = np.eye(3)[AXES.index(self.axis)]
         gyro, force = self.gyro * along, self.accelerometer * along
         return ImuEffect(self.unit, lambda t, rates, f: (t, rates + gyro, f + force))
@@ -54,8 +62,10 @@ class ImuSaturation(PlantFault):
     accelerometer: float = number(10.0, "largest specific force", "m/s^2", 0.0, 200.0)
     unit: str = choice(BOTH, UNIT, UNITS)
 
-    def effect(self, noise):
-        def alter(stamp, rates, force):
+    def effect(self, noise: np.random.Generator) -> Effect:
+        def alter(
+            stamp: float, rates: np.ndarray, force: np.ndarray
+        ) -> tuple[float, np.ndarray, np.ndarray]:
             limited = np.clip(force, -self.accelerometer, self.accelerometer)
             return stamp, np.clip(rates, -self.gyro, self.gyro), limited
 
@@ -71,7 +81,7 @@ class ImuDropout(PlantFault):
 
     unit: str = choice(COMPANION, UNIT, UNITS)
 
-    def effect(self, noise):
+    def effect(self, noise: np.random.Generator) -> Effect:
         return Silent(self.unit)
 
 
@@ -82,7 +92,7 @@ class Silent(Effect):
         self._unit = unit
         self._held: tuple | None = None
 
-    def sense(self, samples):
+    def sense(self, samples: Samples) -> None:
         if self._unit != AUTOPILOT:
             samples.imu = None
         if self._unit != COMPANION:
@@ -97,7 +107,7 @@ class EncoderStuck(PlantFault):
 
     joint: float = number(1, "which joint", "1", 1, 2)
 
-    def effect(self, noise):
+    def effect(self, noise: np.random.Generator) -> Effect:
         return Stuck(int(self.joint) - 1)
 
 
@@ -108,7 +118,7 @@ class Stuck(Effect):
         self._joint = joint
         self._angle: float | None = None
 
-    def sense(self, samples):
+    def sense(self, samples: Samples) -> None:
         if samples.joints is None:
             return
         stamp, alpha, alpha_dot, torque = samples.joints

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import math
 from collections import deque
+from collections.abc import Callable
 from dataclasses import dataclass
-from typing import ClassVar
+from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 
@@ -13,16 +14,24 @@ from uam_control.parameters import choice, number
 from uam_control.rotations import quaternion_from_rotation_vector, quaternion_multiply
 from uam_sim_bridge.faults.fault import Effect, PlantFault
 
+if TYPE_CHECKING:
+    from uam_sim_bridge.plant import Samples
+
 AXES = {"xy": [1, 0, 2], "xz": [2, 1, 0], "yz": [0, 2, 1]}
 
 
 class PoseEffect(Effect):
     """Alters each pose that arrives."""
 
-    def __init__(self, alter):
+    def __init__(
+        self,
+        alter: Callable[
+            [float, np.ndarray, np.ndarray], tuple[float, np.ndarray, np.ndarray] | None
+        ],
+    ):
         self._alter = alter
 
-    def sense(self, samples):
+    def sense(self, samples: Samples) -> None:
         if samples.mocap is not None:
             samples.mocap = self._alter(*samples.mocap)
 
@@ -32,7 +41,7 @@ class MocapDropout(PlantFault):
     NAME: ClassVar[str] = "mocap_dropout"
     ABOUT: ClassVar[str] = "no poses of the motion capture arrive"
 
-    def effect(self, noise):
+    def effect(self, noise: np.random.Generator) -> Effect:
         return PoseEffect(lambda *pose: None)
 
 
@@ -41,10 +50,10 @@ class MocapFreeze(PlantFault):
     NAME: ClassVar[str] = "mocap_freeze"
     ABOUT: ClassVar[str] = "poses go on arriving with new stamps, but always the same one"
 
-    def effect(self, noise):
+    def effect(self, noise: np.random.Generator) -> Effect:
         held = []
 
-        def repeat(stamp, *pose):
+        def repeat(stamp: float, *pose) -> tuple[float, np.ndarray, np.ndarray]:
             held[:] = held or pose
             return (stamp, *held)
 
@@ -61,7 +70,7 @@ class MocapJump(PlantFault):
     z: float = number(0.0, "displacement", "m", -10.0, 10.0)
     yaw: float = number(0.0, "turn about the vertical", "rad", -math.pi, math.pi)
 
-    def effect(self, noise):
+    def effect(self, noise: np.random.Generator) -> Effect:
         offset = np.array([self.x, self.y, self.z])
         turn = quaternion_from_rotation_vector(np.array([0.0, 0.0, self.yaw]))
         return PoseEffect(
@@ -76,7 +85,7 @@ class MocapSwap(PlantFault):
 
     axes: str = choice("xy", "which two", tuple(AXES))
 
-    def effect(self, noise):
+    def effect(self, noise: np.random.Generator) -> Effect:
         order = AXES[self.axes]
         return PoseEffect(lambda stamp, position, q: (stamp, position[order], q))
 
@@ -88,7 +97,7 @@ class MocapLatency(PlantFault):
 
     delay: float = number(0.1, "on top of the usual latency", "s", 0.0, 5.0)
 
-    def effect(self, noise):
+    def effect(self, noise: np.random.Generator) -> Effect:
         return Late(self.delay)
 
 
@@ -99,7 +108,7 @@ class Late(Effect):
         self._delay = delay
         self._waiting: deque[tuple[float, tuple]] = deque()
 
-    def sense(self, samples):
+    def sense(self, samples: Samples) -> None:
         now = samples.hil[0]
         if samples.mocap is not None:
             self._waiting.append((now + self._delay, samples.mocap))
@@ -115,8 +124,10 @@ class MocapOutliers(PlantFault):
     share: float = number(0.05, "part of the poses that are", "1", 0.0, 1.0)
     distance: float = number(0.5, "how far", "m", 0.0, 100.0)
 
-    def effect(self, noise):
-        def alter(stamp, position, quaternion):
+    def effect(self, noise: np.random.Generator) -> Effect:
+        def alter(
+            stamp: float, position: np.ndarray, quaternion: np.ndarray
+        ) -> tuple[float, np.ndarray, np.ndarray]:
             direction, drawn = noise.standard_normal(3), noise.random()
             if drawn < self.share:
                 position = position + self.distance * direction / np.linalg.norm(direction)
@@ -132,5 +143,5 @@ class ClockJump(PlantFault):
 
     step: float = number(0.5, "by how much, ahead or behind", "s", -100.0, 100.0)
 
-    def effect(self, noise):
+    def effect(self, noise: np.random.Generator) -> Effect:
         return PoseEffect(lambda stamp, *pose: (max(0.0, stamp + self.step), *pose))

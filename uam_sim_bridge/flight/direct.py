@@ -18,7 +18,7 @@ from uam_control.compiled import jit
 from uam_control.controllers import ArmController, AttitudeController, PositionController
 from uam_control.coordinates import ATTITUDE
 from uam_control.estimation import StateEstimator
-from uam_control.mission import Mission, Scenario
+from uam_control.mission import Mission, MissionOutput, Scenario
 from uam_control.profile import Profile
 from uam_control.supervision import Inputs, State
 from uam_sim_bridge.autopilot.core import Autopilot
@@ -274,7 +274,17 @@ class Bridge:
         """Stamp [s] at which the autopilot was first seen armed, None while it is not."""
         return self.sequence.armed_stamp if self.autopilot.commander.armed else None
 
-    def send(self, stamp, time, tau_p, tau_q, state, flying, wanted, mocap) -> None:
+    def send(
+        self,
+        stamp: float,
+        time: float,
+        tau_p: np.ndarray,
+        tau_q: np.ndarray,
+        state: np.ndarray,
+        flying: bool,
+        wanted: MissionOutput,
+        mocap: tuple | None,
+    ) -> None:
         """One tick of the bridge: vision, requests, setpoint.
 
         stamp: of the tick's IMU sample [s], the bridge's clock; time: the autopilot's [s]; wanted:
@@ -300,7 +310,9 @@ class Bridge:
             stamp, state, thrust, self.map.assumed_thrust(thrust), flying and status.armed
         )
 
-    def _command(self, stamp, tau_p, tau_q, state, flying):
+    def _command(
+        self, stamp: float, tau_p: np.ndarray, tau_q: np.ndarray, state: np.ndarray, flying: bool
+    ) -> tuple[np.ndarray, float] | None:
         """Rates (3,) and thrust of this tick, None for no setpoint: what the node does."""
         if flying:
             try:
@@ -332,22 +344,22 @@ class Bridge:
 
 @jit
 def record(
-    row,
-    time,
-    truth,
-    state,
-    reference,
-    attitude_reference,
-    tau_p,
-    tau_q,
-    tau_alpha,
-    setpoint,
-    gains,
-    gain_columns,
-    motors,
-    thrust,
-    payload_pose,
-):
+    row: np.ndarray,
+    time: float,
+    truth: np.ndarray,
+    state: np.ndarray,
+    reference: np.ndarray,
+    attitude_reference: np.ndarray,
+    tau_p: np.ndarray,
+    tau_q: np.ndarray,
+    tau_alpha: np.ndarray,
+    setpoint: np.ndarray,
+    gains: tuple[np.ndarray, ...],
+    gain_columns: tuple[np.ndarray, ...],
+    motors: np.ndarray,
+    thrust: np.ndarray,
+    payload_pose: np.ndarray,
+) -> None:
     """Copy one tick into its row of the recording; roll and pitch reference are what tau_p asks.
 
     gains, gain_columns: three arrays each, the published gains and where they go.

@@ -20,6 +20,7 @@ from mcap.records import (
     DataEnd,
     Footer,
     Header,
+    McapRecord,
     MessageIndex,
     Metadata,
     MetadataIndex,
@@ -193,7 +194,7 @@ class McapWriter:
         self._chunk = bytearray()
         self._index: dict[int, list[tuple[int, int]]] = {}
 
-    def _record(self, record) -> int:
+    def _record(self, record: McapRecord) -> int:
         """Write a record to the file; returns its length in bytes."""
         return self._file.write(_packed(record))
 
@@ -204,7 +205,7 @@ class McapWriter:
         self.close()
 
 
-def _packed(record) -> bytes:
+def _packed(record: McapRecord) -> bytes:
     builder = RecordBuilder()
     record.write(builder)
     return builder.end()

@@ -6,7 +6,7 @@ command to the touchdown command (`Series.flown`); every control tick weighs the
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -126,7 +126,9 @@ def _nothing(errors: np.ndarray) -> np.ndarray:
     return np.full(errors.shape[1], np.nan)
 
 
-def errors(series: Series, figure=rms) -> dict[str, list[float]]:
+def errors(
+    series: Series, figure: Callable[[np.ndarray], np.ndarray] = rms
+) -> dict[str, list[float]]:
     """`figure` of the tracking errors over the flight, in the units and shape of metrics.json."""
     error = series.block("error.")[series.flown]
     return {key: (factor * figure(error[:, columns])).tolist() for key, columns, factor in GROUPS}

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Mapping
+from collections.abc import Callable, Collection, Mapping
 from typing import Any
 
 from rcl_interfaces.srv import GetParameters, ListParameters, SetParametersAtomically
@@ -109,7 +109,7 @@ class ProfileSwitch:
         if refused:
             raise SwitchRefused("\n".join(refused))
 
-    def _call(self, kind, service: str, requests: Mapping[str, Any]) -> dict[str, Any]:
+    def _call(self, kind: type, service: str, requests: Mapping[str, Any]) -> dict[str, Any]:
         """Call a service of several nodes at a time; node → response. Raises SwitchRefused."""
         clients = {node: self._node.create_client(kind, f"/{node}/{service}") for node in requests}
         try:
@@ -121,7 +121,7 @@ class ProfileSwitch:
             for client in clients.values():
                 self._node.destroy_client(client)
 
-    def _until(self, done, nodes, complaint: str) -> None:
+    def _until(self, done: Callable[[str], bool], nodes: Collection[str], complaint: str) -> None:
         end = time.monotonic() + PATIENCE
         while missing := [node for node in nodes if not done(node)]:
             if time.monotonic() > end:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import importlib.util
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -183,6 +183,6 @@ def _instance_of(link: LinkUrl | None) -> int | None:
     return number if link.kind == "udp" and 0 <= number < INSTANCES else 0
 
 
-def _choice(name: str, value: str, allowed) -> None:
+def _choice(name: str, value: str, allowed: Collection[str]) -> None:
     if value not in allowed:
         raise SettingsError(f"unknown {name} '{value}'; there are: {', '.join(allowed)}")

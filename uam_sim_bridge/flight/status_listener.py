@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 
+from diagnostic_msgs.msg import DiagnosticArray
 from rclpy.node import Node
+from rclpy.subscription import Subscription
 
 from uam_msgs_py import topics
 from uam_msgs_py.convert import seconds
@@ -74,6 +76,6 @@ class StatusListener:
         self._guest.close()
 
 
-def _messages(subscription):
+def _messages(subscription: Subscription) -> Iterator[DiagnosticArray]:
     while (taken := subscription.handle.take_message(subscription.msg_type, False)) is not None:
         yield taken[0]

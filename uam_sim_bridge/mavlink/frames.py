@@ -22,7 +22,7 @@ _HALF = math.sqrt(0.5)
 
 
 @jit
-def swap_world(v):
+def swap_world(v: np.ndarray) -> np.ndarray:
     """Return the world vector v (3,) given in ENU, in NED; or the other way round."""
     out = np.empty(3)
     out[0] = v[1]
@@ -32,7 +32,7 @@ def swap_world(v):
 
 
 @jit
-def swap_body(v):
+def swap_body(v: np.ndarray) -> np.ndarray:
     """Return the body vector v (3,) given in FLU, in FRD; or the other way round."""
     out = np.empty(3)
     out[0] = v[0]
@@ -42,7 +42,7 @@ def swap_body(v):
 
 
 @jit
-def swap_quaternion(q):
+def swap_quaternion(q: np.ndarray) -> np.ndarray:
     """Return the attitude FLU → ENU given by q (4,) as FRD → NED; or the other way round.
 
     It is the product (half turn about (1, 1, 0)) ⊗ q ⊗ (half turn about x), up to sign.
@@ -56,7 +56,7 @@ def swap_quaternion(q):
 
 
 @jit
-def swap_euler(euler):
+def swap_euler(euler: np.ndarray) -> np.ndarray:
     """Return roll, pitch, yaw (3,) [rad] of FLU in ENU as those of FRD in NED; or back.
 
     ENU yaw counts from east, counter-clockwise; NED yaw from north, clockwise. Yaw in [-pi, pi).

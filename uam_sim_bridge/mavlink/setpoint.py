@@ -132,7 +132,14 @@ class RateThrustParameters(ParameterSet):
 
 
 @jit
-def rate_thrust_map(tau_p, tau_q, attitude, body_rates, p, rates):
+def rate_thrust_map(
+    tau_p: np.ndarray,
+    tau_q: np.ndarray,
+    attitude: np.ndarray,
+    body_rates: np.ndarray,
+    p: np.ndarray,
+    rates: np.ndarray,
+) -> float:
     """Write the body-rate setpoint into rates (3,) and return the normalised thrust.
 
     Returns -1 - i, touching nothing, where INPUTS[i] is not finite.

@@ -12,8 +12,12 @@ import time
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from uam_sim_bridge.flight.ports import PortError
+
+if TYPE_CHECKING:
+    from pymavlink.dialects.v20.common import MAVLink
 
 EPOCH = 1_420_070_400  # 2015-01-01 00:00 UTC as Unix time [s]
 _STEPS = 100_000  # per second
@@ -59,7 +63,7 @@ class Signing:
 class Seal:
     """Switches signing on in one pymavlink object (`mav`) and keeps its time and counts."""
 
-    def __init__(self, mav, signing: Signing) -> None:
+    def __init__(self, mav: MAVLink, signing: Signing) -> None:
         self._state, self._clock = mav.signing, signing.clock
         self._state.secret_key = signing.key
         self._state.link_id = signing.link_id

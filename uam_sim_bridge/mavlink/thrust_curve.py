@@ -21,14 +21,14 @@ from uam_control.compiled import jit
 
 
 @jit
-def curve(factor, u):
+def curve(factor: float, u: float) -> float:
     """Return factor u^2 + (1 - factor) u, the relative thrust of command u in 0..1 (clamped)."""
     u = min(1.0, max(0.0, u))
     return factor * u * u + (1.0 - factor) * u
 
 
 @jit
-def inverse_curve(factor, relative_thrust):
+def inverse_curve(factor: float, relative_thrust: float) -> float:
     """Return the u in 0..1 with curve(factor, u) = relative_thrust (clamped to 0..1)."""
     y = min(1.0, max(0.0, relative_thrust))
     b = 1.0 - factor
@@ -38,7 +38,9 @@ def inverse_curve(factor, relative_thrust):
 
 
 @jit
-def command_of_thrust(newtons, full_thrust, battery, motor_factor, model_factor):
+def command_of_thrust(
+    newtons: float, full_thrust: float, battery: float, motor_factor: float, model_factor: float
+) -> float:
     """Return the normalised thrust s in 0..1 that makes `newtons`.
 
     newtons: collective thrust wanted; full_thrust [N]: the collective at u = 1 with a full battery;
@@ -49,14 +51,18 @@ def command_of_thrust(newtons, full_thrust, battery, motor_factor, model_factor)
 
 
 @jit
-def thrust_of_command(command, full_thrust, battery, motor_factor, model_factor):
+def thrust_of_command(
+    command: float, full_thrust: float, battery: float, motor_factor: float, model_factor: float
+) -> float:
     """Return the collective [N] that the normalised thrust `command` makes: the forward map."""
     u = inverse_curve(model_factor, command)
     return full_thrust * battery * curve(motor_factor, u)
 
 
 @jit
-def thrust_slope(command, full_thrust, battery, motor_factor, model_factor):
+def thrust_slope(
+    command: float, full_thrust: float, battery: float, motor_factor: float, model_factor: float
+) -> float:
     """Return d(newtons)/d(command) at `command`, clamped to 0..1 [N].
 
     It is `full_thrust * battery` everywhere for motor_factor = model_factor.

@@ -109,7 +109,7 @@ class ThrustIdentificationParameters(ParameterSet):
 
 
 @jit
-def steady_force(state, tilt_max, acceleration_max):
+def steady_force(state: np.ndarray, tilt_max: float, acceleration_max: float) -> float:
     """Return the specific force [m/s^2] along the thrust axis of state (3, 8), 0 if not steady.
 
     0 as well where a number is not finite: every comparison with NaN is false.

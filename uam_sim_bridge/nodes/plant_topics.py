@@ -5,6 +5,7 @@ from __future__ import annotations
 import time
 
 import numpy as np
+from diagnostic_msgs.msg import DiagnosticArray
 from rclpy.event_handler import PublisherEventCallbacks, SubscriptionEventCallbacks
 from rclpy.node import Node
 from rclpy.publisher import Publisher
@@ -183,6 +184,6 @@ class Answers:
         self._arrived.add("magnet")
         self.arrivals[topics.MAGNET.name] = time.monotonic()
 
-    def _on_mission(self, message, info: dict | None = None) -> None:
+    def _on_mission(self, message: DiagnosticArray, info: dict | None = None) -> None:
         self.mission_stamp, self.mission = MissionStatus.from_message(message)
         self.arrivals[topics.MISSION_STATUS.name] = time.monotonic()

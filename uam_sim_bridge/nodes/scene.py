@@ -17,6 +17,7 @@ import time
 from dataclasses import dataclass
 
 import numpy as np
+from diagnostic_msgs.msg import DiagnosticArray
 from std_msgs.msg import String
 
 from uam_control.coordinates import ARM, ATTITUDE, COORDINATES, JOINTS, POSITION
@@ -95,7 +96,7 @@ class SceneNode(UamNode):
         still = [Transform(0, f.parent, f.name, f.position, f.quaternion) for f in self._fixed]
         self.publisher(topics.TF_STATIC).publish(transforms_message(still))
 
-    def _on_status(self, message) -> None:
+    def _on_status(self, message: DiagnosticArray) -> None:
         self._status = MissionStatus.from_message(message)
         if not self._late:
             self._late = [
@@ -193,7 +194,7 @@ class SceneNode(UamNode):
             ahead = ahead[:0]
         self._markers.publish(self._maker.message(stamp, status, ahead, self._flown.points, now[2]))
 
-    def diagnose(self):
+    def diagnose(self) -> tuple[bytes, str, dict[str, object]]:
         """Phase as the mission says it; and what is shown."""
         if self._status is None:
             return OK, "waiting for the mission", {}

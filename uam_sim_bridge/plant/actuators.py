@@ -36,7 +36,14 @@ class Rotors:
 
 
 @jit
-def rotor_step(commands, constants, efficiency, speed, thrust, output):
+def rotor_step(
+    commands: np.ndarray,
+    constants: np.ndarray,
+    efficiency: np.ndarray,
+    speed: np.ndarray,
+    thrust: np.ndarray,
+    output: np.ndarray,
+) -> None:
     """First-order speed lag with separate rates up and down; T = c speed^2."""
     coefficient, thrust_max, factor = constants[0], constants[1], constants[2]
     gain_up, gain_down = constants[3], constants[4]
@@ -73,7 +80,13 @@ class Servos:
 
 
 @jit
-def servo_step(effort, velocity, constants, torque, output):
+def servo_step(
+    effort: np.ndarray,
+    velocity: np.ndarray,
+    constants: np.ndarray,
+    torque: np.ndarray,
+    output: np.ndarray,
+) -> None:
     """Torque = command in whole current units, within stall (1 - speed / no-load speed)."""
     stall, no_load, unit = constants[0], constants[1], constants[2]
     for i in range(len(effort)):

@@ -6,11 +6,19 @@ it holds, and whether, comes out of contact and friction. Here only its strength
 
 from __future__ import annotations
 
+import numpy as np
+
 from uam_control.compiled import jit
 
 
 @jit
-def pull_fraction(face, payload, payload_axes, half_height, gap_scale):
+def pull_fraction(
+    face: np.ndarray,
+    payload: np.ndarray,
+    payload_axes: np.ndarray,
+    half_height: float,
+    gap_scale: float,
+) -> float:
     """Return the fraction 0..1 of the holding force at the present air gap.
 
     face (3,): centre of the magnet's face; payload (3,), payload_axes (9,): centre and rotation

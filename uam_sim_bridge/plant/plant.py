@@ -239,8 +239,16 @@ class Plant:
 
 @jit
 def write_state(
-    position, quaternion, velocity, rates, alpha, alpha_dot, base_acceleration, alpha_ddot, state
-):
+    position: np.ndarray,
+    quaternion: np.ndarray,
+    velocity: np.ndarray,
+    rates: np.ndarray,
+    alpha: np.ndarray,
+    alpha_dot: np.ndarray,
+    base_acceleration: np.ndarray,
+    alpha_ddot: np.ndarray,
+    state: np.ndarray,
+) -> None:
     """Gather chi, chi_dot, chi_ddot into state (3, 8)."""
     euler = euler_from_quaternion(quaternion)
     for i in range(3):
@@ -253,18 +261,18 @@ def write_state(
 
 @jit
 def surroundings(
-    drag,
-    velocity,
-    wind,
-    force,
-    magnet,
-    face,
-    payload,
-    payload_axes,
-    magnet_constants,
-    magnet_control,
-    specific_force,
-):
+    drag: np.ndarray,
+    velocity: np.ndarray,
+    wind: np.ndarray,
+    force: np.ndarray,
+    magnet: bool,
+    face: np.ndarray,
+    payload: np.ndarray,
+    payload_axes: np.ndarray,
+    magnet_constants: np.ndarray,
+    magnet_control: np.ndarray,
+    specific_force: np.ndarray,
+) -> None:
     """Before a tick: drag -c (v - wind) [N, world] into force (3,), pull of the magnet at its gap.
 
     Also clears specific_force (3,) for the average over the physics steps of the tick.
@@ -281,24 +289,24 @@ def surroundings(
 
 @jit
 def actuate(
-    commands,
-    rotor_constants,
-    efficiency,
-    speed,
-    thrust,
-    effort,
-    joint_rates,
-    servo_constants,
-    torque,
-    control,
-):
+    commands: np.ndarray,
+    rotor_constants: np.ndarray,
+    efficiency: np.ndarray,
+    speed: np.ndarray,
+    thrust: np.ndarray,
+    effort: np.ndarray,
+    joint_rates: np.ndarray,
+    servo_constants: np.ndarray,
+    torque: np.ndarray,
+    control: np.ndarray,
+) -> None:
     """Before a physics step: rotors into control[0:4] [N], servos into control[4:6] [N m]."""
     rotor_step(commands, rotor_constants, efficiency, speed, thrust, control[0:4])
     servo_step(effort, joint_rates, servo_constants, torque, control[4:6])
 
 
 @jit
-def average(sample, weight, mean):
+def average(sample: np.ndarray, weight: float, mean: np.ndarray) -> None:
     """Add weight * sample (3,) to mean (3,)."""
     for i in range(3):
         mean[i] += weight * sample[i]

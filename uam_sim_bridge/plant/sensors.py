@@ -64,7 +64,9 @@ class Imu:
         self.bias = scale * generator.standard_normal(6) * np.array(biases)
         self._noise = Noise(generator, scale * np.array([gyro] * 3 + [accelerometer] * 3))
 
-    def sample(self, rates: np.ndarray, specific_force: np.ndarray):
+    def sample(
+        self, rates: np.ndarray, specific_force: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray]:
         """Return (gyro (3,) [rad/s], accelerometer (3,) [m/s^2]) with noise and bias."""
         return disturbed(rates, specific_force, self._noise(), self.bias)
 
@@ -86,7 +88,7 @@ class Mocap:
         self._next += self._period
         return True
 
-    def sample(self, position: np.ndarray, quaternion: np.ndarray):
+    def sample(self, position: np.ndarray, quaternion: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Return (position (3,) [m], quaternion [w x y z]) with noise."""
         noise = self._noise()
         turn = quaternion_from_rotation_vector(noise[3:])
@@ -101,13 +103,15 @@ class Encoders:
         self._count = 2.0 * np.pi / numbers["counts_per_turn"]
         self._velocity = numbers["velocity_unit"]
 
-    def sample(self, angle: np.ndarray, velocity: np.ndarray):
+    def sample(self, angle: np.ndarray, velocity: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Return (alpha (n,) [rad], alpha_dot (n,) [rad/s]) in whole counts."""
         return quantised(angle, self._count), quantised(velocity, self._velocity)
 
 
 @jit
-def disturbed(rates, specific_force, noise, bias):
+def disturbed(
+    rates: np.ndarray, specific_force: np.ndarray, noise: np.ndarray, bias: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
     """Return rates and specific force (3,) each with noise and bias (6,) added."""
     gyro, accelerometer = np.empty(3), np.empty(3)
     for i in range(3):
@@ -117,7 +121,7 @@ def disturbed(rates, specific_force, noise, bias):
 
 
 @jit
-def quantised(values, unit):
+def quantised(values: np.ndarray, unit: float) -> np.ndarray:
     """Return values (n,) in whole units."""
     out = np.empty(len(values))
     for i in range(len(values)):

@@ -9,6 +9,7 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 
 import numpy as np
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.ticker import NullFormatter
@@ -133,7 +134,7 @@ def adaptation(flights: Sequence[Flight]) -> Figure | None:
     return figure
 
 
-def _gain_legend(axis, names: tuple[str, ...], above: float) -> None:
+def _gain_legend(axis: Axes, names: tuple[str, ...], above: float) -> None:
     """Names of the gains of a row; above the names of the phases in the first."""
     lines = zip(style.GAINS, names, strict=False)
     axis.legend(
@@ -156,7 +157,7 @@ def _adapted(flight: Flight, names: tuple[str, ...]) -> bool:
 
 
 def _adaptation_of(
-    axis, flight: Flight, subsystem: str, names: tuple[str, ...], number: int, flights: int
+    axis: Axes, flight: Flight, subsystem: str, names: tuple[str, ...], number: int, flights: int
 ) -> None:
     series = flight.series
     for i, name in enumerate(names):

@@ -38,7 +38,14 @@ def labelled(directories: Sequence[Path]) -> list[str]:
     ]
 
 
-def _table(flights: Sequence[Flight], group, heading, unit, digits, names) -> dict:
+def _table(
+    flights: Sequence[Flight],
+    group: str,
+    heading: str,
+    unit: str,
+    digits: int,
+    names: Sequence[str],
+) -> dict:
     """RMS of one group of coordinates, a row per flight."""
     rows = []
     for flight in flights:

@@ -57,7 +57,9 @@ def window(flights: Sequence[Flight]) -> tuple[float, float]:
     return min(t[0] for t in times) - MARGIN_S, max(t[-1] for t in times) + MARGIN_S
 
 
-def thin(time: np.ndarray, values: np.ndarray, buckets: int = BUCKETS):
+def thin(
+    time: np.ndarray, values: np.ndarray, buckets: int = BUCKETS
+) -> tuple[np.ndarray, np.ndarray]:
     """Fewer points of the same picture: lowest and highest of each of `buckets` stretches.
 
     Unlike taking every n-th point this keeps every peak. time, values: (ticks,).
@@ -226,7 +228,9 @@ def events(series: Series) -> list[tuple[float, str, str]]:
     return found
 
 
-def legend(figure: Figure, flights: Sequence[Flight], marked) -> None:
+def legend(
+    figure: Figure, flights: Sequence[Flight], marked: Sequence[tuple[float, str, str]]
+) -> None:
     """Flights and events in the upper right corner."""
     handles = [
         Line2D([], [], color=style.FLIGHTS[n % len(style.FLIGHTS)], label=flight.label)

@@ -69,7 +69,9 @@ def render(
     return replace(existing(directory), problem=problem)
 
 
-def _child(directory: Path, video: bool, progress, platform: str) -> tuple[int, str]:
+def _child(
+    directory: Path, video: bool, progress: Callable[[str], None], platform: str
+) -> tuple[int, str]:
     """Run this module as a process; (exit status, last line that was not progress)."""
     command = [sys.executable, "-m", "uam_sim_bridge.report.rendering", str(directory)]
     child = subprocess.Popen(

@@ -56,7 +56,9 @@ class Scene:
         self._draw_path("truth.", np.append(flown, row), TRAIL_RGBA, 2.5, dashed=False)
         return self._renderer.render()
 
-    def _draw_path(self, group: str, rows, rgba, pixels: float, dashed: bool) -> None:
+    def _draw_path(
+        self, group: str, rows: np.ndarray, rgba: tuple[float, ...], pixels: float, dashed: bool
+    ) -> None:
         columns = [f"{group}{axis}" for axis in "xyz"]
         points = np.column_stack([self.series[c][rows] for c in columns])
         scene = self._renderer.scene

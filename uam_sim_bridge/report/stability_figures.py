@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import TYPE_CHECKING
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -13,6 +14,10 @@ from matplotlib.ticker import LogLocator, MaxNLocator, NullLocator
 from uam_sim_bridge.flight.timeseries import SUBSYSTEMS
 from uam_sim_bridge.report import panels, style
 from uam_sim_bridge.report.panels import Flight
+
+if TYPE_CHECKING:
+    from uam_sim_bridge.analysis.lyapunov import Comparison
+    from uam_sim_bridge.analysis.stability import Subsystem
 
 SYMBOLS = {"position": "p", "attitude": "q", "arm": "\\alpha"}
 BOUND, ENVELOPE = (0, (6, 2)), (0, (1, 1.4))
@@ -100,11 +105,11 @@ def _only(flights: Sequence[Flight]):
     return flights[0].stability if len(flights) == 1 else None
 
 
-def _terms(subsystem):
+def _terms(subsystem: Subsystem) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     return subsystem.parts.tracking, subsystem.parts.gains, subsystem.parts.zeta
 
 
-def _bounded(axis: Axes, time: np.ndarray, value: np.ndarray, comparison) -> None:
+def _bounded(axis: Axes, time: np.ndarray, value: np.ndarray, comparison: Comparison) -> None:
     """V with the ultimate bound and what the differential inequality allows until then."""
     axis.plot(*panels.thin(time, value), color=style.INK, linewidth=1.5, zorder=4)
     envelope = comparison.envelope(value[0], time - time[0])
@@ -116,5 +121,7 @@ def _bounded(axis: Axes, time: np.ndarray, value: np.ndarray, comparison) -> Non
     axis.yaxis.set_minor_locator(NullLocator())
 
 
-def _key(label: str, colour: str, width: float = 1.0, dash="-") -> Line2D:
+def _key(
+    label: str, colour: str, width: float = 1.0, dash: str | tuple[int, tuple[float, ...]] = "-"
+) -> Line2D:
     return Line2D([], [], color=colour, linewidth=width, linestyle=dash, label=label)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from contextlib import AbstractContextManager
+
 import matplotlib as mpl
 
 INK = "#22303c"
@@ -54,6 +56,6 @@ SETTINGS = {
 }
 
 
-def styled():
+def styled() -> AbstractContextManager[None]:
     """Context in which figures are drawn and saved."""
     return mpl.rc_context(SETTINGS)

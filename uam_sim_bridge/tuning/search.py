@@ -40,7 +40,7 @@ class Task:
     step: float = STEP
 
 
-def open_storage(where: str):
+def open_storage(where: str) -> JournalStorage | RDBStorage:
     """A journal file, or a database URL as sqlite:///file.db or mysql://...; TuningError."""
     try:
         if "://" in where:

@@ -13,7 +13,7 @@ import yaml
 
 from uam_control import configuration
 from uam_control.profile import NODES, Profile, load_profile, profile_of
-from uam_sim_bridge.campaign.trial import ERRORS, Trial
+from uam_sim_bridge.campaign.trial import ERRORS, Result, Trial
 
 DIGITS = 4  # significant ones of a found value
 
@@ -60,7 +60,7 @@ class Cost:
     not_completed: float
     lost: float
 
-    def of(self, result) -> float:
+    def of(self, result: Result) -> float:
         """The cost of a campaign.trial.Result; finite in any case."""
         if result.cut_short or not all(map(math.isfinite, result.rms)):
             return self.lost * (2.0 - result.flown)
