@@ -20,7 +20,9 @@ class ColconDistribution(Distribution):
     that setuptools makes of `requires-python`.
     """
 
-    def parse_config_files(self, filenames=None, ignore_option_errors=False):
+    def parse_config_files(
+        self, filenames: list[str] | None = None, ignore_option_errors: bool = False
+    ) -> None:
         names = filenames if filenames is not None else self.find_config_files()
         super().parse_config_files(
             [name for name in names if os.path.basename(name) != "pyproject.toml"],
