@@ -40,3 +40,12 @@ def test_most_random_flights_are_flown_to_the_end(tmp_path, capsys):
     assert len(rows) == FLIGHTS
     assert all(np.isfinite(float(row["rms x"])) for row in rows)
     assert (tmp_path / "campaign.png").stat().st_size > 0
+
+    whole = (tmp_path / "flights.csv").read_bytes()
+    kept = tmp_path / "flown.jsonl"
+    kept.write_text(kept.read_text()[:-9])  # as after a kill while the last one was written
+    assert main(["campaign", "--flights", str(FLIGHTS), "--out", str(tmp_path)]) == 0
+    assert f"{FLIGHTS - 1} flights were flown before" in capsys.readouterr().out
+    assert (tmp_path / "flights.csv").read_bytes() == whole
+    assert main(["campaign", "--seed", "2", "--out", str(tmp_path)]) == 2
+    assert "choose another --out" in capsys.readouterr().err

@@ -54,6 +54,7 @@ def ros2(flight, monkeypatch):
             command.send_signal(signal.SIGINT)
             return command.communicate(timeout=30.0)[0]
 
+    run("daemon", "start")  # first, so that every command asks the same one
     yield run
     run("daemon", "stop")
 

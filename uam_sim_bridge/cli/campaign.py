@@ -20,10 +20,11 @@ EXAMPLES = """\
 examples:
   uam campaign                             1,000 flights of the flying profile
   uam campaign --flights 100 --profile asmc2
+  uam campaign --out robust                until Ctrl-C; the same again goes on from there
 
 Payload, its place, wind, gusts, sensor noise, masses, inertias and motors are drawn from the ranges
 of config/campaign/robustness.yaml. Left in --out: summary.md, flights.csv, campaign.json,
-campaign.png. The same seed gives the same flights.
+campaign.png. The same seed gives the same flights, and more of them begin with the same.
 """
 
 
@@ -72,18 +73,23 @@ def run(options: argparse.Namespace) -> int:
 def campaign(options: argparse.Namespace, profile: Profile, out: Path) -> int:
     """Fly, then write everything; returns the exit status."""
     from uam_sim_bridge.campaign import report
-    from uam_sim_bridge.campaign.variations import draw
+    from uam_sim_bridge.campaign.flown import Flown
+    from uam_sim_bridge.campaign.variations import draw, ranges
 
     draws = draw(profile, options.flights, options.seed)
-    bad = 0
+    flown = Flown(out, (options.seed, ranges(), profile.sets, profile.bridge()))
+    trials = [one.trial for one in draws if one.trial.seed not in flown.results]
+    if flown.results:
+        print(f"campaign: {len(flown.results)} flights were flown before, going on", flush=True)
     with Counting("campaign", len(draws)) as counting:
 
         def show(done: int, result: Result) -> None:
-            nonlocal bad
-            bad += not result.completed
-            counting.show(done, f"{bad} not completed")
+            flown.add(result)
+            bad = sum(not one.completed for one in flown.results.values())
+            counting.show(len(draws) - len(trials) + done, f"{bad} not completed")
 
-        results = fly_all([one.trial for one in draws], options.jobs, progress=show)
+        fly_all(trials, options.jobs, progress=show)
+    results = [flown.results[one.trial.seed] for one in draws]
     print(report.write(out, draws, results, shlex.join(["uam", *sys.argv[1:]])))
     print(f"results  {out}")
     return 0
