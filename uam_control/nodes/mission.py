@@ -3,11 +3,12 @@
 import time
 
 import numpy as np
+from diagnostic_msgs.msg import DiagnosticArray
 from rcl_interfaces.msg import ParameterDescriptor
 from std_msgs.msg import Bool
 
 from uam_control.coordinates import ARM, ATTITUDE, POSITION, SIZE
-from uam_control.mission import Mission, MissionParameters, load_scenario
+from uam_control.mission import Mission, MissionOutput, MissionParameters, load_scenario
 from uam_control.nodes.mission_inputs import MissionInputs
 from uam_control.nodes.mission_services import offer
 from uam_control.nodes.timing import Ticks, Timing
@@ -66,7 +67,7 @@ class MissionNode(UamNode):
         self.triggers = (topics.STATE.name,)
         offer(self, self._mission)
 
-    def _on_autopilot(self, message) -> None:
+    def _on_autopilot(self, message: DiagnosticArray) -> None:
         _, state = AutopilotState.from_message(message)
         armed = state.armed and state.armed_since is not None
         self._armed_since = seconds(state.armed_since) if armed else None
@@ -102,7 +103,7 @@ class MissionNode(UamNode):
         )
         self._ahead = stamp
 
-    def _measure(self, state: np.ndarray, output) -> None:
+    def _measure(self, state: np.ndarray, output: MissionOutput) -> None:
         """Errors of this tick: norms of estimate − reference; zero what is not controlled."""
         error = state[0] - output.reference[0]
         error[3:] = wrap_angle(error[3:])
@@ -148,7 +149,7 @@ class MissionNode(UamNode):
         else:
             self.get_logger().info(text)
 
-    def diagnose(self):
+    def diagnose(self) -> tuple[bytes, str, dict[str, object]]:
         output, beyond = self._mission.output, self._mission.beyond
         level = WARN if beyond or output.state is State.HOLDING else OK
         if output.abort_reason:

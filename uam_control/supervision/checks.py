@@ -140,7 +140,14 @@ def _cause(check: Check, value: float, limit: float) -> str:
 
 
 @jit
-def measure(state, reference, ground, box, joints, values):
+def measure(
+    state: np.ndarray,
+    reference: np.ndarray,
+    ground: float,
+    box: np.ndarray,
+    joints: np.ndarray,
+    values: np.ndarray,
+) -> None:
     """Write what state and reference tell into values[:7]; only the first where the state is not
     finite.
 
@@ -167,7 +174,17 @@ def measure(state, reference, ground, box, joints, values):
 
 
 @jit
-def read(battery, mocap, joints, missed, effort, effort_limits, gains, gain_limits, values):
+def read(
+    battery: float,
+    mocap: float,
+    joints: float,
+    missed: float,
+    effort: np.ndarray,
+    effort_limits: np.ndarray,
+    gains: np.ndarray,
+    gain_limits: np.ndarray,
+    values: np.ndarray,
+) -> None:
     """Write the readings (see `Readings`) into values[7:]; unknown ones are in order."""
     values[7] = _known(-battery)
     values[8], values[9], values[10] = _known(mocap), _known(joints), _known(missed)
@@ -176,12 +193,12 @@ def read(battery, mocap, joints, missed, effort, effort_limits, gains, gain_limi
 
 
 @jit
-def _known(value):
+def _known(value: float) -> float:
     return -math.inf if math.isnan(value) else value
 
 
 @jit
-def _largest(values, limits):
+def _largest(values: np.ndarray, limits: np.ndarray) -> float:
     """The largest |value| / limit of those that are known."""
     found = -math.inf
     for i in range(len(limits)):
@@ -192,7 +209,7 @@ def _largest(values, limits):
 
 
 @jit
-def _below(values, limits):
+def _below(values: np.ndarray, limits: np.ndarray) -> bool:
     """Whether every value is below its limit; one that is not a number is not."""
     for i in range(len(limits)):
         if not values[i] < limits[i]:

@@ -17,21 +17,22 @@ for `hold_time`, then nothing: the autopilot's failsafe acts |
 from __future__ import annotations
 
 import time
-from dataclasses import dataclass
-from typing import Any
+from collections.abc import Callable
+from enum import Enum
 
 import numpy as np
-from rcl_interfaces.msg import ParameterDescriptor
+from diagnostic_msgs.msg import DiagnosticArray
 from rclpy.clock import Clock, ClockType
 from rclpy.parameter import Parameter
+from std_msgs.msg import Bool
 
 from uam_control.coordinates import ATTITUDE
-from uam_control.parameters import ParameterError, ParameterSet, choice, number
+from uam_control.parameters import ParameterError
 from uam_control.supervision import State
 from uam_msgs_py import topics
-from uam_msgs_py.battery import battery_message
 from uam_msgs_py.control import (
     TAU_Q,
+    PositionCommand,
     read_position_command,
     read_state,
     read_torque,
@@ -40,68 +41,38 @@ from uam_msgs_py.convert import JointStateWriter, SetpointWriter, read_pose, sec
 from uam_msgs_py.joins import StampJoin
 from uam_msgs_py.layouts import BadMessage, stamp_of
 from uam_msgs_py.node import UamNode, run
-from uam_msgs_py.parameters import NodeParameters, given
-from uam_msgs_py.status import OK, WARN, AutopilotState, MissionStatus
-from uam_sim_bridge.faults import LINK, Schedule
+from uam_msgs_py.parameters import NodeParameters
+from uam_msgs_py.status import OK, WARN, MissionStatus
 from uam_sim_bridge.flight.fault_log import FaultTopic
-from uam_sim_bridge.flight.ports import PortError
-from uam_sim_bridge.mavlink.faulty_transport import FaultyTransport
-from uam_sim_bridge.mavlink.forwarding import GroundStation
 from uam_sim_bridge.mavlink.hold import HoldParameters, LevelHold
-from uam_sim_bridge.mavlink.link import OffboardLink
 from uam_sim_bridge.mavlink.link_report import faults, report
 from uam_sim_bridge.mavlink.offboard import OffboardParameters, OffboardSequence
 from uam_sim_bridge.mavlink.parameter_check import adopted, differences
 from uam_sim_bridge.mavlink.setpoint import RateThrustMap, RateThrustParameters, SetpointRefused
-from uam_sim_bridge.mavlink.signing import Signing
 from uam_sim_bridge.mavlink.thrust_identification import (
     ThrustIdentification,
     ThrustIdentificationParameters,
     steady_force,
 )
-from uam_sim_bridge.mavlink.transport import Transport, UdpTransport, open_transport
 from uam_sim_bridge.mavlink.vision import vision_message
-from uam_sim_bridge.mavlink.wire import Codec, mavlink2
+from uam_sim_bridge.nodes.autopilot_topics import AutopilotTopics
+from uam_sim_bridge.nodes.bridge_link import BridgeParameters, open_links
 
 NAME = "mavlink_bridge"
-STATE_PERIOD = 500_000_000  # ns between two reports of the autopilot's state
-BATTERY_PERIOD = 1_000_000_000  # ns
 THRUST_PERIOD = 100_000_000  # ns between two reports of the thrust factor
 WATCH_PERIOD = 0.02  # s between two looks of the real-time watchdog, and its setpoints
-BAD = object()  # stands for a message that must not be used
 
 
-@dataclass(frozen=True)
-class BridgeParameters(ParameterSet):
-    """Ports and rates of the bridge; fixed once the node runs."""
+class Unusable(Enum):
+    """Stands for a message that must not be used."""
 
-    clock: str = choice(
-        "lockstep",
-        "lockstep: ticks alone; realtime: a watchdog on wall time as well",
-        ("lockstep", "realtime"),
-    )
-    local_port: float = number(14540, "own UDP port (14540 + instance)", "1", 1, 65535)
-    autopilot_port: float = number(
-        14580, "UDP port of the autopilot (14580 + instance)", "1", 1, 65535
-    )
-    autopilot_system: float = number(1, "MAVLink system id of the autopilot", "1", 1, 255)
-    signing_link_id: float = number(0, "number of this link in MAVLink 2 signatures", "1", 0, 255)
-    vision_interval: float = number(0.02, "least time between two vision poses sent", "s", 0.0, 1.0)
-    vision_position_deviation: float = number(
-        0.005, "standard deviation told with a vision pose", "m", 1e-4, 1.0
-    )
-    vision_attitude_deviation: float = number(
-        0.02, "standard deviation told with a vision pose", "rad", 1e-4, 1.0
-    )
-    autopilot_parameters: str = choice(
-        "warn",
-        "where the autopilot's MC_*RATE_P/K or THR_MDL_FAC differ from the mapping: warn, "
-        "or adopt them before arming",
-        ("warn", "adopt"),
-    )
-    stale_after: float = number(
-        0.1, "real time without a tick, after which the commands count as lost", "s", 0.01, 5.0
-    )
+    BAD = 0
+
+
+BAD = Unusable.BAD
+StateOrBad = np.ndarray | Unusable
+CommandOrBad = PositionCommand | Unusable
+TorqueOrBad = tuple[np.ndarray | None] | Unusable
 
 
 class MavlinkBridgeNode(UamNode):
@@ -122,17 +93,13 @@ class MavlinkBridgeNode(UamNode):
         self.sequence = OffboardSequence(offboard)
         self._hold = LevelHold(hold)
         options = self._options
-        self._station: GroundStation | None = None
-        self._faulty: FaultyTransport | None = None
-        self.link = self._open_link(hold.hold_time)
+        links = open_links(self, options, self.sequence, self.map.parameters, hold.hold_time)
+        self.link, self._station, self._faulty = links.autopilot, links.station, links.faulty
+        self._fault_topic = FaultTopic(self) if self._faulty else None
         self._state = np.zeros((3, 8))
         self._pose: tuple[int, np.ndarray, np.ndarray] | None = None
         self._pose_sent = -1.0
-        self._told: tuple[Any, ...] = ()
-        self._told_at = -STATE_PERIOD
-        self._warned: tuple[str, ...] = ()
         self._adopted: tuple[str, ...] = ()
-        self._battery_told = -BATTERY_PERIOD
         self._last_tick = time.monotonic()
         self._ground: float | None = None  # height [m] at which the vehicle stood
         self._margin = hold.ground_margin
@@ -140,8 +107,7 @@ class MavlinkBridgeNode(UamNode):
         self._warm_up()
 
         self._setpoint = self.publisher(topics.SETPOINT)
-        self._autopilot_state = self.publisher(topics.AUTOPILOT_STATE)
-        self._battery = self.publisher(topics.AUTOPILOT_BATTERY)
+        self._autopilot = AutopilotTopics(self, self.link, self.sequence)
         self._thrust = self.publisher(topics.THRUST)
         self._writer = SetpointWriter()
         self._factor_writer = JointStateWriter(["factor"])
@@ -159,65 +125,6 @@ class MavlinkBridgeNode(UamNode):
             steady = Clock(clock_type=ClockType.STEADY_TIME)
             self.create_timer(WATCH_PERIOD, self._watch, clock=steady)
 
-    def _open_link(self, hold_time: float) -> OffboardLink:
-        """Open the links that the parameters name; raises PortError, FaultError in one line."""
-        options = self._options
-        system = int(options.autopilot_system)
-        about = ParameterDescriptor(
-            description="address of the autopilot's UDP port, where `autopilot` names no link",
-            read_only=True,
-        )
-        host = self.declare_parameter("autopilot_host", "127.0.0.1", about).value
-        url = self._text(
-            "autopilot",
-            "link to the autopilot, in place of the UDP port: "
-            "udp:HOST:PORT[:LOCAL_PORT], tcp:HOST:PORT or serial:DEVICE:BAUD",
-        )
-        station = self._text("gcs", "ground station that watches: udp:HOST:PORT[:LOCAL_PORT]")
-        signing = Signing.from_text(
-            self._text(
-                "signing_key",
-                "MAVLink 2 signing: 64 hex digits, or a file that holds "
-                "them; read as 'set' from outside",
-                secret=True,
-            ),
-            int(options.signing_link_id),
-        )
-        transport: Transport
-        if url:
-            transport = open_transport(url)
-        else:
-            transport = UdpTransport(int(options.local_port), (host, int(options.autopilot_port)))
-        faults = Schedule.from_text(
-            self._text(
-                "faults",
-                "JSON, faults of the MAVLink connection and when they come, see "
-                "docs/faults.md; empty = none",
-            )
-        ).only(LINK)
-        if faults:
-            transport = self._faulty = FaultyTransport(transport, faults)
-            self._fault_topic = FaultTopic(self)
-        if station:
-            codec = Codec(system, mavlink2.MAV_COMP_ID_ONBOARD_COMPUTER, signing)
-            transport = self._station = GroundStation(station, transport, codec)
-        return OffboardLink(
-            transport, self.sequence, self.map.parameters, system, hold_time, signing
-        )
-
-    def _text(self, name: str, description: str, secret: bool = False) -> str:
-        """Declare a read-only text, '' by default, and return it; a secret one is not shown.
-
-        Raises PortError where something else is given, such as a key that reads as a number.
-        """
-        value = given(self).get(name, "")
-        if not isinstance(value, str):
-            raise PortError(f"{name}: a text expected" + (", or a file's name" if secret else ""))
-        shown = "set" if secret and value else value
-        descriptor = ParameterDescriptor(description=description, read_only=True)
-        self.declare_parameter(name, shown, descriptor, ignore_override=True)
-        return value
-
     def _configure(self, parameters: RateThrustParameters) -> None:
         self.map.configure(parameters)
         self.link.set_mapping(parameters)
@@ -228,7 +135,7 @@ class MavlinkBridgeNode(UamNode):
             self.link.close()
         super().destroy_node()
 
-    def _feed(self, topic: topics.Topic, read) -> None:
+    def _feed(self, topic: topics.Topic, read: Callable[[bytes], tuple[int, object]]) -> None:
         """Join a topic; a message that must not be used still counts for its stamp."""
 
         def handle(data: bytes) -> None:
@@ -246,10 +153,10 @@ class MavlinkBridgeNode(UamNode):
         stamp, torque = read_torque(data, TAU_Q)
         return stamp, (torque,)  # None means "idle" here, but "not there" to the join
 
-    def _on_arming(self, message) -> None:
+    def _on_arming(self, message: Bool) -> None:
         self.sequence.want(bool(message.data))
 
-    def _on_mission(self, message) -> None:
+    def _on_mission(self, message: DiagnosticArray) -> None:
         stamp, status = MissionStatus.from_message(message)
         self.identification.switch(seconds(stamp), status.magnet)
         self.sequence.let_go = status.state == State.FAILSAFE.value
@@ -259,7 +166,9 @@ class MavlinkBridgeNode(UamNode):
     def _on_mocap(self, data: bytes) -> None:
         self._pose = read_pose(data)
 
-    def _tick(self, stamp: int, state, position, torque) -> None:
+    def _tick(
+        self, stamp: int, state: StateOrBad, position: CommandOrBad, torque: TorqueOrBad
+    ) -> None:
         begun = time.perf_counter()
         now = seconds(stamp)
         self._last_tick = time.monotonic()
@@ -273,14 +182,14 @@ class MavlinkBridgeNode(UamNode):
         self._adopt()
         setpoint = self._command(now, state, position, torque)
         self._send(now, setpoint)
-        self._tell(stamp)
+        self._autopilot.tell(stamp)
         rates, thrust = setpoint or (self._idle, 0.0)
         self._identify(stamp, state, position, thrust)
         self._setpoint.publish(self._writer.fill(stamp, rates, thrust))
         self.done_tick(stamp, begun)
 
     def _update_faults(self, now: float) -> None:
-        if self._faulty is not None:
+        if self._faulty and self._fault_topic:
             self._fault_topic.tell(round(now * 1e9), self._faulty.update(now))
 
     def _adopt(self) -> None:
@@ -304,7 +213,9 @@ class MavlinkBridgeNode(UamNode):
         for change in changes:
             self.get_logger().info(f"adopted from the autopilot: {change}")
 
-    def _identify(self, stamp: int, state, position, thrust: float) -> None:
+    def _identify(
+        self, stamp: int, state: StateOrBad, position: CommandOrBad, thrust: float
+    ) -> None:
         """Compare the thrust sent with the acceleration; the factor counts from the next tick."""
         if stamp // THRUST_PERIOD != self.stamp // THRUST_PERIOD:
             self._factor_writer.position[0] = self.map.thrust_factor  # as applied at this tick
@@ -319,7 +230,9 @@ class MavlinkBridgeNode(UamNode):
             position.flying and self.link.armed,
         )
 
-    def _command(self, now: float, state, position, torque) -> tuple[np.ndarray, float] | None:
+    def _command(
+        self, now: float, state: StateOrBad, position: CommandOrBad, torque: TorqueOrBad
+    ) -> tuple[np.ndarray, float] | None:
         """Return body rates (3,) and thrust for this tick, None for no setpoint at all."""
         good = state is not BAD and position is not BAD and torque is not BAD
         good = good and not self.sequence.let_go
@@ -387,41 +300,9 @@ class MavlinkBridgeNode(UamNode):
         self._update_faults(now)
         self.link.poll(now)
         self._send(now, self._without_command(now))
-        self._tell(round(now * 1e9))
+        self._autopilot.tell(round(now * 1e9))
 
-    def _tell(self, stamp: int) -> None:
-        """Publish the autopilot's state when it changes and twice a second, its battery once."""
-        link, sequence = self.link, self.sequence
-        if link.battery is not None and stamp - self._battery_told >= BATTERY_PERIOD:
-            self._battery_told = stamp
-            self._battery.publish(battery_message(stamp, link.battery))
-        connected = link.connected(seconds(stamp))
-        what = (connected, link.mode, link.armed, sequence.phase, sequence.reasons)
-        if link.warnings != self._warned:
-            for warning in link.warnings:
-                if warning not in self._warned:
-                    self.get_logger().warning(warning)
-            self._warned = link.warnings
-        if what == self._told and stamp - self._told_at < STATE_PERIOD:
-            return
-        if what != self._told:
-            text = f"{sequence.phase.value}; autopilot {link.mode.name}, " + (
-                "armed" if link.armed else "disarmed"
-            )
-            self.get_logger().info("; ".join((text, *sequence.reasons)))
-        self._told, self._told_at = what, stamp
-        since = link.armed_since
-        self._autopilot_state.publish(
-            AutopilotState(
-                connected,
-                link.mode.name,
-                link.armed,
-                None if since is None else round(since * 1e6) * 1000,
-                "; ".join(sequence.reasons),
-            ).to_message(stamp)
-        )
-
-    def diagnose(self):
+    def diagnose(self) -> tuple[bytes, str, dict[str, object]]:
         link, sequence = self.link, self.sequence
         notes = (*sequence.reasons, *faults(link), *link.warnings)
         values = {

@@ -1,0 +1,130 @@
+"""The bridge's links: to the autopilot, and to a ground station that watches."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from rcl_interfaces.msg import ParameterDescriptor
+
+from uam_control.parameters import ParameterSet, choice, number
+from uam_msgs_py.parameters import given
+from uam_msgs_py.tunable import TunableNode
+from uam_sim_bridge.faults import LINK, Schedule
+from uam_sim_bridge.flight.ports import PortError
+from uam_sim_bridge.mavlink.faulty_transport import FaultyTransport
+from uam_sim_bridge.mavlink.forwarding import GroundStation
+from uam_sim_bridge.mavlink.link import OffboardLink
+from uam_sim_bridge.mavlink.offboard import OffboardSequence
+from uam_sim_bridge.mavlink.setpoint import RateThrustParameters
+from uam_sim_bridge.mavlink.signing import Signing
+from uam_sim_bridge.mavlink.transport import Transport, UdpTransport, open_transport
+from uam_sim_bridge.mavlink.wire import Codec, mavlink2
+
+
+@dataclass(frozen=True)
+class BridgeParameters(ParameterSet):
+    """Ports and rates of the bridge; fixed once the node runs."""
+
+    clock: str = choice(
+        "lockstep",
+        "lockstep: ticks alone; realtime: a watchdog on wall time as well",
+        ("lockstep", "realtime"),
+    )
+    local_port: float = number(14540, "own UDP port (14540 + instance)", "1", 1, 65535)
+    autopilot_port: float = number(
+        14580, "UDP port of the autopilot (14580 + instance)", "1", 1, 65535
+    )
+    autopilot_system: float = number(1, "MAVLink system id of the autopilot", "1", 1, 255)
+    signing_link_id: float = number(0, "number of this link in MAVLink 2 signatures", "1", 0, 255)
+    vision_interval: float = number(0.02, "least time between two vision poses sent", "s", 0.0, 1.0)
+    vision_position_deviation: float = number(
+        0.005, "standard deviation told with a vision pose", "m", 1e-4, 1.0
+    )
+    vision_attitude_deviation: float = number(
+        0.02, "standard deviation told with a vision pose", "rad", 1e-4, 1.0
+    )
+    autopilot_parameters: str = choice(
+        "warn",
+        "where the autopilot's MC_*RATE_P/K or THR_MDL_FAC differ from the mapping: warn, "
+        "or adopt them before arming",
+        ("warn", "adopt"),
+    )
+    stale_after: float = number(
+        0.1, "real time without a tick, after which the commands count as lost", "s", 0.01, 5.0
+    )
+
+
+@dataclass(frozen=True)
+class Links:
+    """What was opened; station, faulty: None where none is asked for."""
+
+    autopilot: OffboardLink
+    station: GroundStation | None
+    faulty: FaultyTransport | None
+
+
+def open_links(
+    node: TunableNode,
+    options: BridgeParameters,
+    sequence: OffboardSequence,
+    mapping: RateThrustParameters,
+    hold_time: float,
+) -> Links:
+    """Declare the parameters that name links, and open them.
+
+    hold_time [s]: of the level hold. Raises PortError, FaultError in one line.
+    """
+    system = int(options.autopilot_system)
+    about = ParameterDescriptor(
+        description="address of the autopilot's UDP port, where `autopilot` names no link",
+        read_only=True,
+    )
+    host = node.declare_parameter("autopilot_host", "127.0.0.1", about).value
+    url = _text(
+        node,
+        "autopilot",
+        "link to the autopilot, in place of the UDP port: "
+        "udp:HOST:PORT[:LOCAL_PORT], tcp:HOST:PORT or serial:DEVICE:BAUD",
+    )
+    watching = _text(node, "gcs", "ground station that watches: udp:HOST:PORT[:LOCAL_PORT]")
+    key = _text(
+        node,
+        "signing_key",
+        "MAVLink 2 signing: 64 hex digits, or a file that holds them; read as 'set' from outside",
+        secret=True,
+    )
+    signing = Signing.from_text(key, int(options.signing_link_id))
+    planned = _text(
+        node,
+        "faults",
+        "JSON, faults of the MAVLink connection and when they come, see docs/faults.md; "
+        "empty = none",
+    )
+    faults = Schedule.from_text(planned).only(LINK)
+    transport: Transport
+    if url:
+        transport = open_transport(url)
+    else:
+        transport = UdpTransport(int(options.local_port), (host, int(options.autopilot_port)))
+    faulty = station = None
+    if faults:
+        transport = faulty = FaultyTransport(transport, faults)
+    if watching:
+        codec = Codec(system, mavlink2.MAV_COMP_ID_ONBOARD_COMPUTER, signing)
+        transport = station = GroundStation(watching, transport, codec)
+    link = OffboardLink(transport, sequence, mapping, system, hold_time, signing)
+    return Links(link, station, faulty)
+
+
+def _text(node: TunableNode, name: str, description: str, secret: bool = False) -> str:
+    """Declare a read-only text, '' by default, and return it; a secret one is not shown.
+
+    Raises PortError where something else is given, such as a key that reads as a number.
+    """
+    value = given(node).get(name, "")
+    if not isinstance(value, str):
+        raise PortError(f"{name}: a text expected" + (", or a file's name" if secret else ""))
+    shown = "set" if secret and value else value
+    descriptor = ParameterDescriptor(description=description, read_only=True)
+    node.declare_parameter(name, shown, descriptor, ignore_override=True)
+    return value
