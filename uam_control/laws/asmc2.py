@@ -137,7 +137,7 @@ def asmc2_step(
 
 @jit
 def adapt(
-    p: np.void, w_norm: float, rate: float, saturated: bool, dt: float, adaptation: np.ndarray
+    p: np.record, w_norm: float, rate: float, saturated: bool, dt: float, adaptation: np.ndarray
 ) -> None:
     """Advance theta by dt, exactly for inputs that are constant over the tick.
 

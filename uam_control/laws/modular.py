@@ -79,7 +79,7 @@ def law_step(
 
 @jit
 def adapt(
-    p: np.void,
+    p: np.record,
     r_norm: float,
     xi_norm: float,
     acceleration: float,

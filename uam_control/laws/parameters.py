@@ -54,9 +54,12 @@ class LawParameters(ParameterSet):
 
 
 def structured(values: dict[str, Any]) -> np.ndarray:
-    """Return `values`, numbers and vectors, as a one-element structured float64 array."""
+    """Return `values`, numbers and vectors, as a one-element structured float64 array.
+
+    Its element is a np.record: compiled or not, its fields are attributes.
+    """
     fields = [(name, np.float64, np.shape(value)) for name, value in values.items()]
-    record = np.zeros(1, np.dtype(fields))
+    record = np.zeros(1, np.dtype((np.record, fields)))
     for name, value in values.items():
         record[name][0] = value
     return record
