@@ -10,7 +10,7 @@ import time
 from collections.abc import Callable
 from pathlib import Path
 
-from uam_sim_bridge.flight import shared_memory
+from uam_sim_bridge.flight import process_table, shared_memory
 from uam_sim_bridge.flight.ports import SIMULATOR_TCP
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -77,17 +77,11 @@ class Flight:
     def children(self) -> dict[str, int]:
         """Its nodes: name → process id."""
         found = {}
-        for entry in Path("/proc").glob("[0-9]*"):
-            try:
-                words = (entry / "cmdline").read_text().split("\0")
-                parent = int((entry / "stat").read_text().rsplit(")", 1)[1].split()[1])
-            except OSError:
-                continue
-            if parent == self.process.pid and "uam_sim_bridge.flight.child" in words:
-                module = words[words.index("uam_sim_bridge.flight.child") + 2]
-                found["autopilot" if "autopilot" in module else module.split(".")[-1]] = int(
-                    entry.name
-                )
+        for pid in process_table.pids():
+            name = process_table.node_name(pid)
+            forker = process_table.parent(pid)
+            if name and process_table.parent(forker) == self.process.pid:
+                found[name] = pid
         return found
 
     def shared_memory(self) -> set[Path]:

@@ -42,6 +42,11 @@ class CompileCache(FunctionCache):
         super().__init__(function)
         self._cache_file = _Files(self.cache_path, self._impl.filename_base, function)
 
+    @property
+    def filled(self) -> bool:
+        """Whether it holds machine code of the present sources, for any signature."""
+        return self._cache_file.filled
+
 
 class _Files(IndexDataCacheFile):
     """One file for each signature, without an index: <function>.<sources>.<signature>.nbc."""
@@ -54,6 +59,12 @@ class _Files(IndexDataCacheFile):
     def _name(self, key: Any) -> str:
         signature = hashlib.sha256(repr((numba.__version__, key)).encode()).hexdigest()
         return f"{self._base}.{_sources(self._function)}.{signature[:16]}.nbc"
+
+    @property
+    def filled(self) -> bool:
+        """See `CompileCache.filled`."""
+        pattern = f"{self._base}.{_sources(self._function)}.*.nbc"
+        return any(Path(self._cache_path).glob(pattern))
 
     def load(self, key: Any) -> Any:
         """Return what was saved for `key`; None if there is nothing, or nothing readable."""

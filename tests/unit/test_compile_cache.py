@@ -1,10 +1,13 @@
 """What is loaded from disk is the code of this function, for these arguments, as it is now."""
 
+import importlib
 import subprocess
 import sys
 from pathlib import Path
 
 import pytest
+
+from uam_sim_bridge.flight import ros_engine, warm_up
 
 CALLER = """
 from uam_control.compiled import jit
@@ -134,3 +137,31 @@ def test_records_of_two_layouts_compiled_apart_are_told_apart(tmp_path):
     assert run("print(call(3))") == [60.0]
     assert run("print(call(2), call(3))") == [30.0, 60.0]
     assert run("print(call(3), call(2))") == [60.0, 30.0]
+
+
+def test_what_is_compiled_is_known_until_an_edit(tmp_path):
+    told = "from caller import total; print(total._cache.filled)"
+    code = f"import sys; sys.path.insert(0, {str(tmp_path)!r}); {told}"
+
+    def filled() -> str:
+        return subprocess.run(
+            [sys.executable, "-c", code], capture_output=True, text=True, check=True
+        ).stdout.strip()
+
+    write(tmp_path)
+    assert filled() == "False"
+    result(begin(tmp_path))
+    assert filled() == "True"
+    (tmp_path / "caller.py").touch()
+    assert filled() == "True"
+    write(tmp_path, factor=5)
+    assert filled() == "False"
+
+
+def test_a_warm_up_leaves_nothing_of_the_nodes_to_compile():
+    for module in ros_engine.MODULES.values():
+        importlib.import_module(module)
+    assert list(warm_up.compiled_functions())
+    if warm_up.is_cold():
+        warm_up.warm_up()
+    assert not warm_up.is_cold()

@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 from pathlib import Path
 
-from uam_sim_bridge.flight.process_table import PROC, command, pids
+from uam_sim_bridge.flight.process_table import PROC, command, node_name, pids
 
 
 def of_port(protocol: str, port: int) -> list[str]:
@@ -41,7 +41,8 @@ def name_of(pid: int) -> str:
         for word in words[1:]
         if word.startswith("uam_sim_bridge.") or word.startswith("uam_control.")
     ]
-    name = known[-1] if known else Path(words[0]).name if words else "a program"
+    program = Path(words[0]).name if words else "a program"
+    name = node_name(pid) or (known[-1] if known else program)
     return f"{name} (process {pid})"
 
 

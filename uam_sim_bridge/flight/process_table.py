@@ -6,10 +6,9 @@ import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
-from uam_sim_bridge.flight.child import GRACE
+from uam_sim_bridge.flight.child import GRACE, TITLE
 
 PROC = Path("/proc")
-CHILD = "uam_sim_bridge.flight.child"
 INIT = 1
 POLL = 0.1  # [s]
 
@@ -37,9 +36,15 @@ def parent(pid: int) -> int:
         return 0
 
 
+def node_name(pid: int) -> str:
+    """What a flight has started it as, "" where it is no node of a flight."""
+    title, _, name = "".join(command(pid)[:1]).partition(" ")
+    return name if title == TITLE else ""
+
+
 def orphans() -> list[int]:
     """Nodes whose `uam fly` has gone; they end by themselves within child.GRACE, as a rule."""
-    return [pid for pid in pids() if CHILD in command(pid) and parent(pid) == INIT]
+    return [pid for pid in pids() if node_name(pid) and parent(pid) == INIT]
 
 
 def await_orphans(say: Callable[[str], None]) -> None:

@@ -3,12 +3,11 @@
 Each child has its own process group, so that Ctrl-C in the terminal reaches the orchestrator alone
 and the children are stopped in order; its output goes to <logs>/<name>.log. It stays in the
 session: schedulers share time between sessions first, whatever the processes' priorities.
+See `child` for how they run.
 """
 
 import os
 import signal
-import subprocess
-import sys
 import time
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
@@ -16,6 +15,7 @@ from pathlib import Path
 
 from uam_control import configuration
 from uam_sim_bridge.flight import shared_memory
+from uam_sim_bridge.flight.child import SINGLE_THREAD, Forked
 
 LAST_LINES = 12  # of a failed node's log that its error message shows
 INTERRUPT_WAIT, TERMINATE_WAIT = 10.0, 3.0  # seconds until the next, harder signal
@@ -61,7 +61,7 @@ class Child:
     """One running process."""
 
     name: str
-    process: subprocess.Popen
+    process: Forked
     log: Path
     may_end: bool = False  # its end is expected: it was asked to stop, or ends with the mission
     optional: bool = False  # the flight goes on without it
@@ -102,17 +102,7 @@ class Processes:
         optional: its end is no failure of the flight, see `missed`.
         """
         log = self._logs / f"{name}.log"
-        runner = [sys.executable, "-m", "uam_sim_bridge.flight.child", str(niceness)]
-        command = [*runner, module, *arguments]
-        with log.open("ab") as output:
-            process = subprocess.Popen(
-                command,
-                stdin=subprocess.PIPE,  # child.py watches it
-                stdout=output,
-                stderr=subprocess.STDOUT,
-                env=self._environment,
-                process_group=0,
-            )
+        process = Forked(name, module, arguments, log, self._environment, niceness)
         child = Child(name, process, log, may_end, optional)
         self._children[name] = child
         return child
@@ -190,9 +180,6 @@ class Processes:
         """Stop whatever still runs and remove what killed children left in shared memory."""
         self.note_shared_memory()
         self.stop(self.names)
-        for child in self._children.values():
-            if child.process.stdin and not child.process.stdin.closed:
-                child.process.stdin.close()
         used = set().union(*(child.shared for child in self._children.values()))
         self._tidy(used)
 
@@ -204,19 +191,8 @@ class Processes:
 
 
 def environment(domain: int, log_folder: Path) -> dict[str, str]:
-    """What the children inherit: a private, local ROS domain and one thread each.
-
-    One thread, because the nodes' matrices are tiny and several pools of threads on few cores
-    only delay each other.
-    """
-    return {
-        **os.environ,
-        **ros_environment(domain, log_folder),
-        "OMP_NUM_THREADS": "1",
-        "OPENBLAS_NUM_THREADS": "1",
-        "NUMBA_NUM_THREADS": "1",
-        "PYTHONUNBUFFERED": "1",
-    }
+    """What the children inherit: a private, local ROS domain and one thread each."""
+    return {**os.environ, **ros_environment(domain, log_folder), **SINGLE_THREAD}
 
 
 def ros_environment(domain: int, log_folder: Path) -> dict[str, str]:

@@ -15,7 +15,7 @@ from typing import Any
 from uam_sim_bridge.cockpit import place
 from uam_sim_bridge.faults import LINK, PLANT, PROCESS
 from uam_sim_bridge.faults.timeline import Happened
-from uam_sim_bridge.flight import log_facts, shared_memory, wiring
+from uam_sim_bridge.flight import child, log_facts, shared_memory, wiring
 from uam_sim_bridge.flight.conclude import asked, command_line
 from uam_sim_bridge.flight.fault_log import FaultTopic
 from uam_sim_bridge.flight.interrupts import Interrupts
@@ -49,6 +49,7 @@ MODULES = {
 }
 AUTOPILOT = "autopilot"
 FACTS = "facts.json"
+FORKER = "uam_sim_bridge.flight.forker"
 STAND_IN, SITL = "uam_sim_bridge.autopilot.server", "uam_sim_bridge.px4.sitl"
 HITL_ROUTER = "uam_sim_bridge.mavlink.router"
 PX4_LOG = "px4.ulg"
@@ -76,6 +77,7 @@ def fly(settings: FlightSettings, folder: ResultFolder, progress: Progress) -> O
         if is_cold():
             progress.message("compiling the control path (once)")
             warm_up()
+        child.prepare([*_modules(settings).values(), FORKER])
         await_orphans(progress.message)
         presence.remove_unused(shared_memory.abandoned())
         with Interrupts() as stop:
@@ -213,9 +215,7 @@ def _start(
     # What the nodes log is in their output already; files of their own would repeat it.
     arguments = ["--ros-args", "--disable-external-lib-logs"]
     arguments += ["--params-file", str(folder.parameters)]
-    for name, module in MODULES.items():
-        if name in settings.without:
-            continue
+    for name, module in _modules(settings).items():
         children.start(
             name,
             module,
@@ -227,6 +227,11 @@ def _start(
     module, own = _autopilot(settings, folder, ports)
     if module:
         children.start(AUTOPILOT, module, own, may_end=True)
+
+
+def _modules(settings: FlightSettings) -> dict[str, str]:
+    """The nodes of a flight: executable → module."""
+    return {name: module for name, module in MODULES.items() if name not in settings.without}
 
 
 def _in_the_loop(settings: FlightSettings) -> bool:

@@ -7,8 +7,7 @@ them there and up to date nothing is left to do.
 from __future__ import annotations
 
 import sys
-from collections.abc import Iterator
-from pathlib import Path
+from collections.abc import Iterable, Iterator
 
 from uam_control.laws.catalogue import LAWS
 from uam_control.mission import load_scenario
@@ -30,20 +29,15 @@ def compiled_functions() -> Iterator:
 
 
 def is_cold() -> bool:
-    """Whether a function of the control path has no compiled form newer than its source."""
-    for function in compiled_functions():
-        source = Path(function.py_func.__code__.co_filename)
-        pattern = f"{source.stem}.{function.py_func.__qualname__}-*.nbi"
-        cached = Path(function.stats.cache_path).glob(pattern)
-        if not any(file.stat().st_mtime >= source.stat().st_mtime for file in cached):
-            return True
-    return False
+    """Whether a function of the control path has no compiled form of its present source."""
+    return not all(function._cache.filled for function in compiled_functions())
 
 
-def warm_up() -> None:
+def warm_up(laws: Iterable[str] = tuple(LAWS)) -> None:
     """Fly a few seconds in the direct engine with each law: it runs every function of the nodes."""
     scenario, vehicle = load_scenario("hover"), Vehicle.load()
-    for entry in LAWS.values():
-        flight = DirectFlight(scenario, load_profile(entry.profile), vehicle, 0.0, seed=1)
+    for law in laws:
+        profile = load_profile(LAWS[law].profile)
+        flight = DirectFlight(scenario, profile, vehicle, 0.0, seed=1)
         for _ in range(TICKS):
             flight.tick()
