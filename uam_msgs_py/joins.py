@@ -88,6 +88,14 @@ class StampJoin:
             self.fired += 1
             self._fire(stamp, *values)
 
+    def skip(self, stamp: int) -> None:
+        """Let nothing up to `stamp` [ns] fire any more."""
+        if stamp > self._last:
+            self._last = stamp
+            for old in [key for key in self._open if key <= stamp]:
+                del self._open[old]
+                self._dropped += 1
+
     @property
     def dropped(self) -> int:
         """Ticks and values that came to nothing."""

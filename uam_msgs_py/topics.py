@@ -127,6 +127,14 @@ FAULTS = Topic(
     one_publisher=False,
 )
 
+RESTARTS = Topic(
+    "/uam/restarts",
+    DiagnosticArray,
+    _qos(100, latched=True),
+    "nodes that were lost and are started again, as uam fly says; name: the node",
+    one_publisher=False,
+)
+
 # What only a simulator knows
 TRUTH_STATE = Topic("/uam/truth/state", JointTrajectory, RELIABLE, "true chi, chi_dot, chi_ddot")
 TRUTH_PAYLOAD = Topic("/uam/truth/payload", PoseStamped, RELIABLE, "payload, world")

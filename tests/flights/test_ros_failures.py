@@ -30,7 +30,7 @@ def kept(flight):
 @pytest.mark.parametrize(
     "victim",
     [
-        "position_controller",
+        "state_estimator",
         *(pytest.param(name, marks=pytest.mark.slow) for name in ("autopilot", "recorder")),
     ],
 )

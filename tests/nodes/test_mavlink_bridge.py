@@ -331,6 +331,28 @@ def test_garbage_from_the_autopilots_port_does_no_harm(make_rig):
     assert rig.node.process.poll() is None
 
 
+def test_states_without_commands_hold_level_then_the_failsafe_acts(make_rig):
+    """A controller is lost: states go on, by whose stamps the bridge counts."""
+    rig = make_rig()
+    rig.fly()
+    stopped, thrusts = rig.count, []
+    for _ in range(700):
+        rig.publish(topics.STATE, rig.state.fill(rig.count * PERIOD, np.zeros((3, 8))))
+        silent = rig.count - stopped < 24  # stale_after, 0.1 s, after the last command
+        before = len(rig.setpoints)
+        if not silent:
+            rig.probe.until(lambda n=before: len(rig.setpoints) > n, "a setpoint without command")
+            thrusts.append(read_setpoint(rig.setpoints[-1])[2])
+        rig.autopilot_tick()
+        rig.count += 1
+    assert thrusts[:240] == pytest.approx([WEIGHT / 41.36] * 240, rel=0.02)
+    assert thrusts[-1] == 0.0 and "stream stopped" in rig.node.output
+    assert rig.autopilot.status.mode is Mode.LAND and rig.autopilot.status.armed
+    for _ in range(400):
+        rig.tick((0, 0, WEIGHT))
+    assert rig.autopilot.status.mode is Mode.OFFBOARD
+
+
 def test_realtime_watchdog_holds_level_and_then_stops(make_rig):
     """Ticks stop in flight: level setpoints go on by themselves for hold_time, then none."""
     rig = make_rig("-p", "clock:=realtime", "-p", "stale_after:=2.0", "-p", "hold_time:=1.0")

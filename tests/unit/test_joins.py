@@ -22,6 +22,16 @@ def test_it_fires_when_the_last_input_of_a_stamp_arrives():
     assert fired == [(4, ("a4", "b4", "c4"))]
 
 
+def test_what_is_skipped_does_not_fire_any_more():
+    join, fired = joined()
+    join.add("a", 4, 1)
+    join.skip(8)
+    for stamp in (4, 8, 12):
+        for name in "abc":
+            join.add(name, stamp, stamp)
+    assert [stamp for stamp, _ in fired] == [12]
+
+
 def test_arrays_are_values_like_any_other():
     join, fired = joined()
     for name in "abc":

@@ -72,6 +72,32 @@ def test_a_child_obeys_the_interrupt(children):
     assert gone(children.pid("a"))
 
 
+def test_who_may_be_is_started_again_as_often_as_that(children):
+    children.start("a", "sleeper", again=2)
+    for left in (1, 0):
+        ready(children, "a")
+        pid = children.pid("a")
+        os.kill(pid, signal.SIGKILL)
+        wait_for(lambda: not children.running("a"))
+        (lost,) = children.revive()
+        assert lost.name == "a" and lost.status == -signal.SIGKILL
+        assert children.running("a") and children.pid("a") != pid
+        assert children._children["a"].again == left
+        children.check()
+    os.kill(children.pid("a"), signal.SIGKILL)
+    wait_for(lambda: not children.running("a"))
+    assert children.revive() == []
+    with pytest.raises(NodeFailed, match="killed by SIGKILL"):
+        children.check()
+
+
+def test_who_was_asked_to_stop_is_not_started_again(children):
+    children.start("a", "sleeper", again=1)
+    ready(children, "a")
+    children.stop(["a"])
+    assert children.revive() == []
+
+
 def test_a_child_that_ignores_signals_is_killed_and_named(children, monkeypatch):
     monkeypatch.setattr(processes, "INTERRUPT_WAIT", 0.2)
     monkeypatch.setattr(processes, "TERMINATE_WAIT", 0.2)

@@ -60,8 +60,8 @@ def test_nothing_leads_out_of_failsafe_but_a_command_and_motors_go_off_on_the_gr
 def test_as_many_quantities_are_measured_as_are_named():
     values, seen, two, three = np.full(len(CHECKS), np.nan), observation(), np.ones(2), np.ones(3)
     measure(seen.state, seen.reference, 0.0, np.zeros((2, 3)), two, values)
-    assert np.isnan(values).sum() == 6
-    read(1.0, 0.0, 0.0, 0.0, two, two, three, three, values)
+    assert np.isnan(values).sum() == 7
+    read(1.0, 0.0, 0.0, 0.0, 0.0, two, two, three, three, values)
     assert not np.isnan(values).any()
     checks = Checks(SupervisionParameters())
     assert checks.update(0.0, seen, True) is None
@@ -170,6 +170,7 @@ def with_state(entry, value):
         (observation(readings=Readings(mocap_age=0.3)), State.HOLDING, "mocap pose is 0.30 s old"),
         (observation(readings=Readings(mocap_age=1.1)), State.FAILSAFE, "mocap pose is 1.10 s"),
         (observation(readings=Readings(joint_age=0.3)), State.HOLDING, "joint angles are 0.30 s"),
+        (observation(readings=Readings(controller_age=0.3)), State.HOLDING, "a controller's gains"),
         (observation(readings=Readings(missed_ticks=130)), State.HOLDING, "130 control ticks"),
         (
             observation(readings=Readings(joint_effort=np.array([0.0, -2.9]))),
@@ -229,6 +230,29 @@ def test_a_hard_limit_on_the_ground_stops_the_motors_there():
     assert decision.state is State.DISARMED and not decision.arm
 
 
+@pytest.mark.parametrize(
+    ("policy", "state", "cause"),
+    [
+        ("go_on", State.FLYING, "the controller is back"),
+        ("land", State.LANDING, "the controller is back"),
+        ("stay", State.HOLDING, "a controller's gains are 0.30 s old, 0.25 s allowed"),
+    ],
+)
+def test_a_controller_that_is_back_is_followed_by_what_the_policy_says(policy, state, cause):
+    supervisor = flying(after_restart=policy)
+    assert watch(supervisor, observation(readings=Readings(controller_age=0.3)), 1.0).state is (
+        State.HOLDING
+    )
+    decision = watch(supervisor, observation(readings=Readings(controller_age=0.02)), 2.0, 3.0)
+    assert (decision.state, decision.cause) == (state, cause)
+
+
+def test_another_limit_that_is_clear_again_waits_for_a_command():
+    supervisor = flying(after_restart="go_on")
+    watch(supervisor, observation(readings=Readings(joint_age=0.3)), 1.0)
+    assert watch(supervisor, observation(), 2.0, 3.0).state is State.HOLDING
+
+
 @pytest.mark.parametrize("keep", ["keep", "release"])
 def test_arm_and_magnet_follow_the_policy(keep):
     supervisor = flying(arm_holding="stow", arm_landing="stay", magnet_holding=keep)
@@ -243,10 +267,11 @@ def test_inputs_tell_ages_by_stamps_and_count_missed_ticks_of_a_second():
     assert math.isnan(inputs.at(1.0).mocap_age)
     inputs.mocap(0.99)
     inputs.joints(1.0, np.array([0.1, 0.2]))
-    inputs.gains("arm", ["K0", "zeta", "rho"], np.array([-3.0, 0.1, 99.0]))
-    inputs.gains("position", ["D0", "s_norm"], np.array([5.0, 9.0]))
+    inputs.gains(0.0, "arm", ["K0", "zeta", "rho"], np.array([-3.0, 0.1, 99.0]))
+    inputs.gains(0.0, "position", ["D0", "s_norm"], np.array([5.0, 9.0]))
     readings = inputs.at(1.02)  # four ticks were missed
     assert readings.mocap_age == pytest.approx(0.03) and readings.missed_ticks == 4.0
+    assert readings.controller_age == pytest.approx(1.02)
     assert readings.gains[2] == 3.0 and np.isnan(readings.gains[:2]).all()
     assert inputs.at(1.024).missed_ticks == 4.0
     for tick in range(300):
@@ -256,7 +281,7 @@ def test_inputs_tell_ages_by_stamps_and_count_missed_ticks_of_a_second():
 
 NUMBERS = st.floats(-1e3, 1e3) | st.sampled_from([math.nan, math.inf, -math.inf, 0.0])
 READINGS = st.builds(
-    Readings, NUMBERS, NUMBERS, NUMBERS, NUMBERS,
+    Readings, NUMBERS, NUMBERS, NUMBERS, NUMBERS, NUMBERS,
     st.builds(np.array, st.tuples(NUMBERS, NUMBERS)),
     st.builds(np.array, st.tuples(NUMBERS, NUMBERS, NUMBERS)),
 )  # fmt: skip

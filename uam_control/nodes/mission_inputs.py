@@ -81,5 +81,5 @@ class MissionInputs:
         self._inputs.battery(message.percentage)
 
     def _on_gains(self, subsystem: str, data: bytes) -> None:
-        _, names, values = read_values(data, "position")
-        self._inputs.gains(subsystem, names, values)
+        stamp, names, values = read_values(data, "position")
+        self._inputs.gains(seconds(stamp), subsystem, names, values)

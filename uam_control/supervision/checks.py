@@ -16,6 +16,7 @@ from uam_control.supervision.observation import Observation
 from uam_control.supervision.parameters import SupervisionParameters
 
 NONE = math.inf
+CONTROLLERS = "controllers"
 
 
 class Check(NamedTuple):
@@ -53,6 +54,8 @@ CHECKS = (
     Check("mocap", "{name} pose is {value:.2f} s old, {limit:g} s allowed", "mocap_age_hold",
           failsafe="mocap_age_failsafe"),
     Check("joint angles", "{name} are {value:.2f} s old, {limit:g} s allowed", "joint_age_hold"),
+    Check(CONTROLLERS, "a controller's gains are {value:.2f} s old, {limit:g} s allowed",
+          "controller_age_hold"),
     Check("control ticks", "{value:.0f} {name} missed within a second, {limit:g} allowed",
           "missed_ticks_hold"),
     Check("joint torque", "{name} at {value:.2f} of its limit", 1.0),
@@ -61,10 +64,11 @@ CHECKS = (
 
 
 class Finding(NamedTuple):
-    """What is beyond a limit for long enough: how bad, and in words."""
+    """What is beyond a limit for long enough: how bad, in words, and the quantity's name."""
 
     level: Level
     cause: str
+    name: str
 
 
 class Checks:
@@ -106,6 +110,7 @@ class Checks:
             readings.battery,
             readings.mocap_age,
             readings.joint_age,
+            readings.controller_age,
             readings.missed_ticks,
             readings.joint_effort,
             self._efforts,
@@ -123,7 +128,7 @@ class Checks:
                 value = -math.inf
             level = monitor.update(stamp, value, limits, self._after, p.clear_after, p.hysteresis)
             if level and (worst is None or level > worst.level):
-                worst = Finding(level, _cause(check, value, limits[level - 1]))
+                worst = Finding(level, _cause(check, value, limits[level - 1]), check.name)
         self.quiet = all(monitor.quiet for monitor in self._monitors)
         self.finding = worst
         return worst
@@ -178,6 +183,7 @@ def read(
     battery: float,
     mocap: float,
     joints: float,
+    controllers: float,
     missed: float,
     effort: np.ndarray,
     effort_limits: np.ndarray,
@@ -187,9 +193,10 @@ def read(
 ) -> None:
     """Write the readings (see `Readings`) into values[7:]; unknown ones are in order."""
     values[7] = _known(-battery)
-    values[8], values[9], values[10] = _known(mocap), _known(joints), _known(missed)
-    values[11] = _largest(effort, effort_limits)
-    values[12] = _largest(gains, gain_limits)
+    values[8], values[9] = _known(mocap), _known(joints)
+    values[10], values[11] = _known(controllers), _known(missed)
+    values[12] = _largest(effort, effort_limits)
+    values[13] = _largest(gains, gain_limits)
 
 
 @jit

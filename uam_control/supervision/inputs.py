@@ -23,6 +23,7 @@ class Inputs:
         self._readings = Readings()
         self._period = period
         self._mocap = self._joints = math.nan  # stamps [s]
+        self._controllers: dict[str, float] = {}  # stamps of the newest gains [s]
         self._last: float | None = None
         self._gaps: deque[tuple[float, int]] = deque()  # stamp [s], ticks missed before it
         self._watched: dict[tuple[str, ...], list[int]] = {}
@@ -40,14 +41,15 @@ class Inputs:
         """Note the charge left, 0..1; NaN where nobody knows."""
         self._readings.battery = left
 
-    def gains(self, subsystem: str, names: Sequence[str], values: np.ndarray) -> None:
-        """Note the published gains (n,) of one of SUBSYSTEMS and their names."""
+    def gains(self, stamp: float, subsystem: str, names: Sequence[str], values: np.ndarray) -> None:
+        """Note the gains (n,) that one of SUBSYSTEMS had at `stamp` [s], and their names."""
         key = tuple(names)
         if key not in self._watched:
             self._watched[key] = [i for i, n in enumerate(names) if n.startswith(WATCHED)]
         watched = self._watched[key]
         largest = float(np.max(np.abs(values[watched]))) if watched else math.nan
         self._readings.gains[SUBSYSTEMS.index(subsystem)] = largest
+        self._controllers[subsystem] = stamp
 
     def at(self, stamp: float) -> Readings:
         """Return what is known at the tick `stamp` [s]; the object is reused by the next call."""
@@ -62,4 +64,6 @@ class Inputs:
         readings.missed_ticks = float(sum(missed for _, missed in gaps))
         readings.mocap_age = stamp - self._mocap
         readings.joint_age = stamp - self._joints
+        if self._controllers:
+            readings.controller_age = stamp - min(self._controllers.values())
         return readings

@@ -24,7 +24,8 @@ class Command(Enum):
 class Readings:
     """What is known besides state and reference; NaN where it is not, and then nothing follows.
 
-    battery: charge left, 0..1. mocap_age, joint_age [s]: of the newest message by its stamp.
+    battery: charge left, 0..1. mocap_age, joint_age [s]: of the newest message by its stamp;
+    controller_age [s]: of the oldest of the newest gains, which every controller tells.
     missed_ticks: within the last second. joint_effort (2,): measured [N m]. gains (3,): largest
     adapted gain of position, attitude, arm.
     """
@@ -32,6 +33,7 @@ class Readings:
     battery: float = math.nan
     mocap_age: float = math.nan
     joint_age: float = math.nan
+    controller_age: float = math.nan
     missed_ticks: float = math.nan
     joint_effort: np.ndarray = field(default_factory=lambda: np.full(2, math.nan))
     gains: np.ndarray = field(default_factory=lambda: np.full(3, math.nan))

@@ -45,6 +45,9 @@ class Limits(ParameterSet):
         1.0, "age of the mocap pose to leave it to the autopilot at", "s", 0.02, 60.0
     )
     joint_age_hold: float = number(0.25, "age of the joint angles to hold at", "s", 0.02, 10.0)
+    controller_age_hold: float = number(
+        0.25, "age of the gains that a controller tells, to hold at", "s", 0.05, 10.0
+    )
     missed_ticks_hold: float = number(
         125.0, "control ticks missed within a second to hold at", "1", 1.0, 1e4
     )
@@ -94,6 +97,12 @@ class Reactions(ParameterSet):
         5.0, "how long it holds beyond a limit, until it lands", "s", 0.0, 600.0
     )
     resume_automatically: bool = switch(False, "go on by itself once a limit is clear again")
+    after_restart: str = choice(
+        "go_on",
+        "what follows a hold for a lost controller that is back: go_on, stay (until a command) "
+        "or land",
+        ("go_on", "stay", "land"),
+    )
     arm_holding: str = choice("stay", "where the arm goes while holding", _ARM)
     arm_landing: str = choice("stow", "where the arm goes in a landing that is not planned", _ARM)
     arm_failsafe: str = choice("stow", "where the arm goes in failsafe", _ARM)

@@ -35,6 +35,8 @@ class Event(Enum):
     HARD_LIMIT_ON_GROUND = "a hard limit on the ground"
     HELD_TOO_LONG = "beyond a limit for too long"
     CLEAR = "clear again, resume_automatically"
+    RESTARTED = "a lost controller is back, after_restart: go_on"
+    RESTARTED_TO_LAND = "a lost controller is back, after_restart: land"
     NO_TOUCHDOWN = "no touchdown"
     LOST_ARMING = "the autopilot disarmed"
     GIVEN_UP = "given up before take-off"
@@ -76,6 +78,8 @@ TRANSITIONS = (
     Transition(_S.FLYING, _E.LOST_ARMING, _S.DISARMED),
     Transition(_S.HOLDING, _E.RESUME, _S.FLYING),
     Transition(_S.HOLDING, _E.CLEAR, _S.FLYING),
+    Transition(_S.HOLDING, _E.RESTARTED, _S.FLYING),
+    Transition(_S.HOLDING, _E.RESTARTED_TO_LAND, _S.LANDING),
     Transition(_S.HOLDING, _E.HELD_TOO_LONG, _S.LANDING),
     Transition(_S.HOLDING, _E.LAND_LIMIT, _S.LANDING),
     Transition(_S.HOLDING, _E.LAND, _S.LANDING),

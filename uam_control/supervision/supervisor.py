@@ -12,7 +12,7 @@ from collections.abc import Iterator
 from enum import Enum
 from typing import NamedTuple
 
-from uam_control.supervision.checks import Checks
+from uam_control.supervision.checks import CONTROLLERS, Checks
 from uam_control.supervision.monitor import Level
 from uam_control.supervision.observation import Command, Observation
 from uam_control.supervision.parameters import SupervisionParameters
@@ -68,6 +68,7 @@ class Supervisor:
         self._planned = False  # whether a landing is the scenario's
         self._stamp = -math.inf
         self._beyond_since: float | None = None  # while holding
+        self._held_for = ""  # the quantity beyond its limit for which it holds
         self._checks = Checks(parameters)
         self._parameters = parameters
         self.decision = self._decide()
@@ -148,7 +149,7 @@ class Supervisor:
     def _events(self, seen: Observation, command: Command | None) -> Iterator[tuple[Event, str]]:
         """What happens at this tick, and why; what saves the vehicle first."""
         finding, p = self._checks.finding, self._parameters
-        level, cause = finding or (Level.FINE, "")
+        level, cause = (finding.level, finding.cause) if finding else (Level.FINE, "")
         if not seen.armed:
             if seen.on_ground:
                 yield _planned(Event.TOUCHDOWN)
@@ -173,8 +174,8 @@ class Supervisor:
         if level is Level.HOLD:
             yield Event.HOLD_LIMIT, cause
         if level is Level.FINE:
-            if p.resume_automatically and self.changes and self._held_by_limit():
-                yield Event.CLEAR, "clear again"
+            if self.state is State.HOLDING and self._held_for:
+                yield from self._clear()
             if seen.ready and self._checks.quiet:
                 yield _planned(Event.READY)
         if seen.landing_due:
@@ -190,13 +191,21 @@ class Supervisor:
             self._beyond_since = self._stamp
         return self._stamp - self._beyond_since >= self._parameters.hold_timeout
 
-    def _held_by_limit(self) -> bool:
-        return self.changes[-1].event is Event.HOLD_LIMIT
+    def _clear(self) -> Iterator[tuple[Event, str]]:
+        """What follows when that for which it holds is within its limit again."""
+        p, back = self._parameters, "the controller is back"
+        if p.resume_automatically:
+            yield Event.CLEAR, "clear again"
+        elif self._held_for == CONTROLLERS and p.after_restart != "stay":
+            landing = p.after_restart == "land"
+            yield (Event.RESTARTED_TO_LAND if landing else Event.RESTARTED), back
 
     def _go(self, event: Event, cause: str) -> None:
         source, self.state = self.state, TARGETS[self.state, event]
         self.cause = cause
         self._planned = event is Event.LANDING_DUE
+        finding = self._checks.finding
+        self._held_for = finding.name if event is Event.HOLD_LIMIT and finding else ""
         self._beyond_since = None
         self._arm = self._arm and self.state is not State.DISARMED
         self.decision = self._decide()

@@ -180,7 +180,7 @@ class DirectFlight:
         plant.step(motors, tau_alpha, magnet)
         if plant.tick % GAINS_TICKS == 0:
             for subsystem, controller in zip(SUBSYSTEMS, self._controllers, strict=True):
-                self.inputs.gains(subsystem, controller.names, controller.adaptation)
+                self.inputs.gains(stamp, subsystem, controller.names, controller.adaptation)
         mission.step(self._ahead, state, self.bridge.armed_since, self.inputs.at(stamp))
 
     def _blind_tick(self, samples: Samples) -> None:

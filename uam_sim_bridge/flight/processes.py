@@ -11,6 +11,7 @@ import signal
 import time
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import partial
 from pathlib import Path
 
 from uam_control import configuration
@@ -63,8 +64,10 @@ class Child:
     name: str
     process: Forked
     log: Path
+    run: Callable[[], Forked]  # starts it again
     may_end: bool = False  # its end is expected: it was asked to stop, or ends with the mission
     optional: bool = False  # the flight goes on without it
+    again: int = 0  # how often it is still started again where it ends by itself
     shared: set[Path] = field(default_factory=set)  # shared-memory files seen in its address space
 
 
@@ -95,15 +98,17 @@ class Processes:
         may_end: bool = False,
         niceness: int = 0,
         optional: bool = False,
+        again: int = 0,
     ) -> Child:
         """Run `module.main()` as the process `name`.
 
         may_end: it stops by itself when done; niceness: how far it steps back for the others;
-        optional: its end is no failure of the flight, see `missed`.
+        optional: its end is no failure of the flight, see `missed`; again: how often `revive`
+        starts it again.
         """
         log = self._logs / f"{name}.log"
-        process = Forked(name, module, arguments, log, self._environment, niceness)
-        child = Child(name, process, log, may_end, optional)
+        run = partial(Forked, name, module, arguments, log, self._environment, niceness)
+        child = Child(name, run(), log, run, may_end, optional, again)
         self._children[name] = child
         return child
 
@@ -117,8 +122,9 @@ class Processes:
         return self._children[name].process.pid
 
     def let_end(self, name: str) -> None:
-        """Whatever ends this child, it is no failure of the flight any more."""
-        self._children[name].optional = True
+        """Whatever ends this child, it is no failure of the flight; one to be revived will be."""
+        child = self._children[name]
+        child.optional = not child.again
 
     def running(self, name: str) -> bool:
         """True while the child has not ended."""
@@ -139,6 +145,16 @@ class Processes:
         for child in ended:
             child.may_end = True
         return [NodeFailed(child.name, child.process.returncode, child.log) for child in ended]
+
+    def revive(self) -> list[NodeFailed]:
+        """Start again what has ended by itself and may be; returns what became of each."""
+        ended = [c for c in self._children.values() if c.again and not c.may_end]
+        ended = [child for child in ended if child.process.poll() is not None]
+        told = [NodeFailed(child.name, child.process.returncode, child.log) for child in ended]
+        for child in ended:
+            child.again -= 1
+            child.process = child.run()
+        return told
 
     def note_shared_memory(self) -> None:
         """Remember which shared-memory files the children use, to remove them should one be killed.

@@ -28,6 +28,7 @@ from uam_sim_bridge.flight.process_faults import ProcessFaults
 from uam_sim_bridge.flight.process_table import await_orphans
 from uam_sim_bridge.flight.processes import NodeFailed, Processes, environment
 from uam_sim_bridge.flight.progress import Progress
+from uam_sim_bridge.flight.restart_log import RestartTopic
 from uam_sim_bridge.flight.result_folder import ResultFolder, as_json, versions
 from uam_sim_bridge.flight.settings import BUILTIN, ONLOOKERS, FlightSettings
 from uam_sim_bridge.flight.status_listener import StatusListener
@@ -60,7 +61,8 @@ OWN_START_TIMEOUT = 600.0  # [s] the same where the user is to start one by hand
 ANSWER_TIMEOUT = 10.0  # [s] for the answers to one lockstep tick
 # Nobody waits for the recorder, which has seconds of room, or for those who only look on.
 NICENESS = {wiring.RECORDER: 10} | dict.fromkeys(ONLOOKERS, 10)
-POLL = 0.1  # [s]
+RESTARTS = 3  # of each controller in a flight
+POLL = 0.05  # [s]
 NOTE_PERIOD = 1.0  # [s] between two looks at the shared memory that the nodes use
 
 
@@ -223,6 +225,7 @@ def _start(
             may_end=name == wiring.PLANT,
             niceness=NICENESS.get(name, 0),
             optional=name in ONLOOKERS,
+            again=RESTARTS if name in wiring.CONTROLLERS else 0,
         )
     module, own = _autopilot(settings, folder, ports)
     if module:
@@ -284,11 +287,14 @@ def _watch(
     faults: ProcessFaults,
 ) -> None:
     """Show the progress until the plant ends or the user stops it. Raises NodeFailed."""
-    noted = -NOTE_PERIOD
+    noted, restarts = -NOTE_PERIOD, RestartTopic(listener.node)
     while children.running(wiring.PLANT) and not stop.raised:
         if time.monotonic() - noted >= NOTE_PERIOD:  # who is killed cannot be asked any more
             children.note_shared_memory()
             noted = time.monotonic()
+        for lost in children.revive():
+            progress.message(f"{lost}; started again")
+            restarts.tell(listener.stamp, lost)
         children.check()
         for failure in children.missed():
             progress.message(f"{failure}; the flight goes on without it")

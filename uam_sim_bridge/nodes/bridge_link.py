@@ -50,7 +50,7 @@ class BridgeParameters(ParameterSet):
         ("warn", "adopt"),
     )
     stale_after: float = number(
-        0.1, "real time without a tick, after which the commands count as lost", "s", 0.01, 5.0
+        0.1, "time without a command, after which they count as lost", "s", 0.01, 5.0
     )
 
 

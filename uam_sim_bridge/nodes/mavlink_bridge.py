@@ -9,9 +9,9 @@ setpoint; /uam/setpoint repeats what was sent and acknowledges the tick.
 | good | body rates and thrust from the map |
 | idle (not flying) | rates 0, thrust 0: the stream goes on, the vehicle stays on the ground |
 | not finite or malformed, on the ground | as idle |
-| the same in flight; the mission in failsafe; idle high above the start; in real time none for \
-`stale_after` | level hold \
-for `hold_time`, then nothing: the autopilot's failsafe acts |
+| the same in flight; the mission in failsafe; idle high above the start; none for `stale_after`, \
+by the stamps of the state or, in real time, by the wall clock | level hold for `hold_time`, then \
+nothing: the autopilot's failsafe acts |
 """
 
 from __future__ import annotations
@@ -100,6 +100,7 @@ class MavlinkBridgeNode(UamNode):
         self._pose: tuple[int, np.ndarray, np.ndarray] | None = None
         self._pose_sent = -1.0
         self._adopted: tuple[str, ...] = ()
+        self._commanded = 0  # stamp [ns] of the last tick with commands
         self._last_tick = time.monotonic()
         self._ground: float | None = None  # height [m] at which the vehicle stood
         self._margin = hold.ground_margin
@@ -171,6 +172,7 @@ class MavlinkBridgeNode(UamNode):
     ) -> None:
         begun = time.perf_counter()
         now = seconds(stamp)
+        self._commanded = stamp
         self._last_tick = time.monotonic()
         self.take_waiting(self._arming)
         self.take_waiting(self._mocap)
@@ -291,16 +293,35 @@ class MavlinkBridgeNode(UamNode):
         if self._station is not None:
             self._station.forward()
 
+    def settle(self) -> None:
+        """Act on complete inputs, and on states for which the commands do not come."""
+        super().settle()
+        state = self._join.last_seen[topics.STATE.name]
+        if self.ticks == 0 or state is None or state <= self.stamp:
+            return
+        if seconds(state - self._commanded) >= self._options.stale_after:
+            self._join.skip(state)
+            self._last_tick = time.monotonic()
+            setpoint = self._go_without(seconds(state))
+            rates, thrust = setpoint or (self._idle, 0.0)
+            self._setpoint.publish(self._writer.fill(state, rates, thrust))
+            self.done_tick(state, time.perf_counter())
+
     def _watch(self) -> None:
-        """In real time: act when ticks stop coming."""
+        """In real time: act when states stop coming."""
         silence = time.monotonic() - self._last_tick
         if self.ticks == 0 or silence < self._options.stale_after:
             return
-        now = seconds(self.stamp) + silence
+        self._go_without(seconds(self.stamp) + silence)
+
+    def _go_without(self, now: float) -> tuple[np.ndarray, float] | None:
+        """Do what a tick at `now` [s] does, without commands; return the setpoint sent."""
         self._update_faults(now)
         self.link.poll(now)
-        self._send(now, self._without_command(now))
+        setpoint = self._without_command(now)
+        self._send(now, setpoint)
         self._autopilot.tell(round(now * 1e9))
+        return setpoint
 
     def diagnose(self) -> tuple[bytes, str, dict[str, object]]:
         link, sequence = self.link, self.sequence

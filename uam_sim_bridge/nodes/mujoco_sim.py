@@ -7,6 +7,9 @@ lockstep  At every control tick the plant waits for the setpoint that the bridge
           tick's IMU sample, for joint efforts and magnet, and for the autopilot's motor commands.
           It also waits for a recorder that has fallen far behind, so that nothing is lost.
           Every wait is bounded in wall time; when one ends, the node says who did not answer.
+          Where a lost node is being started again, ticks go on at the pace of the wall clock
+          without its answers, until all have come in time for a while: the flight is lost or saved
+          as in real time.
 realtime  Ticks begin at absolute deadlines of the wall clock, `control period` apart; after a stall
           of the machine they follow each other at most CATCH_UP times as fast. What has not arrived
           by the next deadline is missing, and what was commanded last holds. A control tick counts
@@ -48,6 +51,7 @@ from uam_sim_bridge.mavlink.hil_server import HilParameters, HilServer
 from uam_sim_bridge.nodes.plant_health import PlantHealth
 from uam_sim_bridge.nodes.plant_options import NOT_READY, Options, Statistics, declare
 from uam_sim_bridge.nodes.plant_topics import SUSPECTS, Answers, Sensors, TruthTopics, nanoseconds
+from uam_sim_bridge.nodes.restart import Restart
 from uam_sim_bridge.plant import Plant, Samples, Truth, Vehicle
 
 NAME = "mujoco_sim"
@@ -96,6 +100,7 @@ class Simulator:
         self._complete = False  # every kind of sensor has delivered
         self._stamp: int | None = None  # of this tick's IMU sample [ns]
         self._published = 0  # wall time [ns] of its publication
+        self._restart = Restart(options.answer_timeout)
         self._begun = 0.0  # wall time [s] at which this tick began
         self._begun_at = 0.0  # and simulation time [s]
         self._unanswered: dict[int, int] = {}  # stamp [ns] → wall time of publication [ns]
@@ -227,11 +232,14 @@ class Simulator:
         patience = Patience(self.options.answer_timeout)
         while missing := self.answers.missing(self._stamp):
             self._setpoint_is_there = "setpoint" not in missing
-            self.executor.spin_once(0.1)
-            if self._stop.raised:
-                return
+            left = self._begun + self.plant.period - time.monotonic()
+            self.executor.spin_once(max(0.0, left) if self._restart.going_on else 0.1)
+            self._restart.look(self.answers.restarts)
+            if self._stop.raised or (self._restart.going_on and left <= 0.0):
+                break
             if patience.over:
                 raise PlantStopped(self._no_answer(missing))
+        self._restart.tick(complete=not missing)
 
     def _recorder_has_caught_up(self, lag: float, patience: float) -> bool:
         """Wait until it is not more than `lag` [s] behind what was published; False: it stays so.

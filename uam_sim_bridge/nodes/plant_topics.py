@@ -136,6 +136,7 @@ class Answers:
         self.mission, self.mission_stamp = MissionStatus(), 0  # [ns]
         self.setpoints: dict[int, int] = {}
         self.arrivals: dict[str, float] = {}  # time.monotonic() of the newest, by topic
+        self.restarts = 0  # of nodes that were lost
         self._arrived: set[str] = set()
         self._setpoint_stamp = -1
 
@@ -149,6 +150,7 @@ class Answers:
                 (topics.ARM_EFFORT, self._on_effort, True),
                 (topics.MAGNET, self._on_magnet, True),
                 (topics.MISSION_STATUS, self._on_mission, False),
+                (topics.RESTARTS, self._on_restart, False),
             )
         }
 
@@ -183,6 +185,9 @@ class Answers:
         self.magnet = read_switch(data)
         self._arrived.add("magnet")
         self.arrivals[topics.MAGNET.name] = time.monotonic()
+
+    def _on_restart(self, message: DiagnosticArray, info: dict | None = None) -> None:
+        self.restarts += 1
 
     def _on_mission(self, message: DiagnosticArray, info: dict | None = None) -> None:
         self.mission_stamp, self.mission = MissionStatus.from_message(message)

@@ -1,0 +1,75 @@
+"""A controller is killed in flight: it is started again, and the flight goes on or lands."""
+
+import json
+
+import pytest
+import yaml
+from whole_flight import assert_nothing_left
+
+from uam_sim_bridge.flight.wiring import ARM, ATTITUDE, POSITION
+from uam_sim_bridge.report.rebuild import rebuild
+
+LONGER = """\
+description: Up, some seconds of hovering, down, for tests.
+arm_start: {alpha_1_deg: 0, alpha_2_deg: 90}
+phases:
+  - {from: 0, name: take-off}
+  - {from: 1.5, name: hover}
+  - {from: 5, name: land}
+moves:
+  - {coordinate: z, from: 0, until: 1.5, to: 0.6}
+landing: {at: 5, duration: 2}
+"""
+
+
+@pytest.fixture
+def scenario(tmp_path):
+    file = tmp_path / "longer.yaml"
+    file.write_text(LONGER)
+    return file
+
+
+def states(flight):
+    figures = json.loads((flight.out / "metrics.json").read_text())
+    return figures, [(one["to"], one["cause"]) for one in figures["transitions"]]
+
+
+@pytest.mark.parametrize(
+    "victim", [POSITION, *(pytest.param(name, marks=pytest.mark.slow) for name in (ATTITUDE, ARM))]
+)
+def test_a_killed_controller_is_started_again_and_the_flight_goes_on(fly, scenario, victim):
+    flight = fly("--scenario", str(scenario), "--fault", f"node_kill@hover+0.5:node={victim}")
+    assert flight.wait() == 0, flight.said + flight.complained
+    assert f"{victim} was killed by SIGKILL; started again" in flight.said
+    figures, passed = states(flight)
+    assert figures["mission_completed"]
+    assert ("flying", "the controller is back") in passed
+    assert max(figures["max"]["position_m"]) < 1.5
+    assert_nothing_left(flight, [], set())
+
+
+@pytest.mark.slow
+def test_the_policy_may_be_to_land(fly, scenario, tmp_path):
+    flight = fly(
+        "--scenario",
+        str(scenario),
+        "--fault",
+        f"node_kill@hover+0.5:node={ARM}",
+        "--profile",
+        str(landing_profile(tmp_path)),
+    )
+    assert flight.wait() == 1
+    _, passed = states(flight)
+    assert passed[-2:] == [("landing", "the controller is back"), ("disarmed", "touchdown")]
+    again = rebuild(flight.out, tmp_path / "again")
+    assert [(one["to"], one["cause"]) for one in again["transitions"]] == passed
+
+
+def landing_profile(folder):
+    from uam_control.configuration import path
+
+    profile = yaml.safe_load(path("profiles/s500.yaml").read_text())
+    profile["mission"]["ros__parameters"]["after_restart"] = "land"
+    file = folder / "landing.yaml"
+    file.write_text(yaml.safe_dump(profile))
+    return file

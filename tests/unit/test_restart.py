@@ -1,0 +1,30 @@
+"""When the plant in lockstep does not wait for a node that is being started again."""
+
+from uam_sim_bridge.nodes.restart import IN_TIME, Restart
+
+
+def test_without_a_restart_it_waits():
+    restart = Restart(10.0)
+    restart.tick(complete=False)
+    restart.look(0)
+    assert not restart.going_on
+
+
+def test_it_goes_on_until_all_have_answered_in_time_for_a_while():
+    restart = Restart(10.0)
+    restart.look(1)
+    for complete in (False, *[True] * (IN_TIME - 1), False, *[True] * (IN_TIME - 1)):
+        restart.tick(complete)
+        assert restart.going_on
+    restart.tick(complete=True)
+    assert not restart.going_on
+    restart.look(1)
+    assert not restart.going_on
+    restart.look(2)
+    assert restart.going_on
+
+
+def test_it_does_not_go_on_for_ever():
+    restart = Restart(0.0)
+    restart.look(1)
+    assert not restart.going_on

@@ -1,0 +1,25 @@
+"""/uam/restarts and /diagnostics: a node was lost and is started again."""
+
+from __future__ import annotations
+
+from rclpy.node import Node
+
+from uam_msgs_py import topics
+from uam_msgs_py.status import WARN, diagnostic
+from uam_sim_bridge.flight.processes import NodeFailed
+
+
+class RestartTopic:
+    """Publishes each restart, for the plant, the log and those who watch."""
+
+    def __init__(self, node: Node) -> None:
+        self._publishers = [
+            node.create_publisher(topic.type, topic.name, topic.qos)
+            for topic in (topics.RESTARTS, topics.DIAGNOSTICS)
+        ]
+
+    def tell(self, stamp: int, lost: NodeFailed) -> None:
+        """Say so; stamp [ns]: of the flight's clock."""
+        message = diagnostic(stamp, lost.name, WARN, f"{lost}; started again", {})
+        for publisher in self._publishers:
+            publisher.publish(message)
