@@ -7,7 +7,8 @@ from typing import Any
 
 from diagnostic_msgs.msg import DiagnosticArray
 
-from uam_msgs_py.layouts import SECOND, BadMessage
+from uam_msgs_py.convert import nanoseconds
+from uam_msgs_py.layouts import BadMessage
 from uam_msgs_py.status import OK, WARN, diagnostic
 
 ACCEPTED = "accepted"
@@ -53,8 +54,7 @@ class Change:
         except (KeyError, ValueError):
             raise BadMessage("not a change of parameters") from None
         reason = "" if status.message == ACCEPTED else status.message.removeprefix(REFUSED)
-        stamp = message.header.stamp
-        return stamp.sec * SECOND + stamp.nanosec, cls(status.name, by, values, reason)
+        return nanoseconds(message.header.stamp), cls(status.name, by, values, reason)
 
 
 def _json(value: Any) -> str:

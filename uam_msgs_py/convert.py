@@ -59,6 +59,11 @@ def set_stamp(stamp: Time, nanoseconds: int) -> None:
     stamp.sec, stamp.nanosec = divmod(nanoseconds, SECOND)
 
 
+def nanoseconds(stamp: Time) -> int:
+    """builtin_interfaces/Time → integer nanoseconds."""
+    return stamp.sec * SECOND + stamp.nanosec
+
+
 def seconds(nanoseconds: int) -> float:
     """Nanoseconds [ns] → the maths' seconds [s]."""
     return nanoseconds / SECOND

@@ -6,7 +6,8 @@ from typing import Any
 
 from diagnostic_msgs.msg import DiagnosticArray
 
-from uam_msgs_py.layouts import SECOND, BadMessage
+from uam_msgs_py.convert import nanoseconds
+from uam_msgs_py.layouts import BadMessage
 from uam_msgs_py.status import OK, WARN, diagnostic
 
 BEGUN, OVER = "begun", "over"
@@ -44,7 +45,6 @@ class FaultEvent:
             active = {BEGUN: True, OVER: False}[status.message]
         except (KeyError, ValueError):
             raise BadMessage("not a fault") from None
-        stamp = message.header.stamp
-        return stamp.sec * SECOND + stamp.nanosec, cls(
+        return nanoseconds(message.header.stamp), cls(
             status.name, place, number, active, parameters
         )

@@ -5,8 +5,8 @@ from typing import ClassVar, Self
 
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 
-from uam_msgs_py.convert import set_stamp
-from uam_msgs_py.layouts import SECOND, BadMessage
+from uam_msgs_py.convert import nanoseconds, set_stamp
+from uam_msgs_py.layouts import BadMessage
 
 OK, WARN, ERROR, STALE = (
     DiagnosticStatus.OK,
@@ -64,8 +64,7 @@ class _Status:
                 raise BadMessage(
                     f"{cls.NAME}: '{item.name}' is {texts[item.name]!r}, {item.type} expected"
                 ) from None
-        stamp = message.header.stamp
-        return stamp.sec * SECOND + stamp.nanosec, cls(**values)
+        return nanoseconds(message.header.stamp), cls(**values)
 
 
 def _truth(text: str) -> bool:

@@ -302,12 +302,12 @@ def test_parameters_are_checked_and_take_effect():
 
 def test_parameter_files(tmp_path):
     bad = tmp_path / "bad.yaml"
-    with pytest.raises(ParameterError, match="No such file"):
+    with pytest.raises(ParameterError, match="no such file"):
         Parameters.load(bad)
     for text, message in (
         ("[1, 2]", "NAME: value"),
         ("MC_ROLLRATE_P: x", "not a number"),
-        ("A: [", "not YAML"),
+        ("A: [", "not valid YAML"),
         ("FOO: 1", "unknown"),
     ):
         bad.write_text(text)

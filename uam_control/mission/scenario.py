@@ -9,9 +9,8 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import yaml
 
-from uam_control import configuration
+from uam_control import configuration, yaml_file
 from uam_control.coordinates import ARM, COORDINATES
 from uam_control.mission.trajectory import Chain, Move, Moves, Sampled, Trajectory
 
@@ -103,12 +102,7 @@ def load_scenario(name_or_file: str) -> Scenario:
 
 def from_yaml(file: Path) -> Scenario:
     """Read a scenario file; see config/scenarios/pick_and_place.yaml for the form."""
-    try:
-        document = yaml.safe_load(file.read_text())
-    except yaml.YAMLError as error:
-        place = getattr(error, "problem_mark", None)
-        where = f" line {place.line + 1} column {place.column + 1}" if place else ""
-        raise ScenarioError(f"{file}{where}: not valid YAML") from None
+    document = yaml_file.read(file, ScenarioError)
     if not isinstance(document, dict):
         raise ScenarioError(f"{file}: a mapping expected, see scenarios/pick_and_place.yaml")
     reader = Reader(str(file))

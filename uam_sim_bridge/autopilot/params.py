@@ -6,8 +6,7 @@ import math
 from dataclasses import dataclass
 from pathlib import Path
 
-import yaml
-
+from uam_control import yaml_file
 from uam_control.parameters import ParameterError
 
 
@@ -89,12 +88,7 @@ class Parameters:
     @classmethod
     def load(cls, path: Path | str) -> Parameters:
         """Read a YAML file `NAME: value`; raises ParameterError, one line with the file's name."""
-        try:
-            values = yaml.safe_load(Path(path).read_text())
-        except OSError as error:
-            raise ParameterError(f"{path}: {error.strerror}") from None
-        except (yaml.YAMLError, UnicodeDecodeError) as error:
-            raise ParameterError(f"{path}: not YAML: {' '.join(str(error).split())}") from None
+        values = yaml_file.read(Path(path), ParameterError)
         if not isinstance(values, dict):
             raise ParameterError(f"{path}: 'NAME: value' lines expected")
         try:

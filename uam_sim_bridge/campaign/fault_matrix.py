@@ -7,10 +7,11 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from uam_control import yaml_file
 from uam_control.mission import Scenario, load_scenario
 from uam_sim_bridge.faults import FAULTS, FaultError, Schedule, TimedFault
 from uam_sim_bridge.faults.limits import needs_nodes
-from uam_sim_bridge.faults.schedule import beginnings, listed, read_yaml, timed
+from uam_sim_bridge.faults.schedule import beginnings, listed, timed
 
 NOMINAL = "no fault"
 KEYS = ("scenario", "moments", "faults")
@@ -93,7 +94,7 @@ def read(
 
 
 def _document(file: Path) -> dict[str, Any]:
-    document = read_yaml(file)
+    document = yaml_file.read(file, FaultError)
     if not isinstance(document, dict) or sorted(document) != sorted(KEYS):
         raise FaultError(f"{file}: a mapping of {', '.join(KEYS)} expected")
     return document

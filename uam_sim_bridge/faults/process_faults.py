@@ -34,7 +34,9 @@ class ProcessFault(Fault):
 @dataclass(frozen=True)
 class NodeKill(ProcessFault):
     NAME: ClassVar[str] = "node_kill"
-    ABOUT: ClassVar[str] = "a process is killed (SIGKILL); a controller is started again, others are not"
+    ABOUT: ClassVar[str] = (
+        "a process is killed (SIGKILL); a controller is started again, others are not"
+    )
 
 
 @dataclass(frozen=True)

@@ -19,8 +19,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-import yaml
-
+from uam_control import yaml_file
 from uam_control.mission import Scenario
 from uam_sim_bridge.faults.catalogue import make
 from uam_sim_bridge.faults.fault import Fault, FaultError
@@ -112,19 +111,9 @@ def beginnings(scenario: Scenario) -> dict[str, float]:
 
 def from_file(file: Path) -> list[Mapping[str, Any]]:
     """Entries of a YAML file; raises FaultError."""
-    document = read_yaml(file)
+    document = yaml_file.read(file, FaultError)
     entries = document.get("faults") if isinstance(document, dict) else document
     return listed(entries, str(file))
-
-
-def read_yaml(file: Path) -> Any:
-    """What a YAML file holds; raises FaultError."""
-    try:
-        return yaml.safe_load(file.read_text())
-    except OSError as error:
-        raise FaultError(f"{file}: {(error.strerror or str(error)).lower()}") from None
-    except (yaml.YAMLError, UnicodeDecodeError):
-        raise FaultError(f"{file}: not valid YAML") from None
 
 
 def listed(entries: Any, where: str) -> list[Mapping[str, Any]]:

@@ -7,9 +7,7 @@ import re
 from collections.abc import Sequence
 from pathlib import Path
 
-import yaml
-
-from uam_control import configuration
+from uam_control import configuration, yaml_file
 from uam_sim_bridge.px4.installation import Px4Error
 
 FILES = ("autopilot/s500.yaml", "px4/s500.yaml")  # of config/; a later one overrides
@@ -38,12 +36,7 @@ def environment(values: dict[str, Value]) -> dict[str, str]:
 
 
 def _read(file: Path) -> dict[str, Value]:
-    try:
-        values = yaml.safe_load(file.read_text())
-    except OSError as error:
-        raise Px4Error(f"{file}: {error.strerror}") from None
-    except (yaml.YAMLError, UnicodeDecodeError):
-        raise Px4Error(f"{file}: not valid YAML") from None
+    values = yaml_file.read(file, Px4Error)
     if not isinstance(values, dict):
         raise Px4Error(f"{file}: 'NAME: value' lines expected")
     for name, value in values.items():

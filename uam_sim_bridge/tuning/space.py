@@ -9,9 +9,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-import yaml
-
-from uam_control import configuration
+from uam_control import configuration, yaml_file
 from uam_control.profile import NODES, Profile, load_profile, profile_of
 from uam_sim_bridge.campaign.trial import ERRORS, Result, Trial
 
@@ -128,10 +126,10 @@ def load_space(name_or_file: str, start: Profile | None = None) -> Space:
     """
     try:
         file = configuration.named("tuning", name_or_file)
-        document = yaml.safe_load(file.read_text())
+        document = yaml_file.read(file, TuningError)
         if "judged_as" in document:  # flights and cost of another space: a fair comparison
             other = configuration.named("tuning", document["judged_as"])
-            document = {**yaml.safe_load(other.read_text()), **document}
+            document = {**yaml_file.read(other, TuningError), **document}
         start = start or load_profile(document["profile"])
         knobs = tuple(_knob(entry, start) for entry in document["knobs"])
         cost = {
@@ -143,8 +141,6 @@ def load_space(name_or_file: str, start: Profile | None = None) -> Space:
             for flight in document["flights"]
         )
         space = Space(file.stem, start, knobs, flights, Cost(**cost))
-    except yaml.YAMLError:
-        raise TuningError(f"{name_or_file}: not valid YAML") from None
     except (KeyError, TypeError) as error:
         raise TuningError(f"{name_or_file}: {error.args[0]} is missing or not allowed") from None
     if len(space.cost.aim) != len(ERRORS):
