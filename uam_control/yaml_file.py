@@ -25,7 +25,7 @@ def read(file: Path, error: type[ValueError]) -> Any:
     try:
         return yaml.load(file.read_text(), _Loader)  # noqa: S506 (a SafeLoader)
     except OSError as reason:
-        raise error(f"{file}: {(reason.strerror or str(reason)).lower()}") from None
+        raise error(f"{file}: {reason.strerror or reason}") from None
     except (yaml.YAMLError, UnicodeDecodeError) as reason:
         mark = getattr(reason, "problem_mark", None)
         where = f" line {mark.line + 1} column {mark.column + 1}" if mark else ""

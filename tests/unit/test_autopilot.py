@@ -302,7 +302,7 @@ def test_parameters_are_checked_and_take_effect():
 
 def test_parameter_files(tmp_path):
     bad = tmp_path / "bad.yaml"
-    with pytest.raises(ParameterError, match="no such file"):
+    with pytest.raises(ParameterError, match="No such file"):
         Parameters.load(bad)
     for text, message in (
         ("[1, 2]", "NAME: value"),
