@@ -128,7 +128,7 @@ REFUSED = {
     "motor_loss@20:at=3": "'at=3' is not one parameter=value",
     "motor_loss@20:after=3": "after: only together with a phase",
     "node_kill@20:node=plant": "'plant' is not one of state_estimator",
-    "no.yaml": "no.yaml: no such file",
+    "no.yaml": "no.yaml: No such file",
 }
 
 
