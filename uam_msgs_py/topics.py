@@ -15,7 +15,7 @@ from rclpy.qos import (
     QoSReliabilityPolicy,
 )
 from rosgraph_msgs.msg import Clock
-from sensor_msgs.msg import BatteryState, Imu, JointState
+from sensor_msgs.msg import BatteryState, Imu, JointState, Temperature
 from std_msgs.msg import Bool, Float64MultiArray, String
 from trajectory_msgs.msg import JointTrajectory
 from visualization_msgs.msg import MarkerArray
@@ -105,6 +105,13 @@ AUTOPILOT_STATE = Topic(
 )
 AUTOPILOT_BATTERY = Topic(
     "/uam/autopilot/battery", BatteryState, RELIABLE, "as the autopilot tells it, 1 Hz; NaN unknown"
+)
+ARM_TEMPERATURE = Topic(
+    "/uam/arm/temperature",
+    Temperature,
+    RELIABLE,
+    "of a servo, whose joint frame_id names; from a vehicle's driver, the simulation has none",
+    one_publisher=False,
 )
 MISSION_STATUS = Topic(
     "/uam/mission/status", DiagnosticArray, LATCHED, "see uam_msgs_py.status.MissionStatus"

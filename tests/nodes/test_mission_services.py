@@ -3,7 +3,8 @@
 import numpy as np
 import pytest
 from diagnostic_msgs.msg import DiagnosticArray
-from sensor_msgs.msg import BatteryState
+from sensor_msgs.msg import BatteryState, Temperature
+from std_msgs.msg import Header
 from std_srvs.srv import SetBool, Trigger
 
 from uam_control.coordinates import COORDINATES
@@ -100,6 +101,17 @@ def test_hold_resume_land_and_disarm_answer_and_are_followed(vehicle):
     assert vehicle.status.abort_reason == "land by command" and vehicle.status.phase == "landed"
     assert vehicle.ask("hold") == (False, "refused: not while disarmed")
     assert "holding: hold by command" in vehicle.node.output
+
+
+def test_a_hot_servo_holds_and_an_unknown_joint_is_refused(vehicle, probe):
+    temperatures = probe.publisher(topics.ARM_TEMPERATURE)
+    probe.until_connected("mission", [temperatures], [])
+    take_off(vehicle)
+    for joint, degrees in (("alpha_9", 99.0), ("alpha_1", 40.0), ("alpha_2", 71.5)):
+        temperatures.publish(Temperature(header=Header(frame_id=joint), temperature=degrees))
+    vehicle.until_state("holding")
+    assert vehicle.status.cause == "servo temperature 72 deg C exceeds 70 deg C"
+    assert "frame_id 'alpha_9' is no joint" in vehicle.node.output
 
 
 def test_an_empty_battery_lands_and_the_diagnostics_say_why(vehicle, probe):

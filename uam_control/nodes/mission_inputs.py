@@ -9,7 +9,7 @@ from collections.abc import Callable
 from functools import partial
 from typing import Any
 
-from sensor_msgs.msg import BatteryState
+from sensor_msgs.msg import BatteryState, Temperature
 
 from uam_control.coordinates import JOINTS
 from uam_control.supervision import Inputs, Readings
@@ -40,6 +40,7 @@ class MissionInputs:
         self._keep(topics.MOCAP, self._on_mocap)
         self._keep(topics.JOINTS, self._on_joints)
         self._keep(topics.AUTOPILOT_BATTERY, self._on_battery)
+        node.listen(topics.ARM_TEMPERATURE, self._on_temperature, required=False)
         for topic, subsystem in GAINS:
             self._keep(topic, partial(self._on_gains, subsystem))
 
@@ -79,6 +80,12 @@ class MissionInputs:
 
     def _on_battery(self, message: BatteryState) -> None:
         self._inputs.battery(message.percentage)
+
+    def _on_temperature(self, message: Temperature) -> None:
+        joint = message.header.frame_id
+        if joint not in NAMES:
+            raise BadMessage(f"frame_id {joint!r} is no joint; there are: {', '.join(NAMES)}")
+        self._inputs.temperature(joint, message.temperature)
 
     def _on_gains(self, subsystem: str, data: bytes) -> None:
         stamp, names, values = read_values(data, "position")

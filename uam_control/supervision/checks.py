@@ -58,6 +58,8 @@ CHECKS = (
           "controller_age_hold"),
     Check("control ticks", "{value:.0f} {name} missed within a second, {limit:g} allowed",
           "missed_ticks_hold"),
+    Check("servo temperature", "{name} {value:.0f} deg C exceeds {limit:g} deg C",
+          "temperature_hold", "temperature_land"),
     Check("joint torque", "{name} at {value:.2f} of its limit", 1.0),
     Check("adapted gain", "{name} at {value:.2f} of its limit", 1.0),
 )  # fmt: skip
@@ -112,6 +114,7 @@ class Checks:
             readings.joint_age,
             readings.controller_age,
             readings.missed_ticks,
+            readings.temperature,
             readings.joint_effort,
             self._efforts,
             readings.gains,
@@ -185,6 +188,7 @@ def read(
     joints: float,
     controllers: float,
     missed: float,
+    temperature: float,
     effort: np.ndarray,
     effort_limits: np.ndarray,
     gains: np.ndarray,
@@ -195,8 +199,9 @@ def read(
     values[7] = _known(-battery)
     values[8], values[9] = _known(mocap), _known(joints)
     values[10], values[11] = _known(controllers), _known(missed)
-    values[12] = _largest(effort, effort_limits)
-    values[13] = _largest(gains, gain_limits)
+    values[12] = _known(temperature)
+    values[13] = _largest(effort, effort_limits)
+    values[14] = _largest(gains, gain_limits)
 
 
 @jit

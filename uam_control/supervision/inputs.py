@@ -23,6 +23,7 @@ class Inputs:
         self._readings = Readings()
         self._period = period
         self._mocap = self._joints = math.nan  # stamps [s]
+        self._temperatures: dict[str, float] = {}
         self._controllers: dict[str, float] = {}  # stamps of the newest gains [s]
         self._last: float | None = None
         self._gaps: deque[tuple[float, int]] = deque()  # stamp [s], ticks missed before it
@@ -36,6 +37,12 @@ class Inputs:
         """Note joint readings; effort (2,): measured torques [N m]."""
         self._joints = stamp
         self._readings.joint_effort[:] = effort  # as compiled maths wants it, writable
+
+    def temperature(self, joint: str, degrees: float) -> None:
+        """Note the temperature [deg C] of a joint's servo."""
+        self._temperatures[joint] = degrees
+        known = [value for value in self._temperatures.values() if not math.isnan(value)]
+        self._readings.temperature = max(known, default=math.nan)
 
     def battery(self, left: float) -> None:
         """Note the charge left, 0..1; NaN where nobody knows."""

@@ -26,8 +26,8 @@ class Readings:
 
     battery: charge left, 0..1. mocap_age, joint_age [s]: of the newest message by its stamp;
     controller_age [s]: of the oldest of the newest gains, which every controller tells.
-    missed_ticks: within the last second. joint_effort (2,): measured [N m]. gains (3,): largest
-    adapted gain of position, attitude, arm.
+    missed_ticks: within the last second. temperature: of the hottest servo [deg C]. joint_effort
+    (2,): measured [N m]. gains (3,): largest adapted gain of position, attitude, arm.
     """
 
     battery: float = math.nan
@@ -35,6 +35,7 @@ class Readings:
     joint_age: float = math.nan
     controller_age: float = math.nan
     missed_ticks: float = math.nan
+    temperature: float = math.nan
     joint_effort: np.ndarray = field(default_factory=lambda: np.full(2, math.nan))
     gains: np.ndarray = field(default_factory=lambda: np.full(3, math.nan))
 

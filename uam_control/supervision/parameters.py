@@ -39,6 +39,11 @@ class Limits(ParameterSet):
     joint_effort_hold: tuple = vector(
         (2.8, 2.8), "measured torque of alpha_1, alpha_2 to hold at", "N m", 0.01, 100.0, 2
     )
+    temperature_hold: float = number(
+        70.0, "temperature of a servo to hold at (a Dynamixel X switches off at 80)", "deg C", 0.0,
+        150.0,
+    )  # fmt: skip
+    temperature_land: float = number(75.0, "temperature of a servo to land at", "deg C", 0.0, 150.0)
     battery_land: float = number(0.15, "charge left to land at", "1", 0.0, 1.0)
     mocap_age_hold: float = number(0.25, "age of the mocap pose to hold at", "s", 0.02, 10.0)
     mocap_age_failsafe: float = number(
@@ -66,6 +71,7 @@ class Limits(ParameterSet):
             ("body_rate_hold", "body_rate_failsafe"),
             ("geofence_land", "geofence_failsafe"),
             ("mocap_age_hold", "mocap_age_failsafe"),
+            ("temperature_hold", "temperature_land"),
         ):
             for less, more in zip(order, order[1:], strict=False):
                 low, high = getattr(self, less), getattr(self, more)
