@@ -209,6 +209,8 @@ def test_notes_and_changes_of_the_vehicle_are_on_the_page(flight_folder):
 
 def test_outcomes_in_words():
     assert outcome.payload_story({"payload_lifted": None}) == "no payload in this flight"
+    never = {"payload_lifted": None, "payload_mass_kg": 0.2}
+    assert outcome.payload_story(never) == "the magnet was never on"
     assert outcome.payload_story({"payload_lifted": False}) == "not lifted"
     story = {"payload_lifted": True, "payload_place_error_m": 0.034}
     assert outcome.payload_story(story) == "lifted, came to rest 3.4 cm from the drop point"

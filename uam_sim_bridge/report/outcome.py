@@ -60,7 +60,8 @@ def verdict(metrics: Mapping[str, Any]) -> str:
 def payload_story(metrics: Mapping[str, Any]) -> str:
     """What became of the payload, in one line."""
     if metrics.get("payload_lifted") is None:
-        return "no payload in this flight"
+        there = metrics.get("payload_mass_kg")
+        return "the magnet was never on" if there else "no payload in this flight"
     if not metrics["payload_lifted"]:
         return "not lifted"
     error = metrics.get("payload_place_error_m")
