@@ -82,6 +82,7 @@ class Flight:
             forker = process_table.parent(pid)
             if name and process_table.parent(forker) == self.process.pid:
                 found[name] = pid
+        assert found, "no nodes"
         return found
 
     def shared_memory(self) -> set[Path]:

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from uam_sim_bridge.flight import processes, shared_memory
+from uam_sim_bridge.flight import process_table, processes, shared_memory
 from uam_sim_bridge.flight.processes import NodeFailed, Processes
 
 SLEEPER = """
@@ -68,6 +68,7 @@ def test_a_child_obeys_the_interrupt(children):
     children.start("a", "sleeper")
     ready(children, "a")
     children.check()
+    assert process_table.node_name(children.pid("a")) == "a"
     assert children.stop(["a"]) == []
     assert gone(children.pid("a"))
 

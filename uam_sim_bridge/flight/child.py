@@ -110,6 +110,7 @@ def _run(
 ) -> None:
     """Be the child: import the module and call its `main()`, which reads sys.argv."""
     os.setpgid(0, 0)  # Ctrl-C in the terminal is for the orchestrator alone
+    setproctitle(f"{TITLE} {name}")  # before the environment changes, beside which the title lies
     with open(log, "ab", buffering=0) as output:
         for stream in (1, 2):
             os.dup2(output.fileno(), stream)
@@ -120,7 +121,6 @@ def _run(
     added = environment.get("PYTHONPATH", "").split(os.pathsep)
     sys.path[:0] = [place for place in added if place and place not in sys.path]
     os.nice(niceness)
-    setproctitle(f"{TITLE} {name}")
     threading.Thread(target=_follow_the_orchestrator, daemon=True).start()
     sys.argv = [module, *arguments]
     try:
