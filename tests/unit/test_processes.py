@@ -73,6 +73,16 @@ def test_a_child_obeys_the_interrupt(children):
     assert gone(children.pid("a"))
 
 
+def test_of_several_that_ended_the_killed_one_is_named(children):
+    children.start("plant", "failing")
+    children.start("autopilot", "sleeper")
+    ready(children, "autopilot")
+    os.kill(children.pid("autopilot"), signal.SIGKILL)
+    wait_for(lambda: not (children.running("plant") or children.running("autopilot")))
+    with pytest.raises(NodeFailed, match="autopilot was killed by SIGKILL"):
+        children.check()
+
+
 def test_who_may_be_is_started_again_as_often_as_that(children):
     children.start("a", "sleeper", again=2)
     for left in (1, 0):

@@ -131,12 +131,18 @@ class Processes:
         return self._children[name].process.poll() is None
 
     def check(self) -> None:
-        """Raise NodeFailed for the first child that ended although nobody asked it to."""
+        """Raise NodeFailed for a child that ended although nobody asked it to.
+
+        Of several one that was killed: the others may have ended because of it.
+        """
+        failed = []
         for child in self._children.values():
             status = child.process.poll()
             if status is None or child.optional or (child.may_end and status == 0):
                 continue
-            raise NodeFailed(child.name, status, child.log)
+            failed.append(NodeFailed(child.name, status, child.log))
+        if failed:
+            raise min(failed, key=lambda one: one.status >= 0)
 
     def missed(self) -> list[NodeFailed]:
         """What became of optional children that ended by themselves, told once for each."""
