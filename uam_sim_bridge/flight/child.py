@@ -2,7 +2,7 @@
 
 A node needs seconds to import what it uses, the same for all of them. So they are forked from one
 process that has imported it (multiprocessing's fork server, see `prepare`): a flight starts sooner,
-and a node that was lost in flight is back within a fraction of a second.
+and a node that was lost in flight is back sooner.
 
 Each child watches its orchestrator. When that is gone - even by `kill -9`, which no handler sees -
 it is interrupted as by Ctrl-C, and killed if that does not help. Unlike PR_SET_PDEATHSIG this works
