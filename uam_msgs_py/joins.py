@@ -74,13 +74,18 @@ class StampJoin:
         values[self._index[name]] = value
         if any(value is None for value in values):
             return
-        self._last = stamp
-        for old in [key for key in self._open if key <= stamp]:
-            del self._open[old]
-            self._dropped += old != stamp
+        self._dropped += self._close(stamp) - 1  # all but this one
         self._backlog.put((stamp, values))
         if not self.deferred:
             self.settle()
+
+    def _close(self, stamp: int) -> int:
+        """Let go of the ticks up to `stamp` [ns]; return how many were open."""
+        self._last = stamp
+        closed = [key for key in self._open if key <= stamp]
+        for old in closed:
+            del self._open[old]
+        return len(closed)
 
     def settle(self) -> None:
         """Where `deferred`: fire what is complete."""
@@ -91,10 +96,7 @@ class StampJoin:
     def skip(self, stamp: int) -> None:
         """Let nothing up to `stamp` [ns] fire any more."""
         if stamp > self._last:
-            self._last = stamp
-            for old in [key for key in self._open if key <= stamp]:
-                del self._open[old]
-                self._dropped += 1
+            self._dropped += self._close(stamp)
 
     @property
     def dropped(self) -> int:

@@ -11,10 +11,9 @@ import numpy as np
 import pytest
 import yaml
 
-from uam_control.profile import NODES, load_profile
+from uam_control.profile import CONTROLLERS, NODES, load_profile
 from uam_sim_bridge.flight.wiring import BRIDGE, PLANT, RECORDER, SCENE
 
-CONTROLLERS = ("position_controller", "attitude_controller", "arm_controller")
 # topic → rate [Hz of simulated time] that docs/architecture.md and uam_msgs_py/topics.py promise
 RATES = {
     "/imu/data": 250.0,

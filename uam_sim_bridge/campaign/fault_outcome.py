@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections import Counter
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -19,6 +20,12 @@ OUTCOMES = {
     FAILSAFE: "it came down softly, but not by the mission's landing",
     LOST: "anything else: a fall, a hard landing, or out of control",
 }
+
+
+def counts(outcomes: Iterable[str]) -> dict[str, int]:
+    """How many there are of each, in the order of OUTCOMES."""
+    counted = Counter(outcomes)
+    return {outcome: counted[outcome] for outcome in OUTCOMES}
 
 
 @dataclass(frozen=True)

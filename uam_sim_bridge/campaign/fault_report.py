@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections import Counter
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -18,6 +17,7 @@ from uam_sim_bridge.campaign.fault_outcome import (
     LANDED,
     LOST,
     OUTCOMES,
+    counts,
 )
 from uam_sim_bridge.campaign.fault_trial import FaultResult
 from uam_sim_bridge.flight.atomic import replacing, write_rows, write_text
@@ -81,8 +81,8 @@ def worst(result: FaultResult, key: str) -> float:
 
 def sentence(results: Sequence[FaultResult]) -> str:
     """How many flights ended how."""
-    counted = Counter(result.outcome for result in results if result.fault != NOMINAL)
-    parts = [f"{counted[outcome]} {outcome}" for outcome in OUTCOMES if counted[outcome]]
+    counted = counts(result.outcome for result in results if result.fault != NOMINAL)
+    parts = [f"{number} {outcome}" for outcome, number in counted.items() if number]
     nominal = next((r.outcome for r in results if r.fault == NOMINAL), "not flown")
     return (
         f"{sum(counted.values())} flights with a fault: {', '.join(parts)}. "

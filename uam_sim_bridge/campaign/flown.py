@@ -11,6 +11,7 @@ import numpy as np
 
 from uam_control.configuration import ConfigurationError
 from uam_sim_bridge.campaign.trial import Result
+from uam_sim_bridge.flight.atomic import write_text
 
 FILE = "flown.jsonl"
 
@@ -43,7 +44,7 @@ class Flown:
             except (ValueError, TypeError):  # the last one, where the process was killed
                 continue
             self.results[result.seed] = result
-        self._file.write_text("\n".join([first, *map(_line, self.results.values()), ""]))
+        write_text(self._file, "\n".join([first, *map(_line, self.results.values()), ""]))
 
     def add(self, result: Result) -> None:
         """Note one more flight."""

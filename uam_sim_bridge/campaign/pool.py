@@ -11,9 +11,8 @@ from collections.abc import Callable, Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
 
 from uam_sim_bridge.campaign.trial import Result, Trial, fly
+from uam_sim_bridge.flight.child import SINGLE_THREAD
 from uam_sim_bridge.flight.warm_up import is_cold, warm_up
-
-SINGLE_THREAD = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "NUMBA_NUM_THREADS")
 
 
 def cores() -> int:
@@ -60,8 +59,8 @@ def figures_of(trial: Trial) -> Result:
 
 def _executor(jobs: int) -> ProcessPoolExecutor:
     """Fresh processes of one thread each, deaf to Ctrl-C, which is for the main process."""
-    for name in SINGLE_THREAD:
-        os.environ.setdefault(name, "1")
+    for name, threads in SINGLE_THREAD.items():
+        os.environ.setdefault(name, threads)
     return ProcessPoolExecutor(
         jobs, mp_context=multiprocessing.get_context("spawn"), initializer=prepare_worker
     )

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 from matplotlib.figure import Figure
 
-from uam_sim_bridge.campaign.fault_outcome import COMPLETED, OUTCOMES
+from uam_sim_bridge.campaign.fault_outcome import COMPLETED, OUTCOMES, counts
 from uam_sim_bridge.campaign.trial import ERRORS, Result
 from uam_sim_bridge.campaign.variations import Draw, common
 from uam_sim_bridge.flight.atomic import replacing, write_rows, write_text
@@ -32,7 +32,7 @@ def write(out: Path, draws: Sequence[Draw], results: Sequence[Result], command: 
                 "command": command,
                 "versions": versions(),
                 "flights": len(results),
-                "outcomes": _outcomes(results),
+                "outcomes": counts(r.outcome for r in results),
                 "rms_percentiles": {str(p): np.percentile(rms, p, axis=0) for p in PERCENTILES},
                 "columns": ERRORS,
                 "failures_have_in_common": common(draws, failed),
@@ -72,7 +72,7 @@ def _summary(
     command: str,
 ) -> str:
     count, bad = len(results), sum(failed)
-    others = {o: n for o, n in _outcomes(results).items() if n and o != COMPLETED}
+    others = {o: n for o, n in counts(r.outcome for r in results).items() if n and o != COMPLETED}
     told = ", ".join(f"{number} {outcome}" for outcome, number in others.items())
     lines = [
         f"{count - bad} of {count} flights completed the mission "
@@ -109,11 +109,6 @@ def _summary(
             + ".",
         ]
     return "\n".join([*lines, "", f"Made by `{command}`."]) + "\n"
-
-
-def _outcomes(results: Sequence[Result]) -> dict[str, int]:
-    """How many flights ended in each way, in the order of OUTCOMES."""
-    return {outcome: sum(r.outcome == outcome for r in results) for outcome in OUTCOMES}
 
 
 def _kind(why: str) -> str:

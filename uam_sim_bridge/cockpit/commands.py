@@ -8,9 +8,9 @@ from dataclasses import dataclass
 import viser
 from std_srvs.srv import SetBool, Trigger
 
+from uam_control.profile import CONTROLLERS
 from uam_sim_bridge.cockpit.services import Services
 
-CONTROLLERS = ("position_controller", "attitude_controller", "arm_controller")
 Later = Callable[[Callable[[], None]], None]
 
 

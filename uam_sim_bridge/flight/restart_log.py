@@ -6,7 +6,6 @@ from rclpy.node import Node
 
 from uam_msgs_py import topics
 from uam_msgs_py.status import WARN, diagnostic
-from uam_sim_bridge.flight.processes import NodeFailed
 
 
 class RestartTopic:
@@ -18,8 +17,8 @@ class RestartTopic:
             for topic in (topics.RESTARTS, topics.DIAGNOSTICS)
         ]
 
-    def tell(self, stamp: int, lost: NodeFailed) -> None:
-        """Say so; stamp [ns]: of the flight's clock."""
-        message = diagnostic(stamp, lost.name, WARN, f"{lost}; started again", {})
+    def tell(self, stamp: int, node: str, text: str) -> None:
+        """Say what became of a node; stamp [ns]: of the flight's clock."""
+        message = diagnostic(stamp, node, WARN, text, {})
         for publisher in self._publishers:
             publisher.publish(message)

@@ -12,6 +12,7 @@ import time
 from pathlib import Path
 from typing import Any
 
+from uam_control.profile import CONTROLLERS
 from uam_sim_bridge.cockpit import place
 from uam_sim_bridge.faults import LINK, PLANT, PROCESS
 from uam_sim_bridge.faults.timeline import Happened
@@ -225,7 +226,7 @@ def _start(
             may_end=name == wiring.PLANT,
             niceness=NICENESS.get(name, 0),
             optional=name in ONLOOKERS,
-            again=RESTARTS if name in wiring.CONTROLLERS else 0,
+            again=RESTARTS if name in CONTROLLERS else 0,
         )
     module, own = _autopilot(settings, folder, ports)
     if module:
@@ -293,8 +294,9 @@ def _watch(
             children.note_shared_memory()
             noted = time.monotonic()
         for lost in children.revive():
-            progress.message(f"{lost}; started again")
-            restarts.tell(listener.stamp, lost)
+            text = f"{lost}; started again"
+            progress.message(text)
+            restarts.tell(listener.stamp, lost.name, text)
         children.check()
         for failure in children.missed():
             progress.message(f"{failure}; the flight goes on without it")

@@ -17,7 +17,6 @@ from uam_msgs_py.connections import READERS, WRITERS, Connections
 
 ESTIMATOR, MISSION = "state_estimator", "mission"
 POSITION, ATTITUDE, ARM = "position_controller", "attitude_controller", "arm_controller"
-CONTROLLERS = (POSITION, ATTITUDE, ARM)
 BRIDGE, PLANT, RECORDER = "mavlink_bridge", "mujoco_sim", "recorder"
 SCENE, COCKPIT = "scene", "cockpit"  # only look on, nobody waits for them: in none of WIRES
 
