@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import mujoco
 import numpy as np
 import pytest
 from hypothesis import given
@@ -9,7 +10,7 @@ from hypothesis import strategies as st
 
 from uam_sim_bridge.plant import Plant, Vehicle
 from uam_sim_bridge.plant.actuators import Rotors, Servos
-from uam_sim_bridge.plant.magnet import pull_fraction
+from uam_sim_bridge.plant.magnet import magnet_constants, pull_fraction
 from uam_sim_bridge.plant.sensors import Delay, Encoders, Mocap
 
 VEHICLE = Vehicle.load()
@@ -111,13 +112,42 @@ def test_noise_has_the_stated_size():
     np.testing.assert_allclose(gyro.std(axis=0), NUMBERS["sensors"]["imu"]["gyro_noise"], rtol=0.06)
 
 
-def test_magnet_pull_falls_with_the_gap():
+GAP = np.array([0.02, 0.0385, 0.001, 0.003])  # height, reach, thickness, gap_scale
+
+
+@pytest.mark.parametrize(
+    ("face", "expected"),
+    [
+        ((0, 0, 0.019), 1.0),  # pressed into the plate
+        ((0, 0, 0.02), 1.0),
+        ((0, 0, 0.023), 0.25),
+        ((0, 0, 0.032), 0.04),
+        ((0.0385, -0.0385, 0.02), 1.0),  # a corner of the face on a corner of the plate
+        ((0.0385 + 0.003, 0, 0.02), 0.25),  # beside it
+        ((0.03, 0, 0.007), 0.04),  # at the side of a payload that has toppled
+    ],
+)
+def test_magnet_pull_falls_with_the_gap_to_the_plate(face, expected):
     upright = np.eye(3).ravel()
-    pulls = [
-        pull_fraction(np.array([0, 0, 0.02 + gap]), np.zeros(3), upright, 0.02, 0.003)
-        for gap in (-0.001, 0.0, 0.003, 0.012)
-    ]
-    assert pulls == pytest.approx([1.0, 1.0, 0.25, 0.04])
+    assert pull_fraction(np.array(face), np.zeros(3), upright, GAP) == pytest.approx(expected)
+
+
+def test_the_plate_is_where_the_model_has_it():
+    np.testing.assert_allclose(magnet_constants(VEHICLE.compile(0.2), 0.003), GAP)
+
+
+def test_the_magnet_stands_on_the_stand_but_does_not_hold_on_to_it():
+    plant = Plant(VEHICLE, 0.0, seed=1)
+    model, data = plant.model, plant.data
+    face, top = (model.geom(name).id for name in ("magnet_face", "stand_top"))
+    mujoco.mj_forward(model, data)
+    data.qpos[0:3] += data.geom_xpos[top] - data.geom_xpos[face] + (0.0, 0.0, 0.0108)
+    data.ctrl[6] = 1.0
+    mujoco.mj_forward(model, data)
+    met = {frozenset(pair) for pair in data.contact.geom.tolist()}
+    case = model.geom("magnet_case").id
+    assert frozenset((case, top)) in met and frozenset((face, top)) not in met
+    assert not data.qfrc_actuator[0:6].any()
 
 
 def test_drag_and_wind_push_the_vehicle():

@@ -8,7 +8,7 @@ import mujoco
 import numpy as np
 
 from uam_control.rotations import quaternion_from_rotation_vector, quaternion_multiply
-from uam_sim_bridge.plant.urdf import BASE_LINK, ROOT
+from uam_sim_bridge.plant.urdf import BASE_LINK, ROOT, carried
 
 SWING = "magnet_swing"  # the joint that nothing measures
 
@@ -45,11 +45,7 @@ class Box:
 def frames(model: mujoco.MjModel) -> list[Frame]:
     """The frames that hang on the vehicle's base, parents first."""
     root = model.body(ROOT).id
-    return [
-        _frame(model, body, root)
-        for body in range(root + 1, model.nbody)
-        if model.body_rootid[body] == root
-    ]
+    return [_frame(model, body, root) for body in carried(model)]
 
 
 def _frame(model: mujoco.MjModel, body: int, root: int) -> Frame:

@@ -6,27 +6,44 @@ it holds, and whether, comes out of contact and friction. Here only its strength
 
 from __future__ import annotations
 
+import math
+
+import mujoco
 import numpy as np
 
 from uam_control.compiled import jit
 
 
+def magnet_constants(model: mujoco.MjModel, gap_scale: float) -> np.ndarray:
+    """What `pull_fraction` needs of the model (4,): height, reach, thickness, gap_scale, all [m].
+
+    Where the payload's steel plate is in its own frame: its upper side, how far from its middle
+    some of the magnet's face is still above it, and how thick it is.
+    """
+    plate, face = model.geom("payload_plate").size, model.geom("magnet_face").size
+    return np.array([model.geom("payload").size[2], plate[0] + face[0], 2 * plate[2], gap_scale])
+
+
 @jit
 def pull_fraction(
-    face: np.ndarray,
-    payload: np.ndarray,
-    payload_axes: np.ndarray,
-    half_height: float,
-    gap_scale: float,
+    face: np.ndarray, payload: np.ndarray, payload_axes: np.ndarray, constants: np.ndarray
 ) -> float:
-    """Return the fraction 0..1 of the holding force at the present air gap.
+    """Return the fraction 0..1 of the holding force at the present air gap to the steel plate.
 
     face (3,): centre of the magnet's face; payload (3,), payload_axes (9,): centre and rotation
-    matrix, row by row, of the payload; half_height [m]: from its centre to its steel plate;
-    gap_scale [m]. Reluctance of an air gap: F = F0 / (1 + gap / gap_scale)^2.
+    matrix, row by row, of the payload; constants (4,): of `magnet_constants`. Reluctance of an air
+    gap: F = F0 / (1 + gap / gap_scale)^2.
     """
-    above = 0.0
-    for i in range(3):
-        above += (face[i] - payload[i]) * payload_axes[3 * i + 2]
-    ratio = 1.0 + max(above - half_height, 0.0) / gap_scale
+    height, reach, thickness, gap_scale = constants
+    gap_squared = 0.0
+    for axis in range(3):
+        along = 0.0
+        for i in range(3):
+            along += (face[i] - payload[i]) * payload_axes[3 * i + axis]
+        if axis < 2:
+            gap = max(abs(along) - reach, 0.0)
+        else:
+            gap = max(along - height, height - thickness - along, 0.0)
+        gap_squared += gap * gap
+    ratio = 1.0 + math.sqrt(gap_squared) / gap_scale
     return 1.0 / (ratio * ratio)

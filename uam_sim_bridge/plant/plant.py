@@ -10,7 +10,7 @@ import numpy as np
 from uam_control.compiled import jit
 from uam_control.rotations import euler_from_quaternion
 from uam_sim_bridge.plant.actuators import Rotors, Servos, rotor_step, servo_step
-from uam_sim_bridge.plant.magnet import pull_fraction
+from uam_sim_bridge.plant.magnet import magnet_constants, pull_fraction
 from uam_sim_bridge.plant.sensors import Delay, Encoders, Imu, Mocap, Noise, generators
 from uam_sim_bridge.plant.vehicle import Vehicle
 
@@ -120,9 +120,8 @@ class Plant:
         self._magnet_control = data.ctrl[6:7]
         self._face = data.site_xpos[self.model.site("magnet_face").id]
         self._payload_axes = data.xmat[self.model.body("payload").id]
-        self._magnet_constants = np.array(
-            [self.model.geom("payload").size[2], self.vehicle.numbers["magnet"]["gap_scale"]]
-        )
+        gap_scale = self.vehicle.numbers["magnet"]["gap_scale"]
+        self._magnet_constants = magnet_constants(self.model, gap_scale)
         self._alpha[:] = arm_start
         data.qpos[self._swing] = -sum(arm_start)
         self._payload_position[0:2] += self.vehicle.numbers["variation"]["payload_offset"]
@@ -269,7 +268,7 @@ def surroundings(
     face: np.ndarray,
     payload: np.ndarray,
     payload_axes: np.ndarray,
-    magnet_constants: np.ndarray,
+    gap_constants: np.ndarray,
     magnet_control: np.ndarray,
     specific_force: np.ndarray,
 ) -> None:
@@ -280,11 +279,7 @@ def surroundings(
     for i in range(3):
         force[i] = drag[i] * (wind[i] - velocity[i])
         specific_force[i] = 0.0
-    magnet_control[0] = (
-        pull_fraction(face, payload, payload_axes, magnet_constants[0], magnet_constants[1])
-        if magnet
-        else 0.0
-    )
+    magnet_control[0] = pull_fraction(face, payload, payload_axes, gap_constants) if magnet else 0.0
 
 
 @jit

@@ -30,9 +30,7 @@ def urdf(vehicle: Vehicle, root_name: str = BASE_LINK) -> str:
     model = vehicle.compile(0.0)
     robot = ElementTree.Element("robot", name=model.body(ROOT).name)
     root = model.body(ROOT).id
-    for body in range(root, model.nbody):
-        if model.body_rootid[body] != root:
-            continue
+    for body in (root, *carried(model)):
         name = root_name if body == root else model.body(body).name
         link = ElementTree.SubElement(robot, "link", name=name)
         _inertial(link, model, body)
@@ -46,9 +44,17 @@ def urdf(vehicle: Vehicle, root_name: str = BASE_LINK) -> str:
     return ElementTree.tostring(robot, encoding="unicode")
 
 
+def carried(model: mujoco.MjModel) -> list[int]:
+    """The bodies that hang on the vehicle's base, parents first, without mere contacts."""
+    root = model.body(ROOT).id
+    return [
+        body
+        for body in range(root + 1, model.nbody)
+        if model.body_rootid[body] == root and model.body_mass[body] > 0.0
+    ]
+
+
 def _inertial(link: ElementTree.Element, model: mujoco.MjModel, body: int) -> None:
-    if model.body_mass[body] <= 0.0:
-        return
     inertial = ElementTree.SubElement(link, "inertial")
     ElementTree.SubElement(inertial, "origin", xyz=_text(model.body_ipos[body]), rpy="0 0 0")
     ElementTree.SubElement(inertial, "mass", value=_text(model.body_mass[body : body + 1]))
