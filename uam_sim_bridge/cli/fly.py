@@ -20,7 +20,13 @@ from uam_sim_bridge.flight.conclude import command_line, conclude
 from uam_sim_bridge.flight.ports import INSTANCES, PortError
 from uam_sim_bridge.flight.progress import Progress
 from uam_sim_bridge.flight.result_folder import ResultFolder, ResultFolderError
-from uam_sim_bridge.flight.settings import ONLOOKERS, REPLACEABLE, FlightSettings, SettingsError
+from uam_sim_bridge.flight.settings import (
+    LOG_LIMIT,
+    ONLOOKERS,
+    REPLACEABLE,
+    FlightSettings,
+    SettingsError,
+)
 from uam_sim_bridge.mavlink.transport import ALLOWED
 from uam_sim_bridge.px4.installation import Px4Error
 from uam_sim_bridge.report.build import build_report
@@ -175,6 +181,13 @@ def add(commands: argparse._SubParsersAction) -> None:
         metavar="DIR",
         help="result folder (default results/<time>-<scenario>-<controller>)",
     )
+    option(
+        "--log-limit",
+        type=_number("size", "MB", 1.0),
+        default=LOG_LIMIT,
+        metavar="MB",
+        help="size at which log.mcap ends; the flight goes on (default %(default)g, hours)",
+    )
     option("--no-video", action="store_true", help="leave out the video, which takes longest")
     option(
         "--instance",
@@ -229,6 +242,7 @@ def run(options: argparse.Namespace) -> int:
             vehicle_changes=_vehicle_changes(options),
             instance=options.instance,
             without=options.without,
+            log_limit=options.log_limit,
             view=options.view,
             faults=options.fault,
         )

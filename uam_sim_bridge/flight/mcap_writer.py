@@ -164,6 +164,11 @@ class McapWriter:
         self._file.close()
 
     @property
+    def size(self) -> int:
+        """Bytes in the file so far."""
+        return self._file.tell()
+
+    @property
     def counts(self) -> dict[str, int]:
         """Messages written per topic, including those not flushed yet."""
         waiting = {channel: len(entries) for channel, entries in self._index.items()}

@@ -153,6 +153,7 @@ def parameters(
         "file": str(folder.log),
         "statistics": str(folder.path / "logs" / "recorder.json"),
         "facts": str(folder.path / "logs" / FACTS),
+        "size_limit": settings.log_limit,
     }
     return sections
 
@@ -329,8 +330,8 @@ def _outcome(
             outcome.notes.append(
                 f"{late} of {asked} setpoints came later than one control period after their sample"
             )
-    lost = _statistics(folder.path / "logs" / "recorder.json").get("lost", {})
-    if lost:
+    recorder = _statistics(folder.path / "logs" / "recorder.json")
+    if lost := recorder.get("lost"):
         text = ", ".join(f"{count} of {topic}" for topic, count in lost.items())
         outcome.notes.append(f"the recorder lost messages: {text}")
     try:
@@ -342,7 +343,8 @@ def _outcome(
     outcome.parameter_changes, outcome.transitions = flight.parameter_changes, flight.transitions
     outcome.faults = flight.faults
     if not flight.done and not outcome.partial:
-        outcome.failure = numbers.get("ended_by") or "the mission did not end"
+        ended = recorder.get("ended") or numbers.get("ended_by")
+        outcome.failure = ended or "the mission did not end"
     return outcome
 
 

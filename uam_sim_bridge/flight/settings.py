@@ -22,6 +22,7 @@ BUILTIN, PX4 = "builtin", "px4"
 # Nodes that a user's own can stand in for: their inputs and outputs are all there is to them.
 REPLACEABLE = ("state_estimator", "position_controller", "attitude_controller", "arm_controller")
 COCKPIT = "cockpit"
+LOG_LIMIT = 4000.0  # [MB] some four hours of flight
 ONLOOKERS = ("scene", COCKPIT)  # nodes that only look on: the flight goes on without
 PAYLOAD_MAX = 2.0  # [kg] more than the rotors could ever carry
 
@@ -57,6 +58,7 @@ class FlightSettings:
     instance: int | None = None  # of ROS domain and ports; None: the first free one
     vehicle_changes: dict[str, object] = field(default_factory=dict)
     without: tuple[str, ...] = (COCKPIT,)
+    log_limit: float = LOG_LIMIT  # [MB] size at which log.mcap ends
     faults: Schedule = Schedule()
 
     @property
@@ -82,6 +84,7 @@ def settings(
     instance: int | None = None,
     without: Sequence[str] = (),
     view: bool = False,
+    log_limit: float = LOG_LIMIT,
     faults: Sequence[str] = (),
 ) -> FlightSettings:
     """Check the options and load what they name.
@@ -152,6 +155,7 @@ def settings(
         vehicle_changes=dict(vehicle_changes or {}),
         without=left_out,
         faults=injected,
+        log_limit=log_limit,
     )
 
 

@@ -27,7 +27,6 @@ import json
 import math
 import sys
 import time
-from dataclasses import asdict
 from pathlib import Path
 
 import numpy as np
@@ -351,7 +350,7 @@ def main() -> int:
         if simulator is not None:
             simulator.close()
             if options.statistics:
-                Path(options.statistics).write_text(json.dumps(asdict(simulator.report())))
+                Path(options.statistics).write_text(json.dumps(simulator.report().to_mapping()))
         node.destroy_node()
         rclpy.try_shutdown()
 

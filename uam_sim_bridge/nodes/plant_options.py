@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from dataclasses import asdict, dataclass, field
+from array import array
+from dataclasses import asdict, dataclass, field, replace
 
 from rcl_interfaces.msg import ParameterDescriptor
 from rclpy.node import Node
@@ -79,5 +80,10 @@ class Statistics:
     missed_ticks: int = 0
     late_ticks: int = 0
     late_motor_commands: int = 0
-    latency_s: list[float] = field(default_factory=list)
+    latency_s: array[float] = field(default_factory=lambda: array("f"))  # small: for hours
     ended_by: str = ""
+
+    def to_mapping(self) -> dict[str, object]:
+        """As JSON takes it; latencies to the microsecond."""
+        latencies = [round(value, 6) for value in self.latency_s]
+        return asdict(replace(self, latency_s=array("f"))) | {"latency_s": latencies}

@@ -32,8 +32,8 @@ from uam_msgs_py.health import LoopTime, ages
 from uam_msgs_py.layouts import SECOND, stamp_of
 from uam_msgs_py.node import StopSignal, refuse
 from uam_msgs_py.parameters import refuse_unknown
-from uam_msgs_py.status import OK, WARN, diagnostic
-from uam_sim_bridge.flight.mcap_writer import McapWriter
+from uam_msgs_py.status import ERROR, OK, WARN, diagnostic
+from uam_sim_bridge.flight.bounded_log import BoundedLog
 from uam_sim_bridge.flight.message_definitions import schema
 
 DEPTH = 2000  # messages per topic that may wait for one poll: 8 s at control rate
@@ -71,12 +71,16 @@ class Recording:
         chosen: list[topics.Topic],
         simulated: bool,
         metadata: Mapping[str, Mapping[str, str]] | None = None,
+        size_limit: float = 0.0,
     ):
-        """Subscribe to `chosen` and create `file`, which begins with the named texts `metadata`."""
+        """Subscribe to `chosen` and create `file`, which begins with the named texts `metadata`.
+
+        size_limit [MB], 0 for none.
+        """
         self._simulated = simulated
-        self._writer = McapWriter(file)
+        self._writer = BoundedLog(file, size_limit)
         for name, values in (metadata or {}).items():
-            self._writer.add_metadata(name, dict(values))
+            self._writer.add_metadata(name, values)
         self._tracks = [self._track(node, topic) for topic in chosen]
         # The clock comes last in each poll: when it has been taken, every /clock that was
         # published before any message taken in this poll is known.
@@ -159,6 +163,11 @@ class Recording:
         self._writer.flush()
 
     @property
+    def ended(self) -> str:
+        """Why nothing is written any more, "" while it is."""
+        return self._writer.ended
+
+    @property
     def until(self) -> float:
         """Simulation time [s] of the newest /clock that was taken, 0 before the first."""
         return self._clock_sim[-1] / SECOND if self._clock_sim else 0.0
@@ -196,12 +205,13 @@ def _qos_text(qos: QoSProfile) -> str:
 def _health(node: Node, recording: Recording, polls: LoopTime) -> DiagnosticArray:
     """The node's entry of /diagnostics: what it has lost, its loop, to whom it is connected."""
     lost = sum(recording.lost.values())
-    summary = f"{lost} messages lost" if lost else "recording"
+    summary = recording.ended or (f"{lost} messages lost" if lost else "recording")
     values = {"messages lost": lost, connections.RECORDED_UNTIL: recording.until}
     values |= polls.report("poll") | ages(recording.inlets, recording.arrivals)
     values |= connections.of({}, recording.inlets)
     now = node.get_clock().now().nanoseconds
-    return diagnostic(now, node.get_name(), WARN if lost else OK, summary, values)
+    level = ERROR if recording.ended else WARN if lost else OK
+    return diagnostic(now, node.get_name(), level, summary, values)
 
 
 def main() -> int:
@@ -215,11 +225,12 @@ def main() -> int:
     facts = node.declare_parameter("facts", "").value  # see flight/log_facts.py
     simulated = node.declare_parameter("simulated", True).value
     flush_period = node.declare_parameter("flush_period", 0.5).value
+    size_limit = float(node.declare_parameter("size_limit", 0.0).value)  # [MB], 0: none
     poll_period = node.declare_parameter("poll_period", 0.02).value
     try:
         refuse_unknown(node)
         known = json.loads(Path(facts).read_text()) if facts else None
-        recording = Recording(node, file, topics.ALL, simulated, known)
+        recording = Recording(node, file, topics.ALL, simulated, known, size_limit)
     except ParameterError as error:
         return refuse("recorder", error)
     except OSError as error:
@@ -230,7 +241,7 @@ def main() -> int:
     )
     print(f"recorder: {len(topics.ALL)} topics to {file}", flush=True)
     polls_per_flush = max(1, round(flush_period / poll_period))
-    polls, loop = 0, LoopTime()
+    polls, loop, told = 0, LoopTime(), ""
     while not stop.raised:
         time.sleep(poll_period)
         begun = time.perf_counter()
@@ -239,13 +250,16 @@ def main() -> int:
         polls += 1
         if polls % polls_per_flush == 0:
             recording.flush()
+            if recording.ended and not told:
+                told = recording.ended
+                print(f"recorder: {told}; recorded until {recording.until:g} s", flush=True)
             health.publish(_health(node, recording, loop))
     recording.drain()
     recording.close()
     for topic, count in recording.lost.items():
         print(f"recorder: {count} messages of {topic} were lost", flush=True)
     if statistics:
-        summary = {"messages": recording.counts, "lost": recording.lost}
+        summary = {"messages": recording.counts, "lost": recording.lost, "ended": recording.ended}
         Path(statistics).write_text(json.dumps(summary, indent=1))
     node.destroy_node()
     rclpy.shutdown()

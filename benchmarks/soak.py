@@ -1,0 +1,65 @@
+"""Fly for hours, and see whether memory, file handles, threads and the log stay bounded.
+
+    .venv/bin/python benchmarks/soak.py --minutes 60                          # nodes, real time
+    .venv/bin/python benchmarks/soak.py --minutes 600 --clock lockstep        # as fast as it goes
+    .venv/bin/python benchmarks/soak.py --minutes 600 --engine direct         # missions in a row
+
+With nodes it is one flight, to and fro with the arm swinging; in the direct engine mission after
+mission in one process. Every process is looked at every few seconds in /proc. Leaves soak.json and
+soak.png in --out; the exit status is 1 where something has grown.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import sys
+from pathlib import Path
+
+from soaking import judgement, picture, watch
+
+FAILED, INTERRUPTED = 1, 130
+
+
+def main() -> int:
+    """Fly, judge, print; returns the exit status."""
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    option = parser.add_argument
+    option("--minutes", type=float, default=60.0, help="of simulated time (default %(default)g)")
+    option("--engine", choices=("ros", "direct"), default="ros", help="(default %(default)s)")
+    option(
+        "--clock",
+        choices=("realtime", "lockstep"),
+        default="realtime",
+        help="of the nodes (default %(default)s)",
+    )
+    option("--log-limit", type=float, default=200.0, help="[MB] of the log (default %(default)g)")
+    option("--out", type=Path, default=Path("results/soak"), help="(default %(default)s)")
+    options = parser.parse_args()
+    if options.minutes < 2.0:
+        parser.error("--minutes is 2 or more: what grows is not to be seen earlier")
+    options.out.mkdir(parents=True, exist_ok=True)
+    try:
+        if options.engine == "direct":
+            soak = watch.missions(60.0 * options.minutes)
+        else:
+            soak = watch.flight(
+                60.0 * options.minutes, options.clock, options.log_limit, options.out
+            )
+    except KeyboardInterrupt:
+        print("soak: interrupted", file=sys.stderr)
+        return INTERRUPTED
+    verdicts = judgement.judge(soak)
+    print(judgement.table(verdicts))
+    for line in soak.notes:
+        print(line)
+    (options.out / "soak.json").write_text(json.dumps(soak.to_mapping(verdicts), indent=1))
+    picture.draw(soak, options.out / "soak.png")
+    print(f"picture  {options.out / 'soak.png'}")
+    return FAILED if soak.failed or any(one.grown for one in verdicts) else 0
+
+
+if __name__ == "__main__":
+    raise SystemExit(main())

@@ -1,0 +1,63 @@
+"""What a process uses, from /proc, over the time of a soak."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass, field
+
+from uam_sim_bridge.flight.process_table import PROC
+
+
+@dataclass(frozen=True)
+class Usage:
+    """memory [MB]: its own, neither shared nor of files."""
+
+    memory: float
+    handles: int
+    threads: int
+
+
+def usage(pid: int) -> Usage | None:
+    """What a process uses now; None where it is gone."""
+    try:
+        status = (PROC / str(pid) / "status").read_text()
+        handles = len(list((PROC / str(pid) / "fd").iterdir()))
+    except OSError:
+        return None
+    fields = dict(line.split(":", 1) for line in status.splitlines() if ":" in line)
+    if "RssAnon" not in fields:
+        return None
+    memory = int(fields["RssAnon"].split()[0]) * 1024 / 1e6
+    return Usage(memory, handles, int(fields["Threads"]))
+
+
+@dataclass
+class Soak:
+    """What was seen. usage: by process, each (time of the soak [s], what it used).
+
+    unit: of the time, as the picture names it; failed: whether the flight itself went wrong.
+    """
+
+    title: str
+    unit: str
+    usage: dict[str, list[tuple[float, Usage]]] = field(default_factory=dict)
+    notes: list[str] = field(default_factory=list)
+    failed: bool = False
+
+    def add(self, name: str, time: float, used: Usage) -> None:
+        """Note what a process used at a time [s]."""
+        self.usage.setdefault(name, []).append((time, used))
+
+    def to_mapping(self, verdicts: Sequence[object]) -> dict[str, object]:
+        """As JSON takes it."""
+        seen = {
+            name: [(time, used.memory, used.handles, used.threads) for time, used in samples]
+            for name, samples in self.usage.items()
+        }
+        return {
+            "title": self.title,
+            "notes": self.notes,
+            "failed": self.failed,
+            "verdicts": [asdict(one) for one in verdicts],
+            "usage": {"columns": ["time_s", "memory_mb", "handles", "threads"], "processes": seen},
+        }

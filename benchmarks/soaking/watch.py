@@ -1,0 +1,124 @@
+"""Flies, and looks at what the processes use."""
+
+from __future__ import annotations
+
+import json
+import os
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+from soaking.samples import Soak, usage
+from soaking.scenario import shuttle
+from uam_control.mission import load_scenario
+from uam_control.profile import load_profile
+from uam_sim_bridge.flight.direct import DirectFlight
+from uam_sim_bridge.flight.process_table import node_name, parent, pids
+from uam_sim_bridge.plant import Vehicle
+
+PERIOD = 10.0  # [s] of wall time between two looks
+SPOKEN = 30  # looks between two lines of progress
+STOP_WAIT = 60.0  # [s]
+ORCHESTRATOR = "uam fly"
+
+
+def flight(duration: float, clock: str, log_limit: float, out: Path) -> Soak:
+    """One flight of `duration` [s] with all nodes, log_limit [MB], into `out`/flight."""
+    scenario = out / "shuttle.yaml"
+    scenario.write_text(shuttle(duration))
+    said = out / "flight.txt"
+    command = ["-m", "uam_sim_bridge.cli.main", "fly", "--scenario", str(scenario)]
+    command += ["--clock", clock, "--no-video", "--log-limit", str(log_limit)]
+    folder = _fresh(out / "flight")
+    with said.open("w") as output:
+        run = subprocess.Popen(
+            [sys.executable, *command, "--out", str(folder)], stdout=output, stderr=output
+        )
+    soak = Soak(f"{duration / 60.0:g} minutes through the nodes, {clock}", "wall time")
+    try:
+        _look(soak, run, folder / "logs" / "mujoco_sim.json")
+        run.wait()
+    except KeyboardInterrupt:
+        run.send_signal(2)
+        run.wait(STOP_WAIT)
+        raise
+    _conclude(soak, folder, duration)
+    return soak
+
+
+def _fresh(folder: Path) -> Path:
+    """A name that is not taken."""
+    number, chosen = 1, folder
+    while chosen.exists():
+        number += 1
+        chosen = folder.with_name(f"{folder.name}_{number}")
+    return chosen
+
+
+def _look(soak: Soak, run: subprocess.Popen, ended: Path) -> None:
+    """Until the plant has written its statistics, which it does at its end, or the run is over."""
+    begin, looks = time.monotonic(), 0
+    while run.poll() is None and not ended.exists():
+        now = time.monotonic() - begin
+        found = {node_name(pid): pid for pid in pids() if node_name(pid) and _below(pid, run.pid)}
+        for name, pid in {ORCHESTRATOR: run.pid, **found}.items():
+            used = usage(pid)
+            if used is not None:
+                soak.add(name, now, used)
+        looks += 1
+        if looks % SPOKEN == 0:
+            total = sum(samples[-1][1].memory for samples in soak.usage.values())
+            print(f"soak: {now / 60.0:.0f} min, {total:.0f} MB in all", flush=True)
+        time.sleep(PERIOD)
+
+
+def _below(pid: int, ancestor: int) -> bool:
+    while pid > 1:
+        if pid == ancestor:
+            return True
+        pid = parent(pid)
+    return False
+
+
+def _conclude(soak: Soak, folder: Path, duration: float) -> None:
+    try:
+        plant = json.loads((folder / "logs" / "mujoco_sim.json").read_text())
+        recorder = json.loads((folder / "logs" / "recorder.json").read_text())
+    except OSError as error:
+        soak.failed = True
+        soak.notes.append(f"the flight left no {error.filename}")
+        return
+    soak.failed = plant["ended_by"] != "mission" or plant["simulated_s"] < 0.9 * duration
+    soak.notes += [
+        f"flown    {plant['simulated_s']:.0f} s in {plant['wall_s']:.0f} s, "
+        f"ended by: {plant['ended_by']}",
+        f"log      {(folder / 'log.mcap').stat().st_size / 1e6:.0f} MB, {recorder['ended']}; "
+        f"{sum(recorder['lost'].values())} messages lost",
+    ]
+    if plant["clock"] == "realtime":
+        asked = plant["answerable_ticks"]
+        soak.notes.append(f"missed   {plant['missed_ticks']} of {asked} control ticks")
+
+
+def missions(duration: float) -> Soak:
+    """Mission after mission in the direct engine and this process, `duration` [s] in all."""
+    scenario, profile = load_scenario("pick_and_place"), load_profile("s500")
+    soak, flown, completed, number = Soak("missions in one process", "simulated time"), 0.0, 0, 0
+    begin = time.monotonic()
+    while flown < duration:
+        number += 1
+        one = DirectFlight(scenario, profile, Vehicle.load(), scenario.payload_mass, seed=number)
+        one.run()
+        flown += one.plant.time
+        completed += one.mission.output.done and not one.mission.output.abort_reason
+        soak.add("direct engine", flown, usage(os.getpid()))
+        if number % SPOKEN == 0:
+            print(f"soak: {flown / 60.0:.0f} min simulated, {number} missions", flush=True)
+    soak.title = f"{flown / 60.0:.0f} minutes of missions in one process"
+    soak.failed = completed < number
+    took = time.monotonic() - begin
+    soak.notes.append(
+        f"flown    {completed} of {number} missions completed, {flown:.0f} s in {took:.0f} s"
+    )
+    return soak
