@@ -64,10 +64,9 @@ class Forked:
         arguments: Sequence[str],
         log: Path,
         environment: Mapping[str, str],
-        niceness: int,
     ) -> None:
         """See `Processes.start`; log: output is appended to it."""
-        run = (name, module, tuple(arguments), str(log), dict(environment), niceness)
+        run = (name, module, tuple(arguments), str(log), dict(environment))
         self._process = _context.Process(target=_run, args=run, name=name)
         self._process.start()
         while self.returncode is None and not self._apart():
@@ -106,7 +105,6 @@ def _run(
     arguments: tuple[str, ...],
     log: str,
     environment: dict[str, str],
-    niceness: int,
 ) -> None:
     """Be the child: import the module and call its `main()`, which reads sys.argv."""
     os.setpgid(0, 0)  # Ctrl-C in the terminal is for the orchestrator alone
@@ -120,7 +118,6 @@ def _run(
     os.environ.update(environment)
     added = environment.get("PYTHONPATH", "").split(os.pathsep)
     sys.path[:0] = [place for place in added if place and place not in sys.path]
-    os.nice(niceness)
     threading.Thread(target=_follow_the_orchestrator, daemon=True).start()
     sys.argv = [module, *arguments]
     try:

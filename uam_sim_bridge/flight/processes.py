@@ -96,18 +96,19 @@ class Processes:
         module: str,
         arguments: Sequence[str] = (),
         may_end: bool = False,
-        niceness: int = 0,
         optional: bool = False,
         again: int = 0,
     ) -> Child:
         """Run `module.main()` as the process `name`.
 
-        may_end: it stops by itself when done; niceness: how far it steps back for the others;
-        optional: its end is no failure of the flight, see `missed`; again: how often `revive`
-        starts it again.
+        may_end: it stops by itself when done; optional: its end is no failure of the flight, see
+        `missed`; again: how often `revive` starts it again.
+
+        All have the same priority: one that is preempted between writing to another's queue in
+        shared memory and waking it would leave that one asleep, for up to a second.
         """
         log = self._logs / f"{name}.log"
-        run = partial(Forked, name, module, arguments, log, self._environment, niceness)
+        run = partial(Forked, name, module, arguments, log, self._environment)
         child = Child(name, run(), log, run, may_end, optional, again)
         self._children[name] = child
         return child

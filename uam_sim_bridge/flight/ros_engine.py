@@ -60,8 +60,6 @@ START_TIMEOUT = 20.0  # [s] without progress until every node is connected to th
 AUTOPILOT_WAIT = 60.0  # [s] of the autopilot for the simulator
 OWN_START_TIMEOUT = 600.0  # [s] the same where the user is to start one by hand
 ANSWER_TIMEOUT = 10.0  # [s] for the answers to one lockstep tick
-# Nobody waits for the recorder, which has seconds of room, or for those who only look on.
-NICENESS = {wiring.RECORDER: 10} | dict.fromkeys(ONLOOKERS, 10)
 RESTARTS = 3  # of each controller in a flight
 POLL = 0.05  # [s]
 NOTE_PERIOD = 1.0  # [s] between two looks at the shared memory that the nodes use
@@ -225,7 +223,6 @@ def _start(
             module,
             arguments,
             may_end=name == wiring.PLANT,
-            niceness=NICENESS.get(name, 0),
             optional=name in ONLOOKERS,
             again=RESTARTS if name in CONTROLLERS else 0,
         )
