@@ -167,7 +167,8 @@ def test_a_bad_matrix_is_refused_in_one_line(tmp_path, text, said):
         (["--matrix", "no"], "unknown campaign 'no'; there are: faults"),
         (["--engine", "fast"], "unknown engine 'fast'"),
         (["--clock", "realtime"], "the direct engine has no clock"),
-        (["--jobs", "0"], "--jobs is 1 or more"),
+        (["--jobs", "0"], "--jobs and --repeat are 1 or more"),
+        (["--repeat", "0"], "--jobs and --repeat are 1 or more"),
     ],
 )
 def test_wrong_use_is_one_line(capsys, monkeypatch, tmp_path, options, said):

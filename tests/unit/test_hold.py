@@ -33,11 +33,11 @@ def test_thrust_is_an_average_not_the_last_value():
 def test_ends_after_its_time_and_starts_anew():
     hold = flown()
     assert hold.setpoint(4.0, TILTED) is not None
-    assert hold.setpoint(4.99, TILTED) is not None
-    assert hold.setpoint(5.01, TILTED) is None
-    hold.good(5.1, 0.5)
+    assert hold.setpoint(5.99, TILTED) is not None
+    assert hold.setpoint(6.01, TILTED) is None
+    hold.good(6.1, 0.5)
     assert not hold.active
-    assert hold.setpoint(5.2, TILTED) is not None
+    assert hold.setpoint(6.2, TILTED) is not None
 
 
 def test_nothing_before_a_flight_and_after_it():

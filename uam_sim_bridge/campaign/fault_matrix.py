@@ -5,11 +5,13 @@ from __future__ import annotations
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 from uam_control import yaml_file
 from uam_control.mission import Scenario, load_scenario
-from uam_sim_bridge.faults import FAULTS, FaultError, Schedule, TimedFault
+from uam_sim_bridge.campaign import promise
+from uam_sim_bridge.campaign.promise import Promise
+from uam_sim_bridge.faults import FAULTS, Fault, FaultError, Schedule
 from uam_sim_bridge.faults.limits import needs_nodes
 from uam_sim_bridge.faults.schedule import beginnings, listed, timed
 
@@ -24,15 +26,18 @@ class Cell:
     fault: str
     moment: str
     schedule: Schedule
+    promise: Promise | None = None
 
 
 @dataclass(frozen=True)
 class Matrix:
-    """What is flown. moments: mission times [s] by name; left_out: rows the engine cannot have."""
+    """What is flown. moments: mission times [s] by name; promises: of each row; left_out: rows
+    that the engine cannot have."""
 
     scenario: str
     moments: dict[str, float]
     faults: tuple[dict[str, Any], ...]
+    promises: tuple[Promise | None, ...]
     left_out: tuple[str, ...] = ()
 
     @property
@@ -40,13 +45,16 @@ class Matrix:
         """Names of the rows."""
         return tuple(label(entry) for entry in self.faults)
 
-    def cells(self, seed: int) -> list[Cell]:
-        """Every flight, the one without any fault first; seed: of what is random in the faults."""
+    def cells(self, seed: int, repeat: int = 1) -> list[Cell]:
+        """Every flight, the one without any fault first; seed: of what is random in the faults.
+
+        repeat: how often each with a fault is flown, one after the other.
+        """
         found = [Cell(NOMINAL, "", Schedule(seed=seed))]
-        for entry in self.faults:
+        for entry, promised in zip(self.faults, self.promises, strict=True):
             for moment, at in self.moments.items():
                 one = timed({**entry, "at": at}, {}, moment)
-                found.append(Cell(label(entry), moment, Schedule((one,), seed)))
+                found += [Cell(label(entry), moment, Schedule((one,), seed), promised)] * repeat
         return found
 
 
@@ -84,13 +92,14 @@ def read(
                     f"unknown {'fault' if asked is only else 'moment'} '{one}'; "
                     f"there are: {', '.join(known)}"
                 )
-    wanted = [(entry, one) for entry, one in rows if not only or entry["fault"] in only]
-    out = [label(entry) for entry, one in wanted if engine == "direct" and needs_nodes(one.fault)]
-    kept = tuple(entry for entry, _ in wanted if label(entry) not in out)
+    wanted = [row for row in rows if not only or row.entry["fault"] in only]
+    out = [label(row.entry) for row in wanted if engine == "direct" and needs_nodes(row.fault)]
+    kept = [row for row in wanted if label(row.entry) not in out]
     if not kept:
         raise FaultError(f"{file}: nothing to fly with the {engine} engine")
     chosen = {k: v for k, v in times.items() if not moments or k in moments}
-    return Matrix(name, chosen, kept, tuple(out))
+    entries, promises = tuple(row.entry for row in kept), tuple(row.promise for row in kept)
+    return Matrix(name, chosen, entries, promises, tuple(out))
 
 
 def _document(file: Path) -> dict[str, Any]:
@@ -112,8 +121,16 @@ def _moments(given: Any, scenario: Scenario, where: str) -> dict[str, float]:
     }
 
 
-def _checked(entry: dict[str, Any], where: str) -> tuple[dict[str, Any], TimedFault]:
+class _Row(NamedTuple):
+    entry: dict[str, Any]
+    fault: Fault
+    promise: Promise | None
+
+
+def _checked(entry: dict[str, Any], where: str) -> _Row:
     for key in ("at", "after"):
         if key in entry:
             raise FaultError(f"{where}: {key}: the moments say when")
-    return entry, timed({**entry, "at": 0.0}, {}, where)
+    promised = entry.pop("promise", None)
+    fault = timed({**entry, "at": 0.0}, {}, where).fault
+    return _Row(entry, fault, None if promised is None else promise.read(promised, where))

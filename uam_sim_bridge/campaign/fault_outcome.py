@@ -80,6 +80,17 @@ def classify(series: Series, figures: Mapping[str, Any], limits: Limits | None =
     return LOST
 
 
+def down_after(series: Series, begun: float, limits: Limits | None = None) -> float | None:
+    """How long after the mission time `begun` [s] it was down to stay; None: it is still up."""
+    limits = limits or Limits()
+    up = np.flatnonzero(series["truth.z"] - series["truth.z"][0] > limits.height)
+    if not up.size:
+        return 0.0
+    if up[-1] == len(series) - 1:
+        return None
+    return max(0.0, float(series.time[up[-1]]) - begun)
+
+
 def _down_early(series: Series, limits: Limits) -> bool:
     """Whether it came to the ground, once it was up, while the mission still wanted it up."""
     height = series["truth.z"] - series["truth.z"][0]

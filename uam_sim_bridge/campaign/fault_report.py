@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from dataclasses import asdict, dataclass
 from pathlib import Path
 
 from matplotlib.colors import to_rgb
@@ -31,7 +32,18 @@ COLOURS = {
     FAILSAFE: "#e39b50",
     LOST: "#cf5b4a",
 }
-HEAD = ("fault", "moment", "outcome", "position_m", "attitude_deg", "arm_deg", "duration_s", "why")
+HEAD = (
+    "fault",
+    "moment",
+    "outcome",
+    "position_m",
+    "attitude_deg",
+    "arm_deg",
+    "duration_s",
+    "down_after_s",
+    "promise_kept",
+    "why",
+)
 
 
 def write(
@@ -48,6 +60,8 @@ def write(
                 r.outcome,
                 *(_shown(worst(r, key)) for key in HEAD[3:6]),
                 f"{r.duration_s:.2f}",
+                "" if r.down_after_s is None else f"{r.down_after_s:.2f}",
+                "" if r.kept is None else r.kept,
                 r.why,
             ]
             for r in results
@@ -59,7 +73,7 @@ def write(
             {
                 "command": command,
                 "versions": versions(),
-                "matrix": vars(matrix),
+                "matrix": asdict(matrix),
                 "flights": [vars(result) for result in results],
             }
         ),
@@ -73,6 +87,40 @@ def write(
     return summary, page
 
 
+@dataclass(frozen=True)
+class Group:
+    """The flights of one cell. As text: what a cell says."""
+
+    results: tuple[FaultResult, ...]
+
+    @property
+    def outcome(self) -> str:
+        """The worst."""
+        return max((r.outcome for r in self.results), key=list(OUTCOMES).index)
+
+    def __str__(self) -> str:
+        """Outcome and how often, time to the ground, position error, and broken promises."""
+        count = len(self.results)
+        same = sum(r.outcome == self.outcome for r in self.results)
+        often = f" {same}/{count}" if count > 1 else ""
+        down = [r.down_after_s for r in self.results if r.down_after_s is not None]
+        errors = [worst(r, "position_m") for r in self.results]
+        error = max((e for e in errors if not math.isnan(e)), default=math.nan)
+        parts = [self.outcome + often]
+        parts += [f"{max(down):.1f} s"] if down else []
+        parts += [] if math.isnan(error) else [f"{error:.2f} m"]
+        parts += ["broken"] if any(r.kept is False for r in self.results) else []
+        return " ".join(parts)
+
+
+def grouped(results: Sequence[FaultResult]) -> dict[tuple[str, str], Group]:
+    """The flights by fault and moment."""
+    found: dict[tuple[str, str], tuple[FaultResult, ...]] = {}
+    for one in results:
+        found[one.fault, one.moment] = (*found.get((one.fault, one.moment), ()), one)
+    return {key: Group(flights) for key, flights in found.items()}
+
+
 def worst(result: FaultResult, key: str) -> float:
     """Largest error of a group over its axes, in the unit of the key; NaN if it never flew."""
     values = [v for v in result.worst.get(key, ()) if v is not None]
@@ -84,15 +132,17 @@ def sentence(results: Sequence[FaultResult]) -> str:
     counted = counts(result.outcome for result in results if result.fault != NOMINAL)
     parts = [f"{number} {outcome}" for outcome, number in counted.items() if number]
     nominal = next((r.outcome for r in results if r.fault == NOMINAL), "not flown")
+    promised = [result.kept for result in results if result.kept is not None]
+    kept = f" Promises kept: {sum(promised)} of {len(promised)}." if promised else ""
     return (
         f"{sum(counted.values())} flights with a fault: {', '.join(parts)}. "
-        f"Without a fault: {nominal}."
+        f"Without a fault: {nominal}.{kept}"
     )
 
 
 def markdown(matrix: Matrix, results: Sequence[FaultResult], command: str) -> str:
     """The matrix as a table: outcome and largest position error."""
-    cells = {(r.fault, r.moment): r for r in results}
+    cells = grouped(results)
     lines = [
         sentence(results),
         "",
@@ -100,13 +150,13 @@ def markdown(matrix: Matrix, results: Sequence[FaultResult], command: str) -> st
         "|---|" + "---|" * len(matrix.moments),
     ]
     for row in matrix.rows:
-        shown = [_cell(cells[row, moment]) for moment in matrix.moments]
+        shown = [str(cells[row, moment]) for moment in matrix.moments]
         lines.append(f"| {row} | {' | '.join(shown)} |")
     lines += [
         "",
-        "In each cell: how it ended, and the largest position error. "
-        + "; ".join(f"{name}: {about}" for name, about in OUTCOMES.items())
-        + ".",
+        "In each cell: how it ended, the worst where it was flown several times, the longest time "
+        "from the fault to the ground if it did not complete its mission, and the largest position "
+        "error. " + "; ".join(f"{name}: {about}" for name, about in OUTCOMES.items()) + ".",
     ]
     if matrix.left_out:
         lines += ["", f"Only with --engine ros: {'; '.join(matrix.left_out)}."]
@@ -116,7 +166,7 @@ def markdown(matrix: Matrix, results: Sequence[FaultResult], command: str) -> st
 def picture(matrix: Matrix, results: Sequence[FaultResult]) -> Figure:
     """The matrix in colours, with the largest position error in each cell."""
     rows, columns = matrix.rows, list(matrix.moments)
-    cells = {(r.fault, r.moment): r for r in results}
+    cells = grouped(results)
     figure = Figure(figsize=(style.WIDTH, 1.3 + 0.27 * len(rows)), layout="constrained")
     axis = figure.subplots()
     axis.imshow(
@@ -125,11 +175,10 @@ def picture(matrix: Matrix, results: Sequence[FaultResult]) -> Figure:
     )
     for i, row in enumerate(rows):
         for j, column in enumerate(columns):
-            result = cells[row, column]
             axis.text(
                 j,
                 i,
-                f"{result.outcome}  {_metres(result)}",
+                str(cells[row, column]),
                 ha="center",
                 va="center",
                 fontsize=7.5,
@@ -145,15 +194,6 @@ def picture(matrix: Matrix, results: Sequence[FaultResult]) -> Figure:
     axis.tick_params(which="minor", length=0)
     axis.spines[:].set_visible(False)
     return figure
-
-
-def _cell(result: FaultResult) -> str:
-    return f"{result.outcome} {_metres(result)}".strip()
-
-
-def _metres(result: FaultResult) -> str:
-    value = worst(result, "position_m")
-    return "" if math.isnan(value) else f"{value:.2f} m"
 
 
 def _shown(value: float) -> str:

@@ -14,7 +14,8 @@ from rich.console import Console
 from uam_control.mission import load_scenario
 from uam_control.profile import Profile
 from uam_sim_bridge.campaign.fault_matrix import Cell
-from uam_sim_bridge.campaign.fault_outcome import LOST, classify
+from uam_sim_bridge.campaign.fault_outcome import COMPLETED, LOST, classify, down_after
+from uam_sim_bridge.faults import PROCESS
 from uam_sim_bridge.flight import metrics
 from uam_sim_bridge.flight.direct import DirectFlight
 from uam_sim_bridge.flight.outcome import transitions
@@ -42,6 +43,8 @@ class FaultTrial:
 class FaultResult:
     """What is kept. why: what kept the mission from being completed.
 
+    down_after_s: from the fault until it was down for good, None where it completed its mission or
+    did not come down. kept: whether it did what is promised, None where nothing is.
     worst: largest errors over the flight, the keys of `max` in metrics.json. happened: the faults
     as they were, see `faults.timeline.record`.
     """
@@ -53,6 +56,8 @@ class FaultResult:
     duration_s: float
     worst: Mapping[str, list[float | None]] = field(default_factory=dict)
     happened: tuple[dict[str, Any], ...] = ()
+    down_after_s: float | None = None
+    kept: bool | None = None
 
 
 def fly(trial: FaultTrial) -> FaultResult:
@@ -79,6 +84,7 @@ def _direct(trial: FaultTrial) -> FaultResult:
 def _ros(trial: FaultTrial) -> FaultResult:
     from uam_sim_bridge.flight import ros_engine
 
+    hindered = {one.fault.values["node"] for one in trial.cell.schedule.only(PROCESS).faults}
     settings = FlightSettings(
         scenario=load_scenario(trial.scenario),
         profile=trial.profile,
@@ -86,7 +92,7 @@ def _ros(trial: FaultTrial) -> FaultResult:
         payload_mass=trial.payload_mass,
         seed=trial.seed,
         scenario_source=trial.scenario,
-        without=ONLOOKERS,
+        without=tuple(name for name in ONLOOKERS if name not in hindered),
         faults=trial.cell.schedule,
     )
     with (
@@ -96,7 +102,10 @@ def _ros(trial: FaultTrial) -> FaultResult:
     ):
         outcome = ros_engine.fly(settings, ResultFolder(Path(folder)), progress)
     if outcome.series is None:
-        return FaultResult(trial.cell.fault, trial.cell.moment, LOST, outcome.reason, 0.0)
+        broken = None if trial.cell.promise is None else False
+        return FaultResult(
+            trial.cell.fault, trial.cell.moment, LOST, outcome.reason, 0.0, kept=broken
+        )
     return _result(trial, outcome.series, outcome.reason, outcome.faults, outcome.transitions)
 
 
@@ -115,12 +124,17 @@ def _result(
         "transitions": told,
     }
     figures = metrics.compute(series, info)
+    outcome, promise = classify(series, figures), trial.cell.promise
+    begun = min((one["begin_s"] for one in happened), default=None)
+    down = None if outcome == COMPLETED or begun is None else down_after(series, begun)
     return FaultResult(
         fault=trial.cell.fault,
         moment=trial.cell.moment,
-        outcome=classify(series, figures),
+        outcome=outcome,
         why="; ".join(figures["shortfalls"]),
         duration_s=figures["duration_s"],
+        down_after_s=down,
+        kept=None if promise is None else promise.kept(outcome, down),
         worst=figures["max"],
         happened=tuple(happened),
     )

@@ -9,7 +9,7 @@ from pathlib import Path
 
 from uam_sim_bridge.doctor import holders
 from uam_sim_bridge.doctor.finding import Finding, fail, ok, warn
-from uam_sim_bridge.flight.ports import INSTANCES, held, in_use, lock_file, ports_of
+from uam_sim_bridge.flight.ports import INSTANCES, discovery_port, held, in_use, lock_file, ports_of
 
 SHOWN = 4  # busy ports named in the line
 
@@ -54,12 +54,11 @@ def look(instance: int, folder: Path | None = None) -> Busy | None:
     if held(lock):
         return Busy(instance, ", ".join(holders.of_file(lock)) or "a flight", True)
     ports = ports_of(instance)
-    discovery = 7400 + 250 * ports.domain + 10  # as in flight.ports
     for protocol, kind, port in (
         ("tcp", socket.SOCK_STREAM, ports.simulator_tcp),
         ("udp", socket.SOCK_DGRAM, ports.offboard_udp),
         ("udp", socket.SOCK_DGRAM, ports.autopilot_udp),
-        ("udp", socket.SOCK_DGRAM, discovery),
+        ("udp", socket.SOCK_DGRAM, discovery_port(ports.domain)),
     ):
         if in_use(kind, port):
             who = ", ".join(holders.of_port(protocol, port)) or "an unknown program"

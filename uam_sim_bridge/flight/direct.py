@@ -26,7 +26,7 @@ from uam_sim_bridge.autopilot.modes import CUSTOM_MODE_ENABLED, Command, Mode
 from uam_sim_bridge.autopilot.params import Parameters
 from uam_sim_bridge.faults import Schedule
 from uam_sim_bridge.faults.direct import DirectFaults
-from uam_sim_bridge.flight.limits import time_limit
+from uam_sim_bridge.flight.limits import DISARMED, Settled, time_limit
 from uam_sim_bridge.flight.timeseries import COLUMNS, SUBSYSTEMS, Recording, gain_columns
 from uam_sim_bridge.mavlink.frames import swap_body, swap_quaternion, swap_world
 from uam_sim_bridge.mavlink.hold import HoldParameters, LevelHold
@@ -106,11 +106,15 @@ class DirectFlight:
     def run(self, progress: Callable[[float, str], None] | None = None) -> Recording:
         """Fly until the mission is done; progress(mission time [s], phase) once a second."""
         plant, output = self.plant, self.mission.output
-        ticks_a_second = round(1.0 / plant.period)
+        ticks_a_second, settled = round(1.0 / plant.period), Settled()
         while not output.done:
             self.tick()
-            if progress is not None and plant.tick % ticks_a_second == 0:
-                progress(output.time, output.phase)
+            if plant.tick % ticks_a_second == 0:
+                if progress is not None:
+                    progress(output.time, output.phase)
+                if settled.over(plant.time, self.bridge.autopilot.commander.armed):
+                    self.ended_by = DISARMED
+                    break
             if output.time < 0.0 and plant.time > LONGEST_WAIT:
                 reasons = "; ".join(self.bridge.sequence.reasons) or "no reason"
                 against = self.mission.beyond or f"the autopilot did not arm: {reasons}"

@@ -37,6 +37,7 @@ from uam_sim_bridge.flight.timeseries import (
 )
 
 SECOND = 1e9
+SILENCE = 1e9  # [ns] without references, until the mission counts as lost
 STATE_ROWS = ("positions", "velocities", "accelerations")
 TRUTH, STATE, REFERENCE = (t.name for t in (topics.TRUTH_STATE, topics.STATE, topics.REFERENCE))
 POSITION, ATTITUDE, JOINTS = (
@@ -182,7 +183,7 @@ def read_flight(path: Path, scenario: Scenario, info: Mapping[str, Any] | None =
     first, last = references.samples.stamps[[0, -1]]
     # The mission is one tick ahead: its last reference is of a tick that nobody controlled. What
     # follows its end depends on how fast the plant heard of it.
-    last = last if end is None else min(last, end + 1)
+    last = min(last, end + 1) if end is not None else _last_of_all(last, truth.stamps)
     ticks = truth.stamps[(truth.stamps >= first) & (truth.stamps < last)]
     if not len(ticks):
         raise UnreadableLog(f"{path} has no control tick")
@@ -210,6 +211,14 @@ def read_flight(path: Path, scenario: Scenario, info: Mapping[str, Any] | None =
     faults = fault_log.records(log.messages(FAULTS), takeoff)
     series = recording.series(info)
     return Flight(series, end is not None, abort_reason, changes, told, faults, wall)
+
+
+def _last_of_all(last: int, truth: np.ndarray) -> int:
+    """Where the table of a flight ends that the mission did not end; stamps [ns].
+
+    last: of the last reference. A mission that fell silent in flight still has a vehicle.
+    """
+    return int(truth[-1]) + 1 if len(truth) and truth[-1] - last > SILENCE else int(last)
 
 
 def parameter_changes(log: Log, takeoff: int) -> list[dict[str, Any]]:

@@ -61,6 +61,11 @@ def in_use(kind: int, port: int, host: str = "127.0.0.1") -> bool:
     return False
 
 
+def discovery_port(domain: int, participant: int = 0) -> int:
+    """UDP port of a participant's discovery (RTPS 2.2, 9.6.1.1)."""
+    return 7400 + 250 * domain + 10 + 2 * participant
+
+
 def require_free(kind: int, port: int, purpose: str) -> None:
     """Raise PortError naming the port and its purpose when it cannot be bound."""
     if not 1 <= port <= 65535:
@@ -81,8 +86,8 @@ def busy_port(ports: Ports, own_autopilot: bool = True) -> str | None:
     wanted = [
         (socket.SOCK_STREAM, ports.simulator_tcp, "TCP {} (simulator link)"),
         (socket.SOCK_DGRAM, ports.offboard_udp, "UDP {} (offboard link)"),
-        # RTPS: the first participant's discovery port of a domain. Taken means: the domain lives.
-        (socket.SOCK_DGRAM, 7400 + 250 * ports.domain + 10, "UDP {} (ROS discovery)"),
+        # of the domain's first participant: taken means that the domain lives
+        (socket.SOCK_DGRAM, discovery_port(ports.domain), "UDP {} (ROS discovery)"),
     ]
     if own_autopilot:
         wanted.append((socket.SOCK_DGRAM, ports.autopilot_udp, "UDP {} (autopilot)"))

@@ -79,12 +79,14 @@ class Processes:
         logs: Path,
         environment: Mapping[str, str],
         tidy: Callable[[Iterable[Path]], object] = shared_memory.remove_unused,
+        before_revival: Callable[[], object] = lambda: None,
     ):
         """Output goes to `logs`, which must exist; `environment` is the children's whole one.
 
-        tidy: told of the shared-memory files that they have used, when all have ended.
+        tidy: told of the shared-memory files that they have used, when all have ended;
+        before_revival: called before a child is started again.
         """
-        self._tidy = tidy
+        self._tidy, self._before_revival = tidy, before_revival
         self._logs = logs
         self._environment = dict(environment)
         self._children: dict[str, Child] = {}
@@ -160,6 +162,7 @@ class Processes:
         told = [NodeFailed(child.name, child.process.returncode, child.log) for child in ended]
         for child in ended:
             child.again -= 1
+            self._before_revival()
             child.process = child.run()
         return told
 

@@ -24,6 +24,7 @@ from uam_sim_bridge.flight.limits import time_limit
 from uam_sim_bridge.flight.log_reader import read_flight
 from uam_sim_bridge.flight.mcap_reader import UnreadableLog
 from uam_sim_bridge.flight.outcome import Outcome
+from uam_sim_bridge.flight.places import Places
 from uam_sim_bridge.flight.ports import Ports, Reservation
 from uam_sim_bridge.flight.process_faults import ProcessFaults
 from uam_sim_bridge.flight.process_table import await_orphans
@@ -52,6 +53,7 @@ MODULES = {
 AUTOPILOT = "autopilot"
 FACTS = "facts.json"
 FORKER = "uam_sim_bridge.flight.forker"
+COMMAND = "uam_sim_bridge.cli.main"  # which each child imports anew, as its parent's main module
 STAND_IN, SITL = "uam_sim_bridge.autopilot.server", "uam_sim_bridge.px4.sitl"
 HITL_ROUTER = "uam_sim_bridge.mavlink.router"
 PX4_LOG = "px4.ulg"
@@ -78,7 +80,7 @@ def fly(settings: FlightSettings, folder: ResultFolder, progress: Progress) -> O
         if is_cold():
             progress.message("compiling the control path (once)")
             warm_up()
-        child.prepare([*_modules(settings).values(), FORKER])
+        child.prepare([*_modules(settings).values(), FORKER, COMMAND])
         await_orphans(progress.message)
         presence.remove_unused(shared_memory.abandoned())
         with Interrupts() as stop:
@@ -183,7 +185,10 @@ def _supervise(
     """Start everything, watch it until the plant ends, stop it; returns what failed."""
     logs = folder.path / "logs"
     surroundings = environment(ports.domain, logs)
-    with Processes(logs, surroundings, presence.remove_unused) as children:
+    with (
+        Places(ports.domain) as places,
+        Processes(logs, surroundings, presence.remove_unused, places.occupy) as children,
+    ):
         children.hurry = lambda: stop.impatient
         try:
             _start(children, settings, folder, ports)

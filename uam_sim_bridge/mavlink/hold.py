@@ -20,7 +20,7 @@ class HoldParameters(ParameterSet):
     """The reaction to missing or bad commands in flight."""
 
     hold_time: float = number(
-        1.0,
+        2.0,
         "how long level setpoints go out in place of commands, before the stream stops",
         "s",
         0.0,

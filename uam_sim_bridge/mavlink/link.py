@@ -65,10 +65,8 @@ class OffboardLink:
         sequence: OffboardSequence,
         mapping: RateThrustParameters,
         target_system: int = 1,
-        hold_time: float = 0.0,
         signing: Signing | None = None,
     ) -> None:
-        """hold_time [s]: how long the bridge holds level, to be compared with COM_OF_LOSS_T."""
         self.sequence = sequence
         self.mode, self.armed, self.landed = Mode.UNKNOWN, False, True
         self.armed_since: float | None = None
@@ -84,7 +82,6 @@ class OffboardLink:
         self._reboot = RebootDetector()
         self._events = EventReader()
         self._parameter_warnings: tuple[str, ...] = ()
-        self._hold_time = hold_time
         self._transport = transport
         self._mapping = mapping
         self._target = target_system
@@ -301,7 +298,7 @@ class OffboardLink:
         missing = self._missing if self._parameter_attempts > PARAMETER_ATTEMPTS else []
         self._parameter_warnings = (
             *differences(self._mapping, self.values),
-            *stream_loss(self.values, self._hold_time),
+            *stream_loss(self.values),
             *untold(missing, PARAMETER_ATTEMPTS),
         )
 

@@ -21,6 +21,7 @@ WATCHED = (
     "THR_MDL_FAC", "MPC_THR_HOVER", "COM_OF_LOSS_T",
 )  # fmt: skip
 _TOLERANCE = 1e-4  # relative: MAVLink carries 32-bit numbers
+HICCUP = 0.5  # [s] without setpoints, by a busy computer or link
 _INTEGERS = {
     mavlink2.MAV_PARAM_TYPE_UINT8: "<Bxxx", mavlink2.MAV_PARAM_TYPE_INT8: "<bxxx",
     mavlink2.MAV_PARAM_TYPE_UINT16: "<Hxx", mavlink2.MAV_PARAM_TYPE_INT16: "<hxx",
@@ -75,21 +76,21 @@ def adopted(mapping: RateThrustParameters, values: dict[str, float]) -> RateThru
     ).validated()
 
 
-def stream_loss(values: dict[str, float], hold_time: float) -> Iterator[str]:
-    """Yield what is wrong with COM_OF_LOSS_T; hold_time [s]: how long the bridge holds level.
+def stream_loss(values: dict[str, float]) -> Iterator[str]:
+    """Yield what is wrong with COM_OF_LOSS_T, which should be longer than a hiccup of the stream.
 
-    The autopilot should wait for setpoints longer than a hiccup of the stream and need not be
-    quicker than the bridge, whose level hold comes first.
+    A loss of commands is the bridge's to bridge, by its level hold; the autopilot sees that of the
+    bridge itself and of the link.
     """
     wait = values.get("COM_OF_LOSS_T")
     if wait is None:
         return
     if wait <= 0.0:
         yield "COM_OF_LOSS_T is 0 on the autopilot: any late setpoint is a failsafe"
-    elif wait < hold_time * (1.0 - _TOLERANCE):
+    elif wait < HICCUP * (1.0 - _TOLERANCE):
         yield (
-            f"COM_OF_LOSS_T is {wait:g} s on the autopilot, shorter than the bridge's hold_time "
-            f"of {hold_time:g} s"
+            f"COM_OF_LOSS_T is {wait:g} s on the autopilot: a hiccup of {HICCUP:g} s should not "
+            "be a failsafe"
         )
 
 

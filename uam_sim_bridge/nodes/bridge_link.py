@@ -68,11 +68,10 @@ def open_links(
     options: BridgeParameters,
     sequence: OffboardSequence,
     mapping: RateThrustParameters,
-    hold_time: float,
 ) -> Links:
     """Declare the parameters that name links, and open them.
 
-    hold_time [s]: of the level hold. Raises PortError, FaultError in one line.
+    Raises PortError, FaultError in one line.
     """
     system = int(options.autopilot_system)
     about = ParameterDescriptor(
@@ -112,7 +111,7 @@ def open_links(
     if watching:
         codec = Codec(system, mavlink2.MAV_COMP_ID_ONBOARD_COMPUTER, signing)
         transport = station = GroundStation(watching, transport, codec)
-    link = OffboardLink(transport, sequence, mapping, system, hold_time, signing)
+    link = OffboardLink(transport, sequence, mapping, system, signing)
     return Links(link, station, faulty)
 
 

@@ -93,7 +93,7 @@ class MavlinkBridgeNode(UamNode):
         self.sequence = OffboardSequence(offboard)
         self._hold = LevelHold(hold)
         options = self._options
-        links = open_links(self, options, self.sequence, self.map.parameters, hold.hold_time)
+        links = open_links(self, options, self.sequence, self.map.parameters)
         self.link, self._station, self._faulty = links.autopilot, links.station, links.faulty
         self._fault_topic = FaultTopic(self) if self._faulty else None
         self._state = np.zeros((3, 8))

@@ -45,6 +45,7 @@ from uam_sim_bridge.faults import PLANT, Schedule
 from uam_sim_bridge.faults.plant import FaultyPlant
 from uam_sim_bridge.flight import wiring
 from uam_sim_bridge.flight.fault_log import FaultTopic
+from uam_sim_bridge.flight.limits import DISARMED, Settled
 from uam_sim_bridge.flight.patience import Patience
 from uam_sim_bridge.mavlink.hil_server import HilParameters, HilServer
 from uam_sim_bridge.nodes.plant_health import PlantHealth
@@ -56,7 +57,7 @@ from uam_sim_bridge.plant import Plant, Samples, Truth, Vehicle
 NAME = "mujoco_sim"
 REPORT_INTERVAL = 5.0  # [s] between two lines that say who is waited for
 DEADLINE_TICKS = 3  # [control periods] 12 ms, about a rotor's time constant
-CATCH_UP = 2.0  # [1] times real time, after a stall of the machine
+CATCH_UP = 1.25  # [1] times real time, after a stall of the machine, which had no time to spare
 FOREIGN_WAIT = 1.0  # [s] for a foreign node to find us as well: it does not say when it has
 LAST_WAIT = 3.0  # [s] for a recorder that has not seen the last tick, and may have lost it
 RECORDER_LAG = 2.0  # [s] half of what fits the queue that config/dds gives each process
@@ -145,7 +146,7 @@ class Simulator:
         limit, end = self.options.time_limit or math.inf, math.inf
         gc.collect()
         gc.freeze()  # what exists now stays; later collections need not look at it
-        begin = time.monotonic()
+        begin, settled = time.monotonic(), Settled()
         while not self._stop.raised:
             begun = time.perf_counter()
             samples, truth = self._begin_tick()
@@ -167,6 +168,9 @@ class Simulator:
                 self.statistics.ended_by = "mission"
                 end = self.plant.time + self.options.linger
             if self.plant.time >= end:
+                break
+            if settled.over(self.plant.time, self.hil.armed) and not self.statistics.ended_by:
+                self.statistics.ended_by = DISARMED
                 break
             if self.plant.time >= limit:
                 self.statistics.ended_by = self.statistics.ended_by or f"time limit of {limit:g} s"
