@@ -108,6 +108,16 @@ def test_a_killed_recorder_leaves_what_was_flushed(recorder, probe):
     assert len(times) >= 50, "at most half a second is lost"
 
 
+def test_a_full_disk_is_announced_and_ends_the_log_alone(start, probe):
+    heard = probe.collect(topics.DIAGNOSTICS)
+    running = start(MODULE, "--ros-args", "-p", "file:=/dev/full")
+    running.until_said("the log cannot be written: No space left on device; recorded until 0 s")
+    said = "the log cannot be written: No space left on device"
+    probe.until(lambda: any(m.status[0].message == said for m in heard), "it is announced")
+    assert running.interrupt() == 0
+    assert "Traceback" not in running.output
+
+
 def test_a_file_that_cannot_be_written_is_named(start):
     running = start(MODULE, "--ros-args", "-p", "file:=/proc/nowhere/log.mcap")
     assert running.process.wait(60) == 1

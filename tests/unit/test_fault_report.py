@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import json
+import re
 
 import numpy as np
 import pytest
 
 from uam_control import configuration
 from uam_sim_bridge.campaign import fault_matrix, fault_report
-from uam_sim_bridge.campaign.fault_outcome import OUTCOMES, classify
+from uam_sim_bridge.campaign.fault_outcome import OUTCOMES, classify, down_after
 from uam_sim_bridge.campaign.fault_trial import FaultResult
 from uam_sim_bridge.cli.main import main
 from uam_sim_bridge.faults import FAULTS, FaultError
@@ -177,6 +178,63 @@ def test_wrong_use_is_one_line(capsys, monkeypatch, tmp_path, options, said):
     out, err = capsys.readouterr()
     assert said in err and err.count("\n") == 1 and not out
     assert not any(tmp_path.iterdir())
+
+
+def test_what_is_promised_of_a_row_is_read_and_judged(tmp_path):
+    file = tmp_path / "mine.yaml"
+    file.write_text(
+        "{scenario: hover, moments: {a: {at: 3}}, faults: ["
+        "{fault: servo_jam, promise: {outcome: [held, landed], within: 4}}, {fault: magnet_stuck}]}"
+    )
+    matrix = fault_matrix.read(file, "direct")
+    first, second = matrix.promises
+    assert second is None and matrix.rows[0] == "servo_jam"
+    assert first.kept("held", None) and first.kept("landed", 3.9)
+    assert not first.kept("landed", 4.1) and not first.kept("lost", 1.0)
+    cells = matrix.cells(1, repeat=3)
+    assert len(cells) == 7 and [cell.promise for cell in cells[1:]] == 3 * [first] + 3 * [None]
+
+
+@pytest.mark.parametrize(
+    ("promise", "said"),
+    [
+        ("landed", "{outcome: ..., within: seconds} expected"),
+        ("{outcome: fine}", "unknown outcome 'fine'; there are: completed"),
+        ("{outcome: held, within: soon}", "within: 'soon' is no time"),
+        ("{outcome: held, by: 3}", "{outcome: ..., within: seconds} expected"),
+    ],
+)
+def test_a_bad_promise_is_refused_in_one_line(tmp_path, promise, said):
+    file = tmp_path / "mine.yaml"
+    file.write_text(
+        "{scenario: hover, moments: {a: {at: 3}}, "
+        f"faults: [{{fault: servo_jam, promise: {promise}}}]}}"
+    )
+    with pytest.raises(FaultError, match=f"mine.yaml: promise: .*{re.escape(said)}"):
+        fault_matrix.read(file, "direct")
+
+
+def test_a_cell_flown_several_times_shows_the_worst(tmp_path):
+    errors = {"position_m": [0.1, None, None]}
+    results = [
+        FaultResult("servo_jam", "a", outcome, "", 1.0, errors, down_after_s=down, kept=kept)
+        for outcome, down, kept in (
+            ("landed", 3.0, True),
+            ("completed", None, True),
+            ("landed", 5.0, False),
+        )
+    ]
+    group = fault_report.grouped(results)["servo_jam", "a"]
+    assert str(group) == "landed 2/3 5.0 s 0.10 m broken"
+    assert "Promises kept: 2 of 3." in fault_report.sentence(results)
+
+
+def test_down_is_since_when_it_did_not_rise_again(make_flight):
+    series = ended(make_flight)
+    height = series["truth.z"] - series["truth.z"][0]
+    landed = series.time[np.flatnonzero(height > 0.08)[-1]]
+    assert down_after(series, 10.0) == pytest.approx(landed - 10.0)
+    assert down_after(ended(make_flight, height=0.8), 10.0) is None
 
 
 def test_the_report_of_a_campaign(tmp_path):

@@ -81,6 +81,13 @@ def test_phases_are_the_scenarios_unless_the_mission_left_it():
     assert phases(lost, [14, 16], [True, False]) == ["hover", "aborted"]
 
 
+def test_a_vehicle_whose_mission_fell_silent_is_in_the_table_to_its_end():
+    truth = np.arange(0, 5_000_000_000, 4_000_000)
+    assert log_reader._last_of_all(4_000_000_000, truth) == 4_000_000_000, "cut off, a little later"
+    assert log_reader._last_of_all(2_000_000_000, truth) == truth[-1] + 1
+    assert log_reader._last_of_all(2_000_000_000, truth[:0]) == 2_000_000_000
+
+
 def test_transitions_are_told_with_mission_time_and_cause():
     statuses = told((9, "waiting", "grounded", "", ""), (10, "take-off", "taking off", "armed", ""),
                     (10.5, "take-off", "taking off", "armed", ""),

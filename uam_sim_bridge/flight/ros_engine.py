@@ -53,7 +53,11 @@ MODULES = {
 AUTOPILOT = "autopilot"
 FACTS = "facts.json"
 FORKER = "uam_sim_bridge.flight.forker"
-COMMAND = "uam_sim_bridge.cli.main"  # which each child imports anew, as its parent's main module
+# Each child imports its parent's main module anew, as a rule the command and these.
+COMMANDS = [
+    f"uam_sim_bridge.cli.{name}"
+    for name in "campaign compare doctor faults fly profile report tune view".split()
+]
 STAND_IN, SITL = "uam_sim_bridge.autopilot.server", "uam_sim_bridge.px4.sitl"
 HITL_ROUTER = "uam_sim_bridge.mavlink.router"
 PX4_LOG = "px4.ulg"
@@ -80,7 +84,7 @@ def fly(settings: FlightSettings, folder: ResultFolder, progress: Progress) -> O
         if is_cold():
             progress.message("compiling the control path (once)")
             warm_up()
-        child.prepare([*_modules(settings).values(), FORKER, COMMAND])
+        child.prepare([*_modules(settings).values(), FORKER, *COMMANDS])
         await_orphans(progress.message)
         presence.remove_unused(shared_memory.abandoned())
         with Interrupts() as stop:

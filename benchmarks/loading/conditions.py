@@ -1,0 +1,90 @@
+"""What keeps the machine busy: processes beside the flight, and fewer cores for it."""
+
+from __future__ import annotations
+
+import multiprocessing
+import os
+import tempfile
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+
+from uam_sim_bridge.flight.processes import ros_environment
+
+BLOCK = 8_000_000  # bytes
+BLOCKS = 16  # until the hog begins its file anew
+LISTENERS = 20  # ten times the two that listen to /diagnostics in a flight
+
+
+@dataclass(frozen=True)
+class Condition:
+    """cores: that the flight may use, None for all. beside: run by so many processes each, in the
+    flight's folder and ROS domain."""
+
+    name: str
+    cores: int | None = None
+    beside: tuple[tuple[Callable[[Path, int], None], int], ...] = ()
+
+
+def hog(folder: Path, domain: int) -> None:
+    """Takes a core, or as much of it as it gets."""
+    while True:
+        sum(range(100_000))
+
+
+def writer(folder: Path, domain: int) -> None:
+    """Keeps the disk busy: writes, and waits until it is there."""
+    block = os.urandom(BLOCK)
+    with tempfile.TemporaryFile(dir=folder) as file:
+        while True:
+            file.seek(0)
+            for _ in range(BLOCKS):
+                file.write(block)
+                file.flush()
+                os.fsync(file.fileno())
+
+
+def listener(folder: Path, domain: int) -> None:
+    """Takes every message of /diagnostics."""
+    os.environ.update(ros_environment(domain, folder))
+    import rclpy
+    from diagnostic_msgs.msg import DiagnosticArray
+
+    rclpy.init()
+    node = rclpy.create_node(f"listener_{os.getpid()}")
+    node.create_subscription(DiagnosticArray, "/diagnostics", lambda message: None, 10)
+    rclpy.spin(node)
+
+
+CONDITIONS = (
+    Condition("no load"),
+    Condition("every core has a hog", beside=((hog, os.cpu_count() or 1),)),
+    Condition("slow disk", beside=((writer, 2),)),
+    Condition("10 x the listeners to /diagnostics", beside=((listener, LISTENERS),)),
+    Condition("one core", cores=1),
+    Condition("one core, and a hog on it", cores=1, beside=((hog, 1),)),
+)
+
+
+@contextmanager
+def under(condition: Condition, folder: Path, domain: int) -> Iterator[None]:
+    """The load, and the cores, while it lasts; both are inherited by what is started inside."""
+    before = os.sched_getaffinity(0)
+    if condition.cores is not None:
+        os.sched_setaffinity(0, set(sorted(before)[: condition.cores]))
+    context = multiprocessing.get_context("spawn")
+    running = [
+        context.Process(target=run, args=(folder, domain), daemon=True)
+        for run, count in condition.beside
+        for _ in range(count)
+    ]
+    try:
+        for one in running:
+            one.start()
+        yield
+    finally:
+        for one in running:
+            one.kill()
+            one.join()
+        os.sched_setaffinity(0, before)

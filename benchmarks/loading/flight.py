@@ -1,0 +1,78 @@
+"""One flight under a condition, and what is kept of it."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from loading.conditions import Condition, under
+from uam_sim_bridge.campaign.fault_outcome import classify
+from uam_sim_bridge.flight import timeseries
+from uam_sim_bridge.flight.ports import INSTANCES, ports_of
+
+SCENARIO = "quick_pick"
+INSTANCE = INSTANCES - 1  # whose domain the listeners are to know before the flight begins
+
+
+@dataclass(frozen=True)
+class Measured:
+    """latency [ms]: median and 99th percentile; missed: control ticks, of those with a sample.
+
+    pace: simulated over wall time. position [m]: largest RMS error of an axis. told: why the
+    mission was not completed, or holds.
+    """
+
+    condition: str
+    outcome: str
+    latency_p50: float
+    latency_p99: float
+    missed: int
+    ticks: int
+    pace: float
+    position: float
+    lost_messages: int
+    told: str
+
+
+def fly(condition: Condition, out: Path) -> Measured:
+    """Fly in real time; the folder of the flight is in `out`."""
+    folder = out / condition.name.replace(" ", "_").replace("/", "").replace(",", "")
+    number = 1
+    while folder.exists():
+        number += 1
+        folder = folder.with_name(f"{folder.name.rstrip('0123456789')}{number}")
+    command = [sys.executable, "-m", "uam_sim_bridge.cli.main", "fly", "--scenario", SCENARIO]
+    command += ["--clock", "realtime", "--no-video", "--instance", str(INSTANCE)]
+    with (
+        under(condition, out, ports_of(INSTANCE).domain),
+        (out / f"{folder.name}.txt").open("w") as said,
+    ):
+        subprocess.run([*command, "--out", str(folder)], stdout=said, stderr=said, check=False)
+    return measured(condition.name, folder)
+
+
+def measured(name: str, folder: Path) -> Measured:
+    """Read what the flight has left."""
+    plant = json.loads((folder / "logs" / "mujoco_sim.json").read_text())
+    recorder = json.loads((folder / "logs" / "recorder.json").read_text())
+    metrics = json.loads((folder / "metrics.json").read_text())
+    latency = 1e3 * np.array(plant["latency_s"])
+    causes = [one["cause"] for one in metrics["transitions"] if one["to"] in ("holding", "landing")]
+    unplanned = [cause for cause in causes if cause != "the scenario lands"]
+    return Measured(
+        condition=name,
+        outcome=classify(timeseries.read(folder / "timeseries.parquet"), metrics),
+        latency_p50=float(np.percentile(latency, 50)),
+        latency_p99=float(np.percentile(latency, 99)),
+        missed=plant["missed_ticks"],
+        ticks=plant["answerable_ticks"],
+        pace=plant["simulated_s"] / plant["wall_s"],
+        position=max(metrics["rms"]["position_m"]),
+        lost_messages=sum(recorder["lost"].values()),
+        told="; ".join([*unplanned, *metrics["shortfalls"]]),
+    )
