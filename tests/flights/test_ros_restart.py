@@ -9,27 +9,9 @@ import pytest
 import yaml
 from whole_flight import assert_nothing_left
 
+from uam_control.configuration import path
 from uam_sim_bridge.flight.wiring import ARM, ATTITUDE, POSITION
 from uam_sim_bridge.report.rebuild import rebuild
-
-LONGER = """\
-description: Up, some seconds of hovering, down, for tests.
-arm_start: {alpha_1_deg: 0, alpha_2_deg: 90}
-phases:
-  - {from: 0, name: take-off}
-  - {from: 1.5, name: hover}
-  - {from: 5, name: land}
-moves:
-  - {coordinate: z, from: 0, until: 1.5, to: 0.6}
-landing: {at: 5, duration: 2}
-"""
-
-
-@pytest.fixture
-def scenario(tmp_path):
-    file = tmp_path / "longer.yaml"
-    file.write_text(LONGER)
-    return file
 
 
 def states(flight):
@@ -39,8 +21,8 @@ def states(flight):
 
 @pytest.mark.slow
 @pytest.mark.parametrize("victim", [POSITION, ATTITUDE, ARM])
-def test_a_killed_controller_is_started_again_and_the_flight_goes_on(fly, scenario, victim):
-    flight = fly("--scenario", str(scenario), "--fault", f"node_kill@hover+0.5:node={victim}")
+def test_a_killed_controller_is_started_again_and_the_flight_goes_on(fly, victim):
+    flight = fly("--scenario", "hover", "--fault", f"node_kill@hover+0.5:node={victim}")
     assert flight.wait() == 0, flight.said + flight.complained
     assert f"{victim} was killed by SIGKILL; started again" in flight.said
     figures, passed = states(flight)
@@ -51,10 +33,10 @@ def test_a_killed_controller_is_started_again_and_the_flight_goes_on(fly, scenar
 
 
 @pytest.mark.slow
-def test_the_policy_may_be_to_land(fly, scenario, tmp_path):
+def test_the_policy_may_be_to_land(fly, tmp_path):
     flight = fly(
         "--scenario",
-        str(scenario),
+        "hover",
         "--fault",
         f"node_kill@hover+0.5:node={ARM}",
         "--profile",
@@ -68,8 +50,6 @@ def test_the_policy_may_be_to_land(fly, scenario, tmp_path):
 
 
 def landing_profile(folder):
-    from uam_control.configuration import path
-
     profile = yaml.safe_load(path("profiles/s500.yaml").read_text())
     profile["mission"]["ros__parameters"]["after_restart"] = "land"
     file = folder / "landing.yaml"

@@ -25,13 +25,16 @@ def test_a_busy_port_is_named_with_its_holder(free, tmp_path):
     with socket.create_server(("127.0.0.1", free.simulator_tcp)):
         busy = instances.look(free.instance, tmp_path)
         assert not busy.flight
-        assert f"TCP {free.simulator_tcp} held by " in busy.who
+        assert f"TCP {free.simulator_tcp} (simulator link), held by " in busy.who
         assert f"(process {os.getpid()})" in busy.who
         (found,) = instances.checks(tmp_path)
         assert found.verdict in (WARN, FAIL) and f"of {INSTANCES} instances" in found.found
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as program:
         program.bind(("127.0.0.1", free.offboard_udp))
-        assert f"UDP {free.offboard_udp} held by" in instances.look(free.instance, tmp_path).who
+        assert (
+            f"UDP {free.offboard_udp} (offboard link), held by"
+            in instances.look(free.instance, tmp_path).who
+        )
 
 
 def test_another_flight_is_no_trouble(tmp_path):

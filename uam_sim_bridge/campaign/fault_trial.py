@@ -2,25 +2,19 @@
 
 from __future__ import annotations
 
-import os
-import tempfile
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from pathlib import Path
 from typing import Any
-
-from rich.console import Console
 
 from uam_control.mission import load_scenario
 from uam_control.profile import Profile
+from uam_sim_bridge.campaign import quiet
 from uam_sim_bridge.campaign.fault_matrix import Cell
 from uam_sim_bridge.campaign.fault_outcome import COMPLETED, LOST, classify, down_after
 from uam_sim_bridge.faults import PROCESS
 from uam_sim_bridge.flight import metrics
 from uam_sim_bridge.flight.direct import DirectFlight
 from uam_sim_bridge.flight.outcome import transitions
-from uam_sim_bridge.flight.progress import Progress
-from uam_sim_bridge.flight.result_folder import ResultFolder
 from uam_sim_bridge.flight.settings import ONLOOKERS, FlightSettings
 from uam_sim_bridge.flight.timeseries import Series
 from uam_sim_bridge.plant import Vehicle
@@ -82,8 +76,6 @@ def _direct(trial: FaultTrial) -> FaultResult:
 
 
 def _ros(trial: FaultTrial) -> FaultResult:
-    from uam_sim_bridge.flight import ros_engine
-
     hindered = {one.fault.values["node"] for one in trial.cell.schedule.only(PROCESS).faults}
     settings = FlightSettings(
         scenario=load_scenario(trial.scenario),
@@ -95,12 +87,7 @@ def _ros(trial: FaultTrial) -> FaultResult:
         without=tuple(name for name in ONLOOKERS if name not in hindered),
         faults=trial.cell.schedule,
     )
-    with (
-        tempfile.TemporaryDirectory(prefix="uam-fault-") as folder,
-        open(os.devnull, "w") as nowhere,
-        Progress(Console(file=nowhere)) as progress,
-    ):
-        outcome = ros_engine.fly(settings, ResultFolder(Path(folder)), progress)
+    outcome = quiet.fly(settings)
     if outcome.series is None:
         broken = None if trial.cell.promise is None else False
         return FaultResult(

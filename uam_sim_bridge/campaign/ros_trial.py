@@ -2,18 +2,10 @@
 
 from __future__ import annotations
 
-import os
-import tempfile
-from pathlib import Path
-
-from rich.console import Console
-
 from uam_control.mission import load_scenario
+from uam_sim_bridge.campaign import quiet
 from uam_sim_bridge.campaign import trial as direct
 from uam_sim_bridge.campaign.trial import Result, Trial
-from uam_sim_bridge.flight import ros_engine
-from uam_sim_bridge.flight.progress import Progress
-from uam_sim_bridge.flight.result_folder import ResultFolder
 from uam_sim_bridge.flight.settings import ONLOOKERS, FlightSettings
 
 
@@ -22,7 +14,7 @@ class NotFlown(RuntimeError):
 
 
 def fly(trial: Trial) -> Result:
-    """Fly it; log and output of the nodes are thrown away. Raises NotFlown."""
+    """Fly it. Raises NotFlown."""
     scenario = load_scenario(trial.scenario)
     settings = FlightSettings(
         scenario=scenario,
@@ -33,12 +25,7 @@ def fly(trial: Trial) -> Result:
         vehicle_changes=trial.vehicle_changes,
         without=ONLOOKERS,
     )
-    with (
-        tempfile.TemporaryDirectory(prefix="uam-trial-") as folder,
-        open(os.devnull, "w") as nowhere,
-        Progress(Console(file=nowhere)) as progress,
-    ):
-        outcome = ros_engine.fly(settings, ResultFolder(Path(folder)), progress)
+    outcome = quiet.fly(settings)
     if outcome.partial or outcome.series is None:
         raise NotFlown(
             f"{trial.label}, {trial.payload_mass:g} kg, seed {trial.seed}: "

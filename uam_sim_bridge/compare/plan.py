@@ -8,10 +8,10 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from uam_control.laws import catalogue
-from uam_control.profile import Profile, load_profile, profile_of
+from uam_control.profile import CONTROLLERS, Profile, load_profile, profile_of
 from uam_sim_bridge.campaign.trial import Trial
 
-CONTROLLERS = ("position_controller", "attitude_controller", "arm_controller")
+POSITION = "position_controller"
 PROPOSED = "proposed"
 ASMC1, ASMC2 = catalogue.label("asmc1"), catalogue.label("asmc2")
 FROZEN = "proposed, adaptation frozen"
@@ -65,7 +65,7 @@ def with_weight(profile: Profile, other: Profile) -> Profile:
     """The same profile with the weight that `other` adds to tau_p, without which nothing flies."""
     name = "gravity_feedforward_mass"
     sections = copy.deepcopy(profile.sections)
-    sections[CONTROLLERS[0]][name] = other.sections[CONTROLLERS[0]][name]
+    sections[POSITION][name] = other.sections[POSITION][name]
     return profile_of(sections, Path(f"{profile.name}_weight.yaml"))
 
 

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import socket
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
 from uam_sim_bridge.doctor import holders
 from uam_sim_bridge.doctor.finding import Finding, fail, ok, warn
-from uam_sim_bridge.flight.ports import INSTANCES, discovery_port, held, in_use, lock_file, ports_of
+from uam_sim_bridge.flight.ports import INSTANCES, busy_port, held, lock_file, ports_of
 
 SHOWN = 4  # busy ports named in the line
 
@@ -53,14 +52,8 @@ def look(instance: int, folder: Path | None = None) -> Busy | None:
     lock = lock_file(folder, instance)
     if held(lock):
         return Busy(instance, ", ".join(holders.of_file(lock)) or "a flight", True)
-    ports = ports_of(instance)
-    for protocol, kind, port in (
-        ("tcp", socket.SOCK_STREAM, ports.simulator_tcp),
-        ("udp", socket.SOCK_DGRAM, ports.offboard_udp),
-        ("udp", socket.SOCK_DGRAM, ports.autopilot_udp),
-        ("udp", socket.SOCK_DGRAM, discovery_port(ports.domain)),
-    ):
-        if in_use(kind, port):
-            who = ", ".join(holders.of_port(protocol, port)) or "an unknown program"
-            return Busy(instance, f"{protocol.upper()} {port} held by {who}", False)
-    return None
+    port = busy_port(ports_of(instance))
+    if port is None:
+        return None
+    who = ", ".join(holders.of_port(port.protocol.lower(), port.number)) or "an unknown program"
+    return Busy(instance, f"{port}, held by {who}", False)

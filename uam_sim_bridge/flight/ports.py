@@ -12,10 +12,12 @@ import tempfile
 from dataclasses import dataclass
 from pathlib import Path
 from types import TracebackType
+from typing import NamedTuple
 
 SIMULATOR_TCP, OFFBOARD_UDP, AUTOPILOT_UDP = 4560, 14540, 14580  # PX4's own, instance 0
 FIRST_DOMAIN = 1  # domain 0 is everybody's default
 LAST_DOMAIN = 101  # above, the middleware's ports run into the system's ephemeral ones
+KINDS = {"TCP": socket.SOCK_STREAM, "UDP": socket.SOCK_DGRAM}
 INSTANCES = min(LAST_DOMAIN - FIRST_DOMAIN + 1, AUTOPILOT_UDP - OFFBOARD_UDP)
 
 
@@ -78,23 +80,31 @@ def require_free(kind: int, port: int, purpose: str) -> None:
         )
 
 
-def busy_port(ports: Ports, own_autopilot: bool = True) -> str | None:
-    """Which port of an instance another program holds, in words; None if all are free.
+class BusyPort(NamedTuple):
+    """A port that another program holds; protocol: TCP or UDP."""
+
+    protocol: str
+    number: int
+    purpose: str
+
+    def __str__(self) -> str:
+        return f"{self.protocol} {self.number} ({self.purpose})"
+
+
+def busy_port(ports: Ports, own_autopilot: bool = True) -> BusyPort | None:
+    """The first port of an instance that another program holds; None if all are free.
 
     own_autopilot: the autopilot is to be started, so its port must be free, too.
     """
     wanted = [
-        (socket.SOCK_STREAM, ports.simulator_tcp, "TCP {} (simulator link)"),
-        (socket.SOCK_DGRAM, ports.offboard_udp, "UDP {} (offboard link)"),
+        BusyPort("TCP", ports.simulator_tcp, "simulator link"),
+        BusyPort("UDP", ports.offboard_udp, "offboard link"),
         # of the domain's first participant: taken means that the domain lives
-        (socket.SOCK_DGRAM, discovery_port(ports.domain), "UDP {} (ROS discovery)"),
+        BusyPort("UDP", discovery_port(ports.domain), "ROS discovery"),
     ]
     if own_autopilot:
-        wanted.append((socket.SOCK_DGRAM, ports.autopilot_udp, "UDP {} (autopilot)"))
-    for kind, port, purpose in wanted:
-        if in_use(kind, port):
-            return purpose.format(port)
-    return None
+        wanted.append(BusyPort("UDP", ports.autopilot_udp, "autopilot"))
+    return next((one for one in wanted if in_use(KINDS[one.protocol], one.number)), None)
 
 
 def instances_in_use(folder: Path | None = None) -> list[int]:
