@@ -12,7 +12,7 @@ from quadrotor import MASS, Quadrotor
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Bool
 
-from uam_control.rotations import euler_from_quaternion
+from uam_control.rotations import euler_from_quaternion, quaternion_from_euler
 from uam_msgs_py import topics
 from uam_msgs_py.control import ATTITUDE_NAMES, PositionCommandWriter, TorqueWriter
 from uam_msgs_py.convert import PoseWriter, Serialized, TrajectoryWriter, read_setpoint
@@ -253,7 +253,7 @@ def test_bad_commands_in_flight_hold_level_then_the_failsafe_acts(make_rig):
         assert np.all(np.isfinite(rates)) and np.all(np.abs(rates) <= 2.0)
     assert thrusts == pytest.approx([WEIGHT / 41.36] * 200, rel=0.02)
     assert rig.autopilot.status.mode is Mode.OFFBOARD
-    for _ in range(400):
+    for _ in range(650):
         rig.tick((0, 0, math.nan))
     assert rig.autopilot.status.mode is Mode.LAND  # COM_OF_LOSS_T after the hold
     assert rig.autopilot.status.armed
@@ -335,17 +335,22 @@ def test_states_without_commands_hold_level_then_the_failsafe_acts(make_rig):
     """A controller is lost: states go on, by whose stamps the bridge counts."""
     rig = make_rig()
     rig.fly()
-    stopped, thrusts = rig.count, []
-    for _ in range(700):
-        rig.publish(topics.STATE, rig.state.fill(rig.count * PERIOD, np.zeros((3, 8))))
+    stopped, thrusts, rolls = rig.count, [], []
+    tilted = np.zeros((3, 8))
+    tilted[0, 3] = 0.1  # roll [rad], which no command has seen
+    for _ in range(950):
+        rig.publish(topics.STATE, rig.state.fill(rig.count * PERIOD, tilted))
         silent = rig.count - stopped < 24  # stale_after, 0.1 s, after the last command
         before = len(rig.setpoints)
         if not silent:
             rig.probe.until(lambda n=before: len(rig.setpoints) > n, "a setpoint without command")
-            thrusts.append(read_setpoint(rig.setpoints[-1])[2])
+            _, rates, thrust = read_setpoint(rig.setpoints[-1])
+            thrusts.append(thrust)
+            rolls.append(rates[0])
         rig.autopilot_tick()
         rig.count += 1
-    assert thrusts[:240] == pytest.approx([WEIGHT / 41.36] * 240, rel=0.02)
+    assert thrusts[:480] == pytest.approx([WEIGHT / 41.36] * 480, rel=0.02)
+    assert rolls[:480] == pytest.approx([-0.3] * 480)
     assert thrusts[-1] == 0.0 and "stream stopped" in rig.node.output
     assert rig.autopilot.status.mode is Mode.LAND and rig.autopilot.status.armed
     for _ in range(400):
@@ -354,8 +359,8 @@ def test_states_without_commands_hold_level_then_the_failsafe_acts(make_rig):
 
 
 def test_realtime_watchdog_holds_level_and_then_stops(make_rig):
-    """Ticks stop in flight: level setpoints go on by themselves for hold_time, then none."""
-    rig = make_rig("-p", "clock:=realtime", "-p", "stale_after:=2.0", "-p", "hold_time:=1.0")
+    """Ticks stop in flight: level setpoints go on by themselves for release_time, then none."""
+    rig = make_rig("-p", "clock:=realtime", "-p", "stale_after:=2.0", "-p", "release_time:=1.0")
     rig.fly()
     rig.hear()
     rig.received.clear()
@@ -371,6 +376,25 @@ def test_realtime_watchdog_holds_level_and_then_stops(make_rig):
     rig.received.clear()
     rig.probe.until(lambda: (rig.hear(), "HEARTBEAT" in rig.kinds())[1], "a heartbeat")
     assert stream() == []
+
+
+def test_without_states_it_levels_by_the_motion_capture(make_rig):
+    """The estimator is lost: the last estimate of the attitude is old, the mocap's is not."""
+    rig = make_rig("-p", "clock:=realtime", "-p", "stale_after:=1.0", "-p", "release_time:=3.0")
+    rig.fly()
+    pose, tilted = PoseWriter(), quaternion_from_euler(np.array([0.1, 0.0, 0.0]))
+    rig.hear()
+    rig.received.clear()
+
+    def rolled():
+        now = rig.count * PERIOD + round((time.monotonic() - begin) * 1e9)
+        rig.publish(topics.MOCAP, pose.fill(now, np.zeros(3), tilted))
+        rig.hear()
+        sent = [m for m in rig.received if m.get_type() == "SET_ATTITUDE_TARGET"]
+        return any(m.body_roll_rate == pytest.approx(-0.3, abs=1e-3) for m in sent)
+
+    begin = time.monotonic()
+    rig.probe.until(rolled, "rates against the tilt that the mocap shows")
 
 
 def values(messages):

@@ -23,6 +23,23 @@ def test_levels_with_the_thrust_flown():
     assert thrust == pytest.approx(0.52)
 
 
+def test_the_last_setpoints_do_not_turn_it():
+    """The autopilot keeps to them until its failsafe."""
+    hold = flown()
+    hold.setpoint(4.0, TILTED)
+    rates, _ = hold.setpoint(5.94, TILTED)
+    assert rates == pytest.approx([-0.3, 0.6, 0.0])
+    rates, _ = hold.setpoint(5.96, TILTED)
+    assert rates == pytest.approx([0.0, 0.0, 0.0])
+
+
+def test_without_hope_it_ends_sooner():
+    hold = flown()
+    assert hold.setpoint(4.0, TILTED, hopeless=True) is not None
+    assert hold.setpoint(4.99, TILTED, hopeless=True) is not None
+    assert hold.setpoint(5.01, TILTED, hopeless=True) is None
+
+
 def test_thrust_is_an_average_not_the_last_value():
     hold = flown()
     hold.good(4.0, 0.9)

@@ -326,7 +326,7 @@ class Bridge:
             self._hold.good(stamp, thrust)
             return rates, thrust
         if self.sequence.let_go and self.autopilot.commander.armed:
-            return self._hold.setpoint(stamp, state[0, ATTITUDE])
+            return self._hold.setpoint(stamp, state[0, ATTITUDE], hopeless=True)
         return IDLE
 
     def _request(self, time: float, request: Request) -> None:

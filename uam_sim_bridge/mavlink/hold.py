@@ -12,6 +12,7 @@ import numpy as np
 
 from uam_control.parameters import ParameterSet, number
 
+_LAST = 0.05  # s, before the end: the autopilot keeps to the last setpoint until its failsafe
 _THRUST_TIME = 0.5  # s, over which the thrust of normal flight is averaged
 
 
@@ -22,6 +23,13 @@ class HoldParameters(ParameterSet):
     hold_time: float = number(
         2.0,
         "how long level setpoints go out in place of commands, before the stream stops",
+        "s",
+        0.0,
+        10.0,
+    )
+    release_time: float = number(
+        1.0,
+        "the same where no commands are to be expected: no estimate, or the mission has given up",
         "s",
         0.0,
         10.0,
@@ -68,19 +76,24 @@ class LevelHold:
         """Forget the flight: the vehicle is on the ground."""
         self._thrust = self._since = None
 
-    def setpoint(self, time: float, attitude: np.ndarray) -> tuple[np.ndarray, float] | None:
+    def setpoint(
+        self, time: float, attitude: np.ndarray, hopeless: bool = False
+    ) -> tuple[np.ndarray, float] | None:
         """Return body rates (3,) [rad/s, FLU] and thrust, or None when the stream is to stop.
 
-        attitude (3,): roll, pitch, yaw [rad], the latest known.
+        attitude (3,): roll, pitch, yaw [rad]; no rates about an axis of which it is not finite.
+        hopeless: no commands are to be expected.
         """
         if self._thrust is None:
             return None
         if self._since is None:
             self._since = time
-        if time - self._since > self.parameters.hold_time:
+        longest = self.parameters.release_time if hopeless else self.parameters.hold_time
+        left = longest - (time - self._since)
+        if left < 0.0:
             return None
         limit, gain = self.parameters.hold_rate_limit, self.parameters.hold_gain
         for axis in range(2):
-            angle = attitude[axis] if math.isfinite(attitude[axis]) else 0.0
+            angle = attitude[axis] if left > _LAST and math.isfinite(attitude[axis]) else 0.0
             self.rates[axis] = min(limit, max(-limit, -gain * angle))
         return self.rates, self._thrust

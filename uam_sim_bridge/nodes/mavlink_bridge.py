@@ -10,12 +10,13 @@ setpoint; /uam/setpoint repeats what was sent and acknowledges the tick.
 | idle (not flying) | rates 0, thrust 0: the stream goes on, the vehicle stays on the ground |
 | not finite or malformed, on the ground | as idle |
 | the same in flight; the mission in failsafe; idle high above the start; none for `stale_after`, \
-by the stamps of the state or, in real time, by the wall clock | level hold for `hold_time`, then \
-nothing: the autopilot's failsafe acts |
+by the stamps of the state or, in real time, by the wall clock | level hold for `hold_time`, \
+`release_time` where nothing is to be expected, then nothing: the autopilot's failsafe acts |
 """
 
 from __future__ import annotations
 
+import math
 import time
 from collections.abc import Callable
 from enum import Enum
@@ -28,6 +29,7 @@ from std_msgs.msg import Bool
 
 from uam_control.coordinates import ATTITUDE
 from uam_control.parameters import ParameterError
+from uam_control.rotations import euler_from_quaternion
 from uam_control.supervision import State
 from uam_msgs_py import topics
 from uam_msgs_py.control import (
@@ -60,6 +62,8 @@ from uam_sim_bridge.nodes.bridge_link import BridgeParameters, open_links
 
 NAME = "mavlink_bridge"
 THRUST_PERIOD = 100_000_000  # ns between two reports of the thrust factor
+LATENCY = 0.05  # s, by which a pose is older than what it is waited for
+UNKNOWN = np.full(3, math.nan)
 WATCH_PERIOD = 0.02  # s between two looks of the real-time watchdog, and its setpoints
 
 
@@ -98,6 +102,8 @@ class MavlinkBridgeNode(UamNode):
         self._fault_topic = FaultTopic(self) if self._faulty else None
         self._state = np.zeros((3, 8))
         self._pose: tuple[int, np.ndarray, np.ndarray] | None = None
+        # What is known of the attitude when commands do not come: stamp [ns], roll, pitch, yaw.
+        self._estimated = self._seen = (-1, UNKNOWN)
         self._pose_sent = -1.0
         self._adopted: tuple[str, ...] = ()
         self._commanded = 0  # stamp [ns] of the last tick with commands
@@ -118,7 +124,7 @@ class MavlinkBridgeNode(UamNode):
         self._arming = self.listen(topics.ARMING, self._on_arming, required=False)
         self._mocap = self.listen(topics.MOCAP, self._on_mocap)
         self._mission = self.listen(topics.MISSION_STATUS, self._on_mission, required=False)
-        self._feed(topics.STATE, read_state)
+        self._feed(topics.STATE, self._read_state)
         self._feed(topics.POSITION_COMMAND, read_position_command)
         self._feed(topics.ATTITUDE_COMMAND, self._read_attitude_command)
         self.triggers = (topics.ATTITUDE_COMMAND.name,)
@@ -149,6 +155,11 @@ class MavlinkBridgeNode(UamNode):
 
         self.listen(topic, handle)
 
+    def _read_state(self, data: bytes) -> tuple[int, np.ndarray]:
+        stamp, state = read_state(data)
+        self._estimated = stamp, state[0, ATTITUDE]
+        return stamp, state
+
     @staticmethod
     def _read_attitude_command(data: bytes) -> tuple[int, tuple[np.ndarray | None]]:
         stamp, torque = read_torque(data, TAU_Q)
@@ -165,7 +176,8 @@ class MavlinkBridgeNode(UamNode):
             self._faulty.mission_at(seconds(stamp), status.time)
 
     def _on_mocap(self, data: bytes) -> None:
-        self._pose = read_pose(data)
+        self._pose = stamp, _, quaternion = read_pose(data)
+        self._seen = stamp, euler_from_quaternion(quaternion)
 
     def _tick(
         self, stamp: int, state: StateOrBad, position: CommandOrBad, torque: TorqueOrBad
@@ -264,13 +276,23 @@ class MavlinkBridgeNode(UamNode):
     def _without_command(self, now: float) -> tuple[np.ndarray, float] | None:
         if not self.link.armed or (self.link.landed and not self._high()):
             return self._idle, 0.0
-        setpoint = self._hold.setpoint(now, self._state[0, ATTITUDE])
+        blind = not self._fresh(self._estimated[0], now)
+        setpoint = self._hold.setpoint(now, self._attitude(now), blind or self.sequence.let_go)
         self.say(
             "no usable commands in flight: "
             + ("holding level" if setpoint else "stream stopped, the failsafe acts"),
             "hold",
         )
         return setpoint
+
+    def _attitude(self, now: float) -> np.ndarray:
+        """Roll, pitch, yaw [rad]: the estimate, the mocap's where that is old; NaN without both."""
+        known = (self._estimated, self._seen)
+        return next((angles for stamp, angles in known if self._fresh(stamp, now)), UNKNOWN)
+
+    def _fresh(self, stamp: int, now: float) -> bool:
+        """Whether what was measured at a stamp [ns], negative for never, is good at `now` [s]."""
+        return stamp >= 0 and now - seconds(stamp) < self._options.stale_after + LATENCY
 
     def _send(self, now: float, setpoint: tuple[np.ndarray, float] | None) -> None:
         """Send the autopilot what is due: heartbeat, requests, vision, setpoint."""
