@@ -17,5 +17,6 @@ COORDINATES = ("x", "y", "z", "roll", "pitch", "yaw", "alpha_1", "alpha_2")
 POSITION = slice(0, 3)
 ATTITUDE = slice(3, 6)
 ARM = slice(6, 8)
+YAW = COORDINATES.index("yaw")
 SIZE = len(COORDINATES)
 JOINTS = COORDINATES[ARM]

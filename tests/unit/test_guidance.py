@@ -136,3 +136,35 @@ def test_a_segment_takes_its_own_time_for_each_coordinate():
     segment.write(7.0, reference)
     np.testing.assert_array_equal(reference[0, :2], goal[:2])
     assert reference[0, 3] == pytest.approx(1.5) and segment.end == 13.0
+
+
+def test_who_drifts_is_stayed_with_and_comes_back_to_the_path_smoothly():
+    guide = guidance()
+    state = np.zeros((3, 8))
+
+    def adrift(stamp):
+        path = guide.reference[0].copy()
+        state[0] = (-0.6, 0.2, 0.9, 0.1, 0.1, 0.1, 0.0, 0.0)
+        guide.drift(stamp, state)
+        np.testing.assert_allclose(guide.reference[0, [0, 1, 2, 5]], state[0, [0, 1, 2, 5]])
+        np.testing.assert_array_equal(guide.reference[0, 6:], path[6:])
+
+    fly(guide, 0.0, 10.0, [(9.0, lambda stamp: guide.stop(stamp, False))])
+    fly(guide, 10.0, 13.0, [(12.0 + 0.1 * k, adrift) for k in range(10)])
+    guide.go_on(113.0)
+    back = fly(guide, 13.0, 20.0)
+    assert_smooth(back)
+    assert back[0, 0, 0] == pytest.approx(-0.6, abs=0.01), "from where it was"
+    alone = guidance()
+    expected = fly(alone, 0.0, 20.0, [(9.0, lambda stamp: alone.stop(stamp, False))])
+    gone_on = guide.scenario_time - alone.scenario_time
+    assert 0.0 < gone_on < 7.0, "the path goes on once the vehicle is back on it"
+    np.testing.assert_allclose(back[-1, 0, 1:6], expected[-1, 0, 1:6], atol=1e-9)
+
+
+def test_a_state_that_is_not_finite_does_not_move_the_reference():
+    guide = guidance()
+    fly(guide, 0.0, 10.0)
+    before = guide.reference.copy()
+    guide.drift(110.0, np.full((3, 8), np.nan))
+    np.testing.assert_array_equal(guide.reference, before)

@@ -11,9 +11,10 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from uam_control.coordinates import ARM, POSITION, SIZE
+from uam_control.coordinates import ARM, POSITION, SIZE, YAW
 from uam_control.mission.scenario import SINK
 from uam_control.mission.trajectory import Trajectory
+from uam_control.rotations import wrap_angle
 from uam_control.supervision import SupervisionParameters
 
 _PEAK = 1.875  # largest rate of a quintic from rest to rest, times its mean rate
@@ -119,6 +120,7 @@ class Guidance:
         self._rate, self._slope = 1.0, 0.0  # of the clock
         self._path = np.zeros((3, SIZE))
         self._arm: Segment | None = None  # in place of the path's, while holding
+        self._away: Segment | None = None  # from the path, once nobody flew the vehicle
         self._go_on_at = math.inf  # stamp at which the arm is back and the path goes on
         self._last: Segment | None = None  # in place of the path, to the end of the flight
 
@@ -149,6 +151,28 @@ class Guidance:
         if self._arm is not None:
             self._arm.write(stamp, self._path)
             self.reference[:, ARM] = self._path[:, ARM]
+        if self._away is not None:
+            self._away.write(stamp, self._path)
+            self.reference[:, : ARM.start] += self._path[:, : ARM.start]
+            if stamp >= self._away.end:
+                self._away = None
+
+    def drift(self, stamp: float, state: np.ndarray) -> None:
+        """After `write`, while nobody flies the vehicle: stay with it, and come back to the path
+        from where it is; state (3, 8). Otherwise whoever takes over is met by a large error."""
+        path = self.reference[0].copy()
+        if self._away is not None:
+            self._away.write(stamp, self._path)
+            path[: ARM.start] -= self._path[0, : ARM.start]
+        offset = np.zeros((3, SIZE))
+        offset[0, POSITION] = state[0, POSITION] - path[POSITION]
+        offset[0, YAW] = wrap_angle(state[0, YAW] - path[YAW])
+        if not np.all(np.isfinite(offset)):
+            return
+        self.reference[0, : ARM.start] = path[: ARM.start] + offset[0, : ARM.start]
+        p, way = self.parameters, float(np.linalg.norm(offset[0, POSITION]))
+        length = max(p.stop_time, _PEAK * way / p.travel_speed)
+        self._away = Segment(stamp, offset, np.zeros(SIZE), np.full(SIZE, length))
 
     def stop(self, stamp: float, stow: bool) -> None:
         """Slow down to a stop on the path; stow: the arm goes to its place meanwhile."""
@@ -165,6 +189,8 @@ class Guidance:
             self._trajectory.write(time, self._path)
             self._arm = self._arm_segment(stamp, self._path[0, ARM])
             self._go_on_at = max(self._go_on_at, self._arm.end)
+        if self._away is not None:
+            self._go_on_at = max(self._go_on_at, self._away.end)
 
     def descend(self, stamp: float, state: np.ndarray, ground: float, stow: bool) -> None:
         """Go straight down from where the vehicle is; state (3, 8), ground [m]: height there."""

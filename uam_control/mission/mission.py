@@ -111,6 +111,9 @@ class Mission:
             decision = self._supervisor.step(stamp, seen, command)
             if guidance is not None:
                 guidance.write(stamp)
+                adrift = seen.readings.pose_controller_age > self._parameters.controller_age_hold
+                if adrift and output.state is State.HOLDING:
+                    guidance.drift(stamp, state)
             self._follow(stamp, decision)
             if output.state is State.FAILSAFE and self._end is None:
                 given = self._failsafe_since + self._parameters.failsafe_timeout

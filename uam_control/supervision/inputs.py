@@ -10,8 +10,9 @@ import numpy as np
 
 from uam_control.supervision.observation import Readings
 
+POSE = ("position", "attitude")  # without these nobody flies the vehicle
 WATCHED = ("K", "zeta")  # how the names of gains with a limit begin
-SUBSYSTEMS = ("position", "attitude", "arm")
+SUBSYSTEMS = (*POSE, "arm")
 
 
 class Inputs:
@@ -73,4 +74,6 @@ class Inputs:
         readings.joint_age = stamp - self._joints
         if self._controllers:
             readings.controller_age = stamp - min(self._controllers.values())
+            of_pose = [at for subsystem, at in self._controllers.items() if subsystem in POSE]
+            readings.pose_controller_age = stamp - min(of_pose, default=math.nan)
         return readings

@@ -25,7 +25,8 @@ class Readings:
     """What is known besides state and reference; NaN where it is not, and then nothing follows.
 
     battery: charge left, 0..1. mocap_age, joint_age [s]: of the newest message by its stamp;
-    controller_age [s]: of the oldest of the newest gains, which every controller tells.
+    controller_age [s]: of the oldest of the newest gains, which every controller tells;
+    pose_controller_age: the same without the arm's.
     missed_ticks: within the last second. temperature: of the hottest servo [deg C]. joint_effort
     (2,): measured [N m]. gains (3,): largest adapted gain of position, attitude, arm.
     """
@@ -38,6 +39,7 @@ class Readings:
     temperature: float = math.nan
     joint_effort: np.ndarray = field(default_factory=lambda: np.full(2, math.nan))
     gains: np.ndarray = field(default_factory=lambda: np.full(3, math.nan))
+    pose_controller_age: float = math.nan
 
 
 @dataclass
