@@ -8,6 +8,7 @@ from whole_flight import assert_nothing_left
 
 from uam_control.mission import load_scenario
 from uam_control.profile import load_profile
+from uam_sim_bridge.cli.main import main
 from uam_sim_bridge.faults import read_schedule
 from uam_sim_bridge.flight.direct import DirectFlight
 from uam_sim_bridge.plant import Vehicle
@@ -56,3 +57,13 @@ def test_faults_come_when_they_should_and_the_log_knows_them(fly, short_scenario
     shutil.copy(flight.out / "log.mcap", alone)
     assert rebuild(alone, tmp_path / "again")["faults"] == figures["faults"]
     assert_nothing_left(flight, [], set())
+
+
+@pytest.mark.slow
+def test_what_is_promised_of_killed_processes_is_kept(tmp_path):
+    """In real time, hence on an idle machine: every process at one moment."""
+    options = ["--matrix", "processes", "--engine", "ros", "--clock", "realtime"]
+    options += ["--only", "node_kill", "--moment", "transit"]
+    assert main(["faults", *options, "--out", str(tmp_path / "faults")]) == 0
+    summary = (tmp_path / "faults" / "summary.md").read_text()
+    assert "Promises kept: 7 of 7." in summary
