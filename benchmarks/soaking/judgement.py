@@ -1,10 +1,11 @@
-"""Whether something has grown: the second half of a soak against the quarter before it."""
+"""Whether something has grown: the most of a soak's last quarter against that of its first half.
+
+The most, because memory that Python collects now and then comes and goes.
+"""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-
-import numpy as np
 
 from soaking.samples import Soak
 
@@ -14,12 +15,12 @@ SHARE = 0.03  # [1] of the memory, whichever is more: caches that fill, pages th
 
 @dataclass(frozen=True)
 class Verdict:
-    """memory [MB]: medians of the second and of the last quarter; handles, threads: likewise."""
+    """memory [MB]: the most of the first half and of the last quarter; handles, threads: likewise."""
 
     name: str
     memory: tuple[float, float]
-    handles: tuple[float, float]
-    threads: tuple[float, float]
+    handles: tuple[int, int]
+    threads: tuple[int, int]
 
     @property
     def grown(self) -> bool:
@@ -35,11 +36,9 @@ def judge(soak: Soak) -> list[Verdict]:
     for name, samples in soak.usage.items():
         if len(samples) < 8:
             continue
-        columns = np.array([(one.memory, one.handles, one.threads) for _, one in samples])
-        quarter = len(columns) // 4
-        before = np.median(columns[quarter : 2 * quarter], axis=0)
-        after = np.median(columns[-quarter:], axis=0)
-        pairs = [(float(b), float(a)) for b, a in zip(before, after, strict=True)]
+        columns = zip(*((one.memory, one.handles, one.threads) for _, one in samples), strict=True)
+        half, quarter = len(samples) // 2, len(samples) // 4
+        pairs = [(max(values[:half]), max(values[-quarter:])) for values in columns]
         found.append(Verdict(name, *pairs))
     return found
 
@@ -47,14 +46,14 @@ def judge(soak: Soak) -> list[Verdict]:
 def table(verdicts: list[Verdict]) -> str:
     """As Markdown."""
     lines = [
-        "| process | memory [MB], second → last quarter | file handles | threads | |",
+        "| process | memory [MB], most of the first half → last quarter | handles | threads | |",
         "|---|---|---|---|---|",
     ]
     for one in verdicts:
         handles, threads = one.handles, one.threads
         lines.append(
             f"| {one.name} | {one.memory[0]:.1f} → {one.memory[1]:.1f} "
-            f"| {handles[0]:.0f} → {handles[1]:.0f} | {threads[0]:.0f} → {threads[1]:.0f} "
+            f"| {handles[0]} → {handles[1]} | {threads[0]} → {threads[1]} "
             f"| {'grown' if one.grown else 'flat'} |"
         )
     return "\n".join(lines)
