@@ -15,7 +15,7 @@ SHARE = 0.03  # [1] of the memory, whichever is more: caches that fill, pages th
 
 @dataclass(frozen=True)
 class Verdict:
-    """memory [MB]: the most of the first half and of the last quarter; handles, threads: likewise."""
+    """memory [MB]: the most of the first half, and of the last quarter; the others likewise."""
 
     name: str
     memory: tuple[float, float]
