@@ -4,16 +4,20 @@ from __future__ import annotations
 
 import multiprocessing
 import os
+import socket
 import tempfile
+import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
+from uam_sim_bridge.flight.ports import discovery_port, in_use
 from uam_sim_bridge.flight.processes import ros_environment
 
 BLOCK = 8_000_000  # bytes
 BLOCKS = 16  # until the hog begins its file anew
+WAIT = 0.2  # [s]
 LISTENERS = 20  # ten times the two that listen to /diagnostics in a flight
 
 
@@ -46,12 +50,14 @@ def writer(folder: Path, domain: int) -> None:
 
 
 def listener(folder: Path, domain: int) -> None:
-    """Takes every message of /diagnostics."""
+    """Takes every message of /diagnostics, once the flight is there."""
+    while not in_use(socket.SOCK_DGRAM, discovery_port(domain)):
+        time.sleep(WAIT)
     os.environ.update(ros_environment(domain, folder))
     import rclpy
     from diagnostic_msgs.msg import DiagnosticArray
 
-    rclpy.init()
+    rclpy.init(args=["--ros-args", "--disable-external-lib-logs"])
     node = rclpy.create_node(f"listener_{os.getpid()}")
     node.create_subscription(DiagnosticArray, "/diagnostics", lambda message: None, 10)
     rclpy.spin(node)

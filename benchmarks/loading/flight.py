@@ -16,7 +16,7 @@ from uam_sim_bridge.flight import timeseries
 from uam_sim_bridge.flight.ports import INSTANCES, ports_of
 
 SCENARIO = "quick_pick"
-INSTANCE = INSTANCES - 1  # whose domain the listeners are to know before the flight begins
+INSTANCE = INSTANCES - 1  # whose domain the listeners are to know
 
 
 @dataclass(frozen=True)
@@ -63,7 +63,7 @@ def measured(name: str, folder: Path) -> Measured:
     metrics = json.loads((folder / "metrics.json").read_text())
     latency = 1e3 * np.array(plant["latency_s"])
     causes = [one["cause"] for one in metrics["transitions"] if one["to"] in ("holding", "landing")]
-    unplanned = [cause for cause in causes if cause != "the scenario lands"]
+    unplanned = [cause for cause in causes if cause != "as planned"]
     return Measured(
         condition=name,
         outcome=classify(timeseries.read(folder / "timeseries.parquet"), metrics),
