@@ -167,7 +167,7 @@ def test_offboard_is_refused_without_a_stream(flight):
 def test_loss_of_the_stream_and_recovery(flight):
     flight.airborne()
     flight.streaming = False
-    flight.run(0.9, thrust=0.5)
+    flight.run(0.4, thrust=0.5)
     assert flight.link.mode is Mode.OFFBOARD
     flight.run(0.3)
     assert flight.link.mode is Mode.LAND and flight.hil.armed  # descending

@@ -208,7 +208,7 @@ def test_loss_of_the_stream_descends_level_and_disarms():
     bench = airborne()
     bench.body.position[2] = 3.0
     bench.run(0.5, ((0.5, 0.0, 0.0), HOVER))  # some tilt left
-    bench.run(0.9)
+    bench.run(0.4)
     assert bench.autopilot.status.mode is Mode.OFFBOARD
     bench.run(0.2)
     status = bench.autopilot.status

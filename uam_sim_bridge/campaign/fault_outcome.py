@@ -67,8 +67,8 @@ def ending(series: Series, limits: Limits | None = None) -> Ending:
 def classify(series: Series, figures: Mapping[str, Any], limits: Limits | None = None) -> str:
     """One of OUTCOMES; figures: metrics.json of the flight."""
     limits = limits or Limits()
-    if figures["mission_completed"]:
-        return COMPLETED
+    if figures["mission_completed"]:  # unless the autopilot had landed it unasked
+        return FAILSAFE if _down_early(series, limits) else COMPLETED
     end = ending(series, limits)
     upright = end.tilt <= limits.tilt and end.speed <= limits.rest
     if upright and end.height > limits.height:
