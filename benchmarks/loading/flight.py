@@ -14,6 +14,7 @@ from loading.conditions import Condition, under
 from uam_sim_bridge.campaign.fault_outcome import classify
 from uam_sim_bridge.flight import timeseries
 from uam_sim_bridge.flight.ports import INSTANCES, ports_of
+from uam_sim_bridge.flight.result_folder import in_a_name, new_folder
 
 SCENARIO = "quick_pick"
 INSTANCE = INSTANCES - 1  # whose domain the listeners are to know
@@ -41,11 +42,7 @@ class Measured:
 
 def fly(condition: Condition, out: Path) -> Measured:
     """Fly in real time; the folder of the flight is in `out`."""
-    folder = out / condition.name.replace(" ", "_").replace("/", "").replace(",", "")
-    number = 1
-    while folder.exists():
-        number += 1
-        folder = folder.with_name(f"{folder.name.rstrip('0123456789')}{number}")
+    folder = new_folder(out, in_a_name(condition.name))
     command = [sys.executable, "-m", "uam_sim_bridge.cli.main", "fly", "--scenario", SCENARIO]
     command += ["--clock", "realtime", "--no-video", "--instance", str(INSTANCE)]
     with (

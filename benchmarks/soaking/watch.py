@@ -15,6 +15,7 @@ from uam_control.mission import load_scenario
 from uam_control.profile import load_profile
 from uam_sim_bridge.flight.direct import DirectFlight
 from uam_sim_bridge.flight.process_table import node_name, parent, pids
+from uam_sim_bridge.flight.result_folder import new_folder
 from uam_sim_bridge.plant import Vehicle
 
 PERIOD = 10.0  # [s] of wall time between two looks
@@ -30,7 +31,7 @@ def flight(duration: float, clock: str, log_limit: float, out: Path) -> Soak:
     said = out / "flight.txt"
     command = ["-m", "uam_sim_bridge.cli.main", "fly", "--scenario", str(scenario)]
     command += ["--clock", clock, "--no-video", "--log-limit", str(log_limit)]
-    folder = _fresh(out / "flight")
+    folder = new_folder(out, "flight")
     with said.open("w") as output:
         run = subprocess.Popen(
             [sys.executable, *command, "--out", str(folder)], stdout=output, stderr=output
@@ -45,15 +46,6 @@ def flight(duration: float, clock: str, log_limit: float, out: Path) -> Soak:
         raise
     _conclude(soak, folder, duration)
     return soak
-
-
-def _fresh(folder: Path) -> Path:
-    """A name that is not taken."""
-    number, chosen = 1, folder
-    while chosen.exists():
-        number += 1
-        chosen = folder.with_name(f"{folder.name}_{number}")
-    return chosen
 
 
 def _look(soak: Soak, run: subprocess.Popen, ended: Path) -> None:

@@ -154,10 +154,11 @@ def make_folder(out: Path | None, *words: str, now: datetime | None = None) -> P
         _usable(out)
         return out
     stamp = (now or datetime.now()).strftime("%Y%m%d-%H%M%S")
-    return _unique(RESULTS, "-".join([stamp, *map(_in_a_name, words)]))
+    return new_folder(RESULTS, "-".join([stamp, *map(in_a_name, words)]))
 
 
-def _in_a_name(text: str) -> str:
+def in_a_name(text: str) -> str:
+    """The text without what a file's name had better not have."""
     return re.sub(r"[^A-Za-z0-9_.]+", "_", text).strip("._") or "flight"
 
 
@@ -170,8 +171,11 @@ def _usable(path: Path) -> None:
         raise _refusal(path, error) from None
 
 
-def _unique(parent: Path, name: str) -> Path:
-    """A new directory `name` under `parent`, numbered where two flights start in one second."""
+def new_folder(parent: Path, name: str) -> Path:
+    """Make a new directory `name` under `parent`, numbered where there is one of that name.
+
+    Raises ResultFolderError.
+    """
     try:
         parent.mkdir(parents=True, exist_ok=True)
         path, number = parent / name, 1
