@@ -84,7 +84,7 @@ _READ = {
 
 @dataclass(frozen=True)
 class AutopilotState(_Status):
-    """What the bridge knows of the autopilot, on change and twice a second.
+    """What the bridge knows of the autopilot, on change and five times a second.
 
     armed_since: stamp [ns] of the tick at which it was first reported armed, None while disarmed.
     reasons: why it is not armed or left OFFBOARD, "; " between them.

@@ -72,6 +72,7 @@ def test_without_imu_or_link_the_autopilot_brings_it_down_and_the_flight_ends():
         flight, series, figures = flown(text)
         assert not flight.bridge.autopilot.commander.armed
         assert classify(series, figures) == "failsafe", text
+        assert figures["shortfalls"], text
 
 
 def test_the_same_seed_gives_the_same_flight_with_random_faults():

@@ -147,7 +147,7 @@ class Plant:
         self.joint.position[:], self.joint.velocity[:] = joints
         self.joints.publish(self.joint.stamped(stamp))
         self.imu.publish(self.imu_writer.fill(stamp, *imu))
-        if stamp == ARMED_AT:
+        if stamp >= ARMED_AT and (stamp - ARMED_AT) % (50 * PERIOD) == 0:
             state = AutopilotState(True, "OFFBOARD", True, ARMED_AT)
             self.autopilot.publish(state.to_message(stamp))
         answers = (self.states, self.position, self.attitude, self.effort, self.magnet)

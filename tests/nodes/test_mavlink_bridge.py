@@ -244,7 +244,7 @@ def test_mapping_parameters_of_the_autopilot_are_compared(make_rig):
 
 
 def test_bad_commands_in_flight_hold_level_then_the_failsafe_acts(make_rig):
-    rig = make_rig()
+    rig = make_rig("-p", "hold_braking:=0.0")
     rig.fly()
     thrusts = []
     for _ in range(200):
@@ -316,7 +316,7 @@ def test_a_mission_in_failsafe_is_left_to_the_autopilot_down_to_the_ground(make_
 
 
 def test_idle_high_up_is_not_thrust_zero(make_rig):
-    rig = make_rig()
+    rig = make_rig("-p", "hold_braking:=0.0")
     rig.fly()
     _, thrust = rig.tick()
     assert thrust == pytest.approx(WEIGHT / 41.36, rel=0.02)
@@ -350,7 +350,8 @@ def test_states_without_commands_hold_level_then_the_failsafe_acts(make_rig):
         rig.autopilot_tick()
         rig.count += 1
     assert thrusts[:480] == pytest.approx([WEIGHT / 41.36] * 480, rel=0.02)
-    assert rolls[:480] == pytest.approx([-0.3] * 480)
+    expected = -0.1 * (6.0 + 6.0 * 0.004 * np.arange(480))  # hold_gain, hold_integral
+    assert rolls[:480] == pytest.approx(expected, rel=0.03)
     assert thrusts[-1] == 0.0 and "stream stopped" in rig.node.output
     assert rig.autopilot.status.mode is Mode.LAND and rig.autopilot.status.armed
     for _ in range(400):
@@ -380,7 +381,8 @@ def test_realtime_watchdog_holds_level_and_then_stops(make_rig):
 
 def test_without_states_it_levels_by_the_motion_capture(make_rig):
     """The estimator is lost: the last estimate of the attitude is old, the mocap's is not."""
-    rig = make_rig("-p", "clock:=realtime", "-p", "stale_after:=1.0", "-p", "release_time:=3.0")
+    level = ("-p", "hold_gain:=3.0", "-p", "hold_integral:=0.0", "-p", "release_time:=3.0")
+    rig = make_rig("-p", "clock:=realtime", "-p", "stale_after:=1.0", *level)
     rig.fly()
     pose, tilted = PoseWriter(), quaternion_from_euler(np.array([0.1, 0.0, 0.0]))
     rig.hear()

@@ -36,12 +36,21 @@ class Vehicle:
             [topics.REFERENCE, topics.MAGNET, topics.MISSION_STATUS],
         )
 
+        self.armed = False
+
     def arm(self):
-        self.autopilot.publish(AutopilotState(True, "OFFBOARD", True, 1).to_message(1))
+        self.armed = True
+        self.tell()
+
+    def tell(self):
+        state = AutopilotState(True, "OFFBOARD", self.armed, 1 if self.armed else None)
+        self.autopilot.publish(state.to_message(self.stamp))
 
     def fly(self, ticks):
         for _ in range(ticks):
             self.stamp += PERIOD
+            if self.stamp % (50 * PERIOD) == 0:
+                self.tell()
             before = len(self.magnet)
             self.states.publish(self.writer.fill(self.stamp, self.state))
             self.probe.until(lambda n=before: len(self.magnet) > n, "an answered tick")

@@ -60,8 +60,8 @@ def test_nothing_leads_out_of_failsafe_but_a_command_and_motors_go_off_on_the_gr
 def test_as_many_quantities_are_measured_as_are_named():
     values, seen, two, three = np.full(len(CHECKS), np.nan), observation(), np.ones(2), np.ones(3)
     measure(seen.state, seen.reference, 0.0, np.zeros((2, 3)), two, values)
-    assert np.isnan(values).sum() == 8
-    read(1.0, 0.0, 0.0, 0.0, 0.0, 0.0, two, two, three, three, values)
+    assert np.isnan(values).sum() == 9
+    read(1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, two, two, three, three, values)
     assert not np.isnan(values).any()
     checks = Checks(SupervisionParameters())
     assert checks.update(0.0, seen, True) is None
@@ -172,6 +172,11 @@ def with_state(entry, value):
         (observation(readings=Readings(joint_age=0.3)), State.HOLDING, "joint angles are 0.30 s"),
         (observation(readings=Readings(controller_age=0.3)), State.HOLDING, "a controller's gains"),
         (
+            observation(readings=Readings(autopilot_age=0.8)),
+            State.LANDING,
+            "nothing of the autopilot for 0.80 s, 0.75 s allowed",
+        ),
+        (
             observation(readings=Readings(temperature=71)),
             State.HOLDING,
             "servo temperature 71 deg C",
@@ -274,8 +279,9 @@ def test_arm_and_magnet_follow_the_policy(keep):
 
 def test_inputs_tell_ages_by_stamps_and_count_missed_ticks_of_a_second():
     inputs = Inputs(0.004)
-    assert math.isnan(inputs.at(1.0).mocap_age)
+    assert math.isnan(inputs.at(1.0).mocap_age) and math.isnan(inputs.at(1.0).autopilot_age)
     inputs.mocap(0.99)
+    inputs.autopilot(0.5)
     inputs.joints(1.0, np.array([0.1, 0.2]))
     inputs.gains(0.0, "arm", ["K0", "zeta", "rho"], np.array([-3.0, 0.1, 99.0]))
     inputs.gains(0.0, "position", ["D0", "s_norm"], np.array([5.0, 9.0]))
@@ -283,7 +289,7 @@ def test_inputs_tell_ages_by_stamps_and_count_missed_ticks_of_a_second():
         inputs.temperature(joint, degrees)
     readings = inputs.at(1.02)  # four ticks were missed
     assert readings.mocap_age == pytest.approx(0.03) and readings.missed_ticks == 4.0
-    assert readings.temperature == 61.0
+    assert readings.temperature == 61.0 and readings.autopilot_age == pytest.approx(0.52)
     assert readings.controller_age == pytest.approx(1.02)
     assert readings.gains[2] == 3.0 and np.isnan(readings.gains[:2]).all()
     assert inputs.at(1.024).missed_ticks == 4.0
@@ -297,6 +303,7 @@ READINGS = st.builds(
     Readings, *[NUMBERS] * 6,
     st.builds(np.array, st.tuples(NUMBERS, NUMBERS)),
     st.builds(np.array, st.tuples(NUMBERS, NUMBERS, NUMBERS)),
+    autopilot_age=NUMBERS,
 )  # fmt: skip
 
 

@@ -61,14 +61,16 @@ class MissionNode(UamNode):
         self._arming = self.publisher(topics.ARMING)
         self._status = self.publisher(topics.MISSION_STATUS)
         self._writer = ReferenceWriter()
-        self.listen(topics.AUTOPILOT_STATE, self._on_autopilot, required=False)
         self._inputs = MissionInputs(self, seconds(self._period))
+        self.listen(topics.AUTOPILOT_STATE, self._on_autopilot, required=False)
         self.listen(topics.STATE, self._on_state)
         self.triggers = (topics.STATE.name,)
         offer(self, self._mission)
 
     def _on_autopilot(self, message: DiagnosticArray) -> None:
-        _, state = AutopilotState.from_message(message)
+        stamp, state = AutopilotState.from_message(message)
+        if state.connected:
+            self._inputs.autopilot(seconds(stamp))
         armed = state.armed and state.armed_since is not None
         self._armed_since = seconds(state.armed_since) if armed else None
 

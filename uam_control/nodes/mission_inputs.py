@@ -52,6 +52,10 @@ class MissionInputs:
 
         self._node.listen(topic, handle, required=False)
 
+    def autopilot(self, stamp: float) -> None:
+        """Note that the bridge was connected with the autopilot at `stamp` [s]."""
+        self._inputs.autopilot(stamp)
+
     def tick(self, stamp: int) -> None:
         """Note the tick `stamp` [ns], and look at the messages when it is time to."""
         if stamp - self._looked >= PERIOD or stamp < self._looked:

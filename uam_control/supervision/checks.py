@@ -56,6 +56,8 @@ CHECKS = (
     Check("joint angles", "{name} are {value:.2f} s old, {limit:g} s allowed", "joint_age_hold"),
     Check(CONTROLLERS, "a controller's gains are {value:.2f} s old, {limit:g} s allowed",
           "controller_age_hold"),
+    Check("autopilot", "nothing of the {name} for {value:.2f} s, {limit:g} s allowed",
+          land="autopilot_age_land"),
     Check("control ticks", "{value:.0f} {name} missed within a second, {limit:g} allowed",
           "missed_ticks_hold"),
     Check("servo temperature", "{name} {value:.0f} deg C exceeds {limit:g} deg C",
@@ -113,6 +115,7 @@ class Checks:
             readings.mocap_age,
             readings.joint_age,
             readings.controller_age,
+            readings.autopilot_age,
             readings.missed_ticks,
             readings.temperature,
             readings.joint_effort,
@@ -187,6 +190,7 @@ def read(
     mocap: float,
     joints: float,
     controllers: float,
+    autopilot: float,
     missed: float,
     temperature: float,
     effort: np.ndarray,
@@ -198,10 +202,10 @@ def read(
     """Write the readings (see `Readings`) into values[7:]; unknown ones are in order."""
     values[7] = _known(-battery)
     values[8], values[9] = _known(mocap), _known(joints)
-    values[10], values[11] = _known(controllers), _known(missed)
-    values[12] = _known(temperature)
-    values[13] = _largest(effort, effort_limits)
-    values[14] = _largest(gains, gain_limits)
+    values[10], values[11] = _known(controllers), _known(autopilot)
+    values[12], values[13] = _known(missed), _known(temperature)
+    values[14] = _largest(effort, effort_limits)
+    values[15] = _largest(gains, gain_limits)
 
 
 @jit

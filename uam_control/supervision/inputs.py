@@ -23,7 +23,7 @@ class Inputs:
         """period [s]: of control ticks."""
         self._readings = Readings()
         self._period = period
-        self._mocap = self._joints = math.nan  # stamps [s]
+        self._mocap = self._joints = self._autopilot = math.nan  # stamps [s]
         self._temperatures: dict[str, float] = {}
         self._controllers: dict[str, float] = {}  # stamps of the newest gains [s]
         self._last: float | None = None
@@ -49,6 +49,10 @@ class Inputs:
         """Note the charge left, 0..1; NaN where nobody knows."""
         self._readings.battery = left
 
+    def autopilot(self, stamp: float) -> None:
+        """Note that the bridge was connected with the autopilot at `stamp` [s]."""
+        self._autopilot = stamp
+
     def gains(self, stamp: float, subsystem: str, names: Sequence[str], values: np.ndarray) -> None:
         """Note the gains (n,) that one of SUBSYSTEMS had at `stamp` [s], and their names."""
         key = tuple(names)
@@ -72,6 +76,7 @@ class Inputs:
         readings.missed_ticks = float(sum(missed for _, missed in gaps))
         readings.mocap_age = stamp - self._mocap
         readings.joint_age = stamp - self._joints
+        readings.autopilot_age = stamp - self._autopilot
         if self._controllers:
             readings.controller_age = stamp - min(self._controllers.values())
             of_pose = [at for subsystem, at in self._controllers.items() if subsystem in POSE]

@@ -26,7 +26,8 @@ class Readings:
 
     battery: charge left, 0..1. mocap_age, joint_age [s]: of the newest message by its stamp;
     controller_age [s]: of the oldest of the newest gains, which every controller tells;
-    pose_controller_age: the same without the arm's.
+    pose_controller_age: the same without the arm's. autopilot_age [s]: since the bridge last told
+    that it hears the autopilot.
     missed_ticks: within the last second. temperature: of the hottest servo [deg C]. joint_effort
     (2,): measured [N m]. gains (3,): largest adapted gain of position, attitude, arm.
     """
@@ -40,6 +41,7 @@ class Readings:
     joint_effort: np.ndarray = field(default_factory=lambda: np.full(2, math.nan))
     gains: np.ndarray = field(default_factory=lambda: np.full(3, math.nan))
     pose_controller_age: float = math.nan
+    autopilot_age: float = math.nan
 
 
 @dataclass

@@ -53,6 +53,10 @@ class Limits(ParameterSet):
     controller_age_hold: float = number(
         0.25, "age of the gains that a controller tells, to hold at", "s", 0.05, 10.0
     )
+    autopilot_age_land: float = number(
+        0.75, "how long nothing is heard of the autopilot, or of the bridge, to land at", "s", 0.3,
+        60.0,
+    )  # fmt: skip
     missed_ticks_hold: float = number(
         125.0, "control ticks missed within a second to hold at", "1", 1.0, 1e4
     )

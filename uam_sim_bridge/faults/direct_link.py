@@ -20,6 +20,13 @@ class DirectLink:
         self.timeline = Timeline(schedule)
         self._noise = np.random.default_rng(np.random.SeedSequence(schedule.seed, spawn_key=(1,)))
 
+    def hears(self) -> bool:
+        """Whether what the autopilot says arrives."""
+        return not any(
+            one.active and isinstance(one.fault, MavlinkCut) and one.fault.inwards
+            for one in self.timeline.all
+        )
+
     def passes(self) -> bool:
         """Whether the message that is being sent arrives in good order."""
         for one in self.timeline.all:

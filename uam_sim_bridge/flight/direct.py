@@ -16,7 +16,7 @@ import numpy as np
 from uam_control import configuration
 from uam_control.compiled import jit
 from uam_control.controllers import ArmController, AttitudeController, PositionController
-from uam_control.coordinates import ATTITUDE
+from uam_control.coordinates import ATTITUDE, POSITION
 from uam_control.estimation import StateEstimator
 from uam_control.mission import Mission, MissionOutput, Scenario
 from uam_control.profile import Profile
@@ -29,8 +29,13 @@ from uam_sim_bridge.faults.direct import DirectFaults
 from uam_sim_bridge.flight.limits import DISARMED, Settled, time_limit
 from uam_sim_bridge.flight.timeseries import COLUMNS, SUBSYSTEMS, Recording, gain_columns
 from uam_sim_bridge.mavlink.frames import swap_body, swap_quaternion, swap_world
-from uam_sim_bridge.mavlink.hold import HoldParameters, LevelHold
-from uam_sim_bridge.mavlink.offboard import OffboardParameters, OffboardSequence, Request
+from uam_sim_bridge.mavlink.hold import UNKNOWN, HoldParameters, LevelHold
+from uam_sim_bridge.mavlink.offboard import (
+    HEARTBEAT_TIMEOUT,
+    OffboardParameters,
+    OffboardSequence,
+    Request,
+)
 from uam_sim_bridge.mavlink.setpoint import RateThrustMap, RateThrustParameters, SetpointRefused
 from uam_sim_bridge.mavlink.thrust_identification import (
     ThrustIdentification,
@@ -87,6 +92,7 @@ class DirectFlight:
         self.inputs = Inputs(self.plant.period)
         if self._faults:
             self.bridge.passes = self._faults.link.passes
+            self.bridge.hears = self._faults.link.hears
         self.ended_by = ""  # why it was ended although the mission was not done
         self._limit = time_limit(scenario)
         self._ahead = math.inf  # [s] stamp of the tick that the mission is ready for
@@ -151,6 +157,8 @@ class DirectFlight:
         tau_alpha = self.arm.update(state, reference, attitude_reference, flying, dt)
         self.bridge.identification.switch(stamp, magnet)
         self.bridge.send(stamp, plant.time, tau_p, tau_q, state, flying, output, samples.mocap)
+        if self.bridge.connected(stamp):
+            self.inputs.autopilot(stamp)
         motors = self.bridge.autopilot_tick(samples.hil)
 
         truth = self._truth_at(stamp)
@@ -272,11 +280,17 @@ class Bridge:
         self.setpoint = np.zeros(4)
         self.factor = 1.0
         self.passes: Callable[[], bool] = lambda: True  # whether a message reaches the autopilot
+        self.hears: Callable[[], bool] = lambda: True  # whether one of the autopilot arrives
+        self._heard = 0.0  # stamp [s] of the last one
 
     @property
     def armed_since(self) -> float | None:
         """Stamp [s] at which the autopilot was first seen armed, None while it is not."""
         return self.sequence.armed_stamp if self.autopilot.commander.armed else None
+
+    def connected(self, stamp: float) -> bool:
+        """Whether a heartbeat came within the last seconds before `stamp` [s]."""
+        return stamp - self._heard < HEARTBEAT_TIMEOUT
 
     def send(
         self,
@@ -297,6 +311,8 @@ class Bridge:
         autopilot, setpoint = self.autopilot, self.setpoint
         if mocap is not None and self.passes():
             autopilot.vision(time, swap_world(mocap[1]), swap_quaternion(mocap[2]))
+        if self.hears():
+            self._heard = stamp
         self.sequence.want(wanted.arm)
         self.sequence.let_go = wanted.state is State.FAILSAFE
         status = autopilot.commander
@@ -322,11 +338,11 @@ class Bridge:
             try:
                 rates, thrust = self.map.map(tau_p, tau_q, state[0, 3:6], state[1, 3:6])
             except SetpointRefused:
-                return self._hold.setpoint(stamp, state[0, ATTITUDE])
+                return self._hold.setpoint(stamp, state[0, ATTITUDE], state[1, POSITION])
             self._hold.good(stamp, thrust)
             return rates, thrust
         if self.sequence.let_go and self.autopilot.commander.armed:
-            return self._hold.setpoint(stamp, state[0, ATTITUDE], hopeless=True)
+            return self._hold.setpoint(stamp, state[0, ATTITUDE], UNKNOWN, hopeless=True)
         return IDLE
 
     def _request(self, time: float, request: Request) -> None:

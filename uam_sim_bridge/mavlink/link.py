@@ -16,7 +16,7 @@ from uam_sim_bridge.mavlink.events import EventReader
 from uam_sim_bridge.mavlink.frames import swap_body
 from uam_sim_bridge.mavlink.health import unhealthy
 from uam_sim_bridge.mavlink.link_statistics import LinkStatistics
-from uam_sim_bridge.mavlink.offboard import OffboardSequence, Request
+from uam_sim_bridge.mavlink.offboard import HEARTBEAT_TIMEOUT, OffboardSequence, Request
 from uam_sim_bridge.mavlink.parameter_check import (
     WATCHED,
     differences,
@@ -42,7 +42,6 @@ from uam_sim_bridge.mavlink.wire import (
 )
 
 HEARTBEAT_PERIOD = 1.0  # s
-HEARTBEAT_TIMEOUT = 3.0  # s without one: not connected
 PARAMETER_RETRY, PARAMETER_ATTEMPTS = 0.5, 10  # s, times
 EXPLAIN_PERIOD = 3.0  # s between two requests to say again what keeps it from arming
 _NO_ATTITUDE = [1.0, 0.0, 0.0, 0.0]

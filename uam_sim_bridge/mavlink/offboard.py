@@ -25,6 +25,7 @@ from uam_control.parameters import ParameterSet, number
 from uam_sim_bridge.autopilot.modes import Mode, Result, Severity, result_word
 from uam_sim_bridge.mavlink.advice import with_advice
 
+HEARTBEAT_TIMEOUT = 3.0  # s without one: not connected
 _KEPT_REASONS = 5
 
 

@@ -12,12 +12,12 @@ from uam_msgs_py.status import AutopilotState
 from uam_sim_bridge.mavlink.link import OffboardLink
 from uam_sim_bridge.mavlink.offboard import OffboardSequence
 
-STATE_PERIOD = 500_000_000  # ns between two reports of the autopilot's state
+STATE_PERIOD = 200_000_000  # ns between two reports of the autopilot's state
 BATTERY_PERIOD = 1_000_000_000  # ns
 
 
 class AutopilotTopics:
-    """Publishes the state when it changes and twice a second, the battery once a second."""
+    """Publishes the state when it changes and five times a second, the battery once a second."""
 
     def __init__(self, node: UamNode, link: OffboardLink, sequence: OffboardSequence) -> None:
         self._logger, self._link, self._sequence = node.get_logger(), link, sequence

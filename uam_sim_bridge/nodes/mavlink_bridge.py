@@ -16,7 +16,6 @@ by the stamps of the state or, in real time, by the wall clock | level hold for 
 
 from __future__ import annotations
 
-import math
 import time
 from collections.abc import Callable
 from enum import Enum
@@ -27,7 +26,7 @@ from rclpy.clock import Clock, ClockType
 from rclpy.parameter import Parameter
 from std_msgs.msg import Bool
 
-from uam_control.coordinates import ATTITUDE
+from uam_control.coordinates import ATTITUDE, POSITION
 from uam_control.parameters import ParameterError
 from uam_control.rotations import euler_from_quaternion
 from uam_control.supervision import State
@@ -46,7 +45,7 @@ from uam_msgs_py.node import UamNode, run
 from uam_msgs_py.parameters import NodeParameters
 from uam_msgs_py.status import OK, WARN, MissionStatus
 from uam_sim_bridge.flight.fault_log import FaultTopic
-from uam_sim_bridge.mavlink.hold import HoldParameters, LevelHold
+from uam_sim_bridge.mavlink.hold import UNKNOWN, HoldParameters, LevelHold
 from uam_sim_bridge.mavlink.link_report import faults, report
 from uam_sim_bridge.mavlink.offboard import OffboardParameters, OffboardSequence
 from uam_sim_bridge.mavlink.parameter_check import adopted, differences
@@ -63,7 +62,6 @@ from uam_sim_bridge.nodes.bridge_link import BridgeParameters, open_links
 NAME = "mavlink_bridge"
 THRUST_PERIOD = 100_000_000  # ns between two reports of the thrust factor
 LATENCY = 0.05  # s, by which a pose is older than what it is waited for
-UNKNOWN = np.full(3, math.nan)
 WATCH_PERIOD = 0.02  # s between two looks of the real-time watchdog, and its setpoints
 
 
@@ -104,6 +102,7 @@ class MavlinkBridgeNode(UamNode):
         self._pose: tuple[int, np.ndarray, np.ndarray] | None = None
         # What is known of the attitude when commands do not come: stamp [ns], roll, pitch, yaw.
         self._estimated = self._seen = (-1, UNKNOWN)
+        self._velocity = UNKNOWN
         self._pose_sent = -1.0
         self._adopted: tuple[str, ...] = ()
         self._commanded = 0  # stamp [ns] of the last tick with commands
@@ -157,7 +156,7 @@ class MavlinkBridgeNode(UamNode):
 
     def _read_state(self, data: bytes) -> tuple[int, np.ndarray]:
         stamp, state = read_state(data)
-        self._estimated = stamp, state[0, ATTITUDE]
+        self._estimated, self._velocity = (stamp, state[0, ATTITUDE]), state[1, POSITION]
         return stamp, state
 
     @staticmethod
@@ -276,8 +275,9 @@ class MavlinkBridgeNode(UamNode):
     def _without_command(self, now: float) -> tuple[np.ndarray, float] | None:
         if not self.link.armed or (self.link.landed and not self._high()):
             return self._idle, 0.0
-        blind = not self._fresh(self._estimated[0], now)
-        setpoint = self._hold.setpoint(now, self._attitude(now), blind or self.sequence.let_go)
+        hopeless = self.sequence.let_go or not self._fresh(self._estimated[0], now)
+        velocity = UNKNOWN if hopeless else self._velocity
+        setpoint = self._hold.setpoint(now, self._attitude(now), velocity, hopeless)
         self.say(
             "no usable commands in flight: "
             + ("holding level" if setpoint else "stream stopped, the failsafe acts"),
