@@ -7,9 +7,14 @@ import json
 
 import pytest
 import yaml
+from rcl_interfaces.srv import GetParameters, SetParameters
+from rclpy.executors import SingleThreadedExecutor
+from rclpy.parameter import Parameter
 from whole_flight import assert_nothing_left
 
 from uam_control.configuration import path
+from uam_sim_bridge.flight.guest import Guest
+from uam_sim_bridge.flight.processes import transport_environment
 from uam_sim_bridge.flight.wiring import ARM, ATTITUDE, POSITION
 from uam_sim_bridge.report.rebuild import rebuild
 
@@ -31,6 +36,36 @@ def test_a_killed_controller_is_started_again_and_the_flight_goes_on(fly, victim
     assert held == (("flying", "the controller is back") in passed)
     assert max(figures["max"]["position_m"]) < 1.5
     assert_nothing_left(flight, [], set())
+
+
+@pytest.mark.slow
+def test_a_controller_that_is_back_has_what_was_changed_in_flight(fly):
+    flight = fly("--scenario", "hover", "--fault", f"node_kill@hover+1:node={POSITION}")
+    flight.until(lambda: "ROS domain" in flight.said, "started")
+    domain = int(flight.said.split("ROS domain ")[1].split(",")[0])
+    with Guest("tuner", transport_environment(), domain) as guest:
+
+        def called(kind, service, **request):
+            """The answer; asked again each second, as one who is killed does not give any."""
+            client, answers = guest.node.create_client(kind, f"/{POSITION}/{service}"), []
+
+            def answered():
+                answers.append(client.call_async(kind.Request(**request)))
+                executor.spin_until_future_complete(answers[-1], timeout_sec=1.0)
+                return answers[-1].done()
+
+            flight.until(lambda: client.service_is_ready() and answered(), service)
+            return answers[-1].result()
+
+        executor = SingleThreadedExecutor(context=guest.context)
+        executor.add_node(guest.node)
+        asked = [Parameter("tilt_max", value=0.3).to_parameter_msg()]
+        (result,) = called(SetParameters, "set_parameters", parameters=asked).results
+        assert result.successful, result.reason
+        flight.until(lambda: "started again" in flight.said, "the restart")
+        (kept,) = called(GetParameters, "get_parameters", names=["tilt_max"]).values
+    assert kept.double_value == 0.3
+    assert flight.wait() == 0, flight.said + flight.complained
 
 
 @pytest.mark.slow

@@ -10,6 +10,7 @@ from pathlib import Path
 
 import pytest
 import rclpy
+from bridge_rig import Rig
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 
@@ -159,3 +160,16 @@ def start(tmp_path) -> Iterator[Callable[..., Running]]:
         if node.process.poll() is None:
             node.process.kill()
         node.process.wait()
+
+
+@pytest.fixture
+def make_rig(probe, start):
+    rigs = []
+
+    def make(*arguments):
+        rigs.append(Rig(probe, start, *arguments))
+        return rigs[-1]
+
+    yield make
+    for rig in rigs:
+        rig.socket.close()

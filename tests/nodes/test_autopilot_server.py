@@ -8,6 +8,7 @@ import time
 
 import numpy as np
 import pytest
+from free_port import free_port
 from quadrotor import MASS, Quadrotor
 
 from uam_sim_bridge.autopilot.modes import Mode
@@ -22,12 +23,6 @@ from uam_sim_bridge.mavlink.wire import Codec, Framer, mavlink2
 START_TIMEOUT = 60.0  # s: a first start compiles
 PATIENT = HilParameters(answer_timeout=30.0, silent_timeout=10.0)  # a loaded machine is no failure
 HOVER = MASS * 9.81
-
-
-def free_port(kind):
-    with socket.socket(socket.AF_INET, kind) as s:
-        s.bind(("127.0.0.1", 0))
-        return s.getsockname()[1]
 
 
 def start(*arguments):

@@ -4,6 +4,7 @@ import socket
 
 import numpy as np
 import pytest
+from free_port import free_port
 
 from uam_control.coordinates import COORDINATES, SIZE
 from uam_msgs_py import topics
@@ -23,16 +24,10 @@ NODES = {
 }
 
 
-def free_port(kind=socket.SOCK_STREAM):
-    with socket.socket(type=kind) as probe:
-        probe.bind(("127.0.0.1", 0))
-        return probe.getsockname()[1]
-
-
 def arguments(name, folder):
     """What keeps a node away from the ports and files of others."""
     own = {
-        "mujoco_sim": [f"hil_port:={free_port()}"],
+        "mujoco_sim": [f"hil_port:={free_port(socket.SOCK_STREAM)}"],
         "mavlink_bridge": [f"local_port:={free_port(socket.SOCK_DGRAM)}"],
         "recorder": [f"file:={folder / 'log.mcap'}"],
     }.get(name, [])

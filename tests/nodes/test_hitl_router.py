@@ -11,6 +11,7 @@ import tty
 
 import numpy as np
 import pytest
+from free_port import free_port
 from quadrotor import Quadrotor
 
 from uam_sim_bridge.autopilot.modes import Mode
@@ -26,12 +27,6 @@ PATIENCE = 60.0  # s for a process to start: the stand-in compiles
 # a frame cut short by garbage is waited for; only then does the time matter
 HIL = HilParameters(answer_timeout=2.0, silent_timeout=0.5)
 PATIENT = HilParameters(answer_timeout=30.0, silent_timeout=10.0)
-
-
-def free_port(kind):
-    with socket.socket(socket.AF_INET, kind) as s:
-        s.bind(("127.0.0.1", 0))
-        return s.getsockname()[1]
 
 
 class Cable:

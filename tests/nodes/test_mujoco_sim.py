@@ -3,6 +3,8 @@
 import json
 import socket
 
+from free_port import free_port
+
 from uam_msgs_py import topics
 from uam_sim_bridge.flight import wiring
 from uam_sim_bridge.nodes.plant_options import NOT_READY
@@ -10,14 +12,8 @@ from uam_sim_bridge.nodes.plant_options import NOT_READY
 MODULE = "uam_sim_bridge.nodes.mujoco_sim"
 
 
-def free_port():
-    with socket.socket() as probe:
-        probe.bind(("127.0.0.1", 0))
-        return probe.getsockname()[1]
-
-
 def options(**values):
-    arguments = ["--ros-args", "-p", f"hil_port:={free_port()}"]
+    arguments = ["--ros-args", "-p", f"hil_port:={free_port(socket.SOCK_STREAM)}"]
     for name, value in values.items():
         arguments += ["-p", f"{name}:={value}"]
     return arguments
@@ -89,7 +85,7 @@ def test_the_list_of_wires_is_that_of_the_running_nodes(start, probe, tmp_path):
         )
     ]
     nodes = [start(module) for module in modules]
-    ports = ["--ros-args", "-p", f"local_port:={free_port()}"]
+    ports = ["--ros-args", "-p", f"local_port:={free_port(socket.SOCK_STREAM)}"]
     nodes += [start(MODULE, *options()), start("uam_sim_bridge.nodes.mavlink_bridge", *ports)]
     file = ["--ros-args", "-p", f"file:={tmp_path / 'log.mcap'}"]
     nodes.append(start("uam_sim_bridge.nodes.recorder", *file))

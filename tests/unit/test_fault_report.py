@@ -199,6 +199,7 @@ def test_what_is_promised_of_a_row_is_read_and_judged(tmp_path):
     ("promise", "said"),
     [
         ("landed", "{outcome: ..., within: seconds} expected"),
+        ("{outcome: [[held]]}", "unknown outcome '['held']'; there are: completed"),
         ("{outcome: fine}", "unknown outcome 'fine'; there are: completed"),
         ("{outcome: held, within: soon}", "within: 'soon' is no time"),
         ("{outcome: held, by: 3}", "{outcome: ..., within: seconds} expected"),

@@ -16,6 +16,7 @@ SLEEPER = """
 import signal, sys, time
 def main():
     signal.signal(signal.SIGINT, lambda *_: sys.exit(0))
+    print("told", *sys.argv[1:])
     print("ready", flush=True)
     while True:
         time.sleep(0.05)
@@ -100,6 +101,15 @@ def test_who_may_be_is_started_again_as_often_as_that(children):
     assert children.revive() == []
     with pytest.raises(NodeFailed, match="killed by SIGKILL"):
         children.check()
+
+
+def test_who_is_started_again_may_get_further_arguments(children):
+    children.start("a", "sleeper", ["first"], again=1)
+    ready(children, "a")
+    os.kill(children.pid("a"), signal.SIGKILL)
+    wait_for(lambda: not children.running("a"))
+    children.revive(lambda name: ["and", name])
+    wait_for(lambda: "told first and a" in processes.tail(children._logs / "a.log"))
 
 
 def test_who_was_asked_to_stop_is_not_started_again(children):

@@ -34,7 +34,7 @@ def read(given: Any, where: str) -> Promise:
     named = given["outcome"]
     outcomes = tuple(named) if isinstance(named, list) else (named,)
     for one in outcomes:
-        if one not in OUTCOMES:
+        if not isinstance(one, str) or one not in OUTCOMES:
             raise FaultError(
                 f"{where}: promise: unknown outcome '{one}'; there are: {', '.join(OUTCOMES)}"
             )

@@ -11,7 +11,6 @@ import signal
 import time
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
-from functools import partial
 from pathlib import Path
 
 from uam_control import configuration
@@ -64,7 +63,7 @@ class Child:
     name: str
     process: Forked
     log: Path
-    run: Callable[[], Forked]  # starts it again
+    run: Callable[[Sequence[str]], Forked]  # starts it again, with further arguments
     may_end: bool = False  # its end is expected: it was asked to stop, or ends with the mission
     optional: bool = False  # the flight goes on without it
     again: int = 0  # how often it is still started again where it ends by itself
@@ -110,8 +109,11 @@ class Processes:
         shared memory and waking it would leave that one asleep, for up to a second.
         """
         log = self._logs / f"{name}.log"
-        run = partial(Forked, name, module, arguments, log, self._environment)
-        child = Child(name, run(), log, run, may_end, optional, again)
+
+        def run(further: Sequence[str]) -> Forked:
+            return Forked(name, module, [*arguments, *further], log, self._environment)
+
+        child = Child(name, run([]), log, run, may_end, optional, again)
         self._children[name] = child
         return child
 
@@ -155,15 +157,18 @@ class Processes:
             child.may_end = True
         return [NodeFailed(child.name, child.process.returncode, child.log) for child in ended]
 
-    def revive(self) -> list[NodeFailed]:
-        """Start again what has ended by itself and may be; returns what became of each."""
+    def revive(self, further: Callable[[str], Sequence[str]] = lambda _: ()) -> list[NodeFailed]:
+        """Start again what has ended by itself and may be; returns what became of each.
+
+        further: arguments for the process of a name, after those that it was started with.
+        """
         ended = [c for c in self._children.values() if c.again and not c.may_end]
         ended = [child for child in ended if child.process.poll() is not None]
         told = [NodeFailed(child.name, child.process.returncode, child.log) for child in ended]
         for child in ended:
             child.again -= 1
             self._before_revival()
-            child.process = child.run()
+            child.process = child.run(further(child.name))
         return told
 
     def note_shared_memory(self) -> None:

@@ -17,6 +17,7 @@ from uam_sim_bridge.cockpit import place
 from uam_sim_bridge.faults import LINK, PLANT, PROCESS
 from uam_sim_bridge.faults.timeline import Happened
 from uam_sim_bridge.flight import child, log_facts, shared_memory, wiring
+from uam_sim_bridge.flight.changed_parameters import ChangedParameters
 from uam_sim_bridge.flight.conclude import asked, command_line
 from uam_sim_bridge.flight.fault_log import FaultTopic
 from uam_sim_bridge.flight.interrupts import Interrupts
@@ -296,11 +297,13 @@ def _watch(
 ) -> None:
     """Show the progress until the plant ends or the user stops it. Raises NodeFailed."""
     noted, restarts = -NOTE_PERIOD, RestartTopic(listener.node)
+    changed = ChangedParameters(listener.node)
     while children.running(wiring.PLANT) and not stop.raised:
         if time.monotonic() - noted >= NOTE_PERIOD:  # who is killed cannot be asked any more
             children.note_shared_memory()
             noted = time.monotonic()
-        for lost in children.revive():
+        changed.poll()
+        for lost in children.revive(changed.arguments):
             text = f"{lost}; started again"
             progress.message(text)
             restarts.tell(listener.stamp, lost.name, text)

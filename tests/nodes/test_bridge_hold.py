@@ -1,0 +1,134 @@
+"""The bridge node without usable commands in flight: level for a bounded time, then nothing."""
+
+import math
+import time
+
+import numpy as np
+import pytest
+from bridge_rig import PERIOD, WEIGHT
+
+from uam_control.rotations import quaternion_from_euler
+from uam_msgs_py import topics
+from uam_msgs_py.convert import PoseWriter, read_setpoint
+from uam_msgs_py.status import MissionStatus
+from uam_sim_bridge.autopilot.modes import Mode
+
+
+def test_bad_commands_in_flight_hold_level_then_the_failsafe_acts(make_rig):
+    rig = make_rig("-p", "hold_braking:=0.0")
+    rig.fly()
+    thrusts = []
+    for _ in range(200):
+        rates, thrust = rig.tick((0, 0, math.nan))
+        thrusts.append(thrust)
+        assert np.all(np.isfinite(rates)) and np.all(np.abs(rates) <= 2.0)
+    assert thrusts == pytest.approx([WEIGHT / 41.36] * 200, rel=0.02)
+    assert rig.autopilot.status.mode is Mode.OFFBOARD
+    for _ in range(650):
+        rig.tick((0, 0, math.nan))
+    assert rig.autopilot.status.mode is Mode.LAND  # COM_OF_LOSS_T after the hold
+    assert rig.autopilot.status.armed
+    assert "holding level" in rig.node.output
+    # good commands again: the bridge asks for OFFBOARD again
+    for _ in range(400):
+        rig.tick((0, 0, WEIGHT))
+    assert rig.autopilot.status.mode is Mode.OFFBOARD
+
+
+def test_a_mission_in_failsafe_is_left_to_the_autopilot_down_to_the_ground(make_rig, probe):
+    """Level, then no stream, and no wish for OFFBOARD, at any height; idle does not mean thrust
+    0."""
+    status = probe.publisher(topics.MISSION_STATUS)
+    rig = make_rig()
+    probe.until_connected("mavlink_bridge", [status], [])
+    rig.fly()
+    told = MissionStatus("aborted", 1.0, state="failsafe", cause="tilt").to_message(1)
+    status.publish(told)
+    time.sleep(0.2)  # it is not part of the join; let it arrive
+    for _ in range(100):
+        _, thrust = rig.tick()
+        assert thrust == pytest.approx(WEIGHT / 41.36, rel=0.02)
+    for _ in range(500):
+        rig.tick()
+    assert rig.autopilot.status.mode is Mode.LAND
+    rig.body.position[2] = 0.2
+    rig.received.clear()
+    for _ in range(200):
+        rig.tick()
+    assert rig.autopilot.status.mode is Mode.LAND
+    assert not rig.kinds() & {"SET_ATTITUDE_TARGET", "COMMAND_LONG"}
+
+
+def test_idle_high_up_is_not_thrust_zero(make_rig):
+    rig = make_rig("-p", "hold_braking:=0.0")
+    rig.fly()
+    _, thrust = rig.tick()
+    assert thrust == pytest.approx(WEIGHT / 41.36, rel=0.02)
+
+
+def test_states_without_commands_hold_level_then_the_failsafe_acts(make_rig):
+    """A controller is lost: states go on, by whose stamps the bridge counts."""
+    rig = make_rig()
+    rig.fly()
+    stopped, thrusts, rolls = rig.count, [], []
+    tilted = np.zeros((3, 8))
+    tilted[0, 3] = 0.1  # roll [rad], which no command has seen
+    for _ in range(950):
+        rig.publish(topics.STATE, rig.state.fill(rig.count * PERIOD, tilted))
+        silent = rig.count - stopped < 24  # stale_after, 0.1 s, after the last command
+        before = len(rig.setpoints)
+        if not silent:
+            rig.probe.until(lambda n=before: len(rig.setpoints) > n, "a setpoint without command")
+            _, rates, thrust = read_setpoint(rig.setpoints[-1])
+            thrusts.append(thrust)
+            rolls.append(rates[0])
+        rig.autopilot_tick()
+        rig.count += 1
+    assert thrusts[:480] == pytest.approx([WEIGHT / 41.36] * 480, rel=0.02)
+    expected = -0.1 * (6.0 + 6.0 * 0.004 * np.arange(480))  # hold_gain, hold_integral
+    assert rolls[:480] == pytest.approx(expected, rel=0.03)
+    assert thrusts[-1] == 0.0 and "stream stopped" in rig.node.output
+    assert rig.autopilot.status.mode is Mode.LAND and rig.autopilot.status.armed
+    for _ in range(400):
+        rig.tick((0, 0, WEIGHT))
+    assert rig.autopilot.status.mode is Mode.OFFBOARD
+
+
+def test_realtime_watchdog_holds_level_and_then_stops(make_rig):
+    """Ticks stop in flight: level setpoints go on by themselves for release_time, then none."""
+    rig = make_rig("-p", "clock:=realtime", "-p", "stale_after:=2.0", "-p", "release_time:=1.0")
+    rig.fly()
+    rig.hear()
+    rig.received.clear()
+
+    def stream():
+        rig.hear()
+        return [m for m in rig.received if m.get_type() == "SET_ATTITUDE_TARGET"]
+
+    rig.probe.until(lambda: len(stream()) >= 5, "setpoints of the watchdog")
+    assert stream()[-1].thrust == pytest.approx(WEIGHT / 41.36, rel=0.05)
+    rig.node.until_said("stream stopped")
+    rig.hear()
+    rig.received.clear()
+    rig.probe.until(lambda: (rig.hear(), "HEARTBEAT" in rig.kinds())[1], "a heartbeat")
+    assert stream() == []
+
+
+def test_without_states_it_levels_by_the_motion_capture(make_rig):
+    """The estimator is lost: the last estimate of the attitude is old, the mocap's is not."""
+    level = ("-p", "hold_gain:=3.0", "-p", "hold_integral:=0.0", "-p", "release_time:=3.0")
+    rig = make_rig("-p", "clock:=realtime", "-p", "stale_after:=1.0", *level)
+    rig.fly()
+    pose, tilted = PoseWriter(), quaternion_from_euler(np.array([0.1, 0.0, 0.0]))
+    rig.hear()
+    rig.received.clear()
+
+    def rolled():
+        now = rig.count * PERIOD + round((time.monotonic() - begin) * 1e9)
+        rig.publish(topics.MOCAP, pose.fill(now, np.zeros(3), tilted))
+        rig.hear()
+        sent = [m for m in rig.received if m.get_type() == "SET_ATTITUDE_TARGET"]
+        return any(m.body_roll_rate == pytest.approx(-0.3, abs=1e-3) for m in sent)
+
+    begin = time.monotonic()
+    rig.probe.until(rolled, "rates against the tilt that the mocap shows")

@@ -1,0 +1,131 @@
+"""The links of the bridge node: UDP, serial line, ground station, signing."""
+
+import os
+import socket
+import tty
+
+import numpy as np
+import pytest
+from bridge_rig import MODULE, WEIGHT
+
+from uam_msgs_py import topics
+from uam_msgs_py.status import AutopilotState
+from uam_sim_bridge.autopilot.modes import Mode
+from uam_sim_bridge.mavlink.signing import Signing
+from uam_sim_bridge.mavlink.wire import Codec, Framer, mavlink2
+
+
+def test_taken_port_is_said(start):
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as s:
+        s.bind(("127.0.0.1", 0))
+        port = s.getsockname()[1]
+        node = start(MODULE, "--ros-args", "-p", f"local_port:={port}")
+        assert node.process.wait(60) == 2
+    assert f"UDP port {port}" in node.output and "Traceback" not in node.output
+
+
+def test_garbage_from_the_autopilots_port_does_no_harm(make_rig):
+    rig = make_rig()
+    noise = np.random.default_rng(2)
+    for _ in range(50):
+        rig.socket.sendto(noise.bytes(int(noise.integers(1, 400))), ("127.0.0.1", rig.local))
+        rig.tick()
+    assert rig.node.process.poll() is None
+
+
+def values(messages):
+    """The newest values under /diagnostics."""
+    return {v.key: v.value for v in messages[-1].status[0].values}
+
+
+def test_link_by_url(make_rig):
+    rig = make_rig("-p", "local_port:=1", "-p", "autopilot:=udp:localhost:{remote}:{local}")
+    rig.fly()
+
+
+class Line:
+    """A pseudo-terminal in the place of the rig's socket."""
+
+    def __init__(self):
+        self.far, self.near = os.openpty()
+        tty.setraw(self.near)
+        os.set_blocking(self.far, False)
+        self.device = os.ttyname(self.near)
+
+    def recv(self, size):
+        return os.read(self.far, size)
+
+    def sendto(self, data, place):
+        os.write(self.far, data)
+
+    def close(self):
+        os.close(self.far)
+        os.close(self.near)
+
+
+def test_serial_link_by_url(make_rig):
+    line = Line()
+    rig = make_rig("-p", f"autopilot:=serial:{line.device}:921600")
+    rig.socket.close()
+    rig.socket, rig.framer.datagram = line, rig.framer.stream
+    rig.fly()
+
+
+def test_a_ground_station_watches_and_may_speak(make_rig):
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as station:
+        station.bind(("127.0.0.1", 0))
+        station.settimeout(60.0)
+        rig = make_rig("-p", f"gcs:=udp:127.0.0.1:{station.getsockname()[1]}")
+        rig.fly()
+        framer, seen, noise = Framer(Codec(255, 190)), set(), np.random.default_rng(3)
+        while not {"HEARTBEAT", "SYS_STATUS", "COMMAND_ACK"} <= seen:
+            data, place = station.recvfrom(65535)
+            seen |= {m.get_type() for m in framer.datagram(data)}
+        rig.socket.sendto(b"\xfd unknown to us", ("127.0.0.1", rig.local))
+        rig.tick((0, 0, WEIGHT))
+        while data != b"\xfd unknown to us":
+            data = station.recv(65535)
+        # it pretends to be the autopilot, floods, and asks for something
+        fake, own = Codec(1, 1), Codec(255, 190)
+        disarmed = mavlink2.MAVLink_heartbeat_message(2, 12, 1, 0, 3, 3)
+        for _ in range(200):
+            station.sendto(fake.encode(disarmed), place)
+            station.sendto(noise.bytes(1000), place)
+            rates, thrust = rig.tick((0, 0, WEIGHT))
+            assert thrust == pytest.approx(WEIGHT / 41.36, rel=1e-6)
+        ask = mavlink2.MAVLink_param_request_read_message(1, 1, b"MAV_SYS_ID", -1)
+        for _ in range(2000):
+            station.sendto(own.encode(ask), place)
+            rig.tick((0, 0, WEIGHT))
+            if any(m.get_srcSystem() == 255 for m in rig.received):
+                break
+        assert any(
+            m.get_srcSystem() == 255 and m.get_type() == "PARAM_REQUEST_READ" for m in rig.received
+        )
+        assert rig.autopilot.status.armed and rig.autopilot.status.mode is Mode.OFFBOARD
+        states = [AutopilotState.from_message(m)[1] for m in rig.states]
+        assert states[-1].armed and states[-1].mode == "OFFBOARD"
+
+
+def test_signed_on_both_sides_and_nothing_else_is_taken(make_rig, tmp_path):
+    key = "0f" * 32
+    file = tmp_path / "key"
+    file.write_text(key + "\n")
+    rig = make_rig("-p", f"signing_key:={file}", "-p", "signing_link_id:=4")
+    heard = rig.probe.collect(topics.DIAGNOSTICS)
+    signing = Signing.from_text(key)
+    unsigned = rig.codec
+    rig.codec = Codec(1, 1, signing)
+    rig.framer = Framer(Codec(1, 1, signing))
+    rig.fly()
+    assert all(m.get_signed() and m.get_link_id() == 4 for m in rig.received)
+    rig.codec = unsigned
+    for _ in range(50):
+        rig.tick((0, 0, WEIGHT))
+
+    def refused():
+        mine = [m for m in heard if m.status[0].name == "mavlink_bridge"]
+        return mine and int(values(mine)["refused"]) > 0
+
+    rig.probe.until(refused, "refusals under /diagnostics")
+    assert key not in rig.node.output

@@ -1,0 +1,44 @@
+"""What a node that is started again is told of the changes in flight."""
+
+import rclpy
+from rclpy.node import Node
+from rclpy.parameter import Parameter
+
+from uam_msgs_py.changes import Change
+from uam_sim_bridge.flight.changed_parameters import ChangedParameters
+
+
+class Silent:
+    """A node without a middleware: nothing arrives by itself."""
+
+    def create_subscription(self, *_, **__):
+        return None
+
+
+def test_the_newest_accepted_values_come_back_as_ros_arguments():
+    changed = ChangedParameters(Silent())
+    assert changed.arguments("arm_controller") == []
+    for values, reason in (
+        ({"rho_0": (1.0, 2.5), "phi": ([1.0, 1.0], [1e-7, 3.0])}, ""),
+        ({"rho_0": (2.5, 1e-12)}, ""),
+        ({"rho_0": (1e-12, -1.0)}, "rho_0: -1 is outside"),
+        ({"law": ("modular", "pid"), "integral": (True, False), "K": (3, 4)}, ""),
+    ):
+        changed.note(Change("arm_controller", "set_parameters", values, reason))
+    changed.note(Change("mission", "set_parameters", {"tilt_hold": (0.8, 0.7)}))
+    context = rclpy.Context()
+    rclpy.init(args=["--ros-args", *changed.arguments("arm_controller")], context=context)
+    node = Node(
+        "arm_controller", context=context, automatically_declare_parameters_from_overrides=True
+    )
+    found = {name: node.get_parameter(name) for name in ("rho_0", "phi", "law", "integral", "K")}
+    node.destroy_node()
+    context.shutdown()
+    assert {name: one.value for name, one in found.items()} | {"phi": list(found["phi"].value)} == {
+        "rho_0": 1e-12,
+        "phi": [1e-7, 3.0],
+        "law": "pid",
+        "integral": False,
+        "K": 4,
+    }
+    assert found["rho_0"].type_ == Parameter.Type.DOUBLE
