@@ -75,6 +75,21 @@ def test_without_imu_or_link_the_autopilot_brings_it_down_and_the_flight_ends():
         assert figures["shortfalls"], text
 
 
+def test_late_poses_do_no_harm():
+    for delay in (0.05, 0.15):
+        _, series, figures = flown(f"mocap_latency@hover+1+3:delay={delay}")
+        assert classify(series, figures) == "completed"
+        assert max(figures["max"]["position_m"]) < 0.1
+
+
+def test_a_frozen_tracker_is_believed_by_nobody():
+    """Neither by the estimator nor by the autopilot, whose descent would use it."""
+    flight, series, figures = flown("mocap_freeze@hover+1+6")
+    assert classify(series, figures) == "failsafe"
+    assert "mocap pose has been the same for 1.10 s" in figures["shortfalls"][0]
+    assert not flight.bridge.autopilot.commander.armed
+
+
 def test_the_same_seed_gives_the_same_flight_with_random_faults():
     spec = "mocap_outliers@hover+1+2:share=0.1,distance=0.1"
     first, again, other = flown(spec), flown(spec), flown(spec, seed=2)

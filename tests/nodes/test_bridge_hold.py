@@ -125,7 +125,7 @@ def test_without_states_it_levels_by_the_motion_capture(make_rig):
 
     def rolled():
         now = rig.count * PERIOD + round((time.monotonic() - begin) * 1e9)
-        rig.publish(topics.MOCAP, pose.fill(now, np.zeros(3), tilted))
+        rig.publish(topics.MOCAP, pose.fill(now, np.full(3, 1e-12 * now), tilted))
         rig.hear()
         sent = [m for m in rig.received if m.get_type() == "SET_ATTITUDE_TARGET"]
         return any(m.body_roll_rate == pytest.approx(-0.3, abs=1e-3) for m in sent)

@@ -7,6 +7,7 @@ import pytest
 
 from uam_control.estimation import EstimatorParameters, StateEstimator
 from uam_control.estimation.filters import derivative_step, low_pass_step
+from uam_control.estimation.repeats import Repeats
 from uam_control.rotations import matrix_from_euler, quaternion_from_euler
 
 DT = 0.004
@@ -22,16 +23,17 @@ def motion(t):
     return p, v, a, euler, rates
 
 
-def feed(estimator, until, gyro_bias=0.0, force_bias=0.0, latency=3):
+def feed(estimator, until, gyro_bias=0.0, force_bias=0.0, latency=3, frozen=np.inf):
     """Feed samples up to `until` [s]: IMU and joints at once, motion capture `latency` ticks
-    late."""
+    late, and always the same from `frozen` [s] on."""
     late = []
     for k in range(round(until / DT)):
         t = k * DT
         p, v, a, euler, rates = motion(t)
         force = matrix_from_euler(euler).T @ (a + [0, 0, 9.81])
         if k % 2 == 0:
-            late.append((k + latency, (t, p, quaternion_from_euler(euler))))
+            seen, _, _, turned, _ = motion(min(t, frozen))
+            late.append((k + latency, (t, seen, quaternion_from_euler(turned))))
         while late and late[0][0] <= k:
             estimator.mocap(*late.pop(0)[1])
         estimator.joints(t, np.array([0.3 * np.sin(t), 0.2]), np.array([0.3 * np.cos(t), 0.0]))
@@ -41,8 +43,11 @@ def feed(estimator, until, gyro_bias=0.0, force_bias=0.0, latency=3):
     return t, state
 
 
-def test_follows_a_motion_despite_late_motion_capture_and_biases():
-    t, state = feed(StateEstimator(EstimatorParameters()), 12.0, gyro_bias=0.01, force_bias=0.1)
+@pytest.mark.parametrize("latency", [1, 3, 10, 20, 50])
+def test_follows_a_motion_despite_late_motion_capture_and_biases(latency):
+    """Without the history being corrected, too, it rings from some 40 ms on."""
+    estimator = StateEstimator(EstimatorParameters())
+    t, state = feed(estimator, 12.0, gyro_bias=0.01, force_bias=0.1, latency=latency)
     p, v, a, euler, rates = motion(t)
     np.testing.assert_allclose(state[0, :3], p, atol=2e-3)
     np.testing.assert_allclose(state[1, :3], v, atol=1e-2)
@@ -52,6 +57,22 @@ def test_follows_a_motion_despite_late_motion_capture_and_biases():
     np.testing.assert_allclose(state[0, 6:], [0.3 * np.sin(t), 0.2], atol=2e-3)
     np.testing.assert_allclose(state[1, 6:], [0.3 * np.cos(t), 0.0], atol=5e-3)
     np.testing.assert_allclose(state[2, 6:], [-0.3 * np.sin(t), 0.0], atol=3e-2)
+
+
+def test_a_frozen_motion_capture_is_not_believed():
+    """It goes on with the IMU; the pose that is repeated is 1.4 m away at the end."""
+    estimator = StateEstimator(EstimatorParameters())
+    t, state = feed(estimator, 12.0, gyro_bias=0.01, force_bias=0.1, frozen=10.0)
+    p, v, *_ = motion(t)
+    np.testing.assert_allclose(state[0, :3], p, atol=0.1)
+    np.testing.assert_allclose(state[1, :3], v, atol=0.1)
+
+
+def test_repeats_are_exact():
+    repeats, pose = Repeats(), (np.ones(3), np.array([1.0, 0.0, 0.0, 0.0]))
+    assert [repeats(*pose) for _ in range(3)] == [False, True, True]
+    assert not repeats(pose[0] + [0.0, 0.0, 1e-12], pose[1])
+    assert not repeats(*pose)
 
 
 def test_says_what_it_waits_for():

@@ -60,8 +60,8 @@ def test_nothing_leads_out_of_failsafe_but_a_command_and_motors_go_off_on_the_gr
 def test_as_many_quantities_are_measured_as_are_named():
     values, seen, two, three = np.full(len(CHECKS), np.nan), observation(), np.ones(2), np.ones(3)
     measure(seen.state, seen.reference, 0.0, np.zeros((2, 3)), two, values)
-    assert np.isnan(values).sum() == 9
-    read(1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, two, two, three, three, values)
+    assert np.isnan(values).sum() == 10
+    read(1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, two, two, three, three, values)
     assert not np.isnan(values).any()
     checks = Checks(SupervisionParameters())
     assert checks.update(0.0, seen, True) is None
@@ -187,6 +187,17 @@ def with_state(entry, value):
             "servo temperature 76 deg C",
         ),
         (observation(readings=Readings(missed_ticks=130)), State.HOLDING, "130 control ticks"),
+        (observation(readings=Readings(missed_ticks=260)), State.FAILSAFE, "260 control ticks"),
+        (
+            observation(readings=Readings(mocap_still=0.3)),
+            State.HOLDING,
+            "mocap pose has been the same for 0.30 s",
+        ),
+        (
+            observation(readings=Readings(mocap_still=1.1)),
+            State.FAILSAFE,
+            "mocap pose has been the same for 1.10 s",
+        ),
         (
             observation(readings=Readings(joint_effort=np.array([0.0, -2.9]))),
             State.HOLDING,
@@ -280,7 +291,8 @@ def test_arm_and_magnet_follow_the_policy(keep):
 def test_inputs_tell_ages_by_stamps_and_count_missed_ticks_of_a_second():
     inputs = Inputs(0.004)
     assert math.isnan(inputs.at(1.0).mocap_age) and math.isnan(inputs.at(1.0).autopilot_age)
-    inputs.mocap(0.99)
+    inputs.mocap(0.5, np.ones(3))
+    inputs.mocap(0.99, np.ones(3))
     inputs.autopilot(0.5)
     inputs.joints(1.0, np.array([0.1, 0.2]))
     inputs.gains(0.0, "arm", ["K0", "zeta", "rho"], np.array([-3.0, 0.1, 99.0]))
@@ -288,7 +300,9 @@ def test_inputs_tell_ages_by_stamps_and_count_missed_ticks_of_a_second():
     for joint, degrees in (("alpha_1", 50.0), ("alpha_2", 61.0), ("alpha_1", math.nan)):
         inputs.temperature(joint, degrees)
     readings = inputs.at(1.02)  # four ticks were missed
-    assert readings.mocap_age == pytest.approx(0.03) and readings.missed_ticks == 4.0
+    assert readings.mocap_age == pytest.approx(0.03)
+    assert readings.mocap_still == pytest.approx(0.52)
+    assert readings.missed_ticks == 4.0
     assert readings.temperature == 61.0 and readings.autopilot_age == pytest.approx(0.52)
     assert readings.controller_age == pytest.approx(1.02)
     assert readings.gains[2] == 3.0 and np.isnan(readings.gains[:2]).all()
@@ -304,6 +318,7 @@ READINGS = st.builds(
     st.builds(np.array, st.tuples(NUMBERS, NUMBERS)),
     st.builds(np.array, st.tuples(NUMBERS, NUMBERS, NUMBERS)),
     autopilot_age=NUMBERS,
+    mocap_still=NUMBERS,
 )  # fmt: skip
 
 

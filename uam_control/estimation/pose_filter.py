@@ -9,6 +9,7 @@ from __future__ import annotations
 import numpy as np
 
 from uam_control.compiled import jit
+from uam_control.estimation.repeats import Repeats
 from uam_control.rotations import (
     matrix_from_quaternion,
     quaternion_from_rotation_vector,
@@ -19,7 +20,9 @@ from uam_control.rotations import (
 
 HISTORY = 64  # ticks of pose kept, 256 ms at 250 Hz
 OLDEST_MATCH = 0.02  # [s] a pose without a prediction this near is not used
+LATE = 0.03  # [s] later than this, a pose corrects the predictions since, too
 GRAVITY = 9.81
+CONJUGATE = np.array([1.0, -1.0, -1.0, -1.0])
 
 
 class PoseFilter:
@@ -44,6 +47,7 @@ class PoseFilter:
         self._poses = np.zeros((HISTORY, 7))
         self._count = 0
         self._last_correction = -1.0
+        self._repeats = Repeats()
 
     def set_bandwidths(self, position: float, attitude: float) -> None:
         """Change the corrections; the estimate goes on."""
@@ -76,12 +80,19 @@ class PoseFilter:
         )
 
     def correct(self, stamp: float, position: np.ndarray, quaternion: np.ndarray) -> None:
-        """Correct with a pose exposed at `stamp`; older than the history: not used."""
+        """Correct with a pose exposed at `stamp`.
+
+        Not used: one that is older than the history, and one that repeats exactly what came before,
+        see `Repeats`.
+        """
         row = nearest(self._stamps, stamp)
-        if abs(self._stamps[row] - stamp) > OLDEST_MATCH:
+        if abs(self._stamps[row] - stamp) > OLDEST_MATCH or self._repeats(position, quaternion):
             return
         dt = min(max(stamp - self._last_correction, 1e-3), 0.05)
         self._last_correction = stamp
+        since = self._stamps[(self._count - 1) % HISTORY] - self._stamps[row]
+        if since > LATE:
+            before = self.position.copy(), self.velocity.copy(), self.quaternion.copy()
         correct(
             dt,
             self._bandwidths,
@@ -94,6 +105,16 @@ class PoseFilter:
             self.gyro_bias,
             self.accelerometer_bias,
         )
+        if since > LATE:
+            self.position += since * (self.velocity - before[1])
+            shift(
+                self._stamps,
+                self._poses,
+                self._stamps[row],
+                self.position - before[0],
+                self.velocity - before[1],
+                quaternion_multiply(before[2] * CONJUGATE, self.quaternion),
+            )
 
 
 @jit
@@ -104,6 +125,28 @@ def nearest(stamps: np.ndarray, stamp: float) -> int:
         if abs(stamps[row] - stamp) < abs(stamps[best] - stamp):
             best = row
     return best
+
+
+@jit
+def shift(
+    stamps: np.ndarray,
+    poses: np.ndarray,
+    since: float,
+    displacement: np.ndarray,
+    velocity: np.ndarray,
+    turn: np.ndarray,
+) -> None:
+    """Correct the predictions from `since` [s] on, as what was found then would have changed them.
+
+    Without it every pose under way would ask for the same correction again, and the observer rings.
+    displacement (3,): of the newest one; velocity (3,): change at `since`; turn (4,): in the body.
+    """
+    newest = np.max(stamps)
+    for row in range(len(stamps)):
+        if stamps[row] >= since:
+            for i in range(3):
+                poses[row, i] += displacement[i] - (newest - stamps[row]) * velocity[i]
+            poses[row, 3:] = quaternion_multiply(poses[row, 3:], turn)
 
 
 @jit

@@ -53,13 +53,15 @@ CHECKS = (
     Check("battery", "{name} {value:.2f} full, below {limit:g}", land="battery_land", sign=-1),
     Check("mocap", "{name} pose is {value:.2f} s old, {limit:g} s allowed", "mocap_age_hold",
           failsafe="mocap_age_failsafe"),
+    Check("mocap pose", "{name} has been the same for {value:.2f} s, {limit:g} s allowed",
+          "mocap_age_hold", failsafe="mocap_age_failsafe", in_flight=True),
     Check("joint angles", "{name} are {value:.2f} s old, {limit:g} s allowed", "joint_age_hold"),
     Check(CONTROLLERS, "a controller's gains are {value:.2f} s old, {limit:g} s allowed",
           "controller_age_hold"),
     Check("autopilot", "nothing of the {name} for {value:.2f} s, {limit:g} s allowed",
           land="autopilot_age_land"),
     Check("control ticks", "{value:.0f} {name} missed within a second, {limit:g} allowed",
-          "missed_ticks_hold"),
+          "missed_ticks_hold", failsafe="missed_ticks_failsafe"),
     Check("servo temperature", "{name} {value:.0f} deg C exceeds {limit:g} deg C",
           "temperature_hold", "temperature_land"),
     Check("joint torque", "{name} at {value:.2f} of its limit", 1.0),
@@ -113,6 +115,7 @@ class Checks:
         read(
             readings.battery,
             readings.mocap_age,
+            readings.mocap_still,
             readings.joint_age,
             readings.controller_age,
             readings.autopilot_age,
@@ -188,6 +191,7 @@ def measure(
 def read(
     battery: float,
     mocap: float,
+    still: float,
     joints: float,
     controllers: float,
     autopilot: float,
@@ -201,11 +205,11 @@ def read(
 ) -> None:
     """Write the readings (see `Readings`) into values[7:]; unknown ones are in order."""
     values[7] = _known(-battery)
-    values[8], values[9] = _known(mocap), _known(joints)
-    values[10], values[11] = _known(controllers), _known(autopilot)
-    values[12], values[13] = _known(missed), _known(temperature)
-    values[14] = _largest(effort, effort_limits)
-    values[15] = _largest(gains, gain_limits)
+    values[8], values[9], values[10] = _known(mocap), _known(still), _known(joints)
+    values[11], values[12] = _known(controllers), _known(autopilot)
+    values[13], values[14] = _known(missed), _known(temperature)
+    values[15] = _largest(effort, effort_limits)
+    values[16] = _largest(gains, gain_limits)
 
 
 @jit

@@ -24,15 +24,20 @@ class Inputs:
         self._readings = Readings()
         self._period = period
         self._mocap = self._joints = self._autopilot = math.nan  # stamps [s]
+        self._moved = math.nan  # stamp [s] of the first pose like the newest
+        self._position: tuple[float, ...] = ()
         self._temperatures: dict[str, float] = {}
         self._controllers: dict[str, float] = {}  # stamps of the newest gains [s]
         self._last: float | None = None
         self._gaps: deque[tuple[float, int]] = deque()  # stamp [s], ticks missed before it
         self._watched: dict[tuple[str, ...], list[int]] = {}
 
-    def mocap(self, stamp: float) -> None:
-        """Note a pose that was exposed at `stamp` [s]."""
+    def mocap(self, stamp: float, position: np.ndarray) -> None:
+        """Note a pose that was exposed at `stamp` [s]; position (3,) [m]."""
         self._mocap = stamp
+        x, y, z = position
+        if self._position != (x, y, z):
+            self._position, self._moved = (x, y, z), stamp
 
     def joints(self, stamp: float, effort: np.ndarray) -> None:
         """Note joint readings; effort (2,): measured torques [N m]."""
@@ -75,6 +80,7 @@ class Inputs:
             gaps.popleft()
         readings.missed_ticks = float(sum(missed for _, missed in gaps))
         readings.mocap_age = stamp - self._mocap
+        readings.mocap_still = stamp - self._moved
         readings.joint_age = stamp - self._joints
         readings.autopilot_age = stamp - self._autopilot
         if self._controllers:

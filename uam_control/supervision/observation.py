@@ -25,6 +25,7 @@ class Readings:
     """What is known besides state and reference; NaN where it is not, and then nothing follows.
 
     battery: charge left, 0..1. mocap_age, joint_age [s]: of the newest message by its stamp;
+    mocap_still [s]: since the pose last was another one;
     controller_age [s]: of the oldest of the newest gains, which every controller tells;
     pose_controller_age: the same without the arm's. autopilot_age [s]: since the bridge last told
     that it hears the autopilot.
@@ -42,6 +43,7 @@ class Readings:
     gains: np.ndarray = field(default_factory=lambda: np.full(3, math.nan))
     pose_controller_age: float = math.nan
     autopilot_age: float = math.nan
+    mocap_still: float = math.nan
 
 
 @dataclass

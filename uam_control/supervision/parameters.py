@@ -60,6 +60,9 @@ class Limits(ParameterSet):
     missed_ticks_hold: float = number(
         125.0, "control ticks missed within a second to hold at", "1", 1.0, 1e4
     )
+    missed_ticks_failsafe: float = number(
+        250.0, "control ticks missed within a second to leave it to the autopilot at", "1", 1.0, 1e4
+    )
     gain_hold: tuple = vector(
         (100.0, 100.0, 1000.0),
         "largest adapted gain K0..K3, zeta of position, attitude, arm to hold at",
@@ -75,6 +78,7 @@ class Limits(ParameterSet):
             ("body_rate_hold", "body_rate_failsafe"),
             ("geofence_land", "geofence_failsafe"),
             ("mocap_age_hold", "mocap_age_failsafe"),
+            ("missed_ticks_hold", "missed_ticks_failsafe"),
             ("temperature_hold", "temperature_land"),
         ):
             for less, more in zip(order, order[1:], strict=False):

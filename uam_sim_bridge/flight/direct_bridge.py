@@ -9,6 +9,7 @@ import numpy as np
 
 from uam_control import configuration
 from uam_control.coordinates import ATTITUDE, POSITION
+from uam_control.estimation.repeats import Repeats
 from uam_control.mission import MissionOutput
 from uam_control.supervision import State
 from uam_sim_bridge.autopilot.core import Autopilot
@@ -43,6 +44,7 @@ class DirectBridge:
         self.map = RateThrustMap(RateThrustParameters.among(section))
         self.identification = ThrustIdentification(ThrustIdentificationParameters.among(section))
         self.sequence = OffboardSequence(OffboardParameters.among(section))
+        self._repeats = Repeats()
         self._hold = LevelHold(HoldParameters.among(section))
         self.autopilot = Autopilot(Parameters.load(configuration.path("autopilot/s500.yaml")))
         self.setpoint = np.zeros(4)
@@ -77,7 +79,7 @@ class DirectBridge:
         the mission's output.
         """
         autopilot, setpoint = self.autopilot, self.setpoint
-        if mocap is not None and self.passes():
+        if mocap is not None and not self._frozen(mocap) and self.passes():
             autopilot.vision(time, swap_world(mocap[1]), swap_quaternion(mocap[2]))
         if self.hears():
             self._heard = stamp
@@ -97,6 +99,9 @@ class DirectBridge:
         self.map.thrust_factor = self.identification.update(
             stamp, state, thrust, self.map.assumed_thrust(thrust), flying and status.armed
         )
+
+    def _frozen(self, mocap: tuple) -> bool:
+        return self._repeats(mocap[1], mocap[2]) and self.autopilot.commander.armed
 
     def _command(
         self, stamp: float, tau_p: np.ndarray, tau_q: np.ndarray, state: np.ndarray, flying: bool

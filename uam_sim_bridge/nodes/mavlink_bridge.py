@@ -27,6 +27,7 @@ from rclpy.parameter import Parameter
 from std_msgs.msg import Bool
 
 from uam_control.coordinates import ATTITUDE, POSITION
+from uam_control.estimation.repeats import Repeats
 from uam_control.parameters import ParameterError
 from uam_control.rotations import euler_from_quaternion
 from uam_control.supervision import State
@@ -103,6 +104,7 @@ class MavlinkBridgeNode(UamNode):
         # What is known of the attitude when commands do not come: stamp [ns], roll, pitch, yaw.
         self._estimated = self._seen = (-1, UNKNOWN)
         self._velocity = UNKNOWN
+        self._repeats = Repeats()
         self._pose_sent = -1.0
         self._adopted: tuple[str, ...] = ()
         self._commanded = 0  # stamp [ns] of the last tick with commands
@@ -175,7 +177,10 @@ class MavlinkBridgeNode(UamNode):
             self._faulty.mission_at(seconds(stamp), status.time)
 
     def _on_mocap(self, data: bytes) -> None:
-        self._pose = stamp, _, quaternion = read_pose(data)
+        stamp, position, quaternion = pose = read_pose(data)
+        if self._repeats(position, quaternion) and self.link.armed:
+            return  # neither the autopilot nor the level hold is to believe a frozen tracker
+        self._pose = pose
         self._seen = stamp, euler_from_quaternion(quaternion)
 
     def _tick(
