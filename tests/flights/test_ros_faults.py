@@ -26,6 +26,19 @@ IN_NODES = (
 )
 
 
+def test_without_the_autopilots_voice_it_lands_by_itself(fly):
+    """Setpoints still arrive, but nobody knows: no heartbeat for 3 s, then autopilot_age_land."""
+    cut = "mavlink_cut@hover+0.5:direction=from_autopilot"
+    flight = fly("--scenario", "hover", "--fault", cut)
+    assert flight.wait() == 1
+    figures = json.loads((flight.out / "metrics.json").read_text())
+    passed = [(one["to"], one["cause"]) for one in figures["transitions"]]
+    assert passed[-2][0] == "landing" and "nothing of the autopilot for" in passed[-2][1]
+    assert passed[-1] == ("disarmed", "touchdown")
+    assert max(figures["max"]["position_m"]) < 0.1
+    assert "no heartbeat" in (flight.out / "logs/mavlink_bridge.log").read_text()
+
+
 @pytest.mark.slow
 def test_faults_come_when_they_should_and_the_log_knows_them(fly, short_scenario, tmp_path):
     options = [word for text in (*IN_BOTH, *IN_NODES) for word in ("--fault", text)]

@@ -38,7 +38,8 @@ class AutopilotTopics:
             return
         if what != self._told:
             armed = "armed" if link.armed else "disarmed"
-            text = f"{sequence.phase.value}; autopilot {link.mode.name}, {armed}"
+            heard = "" if connected else ", no heartbeat"
+            text = f"{sequence.phase.value}; autopilot {link.mode.name}, {armed}{heard}"
             self._logger.info("; ".join((text, *sequence.reasons)))
         self._told, self._told_at = what, stamp
         since = link.armed_since
