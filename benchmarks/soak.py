@@ -13,6 +13,7 @@ from __future__ import annotations
 
 import argparse
 import json
+import signal
 import sys
 from pathlib import Path
 
@@ -41,6 +42,7 @@ def main() -> int:
     if options.minutes < 2.0:
         parser.error("--minutes is 2 or more: what grows is not to be seen earlier")
     options.out.mkdir(parents=True, exist_ok=True)
+    signal.signal(signal.SIGTERM, signal.default_int_handler)  # the flight must not fly on alone
     try:
         if options.engine == "direct":
             soak = watch.missions(60.0 * options.minutes)
