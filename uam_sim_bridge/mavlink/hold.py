@@ -107,17 +107,17 @@ class LevelHold:
             self._since = self._time = time
             self._integral[:] = 0.0
         longest = self.parameters.release_time if hopeless else self.parameters.hold_time
-        left = longest - (time - self._since)
+        remaining = longest - (time - self._since)
         dt, self._time = max(0.0, time - self._time), time
-        if left < 0.0:
+        if remaining < 0.0:
             return None
-        if left <= _LAST:
+        if remaining <= _LAST:
             self.rates[:] = 0.0
             return self.rates, self._thrust
-        back, sideways, up = self._braking(velocity, attitude[2])
-        self._turn(0, attitude[0] + sideways / GRAVITY, dt)
-        self._turn(1, attitude[1] - back / GRAVITY, dt)
-        return self.rates, self._thrust * (1.0 + up / GRAVITY)
+        forward, left, up = self._braking(velocity, attitude[2])
+        self._turn(0, attitude[0] + left / GRAVITY, dt)
+        self._turn(1, attitude[1] - forward / GRAVITY, dt)
+        return self.rates, min(1.0, self._thrust * (1.0 + up / GRAVITY))
 
     def _turn(self, axis: int, tilt: float, dt: float) -> None:
         """Set the rate against what the angle is off by [rad]."""
