@@ -26,7 +26,7 @@ def test_the_examples_can_be_typed():
     lines = re.findall(r"^\.venv/bin/uam (.*?)(?: {2,}#.*)?$", TEXT, re.M)
     asked = [vars(parser().parse_args(shlex.split(line))).get("fault") or [] for line in lines]
     words = [text for found in asked for text in found if not text.endswith(".yaml")]
-    assert len(lines) >= 6 and len(words) >= 3
+    assert len(lines) == 7 and len(words) == 3
     read_schedule(words, load_scenario("pick_and_place"), 1)
 
 

@@ -291,8 +291,8 @@ def test_arm_and_magnet_follow_the_policy(keep):
 def test_inputs_tell_ages_by_stamps_and_count_missed_ticks_of_a_second():
     inputs = Inputs(0.004)
     assert math.isnan(inputs.at(1.0).mocap_age) and math.isnan(inputs.at(1.0).autopilot_age)
-    inputs.mocap(0.5, np.ones(3))
-    inputs.mocap(0.99, np.ones(3))
+    inputs.mocap(0.5, np.ones(3), np.ones(4))
+    inputs.mocap(0.99, np.ones(3), np.ones(4))
     inputs.autopilot(0.5)
     inputs.joints(1.0, np.array([0.1, 0.2]))
     inputs.gains(0.0, "arm", ["K0", "zeta", "rho"], np.array([-3.0, 0.1, 99.0]))

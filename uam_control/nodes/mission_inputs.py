@@ -70,8 +70,8 @@ class MissionInputs:
         self.readings = self._inputs.at(seconds(stamp))
 
     def _on_mocap(self, data: bytes) -> None:
-        stamp, position, _ = read_pose(data)  # one that the estimator cannot use does not count
-        self._inputs.mocap(seconds(stamp), position)
+        stamp, *pose = read_pose(data)  # one that the estimator cannot use does not count
+        self._inputs.mocap(seconds(stamp), *pose)
 
     def _on_joints(self, data: bytes) -> None:
         stamp, names, effort = read_values(data, "effort")

@@ -8,6 +8,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from uam_control.estimation.repeats import Repeats
 from uam_control.supervision.observation import Readings
 
 POSE = ("position", "attitude")  # without these nobody flies the vehicle
@@ -25,19 +26,18 @@ class Inputs:
         self._period = period
         self._mocap = self._joints = self._autopilot = math.nan  # stamps [s]
         self._moved = math.nan  # stamp [s] of the first pose like the newest
-        self._position: tuple[float, ...] = ()
+        self._repeats = Repeats()
         self._temperatures: dict[str, float] = {}
         self._controllers: dict[str, float] = {}  # stamps of the newest gains [s]
         self._last: float | None = None
         self._gaps: deque[tuple[float, int]] = deque()  # stamp [s], ticks missed before it
         self._watched: dict[tuple[str, ...], list[int]] = {}
 
-    def mocap(self, stamp: float, position: np.ndarray) -> None:
-        """Note a pose that was exposed at `stamp` [s]; position (3,) [m]."""
+    def mocap(self, stamp: float, position: np.ndarray, quaternion: np.ndarray) -> None:
+        """Note a pose, position (3,) and quaternion (4,), that was exposed at `stamp` [s]."""
         self._mocap = stamp
-        x, y, z = position
-        if self._position != (x, y, z):
-            self._position, self._moved = (x, y, z), stamp
+        if not self._repeats(position, quaternion):
+            self._moved = stamp
 
     def joints(self, stamp: float, effort: np.ndarray) -> None:
         """Note joint readings; effort (2,): measured torques [N m]."""

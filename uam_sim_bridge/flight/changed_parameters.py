@@ -5,28 +5,24 @@ from __future__ import annotations
 import json
 from typing import Any
 
-from diagnostic_msgs.msg import DiagnosticArray
 from rclpy.node import Node
 
 from uam_msgs_py import topics
 from uam_msgs_py.changes import Change
+from uam_sim_bridge.flight.guest import listen, messages
 
 
 class ChangedParameters:
     """Listens to /uam/parameter_changes through a node; polled, hence no executor."""
 
     def __init__(self, node: Node) -> None:
-        topic = topics.CHANGES
-        self._subscription = node.create_subscription(
-            topic.type, topic.name, lambda _: None, topic.qos
-        )
+        self._subscription = listen(node, topics.CHANGES)
         self._newest: dict[str, dict[str, Any]] = {}  # node → parameter → value
 
     def poll(self) -> None:
         """Note what has arrived."""
-        take = self._subscription.handle.take_message
-        while (taken := take(DiagnosticArray, False)) is not None:
-            self.note(Change.from_message(taken[0])[1])
+        for message in messages(self._subscription):
+            self.note(Change.from_message(message)[1])
 
     def note(self, change: Change) -> None:
         """Note a change; one that was refused changes nothing."""

@@ -181,7 +181,7 @@ class DirectFlight:
             return False
         if samples.mocap is not None:
             estimator.mocap(*samples.mocap)
-            self.inputs.mocap(samples.mocap[0], samples.mocap[1])
+            self.inputs.mocap(*samples.mocap)
         if samples.joints is not None:
             estimator.joints(*samples.joints[:3])
             self.inputs.joints(samples.joints[0], samples.joints[3])

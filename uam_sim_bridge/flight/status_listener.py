@@ -3,16 +3,14 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 
-from diagnostic_msgs.msg import DiagnosticArray
 from rclpy.node import Node
-from rclpy.subscription import Subscription
 
 from uam_msgs_py import topics
 from uam_msgs_py.convert import seconds
 from uam_msgs_py.status import AutopilotState, MissionStatus
-from uam_sim_bridge.flight.guest import Guest
+from uam_sim_bridge.flight.guest import Guest, listen, messages
 from uam_sim_bridge.flight.progress import Status
 
 
@@ -22,15 +20,11 @@ class StatusListener:
     def __init__(self, environment: Mapping[str, str], domain: int):
         """environment: of the flight's processes, of which ROS reads some variables here too."""
         self._guest = Guest("uam_fly", environment, domain)
-        self._mission = self._listen(topics.MISSION_STATUS)
-        self._autopilot = self._listen(topics.AUTOPILOT_STATE)
+        self._mission = listen(self._guest.node, topics.MISSION_STATUS)
+        self._autopilot = listen(self._guest.node, topics.AUTOPILOT_STATE)
         self._autopilot_text = ""
         self._last: tuple[float, float] | None = None  # simulated and wall time [s]
         self.stamp, self.mission_time = 0, None  # [ns], [s] of the newest status after take-off
-
-    def _listen(self, topic: topics.Topic):
-        create = self._guest.node.create_subscription
-        return create(topic.type, topic.name, lambda _: None, topic.qos)
 
     @property
     def node(self) -> Node:
@@ -39,12 +33,12 @@ class StatusListener:
 
     def poll(self) -> Status | None:
         """The newest status, None if there is none since the last call."""
-        for message in _messages(self._autopilot):
+        for message in messages(self._autopilot):
             _, state = AutopilotState.from_message(message)
             reasons = f": {state.reasons}" if state.reasons else ""
             self._autopilot_text = f"{state.summary}{reasons}"
         newest = None
-        for message in _messages(self._mission):
+        for message in messages(self._mission):
             newest = message
         if newest is None:
             return None
@@ -74,8 +68,3 @@ class StatusListener:
 
     def __exit__(self, *exception) -> None:
         self._guest.close()
-
-
-def _messages(subscription: Subscription) -> Iterator[DiagnosticArray]:
-    while (taken := subscription.handle.take_message(subscription.msg_type, False)) is not None:
-        yield taken[0]
