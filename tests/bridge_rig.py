@@ -10,7 +10,8 @@ from std_msgs.msg import Bool
 from uam_control.rotations import euler_from_quaternion
 from uam_msgs_py import topics
 from uam_msgs_py.control import ATTITUDE_NAMES, PositionCommandWriter, TorqueWriter
-from uam_msgs_py.convert import PoseWriter, TrajectoryWriter, read_setpoint
+from uam_msgs_py.convert import PoseWriter, read_setpoint
+from uam_msgs_py.trajectories import TrajectoryWriter
 from uam_sim_bridge.autopilot.companion import Companion
 from uam_sim_bridge.autopilot.core import Autopilot
 from uam_sim_bridge.mavlink.frames import swap_body

@@ -5,7 +5,7 @@ from typing import Protocol
 
 from sensor_msgs.msg import BatteryState
 
-from uam_msgs_py.convert import set_stamp
+from uam_msgs_py.stamps import set_stamp
 
 _NAN = math.nan
 

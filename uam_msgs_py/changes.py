@@ -7,8 +7,8 @@ from typing import Any
 
 from diagnostic_msgs.msg import DiagnosticArray
 
-from uam_msgs_py.convert import nanoseconds
 from uam_msgs_py.layouts import BadMessage
+from uam_msgs_py.stamps import nanoseconds
 from uam_msgs_py.status import OK, WARN, diagnostic
 
 ACCEPTED = "accepted"

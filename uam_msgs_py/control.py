@@ -9,13 +9,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from uam_control.coordinates import ARM, ATTITUDE, COORDINATES, JOINTS, POSITION, SIZE
-from uam_msgs_py.convert import (
-    IdleWriter,
-    TrajectoryReader,
-    TrajectoryWriter,
-    trajectory,
-)
 from uam_msgs_py.layouts import BadMessage
+from uam_msgs_py.trajectories import IdleWriter, TrajectoryReader, TrajectoryWriter, trajectory
 
 ALL = list(COORDINATES)
 ARM_NAMES = list(JOINTS)

@@ -1,253 +1,28 @@
 """numpy ↔ serialized ROS messages, with what costs time at 250 Hz left out.
 
-Writers serialize one message when they are made; afterwards only numbers and stamp are put into its
-bytes, which are what is published. Readers take serialized messages (raw subscriptions), look up
-where the numbers lie, check names, lengths, frames and numbers, and raise BadMessage with one line.
+Writers put numbers into a serialized message (`serialized.py`); readers take serialized messages
+(raw subscriptions), check names, lengths, frames and numbers, and raise BadMessage with one line.
 This is the only place where quaternions change between [w x y z] (maths) and x, y, z, w (ROS).
-Stamps are integer nanoseconds.
+Trajectories have a file of their own. Stamps are integer nanoseconds.
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
 
 import numpy as np
 from geometry_msgs.msg import PoseStamped, TwistStamped
-from rclpy.serialization import deserialize_message, serialize_message
-from rosgraph_msgs.msg import Clock
+from rclpy.serialization import serialize_message
 from sensor_msgs.msg import Imu, JointState
 from std_msgs.msg import Bool, Float64MultiArray
-from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
 
-from uam_msgs_py.layouts import (
-    ENCAPSULATION,
-    SECOND,
-    STAMP,
-    BadMessage,
-    Layout,
-    Layouts,
-    is_little_endian,
-    stamp_of,
-)
+from uam_msgs_py.layouts import ENCAPSULATION, BadMessage
+from uam_msgs_py.name_checks import check_length, check_names, refuse_infinite
+from uam_msgs_py.serialized import Serialized, Template
+from uam_msgs_py.topics import BODY, WORLD
 
-if TYPE_CHECKING:
-    from builtin_interfaces.msg import Time
-
-WORLD = "world"  # frame of poses and states, ENU
-BODY = "base_link"  # frame of rates, forces and torques, FLU
-
-
-def type_name(message_type: type) -> str:
-    """`package/msg/Name` of a generated message class."""
-    return f"{message_type.__module__.split('.')[0]}/msg/{message_type.__name__}"
-
-
-KINDS = (JointTrajectory, JointState, Imu, PoseStamped, TwistStamped, Float64MultiArray, Clock)
-LAYOUTS = {kind: Layouts(type_name(kind)) for kind in KINDS}
 SWITCH = {on: serialize_message(Bool(data=on)) for on in (False, True)}
-
-
-def stays_serialized(message_type: type) -> bool:
-    """Whether messages of this type are read and written here, serialized."""
-    return message_type in LAYOUTS
-
-
-def set_stamp(stamp: Time, nanoseconds: int) -> None:
-    """Integer nanoseconds → builtin_interfaces/Time, in place."""
-    stamp.sec, stamp.nanosec = divmod(nanoseconds, SECOND)
-
-
-def nanoseconds(stamp: Time) -> int:
-    """builtin_interfaces/Time → integer nanoseconds."""
-    return stamp.sec * SECOND + stamp.nanosec
-
-
-def seconds(nanoseconds: int) -> float:
-    """Nanoseconds [ns] → the maths' seconds [s]."""
-    return nanoseconds / SECOND
-
-
-class Template:
-    """A serialized message; `values` holds a view for each of its fields of numbers."""
-
-    def __init__(
-        self,
-        message: JointTrajectory
-        | JointState
-        | Imu
-        | PoseStamped
-        | TwistStamped
-        | Float64MultiArray
-        | Clock,
-    ):
-        """message: of a type in LAYOUTS, with its names and with arrays as long as they will be."""
-        data = serialize_message(message)
-        layout = LAYOUTS[type(message)].of(data)
-        # Numbers are aligned from the end of the encapsulation: let that be aligned in memory.
-        self._bytes = np.zeros(4 + len(data), dtype=np.uint8)[4:]
-        self._bytes[:] = np.frombuffer(data, dtype=np.uint8)
-        self.values = {
-            name: self._bytes[where].view("<f8") for name, where in layout.fields.items()
-        }
-        self._stamp = self._time(STAMP)
-        self._duration = None if layout.duration is None else self._time(layout.duration)
-
-    def _time(self, where: slice) -> np.ndarray:
-        return self._bytes[where].view("<i4")  # seconds; nanoseconds fit an int32 as well
-
-    def stamped(self, stamp: int, time_from_start: int = 0) -> bytes:
-        """Return the message with this stamp [ns]; time_from_start [ns], of trajectories only."""
-        self._stamp[:] = divmod(stamp, SECOND)
-        if self._duration is not None:
-            self._duration[:] = divmod(time_from_start, SECOND)
-        return self._bytes.tobytes()
-
-    def plain(self) -> bytes:
-        """Return the message, of a type that has no stamp."""
-        return self._bytes.tobytes()
-
-
-class Serialized:
-    """A received message: its bytes and their layout."""
-
-    def __init__(self, kind: type, data: bytes):
-        """kind: a type in LAYOUTS. Raises BadMessage."""
-        if not is_little_endian(data):
-            data = _here(kind, data)
-        self.data = data
-        self.layout: Layout = LAYOUTS[kind].of(data)
-
-    @property
-    def stamp(self) -> int:
-        """Its stamp [ns]."""
-        return stamp_of(self.data)
-
-    def numbers(self, field: str) -> np.ndarray:
-        """A read-only view (n,) of a field of numbers, (0,) where it is empty."""
-        length = self.layout.length(field)
-        if not length:
-            return _NOTHING
-        return np.frombuffer(self.data, "<f8", length, self.layout.fields[field].start)
-
-    def vector(self, field: str) -> np.ndarray:
-        """A copy of a field of numbers; raises BadMessage unless all are finite."""
-        values = self.numbers(field).copy()
-        if not math.isfinite(values.sum()):
-            raise BadMessage(f"{field} is {values.tolist()}, finite numbers expected")
-        return values
-
-
-_NOTHING = np.zeros(0)
-
-
-def _here(kind: type, data: bytes) -> bytes:
-    """Serialize anew, in the byte order of this machine, what another one has sent."""
-    try:
-        return serialize_message(deserialize_message(data, kind))
-    except Exception as error:  # rclpy raises its own classes, without a common base
-        raise BadMessage(f"cannot be deserialized ({error})") from None
-
-
-class TrajectoryWriter(Template):
-    """A JointTrajectory with one point: rows positions, velocities, accelerations, effort.
-
-    `values` holds a view (n,) for each row in use; write to them and publish `stamped(stamp)`.
-    """
-
-    ROWS = ("positions", "velocities", "accelerations", "effort")
-
-    def __init__(self, names: Sequence[str], rows: Sequence[str] = ROWS[:3]):
-        """names: of the n joints; rows: those of ROWS that are used."""
-        point = JointTrajectoryPoint(**{row: [0.0] * len(names) for row in rows})
-        message = JointTrajectory(joint_names=list(names), points=[point])
-        message.header.frame_id = WORLD
-        super().__init__(message)
-
-    def fill(self, stamp: int, state: np.ndarray, time_from_start: int = 0) -> bytes:
-        """Return the message with state (3, n): positions, velocities, accelerations."""
-        values = self.values
-        values["positions"][:] = state[0]
-        values["velocities"][:] = state[1]
-        values["accelerations"][:] = state[2]
-        return self.stamped(stamp, time_from_start)
-
-
-class IdleWriter(Template):
-    """A JointTrajectory without names and points: nothing is commanded at its stamp."""
-
-    def __init__(self):
-        message = JointTrajectory()
-        message.header.frame_id = WORLD
-        super().__init__(message)
-
-
-def trajectory(data: bytes) -> Serialized:
-    """A received JointTrajectory; raises BadMessage."""
-    return Serialized(JointTrajectory, data)
-
-
-class TrajectoryReader:
-    """Reads `rows` of trajectories of the joints `names`.
-
-    Rows that lie next to each other in a message are as far apart as any two of them, so that one
-    strided view holds them all.
-    """
-
-    def __init__(self, names: Sequence[str], rows: Sequence[str] = TrajectoryWriter.ROWS[:3]):
-        """names: of the n joints; rows: adjacent ones of TrajectoryWriter.ROWS."""
-        self._names, self._rows = list(names), list(rows)
-
-    def read(self, message: Serialized) -> np.ndarray:
-        """Return a copy (rows, n) of the first point's rows.
-
-        Raises BadMessage on other joint names, wrong lengths, no point, or a number that is not
-        finite.
-        """
-        checked = message.layout.checked.get(self)
-        if checked is None:
-            checked = message.layout.checked[self] = self._check(message.layout)
-        shape, start, strides = checked
-        values = np.ndarray(shape, "<f8", message.data, start, strides).copy()
-        if not math.isfinite(values.sum()):
-            for row, numbers in zip(self._rows, values, strict=True):
-                _refuse_infinite(row, numbers, self._names)
-            raise BadMessage("overflow")
-        return values
-
-    def _check(self, layout: Layout) -> tuple[tuple[int, int], int, tuple[int, int]]:
-        """Shape, first byte and strides [bytes] of the rows; raises BadMessage."""
-        names, rows = self._names, self._rows
-        check_names(layout.names, names)
-        if layout.points != 1:
-            raise BadMessage(f"{layout.points} points, 1 expected")
-        for row in rows:
-            _check_length(row, layout.length(row), names)
-        starts = [layout.fields[row].start for row in rows]
-        stride = starts[1] - starts[0] if len(starts) > 1 else 0
-        return (len(rows), len(names)), starts[0], (stride, 8)
-
-
-def check_names(given: Sequence[str], expected: Sequence[str]) -> None:
-    """Raise BadMessage unless `given` are exactly the expected joint names, in order."""
-    if list(given) != list(expected):
-        raise BadMessage(
-            f"joint names {', '.join(given) or '(none)'}; expected {', '.join(expected)}"
-        )
-
-
-def _check_length(what: str, length: int, names: Sequence[str]) -> None:
-    if length != len(names):
-        raise BadMessage(f"{length} {what}, {len(names)} expected ({', '.join(names)})")
-
-
-def _refuse_infinite(what: str, values: np.ndarray, names: Sequence[str]) -> None:
-    if not math.isfinite(values.sum()):
-        for name, value in zip(names, values, strict=True):
-            if not math.isfinite(value):
-                raise BadMessage(f"{what} of {name} is {value}")
-        raise BadMessage(f"{what} overflow")
 
 
 class JointStateWriter(Template):
@@ -277,7 +52,7 @@ def read_joints(data: bytes, names: Sequence[str]) -> tuple[int, np.ndarray, np.
                 values = values[[order.index(name) for name in names]]
             except ValueError:
                 check_names(order, names)
-        _refuse_infinite(what, values, names)
+        refuse_infinite(what, values, names)
         found.append(values)
     return message.stamp, *found
 
@@ -292,7 +67,7 @@ def read_values(data: bytes, field: str) -> tuple[int, list[str], np.ndarray]:
     names, values = message.layout.names, message.numbers(field)
     if not len(values):
         return message.stamp, names, np.full(len(names), math.nan)
-    _check_length(field, len(values), names)
+    check_length(field, len(values), names)
     return message.stamp, names, values
 
 
@@ -368,8 +143,8 @@ class EffortWriter(Template):
 def read_effort(data: bytes, names: Sequence[str]) -> np.ndarray:
     """Return the efforts (n,) [N m]; raises BadMessage on a wrong number of joints or a NaN."""
     effort = Serialized(Float64MultiArray, data).numbers("data")
-    _check_length("efforts", len(effort), names)
-    _refuse_infinite("effort", effort, names)
+    check_length("efforts", len(effort), names)
+    refuse_infinite("effort", effort, names)
     return effort
 
 

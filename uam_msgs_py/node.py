@@ -16,12 +16,12 @@ from rclpy.signals import SignalHandlerOptions
 from rclpy.subscription import Subscription
 
 from uam_msgs_py import connections, topics
-from uam_msgs_py.convert import stays_serialized
 from uam_msgs_py.executor import spin
 from uam_msgs_py.health import LoopTime, ages
 from uam_msgs_py.joins import StampJoin
 from uam_msgs_py.layouts import BadMessage
 from uam_msgs_py.parameters import refuse_unknown
+from uam_msgs_py.serialized import stays_serialized
 from uam_msgs_py.status import ERROR, OK, STALE, WARN, diagnostic
 from uam_msgs_py.topics import Topic
 from uam_msgs_py.tunable import TunableNode
@@ -74,7 +74,7 @@ class UamNode(TunableNode):
     ) -> Subscription:
         """Call `handle(message)` for each message; a BadMessage it raises is refused and said.
 
-        The message comes serialized where uam_msgs_py.convert reads its type.
+        The message comes serialized where uam_msgs_py.serialized knows its type.
         required: the node reports that it waits while this input is silent. qos: if not what the
         stack's nodes ask for (`Topic.reading`).
         """

@@ -5,8 +5,8 @@ from typing import ClassVar, Self
 
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 
-from uam_msgs_py.convert import nanoseconds, set_stamp
 from uam_msgs_py.layouts import BadMessage
+from uam_msgs_py.stamps import nanoseconds, set_stamp
 
 OK, WARN, ERROR, STALE = (
     DiagnosticStatus.OK,
@@ -79,6 +79,7 @@ _READ = {
     bool: _truth,
     int: int,
     int | None: lambda text: int(text) if text else None,
+    float | None: lambda text: float(text) if text else None,
 }
 
 
@@ -87,7 +88,8 @@ class AutopilotState(_Status):
     """What the bridge knows of the autopilot, on change and five times a second.
 
     armed_since: stamp [ns] of the tick at which it was first reported armed, None while disarmed.
-    reasons: why it is not armed or left OFFBOARD, "; " between them.
+    reasons: why it is not armed or left OFFBOARD, "; " between them. round_trip: of the quickest
+    answer of the last second [s], None while not known.
     """
 
     connected: bool = False
@@ -95,8 +97,10 @@ class AutopilotState(_Status):
     armed: bool = False
     armed_since: int | None = None
     reasons: str = ""
+    round_trip: float | None = None
 
     NAME = "autopilot"
+    LATER = ("round_trip",)
 
     @property
     def level(self) -> bytes:

@@ -25,6 +25,9 @@ try:
 except ImportError:  # not among the wheels of PyPI
     from uam_msgs_py.tf_message import TFMessage
 
+WORLD = "world"  # frame of poses and states, ENU
+BODY = "base_link"  # frame of rates, forces and torques, FLU
+
 
 def _qos(depth: int, reliable: bool = True, latched: bool = False) -> QoSProfile:
     return QoSProfile(

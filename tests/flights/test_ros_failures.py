@@ -9,7 +9,7 @@ import pytest
 from rich.console import Console
 from whole_flight import assert_nothing_left, wait_until_gone
 
-from uam_sim_bridge.flight import ros_engine, shared_memory, timeseries
+from uam_sim_bridge.flight import ros_engine, ros_parameters, shared_memory, timeseries
 from uam_sim_bridge.flight.ports import Reservation
 from uam_sim_bridge.flight.progress import Progress
 from uam_sim_bridge.flight.result_folder import ResultFolder
@@ -125,7 +125,7 @@ def test_no_node_survives_a_killed_orchestrator(fly, short_scenario):
 
 
 def test_who_does_not_find_the_others_is_started_once_more(short_scenario, tmp_path, monkeypatch):
-    monkeypatch.setattr(ros_engine, "START_TIMEOUT", 0.1)
+    monkeypatch.setattr(ros_parameters, "START_TIMEOUT", 0.1)
     with (tmp_path / "said").open("w+") as said, Progress(Console(file=said, width=400)) as shown:
         wanted = settings(scenario=str(short_scenario))
         flown = ros_engine.fly(wanted, ResultFolder(tmp_path), shown)

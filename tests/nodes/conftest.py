@@ -15,7 +15,7 @@ from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 
 from uam_msgs_py.connections import Connections
-from uam_msgs_py.convert import stays_serialized
+from uam_msgs_py.serialized import stays_serialized
 from uam_sim_bridge.flight.ports import Reservation
 from uam_sim_bridge.flight.processes import ros_environment
 from uam_sim_bridge.flight.shared_memory import Presence, abandoned

@@ -17,15 +17,10 @@ from uam_msgs_py.control import (
     read_state,
     read_torque,
 )
-from uam_msgs_py.convert import (
-    ImuWriter,
-    JointStateWriter,
-    PoseWriter,
-    TrajectoryWriter,
-    read_effort,
-    seconds,
-)
+from uam_msgs_py.convert import ImuWriter, JointStateWriter, PoseWriter, read_effort
+from uam_msgs_py.stamps import seconds
 from uam_msgs_py.status import AutopilotState, MissionStatus
+from uam_msgs_py.trajectories import TrajectoryWriter
 
 PERIOD = 4_000_000  # [ns]
 ARMED_AT = 40 * PERIOD  # take-off follows 0.5 s later

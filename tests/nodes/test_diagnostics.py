@@ -8,8 +8,8 @@ from free_port import free_port
 
 from uam_control.coordinates import COORDINATES, SIZE
 from uam_msgs_py import topics
-from uam_msgs_py.convert import TrajectoryWriter
 from uam_msgs_py.status import OK, STALE
+from uam_msgs_py.trajectories import TrajectoryWriter
 
 NODES = {
     "uam_control.nodes.position_controller": "/uam/state",

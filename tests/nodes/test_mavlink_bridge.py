@@ -12,7 +12,7 @@ from sensor_msgs.msg import JointState
 from std_msgs.msg import Bool
 
 from uam_msgs_py import topics
-from uam_msgs_py.convert import Serialized
+from uam_msgs_py.serialized import Serialized
 from uam_msgs_py.status import AutopilotState, MissionStatus
 from uam_sim_bridge.mavlink.wire import mavlink2
 

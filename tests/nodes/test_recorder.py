@@ -13,7 +13,8 @@ from std_msgs.msg import Bool
 
 from uam_msgs_py import topics
 from uam_msgs_py.connections import Connections
-from uam_msgs_py.convert import SetpointWriter, set_stamp
+from uam_msgs_py.convert import SetpointWriter
+from uam_msgs_py.stamps import set_stamp
 from uam_sim_bridge.flight.mcap_reader import read_log
 
 MODULE = "uam_sim_bridge.nodes.recorder"

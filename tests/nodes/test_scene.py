@@ -8,8 +8,9 @@ from uam_control.coordinates import COORDINATES, SIZE
 from uam_msgs_py import topics
 from uam_msgs_py.connections import Connections
 from uam_msgs_py.control import ReferenceWriter
-from uam_msgs_py.convert import PoseWriter, TrajectoryWriter, read_joints
+from uam_msgs_py.convert import PoseWriter, read_joints
 from uam_msgs_py.status import MissionStatus
+from uam_msgs_py.trajectories import TrajectoryWriter
 from uam_sim_bridge.flight.message_definitions import schema
 
 MODULE = "uam_sim_bridge.nodes.scene"

@@ -20,8 +20,9 @@ from uam_control.profile import CONTROLLERS, NODES, load_profile
 from uam_msgs_py import topics
 from uam_msgs_py.changes import Change
 from uam_msgs_py.control import ReferenceWriter
-from uam_msgs_py.convert import TrajectoryWriter, read_joints
+from uam_msgs_py.convert import read_joints
 from uam_msgs_py.layouts import stamp_of
+from uam_msgs_py.trajectories import TrajectoryWriter
 from uam_sim_bridge.flight.guest import Guest
 from uam_sim_bridge.flight.profile_switch import ProfileSwitch, SwitchRefused
 

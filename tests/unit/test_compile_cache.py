@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from uam_sim_bridge.flight import ros_engine, warm_up
+from uam_sim_bridge.flight import ros_nodes, warm_up
 
 CALLER = """
 from uam_control.compiled import jit
@@ -159,7 +159,7 @@ def test_what_is_compiled_is_known_until_an_edit(tmp_path):
 
 
 def test_a_warm_up_leaves_nothing_of_the_nodes_to_compile():
-    for module in ros_engine.MODULES.values():
+    for module in ros_nodes.MODULES.values():
         importlib.import_module(module)
     assert list(warm_up.compiled_functions())
     if warm_up.is_cold():

@@ -29,23 +29,23 @@ from uam_msgs_py.control import (
     read_torque,
 )
 from uam_msgs_py.convert import (
-    LAYOUTS,
     SWITCH,
     EffortWriter,
     ImuWriter,
     JointStateWriter,
     PoseWriter,
     SetpointWriter,
-    TrajectoryWriter,
     read_effort,
     read_imu,
     read_joints,
     read_pose,
     read_setpoint,
     read_switch,
-    set_stamp,
 )
 from uam_msgs_py.layouts import KNOWN_LAYOUTS, BadMessage, stamp_of
+from uam_msgs_py.serialized import LAYOUTS
+from uam_msgs_py.stamps import set_stamp
+from uam_msgs_py.trajectories import TrajectoryWriter
 
 FINITE = st.floats(-1e100, 1e100)
 STATES = arrays(float, (3, 8), elements=FINITE)

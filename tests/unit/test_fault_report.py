@@ -123,7 +123,7 @@ def test_how_a_flight_ended(make_flight, end, outcome):
 
 def test_the_matrix_of_the_configuration_has_every_fault_and_moment():
     ros, direct = (fault_matrix.read(MATRIX, engine) for engine in ("ros", "direct"))
-    assert {entry["fault"] for entry in ros.faults} >= set(FAULTS) - {"node_slow"}
+    assert {entry["fault"] for entry in ros.faults} >= set(FAULTS) - {"node_slow", "discovery_loss"}
     assert len(direct.cells(1)) == 1 + len(direct.faults) * 4
     assert set(ros.rows) - set(direct.rows) == set(direct.left_out)
     assert list(direct.moments) == ["take-off", "transit", "with payload", "landing"]

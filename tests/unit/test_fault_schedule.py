@@ -27,6 +27,7 @@ from uam_sim_bridge.faults import (
 )
 from uam_sim_bridge.faults.schedule import WORDS, TimedFault, in_words
 from uam_sim_bridge.faults.timeline import Timeline
+from uam_sim_bridge.flight import thread_stop
 
 SCENARIO = load_scenario("pick_and_place")
 times = st.floats(0.0, 1000.0).map(lambda value: round(value, 3))
@@ -184,6 +185,23 @@ def test_a_process_that_is_not_started_cannot_be_killed():
     found = read_schedule(["node_stall@20+1:node=scene"], SCENARIO, 1)
     with pytest.raises(FaultError, match="node_stall: this flight does not start scene"):
         limits.check(found, "ros", ("scene",))
+
+
+def test_what_the_machine_refuses_is_refused_with_its_reason(monkeypatch, tmp_path):
+    found = read_schedule(["discovery_loss@20+1"], SCENARIO, 1)
+    scope = tmp_path / "ptrace_scope"
+    monkeypatch.setattr(thread_stop, "SCOPE", scope)
+    monkeypatch.setattr(thread_stop.os, "geteuid", lambda: 1000)
+    for there, refused in ((None, False), ("0", False), ("1", False), ("2", True), ("3", True)):
+        if there:
+            scope.write_text(f"{there}\n")
+        why = thread_stop.refusal()
+        assert bool(why) == refused
+        if refused:
+            with pytest.raises(FaultError, match=f"not on this machine: .*scope is {there}"):
+                limits.check(found, "ros", (), {"discovery_loss": why})
+        else:
+            limits.check(found, "ros", (), {"discovery_loss": why})
 
 
 @given(times, times, st.floats(0.0, 50.0))

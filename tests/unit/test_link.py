@@ -158,10 +158,10 @@ def test_the_report_shows_the_autopilots_health(rig):
 
 def test_a_battery_that_sys_status_alone_knows(rig):
     rig.run(2.5)
-    assert not rig.link.battery.known
+    assert not rig.link.vitals.battery.known
     rig.say(mavlink2.MAVLink_sys_status_message(0, 0, 0, 0, 15200, 250, 80, 0, 0, 0, 0, 0, 0))
     rig.run(0.008)
-    assert rig.link.battery.voltage == pytest.approx(15.2)
+    assert rig.link.vitals.battery.voltage == pytest.approx(15.2)
 
 
 def test_cut_of_a_fifth_of_a_second_changes_nothing(rig):

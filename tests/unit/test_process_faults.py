@@ -21,6 +21,19 @@ def main():
     while True:
         time.sleep(0.05)
 """
+# With threads named as Fast DDS names its own.
+NODE = """
+import threading, time
+from pathlib import Path
+def work(name):
+    Path(f"/proc/self/task/{threading.get_native_id()}/comm").write_text(name)
+    while True:
+        time.sleep(0.01)
+def main():
+    for name in ("dds.udp.7660", "dds.ev.0", "dds.shm.7661"):
+        threading.Thread(target=work, args=(name,), daemon=True).start()
+    work("main")
+"""
 SCENARIO = load_scenario("hover")
 
 
@@ -102,6 +115,42 @@ def test_who_is_slow_is_stopped_for_its_part_of_the_time(children):
             seen.append(state(children, "arm_controller") == "T")
             time.sleep(0.003)
     assert 0.5 < sum(seen) / len(seen) < 0.97
+
+
+def test_threads_of_discovery_are_stopped_alone_and_go_on(tmp_path):
+    (tmp_path / "node.py").write_text(NODE)
+    path = os.pathsep.join([str(tmp_path), *sys.path])
+    with Processes(tmp_path, {**os.environ, "PYTHONPATH": path}) as running:
+        running.start("mission", "node")
+        tasks = Path(f"/proc/{running.pid('mission')}/task")
+
+        def found():
+            stats = [(task / "stat").read_text() for task in tasks.iterdir()]
+            return sorted(
+                (text.split("(", 1)[1].rsplit(")", 1)[0], text.rsplit(")", 1)[1].split()[0])
+                for text in stats
+            )
+
+        until(lambda: len(found()) >= 4)
+        with faults(running, "discovery_loss@1:node=mission")[0] as made:
+            made.update(1.0)
+            states = dict(found())
+            assert states["dds.udp.7660"] == states["dds.ev.0"] == "t"
+            assert states["dds.shm.7661"] != "t" and states["main"] != "t"
+        assert all(state != "t" for _, state in found())
+
+
+def test_who_is_killed_with_stopped_threads_has_ended(tmp_path):
+    (tmp_path / "node.py").write_text(NODE)
+    path = os.pathsep.join([str(tmp_path), *sys.path])
+    with Processes(tmp_path, {**os.environ, "PYTHONPATH": path}) as running:
+        running.start("mission", "node")
+        tasks = Path(f"/proc/{running.pid('mission')}/task")
+        until(lambda: len(list(tasks.iterdir())) >= 4)
+        with faults(running, "discovery_loss@1:node=mission")[0] as made:
+            made.update(1.0)
+            os.kill(running.pid("mission"), signal.SIGKILL)
+            until(lambda: made.update(1.1) or not running.running("mission"))
 
 
 def test_who_has_ended_already_is_left_alone(children):

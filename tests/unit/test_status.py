@@ -11,6 +11,7 @@ from uam_msgs_py.status import ERROR, OK, STALE, WARN, AutopilotState, MissionSt
     [
         (AutopilotState(), STALE),
         (AutopilotState(True, "OFFBOARD", True, 12_000_000_000), OK),
+        (AutopilotState(True, "OFFBOARD", True, 12_000_000_000, "", 0.008), OK),
         (AutopilotState(True, "AUTO.LAND", True, 5, "setpoint lost"), WARN),
     ],
 )

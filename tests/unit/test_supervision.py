@@ -60,8 +60,8 @@ def test_nothing_leads_out_of_failsafe_but_a_command_and_motors_go_off_on_the_gr
 def test_as_many_quantities_are_measured_as_are_named():
     values, seen, two, three = np.full(len(CHECKS), np.nan), observation(), np.ones(2), np.ones(3)
     measure(seen.state, seen.reference, 0.0, np.zeros((2, 3)), two, values)
-    assert np.isnan(values).sum() == 10
-    read(1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, two, two, three, three, values)
+    assert np.isnan(values).sum() == 11
+    read(1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, two, two, three, three, values)
     assert not np.isnan(values).any()
     checks = Checks(SupervisionParameters())
     assert checks.update(0.0, seen, True) is None
@@ -175,6 +175,11 @@ def with_state(entry, value):
             observation(readings=Readings(autopilot_age=0.8)),
             State.LANDING,
             "nothing of the autopilot for 0.80 s, 0.75 s allowed",
+        ),
+        (
+            observation(readings=Readings(round_trip=0.068)),
+            State.FAILSAFE,
+            "autopilot's link takes 0.068 s there and back, 0.05 s allowed",
         ),
         (
             observation(readings=Readings(temperature=71)),
@@ -293,7 +298,7 @@ def test_inputs_tell_ages_by_stamps_and_count_missed_ticks_of_a_second():
     assert math.isnan(inputs.at(1.0).mocap_age) and math.isnan(inputs.at(1.0).autopilot_age)
     inputs.mocap(0.5, np.ones(3), np.ones(4))
     inputs.mocap(0.99, np.ones(3), np.ones(4))
-    inputs.autopilot(0.5)
+    inputs.autopilot(0.5, 0.02)
     inputs.joints(1.0, np.array([0.1, 0.2]))
     inputs.gains(0.0, "arm", ["K0", "zeta", "rho"], np.array([-3.0, 0.1, 99.0]))
     inputs.gains(0.0, "position", ["D0", "s_norm"], np.array([5.0, 9.0]))
@@ -304,6 +309,7 @@ def test_inputs_tell_ages_by_stamps_and_count_missed_ticks_of_a_second():
     assert readings.mocap_still == pytest.approx(0.52)
     assert readings.missed_ticks == 4.0
     assert readings.temperature == 61.0 and readings.autopilot_age == pytest.approx(0.52)
+    assert readings.round_trip == 0.02
     assert readings.controller_age == pytest.approx(1.02)
     assert readings.gains[2] == 3.0 and np.isnan(readings.gains[:2]).all()
     assert inputs.at(1.024).missed_ticks == 4.0
@@ -319,6 +325,7 @@ READINGS = st.builds(
     st.builds(np.array, st.tuples(NUMBERS, NUMBERS, NUMBERS)),
     autopilot_age=NUMBERS,
     mocap_still=NUMBERS,
+    round_trip=NUMBERS,
 )  # fmt: skip
 
 

@@ -42,6 +42,18 @@ def test_constant_delay():
     assert sync.round_trip == pytest.approx(0.008, abs=0.0041)
 
 
+def test_the_quickest_of_a_second_tells_a_slow_link_at_once_and_ignores_a_late_answer():
+    sync = TimeSync()
+    run(sync, 0.7, 10.0, offset=5.0, delay=0.004)
+    assert sync.quickest is None  # too few
+    run(sync, 2.0, 11.0, offset=5.0, delay=0.004)
+    assert sync.quickest == pytest.approx(0.008, abs=0.0041)
+    run(sync, 0.15, 13.1, offset=5.0, delay=0.05)  # one answer
+    assert sync.quickest < 0.02
+    run(sync, 1.3, 14.0, offset=5.0, delay=0.05)
+    assert sync.quickest == pytest.approx(0.1, abs=0.0041) and sync.round_trip < 0.07
+
+
 def test_random_delays_and_losses():
     sync = TimeSync()
     run(sync, 30.0, 20.0, offset=-7.0, delay=lambda n: n.exponential(0.02), back=0.002, lost=0.3)

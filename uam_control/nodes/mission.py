@@ -17,11 +17,12 @@ from uam_control.rotations import wrap_angle
 from uam_control.supervision import State
 from uam_msgs_py import topics
 from uam_msgs_py.control import ReferenceWriter, read_state
-from uam_msgs_py.convert import SWITCH, seconds
+from uam_msgs_py.convert import SWITCH
 from uam_msgs_py.joins import Backlog
 from uam_msgs_py.layouts import SECOND
 from uam_msgs_py.node import UamNode, run
 from uam_msgs_py.parameters import NodeParameters
+from uam_msgs_py.stamps import seconds
 from uam_msgs_py.status import ERROR, OK, WARN, AutopilotState, MissionStatus
 
 NAME = "mission"
@@ -70,7 +71,7 @@ class MissionNode(UamNode):
     def _on_autopilot(self, message: DiagnosticArray) -> None:
         stamp, state = AutopilotState.from_message(message)
         if state.connected:
-            self._inputs.autopilot(seconds(stamp))
+            self._inputs.autopilot(seconds(stamp), state.round_trip)
         armed = state.armed and state.armed_since is not None
         self._armed_since = seconds(state.armed_since) if armed else None
 

@@ -5,6 +5,7 @@ read only a few times a second, by stamps. So it is cheap, and how fast another 
 matter to a flight that stays within its limits.
 """
 
+import math
 from collections.abc import Callable
 from functools import partial
 from typing import Any
@@ -14,9 +15,11 @@ from sensor_msgs.msg import BatteryState, Temperature
 from uam_control.coordinates import JOINTS
 from uam_control.supervision import Inputs, Readings
 from uam_msgs_py import topics
-from uam_msgs_py.convert import check_names, read_pose, read_values, seconds
+from uam_msgs_py.convert import read_pose, read_values
 from uam_msgs_py.layouts import BadMessage
+from uam_msgs_py.name_checks import check_names
 from uam_msgs_py.node import UamNode
+from uam_msgs_py.stamps import seconds
 
 PERIOD = 20_000_000  # [ns] of stamps between two looks
 GAINS = (
@@ -52,9 +55,12 @@ class MissionInputs:
 
         self._node.listen(topic, handle, required=False)
 
-    def autopilot(self, stamp: float) -> None:
-        """Note that the bridge was connected with the autopilot at `stamp` [s]."""
-        self._inputs.autopilot(stamp)
+    def autopilot(self, stamp: float, round_trip: float | None) -> None:
+        """Note that the bridge was connected with the autopilot at `stamp` [s].
+
+        round_trip: how long its answers take [s], None where not known.
+        """
+        self._inputs.autopilot(stamp, math.nan if round_trip is None else round_trip)
 
     def tick(self, stamp: int) -> None:
         """Note the tick `stamp` [ns], and look at the messages when it is time to."""

@@ -8,10 +8,12 @@ from uam_control.coordinates import COORDINATES, JOINTS
 from uam_control.estimation import EstimatorParameters, StateEstimator
 from uam_control.profile import load_profile
 from uam_msgs_py import topics
-from uam_msgs_py.convert import TrajectoryWriter, read_imu, read_joints, read_pose, seconds
+from uam_msgs_py.convert import read_imu, read_joints, read_pose
 from uam_msgs_py.joins import Backlog
 from uam_msgs_py.node import UamNode, run
 from uam_msgs_py.parameters import NodeParameters
+from uam_msgs_py.stamps import seconds
+from uam_msgs_py.trajectories import TrajectoryWriter
 
 NAME = "state_estimator"
 DEFAULT_PROFILE = "s500"

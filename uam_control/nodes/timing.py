@@ -3,8 +3,8 @@
 from dataclasses import dataclass
 
 from uam_control.parameters import ParameterSet, number
-from uam_msgs_py.convert import seconds
 from uam_msgs_py.layouts import SECOND
+from uam_msgs_py.stamps import seconds
 
 
 @dataclass(frozen=True)

@@ -60,6 +60,8 @@ CHECKS = (
           "controller_age_hold"),
     Check("autopilot", "nothing of the {name} for {value:.2f} s, {limit:g} s allowed",
           land="autopilot_age_land"),
+    Check("autopilot's link", "{name} takes {value:.3f} s there and back, {limit:g} s allowed",
+          failsafe="round_trip_failsafe"),
     Check("control ticks", "{value:.0f} {name} missed within a second, {limit:g} allowed",
           "missed_ticks_hold", failsafe="missed_ticks_failsafe"),
     Check("servo temperature", "{name} {value:.0f} deg C exceeds {limit:g} deg C",
@@ -119,6 +121,7 @@ class Checks:
             readings.joint_age,
             readings.controller_age,
             readings.autopilot_age,
+            readings.round_trip,
             readings.missed_ticks,
             readings.temperature,
             readings.joint_effort,
@@ -195,6 +198,7 @@ def read(
     joints: float,
     controllers: float,
     autopilot: float,
+    round_trip: float,
     missed: float,
     temperature: float,
     effort: np.ndarray,
@@ -207,9 +211,9 @@ def read(
     values[7] = _known(-battery)
     values[8], values[9], values[10] = _known(mocap), _known(still), _known(joints)
     values[11], values[12] = _known(controllers), _known(autopilot)
-    values[13], values[14] = _known(missed), _known(temperature)
-    values[15] = _largest(effort, effort_limits)
-    values[16] = _largest(gains, gain_limits)
+    values[13], values[14], values[15] = _known(round_trip), _known(missed), _known(temperature)
+    values[16] = _largest(effort, effort_limits)
+    values[17] = _largest(gains, gain_limits)
 
 
 @jit

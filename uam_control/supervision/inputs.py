@@ -54,9 +54,13 @@ class Inputs:
         """Note the charge left, 0..1; NaN where nobody knows."""
         self._readings.battery = left
 
-    def autopilot(self, stamp: float) -> None:
-        """Note that the bridge was connected with the autopilot at `stamp` [s]."""
+    def autopilot(self, stamp: float, round_trip: float) -> None:
+        """Note that the bridge was connected with the autopilot at `stamp` [s].
+
+        round_trip: how long its answers take [s], NaN where not known.
+        """
         self._autopilot = stamp
+        self._readings.round_trip = round_trip
 
     def gains(self, stamp: float, subsystem: str, names: Sequence[str], values: np.ndarray) -> None:
         """Note the gains (n,) that one of SUBSYSTEMS had at `stamp` [s], and their names."""

@@ -28,7 +28,7 @@ class Readings:
     mocap_still [s]: since the pose last was another one;
     controller_age [s]: of the oldest of the newest gains, which every controller tells;
     pose_controller_age: the same without the arm's. autopilot_age [s]: since the bridge last told
-    that it hears the autopilot.
+    that it hears the autopilot; round_trip [s]: how long the autopilot's answers take.
     missed_ticks: within the last second. temperature: of the hottest servo [deg C]. joint_effort
     (2,): measured [N m]. gains (3,): largest adapted gain of position, attitude, arm.
     """
@@ -44,6 +44,7 @@ class Readings:
     pose_controller_age: float = math.nan
     autopilot_age: float = math.nan
     mocap_still: float = math.nan
+    round_trip: float = math.nan
 
 
 @dataclass

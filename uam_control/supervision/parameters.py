@@ -57,6 +57,9 @@ class Limits(ParameterSet):
         0.75, "how long nothing is heard of the autopilot, or of the bridge, to land at", "s", 0.3,
         60.0,
     )  # fmt: skip
+    round_trip_failsafe: float = number(
+        0.05, "round trip of the autopilot's link to leave it to the autopilot at", "s", 0.005, 10.0
+    )
     missed_ticks_hold: float = number(
         125.0, "control ticks missed within a second to hold at", "1", 1.0, 1e4
     )

@@ -9,7 +9,7 @@ import viser
 from std_msgs.msg import String
 from visualization_msgs.msg import Marker, MarkerArray
 
-from uam_msgs_py.convert import WORLD
+from uam_msgs_py.topics import WORLD
 from uam_msgs_py.transforms import Transform
 from uam_sim_bridge.cockpit.urdf_shapes import Shape, shapes
 

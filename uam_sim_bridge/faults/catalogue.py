@@ -40,6 +40,7 @@ FAULTS: dict[str, type[Fault]] = {
         process_faults.NodeKill,
         process_faults.NodeStall,
         process_faults.NodeSlow,
+        process_faults.DiscoveryLoss,
     )
 }
 WHOLE = ("joint", "motor")  # parameters that count something

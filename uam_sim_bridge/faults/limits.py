@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection
+from collections.abc import Collection, Mapping
 
 from uam_sim_bridge.faults.fault import PROCESS, Fault, FaultError
 from uam_sim_bridge.faults.link_faults import LinkFault, MavlinkDelay
@@ -10,16 +10,24 @@ from uam_sim_bridge.faults.process_faults import ProcessFault
 from uam_sim_bridge.faults.schedule import Schedule
 
 
-def check(schedule: Schedule, engine: str, absent: Collection[str] = ()) -> None:
+def check(
+    schedule: Schedule,
+    engine: str,
+    absent: Collection[str] = (),
+    refused: Mapping[str, str] | None = None,
+) -> None:
     """Raise FaultError for the first fault that this flight cannot have.
 
-    engine: ros or direct; absent: processes that the flight does not start itself.
+    engine: ros or direct; absent: processes that the flight does not start itself; refused: by
+    name, why this machine cannot have a fault, empty where it can.
     """
     for one in schedule.faults:
         fault = one.fault
         why = needs_nodes(fault) if engine == "direct" else ""
         if why:
             raise FaultError(f"{fault.NAME}: {why}: needs --engine ros")
+        if why := (refused or {}).get(fault.NAME):
+            raise FaultError(f"{fault.NAME}: not on this machine: {why}")
         if isinstance(fault, ProcessFault) and fault.node in absent:
             raise FaultError(f"{fault.NAME}: this flight does not start {fault.node}")
 

@@ -1,4 +1,4 @@
-"""Nodes that are killed, stopped for a while, or slow. They need processes: the ROS engine."""
+"""Nodes that are killed, stopped, slow, or unheard of. They need processes: the ROS engine."""
 
 from __future__ import annotations
 
@@ -43,6 +43,17 @@ class NodeKill(ProcessFault):
 class NodeStall(ProcessFault):
     NAME: ClassVar[str] = "node_stall"
     ABOUT: ClassVar[str] = "a process is stopped (SIGSTOP), and goes on when the fault ends"
+
+
+@dataclass(frozen=True)
+class DiscoveryLoss(ProcessFault):
+    NAME: ClassVar[str] = "discovery_loss"
+    ABOUT: ClassVar[str] = (
+        "a process neither hears nor tells anything of DDS discovery; "
+        "what flows does so until the others' lease of it runs out"
+    )
+
+    node: str = choice("arm_controller", NODE, tuple(one for one in NODES if one != "autopilot"))
 
 
 @dataclass(frozen=True)

@@ -125,7 +125,7 @@ class DirectFlight:
         self.bridge.identification.switch(stamp, magnet)
         self.bridge.send(stamp, plant.time, tau_p, tau_q, state, flying, output, samples.mocap)
         if self.bridge.connected(stamp):
-            self.inputs.autopilot(stamp)
+            self.inputs.autopilot(stamp, math.nan)  # no link, no round trip
         motors = self.bridge.autopilot_tick(samples.hil)
 
         truth = self._truth_at(stamp)

@@ -14,9 +14,12 @@ from collections.abc import Callable
 from functools import partial
 
 from uam_sim_bridge.faults import Schedule
-from uam_sim_bridge.faults.process_faults import NodeKill, NodeSlow, ProcessFault
+from uam_sim_bridge.faults.process_faults import DiscoveryLoss, NodeKill, NodeSlow, ProcessFault
 from uam_sim_bridge.faults.timeline import Happened
 from uam_sim_bridge.flight.processes import Processes
+from uam_sim_bridge.flight.thread_stop import StoppedThreads
+
+DISCOVERY = ("dds.udp.", "dds.ev.")  # Fast DDS's threads that hear the others, and tell of itself
 
 
 class ProcessFaults:
@@ -33,11 +36,13 @@ class ProcessFaults:
         self._children, self._tell, self._clock = children, tell, clock
         self._all = [Happened(one, number) for number, one in enumerate(schedule.faults)]
         self._ends: dict[int, float] = {}  # by the clock
-        self._hindering: dict[int, _Hindrance] = {}
+        self._hindering: dict[int, _Hindrance | StoppedThreads] = {}
 
     def update(self, mission_time: float | None) -> None:
         """Begin what is due at a mission time [s] (None: not known yet), end what is over."""
         now = self._clock()
+        for hindrance in self._hindering.values():
+            hindrance.look()
         for one in self._all:
             due = mission_time is not None and mission_time >= one.planned.at
             if one.begin is None and due:
@@ -59,6 +64,9 @@ class ProcessFaults:
         if isinstance(fault, NodeKill):
             self._children.let_end(fault.node)
             os.kill(pid, signal.SIGKILL)
+            return
+        if isinstance(fault, DiscoveryLoss):
+            self._hindering[one.number] = StoppedThreads(pid, DISCOVERY)
             return
         stopped, cycle = (fault.stopped, fault.cycle) if isinstance(fault, NodeSlow) else (1.0, 0.0)
         self._hindering[one.number] = _Hindrance(
@@ -91,6 +99,9 @@ class _Hindrance:
             phases = ((signal.SIGSTOP, stopped * cycle), (signal.SIGCONT, (1.0 - stopped) * cycle))
             self._thread = threading.Thread(target=self._cycle, args=(phases,), daemon=True)
             self._thread.start()
+
+    def look(self) -> None:
+        """Nothing to note."""
 
     def end(self) -> None:
         """Let it go on."""

@@ -12,6 +12,8 @@ from uam_control.laws.catalogue import LAWS
 from uam_control.mission import Scenario, load_scenario
 from uam_control.profile import Profile, load_profile
 from uam_sim_bridge.faults import Schedule, limits, read_schedule
+from uam_sim_bridge.faults.process_faults import DiscoveryLoss
+from uam_sim_bridge.flight import thread_stop
 from uam_sim_bridge.flight.ports import AUTOPILOT_UDP, INSTANCES
 from uam_sim_bridge.mavlink.transport import ALLOWED, LinkUrl, parse_url
 from uam_sim_bridge.px4.installation import Px4Installation
@@ -135,7 +137,8 @@ def settings(
         raise SettingsError(f"payload mass {mass:g} kg is outside 0..{PAYLOAD_MAX:g} kg")
     injected = read_schedule(faults, loaded, seed)
     left_out = tuple(dict.fromkeys(without if view else (*without, COCKPIT)))
-    limits.check(injected, engine, (*left_out, "autopilot") if link is not None else left_out)
+    absent = (*left_out, "autopilot") if link is not None else left_out
+    limits.check(injected, engine, absent, {DiscoveryLoss.NAME: thread_stop.refusal()})
     return FlightSettings(
         scenario=loaded,
         profile=flown,

@@ -11,20 +11,11 @@ import math
 import numpy as np
 
 from uam_sim_bridge.autopilot.modes import CUSTOM_MODE_ENABLED, Command, Mode, Result
-from uam_sim_bridge.mavlink.battery import Battery, from_battery_status, from_sys_status
 from uam_sim_bridge.mavlink.events import EventReader
 from uam_sim_bridge.mavlink.frames import swap_body
-from uam_sim_bridge.mavlink.health import unhealthy
 from uam_sim_bridge.mavlink.link_statistics import LinkStatistics
 from uam_sim_bridge.mavlink.offboard import HEARTBEAT_TIMEOUT, OffboardSequence, Request
-from uam_sim_bridge.mavlink.parameter_check import (
-    WATCHED,
-    differences,
-    expected,
-    stream_loss,
-    untold,
-    value_of,
-)
+from uam_sim_bridge.mavlink.parameter_watch import ParameterWatch
 from uam_sim_bridge.mavlink.reboot import RebootDetector
 from uam_sim_bridge.mavlink.setpoint import RateThrustParameters
 from uam_sim_bridge.mavlink.signing import Signing
@@ -32,17 +23,10 @@ from uam_sim_bridge.mavlink.streams import StreamCheck
 from uam_sim_bridge.mavlink.time_sync import TimeSync, nanoseconds
 from uam_sim_bridge.mavlink.transport import Transport
 from uam_sim_bridge.mavlink.vision import vision_message
-from uam_sim_bridge.mavlink.wire import (
-    Codec,
-    Framer,
-    Message,
-    TextAssembler,
-    clean_text,
-    mavlink2,
-)
+from uam_sim_bridge.mavlink.vitals import Vitals
+from uam_sim_bridge.mavlink.wire import Codec, Framer, Message, TextAssembler, mavlink2
 
 HEARTBEAT_PERIOD = 1.0  # s
-PARAMETER_RETRY, PARAMETER_ATTEMPTS = 0.5, 10  # s, times
 EXPLAIN_PERIOD = 3.0  # s between two requests to say again what keeps it from arming
 _NO_ATTITUDE = [1.0, 0.0, 0.0, 0.0]
 ATTITUDE_IGNORED = 128  # type_mask of SET_ATTITUDE_TARGET: body rates and thrust count
@@ -52,10 +36,9 @@ class OffboardLink:
     """The autopilot as the bridge sees it, and the way to it.
 
     `armed`, `mode`, `landed`: its latest word; `armed_since` [s] or None: tick at which it was
-    first known armed; `values`: by name, those of its parameters that are WATCHED; `warnings`:
-    where they disagree with the mapping, and streams that do not come; `ignored`: messages of
-    other systems, and answers to others; `battery`, `estimator_flags`, `unhealthy` sensors, `load`
-    0..1: its latest word, None before the first; `reboots`: how often it has restarted.
+    first known armed; `values`: by name, those of its parameters that are WATCHED; `ignored`:
+    messages of other systems, and answers to others; `vitals`: how it is; `reboots`: how often it
+    has restarted.
     """
 
     def __init__(
@@ -69,43 +52,37 @@ class OffboardLink:
         self.sequence = sequence
         self.mode, self.armed, self.landed = Mode.UNKNOWN, False, True
         self.armed_since: float | None = None
-        self.values: dict[str, float] = {}
         self.ignored = self.reboots = 0
-        self.battery: Battery | None = None
-        self.estimator_flags: int | None = None
-        self.unhealthy: tuple[str, ...] = ()
-        self.load: float | None = None
+        self.vitals = Vitals()
         self.time_sync = TimeSync()
         self.streams = StreamCheck()
         self.statistics = LinkStatistics()
         self._reboot = RebootDetector()
         self._events = EventReader()
-        self._parameter_warnings: tuple[str, ...] = ()
+        self._parameters = ParameterWatch(mapping)
+        self.values = self._parameters.values
         self._transport = transport
-        self._mapping = mapping
         self._target = target_system
         self._codec = Codec(target_system, mavlink2.MAV_COMP_ID_ONBOARD_COMPUTER, signing)
         self._framer = Framer(self._codec)
         self._texts = TextAssembler()
         self._asked: dict[int, Request] = {}
-        self._heard = self._beat = self._parameters_asked = self._explained = -math.inf
-        self._parameter_attempts = 0
+        self._heard = self._beat = self._explained = -math.inf
         self._met = False  # connected at the last tick
 
     def set_mapping(self, mapping: RateThrustParameters) -> None:
         """Compare the autopilot's parameters with another mapping from now on."""
-        self._mapping = mapping
-        self._compare()
+        self._parameters.set_mapping(mapping)
 
     @property
     def warnings(self) -> tuple[str, ...]:
         """One line for each thing about parameters and streams that is not as it should be."""
-        return self._parameter_warnings + self.streams.warnings
+        return self._parameters.warnings + self.streams.warnings
 
     @property
     def mapping_told(self) -> bool:
         """Whether the autopilot has told every parameter that the mapping assumes."""
-        return all(name in self.values for name in expected(self._mapping))
+        return self._parameters.mapping_told
 
     @property
     def bad_bytes(self) -> int:
@@ -241,29 +218,11 @@ class OffboardLink:
             if said is not None:
                 self.sequence.text(*said)
         elif kind == "PARAM_VALUE":
-            name = clean_text(m.param_id)
-            if name in WATCHED:  # of others there may be any number
-                self.values[name] = value_of(m)
-                self._compare()
+            self._parameters.take(m)
         elif kind == "TIMESYNC" and m.tc1 == 0:
             self._send(mavlink2.MAVLink_timesync_message(nanoseconds(time), m.ts1))
         else:
-            self._take_health(kind, m)
-
-    def _take_health(self, kind: str, m: Message) -> None:
-        if kind == "BATTERY_STATUS" and m.id == 0:
-            self.battery = from_battery_status(m)
-        elif kind == "SYS_STATUS":
-            self.unhealthy = unhealthy(
-                m.onboard_control_sensors_present,
-                m.onboard_control_sensors_enabled,
-                m.onboard_control_sensors_health,
-            )
-            self.load = 1e-3 * m.load
-            if self.battery is None or not self.battery.known:
-                self.battery = from_sys_status(m)
-        elif kind == "ESTIMATOR_STATUS":
-            self.estimator_flags = m.flags
+            self.vitals.take(kind, m)
 
     def _watch_clock(self, time: float, kind: str, m: Message) -> None:
         """Follow the autopilot's clock, and notice that it starts again."""
@@ -288,18 +247,8 @@ class OffboardLink:
         """Ask for everything anew: the autopilot is there for the first time, or again."""
         self.statistics.restart()
         self.streams.restart()
-        self.values.clear()
         self._asked.clear()
-        self._parameters_asked, self._parameter_attempts = -math.inf, 0
-        self._compare()
-
-    def _compare(self) -> None:
-        missing = self._missing if self._parameter_attempts > PARAMETER_ATTEMPTS else []
-        self._parameter_warnings = (
-            *differences(self._mapping, self.values),
-            *stream_loss(self.values),
-            *untold(missing, PARAMETER_ATTEMPTS),
-        )
+        self._parameters.restart()
 
     def _take_state(self, time: float, mode: Mode, armed: bool) -> None:
         if armed and not self.armed:
@@ -351,23 +300,9 @@ class OffboardLink:
         wanted = self.streams.request(time)
         if wanted is not None:
             self._command(Command.SET_MESSAGE_INTERVAL, *wanted)
-        if time - self._parameters_asked < PARAMETER_RETRY:
-            return
-        missing = self._missing
-        if not missing or self._parameter_attempts > PARAMETER_ATTEMPTS:
-            return
-        self._parameters_asked = time
-        self._parameter_attempts += 1
-        if self._parameter_attempts > PARAMETER_ATTEMPTS:  # the last answers have had their time
-            self._compare()
-            return
-        for name in missing:
+        for name in self._parameters.due(time):
             self._send(
                 mavlink2.MAVLink_param_request_read_message(
                     self._target, mavlink2.MAV_COMP_ID_AUTOPILOT1, name.encode(), -1
                 )
             )
-
-    @property
-    def _missing(self) -> list[str]:
-        return [name for name in WATCHED if name not in self.values]

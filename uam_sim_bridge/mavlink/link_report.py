@@ -8,7 +8,8 @@ from uam_sim_bridge.mavlink.link import OffboardLink
 
 def report(link: OffboardLink) -> dict[str, str | int | None]:
     """Return the values by name; None where nothing is known yet."""
-    flags, sync, battery = link.estimator_flags, link.time_sync, link.battery
+    vitals, sync = link.vitals, link.time_sync
+    flags, battery = vitals.estimator_flags, vitals.battery
     return {
         "round trip [ms]": _scaled(sync.round_trip, 1e3, ".1f"),
         "clock offset [ms]": _scaled(sync.offset, 1e3, ".1f"),
@@ -17,17 +18,17 @@ def report(link: OffboardLink) -> dict[str, str | int | None]:
         "bad bytes": link.bad_bytes,
         "reboots of the autopilot": link.reboots,
         "estimator": None if flags is None else ", ".join(names(flags, ESTIMATOR_FLAGS)),
-        "sensors unhealthy": ", ".join(link.unhealthy),
-        "autopilot load [%]": _scaled(link.load, 100.0, ".0f"),
+        "sensors unhealthy": ", ".join(vitals.unhealthy),
+        "autopilot load [%]": _scaled(vitals.load, 100.0, ".0f"),
         "battery [V]": f"{battery.voltage:.2f}" if battery and battery.known else None,
     }
 
 
 def faults(link: OffboardLink) -> tuple[str, ...]:
     """Return what is wrong with the autopilot's estimate while it is armed, in words."""
-    if not link.armed or link.estimator_flags is None:
+    if not link.armed or link.vitals.estimator_flags is None:
         return ()
-    return tuple(f"autopilot: {fault}" for fault in estimate_faults(link.estimator_flags))
+    return tuple(f"autopilot: {fault}" for fault in estimate_faults(link.vitals.estimator_flags))
 
 
 def _scaled(value: float | None, scale: float, form: str) -> str | None:

@@ -17,6 +17,7 @@ _OUTSTANDING = 16  # requests whose answers are still accepted
 _RECENT = 25  # answers over which the quickest is looked for
 _SLOWEST_GAIN = 0.05
 _SHORTEST = 1e-3  # s: what counts as no round trip at all
+_NEWEST = 5  # answers, those of a second
 
 
 class TimeSync:
@@ -38,6 +39,15 @@ class TimeSync:
         self.round_trip: float | None = None
         self._count = self._jumps = 0
         self._recent: deque[float] = deque(maxlen=_RECENT)
+
+    @property
+    def quickest(self) -> float | None:
+        """Round trip [s] of the quickest answer of the last second; None before there are enough.
+
+        A single late answer does not count, a slow link does at once.
+        """
+        newest = list(self._recent)[-_NEWEST:]
+        return min(newest) if len(newest) == _NEWEST else None
 
     def request(self, time: float) -> int | None:
         """Return the ts1 [ns] of the request due at `time` [s], None where none is due."""

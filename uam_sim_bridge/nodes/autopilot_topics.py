@@ -6,8 +6,8 @@ from typing import Any
 
 from uam_msgs_py import topics
 from uam_msgs_py.battery import battery_message
-from uam_msgs_py.convert import seconds
 from uam_msgs_py.node import UamNode
+from uam_msgs_py.stamps import seconds
 from uam_msgs_py.status import AutopilotState
 from uam_sim_bridge.mavlink.link import OffboardLink
 from uam_sim_bridge.mavlink.offboard import OffboardSequence
@@ -49,11 +49,12 @@ class AutopilotTopics:
             link.armed,
             None if since is None else round(since * 1e6) * 1000,
             "; ".join(sequence.reasons),
+            link.time_sync.quickest,
         )
         self._state.publish(state.to_message(stamp))
 
     def _tell_battery(self, stamp: int) -> None:
-        battery = self._link.battery
+        battery = self._link.vitals.battery
         if battery is not None and stamp - self._battery_told >= BATTERY_PERIOD:
             self._battery_told = stamp
             self._battery.publish(battery_message(stamp, battery))

@@ -39,11 +39,12 @@ from uam_msgs_py.control import (
     read_state,
     read_torque,
 )
-from uam_msgs_py.convert import JointStateWriter, SetpointWriter, read_pose, seconds
+from uam_msgs_py.convert import JointStateWriter, SetpointWriter, read_pose
 from uam_msgs_py.joins import StampJoin
 from uam_msgs_py.layouts import BadMessage, stamp_of
 from uam_msgs_py.node import UamNode, run
 from uam_msgs_py.parameters import NodeParameters
+from uam_msgs_py.stamps import seconds
 from uam_msgs_py.status import OK, WARN, MissionStatus
 from uam_sim_bridge.flight.fault_log import FaultTopic
 from uam_sim_bridge.mavlink.hold import UNKNOWN, HoldParameters, LevelHold

@@ -13,8 +13,8 @@ lockstep  At every control tick the plant waits for the setpoint that the bridge
 realtime  Ticks begin at absolute deadlines of the wall clock, `control period` apart; after a stall
           of the machine they follow each other at most CATCH_UP times as fast. What has not arrived
           by the next deadline is missing, and what was commanded last holds. A control tick counts
-          as missed when its setpoint was never sent, or later than DEADLINE_TICKS control periods
-          after its IMU sample. The latency of a tick is the time between these two publications;
+          as missed when its setpoint was never sent, or some control periods after its IMU sample
+          (`latencies.py`). The latency of a tick is the time between these two publications;
           beyond one control period it counts as late.
           The bridge publishes /uam/setpoint when it has sent the setpoint to the autopilot, which
           therefore has it by then.
@@ -48,6 +48,7 @@ from uam_sim_bridge.flight.fault_log import FaultTopic
 from uam_sim_bridge.flight.limits import DISARMED, Settled
 from uam_sim_bridge.flight.patience import Patience
 from uam_sim_bridge.mavlink.hil_server import HilParameters, HilServer
+from uam_sim_bridge.nodes.latencies import Latencies
 from uam_sim_bridge.nodes.plant_health import PlantHealth
 from uam_sim_bridge.nodes.plant_options import NOT_READY, Options, Statistics, declare
 from uam_sim_bridge.nodes.plant_topics import SUSPECTS, Answers, Sensors, TruthTopics, nanoseconds
@@ -56,7 +57,6 @@ from uam_sim_bridge.plant import Plant, Samples, Truth, Vehicle
 
 NAME = "mujoco_sim"
 REPORT_INTERVAL = 5.0  # [s] between two lines that say who is waited for
-DEADLINE_TICKS = 3  # [control periods] 12 ms, about a rotor's time constant
 CATCH_UP = 1.25  # [1] times real time, after a stall of the machine, which had no time to spare
 FOREIGN_WAIT = 1.0  # [s] for a foreign node to find us as well: it does not say when it has
 LAST_WAIT = 3.0  # [s] for a recorder that has not seen the last tick, and may have lost it
@@ -103,7 +103,7 @@ class Simulator:
         self._restart = Restart(options.answer_timeout)
         self._begun = 0.0  # wall time [s] at which this tick began
         self._begun_at = 0.0  # and simulation time [s]
-        self._unanswered: dict[int, int] = {}  # stamp [ns] → wall time of publication [ns]
+        self._latencies = Latencies(self.statistics, self.plant.period)
 
     def wait_for_everyone(self) -> None:
         """Return when all nodes are connected to each other and the autopilot to us."""
@@ -275,31 +275,16 @@ class Simulator:
         self.answers.take()
 
     def _measure(self) -> None:
-        """Note what became of this tick, and the latencies of the setpoints that have arrived."""
-        numbers = self.statistics
-        if self._stamp is not None:
-            self._unanswered[self._stamp] = self._published
-            numbers.answerable_ticks += 1
-        for answered, sent in self.answers.setpoints.items():
-            begun = self._unanswered.pop(answered, None)
-            if begun is None:
-                continue
-            latency = (sent - begun) * 1e-9
-            numbers.latency_s.append(latency)
-            numbers.late_ticks += latency > self.plant.period
-            numbers.missed_ticks += latency > DEADLINE_TICKS * self.plant.period
+        """Note what became of this tick, and of those whose setpoints have arrived."""
+        self._latencies.tick(self._stamp, self._published, self.answers.setpoints)
         self.answers.setpoints.clear()
 
     def report(self) -> Statistics:
         """The statistics so far; ticks never answered count, except those still on their way."""
         numbers = self.statistics
         numbers.ticks, numbers.simulated_s = self.plant.tick, self.plant.time
-        underway = DEADLINE_TICKS * self.plant.period * 1e9
-        never = sum(self._published - sent > underway for sent in self._unanswered.values())
-        numbers.late_ticks += never
-        numbers.missed_ticks += never
+        self._latencies.conclude(self._published)
         numbers.late_motor_commands = self.hil.missed
-        self._unanswered.clear()
         return numbers
 
     def close(self) -> None:

@@ -14,17 +14,11 @@ from rosgraph_msgs.msg import Clock
 
 from uam_control.coordinates import ARM, COORDINATES
 from uam_msgs_py import topics
-from uam_msgs_py.convert import (
-    ImuWriter,
-    JointStateWriter,
-    PoseWriter,
-    Template,
-    TrajectoryWriter,
-    read_effort,
-    read_switch,
-)
+from uam_msgs_py.convert import ImuWriter, JointStateWriter, PoseWriter, read_effort, read_switch
 from uam_msgs_py.layouts import stamp_of
+from uam_msgs_py.serialized import Template
 from uam_msgs_py.status import MissionStatus
+from uam_msgs_py.trajectories import TrajectoryWriter
 from uam_sim_bridge.plant import Samples, Truth
 
 JOINTS = list(COORDINATES[ARM])

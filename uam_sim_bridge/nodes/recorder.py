@@ -27,11 +27,11 @@ from rclpy.subscription import Subscription
 
 from uam_control.parameters import ParameterError
 from uam_msgs_py import connections, topics
-from uam_msgs_py.convert import type_name
 from uam_msgs_py.health import LoopTime, ages
 from uam_msgs_py.layouts import SECOND, stamp_of
 from uam_msgs_py.node import StopSignal, refuse
 from uam_msgs_py.parameters import refuse_unknown
+from uam_msgs_py.serialized import type_name
 from uam_msgs_py.status import ERROR, OK, WARN, diagnostic
 from uam_sim_bridge.flight.bounded_log import BoundedLog
 from uam_sim_bridge.flight.message_definitions import schema

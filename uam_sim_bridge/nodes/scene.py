@@ -26,11 +26,13 @@ from uam_control.parameters import ParameterSet, number
 from uam_control.rotations import quaternion_from_euler, wrap_angle
 from uam_msgs_py import topics
 from uam_msgs_py.control import Reference, read_reference, read_state
-from uam_msgs_py.convert import BODY, WORLD, JointStateWriter, read_pose, seconds
+from uam_msgs_py.convert import JointStateWriter, read_pose
 from uam_msgs_py.layouts import SECOND
 from uam_msgs_py.node import UamNode, run
 from uam_msgs_py.parameters import NodeParameters
+from uam_msgs_py.stamps import seconds
 from uam_msgs_py.status import ERROR, OK, MissionStatus
+from uam_msgs_py.topics import BODY, WORLD
 from uam_msgs_py.transforms import Transform, transforms_message
 from uam_sim_bridge.nodes.scene_markers import PAYLOAD, FlownPath, Markers, ReferencePath
 from uam_sim_bridge.plant import Vehicle

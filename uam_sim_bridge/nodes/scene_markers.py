@@ -14,8 +14,9 @@ from visualization_msgs.msg import Marker, MarkerArray
 
 from uam_control.mission import Scenario
 from uam_control.mission.trajectory import empty_reference
-from uam_msgs_py.convert import BODY, WORLD, set_stamp
+from uam_msgs_py.stamps import set_stamp
 from uam_msgs_py.status import MissionStatus
+from uam_msgs_py.topics import BODY, WORLD
 from uam_sim_bridge.plant.frames import Box
 
 PAYLOAD, MAGNET = "payload", "magnet"  # frames

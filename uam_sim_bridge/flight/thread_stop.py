@@ -1,0 +1,76 @@
+"""Stops single threads of a child process by ptrace, as a debugger does (Linux, see ptrace(2)).
+
+Signals stop whole processes only. The kernel lets the threads go on when the tracer ends, however
+it ends; a traced process can be killed and interrupted as usual.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import ctypes
+import os
+from collections.abc import Sequence
+from pathlib import Path
+
+SEIZE, INTERRUPT, DETACH = 0x4206, 0x4207, 17  # sys/ptrace.h
+WAIT_ALL = 0x40000000  # __WALL, for threads as well
+SCOPE = Path("/proc/sys/kernel/yama/ptrace_scope")
+ADMINISTRATOR_ONLY = 2
+
+_ptrace = ctypes.CDLL(None, use_errno=True).ptrace
+_ptrace.argtypes = [ctypes.c_long, ctypes.c_long, ctypes.c_void_p, ctypes.c_void_p]
+_ptrace.restype = ctypes.c_long
+
+
+def refusal() -> str:
+    """Why threads of children cannot be stopped on this machine; empty where they can be."""
+    try:
+        scope = int(SCOPE.read_text())
+    except (OSError, ValueError):  # a kernel without Yama
+        return ""
+    if scope >= ADMINISTRATOR_ONLY and os.geteuid() != 0:
+        return f"kernel.yama.ptrace_scope is {scope}; it takes 1 or less"
+    return ""
+
+
+class StoppedThreads:
+    """Threads of a process, by the beginnings of their names, stopped until `end`."""
+
+    def __init__(self, pid: int, names: Sequence[str]):
+        """Stop them. `end` is for the thread that made it, as ptrace has it.
+
+        Raises OSError where the kernel refuses.
+        """
+        self._stopped: list[int] = []
+        for task in Path(f"/proc/{pid}/task").iterdir():
+            if (task / "comm").read_text().startswith(tuple(names)):
+                self._stop(int(task.name))
+
+    def __len__(self) -> int:
+        return len(self._stopped)
+
+    def _stop(self, thread: int) -> None:
+        _call(SEIZE, thread)
+        self._stopped.append(thread)
+        _call(INTERRUPT, thread)
+        os.waitpid(thread, WAIT_ALL)
+
+    def look(self) -> None:
+        """Take note of those that have ended: until then their process has not, for its parent."""
+        for thread in self._stopped:
+            with contextlib.suppress(OSError):
+                os.waitpid(thread, WAIT_ALL | os.WNOHANG)
+
+    def end(self) -> None:
+        """Let them go on."""
+        self.look()
+        for thread in self._stopped:
+            with contextlib.suppress(OSError):  # ended meanwhile
+                _call(DETACH, thread)
+        self._stopped.clear()
+
+
+def _call(request: int, thread: int) -> None:
+    if _ptrace(request, thread, None, None) == -1:
+        number = ctypes.get_errno()
+        raise OSError(number, f"ptrace of thread {thread}: {os.strerror(number)}")

@@ -1,0 +1,42 @@
+"""How long setpoints take from the IMU sample that they answer, in real time."""
+
+from __future__ import annotations
+
+from uam_sim_bridge.nodes.plant_options import Statistics
+
+DEADLINE_TICKS = 3  # [control periods] 12 ms, about a rotor's time constant
+
+
+class Latencies:
+    """Notes when samples were published and when their setpoints were sent, in `statistics`."""
+
+    def __init__(self, statistics: Statistics, period: float):
+        """period: of the control ticks [s]."""
+        self._statistics, self._period = statistics, period
+        self._unanswered: dict[int, int] = {}  # stamp [ns] → wall time of publication [ns]
+
+    def tick(self, stamp: int | None, published: int, setpoints: dict[int, int]) -> None:
+        """Note a tick's sample, None for none, and the setpoints that have arrived.
+
+        published: wall time [ns]; setpoints: stamp of the sample answered [ns] → wall time [ns].
+        """
+        numbers = self._statistics
+        if stamp is not None:
+            self._unanswered[stamp] = published
+            numbers.answerable_ticks += 1
+        for answered, sent in setpoints.items():
+            begun = self._unanswered.pop(answered, None)
+            if begun is None:
+                continue
+            latency = (sent - begun) * 1e-9
+            numbers.latency_s.append(latency)
+            numbers.late_ticks += latency > self._period
+            numbers.missed_ticks += latency > DEADLINE_TICKS * self._period
+
+    def conclude(self, now: int) -> None:
+        """Count as missed what was never answered and not on its way any more at `now` [ns]."""
+        underway = DEADLINE_TICKS * self._period * 1e9
+        never = sum(now - sent > underway for sent in self._unanswered.values())
+        self._statistics.late_ticks += never
+        self._statistics.missed_ticks += never
+        self._unanswered.clear()
