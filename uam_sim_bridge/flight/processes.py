@@ -21,6 +21,7 @@ LAST_LINES = 12  # of a failed node's log that its error message shows
 INTERRUPT_WAIT, TERMINATE_WAIT = 10.0, 3.0  # seconds until the next, harder signal
 POLL = 0.02  # seconds
 PROFILES_FILE = "FASTRTPS_DEFAULT_PROFILES_FILE"
+TRANSPORTS = {"lockstep": "dds/fastdds.xml", "realtime": "dds/realtime.xml"}
 
 
 class NodeFailed(RuntimeError):
@@ -221,32 +222,32 @@ class Processes:
         self.close()
 
 
-def environment(domain: int, log_folder: Path) -> dict[str, str]:
+def environment(domain: int, log_folder: Path, clock: str = "lockstep") -> dict[str, str]:
     """What the children inherit: a private, local ROS domain and one thread each."""
-    return {**os.environ, **ros_environment(domain, log_folder), **SINGLE_THREAD}
+    return {**os.environ, **ros_environment(domain, log_folder, clock), **SINGLE_THREAD}
 
 
-def ros_environment(domain: int, log_folder: Path) -> dict[str, str]:
+def ros_environment(domain: int, log_folder: Path, clock: str = "lockstep") -> dict[str, str]:
     """The variables by which ROS finds its domain, its transports and the place of its logs."""
     return {
-        **transport_environment(),
+        **transport_environment(clock),
         "ROS_DOMAIN_ID": str(domain),
         "ROS_LOG_DIR": str(log_folder),
         "RCUTILS_COLORIZED_OUTPUT": "0",
     }
 
 
-def transport_environment() -> dict[str, str]:
+def transport_environment(clock: str = "lockstep") -> dict[str, str]:
     """The variables that keep ROS on this machine.
 
-    Our transports do so by themselves (config/dds/fastdds.xml). Where the user's own file or
-    another middleware is used, ROS is told to.
+    Our transports do so by themselves (config/dds, a file for each clock). Where the user's own
+    file or another middleware is used, ROS is told to.
     """
-    transports = str(configuration.path("dds/fastdds.xml"))
-    chosen = os.environ.get(PROFILES_FILE) or transports
+    files = {one: str(configuration.path(file)) for one, file in TRANSPORTS.items()}
+    chosen = os.environ.get(PROFILES_FILE) or files[clock]
     middleware = os.environ.get("RMW_IMPLEMENTATION") or "rmw_fastrtps_cpp"
-    ours = chosen == transports and "fastrtps" in middleware
+    ours = chosen in files.values() and "fastrtps" in middleware
     return {
-        PROFILES_FILE: chosen,
+        PROFILES_FILE: files[clock] if ours else chosen,
         "ROS_AUTOMATIC_DISCOVERY_RANGE": "SYSTEM_DEFAULT" if ours else "LOCALHOST",
     }
