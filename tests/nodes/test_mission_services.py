@@ -140,3 +140,17 @@ def test_an_empty_battery_lands_and_the_diagnostics_say_why(vehicle, probe):
         return values.get("state") == "landing" and "battery" in values["cause"]
 
     probe.until(told, "diagnostics of the landing")
+
+
+def test_a_failsafe_is_told_before_its_reference_is_idle(vehicle):
+    """Idle commands in the air, to a bridge that does not know yet, switch motors off."""
+    take_off(vehicle)
+    for _ in range(150):
+        vehicle.state[0, 3] = 1.2  # rad, beyond tilt_failsafe
+        vehicle.fly(1)
+    told = [MissionStatus.from_message(message) for message in vehicle.told]
+    failed = min(stamp for stamp, status in told if status.state == "failsafe")
+    references = [read_reference(data) for data in vehicle.references]
+    later = [(stamp, one.flying) for stamp, one in references if stamp >= failed]
+    assert [flying for _, flying in later[:40]] == [True] * 40
+    assert not later[-1][1]

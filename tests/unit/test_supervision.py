@@ -177,6 +177,11 @@ def with_state(entry, value):
             "nothing of the autopilot for 0.80 s, 0.75 s allowed",
         ),
         (
+            observation(readings=Readings(round_trip=0.038)),
+            State.LANDING,
+            "autopilot's link takes 0.038 s there and back, 0.03 s allowed",
+        ),
+        (
             observation(readings=Readings(round_trip=0.068)),
             State.FAILSAFE,
             "autopilot's link takes 0.068 s there and back, 0.05 s allowed",

@@ -28,6 +28,7 @@ from uam_msgs_py.status import ERROR, OK, WARN, AutopilotState, MissionStatus
 NAME = "mission"
 DEFAULT_PROFILE, DEFAULT_SCENARIO = "s500", "pick_and_place"
 STATUS_PERIOD = 500_000_000  # [ns]
+TOLD_BY = 200_000_000  # [ns] by which everybody has the status of a tick
 
 
 class MissionNode(UamNode):
@@ -51,6 +52,7 @@ class MissionNode(UamNode):
         self.parameter_set.apply = self._mission.configure
         self._armed_since: float | None = None
         self._ahead = -1  # stamp [ns] of the newest reference
+        self._flown = -TOLD_BY  # stamp [ns] of the newest one that the mission wanted flown
         self._arm: bool | None = None
         self._told: tuple = ()  # what the last status said
         self._errors = (0.0, 0.0, 0.0)
@@ -101,10 +103,19 @@ class MissionNode(UamNode):
         readings = self._inputs.readings
         output = self._mission.step(seconds(stamp), state, self._armed_since, readings)
         time_of_mission = max(0, round(output.time * SECOND))
-        self._reference.publish(
-            self._writer.fill(stamp, output.reference, output.flying, time_of_mission)
-        )
+        flying = self._flying(stamp, output)
+        self._reference.publish(self._writer.fill(stamp, output.reference, flying, time_of_mission))
         self._ahead = stamp
+
+    def _flying(self, stamp: int, output: MissionOutput) -> bool:
+        """Whether the reference is to be flown: in a failsafe, until the bridge knows of it.
+
+        It then ignores commands. Were they idle before its status arrives, they would mean that the
+        vehicle stands on the ground, and low in the air switch its motors off.
+        """
+        if output.flying:
+            self._flown = stamp
+        return stamp - self._flown < TOLD_BY and output.state is State.FAILSAFE or output.flying
 
     def _measure(self, state: np.ndarray, output: MissionOutput) -> None:
         """Errors of this tick: norms of estimate − reference; zero what is not controlled."""

@@ -61,7 +61,7 @@ CHECKS = (
     Check("autopilot", "nothing of the {name} for {value:.2f} s, {limit:g} s allowed",
           land="autopilot_age_land"),
     Check("autopilot's link", "{name} takes {value:.3f} s there and back, {limit:g} s allowed",
-          failsafe="round_trip_failsafe"),
+          land="round_trip_land", failsafe="round_trip_failsafe"),
     Check("control ticks", "{value:.0f} {name} missed within a second, {limit:g} allowed",
           "missed_ticks_hold", failsafe="missed_ticks_failsafe"),
     Check("servo temperature", "{name} {value:.0f} deg C exceeds {limit:g} deg C",

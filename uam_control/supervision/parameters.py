@@ -57,6 +57,9 @@ class Limits(ParameterSet):
         0.75, "how long nothing is heard of the autopilot, or of the bridge, to land at", "s", 0.3,
         60.0,
     )  # fmt: skip
+    round_trip_land: float = number(
+        0.03, "round trip of the autopilot's link to land at", "s", 0.005, 10.0
+    )
     round_trip_failsafe: float = number(
         0.05, "round trip of the autopilot's link to leave it to the autopilot at", "s", 0.005, 10.0
     )
@@ -83,6 +86,7 @@ class Limits(ParameterSet):
             ("mocap_age_hold", "mocap_age_failsafe"),
             ("missed_ticks_hold", "missed_ticks_failsafe"),
             ("temperature_hold", "temperature_land"),
+            ("round_trip_land", "round_trip_failsafe"),
         ):
             for less, more in zip(order, order[1:], strict=False):
                 low, high = getattr(self, less), getattr(self, more)

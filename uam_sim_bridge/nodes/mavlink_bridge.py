@@ -246,7 +246,7 @@ class MavlinkBridgeNode(UamNode):
             state,
             thrust,
             self.map.assumed_thrust(thrust),
-            position.flying and self.link.armed,
+            position.flying and self.link.armed and not self.sequence.let_go,
         )
 
     def _command(
