@@ -13,8 +13,8 @@ from websockets.exceptions import InvalidStatus
 from websockets.sync.client import connect
 
 from uam_msgs_py.parameters import plain
+from uam_sim_bridge.flight.environment import transport_environment
 from uam_sim_bridge.flight.guest import Guest
-from uam_sim_bridge.flight.processes import transport_environment
 
 PATIENCE = 60_000  # [ms] only a failing test waits that long
 BROWSERS = ("chromium", "chromium-browser", "google-chrome", "google-chrome-stable")

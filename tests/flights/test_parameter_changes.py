@@ -17,8 +17,8 @@ from uam_msgs_py import topics
 from uam_msgs_py.changes import Change
 from uam_msgs_py.layouts import SECOND, stamp_of
 from uam_sim_bridge.flight import timeseries
+from uam_sim_bridge.flight.environment import transport_environment
 from uam_sim_bridge.flight.guest import Guest
-from uam_sim_bridge.flight.processes import transport_environment
 
 NODES = ("position_controller", "attitude_controller", "arm_controller", "state_estimator")
 COUNT = 500

@@ -73,6 +73,21 @@ def test_faults_come_when_they_should_and_the_log_knows_them(fly, short_scenario
 
 
 @pytest.mark.slow
+def test_a_controller_that_is_unheard_of_is_waited_for_and_comes_back(fly):
+    """In real time, hence on an idle machine."""
+    loss = "discovery_loss@carry+1+4:node=arm_controller"
+    flight = fly("--scenario", "quick_pick", "--clock", "realtime", "--fault", loss)
+    flight.wait()
+    assert "fault discovery_loss of arm_controller is over" in flight.said
+    figures = json.loads((flight.out / "metrics.json").read_text())
+    passed = [(one["to"], one["cause"]) for one in figures["transitions"]]
+    held = [cause for to, cause in passed if to == "holding"]
+    assert len(held) == 1 and "a controller's gains" in held[0]
+    assert ("flying", "the controller is back") in passed
+    assert passed[-1][0] == "disarmed" and max(figures["max"]["position_m"]) < 0.3
+
+
+@pytest.mark.slow
 def test_what_is_promised_of_killed_processes_is_kept(tmp_path):
     """In real time, hence on an idle machine: every process at one moment."""
     options = ["--matrix", "processes", "--engine", "ros", "--clock", "realtime"]

@@ -13,8 +13,8 @@ from rclpy.parameter import Parameter
 from whole_flight import assert_nothing_left
 
 from uam_control.configuration import path
+from uam_sim_bridge.flight.environment import transport_environment
 from uam_sim_bridge.flight.guest import Guest
-from uam_sim_bridge.flight.processes import transport_environment
 from uam_sim_bridge.flight.wiring import ARM, ATTITUDE, POSITION
 from uam_sim_bridge.report.rebuild import rebuild
 

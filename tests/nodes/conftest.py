@@ -16,8 +16,8 @@ from rclpy.node import Node
 
 from uam_msgs_py.connections import Connections
 from uam_msgs_py.serialized import stays_serialized
+from uam_sim_bridge.flight.environment import ros_environment
 from uam_sim_bridge.flight.ports import Reservation
-from uam_sim_bridge.flight.processes import ros_environment
 from uam_sim_bridge.flight.shared_memory import Presence, abandoned
 
 PATIENCE = 60.0  # [s] for a process to get somewhere; only a failing test waits that long

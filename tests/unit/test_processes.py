@@ -1,12 +1,10 @@
 """Supervision of child processes, with small stand-in programs instead of nodes."""
 
 import os
-import re
 import signal
 import subprocess
 import sys
 import time
-from pathlib import Path
 
 import pytest
 
@@ -191,45 +189,6 @@ time.sleep(60)
     orchestrator.wait()
     orchestrator.stdout.close()
     wait_for(lambda: all(map(gone, pids)))
-
-
-def test_the_environment_is_private_and_local(tmp_path, monkeypatch):
-    monkeypatch.delenv(processes.PROFILES_FILE, raising=False)
-    monkeypatch.delenv("RMW_IMPLEMENTATION", raising=False)
-    made = processes.environment(42, tmp_path)
-    assert made["ROS_DOMAIN_ID"] == "42"
-    assert made["ROS_AUTOMATIC_DISCOVERY_RANGE"] == "SYSTEM_DEFAULT"
-    assert "<address>127.0.0.1</address>" in Path(made[processes.PROFILES_FILE]).read_text()
-    assert made["ROS_LOG_DIR"] == str(tmp_path)
-    assert made["OMP_NUM_THREADS"] == made["NUMBA_NUM_THREADS"] == "1"
-
-
-def test_in_real_time_a_lost_process_is_given_up_sooner_and_nothing_else_differs(
-    tmp_path, monkeypatch
-):
-    monkeypatch.delenv("RMW_IMPLEMENTATION", raising=False)
-    texts = {}
-    for clock in ("lockstep", "realtime"):
-        made = processes.environment(42, tmp_path, clock)
-        assert made["ROS_AUTOMATIC_DISCOVERY_RANGE"] == "SYSTEM_DEFAULT"
-        texts[clock] = Path(made[processes.PROFILES_FILE]).read_text().split("-->", 1)[1]
-        # as it was told to a parent, which may fly by the other clock
-        monkeypatch.setenv(processes.PROFILES_FILE, made[processes.PROFILES_FILE])
-    lease = re.compile(r"<leaseDuration>.*</leaseDuration>")
-    assert texts["lockstep"] != texts["realtime"]
-    assert lease.sub("", texts["lockstep"]) == lease.sub("", texts["realtime"])
-
-
-@pytest.mark.parametrize(
-    "name, value",
-    [(processes.PROFILES_FILE, "/home/me/mine.xml"), ("RMW_IMPLEMENTATION", "rmw_cyclonedds_cpp")],
-)
-def test_with_the_users_own_middleware_ros_keeps_it_on_this_machine(
-    name, value, tmp_path, monkeypatch
-):
-    monkeypatch.setenv(name, value)
-    made = processes.environment(42, tmp_path)
-    assert made[name] == value and made["ROS_AUTOMATIC_DISCOVERY_RANGE"] == "LOCALHOST"
 
 
 def segment(folder, name):

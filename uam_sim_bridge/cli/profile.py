@@ -66,8 +66,8 @@ def run(options: argparse.Namespace) -> int:
 
 def switch(profile: Profile, domain: int | None) -> int:
     """Switch the nodes of a ROS domain, say what changed; returns the exit status."""
+    from uam_sim_bridge.flight.environment import transport_environment
     from uam_sim_bridge.flight.guest import Guest
-    from uam_sim_bridge.flight.processes import transport_environment
     from uam_sim_bridge.flight.profile_switch import ProfileSwitch, SwitchRefused
 
     environment = {} if domain is None else transport_environment()  # of uam fly, or the user's

@@ -77,7 +77,7 @@ def run(options: argparse.Namespace) -> int:
     except (PortError, SettingsError) as error:
         print(f"uam view: {error}", file=sys.stderr)
         return WRONG_USE
-    from uam_sim_bridge.flight.processes import transport_environment
+    from uam_sim_bridge.flight.environment import transport_environment
     from uam_sim_bridge.nodes import cockpit
 
     if domain is not None:  # of uam fly; else the user's own

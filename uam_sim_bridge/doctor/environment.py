@@ -6,8 +6,8 @@ from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 
 from uam_sim_bridge.doctor.finding import Finding, fail, ok, warn
+from uam_sim_bridge.flight.environment import PROFILES_FILE
 from uam_sim_bridge.flight.ports import LAST_DOMAIN
-from uam_sim_bridge.flight.processes import PROFILES_FILE
 
 BY_HAND = "flights have a domain of their own; nodes started by hand"
 

@@ -12,8 +12,8 @@ from uam_sim_bridge.doctor import environment
 from uam_sim_bridge.doctor.child import Child, Said
 from uam_sim_bridge.doctor.finding import Finding, fail, ok, warn
 from uam_sim_bridge.flight import shared_memory
+from uam_sim_bridge.flight.environment import ros_environment
 from uam_sim_bridge.flight.ports import PortError, Reservation
-from uam_sim_bridge.flight.processes import ros_environment
 
 MODULE = "uam_sim_bridge.doctor.round_trip"
 PATIENCE = 40.0  # [s] for both processes: import, discovery, messages

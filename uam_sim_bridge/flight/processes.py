@@ -6,22 +6,18 @@ session: schedulers share time between sessions first, whatever the processes' p
 See `child` for how they run.
 """
 
-import os
 import signal
 import time
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from uam_control import configuration
 from uam_sim_bridge.flight import shared_memory
-from uam_sim_bridge.flight.child import SINGLE_THREAD, Forked
+from uam_sim_bridge.flight.child import Forked
 
 LAST_LINES = 12  # of a failed node's log that its error message shows
 INTERRUPT_WAIT, TERMINATE_WAIT = 10.0, 3.0  # seconds until the next, harder signal
 POLL = 0.02  # seconds
-PROFILES_FILE = "FASTRTPS_DEFAULT_PROFILES_FILE"
-TRANSPORTS = {"lockstep": "dds/fastdds.xml", "realtime": "dds/realtime.xml"}
 
 
 class NodeFailed(RuntimeError):
@@ -220,34 +216,3 @@ class Processes:
 
     def __exit__(self, *exception) -> None:
         self.close()
-
-
-def environment(domain: int, log_folder: Path, clock: str = "lockstep") -> dict[str, str]:
-    """What the children inherit: a private, local ROS domain and one thread each."""
-    return {**os.environ, **ros_environment(domain, log_folder, clock), **SINGLE_THREAD}
-
-
-def ros_environment(domain: int, log_folder: Path, clock: str = "lockstep") -> dict[str, str]:
-    """The variables by which ROS finds its domain, its transports and the place of its logs."""
-    return {
-        **transport_environment(clock),
-        "ROS_DOMAIN_ID": str(domain),
-        "ROS_LOG_DIR": str(log_folder),
-        "RCUTILS_COLORIZED_OUTPUT": "0",
-    }
-
-
-def transport_environment(clock: str = "lockstep") -> dict[str, str]:
-    """The variables that keep ROS on this machine.
-
-    Our transports do so by themselves (config/dds, a file for each clock). Where the user's own
-    file or another middleware is used, ROS is told to.
-    """
-    files = {one: str(configuration.path(file)) for one, file in TRANSPORTS.items()}
-    chosen = os.environ.get(PROFILES_FILE) or files[clock]
-    middleware = os.environ.get("RMW_IMPLEMENTATION") or "rmw_fastrtps_cpp"
-    ours = chosen in files.values() and "fastrtps" in middleware
-    return {
-        PROFILES_FILE: files[clock] if ours else chosen,
-        "ROS_AUTOMATIC_DISCOVERY_RANGE": "SYSTEM_DEFAULT" if ours else "LOCALHOST",
-    }

@@ -16,6 +16,7 @@ from uam_sim_bridge.faults import PROCESS
 from uam_sim_bridge.faults.timeline import Happened
 from uam_sim_bridge.flight import child, ros_nodes, shared_memory, wiring
 from uam_sim_bridge.flight.changed_parameters import ChangedParameters
+from uam_sim_bridge.flight.environment import environment
 from uam_sim_bridge.flight.fault_log import FaultTopic
 from uam_sim_bridge.flight.interrupts import Interrupts
 from uam_sim_bridge.flight.outcome import Outcome
@@ -23,7 +24,7 @@ from uam_sim_bridge.flight.places import Places
 from uam_sim_bridge.flight.ports import Ports, Reservation
 from uam_sim_bridge.flight.process_faults import ProcessFaults
 from uam_sim_bridge.flight.process_table import await_orphans
-from uam_sim_bridge.flight.processes import NodeFailed, Processes, environment
+from uam_sim_bridge.flight.processes import NodeFailed, Processes
 from uam_sim_bridge.flight.progress import Progress
 from uam_sim_bridge.flight.restart_log import RestartTopic
 from uam_sim_bridge.flight.result_folder import ResultFolder

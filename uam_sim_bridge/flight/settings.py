@@ -13,7 +13,7 @@ from uam_control.mission import Scenario, load_scenario
 from uam_control.profile import Profile, load_profile
 from uam_sim_bridge.faults import Schedule, limits, read_schedule
 from uam_sim_bridge.faults.process_faults import DiscoveryLoss
-from uam_sim_bridge.flight import thread_stop
+from uam_sim_bridge.flight.environment import without_discovery
 from uam_sim_bridge.flight.ports import AUTOPILOT_UDP, INSTANCES
 from uam_sim_bridge.mavlink.transport import ALLOWED, LinkUrl, parse_url
 from uam_sim_bridge.px4.installation import Px4Installation
@@ -138,7 +138,7 @@ def settings(
     injected = read_schedule(faults, loaded, seed)
     left_out = tuple(dict.fromkeys(without if view else (*without, COCKPIT)))
     absent = (*left_out, "autopilot") if link is not None else left_out
-    limits.check(injected, engine, absent, {DiscoveryLoss.NAME: thread_stop.refusal()})
+    limits.check(injected, engine, absent, {DiscoveryLoss.NAME: without_discovery()})
     return FlightSettings(
         scenario=loaded,
         profile=flown,

@@ -43,11 +43,9 @@ class StoppedThreads:
         """
         self._stopped: list[int] = []
         for task in Path(f"/proc/{pid}/task").iterdir():
-            if (task / "comm").read_text().startswith(tuple(names)):
-                self._stop(int(task.name))
-
-    def __len__(self) -> int:
-        return len(self._stopped)
+            with contextlib.suppress(FileNotFoundError, ProcessLookupError):  # it has just ended
+                if (task / "comm").read_text().startswith(tuple(names)):
+                    self._stop(int(task.name))
 
     def _stop(self, thread: int) -> None:
         _call(SEIZE, thread)

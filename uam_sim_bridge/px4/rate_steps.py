@@ -17,8 +17,9 @@ from pathlib import Path
 import numpy as np
 
 from uam_sim_bridge.flight.atomic import replacing, write_rows, write_text
+from uam_sim_bridge.flight.environment import environment
 from uam_sim_bridge.flight.ports import PortError, Reservation
-from uam_sim_bridge.flight.processes import NodeFailed, Processes, environment
+from uam_sim_bridge.flight.processes import NodeFailed, Processes
 from uam_sim_bridge.flight.result_folder import ResultFolderError, as_json, make_folder
 from uam_sim_bridge.flight.warm_up import is_cold, warm_up
 from uam_sim_bridge.px4.hover_flight import HoverFlight, NotFlown
