@@ -74,9 +74,9 @@ def test_faults_come_when_they_should_and_the_log_knows_them(fly, short_scenario
 
 @pytest.mark.slow
 def test_a_controller_that_is_unheard_of_is_waited_for_and_comes_back(fly):
-    """In real time, hence on an idle machine."""
-    loss = "discovery_loss@carry+1+4:node=arm_controller"
-    flight = fly("--scenario", "quick_pick", "--clock", "realtime", "--fault", loss)
+    """In real time, hence on an idle machine; the lease is 20 s."""
+    loss = "discovery_loss@approach+0+24:node=arm_controller"
+    flight = fly("--scenario", "pick_and_place", "--clock", "realtime", "--fault", loss)
     flight.wait()
     assert "fault discovery_loss of arm_controller is over" in flight.said
     figures = json.loads((flight.out / "metrics.json").read_text())

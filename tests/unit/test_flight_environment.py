@@ -1,6 +1,5 @@
 """What the processes of a flight inherit, and what discovery loss needs of it."""
 
-import re
 from pathlib import Path
 
 import pytest
@@ -17,22 +16,6 @@ def test_the_environment_is_private_and_local(tmp_path, monkeypatch):
     assert "<address>127.0.0.1</address>" in Path(made[environment.PROFILES_FILE]).read_text()
     assert made["ROS_LOG_DIR"] == str(tmp_path)
     assert made["OMP_NUM_THREADS"] == made["NUMBA_NUM_THREADS"] == "1"
-
-
-def test_in_real_time_a_lost_process_is_given_up_sooner_and_nothing_else_differs(
-    tmp_path, monkeypatch
-):
-    monkeypatch.delenv("RMW_IMPLEMENTATION", raising=False)
-    texts = {}
-    for clock in ("lockstep", "realtime"):
-        made = environment.environment(42, tmp_path, clock)
-        assert made["ROS_AUTOMATIC_DISCOVERY_RANGE"] == "SYSTEM_DEFAULT"
-        texts[clock] = Path(made[environment.PROFILES_FILE]).read_text().split("-->", 1)[1]
-        # as it was told to a parent, which may fly by the other clock
-        monkeypatch.setenv(environment.PROFILES_FILE, made[environment.PROFILES_FILE])
-    lease = re.compile(r"<leaseDuration>.*</leaseDuration>")
-    assert texts["lockstep"] != texts["realtime"]
-    assert lease.sub("", texts["lockstep"]) == lease.sub("", texts["realtime"])
 
 
 @pytest.mark.parametrize(

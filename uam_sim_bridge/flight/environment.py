@@ -10,36 +10,35 @@ from uam_sim_bridge.flight import thread_stop
 from uam_sim_bridge.flight.child import SINGLE_THREAD
 
 PROFILES_FILE = "FASTRTPS_DEFAULT_PROFILES_FILE"
-TRANSPORTS = {"lockstep": "dds/fastdds.xml", "realtime": "dds/realtime.xml"}
 FAST_DDS = "fastrtps"  # in the names of its middlewares
 
 
-def environment(domain: int, log_folder: Path, clock: str = "lockstep") -> dict[str, str]:
+def environment(domain: int, log_folder: Path) -> dict[str, str]:
     """What the children inherit: a private, local ROS domain and one thread each."""
-    return {**os.environ, **ros_environment(domain, log_folder, clock), **SINGLE_THREAD}
+    return {**os.environ, **ros_environment(domain, log_folder), **SINGLE_THREAD}
 
 
-def ros_environment(domain: int, log_folder: Path, clock: str = "lockstep") -> dict[str, str]:
+def ros_environment(domain: int, log_folder: Path) -> dict[str, str]:
     """The variables by which ROS finds its domain, its transports and the place of its logs."""
     return {
-        **transport_environment(clock),
+        **transport_environment(),
         "ROS_DOMAIN_ID": str(domain),
         "ROS_LOG_DIR": str(log_folder),
         "RCUTILS_COLORIZED_OUTPUT": "0",
     }
 
 
-def transport_environment(clock: str = "lockstep") -> dict[str, str]:
+def transport_environment() -> dict[str, str]:
     """The variables that keep ROS on this machine.
 
-    Our transports do so by themselves (config/dds, a file for each clock). Where the user's own
-    file or another middleware is used, ROS is told to.
+    Our transports do so by themselves (config/dds/fastdds.xml). Where the user's own file or
+    another middleware is used, ROS is told to.
     """
-    files = {one: str(configuration.path(file)) for one, file in TRANSPORTS.items()}
-    chosen = os.environ.get(PROFILES_FILE) or files[clock]
-    ours = chosen in files.values() and FAST_DDS in middleware()
+    transports = str(configuration.path("dds/fastdds.xml"))
+    chosen = os.environ.get(PROFILES_FILE) or transports
+    ours = chosen == transports and FAST_DDS in middleware()
     return {
-        PROFILES_FILE: files[clock] if ours else chosen,
+        PROFILES_FILE: chosen,
         "ROS_AUTOMATIC_DISCOVERY_RANGE": "SYSTEM_DEFAULT" if ours else "LOCALHOST",
     }
 

@@ -103,7 +103,7 @@ def _supervise(
 ) -> NodeFailed | None:
     """Start everything, watch it until the plant ends, stop it; returns what failed."""
     logs = folder.path / "logs"
-    surroundings = environment(ports.domain, logs, settings.clock)
+    surroundings = environment(ports.domain, logs)
     with (
         Places(ports.domain) as places,
         Processes(logs, surroundings, presence.remove_unused, places.occupy) as children,
