@@ -9,5 +9,6 @@ from hypothesis import settings
 settings.register_profile("uam", deadline=None, derandomize=True)
 settings.load_profile("uam")
 
-# helper modules that several test folders import
-sys.path.insert(0, str(Path(__file__).parent))
+# helper modules that several test folders import, and what the benchmarks are made of
+TESTS = Path(__file__).parent
+sys.path[:0] = [str(TESTS), str(TESTS.parent / "benchmarks")]

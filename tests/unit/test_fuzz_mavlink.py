@@ -1,11 +1,10 @@
 """A seeded share of benchmarks/fuzz_mavlink.py, and what the full amount found."""
 
-import importlib
 import struct
 import sys
 from collections import deque
-from pathlib import Path
 
+import fuzz_mavlink
 import numpy as np
 import pytest
 
@@ -17,16 +16,8 @@ from uam_sim_bridge.mavlink.setpoint import RateThrustParameters
 from uam_sim_bridge.mavlink.wire import Codec, Framer, _frame_end, checksum_fits, mavlink2
 
 
-@pytest.fixture(scope="module")
-def fuzzer():
-    folder = str(Path(__file__).parents[2] / "benchmarks")
-    sys.path.insert(0, folder)
-    yield importlib.import_module("fuzz_mavlink")
-    sys.path.remove(folder)
-
-
-def test_neither_garbage_nor_mutated_messages_do_harm(fuzzer):
-    campaign = fuzzer.Campaign(seed=11)
+def test_neither_garbage_nor_mutated_messages_do_harm():
+    campaign = fuzz_mavlink.Campaign(seed=11)
     try:
         campaign.random_bytes(400_000, lambda share: None)
         campaign.mutated_messages(8_000, lambda share: None)
@@ -39,10 +30,10 @@ def test_neither_garbage_nor_mutated_messages_do_harm(fuzzer):
         assert counts[what] > 0, counts
 
 
-def test_the_same_seed_gives_the_same_input(fuzzer):
+def test_the_same_seed_gives_the_same_input():
     found = []
     for _ in range(2):
-        campaign = fuzzer.Campaign(seed=5)
+        campaign = fuzz_mavlink.Campaign(seed=5)
         try:
             campaign.mutated_messages(400, lambda share: None)
         finally:
@@ -51,15 +42,15 @@ def test_the_same_seed_gives_the_same_input(fuzzer):
     assert found[0] == found[1]
 
 
-def test_a_failure_leaves_its_seed_and_input(fuzzer, tmp_path, monkeypatch, capsys):
+def test_a_failure_leaves_its_seed_and_input(tmp_path, monkeypatch, capsys):
     def broken(self, chunks):
         raise ValueError("broken")
 
-    monkeypatch.setattr(fuzzer.Bridge, "feed", broken)
+    monkeypatch.setattr(fuzz_mavlink.Bridge, "feed", broken)
     file = tmp_path / "failure.json"
     arguments = ["fuzz_mavlink", "--bytes", "1e4", "--messages", "10", "--save", str(file)]
     monkeypatch.setattr(sys, "argv", arguments)
-    assert fuzzer.main() == 1
+    assert fuzz_mavlink.main() == 1
     assert "random bytes to the bridge: ValueError: broken" in capsys.readouterr().err
     assert '"inputs"' in file.read_text()
 

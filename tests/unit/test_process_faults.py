@@ -6,6 +6,7 @@ import os
 import signal
 import sys
 import time
+from contextlib import contextmanager
 from pathlib import Path
 
 import pytest
@@ -37,20 +38,44 @@ def main():
 SCENARIO = load_scenario("hover")
 
 
-@pytest.fixture
-def children(tmp_path):
-    (tmp_path / "sleeper.py").write_text(SLEEPER)
-    path = os.pathsep.join([str(tmp_path), *sys.path])
-    with Processes(tmp_path, {**os.environ, "PYTHONPATH": path}) as running:
-        running.start("arm_controller", "sleeper")
-        running.start("mission", "sleeper")
+@contextmanager
+def started(folder, code, *names):
+    """Processes with these names, each of which runs the `code` of a module."""
+    (folder / "own_code.py").write_text(code)
+    path = os.pathsep.join([str(folder), *sys.path])
+    with Processes(folder, {**os.environ, "PYTHONPATH": path}) as running:
+        for name in names:
+            running.start(name, "own_code")
         yield running
 
 
+@pytest.fixture
+def children(tmp_path):
+    with started(tmp_path, SLEEPER, "arm_controller", "mission") as running:
+        yield running
+
+
+@pytest.fixture
+def node(tmp_path):
+    """The process `mission`, with its threads."""
+    with started(tmp_path, NODE, "mission") as running:
+        until(lambda: len(threads(running, "mission")) >= 4)
+        yield running
+
+
+def stat(folder):
+    """Name and state, as /proc has them: T stopped, t traced and stopped, S or R running."""
+    text = (folder / "stat").read_text()
+    return text.split("(", 1)[1].rsplit(")", 1)[0], text.rsplit(")", 1)[1].split()[0]
+
+
 def state(children, name):
-    """As /proc has it: T stopped, S or R running."""
-    stat = Path(f"/proc/{children.pid(name)}/stat").read_text()
-    return stat.rsplit(")", 1)[1].split()[0]
+    return stat(Path(f"/proc/{children.pid(name)}"))[1]
+
+
+def threads(children, name):
+    """The threads of a process: name and state of each."""
+    return [stat(one) for one in Path(f"/proc/{children.pid(name)}/task").iterdir()]
 
 
 def until(condition, seconds=5.0):
@@ -117,40 +142,20 @@ def test_who_is_slow_is_stopped_for_its_part_of_the_time(children):
     assert 0.5 < sum(seen) / len(seen) < 0.97
 
 
-def test_threads_of_discovery_are_stopped_alone_and_go_on(tmp_path):
-    (tmp_path / "node.py").write_text(NODE)
-    path = os.pathsep.join([str(tmp_path), *sys.path])
-    with Processes(tmp_path, {**os.environ, "PYTHONPATH": path}) as running:
-        running.start("mission", "node")
-        tasks = Path(f"/proc/{running.pid('mission')}/task")
-
-        def found():
-            stats = [(task / "stat").read_text() for task in tasks.iterdir()]
-            return sorted(
-                (text.split("(", 1)[1].rsplit(")", 1)[0], text.rsplit(")", 1)[1].split()[0])
-                for text in stats
-            )
-
-        until(lambda: len(found()) >= 4)
-        with faults(running, "discovery_loss@1:node=mission")[0] as made:
-            made.update(1.0)
-            states = dict(found())
-            assert states["dds.udp.7660"] == states["dds.ev.0"] == "t"
-            assert states["dds.shm.7661"] != "t" and states["main"] != "t"
-        assert all(state != "t" for _, state in found())
+def test_threads_of_discovery_are_stopped_alone_and_go_on(node):
+    with faults(node, "discovery_loss@1:node=mission")[0] as made:
+        made.update(1.0)
+        states = dict(threads(node, "mission"))
+        assert states["dds.udp.7660"] == states["dds.ev.0"] == "t"
+        assert states["dds.shm.7661"] != "t" and states["main"] != "t"
+    assert all(state != "t" for _, state in threads(node, "mission"))
 
 
-def test_who_is_killed_with_stopped_threads_has_ended(tmp_path):
-    (tmp_path / "node.py").write_text(NODE)
-    path = os.pathsep.join([str(tmp_path), *sys.path])
-    with Processes(tmp_path, {**os.environ, "PYTHONPATH": path}) as running:
-        running.start("mission", "node")
-        tasks = Path(f"/proc/{running.pid('mission')}/task")
-        until(lambda: len(list(tasks.iterdir())) >= 4)
-        with faults(running, "discovery_loss@1:node=mission")[0] as made:
-            made.update(1.0)
-            os.kill(running.pid("mission"), signal.SIGKILL)
-            until(lambda: made.update(1.1) or not running.running("mission"))
+def test_who_is_killed_with_stopped_threads_has_ended(node):
+    with faults(node, "discovery_loss@1:node=mission")[0] as made:
+        made.update(1.0)
+        os.kill(node.pid("mission"), signal.SIGKILL)
+        until(lambda: made.update(1.1) or not node.running("mission"))
 
 
 def test_who_has_ended_already_is_left_alone(children):

@@ -1,26 +1,17 @@
 """benchmarks/soak.py: what has grown is told from what comes and goes."""
 
-import importlib
-import sys
-from pathlib import Path
+import os
 
 import pytest
+from soaking import judgement
+from soaking.samples import Soak, Usage, usage
 
 
-@pytest.fixture(scope="module")
-def soaking():
-    folder = str(Path(__file__).parents[2] / "benchmarks")
-    sys.path.insert(0, folder)
-    yield {name: importlib.import_module(f"soaking.{name}") for name in ("judgement", "samples")}
-    sys.path.remove(folder)
-
-
-def verdict(soaking, memory, handles=lambda k: 6, threads=lambda k: 4, count=40):
-    samples = soaking["samples"]
-    soak = samples.Soak("a soak", "wall time")
+def verdict(memory, handles=lambda k: 6, threads=lambda k: 4, count=40):
+    soak = Soak("a soak", "wall time")
     for k in range(count):
-        soak.add("node", 10.0 * k, samples.Usage(memory(k), handles(k), threads(k)))
-    return soaking["judgement"].judge(soak)
+        soak.add("node", 10.0 * k, Usage(memory(k), handles(k), threads(k)))
+    return judgement.judge(soak)
 
 
 @pytest.mark.parametrize(
@@ -35,21 +26,19 @@ def verdict(soaking, memory, handles=lambda k: 6, threads=lambda k: 4, count=40)
         ({"memory": lambda k: 100.0, "handles": lambda k: 6 + (k == 3)}, False),
     ],
 )
-def test_what_goes_on_growing_is_found(soaking, uses, grown):
-    (found,) = verdict(soaking, **uses)
+def test_what_goes_on_growing_is_found(uses, grown):
+    (found,) = verdict(**uses)
     assert found.grown == grown
-    assert ("grown" if grown else "flat") in soaking["judgement"].table([found])
+    assert ("grown" if grown else "flat") in judgement.table([found])
 
 
-def test_who_was_seen_too_short_is_not_judged(soaking):
-    assert verdict(soaking, lambda k: 100.0 * k, count=7) == []
+def test_who_was_seen_too_short_is_not_judged():
+    assert verdict(lambda k: 100.0 * k, count=7) == []
 
 
-def test_this_process_uses_memory_handles_and_a_thread(soaking):
-    samples = soaking["samples"]
-    before = samples.usage(1 << 30)
-    assert before is None  # no such process
+def test_this_process_uses_memory_handles_and_a_thread():
+    assert usage(1 << 30) is None  # no such process
     with open(__file__) as held:
-        used = samples.usage(int(Path("/proc/self").resolve().name))
+        used = usage(os.getpid())
         assert held and used.memory > 1.0 and used.threads >= 1
-    assert samples.usage(int(Path("/proc/self").resolve().name)).handles == used.handles - 1
+    assert usage(os.getpid()).handles == used.handles - 1

@@ -115,7 +115,8 @@ class MissionNode(UamNode):
         """
         if output.flying:
             self._flown = stamp
-        return stamp - self._flown < TOLD_BY and output.state is State.FAILSAFE or output.flying
+            return True
+        return output.state is State.FAILSAFE and stamp - self._flown < TOLD_BY
 
     def _measure(self, state: np.ndarray, output: MissionOutput) -> None:
         """Errors of this tick: norms of estimate − reference; zero what is not controlled."""

@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from typing import Any
 
 from rclpy.node import Node
 from rclpy.qos import QoSProfile
-from rclpy.subscription import Subscription
 
 from uam_msgs_py import topics
+from uam_msgs_py.polling import listen, messages
 from uam_msgs_py.topics import Topic
 
 # Before the first tick of a simulated flight every publisher of the control loop counts its
@@ -55,15 +55,13 @@ class Watch:
 
     def _listen(self, topic: Topic) -> None:
         qos: QoSProfile = topic.qos if topic in EARLY else topics.NEWEST
-        self._subscriptions[topic] = self._node.create_subscription(
-            topic.type, topic.name, lambda _: None, qos, raw=topic in SERIALIZED
-        )
+        self._subscriptions[topic] = listen(self._node, topic, qos, raw=topic in SERIALIZED)
 
     def look(self, show: Callable[[Topic, Any], None]) -> None:
         """show(topic, message) for what is new: all of WHOLE, of the others the newest."""
         for topic, subscription in self._subscriptions.items():
             newest = None
-            for message in _waiting(subscription):
+            for message in messages(subscription):
                 if topic in WHOLE:
                     show(topic, message)
                 newest = message
@@ -85,9 +83,3 @@ class Watch:
         """
         arrivals = [at for topic, at in self._arrivals.items() if topic not in WHOLE]
         return time.monotonic() - max(arrivals) if arrivals else None
-
-
-def _waiting(subscription: Subscription) -> Iterator[Any]:
-    kind, raw = subscription.msg_type, subscription.raw
-    while (taken := subscription.handle.take_message(kind, raw)) is not None:
-        yield taken[0]

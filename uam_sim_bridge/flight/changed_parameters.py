@@ -9,7 +9,7 @@ from rclpy.node import Node
 
 from uam_msgs_py import topics
 from uam_msgs_py.changes import Change
-from uam_sim_bridge.flight.guest import listen, messages
+from uam_msgs_py.polling import listen, messages
 
 
 class ChangedParameters:

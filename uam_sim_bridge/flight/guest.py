@@ -3,26 +3,11 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Iterator, Mapping
-from typing import Any
+from collections.abc import Mapping
 
 import rclpy
 from rclpy.node import Node
 from rclpy.signals import SignalHandlerOptions
-from rclpy.subscription import Subscription
-
-from uam_msgs_py.topics import Topic
-
-
-def listen(node: Node, topic: Topic) -> Subscription:
-    """Subscribe to a topic whose messages are to be polled, see `messages`."""
-    return node.create_subscription(topic.type, topic.name, lambda _: None, topic.qos)
-
-
-def messages(subscription: Subscription) -> Iterator[Any]:
-    """Take what has arrived, oldest first; hence no executor."""
-    while (taken := subscription.handle.take_message(subscription.msg_type, False)) is not None:
-        yield taken[0]
 
 
 class Guest:

@@ -8,9 +8,10 @@ from collections.abc import Mapping
 from rclpy.node import Node
 
 from uam_msgs_py import topics
+from uam_msgs_py.polling import listen, messages
 from uam_msgs_py.stamps import seconds
 from uam_msgs_py.status import AutopilotState, MissionStatus
-from uam_sim_bridge.flight.guest import Guest, listen, messages
+from uam_sim_bridge.flight.guest import Guest
 from uam_sim_bridge.flight.progress import Status
 
 

@@ -31,6 +31,7 @@ from uam_msgs_py.health import LoopTime, ages
 from uam_msgs_py.layouts import SECOND, stamp_of
 from uam_msgs_py.node import StopSignal, refuse
 from uam_msgs_py.parameters import refuse_unknown
+from uam_msgs_py.polling import listen
 from uam_msgs_py.serialized import type_name
 from uam_msgs_py.status import ERROR, OK, WARN, diagnostic
 from uam_sim_bridge.flight.bounded_log import BoundedLog
@@ -95,9 +96,7 @@ class Recording:
             reliability=topic.reading.reliability,
             durability=topic.qos.durability,
         )
-        subscription = node.create_subscription(
-            topic.type, topic.name, lambda _: None, qos, raw=True
-        )
+        subscription = listen(node, topic, qos, raw=True)
         name = type_name(topic.type)
         metadata = {"offered_qos_profiles": _qos_text(topic.qos)}
         channel = self._writer.add_channel(topic.name, name, schema(name), metadata)
