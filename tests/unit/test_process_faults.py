@@ -23,15 +23,16 @@ def main():
         time.sleep(0.05)
 """
 # With threads named as Fast DDS names its own.
-NODE = """
+NAMED = ("dds.udp.7660", "dds.ev.0", "dds.shm.7661")
+NODE = f"""
 import threading, time
 from pathlib import Path
 def work(name):
-    Path(f"/proc/self/task/{threading.get_native_id()}/comm").write_text(name)
+    Path("/proc/self/task", str(threading.get_native_id()), "comm").write_text(name)
     while True:
         time.sleep(0.01)
 def main():
-    for name in ("dds.udp.7660", "dds.ev.0", "dds.shm.7661"):
+    for name in {NAMED}:
         threading.Thread(target=work, args=(name,), daemon=True).start()
     work("main")
 """
@@ -59,7 +60,7 @@ def children(tmp_path):
 def node(tmp_path):
     """The process `mission`, with its threads."""
     with started(tmp_path, NODE, "mission") as running:
-        until(lambda: len(threads(running, "mission")) >= 4)
+        until(lambda: {*NAMED, "main"} <= dict(threads(running, "mission")).keys())
         yield running
 
 
