@@ -10,7 +10,7 @@ import time
 from collections.abc import Callable
 from pathlib import Path
 
-from uam_sim_bridge.flight import process_table, shared_memory
+from uam_sim_bridge.flight import process_table
 from uam_sim_bridge.flight.ports import SIMULATOR_TCP
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -85,10 +85,6 @@ class Flight:
         assert found, "no nodes"
         return found
 
-    def shared_memory(self) -> set[Path]:
-        """The middleware's files that its nodes use now."""
-        return set().union(*(shared_memory.used_by(pid) for pid in self.children().values()))
-
     def wait(self, patience: float = PATIENCE) -> int:
         """Its exit status, within `patience` [s]."""
         return self.process.wait(patience)
@@ -132,11 +128,8 @@ def wait_until_gone(pids: list[int], seconds: float = 20.0) -> None:
         time.sleep(0.1)
 
 
-def assert_nothing_left(flight: Flight, pids: list[int], files: set[Path]) -> None:
-    """No process, shared memory or temporary file is there; the lock may be another flight's."""
+def assert_nothing_left(flight: Flight, pids: list[int]) -> None:
+    """No process or temporary file is there; the lock may be another flight's."""
     assert [pid for pid in pids if not is_gone(pid)] == []
-    # Ports are numbered over all domains: another flight may use them now.
-    left = shared_memory.remove_unused(files)
-    assert left == [], left
     assert list(flight.out.rglob(".*")) == []
     lock_is_held(flight.instance)

@@ -9,7 +9,7 @@ import pytest
 from rich.console import Console
 from whole_flight import assert_nothing_left, wait_until_gone
 
-from uam_sim_bridge.flight import ros_engine, ros_parameters, shared_memory, timeseries
+from uam_sim_bridge.flight import ros_engine, ros_parameters, timeseries
 from uam_sim_bridge.flight.ports import Reservation
 from uam_sim_bridge.flight.progress import Progress
 from uam_sim_bridge.flight.result_folder import ResultFolder
@@ -37,13 +37,13 @@ def kept(flight):
 def test_a_killed_node_ends_the_flight_and_is_named(fly, short_scenario, victim):
     flight = fly("--scenario", str(short_scenario))
     flight.until_phase("take-off")
-    nodes, shared = flight.children(), flight.shared_memory()
-    assert len(nodes) == 10 and shared
+    nodes = flight.children()
+    assert len(nodes) == 10
     os.kill(nodes[victim], signal.SIGKILL)
     assert flight.wait() == 1
     assert f"uam fly: {victim} was killed by SIGKILL" in flight.complained
     assert "Traceback" not in flight.complained
-    assert_nothing_left(flight, list(nodes.values()), shared)
+    assert_nothing_left(flight, list(nodes.values()))
     if victim != "recorder":
         assert f"{victim} was killed by SIGKILL" in kept(flight)["abort_reason"]
 
@@ -57,7 +57,7 @@ def test_a_killed_scene_is_announced_and_the_flight_goes_on(fly, short_scenario)
     assert "scene was killed by SIGKILL; the flight goes on without it" in flight.said
     figures = json.loads((flight.out / "metrics.json").read_text())
     assert figures["mission_completed"]
-    assert_nothing_left(flight, [], set())
+    assert_nothing_left(flight, [])
 
 
 @pytest.mark.slow
@@ -78,24 +78,24 @@ def test_a_recorder_without_processor_time_loses_nothing(fly, short_scenario):
 def test_a_node_that_hangs_is_named_and_killed(fly, short_scenario):
     flight = fly("--scenario", str(short_scenario))
     flight.until_phase("take-off")
-    nodes, shared = flight.children(), flight.shared_memory()
+    nodes = flight.children()
     os.kill(nodes["arm_controller"], signal.SIGSTOP)
     assert flight.wait() == 1
     assert "no effort for t = " in flight.complained
     assert "arm_controller is silent" in flight.complained
     assert "had to be killed: arm_controller" in flight.said
-    assert_nothing_left(flight, list(nodes.values()), shared)
+    assert_nothing_left(flight, list(nodes.values()))
     kept(flight)
 
 
 def test_ctrl_c_keeps_what_was_flown(fly, short_scenario):
     flight = fly("--scenario", str(short_scenario))
     flight.until_phase("take-off")
-    nodes, shared = flight.children(), flight.shared_memory()
+    nodes = flight.children()
     flight.process.send_signal(signal.SIGINT)
     assert flight.wait() == 130
     assert "Traceback" not in flight.complained
-    assert_nothing_left(flight, list(nodes.values()), shared)
+    assert_nothing_left(flight, list(nodes.values()))
     assert kept(flight)["abort_reason"] == "interrupted by the user"
 
 
@@ -106,20 +106,17 @@ def test_ctrl_c_before_the_first_tick_leaves_nothing(fly, short_scenario):
     flight.process.send_signal(signal.SIGINT)
     assert flight.wait() == 130
     assert "Traceback" not in flight.complained
-    assert_nothing_left(flight, list(nodes.values()), set())
+    assert_nothing_left(flight, list(nodes.values()))
 
 
 def test_no_node_survives_a_killed_orchestrator(fly, short_scenario):
     flight = fly("--scenario", str(short_scenario))
     flight.until_phase("take-off")
-    nodes, used = flight.children(), flight.shared_memory()
+    nodes = flight.children()
     flight.process.kill()
     flight.wait()
     wait_until_gone(list(nodes.values()))
     assert flight.out.joinpath("logs/mujoco_sim.json").exists(), "the nodes ended in good order"
-    # What the killed process shared with them is for the next flight to remove, and its lock.
-    shared_memory.remove_unused(used)
-    assert [file for file in used if file.exists()] == []
     with Reservation(flight.instance):
         pass
 

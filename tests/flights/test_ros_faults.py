@@ -69,7 +69,7 @@ def test_faults_come_when_they_should_and_the_log_knows_them(fly, short_scenario
     alone.mkdir()
     shutil.copy(flight.out / "log.mcap", alone)
     assert rebuild(alone, tmp_path / "again")["faults"] == figures["faults"]
-    assert_nothing_left(flight, [], set())
+    assert_nothing_left(flight, [])
 
 
 @pytest.mark.slow

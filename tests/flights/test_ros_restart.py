@@ -35,7 +35,7 @@ def test_a_killed_controller_is_started_again_and_the_flight_goes_on(fly, victim
     held = any(state == "holding" for state, _ in passed)  # or it was back before that
     assert held == (("flying", "the controller is back") in passed)
     assert max(figures["max"]["position_m"]) < 1.5
-    assert_nothing_left(flight, [], set())
+    assert_nothing_left(flight, [])
 
 
 @pytest.mark.slow

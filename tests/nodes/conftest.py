@@ -18,7 +18,6 @@ from uam_msgs_py.connections import Connections
 from uam_msgs_py.serialized import stays_serialized
 from uam_sim_bridge.flight.environment import ros_environment
 from uam_sim_bridge.flight.ports import Reservation
-from uam_sim_bridge.flight.shared_memory import Presence, abandoned
 
 PATIENCE = 60.0  # [s] for a process to get somewhere; only a failing test waits that long
 
@@ -26,11 +25,10 @@ PATIENCE = 60.0  # [s] for a process to get somewhere; only a failing test waits
 @pytest.fixture(scope="session", autouse=True)
 def domain(tmp_path_factory) -> Iterator[int]:
     """A ROS domain that no other flight or test uses."""
-    with Presence() as presence, Reservation() as reservation:
+    with Reservation() as reservation:
         logs = tmp_path_factory.mktemp("ros_log")
         os.environ.update(ros_environment(reservation.ports.domain, logs))
         yield reservation.ports.domain
-        presence.remove_unused(abandoned())
 
 
 class Probe:

@@ -7,7 +7,6 @@ import pytest
 
 from uam_sim_bridge.doctor import holders, instances, leftovers
 from uam_sim_bridge.doctor.finding import Verdict
-from uam_sim_bridge.flight import shared_memory
 from uam_sim_bridge.flight.ports import INSTANCES, Reservation
 
 OK, WARN, FAIL = Verdict
@@ -63,16 +62,6 @@ def test_locks_without_a_flight_are_named_and_others_left_alone(tmp_path):
     found = leftovers.locks(tmp_path)
     assert found.verdict is WARN and f"uam-{os.getuid()}-7.lock" in found.found
     assert "other" not in found.found
-
-
-def test_shared_memory_that_nobody_uses_is_counted(tmp_path, monkeypatch):
-    monkeypatch.setattr(shared_memory, "FOLDER", tmp_path)
-    assert leftovers.shared().verdict is OK
-    for name in ("fastrtps_0123456789abcdef", "sem.fastrtps_port7400_mutex"):
-        (tmp_path / name).touch()
-        os.utime(tmp_path / name, (0, 0))
-    found = leftovers.shared()
-    assert found.verdict is WARN and "1 files" in found.found
 
 
 def test_a_process_is_called_by_its_program():

@@ -84,8 +84,10 @@ def test_apt_and_workspaces_are_told_apart(tmp_path):
     assert ros.kind_of(tmp_path / "rclpy" / "__init__.py") == "a workspace"
 
 
-def test_shared_memory_that_is_too_small_or_missing(tmp_path, monkeypatch):
-    assert ros.room(tmp_path).verdict is OK
-    assert ros.room(tmp_path / "none").verdict is WARN
-    monkeypatch.setattr(ros, "ROOM", 2**40)
-    assert ros.room(tmp_path).verdict is FAIL
+def test_small_receive_buffers_are_told_with_the_remedy(tmp_path):
+    limit = tmp_path / "rmem_max"
+    assert ros.room(limit).verdict is OK, "no such file: not Linux"
+    limit.write_text("212992\n")
+    assert ros.room(limit).verdict is WARN and "rmem_max=4194304" in ros.room(limit).advice
+    limit.write_text("4194304\n")
+    assert ros.room(limit).verdict is OK

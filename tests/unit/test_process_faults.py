@@ -23,7 +23,7 @@ def main():
         time.sleep(0.05)
 """
 # With threads named as Fast DDS names its own.
-NAMED = ("dds.udp.7660", "dds.ev.0", "dds.shm.7661")
+NAMED = ("dds.udp.7660", "dds.ev.0", "dds.udp.7661")
 NODE = f"""
 import threading, time
 from pathlib import Path
@@ -148,7 +148,7 @@ def test_threads_of_discovery_are_stopped_alone_and_go_on(node):
         made.update(1.0)
         states = dict(threads(node, "mission"))
         assert states["dds.udp.7660"] == states["dds.ev.0"] == "t"
-        assert states["dds.shm.7661"] != "t" and states["main"] != "t"
+        assert states["dds.udp.7661"] != "t" and states["main"] != "t"
     assert all(state != "t" for _, state in threads(node, "mission"))
 
 

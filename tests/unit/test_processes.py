@@ -8,7 +8,7 @@ import time
 
 import pytest
 
-from uam_sim_bridge.flight import process_table, processes, shared_memory
+from uam_sim_bridge.flight import process_table, processes
 from uam_sim_bridge.flight.processes import NodeFailed, Processes
 
 SLEEPER = """
@@ -189,52 +189,3 @@ time.sleep(60)
     orchestrator.wait()
     orchestrator.stdout.close()
     wait_for(lambda: all(map(gone, pids)))
-
-
-def segment(folder, name):
-    """A file as the middleware makes them, with its lock file."""
-    file = folder / name
-    file.write_bytes(bytes(4096))
-    file.with_name(name + "_el").touch()
-    return file
-
-
-def test_shared_memory_is_removed_once_nobody_uses_it(tmp_path, monkeypatch):
-    monkeypatch.setattr(shared_memory, "FOLDER", tmp_path)
-    file = segment(tmp_path, "fastrtps_0123456789abcdef")
-    other = segment(tmp_path, "fastrtps_fedcba9876543210")
-    hold = "import mmap; f = open('{}', 'r+b'); m = mmap.mmap(f.fileno(), 4096); input()"
-    user = subprocess.Popen([sys.executable, "-c", hold.format(file)], stdin=subprocess.PIPE)
-    while not shared_memory.used_by(user.pid):
-        assert user.poll() is None
-        time.sleep(0.01)
-    assert shared_memory.used_by(user.pid) == {file}
-    assert shared_memory.remove_unused({file}) == []
-    user.communicate(b"\n")
-    assert len(shared_memory.remove_unused({file})) == 2
-    assert set(tmp_path.iterdir()) == {other, other.with_name(other.name + "_el")}
-
-
-def test_what_was_abandoned_long_ago_is_found(tmp_path, monkeypatch):
-    monkeypatch.setattr(shared_memory, "FOLDER", tmp_path)
-    fresh = segment(tmp_path, "fastrtps_port7661")
-    old = segment(tmp_path, "sem.fastrtps_port7661_mutex")
-    foreign = segment(tmp_path, "fastrtps_somebody_elses")
-    for file in (old, foreign):
-        os.utime(file, (0, 0))
-    assert shared_memory.abandoned() == {old}
-    assert shared_memory.abandoned(age=-1.0) == {fresh, old}
-
-
-def test_nothing_is_removed_while_another_flight_is_there(tmp_path, monkeypatch):
-    monkeypatch.setattr(shared_memory, "FOLDER", tmp_path)
-    file = tmp_path / "fastrtps_port7001"
-    file.touch()
-    with shared_memory.Presence(tmp_path) as ours:
-        with shared_memory.Presence(tmp_path) as theirs:
-            assert ours.remove_unused({file}) == theirs.remove_unused({file}) == []
-            assert file.exists()
-        assert ours.remove_unused({file}) == [file]
-        with shared_memory.Presence(tmp_path):  # asking has not cost us our own share
-            file.touch()
-            assert ours.remove_unused({file}) == []

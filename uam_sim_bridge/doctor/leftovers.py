@@ -1,4 +1,4 @@
-"""What crashed flights left: locks, shared memory, processes without their orchestrator."""
+"""What crashed flights left: locks, processes without their orchestrator."""
 
 from __future__ import annotations
 
@@ -10,14 +10,13 @@ from pathlib import Path
 
 from uam_sim_bridge.doctor import holders
 from uam_sim_bridge.doctor.finding import Finding, ok, warn
-from uam_sim_bridge.flight import process_table, shared_memory
+from uam_sim_bridge.flight import process_table
 from uam_sim_bridge.flight.ports import held
 
 
 def checks(folder: Path | None = None) -> Iterator[Finding]:
     """Findings about leftovers; folder: where flights keep their locks."""
     yield locks(folder or Path(tempfile.gettempdir()))
-    yield shared()
     yield orphans()
 
 
@@ -34,21 +33,6 @@ def locks(folder: Path) -> Finding:
             "nothing to do: the next flights use them again and remove them",
         )
     return ok("locks", f"none left in {folder}")
-
-
-def shared() -> Finding:
-    """Shared memory of ROS that no process uses any more; mutexes stay behind clean ends, too."""
-    files = {file for file in shared_memory.abandoned() if not file.name.startswith("sem.")}
-    used = set().union(*map(shared_memory.used_by, process_table.pids())) if files else set()
-    left = files - used
-    if left:
-        size = sum(file.stat().st_size for file in left if file.exists()) / 2**20
-        return warn(
-            "ROS memory",
-            f"{len(left)} files in {shared_memory.FOLDER} that nobody uses, {size:.0f} MiB",
-            "nothing to do: the next flight removes them",
-        )
-    return ok("ROS memory", f"nothing left in {shared_memory.FOLDER}")
 
 
 def orphans() -> Finding:

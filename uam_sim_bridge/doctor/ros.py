@@ -1,4 +1,4 @@
-"""ROS: which installation, whether two processes reach each other, room in shared memory."""
+"""ROS: which installation, whether two processes reach each other, room for messages."""
 
 from __future__ import annotations
 
@@ -11,7 +11,6 @@ from pathlib import Path
 from uam_sim_bridge.doctor import environment
 from uam_sim_bridge.doctor.child import Child, Said
 from uam_sim_bridge.doctor.finding import Finding, fail, ok, warn
-from uam_sim_bridge.flight import shared_memory
 from uam_sim_bridge.flight.environment import ros_environment
 from uam_sim_bridge.flight.ports import PortError, Reservation
 
@@ -19,7 +18,8 @@ MODULE = "uam_sim_bridge.doctor.round_trip"
 PATIENCE = 40.0  # [s] for both processes: import, discovery, messages
 WANTED, WANTED_RMW = "jazzy", "rmw_fastrtps_cpp"
 SLOW = 0.05  # [s] a round trip that long: control at 250 Hz in real time is out of the question
-ROOM = 16 * 5  # [MiB]: config/dds gives each of a flight's processes 4 for content and its queue
+RECEIVE_LIMIT = Path("/proc/sys/net/core/rmem_max")
+ROOM = 4 * 2**20  # [bytes]: what config/dds/fastdds.xml asks for
 INSTALL = "make setup brings the wheels (x86-64); else source /opt/ros/jazzy/setup.bash"
 
 
@@ -93,7 +93,7 @@ def round_trip(said: Said, domain: int) -> Finding:
         return fail(
             "round trip",
             f"domain {domain}: {said.problem or 'no messages'}",
-            "look at the variables and shared memory above, then at firewall and container",
+            "look at the variables above, then at firewall and container",
         )
     median, longest = (1e3 * said.facts[name] for name in ("median_s", "longest_s"))
     found = (
@@ -105,23 +105,17 @@ def round_trip(said: Said, domain: int) -> Finding:
     return ok("round trip", found)
 
 
-def room(folder: Path = shared_memory.FOLDER) -> Finding:
-    """Whether a flight's messages fit into shared memory."""
+def room(file: Path = RECEIVE_LIMIT) -> Finding:
+    """How much of what a process has not taken yet the system keeps for it."""
     try:
-        status = os.statvfs(folder)
-    except OSError as error:
+        limit = int(file.read_text())
+    except (OSError, ValueError):
+        return ok("receive buffers", f"{file} does not tell their limit")
+    found = f"net.core.rmem_max is {limit // 1024} KiB"
+    if limit < ROOM:
         return warn(
-            "shared memory",
-            f"{folder}: {error.strerror}",
-            "ROS falls back to UDP; in a container mount /dev/shm",
+            "receive buffers",
+            f"{found}: who gets no processor time for some hundredths of a second loses messages",
+            f"sudo sysctl -w net.core.rmem_max={ROOM}",
         )
-    free = status.f_bavail * status.f_frsize // 2**20
-    if not os.access(folder, os.W_OK):
-        return fail("shared memory", f"{folder} is not writable", f"chmod 1777 {folder}")
-    if free < ROOM:
-        return fail(
-            "shared memory",
-            f"{folder} has {free} MiB free, a flight needs {ROOM}",
-            f"remove what is left in {folder}; in a container: --shm-size 256m",
-        )
-    return ok("shared memory", f"{folder} has {free} MiB free, a flight needs {ROOM}")
+    return ok("receive buffers", found)

@@ -64,8 +64,13 @@ def in_use(kind: int, port: int, host: str = "127.0.0.1") -> bool:
 
 
 def discovery_port(domain: int, participant: int = 0) -> int:
-    """UDP port of a participant's discovery (RTPS 2.2, 9.6.1.1)."""
+    """UDP port of a participant's discovery (RTPS 2.2, 9.6.1.1); the next one has all else."""
     return 7400 + 250 * domain + 10 + 2 * participant
+
+
+def is_discovery_port(port: int) -> bool:
+    """Whether a port of the middleware is one of `discovery_port`."""
+    return port % 2 == 0
 
 
 def require_free(kind: int, port: int, purpose: str) -> None:

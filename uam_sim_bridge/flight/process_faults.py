@@ -16,10 +16,20 @@ from functools import partial
 from uam_sim_bridge.faults import Schedule
 from uam_sim_bridge.faults.process_faults import DiscoveryLoss, NodeKill, NodeSlow, ProcessFault
 from uam_sim_bridge.faults.timeline import Happened
+from uam_sim_bridge.flight.ports import is_discovery_port
 from uam_sim_bridge.flight.processes import Processes
 from uam_sim_bridge.flight.thread_stop import StoppedThreads
 
-DISCOVERY = ("dds.udp.", "dds.ev.")  # Fast DDS's threads that hear the others, and tell of itself
+# Fast DDS's threads: one that tells of itself, one for each UDP port that it listens at
+EVENTS, PORT = "dds.ev.", "dds.udp."
+
+
+def of_discovery(thread: str) -> bool:
+    """Whether a thread, by its name, does DDS discovery alone."""
+    port = thread.removeprefix(PORT)
+    return thread.startswith(EVENTS) or (
+        thread.startswith(PORT) and port.isdecimal() and is_discovery_port(int(port))
+    )
 
 
 class ProcessFaults:
@@ -66,7 +76,7 @@ class ProcessFaults:
             os.kill(pid, signal.SIGKILL)
             return
         if isinstance(fault, DiscoveryLoss):
-            self._hindering[one.number] = StoppedThreads(pid, DISCOVERY)
+            self._hindering[one.number] = StoppedThreads(pid, of_discovery)
             return
         stopped, cycle = (fault.stopped, fault.cycle) if isinstance(fault, NodeSlow) else (1.0, 0.0)
         self._hindering[one.number] = _Hindrance(

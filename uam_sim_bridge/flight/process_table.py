@@ -50,7 +50,7 @@ def orphans() -> list[int]:
 def await_orphans(say: Callable[[str], None]) -> None:
     """Wait until the nodes of a flight that was killed have ended, at most a little over GRACE.
 
-    While they let go of the middleware's shared memory, nodes that start then could lose theirs.
+    Nobody holds their instance any more: one that starts could meet them in its ROS domain.
     """
     end = time.monotonic() + GRACE + 1.0
     left = orphans()

@@ -9,10 +9,9 @@ See `child` for how they run.
 import signal
 import time
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
 
-from uam_sim_bridge.flight import shared_memory
 from uam_sim_bridge.flight.child import Forked
 
 LAST_LINES = 12  # of a failed node's log that its error message shows
@@ -64,25 +63,13 @@ class Child:
     may_end: bool = False  # its end is expected: it was asked to stop, or ends with the mission
     optional: bool = False  # the flight goes on without it
     again: int = 0  # how often it is still started again where it ends by itself
-    shared: set[Path] = field(default_factory=set)  # shared-memory files seen in its address space
 
 
 class Processes:
     """The children of one flight. A context manager: nothing survives the `with` block."""
 
-    def __init__(
-        self,
-        logs: Path,
-        environment: Mapping[str, str],
-        tidy: Callable[[Iterable[Path]], object] = shared_memory.remove_unused,
-        before_revival: Callable[[], object] = lambda: None,
-    ):
-        """Output goes to `logs`, which must exist; `environment` is the children's whole one.
-
-        tidy: told of the shared-memory files that they have used, when all have ended;
-        before_revival: called before a child is started again.
-        """
-        self._tidy, self._before_revival = tidy, before_revival
+    def __init__(self, logs: Path, environment: Mapping[str, str]):
+        """Output goes to `logs`, which must exist; `environment` is the children's whole one."""
         self._logs = logs
         self._environment = dict(environment)
         self._children: dict[str, Child] = {}
@@ -101,9 +88,6 @@ class Processes:
 
         may_end: it stops by itself when done; optional: its end is no failure of the flight, see
         `missed`; again: how often `revive` starts it again.
-
-        All have the same priority: one that is preempted between writing to another's queue in
-        shared memory and waking it would leave that one asleep, for up to a second.
         """
         log = self._logs / f"{name}.log"
 
@@ -164,17 +148,8 @@ class Processes:
         told = [NodeFailed(child.name, child.process.returncode, child.log) for child in ended]
         for child in ended:
             child.again -= 1
-            self._before_revival()
             child.process = child.run(further(child.name))
         return told
-
-    def note_shared_memory(self) -> None:
-        """Remember which shared-memory files the children use, to remove them should one be killed.
-
-        The middleware removes them itself at a clean end.
-        """
-        for child in self._children.values():
-            child.shared |= shared_memory.used_by(child.process.pid)
 
     def stop(self, names: Iterable[str]) -> list[str]:
         """Interrupt these children together, wait, then terminate, then kill.
@@ -205,11 +180,8 @@ class Processes:
         return sorted(disobedient)
 
     def close(self) -> None:
-        """Stop whatever still runs and remove what killed children left in shared memory."""
-        self.note_shared_memory()
+        """Stop whatever still runs."""
         self.stop(self.names)
-        used = set().union(*(child.shared for child in self._children.values()))
-        self._tidy(used)
 
     def __enter__(self) -> "Processes":
         return self

@@ -2,7 +2,7 @@
 
     ports → parameter file → processes → readiness → flight → stop in order → log → table
 
-Nothing is left behind, however it ends: no process, port, lock or shared memory.
+Nothing is left behind, however it ends: no process, port or lock.
 """
 
 from __future__ import annotations
@@ -14,13 +14,12 @@ from uam_control.profile import CONTROLLERS
 from uam_sim_bridge.cockpit import place
 from uam_sim_bridge.faults import PROCESS
 from uam_sim_bridge.faults.timeline import Happened
-from uam_sim_bridge.flight import child, ros_nodes, shared_memory, wiring
+from uam_sim_bridge.flight import child, ros_nodes, wiring
 from uam_sim_bridge.flight.changed_parameters import ChangedParameters
 from uam_sim_bridge.flight.environment import environment
 from uam_sim_bridge.flight.fault_log import FaultTopic
 from uam_sim_bridge.flight.interrupts import Interrupts
 from uam_sim_bridge.flight.outcome import Outcome
-from uam_sim_bridge.flight.places import Places
 from uam_sim_bridge.flight.ports import Ports, Reservation
 from uam_sim_bridge.flight.process_faults import ProcessFaults
 from uam_sim_bridge.flight.process_table import await_orphans
@@ -45,7 +44,6 @@ COMMANDS = [
 ]
 RESTARTS = 3  # of each controller in a flight
 POLL = 0.05  # [s]
-NOTE_PERIOD = 1.0  # [s] between two looks at the shared memory that the nodes use
 
 
 def fly(settings: FlightSettings, folder: ResultFolder, progress: Progress) -> Outcome:
@@ -54,16 +52,13 @@ def fly(settings: FlightSettings, folder: ResultFolder, progress: Progress) -> O
     Raises PortError when no instance is free.
     """
     (folder.path / "logs").mkdir(exist_ok=True)
-    with (
-        Reservation(settings.instance, own_autopilot=not users_autopilot(settings)) as reservation,
-        shared_memory.Presence() as presence,
-    ):
+    own_autopilot = not users_autopilot(settings)
+    with Reservation(settings.instance, own_autopilot=own_autopilot) as reservation:
         if is_cold():
             progress.message("compiling the control path (once)")
             warm_up()
         child.prepare([*ros_nodes.modules(settings).values(), FORKER, *COMMANDS])
         await_orphans(progress.message)
-        presence.remove_unused(shared_memory.abandoned())
         with Interrupts() as stop:
             ports = reservation.ports
             sections = parameters(settings, folder, ports)
@@ -72,12 +67,12 @@ def fly(settings: FlightSettings, folder: ResultFolder, progress: Progress) -> O
             if wiring.COCKPIT in sections:
                 port = sections[wiring.COCKPIT]["port"]
                 progress.message(f"cockpit: {place.address(place.LOCAL, port)}")
-            failure = _supervise(settings, folder, ports, progress, stop, presence)
+            failure = _supervise(settings, folder, ports, progress, stop)
             if failure is not None and failure.status == NOT_READY and not settings.foreign:
                 # on a machine without processor time the middleware may not connect all of them
                 progress.message(f"{failure}; starting once more")
                 _keep_logs(folder.path / "logs")
-                failure = _supervise(settings, folder, ports, progress, stop, presence)
+                failure = _supervise(settings, folder, ports, progress, stop)
     outcome = read_outcome(settings, folder, failure, stop.raised)
     last = progress.last
     if outcome.failure and failure is None and last is not None and last.time < 0.0:
@@ -99,15 +94,11 @@ def _supervise(
     ports: Ports,
     progress: Progress,
     stop: Interrupts,
-    presence: shared_memory.Presence,
 ) -> NodeFailed | None:
     """Start everything, watch it until the plant ends, stop it; returns what failed."""
     logs = folder.path / "logs"
     surroundings = environment(ports.domain, logs)
-    with (
-        Places(ports.domain) as places,
-        Processes(logs, surroundings, presence.remove_unused, places.occupy) as children,
-    ):
+    with Processes(logs, surroundings) as children:
         children.hurry = lambda: stop.impatient
         try:
             _start(children, settings, folder, ports)
@@ -127,7 +118,6 @@ def _supervise(
         except NodeFailed as failure:
             return failure
         finally:
-            children.note_shared_memory()
             others = [name for name in children.names if name != wiring.RECORDER]
             disobedient = children.stop(others) + children.stop([wiring.RECORDER])
             if disobedient and not stop.impatient:
@@ -178,12 +168,8 @@ def _watch(
     faults: ProcessFaults,
 ) -> None:
     """Show the progress until the plant ends or the user stops it. Raises NodeFailed."""
-    noted, restarts = -NOTE_PERIOD, RestartTopic(listener.node)
-    changed = ChangedParameters(listener.node)
+    restarts, changed = RestartTopic(listener.node), ChangedParameters(listener.node)
     while children.running(wiring.PLANT) and not stop.raised:
-        if time.monotonic() - noted >= NOTE_PERIOD:  # who is killed cannot be asked any more
-            children.note_shared_memory()
-            noted = time.monotonic()
         changed.poll()
         for lost in children.revive(changed.arguments):
             text = f"{lost}; started again"

@@ -9,7 +9,7 @@ from __future__ import annotations
 import contextlib
 import ctypes
 import os
-from collections.abc import Sequence
+from collections.abc import Callable
 from pathlib import Path
 
 SEIZE, INTERRUPT, DETACH = 0x4206, 0x4207, 17  # sys/ptrace.h
@@ -34,9 +34,9 @@ def refusal() -> str:
 
 
 class StoppedThreads:
-    """Threads of a process, by the beginnings of their names, stopped until `end`."""
+    """Threads of a process, chosen by their names, stopped until `end`."""
 
-    def __init__(self, pid: int, names: Sequence[str]):
+    def __init__(self, pid: int, chosen: Callable[[str], bool]):
         """Stop them. `end` is for the thread that made it, as ptrace has it.
 
         Raises OSError where the kernel refuses.
@@ -44,7 +44,7 @@ class StoppedThreads:
         self._stopped: list[int] = []
         for task in Path(f"/proc/{pid}/task").iterdir():
             with contextlib.suppress(FileNotFoundError, ProcessLookupError):  # it has just ended
-                if (task / "comm").read_text().startswith(tuple(names)):
+                if chosen((task / "comm").read_text().strip()):
                     self._stop(int(task.name))
 
     def _stop(self, thread: int) -> None:
