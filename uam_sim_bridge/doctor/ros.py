@@ -110,12 +110,12 @@ def room(file: Path = RECEIVE_LIMIT) -> Finding:
     try:
         limit = int(file.read_text())
     except (OSError, ValueError):
-        return ok("receive buffers", f"{file} does not tell their limit")
+        return ok("buffers", f"{file} does not tell their limit")
     found = f"net.core.rmem_max is {limit // 1024} KiB"
     if limit < ROOM:
         return warn(
-            "receive buffers",
+            "buffers",
             f"{found}: who gets no processor time for some hundredths of a second loses messages",
             f"sudo sysctl -w net.core.rmem_max={ROOM}",
         )
-    return ok("receive buffers", found)
+    return ok("buffers", found)

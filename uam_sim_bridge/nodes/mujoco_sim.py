@@ -60,7 +60,7 @@ REPORT_INTERVAL = 5.0  # [s] between two lines that say who is waited for
 CATCH_UP = 1.25  # [1] times real time, after a stall of the machine, which had no time to spare
 FOREIGN_WAIT = 1.0  # [s] for a foreign node to find us as well: it does not say when it has
 LAST_WAIT = 3.0  # [s] for a recorder that has not seen the last tick, and may have lost it
-RECORDER_LAG = 2.0  # [s] half of what fits the queue that config/dds gives each process
+RECORDER_LAG = 2.0  # [s] it tells once a second how far it is, and keeps four times as much
 SERVICE_TICKS = 25  # in real time the parameter services are looked after every so many ticks
 
 
