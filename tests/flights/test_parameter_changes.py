@@ -16,6 +16,7 @@ from uam_control.profile import load_profile
 from uam_msgs_py import topics
 from uam_msgs_py.changes import Change
 from uam_msgs_py.layouts import SECOND, stamp_of
+from uam_msgs_py.polling import listen
 from uam_sim_bridge.flight import timeseries
 from uam_sim_bridge.flight.environment import transport_environment
 from uam_sim_bridge.flight.guest import Guest
@@ -65,10 +66,7 @@ class Tuner:
             node: self.node.create_client(SetParametersAtomically, f"/{node}/{service}")
             for node in NODES
         }
-        clock = topics.CLOCK
-        self._clock = self.node.create_subscription(
-            clock.type, clock.name, lambda _: None, clock.qos, raw=True
-        )
+        self._clock = listen(self.node, topics.CLOCK, raw=True)
         self._now = 0
         self.told = []  # (stamp [ns], change)
         topic = topics.CHANGES

@@ -2,6 +2,7 @@
 
 import pytest
 
+from uam_control import configuration
 from uam_sim_bridge.doctor import environment, ros
 from uam_sim_bridge.doctor.child import Said
 from uam_sim_bridge.doctor.finding import Verdict
@@ -91,3 +92,5 @@ def test_small_receive_buffers_are_told_with_the_remedy(tmp_path):
     assert ros.room(limit).verdict is WARN and "rmem_max=4194304" in ros.room(limit).advice
     limit.write_text("4194304\n")
     assert ros.room(limit).verdict is OK
+    asked = configuration.path("dds/fastdds.xml").read_text()
+    assert f"<receiveBufferSize>{ros.ROOM}</receiveBufferSize>" in asked

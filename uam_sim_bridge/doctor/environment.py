@@ -49,7 +49,7 @@ def _profiles(name: str, value: str) -> Finding:
         return fail("environment", f"{name}={value} is no file", f"unset {name}")
     return warn(
         "environment",
-        f"{name}={value} takes the place of config/dds/fastdds.xml: smaller queues lose messages",
+        f"{name}={value} takes the place of config/dds/fastdds.xml: smaller buffers lose messages",
         f"unset {name}, unless it is meant",
     )
 

@@ -179,12 +179,8 @@ class Processes:
                 time.sleep(POLL)
         return sorted(disobedient)
 
-    def close(self) -> None:
-        """Stop whatever still runs."""
-        self.stop(self.names)
-
     def __enter__(self) -> "Processes":
         return self
 
     def __exit__(self, *exception) -> None:
-        self.close()
+        self.stop(self.names)
