@@ -7,6 +7,7 @@
 With nodes it is one flight, to and fro with the arm swinging; in the direct engine mission after
 mission in one process. Every process is looked at every few seconds in /proc. Leaves soak.json and
 soak.png in --out; the exit status is 1 where something has grown.
+After Ctrl-C what was flown until then is judged.
 """
 
 from __future__ import annotations
@@ -43,16 +44,11 @@ def main() -> int:
         parser.error("--minutes is 2 or more: what grows is not to be seen earlier")
     options.out.mkdir(parents=True, exist_ok=True)
     signal.signal(signal.SIGTERM, signal.default_int_handler)  # the flight must not fly on alone
-    try:
-        if options.engine == "direct":
-            soak = watch.missions(60.0 * options.minutes)
-        else:
-            soak = watch.flight(
-                60.0 * options.minutes, options.clock, options.log_limit, options.out
-            )
-    except KeyboardInterrupt:
-        print("soak: interrupted", file=sys.stderr)
-        return INTERRUPTED
+    duration = 60.0 * options.minutes
+    if options.engine == "direct":
+        soak = watch.missions(duration)
+    else:
+        soak = watch.flight(duration, options.clock, options.log_limit, options.out)
     verdicts = judgement.judge(soak)
     print(judgement.table(verdicts))
     for line in soak.notes:
@@ -60,6 +56,9 @@ def main() -> int:
     (options.out / "soak.json").write_text(json.dumps(soak.to_mapping(verdicts), indent=1))
     picture.draw(soak, options.out / "soak.png")
     print(f"picture  {options.out / 'soak.png'}")
+    if soak.interrupted:
+        print("soak: interrupted", file=sys.stderr)
+        return INTERRUPTED
     return FAILED if soak.failed or any(one.grown for one in verdicts) else 0
 
 

@@ -35,7 +35,8 @@ def usage(pid: int) -> Usage | None:
 class Soak:
     """What was seen. usage: by process, each (time of the soak [s], what it used).
 
-    unit: of the time, as the picture names it; failed: whether the flight itself went wrong.
+    unit: of the time, as the picture names it; failed: whether the flight itself went wrong;
+    interrupted: by people, and what is here is what had been seen by then.
     """
 
     title: str
@@ -43,6 +44,7 @@ class Soak:
     usage: dict[str, list[tuple[float, Usage]]] = field(default_factory=dict)
     notes: list[str] = field(default_factory=list)
     failed: bool = False
+    interrupted: bool = False
 
     def add(self, name: str, time: float, used: Usage) -> None:
         """Note what a process used at a time [s]."""

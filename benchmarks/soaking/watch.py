@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import signal
 import subprocess
 import sys
 import time
@@ -20,7 +21,6 @@ from uam_sim_bridge.plant import Vehicle
 
 PERIOD = 10.0  # [s] of wall time between two looks
 SPOKEN = 30  # looks between two lines of progress
-STOP_WAIT = 60.0  # [s]
 ORCHESTRATOR = "uam fly"
 
 
@@ -34,16 +34,19 @@ def flight(duration: float, clock: str, log_limit: float, out: Path) -> Soak:
     folder = new_folder(out, "flight")
     with said.open("w") as output:
         run = subprocess.Popen(
-            [sys.executable, *command, "--out", str(folder)], stdout=output, stderr=output
+            [sys.executable, *command, "--out", str(folder)],
+            stdout=output,
+            stderr=output,
+            process_group=0,  # Ctrl-C comes to it from here, once
         )
     soak = Soak(f"{duration / 60.0:g} minutes through the nodes, {clock}", "wall time")
-    try:
-        _look(soak, run, folder / "logs" / "mujoco_sim.json")
-        run.wait()
-    except KeyboardInterrupt:
-        run.send_signal(2)
-        run.wait(STOP_WAIT)
-        raise
+    while run.poll() is None:
+        try:
+            _look(soak, run, folder / "logs" / "mujoco_sim.json")
+            run.wait()
+        except KeyboardInterrupt:
+            soak.interrupted = True
+            run.send_signal(signal.SIGINT)
     _conclude(soak, folder, duration)
     return soak
 
@@ -81,7 +84,11 @@ def _conclude(soak: Soak, folder: Path, duration: float) -> None:
         soak.failed = True
         soak.notes.append(f"the flight left no {error.filename}")
         return
-    soak.failed = plant["ended_by"] != "mission" or plant["simulated_s"] < 0.9 * duration
+    soak.failed = not soak.interrupted and (
+        plant["ended_by"] != "mission" or plant["simulated_s"] < 0.9 * duration
+    )
+    if soak.interrupted:
+        soak.title = f"{plant['simulated_s'] / 60.0:.0f} of {soak.title}"
     soak.notes += [
         f"flown    {plant['simulated_s']:.0f} s in {plant['wall_s']:.0f} s, "
         f"ended by: {plant['ended_by']}",
@@ -99,9 +106,15 @@ def missions(duration: float) -> Soak:
     soak, flown, completed, number = Soak("missions in one process", "simulated time"), 0.0, 0, 0
     begin = time.monotonic()
     while flown < duration:
+        one = DirectFlight(
+            scenario, profile, Vehicle.load(), scenario.payload_mass, seed=number + 1
+        )
+        try:
+            one.run()
+        except KeyboardInterrupt:
+            soak.interrupted = True
+            break
         number += 1
-        one = DirectFlight(scenario, profile, Vehicle.load(), scenario.payload_mass, seed=number)
-        one.run()
         flown += one.plant.time
         completed += one.mission.output.done and not one.mission.output.abort_reason
         soak.add("direct engine", flown, usage(os.getpid()))

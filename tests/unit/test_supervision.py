@@ -59,7 +59,7 @@ def test_nothing_leads_out_of_failsafe_but_a_command_and_motors_go_off_on_the_gr
 
 def test_as_many_quantities_are_measured_as_are_named():
     values, seen, two, three = np.full(len(CHECKS), np.nan), observation(), np.ones(2), np.ones(3)
-    measure(seen.state, seen.reference, 0.0, np.zeros((2, 3)), two, values)
+    measure(seen.state, seen.reference, three, 0.0, 0.0, np.zeros((2, 3)), two, values)
     assert np.isnan(values).sum() == 11
     read(1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, two, two, three, three, values)
     assert not np.isnan(values).any()
@@ -209,6 +209,11 @@ def with_state(entry, value):
             "mocap pose has been the same for 1.10 s",
         ),
         (
+            observation(readings=Readings(mocap_age=0.01, mocap_position=np.array([0.3, -0.4, 1]))),
+            State.HOLDING,
+            "motion capture is 0.50 m off the estimate, 0.15 m allowed",
+        ),
+        (
             observation(readings=Readings(joint_effort=np.array([0.0, -2.9]))),
             State.HOLDING,
             "joint torque at 1.04 of its limit",
@@ -225,6 +230,13 @@ def test_what_is_beyond_a_limit_has_its_reaction_and_says_so(seen, state, cause)
     supervisor = flying()
     decision = watch(supervisor, seen, 0.6)
     assert decision.state is state and decision.cause.startswith(cause)
+
+
+def test_poses_away_from_the_estimate_are_left_to_the_autopilot_as_late_as_no_poses():
+    seen = observation(readings=Readings(mocap_age=0.01, mocap_position=np.array([0.3, -0.4, 1])))
+    supervisor = flying()
+    assert watch(supervisor, seen, 0.95).state is State.HOLDING
+    assert watch(supervisor, seen, 0.1, 1.96).state is State.FAILSAFE
 
 
 def test_a_fence_left_is_a_landing():
@@ -331,6 +343,7 @@ READINGS = st.builds(
     autopilot_age=NUMBERS,
     mocap_still=NUMBERS,
     round_trip=NUMBERS,
+    mocap_position=st.builds(np.array, st.tuples(NUMBERS, NUMBERS, NUMBERS)),
 )  # fmt: skip
 
 

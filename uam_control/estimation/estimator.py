@@ -17,6 +17,8 @@ from uam_control.estimation.pose_filter import PoseFilter
 from uam_control.parameters import ParameterSet, number
 from uam_control.rotations import euler_from_quaternion
 
+LONGEST_STEP = 0.05  # [s] that filters are advanced by at once; beyond it samples were lost
+
 
 @dataclass(frozen=True)
 class EstimatorParameters(ParameterSet):
@@ -27,6 +29,9 @@ class EstimatorParameters(ParameterSet):
     )
     attitude_bandwidth: float = number(
         8.0, "correction of attitude by motion capture", "rad/s", 0.5, 60.0
+    )
+    pose_gate: float = number(
+        0.15, "jump of the motion capture from which on its poses are not used", "m", 0.05, 1000.0
     )
     joint_bandwidth: float = number(
         60.0, "correction of joint state by the encoder angle", "rad/s", 1.0, 125.0
@@ -50,7 +55,9 @@ class StateEstimator:
 
     def __init__(self, parameters: EstimatorParameters) -> None:
         self.parameters = parameters
-        self._pose = PoseFilter(parameters.position_bandwidth, parameters.attitude_bandwidth)
+        self._pose = PoseFilter(
+            parameters.position_bandwidth, parameters.attitude_bandwidth, parameters.pose_gate
+        )
         self._state = np.zeros((3, 8))
         self._joints = np.zeros((2, 2))
         self._rates_filter = np.zeros((2, 3))
@@ -65,6 +72,12 @@ class StateEstimator:
         """Use `parameters` (validated) from the next sample on."""
         self.parameters = parameters
         self._pose.set_bandwidths(parameters.position_bandwidth, parameters.attitude_bandwidth)
+        self._pose.gate.distance = parameters.pose_gate
+
+    @property
+    def refused_poses(self) -> int:
+        """How many poses were not used because they had jumped away."""
+        return self._pose.gate.refused
 
     @property
     def waiting_for(self) -> list[str]:
@@ -91,7 +104,9 @@ class StateEstimator:
     def imu(self, stamp: float, gyro: np.ndarray, specific_force: np.ndarray) -> None:
         """Take an IMU sample: gyro (3,) [rad/s], specific force (3,) [m/s^2], FLU."""
         last, self._imu_stamp = self._imu_stamp, stamp
-        self._period = 0.0 if last is None else min(max(stamp - last, 0.0), 0.05)
+        self._period = 0.0 if last is None else min(max(stamp - last, 0.0), LONGEST_STEP)
+        if last is not None and stamp - last > LONGEST_STEP:
+            self._pose.gate.doubt(stamp)
         if self._started and self._period > 0.0:
             self._pose.predict(stamp, self._period, gyro, specific_force)
 
@@ -103,7 +118,7 @@ class StateEstimator:
             self._joints[0] = alpha
             self._joints[1] = alpha_dot
             return
-        dt = min(max(stamp - last, 0.0), 0.05)
+        dt = min(max(stamp - last, 0.0), LONGEST_STEP)
         joint_step(alpha, alpha_dot, p.joint_bandwidth, p.joint_velocity_weight, dt, self._joints)
         derivative_step(
             self._joints[1],

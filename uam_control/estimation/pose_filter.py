@@ -6,9 +6,12 @@ when the camera exposed is kept in a ring, so that the correction compares like 
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 
 from uam_control.compiled import jit
+from uam_control.estimation.pose_gate import PoseGate
 from uam_control.estimation.repeats import Repeats
 from uam_control.rotations import (
     matrix_from_quaternion,
@@ -33,8 +36,11 @@ class PoseFilter:
     world.
     """
 
-    def __init__(self, position_bandwidth: float, attitude_bandwidth: float) -> None:
-        """Bandwidths [rad/s] of the corrections from motion capture."""
+    def __init__(
+        self, position_bandwidth: float, attitude_bandwidth: float, gate: float = math.inf
+    ) -> None:
+        """Bandwidths [rad/s] of the corrections from motion capture; gate [m]: see `PoseGate`."""
+        self.gate = PoseGate(gate)
         self.set_bandwidths(position_bandwidth, attitude_bandwidth)
         self.position = np.zeros(3)
         self.velocity = np.zeros(3)
@@ -82,11 +88,14 @@ class PoseFilter:
     def correct(self, stamp: float, position: np.ndarray, quaternion: np.ndarray) -> None:
         """Correct with a pose exposed at `stamp`.
 
-        Not used: one that is older than the history, and one that repeats exactly what came before,
-        see `Repeats`.
+        Not used: one that is older than the history, one that repeats exactly what came before, see
+        `Repeats`, and one that has jumped away, see `PoseGate`.
         """
         row = nearest(self._stamps, stamp)
         if abs(self._stamps[row] - stamp) > OLDEST_MATCH or self._repeats(position, quaternion):
+            return
+        off, bias = math.dist(position, self._poses[row, :3]), math.hypot(*self.accelerometer_bias)
+        if self.gate(stamp, off, bias):
             return
         dt = min(max(stamp - self._last_correction, 1e-3), 0.05)
         self._last_correction = stamp

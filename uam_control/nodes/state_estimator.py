@@ -13,6 +13,7 @@ from uam_msgs_py.joins import Backlog
 from uam_msgs_py.node import UamNode, run
 from uam_msgs_py.parameters import NodeParameters
 from uam_msgs_py.stamps import seconds
+from uam_msgs_py.status import OK, WARN
 from uam_msgs_py.trajectories import TrajectoryWriter
 
 NAME = "state_estimator"
@@ -41,6 +42,7 @@ class StateEstimatorNode(UamNode):
         self.listen(topics.IMU, self._on_imu)
         self.triggers = (topics.IMU.name,)
         self._last_imu = -1
+        self._refused_before = 0  # poses, at the last report
         self._updates = Backlog()
 
     def _on_mocap(self, data: bytes) -> None:
@@ -73,6 +75,14 @@ class StateEstimatorNode(UamNode):
         for stamp, data, begun in self._updates.take():
             self._state.publish(data)
             self.done_tick(stamp, begun)
+
+    def diagnose(self) -> tuple[bytes, str, dict[str, object]]:
+        refused = self._estimator.refused_poses
+        fresh, self._refused_before = refused - self._refused_before, refused
+        values = {"poses refused": refused}
+        if fresh:
+            return WARN, f"{fresh} poses of late jumped away from the estimate", values
+        return OK, "running", values
 
     def _warm_up(self) -> None:
         """Compile the filters on an estimator that never flies."""

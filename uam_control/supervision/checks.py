@@ -17,13 +17,15 @@ from uam_control.supervision.parameters import SupervisionParameters
 
 NONE = math.inf
 CONTROLLERS = "controllers"
+LATEST = 0.25  # [s] later than this, a pose is not compared with the estimate of its time
 
 
 class Check(NamedTuple):
     """A quantity: its name, a format for value and limit in a cause, and its limits.
 
     A limit is a parameter's name or a number. in_flight: means nothing on the ground.
-    sign -1: less is worse.
+    sign -1: less is worse. failsafe_after: the parameter that says how long, if it is not the
+    common one.
     """
 
     name: str
@@ -33,6 +35,7 @@ class Check(NamedTuple):
     failsafe: str | float = NONE
     in_flight: bool = False
     sign: int = 1
+    failsafe_after: str = "failsafe_after"
 
 
 # in the order in which `measure` writes them
@@ -50,6 +53,9 @@ CHECKS = (
     Check("geofence", "{name} left by {value:.2f} m, {limit:g} m allowed",
           land="geofence_land", failsafe="geofence_failsafe"),
     Check("joint angle", "{name} at {value:.2f} of its limit", 1.0),
+    Check("motion capture", "{name} is {value:.2f} m off the estimate, {limit:g} m allowed",
+          "mocap_distance_hold", failsafe="mocap_distance_hold", in_flight=True,
+          failsafe_after="mocap_age_failsafe"),
     Check("battery", "{name} {value:.2f} full, below {limit:g}", land="battery_land", sign=-1),
     Check("mocap", "{name} pose is {value:.2f} s old, {limit:g} s allowed", "mocap_age_hold",
           failsafe="mocap_age_failsafe"),
@@ -99,7 +105,9 @@ class Checks:
             tuple(_limit(p, check, limit) for limit in (check.hold, check.land, check.failsafe))
             for check in CHECKS
         )
-        self._after = (p.hold_after, p.land_after, p.failsafe_after)
+        self._after = tuple(
+            (p.hold_after, p.land_after, getattr(p, check.failsafe_after)) for check in CHECKS
+        )
         # below these a monitor has nothing to do unless something was beyond a limit before
         first = [min(limits) for limits in self._limits]
         self._calm = np.array([limit - p.hysteresis * abs(limit) for limit in first])
@@ -113,7 +121,16 @@ class Checks:
         in_flight: whether the reference is one that the vehicle follows.
         """
         readings, values = seen.readings, self._values
-        measure(seen.state, seen.reference, seen.ground, self._box, self._joints, values)
+        measure(
+            seen.state,
+            seen.reference,
+            readings.mocap_position,
+            readings.mocap_age,
+            seen.ground,
+            self._box,
+            self._joints,
+            values,
+        )
         read(
             readings.battery,
             readings.mocap_age,
@@ -133,12 +150,12 @@ class Checks:
         if self.quiet and _below(values, self._calm):
             return None
         p, worst = self._parameters, None
-        for check, monitor, value, limits in zip(
-            CHECKS, self._monitors, values.tolist(), self._limits, strict=True
+        for check, monitor, value, limits, after in zip(
+            CHECKS, self._monitors, values.tolist(), self._limits, self._after, strict=True
         ):
             if check.in_flight and not in_flight:
                 value = -math.inf
-            level = monitor.update(stamp, value, limits, self._after, p.clear_after, p.hysteresis)
+            level = monitor.update(stamp, value, limits, after, p.clear_after, p.hysteresis)
             if level and (worst is None or level > worst.level):
                 worst = Finding(level, _cause(check, value, limits[level - 1]), check.name)
         self.quiet = all(monitor.quiet for monitor in self._monitors)
@@ -160,15 +177,18 @@ def _cause(check: Check, value: float, limit: float) -> str:
 def measure(
     state: np.ndarray,
     reference: np.ndarray,
+    mocap: np.ndarray,
+    age: float,
     ground: float,
     box: np.ndarray,
     joints: np.ndarray,
     values: np.ndarray,
 ) -> None:
-    """Write what state and reference tell into values[:7]; only the first where the state is not
+    """Write what state and reference tell into values[:8]; only the first where the state is not
     finite.
 
-    box (2, 3): low and high corner [m]; joints (2,): limits of the angles [rad].
+    mocap (3,), age: position [m] of the newest pose and its age [s], NaN for none; box (2, 3): low
+    and high corner [m]; joints (2,): limits of the angles [rad].
     """
     values[0] = 0.0
     for i in range(3):
@@ -176,9 +196,11 @@ def measure(
             if not math.isfinite(state[i, j]):
                 values[0] = 1.0
                 return
-    squared, outside, rate = 0.0, -math.inf, 0.0
+    age = min(max(age, 0.0), LATEST)
+    squared, apart, outside, rate = 0.0, 0.0, -math.inf, 0.0
     for i in range(3):
         squared += (state[0, i] - reference[0, i]) ** 2
+        apart += (state[0, i] - state[1, i] * age - mocap[i]) ** 2
         outside = max(outside, box[0, i] - state[0, i], state[0, i] - box[1, i])
         rate = max(rate, abs(state[1, 3 + i]))
     cosine = math.cos(state[0, 3]) * math.cos(state[0, 4])
@@ -188,6 +210,7 @@ def measure(
     values[4] = state[0, 2] - ground
     values[5] = outside
     values[6] = max(abs(state[0, 6]) / joints[0], abs(state[0, 7]) / joints[1])
+    values[7] = _known(math.sqrt(apart))
 
 
 @jit
@@ -207,13 +230,13 @@ def read(
     gain_limits: np.ndarray,
     values: np.ndarray,
 ) -> None:
-    """Write the readings (see `Readings`) into values[7:]; unknown ones are in order."""
-    values[7] = _known(-battery)
-    values[8], values[9], values[10] = _known(mocap), _known(still), _known(joints)
-    values[11], values[12] = _known(controllers), _known(autopilot)
-    values[13], values[14], values[15] = _known(round_trip), _known(missed), _known(temperature)
-    values[16] = _largest(effort, effort_limits)
-    values[17] = _largest(gains, gain_limits)
+    """Write the readings (see `Readings`) into values[8:]; unknown ones are in order."""
+    values[8] = _known(-battery)
+    values[9], values[10], values[11] = _known(mocap), _known(still), _known(joints)
+    values[12], values[13] = _known(controllers), _known(autopilot)
+    values[14], values[15], values[16] = _known(round_trip), _known(missed), _known(temperature)
+    values[17] = _largest(effort, effort_limits)
+    values[18] = _largest(gains, gain_limits)
 
 
 @jit

@@ -36,6 +36,7 @@ class Inputs:
     def mocap(self, stamp: float, position: np.ndarray, quaternion: np.ndarray) -> None:
         """Note a pose, position (3,) and quaternion (4,), that was exposed at `stamp` [s]."""
         self._mocap = stamp
+        self._readings.mocap_position[:] = position
         if not self._repeats(position, quaternion):
             self._moved = stamp
 

@@ -25,7 +25,7 @@ class Readings:
     """What is known besides state and reference; NaN where it is not, and then nothing follows.
 
     battery: charge left, 0..1. mocap_age, joint_age [s]: of the newest message by its stamp;
-    mocap_still [s]: since the pose last was another one;
+    mocap_still [s]: since the pose last was another one; mocap_position (3,): of the newest [m];
     controller_age [s]: of the oldest of the newest gains, which every controller tells;
     pose_controller_age: the same without the arm's. autopilot_age [s]: since the bridge last told
     that it hears the autopilot; round_trip [s]: how long the autopilot's answers take.
@@ -45,6 +45,7 @@ class Readings:
     autopilot_age: float = math.nan
     mocap_still: float = math.nan
     round_trip: float = math.nan
+    mocap_position: np.ndarray = field(default_factory=lambda: np.full(3, math.nan))
 
 
 @dataclass

@@ -49,6 +49,9 @@ class Limits(ParameterSet):
     mocap_age_failsafe: float = number(
         1.0, "age of the mocap pose to leave it to the autopilot at", "s", 0.02, 60.0
     )
+    mocap_distance_hold: float = number(
+        0.15, "distance of the mocap pose from the estimate to hold at", "m", 0.05, 1000.0
+    )
     joint_age_hold: float = number(0.25, "age of the joint angles to hold at", "s", 0.02, 10.0)
     controller_age_hold: float = number(
         0.25, "age of the gains that a controller tells, to hold at", "s", 0.05, 10.0

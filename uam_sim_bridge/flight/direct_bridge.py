@@ -8,7 +8,6 @@ from typing import Any
 import numpy as np
 
 from uam_control import configuration
-from uam_control.coordinates import ATTITUDE, POSITION
 from uam_control.estimation.repeats import Repeats
 from uam_control.mission import MissionOutput
 from uam_control.supervision import State
@@ -16,20 +15,19 @@ from uam_sim_bridge.autopilot.core import Autopilot
 from uam_sim_bridge.autopilot.modes import CUSTOM_MODE_ENABLED, Command, Mode
 from uam_sim_bridge.autopilot.params import Parameters
 from uam_sim_bridge.mavlink.frames import swap_body, swap_quaternion, swap_world
-from uam_sim_bridge.mavlink.hold import UNKNOWN, HoldParameters, LevelHold
+from uam_sim_bridge.mavlink.hold import HoldParameters
 from uam_sim_bridge.mavlink.offboard import (
     HEARTBEAT_TIMEOUT,
     OffboardParameters,
     OffboardSequence,
     Request,
 )
-from uam_sim_bridge.mavlink.setpoint import RateThrustMap, RateThrustParameters, SetpointRefused
+from uam_sim_bridge.mavlink.setpoint import RateThrustMap, RateThrustParameters
+from uam_sim_bridge.mavlink.setpoint_source import SetpointSource, Situation
 from uam_sim_bridge.mavlink.thrust_identification import (
     ThrustIdentification,
     ThrustIdentificationParameters,
 )
-
-IDLE = (np.zeros(3), 0.0)  # setpoint of a vehicle on the ground
 
 
 class DirectBridge:
@@ -45,7 +43,7 @@ class DirectBridge:
         self.identification = ThrustIdentification(ThrustIdentificationParameters.among(section))
         self.sequence = OffboardSequence(OffboardParameters.among(section))
         self._repeats = Repeats()
-        self._hold = LevelHold(HoldParameters.among(section))
+        self._source = SetpointSource(self.map, HoldParameters.among(section))
         self.autopilot = Autopilot(Parameters.load(configuration.path("autopilot/s500.yaml")))
         self.setpoint = np.zeros(4)
         self.factor = 1.0
@@ -89,7 +87,11 @@ class DirectBridge:
         request = self.sequence.update(stamp, self.connected(stamp), status.armed, status.mode)
         if request is not None and self.passes():
             self._request(time, request)
-        command = self._command(stamp, tau_p, tau_q, state, flying)
+        situation = Situation(status.armed, autopilot.landing.landed, self.sequence.let_go)
+        self._source.note_state(stamp, state)
+        command = self._source.commanded(
+            stamp, state, flying, tau_p, tau_q if flying else None, situation
+        )
         setpoint[:] = 0.0
         if command is not None:
             setpoint[0:3], setpoint[3] = command
@@ -102,21 +104,6 @@ class DirectBridge:
 
     def _frozen(self, mocap: tuple) -> bool:
         return self._repeats(mocap[1], mocap[2]) and self.autopilot.commander.armed
-
-    def _command(
-        self, stamp: float, tau_p: np.ndarray, tau_q: np.ndarray, state: np.ndarray, flying: bool
-    ) -> tuple[np.ndarray, float] | None:
-        """Rates (3,) and thrust of this tick, None for no setpoint: what the node does."""
-        if flying:
-            try:
-                rates, thrust = self.map.map(tau_p, tau_q, state[0, 3:6], state[1, 3:6])
-            except SetpointRefused:
-                return self._hold.setpoint(stamp, state[0, ATTITUDE], state[1, POSITION])
-            self._hold.good(stamp, thrust)
-            return rates, thrust
-        if self.sequence.let_go and self.autopilot.commander.armed:
-            return self._hold.setpoint(stamp, state[0, ATTITUDE], UNKNOWN, hopeless=True)
-        return IDLE
 
     def _request(self, time: float, request: Request) -> None:
         if request is Request.OFFBOARD:

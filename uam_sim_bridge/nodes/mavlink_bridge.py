@@ -4,14 +4,8 @@ One tick per stamp at which state, position command and attitude command are the
 the autopilot sent is read, then go out: heartbeat and requests, the newest mocap pose, the
 setpoint; /uam/setpoint repeats what was sent and acknowledges the tick.
 
-| commands at a tick | sent |
-|---|---|
-| good | body rates and thrust from the map |
-| idle (not flying) | rates 0, thrust 0: the stream goes on, the vehicle stays on the ground |
-| not finite or malformed, on the ground | as idle |
-| the same in flight; the mission in failsafe; idle high above the start; none for `stale_after`, \
-by the stamps of the state or, in real time, by the wall clock | level hold for `hold_time`, \
-`release_time` where nothing is to be expected, then nothing: the autopilot's failsafe acts |
+Without commands for `stale_after`, by the stamps of the state or, in real time, by the wall clock,
+it sends what `SetpointSource` has for that.
 """
 
 from __future__ import annotations
@@ -26,10 +20,9 @@ from rclpy.clock import Clock, ClockType
 from rclpy.parameter import Parameter
 from std_msgs.msg import Bool
 
-from uam_control.coordinates import ATTITUDE, POSITION
+from uam_control.coordinates import ATTITUDE
 from uam_control.estimation.repeats import Repeats
 from uam_control.parameters import ParameterError
-from uam_control.rotations import euler_from_quaternion
 from uam_control.supervision import State
 from uam_msgs_py import topics
 from uam_msgs_py.control import (
@@ -47,11 +40,12 @@ from uam_msgs_py.parameters import NodeParameters
 from uam_msgs_py.stamps import seconds
 from uam_msgs_py.status import OK, WARN, MissionStatus
 from uam_sim_bridge.flight.fault_log import FaultTopic
-from uam_sim_bridge.mavlink.hold import UNKNOWN, HoldParameters, LevelHold
+from uam_sim_bridge.mavlink.hold import HoldParameters
 from uam_sim_bridge.mavlink.link_report import faults, report
 from uam_sim_bridge.mavlink.offboard import OffboardParameters, OffboardSequence
 from uam_sim_bridge.mavlink.parameter_check import adopted, differences
-from uam_sim_bridge.mavlink.setpoint import RateThrustMap, RateThrustParameters, SetpointRefused
+from uam_sim_bridge.mavlink.setpoint import RateThrustMap, RateThrustParameters
+from uam_sim_bridge.mavlink.setpoint_source import IDLE, Setpoint, SetpointSource, Situation
 from uam_sim_bridge.mavlink.thrust_identification import (
     ThrustIdentification,
     ThrustIdentificationParameters,
@@ -95,24 +89,17 @@ class MavlinkBridgeNode(UamNode):
         self.identification = ThrustIdentification(thrust.current)
         thrust.apply = self.identification.configure
         self.sequence = OffboardSequence(offboard)
-        self._hold = LevelHold(hold)
         options = self._options
+        self._source = SetpointSource(self.map, hold, options.stale_after + LATENCY, self.say)
         links = open_links(self, options, self.sequence, self.map.parameters)
         self.link, self._station, self._faulty = links.autopilot, links.station, links.faulty
         self._fault_topic = FaultTopic(self) if self._faulty else None
-        self._state = np.zeros((3, 8))
         self._pose: tuple[int, np.ndarray, np.ndarray] | None = None
-        # What is known of the attitude when commands do not come: stamp [ns], roll, pitch, yaw.
-        self._estimated = self._seen = (-1, UNKNOWN)
-        self._velocity = UNKNOWN
         self._repeats = Repeats()
         self._pose_sent = -1.0
         self._adopted: tuple[str, ...] = ()
         self._commanded = 0  # stamp [ns] of the last tick with commands
         self._last_tick = time.monotonic()
-        self._ground: float | None = None  # height [m] at which the vehicle stood
-        self._margin = hold.ground_margin
-        self._idle = np.zeros(3)
         self._warm_up()
 
         self._setpoint = self.publisher(topics.SETPOINT)
@@ -159,7 +146,7 @@ class MavlinkBridgeNode(UamNode):
 
     def _read_state(self, data: bytes) -> tuple[int, np.ndarray]:
         stamp, state = read_state(data)
-        self._estimated, self._velocity = (stamp, state[0, ATTITUDE]), state[1, POSITION]
+        self._source.note_state(seconds(stamp), state)
         return stamp, state
 
     @staticmethod
@@ -178,11 +165,11 @@ class MavlinkBridgeNode(UamNode):
             self._faulty.mission_at(seconds(stamp), status.time)
 
     def _on_mocap(self, data: bytes) -> None:
-        stamp, position, quaternion = pose = read_pose(data)
+        pose = stamp, position, quaternion = read_pose(data)
         if self._repeats(position, quaternion) and self.link.armed:
             return  # neither the autopilot nor the level hold is to believe a frozen tracker
         self._pose = pose
-        self._seen = stamp, euler_from_quaternion(quaternion)
+        self._source.note_pose(seconds(stamp), quaternion)
 
     def _tick(
         self, stamp: int, state: StateOrBad, position: CommandOrBad, torque: TorqueOrBad
@@ -194,15 +181,18 @@ class MavlinkBridgeNode(UamNode):
         self.take_waiting(self._arming)
         self.take_waiting(self._mocap)
         self.take_waiting(self._mission)
-        if state is not BAD:
-            self._state = state
         self._update_faults(now)
         self.link.poll(now)
         self._adopt()
-        setpoint = self._command(now, state, position, torque)
+        if state is BAD or position is BAD or torque is BAD:
+            setpoint = self._source.without(now, self._situation)
+        else:
+            setpoint = self._source.commanded(
+                now, state, position.flying, position.tau, *torque, self._situation
+            )
         self._send(now, setpoint)
         self._autopilot.tell(stamp)
-        rates, thrust = setpoint or (self._idle, 0.0)
+        rates, thrust = setpoint or IDLE
         self._identify(stamp, state, position, thrust)
         self._setpoint.publish(self._writer.fill(stamp, rates, thrust))
         self.done_tick(stamp, begun)
@@ -249,58 +239,11 @@ class MavlinkBridgeNode(UamNode):
             position.flying and self.link.armed and not self.sequence.let_go,
         )
 
-    def _command(
-        self, now: float, state: StateOrBad, position: CommandOrBad, torque: TorqueOrBad
-    ) -> tuple[np.ndarray, float] | None:
-        """Return body rates (3,) and thrust for this tick, None for no setpoint at all."""
-        good = state is not BAD and position is not BAD and torque is not BAD
-        good = good and not self.sequence.let_go
-        if good and position.flying and torque[0] is not None:
-            try:
-                chi, chi_dot = state[0], state[1]
-                rates, thrust = self.map.map(
-                    position.tau, torque[0], chi[ATTITUDE], chi_dot[ATTITUDE]
-                )
-            except SetpointRefused as error:
-                self.say(f"setpoint refused: {error}")
-            else:
-                self._hold.good(now, thrust)
-                return rates, thrust
-        elif good and not position.flying and torque[0] is None and not self._high():
-            self._hold.reset()
-            return self._idle, 0.0
-        return self._without_command(now)
+    @property
+    def _situation(self) -> Situation:
+        return Situation(self.link.armed, self.link.landed, self.sequence.let_go)
 
-    def _high(self) -> bool:
-        """Whether the vehicle is armed and well above the place where it stood disarmed."""
-        height = float(self._state[0, 2])
-        if self._ground is None or not self.link.armed:
-            self._ground = height
-        return height - self._ground > self._margin
-
-    def _without_command(self, now: float) -> tuple[np.ndarray, float] | None:
-        if not self.link.armed or (self.link.landed and not self._high()):
-            return self._idle, 0.0
-        hopeless = self.sequence.let_go or not self._fresh(self._estimated[0], now)
-        velocity = UNKNOWN if hopeless else self._velocity
-        setpoint = self._hold.setpoint(now, self._attitude(now), velocity, hopeless)
-        self.say(
-            "no usable commands in flight: "
-            + ("holding level" if setpoint else "stream stopped, the failsafe acts"),
-            "hold",
-        )
-        return setpoint
-
-    def _attitude(self, now: float) -> np.ndarray:
-        """Roll, pitch, yaw [rad]: the estimate, the mocap's where that is old; NaN without both."""
-        known = (self._estimated, self._seen)
-        return next((angles for stamp, angles in known if self._fresh(stamp, now)), UNKNOWN)
-
-    def _fresh(self, stamp: int, now: float) -> bool:
-        """Whether what was measured at a stamp [ns], negative for never, is good at `now` [s]."""
-        return stamp >= 0 and now - seconds(stamp) < self._options.stale_after + LATENCY
-
-    def _send(self, now: float, setpoint: tuple[np.ndarray, float] | None) -> None:
+    def _send(self, now: float, setpoint: Setpoint) -> None:
         """Send the autopilot what is due: heartbeat, requests, vision, setpoint."""
         link, options = self.link, self._options
         link.tick(now)
@@ -331,7 +274,7 @@ class MavlinkBridgeNode(UamNode):
             self._join.skip(state)
             self._last_tick = time.monotonic()
             setpoint = self._go_without(seconds(state))
-            rates, thrust = setpoint or (self._idle, 0.0)
+            rates, thrust = setpoint or IDLE
             self._setpoint.publish(self._writer.fill(state, rates, thrust))
             self.done_tick(state, time.perf_counter())
 
@@ -342,11 +285,11 @@ class MavlinkBridgeNode(UamNode):
             return
         self._go_without(seconds(self.stamp) + silence)
 
-    def _go_without(self, now: float) -> tuple[np.ndarray, float] | None:
+    def _go_without(self, now: float) -> Setpoint:
         """Do what a tick at `now` [s] does, without commands; return the setpoint sent."""
         self._update_faults(now)
         self.link.poll(now)
-        setpoint = self._without_command(now)
+        setpoint = self._source.without(now, self._situation)
         self._send(now, setpoint)
         self._autopilot.tell(round(now * 1e9))
         return setpoint
@@ -363,7 +306,7 @@ class MavlinkBridgeNode(UamNode):
             "refused": link.refused,
             "link open": link.open,
             "frames dropped": link.dropped,
-            "level hold": self._hold.active,
+            "level hold": self._source.holding,
             "adopted": "; ".join(self._adopted),
             **report(link),
             "thrust factor [1]": f"{self.map.thrust_factor:.4f}",
@@ -374,9 +317,10 @@ class MavlinkBridgeNode(UamNode):
     def _warm_up(self) -> None:
         """Compile the maths before the flight: a first call takes a second."""
         spare, zero, level = RateThrustMap(), np.zeros(3), np.array([1.0, 0.0, 0.0, 0.0])
-        spare.map(zero, zero, self._state[0, ATTITUDE], self._state[1, ATTITUDE])
+        state = np.zeros((3, 8))
+        spare.map(zero, zero, state[0, ATTITUDE], state[1, ATTITUDE])
         spare.assumed_thrust(0.5)
-        steady_force(self._state, 0.1, 1.0)
+        steady_force(state, 0.1, 1.0)
         vision_message(0.0, zero, level, 1.0, 1.0)
 
 

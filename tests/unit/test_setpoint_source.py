@@ -1,0 +1,125 @@
+"""What goes out, whatever comes: the map's, idle, the level hold's or nothing."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from uam_control.rotations import quaternion_from_euler
+from uam_sim_bridge.mavlink.hold import HoldParameters
+from uam_sim_bridge.mavlink.setpoint import RateThrustMap, RateThrustParameters
+from uam_sim_bridge.mavlink.setpoint_source import SetpointSource, Situation
+
+TICK = 0.004
+FLYING = Situation(armed=True, landed=False, let_go=False)
+LET_GO = FLYING._replace(let_go=True)
+STANDING = Situation(armed=False, landed=True, let_go=False)
+WEIGHT, REST = np.array([0.0, 0.0, 20.0]), np.zeros(3)
+ENDLESS = np.full(3, math.inf)
+
+
+def state_at(height: float = 0.0, roll: float = 0.0) -> np.ndarray:
+    state = np.zeros((3, 8))
+    state[0, 2], state[0, 3] = height, roll
+    return state
+
+
+def in_flight(said: list[str] | None = None, fresh: float = math.inf) -> SetpointSource:
+    """One that stood on the ground and hovers at 1 m; its last tick was at 1 s."""
+    notes = [] if said is None else said
+    source = SetpointSource(
+        RateThrustMap(), HoldParameters(), fresh, lambda text, _: notes.append(text)
+    )
+    state = state_at()
+    source.note_state(0.0, state)
+    assert source.commanded(0.0, state, False, WEIGHT, None, STANDING)[1] == 0.0
+    state = state_at(1.0)
+    for k in range(1, 251):
+        source.note_state(TICK * k, state)
+        _, thrust = source.commanded(TICK * k, state, True, WEIGHT, REST, FLYING)
+    assert thrust > 0.3 and not source.holding
+    return source
+
+
+@pytest.mark.parametrize(
+    ("flying", "tau_p", "tau_q", "situation"),
+    [
+        (True, WEIGHT * math.nan, REST, FLYING),
+        (True, WEIGHT, ENDLESS, FLYING),
+        (True, WEIGHT, None, FLYING),
+        (False, WEIGHT, REST, FLYING),
+        (False, WEIGHT, None, FLYING),  # idle, high above the start
+        (True, WEIGHT, REST, LET_GO),
+    ],
+)
+def test_what_is_not_good_in_flight_is_a_level_hold_and_then_nothing(
+    flying, tau_p, tau_q, situation
+):
+    source, state = in_flight(), state_at(1.0, roll=0.1)
+    held = HoldParameters().release_time if situation.let_go else HoldParameters().hold_time
+    for k in range(round((held + 0.5) / TICK)):
+        now = 1.0 + TICK * (k + 1)
+        source.note_state(now, state)
+        setpoint = source.commanded(now, state, flying, tau_p, tau_q, situation)
+        if TICK * k < held - 0.1:
+            assert setpoint[0][0] < -0.5 and setpoint[1] > 0.3
+    assert setpoint is None and source.holding
+
+
+def test_it_says_why():
+    said = []
+    source = in_flight(said)
+    source.commanded(1.004, state_at(1.0), True, WEIGHT * math.nan, REST, FLYING)
+    source.without(9.0, FLYING)
+    assert said == [
+        "setpoint refused: tau_p.x is not finite",
+        "no usable commands in flight: holding level",
+        "no usable commands in flight: stream stopped, the failsafe acts",
+    ]
+
+
+def test_on_the_ground_everything_is_idle():
+    source = SetpointSource(RateThrustMap(), HoldParameters())
+    for situation in (STANDING, FLYING._replace(landed=True), STANDING._replace(let_go=True)):
+        rates, thrust = source.without(1.0, situation)
+        assert thrust == 0.0 and not rates.any()
+
+
+def test_an_old_estimate_gives_way_to_what_the_motion_capture_saw_and_then_to_none():
+    source = in_flight(fresh=0.15)
+    source.note_pose(1.1, quaternion_from_euler(np.array([0.0, 0.2, 0.0])))
+    rates, _ = source.without(1.2, FLYING)
+    assert rates[1] == pytest.approx(-1.2, rel=0.05) and rates[0] == 0.0
+    rates, _ = source.without(1.3, FLYING)
+    assert rates[0] == 0.0 and abs(rates[1]) < 0.3  # what the integral has gathered
+
+
+NUMBERS = st.floats(-1e3, 1e3) | st.sampled_from([math.nan, math.inf, -math.inf, 0.0])
+VECTORS = st.builds(lambda *v: np.array(v), NUMBERS, NUMBERS, NUMBERS)
+
+
+@st.composite
+def ticks(draw):
+    state = state_at(draw(NUMBERS))
+    state[0, 3:6], state[1, :3], state[1, 3:6] = draw(VECTORS), draw(VECTORS), draw(VECTORS)
+    commands = draw(st.booleans()), draw(VECTORS), draw(st.none() | VECTORS)
+    situation = Situation(draw(st.booleans()), draw(st.booleans()), draw(st.booleans()))
+    return draw(st.booleans()), state, commands, situation
+
+
+@given(st.lists(ticks(), min_size=1, max_size=30), st.floats(0.001, 1.0))
+def test_whatever_comes_rates_and_thrust_are_finite_and_within_their_limits(sequence, step):
+    source, limit = in_flight(), np.array(RateThrustParameters().rate_limit)
+    for k, (told, state, commands, situation) in enumerate(sequence):
+        now = 1.0 + step * (k + 1)
+        if told:
+            source.note_state(now, state)
+            setpoint = source.commanded(now, state, *commands, situation)
+        else:
+            setpoint = source.without(now, situation)
+        if setpoint is not None:
+            assert np.all(np.abs(setpoint[0]) <= limit) and 0.0 <= setpoint[1] <= 1.0
