@@ -11,7 +11,10 @@ from __future__ import annotations
 import math
 
 CONTRADICTED = 1.0  # [m/s^2] bias of the accelerometer that no accelerometer has
-MEMORY = 1.0  # [s] for which the estimate is not trusted after such a bias, or a gap of the IMU
+GAP = 0.5  # [s] without poses, after which the estimate may be off
+MEMORY = (
+    1.0  # [s] for which the estimate is not trusted after such a bias or gap, or one of the IMU
+)
 LONGEST = 2.0  # [s] after which poses are used again, as the estimate is worse by then
 
 
@@ -22,7 +25,7 @@ class PoseGate:
         """distance [m]: from the estimate, from which on a pose is not used."""
         self.distance = distance
         self.refused = 0
-        self._doubted = -math.inf  # stamps [s]
+        self._doubted = self._last = -math.inf  # stamps [s]
         self._closed: float | None = None
 
     def __call__(self, stamp: float, distance: float, bias: float) -> bool:
@@ -30,8 +33,9 @@ class PoseGate:
 
         bias [m/s^2]: of the accelerometer, as estimated.
         """
-        if self._closed is None and bias > CONTRADICTED:
+        if stamp - self._last > GAP or (self._closed is None and bias > CONTRADICTED):
             self.doubt(stamp)
+        self._last = stamp
         trusted = stamp - self._doubted > MEMORY
         if not (distance > self.distance and trusted):
             self._closed = None
