@@ -6,9 +6,10 @@ import numpy as np
 import pytest
 from free_port import free_port
 
-from uam_control.coordinates import COORDINATES, SIZE
+from uam_control.coordinates import COORDINATES, JOINTS, SIZE
 from uam_msgs_py import topics
-from uam_msgs_py.status import OK, STALE
+from uam_msgs_py.convert import ImuWriter, JointStateWriter, PoseWriter
+from uam_msgs_py.status import OK, STALE, WARN
 from uam_msgs_py.trajectories import TrajectoryWriter
 
 NODES = {
@@ -86,3 +87,29 @@ def test_loop_time_and_age_are_those_of_the_work(start, probe):
     assert said.values["age of /uam/autopilot/state [ms]"] == ""
     probe.until(lambda: said.status.level == STALE, "it waits again")
     assert float(said.values["age of /uam/state [ms]"]) > 1000.0
+
+
+def test_an_estimator_whose_poses_jump_says_so(start, probe):
+    said = Said(probe, "state_estimator")
+    start("uam_control.nodes.state_estimator")
+    mocap, joints, imu = map(probe.publisher, (topics.MOCAP, topics.JOINTS, topics.IMU))
+    probe.until_connected("state_estimator", [mocap, joints, imu])
+    pose, joint, sample = PoseWriter(), JointStateWriter(JOINTS), ImuWriter()
+    noise = np.random.default_rng(1)
+    stamp, jump = 0, 0.0
+
+    def fed():
+        nonlocal stamp
+        stamp += 4_000_000
+        position = np.array([jump, 0.0, 0.0]) + 1e-4 * noise.standard_normal(3)
+        mocap.publish(pose.fill(stamp, position, np.array([1.0, 0.0, 0.0, 0.0])))
+        joints.publish(joint.stamped(stamp))
+        imu.publish(sample.fill(stamp, np.zeros(3), np.array([0.0, 0.0, 9.81])))
+        return said.status and said.status.level == (WARN if jump else OK)
+
+    probe.until(lambda: fed() and stamp > 1_500_000_000, "an estimator that is content")
+    assert said.values["poses refused"] == "0"
+    jump = 1.0
+    probe.until(fed, "a warning")
+    assert "poses of late jumped away from the estimate" in said.status.message
+    assert int(said.values["poses refused"]) > 0

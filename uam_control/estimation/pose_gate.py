@@ -12,9 +12,7 @@ import math
 
 CONTRADICTED = 1.0  # [m/s^2] bias of the accelerometer that no accelerometer has
 GAP = 0.5  # [s] without poses, after which the estimate may be off
-MEMORY = (
-    1.0  # [s] for which the estimate is not trusted after such a bias or gap, or one of the IMU
-)
+MEMORY = 1.0  # [s] for which the estimate is not trusted after such a bias, or a gap
 LONGEST = 2.0  # [s] after which poses are used again, as the estimate is worse by then
 
 
