@@ -36,9 +36,7 @@ class PoseFilter:
     world.
     """
 
-    def __init__(
-        self, position_bandwidth: float, attitude_bandwidth: float, gate: float = math.inf
-    ) -> None:
+    def __init__(self, position_bandwidth: float, attitude_bandwidth: float, gate: float) -> None:
         """Bandwidths [rad/s] of the corrections from motion capture; gate [m]: see `PoseGate`."""
         self.gate = PoseGate(gate)
         self.set_bandwidths(position_bandwidth, attitude_bandwidth)
