@@ -7,15 +7,15 @@ from free_port import free_port
 from quadrotor import MASS, Quadrotor
 from std_msgs.msg import Bool
 
-from uam_control.rotations import euler_from_quaternion
-from uam_msgs_py import topics
-from uam_msgs_py.control import ATTITUDE_NAMES, PositionCommandWriter, TorqueWriter
-from uam_msgs_py.convert import PoseWriter, read_setpoint
-from uam_msgs_py.trajectories import TrajectoryWriter
+from uam_control.maths.rotations import euler_from_quaternion
+from uam_msgs_py.messages import topics
+from uam_msgs_py.messages.control import ATTITUDE_NAMES, PositionCommandWriter, TorqueWriter
+from uam_msgs_py.messages.convert import PoseWriter, read_setpoint
+from uam_msgs_py.messages.trajectories import TrajectoryWriter
 from uam_sim_bridge.autopilot.companion import Companion
 from uam_sim_bridge.autopilot.core import Autopilot
-from uam_sim_bridge.mavlink.frames import swap_body
-from uam_sim_bridge.mavlink.wire import Codec, Framer
+from uam_sim_bridge.mavlink.protocol.frames import swap_body
+from uam_sim_bridge.mavlink.protocol.wire import Codec, Framer
 
 MODULE = "uam_sim_bridge.nodes.mavlink_bridge"
 PERIOD = 4_000_000

@@ -6,7 +6,7 @@ at z = 0 that holds the vehicle level.
 
 import numpy as np
 
-from uam_control.rotations import (
+from uam_control.maths.rotations import (
     matrix_from_quaternion,
     quaternion_from_rotation_vector,
     quaternion_multiply,

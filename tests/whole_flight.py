@@ -10,8 +10,8 @@ import time
 from collections.abc import Callable
 from pathlib import Path
 
-from uam_sim_bridge.flight import process_table
-from uam_sim_bridge.flight.ports import SIMULATOR_TCP
+from uam_lab.processes import process_table
+from uam_sim_bridge.ports import SIMULATOR_TCP
 
 ROOT = Path(__file__).resolve().parents[1]
 PATIENCE = 240.0  # [s] only a failing test waits that long
@@ -38,7 +38,7 @@ class Flight:
         self.out = folder / "out"
         self._text = (folder / "stdout").open("w+")
         self._errors = (folder / "stderr").open("w+")
-        command = [sys.executable, "-m", "uam_sim_bridge.cli.main", "fly", "--out", str(self.out)]
+        command = [sys.executable, "-m", "uam_lab.cli.main", "fly", "--out", str(self.out)]
         self.process = subprocess.Popen(
             [*command, "--no-video", *options],
             stdout=self._text,

@@ -16,14 +16,14 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
-from uam_control import configuration
-from uam_control.controllers import POSITION_SETS, TORQUE_SETS
+from uam_control.control.controllers import POSITION_SETS, TORQUE_SETS
 from uam_control.coordinates import ARM, ATTITUDE, COORDINATES, POSITION
 from uam_control.estimation import EstimatorParameters
 from uam_control.laws import catalogue
 from uam_control.mission import MissionParameters
-from uam_control.parameter_file import ProfileError, read_sections
-from uam_control.parameters import ParameterError, ParameterSet
+from uam_control.settings import configuration
+from uam_control.settings.parameter_file import ProfileError, read_sections
+from uam_control.settings.parameter_set import ParameterError, ParameterSet
 
 # controller → (law → parameter set, names of the entries of its per-axis vectors)
 CONTROLLERS: dict[str, tuple[dict[str, type[ParameterSet]], tuple[str, ...]]] = {

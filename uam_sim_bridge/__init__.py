@@ -1,1 +1,1 @@
-"""MuJoCo plant, MAVLink bridge, autopilot stand-in, flights and reports."""
+"""What stands in for hardware, or talks to it: plant, sensors, faults, autopilot, MAVLink, PX4."""

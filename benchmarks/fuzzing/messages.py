@@ -9,7 +9,7 @@ import struct
 from collections import Counter
 
 from uam_sim_bridge.autopilot.params import DEFINITIONS
-from uam_sim_bridge.mavlink.wire import mavlink2
+from uam_sim_bridge.mavlink.protocol.wire import mavlink2
 
 # Numbers and words that lead deeper into the handlers than random ones do.
 FLOATS = (

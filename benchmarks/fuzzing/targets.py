@@ -11,12 +11,12 @@ import numpy as np
 from fuzzing.messages import number
 from uam_sim_bridge.autopilot.core import Autopilot
 from uam_sim_bridge.autopilot.server import Server, UdpPort
-from uam_sim_bridge.mavlink.hil_server import HilParameters, HilServer
-from uam_sim_bridge.mavlink.link import OffboardLink
-from uam_sim_bridge.mavlink.offboard import OffboardSequence
-from uam_sim_bridge.mavlink.setpoint import RateThrustMap, SetpointRefused
-from uam_sim_bridge.mavlink.thrust_identification import ThrustIdentification
-from uam_sim_bridge.mavlink.wire import Codec, Framer, mavlink2
+from uam_sim_bridge.mavlink.hil.hil_server import HilParameters, HilServer
+from uam_sim_bridge.mavlink.link.link import OffboardLink
+from uam_sim_bridge.mavlink.offboard.sequence import OffboardSequence
+from uam_sim_bridge.mavlink.offboard.setpoint import RateThrustMap, SetpointRefused
+from uam_sim_bridge.mavlink.offboard.thrust_identification import ThrustIdentification
+from uam_sim_bridge.mavlink.protocol.wire import Codec, Framer, mavlink2
 
 PERIOD = 0.004  # s
 LONGEST_FRAME = 280

@@ -12,8 +12,8 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
-from uam_sim_bridge.flight.environment import ros_environment
-from uam_sim_bridge.flight.ports import discovery_port, in_use
+from uam_lab.processes.environment import ros_environment
+from uam_sim_bridge.ports import discovery_port, in_use
 
 BLOCK = 8_000_000  # bytes
 BLOCKS = 16  # until the hog begins its file anew

@@ -11,10 +11,10 @@ from pathlib import Path
 import numpy as np
 
 from loading.conditions import Condition, under
-from uam_sim_bridge.campaign.fault_outcome import classify
-from uam_sim_bridge.flight import timeseries
-from uam_sim_bridge.flight.ports import INSTANCES, ports_of
-from uam_sim_bridge.flight.result_folder import in_a_name, new_folder
+from uam_lab.campaign.fault_outcome import classify
+from uam_lab.results import timeseries
+from uam_lab.results.result_folder import in_a_name, new_folder
+from uam_sim_bridge.ports import INSTANCES, ports_of
 
 SCENARIO = "quick_pick"
 INSTANCE = INSTANCES - 1  # whose domain the listeners are to know
@@ -43,7 +43,7 @@ class Measured:
 def fly(condition: Condition, out: Path) -> Measured:
     """Fly in real time; the folder of the flight is in `out`."""
     folder = new_folder(out, in_a_name(condition.name))
-    command = [sys.executable, "-m", "uam_sim_bridge.cli.main", "fly", "--scenario", SCENARIO]
+    command = [sys.executable, "-m", "uam_lab.cli.main", "fly", "--scenario", SCENARIO]
     command += ["--clock", "realtime", "--no-video", "--instance", str(INSTANCE)]
     with (
         under(condition, out, ports_of(INSTANCE).domain),

@@ -8,7 +8,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from soaking.samples import Soak
-from uam_sim_bridge.report import style
+from uam_lab.report.figures import style
 
 
 def draw(soak: Soak, file: Path) -> None:

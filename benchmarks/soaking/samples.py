@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass, field
 
-from uam_sim_bridge.flight.process_table import PROC
+from uam_lab.processes.process_table import PROC
 
 
 @dataclass(frozen=True)

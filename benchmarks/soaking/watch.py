@@ -14,9 +14,9 @@ from soaking.samples import Soak, usage
 from soaking.scenario import shuttle
 from uam_control.mission import load_scenario
 from uam_control.profile import load_profile
-from uam_sim_bridge.flight.direct import DirectFlight
-from uam_sim_bridge.flight.process_table import node_name, parent, pids
-from uam_sim_bridge.flight.result_folder import new_folder
+from uam_lab.flight.direct.flight import DirectFlight
+from uam_lab.processes.process_table import node_name, parent, pids
+from uam_lab.results.result_folder import new_folder
 from uam_sim_bridge.plant import Vehicle
 
 PERIOD = 10.0  # [s] of wall time between two looks
@@ -29,7 +29,7 @@ def flight(duration: float, clock: str, log_limit: float, out: Path) -> Soak:
     scenario = out / "shuttle.yaml"
     scenario.write_text(shuttle(duration))
     said = out / "flight.txt"
-    command = ["-m", "uam_sim_bridge.cli.main", "fly", "--scenario", str(scenario)]
+    command = ["-m", "uam_lab.cli.main", "fly", "--scenario", str(scenario)]
     command += ["--clock", clock, "--no-video", "--log-limit", str(log_limit)]
     folder = new_folder(out, "flight")
     with said.open("w") as output:

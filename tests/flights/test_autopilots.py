@@ -10,7 +10,7 @@ import tty
 
 import pytest
 
-from uam_sim_bridge.flight.ports import AUTOPILOT_UDP, Reservation
+from uam_sim_bridge.ports import AUTOPILOT_UDP, Reservation
 
 AUTOPILOT = [sys.executable, "-m", "uam_sim_bridge.autopilot.server"]
 

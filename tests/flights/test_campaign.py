@@ -6,8 +6,8 @@ import json
 import numpy as np
 
 from uam_control.profile import load_profile
-from uam_sim_bridge.campaign.variations import common, draw, ranges
-from uam_sim_bridge.cli.main import main
+from uam_lab.campaign.variations import common, draw, ranges
+from uam_lab.cli.main import main
 
 FLIGHTS = 4
 

@@ -2,8 +2,8 @@
 
 import pytest
 
-from uam_sim_bridge.cli.main import main
-from uam_sim_bridge.flight.ports import Reservation
+from uam_lab.cli.main import main
+from uam_sim_bridge.ports import Reservation
 
 CSV_HEAD = "t,px,py,pz,yaw,vx,vy,vz,ax,ay,az,dyaw"
 ROW = "{t},0,0,1,0,0,0,0,0,0,0,0"

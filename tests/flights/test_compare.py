@@ -4,9 +4,9 @@ import json
 
 import pytest
 
-from uam_sim_bridge.campaign import ros_trial, trial
-from uam_sim_bridge.cli.main import main
-from uam_sim_bridge.compare import plan
+from uam_lab.campaign import ros_trial, trial
+from uam_lab.cli.main import main
+from uam_lab.compare import plan
 
 
 def compare(out, *options):

@@ -15,11 +15,11 @@ import pytest
 
 from uam_control.mission import load_scenario
 from uam_control.profile import load_profile
-from uam_sim_bridge.campaign.fault_outcome import classify
-from uam_sim_bridge.cli.main import main
+from uam_lab.campaign.fault_outcome import classify
+from uam_lab.cli.main import main
+from uam_lab.flight.direct.flight import DirectFlight
+from uam_lab.results import metrics
 from uam_sim_bridge.faults import read_schedule
-from uam_sim_bridge.flight import metrics
-from uam_sim_bridge.flight.direct import DirectFlight
 from uam_sim_bridge.plant import Vehicle
 
 SCENARIO = load_scenario("hover")
@@ -132,7 +132,7 @@ def test_ctrl_c_ends_the_matrix_at_once_and_leaves_no_process(tmp_path):
     command = [
         sys.executable,
         "-m",
-        "uam_sim_bridge.cli.main",
+        "uam_lab.cli.main",
         "faults",
         "--jobs",
         "1",

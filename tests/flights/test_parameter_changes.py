@@ -11,15 +11,15 @@ from rcl_interfaces.srv import SetParametersAtomically
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.parameter import Parameter
 
-from uam_control.parameters import Bound
 from uam_control.profile import load_profile
-from uam_msgs_py import topics
-from uam_msgs_py.changes import Change
-from uam_msgs_py.layouts import SECOND, stamp_of
-from uam_msgs_py.polling import listen
-from uam_sim_bridge.flight import timeseries
-from uam_sim_bridge.flight.environment import transport_environment
-from uam_sim_bridge.flight.guest import Guest
+from uam_control.settings.parameter_set import Bound
+from uam_lab.processes.environment import transport_environment
+from uam_lab.processes.guest import Guest
+from uam_lab.results import timeseries
+from uam_msgs_py.messages import topics
+from uam_msgs_py.messages.changes import Change
+from uam_msgs_py.messages.layouts import SECOND, stamp_of
+from uam_msgs_py.node.polling import listen
 
 NODES = ("position_controller", "attitude_controller", "arm_controller", "state_estimator")
 COUNT = 500

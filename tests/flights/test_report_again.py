@@ -5,10 +5,10 @@ import shutil
 
 import pytest
 
-from uam_sim_bridge.cli import main
-from uam_sim_bridge.flight import timeseries
-from uam_sim_bridge.report import figures
-from uam_sim_bridge.report.rebuild import rebuild
+from uam_lab.cli import main
+from uam_lab.report.figures import figures
+from uam_lab.report.rebuild import rebuild
+from uam_lab.results import timeseries
 
 
 @pytest.fixture

@@ -12,9 +12,9 @@ import pytest
 import yaml
 
 from uam_control.profile import CONTROLLERS, NODES, load_profile
-from uam_sim_bridge.flight.wiring import BRIDGE, PLANT, RECORDER, SCENE
+from uam_msgs_py.node.wiring import BRIDGE, PLANT, RECORDER, SCENE
 
-# topic → rate [Hz of simulated time] that docs/architecture.md and uam_msgs_py/topics.py promise
+# topic → rate [Hz of simulated time], as docs/architecture.md and messages/topics.py promise
 RATES = {
     "/imu/data": 250.0,
     "/uam/state": 250.0,

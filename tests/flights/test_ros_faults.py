@@ -8,11 +8,11 @@ from whole_flight import assert_nothing_left
 
 from uam_control.mission import load_scenario
 from uam_control.profile import load_profile
-from uam_sim_bridge.cli.main import main
+from uam_lab.cli.main import main
+from uam_lab.flight.direct.flight import DirectFlight
+from uam_lab.report.rebuild import rebuild
 from uam_sim_bridge.faults import read_schedule
-from uam_sim_bridge.flight.direct import DirectFlight
 from uam_sim_bridge.plant import Vehicle
-from uam_sim_bridge.report.rebuild import rebuild
 
 IN_BOTH = (
     "wind_gust@take-off+0+1.5:speed=2",

@@ -10,13 +10,13 @@ from mcap_ros2.decoder import DecoderFactory
 from uam_control.laws.modular import ADAPTATION
 from uam_control.mission import load_scenario
 from uam_control.profile import load_profile
-from uam_msgs_py import topics
-from uam_sim_bridge.flight import timeseries
-from uam_sim_bridge.flight.direct import DirectFlight
-from uam_sim_bridge.flight.log_reader import read_flight
-from uam_sim_bridge.flight.metrics import errors
-from uam_sim_bridge.flight.settings import settings
-from uam_sim_bridge.flight.timeseries import gain_columns
+from uam_lab.flight.direct.flight import DirectFlight
+from uam_lab.flight.settings import settings
+from uam_lab.recording.log_reader import read_flight
+from uam_lab.results import timeseries
+from uam_lab.results.metrics import errors
+from uam_lab.results.timeseries import gain_columns
+from uam_msgs_py.messages import topics
 from uam_sim_bridge.plant import Vehicle
 
 WALL = ("wall_s", "real_time_factor")  # what may differ between two runs of one flight

@@ -12,11 +12,11 @@ from rclpy.executors import SingleThreadedExecutor
 from rclpy.parameter import Parameter
 from whole_flight import assert_nothing_left
 
-from uam_control.configuration import path
-from uam_sim_bridge.flight.environment import transport_environment
-from uam_sim_bridge.flight.guest import Guest
-from uam_sim_bridge.flight.wiring import ARM, ATTITUDE, POSITION
-from uam_sim_bridge.report.rebuild import rebuild
+from uam_control.settings.configuration import path
+from uam_lab.processes.environment import transport_environment
+from uam_lab.processes.guest import Guest
+from uam_lab.report.rebuild import rebuild
+from uam_msgs_py.node.wiring import ARM, ATTITUDE, POSITION
 
 
 def states(flight):

@@ -10,8 +10,8 @@ import pytest
 from uam_control.mission import load_scenario
 from uam_control.profile import load_profile
 from uam_control.supervision import Command, State
-from uam_sim_bridge.flight.direct import DirectFlight
-from uam_sim_bridge.flight.metrics import compute
+from uam_lab.flight.direct.flight import DirectFlight
+from uam_lab.results.metrics import compute
 from uam_sim_bridge.plant import Vehicle
 
 

@@ -14,10 +14,10 @@ from bridge_rig import Rig
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 
-from uam_msgs_py.connections import Connections
-from uam_msgs_py.serialized import stays_serialized
-from uam_sim_bridge.flight.environment import ros_environment
-from uam_sim_bridge.flight.ports import Reservation
+from uam_lab.processes.environment import ros_environment
+from uam_msgs_py.messages.serialized import stays_serialized
+from uam_msgs_py.node.connections import Connections
+from uam_sim_bridge.ports import Reservation
 
 PATIENCE = 60.0  # [s] for a process to get somewhere; only a failing test waits that long
 

@@ -11,14 +11,14 @@ import pytest
 from free_port import free_port
 from quadrotor import MASS, Quadrotor
 
-from uam_sim_bridge.autopilot.modes import Mode
-from uam_sim_bridge.mavlink.hil_server import HilError, HilParameters, HilServer
-from uam_sim_bridge.mavlink.link import OffboardLink
-from uam_sim_bridge.mavlink.offboard import OffboardSequence, Phase
-from uam_sim_bridge.mavlink.setpoint import RateThrustMap, RateThrustParameters
-from uam_sim_bridge.mavlink.signing import Signing
-from uam_sim_bridge.mavlink.transport import UdpTransport
-from uam_sim_bridge.mavlink.wire import Codec, Framer, mavlink2
+from uam_sim_bridge.mavlink.hil.hil_server import HilError, HilParameters, HilServer
+from uam_sim_bridge.mavlink.link.link import OffboardLink
+from uam_sim_bridge.mavlink.offboard.sequence import OffboardSequence, Phase
+from uam_sim_bridge.mavlink.offboard.setpoint import RateThrustMap, RateThrustParameters
+from uam_sim_bridge.mavlink.protocol.modes import Mode
+from uam_sim_bridge.mavlink.protocol.signing import Signing
+from uam_sim_bridge.mavlink.protocol.wire import Codec, Framer, mavlink2
+from uam_sim_bridge.mavlink.transport.transport import UdpTransport
 
 START_TIMEOUT = 60.0  # s: a first start compiles
 PATIENT = HilParameters(answer_timeout=30.0, silent_timeout=10.0)  # a loaded machine is no failure

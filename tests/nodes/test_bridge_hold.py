@@ -7,11 +7,11 @@ import numpy as np
 import pytest
 from bridge_rig import PERIOD, WEIGHT
 
-from uam_control.rotations import quaternion_from_euler
-from uam_msgs_py import topics
-from uam_msgs_py.convert import PoseWriter, read_setpoint
-from uam_msgs_py.status import MissionStatus
-from uam_sim_bridge.autopilot.modes import Mode
+from uam_control.maths.rotations import quaternion_from_euler
+from uam_msgs_py.messages import topics
+from uam_msgs_py.messages.convert import PoseWriter, read_setpoint
+from uam_msgs_py.messages.status import MissionStatus
+from uam_sim_bridge.mavlink.protocol.modes import Mode
 
 
 def test_bad_commands_in_flight_hold_level_then_the_failsafe_acts(make_rig):

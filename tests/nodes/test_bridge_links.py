@@ -8,11 +8,11 @@ import numpy as np
 import pytest
 from bridge_rig import MODULE, WEIGHT
 
-from uam_msgs_py import topics
-from uam_msgs_py.status import AutopilotState
-from uam_sim_bridge.autopilot.modes import Mode
-from uam_sim_bridge.mavlink.signing import Signing
-from uam_sim_bridge.mavlink.wire import Codec, Framer, mavlink2
+from uam_msgs_py.messages import topics
+from uam_msgs_py.messages.status import AutopilotState
+from uam_sim_bridge.mavlink.protocol.modes import Mode
+from uam_sim_bridge.mavlink.protocol.signing import Signing
+from uam_sim_bridge.mavlink.protocol.wire import Codec, Framer, mavlink2
 
 
 def test_taken_port_is_said(start):

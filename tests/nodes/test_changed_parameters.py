@@ -4,8 +4,8 @@ import rclpy
 from rclpy.node import Node
 from rclpy.parameter import Parameter
 
-from uam_msgs_py.changes import Change
-from uam_sim_bridge.flight.changed_parameters import ChangedParameters
+from uam_lab.flight.ros.changed_parameters import ChangedParameters
+from uam_msgs_py.messages.changes import Change
 
 
 class Silent:

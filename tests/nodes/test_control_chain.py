@@ -3,24 +3,24 @@
 import numpy as np
 import pytest
 
-from uam_control.controllers import ArmController, AttitudeController, PositionController
+from uam_control.control.controllers import ArmController, AttitudeController, PositionController
 from uam_control.coordinates import COORDINATES, JOINTS
 from uam_control.estimation import StateEstimator
 from uam_control.mission import Mission, load_scenario
 from uam_control.profile import load_profile
-from uam_msgs_py import topics
-from uam_msgs_py.connections import Connections
-from uam_msgs_py.control import (
+from uam_msgs_py.messages import topics
+from uam_msgs_py.messages.control import (
     TAU_Q,
     read_position_command,
     read_reference,
     read_state,
     read_torque,
 )
-from uam_msgs_py.convert import ImuWriter, JointStateWriter, PoseWriter, read_effort
-from uam_msgs_py.stamps import seconds
-from uam_msgs_py.status import AutopilotState, MissionStatus
-from uam_msgs_py.trajectories import TrajectoryWriter
+from uam_msgs_py.messages.convert import ImuWriter, JointStateWriter, PoseWriter, read_effort
+from uam_msgs_py.messages.stamps import seconds
+from uam_msgs_py.messages.status import AutopilotState, MissionStatus
+from uam_msgs_py.messages.trajectories import TrajectoryWriter
+from uam_msgs_py.node.connections import Connections
 
 PERIOD = 4_000_000  # [ns]
 ARMED_AT = 40 * PERIOD  # take-off follows 0.5 s later

@@ -6,8 +6,8 @@ import pytest
 from rcl_interfaces.srv import DescribeParameters, GetParameters, SetParameters
 from rclpy.parameter import Parameter
 
-from uam_control import configuration
-from uam_msgs_py import topics
+from uam_control.settings import configuration
+from uam_msgs_py.messages import topics
 
 INPUTS = {
     "position_controller": ["/uam/state", "/uam/reference"],

@@ -7,10 +7,10 @@ import pytest
 from free_port import free_port
 
 from uam_control.coordinates import COORDINATES, JOINTS, SIZE
-from uam_msgs_py import topics
-from uam_msgs_py.convert import ImuWriter, JointStateWriter, PoseWriter
-from uam_msgs_py.status import OK, STALE, WARN
-from uam_msgs_py.trajectories import TrajectoryWriter
+from uam_msgs_py.messages import topics
+from uam_msgs_py.messages.convert import ImuWriter, JointStateWriter, PoseWriter
+from uam_msgs_py.messages.status import OK, STALE, WARN
+from uam_msgs_py.messages.trajectories import TrajectoryWriter
 
 NODES = {
     "uam_control.nodes.position_controller": "/uam/state",
@@ -20,8 +20,8 @@ NODES = {
     "uam_control.nodes.mission": "/uam/state",
     "uam_sim_bridge.nodes.mavlink_bridge": "/uam/attitude/command",
     "uam_sim_bridge.nodes.mujoco_sim": "/uam/setpoint",
-    "uam_sim_bridge.nodes.scene": "/uam/mission/status",
-    "uam_sim_bridge.nodes.recorder": "/uam/state",
+    "uam_lab.nodes.scene": "/uam/mission/status",
+    "uam_lab.nodes.recorder": "/uam/state",
 }
 
 

@@ -14,15 +14,15 @@ import pytest
 from free_port import free_port
 from quadrotor import Quadrotor
 
-from uam_sim_bridge.autopilot.modes import Mode
-from uam_sim_bridge.mavlink.hil_server import HilParameters, HilServer
-from uam_sim_bridge.mavlink.link import OffboardLink
-from uam_sim_bridge.mavlink.offboard import OffboardSequence, Phase
-from uam_sim_bridge.mavlink.setpoint import RateThrustParameters
-from uam_sim_bridge.mavlink.transport import UdpTransport
-from uam_sim_bridge.mavlink.wire import Codec, Framer, mavlink2
+from uam_sim_bridge.mavlink.hil.hil_server import HilParameters, HilServer
+from uam_sim_bridge.mavlink.link.link import OffboardLink
+from uam_sim_bridge.mavlink.offboard.sequence import OffboardSequence, Phase
+from uam_sim_bridge.mavlink.offboard.setpoint import RateThrustParameters
+from uam_sim_bridge.mavlink.protocol.modes import Mode
+from uam_sim_bridge.mavlink.protocol.wire import Codec, Framer, mavlink2
+from uam_sim_bridge.mavlink.transport.transport import UdpTransport
 
-ROUTER, AUTOPILOT = "uam_sim_bridge.mavlink.router", "uam_sim_bridge.autopilot.server"
+ROUTER, AUTOPILOT = "uam_sim_bridge.mavlink.hil.router", "uam_sim_bridge.autopilot.server"
 PATIENCE = 60.0  # s for a process to start: the stand-in compiles
 # a frame cut short by garbage is waited for; only then does the time matter
 HIL = HilParameters(answer_timeout=2.0, silent_timeout=0.5)

@@ -11,10 +11,10 @@ from free_port import free_port
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Bool
 
-from uam_msgs_py import topics
-from uam_msgs_py.serialized import Serialized
-from uam_msgs_py.status import AutopilotState, MissionStatus
-from uam_sim_bridge.mavlink.wire import mavlink2
+from uam_msgs_py.messages import topics
+from uam_msgs_py.messages.serialized import Serialized
+from uam_msgs_py.messages.status import AutopilotState, MissionStatus
+from uam_sim_bridge.mavlink.protocol.wire import mavlink2
 
 
 def test_alone_it_waits_and_stops(start):

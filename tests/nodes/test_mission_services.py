@@ -8,10 +8,10 @@ from std_msgs.msg import Header
 from std_srvs.srv import SetBool, Trigger
 
 from uam_control.coordinates import COORDINATES
-from uam_msgs_py import topics
-from uam_msgs_py.control import read_reference
-from uam_msgs_py.status import AutopilotState, MissionStatus
-from uam_msgs_py.trajectories import TrajectoryWriter
+from uam_msgs_py.messages import topics
+from uam_msgs_py.messages.control import read_reference
+from uam_msgs_py.messages.status import AutopilotState, MissionStatus
+from uam_msgs_py.messages.trajectories import TrajectoryWriter
 
 PERIOD = 4_000_000  # [ns]
 

@@ -11,13 +11,13 @@ from mcap_ros2.decoder import DecoderFactory
 from rosgraph_msgs.msg import Clock
 from std_msgs.msg import Bool
 
-from uam_msgs_py import topics
-from uam_msgs_py.connections import Connections
-from uam_msgs_py.convert import SetpointWriter
-from uam_msgs_py.stamps import set_stamp
-from uam_sim_bridge.flight.mcap_reader import read_log
+from uam_lab.recording.mcap_reader import read_log
+from uam_msgs_py.messages import topics
+from uam_msgs_py.messages.convert import SetpointWriter
+from uam_msgs_py.messages.stamps import set_stamp
+from uam_msgs_py.node.connections import Connections
 
-MODULE = "uam_sim_bridge.nodes.recorder"
+MODULE = "uam_lab.nodes.recorder"
 TICK = 4_000_000
 SETPOINT = topics.SETPOINT.name
 

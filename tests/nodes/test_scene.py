@@ -5,15 +5,15 @@ from mcap.records import Schema
 from mcap_ros2.decoder import DecoderFactory
 
 from uam_control.coordinates import COORDINATES, SIZE
-from uam_msgs_py import topics
-from uam_msgs_py.connections import Connections
-from uam_msgs_py.control import ReferenceWriter
-from uam_msgs_py.convert import PoseWriter, read_joints
-from uam_msgs_py.status import MissionStatus
-from uam_msgs_py.trajectories import TrajectoryWriter
-from uam_sim_bridge.flight.message_definitions import schema
+from uam_lab.recording.message_definitions import schema
+from uam_msgs_py.messages import topics
+from uam_msgs_py.messages.control import ReferenceWriter
+from uam_msgs_py.messages.convert import PoseWriter, read_joints
+from uam_msgs_py.messages.status import MissionStatus
+from uam_msgs_py.messages.trajectories import TrajectoryWriter
+from uam_msgs_py.node.connections import Connections
 
-MODULE = "uam_sim_bridge.nodes.scene"
+MODULE = "uam_lab.nodes.scene"
 TICK = 4_000_000  # [ns]
 FRAME = 10 * TICK
 

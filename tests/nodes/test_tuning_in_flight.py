@@ -13,18 +13,18 @@ from rcl_interfaces.srv import (
 from rclpy.parameter import Parameter, parameter_value_to_python
 from std_srvs.srv import SetBool, Trigger
 
-from uam_control import configuration
 from uam_control.coordinates import COORDINATES
 from uam_control.nodes.controller_node import ADAPTATION_PERIOD
 from uam_control.profile import CONTROLLERS, NODES, load_profile
-from uam_msgs_py import topics
-from uam_msgs_py.changes import Change
-from uam_msgs_py.control import ReferenceWriter
-from uam_msgs_py.convert import read_joints
-from uam_msgs_py.layouts import stamp_of
-from uam_msgs_py.trajectories import TrajectoryWriter
-from uam_sim_bridge.flight.guest import Guest
-from uam_sim_bridge.flight.profile_switch import ProfileSwitch, SwitchRefused
+from uam_control.settings import configuration
+from uam_lab.flight.ros.profile_switch import ProfileSwitch, SwitchRefused
+from uam_lab.processes.guest import Guest
+from uam_msgs_py.messages import topics
+from uam_msgs_py.messages.changes import Change
+from uam_msgs_py.messages.control import ReferenceWriter
+from uam_msgs_py.messages.convert import read_joints
+from uam_msgs_py.messages.layouts import stamp_of
+from uam_msgs_py.messages.trajectories import TrajectoryWriter
 
 PERIOD = 4_000_000  # [ns]
 POSITION = "position_controller"

@@ -44,7 +44,7 @@ def test_every_node_is_found_and_may_be_run(workspace):
 
 
 def test_code_and_configuration_are_those_of_the_workspace(workspace):
-    program = "import uam_control as u; from uam_control.configuration import root; "
+    program = "import uam_control as u; from uam_control.settings.configuration import root; "
     code, config = workspace.python(program + "print(u.__file__, root())").split()
     assert Path(code).is_relative_to(workspace.folder)
     assert Path(config).is_relative_to(workspace.folder)

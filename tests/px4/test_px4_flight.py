@@ -7,7 +7,7 @@ import pytest
 from px4_at_hand import NO_PX4, installation
 from whole_flight import Flight
 
-from uam_sim_bridge.px4.rate_steps import LIMIT, compared, measure
+from uam_lab.px4_steps.rate_steps import LIMIT, compared, measure
 
 PLACED = 0.25  # [m]
 TIMES_THE_STAND_INS = 2.0

@@ -10,10 +10,10 @@ from whole_flight import SHORT
 from uam_control.laws.modular import ADAPTATION
 from uam_control.mission import load_scenario
 from uam_control.profile import load_profile
-from uam_sim_bridge.flight import metrics
-from uam_sim_bridge.flight.direct import DirectFlight
-from uam_sim_bridge.flight.result_folder import ResultFolder
-from uam_sim_bridge.flight.timeseries import COLUMNS, Recording, gain_columns
+from uam_lab.flight.direct.flight import DirectFlight
+from uam_lab.results import metrics
+from uam_lab.results.result_folder import ResultFolder
+from uam_lab.results.timeseries import COLUMNS, Recording, gain_columns
 from uam_sim_bridge.plant import Vehicle
 
 PERIOD = 0.04  # ten times the control period: enough for a picture

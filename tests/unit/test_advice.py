@@ -4,10 +4,10 @@ import re
 
 import pytest
 
-from uam_sim_bridge.autopilot.modes import Result
-from uam_sim_bridge.mavlink.advice import ADVICE, SEPARATOR, advice, with_advice
-from uam_sim_bridge.mavlink.events import CHECKS, OTHERS
-from uam_sim_bridge.mavlink.offboard import OffboardSequence, Request
+from uam_sim_bridge.mavlink.offboard.advice import ADVICE, SEPARATOR, advice, with_advice
+from uam_sim_bridge.mavlink.offboard.sequence import OffboardSequence, Request
+from uam_sim_bridge.mavlink.protocol.modes import Result
+from uam_sim_bridge.mavlink.telemetry.events import CHECKS, OTHERS
 
 TEXTS = [  # PX4 v1.16.0, STATUSTEXT
     ("Preflight Fail: ekf2 missing data", "EKF2_EV_CTRL"),

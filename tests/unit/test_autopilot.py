@@ -6,14 +6,14 @@ import numpy as np
 import pytest
 from quadrotor import MASS, Quadrotor
 
-from uam_control.configuration import path
-from uam_control.parameters import ParameterError
-from uam_control.rotations import quaternion_multiply
+from uam_control.maths.rotations import quaternion_multiply
+from uam_control.settings.configuration import path
+from uam_control.settings.parameter_set import ParameterError
 from uam_sim_bridge.autopilot.core import Autopilot
-from uam_sim_bridge.autopilot.modes import FORCE, Command, Mode, Result
 from uam_sim_bridge.autopilot.params import Parameters
-from uam_sim_bridge.mavlink.frames import swap_body, swap_quaternion, swap_world
-from uam_sim_bridge.mavlink.setpoint import RateThrustMap
+from uam_sim_bridge.mavlink.offboard.setpoint import RateThrustMap
+from uam_sim_bridge.mavlink.protocol.frames import swap_body, swap_quaternion, swap_world
+from uam_sim_bridge.mavlink.protocol.modes import FORCE, Command, Mode, Result
 
 OFFBOARD = (1.0, 6.0, 0.0)
 HOVER = MASS * 9.81 / (4 * 10.34)

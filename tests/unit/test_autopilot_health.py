@@ -7,15 +7,15 @@ import pytest
 
 from uam_sim_bridge.autopilot.core import Autopilot
 from uam_sim_bridge.autopilot.telemetry import battery_status, estimator_status, sys_status
-from uam_sim_bridge.mavlink.battery import from_battery_status, from_sys_status
-from uam_sim_bridge.mavlink.health import (
+from uam_sim_bridge.mavlink.protocol.wire import mavlink2
+from uam_sim_bridge.mavlink.telemetry.battery import from_battery_status, from_sys_status
+from uam_sim_bridge.mavlink.telemetry.health import (
     ESTIMATOR_FLAGS,
     SENSORS,
     estimate_faults,
     names,
     unhealthy,
 )
-from uam_sim_bridge.mavlink.wire import mavlink2
 
 LEVEL = np.array([1.0, 0.0, 0.0, 0.0])
 

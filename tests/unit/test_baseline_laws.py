@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from uam_control.laws.asmc1 import Asmc1Law, Asmc1Parameters
 from uam_control.laws.asmc2 import Asmc2Law, Asmc2Parameters
-from uam_control.parameters import ParameterError
+from uam_control.settings.parameter_set import ParameterError
 
 DT = 0.004
 ASMC1 = {

@@ -3,14 +3,14 @@
 import pytest
 import yaml
 
-from uam_control.configuration import path
-from uam_control.parameters import ParameterSet
+from uam_control.settings.configuration import path
+from uam_control.settings.parameter_set import ParameterSet
 from uam_sim_bridge.autopilot.params import Parameters
-from uam_sim_bridge.mavlink.hold import HoldParameters
-from uam_sim_bridge.mavlink.offboard import OffboardParameters
-from uam_sim_bridge.mavlink.parameter_check import WATCHED, differences, expected
-from uam_sim_bridge.mavlink.setpoint import RateThrustParameters
-from uam_sim_bridge.mavlink.thrust_identification import ThrustIdentificationParameters
+from uam_sim_bridge.mavlink.offboard.hold import HoldParameters
+from uam_sim_bridge.mavlink.offboard.sequence import OffboardParameters
+from uam_sim_bridge.mavlink.offboard.setpoint import RateThrustParameters
+from uam_sim_bridge.mavlink.offboard.thrust_identification import ThrustIdentificationParameters
+from uam_sim_bridge.mavlink.telemetry.parameter_check import WATCHED, differences, expected
 from uam_sim_bridge.plant import Vehicle
 
 BRIDGE = yaml.safe_load(path("bridge/s500.yaml").read_text())["mavlink_bridge"]["ros__parameters"]

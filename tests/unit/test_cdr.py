@@ -5,10 +5,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from uam_sim_bridge.flight import cdr
-from uam_sim_bridge.flight.mcap_reader import UnreadableLog, read_log
-from uam_sim_bridge.flight.mcap_writer import McapWriter
-from uam_sim_bridge.flight.message_definitions import schema
+from uam_lab.recording import cdr
+from uam_lab.recording.mcap_reader import UnreadableLog, read_log
+from uam_lab.recording.mcap_writer import McapWriter
+from uam_lab.recording.message_definitions import schema
 
 serialization = pytest.importorskip("rclpy.serialization")
 serialize = serialization.serialize_message

@@ -6,10 +6,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from uam_control.controllers import AttitudeController, PositionController
+from uam_control.control.controllers import AttitudeController, PositionController
 from uam_control.laws.catalogue import LAWS
-from uam_control.parameters import ParameterError
 from uam_control.profile import load_profile
+from uam_control.settings.parameter_set import ParameterError
 
 DT = 0.004
 

@@ -10,9 +10,9 @@ from pymavlink.dialects.v20 import common as mavlink2
 
 from uam_sim_bridge.autopilot.companion import Companion
 from uam_sim_bridge.autopilot.core import Autopilot
-from uam_sim_bridge.autopilot.modes import Command, Mode, Result
-from uam_sim_bridge.mavlink.vision import odometry_message, vision_message
-from uam_sim_bridge.mavlink.wire import Codec, Framer, clean_text
+from uam_sim_bridge.mavlink.link.vision import odometry_message, vision_message
+from uam_sim_bridge.mavlink.protocol.modes import Command, Mode, Result
+from uam_sim_bridge.mavlink.protocol.wire import Codec, Framer, clean_text
 
 DOWN = np.array([0.0, 0.0, -9.81])
 LEVEL = np.array([1.0, 0.0, 0.0, 0.0])

@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from uam_sim_bridge.campaign.trial import Result
-from uam_sim_bridge.compare import tables
-from uam_sim_bridge.compare.plan import ASMC1, ASMC2, PROPOSED
+from uam_lab.campaign.trial import Result
+from uam_lab.compare import tables
+from uam_lab.compare.plan import ASMC1, ASMC2, PROPOSED
 
 
 def flight(label, seed, rms, mass=0.2, outcome="completed"):

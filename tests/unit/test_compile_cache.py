@@ -7,10 +7,11 @@ from pathlib import Path
 
 import pytest
 
-from uam_sim_bridge.flight import ros_nodes, warm_up
+from uam_lab.flight.direct import warm_up
+from uam_lab.flight.ros import nodes as ros_nodes
 
 CALLER = """
-from uam_control.compiled import jit
+from uam_control.maths.compiled import jit
 import callee
 from callee import OFFSET
 
@@ -19,7 +20,7 @@ def total(x):
     return callee.scaled(x[0]) + x[len(x) - 1] + OFFSET
 """
 CALLEE = """
-from uam_control.compiled import jit
+from uam_control.maths.compiled import jit
 
 OFFSET = {offset}
 
@@ -39,7 +40,7 @@ print(total(np.arange(1.0, 4.0).astype({kind!r})), sum(total.stats.cache_hits.va
 
 # twice recursive, so that it cannot become part of its caller
 RECORD = """
-from uam_control.compiled import jit
+from uam_control.maths.compiled import jit
 
 @jit
 def weighted(p, i, x):

@@ -2,8 +2,8 @@
 
 import pytest
 
-from uam_control import configuration
-from uam_control.configuration import ConfigurationError
+from uam_control.settings import configuration
+from uam_control.settings.configuration import ConfigurationError
 
 
 def test_a_shipped_file_is_found():

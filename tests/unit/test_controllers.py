@@ -9,19 +9,19 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from uam_control import configuration
-from uam_control.controllers import (
+from uam_control.control.controllers import (
     ArmController,
     AttitudeController,
     PositionController,
     limit_force,
 )
+from uam_control.control.thrust_direction import AttitudeReference
 from uam_control.laws.catalogue import LAWS
 from uam_control.laws.errors import attitude_errors
-from uam_control.parameters import ParameterError
+from uam_control.maths.rotations import matrix_from_euler
 from uam_control.profile import ProfileError, load_profile
-from uam_control.rotations import matrix_from_euler
-from uam_control.thrust_direction import AttitudeReference
+from uam_control.settings import configuration
+from uam_control.settings.parameter_set import ParameterError
 
 DT = 0.004
 angle = st.floats(-0.6, 0.6)

@@ -15,7 +15,7 @@ from std_msgs.msg import Bool, Float64MultiArray
 from trajectory_msgs.msg import JointTrajectory
 
 from uam_control.coordinates import COORDINATES, JOINTS
-from uam_msgs_py.control import (
+from uam_msgs_py.messages.control import (
     ARM_NAMES,
     ATTITUDE_NAMES,
     TAU_ALPHA,
@@ -28,7 +28,7 @@ from uam_msgs_py.control import (
     read_state,
     read_torque,
 )
-from uam_msgs_py.convert import (
+from uam_msgs_py.messages.convert import (
     SWITCH,
     EffortWriter,
     ImuWriter,
@@ -42,10 +42,10 @@ from uam_msgs_py.convert import (
     read_setpoint,
     read_switch,
 )
-from uam_msgs_py.layouts import KNOWN_LAYOUTS, BadMessage, stamp_of
-from uam_msgs_py.serialized import LAYOUTS
-from uam_msgs_py.stamps import set_stamp
-from uam_msgs_py.trajectories import TrajectoryWriter
+from uam_msgs_py.messages.layouts import KNOWN_LAYOUTS, BadMessage, stamp_of
+from uam_msgs_py.messages.serialized import LAYOUTS
+from uam_msgs_py.messages.stamps import set_stamp
+from uam_msgs_py.messages.trajectories import TrajectoryWriter
 
 FINITE = st.floats(-1e100, 1e100)
 STATES = arrays(float, (3, 8), elements=FINITE)

@@ -10,11 +10,11 @@ from importlib import metadata
 
 import pytest
 
-from uam_sim_bridge.cli import doctor as command
-from uam_sim_bridge.cli.main import main
-from uam_sim_bridge.doctor import installation, run
-from uam_sim_bridge.doctor.child import TOO_LATE, Child
-from uam_sim_bridge.doctor.finding import Verdict, fail, ok, warn
+from uam_lab.cli import doctor as command
+from uam_lab.cli.main import main
+from uam_lab.doctor import installation, run
+from uam_lab.doctor.child import TOO_LATE, Child
+from uam_lab.doctor.finding import Verdict, fail, ok, warn
 
 OK, WARN, FAIL = Verdict
 
@@ -107,7 +107,7 @@ def test_a_child_says_facts_and_why_it_failed(tmp_path):
 def test_an_interrupt_is_one_line(tmp_path):
     program = (
         "import time\n"
-        "from uam_sim_bridge.cli import doctor, main\n"
+        "from uam_lab.cli import doctor, main\n"
         "def examine(url):\n"
         "    print('begun', flush=True)\n"
         "    time.sleep(60)\n"

@@ -5,10 +5,10 @@ import threading
 
 import pytest
 
-from uam_sim_bridge.autopilot.modes import Mode
-from uam_sim_bridge.doctor import autopilot
-from uam_sim_bridge.doctor.finding import Verdict
-from uam_sim_bridge.mavlink.wire import Codec, Framer, mavlink2
+from uam_lab.doctor import autopilot
+from uam_lab.doctor.finding import Verdict
+from uam_sim_bridge.mavlink.protocol.modes import Mode
+from uam_sim_bridge.mavlink.protocol.wire import Codec, Framer, mavlink2
 from uam_sim_bridge.px4.installation import VARIABLE
 
 OK, WARN, FAIL = Verdict

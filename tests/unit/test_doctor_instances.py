@@ -5,9 +5,9 @@ import socket
 
 import pytest
 
-from uam_sim_bridge.doctor import holders, instances, leftovers
-from uam_sim_bridge.doctor.finding import Verdict
-from uam_sim_bridge.flight.ports import INSTANCES, Reservation
+from uam_lab.doctor import holders, instances, leftovers
+from uam_lab.doctor.finding import Verdict
+from uam_sim_bridge.ports import INSTANCES, Reservation
 
 OK, WARN, FAIL = Verdict
 

@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from uam_sim_bridge.doctor import machine, rendering
-from uam_sim_bridge.doctor.child import TOO_LATE, Said
-from uam_sim_bridge.doctor.finding import Verdict
+from uam_lab.doctor import machine, rendering
+from uam_lab.doctor.child import TOO_LATE, Said
+from uam_lab.doctor.finding import Verdict
 
 OK, WARN, FAIL = Verdict
 

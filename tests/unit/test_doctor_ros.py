@@ -2,11 +2,11 @@
 
 import pytest
 
-from uam_control import configuration
-from uam_sim_bridge.doctor import environment, ros
-from uam_sim_bridge.doctor.child import Said
-from uam_sim_bridge.doctor.finding import Verdict
-from uam_sim_bridge.flight.ports import Reservation
+from uam_control.settings import configuration
+from uam_lab.doctor import environment, ros
+from uam_lab.doctor.child import Said
+from uam_lab.doctor.finding import Verdict
+from uam_sim_bridge.ports import Reservation
 
 OK, WARN, FAIL = Verdict
 

@@ -8,7 +8,7 @@ import pytest
 from uam_control.estimation import EstimatorParameters, StateEstimator
 from uam_control.estimation.filters import derivative_step, low_pass_step
 from uam_control.estimation.repeats import Repeats
-from uam_control.rotations import matrix_from_euler, quaternion_from_euler
+from uam_control.maths.rotations import matrix_from_euler, quaternion_from_euler
 
 DT = 0.004
 

@@ -4,9 +4,13 @@ import struct
 
 import pytest
 
-from uam_sim_bridge.autopilot.modes import Severity
-from uam_sim_bridge.mavlink.event_messages import CurrentEventSequenceMessage, EventMessage
-from uam_sim_bridge.mavlink.events import (
+from uam_sim_bridge.mavlink.protocol.modes import Severity
+from uam_sim_bridge.mavlink.protocol.wire import Codec, Framer
+from uam_sim_bridge.mavlink.telemetry.event_messages import (
+    CurrentEventSequenceMessage,
+    EventMessage,
+)
+from uam_sim_bridge.mavlink.telemetry.events import (
     CHECKS,
     HEALTH_SUMMARY,
     OFFBOARD,
@@ -15,7 +19,6 @@ from uam_sim_bridge.mavlink.events import (
     EventReader,
     event_id,
 )
-from uam_sim_bridge.mavlink.wire import Codec, Framer
 
 ALL_MODES = 0xFFFFFFFF
 MANUAL = 1

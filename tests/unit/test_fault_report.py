@@ -8,17 +8,18 @@ import re
 import numpy as np
 import pytest
 
-from uam_control import configuration
-from uam_sim_bridge.campaign import fault_matrix, fault_report
-from uam_sim_bridge.campaign.fault_outcome import OUTCOMES, classify, down_after
-from uam_sim_bridge.campaign.fault_trial import FaultResult
-from uam_sim_bridge.cli.main import main
+from uam_control.settings import configuration
+from uam_lab.campaign import fault_matrix, fault_report
+from uam_lab.campaign.fault_outcome import OUTCOMES, classify, down_after
+from uam_lab.campaign.fault_trial import FaultResult
+from uam_lab.cli.main import main
+from uam_lab.report.figures import fault_marks, figures
+from uam_lab.report.figures.figures import draw
+from uam_lab.report.figures.panels import Flight
+from uam_lab.report.page import page
+from uam_lab.results import metrics
+from uam_lab.results.timeseries import COLUMNS
 from uam_sim_bridge.faults import FAULTS, FaultError
-from uam_sim_bridge.flight import metrics
-from uam_sim_bridge.flight.timeseries import COLUMNS
-from uam_sim_bridge.report import fault_marks, figures, page
-from uam_sim_bridge.report.figures import draw
-from uam_sim_bridge.report.panels import Flight
 
 MATRIX = configuration.path("campaign/faults.yaml")
 
@@ -31,8 +32,8 @@ def test_an_event_is_read_back_from_its_message_and_a_log():
     pytest.importorskip("rclpy")
     from rclpy.serialization import serialize_message
 
-    from uam_msgs_py.faults import FaultEvent
-    from uam_sim_bridge.flight import fault_log
+    from uam_lab.recording import fault_records as fault_log
+    from uam_msgs_py.messages.faults import FaultEvent
 
     first = FaultEvent("motor_loss", "plant", 0, True, {"motor": 2.0, "remaining": 0.7})
     other = FaultEvent("mavlink_cut", "MAVLink", 0, True, {"direction": "both"})

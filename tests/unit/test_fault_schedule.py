@@ -11,9 +11,10 @@ import yaml
 from hypothesis import given
 from hypothesis import strategies as st
 
-from uam_control import configuration
 from uam_control.mission import ScenarioError, load_scenario
-from uam_control.parameters import Bound, Choice
+from uam_control.settings import configuration
+from uam_control.settings.parameter_set import Bound, Choice
+from uam_lab.processes import thread_stop
 from uam_sim_bridge.faults import (
     FAULTS,
     LINK,
@@ -27,7 +28,6 @@ from uam_sim_bridge.faults import (
 )
 from uam_sim_bridge.faults.schedule import WORDS, TimedFault, in_words
 from uam_sim_bridge.faults.timeline import Timeline
-from uam_sim_bridge.flight import thread_stop
 
 SCENARIO = load_scenario("pick_and_place")
 times = st.floats(0.0, 1000.0).map(lambda value: round(value, 3))

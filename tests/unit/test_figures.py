@@ -5,12 +5,12 @@ import pytest
 from PIL import Image
 
 from uam_control.profile import load_profile
-from uam_sim_bridge.analysis.stability import analyse
-from uam_sim_bridge.flight import metrics
-from uam_sim_bridge.flight.timeseries import COLUMNS, Series, gain_columns
+from uam_lab.analysis.stability import analyse
+from uam_lab.report.figures import figures, panels
+from uam_lab.report.figures.panels import Flight
+from uam_lab.results import metrics
+from uam_lab.results.timeseries import COLUMNS, Series, gain_columns
 from uam_sim_bridge.plant import Vehicle
-from uam_sim_bridge.report import figures, panels
-from uam_sim_bridge.report.panels import Flight
 
 
 def words(figure):

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from uam_sim_bridge.flight import environment
+from uam_lab.processes import environment
 
 
 def test_the_environment_is_private_and_local(tmp_path, monkeypatch):

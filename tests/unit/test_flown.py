@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from uam_control.configuration import ConfigurationError
-from uam_sim_bridge.campaign.flown import FILE, Flown
-from uam_sim_bridge.campaign.trial import Result
+from uam_control.settings.configuration import ConfigurationError
+from uam_lab.campaign.flown import FILE, Flown
+from uam_lab.campaign.trial import Result
 
 
 def flight(seed):

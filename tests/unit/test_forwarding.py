@@ -7,15 +7,15 @@ import time
 import numpy as np
 import pytest
 
-from uam_sim_bridge.autopilot.modes import Mode
-from uam_sim_bridge.flight.ports import PortError
-from uam_sim_bridge.mavlink.forwarding import BYTES_PER_TICK, LINE_SHARE, GroundStation
-from uam_sim_bridge.mavlink.link import OffboardLink
-from uam_sim_bridge.mavlink.offboard import OffboardSequence, Request
-from uam_sim_bridge.mavlink.pacing import BURST
-from uam_sim_bridge.mavlink.setpoint import RateThrustParameters
-from uam_sim_bridge.mavlink.signing import Signing
-from uam_sim_bridge.mavlink.wire import Codec, Framer, mavlink2
+from uam_sim_bridge.mavlink.link.link import OffboardLink
+from uam_sim_bridge.mavlink.offboard.sequence import OffboardSequence, Request
+from uam_sim_bridge.mavlink.offboard.setpoint import RateThrustParameters
+from uam_sim_bridge.mavlink.protocol.modes import Mode
+from uam_sim_bridge.mavlink.protocol.signing import Signing
+from uam_sim_bridge.mavlink.protocol.wire import Codec, Framer, mavlink2
+from uam_sim_bridge.mavlink.transport.forwarding import BYTES_PER_TICK, LINE_SHARE, GroundStation
+from uam_sim_bridge.mavlink.transport.pacing import BURST
+from uam_sim_bridge.ports import PortError
 
 PATIENCE = 30.0  # s
 SPEED = 92160.0  # bytes/s

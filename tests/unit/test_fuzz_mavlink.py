@@ -10,10 +10,10 @@ import pytest
 
 from uam_sim_bridge.autopilot.core import Autopilot
 from uam_sim_bridge.autopilot.server import Server
-from uam_sim_bridge.mavlink.link import OffboardLink
-from uam_sim_bridge.mavlink.offboard import OffboardSequence
-from uam_sim_bridge.mavlink.setpoint import RateThrustParameters
-from uam_sim_bridge.mavlink.wire import Codec, Framer, _frame_end, checksum_fits, mavlink2
+from uam_sim_bridge.mavlink.link.link import OffboardLink
+from uam_sim_bridge.mavlink.offboard.sequence import OffboardSequence
+from uam_sim_bridge.mavlink.offboard.setpoint import RateThrustParameters
+from uam_sim_bridge.mavlink.protocol.wire import Codec, Framer, _frame_end, checksum_fits, mavlink2
 
 
 def test_neither_garbage_nor_mutated_messages_do_harm():

@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from uam_sim_bridge.mavlink.hold import UNKNOWN, HoldParameters, LevelHold
+from uam_sim_bridge.mavlink.offboard.hold import UNKNOWN, HoldParameters, LevelHold
 
 TILTED = np.array([0.1, -0.2, 1.0])
 LEVEL = np.zeros(3)

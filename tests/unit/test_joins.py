@@ -4,7 +4,7 @@ import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
 
-from uam_msgs_py.joins import BACKLOG, StampJoin
+from uam_msgs_py.node.joins import BACKLOG, StampJoin
 
 
 def joined(depth=32):

@@ -1,6 +1,6 @@
 """When a flight is over that its mission does not end."""
 
-from uam_sim_bridge.flight.limits import SETTLED, Settled
+from uam_control.mission.time_limit import SETTLED, Settled
 
 
 def test_a_flight_is_over_a_while_after_the_autopilot_has_disarmed():

@@ -7,16 +7,16 @@ import pytest
 
 from uam_sim_bridge.autopilot.companion import Companion
 from uam_sim_bridge.autopilot.core import Autopilot
-from uam_sim_bridge.autopilot.modes import Command, Mode, Result
-from uam_sim_bridge.mavlink.event_messages import EventMessage
-from uam_sim_bridge.mavlink.events import SUMMARY, event_id
-from uam_sim_bridge.mavlink.link import OffboardLink
-from uam_sim_bridge.mavlink.link_report import faults, report
-from uam_sim_bridge.mavlink.offboard import OffboardSequence, Phase
-from uam_sim_bridge.mavlink.parameter_check import WATCHED
-from uam_sim_bridge.mavlink.setpoint import RateThrustParameters
-from uam_sim_bridge.mavlink.streams import ONLY_COUNTED, RATES
-from uam_sim_bridge.mavlink.wire import Codec, Framer, clean_text, mavlink2
+from uam_sim_bridge.mavlink.link.link import OffboardLink
+from uam_sim_bridge.mavlink.link.link_report import faults, report
+from uam_sim_bridge.mavlink.offboard.sequence import OffboardSequence, Phase
+from uam_sim_bridge.mavlink.offboard.setpoint import RateThrustParameters
+from uam_sim_bridge.mavlink.protocol.modes import Command, Mode, Result
+from uam_sim_bridge.mavlink.protocol.wire import Codec, Framer, clean_text, mavlink2
+from uam_sim_bridge.mavlink.telemetry.event_messages import EventMessage
+from uam_sim_bridge.mavlink.telemetry.events import SUMMARY, event_id
+from uam_sim_bridge.mavlink.telemetry.parameter_check import WATCHED
+from uam_sim_bridge.mavlink.telemetry.streams import ONLY_COUNTED, RATES
 
 DOWN = np.array([0.0, 0.0, -9.81])
 LEVEL = np.array([1.0, 0.0, 0.0, 0.0])

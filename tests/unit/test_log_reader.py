@@ -8,11 +8,11 @@ pytest.importorskip("rclpy")
 from uam_control.laws.catalogue import LAWS
 from uam_control.mission import load_scenario
 from uam_control.profile import load_profile
-from uam_msgs_py.convert import JointStateWriter
-from uam_msgs_py.status import MissionStatus
-from uam_sim_bridge.flight import log_reader
-from uam_sim_bridge.flight.mcap_reader import TopicLog
-from uam_sim_bridge.flight.timeseries import COLUMNS, gain_columns
+from uam_lab.recording import log_reader
+from uam_lab.recording.mcap_reader import TopicLog
+from uam_lab.results.timeseries import COLUMNS, gain_columns
+from uam_msgs_py.messages.convert import JointStateWriter
+from uam_msgs_py.messages.status import MissionStatus
 
 
 @pytest.mark.parametrize("law", LAWS)

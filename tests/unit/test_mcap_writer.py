@@ -5,8 +5,8 @@ from mcap.exceptions import McapError
 from mcap.reader import NonSeekingReader, make_reader
 from mcap_ros2.decoder import DecoderFactory
 
-from uam_sim_bridge.flight.mcap_writer import McapWriter
-from uam_sim_bridge.flight.message_definitions import (
+from uam_lab.recording.mcap_writer import McapWriter
+from uam_lab.recording.message_definitions import (
     DefinitionMissing,
     dependencies,
     schema,

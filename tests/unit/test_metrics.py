@@ -6,8 +6,8 @@ import math
 import numpy as np
 import pytest
 
-from uam_sim_bridge.flight import metrics
-from uam_sim_bridge.flight.timeseries import COLUMNS, Recording
+from uam_lab.results import metrics
+from uam_lab.results.timeseries import COLUMNS, Recording
 
 INFO = {
     "controller": "modular",

@@ -4,13 +4,13 @@ import numpy as np
 import pytest
 
 from uam_sim_bridge.autopilot.core import Autopilot
-from uam_sim_bridge.autopilot.modes import Command, Mode, Result, Severity
-from uam_sim_bridge.mavlink.offboard import (
+from uam_sim_bridge.mavlink.offboard.sequence import (
     OffboardParameters,
     OffboardSequence,
     Phase,
     Request,
 )
+from uam_sim_bridge.mavlink.protocol.modes import Command, Mode, Result, Severity
 
 DOWN = np.array([0.0, 0.0, -9.81])
 COMMANDS = {

@@ -2,10 +2,10 @@
 
 import pytest
 
-from uam_sim_bridge.mavlink.hil_thinning import FULL_RATE, Thinner, sustainable_rate
-from uam_sim_bridge.mavlink.outbox import OTHERS_KEPT, URGENT_KEPT, Outbox
-from uam_sim_bridge.mavlink.pacing import BURST, Meter, Pacer
-from uam_sim_bridge.mavlink.wire import mavlink2
+from uam_sim_bridge.mavlink.hil.hil_thinning import FULL_RATE, Thinner, sustainable_rate
+from uam_sim_bridge.mavlink.protocol.wire import mavlink2
+from uam_sim_bridge.mavlink.transport.outbox import OTHERS_KEPT, URGENT_KEPT, Outbox
+from uam_sim_bridge.mavlink.transport.pacing import BURST, Meter, Pacer
 
 
 class Line:

@@ -5,8 +5,10 @@ import struct
 
 import pytest
 
-from uam_control.parameters import ParameterError
-from uam_sim_bridge.mavlink.parameter_check import (
+from uam_control.settings.parameter_set import ParameterError
+from uam_sim_bridge.mavlink.offboard.setpoint import RateThrustParameters
+from uam_sim_bridge.mavlink.protocol.wire import Codec, Framer, mavlink2
+from uam_sim_bridge.mavlink.telemetry.parameter_check import (
     adopted,
     differences,
     expected,
@@ -14,8 +16,6 @@ from uam_sim_bridge.mavlink.parameter_check import (
     untold,
     value_of,
 )
-from uam_sim_bridge.mavlink.setpoint import RateThrustParameters
-from uam_sim_bridge.mavlink.wire import Codec, Framer, mavlink2
 
 
 def told(value, kind, layout=None):

@@ -2,8 +2,8 @@
 
 import pytest
 
-from uam_control import configuration
 from uam_control.profile import ProfileError, load_profile
+from uam_control.settings import configuration
 
 DUMP = """\
 /arm_controller:

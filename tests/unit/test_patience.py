@@ -4,8 +4,8 @@ import math
 
 import pytest
 
-from uam_sim_bridge.flight import patience
-from uam_sim_bridge.flight.patience import SLICE, Patience
+from uam_sim_bridge import patience
+from uam_sim_bridge.patience import SLICE, Patience
 
 
 @pytest.fixture

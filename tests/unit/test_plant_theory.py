@@ -6,7 +6,7 @@ import mujoco
 import numpy as np
 import pytest
 
-from uam_control.rotations import matrix_from_quaternion
+from uam_control.maths.rotations import matrix_from_quaternion
 from uam_sim_bridge.plant import Plant, Vehicle
 from uam_sim_bridge.plant.urdf import urdf
 

@@ -6,8 +6,8 @@ import sys
 
 import pytest
 
-from uam_sim_bridge.flight import ports
-from uam_sim_bridge.flight.ports import PortError, Reservation
+from uam_sim_bridge import ports
+from uam_sim_bridge.ports import PortError, Reservation
 
 
 def test_ports_follow_px4_instances():
@@ -40,7 +40,7 @@ def test_a_taken_instance_is_refused_by_name(tmp_path):
 def test_the_lock_of_a_killed_flight_vanishes(tmp_path):
     program = (
         "import os, sys, pathlib\n"
-        "from uam_sim_bridge.flight.ports import Reservation\n"
+        "from uam_sim_bridge.ports import Reservation\n"
         "r = Reservation(folder=pathlib.Path(sys.argv[1]))\n"
         "print(r.ports.instance, flush=True)\n"
         "os.kill(os.getpid(), 9)\n"

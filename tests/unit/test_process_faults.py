@@ -12,9 +12,9 @@ from pathlib import Path
 import pytest
 
 from uam_control.mission import load_scenario
+from uam_lab.flight.ros.process_faults import ProcessFaults
+from uam_lab.processes.processes import Processes
 from uam_sim_bridge.faults import read_schedule
-from uam_sim_bridge.flight.process_faults import ProcessFaults
-from uam_sim_bridge.flight.processes import Processes
 
 SLEEPER = """
 import time

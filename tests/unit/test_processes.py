@@ -8,8 +8,8 @@ import time
 
 import pytest
 
-from uam_sim_bridge.flight import process_table, processes
-from uam_sim_bridge.flight.processes import NodeFailed, Processes
+from uam_lab.processes import process_table, processes
+from uam_lab.processes.processes import NodeFailed, Processes
 
 SLEEPER = """
 import signal, sys, time
@@ -171,7 +171,7 @@ def test_no_child_survives_a_killed_orchestrator(tmp_path):
     path = os.pathsep.join([str(tmp_path), *sys.path])
     program = f"""
 import os, pathlib, sys, time
-from uam_sim_bridge.flight.processes import Processes
+from uam_lab.processes.processes import Processes
 folder = pathlib.Path({str(tmp_path)!r})
 children = Processes(folder, {{**os.environ, "PYTHONPATH": {path!r}}})
 children.start("a", "sleeper")

@@ -9,7 +9,7 @@ import time
 import pytest
 
 from uam_sim_bridge.autopilot.params import DEFINITIONS
-from uam_sim_bridge.px4 import parameters
+from uam_sim_bridge.px4 import px4_parameters as parameters
 from uam_sim_bridge.px4.installation import VARIABLE, Px4Error, Px4Installation
 
 SCRIPT = """#!/bin/sh

@@ -8,10 +8,11 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from uam_sim_bridge.flight.timeseries import Series
-from uam_sim_bridge.report import figures, rendering, video
-from uam_sim_bridge.report.build import build_report
-from uam_sim_bridge.report.poses import Poses
+from uam_lab.report.build import build_report
+from uam_lab.report.figures import figures
+from uam_lab.report.figures.poses import Poses
+from uam_lab.report.video import rendering, video
+from uam_lab.results.timeseries import Series
 
 
 def cut(series, end):

@@ -8,9 +8,13 @@ import numpy as np
 import pytest
 from rich.console import Console
 
-from uam_sim_bridge.flight import timeseries
-from uam_sim_bridge.report import console, figures, outcome, page, parameters, rendering
-from uam_sim_bridge.report.build import build_report
+from uam_lab.report.build import build_report
+from uam_lab.report.facts import outcome
+from uam_lab.report.facts import parameter_table as parameters
+from uam_lab.report.figures import figures
+from uam_lab.report.page import console, page
+from uam_lab.report.video import rendering
+from uam_lab.results import timeseries
 
 
 def text_of(html):
@@ -129,7 +133,7 @@ def test_the_page_names_every_safeguard_and_every_difference(flight_folder):
 
 
 def test_table_one_has_no_safeguard_and_no_difference_from_itself(tmp_path):
-    from uam_control import configuration
+    from uam_control.settings import configuration
 
     found = parameters.compare(configuration.path("profiles/paper_table1.yaml"))
     assert found.safeguards == {}
@@ -137,7 +141,7 @@ def test_table_one_has_no_safeguard_and_no_difference_from_itself(tmp_path):
 
 
 def test_a_reconstructed_law_is_called_so_and_is_not_compared_with_table_one(flight_folder):
-    from uam_control import configuration
+    from uam_control.settings import configuration
 
     file = configuration.path("profiles/asmc2.yaml")
     rows = {row.name: row for row in parameters.compare(file).controllers["arm_controller"]}

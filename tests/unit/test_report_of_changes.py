@@ -5,9 +5,11 @@ import math
 
 import pytest
 
-from uam_sim_bridge.report import changes, figures, page
-from uam_sim_bridge.report.figures import draw
-from uam_sim_bridge.report.panels import Flight
+from uam_lab.report.facts import changes
+from uam_lab.report.figures import figures
+from uam_lab.report.figures.figures import draw
+from uam_lab.report.figures.panels import Flight
+from uam_lab.report.page import page
 
 
 def entry(time, accepted=True, **values):
@@ -23,7 +25,7 @@ def entry(time, accepted=True, **values):
 
 def test_a_change_is_read_back_from_its_message():
     pytest.importorskip("rclpy")
-    from uam_msgs_py.changes import Change
+    from uam_msgs_py.messages.changes import Change
 
     values = {"varpi": (0.1, math.inf), "law": ("a -> b", None), "nu": ([1.0, 2.0], [1.0])}
     change = Change("arm_controller", "parameter service", values, "varpi: no")

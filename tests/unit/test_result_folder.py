@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 import yaml
 
-from uam_sim_bridge.flight import result_folder
-from uam_sim_bridge.flight.result_folder import ResultFolder, ResultFolderError
+from uam_lab.results import result_folder
+from uam_lab.results.result_folder import ResultFolder, ResultFolderError
 
 NOON = datetime(2026, 3, 1, 12, 0, 5)
 

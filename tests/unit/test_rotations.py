@@ -6,7 +6,7 @@ import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
 
-from uam_control import rotations as r
+from uam_control.maths import rotations as r
 
 angles = st.tuples(st.floats(-3.1, 3.1), st.floats(-1.5, 1.5), st.floats(-3.1, 3.1)).map(np.array)
 small = st.tuples(*[st.floats(-0.5, 0.5)] * 3).map(np.array)

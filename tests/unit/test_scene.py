@@ -15,14 +15,14 @@ from mcap.reader import make_reader
 from mcap_ros2.decoder import DecoderFactory
 from visualization_msgs.msg import Marker
 
+from uam_control.maths.rotations import matrix_from_quaternion, quaternion_from_euler
 from uam_control.mission import load_scenario
-from uam_control.rotations import matrix_from_quaternion, quaternion_from_euler
-from uam_msgs_py import tf_message
-from uam_msgs_py.status import MissionStatus
-from uam_msgs_py.transforms import Transform, transforms_message
-from uam_sim_bridge.flight.mcap_writer import McapWriter
-from uam_sim_bridge.flight.message_definitions import schema
-from uam_sim_bridge.nodes.scene_markers import PATH_POINTS, FlownPath, Markers, ReferencePath
+from uam_lab.nodes.scene_markers import PATH_POINTS, FlownPath, Markers, ReferencePath
+from uam_lab.recording.mcap_writer import McapWriter
+from uam_lab.recording.message_definitions import schema
+from uam_msgs_py.messages import tf_message
+from uam_msgs_py.messages.status import MissionStatus
+from uam_msgs_py.messages.transforms import Transform, transforms_message
 from uam_sim_bridge.plant import Vehicle
 from uam_sim_bridge.plant.frames import SWING, box, frames, hanging
 from uam_sim_bridge.plant.urdf import BASE_LINK, urdf

@@ -8,9 +8,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from uam_control.parameters import ParameterError
-from uam_control.rotations import matrix_from_euler
-from uam_sim_bridge.mavlink.setpoint import (
+from uam_control.maths.rotations import matrix_from_euler
+from uam_control.settings.parameter_set import ParameterError
+from uam_sim_bridge.mavlink.offboard.setpoint import (
     INPUTS,
     RateThrustMap,
     RateThrustParameters,

@@ -9,10 +9,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from uam_control.rotations import quaternion_from_euler
-from uam_sim_bridge.mavlink.hold import HoldParameters
-from uam_sim_bridge.mavlink.setpoint import RateThrustMap, RateThrustParameters
-from uam_sim_bridge.mavlink.setpoint_source import SetpointSource, Situation
+from uam_control.maths.rotations import quaternion_from_euler
+from uam_sim_bridge.mavlink.offboard.hold import HoldParameters
+from uam_sim_bridge.mavlink.offboard.setpoint import RateThrustMap, RateThrustParameters
+from uam_sim_bridge.mavlink.offboard.setpoint_source import SetpointSource, Situation
 
 TICK = 0.004
 FLYING = Situation(armed=True, landed=False, let_go=False)

@@ -2,9 +2,9 @@
 
 import pytest
 
-from uam_sim_bridge.flight.ports import PortError
-from uam_sim_bridge.mavlink.signing import EPOCH, Signing, wall_steps
-from uam_sim_bridge.mavlink.wire import Codec, Framer, mavlink2
+from uam_sim_bridge.mavlink.protocol.signing import EPOCH, Signing, wall_steps
+from uam_sim_bridge.mavlink.protocol.wire import Codec, Framer, mavlink2
+from uam_sim_bridge.ports import PortError
 
 KEY, OTHER = bytes(range(32)), bytes(32)
 MINUTE = 6_000_000

@@ -5,16 +5,16 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from uam_control.laws.law_parameters import ModularParameters
 from uam_control.laws.modular import ModularLaw
-from uam_control.laws.parameters import ModularParameters
 from uam_control.profile import load_profile
-from uam_sim_bridge.analysis import constants, lyapunov, stability, ticks
-from uam_sim_bridge.analysis.folder import analyse_folder
-from uam_sim_bridge.analysis.lyapunov import Comparison
-from uam_sim_bridge.analysis.tracking import Tracking
-from uam_sim_bridge.flight.timeseries import COLUMNS, Series
+from uam_lab.analysis import constants, lyapunov, stability, ticks
+from uam_lab.analysis.folder import analyse_folder
+from uam_lab.analysis.lyapunov import Comparison
+from uam_lab.analysis.tracking import Tracking
+from uam_lab.report.figures import figures, panels
+from uam_lab.results.timeseries import COLUMNS, Series
 from uam_sim_bridge.plant import Vehicle
-from uam_sim_bridge.report import figures, panels
 
 LAW = ModularParameters(
     inertia=(1.0, 1.0, 1.0),

@@ -2,8 +2,8 @@
 
 import pytest
 
-from uam_msgs_py.layouts import BadMessage
-from uam_msgs_py.status import ERROR, OK, STALE, WARN, AutopilotState, MissionStatus
+from uam_msgs_py.messages.layouts import BadMessage
+from uam_msgs_py.messages.status import ERROR, OK, STALE, WARN, AutopilotState, MissionStatus
 
 
 @pytest.mark.parametrize(

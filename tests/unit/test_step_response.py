@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from uam_sim_bridge.px4.rate_experiment import AXES, experiment, steps
-from uam_sim_bridge.px4.step_response import distance, figures
+from uam_lab.px4_steps.rate_experiment import AXES, experiment, steps
+from uam_lab.px4_steps.step_response import distance, figures
 
 TIME = np.arange(-10, 500) * 0.004
 

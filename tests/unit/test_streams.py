@@ -2,9 +2,15 @@
 
 import pytest
 
-from uam_sim_bridge.autopilot.modes import Result
-from uam_sim_bridge.mavlink.streams import ATTEMPTS, ONLY_COUNTED, RATES, WINDOW, StreamCheck
-from uam_sim_bridge.mavlink.wire import mavlink2
+from uam_sim_bridge.mavlink.protocol.modes import Result
+from uam_sim_bridge.mavlink.protocol.wire import mavlink2
+from uam_sim_bridge.mavlink.telemetry.streams import (
+    ATTEMPTS,
+    ONLY_COUNTED,
+    RATES,
+    WINDOW,
+    StreamCheck,
+)
 
 ODOMETRY = mavlink2.MAVLINK_MSG_ID_ODOMETRY
 HEARTBEAT = mavlink2.MAVLINK_MSG_ID_HEARTBEAT

@@ -12,7 +12,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.stateful import RuleBasedStateMachine, invariant, rule
 
-from uam_control.parameters import ParameterError
+from uam_control.settings.parameter_set import ParameterError
 from uam_control.supervision import (
     Command,
     Event,

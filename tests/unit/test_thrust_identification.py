@@ -8,9 +8,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from uam_control.parameters import ParameterError
-from uam_sim_bridge.mavlink.setpoint import RateThrustMap
-from uam_sim_bridge.mavlink.thrust_identification import (
+from uam_control.settings.parameter_set import ParameterError
+from uam_sim_bridge.mavlink.offboard.setpoint import RateThrustMap
+from uam_sim_bridge.mavlink.offboard.thrust_identification import (
     GRAVITY,
     LONGEST_GAP,
     ThrustIdentification,

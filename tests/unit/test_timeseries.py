@@ -4,8 +4,8 @@ import numpy as np
 import pyarrow.parquet as pq
 import pytest
 
-from uam_sim_bridge.flight import timeseries
-from uam_sim_bridge.flight.timeseries import COLUMNS, Recording, UnreadableFlight
+from uam_lab.results import timeseries
+from uam_lab.results.timeseries import COLUMNS, Recording, UnreadableFlight
 
 
 def recording(phases, dt=0.5, start=-1.0):

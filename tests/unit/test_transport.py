@@ -7,11 +7,11 @@ import tty
 
 import pytest
 
-from uam_sim_bridge.flight.ports import PortError
-from uam_sim_bridge.mavlink.stream_transport import LAST_RETRY
-from uam_sim_bridge.mavlink.tcp_transport import TcpTransport
-from uam_sim_bridge.mavlink.transport import UdpTransport, open_transport
-from uam_sim_bridge.mavlink.wire import Codec, Framer, mavlink2
+from uam_sim_bridge.mavlink.protocol.wire import Codec, Framer, mavlink2
+from uam_sim_bridge.mavlink.transport.stream_transport import LAST_RETRY
+from uam_sim_bridge.mavlink.transport.tcp_transport import TcpTransport
+from uam_sim_bridge.mavlink.transport.transport import UdpTransport, open_transport
+from uam_sim_bridge.ports import PortError
 
 PATIENCE = 30.0  # s, only spent by a test that fails
 

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from uam_control.profile import load_profile
-from uam_sim_bridge.analysis import dynamics, supply, ticks
-from uam_sim_bridge.analysis.dynamics import Body
+from uam_lab.analysis import dynamics, supply, ticks
+from uam_lab.analysis.dynamics import Body
 from uam_sim_bridge.plant import Vehicle
 
 VEHICLE = Vehicle.load()
@@ -104,7 +104,7 @@ def test_recorded_accelerations_with_payload(direct_flight):
 
 
 def test_terms_of_the_law_add_up_to_what_it_asked_for(direct_flight):
-    from uam_sim_bridge.analysis import tracking
+    from uam_lab.analysis import tracking
 
     rows = ticks.in_the_air(direct_flight)
     sets = load_profile("s500").sets

@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 import yaml
 
-from uam_control import configuration
 from uam_control.profile import load_profile
-from uam_sim_bridge.campaign.trial import Result
-from uam_sim_bridge.cli.main import main
-from uam_sim_bridge.tuning.space import Cost, TuningError, load_space
+from uam_control.settings import configuration
+from uam_lab.campaign.trial import Result
+from uam_lab.cli.main import main
+from uam_lab.tuning.space import Cost, TuningError, load_space
 
 COST = Cost(
     aim=(1.0,) * 8,

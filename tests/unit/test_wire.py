@@ -7,7 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from pymavlink.dialects.v20 import common as mavlink2
 
-from uam_sim_bridge.mavlink.wire import (
+from uam_sim_bridge.mavlink.protocol.wire import (
     UNREAD,
     Codec,
     Framer,

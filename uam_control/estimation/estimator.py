@@ -10,12 +10,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from uam_control.compiled import jit
 from uam_control.coordinates import ARM
 from uam_control.estimation.filters import derivative_step, joint_step, low_pass_step
 from uam_control.estimation.pose_filter import PoseFilter
-from uam_control.parameters import ParameterSet, number
-from uam_control.rotations import euler_from_quaternion
+from uam_control.maths.compiled import jit
+from uam_control.maths.rotations import euler_from_quaternion
+from uam_control.settings.parameter_set import ParameterSet, number
 
 LONGEST_STEP = 0.05  # [s] that filters are advanced by at once; beyond it samples were lost
 

@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from uam_control.compiled import jit
+from uam_control.maths.compiled import jit
 
 
 @jit

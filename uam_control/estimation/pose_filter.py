@@ -10,10 +10,10 @@ import math
 
 import numpy as np
 
-from uam_control.compiled import jit
 from uam_control.estimation.pose_gate import PoseGate
 from uam_control.estimation.repeats import Repeats
-from uam_control.rotations import (
+from uam_control.maths.compiled import jit
+from uam_control.maths.rotations import (
     matrix_from_quaternion,
     quaternion_from_rotation_vector,
     quaternion_multiply,

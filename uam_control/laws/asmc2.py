@@ -23,10 +23,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from uam_control.compiled import jit
 from uam_control.laws.law import Law
-from uam_control.laws.parameters import LawParameters, ceiling, structured
-from uam_control.parameters import HUGE, TINY, choice, number, switch, vector
+from uam_control.laws.law_parameters import LawParameters, ceiling, structured
+from uam_control.maths.compiled import jit
+from uam_control.settings.parameter_set import HUGE, TINY, choice, number, switch, vector
 
 ETA_MAX = 0.98
 ADAPTATION = ("theta0", "theta1", "theta2", "w_norm", "eta", "clamps")

@@ -10,7 +10,7 @@ from uam_control.laws.asmc2 import Asmc2Law
 from uam_control.laws.law import Law
 from uam_control.laws.modular import ADAPTATION as MODULAR
 from uam_control.laws.modular import ModularLaw
-from uam_control.parameters import ParameterError
+from uam_control.settings.parameter_set import ParameterError
 
 
 @dataclass(frozen=True)

@@ -11,8 +11,8 @@ import math
 
 import numpy as np
 
-from uam_control.compiled import jit
-from uam_control.rotations import (
+from uam_control.maths.compiled import jit
+from uam_control.maths.rotations import (
     matrix_from_euler,
     relative_rotation,
     rotate,

@@ -6,7 +6,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from uam_control.laws.parameters import LawParameters
+from uam_control.laws.law_parameters import LawParameters
 
 
 class Law:

@@ -14,9 +14,9 @@ import math
 
 import numpy as np
 
-from uam_control.compiled import jit
 from uam_control.laws.law import Law
-from uam_control.laws.parameters import ModularParameters
+from uam_control.laws.law_parameters import ModularParameters
+from uam_control.maths.compiled import jit
 
 # what it publishes
 ADAPTATION = ("K0", "K1", "K2", "K3", "zeta", "rho", "r_norm")

@@ -1,7 +1,7 @@
 """What to fly: scenarios, smooth references, and the sequence from waiting to landed."""
 
 from uam_control.mission.mission import Mission, MissionOutput
-from uam_control.mission.parameters import MissionParameters
+from uam_control.mission.mission_parameters import MissionParameters
 from uam_control.mission.scenario import Scenario, ScenarioError, load_scenario
 
 __all__ = [

@@ -12,9 +12,9 @@ from collections.abc import Sequence
 import numpy as np
 
 from uam_control.coordinates import ARM, POSITION, SIZE, YAW
+from uam_control.maths.rotations import wrap_angle
 from uam_control.mission.scenario import SINK
 from uam_control.mission.trajectory import Trajectory
-from uam_control.rotations import wrap_angle
 from uam_control.supervision import SupervisionParameters
 
 _PEAK = 1.875  # largest rate of a quintic from rest to rest, times its mean rate

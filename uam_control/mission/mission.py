@@ -11,7 +11,7 @@ import numpy as np
 
 from uam_control.coordinates import ARM
 from uam_control.mission.guidance import Guidance
-from uam_control.mission.parameters import MissionParameters
+from uam_control.mission.mission_parameters import MissionParameters
 from uam_control.mission.scenario import Scenario
 from uam_control.mission.trajectory import empty_reference
 from uam_control.supervision import (

@@ -10,9 +10,9 @@ from typing import Any
 
 import numpy as np
 
-from uam_control import configuration, yaml_file
 from uam_control.coordinates import ARM, COORDINATES
 from uam_control.mission.trajectory import Chain, Move, Moves, Sampled, Trajectory
+from uam_control.settings import configuration, yaml_file
 
 ANGLES = COORDINATES[3:]
 CSV_REQUIRED = ("t", "px", "py", "pz", "yaw", "vx", "vy", "vz", "ax", "ay", "az", "dyaw")

@@ -7,8 +7,8 @@ from typing import Protocol
 
 import numpy as np
 
-from uam_control.compiled import jit
 from uam_control.coordinates import COORDINATES, SIZE
+from uam_control.maths.compiled import jit
 
 
 class Trajectory(Protocol):

@@ -2,12 +2,12 @@
 
 import numpy as np
 
-from uam_control.controllers import ArmController
+from uam_control.control.controllers import ArmController
 from uam_control.nodes.controller_node import ControllerNode
-from uam_msgs_py import topics
-from uam_msgs_py.control import ARM_NAMES, PositionCommand, Reference, TorqueWriter
-from uam_msgs_py.convert import EffortWriter
-from uam_msgs_py.node import run
+from uam_msgs_py.messages import topics
+from uam_msgs_py.messages.control import ARM_NAMES, PositionCommand, Reference, TorqueWriter
+from uam_msgs_py.messages.convert import EffortWriter
+from uam_msgs_py.node.base_node import run
 
 NAME = "arm_controller"
 

@@ -2,11 +2,11 @@
 
 import numpy as np
 
-from uam_control.controllers import AttitudeController
+from uam_control.control.controllers import AttitudeController
 from uam_control.nodes.controller_node import ControllerNode
-from uam_msgs_py import topics
-from uam_msgs_py.control import ATTITUDE_NAMES, PositionCommand, Reference, TorqueWriter
-from uam_msgs_py.node import run
+from uam_msgs_py.messages import topics
+from uam_msgs_py.messages.control import ATTITUDE_NAMES, PositionCommand, Reference, TorqueWriter
+from uam_msgs_py.node.base_node import run
 
 NAME = "attitude_controller"
 

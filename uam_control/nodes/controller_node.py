@@ -6,19 +6,19 @@ import numpy as np
 from rclpy.parameter import Parameter
 from std_srvs.srv import SetBool, Trigger
 
-from uam_control.controllers import Controller
+from uam_control.control.controllers import Controller
 from uam_control.coordinates import SIZE
 from uam_control.laws import catalogue
 from uam_control.nodes.timing import Ticks, Timing
 from uam_control.profile import load_profile, parameter_set
-from uam_msgs_py import topics
-from uam_msgs_py.changes import Change
-from uam_msgs_py.control import read_position_command, read_reference, read_state
-from uam_msgs_py.convert import JointStateWriter
-from uam_msgs_py.joins import StampJoin
-from uam_msgs_py.node import UamNode
-from uam_msgs_py.parameters import NodeParameters, given
-from uam_msgs_py.topics import Topic
+from uam_msgs_py.messages import topics
+from uam_msgs_py.messages.changes import Change
+from uam_msgs_py.messages.control import read_position_command, read_reference, read_state
+from uam_msgs_py.messages.convert import JointStateWriter
+from uam_msgs_py.messages.topics import Topic
+from uam_msgs_py.node.base_node import UamNode
+from uam_msgs_py.node.joins import StampJoin
+from uam_msgs_py.node.node_parameters import NodeParameters, given
 
 ADAPTATION_PERIOD = 20_000_000  # [ns] between two adaptation messages
 RESET, FREEZE = "reset_adaptation", "freeze_adaptation"  # services

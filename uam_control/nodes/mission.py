@@ -8,22 +8,22 @@ from rcl_interfaces.msg import ParameterDescriptor
 from std_msgs.msg import Bool
 
 from uam_control.coordinates import ARM, ATTITUDE, POSITION, SIZE
+from uam_control.maths.rotations import wrap_angle
 from uam_control.mission import Mission, MissionOutput, MissionParameters, load_scenario
 from uam_control.nodes.mission_inputs import MissionInputs
 from uam_control.nodes.mission_services import offer
 from uam_control.nodes.timing import Ticks, Timing
 from uam_control.profile import load_profile
-from uam_control.rotations import wrap_angle
 from uam_control.supervision import State
-from uam_msgs_py import topics
-from uam_msgs_py.control import ReferenceWriter, read_state
-from uam_msgs_py.convert import SWITCH
-from uam_msgs_py.joins import Backlog
-from uam_msgs_py.layouts import SECOND
-from uam_msgs_py.node import UamNode, run
-from uam_msgs_py.parameters import NodeParameters
-from uam_msgs_py.stamps import seconds
-from uam_msgs_py.status import ERROR, OK, WARN, AutopilotState, MissionStatus
+from uam_msgs_py.messages import topics
+from uam_msgs_py.messages.control import ReferenceWriter, read_state
+from uam_msgs_py.messages.convert import SWITCH
+from uam_msgs_py.messages.layouts import SECOND
+from uam_msgs_py.messages.stamps import seconds
+from uam_msgs_py.messages.status import ERROR, OK, WARN, AutopilotState, MissionStatus
+from uam_msgs_py.node.base_node import UamNode, run
+from uam_msgs_py.node.joins import Backlog
+from uam_msgs_py.node.node_parameters import NodeParameters
 
 NAME = "mission"
 DEFAULT_PROFILE, DEFAULT_SCENARIO = "s500", "pick_and_place"

@@ -14,12 +14,12 @@ from sensor_msgs.msg import BatteryState, Temperature
 
 from uam_control.coordinates import JOINTS
 from uam_control.supervision import Inputs, Readings
-from uam_msgs_py import topics
-from uam_msgs_py.convert import read_pose, read_values
-from uam_msgs_py.layouts import BadMessage
-from uam_msgs_py.name_checks import check_names
-from uam_msgs_py.node import UamNode
-from uam_msgs_py.stamps import seconds
+from uam_msgs_py.messages import topics
+from uam_msgs_py.messages.convert import read_pose, read_values
+from uam_msgs_py.messages.layouts import BadMessage
+from uam_msgs_py.messages.name_checks import check_names
+from uam_msgs_py.messages.stamps import seconds
+from uam_msgs_py.node.base_node import UamNode
 
 PERIOD = 20_000_000  # [ns] of stamps between two looks
 GAINS = (

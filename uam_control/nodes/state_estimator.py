@@ -7,14 +7,14 @@ import numpy as np
 from uam_control.coordinates import COORDINATES, JOINTS
 from uam_control.estimation import EstimatorParameters, StateEstimator
 from uam_control.profile import load_profile
-from uam_msgs_py import topics
-from uam_msgs_py.convert import read_imu, read_joints, read_pose
-from uam_msgs_py.joins import Backlog
-from uam_msgs_py.node import UamNode, run
-from uam_msgs_py.parameters import NodeParameters
-from uam_msgs_py.stamps import seconds
-from uam_msgs_py.status import OK, WARN
-from uam_msgs_py.trajectories import TrajectoryWriter
+from uam_msgs_py.messages import topics
+from uam_msgs_py.messages.convert import read_imu, read_joints, read_pose
+from uam_msgs_py.messages.stamps import seconds
+from uam_msgs_py.messages.status import OK, WARN
+from uam_msgs_py.messages.trajectories import TrajectoryWriter
+from uam_msgs_py.node.base_node import UamNode, run
+from uam_msgs_py.node.joins import Backlog
+from uam_msgs_py.node.node_parameters import NodeParameters
 
 NAME = "state_estimator"
 DEFAULT_PROFILE = "s500"

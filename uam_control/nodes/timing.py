@@ -2,9 +2,9 @@
 
 from dataclasses import dataclass
 
-from uam_control.parameters import ParameterSet, number
-from uam_msgs_py.layouts import SECOND
-from uam_msgs_py.stamps import seconds
+from uam_control.settings.parameter_set import ParameterSet, number
+from uam_msgs_py.messages.layouts import SECOND
+from uam_msgs_py.messages.stamps import seconds
 
 
 @dataclass(frozen=True)

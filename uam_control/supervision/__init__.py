@@ -2,8 +2,8 @@
 
 from uam_control.supervision.inputs import Inputs
 from uam_control.supervision.observation import Command, Observation, Readings
-from uam_control.supervision.parameters import SupervisionParameters
 from uam_control.supervision.states import ORDINARY, Event, State
+from uam_control.supervision.supervision_parameters import SupervisionParameters
 from uam_control.supervision.supervisor import Change, Decision, Guide, Supervisor
 
 __all__ = [

@@ -10,10 +10,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from uam_control.compiled import jit
+from uam_control.maths.compiled import jit
 from uam_control.supervision.monitor import Level, Monitor
 from uam_control.supervision.observation import Observation
-from uam_control.supervision.parameters import SupervisionParameters
+from uam_control.supervision.supervision_parameters import SupervisionParameters
 
 NONE = math.inf
 CONTROLLERS = "controllers"

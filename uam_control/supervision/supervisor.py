@@ -15,8 +15,8 @@ from typing import NamedTuple
 from uam_control.supervision.checks import CONTROLLERS, Checks
 from uam_control.supervision.monitor import Level
 from uam_control.supervision.observation import Command, Observation
-from uam_control.supervision.parameters import SupervisionParameters
 from uam_control.supervision.states import AIRBORNE_STATES, ORDINARY, TARGETS, Event, State
+from uam_control.supervision.supervision_parameters import SupervisionParameters
 
 
 class Guide(Enum):

@@ -1,9 +1,6 @@
 """Normalised torques and thrust → four motor thrusts, as PX4's control allocator does it.
 
-The mixer is the pseudo-inverse of the rotors' effectiveness, its columns scaled so that the size of
-the vehicle and of the rotors drops out (PX4: pseudo-inverse with normalised roll, pitch, yaw):
-roll and pitch by the same factor, such that the columns have the norm sqrt(n/2) for n rotors; yaw
-such that its largest entry is 1; thrust such that all entries are 1. Saturation is removed in the
+The mixer is that of `rotor_geometry.normalised_mixer`. Saturation is removed in the
 order of importance (PX4: sequential desaturation, MC_AIRMODE = 0): collective down, then roll and
 pitch, then yaw with a margin, then collective down again.
 
@@ -13,53 +10,13 @@ back-right CW; torques FRD.
 
 from __future__ import annotations
 
-import math
-
 import numpy as np
 
-from uam_control.compiled import jit
+from uam_control.maths.compiled import jit
+from uam_sim_bridge.mavlink.offboard.rotor_geometry import PITCH, ROLL, THRUST, YAW
 
-ROLL, PITCH, YAW, THRUST = range(4)
 YAW_MARGIN = 0.15  # of the motor range, kept for yaw at full thrust (PX4: minimum yaw margin)
 WEAK = 0.2  # mixer entries below this do not desaturate (PX4)
-
-
-def effectiveness(px: np.ndarray, py: np.ndarray, moment_ratio: np.ndarray) -> np.ndarray:
-    """Return (4, n): rows roll, pitch, yaw torque [N m] and thrust [N] per newton of each rotor.
-
-    px, py (n,) [m]: rotor positions forward and right; moment_ratio (n,) [m]: reaction torque per
-    newton, positive for a counter-clockwise rotor seen from above (CA_ROTORn_PX, _PY, _KM).
-    """
-    return np.stack([-np.asarray(py), np.asarray(px), np.asarray(moment_ratio), np.ones(len(px))])
-
-
-def normalised_mixer(px: np.ndarray, py: np.ndarray, moment_ratio: np.ndarray) -> np.ndarray:
-    """Return (n, 4): motor thrust 0..1 per unit of normalised roll, pitch, yaw, thrust.
-
-    Raises ValueError where the rotors cannot make the four of them independently.
-    """
-    matrix = effectiveness(px, py, moment_ratio)
-    if np.linalg.matrix_rank(matrix) < 4:
-        raise ValueError("the rotor geometry cannot make roll, pitch, yaw and thrust independently")
-    mixer = np.linalg.pinv(matrix)
-    used = np.count_nonzero(np.abs(mixer) > 1e-3, axis=0)
-    norms = np.linalg.norm(mixer, axis=0)
-    mixer[:, :YAW] /= max(norms[axis] / math.sqrt(used[axis] / 2.0) for axis in (ROLL, PITCH))
-    mixer[:, YAW] /= mixer[:, YAW].max()
-    mixer[:, THRUST] /= np.abs(mixer[:, THRUST]).mean()
-    mixer[np.abs(mixer) < 1e-3] = 0.0
-    return np.ascontiguousarray(mixer)
-
-
-def torque_scale(
-    px: np.ndarray, py: np.ndarray, moment_ratio: np.ndarray, rotor_thrust: float
-) -> np.ndarray:
-    """Return (3,) [N m]: the torque about each axis for a normalised torque of 1.
-
-    rotor_thrust [N]: thrust of one rotor at motor thrust 1.
-    """
-    matrix = effectiveness(px, py, moment_ratio)
-    return rotor_thrust * np.diag(matrix @ normalised_mixer(px, py, moment_ratio))[:3].copy()
 
 
 @jit

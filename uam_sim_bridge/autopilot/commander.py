@@ -15,8 +15,8 @@ from __future__ import annotations
 
 import math
 
-from uam_sim_bridge.autopilot.modes import Mode, Result, Severity
 from uam_sim_bridge.autopilot.params import Parameters
+from uam_sim_bridge.mavlink.protocol.modes import Mode, Result, Severity
 
 STREAM_GAP = 0.5  # s: slower than 2 Hz is no stream
 STREAM_TIME = 0.5  # s for which it must have lasted

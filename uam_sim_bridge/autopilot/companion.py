@@ -7,13 +7,13 @@ import struct
 
 import numpy as np
 
-from uam_control.parameters import ParameterError
-from uam_control.rotations import matrix_from_quaternion, quaternion_from_euler, rotate
+from uam_control.maths.rotations import matrix_from_quaternion, quaternion_from_euler, rotate
+from uam_control.settings.parameter_set import ParameterError
 from uam_sim_bridge.autopilot.core import Autopilot
-from uam_sim_bridge.autopilot.modes import Command, Result, Severity
 from uam_sim_bridge.autopilot.params import DEFINITIONS
 from uam_sim_bridge.autopilot.telemetry import Telemetry
-from uam_sim_bridge.mavlink.wire import Message, clean_text, mavlink2, text_chunks
+from uam_sim_bridge.mavlink.protocol.modes import Command, Result, Severity
+from uam_sim_bridge.mavlink.protocol.wire import Message, clean_text, mavlink2, text_chunks
 
 ATTITUDE_IGNORED = 128  # the only type_mask of SET_ATTITUDE_TARGET that is flown
 _PARAMETERS_PER_TICK = 10

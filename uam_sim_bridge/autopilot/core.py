@@ -12,13 +12,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from uam_control.compiled import jit
-from uam_sim_bridge.autopilot.allocation import allocate, normalised_mixer, unallocated_torque
+from uam_control.maths.compiled import jit
+from uam_sim_bridge.autopilot.allocation import allocate, unallocated_torque
 from uam_sim_bridge.autopilot.commander import Commander
 from uam_sim_bridge.autopilot.descent import Descent
 from uam_sim_bridge.autopilot.estimator import Estimator
 from uam_sim_bridge.autopilot.landing import LandDetector
-from uam_sim_bridge.autopilot.modes import CUSTOM_MODE_ENABLED, FORCE, Command, Mode, Result
 from uam_sim_bridge.autopilot.params import Parameters
 from uam_sim_bridge.autopilot.rate_control import (
     INTEGRAL,
@@ -30,7 +29,9 @@ from uam_sim_bridge.autopilot.rate_control import (
     rate_torque,
     reset_filters,
 )
-from uam_sim_bridge.mavlink.thrust_curve import inverse_curve
+from uam_sim_bridge.mavlink.offboard.rotor_geometry import normalised_mixer
+from uam_sim_bridge.mavlink.offboard.thrust_curve import inverse_curve
+from uam_sim_bridge.mavlink.protocol.modes import CUSTOM_MODE_ENABLED, FORCE, Command, Mode, Result
 
 FARTHEST_VISION = 1e5  # m
 SHORTEST_STEP, LONGEST_STEP = 0.000125, 0.02  # s, bounds of the time step (PX4)

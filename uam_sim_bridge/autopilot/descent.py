@@ -6,8 +6,8 @@ import math
 
 import numpy as np
 
-from uam_control.compiled import jit
-from uam_control.rotations import euler_from_quaternion
+from uam_control.maths.compiled import jit
+from uam_control.maths.rotations import euler_from_quaternion
 from uam_sim_bridge.autopilot.estimator import ATTITUDE, GRAVITY
 from uam_sim_bridge.autopilot.params import Parameters
 

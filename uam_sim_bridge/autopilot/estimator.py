@@ -12,8 +12,8 @@ import math
 
 import numpy as np
 
-from uam_control.compiled import jit
-from uam_control.rotations import (
+from uam_control.maths.compiled import jit
+from uam_control.maths.rotations import (
     matrix_from_quaternion,
     quaternion_from_rotation_vector,
     quaternion_multiply,

@@ -6,8 +6,8 @@ import math
 from dataclasses import dataclass
 from pathlib import Path
 
-from uam_control import yaml_file
-from uam_control.parameters import ParameterError
+from uam_control.settings import yaml_file
+from uam_control.settings.parameter_set import ParameterError
 
 
 @dataclass(frozen=True)

@@ -15,7 +15,7 @@ import math
 
 import numpy as np
 
-from uam_control.compiled import jit
+from uam_control.maths.compiled import jit
 
 # rows of `memory` (7, 3), the loop's whole state
 DELAY_1, DELAY_2, RATES, ACCELERATION, INTEGRAL, TORQUE, UNALLOCATED = range(7)

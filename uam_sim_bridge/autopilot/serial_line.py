@@ -7,9 +7,9 @@ from __future__ import annotations
 
 import select
 
-from uam_sim_bridge.mavlink.serial_transport import SerialTransport
-from uam_sim_bridge.mavlink.transport import open_transport
-from uam_sim_bridge.mavlink.wire import Codec, Message
+from uam_sim_bridge.mavlink.protocol.wire import Codec, Message
+from uam_sim_bridge.mavlink.transport.serial_transport import SerialTransport
+from uam_sim_bridge.mavlink.transport.transport import open_transport
 
 
 class SerialLine:

@@ -5,7 +5,7 @@ computer. All time is the simulator's. Before a HIL_SENSOR is handled, everythin
 over UDP is; what is to be told goes out before the answer. So a lockstep flight is deterministic.
 
 With --serial, one line carries both, as at a flight controller in HITL mode; see
-`uam_sim_bridge.mavlink.router` for its other end.
+`uam_sim_bridge.mavlink.hil.router` for its other end.
 """
 
 from __future__ import annotations
@@ -19,16 +19,16 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from uam_control.configuration import ConfigurationError, path
-from uam_control.parameters import ParameterError
+from uam_control.settings.configuration import ConfigurationError, path
+from uam_control.settings.parameter_set import ParameterError
 from uam_sim_bridge.autopilot.companion import Companion, warm_up
 from uam_sim_bridge.autopilot.core import Autopilot
 from uam_sim_bridge.autopilot.params import Parameters
 from uam_sim_bridge.autopilot.serial_line import SerialLine
-from uam_sim_bridge.mavlink.signing import Signing
-from uam_sim_bridge.mavlink.sitl_options import add_port_options, fill_ports
-from uam_sim_bridge.mavlink.sitl_ports import UdpPort, connect
-from uam_sim_bridge.mavlink.wire import Codec, Framer, Message, mavlink2
+from uam_sim_bridge.mavlink.hil.sitl_options import add_port_options, fill_ports
+from uam_sim_bridge.mavlink.hil.sitl_ports import UdpPort, connect
+from uam_sim_bridge.mavlink.protocol.signing import Signing
+from uam_sim_bridge.mavlink.protocol.wire import Codec, Framer, Message, mavlink2
 
 _GYRO_AND_ACCELEROMETER = 0x3F  # HIL_SENSOR.fields_updated
 _LOCKSTEP = 1  # HIL_ACTUATOR_CONTROLS.flags

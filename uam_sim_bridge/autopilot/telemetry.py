@@ -5,9 +5,9 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 
-from uam_control.rotations import matrix_from_quaternion, rotate_back
+from uam_control.maths.rotations import matrix_from_quaternion, rotate_back
 from uam_sim_bridge.autopilot.core import Autopilot
-from uam_sim_bridge.mavlink.wire import Message, mavlink2
+from uam_sim_bridge.mavlink.protocol.wire import Message, mavlink2
 
 _NAN = float("nan")
 _NO_COVARIANCE = [_NAN] * 21

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 
-from uam_control.parameters import number
+from uam_control.settings.parameter_set import number
 from uam_sim_bridge.faults.fault import Effect, PlantFault
 
 if TYPE_CHECKING:

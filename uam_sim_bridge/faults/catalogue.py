@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from uam_control.parameters import Bound, Choice, ParameterError
+from uam_control.settings.parameter_set import Bound, Choice, ParameterError
 from uam_sim_bridge.faults import (
     actuator_faults,
     imu_faults,

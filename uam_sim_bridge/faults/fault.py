@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 
-from uam_control.parameters import ParameterSet
+from uam_control.settings.parameter_set import ParameterSet
 
 if TYPE_CHECKING:
     from uam_sim_bridge.faults.plant import FaultyPlant

@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 
-from uam_control.parameters import choice, number
-from uam_control.rotations import quaternion_from_rotation_vector, quaternion_multiply
+from uam_control.maths.rotations import quaternion_from_rotation_vector, quaternion_multiply
+from uam_control.settings.parameter_set import choice, number
 from uam_sim_bridge.faults.fault import Effect, PlantFault
 
 if TYPE_CHECKING:

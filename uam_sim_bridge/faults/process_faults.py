@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import ClassVar
 
-from uam_control.parameters import choice, number
+from uam_control.settings.parameter_set import choice, number
 from uam_sim_bridge.faults.fault import PROCESS, Fault
 
 NODES = (

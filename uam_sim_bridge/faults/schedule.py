@@ -19,8 +19,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from uam_control import yaml_file
 from uam_control.mission import Scenario
+from uam_control.settings import yaml_file
 from uam_sim_bridge.faults.catalogue import make
 from uam_sim_bridge.faults.fault import Fault, FaultError
 

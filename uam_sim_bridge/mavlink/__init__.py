@@ -1,1 +1,1 @@
-"""The MAVLink side: frames, thrust curve, body-rate setpoints, offboard link, simulator link."""
+"""The MAVLink side: protocol, transport, link, telemetry, offboard control, simulator link."""

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from typing import Any
 
-from uam_msgs_py import topics
-from uam_msgs_py.battery import battery_message
-from uam_msgs_py.node import UamNode
-from uam_msgs_py.stamps import seconds
-from uam_msgs_py.status import AutopilotState
-from uam_sim_bridge.mavlink.link import OffboardLink
-from uam_sim_bridge.mavlink.offboard import OffboardSequence
+from uam_msgs_py.messages import topics
+from uam_msgs_py.messages.battery import battery_message
+from uam_msgs_py.messages.stamps import seconds
+from uam_msgs_py.messages.status import AutopilotState
+from uam_msgs_py.node.base_node import UamNode
+from uam_sim_bridge.mavlink.link.link import OffboardLink
+from uam_sim_bridge.mavlink.offboard.sequence import OffboardSequence
 
 STATE_PERIOD = 200_000_000  # ns between two reports of the autopilot's state
 BATTERY_PERIOD = 1_000_000_000  # ns

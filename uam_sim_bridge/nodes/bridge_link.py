@@ -6,19 +6,19 @@ from dataclasses import dataclass
 
 from rcl_interfaces.msg import ParameterDescriptor
 
-from uam_control.parameters import ParameterSet, choice, number
-from uam_msgs_py.parameters import given
-from uam_msgs_py.tunable import TunableNode
+from uam_control.settings.parameter_set import ParameterSet, choice, number
+from uam_msgs_py.node.node_parameters import given
+from uam_msgs_py.node.tunable import TunableNode
 from uam_sim_bridge.faults import LINK, Schedule
-from uam_sim_bridge.flight.ports import PortError
-from uam_sim_bridge.mavlink.faulty_transport import FaultyTransport
-from uam_sim_bridge.mavlink.forwarding import GroundStation
-from uam_sim_bridge.mavlink.link import OffboardLink
-from uam_sim_bridge.mavlink.offboard import OffboardSequence
-from uam_sim_bridge.mavlink.setpoint import RateThrustParameters
-from uam_sim_bridge.mavlink.signing import Signing
-from uam_sim_bridge.mavlink.transport import Transport, UdpTransport, open_transport
-from uam_sim_bridge.mavlink.wire import Codec, mavlink2
+from uam_sim_bridge.mavlink.link.link import OffboardLink
+from uam_sim_bridge.mavlink.offboard.sequence import OffboardSequence
+from uam_sim_bridge.mavlink.offboard.setpoint import RateThrustParameters
+from uam_sim_bridge.mavlink.protocol.signing import Signing
+from uam_sim_bridge.mavlink.protocol.wire import Codec, mavlink2
+from uam_sim_bridge.mavlink.transport.faulty_transport import FaultyTransport
+from uam_sim_bridge.mavlink.transport.forwarding import GroundStation
+from uam_sim_bridge.mavlink.transport.transport import Transport, UdpTransport, open_transport
+from uam_sim_bridge.ports import PortError
 
 
 @dataclass(frozen=True)

@@ -22,38 +22,43 @@ from std_msgs.msg import Bool
 
 from uam_control.coordinates import ATTITUDE
 from uam_control.estimation.repeats import Repeats
-from uam_control.parameters import ParameterError
+from uam_control.settings.parameter_set import ParameterError
 from uam_control.supervision import State
-from uam_msgs_py import topics
-from uam_msgs_py.control import (
+from uam_msgs_py.messages import topics
+from uam_msgs_py.messages.control import (
     TAU_Q,
     PositionCommand,
     read_position_command,
     read_state,
     read_torque,
 )
-from uam_msgs_py.convert import JointStateWriter, SetpointWriter, read_pose
-from uam_msgs_py.joins import StampJoin
-from uam_msgs_py.layouts import BadMessage, stamp_of
-from uam_msgs_py.node import UamNode, run
-from uam_msgs_py.parameters import NodeParameters
-from uam_msgs_py.stamps import seconds
-from uam_msgs_py.status import OK, WARN, MissionStatus
-from uam_sim_bridge.flight.fault_log import FaultTopic
-from uam_sim_bridge.mavlink.hold import HoldParameters
-from uam_sim_bridge.mavlink.link_report import faults, report
-from uam_sim_bridge.mavlink.offboard import OffboardParameters, OffboardSequence
-from uam_sim_bridge.mavlink.parameter_check import adopted, differences
-from uam_sim_bridge.mavlink.setpoint import RateThrustMap, RateThrustParameters
-from uam_sim_bridge.mavlink.setpoint_source import IDLE, Setpoint, SetpointSource, Situation
-from uam_sim_bridge.mavlink.thrust_identification import (
+from uam_msgs_py.messages.convert import JointStateWriter, SetpointWriter, read_pose
+from uam_msgs_py.messages.layouts import BadMessage, stamp_of
+from uam_msgs_py.messages.stamps import seconds
+from uam_msgs_py.messages.status import OK, WARN, MissionStatus
+from uam_msgs_py.node.base_node import UamNode, run
+from uam_msgs_py.node.joins import StampJoin
+from uam_msgs_py.node.node_parameters import NodeParameters
+from uam_sim_bridge.mavlink.link.link_report import faults, report
+from uam_sim_bridge.mavlink.link.vision import vision_message
+from uam_sim_bridge.mavlink.offboard.hold import HoldParameters
+from uam_sim_bridge.mavlink.offboard.sequence import OffboardParameters, OffboardSequence
+from uam_sim_bridge.mavlink.offboard.setpoint import RateThrustMap, RateThrustParameters
+from uam_sim_bridge.mavlink.offboard.setpoint_source import (
+    IDLE,
+    Setpoint,
+    SetpointSource,
+    Situation,
+)
+from uam_sim_bridge.mavlink.offboard.thrust_identification import (
     ThrustIdentification,
     ThrustIdentificationParameters,
     steady_force,
 )
-from uam_sim_bridge.mavlink.vision import vision_message
+from uam_sim_bridge.mavlink.telemetry.parameter_check import adopted, differences
 from uam_sim_bridge.nodes.autopilot_topics import AutopilotTopics
 from uam_sim_bridge.nodes.bridge_link import BridgeParameters, open_links
+from uam_sim_bridge.nodes.fault_topic import FaultTopic
 
 NAME = "mavlink_bridge"
 THRUST_PERIOD = 100_000_000  # ns between two reports of the thrust factor

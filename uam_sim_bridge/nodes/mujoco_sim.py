@@ -34,25 +34,25 @@ import rclpy
 from rclpy.signals import SignalHandlerOptions
 
 from uam_control.coordinates import POSITION
-from uam_control.parameters import ParameterError
-from uam_msgs_py import topics
-from uam_msgs_py.connections import Connections, of
-from uam_msgs_py.executor import LeanExecutor
-from uam_msgs_py.node import StopSignal, refuse
-from uam_msgs_py.parameters import refuse_unknown
-from uam_msgs_py.tunable import TunableNode
+from uam_control.mission.time_limit import DISARMED, Settled
+from uam_control.settings.parameter_set import ParameterError
+from uam_msgs_py.messages import topics
+from uam_msgs_py.node import wiring
+from uam_msgs_py.node.base_node import StopSignal, refuse
+from uam_msgs_py.node.connections import Connections, of
+from uam_msgs_py.node.executor import LeanExecutor
+from uam_msgs_py.node.node_parameters import refuse_unknown
+from uam_msgs_py.node.tunable import TunableNode
 from uam_sim_bridge.faults import PLANT, Schedule
 from uam_sim_bridge.faults.plant import FaultyPlant
-from uam_sim_bridge.flight import wiring
-from uam_sim_bridge.flight.fault_log import FaultTopic
-from uam_sim_bridge.flight.limits import DISARMED, Settled
-from uam_sim_bridge.flight.patience import Patience
-from uam_sim_bridge.mavlink.hil_server import HilParameters, HilServer
+from uam_sim_bridge.mavlink.hil.hil_server import HilParameters, HilServer
+from uam_sim_bridge.nodes.fault_topic import FaultTopic
 from uam_sim_bridge.nodes.latencies import Latencies
 from uam_sim_bridge.nodes.plant_health import PlantHealth
 from uam_sim_bridge.nodes.plant_options import NOT_READY, Options, Statistics, declare
 from uam_sim_bridge.nodes.plant_topics import SUSPECTS, Answers, Sensors, TruthTopics, nanoseconds
 from uam_sim_bridge.nodes.restart import Restart
+from uam_sim_bridge.patience import Patience
 from uam_sim_bridge.plant import Plant, Samples, Truth, Vehicle
 
 NAME = "mujoco_sim"

@@ -6,10 +6,10 @@ import time
 
 from rclpy.node import Node
 
-from uam_msgs_py import topics
-from uam_msgs_py.health import LoopTime, ages
-from uam_msgs_py.node import DIAGNOSTICS_PERIOD
-from uam_msgs_py.status import OK, STALE, WARN, diagnostic
+from uam_msgs_py.messages import topics
+from uam_msgs_py.messages.status import OK, STALE, WARN, diagnostic
+from uam_msgs_py.node.base_node import DIAGNOSTICS_PERIOD
+from uam_msgs_py.node.health import LoopTime, ages
 from uam_sim_bridge.nodes.plant_options import Statistics
 from uam_sim_bridge.nodes.plant_topics import Answers, nanoseconds
 

@@ -9,7 +9,7 @@ from dataclasses import asdict, dataclass, field, replace
 from rcl_interfaces.msg import ParameterDescriptor
 from rclpy.node import Node
 
-from uam_control.parameters import ParameterError
+from uam_control.settings.parameter_set import ParameterError
 
 NOT_READY = 3  # exit status: not everyone came, or found the others
 

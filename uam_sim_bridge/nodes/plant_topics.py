@@ -13,12 +13,18 @@ from rclpy.subscription import Subscription
 from rosgraph_msgs.msg import Clock
 
 from uam_control.coordinates import ARM, COORDINATES
-from uam_msgs_py import topics
-from uam_msgs_py.convert import ImuWriter, JointStateWriter, PoseWriter, read_effort, read_switch
-from uam_msgs_py.layouts import stamp_of
-from uam_msgs_py.serialized import Template
-from uam_msgs_py.status import MissionStatus
-from uam_msgs_py.trajectories import TrajectoryWriter
+from uam_msgs_py.messages import topics
+from uam_msgs_py.messages.convert import (
+    ImuWriter,
+    JointStateWriter,
+    PoseWriter,
+    read_effort,
+    read_switch,
+)
+from uam_msgs_py.messages.layouts import stamp_of
+from uam_msgs_py.messages.serialized import Template
+from uam_msgs_py.messages.status import MissionStatus
+from uam_msgs_py.messages.trajectories import TrajectoryWriter
 from uam_sim_bridge.plant import Samples, Truth
 
 JOINTS = list(COORDINATES[ARM])

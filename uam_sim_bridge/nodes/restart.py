@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from uam_sim_bridge.flight.patience import Patience
+from uam_sim_bridge.patience import Patience
 
 IN_TIME = 25  # complete ticks in a row, after which everyone is there again
 

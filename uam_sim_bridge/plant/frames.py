@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import mujoco
 import numpy as np
 
-from uam_control.rotations import quaternion_from_rotation_vector, quaternion_multiply
+from uam_control.maths.rotations import quaternion_from_rotation_vector, quaternion_multiply
 from uam_sim_bridge.plant.urdf import BASE_LINK, ROOT, carried
 
 SWING = "magnet_swing"  # the joint that nothing measures

@@ -11,7 +11,7 @@ import math
 import mujoco
 import numpy as np
 
-from uam_control.compiled import jit
+from uam_control.maths.compiled import jit
 
 
 def magnet_constants(model: mujoco.MjModel, gap_scale: float) -> np.ndarray:

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 import mujoco
 import numpy as np
 
-from uam_control.compiled import jit
-from uam_control.rotations import euler_from_quaternion
+from uam_control.maths.compiled import jit
+from uam_control.maths.rotations import euler_from_quaternion
 from uam_sim_bridge.plant.actuators import Rotors, Servos, rotor_step, servo_step
 from uam_sim_bridge.plant.magnet import magnet_constants, pull_fraction
 from uam_sim_bridge.plant.sensors import Delay, Encoders, Imu, Mocap, Noise, generators

@@ -6,8 +6,8 @@ from collections import deque
 
 import numpy as np
 
-from uam_control.compiled import jit
-from uam_control.rotations import quaternion_from_rotation_vector, quaternion_multiply
+from uam_control.maths.compiled import jit
+from uam_control.maths.rotations import quaternion_from_rotation_vector, quaternion_multiply
 
 BLOCK = (
     2048  # samples of noise drawn at a time: one call to the generator is dear, its numbers cheap

@@ -11,7 +11,7 @@ import mujoco
 import numpy as np
 import yaml
 
-from uam_control.configuration import path
+from uam_control.settings.configuration import path
 
 
 @dataclass

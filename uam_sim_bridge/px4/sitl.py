@@ -19,9 +19,9 @@ import time
 from collections.abc import Sequence
 from pathlib import Path
 
-from uam_control.configuration import ConfigurationError
-from uam_sim_bridge.mavlink.sitl_options import instance
-from uam_sim_bridge.px4 import parameters
+from uam_control.settings.configuration import ConfigurationError
+from uam_sim_bridge.mavlink.hil.sitl_options import instance
+from uam_sim_bridge.px4 import px4_parameters as parameters
 from uam_sim_bridge.px4.installation import WANTED, Px4Error, Px4Installation
 
 PATIENCE = 2.0  # [s] for PX4 to end when asked; without a simulator its clock stands still

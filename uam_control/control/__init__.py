@@ -1,0 +1,1 @@
+"""The three controllers, and the attitude that points the thrust."""

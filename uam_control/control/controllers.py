@@ -1,0 +1,297 @@
+"""The three controllers: what the position, attitude and arm nodes run, and the direct engine too.
+
+Each holds one law with its own parameters and adapted gains, and sees the rest of the vehicle only
+through ||xi||, ||chi_ddot|| and ||chi_dot||. Which law flies follows from the type of the
+parameters; errors, limits and weight are the same for all. Nothing here knows ROS.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from uam_control.control.thrust_direction import AttitudeReference
+from uam_control.coordinates import ARM, ATTITUDE, POSITION, SIZE
+from uam_control.laws import catalogue
+from uam_control.laws.asmc1 import Asmc1Parameters
+from uam_control.laws.asmc2 import Asmc2Parameters
+from uam_control.laws.errors import tracking_errors
+from uam_control.laws.law_parameters import LawParameters, ModularParameters
+from uam_control.maths.compiled import jit
+from uam_control.settings.parameter_set import TINY, ParameterError, ParameterSet, number, vector
+
+
+@dataclass(frozen=True)
+class PositionLimits(ParameterSet):
+    """What surrounds the position law: weight, limits of tau_p, filter of the attitude it asks."""
+
+    gravity_feedforward_mass: float = number(
+        0.0, "mass whose weight is added to tau_p, 0 = the printed law", "kg", 0.0, 50.0
+    )
+    gravity: float = number(9.81, "acceleration of gravity", "m/s^2", 0.0, 30.0)
+    thrust_min: float = number(1.0, "least upward force", "N", TINY, 1e3)
+    thrust_max: float = number(36.0, "largest force", "N", TINY, 1e3)
+    tilt_max: float = number(0.35, "largest angle of tau_p from the vertical", "rad", 0.01, 1.5)
+    attitude_cutoff: float = number(5.0, "filter on the attitude asked for", "Hz", 0.1, 100.0)
+
+    def check_together(self) -> None:
+        """See `ParameterSet.check_together`."""
+        super().check_together()
+        if self.thrust_min > self.thrust_max:
+            raise ParameterError(
+                f"thrust_min: {self.thrust_min:g} N is above thrust_max, {self.thrust_max:g} N"
+            )
+
+
+@dataclass(frozen=True)
+class TorqueLimits(ParameterSet):
+    """Largest torque per axis, of tau_q or tau_alpha."""
+
+    torque_max: tuple = vector((), "largest torque per axis", "N m", TINY, 1e3)
+
+
+@dataclass(frozen=True)
+class ModularPosition(ModularParameters, PositionLimits):
+    """Everything the position controller can be told."""
+
+
+@dataclass(frozen=True)
+class ModularTorque(ModularParameters, TorqueLimits):
+    """Everything the attitude or the arm controller can be told."""
+
+
+@dataclass(frozen=True)
+class Asmc1Position(Asmc1Parameters, PositionLimits):
+    """See `ModularPosition`."""
+
+
+@dataclass(frozen=True)
+class Asmc1Torque(Asmc1Parameters, TorqueLimits):
+    """See `ModularTorque`."""
+
+
+@dataclass(frozen=True)
+class Asmc2Position(Asmc2Parameters, PositionLimits):
+    """See `ModularPosition`."""
+
+
+@dataclass(frozen=True)
+class Asmc2Torque(Asmc2Parameters, TorqueLimits):
+    """See `ModularTorque`."""
+
+
+POSITION_SETS = {"modular": ModularPosition, "asmc1": Asmc1Position, "asmc2": Asmc2Position}
+TORQUE_SETS = {"modular": ModularTorque, "asmc1": Asmc1Torque, "asmc2": Asmc2Torque}
+
+
+class Controller:
+    """What the three have in common: errors of the whole vehicle, one law, its saturation.
+
+    `adaptation` (len(names),) are the law's published gains, called `names`.
+    """
+
+    columns: slice
+
+    def __init__(self, parameters: LawParameters) -> None:
+        self.law = catalogue.entry(parameters.law).law(parameters)
+        self.names = self.law.names
+        self.adaptation = self.law.adaptation[: len(self.names)]
+        self.saturated = False
+        self._errors = np.zeros((3, SIZE))
+        self._own = tuple(self._errors[:, self.columns])
+        self._norms = np.zeros(3)
+        self._printed = parameters.error_rate_form == "printed"
+
+    @property
+    def parameters(self) -> LawParameters:
+        """The set that flies now."""
+        return self.law.parameters
+
+    def set_parameters(self, parameters: LawParameters) -> None:
+        """Fly `parameters` (validated) from the next tick on; adapted gains are kept.
+
+        Raises ParameterError for those of another law.
+        """
+        flying = self.law.parameters.law
+        if parameters.law != flying:
+            raise ParameterError(f"law: {flying} flies, it cannot change to {parameters.law}")
+        self.law.set_parameters(parameters)
+        self._printed = parameters.error_rate_form == "printed"
+
+    def reset_adaptation(self) -> None:
+        """Put the adapted gains back to their initial values, in flight; nothing else changes."""
+        self.law.reset_adaptation()
+
+    @property
+    def errors(self) -> np.ndarray:
+        """Rows e, e_dot, chi_d_ddot (3, 8) of the last tick."""
+        return self._errors
+
+    def _law_output(
+        self,
+        state: np.ndarray,
+        reference: np.ndarray,
+        attitude_reference: np.ndarray,
+        flying: bool,
+        dt: float,
+    ) -> np.ndarray:
+        tracking_errors(
+            state, reference, attitude_reference, flying, self._printed, self._errors, self._norms
+        )
+        return self.law.update(*self._own, self._norms, self.saturated, dt)
+
+    def _idle(self) -> None:
+        self.law.reset()
+        self.saturated = False
+
+
+class PositionController(Controller):
+    """tau_p, equation (ct1), and the attitude that points the thrust along it."""
+
+    columns = POSITION
+
+    def __init__(self, parameters: PositionLimits) -> None:
+        super().__init__(parameters)
+        self._attitude = AttitudeReference(parameters.attitude_cutoff)
+        self._tau = np.zeros(3)
+
+    def set_parameters(self, parameters: PositionLimits) -> None:
+        """See `Controller.set_parameters`; also moves the corner of the attitude filter."""
+        super().set_parameters(parameters)
+        self._attitude.cutoff = parameters.attitude_cutoff
+
+    @property
+    def attitude_reference(self) -> np.ndarray:
+        """Rows q_d (roll, pitch, yaw), Omega_d, Omega_d_dot (3, 3); see `thrust_direction`."""
+        return self._attitude.value
+
+    def update(
+        self, state: np.ndarray, reference: np.ndarray, flying: bool, dt: float
+    ) -> np.ndarray:
+        """Return tau_p (3,) [N, world]; zero, and the law at its start, while not flying.
+
+        state, reference: (3, 8), see `coordinates`. ||xi|| uses the attitude asked for in the last
+        tick, as this tick's is only known afterwards. The array is reused by the next call.
+        """
+        if not flying:
+            self._idle()
+            self._tau[:] = 0.0
+            self._attitude.reset(state[0, 5])
+            return self._tau
+        tau = self._law_output(state, reference, self._attitude.value, True, dt)
+        p = self.parameters
+        self.saturated = limit_force(
+            tau,
+            p.gravity_feedforward_mass * p.gravity,
+            p.thrust_min,
+            p.thrust_max,
+            p.tilt_max,
+            self._tau,
+        )
+        self._attitude.update(self._tau, reference, dt)
+        return self._tau
+
+
+class TorqueController(Controller):
+    """tau_q or tau_alpha: the law's output within the torque limits."""
+
+    def __init__(self, parameters: TorqueLimits) -> None:
+        super().__init__(parameters)
+        self._tau = np.zeros(len(parameters.torque_max))
+        self._torque_max = np.array(parameters.torque_max)
+
+    def set_parameters(self, parameters: TorqueLimits) -> None:
+        """See `Controller.set_parameters`."""
+        super().set_parameters(parameters)
+        self._torque_max = np.array(parameters.torque_max)
+
+    def _torque(
+        self,
+        state: np.ndarray,
+        reference: np.ndarray,
+        attitude_reference: np.ndarray,
+        flying: bool,
+        dt: float,
+    ) -> np.ndarray:
+        tau = self._law_output(state, reference, attitude_reference, flying, dt)
+        self.saturated = limit_torque(tau, self._torque_max, self._tau)
+        return self._tau
+
+
+class AttitudeController(TorqueController):
+    """tau_q, equation (ct2)."""
+
+    columns = ATTITUDE
+
+    def update(
+        self,
+        state: np.ndarray,
+        reference: np.ndarray,
+        attitude_reference: np.ndarray,
+        flying: bool,
+        dt: float,
+    ) -> np.ndarray:
+        """Return tau_q (3,) [N m, FLU]; zero, and the law at its start, while not flying.
+
+        attitude_reference: (3, 3) from the position controller, same tick.
+        """
+        if not flying:
+            self._idle()
+            self._tau[:] = 0.0
+            return self._tau
+        return self._torque(state, reference, attitude_reference, True, dt)
+
+
+class ArmController(TorqueController):
+    """tau_alpha, equation (ct3); on duty on the ground as well."""
+
+    columns = ARM
+
+    def update(
+        self,
+        state: np.ndarray,
+        reference: np.ndarray,
+        attitude_reference: np.ndarray,
+        flying: bool,
+        dt: float,
+    ) -> np.ndarray:
+        """Return tau_alpha (n,) [N m]."""
+        return self._torque(state, reference, attitude_reference, flying, dt)
+
+
+@jit
+def limit_force(
+    tau: np.ndarray,
+    weight: float,
+    thrust_min: float,
+    thrust_max: float,
+    tilt_max: float,
+    limited: np.ndarray,
+) -> bool:
+    """Write tau + weight e3 within the limits to limited (3,); return whether anything was cut.
+
+    The vertical part goes first: altitude is kept while the horizontal part is reduced.
+    """
+    upward = tau[2] + weight
+    limited[2] = min(max(upward, thrust_min), thrust_max)
+    horizontal = math.sqrt(tau[0] * tau[0] + tau[1] * tau[1])
+    room = min(
+        limited[2] * math.tan(tilt_max),
+        math.sqrt(max(thrust_max * thrust_max - limited[2] * limited[2], 0.0)),
+    )
+    scale = 1.0 if horizontal <= room else room / horizontal
+    limited[0] = scale * tau[0]
+    limited[1] = scale * tau[1]
+    return limited[2] != upward or scale != 1.0
+
+
+@jit
+def limit_torque(tau: np.ndarray, torque_max: np.ndarray, limited: np.ndarray) -> bool:
+    """Write tau within ±torque_max to limited (n,); return whether anything was cut."""
+    cut = False
+    for i in range(len(tau)):
+        limited[i] = min(max(tau[i], -torque_max[i]), torque_max[i])
+        cut = cut or limited[i] != tau[i]
+    return cut

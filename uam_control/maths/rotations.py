@@ -1,0 +1,149 @@
+"""Rotations: Z-Y-X Euler angles, matrices and quaternions [w x y z], all body → world.
+
+The paper's R_B^W (its equation for the rotation matrix) is `matrix_from_euler`.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from uam_control.maths.compiled import jit
+
+
+@jit
+def matrix_from_euler(euler: np.ndarray) -> np.ndarray:
+    """Return R_B^W (3, 3) of roll, pitch, yaw [rad] in `euler` (3,)."""
+    cr, sr = math.cos(euler[0]), math.sin(euler[0])
+    cp, sp = math.cos(euler[1]), math.sin(euler[1])
+    cy, sy = math.cos(euler[2]), math.sin(euler[2])
+    matrix = np.empty((3, 3))
+    matrix[0, 0] = cy * cp
+    matrix[0, 1] = cy * sp * sr - sy * cr
+    matrix[0, 2] = cy * sp * cr + sy * sr
+    matrix[1, 0] = sy * cp
+    matrix[1, 1] = sy * sp * sr + cy * cr
+    matrix[1, 2] = sy * sp * cr - cy * sr
+    matrix[2, 0] = -sp
+    matrix[2, 1] = sr * cp
+    matrix[2, 2] = cp * cr
+    return matrix
+
+
+@jit
+def rotate(matrix: np.ndarray, v: np.ndarray) -> np.ndarray:
+    """Return matrix (3, 3) times v (3,)."""
+    out = np.empty(3)
+    for i in range(3):
+        out[i] = matrix[i, 0] * v[0] + matrix[i, 1] * v[1] + matrix[i, 2] * v[2]
+    return out
+
+
+@jit
+def rotate_back(matrix: np.ndarray, v: np.ndarray) -> np.ndarray:
+    """Return the transpose of matrix (3, 3) times v (3,)."""
+    out = np.empty(3)
+    for i in range(3):
+        out[i] = matrix[0, i] * v[0] + matrix[1, i] * v[1] + matrix[2, i] * v[2]
+    return out
+
+
+@jit
+def relative_rotation(a: np.ndarray, b: np.ndarray) -> np.ndarray:
+    """Return a^T b of two rotation matrices (3, 3)."""
+    out = np.empty((3, 3))
+    for i in range(3):
+        for j in range(3):
+            out[i, j] = a[0, i] * b[0, j] + a[1, i] * b[1, j] + a[2, i] * b[2, j]
+    return out
+
+
+@jit
+def matrix_from_quaternion(q: np.ndarray) -> np.ndarray:
+    """Return R (3, 3) of the unit quaternion q = [w x y z]."""
+    w, x, y, z = q[0], q[1], q[2], q[3]
+    matrix = np.empty((3, 3))
+    matrix[0, 0] = 1.0 - 2.0 * (y * y + z * z)
+    matrix[0, 1] = 2.0 * (x * y - w * z)
+    matrix[0, 2] = 2.0 * (x * z + w * y)
+    matrix[1, 0] = 2.0 * (x * y + w * z)
+    matrix[1, 1] = 1.0 - 2.0 * (x * x + z * z)
+    matrix[1, 2] = 2.0 * (y * z - w * x)
+    matrix[2, 0] = 2.0 * (x * z - w * y)
+    matrix[2, 1] = 2.0 * (y * z + w * x)
+    matrix[2, 2] = 1.0 - 2.0 * (x * x + y * y)
+    return matrix
+
+
+@jit
+def euler_from_quaternion(q: np.ndarray) -> np.ndarray:
+    """Return roll, pitch, yaw [rad] (3,) of the unit quaternion q = [w x y z]; |pitch| <= pi/2."""
+    w, x, y, z = q[0], q[1], q[2], q[3]
+    euler = np.empty(3)
+    euler[0] = math.atan2(2.0 * (w * x + y * z), 1.0 - 2.0 * (x * x + y * y))
+    euler[1] = math.asin(min(1.0, max(-1.0, 2.0 * (w * y - x * z))))
+    euler[2] = math.atan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z))
+    return euler
+
+
+@jit
+def quaternion_from_euler(euler: np.ndarray) -> np.ndarray:
+    """Return the unit quaternion [w x y z] of roll, pitch, yaw [rad]; w >= 0."""
+    cr, sr = math.cos(euler[0] / 2.0), math.sin(euler[0] / 2.0)
+    cp, sp = math.cos(euler[1] / 2.0), math.sin(euler[1] / 2.0)
+    cy, sy = math.cos(euler[2] / 2.0), math.sin(euler[2] / 2.0)
+    q = np.empty(4)
+    q[0] = cr * cp * cy + sr * sp * sy
+    q[1] = sr * cp * cy - cr * sp * sy
+    q[2] = cr * sp * cy + sr * cp * sy
+    q[3] = cr * cp * sy - sr * sp * cy
+    if q[0] < 0.0:
+        q *= -1.0
+    return q
+
+
+@jit
+def quaternion_multiply(a: np.ndarray, b: np.ndarray) -> np.ndarray:
+    """Return the Hamilton product a ⊗ b of two quaternions [w x y z]."""
+    q = np.empty(4)
+    q[0] = a[0] * b[0] - a[1] * b[1] - a[2] * b[2] - a[3] * b[3]
+    q[1] = a[0] * b[1] + a[1] * b[0] + a[2] * b[3] - a[3] * b[2]
+    q[2] = a[0] * b[2] - a[1] * b[3] + a[2] * b[0] + a[3] * b[1]
+    q[3] = a[0] * b[3] + a[1] * b[2] - a[2] * b[1] + a[3] * b[0]
+    return q
+
+
+@jit
+def quaternion_from_rotation_vector(v: np.ndarray) -> np.ndarray:
+    """Return the unit quaternion of the rotation vector v (3,) [rad] (exponential map)."""
+    angle = math.sqrt(v[0] * v[0] + v[1] * v[1] + v[2] * v[2])
+    q = np.empty(4)
+    # sin(a/2)/a, by its series where a is too small to divide by
+    scale = 0.5 - angle * angle / 48.0 if angle < 1e-4 else math.sin(angle / 2.0) / angle
+    q[0] = math.cos(angle / 2.0)
+    q[1] = scale * v[0]
+    q[2] = scale * v[1]
+    q[3] = scale * v[2]
+    return q
+
+
+@jit
+def rotation_error(reference: np.ndarray, actual: np.ndarray) -> np.ndarray:
+    """Return the rotation vector (3,) [rad] from `actual` to `reference`, in the actual body frame.
+
+    Both are unit quaternions [w x y z]; exact for small angles, monotone up to pi.
+    """
+    inverse = np.empty(4)
+    inverse[0] = actual[0]
+    inverse[1] = -actual[1]
+    inverse[2] = -actual[2]
+    inverse[3] = -actual[3]
+    difference = quaternion_multiply(inverse, reference)
+    sign = 2.0 if difference[0] >= 0.0 else -2.0
+    return sign * difference[1:4]
+
+
+def wrap_angle(angle: float | np.ndarray) -> float | np.ndarray:
+    """Return `angle` [rad] (number or array) wrapped to [-pi, pi)."""
+    return (np.asarray(angle) + math.pi) % (2.0 * math.pi) - math.pi

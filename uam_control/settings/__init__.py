@@ -1,0 +1,1 @@
+"""Parameter sets, YAML files and the place of config/."""

@@ -1,0 +1,33 @@
+"""`python -m uam_lab.analysis FOLDER`: the analysis of a recorded flight, as JSON."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from pathlib import Path
+
+from uam_control.profile import ProfileError
+from uam_lab.analysis.folder import analyse_folder
+from uam_lab.results import timeseries
+from uam_lab.results.result_folder import as_json
+
+
+def main() -> int:
+    """Print stability.json of the flight in a result folder; 2 where there is none to analyse."""
+    parser = argparse.ArgumentParser(prog="python -m uam_lab.analysis", description=__doc__)
+    parser.add_argument("folder", type=Path, help="result folder of a flight of the modular law")
+    folder = parser.parse_args().folder
+    try:
+        found = analyse_folder(folder, timeseries.read(folder / "timeseries.parquet"))
+    except (timeseries.UnreadableFlight, ProfileError) as error:
+        print(error, file=sys.stderr)
+        return 2
+    if found is None:
+        print(f"{folder}: no flight of the modular law that left the ground", file=sys.stderr)
+        return 2
+    print(as_json(found.summary()), end="")
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

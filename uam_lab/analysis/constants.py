@@ -1,0 +1,98 @@
+"""The paper's unknown constants K*_j0..K*_j3 of ||sigma_j||, found along a flight.
+
+(up_bound_p), (up_bound_q), (up_bound_alpha):
+
+    ||sigma_j|| <= K*0 + K*1 ||xi|| + K*2 ||xi||^2 + K*3 ||chi_ddot||
+
+Any constants that satisfy it at every tick make the proof go through. `smallest` takes those that
+make the sum nu_i K*_i^2, and with it the ultimate bound, smallest; `from_the_paper` evaluates the
+expressions below (up_bound_p), products of norms, which are far larger.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from uam_lab.analysis.coupling import Coupling, nominal_inertia
+from uam_lab.analysis.dynamics import Dynamics
+from uam_lab.analysis.supply import COLUMNS_OF, Supply
+from uam_lab.analysis.tracking import Tracking
+
+SLOWEST = 0.05  # ||chi_dot|| below which C chi_dot / ||chi_dot||^2 is rounding, not dynamics
+
+
+def regressor(truth: Tracking) -> np.ndarray:
+    """1, ||xi||, ||xi||^2, ||chi_ddot|| (m, 4)."""
+    xi = truth.xi
+    return np.column_stack([np.ones_like(xi), xi, xi**2, truth.acceleration])
+
+
+def smallest(sigma: np.ndarray, regressors: np.ndarray, nu: np.ndarray) -> np.ndarray:
+    """K* (4,) >= 0 of least sum nu_i K*_i^2 with regressors @ K* >= sigma (m,) at every tick.
+
+    A least-distance programme, solved as Lawson and Hanson do, by non-negative least squares: with
+    y = sqrt(nu) K*, min ||y|| subject to G y >= h is y = -s[:4] / s[4], s the residual of NNLS on
+    [G^T; h^T] u = (0, 0, 0, 0, 1).
+    """
+    from scipy.optimize import nnls  # takes half a second, which `uam --help` should not wait
+
+    scale = float(np.max(sigma))
+    if scale <= 0.0:
+        return np.zeros(4)
+    root = np.sqrt(nu)
+    constraints = np.vstack([regressors / root, np.eye(4)])
+    least = np.concatenate([sigma / scale, np.zeros(4)])
+    system = np.vstack([constraints.T, least])
+    target = np.array([0.0, 0.0, 0.0, 0.0, 1.0])
+    try:
+        weights, _ = nnls(system, target, maxiter=30 * system.shape[1])
+    except RuntimeError:  # no convergence: K*0 alone is a bound, too
+        return np.array([scale, 0.0, 0.0, 0.0])
+    residual = system @ weights - target
+    found = np.maximum(scale * -residual[:4] / residual[4] / root, 0.0)
+    # rounding must not let one tick escape
+    return found * max(1.0, float(np.max(sigma / np.maximum(regressors @ found, 1e-12))))
+
+
+def from_the_paper(
+    subsystem: str,
+    dynamics: Dynamics,
+    coupling: Coupling,
+    supply: Supply,
+    truth: Tracking,
+    sets: dict,
+) -> np.ndarray:
+    """K* (4,) by the expressions below (up_bound_p), every norm the largest along the flight.
+
+    g_bar is that of g less the weight fed forward; d_bar that of `coupling.rest`.
+    """
+    columns = COLUMNS_OF[subsystem]
+    inertia = nominal_inertia(sets)[columns]
+    inverse = float(np.max(1.0 / inertia))
+    gravity = np.linalg.norm((dynamics.gravity - supply.weight)[:, columns], axis=1).max()
+    rest = np.linalg.norm(coupling.rest[:, columns], axis=1).max()
+    moving = truth.rate > SLOWEST
+    coriolis = 0.0
+    if moving.any():
+        force = np.linalg.norm(dynamics.coriolis[moving, columns], axis=1)
+        coriolis = np.max(force / truth.rate[moving] ** 2)
+    rate = truth.reference_rate.max()
+    own = _norm(dynamics.mass[:, columns, columns] - np.diag(inertia))
+    others = [
+        _norm(dynamics.mass[:, columns, other])
+        for name, other in COLUMNS_OF.items()
+        if name != subsystem
+    ]
+    return inverse * np.array(
+        [
+            gravity + rest + coriolis * rate**2,
+            2.0 * coriolis * rate,
+            coriolis,
+            own + sum(others),
+        ]
+    )
+
+
+def _norm(matrices: np.ndarray) -> float:
+    """Largest 2-norm of matrices (m, a, b)."""
+    return float(np.linalg.norm(matrices, ord=2, axis=(1, 2)).max())

@@ -1,0 +1,160 @@
+"""The true M(chi), C(chi, chi_dot) chi_dot and g(chi) along a flight, out of MuJoCo.
+
+The paper's equation (EL_dynamics): M chi_ddot + C chi_dot + g + d = tau, chi = (p, q, alpha).
+
+Coordinates. This stack uses quasi-velocities for the attitude (docs/law.md): chi_dot[3:6] are the
+body rates Omega (FLU) and chi_ddot[3:6] their derivative, tau_q is a torque in FLU. MuJoCo's free
+joint uses the same: qvel = (velocity in the world, angular velocity in the body). So MuJoCo's mass
+matrix and bias force are those of this chi without any change of coordinates. With body rates the
+matrix C of Euler-Lagrange is that of Boltzmann-Hamel; C chi_dot still is quadratic in chi_dot.
+
+The magnet hangs on a passive pivot, which the paper's arm does not have. In M, C and g it is frozen
+at its recorded angle; the force of its recorded motion is `pivot` and belongs to the paper's d.
+The payload is part of the magnet while it hangs on it. M contains the reflected inertia of the
+servos (armature); friction, drag and contacts are not in M, C, g.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import mujoco
+import numpy as np
+
+from uam_control.coordinates import SIZE
+from uam_lab.analysis import ticks
+from uam_lab.results.timeseries import Series
+from uam_sim_bridge.plant import Vehicle
+
+TREE = SIZE + 1  # dof of base, arm and pivot: the first of the model
+PIVOT = SIZE
+
+
+@dataclass(frozen=True)
+class Dynamics:
+    """m ticks of the true dynamics, SI units, force rows as chi: N (p), N m (q, alpha)."""
+
+    mass: np.ndarray  # (m, 8, 8)
+    coriolis: np.ndarray  # (m, 8) C chi_dot
+    gravity: np.ndarray  # (m, 8) g
+    pivot: np.ndarray  # (m, 8) what the swinging magnet adds; part of d
+    carrying: np.ndarray  # (m,) payload on the magnet
+
+    def required(self, acceleration: np.ndarray) -> np.ndarray:
+        """M chi_ddot + C chi_dot + g (m, 8) for chi_ddot (m, 8)."""
+        return np.einsum("kij,kj->ki", self.mass, acceleration) + self.coriolis + self.gravity
+
+
+class Body:
+    """Vehicle, with or without the payload as part of its magnet, evaluated state by state."""
+
+    def __init__(
+        self,
+        vehicle: Vehicle,
+        payload_mass: float = 0.0,
+        payload_position: np.ndarray = (0.0, 0.0, -0.0505),
+    ) -> None:
+        """payload_mass [kg]; payload_position (3,) [m]: its centre in the magnet's frame."""
+        spec = mujoco.MjSpec.from_file(str(vehicle.model_path))
+        spec.geom("payload").mass = 1e-3  # the free payload; a tree of its own, never looked at
+        if payload_mass > 0.0:
+            spec.body("magnet").add_geom(
+                name="held",
+                type=mujoco.mjtGeom.mjGEOM_BOX,
+                size=np.array(spec.geom("payload").size),
+                pos=np.array(payload_position, dtype=float),
+                mass=payload_mass,
+            )
+        self.model = model = spec.compile()
+        flags = mujoco.mjtDisableBit
+        model.opt.disableflags |= flags.mjDSBL_CONSTRAINT | flags.mjDSBL_CONTACT
+        model.opt.enableflags = 0  # no sleeping
+        self.data = mujoco.MjData(model)
+        self.data.qpos[model.joint("payload").qposadr[0]] = 50.0
+        self._unit, self._column = np.zeros(model.nv), np.zeros(model.nv)
+
+    def place(self, chi: np.ndarray, swing: float) -> None:
+        """Set the pose: chi (8,) with Euler angles, angle of the pivot [rad]."""
+        qpos = self.data.qpos
+        qpos[0:3] = chi[0:3]
+        half = 0.5 * chi[3:6]
+        (cr, cp, cy), (sr, sp, sy) = np.cos(half), np.sin(half)
+        qpos[3] = cr * cp * cy + sr * sp * sy
+        qpos[4] = sr * cp * cy - cr * sp * sy
+        qpos[5] = cr * sp * cy + sr * cp * sy
+        qpos[6] = cr * cp * sy - sr * sp * cy
+        qpos[7:9], qpos[9] = chi[6:8], swing
+
+    def evaluate(
+        self,
+        chi: np.ndarray,
+        chi_dot: np.ndarray,
+        swing: np.ndarray,
+        mass: np.ndarray,
+        coriolis: np.ndarray,
+        gravity: np.ndarray,
+        pivot: np.ndarray,
+    ) -> None:
+        """Write M (8, 8), C chi_dot, g, pivot (8,) of one state into the last four.
+
+        swing (3,): angle, rate, acceleration of the pivot.
+        """
+        model, data = self.model, self.data
+        self.place(chi, swing[0])
+        data.qvel[:] = 0.0
+        mujoco.mj_forward(model, data)
+        gravity[:] = data.qfrc_bias[:SIZE]
+        for i in range(TREE):
+            self._unit[i] = 1.0
+            mujoco.mj_mulM(model, data, self._column, self._unit)
+            self._unit[i] = 0.0
+            if i < SIZE:
+                mass[:, i] = self._column[:SIZE]
+        data.qvel[:SIZE] = chi_dot
+        mujoco.mj_fwdVelocity(model, data)
+        coriolis[:] = data.qfrc_bias[:SIZE] - gravity
+        pivot[:] = self._column[:SIZE] * swing[2] - data.qfrc_bias[:SIZE]
+        data.qvel[PIVOT] = swing[1]
+        mujoco.mj_fwdVelocity(model, data)
+        pivot += data.qfrc_bias[:SIZE]
+
+
+def along(series: Series, rows: np.ndarray, vehicle: Vehicle, payload_mass: float) -> Dynamics:
+    """The true dynamics at `rows` (m,) of a flight with a payload of payload_mass [kg]."""
+    count = len(rows)
+    truth = series.block("truth.").reshape(-1, 3, SIZE)[rows]
+    swing = pivot_motion(series)[rows]
+    held = ticks.carrying(series)[rows] if payload_mass else np.zeros(count, dtype=bool)
+    bare = Body(vehicle)
+    loaded = bare
+    if held.any():
+        loaded = Body(vehicle, payload_mass, hold(series, rows[held], bare))
+    found = Dynamics(
+        np.empty((count, SIZE, SIZE)), *(np.empty((count, SIZE)) for _ in range(3)), held
+    )
+    for k in range(count):
+        (loaded if held[k] else bare).evaluate(
+            truth[k, 0], truth[k, 1], swing[k],
+            found.mass[k], found.coriolis[k], found.gravity[k], found.pivot[k],
+        )  # fmt: skip
+    return found
+
+
+def pivot_motion(series: Series) -> np.ndarray:
+    """Angle, rate and acceleration (ticks, 3) of the pivot, by differences of its angle."""
+    angle = np.nan_to_num(series["magnet.swing"])
+    rate = np.gradient(angle, ticks.period(series))
+    return np.column_stack([angle, rate, np.gradient(rate, ticks.period(series))])
+
+
+def hold(series: Series, rows: np.ndarray, body: Body) -> np.ndarray:
+    """Centre of the payload in the magnet's frame (3,) [m], the median over some of `rows`."""
+    truth, swing = series.block("truth."), series["magnet.swing"]
+    place = series.block("payload.")[:, :3]
+    magnet = body.data.body("magnet")
+    found = []
+    for row in rows[:: max(1, len(rows) // 20)]:
+        body.place(truth[row, :SIZE], swing[row])
+        mujoco.mj_kinematics(body.model, body.data)
+        found.append(magnet.xmat.reshape(3, 3).T @ (place[row] - magnet.xpos))
+    return np.median(found, axis=0)

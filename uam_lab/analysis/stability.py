@@ -1,0 +1,217 @@
+"""The whole analysis of one flight: `analyse`, and its numbers as JSON has them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from uam_control.coordinates import SIZE
+from uam_control.laws.law_parameters import ModularParameters
+from uam_lab.analysis import (
+    assumptions,
+    constants,
+    coupling,
+    dynamics,
+    lyapunov,
+    supply,
+    ticks,
+    tracking,
+)
+from uam_lab.analysis.supply import COLUMNS_OF, NODE_OF
+from uam_lab.results.timeseries import SUBSYSTEMS, Series
+from uam_sim_bridge.plant import Vehicle
+
+
+@dataclass(frozen=True)
+class Subsystem:
+    """V_j along the flight and what the Appendix says about it."""
+
+    constants: np.ndarray  # (4,) K*, the smallest
+    printed: np.ndarray  # (4,) K* by the paper's expressions
+    parts: lyapunov.Parts
+    comparison: lyapunov.Comparison
+    decrease: np.ndarray  # (m,) what dV_j/dt stays below, see lyapunov.decrease
+    gains: np.ndarray  # (m, 4) K as flown
+    zeta: np.ndarray  # (m,)
+    error: np.ndarray  # (m,) ||xi_j||
+    error_bound: float  # what V_j <= max(V_j(0), B_j) leaves for ||xi_j||
+
+
+@dataclass(frozen=True)
+class Stability:
+    """The analysis of one flight at m ticks in the air."""
+
+    rows: np.ndarray
+    time: np.ndarray  # (m,) mission time [s]
+    truth: tracking.Tracking
+    supply: supply.Supply
+    coupling: coupling.Coupling
+    subsystems: dict[str, Subsystem]
+    assumptions: dict[str, Any]
+
+    @cached_property
+    def total(self) -> np.ndarray:
+        """V (m,)."""
+        return sum(s.parts.total for s in self.subsystems.values())
+
+    @cached_property
+    def comparison(self) -> lyapunov.Comparison:
+        """Of V, equation (new)."""
+        p, q, alpha = (self.subsystems[name].comparison for name in SUBSYSTEMS)
+        return p + q + alpha
+
+    def summary(self) -> dict[str, Any]:
+        """stability.json: SI units, gains and V without unit as in the paper."""
+        found = {"ticks": len(self.time), "from_s": self.time[0], "until_s": self.time[-1]}
+        found["V"] = check(self.time, self.total, self.comparison)
+        for name, s in self.subsystems.items():
+            columns = COLUMNS_OF[name]
+            found[name] = {
+                "V": check(self.time, s.parts.total, s.comparison),
+                "step_inequality_holds": np.mean(
+                    np.gradient(s.parts.total, self.time) <= s.decrease
+                ),
+                "V_tracking_max": s.parts.tracking.max(),
+                "xi_max": s.error.max(),
+                "xi_bound": s.error_bound,
+                "K_star": s.constants,
+                "K_star_by_the_papers_expressions": s.printed,
+                "K_max": s.gains.max(axis=0),
+                "zeta_min": s.zeta.min(),
+                "zeta_max": s.zeta.max(),
+                "sigma_max": self.coupling.sigma_norm(name).max(),
+                "coupling": shares(self.coupling, self.supply, columns),
+            }
+        found["assumptions"] = self.assumptions
+        return found
+
+
+def check(time: np.ndarray, value: np.ndarray, comparison: lyapunov.Comparison) -> dict[str, Any]:
+    """V (m,) against max(V(0), B), against its envelope, and dV/dt against -rate V + growth.
+
+    Also how often V falls where it is above B, None where it never is.
+    """
+    limit = max(value[0], comparison.bound)
+    envelope = comparison.envelope(value[0], time - time[0])
+    slope = np.gradient(value, time)
+    above = value > comparison.bound
+    return {
+        "start": value[0],
+        "max": value.max(),
+        "bound": comparison.bound,
+        "rate_per_s": comparison.rate,
+        "growth_per_s": comparison.growth,
+        "within_bound": np.mean(value <= limit * (1.0 + 1e-12)),
+        "largest_ratio_to_bound": value.max() / limit,
+        "within_envelope": np.mean(value <= envelope * (1.0 + 1e-9)),
+        "largest_ratio_to_envelope": np.max(value / envelope),
+        "rate_inequality_holds": np.mean(slope <= -comparison.rate * value + comparison.growth),
+        "falls_above_bound": np.mean(slope[above] < 0.0) if above.any() else None,
+    }
+
+
+def shares(forces: coupling.Coupling, terms: supply.Supply, columns: slice) -> dict[str, Any]:
+    """RMS [N, N m] of the true coupling force and of what meets it, per axis.
+
+    *_share: the part of the coupling that a term supplies, <term, H> / <H, H> over all axes.
+    """
+    plant = forces.plant[:, columns]
+    met = {
+        "adaptive": terms.adaptive[:, columns],
+        "feedback": terms.feedback[:, columns],
+        "feedforward": terms.feedforward[:, columns],
+        "actuators": (terms.applied - terms.asked)[:, columns],
+    }
+    found = {"rms": rms(plant), "rest_rms": rms(forces.rest[:, columns])}
+    power = float(np.sum(plant**2))
+    for name, term in met.items():
+        found[f"{name}_rms"] = rms(term)
+        found[f"{name}_share"] = float(np.sum(term * plant)) / power if power else None
+    if columns == COLUMNS_OF["arm"]:  # what its servos made of tau is not recorded
+        found["actuators_rms"] = found["actuators_share"] = None
+    return found
+
+
+def rms(values: np.ndarray) -> np.ndarray:
+    """Root of the mean square over the ticks, per axis."""
+    return np.sqrt(np.mean(values**2, axis=0))
+
+
+def analyse(
+    series: Series,
+    sets: dict,
+    vehicle: Vehicle,
+    payload_mass: float,
+    frequency: float = ticks.FREQUENCY,
+) -> Stability | None:
+    """The analysis of a flight of the modular law; None where it hardly left the ground.
+
+    sets: the profile's parameter sets by node; payload_mass [kg]; frequency [Hz] of the ticks used.
+    A law that adapts nothing has no numbers in adaptation.*: None as well.
+    """
+    rows = ticks.in_the_air(series, frequency)
+    if len(rows) < ticks.FEWEST:
+        return None
+    printed = sets["attitude_controller"].error_rate_form == "printed"
+    truth, estimate = (
+        tracking.along(series, rows, source, printed) for source in ("truth", "estimate")
+    )
+    true = dynamics.along(series, rows, vehicle, payload_mass)
+    terms = supply.along(series, rows, estimate, sets, dynamics.Body(vehicle))
+    acceleration = series.block("truth.")[rows, 2 * SIZE :]
+    forces = coupling.along(true, acceleration, terms, sets)
+    regressors = constants.regressor(truth)
+    subsystems, ceilings, seen = {}, {}, {}
+    for name in SUBSYSTEMS:
+        parameters = sets[NODE_OF[name]]
+        sigma = forces.sigma_norm(name)
+        best = constants.smallest(sigma, regressors, np.array(parameters.nu))
+        printed_ones = constants.from_the_paper(name, true, forces, terms, truth, sets)
+        found = _subsystem(name, series, rows, truth, parameters, best, printed_ones)
+        subsystems[name] = found
+        ceilings[name] = assumptions.at_ceiling(found.gains, parameters.k_ceiling)
+        seen[name] = assumptions.acceleration(series, rows, truth, parameters)
+    margins = {
+        "mass_matrix": assumptions.mass_matrix(true, sets),
+        "saturated": assumptions.saturated(terms, sets),
+        "at_ceiling": ceilings,
+        "acceleration": seen,
+        "estimator": assumptions.estimator(truth, estimate),
+        "error_rate": assumptions.error_rate(truth),
+        "forms": assumptions.switches(sets),
+    }
+    return Stability(rows, series.time[rows], truth, terms, forces, subsystems, margins)
+
+
+def _subsystem(
+    name: str,
+    series: Series,
+    rows: np.ndarray,
+    truth: tracking.Tracking,
+    parameters: ModularParameters,
+    best: np.ndarray,
+    printed_ones: np.ndarray,
+) -> Subsystem:
+    """V_j with the constants `best` (4,) and its bound; parameters: the subsystem's own set."""
+    columns = COLUMNS_OF[name]
+    gains = np.column_stack([series[f"adaptation.{name}.K{i}"][rows] for i in range(4)])
+    zeta = np.maximum(series[f"adaptation.{name}.zeta"][rows], 1e-12)
+    record = parameters.record()[0]
+    parts = lyapunov.parts(name, record, truth, gains, zeta, best)
+    comparison = lyapunov.comparison(parameters, zeta, best)
+    largest = max(parts.total[0], comparison.bound)
+    xi = np.hstack([truth.e[:, columns], truth.e_dot[:, columns]])
+    return Subsystem(
+        constants=best,
+        printed=printed_ones,
+        parts=parts,
+        comparison=comparison,
+        decrease=lyapunov.decrease(name, parameters, truth, gains, zeta, best),
+        gains=gains,
+        zeta=zeta,
+        error=np.linalg.norm(xi, axis=1),
+        error_bound=lyapunov.error_bound(record, largest),
+    )

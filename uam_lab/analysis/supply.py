@@ -1,0 +1,64 @@
+"""What each term of the law supplies, and what the actuators made of it, per axis."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from uam_control.coordinates import ARM, ATTITUDE, POSITION, SIZE
+from uam_control.maths.rotations import matrix_from_euler
+from uam_lab.analysis.dynamics import Body
+from uam_lab.analysis.tracking import Tracking
+from uam_lab.results.timeseries import SUBSYSTEMS, Series
+
+COLUMNS_OF = {"position": POSITION, "attitude": ATTITUDE, "arm": ARM}
+NODE_OF = {name: f"{name}_controller" for name in SUBSYSTEMS}
+
+
+@dataclass(frozen=True)
+class Supply:
+    """m ticks, all (m, 8), N (p) and N m (q, alpha); equations (ct1), (ct2), (ct3).
+
+    Without saturation asked = feedforward + feedback + adaptive + weight.
+    """
+
+    feedforward: np.ndarray  # Mbar chi_d_ddot
+    feedback: np.ndarray  # -Mbar Lambda xi
+    adaptive: np.ndarray  # -Mbar dtau
+    weight: np.ndarray  # gravity_feedforward_mass g e3
+    asked: np.ndarray  # tau as recorded, after its limits
+    applied: np.ndarray  # what rotors made; for the arm, whose torque is not recorded, asked
+
+
+def along(series: Series, rows: np.ndarray, estimate: Tracking, sets: dict, body: Body) -> Supply:
+    """The terms at `rows` (m,). estimate: the errors that the law saw; sets: of the profile."""
+    shape = (len(rows), SIZE)
+    feedforward, feedback, adaptive, weight = (np.zeros(shape) for _ in range(4))
+    for name, columns in COLUMNS_OF.items():
+        p = sets[NODE_OF[name]].record()[0]
+        e, e_dot = estimate.e[:, columns], estimate.e_dot[:, columns]
+        feedforward[:, columns] = p["inertia"] * estimate.acceleration_d[:, columns]
+        feedback[:, columns] = -p["inertia"] * (p["gain_e"] * e + p["gain_e_dot"] * e_dot)
+        r = p["p12"] * e + p["p22"] * e_dot
+        length = np.linalg.norm(r, axis=1)
+        scale = series[f"adaptation.{name}.rho"][rows] / np.maximum(length, p["varpi"])
+        adaptive[:, columns] = -p["inertia"] * r * scale[:, None]
+    limits = sets["position_controller"]
+    weight[:, 2] = limits.gravity_feedforward_mass * limits.gravity
+    blocks = [series.block(f"{tau}.")[rows] for tau in ("tau_p", "tau_q", "tau_alpha")]
+    asked = np.hstack(blocks)
+    applied = np.hstack([rotor_wrench(series, rows, body), blocks[2]])
+    return Supply(feedforward, feedback, adaptive, weight, asked, applied)
+
+
+def rotor_wrench(series: Series, rows: np.ndarray, body: Body) -> np.ndarray:
+    """Force [N, world] and torque [N m, FLU] (m, 6) of the recorded rotor thrusts."""
+    model = body.model
+    thrust = np.column_stack([series[f"rotor_{i}.thrust"][rows] for i in range(1, 5)])
+    torque = np.zeros((4, 3))  # per newton: r x e3 and the reaction
+    for i in range(4):
+        x, y, _ = model.site(f"rotor_{i + 1}").pos
+        torque[i] = y, -x, model.actuator(f"rotor_{i + 1}").gear[5]
+    up = np.array([matrix_from_euler(euler)[:, 2] for euler in series.block("truth.")[rows, 3:6]])
+    return np.hstack([up * thrust.sum(axis=1)[:, None], thrust @ torque])

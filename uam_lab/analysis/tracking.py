@@ -1,0 +1,41 @@
+"""Tracking errors along a flight as the law defines them, of the truth or of the estimate."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from uam_control.coordinates import ATTITUDE, SIZE
+from uam_control.laws.errors import tracking_errors
+from uam_lab.results.timeseries import Series
+
+
+@dataclass(frozen=True)
+class Tracking:
+    """m ticks; equations (err) and those of e_q. SI units."""
+
+    e: np.ndarray  # (m, 8)
+    e_dot: np.ndarray  # (m, 8)
+    acceleration_d: np.ndarray  # (m, 8) chi_d_ddot as the law feeds it forward
+    xi: np.ndarray  # (m,) ||xi|| of the whole vehicle
+    acceleration: np.ndarray  # (m,) ||chi_ddot||
+    rate: np.ndarray  # (m,) ||chi_dot||
+    reference_rate: np.ndarray  # (m,) ||chi_d_dot||
+
+
+def along(series: Series, rows: np.ndarray, source: str, printed: bool) -> Tracking:
+    """Errors at `rows` (m,) in flight. source: "truth" or "estimate"; printed: the paper's e_q_dot.
+
+    The reference of the attitude is the one asked for in the same tick.
+    """
+    states = np.ascontiguousarray(series.block(f"{source}.")[rows]).reshape(-1, 3, SIZE)
+    references = np.ascontiguousarray(series.block("reference.")[rows]).reshape(-1, 3, SIZE)
+    errors = np.zeros((len(rows), 3, SIZE))
+    norms = np.zeros((len(rows), 3))
+    for k in range(len(rows)):
+        attitude = np.ascontiguousarray(references[k, :, ATTITUDE])
+        tracking_errors(states[k], references[k], attitude, True, printed, errors[k], norms[k])
+    e, e_dot, feedforward = errors.transpose(1, 0, 2)
+    reference_rate = np.linalg.norm(references[:, 1], axis=1)
+    return Tracking(e, e_dot, feedforward, *norms.T, reference_rate)

@@ -1,0 +1,136 @@
+"""The cells of a matrix fault × moment, read from config/campaign/faults.yaml or another file."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, NamedTuple
+
+from uam_control.mission import Scenario, load_scenario
+from uam_control.settings import yaml_file
+from uam_lab.campaign import promise
+from uam_lab.campaign.promise import Promise
+from uam_sim_bridge.faults import FAULTS, Fault, FaultError, Schedule
+from uam_sim_bridge.faults.limits import needs_nodes
+from uam_sim_bridge.faults.schedule import beginnings, listed, timed
+
+NOMINAL = "no fault"
+KEYS = ("scenario", "moments", "faults")
+
+
+@dataclass(frozen=True)
+class Cell:
+    """One flight. fault: the row; moment: the column, "" for the flight without any fault."""
+
+    fault: str
+    moment: str
+    schedule: Schedule
+    promise: Promise | None = None
+
+
+@dataclass(frozen=True)
+class Matrix:
+    """What is flown. moments: mission times [s] by name; promises: of each row; left_out: rows
+    that the engine cannot have."""
+
+    scenario: str
+    moments: dict[str, float]
+    faults: tuple[dict[str, Any], ...]
+    promises: tuple[Promise | None, ...]
+    left_out: tuple[str, ...] = ()
+
+    @property
+    def rows(self) -> tuple[str, ...]:
+        """Names of the rows."""
+        return tuple(label(entry) for entry in self.faults)
+
+    def cells(self, seed: int, repeat: int = 1) -> list[Cell]:
+        """Every flight, the one without any fault first; seed: of what is random in the faults.
+
+        repeat: how often each with a fault is flown, one after the other.
+        """
+        found = [Cell(NOMINAL, "", Schedule(seed=seed))]
+        for entry, promised in zip(self.faults, self.promises, strict=True):
+            for moment, at in self.moments.items():
+                one = timed({**entry, "at": at}, {}, moment)
+                found += [Cell(label(entry), moment, Schedule((one,), seed), promised)] * repeat
+        return found
+
+
+def label(entry: dict[str, Any]) -> str:
+    """A row's name: the fault, its duration, and the parameters that are given."""
+    shown = {key: value for key, value in entry.items() if key not in ("fault", "duration")}
+    lasting = f" {entry['duration']:g} s" if "duration" in entry else ""
+    values = ", ".join(
+        f"{k} {v:g}" if isinstance(v, int | float) else f"{k} {v}" for k, v in shown.items()
+    )
+    return entry["fault"] + lasting + (f" ({values})" if values else "")
+
+
+def read(
+    file: Path,
+    engine: str,
+    only: Collection[str] = (),
+    moments: Sequence[str] = (),
+    scenario: str | None = None,
+) -> Matrix:
+    """Read a matrix for an engine; raises FaultError and what loading a scenario raises.
+
+    only: names of faults, () for all; moments: names of columns, () for all; scenario: in place of
+    the file's.
+    """
+    document = _document(file)
+    name = scenario or str(document["scenario"])
+    times = _moments(document["moments"], load_scenario(name), str(file))
+    entries = listed(document["faults"], str(file))
+    rows = [_checked(dict(entry), str(file)) for entry in entries]
+    for asked, known in ((only, FAULTS), (moments, times)):
+        for one in asked:
+            if one not in known:
+                raise FaultError(
+                    f"unknown {'fault' if asked is only else 'moment'} '{one}'; "
+                    f"there are: {', '.join(known)}"
+                )
+    wanted = [row for row in rows if not only or row.entry["fault"] in only]
+    out = [label(row.entry) for row in wanted if engine == "direct" and needs_nodes(row.fault)]
+    kept = [row for row in wanted if label(row.entry) not in out]
+    if not kept:
+        raise FaultError(f"{file}: nothing to fly with the {engine} engine")
+    chosen = {k: v for k, v in times.items() if not moments or k in moments}
+    entries, promises = tuple(row.entry for row in kept), tuple(row.promise for row in kept)
+    return Matrix(name, chosen, entries, promises, tuple(out))
+
+
+def _document(file: Path) -> dict[str, Any]:
+    document = yaml_file.read(file, FaultError)
+    if not isinstance(document, dict) or sorted(document) != sorted(KEYS):
+        raise FaultError(f"{file}: a mapping of {', '.join(KEYS)} expected")
+    return document
+
+
+def _moments(given: Any, scenario: Scenario, where: str) -> dict[str, float]:
+    """Mission times [s]; a moment is a time of any fault."""
+    if not isinstance(given, dict) or not all(isinstance(v, dict) for v in given.values()):
+        raise FaultError(f"{where}: moments: names with {{at: ..., after: ...}} each expected")
+    phases = beginnings(scenario)
+    any_fault = next(iter(FAULTS))
+    return {
+        str(name): timed({**when, "fault": any_fault}, phases, f"{where}: moments: {name}").at
+        for name, when in given.items()
+    }
+
+
+class _Row(NamedTuple):
+    entry: dict[str, Any]
+    fault: Fault
+    promise: Promise | None
+
+
+def _checked(entry: dict[str, Any], where: str) -> _Row:
+    for key in ("at", "after"):
+        if key in entry:
+            raise FaultError(f"{where}: {key}: the moments say when")
+    promised = entry.pop("promise", None)
+    fault = timed({**entry, "at": 0.0}, {}, where).fault
+    return _Row(entry, fault, None if promised is None else promise.read(promised, where))

@@ -1,0 +1,100 @@
+"""How a flight with a fault ended, in one word."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from uam_control.supervision import State
+from uam_lab.results.timeseries import Series
+
+COMPLETED, HELD, LANDED, FAILSAFE, LOST = "completed", "held", "landed", "failsafe", "lost"
+OUTCOMES = {
+    COMPLETED: "the mission was completed in spite of it",
+    HELD: "in the air at the end, upright and at rest",
+    LANDED: "the mission landed it softly, without completing what it was to do",
+    FAILSAFE: "it came down softly, but not by the mission's landing",
+    LOST: "anything else: a fall, a hard landing, or out of control",
+}
+
+
+def counts(outcomes: Iterable[str]) -> dict[str, int]:
+    """How many there are of each, in the order of OUTCOMES."""
+    counted = Counter(outcomes)
+    return {outcome: counted[outcome] for outcome in OUTCOMES}
+
+
+@dataclass(frozen=True)
+class Limits:
+    """What is still soft, upright, low and at rest."""
+
+    impact: float = 1.0  # [m/s] speed downwards while it comes to the ground
+    tilt: float = 0.35  # [rad] at the end
+    height: float = 0.08  # [m] above the start, at the end, for on the ground
+    near_ground: float = 0.15  # [m] above the start, where an impact is looked for
+    rest: float = 0.3  # [m/s] at the end
+
+
+@dataclass(frozen=True)
+class Ending:
+    """The end of a flight: height above the start [m], tilt [rad], speed [m/s], impact [m/s]."""
+
+    height: float
+    tilt: float
+    speed: float
+    impact: float
+
+
+def ending(series: Series, limits: Limits | None = None) -> Ending:
+    """What the truth says of the end; series: with at least one tick."""
+    limits = limits or Limits()
+    height = series["truth.z"] - series["truth.z"][0]
+    velocity = np.column_stack([series[f"truth.{axis}_dot"] for axis in "xyz"])
+    roll, pitch = series["truth.roll"][-1], series["truth.pitch"][-1]
+    low = height < limits.near_ground
+    return Ending(
+        height=float(height[-1]),
+        tilt=float(np.arccos(np.clip(np.cos(roll) * np.cos(pitch), -1.0, 1.0))),
+        speed=float(np.linalg.norm(velocity[-1])),
+        impact=float(max(0.0, np.max(-velocity[low, 2]))) if low.any() else 0.0,
+    )
+
+
+def classify(series: Series, figures: Mapping[str, Any], limits: Limits | None = None) -> str:
+    """One of OUTCOMES; figures: metrics.json of the flight."""
+    limits = limits or Limits()
+    if figures["mission_completed"]:  # unless the autopilot had landed it unasked
+        return FAILSAFE if _down_early(series, limits) else COMPLETED
+    end = ending(series, limits)
+    upright = end.tilt <= limits.tilt and end.speed <= limits.rest
+    if upright and end.height > limits.height:
+        return HELD
+    if upright and end.impact <= limits.impact:
+        left = any(one["to"] == State.FAILSAFE.value for one in figures.get("transitions", ()))
+        commanded = series.in_phase("landed").any() and not _down_early(series, limits)
+        return LANDED if commanded and not left else FAILSAFE
+    return LOST
+
+
+def down_after(series: Series, begun: float, limits: Limits | None = None) -> float | None:
+    """How long after the mission time `begun` [s] it was down to stay; None: it is still up."""
+    limits = limits or Limits()
+    up = np.flatnonzero(series["truth.z"] - series["truth.z"][0] > limits.height)
+    if not up.size:
+        return 0.0
+    if up[-1] == len(series) - 1:
+        return None
+    return max(0.0, float(series.time[up[-1]]) - begun)
+
+
+def _down_early(series: Series, limits: Limits) -> bool:
+    """Whether it came to the ground, once it was up, while the mission still wanted it up."""
+    height = series["truth.z"] - series["truth.z"][0]
+    wanted = series["reference.z"] - series["truth.z"][0]
+    been_up = np.maximum.accumulate(height) > limits.near_ground
+    down = been_up & (height < limits.height) & series.flown
+    return bool(down.any()) and bool(wanted[np.argmax(down)] > limits.near_ground)

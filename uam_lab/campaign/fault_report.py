@@ -1,0 +1,213 @@
+"""What a campaign of faults leaves: every flight as CSV, the matrix as Markdown, picture, page."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass
+from pathlib import Path
+
+from matplotlib.colors import to_rgb
+from matplotlib.figure import Figure
+
+from uam_lab.campaign.fault_matrix import NOMINAL, Matrix
+from uam_lab.campaign.fault_outcome import (
+    COMPLETED,
+    FAILSAFE,
+    HELD,
+    LANDED,
+    LOST,
+    OUTCOMES,
+    counts,
+)
+from uam_lab.campaign.fault_trial import FaultResult
+from uam_lab.report.figures import style
+from uam_lab.report.page import html
+from uam_lab.results.atomic import replacing, write_rows, write_text
+from uam_lab.results.result_folder import as_json, versions
+
+COLOURS = {
+    COMPLETED: "#5aa469",
+    HELD: "#8fb8de",
+    LANDED: "#e3c567",
+    FAILSAFE: "#e39b50",
+    LOST: "#cf5b4a",
+}
+HEAD = (
+    "fault",
+    "moment",
+    "outcome",
+    "position_m",
+    "attitude_deg",
+    "arm_deg",
+    "duration_s",
+    "down_after_s",
+    "promise_kept",
+    "why",
+)
+
+
+def write(
+    out: Path, matrix: Matrix, results: Sequence[FaultResult], command: str
+) -> tuple[str, Path]:
+    """Write flights.csv, faults.json, summary.md, matrix.png and report.html; (summary, page)."""
+    write_rows(
+        out / "flights.csv",
+        HEAD,
+        (
+            [
+                r.fault,
+                r.moment,
+                r.outcome,
+                *(_shown(worst(r, key)) for key in HEAD[3:6]),
+                f"{r.duration_s:.2f}",
+                "" if r.down_after_s is None else f"{r.down_after_s:.2f}",
+                "" if r.kept is None else r.kept,
+                r.why,
+            ]
+            for r in results
+        ),
+    )
+    write_text(
+        out / "faults.json",
+        as_json(
+            {
+                "command": command,
+                "versions": versions(),
+                "matrix": asdict(matrix),
+                "flights": [vars(result) for result in results],
+            }
+        ),
+    )
+    summary = markdown(matrix, results, command)
+    write_text(out / "summary.md", summary)
+    with style.styled(), replacing(out / "matrix.png") as temporary:
+        picture(matrix, results).savefig(temporary, format="png", dpi=style.PIXELS_PER_INCH)
+    page = out / "report.html"
+    write_text(page, _page(out, matrix, results, command))
+    return summary, page
+
+
+@dataclass(frozen=True)
+class Group:
+    """The flights of one cell. As text: what a cell says."""
+
+    results: tuple[FaultResult, ...]
+
+    @property
+    def outcome(self) -> str:
+        """The worst."""
+        return max((r.outcome for r in self.results), key=list(OUTCOMES).index)
+
+    def __str__(self) -> str:
+        """Outcome and how often, time to the ground, position error, and broken promises."""
+        count = len(self.results)
+        same = sum(r.outcome == self.outcome for r in self.results)
+        often = f" {same}/{count}" if count > 1 else ""
+        down = [r.down_after_s for r in self.results if r.down_after_s is not None]
+        errors = [worst(r, "position_m") for r in self.results]
+        error = max((e for e in errors if not math.isnan(e)), default=math.nan)
+        parts = [self.outcome + often]
+        parts += [f"{max(down):.1f} s"] if down else []
+        parts += [] if math.isnan(error) else [f"{error:.2f} m"]
+        parts += ["broken"] if any(r.kept is False for r in self.results) else []
+        return " ".join(parts)
+
+
+def grouped(results: Sequence[FaultResult]) -> dict[tuple[str, str], Group]:
+    """The flights by fault and moment."""
+    found: dict[tuple[str, str], tuple[FaultResult, ...]] = {}
+    for one in results:
+        found[one.fault, one.moment] = (*found.get((one.fault, one.moment), ()), one)
+    return {key: Group(flights) for key, flights in found.items()}
+
+
+def worst(result: FaultResult, key: str) -> float:
+    """Largest error of a group over its axes, in the unit of the key; NaN if it never flew."""
+    values = [v for v in result.worst.get(key, ()) if v is not None]
+    return max(values, default=math.nan)
+
+
+def sentence(results: Sequence[FaultResult]) -> str:
+    """How many flights ended how."""
+    counted = counts(result.outcome for result in results if result.fault != NOMINAL)
+    parts = [f"{number} {outcome}" for outcome, number in counted.items() if number]
+    nominal = next((r.outcome for r in results if r.fault == NOMINAL), "not flown")
+    promised = [result.kept for result in results if result.kept is not None]
+    kept = f" Promises kept: {sum(promised)} of {len(promised)}." if promised else ""
+    return (
+        f"{sum(counted.values())} flights with a fault: {', '.join(parts)}. "
+        f"Without a fault: {nominal}.{kept}"
+    )
+
+
+def markdown(matrix: Matrix, results: Sequence[FaultResult], command: str) -> str:
+    """The matrix as a table: outcome and largest position error."""
+    cells = grouped(results)
+    lines = [
+        sentence(results),
+        "",
+        f"| fault | {' | '.join(matrix.moments)} |",
+        "|---|" + "---|" * len(matrix.moments),
+    ]
+    for row in matrix.rows:
+        shown = [str(cells[row, moment]) for moment in matrix.moments]
+        lines.append(f"| {row} | {' | '.join(shown)} |")
+    lines += [
+        "",
+        "In each cell: how it ended, the worst where it was flown several times, the longest time "
+        "from the fault to the ground if it did not complete its mission, and the largest position "
+        "error. " + "; ".join(f"{name}: {about}" for name, about in OUTCOMES.items()) + ".",
+    ]
+    if matrix.left_out:
+        lines += ["", f"Only with --engine ros: {'; '.join(matrix.left_out)}."]
+    return "\n".join([*lines, "", f"Made by `{command}`."]) + "\n"
+
+
+def picture(matrix: Matrix, results: Sequence[FaultResult]) -> Figure:
+    """The matrix in colours, with the largest position error in each cell."""
+    rows, columns = matrix.rows, list(matrix.moments)
+    cells = grouped(results)
+    figure = Figure(figsize=(style.WIDTH, 1.3 + 0.27 * len(rows)), layout="constrained")
+    axis = figure.subplots()
+    axis.imshow(
+        [[to_rgb(COLOURS[cells[row, column].outcome]) for column in columns] for row in rows],
+        aspect="auto",
+    )
+    for i, row in enumerate(rows):
+        for j, column in enumerate(columns):
+            axis.text(
+                j,
+                i,
+                str(cells[row, column]),
+                ha="center",
+                va="center",
+                fontsize=7.5,
+                color=style.INK,
+            )
+    axis.set_xticks(range(len(columns)), columns)
+    axis.set_yticks(range(len(rows)), rows)
+    axis.tick_params(length=0, labeltop=True, labelbottom=False)
+    axis.set_xticks([j + 0.5 for j in range(len(columns) - 1)], minor=True)
+    axis.set_yticks([i + 0.5 for i in range(len(rows) - 1)], minor=True)
+    axis.grid(False)
+    axis.grid(True, which="minor", color="white", linewidth=2.0)
+    axis.tick_params(which="minor", length=0)
+    axis.spines[:].set_visible(False)
+    return figure
+
+
+def _shown(value: float) -> str:
+    return "" if math.isnan(value) else f"{value:.4g}"
+
+
+def _page(out: Path, matrix: Matrix, results: Sequence[FaultResult], command: str) -> str:
+    return html.template("uam_lab.campaign", "faults.html.j2").render(
+        sentence=sentence(results),
+        matrix=matrix,
+        outcomes=OUTCOMES,
+        colours=COLOURS,
+        picture=html.embedded(out / "matrix.png"),
+        command=command,
+        rows=[(r, [_shown(worst(r, key)) for key in HEAD[3:6]]) for r in results],
+    )

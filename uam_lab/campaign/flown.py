@@ -1,0 +1,65 @@
+"""What a campaign has flown so far, kept so that an interrupted one goes on where it was."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from dataclasses import asdict
+from pathlib import Path
+
+import numpy as np
+
+from uam_control.settings.configuration import ConfigurationError
+from uam_lab.campaign.trial import Result
+from uam_lab.results.atomic import write_text
+
+FILE = "flown.jsonl"
+
+
+class Flown:
+    """The results in FILE of a result folder: one line says what of, each other is one flight.
+
+    `results`: by the flight's seed.
+    """
+
+    def __init__(self, out: Path, of: object) -> None:
+        """of: all that the flights depend on, with a repr that says so.
+
+        Raises ConfigurationError where the folder holds flights of something else.
+        """
+        self.results: dict[int, Result] = {}
+        self._file = out / FILE
+        mark = {"of": hashlib.sha256(repr(of).encode()).hexdigest()}
+        if not self._file.exists():
+            self._file.write_text(json.dumps(mark) + "\n")
+            return
+        first, *lines = self._file.read_text().splitlines() or [""]
+        if first != json.dumps(mark):
+            raise ConfigurationError(
+                f"{out} holds flights with another profile, seed or range: choose another --out"
+            )
+        for line in lines:
+            try:
+                result = _read(line)
+            except (ValueError, TypeError):  # the last one, where the process was killed
+                continue
+            self.results[result.seed] = result
+        write_text(self._file, "\n".join([first, *map(_line, self.results.values()), ""]))
+
+    def add(self, result: Result) -> None:
+        """Note one more flight."""
+        self.results[result.seed] = result
+        with self._file.open("a") as file:
+            file.write(_line(result) + "\n")
+
+
+def _line(result: Result) -> str:
+    values = asdict(result) | {"rms": result.rms.tolist(), "largest": result.largest.tolist()}
+    return json.dumps(values)
+
+
+def _read(line: str) -> Result:
+    values = json.loads(line)
+    for name in ("rms", "largest"):
+        values[name] = np.array(values[name])
+    return Result(**values | {"restless": tuple(values["restless"])})

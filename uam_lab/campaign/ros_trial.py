@@ -1,0 +1,35 @@
+"""A trial flown by the ROS engine: nodes, topics and MAVLink, as `uam fly` does, in lockstep."""
+
+from __future__ import annotations
+
+from uam_control.mission import load_scenario
+from uam_lab.campaign import quiet
+from uam_lab.campaign import trial as direct
+from uam_lab.campaign.trial import Result, Trial
+from uam_lab.flight.settings import ONLOOKERS, FlightSettings
+
+
+class NotFlown(RuntimeError):
+    """The flight could not go on; the text is one line."""
+
+
+def fly(trial: Trial) -> Result:
+    """Fly it. Raises NotFlown."""
+    scenario = load_scenario(trial.scenario)
+    settings = FlightSettings(
+        scenario=scenario,
+        profile=trial.profile,
+        payload_mass=trial.payload_mass,
+        seed=trial.seed,
+        scenario_source=trial.scenario,
+        vehicle_changes=trial.vehicle_changes,
+        without=ONLOOKERS,
+    )
+    outcome = quiet.fly(settings)
+    if outcome.partial or outcome.series is None:
+        raise NotFlown(
+            f"{trial.label}, {trial.payload_mass:g} kg, seed {trial.seed}: "
+            f"{outcome.reason or 'nothing was recorded'}"
+        )
+    outcome.series.info["controller"] = trial.label
+    return direct.result(trial, scenario, outcome.series, outcome.abort_reason, outcome.transitions)

@@ -1,0 +1,142 @@
+"""One flight of a campaign: what is flown, and the figures that remain of it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from uam_control.mission import Scenario, load_scenario
+from uam_control.profile import Profile
+from uam_lab.campaign.fault_outcome import COMPLETED, LOST, classify
+from uam_lab.flight.direct.flight import DirectFlight
+from uam_lab.results import metrics
+from uam_lab.results.outcome import transitions
+from uam_lab.results.timeseries import COLUMNS, Series
+from uam_sim_bridge.plant import Vehicle
+
+# The eight columns of the paper's tables, in its order: group of metrics.json and place in it.
+ERRORS = ("x", "y", "z", "roll", "pitch", "yaw", "alpha_1", "alpha_2")
+
+
+@dataclass(frozen=True)
+class Trial:
+    """One flight. label: the row of the tables that it counts for; keep: file for its series."""
+
+    label: str
+    profile: Profile
+    payload_mass: float  # [kg]
+    seed: int
+    scenario: str = "pick_and_place"
+    vehicle_changes: dict[str, object] = field(default_factory=dict)
+    keep: Path | None = None
+
+
+@dataclass(frozen=True)
+class Result:
+    """What is kept of a flight. rms, largest (8,): ERRORS in m and deg, NaN if it never flew.
+
+    flown: from take-off as a share of what was planned; cut_short: not landed by the mission.
+    outcome: one of `fault_outcome.OUTCOMES`; why: what kept the mission from being completed.
+    restless: RMS change from tick to tick of body-rate setpoints [rad/s] and joint torques [N m].
+    peaks: the largest value of each adaptation column.
+    """
+
+    label: str
+    payload_mass: float
+    seed: int
+    rms: np.ndarray
+    largest: np.ndarray
+    flown: float
+    cut_short: bool
+    outcome: str
+    why: str
+    place_error: float | None
+    restless: tuple[float, float]
+    peaks: dict[str, float]
+
+    @property
+    def completed(self) -> bool:
+        """Whether the whole mission was."""
+        return self.outcome == COMPLETED
+
+    @property
+    def lost(self) -> bool:
+        """Whether it fell, landed hard or was out of control."""
+        return self.outcome == LOST
+
+
+def fly(trial: Trial) -> tuple[Result, Series]:
+    """Fly it; raises what loading a scenario or changing a vehicle raises."""
+    scenario = load_scenario(trial.scenario)
+    vehicle = Vehicle.load().changed(trial.vehicle_changes)
+    flight = DirectFlight(scenario, trial.profile, vehicle, trial.payload_mass, trial.seed)
+    flight.run()
+    series = flight.recording.series({"controller": trial.label})
+    reason, told = flight.mission.output.abort_reason, transitions(flight.mission.changes)
+    return result(trial, scenario, series, reason, told), series
+
+
+def result(
+    trial: Trial,
+    scenario: Scenario,
+    series: Series,
+    abort_reason: str,
+    told: list[dict[str, Any]],
+) -> Result:
+    """Take the figures of a flight that was flown; writes its series where they are to be kept.
+
+    told: the supervisor's transitions, see `flight.outcome`.
+    """
+    if trial.keep is not None:
+        series.write(trial.keep)
+    figures = metrics.compute(
+        series,
+        {
+            "payload_mass_kg": trial.payload_mass,
+            "drop_point": scenario.drop_point,
+            "abort_reason": abort_reason,
+            "transitions": told,
+        },
+    )
+    flown = series.flown
+    planned = scenario.landing.at + scenario.landing.duration
+    return Result(
+        label=trial.label,
+        payload_mass=trial.payload_mass,
+        seed=trial.seed,
+        rms=_row(figures["rms"]),
+        largest=_row(figures["max"]),
+        flown=min(1.0, figures["duration_s"] / planned),
+        cut_short=not bool(series.in_phase("landed").any()),
+        outcome=classify(series, figures),
+        why="; ".join(figures["shortfalls"]),
+        place_error=figures["payload_place_error_m"],
+        restless=(
+            _change(series.block("setpoint.rate_")[flown]),
+            _change(series.block("tau_alpha.")[flown]),
+        ),
+        peaks=_peaks(series, flown),
+    )
+
+
+def _row(groups: dict[str, list[float | None]]) -> np.ndarray:
+    values = [value for key, _, _ in metrics.GROUPS for value in groups[key]]
+    return np.array([np.nan if value is None else value for value in values])
+
+
+def _change(values: np.ndarray) -> float:
+    """RMS of the change from one tick to the next, over all columns; 0 without two ticks."""
+    return float(np.sqrt(np.mean(np.square(np.diff(values, axis=0))))) if len(values) > 1 else 0.0
+
+
+def _peaks(series: Series, flown: np.ndarray) -> dict[str, float]:
+    where = COLUMNS.block("adaptation.")
+    values = np.abs(series.values[flown, where])
+    return {
+        name.removeprefix("adaptation."): float(np.nanmax(column))
+        for name, column in zip(COLUMNS.names[where], values.T, strict=True)
+        if not np.isnan(column).all()
+    }

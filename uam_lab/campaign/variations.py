@@ -1,0 +1,81 @@
+"""Random flights around the nominal one: what a controller that is to be trusted has to survive."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import yaml
+
+from uam_control.profile import Profile
+from uam_control.settings.configuration import path
+from uam_lab.campaign.trial import Trial
+
+
+@dataclass(frozen=True)
+class Draw:
+    """One random flight. values: name → number, for the statistics; trial: the flight."""
+
+    values: dict[str, float]
+    trial: Trial
+
+
+def ranges(file: Path | None = None) -> dict[str, tuple[float, float]]:
+    """Least and largest of each variation: config/campaign/robustness.yaml, or another file."""
+    document = yaml.safe_load((file or path("campaign/robustness.yaml")).read_text())
+    return {name: (float(low), float(high)) for name, (low, high) in document.items()}
+
+
+def draw(
+    profile: Profile, count: int, seed: int, allowed: dict[str, tuple[float, float]] | None = None
+) -> list[Draw]:
+    """`count` random flights; the same seed gives the same, and a longer campaign begins alike."""
+    allowed = allowed or ranges()
+    return [
+        _one(profile, np.random.default_rng([seed, i]), seed * 100_000 + i, allowed)
+        for i in range(count)
+    ]
+
+
+def _one(
+    profile: Profile,
+    random: np.random.Generator,
+    seed: int,
+    allowed: dict[str, tuple[float, float]],
+) -> Draw:
+    drawn = {name: float(random.uniform(low, high)) for name, (low, high) in allowed.items()}
+    direction = random.uniform(0.0, 2.0 * np.pi)
+    efficiency = random.uniform(*allowed["efficiency"], size=4)
+    offset = random.uniform(0.0, 2.0 * np.pi)
+    speed, away = drawn["wind"], drawn["payload_offset"]
+    drawn["efficiency"] = float(efficiency.min())
+    changes = {
+        "air.wind": [float(speed * np.cos(direction)), float(speed * np.sin(direction)), 0.0],
+        "air.gust": drawn["gust"] * speed,
+        "sensors.noise_scale": drawn["noise"],
+        "variation.mass": drawn["mass"],
+        "variation.inertia": drawn["inertia"],
+        "variation.payload_offset": [float(away * np.cos(offset)), float(away * np.sin(offset))],
+        "rotors.efficiency": efficiency.tolist(),
+    }
+    trial = Trial("random", profile, drawn["payload"], seed, vehicle_changes=changes)
+    return Draw(drawn, trial)
+
+
+def common(draws: Sequence[Draw], failed: Sequence[bool]) -> list[tuple[str, float, float, float]]:
+    """What the failures have in common: (name, mean of them, of the others, distance), worst first.
+
+    distance: of the two means, in standard deviations of all.
+    """
+    failed = np.asarray(failed, dtype=bool)
+    if not failed.any() or failed.all():
+        return []
+    found = []
+    for name in draws[0].values:
+        values = np.array([d.values[name] for d in draws])
+        spread = values.std()
+        lost, kept = float(values[failed].mean()), float(values[~failed].mean())
+        found.append((name, lost, kept, (lost - kept) / float(spread) if spread else 0.0))
+    return sorted(found, key=lambda entry: -abs(entry[3]))

@@ -1,0 +1,95 @@
+"""`uam campaign`: many random flights around the nominal one."""
+
+from __future__ import annotations
+
+import argparse
+import shlex
+import sys
+from pathlib import Path
+
+from uam_control.profile import Profile, ProfileError, load_profile
+from uam_control.settings import configuration
+from uam_control.settings.configuration import ConfigurationError
+from uam_lab.campaign.pool import cores, fly_all
+from uam_lab.campaign.trial import Result
+from uam_lab.cli.counting import Counting
+from uam_lab.results.result_folder import ResultFolderError, make_folder
+
+INTERRUPTED, WRONG_USE = 130, 2
+EXAMPLES = """\
+examples:
+  uam campaign                             1,000 flights of the flying profile
+  uam campaign --flights 100 --profile asmc2
+  uam campaign --out robust                until Ctrl-C; the same again goes on from there
+
+Payload, its place, wind, gusts, sensor noise, masses, inertias and motors are drawn from the ranges
+of config/campaign/robustness.yaml. Left in --out: summary.md, flights.csv, campaign.json,
+campaign.png. The same seed gives the same flights, and more of them begin with the same.
+"""
+
+
+def add(commands: argparse._SubParsersAction) -> None:
+    """Add the subcommand to the command line."""
+    parser = commands.add_parser(
+        "campaign",
+        help="many random flights: success rate, errors, what the losses have in common",
+        description="Fly the mission many times in the direct engine, each with another payload, "
+        "wind, noise, mass and motors.",
+        epilog=EXAMPLES,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    option = parser.add_argument
+    option("--flights", type=int, default=1000, metavar="N", help="(default %(default)s)")
+    option("--profile", default="s500", metavar="NAME|FILE", help="(default %(default)s)")
+    option("--seed", type=int, default=1, metavar="N", help="of the draw (default %(default)s)")
+    option(
+        "--jobs",
+        type=int,
+        default=cores(),
+        metavar="N",
+        help="processes (default: one per core, %(default)s)",
+    )
+    option(
+        "--out", type=Path, metavar="DIR", help="result folder (default results/<time>-campaign)"
+    )
+    parser.set_defaults(run=run)
+
+
+def run(options: argparse.Namespace) -> int:
+    """Fly as asked; returns the exit status."""
+    try:
+        if options.flights < 1 or options.jobs < 1 or options.seed < 0:
+            raise ConfigurationError("--flights and --jobs are 1 or more, --seed 0 or more")
+        profile = load_profile(str(configuration.named("profiles", options.profile)))
+        return campaign(options, profile, make_folder(options.out, "campaign"))
+    except (ConfigurationError, ProfileError, ResultFolderError, OSError) as error:
+        print(f"uam campaign: {error}", file=sys.stderr)
+        return WRONG_USE
+    except KeyboardInterrupt:
+        print("uam campaign: interrupted", file=sys.stderr)
+        return INTERRUPTED
+
+
+def campaign(options: argparse.Namespace, profile: Profile, out: Path) -> int:
+    """Fly, then write everything; returns the exit status."""
+    from uam_lab.campaign import report
+    from uam_lab.campaign.flown import Flown
+    from uam_lab.campaign.variations import draw, ranges
+
+    draws = draw(profile, options.flights, options.seed)
+    flown = Flown(out, (options.seed, ranges(), profile.sets, profile.bridge()))
+    trials = [one.trial for one in draws if one.trial.seed not in flown.results]
+    if flown.results:
+        print(f"campaign: {len(flown.results)} flights were flown before, going on", flush=True)
+    with Counting("campaign", len(draws)) as counting:
+
+        def show(done: int, result: Result) -> None:
+            flown.add(result)
+            bad = sum(not one.completed for one in flown.results.values())
+            counting.show(len(draws) - len(trials) + done, f"{bad} not completed")
+
+        fly_all(trials, options.jobs, progress=show)
+    results = [flown.results[one.trial.seed] for one in draws]
+    print(report.write(out, draws, results, shlex.join(["uam", *sys.argv[1:]])))
+    print(f"results  {out}")
+    return 0

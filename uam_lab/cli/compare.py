@@ -1,0 +1,158 @@
+"""`uam compare`: the paper's tables and figures, every controller over the same flights."""
+
+from __future__ import annotations
+
+import argparse
+import shlex
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+
+from uam_control.profile import ProfileError, load_profile
+from uam_control.settings import configuration
+from uam_control.settings.configuration import ConfigurationError
+from uam_lab.campaign.pool import cores, figures_of, fly_all
+from uam_lab.campaign.trial import Result
+from uam_lab.cli.counting import Counting
+from uam_lab.compare import plan
+from uam_lab.flight.settings import ENGINES, SettingsError, require_ros
+from uam_lab.results.result_folder import ResultFolderError, make_folder
+
+INTERRUPTED, WRONG_USE = 130, 2
+EXAMPLES = """\
+examples:
+  uam compare                          every controller, payloads 0.1 0.2 0.3 kg, 5 seeds
+  uam compare --seeds 10 --jobs 4
+  uam compare --engine ros --rows proposed --seeds 10    through the nodes, one flight at a time
+  uam compare --profile mine=mine.yaml     one more row, of a profile of your own
+
+Left in --out: report.html, tables.md, flights.csv, comparison.json and figures/. The baselines are
+reconstructions (docs/law.md). The same command gives the same tables.
+"""
+
+
+def add(commands: argparse._SubParsersAction) -> None:
+    """Add the subcommand to the command line."""
+    parser = commands.add_parser(
+        "compare",
+        help="all controllers over the same flights: the paper's tables and figures",
+        description="Fly every controller over the same payloads and seeds; write the paper's "
+        "three tables and five figures.",
+        epilog=EXAMPLES,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    option = parser.add_argument
+    option("--seeds", type=int, default=5, metavar="N", help="seeds 1..N (default %(default)s)")
+    option(
+        "--payload-mass", type=float, nargs="+", metavar="KG", help="payloads (default 0.1 0.2 0.3)"
+    )
+    option(
+        "--engine",
+        choices=ENGINES,
+        default="direct",
+        help="nodes and sockets, or one loop without them (default %(default)s)",
+    )
+    option(
+        "--rows",
+        nargs="+",
+        metavar="NAME",
+        choices=tuple(plan.ROWS),
+        default=tuple(plan.ROWS),
+        help=f"what is flown: {', '.join(plan.ROWS)} (default: all)",
+    )
+    option(
+        "--profile",
+        action="append",
+        default=[],
+        metavar="LABEL=FILE",
+        help="a further row; may be given again",
+    )
+    option(
+        "--jobs",
+        type=int,
+        metavar="N",
+        help=f"flights at a time (default: one per core, {cores()}; with --engine ros 1)",
+    )
+    option("--out", type=Path, metavar="DIR", help="result folder (default results/<time>-compare)")
+    parser.set_defaults(run=run)
+
+
+def run(options: argparse.Namespace) -> int:
+    """Compare as asked; returns the exit status."""
+    try:
+        jobs = options.jobs
+        if jobs is None:
+            jobs = 1 if options.engine == "ros" else cores()
+        if options.seeds < 1 or jobs < 1:
+            raise ConfigurationError("--seeds and --jobs are 1 or more")
+        payloads = tuple(options.payload_mass or plan.PAYLOADS)
+        if not all(0.0 <= mass <= 2.0 for mass in payloads):
+            raise ConfigurationError("--payload-mass is 0 to 2 kg")
+        rows = (*plan.entries(options.rows), *map(_further, options.profile))
+        out = make_folder(options.out, "compare")
+        (out / "flights").mkdir(exist_ok=True)
+        seeds = range(1, options.seeds + 1)
+        return compare(rows, payloads, seeds, options.engine, jobs, out)
+    except (ConfigurationError, ProfileError, ResultFolderError, SettingsError, OSError) as error:
+        print(f"uam compare: {error}", file=sys.stderr)
+        return WRONG_USE
+    except KeyboardInterrupt:
+        print("uam compare: interrupted", file=sys.stderr)
+        return INTERRUPTED
+
+
+def _further(text: str):
+    label, _, file = text.partition("=")
+    if not label or not file:
+        raise ConfigurationError(f"--profile {text}: LABEL=FILE is expected")
+    return plan.Entry(label, load_profile(str(configuration.named("profiles", file))))
+
+
+def compare(
+    rows: Sequence[plan.Entry],
+    payloads: Sequence[float],
+    seeds: Sequence[int],
+    engine: str,
+    jobs: int,
+    out: Path,
+) -> int:
+    """Fly, then write everything; returns the exit status."""
+    from uam_lab.compare import modularity, report
+
+    trials = plan.trials(rows, payloads, list(seeds), out / "flights")
+    proposed = load_profile("s500")
+    kept = out / "flights" / "modularity.parquet"
+    extra = modularity.trials(proposed, plan.middle(payloads), seeds[0], kept)
+    with Counting("compare", len(trials) + len(extra)) as counting:
+
+        def show(done: int, result: Result) -> None:
+            counting.show(done, f"{result.label}, {result.payload_mass:g} kg, seed {result.seed}")
+
+        results = fly_all(trials, jobs, _work(engine), progress=show)
+        # of the laws alone, which are the same in both engines
+        others = fly_all(
+            extra, jobs, progress=lambda done, result: show(len(trials) + done, result)
+        )
+    modular = modularity.Evidence.of(proposed, kept, others)
+    facts = {
+        "command": shlex.join(["uam", *sys.argv[1:]]),
+        "engine": engine,
+        "payloads_kg": list(payloads),
+        "seeds": list(seeds),
+        "profiles": {row.label: row.profile.file.name for row in rows},
+        "budgets": report.budgets(rows),
+    }
+    written = report.write(out, trials, results, modular, facts)
+    print(written.text)
+    print(f"results  {out}\nreport   {written.page}")
+    return 0
+
+
+def _work(engine: str):
+    """What a process does with a trial. Raises SettingsError where ROS is not installed."""
+    if engine == "direct":
+        return figures_of
+    require_ros()
+    from uam_lab.campaign.ros_trial import fly
+
+    return fly

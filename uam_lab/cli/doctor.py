@@ -1,0 +1,87 @@
+"""`uam doctor`: is everything here that a flight needs?"""
+
+from __future__ import annotations
+
+import argparse
+import sys
+
+from rich.console import Console
+from rich.text import Text
+
+from uam_lab.doctor.finding import Finding, Verdict
+from uam_lab.doctor.run import as_json, examine, worst
+from uam_sim_bridge.mavlink.transport.transport import ALLOWED, parse_url
+from uam_sim_bridge.ports import PortError
+
+FINE, BROKEN, WRONG_USE, INTERRUPTED = 0, 1, 2, 130
+STYLES = {Verdict.OK: "green", Verdict.WARN: "bold yellow", Verdict.FAIL: "bold red"}
+EXAMPLES = """\
+examples:
+  uam doctor                                    half a minute
+  uam doctor --autopilot serial:/dev/ttyACM0:921600
+  uam doctor --json > doctor.json               to send along with a question
+
+Exit status: 0 all OK, or WARN: flights work; 1 at least one FAIL; 2 wrong use.
+"""
+
+
+def add(commands: argparse._SubParsersAction) -> None:
+    """Add the subcommand to the command line."""
+    parser = commands.add_parser(
+        "doctor",
+        help="what is installed, free and reachable, and what to do where something is missing",
+        description="Check installation, ROS, ports, rendering, autopilot link and machine.",
+        epilog=EXAMPLES,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    option = parser.add_argument
+    option("--autopilot", default="", metavar="URL", help=f"look for an autopilot there: {ALLOWED}")
+    option("--json", action="store_true", help="for programs")
+    parser.set_defaults(run=run)
+
+
+def run(options: argparse.Namespace) -> int:
+    """Examine as asked; returns the exit status."""
+    try:
+        if options.autopilot:
+            parse_url(options.autopilot)
+        return _show(options.autopilot, options.json)
+    except PortError as error:
+        print(f"uam doctor: {error}", file=sys.stderr)
+        return WRONG_USE
+    except KeyboardInterrupt:
+        print("uam doctor: interrupted", file=sys.stderr)
+        return INTERRUPTED
+
+
+def _show(url: str, machine_readable: bool) -> int:
+    """Say every finding as soon as it is there, or all of them as JSON; returns the exit status."""
+    console, found = Console(), []
+    last = ""
+    for group, finding in examine(url):
+        found.append((group, finding))
+        if machine_readable:
+            continue
+        if group != last:
+            console.print(Text(f"\n{group}" if last else group, style="bold"))
+            last = group
+        _print(console, finding)
+    verdict = worst(finding.verdict for _, finding in found)
+    if machine_readable:
+        print(as_json(found))
+    else:
+        counts = {v: sum(f.verdict is v for _, f in found) for v in Verdict}
+        text = ", ".join(f"{count} {v.value}" for v, count in counts.items() if count)
+        console.print(Text(f"\n{text}", style=STYLES[verdict]))
+    return BROKEN if verdict is Verdict.FAIL else FINE
+
+
+def _print(console: Console, finding: Finding) -> None:
+    """One line of what was found; where it is not OK one of what to do."""
+    line = Text.assemble(
+        (f"  {finding.verdict.value:<5}", STYLES[finding.verdict]),
+        f"{finding.check:<14}{finding.found}",
+    )
+    console.print(line, soft_wrap=True)
+    if finding.advice:
+        console.print(Text(f"{'':21}→ {finding.advice}", style="dim"), soft_wrap=True)

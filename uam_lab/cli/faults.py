@@ -1,0 +1,163 @@
+"""`uam faults`: every fault at every moment of the mission, and how it ends."""
+
+from __future__ import annotations
+
+import argparse
+import shlex
+import sys
+from pathlib import Path
+
+from uam_control.mission import ScenarioError, load_scenario
+from uam_control.profile import ProfileError, load_profile
+from uam_control.settings import configuration
+from uam_control.settings.configuration import ConfigurationError
+from uam_lab.campaign.pool import cores, fly_all
+from uam_lab.cli.counting import Counting
+from uam_lab.flight import settings as flight_settings
+from uam_lab.flight.settings import CLOCKS, ENGINES, SettingsError
+from uam_lab.results.result_folder import ResultFolderError, make_folder
+from uam_sim_bridge.faults import FaultError, catalogue
+from uam_sim_bridge.ports import PortError
+
+BROKEN, INTERRUPTED, WRONG_USE = 1, 130, 2
+EXAMPLES = """\
+examples:
+  uam faults                                 the matrix of config/campaign/faults.yaml
+  uam faults --list                          what there is, with parameters and ranges
+  uam faults --only motor_loss --moment transit
+  uam faults --matrix mine.yaml --profile asmc2
+  uam faults --matrix processes --engine ros --clock realtime --repeat 3
+  uam fly --fault motor_loss@pick+1:remaining=0.7      a single flight with a report of its own
+
+Left in --out: report.html with the matrix in colours, summary.md, flights.csv, faults.json,
+matrix.png. The same seed gives the same flights, but where processes are hindered. Exit status: 0,
+1 where a row of the matrix did not do what the file promises of it, 2 wrong use.
+"""
+
+
+def add(commands: argparse._SubParsersAction) -> None:
+    """Add the subcommand to the command line."""
+    parser = commands.add_parser(
+        "faults",
+        help="faults at every moment of the mission: what is survived, and how",
+        description="Fly the mission once for each fault and moment, and say how it ended.",
+        epilog=EXAMPLES,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    option = parser.add_argument
+    option("--list", action="store_true", help="say what faults there are, and fly nothing")
+    option(
+        "--matrix",
+        default="faults",
+        metavar="NAME|FILE",
+        help="faults and moments, as config/campaign/faults.yaml (default %(default)s)",
+    )
+    option(
+        "--only",
+        action="append",
+        default=[],
+        metavar="FAULT",
+        help="of the matrix only this fault; may be given again",
+    )
+    option(
+        "--moment",
+        action="append",
+        default=[],
+        metavar="NAME",
+        help="of the matrix only this moment; may be given again",
+    )
+    option("--scenario", metavar="NAME|FILE", help="default: that of the matrix")
+    option("--profile", default="s500", metavar="NAME|FILE", help="(default %(default)s)")
+    option("--engine", default="direct", metavar="ros|direct", help="(default %(default)s)")
+    option(
+        "--clock",
+        default="lockstep",
+        metavar="lockstep|realtime",
+        help="of the ROS engine (default %(default)s)",
+    )
+    option("--seed", type=int, default=1, metavar="N", help="of all noise (default %(default)s)")
+    option(
+        "--jobs",
+        type=int,
+        metavar="N",
+        help=f"flights at once (default: one per core, {cores()}; 1 with --engine ros)",
+    )
+    option(
+        "--repeat",
+        type=int,
+        default=1,
+        metavar="N",
+        help="fly each fault and moment so often (default %(default)s)",
+    )
+    option("--out", type=Path, metavar="DIR", help="result folder (default results/<time>-faults)")
+    parser.set_defaults(run=run)
+
+
+def run(options: argparse.Namespace) -> int:
+    """Fly as asked; returns the exit status."""
+    if options.list:
+        print(catalogue.listing())
+        return 0
+    try:
+        return campaign(options)
+    except (
+        ConfigurationError,
+        ProfileError,
+        ScenarioError,
+        FaultError,
+        SettingsError,
+        PortError,
+        ResultFolderError,
+        OSError,
+    ) as error:
+        print(f"uam faults: {error}", file=sys.stderr)
+        return WRONG_USE
+    except KeyboardInterrupt:
+        print("uam faults: interrupted", file=sys.stderr)
+        return INTERRUPTED
+
+
+def campaign(options: argparse.Namespace) -> int:
+    """Check, fly, then write everything; returns the exit status."""
+    from uam_lab.campaign import fault_matrix, fault_report, fault_trial
+
+    _check(options)
+    profile = load_profile(str(configuration.named("profiles", options.profile)))
+    file = configuration.named("campaign", options.matrix)
+    matrix = fault_matrix.read(file, options.engine, options.only, options.moment, options.scenario)
+    mass = load_scenario(matrix.scenario).payload_mass
+    trials = [
+        fault_trial.FaultTrial(
+            cell, matrix.scenario, profile, mass, options.seed, options.engine, options.clock
+        )
+        for cell in matrix.cells(options.seed, options.repeat)
+    ]
+    out = make_folder(options.out, "faults")
+    jobs = options.jobs or (1 if options.engine == "ros" else cores())
+    with Counting("faults", len(trials)) as counting:
+
+        def show(done: int, one: fault_trial.FaultResult) -> None:
+            moment = f", {one.moment}" if one.moment else ""
+            counting.show(done, f"{one.fault}{moment}: {one.outcome}")
+
+        results = fly_all(trials, jobs, fault_trial.fly, show)
+    command = shlex.join(["uam", *sys.argv[1:]])
+    summary, page = fault_report.write(out, matrix, results, command)
+    print(summary)
+    print(f"report   {page}")
+    return BROKEN if any(result.kept is False for result in results) else 0
+
+
+def _check(options: argparse.Namespace) -> None:
+    if options.seed < 0 or options.repeat < 1 or (options.jobs is not None and options.jobs < 1):
+        raise SettingsError("--jobs and --repeat are 1 or more, --seed 0 or more")
+    for name, value, allowed in (
+        ("engine", options.engine, ENGINES),
+        ("clock", options.clock, CLOCKS),
+    ):
+        if value not in allowed:
+            raise SettingsError(f"unknown {name} '{value}'; there are: {', '.join(allowed)}")
+    if options.engine == "direct" and options.clock == "realtime":
+        raise SettingsError("the direct engine has no clock: --clock realtime needs --engine ros")
+    if options.engine == "ros":
+        flight_settings.require_ros()

@@ -1,0 +1,47 @@
+"""The command `uam`: one module of this package per subcommand."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from collections.abc import Sequence
+
+from uam_lab.cli import campaign, compare, doctor, faults, fly, profile, report, tune, view
+
+# each has add(subparsers), which sets `run`: arguments → exit status
+COMMANDS = (fly, view, profile, report, compare, tune, campaign, faults, doctor)
+WRONG_USE = 2
+
+
+class OneLineParser(argparse.ArgumentParser):
+    """Says what is wrong in one line; the whole usage is for --help."""
+
+    def error(self, message: str) -> None:
+        """Print the line and exit with status 2."""
+        self.exit(WRONG_USE, f"{self.prog}: {message} (see {self.prog} --help)\n")
+
+
+def parser() -> argparse.ArgumentParser:
+    """The command line of `uam` with all its subcommands."""
+    top = OneLineParser(
+        prog="uam",
+        description="Flight control for aerial manipulators, and flights of it in simulation.",
+        epilog="uam <command> --help explains a command.",
+    )
+    commands = top.add_subparsers(dest="command", metavar="<command>", required=True)
+    for command in COMMANDS:
+        command.add(commands)
+    return top
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run the command line; returns the exit status."""
+    options = parser().parse_args(arguments)
+    try:
+        return options.run(options)
+    except BrokenPipeError:  # the reader of our output has gone, as in `uam fly | head`
+        return 1
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,95 @@
+"""`uam profile`: gives another profile to a flight while it flies."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from typing import Any
+
+from uam_control.profile import Profile, ProfileError, load_profile
+from uam_control.settings import configuration
+from uam_control.settings.configuration import ConfigurationError
+from uam_lab.flight.settings import SettingsError, require_ros
+from uam_sim_bridge.ports import INSTANCES, PortError, domain_of_flight
+
+CHANGED, REFUSED, WRONG_USE = 0, 1, 2
+EXAMPLES = """\
+examples:
+  uam profile mine.yaml                    the flight that is under way; all nodes take it, or none
+  uam profile s500 --instance 2            where several fly
+  ROS_DOMAIN_ID=5 uam profile mine.yaml    nodes that uam fly did not start
+  ros2 param dump /arm_controller > arm.yaml; uam profile s500 arm.yaml    the later one counts
+
+Adapted gains, filters and the attitude asked for stay as they are; the outputs move by what the new
+gains make of the same errors (docs/tuning.md). What changed is recorded in the log.
+"""
+
+
+def add(commands: argparse._SubParsersAction) -> None:
+    """Add the subcommand to the command line."""
+    parser = commands.add_parser(
+        "profile",
+        help="give another profile to a flight while it flies",
+        description="Give a whole profile to the nodes of a running flight: all of them take it, "
+        "or none does.",
+        epilog=EXAMPLES,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    option = parser.add_argument
+    option(
+        "profile",
+        nargs="+",
+        metavar="NAME|FILE",
+        help=f"{', '.join(configuration.names('profiles'))}, or a ROS parameter file",
+    )
+    option(
+        "--instance",
+        type=int,
+        metavar="N",
+        help=f"of the flight, 0..{INSTANCES - 1} (default: the one that is under way)",
+    )
+    parser.set_defaults(run=run)
+
+
+def run(options: argparse.Namespace) -> int:
+    """Switch as asked; returns the exit status."""
+    try:
+        require_ros()
+        given = [str(configuration.named("profiles", one)) for one in options.profile]
+        profile = load_profile(*given)
+        domain = domain_of_flight(options.instance)
+    except (ConfigurationError, ProfileError, PortError, SettingsError) as error:
+        print(f"uam profile: {error}", file=sys.stderr)
+        return WRONG_USE
+    return switch(profile, domain)
+
+
+def switch(profile: Profile, domain: int | None) -> int:
+    """Switch the nodes of a ROS domain, say what changed; returns the exit status."""
+    from uam_lab.flight.ros.profile_switch import ProfileSwitch, SwitchRefused
+    from uam_lab.processes.environment import transport_environment
+    from uam_lab.processes.guest import Guest
+
+    environment = {} if domain is None else transport_environment()  # of uam fly, or the user's
+    with Guest("uam_profile", environment, domain) as guest:
+        try:
+            changed = ProfileSwitch(guest.node).switch(profile)
+        except SwitchRefused as refusal:
+            print("uam profile: refused, nothing changed", file=sys.stderr)
+            for line in str(refusal).splitlines():
+                print(f"  {line}", file=sys.stderr)
+            return REFUSED
+    for node, values in changed.items():
+        for name, (old, new) in values.items():
+            print(f"{node}: {name}: {_text(old)} -> {_text(new)}")
+    count = sum(map(len, changed.values()))
+    print(
+        f"{profile.name} flies: {count} values changed"
+        if count
+        else f"{profile.name} flies already"
+    )
+    return CHANGED
+
+
+def _text(value: Any) -> str:
+    return ", ".join(f"{one:g}" for one in value) if isinstance(value, list) else str(value)

@@ -1,0 +1,124 @@
+"""`uam report`: figures and report of a recorded flight again, or of several over one another."""
+
+from __future__ import annotations
+
+import argparse
+import json
+import sys
+from pathlib import Path
+
+from uam_control.mission import ScenarioError
+from uam_control.settings.configuration import ConfigurationError
+from uam_lab.flight.settings import SettingsError, require_ros
+from uam_lab.results.result_folder import ResultFolderError, make_folder
+from uam_lab.results.timeseries import UnreadableFlight
+
+WRITTEN, WRONG_USE, INTERRUPTED = 0, 2, 130
+EXAMPLES = """\
+examples:
+  uam report results/latest                everything anew from its log.mcap, also of a flight that
+                                           was killed in the middle
+  uam report results/latest --out again    the folder itself stays as it is
+  uam report results/a results/b           both in the same figures
+"""
+
+
+def add(commands: argparse._SubParsersAction) -> None:
+    """Add the subcommand to the command line."""
+    parser = commands.add_parser(
+        "report",
+        help="figures and report again, from the log alone; of several flights together",
+        description="Rebuild table, metrics, figures and report of a flight from its log.mcap, or "
+        "draw several flights over one another.",
+        epilog=EXAMPLES,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    option = parser.add_argument
+    option("directories", nargs="+", type=Path, metavar="DIR", help="result folder of a flight")
+    option(
+        "--out",
+        type=Path,
+        metavar="DIR",
+        help="where to (default: the folder itself; of several results/<time>-report)",
+    )
+    option("--scenario", metavar="NAME|FILE", help="what was flown, for a log that does not say")
+    option("--no-video", action="store_true", help="leave out the video, which takes longest")
+    option("--no-pictures", action="store_true", help="leave out snapshots and video")
+    parser.set_defaults(run=run)
+
+
+def run(options: argparse.Namespace) -> int:
+    """Report as asked; returns the exit status."""
+    from uam_lab.recording.mcap_reader import UnreadableLog
+    from uam_lab.report.rebuild import NothingToReport
+
+    try:
+        return several(options) if len(options.directories) > 1 else one(options)
+    except (
+        NothingToReport,
+        UnreadableLog,
+        UnreadableFlight,
+        SettingsError,
+        ScenarioError,
+        ConfigurationError,
+        ResultFolderError,
+        OSError,
+    ) as error:
+        print(f"uam report: {error}", file=sys.stderr)
+        return WRONG_USE
+    except KeyboardInterrupt:
+        print("uam report: interrupted", file=sys.stderr)
+        return INTERRUPTED
+
+
+def one(options: argparse.Namespace) -> int:
+    """One flight: everything anew."""
+    from rich.console import Console
+
+    from uam_lab.report.build import build_report
+    from uam_lab.report.page.console import reporting, summary
+    from uam_lab.report.rebuild import LOG, NothingToReport, rebuild
+
+    (directory,) = options.directories
+    out = options.out or directory
+    if (directory / LOG).exists():
+        require_ros()
+        metrics = rebuild(directory, out, options.scenario)
+    elif options.out is None and (directory / "metrics.json").exists():  # of the direct engine
+        metrics = json.loads((directory / "metrics.json").read_text())
+    else:
+        raise NothingToReport(f"{directory} has no {LOG} to make a report of")
+    console = Console()
+    pictures = not options.no_pictures
+    with reporting(console) as say:
+        report = build_report(out, say, video=not options.no_video, pictures=pictures)
+    console.print(summary(metrics, out))
+    for note in [*_notes(out), report.problem]:
+        if note:
+            print(f"note: {note}")
+    return WRITTEN
+
+
+def several(options: argparse.Namespace) -> int:
+    """Several flights over one another."""
+    from rich.console import Console
+
+    from uam_lab.report.figures.panels import Flight
+    from uam_lab.report.page.console import reporting
+    from uam_lab.report.page.overlay import build_overlay, labelled
+    from uam_lab.report.rebuild import series_of
+
+    names = labelled(options.directories)
+    flights = [
+        Flight(name, series_of(directory))
+        for name, directory in zip(names, options.directories, strict=True)
+    ]
+    out = make_folder(options.out, "report")
+    with reporting(Console()) as say:
+        page = build_overlay(flights, out, say)
+    print(f"report: {page}")
+    return WRITTEN
+
+
+def _notes(directory: Path) -> list[str]:
+    return json.loads((directory / "info.json").read_text()).get("notes") or []

@@ -1,0 +1,101 @@
+"""What is plotted, and from which messages."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import Any
+
+import viser
+from geometry_msgs.msg import TwistStamped
+from sensor_msgs.msg import JointState
+from trajectory_msgs.msg import JointTrajectory
+
+from uam_lab.cockpit.strip_chart import Chart, StripChart
+from uam_msgs_py.messages import topics
+from uam_msgs_py.messages.topics import Topic
+
+XYZ, RPY, JOINTS = ("x", "y", "z"), ("roll", "pitch", "yaw"), ("alpha_1", "alpha_2")
+DEGREES = 180.0 / math.pi
+ADAPTATION = {
+    topics.POSITION_ADAPTATION: "position",
+    topics.ATTITUDE_ADAPTATION: "attitude",
+    topics.ARM_ADAPTATION: "arm",
+}
+
+
+class Charts:
+    """Three tabs of charts; `show` takes every message, `draw` sends what changed."""
+
+    def __init__(self, gui: viser.GuiApi, panel: viser.PanelHandle, window: float, interval: float):
+        """window [s] of time shown; interval [s] between samples."""
+        self._gui, self._window, self._interval = gui, window, interval
+        self._adaptation: dict[Topic, StripChart] = {}
+        with panel.add_tab("Errors", viser.Icon.CHART_LINE):
+            self._position = self._chart("Position error [cm]", XYZ)
+            self._attitude = self._chart("Attitude error [deg]", RPY)
+            self._arm = self._chart("Arm error [deg]", JOINTS)
+        with panel.add_tab("Inputs", viser.Icon.BOLT):
+            self._force = self._chart("tau_p [N, world]", XYZ)
+            self._torque = self._chart("tau_q [N m, body]", RPY)
+            self._effort = self._chart("tau_alpha [N m]", JOINTS)
+            self._thrust = self._chart("Thrust setpoint [0..1]", ("thrust",))
+            self._rates = self._chart("Body rate setpoint [deg/s]", XYZ)
+        self._adaptation_tab = panel.add_tab("Adaptation", viser.Icon.ADJUSTMENTS)
+
+    def _chart(self, title: str, names: Sequence[str], logarithmic: bool = False) -> StripChart:
+        chart = Chart(title, tuple(names), logarithmic)
+        return StripChart(self._gui, chart, self._window, self._interval)
+
+    def show(self, topic: Topic, message: Any) -> None:
+        """Take a message, if it is one that is plotted."""
+        if topic is topics.TRACKING_ERROR:
+            time, error = _time(message), message.position
+            self._position.add(time, [100.0 * value for value in error[0:3]])
+            self._attitude.add(time, [DEGREES * value for value in error[3:6]])
+            self._arm.add(time, [DEGREES * value for value in error[6:8]])
+        elif topic is topics.POSITION_COMMAND:
+            self._force.add(_time(message), _effort(message, 3))
+        elif topic is topics.ATTITUDE_COMMAND:
+            self._torque.add(_time(message), _effort(message, 3))
+        elif topic is topics.ARM_COMMAND:
+            self._effort.add(_time(message), _effort(message, 2))
+        elif topic is topics.SETPOINT:
+            time, rates = _time(message), message.twist.angular
+            self._thrust.add(time, [message.twist.linear.z])
+            self._rates.add(time, [DEGREES * value for value in (rates.x, rates.y, rates.z)])
+        elif topic in ADAPTATION:
+            self._adapted(topic, message)
+
+    def _adapted(self, topic: Topic, message: JointState) -> None:
+        """The gains go by the names that their law gives them."""
+        if topic not in self._adaptation:
+            with self._adaptation_tab:
+                title = f"Adapted gains, {ADAPTATION[topic]}"
+                self._adaptation[topic] = self._chart(title, message.name, logarithmic=True)
+        self._adaptation[topic].add(_time(message), list(message.position))
+
+    def draw(self) -> None:
+        """Send the page what is new."""
+        fixed = (
+            self._position,
+            self._attitude,
+            self._arm,
+            self._force,
+            self._torque,
+            self._effort,
+            self._thrust,
+            self._rates,
+        )
+        for chart in (*fixed, *self._adaptation.values()):
+            chart.draw()
+
+
+def _time(message: JointState | JointTrajectory | TwistStamped) -> float:
+    """The stamp [s]."""
+    return message.header.stamp.sec + 1e-9 * message.header.stamp.nanosec
+
+
+def _effort(message: JointTrajectory, count: int) -> list[float]:
+    """The first `count` efforts of a trajectory's point; none while nothing is commanded."""
+    return list(message.points[0].effort[:count]) if message.points else []

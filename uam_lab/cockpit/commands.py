@@ -1,0 +1,112 @@
+"""The buttons: what can be asked of mission and controllers, through their services."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import viser
+from std_srvs.srv import SetBool, Trigger
+
+from uam_control.profile import CONTROLLERS
+from uam_lab.cockpit.services import Services
+
+Later = Callable[[Callable[[], None]], None]
+
+
+@dataclass(frozen=True)
+class Button:
+    """A label, and the services called by it. on: what a SetBool gets, None for a Trigger.
+
+    ask: a question that is to be answered first, "" for none.
+    """
+
+    label: str
+    icon: str
+    services: tuple[str, ...]
+    hint: str
+    on: bool | None = None
+    ask: str = ""
+    colour: str | None = None
+
+
+def _each(service: str) -> tuple[str, ...]:
+    return tuple(f"/{name}/{service}" for name in CONTROLLERS)
+
+
+BUTTONS = (
+    Button("Hold", "PLAYER_PAUSE", ("/mission/hold",), "stop here and stay"),
+    Button("Resume", "PLAYER_PLAY", ("/mission/resume",), "go on with the scenario"),
+    Button("Land", "ARROW_BAR_TO_DOWN", ("/mission/land",), "land here", colour="orange"),
+    Button("Disarm", "POWER", ("/mission/disarm",), "motors off", colour="red",
+           ask="Motors off: a vehicle in the air falls. Disarm?"),
+    Button("Magnet on", "MAGNET", ("/mission/magnet",), "until the scenario switches it", on=True),
+    Button("Magnet off", "MAGNET_OFF", ("/mission/magnet",), "drops the payload", on=False),
+    Button("Freeze adaptation", "SNOWFLAKE", _each("freeze_adaptation"),
+           "adapted gains stay as they are", on=True),
+    Button("Free adaptation", "SNOWFLAKE_OFF", _each("freeze_adaptation"),
+           "adapted gains adapt again", on=False),
+    Button("Reset adaptation", "REFRESH", _each("reset_adaptation"),
+           "adapted gains back to their initial values"),
+)  # fmt: skip
+
+
+class Commands:
+    """Puts the buttons on the page. A click is worked on by whoever `later` gives it to."""
+
+    def __init__(
+        self, gui: viser.GuiApi, services: Services, later: Later, said: Callable[[bool, str], None]
+    ):
+        """said(whether it was done, what was answered)."""
+        self._gui, self._services, self._said = gui, services, said
+        self._handles = []
+        for button in BUTTONS:
+            handle = gui.add_button(
+                button.label,
+                icon=getattr(viser.Icon, button.icon),
+                hint=button.hint,
+                color=button.colour,
+            )
+            handle.on_click(lambda _, chosen=button: later(lambda: self._pressed(chosen)))
+            self._handles.append((button, handle))
+        self._later = later
+
+    def look(self) -> None:
+        """Only what somebody serves can be pressed."""
+        for button, handle in self._handles:
+            kind = Trigger if button.on is None else SetBool
+            there = any(self._services.ready(kind, name) for name in button.services)
+            if handle.disabled == there:
+                handle.disabled = not there
+
+    def _pressed(self, button: Button) -> None:
+        if not button.ask:
+            self._call(button)
+            return
+        with self._gui.add_modal(button.label) as modal:
+            self._gui.add_markdown(button.ask)
+            yes = self._gui.add_button(button.label, color=button.colour)
+            no = self._gui.add_button("Cancel")
+
+        def agreed(_: viser.GuiEvent) -> None:
+            modal.close()
+            self._later(lambda: self._call(button))
+
+        yes.on_click(agreed)
+        no.on_click(lambda _: modal.close())
+
+    def _call(self, button: Button) -> None:
+        kind = Trigger if button.on is None else SetBool
+        request = Trigger.Request() if button.on is None else SetBool.Request(data=button.on)
+        for name in button.services:
+            if self._services.ready(kind, name):
+                self._services.call(kind, name, request, self._answer(button, name))
+
+    def _answer(self, button: Button, name: str):
+        def answered(response: Trigger.Response | SetBool.Response | None, why: str) -> None:
+            done = response is not None and response.success
+            said = why or response.message or ("done" if done else "refused")
+            node = name.strip("/").partition("/")[0]
+            self._said(done, f"{button.label}: {node}: {said}")
+
+        return answered

@@ -1,0 +1,163 @@
+"""Fields and sliders for every parameter of a node; they show what flies, refusals as well."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from typing import Any
+
+import viser
+
+from uam_lab.cockpit.commands import Later
+from uam_lab.cockpit.entry import axes, reach, text_of, value_of
+from uam_lab.cockpit.remote_parameters import About, RemoteParameters
+
+OPEN = ("lambda_1", "lambda_2")  # what is tuned most: on top, and unfolded
+INTERVAL = 0.15  # [s] of wall time between two changes that a slider asks for
+Said = Callable[[bool, str], None]
+
+
+class ParameterEntry:
+    """One parameter: a folder with its meaning, a field, and a slider for each number."""
+
+    def __init__(
+        self, gui: viser.GuiApi, about: About, remote: RemoteParameters, later: Later, said: Said
+    ):
+        self._about, self._remote, self._later, self._said = about, remote, later, said
+        self._name = about.name
+        self._sent = 0.0
+        self._wanted: Any = None  # what sliders want, not asked for yet
+        value = remote.values[self._name]
+        self._folder = gui.add_folder(self._label(value), expand_by_default=self._name in OPEN)
+        self._sliders: list[viser.GuiSliderHandle] = []
+        with self._folder:
+            gui.add_markdown(f"{about.description}  \n{about.constraints}")
+            if isinstance(value, bool):
+                self._field: Any = gui.add_checkbox(self._name, value)
+                self._field.on_update(self._entered)
+            elif about.choices:
+                self._field = gui.add_dropdown(self._name, about.choices, initial_value=value)
+                self._field.on_update(self._entered)
+            else:
+                with gui.add_form(None) as form:
+                    self._field = gui.add_text(self._name, text_of(value), hint="Enter applies it")
+                form.on_submit(self._entered)
+                self._add_sliders(gui, value)
+            self._reason = gui.add_markdown("", visible=False)
+
+    def _label(self, value: Any) -> str:
+        return f"{self._name} = {text_of(value)}"
+
+    def _add_sliders(self, gui: viser.GuiApi, value: Any) -> None:
+        if isinstance(value, str):
+            return
+        entries = value if isinstance(value, list) else [value]
+        names = axes(self._about, len(entries)) if isinstance(value, list) else [self._name]
+        for name, entry in zip(names, entries, strict=True):
+            low, high, step = reach(self._about, float(entry))
+            slider = gui.add_slider(name, low, high, step, float(entry))
+            slider.on_update(self._slid)
+            self._sliders.append(slider)
+
+    def _entered(self, event: viser.GuiEvent) -> None:
+        if event.client is None:  # our own doing
+            return
+        text = self._field.value
+        self._later(lambda: self._ask_for(text))
+
+    def _ask_for(self, entered: Any) -> None:
+        old = self._remote.values[self._name]
+        try:
+            value = value_of(entered, old) if isinstance(entered, str) else entered
+        except ValueError as error:
+            self._refused(str(error))
+            return
+        self._set(value)
+
+    def _slid(self, event: viser.GuiEvent) -> None:
+        if event.client is None:
+            return
+        values = [slider.value for slider in self._sliders]
+        vector = isinstance(self._remote.values[self._name], list)
+        wanted = values if vector else values[0]
+
+        def note() -> None:
+            self._wanted = wanted
+
+        self._later(note)
+
+    def look(self) -> None:
+        """Ask for what the sliders want, not at each of their steps."""
+        if self._wanted is None or time.monotonic() - self._sent < INTERVAL:
+            return
+        wanted, self._wanted = self._wanted, None
+        self._set(wanted)
+
+    def _set(self, value: Any) -> None:
+        self._sent = time.monotonic()
+
+        def answered(why: str) -> None:
+            if why:
+                self._refused(why)
+                return
+            self._reason.visible = False
+            self.show(value)
+
+        self._remote.set({self._name: value}, answered)
+
+    def _refused(self, why: str) -> None:
+        self._reason.content = f"**refused**: {_escaped(why)}"
+        self._reason.visible = True
+        self._said(False, f"{self._remote.node}: {why}")
+        self.show(self._remote.values[self._name])
+
+    def show(self, value: Any) -> None:
+        """Show the value that flies."""
+        self._remote.values[self._name] = value
+        self._folder.label = self._label(value)
+        shown = value if isinstance(value, bool) or self._about.choices else text_of(value)
+        if self._field.value != shown:
+            self._field.value = shown
+        if self._wanted is not None:
+            return
+        entries = value if isinstance(value, list) else [value]
+        for slider, entry in zip(self._sliders, entries, strict=False):
+            slider.max, slider.min = max(slider.max, entry), min(slider.min, entry)
+            if abs(slider.value - entry) > 0.5 * slider.step:
+                slider.value = float(entry)
+
+
+class NodeGains:
+    """A tab with all parameters of a node that may change in flight."""
+
+    def __init__(
+        self,
+        gui: viser.GuiApi,
+        tab: viser.GuiTabHandle,
+        remote: RemoteParameters,
+        later: Later,
+        said: Said,
+    ):
+        """remote: loaded."""
+        self.remote = remote
+        self._entries: dict[str, ParameterEntry] = {}
+        with tab:
+            for name, about in sorted(remote.known.items(), key=lambda item: item[0] not in OPEN):
+                if not about.read_only and name in remote.values:
+                    self._entries[name] = ParameterEntry(gui, about, remote, later, said)
+
+    def look(self) -> None:
+        """Ask for what sliders want."""
+        for entry in self._entries.values():
+            entry.look()
+
+    def changed(self, values: dict[str, Any]) -> None:
+        """Show what somebody else has changed."""
+        for name, value in values.items():
+            if name in self._entries and value is not None:
+                self._entries[name].show(value)
+
+
+def _escaped(text: str) -> str:
+    """Text as markdown and HTML show it literally."""
+    return "".join(f"&#{ord(char)};" if char in "<>&*_`[]()#\\" else char for char in text)

@@ -1,0 +1,103 @@
+"""How the vehicle is, from what its nodes say: the facts behind the page's headline."""
+
+from __future__ import annotations
+
+import math
+import time
+from dataclasses import dataclass, field
+
+import numpy as np
+from diagnostic_msgs.msg import DiagnosticArray
+
+from uam_control.coordinates import ARM, ATTITUDE, POSITION
+from uam_control.supervision import State
+from uam_msgs_py.messages.status import ERROR, OK, STALE, WARN, AutopilotState, MissionStatus
+
+GOOD, CAUTION, BAD, UNKNOWN = "good", "caution", "bad", "unknown"
+LEVELS = {OK: GOOD, WARN: CAUTION, ERROR: BAD, STALE: CAUTION}
+ORDER = (UNKNOWN, GOOD, CAUTION, BAD)
+
+
+@dataclass
+class NodeHealth:
+    """What one node said last of itself; heard: time.monotonic() [s]."""
+
+    level: str
+    summary: str
+    heard: float
+
+
+@dataclass
+class Health:
+    """What was last heard; `silent_after` [s] of wall time counts as lost."""
+
+    silent_after: float
+    mission: MissionStatus | None = None
+    autopilot: AutopilotState | None = None
+    battery: float = math.nan  # 0..1
+    real_time_factor: str = ""
+    nodes: dict[str, NodeHealth] = field(default_factory=dict)
+    saturated: set[str] = field(default_factory=set)
+    frozen: set[str] = field(default_factory=set)
+    silence: float | None = None  # [s] of wall time without a word of the control loop
+    errors: tuple[float, float, float] = (math.nan,) * 3  # norms: [m], [rad], [rad]
+    _tracked: bool = False  # whether the errors come often, from /uam/tracking/error
+
+    def hear(self, mission: MissionStatus) -> None:
+        """Take the mission's status, twice a second."""
+        self.mission = mission
+        if not self._tracked:
+            self.errors = mission.position_error, mission.attitude_error, mission.arm_error
+
+    def track(self, error: np.ndarray) -> None:
+        """Take estimate - reference, chi (8,)."""
+        self._tracked = True
+        self.errors = tuple(float(np.linalg.norm(error[p])) for p in (POSITION, ATTITUDE, ARM))
+
+    def diagnose(self, message: DiagnosticArray) -> None:
+        """Take a message of /diagnostics."""
+        for status in message.status:
+            level = LEVELS.get(status.level, BAD)
+            self.nodes[status.name] = NodeHealth(level, status.message, time.monotonic())
+            for pair in status.values:
+                if pair.key == "real time factor":
+                    self.real_time_factor = pair.value
+                elif pair.key == "saturated":
+                    change = set.add if pair.value == "True" else set.discard
+                    change(self.saturated, status.name)
+
+    def state(self) -> tuple[str, str, str]:
+        """How the flight is: level, a few words, and why, "" where there is nothing to say."""
+        mission, silence = self.mission, self.silence
+        if mission is None or silence is None:
+            return UNKNOWN, "waiting for a flight", ""
+        if mission.done:
+            return BAD if mission.abort_reason else GOOD, "flight over", mission.abort_reason
+        if silence > self.silent_after:
+            return BAD, f"no signal for {silence:.0f} s", ""
+        if mission.state == State.FAILSAFE.value:
+            return BAD, mission.state, mission.cause
+        if mission.abort_reason:
+            return BAD, mission.phase, mission.abort_reason
+        if mission.state == State.HOLDING.value:
+            return CAUTION, mission.state, mission.cause
+        return GOOD, mission.phase, ""
+
+    def ailing(self) -> list[tuple[str, str, str]]:
+        """(node, level, what is wrong) of nodes that are not well, worst first."""
+        found = []
+        for name, node in self.nodes.items():
+            gone = time.monotonic() - node.heard
+            if gone > self.silent_after:
+                found.append((name, BAD, f"silent for {gone:.0f} s"))
+            elif node.level != GOOD:
+                found.append((name, node.level, node.summary))
+        return sorted(found, key=lambda one: -ORDER.index(one[1]))
+
+
+def grade(value: float, caution: float, bad: float) -> str:
+    """The level of a value that is better the smaller; the larger where caution > bad."""
+    if not math.isfinite(value):
+        return UNKNOWN
+    worse = value.__ge__ if caution < bad else value.__le__
+    return BAD if worse(bad) else CAUTION if worse(caution) else GOOD

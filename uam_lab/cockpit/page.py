@@ -1,0 +1,184 @@
+"""The page: headline and buttons left, the scene, charts and gains right."""
+
+from __future__ import annotations
+
+import math
+import queue
+import time
+from collections import deque
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import viser
+
+from uam_lab.cockpit.charts import Charts
+from uam_lab.cockpit.commands import Commands
+from uam_lab.cockpit.gains import NodeGains
+from uam_lab.cockpit.headline import headline
+from uam_lab.cockpit.health import Health
+from uam_lab.cockpit.remote_parameters import RemoteParameters
+from uam_lab.cockpit.services import Services
+from uam_lab.cockpit.vehicle_view import VehicleView
+from uam_lab.cockpit.watch import Watch
+from uam_msgs_py.messages import topics
+from uam_msgs_py.messages.changes import Change
+from uam_msgs_py.messages.layouts import BadMessage
+from uam_msgs_py.messages.status import AutopilotState, MissionStatus
+from uam_msgs_py.messages.topics import Topic
+from uam_msgs_py.messages.transforms import read_transforms
+
+# nodes whose parameters are shown, and what their tabs are called
+TUNED = {
+    "position_controller": "Position",
+    "attitude_controller": "Attitude",
+    "arm_controller": "Arm",
+    "state_estimator": "Estimator",
+    "mission": "Mission",
+    "mavlink_bridge": "Bridge",
+}
+LINES = 6  # answers and changes kept on the page
+RETRY = 2.0  # [s] of wall time between two looks for nodes and services
+LEFT_WIDTH, RIGHT_WIDTH = 330, 400  # [px]
+
+
+class Page:
+    """One page for one ROS domain; `look` is called again and again, by one thread."""
+
+    def __init__(
+        self, server: viser.ViserServer, watch: Watch, services: Services, options: dict[str, Any]
+    ):
+        """options: config/views/cockpit.yaml."""
+        self._server, self._options = server, options
+        self._todo: queue.SimpleQueue[Callable[[], None]] = queue.SimpleQueue()
+        self._watch, self._services = watch, services
+        self._health = Health(options["silent_after"])
+        self._lines: deque[str] = deque(maxlen=LINES)
+        self._gains: dict[str, NodeGains] = {}
+        self._asked: set[str] = set()
+        self._due = dict.fromkeys(("charts", "nodes"), 0.0)
+
+        gui, camera = server.gui, options["camera"]
+        server.initial_camera.position = tuple(camera["position"])
+        server.initial_camera.look_at = tuple(camera["look_at"])
+        gui.configure_theme(show_logo=False, show_share_button=False)
+        self._view = VehicleView(server.scene)
+        self._headline = gui.add_html("")
+        self._shown = ""
+        with gui.add_folder("Commands"):
+            self._commands = Commands(gui, self._services, self._todo.put, self.say)
+        self._follow = gui.add_checkbox("Camera follows the vehicle", False)
+        self._answers = gui.add_markdown("")
+        self._followed = np.zeros(3)
+        gui.main_panel.dock_left()
+        gui.main_panel.set_width(LEFT_WIDTH)
+        self._panel = gui.add_panel()
+        self._charts = Charts(gui, self._panel, options["window"], options["sample_interval"])
+        self._panel.dock_right()
+        self._panel.set_width(RIGHT_WIDTH)
+        self._tabs = {name: self._panel.add_tab(title) for name, title in TUNED.items()}
+
+    def look(self) -> None:
+        """Show what is new, and do what was clicked."""
+        while not self._todo.empty():
+            self._todo.get()()
+        self._services.look()
+        with self._server.atomic():
+            self._watch.look(self._show)
+            self._move_cameras()
+        now = time.monotonic()
+        for gains in self._gains.values():
+            gains.look()
+        if now >= self._due["charts"]:
+            self._due["charts"] = now + self._options["chart_period"]
+            self._charts.draw()
+            self._tell()
+        if now >= self._due["nodes"]:
+            self._due["nodes"] = now + RETRY
+            self._commands.look()
+            self._find_nodes()
+
+    def say(self, done: bool, text: str) -> None:
+        """Put a line among the answers; at once before everyone's eyes if it is bad."""
+        self._lines.appendleft(text)
+        self._answers.content = "\n\n".join(self._lines)
+        if not done:
+            for client in self._server.get_clients().values():
+                client.add_notification("Refused", text, auto_close_seconds=8.0, color="red")
+
+    def _tell(self) -> None:
+        self._health.silence = self._watch.silence
+        shown = headline(self._health, self._options)
+        if shown != self._shown:
+            self._headline.content = self._shown = shown
+
+    def _show(self, topic: Topic, message: Any) -> None:
+        try:
+            self._take(topic, message)
+        except BadMessage as error:
+            self.say(False, f"{topic.name}: {error}")
+
+    def _take(self, topic: Topic, message: Any) -> None:
+        health = self._health
+        if topic is topics.MISSION_STATUS:
+            health.hear(MissionStatus.from_message(message)[1])
+        elif topic is topics.AUTOPILOT_STATE:
+            health.autopilot = AutopilotState.from_message(message)[1]
+        elif topic is topics.CHANGES:
+            self._changed(Change.from_message(message)[1])
+        elif topic is topics.DIAGNOSTICS:
+            health.diagnose(message)
+        elif topic is topics.AUTOPILOT_BATTERY:
+            health.battery = message.percentage
+        elif topic is topics.ROBOT_DESCRIPTION:
+            self._view.describe(message)
+        elif topic in (topics.TF, topics.TF_STATIC):
+            self._view.transforms(read_transforms(message))
+        elif topic is topics.MARKERS:
+            self._view.markers(message)
+        else:
+            self._charts.show(topic, message)
+        if topic is topics.TRACKING_ERROR:
+            health.track(np.array(message.position))
+
+    def _changed(self, change: Change) -> None:
+        """Somebody asked a node for a change, perhaps this page."""
+        if not change.accepted:
+            return
+        new = {name: values[1] for name, values in change.values.items()}
+        for name, value in new.items():
+            self.say(True, f"{change.node}: {name} = {value}")
+        if "adapt" in new:
+            mark = self._health.frozen.discard if new["adapt"] else self._health.frozen.add
+            mark(change.node)
+        if change.node in self._gains:
+            self._gains[change.node].changed(new)
+
+    def _find_nodes(self) -> None:
+        """Show the parameters of nodes that have come."""
+        for name in TUNED:
+            if name in self._asked:
+                continue
+            remote = RemoteParameters(self._services, name)
+            if remote.is_there:
+                self._asked.add(name)
+                remote.load(lambda why, remote=remote: self._loaded(remote, why))
+
+    def _loaded(self, remote: RemoteParameters, why: str) -> None:
+        if why:
+            self._asked.discard(remote.node)
+            return
+        frozen = remote.values.get("adapt") is False
+        if frozen:
+            self._health.frozen.add(remote.node)
+        gui, tab = self._server.gui, self._tabs[remote.node]
+        self._gains[remote.node] = NodeGains(gui, tab, remote, self._todo.put, self.say)
+
+    def _move_cameras(self) -> None:
+        moved = self._view.vehicle - self._followed
+        self._followed = self._view.vehicle
+        if not self._follow.value or not math.isfinite(moved.sum()) or not moved.any():
+            return
+        for client in self._server.get_clients().values():
+            client.camera.position = client.camera.position + moved
+            client.camera.look_at = client.camera.look_at + moved

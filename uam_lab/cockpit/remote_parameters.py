@@ -1,0 +1,111 @@
+"""The parameters of another node: what they are, what they are set to, and changes to them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+from rcl_interfaces.msg import ParameterDescriptor
+from rcl_interfaces.srv import (
+    DescribeParameters,
+    GetParameters,
+    ListParameters,
+    SetParametersAtomically,
+)
+from rclpy.parameter import Parameter
+
+from uam_control.settings.parameter_file import ROS_OWN
+from uam_lab.cockpit.services import Answer, Services
+from uam_msgs_py.node.node_parameters import plain
+
+
+@dataclass(frozen=True)
+class About:
+    """What a node says of one parameter. choices: the words allowed, () where it is no word."""
+
+    name: str
+    description: str
+    constraints: str
+    choices: tuple[str, ...]
+    low: float | None
+    high: float | None
+    read_only: bool
+
+
+class RemoteParameters:
+    """Parameters of one node. `known` holds them once `load` has been answered."""
+
+    def __init__(self, services: Services, node: str):
+        self.node = node
+        self.known: dict[str, About] = {}
+        self.values: dict[str, Any] = {}
+        self._services = services
+
+    def _call(self, kind: type, service: str, request: Any, answer: Answer) -> None:
+        self._services.call(kind, f"/{self.node}/{service}", request, answer)
+
+    @property
+    def is_there(self) -> bool:
+        """Whether the node offers its parameters."""
+        return self._services.ready(ListParameters, f"/{self.node}/list_parameters")
+
+    def load(self, done: Callable[[str], None]) -> None:
+        """Ask for everything; done("") when it is there, or done(why not)."""
+
+        def listed(response: ListParameters.Response | None, why: str) -> None:
+            if why:
+                done(why)
+                return
+            names = sorted(n for n in response.result.names if not n.startswith(ROS_OWN))
+            request = DescribeParameters.Request(names=names)
+            self._call(DescribeParameters, "describe_parameters", request, described)
+
+        def described(response: DescribeParameters.Response | None, why: str) -> None:
+            if why:
+                done(why)
+                return
+            self.known = {one.name: _about(one) for one in response.descriptors}
+            self.refresh(done)
+
+        self._call(ListParameters, "list_parameters", ListParameters.Request(), listed)
+
+    def refresh(self, done: Callable[[str], None]) -> None:
+        """Ask for the values anew."""
+        names = list(self.known)
+
+        def got(response: GetParameters.Response | None, why: str) -> None:
+            if not why:
+                for name, value in zip(names, response.values, strict=True):
+                    self.values[name] = plain(value)
+            done(why)
+
+        self._call(GetParameters, "get_parameters", GetParameters.Request(names=names), got)
+
+    def set(self, changes: Mapping[str, Any], done: Callable[[str], None]) -> None:
+        """Ask for changes as a whole; done("") when they count, or done(the reason)."""
+
+        def answered(response: SetParametersAtomically.Response | None, why: str) -> None:
+            if not why and not response.result.successful:
+                why = response.result.reason or "refused without a reason"
+            if not why:
+                self.values.update(changes)
+            done(why)
+
+        messages = [Parameter(name, value=v).to_parameter_msg() for name, v in changes.items()]
+        request = SetParametersAtomically.Request(parameters=messages)
+        self._call(SetParametersAtomically, "set_parameters_atomically", request, answered)
+
+
+def _about(said: ParameterDescriptor) -> About:
+    span = said.floating_point_range
+    _, marked, words = said.additional_constraints.partition("one of: ")
+    return About(
+        said.name,
+        said.description,
+        said.additional_constraints,
+        tuple(words.split(", ")) if marked else (),
+        span[0].from_value if span else None,
+        span[0].to_value if span else None,
+        said.read_only,
+    )

@@ -1,0 +1,122 @@
+"""The 3-D scene: frames of /tf, the robot's shapes in them, and the markers."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import viser
+from std_msgs.msg import String
+from visualization_msgs.msg import Marker, MarkerArray
+
+from uam_lab.cockpit.urdf_shapes import Shape, shapes
+from uam_msgs_py.messages.topics import WORLD
+from uam_msgs_py.messages.transforms import Transform
+
+REFERENCE = "reference"  # the frame that the mission asks for
+GROUND = 12.0  # [m] edge of the floor shown
+CELL = 0.25  # [m]
+AXES = 0.12  # [m] of the reference frame
+
+
+class VehicleView:
+    """Keeps viser's scene like the last messages. Frames appear when their parents are known."""
+
+    def __init__(self, scene: viser.SceneApi):
+        self._scene = scene
+        self._paths: dict[str, str] = {WORLD: f"/{WORLD}"}
+        self._frames: dict[str, viser.FrameHandle] = {}
+        self._orphans: dict[str, Transform] = {}  # by child: the newest whose parent is unknown
+        self._shapes: dict[str, list[Shape]] = {}
+        self._markers: dict[str, Any] = {}
+        self._lines: dict[str, bytes] = {}
+        self.vehicle = np.zeros(3)  # position [m, world] of the frame that hangs on the world first
+        scene.add_grid(
+            f"/{WORLD}/ground", width=GROUND, height=GROUND, cell_size=CELL, section_size=1.0
+        )
+
+    def describe(self, message: String) -> None:
+        """std_msgs/String: the URDF."""
+        by_link: dict[str, list[Shape]] = {}
+        for shape in shapes(message.data):
+            by_link.setdefault(shape.link, []).append(shape)
+        self._shapes = by_link
+        for link in by_link:
+            if link in self._frames:
+                self._dress(link)
+
+    def transforms(self, transforms: list[Transform]) -> None:
+        """What /tf or /tf_static says."""
+        for transform in transforms:
+            self._orphans[transform.child] = transform
+        placed = True
+        while placed:
+            placed = [c for c, t in self._orphans.items() if t.parent in self._paths]
+            for child in placed:
+                self._place(child, self._orphans.pop(child))
+
+    def _place(self, child: str, transform: Transform) -> None:
+        position, wxyz = transform.position, transform.quaternion
+        if not np.isfinite(position.sum() + wxyz.sum()):
+            return
+        if child not in self._frames:
+            path = self._paths[child] = f"{self._paths[transform.parent]}/{child}"
+            self._frames[child] = self._scene.add_frame(
+                path, show_axes=child == REFERENCE, axes_length=AXES, axes_radius=AXES / 24.0
+            )
+            self._dress(child)
+        frame = self._frames[child]
+        frame.position, frame.wxyz = position, wxyz
+        if transform.parent == WORLD and child in self._shapes:
+            self.vehicle = position
+
+    def _dress(self, link: str) -> None:
+        for number, shape in enumerate(self._shapes.get(link, ())):
+            name = f"{self._paths[link]}/shape_{number}"
+            look = {
+                "color": tuple(round(255 * part) for part in shape.colour[:3]),
+                "opacity": shape.colour[3] if shape.colour[3] < 1.0 else None,
+                "position": shape.position,
+                "wxyz": shape.quaternion,
+            }
+            if shape.kind == "box":
+                self._scene.add_box(name, dimensions=tuple(shape.size), **look)
+            elif shape.kind == "cylinder":
+                radius, length = shape.size
+                self._scene.add_cylinder(name, radius=radius, height=length, **look)
+            else:
+                self._scene.add_icosphere(name, radius=shape.size[0], **look)
+
+    def markers(self, message: MarkerArray) -> None:
+        """visualization_msgs/MarkerArray, as far as the stack's scene node uses it."""
+        for marker in message.markers:
+            name, frame = marker.ns, marker.header.frame_id
+            if marker.action == Marker.DELETE:
+                if name in self._markers:
+                    self._markers.pop(name).remove()
+                    self._lines.pop(name, None)
+            elif frame in self._paths:
+                self._show(f"{self._paths[frame]}/{name.replace(' ', '_')}", marker)
+
+    def _show(self, path: str, marker: Marker) -> None:
+        name, at, scale, paint = marker.ns, marker.pose.position, marker.scale, marker.color
+        colour = tuple(round(255 * part) for part in (paint.r, paint.g, paint.b))
+        position = (at.x, at.y, at.z)
+        look = {"color": colour, "opacity": paint.a, "position": position}
+        if marker.type == Marker.LINE_STRIP:
+            points = np.array([[p.x, p.y, p.z] for p in marker.points], dtype=np.float32)
+            if self._lines.get(name) == points.tobytes():
+                return
+            self._lines[name] = points.tobytes()
+            segments = np.stack([points[:-1], points[1:]], axis=1)
+            self._markers[name] = self._scene.add_line_segments(
+                path, points=segments, colors=colour, line_width=3.0
+            )
+        elif marker.type == Marker.CUBE:
+            edges = (scale.x, scale.y, scale.z)
+            self._markers[name] = self._scene.add_box(path, dimensions=edges, **look)
+        elif marker.type == Marker.CYLINDER:
+            size = {"radius": scale.x / 2.0, "height": scale.z}
+            self._markers[name] = self._scene.add_cylinder(path, **size, **look)
+        elif marker.type == Marker.TEXT_VIEW_FACING:
+            self._markers[name] = self._scene.add_label(path, marker.text, position=position)

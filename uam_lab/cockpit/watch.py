@@ -1,0 +1,85 @@
+"""The newest message of each topic that the page shows: taken when looked at, not called back."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from typing import Any
+
+from rclpy.node import Node
+from rclpy.qos import QoSProfile
+
+from uam_msgs_py.messages import topics
+from uam_msgs_py.messages.topics import Topic
+from uam_msgs_py.node.polling import listen, messages
+
+# Before the first tick of a simulated flight every publisher of the control loop counts its
+# listeners. So that this one never stands in for another it listens to these from the start only,
+# and to the others when the mission has begun.
+EARLY = (
+    topics.MISSION_STATUS,
+    topics.AUTOPILOT_STATE,
+    topics.DIAGNOSTICS,
+    topics.CHANGES,
+    topics.ROBOT_DESCRIPTION,
+    topics.TF,
+    topics.TF_STATIC,
+    topics.MARKERS,
+)
+LATE = (
+    topics.TRACKING_ERROR,
+    topics.SETPOINT,
+    topics.POSITION_COMMAND,
+    topics.ATTITUDE_COMMAND,
+    topics.ARM_COMMAND,
+    topics.POSITION_ADAPTATION,
+    topics.ATTITUDE_ADAPTATION,
+    topics.ARM_ADAPTATION,
+    topics.AUTOPILOT_BATTERY,
+    topics.CLOCK,
+)
+SERIALIZED = (topics.TF, topics.TF_STATIC)  # where tf2_msgs is not installed there is no other way
+WHOLE = (topics.DIAGNOSTICS, topics.CHANGES, topics.TF, topics.TF_STATIC)  # each message counts
+
+
+class Watch:
+    """Looks at the topics through `node`, which nobody spins."""
+
+    def __init__(self, node: Node):
+        self._node = node
+        self._late = False
+        self._subscriptions: dict[Topic, Any] = {}
+        self._arrivals: dict[Topic, float] = {}
+        for topic in EARLY:
+            self._listen(topic)
+
+    def _listen(self, topic: Topic) -> None:
+        qos: QoSProfile = topic.qos if topic in EARLY else topics.NEWEST
+        self._subscriptions[topic] = listen(self._node, topic, qos, raw=topic in SERIALIZED)
+
+    def look(self, show: Callable[[Topic, Any], None]) -> None:
+        """show(topic, message) for what is new: all of WHOLE, of the others the newest."""
+        for topic, subscription in self._subscriptions.items():
+            newest = None
+            for message in messages(subscription):
+                if topic in WHOLE:
+                    show(topic, message)
+                newest = message
+            if newest is None:
+                continue
+            self._arrivals[topic] = time.monotonic()
+            if topic not in WHOLE:
+                show(topic, newest)
+        if topics.MISSION_STATUS in self._arrivals and not self._late:
+            self._late = True
+            for topic in LATE:
+                self._listen(topic)
+
+    @property
+    def silence(self) -> float | None:
+        """Seconds of wall time since the last message of the control loop; None before the first.
+
+        What nodes say of themselves does not count.
+        """
+        arrivals = [at for topic, at in self._arrivals.items() if topic not in WHOLE]
+        return time.monotonic() - max(arrivals) if arrivals else None

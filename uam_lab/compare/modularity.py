@@ -1,0 +1,150 @@
+"""Modularity made visible: one subsystem's gains are changed, the other two laws do not notice.
+
+Two questions, two answers. What is untouched: the controllers are run again along the recorded
+flight (same states, same references), once with the flying parameters and once with one set
+changed; the outputs and adapted gains of the other two must not differ in a single bit. What it
+does: the changed vehicle flies, and all errors are reported.
+"""
+
+from __future__ import annotations
+
+import copy
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from uam_control.control.controllers import ArmController, AttitudeController, PositionController
+from uam_control.coordinates import COORDINATES, SIZE
+from uam_control.profile import Profile, profile_of
+from uam_lab.campaign.trial import ERRORS, Result, Trial
+from uam_lab.results import timeseries
+from uam_lab.results.timeseries import Series
+
+SUBSYSTEMS = {
+    "position": ("position_controller", PositionController),
+    "attitude": ("attitude_controller", AttitudeController),
+    "arm": ("arm_controller", ArmController),
+}
+FACTOR = 0.8  # on lambda_1 and lambda_2 of the changed subsystem
+
+
+@dataclass(frozen=True)
+class Untouched:
+    """Largest difference of output and adapted gains of each subsystem, over a replayed flight."""
+
+    changed: str
+    differences: dict[str, float]
+
+    @property
+    def holds(self) -> bool:
+        """Whether the others did exactly what they did before, and the changed one did not."""
+        return all((d > 0.0) == (name == self.changed) for name, d in self.differences.items())
+
+
+def changed(profile: Profile, subsystem: str, factor: float = FACTOR) -> Profile:
+    """The profile with one subsystem's feedback gains multiplied by `factor`."""
+    sections = copy.deepcopy(profile.sections)
+    section = sections[SUBSYSTEMS[subsystem][0]]
+    for name in ("lambda_1", "lambda_2"):
+        section[name] = [factor * value for value in section[name]]
+    return profile_of(sections, Path(f"{profile.name}_{subsystem}.yaml"))
+
+
+def trials(profile: Profile, payload_mass: float, seed: int, keep: Path) -> list[Trial]:
+    """The flight as it is (its series goes to `keep`), then one with each subsystem changed."""
+    return [
+        Trial("as it is", profile, payload_mass, seed, keep=keep),
+        *(
+            Trial(f"{name} gains x {FACTOR:g}", changed(profile, name), payload_mass, seed)
+            for name in SUBSYSTEMS
+        ),
+    ]
+
+
+def untouched(profile: Profile, series: Series, period: float) -> list[Untouched]:
+    """Replay the flight with each subsystem changed in turn. period: of the control [s]."""
+    plain = _replay(profile, series, period)
+    found = []
+    for name in SUBSYSTEMS:
+        other = _replay(changed(profile, name), series, period)
+        found.append(
+            Untouched(
+                name, {key: float(np.max(np.abs(plain[key] - other[key]))) for key in SUBSYSTEMS}
+            )
+        )
+    return found
+
+
+def _replay(profile: Profile, series: Series, period: float) -> dict[str, np.ndarray]:
+    """Outputs and adaptation of the three controllers along the recorded states and references."""
+    rows = np.flatnonzero(series.flown)
+    states = series.block("estimate.")[rows].reshape(-1, 3, SIZE)
+    references = series.block("reference.")[rows].reshape(-1, 3, SIZE)
+    attitude = slice(COORDINATES.index("roll"), COORDINATES.index("yaw") + 1)
+    controllers = {name: kind(profile.sets[node]) for name, (node, kind) in SUBSYSTEMS.items()}
+    out: dict[str, list[np.ndarray]] = {name: [] for name in controllers}
+    for state, reference in zip(states, references, strict=True):
+        asked = np.ascontiguousarray(reference[:, attitude])
+        for name, controller in controllers.items():
+            inputs = (True,) if name == "position" else (asked, True)
+            tau = controller.update(state, reference, *inputs, period)
+            out[name].append(np.concatenate([tau, controller.adaptation]))
+    return {name: np.array(values) for name, values in out.items()}
+
+
+@dataclass(frozen=True)
+class Evidence:
+    """Both answers."""
+
+    flights: tuple[Result, ...]
+    replays: tuple[Untouched, ...]
+
+    @classmethod
+    def of(cls, profile: Profile, series: Path, flights: Sequence[Result]) -> Evidence:
+        """From the recorded flight `series` and the results of `trials`."""
+        flight = timeseries.read(series)
+        period = float(np.median(np.diff(flight.time)))
+        return cls(tuple(flights), tuple(untouched(profile, flight, period)))
+
+    @property
+    def claim(self) -> str:
+        """What is found, in a sentence."""
+        if all(replay.holds for replay in self.replays):
+            return (
+                "Changing one subsystem's gains leaves the other two laws and their adapted "
+                "gains untouched: not one bit differs along the same flight."
+            )
+        broken = [replay.changed for replay in self.replays if not replay.holds]
+        return f"Changing the gains of {', '.join(broken)} is felt by another subsystem's law."
+
+    def tables(self) -> list[tuple[list[str], list[list[str]]]]:
+        """(head, rows) of the two tables."""
+        replays = [
+            [
+                replay.changed,
+                *(f"{replay.differences[name]:.3g}" for name in SUBSYSTEMS),
+                "yes" if replay.holds else "no",
+            ]
+            for replay in self.replays
+        ]
+        flights = [
+            [
+                flight.label,
+                *(f"{value:.3g}" for value in flight.rms),
+                "yes" if flight.completed else "no",
+            ]
+            for flight in self.flights
+        ]
+        return [
+            (
+                [
+                    "gains changed of",
+                    *(f"largest change of {name}" for name in SUBSYSTEMS),
+                    "others untouched",
+                ],
+                replays,
+            ),
+            (["RMS error [m, deg]", *ERRORS, "completed"], flights),
+        ]

@@ -1,0 +1,96 @@
+"""Which flights a comparison is made of."""
+
+from __future__ import annotations
+
+import copy
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from uam_control.laws import catalogue
+from uam_control.profile import CONTROLLERS, Profile, load_profile, profile_of
+from uam_lab.campaign.trial import Trial
+
+POSITION = "position_controller"
+PROPOSED = "proposed"
+ASMC1, ASMC2 = catalogue.label("asmc1"), catalogue.label("asmc2")
+FROZEN = "proposed, adaptation frozen"
+VERBATIM, WITH_WEIGHT = "Table I verbatim", "Table I and the weight"
+PAYLOADS = (0.1, 0.2, 0.3)  # [kg]
+
+
+# What the command line calls the rows: the paper's three controllers in its order, then what else
+# the reader should see.
+ROWS = {
+    "asmc1": ASMC1,
+    "asmc2": ASMC2,
+    "proposed": PROPOSED,
+    "frozen": FROZEN,
+    "table1": VERBATIM,
+    "table1_weight": WITH_WEIGHT,
+}
+
+
+@dataclass(frozen=True)
+class Entry:
+    """One row of the tables."""
+
+    label: str
+    profile: Profile
+
+
+def entries(names: Sequence[str] = tuple(ROWS)) -> tuple[Entry, ...]:
+    """Return the rows of these `names`, keys of ROWS."""
+    proposed, verbatim = load_profile("s500"), load_profile("paper_table1")
+    profiles = {
+        ASMC1: load_profile("asmc1"),
+        ASMC2: load_profile("asmc2"),
+        PROPOSED: proposed,
+        FROZEN: frozen(proposed),
+        VERBATIM: verbatim,
+        WITH_WEIGHT: with_weight(verbatim, proposed),
+    }
+    return tuple(Entry(ROWS[name], profiles[ROWS[name]]) for name in names)
+
+
+def frozen(profile: Profile) -> Profile:
+    """The same profile with the adapted gains kept at their initial values."""
+    sections = copy.deepcopy(profile.sections)
+    for node in CONTROLLERS:
+        sections[node]["adapt"] = False
+    return profile_of(sections, Path(f"{profile.name}_frozen.yaml"))
+
+
+def with_weight(profile: Profile, other: Profile) -> Profile:
+    """The same profile with the weight that `other` adds to tau_p, without which nothing flies."""
+    name = "gravity_feedforward_mass"
+    sections = copy.deepcopy(profile.sections)
+    sections[POSITION][name] = other.sections[POSITION][name]
+    return profile_of(sections, Path(f"{profile.name}_weight.yaml"))
+
+
+def middle(payloads: Sequence[float]) -> float:
+    """The payload of the flights that are shown."""
+    return payloads[len(payloads) // 2]
+
+
+def trials(
+    rows: Sequence[Entry], payloads: Sequence[float], seeds: Sequence[int], folder: Path
+) -> list[Trial]:
+    """Every row over every payload and seed. Those that the figures show keep their series.
+
+    The figures show the middle payload and the first seed.
+    """
+    shown = middle(payloads), seeds[0]
+    return [
+        Trial(
+            row.label,
+            row.profile,
+            mass,
+            seed,
+            keep=folder / f"{number}.parquet" if (mass, seed) == shown else None,
+        )
+        for number, row in enumerate(rows)
+        for mass in payloads
+        for seed in seeds
+    ]

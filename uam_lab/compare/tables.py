@@ -1,0 +1,175 @@
+"""From the figures of many flights to the paper's three tables."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.stats import t as student
+
+from uam_lab.campaign.trial import ERRORS, Result
+from uam_lab.compare.plan import ASMC1, ASMC2, PROPOSED
+from uam_lab.report.facts import paper
+
+CONFIDENCE = 0.95
+# Tables II to IV of the paper, in the order of ERRORS: m, m, m, deg ...
+PAPER = {
+    ASMC1: (0.15, 0.08, 0.31, 5.98, 5.33, 8.26, 2.29, 2.34),
+    ASMC2: (0.09, 0.05, 0.22, 4.83, 4.74, 5.04, 1.81, 1.73),
+    PROPOSED: tuple(value for group in paper.RMS.values() for value in group),
+}
+AIM = (0.025, 0.010, 0.045, 1.6, 1.4, 1.5, 0.6, 0.6)  # half of the paper's, rounded as law.md does
+TABLES = (("position", slice(0, 3)), ("attitude", slice(3, 6)), ("arm", slice(6, 8)))
+
+
+@dataclass(frozen=True)
+class Row:
+    """One controller. mean, half_width, worst (8,): RMS errors as ERRORS, m and deg.
+
+    mean over all flights; half_width of its confidence interval over seeds, each seed being the
+    mean of its payloads, NaN for one seed; worst: the largest RMS of any flight.
+    """
+
+    label: str
+    flights: int
+    completed: int
+    lost: int
+    mean: np.ndarray
+    half_width: np.ndarray
+    worst: np.ndarray
+    why: tuple[str, ...]
+
+    @property
+    def shortfall(self) -> str:
+        """How many flights were not completed, "" if all were."""
+        short = self.flights - self.completed
+        return f"{short} of {self.flights} not completed" if short else ""
+
+
+def rows(results: Sequence[Result]) -> list[Row]:
+    """One row per label, in the order in which labels first occur."""
+    return [
+        row(label, [r for r in results if r.label == label])
+        for label in dict.fromkeys(r.label for r in results)
+    ]
+
+
+def row(label: str, results: Sequence[Result]) -> Row:
+    """The row of these flights; one that ended early counts up to its end."""
+    rms = np.array([result.rms for result in results])
+    return Row(
+        label=label,
+        flights=len(results),
+        completed=sum(result.completed for result in results),
+        lost=sum(result.lost for result in results),
+        mean=rms.mean(axis=0),
+        half_width=half_width(results),
+        worst=rms.max(axis=0),
+        why=tuple(sorted({result.why for result in results if result.why})),
+    )
+
+
+def half_width(results: Sequence[Result]) -> np.ndarray:
+    """Half the width (8,) of Student's confidence interval of the mean over seeds."""
+    seeds = sorted({result.seed for result in results})
+    means = np.array(
+        [np.mean([r.rms for r in results if r.seed == seed], axis=0) for seed in seeds]
+    )
+    count = len(seeds)
+    if count < 2:
+        return np.full(len(ERRORS), np.nan)
+    quantile = student.ppf(0.5 + 0.5 * CONFIDENCE, count - 1)
+    return quantile * means.std(axis=0, ddof=1) / np.sqrt(count)
+
+
+def degradation(other: np.ndarray, proposed: np.ndarray) -> np.ndarray:
+    """The paper's "performance degradation" (other - proposed) / other [%]."""
+    return 100.0 * (np.asarray(other) - np.asarray(proposed)) / np.asarray(other)
+
+
+def claims(found: Sequence[Row]) -> list[str]:
+    """Where the paper's claims hold here and where not, a sentence each."""
+    by_label = {row.label: row for row in found}
+    said = []
+    if any(np.isnan(row.half_width).any() for row in found):
+        said.append("One seed only: what follows has no confidence intervals.")
+    for better, worse in ((PROPOSED, ASMC1), (PROPOSED, ASMC2), (ASMC2, ASMC1)):
+        if better in by_label and worse in by_label:
+            said.append(_smaller(by_label[better], by_label[worse]))
+    if PROPOSED in by_label:
+        proposed = by_label[PROPOSED]
+        said.append(_limit("the paper's proposed row", proposed, PAPER[PROPOSED]))
+        said.append(_limit("half of it", proposed, AIM))
+    for row in found:
+        if row.completed < row.flights:
+            said.append(f"{row.label}: {row.shortfall}, {row.lost} of them lost ({row.why[0]}).")
+        elif row.label == PROPOSED:
+            said.append(f"{row.label}: all {row.flights} flights completed, none lost.")
+    return said
+
+
+def _smaller(better: Row, worse: Row) -> str:
+    """In which columns the errors of one are the smaller ones, beyond the confidence intervals."""
+    apart, near, against = [], [], []
+    for i, name in enumerate(ERRORS):
+        margin = np.nan_to_num(better.half_width[i]) + np.nan_to_num(worse.half_width[i])
+        gap = worse.mean[i] - better.mean[i]
+        (apart if gap > margin else against if gap < -margin else near).append(name)
+    return (
+        f"Smaller errors with {better.label} than with {worse.label}: "
+        + (f"holds for {', '.join(apart)}" if apart else "holds in no column")
+        + (f"; cannot be told apart for {', '.join(near)}" if near else "")
+        + (f"; does not hold for {', '.join(against)}" if against else "")
+        + "."
+    )
+
+
+def _limit(what: str, row: Row, limit: Sequence[float]) -> str:
+    missed = [name for i, name in enumerate(ERRORS) if not row.worst[i] <= limit[i]]
+    return (
+        f"Worst RMS of any {row.label} flight against {what}: "
+        + ("met in every column" if not missed else f"missed in {', '.join(missed)}")
+        + "."
+    )
+
+
+def as_markdown(found: Sequence[Row]) -> str:
+    """The three tables with the paper's numbers beside ours."""
+    proposed = next((row for row in found if row.label == PROPOSED), None)
+    parts = []
+    for title, columns in TABLES:
+        names, unit = ERRORS[columns], "m" if title == "position" else "deg"
+        head = [
+            f"RMS {title} error [{unit}]",
+            *names,
+            *(f"paper {name}" for name in names),
+            *(f"degradation {name} [%]" for name in names),
+        ]
+        lines = ["| " + " | ".join(head) + " |", "|" + "---|" * len(head)]
+        for row in found:
+            digits = 4 if unit == "m" else 3
+            cells = [
+                cell(m, w, digits)
+                for m, w in zip(row.mean[columns], row.half_width[columns], strict=True)
+            ]
+            papers = PAPER.get(row.label)
+            cells += [f"{x:g}" for x in papers[columns]] if papers else ["" for _ in names]
+            worse = proposed is not None and row.label != PROPOSED
+            cells += (
+                [f"{x:.0f}" for x in degradation(row.mean, proposed.mean)[columns]]
+                if worse
+                else ["" for _ in names]
+            )
+            lines.append("| " + " | ".join([_name(row), *cells]) + " |")
+        parts.append("\n".join(lines))
+    return "\n\n".join(parts) + "\n"
+
+
+def _name(row: Row) -> str:
+    return row.label + (f" ({row.shortfall})" if row.shortfall else "")
+
+
+def cell(mean: float, half: float, digits: int) -> str:
+    """A mean with half the width of its interval, if there is one."""
+    return f"{mean:.{digits}f}" + ("" if np.isnan(half) else f" ± {half:.{digits}f}")

@@ -1,0 +1,177 @@
+"""The autopilot: does one answer at a link, which, and is PX4 in software there to be started."""
+
+from __future__ import annotations
+
+import os
+import time
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+
+from uam_lab.doctor.finding import Finding, fail, ok, warn
+from uam_sim_bridge.mavlink.protocol.modes import Command, Mode
+from uam_sim_bridge.mavlink.protocol.wire import Codec, Framer, Message, mavlink2
+from uam_sim_bridge.mavlink.transport.transport import Transport, open_transport
+from uam_sim_bridge.ports import PortError
+from uam_sim_bridge.px4.installation import VARIABLE, Px4Error, Px4Installation
+
+PATIENCE = 5.0  # [s] for a heartbeat, which comes once a second
+VERSION_PATIENCE = 2.0  # [s] for AUTOPILOT_VERSION after it
+BEAT, POLL = 0.5, 0.01  # [s]
+OWN_SYSTEM = 254  # nobody's: a ground station is 255, autopilots count from 1
+RELEASES = ((255, ""), (192, " rc"), (128, " beta"), (64, " alpha"), (0, " dev"))
+
+
+@dataclass
+class Heard:
+    """What came over a link. heartbeat: the first one of an autopilot; system: its sender."""
+
+    heartbeat: Message | None = None
+    system: int = 0
+    version: Message | None = None
+    bytes: int = 0
+    others: set[str] = field(default_factory=set)  # types of messages of others
+
+
+def checks(url: str = "") -> Iterator[Finding]:
+    """Findings about PX4 in software and, where `url` is given, the autopilot at that link."""
+    yield px4()
+    if url:
+        yield link(url)
+
+
+def px4(directory: str | None = None) -> Finding:
+    """Whether PX4_SITL_DIR (or `directory`) holds a PX4 that `--autopilot px4` could start."""
+    given = directory or os.environ.get(VARIABLE, "")
+    if not given:
+        return ok("PX4", f"{VARIABLE} is not set, as only --autopilot px4 needs it")
+    try:
+        return ok("PX4", f"{VARIABLE}: {Px4Installation.find(given).directory}")
+    except Px4Error as error:
+        return warn(
+            "PX4", str(error), f"build PX4, or unset {VARIABLE}: other flights do not need it"
+        )
+
+
+def link(url: str, patience: float = PATIENCE) -> Finding:
+    """Who answers at `url` within `patience` [s]."""
+    try:
+        transport = open_transport(url)
+    except PortError as error:
+        return fail("autopilot", str(error), "give another URL, or end who has the port or device")
+    try:
+        heard = listen(transport, patience)
+    finally:
+        transport.close()
+    if heard.heartbeat is None:
+        return _silent(url, heard, patience)
+    return describe(url, heard)
+
+
+def listen(transport: Transport, patience: float) -> Heard:
+    """Beat, wait for an autopilot's heartbeat, then ask for its version."""
+    codec = Codec(OWN_SYSTEM, mavlink2.MAV_COMP_ID_ONBOARD_COMPUTER)
+    framer, heard = Framer(codec), Heard()
+    end, beat = time.monotonic() + patience, 0.0
+    while (now := time.monotonic()) < end and heard.version is None:
+        if now >= beat:  # a UDP peer learns from it where we are
+            beat = now + BEAT
+            transport.send(codec.encode(_heartbeat()))
+            if heard.heartbeat is not None:
+                transport.send(codec.encode(_request(heard.system)))
+        met = heard.heartbeat is not None
+        for data in transport.receive():
+            heard.bytes += len(data)
+            for message in framer.take(data, transport.stream):
+                _take(heard, message)
+        if heard.heartbeat is not None and not met:
+            end, beat = now + VERSION_PATIENCE, 0.0
+        time.sleep(POLL)
+    return heard
+
+
+def _take(heard: Heard, message: Message) -> None:
+    kind, system = message.get_type(), message.get_srcSystem()
+    autopilot = kind == "HEARTBEAT" and message.autopilot != mavlink2.MAV_AUTOPILOT_INVALID
+    if autopilot and heard.system in (0, system):
+        heard.heartbeat, heard.system = message, system
+    elif kind == "AUTOPILOT_VERSION" and system == heard.system:
+        heard.version = message
+    elif heard.heartbeat is None:
+        heard.others.add(kind)
+
+
+def describe(url: str, heard: Heard) -> Finding:
+    """The autopilot that answered."""
+    beat = heard.heartbeat
+    kind = _name("MAV_AUTOPILOT", beat.autopilot)
+    armed = "armed" if beat.base_mode & mavlink2.MAV_MODE_FLAG_SAFETY_ARMED else "disarmed"
+    px4_like = beat.autopilot == mavlink2.MAV_AUTOPILOT_PX4
+    mode = Mode.from_custom_mode(beat.custom_mode).name if px4_like else f"{beat.custom_mode}"
+    firmware = (
+        f"firmware {version(heard.version.flight_sw_version)}"
+        if heard.version
+        else ("no word about its firmware")
+    )
+    found = (
+        f"{url}: system {heard.system}, {kind}, {_name('MAV_TYPE', beat.type)}, mode {mode}, "
+        f"{armed}, {firmware}"
+    )
+    if not px4_like:
+        return warn("autopilot", found, "the bridge speaks PX4's modes and parameters: docs/px4.md")
+    if armed == "armed":
+        return warn("autopilot", f"{found}: ARMED", "mind the propellers; disarm before a flight")
+    return ok("autopilot", found)
+
+
+def version(number: int) -> str:
+    """AUTOPILOT_VERSION.flight_sw_version in words, as "1.16.0" or "1.15.0 beta"."""
+    major, minor, patch, kind = number.to_bytes(4, "big")
+    release = next(word for least, word in RELEASES if kind >= least)
+    return f"{major}.{minor}.{patch}{release}"
+
+
+def _silent(url: str, heard: Heard, patience: float) -> Finding:
+    if heard.others:
+        found = f"messages ({', '.join(sorted(heard.others)[:4])}), but no autopilot's heartbeat"
+        advice = "the link leads to something else: a camera, a radio, a ground station?"
+    elif heard.bytes:
+        found = f"{heard.bytes} bytes that are no MAVLink"
+        advice = "check the baud rate, and that the port is set to MAVLink (MAV_0_CONFIG ...)"
+    else:
+        found = "nothing"
+        advice = "is it on, is the port the right one, does a firewall or another program take it?"
+    return fail("autopilot", f"{url}: {found} within {patience:g} s", advice)
+
+
+def _name(table: str, value: int) -> str:
+    """A MAVLink constant in words, as "px4" for MAV_AUTOPILOT 12."""
+    entry = mavlink2.enums[table].get(value)
+    text = entry.name if entry is not None else f"{table}_{value}"
+    return text.removeprefix(f"{table}_").lower().replace("_", " ")
+
+
+def _heartbeat() -> Message:
+    return mavlink2.MAVLink_heartbeat_message(
+        mavlink2.MAV_TYPE_ONBOARD_CONTROLLER,
+        mavlink2.MAV_AUTOPILOT_INVALID,
+        0,
+        0,
+        mavlink2.MAV_STATE_ACTIVE,
+        3,
+    )
+
+
+def _request(system: int) -> Message:
+    return mavlink2.MAVLink_command_long_message(
+        system,
+        mavlink2.MAV_COMP_ID_AUTOPILOT1,
+        Command.REQUEST_MESSAGE,
+        0,
+        mavlink2.MAVLINK_MSG_ID_AUTOPILOT_VERSION,
+        0,
+        0,
+        0,
+        0,
+        0,
+        0,
+    )

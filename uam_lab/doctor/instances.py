@@ -1,0 +1,59 @@
+"""Which instances (ports and ROS domains of a flight) are free, and who has the others."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+from uam_lab.doctor import holders
+from uam_lab.doctor.finding import Finding, fail, ok, warn
+from uam_sim_bridge.ports import INSTANCES, busy_port, held, lock_file, ports_of
+
+SHOWN = 4  # busy ports named in the line
+
+
+@dataclass(frozen=True)
+class Busy:
+    """An instance that a flight cannot have. who: who holds it, in words; flight: another one."""
+
+    instance: int
+    who: str
+    flight: bool
+
+
+def checks(folder: Path | None = None) -> Iterator[Finding]:
+    """The finding; folder: where flights keep their locks."""
+    busy = [found for number in range(INSTANCES) if (found := look(number, folder))]
+    free = INSTANCES - len(busy)
+    first = next(n for n in range(INSTANCES + 1) if n not in {b.instance for b in busy})
+    text = f"{free} of {INSTANCES} instances are free" + (f", the first is {first}" if free else "")
+    flights = sum(b.flight for b in busy)
+    others = [b for b in busy if not b.flight]
+    if flights:
+        text += f"; flights have {flights}"
+    if others:
+        named = [f"{b.instance}: {b.who}" for b in others[:SHOWN]]
+        text += "; " + ", ".join(named)
+        if len(others) > SHOWN:
+            text += f" and {len(others) - SHOWN} more"
+    if not free:
+        yield fail("instances", text, "end flights or the programs named here")
+    elif others:
+        yield warn(
+            "instances", text, "flights take a free one; end these programs if they are left over"
+        )
+    else:
+        yield ok("instances", text)
+
+
+def look(instance: int, folder: Path | None = None) -> Busy | None:
+    """Who has an instance; None: it is free. Takes nothing."""
+    lock = lock_file(folder, instance)
+    if held(lock):
+        return Busy(instance, ", ".join(holders.of_file(lock)) or "a flight", True)
+    port = busy_port(ports_of(instance))
+    if port is None:
+        return None
+    who = ", ".join(holders.of_port(port.protocol.lower(), port.number)) or "an unknown program"
+    return Busy(instance, f"{port}, held by {who}", False)

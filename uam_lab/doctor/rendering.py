@@ -1,0 +1,46 @@
+"""Pictures: an offscreen frame, with which OpenGL and how fast."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterator
+
+from uam_lab.doctor.child import TOO_LATE, Child, Said
+from uam_lab.doctor.finding import Finding, ok, warn
+from uam_lab.report.video.rendering import HOW_TO_GET_ONE, PLATFORM
+
+MODULE = "uam_lab.doctor.frame"
+PATIENCE = 30.0  # [s] for one platform
+SOFTWARE = ("llvmpipe", "softpipe", "swrast")
+
+
+def checks() -> Iterator[Finding]:
+    """The finding: of the first platform that draws, in the order in which reports try them."""
+    problem, wanted = "", os.environ.get("MUJOCO_GL", "")
+    for platform in dict.fromkeys(filter(None, (wanted, PLATFORM))):
+        with Child(MODULE, environment={"MUJOCO_GL": platform}) as child:
+            said = child.wait(PATIENCE)
+        if "frame_s" in said.facts:
+            yield drawn(platform, said)
+            return
+        problem = problem or f"MUJOCO_GL={platform}: {said.problem}"
+    if TOO_LATE in problem:
+        yield warn(
+            "rendering",
+            problem,
+            "a busy machine, or a driver that hangs: try again, or another MUJOCO_GL",
+        )
+        return
+    what, _, how = HOW_TO_GET_ONE.partition("; ")
+    yield warn("rendering", f"{what} ({problem[:160]})", how)
+
+
+def drawn(platform: str, said: Said) -> Finding:
+    """What a frame tells."""
+    facts = said.facts
+    device = facts["device"] or "unknown renderer"
+    kind = ", in software" if any(word in device for word in SOFTWARE) else ""
+    found = f"{platform}: a frame in {1e3 * facts['frame_s']:.0f} ms by {device}{kind}"
+    if facts["contrast"] < 1.0:
+        return warn("rendering", f"{found}, but it is empty", "try another MUJOCO_GL: egl, glfw")
+    return ok("rendering", found)

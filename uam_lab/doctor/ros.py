@@ -1,0 +1,121 @@
+"""ROS: which installation, whether two processes reach each other, room for messages."""
+
+from __future__ import annotations
+
+import importlib.util
+import os
+import tempfile
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+
+from uam_lab.doctor import environment
+from uam_lab.doctor.child import Child, Said
+from uam_lab.doctor.finding import Finding, fail, ok, warn
+from uam_lab.processes.environment import ros_environment
+from uam_sim_bridge.ports import PortError, Reservation
+
+MODULE = "uam_lab.doctor.round_trip"
+PATIENCE = 40.0  # [s] for both processes: import, discovery, messages
+WANTED, WANTED_RMW = "jazzy", "rmw_fastrtps_cpp"
+SLOW = 0.05  # [s] a round trip that long: control at 250 Hz in real time is out of the question
+RECEIVE_LIMIT = Path("/proc/sys/net/core/rmem_max")
+ROOM = 4 * 2**20  # [bytes]: what config/dds/fastdds.xml asks for
+INSTALL = "make setup brings the wheels (x86-64); else source /opt/ros/jazzy/setup.bash"
+
+
+def checks(surroundings: Mapping[str, str] = os.environ) -> Iterator[Finding]:
+    """Findings about ROS."""
+    spec = importlib.util.find_spec("rclpy")
+    if spec is None or spec.origin is None:
+        yield fail("rclpy", "not installed: --engine direct alone can fly", INSTALL)
+        return
+    yield from environment.checks(surroundings)
+    yield room()
+    try:
+        with Reservation() as reservation:
+            said = measure(reservation.ports.domain)
+            yield installation(Path(spec.origin), said, surroundings)
+            yield round_trip(said, reservation.ports.domain)
+    except PortError as error:
+        yield warn("round trip", f"not tried: {error}", "end another flight and try again")
+
+
+def measure(domain: int) -> Said:
+    """Let two processes exchange messages in `domain`; what the asking one said."""
+    with tempfile.TemporaryDirectory(prefix="uam-doctor-") as logs:
+        own = ros_environment(domain, Path(logs))
+        with Child(MODULE, ["answer"], own), Child(MODULE, ["ask"], own) as asking:
+            return asking.wait(PATIENCE)
+
+
+def installation(origin: Path, said: Said, surroundings: Mapping[str, str]) -> Finding:
+    """Which rclpy this is and with which middleware; origin: its file."""
+    if "file" not in said.facts:
+        return fail("rclpy", f"{origin.parent} cannot be imported: {said.problem}", INSTALL)
+    kind, rmw = kind_of(origin), said.facts["rmw"]
+    found = f"{kind}, {rmw}, {origin.parent}"
+    distribution = surroundings.get("ROS_DISTRO", "")
+    if distribution and distribution != WANTED:
+        return warn(
+            "rclpy",
+            f"{found}; ROS_DISTRO is {distribution}",
+            f"the stack is made for ROS 2 {WANTED}: source that one",
+        )
+    if distribution and kind == "wheels":
+        return warn(
+            "rclpy",
+            f"{found}, with an installation sourced beside it ({distribution})",
+            "use one of them: a shell without the sourced one, or a venv without wheels",
+        )
+    if rmw != WANTED_RMW:
+        return warn(
+            "rclpy",
+            found,
+            f"config/dds speaks to {WANTED_RMW} alone: with others watch "
+            "for lost messages in the report",
+        )
+    return ok("rclpy", found)
+
+
+def kind_of(origin: Path) -> str:
+    """Where an rclpy comes from, by its file."""
+    parts = origin.parts
+    if parts[:3] == ("/", "opt", "ros"):
+        return f"apt, ROS 2 {parts[3]}"
+    if "site-packages" in parts and any(origin.parents[1].glob("ros_jazzy_rclpy-*.dist-info")):
+        return "wheels"
+    return "a workspace"
+
+
+def round_trip(said: Said, domain: int) -> Finding:
+    """Whether messages came through."""
+    if "median_s" not in said.facts:
+        return fail(
+            "round trip",
+            f"domain {domain}: {said.problem or 'no messages'}",
+            "look at the variables above, then at firewall and container",
+        )
+    median, longest = (1e3 * said.facts[name] for name in ("median_s", "longest_s"))
+    found = (
+        f"two processes in domain {domain}: found in {said.facts['discovery_s']:.1f} s, "
+        f"there and back {median:.1f} ms (median), {longest:.1f} ms (longest of 50)"
+    )
+    if median > 1e3 * SLOW:
+        return warn("round trip", found, "the machine is busy or slow: fly --clock lockstep")
+    return ok("round trip", found)
+
+
+def room(file: Path = RECEIVE_LIMIT) -> Finding:
+    """How much of what a process has not taken yet the system keeps for it."""
+    try:
+        limit = int(file.read_text())
+    except (OSError, ValueError):
+        return ok("buffers", f"{file} does not tell their limit")
+    found = f"net.core.rmem_max is {limit // 1024} KiB"
+    if limit < ROOM:
+        return warn(
+            "buffers",
+            f"{found}: who gets no processor time for some hundredths of a second loses messages",
+            f"sudo sysctl -w net.core.rmem_max={ROOM}",
+        )
+    return ok("buffers", found)

@@ -1,0 +1,52 @@
+"""All groups of checks in their order, and what they add up to."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable, Iterable, Iterator
+from importlib import import_module
+
+from uam_lab.doctor.finding import Finding, Verdict, fail
+
+# in the order of the report; each module has checks()
+GROUPS = ("installation", "ros", "instances", "rendering", "autopilot", "machine", "leftovers")
+
+
+def examine(url: str = "") -> Iterator[tuple[str, Finding]]:
+    """Every finding with its group, as soon as it is there; url: link of an autopilot, if any."""
+    for group in GROUPS:
+        for finding in _guarded(group, (url,) if group == "autopilot" else ()):
+            yield group, finding
+
+
+def _guarded(group: str, arguments: tuple[str, ...]) -> Iterator[Finding]:
+    """What a group finds; an error that it did not expect is a finding, too."""
+    try:
+        checks: Callable[..., Iterable[Finding]]
+        checks = import_module(f"uam_lab.doctor.{group}").checks
+        yield from checks(*arguments)
+    except Exception as error:  # a broken installation may raise anything
+        yield fail(group, f"{type(error).__name__}: {error}", "make setup; if it stays, report it")
+
+
+def worst(verdicts: Iterable[Verdict]) -> Verdict:
+    """The worst of the verdicts, OK where there is none."""
+    order = list(Verdict)
+    return max(verdicts, key=order.index, default=Verdict.OK)
+
+
+def as_json(found: Iterable[tuple[str, Finding]]) -> str:
+    """All findings as one JSON document."""
+    found = list(found)
+    rows = [
+        {
+            "group": group,
+            "check": finding.check,
+            "verdict": finding.verdict.value,
+            "found": finding.found,
+            "advice": finding.advice,
+        }
+        for group, finding in found
+    ]
+    verdict = worst(finding.verdict for _, finding in found)
+    return json.dumps({"verdict": verdict.value, "findings": rows}, indent=2)

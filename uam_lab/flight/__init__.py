@@ -1,0 +1,1 @@
+"""One flight: its settings, its two engines, its progress and conclusion."""

@@ -1,0 +1,73 @@
+"""After a flight: the result folder is completed, and metrics.json says how it went."""
+
+from __future__ import annotations
+
+import shlex
+import sys
+from collections.abc import Mapping
+from typing import Any
+
+from uam_lab.flight.settings import FlightSettings
+from uam_lab.results import metrics
+from uam_lab.results.outcome import Outcome
+from uam_lab.results.result_folder import ResultFolder
+
+
+def command_line() -> str:
+    """What the user typed."""
+    return shlex.join(["uam", *sys.argv[1:]])
+
+
+def asked(settings: FlightSettings, command: str) -> dict[str, Any]:
+    """What a flight is asked to be."""
+    scenario = settings.scenario
+    return {
+        "controller": settings.controller,
+        "profile": settings.profile.name,
+        "scenario": scenario.name,
+        "engine": settings.engine,
+        "clock": settings.clock,
+        "autopilot": settings.autopilot,
+        "seed": settings.seed,
+        "payload_mass_kg": settings.payload_mass,
+        "vehicle_changes": settings.vehicle_changes,
+        "drop_point": list(scenario.drop_point) if scenario.drop_point else None,
+        "snapshots": [list(snapshot) for snapshot in scenario.snapshots],
+        "faults_planned": settings.faults.entries,
+        "command": command,
+    }
+
+
+def conclude(
+    settings: FlightSettings, folder: ResultFolder, outcome: Outcome, command: str
+) -> dict[str, Any] | None:
+    """Write metrics, table and facts; returns the metrics, None where nothing was recorded."""
+    folder.write_versions()
+    return complete(folder, asked(settings, command), outcome)
+
+
+def complete(
+    folder: ResultFolder, known: Mapping[str, Any], outcome: Outcome
+) -> dict[str, Any] | None:
+    """Write metrics, table and facts of a flight of which is `known` what it was asked to be."""
+    if outcome.partial:
+        outcome.notes.insert(0, f"partial: the recording ends with the flight ({outcome.reason})")
+    info = {
+        **known,
+        "wall_s": outcome.wall_s,
+        "abort_reason": outcome.reason,
+        "partial": outcome.partial,
+        "notes": outcome.notes,
+        "missed_ticks": outcome.missed_ticks,
+        "parameter_changes": outcome.parameter_changes,
+        "transitions": outcome.transitions,
+        "faults": outcome.faults,
+    }
+    folder.write_info(info)
+    if outcome.series is None:
+        return None
+    outcome.series.info.update(info)
+    folder.write_series(outcome.series)
+    figures = metrics.compute(outcome.series, info, outcome.latency_s)
+    folder.write_metrics(figures)
+    return figures

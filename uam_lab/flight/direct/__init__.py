@@ -1,0 +1,1 @@
+"""The direct engine: the objects of the nodes in one loop."""

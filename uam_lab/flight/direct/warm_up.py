@@ -1,0 +1,43 @@
+"""Compiles the control path before a flight, so that no node compiles in it.
+
+The compiled functions are kept on disk beside their sources (see uam_control.maths.compiled). When
+all of them are there and up to date, nothing is compiled.
+"""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Iterable, Iterator
+
+from uam_control.laws.catalogue import LAWS
+from uam_control.mission import load_scenario
+from uam_control.profile import load_profile
+from uam_lab.flight.direct.flight import DirectFlight
+from uam_sim_bridge.plant import Vehicle
+
+PACKAGES = ("uam_control", "uam_sim_bridge", "uam_lab")
+TICKS = 1000  # 4 s: the vehicle is armed and in the air by then, and every function has run
+
+
+def compiled_functions() -> Iterator:
+    """Every function under `jit` in the modules imported so far; none without numba."""
+    for name, module in list(sys.modules.items()):
+        if name.split(".")[0] in PACKAGES:
+            for value in vars(module).values():
+                if hasattr(value, "py_func") and value.py_func.__module__ == name:
+                    yield value
+
+
+def is_cold() -> bool:
+    """Whether a function of the control path has no compiled form of its present source."""
+    return not all(function._cache.filled for function in compiled_functions())
+
+
+def warm_up(laws: Iterable[str] = tuple(LAWS)) -> None:
+    """Fly a few seconds in the direct engine with each law: it runs every function of the nodes."""
+    scenario, vehicle = load_scenario("hover"), Vehicle.load()
+    for law in laws:
+        profile = load_profile(LAWS[law].profile)
+        flight = DirectFlight(scenario, profile, vehicle, 0.0, seed=1)
+        for _ in range(TICKS):
+            flight.tick()

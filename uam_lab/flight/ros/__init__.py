@@ -1,0 +1,1 @@
+"""The ROS engine: every node is a process of its own."""

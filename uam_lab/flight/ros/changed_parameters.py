@@ -1,0 +1,38 @@
+"""Which parameters were changed in flight: a node that is started again gets them back."""
+
+from __future__ import annotations
+
+import json
+from typing import Any
+
+from rclpy.node import Node
+
+from uam_msgs_py.messages import topics
+from uam_msgs_py.messages.changes import Change
+from uam_msgs_py.node.polling import listen, messages
+
+
+class ChangedParameters:
+    """Listens to /uam/parameter_changes through a node; polled, hence no executor."""
+
+    def __init__(self, node: Node) -> None:
+        self._subscription = listen(node, topics.CHANGES)
+        self._newest: dict[str, dict[str, Any]] = {}  # node → parameter → value
+
+    def poll(self) -> None:
+        """Note what has arrived."""
+        for message in messages(self._subscription):
+            self.note(Change.from_message(message)[1])
+
+    def note(self, change: Change) -> None:
+        """Note a change; one that was refused changes nothing."""
+        if change.accepted:
+            values = {name: new for name, (_, new) in change.values.items()}
+            self._newest.setdefault(change.node, {}).update(values)
+
+    def arguments(self, node: str) -> list[str]:
+        """ROS arguments that give a node its newest values, to follow those of its start."""
+        found = self._newest.get(node, {})
+        return [
+            text for name, value in found.items() for text in ("-p", f"{name}:={json.dumps(value)}")
+        ]

@@ -1,0 +1,190 @@
+"""The ROS engine: every node a process of its own, supervised from here.
+
+    ports → parameter file → processes → readiness → flight → stop in order → log → table
+
+Nothing is left behind, however it ends: no process, port or lock.
+"""
+
+from __future__ import annotations
+
+import time
+from pathlib import Path
+
+from uam_control.profile import CONTROLLERS
+from uam_lab.cockpit import place
+from uam_lab.flight.direct.warm_up import is_cold, warm_up
+from uam_lab.flight.progress import Progress
+from uam_lab.flight.ros import nodes as ros_nodes
+from uam_lab.flight.ros.changed_parameters import ChangedParameters
+from uam_lab.flight.ros.node_arguments import parameters, write_facts
+from uam_lab.flight.ros.nodes import users_autopilot
+from uam_lab.flight.ros.outcome import read_outcome
+from uam_lab.flight.ros.process_faults import ProcessFaults
+from uam_lab.flight.ros.restart_topic import RestartTopic
+from uam_lab.flight.ros.status_listener import StatusListener
+from uam_lab.flight.settings import ONLOOKERS, FlightSettings
+from uam_lab.processes import child
+from uam_lab.processes.environment import environment
+from uam_lab.processes.interrupts import Interrupts
+from uam_lab.processes.process_table import await_orphans
+from uam_lab.processes.processes import NodeFailed, Processes
+from uam_lab.results.outcome import Outcome
+from uam_lab.results.result_folder import ResultFolder
+from uam_msgs_py.node import wiring
+from uam_sim_bridge.faults import PROCESS
+from uam_sim_bridge.faults.timeline import Happened
+from uam_sim_bridge.nodes.fault_topic import FaultTopic
+from uam_sim_bridge.nodes.plant_options import NOT_READY
+from uam_sim_bridge.ports import Ports, Reservation
+
+AUTOPILOT = "autopilot"
+FORKER = "uam_lab.flight.ros.forker"
+# Each child imports its parent's main module anew, as a rule the command and these.
+COMMANDS = [
+    f"uam_lab.cli.{name}"
+    for name in "campaign compare doctor faults fly profile report tune view".split()
+]
+RESTARTS = 3  # of each controller in a flight
+POLL = 0.05  # [s]
+
+
+def fly(settings: FlightSettings, folder: ResultFolder, progress: Progress) -> Outcome:
+    """Fly; what was recorded lies in `folder` afterwards, also after a failure or Ctrl-C.
+
+    Raises PortError when no instance is free.
+    """
+    (folder.path / "logs").mkdir(exist_ok=True)
+    own_autopilot = not users_autopilot(settings)
+    with Reservation(settings.instance, own_autopilot=own_autopilot) as reservation:
+        if is_cold():
+            progress.message("compiling the control path (once)")
+            warm_up()
+        child.prepare([*ros_nodes.modules(settings).values(), FORKER, *COMMANDS])
+        await_orphans(progress.message)
+        with Interrupts() as stop:
+            ports = reservation.ports
+            sections = parameters(settings, folder, ports)
+            folder.write_parameters(sections)
+            write_facts(settings, folder)
+            if wiring.COCKPIT in sections:
+                port = sections[wiring.COCKPIT]["port"]
+                progress.message(f"cockpit: {place.address(place.LOCAL, port)}")
+            failure = _supervise(settings, folder, ports, progress, stop)
+            if failure is not None and failure.status == NOT_READY and not settings.foreign:
+                # on a machine without processor time the middleware may not connect all of them
+                progress.message(f"{failure}; starting once more")
+                _keep_logs(folder.path / "logs")
+                failure = _supervise(settings, folder, ports, progress, stop)
+    outcome = read_outcome(settings, folder, failure, stop.raised)
+    last = progress.last
+    if outcome.failure and failure is None and last is not None and last.time < 0.0:
+        outcome.failure = f"no take-off ({outcome.failure}); autopilot {last.autopilot}"
+    return outcome
+
+
+def _keep_logs(logs: Path) -> None:
+    """Put aside what a start in vain has said."""
+    aside = logs / "first_start"
+    aside.mkdir()
+    for file in logs.glob("*.log"):
+        file.rename(aside / file.name)
+
+
+def _supervise(
+    settings: FlightSettings,
+    folder: ResultFolder,
+    ports: Ports,
+    progress: Progress,
+    stop: Interrupts,
+) -> NodeFailed | None:
+    """Start everything, watch it until the plant ends, stop it; returns what failed."""
+    logs = folder.path / "logs"
+    surroundings = environment(ports.domain, logs)
+    with Processes(logs, surroundings) as children:
+        children.hurry = lambda: stop.impatient
+        try:
+            _start(children, settings, folder, ports)
+            progress.message(
+                f"{len(children.names)} processes in ROS domain {ports.domain}, "
+                f"autopilot on TCP {ports.simulator_tcp}, UDP {ports.autopilot_udp}"
+            )
+            for name in settings.foreign:
+                progress.message(
+                    f"waiting for your {name}, to be started with ROS_DOMAIN_ID={ports.domain}"
+                )
+            with (
+                StatusListener(surroundings, ports.domain) as listener,
+                _process_faults(settings, children, listener, progress) as faults,
+            ):
+                _watch(children, listener, progress, stop, faults)
+        except NodeFailed as failure:
+            return failure
+        finally:
+            others = [name for name in children.names if name != wiring.RECORDER]
+            disobedient = children.stop(others) + children.stop([wiring.RECORDER])
+            if disobedient and not stop.impatient:
+                progress.message(f"had to be killed: {', '.join(disobedient)}")
+    return None
+
+
+def _start(
+    children: Processes, settings: FlightSettings, folder: ResultFolder, ports: Ports
+) -> None:
+    # What the nodes log is in their output already; files of their own would repeat it.
+    arguments = ["--ros-args", "--disable-external-lib-logs"]
+    arguments += ["--params-file", str(folder.parameters)]
+    for name, module in ros_nodes.modules(settings).items():
+        children.start(
+            name,
+            module,
+            arguments,
+            may_end=name == wiring.PLANT,
+            optional=name in ONLOOKERS,
+            again=RESTARTS if name in CONTROLLERS else 0,
+        )
+    module, own = ros_nodes.autopilot(settings, folder, ports)
+    if module:
+        children.start(AUTOPILOT, module, own, may_end=True)
+
+
+def _process_faults(
+    settings: FlightSettings, children: Processes, listener: StatusListener, progress: Progress
+) -> ProcessFaults:
+    """What hinders the processes; each time it is said, and told to the log."""
+    schedule = settings.faults.only(PROCESS)
+    topic = FaultTopic(listener.node) if schedule else None
+
+    def tell(one: Happened) -> None:
+        stage = f"begins at {one.begin:.2f} s" if one.active else f"is over at {one.end:.2f} s"
+        progress.message(f"fault {one.fault.NAME} of {one.fault.values['node']} {stage}")
+        topic.tell(listener.stamp, [one])
+
+    return ProcessFaults(children, schedule, tell)
+
+
+def _watch(
+    children: Processes,
+    listener: StatusListener,
+    progress: Progress,
+    stop: Interrupts,
+    faults: ProcessFaults,
+) -> None:
+    """Show the progress until the plant ends or the user stops it. Raises NodeFailed."""
+    restarts, changed = RestartTopic(listener.node), ChangedParameters(listener.node)
+    while children.running(wiring.PLANT) and not stop.raised:
+        changed.poll()
+        for lost in children.revive(changed.arguments):
+            text = f"{lost}; started again"
+            progress.message(text)
+            restarts.tell(listener.stamp, lost.name, text)
+        children.check()
+        for failure in children.missed():
+            progress.message(f"{failure}; the flight goes on without it")
+        status = listener.poll()
+        faults.update(listener.mission_time)
+        if status is not None:
+            progress.update(status)
+        time.sleep(POLL)
+    progress.finish()
+    if not stop.raised:
+        children.check()

@@ -1,0 +1,60 @@
+"""What became of a flight through the nodes: its log, and what plant and recorder reported."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+from uam_lab.flight.settings import FlightSettings
+from uam_lab.processes.processes import NodeFailed
+from uam_lab.recording.log_reader import read_flight
+from uam_lab.recording.mcap_reader import UnreadableLog
+from uam_lab.results.outcome import Outcome
+from uam_lab.results.result_folder import ResultFolder
+
+
+def read_outcome(
+    settings: FlightSettings,
+    folder: ResultFolder,
+    failure: NodeFailed | None,
+    interrupted: bool,
+) -> Outcome:
+    """The outcome of the flight in `folder`; failure: the node that ended it, if any."""
+    outcome = Outcome(series=None, interrupted=interrupted)
+    if failure is not None and not interrupted:
+        outcome.failure, outcome.details = str(failure), failure.last_lines
+    numbers = _statistics(folder.path / "logs" / "mujoco_sim.json")
+    outcome.wall_s = numbers.get("wall_s", 0.0)
+    if settings.clock == "realtime":
+        outcome.latency_s = numbers.get("latency_s", [])
+        outcome.missed_ticks = numbers.get("missed_ticks")
+        late, asked = numbers.get("late_ticks", 0), numbers.get("answerable_ticks", 0)
+        if late:
+            outcome.notes.append(
+                f"{late} of {asked} setpoints came later than one control period after their sample"
+            )
+    recorder = _statistics(folder.path / "logs" / "recorder.json")
+    if lost := recorder.get("lost"):
+        text = ", ".join(f"{count} of {topic}" for topic, count in lost.items())
+        outcome.notes.append(f"the recorder lost messages: {text}")
+    try:
+        flight = read_flight(folder.log, settings.scenario)
+    except (UnreadableLog, OSError) as error:
+        outcome.failure = outcome.failure or f"nothing recorded: {error}"
+        return outcome
+    outcome.series, outcome.abort_reason = flight.series, flight.abort_reason
+    outcome.parameter_changes, outcome.transitions = flight.parameter_changes, flight.transitions
+    outcome.faults = flight.faults
+    if not flight.done and not outcome.partial:
+        ended = recorder.get("ended") or numbers.get("ended_by")
+        outcome.failure = ended or "the mission did not end"
+    return outcome
+
+
+def _statistics(file: Path) -> dict[str, Any]:
+    """What a node reported at its end; {} when it did not get to it."""
+    try:
+        return json.loads(file.read_text())
+    except (OSError, ValueError):
+        return {}

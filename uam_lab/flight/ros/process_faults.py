@@ -1,0 +1,132 @@
+"""Kills, stops and slows down processes of a flight at mission times.
+
+The mission's time is known from its status, twice a second: a fault comes up to half a simulated
+second late. How long it lasts is wall time, since in lockstep the flight waits for who is stopped.
+"""
+
+from __future__ import annotations
+
+import os
+import signal
+import threading
+import time
+from collections.abc import Callable
+from functools import partial
+
+from uam_lab.processes.processes import Processes
+from uam_lab.processes.thread_stop import StoppedThreads
+from uam_sim_bridge.faults import Schedule
+from uam_sim_bridge.faults.process_faults import DiscoveryLoss, NodeKill, NodeSlow, ProcessFault
+from uam_sim_bridge.faults.timeline import Happened
+from uam_sim_bridge.ports import is_discovery_port
+
+# Fast DDS's threads: one that tells of itself, one for each UDP port that it listens at
+EVENTS, PORT = "dds.ev.", "dds.udp."
+
+
+def of_discovery(thread: str) -> bool:
+    """Whether a thread, by its name, does DDS discovery alone."""
+    port = thread.removeprefix(PORT)
+    return thread.startswith(EVENTS) or (
+        thread.startswith(PORT) and port.isdecimal() and is_discovery_port(int(port))
+    )
+
+
+class ProcessFaults:
+    """A context manager; call `update` often. No process stays stopped at its end."""
+
+    def __init__(
+        self,
+        children: Processes,
+        schedule: Schedule,
+        tell: Callable[[Happened], None],
+        clock: Callable[[], float] = time.monotonic,
+    ):
+        """schedule: faults of processes alone; tell: called as each begins or ends; clock [s]."""
+        self._children, self._tell, self._clock = children, tell, clock
+        self._all = [Happened(one, number) for number, one in enumerate(schedule.faults)]
+        self._ends: dict[int, float] = {}  # by the clock
+        self._hindering: dict[int, _Hindrance | StoppedThreads] = {}
+
+    def update(self, mission_time: float | None) -> None:
+        """Begin what is due at a mission time [s] (None: not known yet), end what is over."""
+        now = self._clock()
+        for hindrance in self._hindering.values():
+            hindrance.look()
+        for one in self._all:
+            due = mission_time is not None and mission_time >= one.planned.at
+            if one.begin is None and due:
+                one.begin = mission_time
+                self._ends[one.number] = now + one.planned.duration
+                self._begin(one)
+                self._tell(one)
+            elif one.active and now >= self._ends[one.number] and mission_time is not None:
+                one.end = mission_time
+                self._release(one.number)
+                self._tell(one)
+
+    def _begin(self, one: Happened) -> None:
+        fault = one.fault
+        assert isinstance(fault, ProcessFault)
+        pid = self._children.pid(fault.node)
+        if not self._children.running(fault.node):
+            return
+        if isinstance(fault, NodeKill):
+            self._children.let_end(fault.node)
+            os.kill(pid, signal.SIGKILL)
+            return
+        if isinstance(fault, DiscoveryLoss):
+            self._hindering[one.number] = StoppedThreads(pid, of_discovery)
+            return
+        stopped, cycle = (fault.stopped, fault.cycle) if isinstance(fault, NodeSlow) else (1.0, 0.0)
+        self._hindering[one.number] = _Hindrance(
+            pid, partial(self._children.running, fault.node), stopped, cycle
+        )
+
+    def _release(self, number: int) -> None:
+        hindrance = self._hindering.pop(number, None)
+        if hindrance is not None:
+            hindrance.end()
+
+    def __enter__(self) -> ProcessFaults:
+        return self
+
+    def __exit__(self, *exception) -> None:
+        for number in list(self._hindering):
+            self._release(number)
+
+
+class _Hindrance:
+    """Stops a process: wholly, or for a part of each cycle by a thread."""
+
+    def __init__(self, pid: int, running: Callable[[], bool], stopped: float, cycle: float):
+        self._pid, self._running = pid, running
+        self._over = threading.Event()
+        self._thread: threading.Thread | None = None
+        if stopped >= 1.0:
+            self._signal(signal.SIGSTOP)
+        else:
+            phases = ((signal.SIGSTOP, stopped * cycle), (signal.SIGCONT, (1.0 - stopped) * cycle))
+            self._thread = threading.Thread(target=self._cycle, args=(phases,), daemon=True)
+            self._thread.start()
+
+    def look(self) -> None:
+        """Nothing to note."""
+
+    def end(self) -> None:
+        """Let it go on."""
+        self._over.set()
+        if self._thread is not None:
+            self._thread.join()
+        self._signal(signal.SIGCONT)
+
+    def _cycle(self, phases: tuple[tuple[signal.Signals, float], ...]) -> None:
+        while not self._over.is_set() and self._running():
+            for number, wait in phases:
+                self._signal(number)
+                self._over.wait(wait)
+
+    def _signal(self, number: signal.Signals) -> None:
+        """It is our child and not waited for yet where it runs, so the number is still its own."""
+        if self._running():
+            os.kill(self._pid, number)

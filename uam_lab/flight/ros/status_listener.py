@@ -1,0 +1,71 @@
+"""Listens to a flight from outside, for the progress display: two topics, twice a second."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Mapping
+
+from rclpy.node import Node
+
+from uam_lab.flight.progress import Status
+from uam_lab.processes.guest import Guest
+from uam_msgs_py.messages import topics
+from uam_msgs_py.messages.stamps import seconds
+from uam_msgs_py.messages.status import AutopilotState, MissionStatus
+from uam_msgs_py.node.polling import listen, messages
+
+
+class StatusListener:
+    """A node of its own ROS context. A context manager; polled, hence no executor."""
+
+    def __init__(self, environment: Mapping[str, str], domain: int):
+        """environment: of the flight's processes, of which ROS reads some variables here too."""
+        self._guest = Guest("uam_fly", environment, domain)
+        self._mission = listen(self._guest.node, topics.MISSION_STATUS)
+        self._autopilot = listen(self._guest.node, topics.AUTOPILOT_STATE)
+        self._autopilot_text = ""
+        self._last: tuple[float, float] | None = None  # simulated and wall time [s]
+        self.stamp, self.mission_time = 0, None  # [ns], [s] of the newest status after take-off
+
+    @property
+    def node(self) -> Node:
+        """The node that listens."""
+        return self._guest.node
+
+    def poll(self) -> Status | None:
+        """The newest status, None if there is none since the last call."""
+        for message in messages(self._autopilot):
+            _, state = AutopilotState.from_message(message)
+            reasons = f": {state.reasons}" if state.reasons else ""
+            self._autopilot_text = f"{state.summary}{reasons}"
+        newest = None
+        for message in messages(self._mission):
+            newest = message
+        if newest is None:
+            return None
+        stamp, mission = MissionStatus.from_message(newest)
+        if mission.time >= 0.0:
+            self.stamp, self.mission_time = stamp, mission.time
+        return Status(
+            phase=mission.phase,
+            time=mission.time,
+            position_error=mission.position_error,
+            attitude_error=mission.attitude_error,
+            arm_error=mission.arm_error,
+            real_time_factor=self._real_time_factor(seconds(stamp)),
+            autopilot=self._autopilot_text,
+        )
+
+    def _real_time_factor(self, simulated: float) -> float:
+        """Simulated over wall time since the first status."""
+        wall = time.monotonic()
+        if self._last is None:
+            self._last = simulated, wall
+        since = wall - self._last[1]
+        return (simulated - self._last[0]) / since if since > 0.0 else 0.0
+
+    def __enter__(self) -> StatusListener:
+        return self
+
+    def __exit__(self, *exception) -> None:
+        self._guest.close()

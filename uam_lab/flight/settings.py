@@ -1,0 +1,195 @@
+"""What a flight is asked to be: the command line's options, checked, before anything starts."""
+
+from __future__ import annotations
+
+import importlib.util
+from collections.abc import Collection, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from uam_control.laws.catalogue import LAWS
+from uam_control.mission import Scenario, load_scenario
+from uam_control.profile import Profile, load_profile
+from uam_control.settings import configuration
+from uam_lab.processes.environment import without_discovery
+from uam_sim_bridge.faults import Schedule, limits, read_schedule
+from uam_sim_bridge.faults.process_faults import DiscoveryLoss
+from uam_sim_bridge.mavlink.transport.transport import ALLOWED, LinkUrl, parse_url
+from uam_sim_bridge.ports import AUTOPILOT_UDP, INSTANCES
+from uam_sim_bridge.px4.installation import Px4Installation
+
+ENGINES = ("ros", "direct")
+CLOCKS = ("lockstep", "realtime")
+BUILTIN, PX4 = "builtin", "px4"
+# Nodes that a user's own can stand in for: their inputs and outputs are all there is to them.
+REPLACEABLE = ("state_estimator", "position_controller", "attitude_controller", "arm_controller")
+COCKPIT = "cockpit"
+LOG_LIMIT = 4000.0  # [MB] some four hours of flight
+ONLOOKERS = ("scene", COCKPIT)  # nodes that only look on: the flight goes on without
+PAYLOAD_MAX = 2.0  # [kg] more than the rotors could ever carry
+
+
+class SettingsError(ValueError):
+    """An option that cannot be flown; the text is one line: what was wrong, what is allowed."""
+
+
+@dataclass(frozen=True)
+class FlightSettings:
+    """One flight. Scenario and profile are loaded, hence valid.
+
+    payload_mass [kg]; vehicle_changes: dotted entries of config/vehicle/*.yaml to replace, as
+    {"air.wind": [3.0, 0.0, 0.0]}; out: the result folder, None for the default one. autopilot:
+    BUILTIN, PX4, or the URL of one that the user has started; link: that URL, taken apart. without:
+    nodes left out, see `foreign`.
+    """
+
+    scenario: Scenario
+    profile: Profile
+    payload_mass: float
+    out: Path | None = None
+    controller: str = "modular"
+    engine: str = "ros"
+    clock: str = "lockstep"
+    autopilot: str = BUILTIN
+    px4: Px4Installation | None = None  # what flies as the autopilot px4
+    link: LinkUrl | None = None
+    gcs: str = ""  # URL of a ground station that watches
+    seed: int = 1
+    video: bool = True
+    scenario_source: str = ""  # what the user called it: a name or a file
+    instance: int | None = None  # of ROS domain and ports; None: the first free one
+    vehicle_changes: dict[str, object] = field(default_factory=dict)
+    without: tuple[str, ...] = (COCKPIT,)
+    log_limit: float = LOG_LIMIT  # [MB] size at which log.mcap ends
+    faults: Schedule = Schedule()
+
+    @property
+    def foreign(self) -> tuple[str, ...]:
+        """Nodes that the user starts in place of the stack's, and that the flight waits for."""
+        return tuple(name for name in self.without if name in REPLACEABLE)
+
+
+def settings(
+    scenario: str = "pick_and_place",
+    controller: str = "modular",
+    profile: str | Sequence[str] | None = None,
+    engine: str = "ros",
+    clock: str = "lockstep",
+    autopilot: str = BUILTIN,
+    px4_dir: str | None = None,
+    gcs: str = "",
+    payload_mass: float | None = None,
+    seed: int = 1,
+    out: str | Path | None = None,
+    video: bool = True,
+    vehicle_changes: dict[str, object] | None = None,
+    instance: int | None = None,
+    without: Sequence[str] = (),
+    view: bool = False,
+    log_limit: float = LOG_LIMIT,
+    faults: Sequence[str] = (),
+) -> FlightSettings:
+    """Check the options and load what they name.
+
+    profile: see `load_profile` for several of them; faults: see `faults.read_schedule`; view: serve
+    the cockpit, too.
+    Raises SettingsError, and what loading raises (ConfigurationError, ScenarioError, ProfileError,
+    Px4Error, PortError, FaultError); each is one line for the user.
+    """
+    _choice("controller", controller, LAWS)
+    _choice("engine", engine, ENGINES)
+    _choice("clock", clock, CLOCKS)
+    if engine == "direct" and clock == "realtime":
+        raise SettingsError("the direct engine has no clock: --clock realtime needs --engine ros")
+    if engine == "direct" and autopilot != BUILTIN:
+        raise SettingsError(
+            f"the direct engine flies the stand-in alone: --autopilot {autopilot} "
+            "needs --engine ros"
+        )
+    for node in without:
+        _choice("node to fly without", node, REPLACEABLE + ONLOOKERS)
+    if without and engine == "direct":
+        raise SettingsError("the direct engine has no nodes: --without needs --engine ros")
+    if view and engine == "direct":
+        raise SettingsError("the direct engine has no topics to look at: --view needs --engine ros")
+    px4 = Px4Installation.find(px4_dir) if autopilot == PX4 else None
+    link = None if autopilot in (BUILTIN, PX4) else _link(autopilot)
+    if link is not None and link.kind == "serial" and clock != "realtime":
+        raise SettingsError(
+            "a flight controller has a clock of its own: --autopilot serial:... "
+            "needs --clock realtime"
+        )
+    if gcs and (parse_url(gcs).kind != "udp" or engine == "direct"):
+        raise SettingsError("--gcs is udp:HOST:PORT, and needs --engine ros")
+    if not 0 <= seed < 2**31:
+        raise SettingsError(f"seed {seed} is outside 0..{2**31 - 1}")
+    loaded = load_scenario(str(configuration.named("scenarios", scenario)))
+    asked = [profile] if isinstance(profile, str) else profile or [LAWS[controller].profile]
+    flown = load_profile(*(str(configuration.named("profiles", one)) for one in asked))
+    for node, law in flown.laws().items():
+        if law != controller:
+            raise SettingsError(
+                f"profile {flown.name} has the law {law} for {node}, not {controller}: "
+                f"--controller {law}, or another --profile"
+            )
+    mass = loaded.payload_mass if payload_mass is None else payload_mass
+    if not 0.0 <= mass <= PAYLOAD_MAX:
+        raise SettingsError(f"payload mass {mass:g} kg is outside 0..{PAYLOAD_MAX:g} kg")
+    injected = read_schedule(faults, loaded, seed)
+    left_out = tuple(dict.fromkeys(without if view else (*without, COCKPIT)))
+    absent = (*left_out, "autopilot") if link is not None else left_out
+    limits.check(injected, engine, absent, {DiscoveryLoss.NAME: without_discovery()})
+    return FlightSettings(
+        scenario=loaded,
+        profile=flown,
+        payload_mass=mass,
+        out=None if out is None else Path(out),
+        controller=controller,
+        engine=engine,
+        clock=clock,
+        autopilot=autopilot,
+        px4=px4,
+        link=link,
+        gcs=gcs,
+        seed=seed,
+        video=video,
+        scenario_source=scenario,
+        instance=_instance_of(link) if instance is None else instance,
+        vehicle_changes=dict(vehicle_changes or {}),
+        without=left_out,
+        faults=injected,
+        log_limit=log_limit,
+    )
+
+
+def require_ros() -> None:
+    """Raise SettingsError where ROS is not installed."""
+    if importlib.util.find_spec("rclpy") is None:
+        raise SettingsError(
+            "the ROS engine needs rclpy, which is not installed: make setup, or source a ROS 2 "
+            "installation, or fly with --engine direct"
+        )
+
+
+def _link(autopilot: str) -> LinkUrl:
+    if ":" not in autopilot:
+        raise SettingsError(
+            f"unknown autopilot '{autopilot}'; there are: {BUILTIN}, {PX4}, or a link: {ALLOWED}"
+        )
+    return parse_url(autopilot)
+
+
+def _instance_of(link: LinkUrl | None) -> int | None:
+    """The instance whose simulator port an autopilot that the user has started connects to.
+
+    PX4 tells it by its offboard port; instance 0 where that says nothing.
+    """
+    if link is None or link.kind == "serial":
+        return None
+    number = link.number - AUTOPILOT_UDP
+    return number if link.kind == "udp" and 0 <= number < INSTANCES else 0
+
+
+def _choice(name: str, value: str, allowed: Collection[str]) -> None:
+    if value not in allowed:
+        raise SettingsError(f"unknown {name} '{value}'; there are: {', '.join(allowed)}")

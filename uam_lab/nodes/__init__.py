@@ -1,0 +1,1 @@
+"""Nodes that only watch a flight: recorder, scene and cockpit."""

@@ -1,0 +1,59 @@
+"""Node: the cockpit, a local web page; see uam_lab.cockpit. Nobody waits for it."""
+
+from __future__ import annotations
+
+import sys
+import time
+
+import rclpy
+import yaml
+from rclpy.executors import SingleThreadedExecutor
+from rclpy.node import Node
+from rclpy.signals import SignalHandlerOptions
+
+from uam_control.settings import configuration
+from uam_control.settings.parameter_set import ParameterError
+from uam_lab.cockpit import web
+from uam_lab.cockpit.page import Page
+from uam_lab.cockpit.place import LOCAL, PORT, PlaceError
+from uam_lab.cockpit.services import Services
+from uam_lab.cockpit.watch import Watch
+from uam_msgs_py.node.base_node import StopSignal, refuse
+from uam_msgs_py.node.node_parameters import refuse_unknown
+
+NAME = "cockpit"
+OPTIONS = "views/cockpit.yaml"
+
+
+def main() -> int:
+    """Serve the page until SIGINT or SIGTERM; return the exit status."""
+    rclpy.init(args=sys.argv, signal_handler_options=SignalHandlerOptions.NO)
+    stop = StopSignal()
+    node = Node(NAME, start_parameter_services=False)
+    host = node.declare_parameter("host", LOCAL).value
+    port = node.declare_parameter("port", PORT).value
+    origins = [one for one in node.declare_parameter("origins", "").value.split(",") if one]
+    options = yaml.safe_load(configuration.path(OPTIONS).read_text())
+    try:
+        refuse_unknown(node)
+        server = web.serve(host, port, "uam", origins)
+    except (ParameterError, PlaceError) as error:
+        return refuse(NAME, error)
+    print(f"{NAME}: {web.url(server)}", flush=True)
+    executor = SingleThreadedExecutor()
+    executor.add_node(node)
+    # An executor would take the messages that the page looks at: this node is not spun.
+    watcher = Node(f"{NAME}_watch", start_parameter_services=False, enable_rosout=False)
+    page = Page(server, Watch(watcher), Services(node), options)
+    period = options["scene_period"]
+    while not stop.raised:
+        end = time.monotonic() + period
+        page.look()
+        while (left := end - time.monotonic()) > 0.0 and not stop.raised:
+            executor.spin_once(timeout_sec=left)
+    server.stop()
+    watcher.destroy_node()
+    node.destroy_node()
+    rclpy.try_shutdown()
+    stop.ignore()
+    return 0

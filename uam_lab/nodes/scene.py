@@ -1,0 +1,210 @@
+"""Node: what RViz and Foxglove need to show the flight: /tf, URDF, markers, tracking errors.
+
+    world ─┬─ base_link (estimate) ─┬─ shoulder
+           │                        └─ link_1 ─ link_2 ─ magnet
+           ├─ reference (while one is flown)
+           └─ payload (where a simulator tells the truth)
+
+Nobody waits for this node. It looks at the newest messages a hundred times a second, takes them
+best-effort, and shows `frame_rate` of them per second of their own time. Before the first tick of a
+simulated flight every publisher counts its listeners; so that this one never stands in for another,
+it listens to the control loop only when the mission has begun.
+"""
+
+from __future__ import annotations
+
+import time
+from dataclasses import dataclass
+
+import numpy as np
+from diagnostic_msgs.msg import DiagnosticArray
+from std_msgs.msg import String
+
+from uam_control.coordinates import ARM, ATTITUDE, COORDINATES, JOINTS, POSITION
+from uam_control.maths.rotations import quaternion_from_euler, wrap_angle
+from uam_control.mission import load_scenario
+from uam_control.settings.parameter_set import ParameterSet, number
+from uam_lab.nodes.scene_markers import PAYLOAD, FlownPath, Markers, ReferencePath
+from uam_msgs_py.messages import topics
+from uam_msgs_py.messages.control import Reference, read_reference, read_state
+from uam_msgs_py.messages.convert import JointStateWriter, read_pose
+from uam_msgs_py.messages.layouts import SECOND
+from uam_msgs_py.messages.stamps import seconds
+from uam_msgs_py.messages.status import ERROR, OK, MissionStatus
+from uam_msgs_py.messages.topics import BODY, WORLD
+from uam_msgs_py.messages.transforms import Transform, transforms_message
+from uam_msgs_py.node.base_node import UamNode, run
+from uam_msgs_py.node.node_parameters import NodeParameters
+from uam_sim_bridge.plant import Vehicle
+from uam_sim_bridge.plant.frames import SWING, box, frames, hanging
+from uam_sim_bridge.plant.urdf import urdf
+
+NAME = "scene"
+REFERENCE = "reference"  # frame of the pose that the mission asks for
+DEFAULT_SCENARIO, DEFAULT_VEHICLE = "pick_and_place", "s500_arm"
+REFERENCES = 8  # kept until the state of the same tick is there: they come one tick ahead
+
+
+@dataclass(frozen=True)
+class SceneParameters(ParameterSet):
+    """How often it shows something."""
+
+    frame_rate: float = number(25.0, "transforms per second of the messages' time", "Hz", 1.0, 60.0)
+    marker_rate: float = number(2.0, "markers, likewise, unless they change", "Hz", 0.1, 25.0)
+
+
+class SceneNode(UamNode):
+    """Publishes /tf, /tf_static, /robot_description, /uam/markers and /uam/tracking/error."""
+
+    wake_up = 0.01
+
+    def __init__(self) -> None:
+        super().__init__(NAME)
+        options = NodeParameters(self, SceneParameters, read_only=True).current
+        self._frame_period = round(SECOND / options.frame_rate)
+        self._marker_period = round(SECOND / options.marker_rate)
+        scenario = self.declare_parameter("scenario", DEFAULT_SCENARIO).value
+        vehicle = Vehicle.load(self.declare_parameter("vehicle", DEFAULT_VEHICLE).value)
+        self._scenario, model = load_scenario(scenario), vehicle.compile(0.0)
+        hung = frames(model)
+        self._fixed = [frame for frame in hung if not frame.joint]
+        self._moving = [frame for frame in hung if frame.joint]
+        self._maker = Markers(self._scenario, box(model, "magnet_face"), box(model, "payload"))
+
+        self._state: tuple[int, np.ndarray] | None = None
+        self._references: dict[int, Reference] = {}
+        self._payload: tuple[int, np.ndarray, np.ndarray] | None = None
+        self._payload_is_there = False  # only a simulator knows where
+        self._status: tuple[int, MissionStatus] | None = None
+        self._path: ReferencePath | None = None
+        self._on_its_way = False  # whether _path begins where the vehicle took off
+        self._flown = FlownPath()
+        self._due = self._markers_due = 0  # [ns]
+        self._shown: tuple = ()  # what the last markers said
+        self._late: list = []  # subscriptions made when the mission has begun
+
+        self._tf = self.publisher(topics.TF)
+        self._markers = self.publisher(topics.MARKERS)
+        self._error = self.publisher(topics.TRACKING_ERROR)
+        self._error_writer = JointStateWriter(COORDINATES)
+        self._describe(urdf(vehicle))
+        self.listen(topics.MISSION_STATUS, self._on_status)
+        # All else is taken along when this comes, or `wake_up` is over.
+        self.triggers = (topics.MISSION_STATUS.name,)
+
+    def _describe(self, robot: str) -> None:
+        """Publish what does not change."""
+        self.publisher(topics.ROBOT_DESCRIPTION).publish(String(data=robot))
+        still = [Transform(0, f.parent, f.name, f.position, f.quaternion) for f in self._fixed]
+        self.publisher(topics.TF_STATIC).publish(transforms_message(still))
+
+    def _on_status(self, message: DiagnosticArray) -> None:
+        self._status = MissionStatus.from_message(message)
+        if not self._late:
+            self._late = [
+                self.listen(topic, handle, required=topic is topics.STATE, qos=topics.NEWEST)
+                for topic, handle in (
+                    (topics.REFERENCE, self._on_reference),
+                    (topics.TRUTH_PAYLOAD, self._on_payload),
+                    (topics.STATE, self._on_state),
+                )
+            ]
+
+    def _on_state(self, data: bytes) -> None:
+        self._state = read_state(data)
+        if not self.deferred:
+            self.settle()
+
+    def _on_reference(self, data: bytes) -> None:
+        stamp, reference = read_reference(data)
+        self._references[stamp] = reference
+        if len(self._references) > REFERENCES:
+            del self._references[min(self._references)]
+
+    def _on_payload(self, data: bytes) -> None:
+        self._payload = read_pose(data)
+
+    def settle(self) -> None:
+        """Show the present, if it is time to."""
+        if self.deferred:
+            for subscription in self._late:
+                self.take_waiting(subscription)
+        if self._state is None or self._state[0] < self._due:
+            return
+        begun = time.perf_counter()
+        stamp, state = self._state
+        reference = self._references.get(stamp)
+        self._due = max(self._due, stamp - self._frame_period) + self._frame_period
+        if reference is not None:
+            self._compare(stamp, state, reference)
+        wanted = reference.values[0] if reference is not None and reference.flying else None
+        self._tf.publish(transforms_message(self._transforms(stamp, state[0], wanted)))
+        self._follow(stamp, state[0], wanted)
+        self._show(stamp)
+        self._state = None
+        self.done_tick(stamp, begun)
+
+    def _compare(self, stamp: int, state: np.ndarray, reference: Reference) -> None:
+        """Publish the errors of this tick."""
+        error = state[:2] - reference.values[:2]
+        error[0, 3:] = wrap_angle(error[0, 3:])
+        if not reference.flying:
+            error[:, : ARM.start] = 0.0
+        writer = self._error_writer
+        writer.position[:], writer.velocity[:] = error
+        self._error.publish(writer.stamped(stamp))
+
+    def _transforms(
+        self, stamp: int, chi: np.ndarray, wanted: np.ndarray | None
+    ) -> list[Transform]:
+        """What moves at `stamp` [ns]: chi (8,), what is asked of it (8,), and the payload."""
+        turned = quaternion_from_euler(chi[ATTITUDE])
+        angles = dict(zip(JOINTS, chi[ARM], strict=True))
+        angles[SWING] = hanging(chi[ATTITUDE][1], chi[ARM])
+        found = [Transform(stamp, WORLD, BODY, chi[POSITION], turned)]
+        found += [
+            Transform(stamp, f.parent, f.name, f.position, f.turned(angles[f.joint]))
+            for f in self._moving
+        ]
+        if wanted is not None:
+            pose = wanted[POSITION], quaternion_from_euler(wanted[ATTITUDE])
+            found.append(Transform(stamp, WORLD, REFERENCE, *pose))
+        if self._payload is not None:
+            at, position, quaternion = self._payload
+            found.append(Transform(at, WORLD, PAYLOAD, position, quaternion))
+            self._payload, self._payload_is_there = None, True  # a stamp is told but once
+        return found
+
+    def _follow(self, stamp: int, chi: np.ndarray, wanted: np.ndarray | None) -> None:
+        """Keep the paths up to date; the reference begins where the vehicle takes off."""
+        self._flown.add(stamp, chi[POSITION])
+        flying = wanted is not None
+        if self._path is None or flying and not self._on_its_way:
+            self._path = ReferencePath(self._scenario, wanted if flying else chi)
+            self._on_its_way = flying
+
+    def _show(self, stamp: int) -> None:
+        """Publish the markers when they change, and now and then."""
+        at, status = self._status
+        now = (status.summary, status.magnet, self._payload_is_there)
+        if now == self._shown and stamp < self._markers_due:
+            return
+        self._shown, self._markers_due = now, stamp + self._marker_period
+        mission_time = status.time + seconds(stamp - at)
+        ahead = self._path.ahead(0.0 if status.time < 0.0 else mission_time)
+        if status.done or status.abort_reason:
+            ahead = ahead[:0]
+        self._markers.publish(self._maker.message(stamp, status, ahead, self._flown.points, now[2]))
+
+    def diagnose(self) -> tuple[bytes, str, dict[str, object]]:
+        """Phase as the mission says it; and what is shown."""
+        if self._status is None:
+            return OK, "waiting for the mission", {}
+        status = self._status[1]
+        level = ERROR if status.abort_reason else OK
+        return level, f"showing {status.summary}", {"payload": self._payload_is_there}
+
+
+def main() -> int:
+    """Run the node; return its exit status."""
+    return run(SceneNode, NAME)

@@ -1,0 +1,151 @@
+"""What is drawn around the vehicle: paths, payload, drop point, magnet, phase; as markers.
+
+A marker in a moving frame moves with /tf, so it need only be sent when it changes.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from geometry_msgs.msg import Point
+from std_msgs.msg import ColorRGBA
+from visualization_msgs.msg import Marker, MarkerArray
+
+from uam_control.mission import Scenario
+from uam_control.mission.trajectory import empty_reference
+from uam_msgs_py.messages.stamps import set_stamp
+from uam_msgs_py.messages.status import MissionStatus
+from uam_msgs_py.messages.topics import BODY, WORLD
+from uam_sim_bridge.plant.frames import Box
+
+PAYLOAD, MAGNET = "payload", "magnet"  # frames
+PATH_STEP = 0.2  # [s] of mission time between two points of a path
+PATH_POINTS = 2000  # of the flown path; a longer one is thinned out
+LINE_WIDTH, TEXT_HEIGHT, TEXT_ABOVE = 0.01, 0.08, 0.35  # [m]
+DROP_RADIUS, MAGNET_MARGIN = 0.06, 0.004  # [m]
+AHEAD, FLOWN = (0.95, 0.55, 0.10, 0.9), (0.12, 0.37, 0.66, 0.95)
+CUBE, TARGET, TEXT = (0.10, 0.55, 0.35, 1.0), (0.80, 0.15, 0.15, 0.8), (0.1, 0.1, 0.1, 1.0)
+ENERGISED, OFF, FAILED = (0.15, 0.90, 0.25, 0.9), (0.45, 0.45, 0.45, 0.6), (0.8, 0.1, 0.1, 1.0)
+
+
+class ReferencePath:
+    """Where a scenario leads, sampled once."""
+
+    def __init__(self, scenario: Scenario, start: np.ndarray):
+        """start: chi (8,) at take-off."""
+        landing = scenario.landing
+        self._times = np.arange(0.0, landing.at + landing.duration + PATH_STEP, PATH_STEP)
+        self._points = np.empty((len(self._times), 3))
+        trajectory, reference = scenario.trajectory(start), empty_reference()
+        for time, point in zip(self._times, self._points, strict=True):
+            trajectory.write(float(time), reference)
+            point[:] = reference[0, :3]
+
+    def ahead(self, time: float) -> np.ndarray:
+        """Points (n, 3) [m] from mission time [s] to the landing."""
+        return self._points[np.searchsorted(self._times, time) :]
+
+
+class FlownPath:
+    """Where the vehicle has been; thinned out when it gets long."""
+
+    def __init__(self) -> None:
+        self._points: list[np.ndarray] = []
+        self._step, self._due = round(PATH_STEP * 1e9), 0  # [ns]
+
+    def add(self, stamp: int, position: np.ndarray) -> None:
+        """Note the position (3,) [m] at `stamp` [ns]."""
+        if stamp < self._due:
+            return
+        self._due = stamp + self._step
+        self._points.append(position.copy())
+        if len(self._points) > PATH_POINTS:
+            del self._points[1::2]
+            self._step *= 2
+
+    @property
+    def points(self) -> np.ndarray:
+        """Points (n, 3) [m], oldest first."""
+        return np.array(self._points).reshape(-1, 3)
+
+
+class Markers:
+    """Makes the MarkerArray of one moment."""
+
+    def __init__(self, scenario: Scenario, face: Box, payload: Box):
+        """face: of the magnet, in the frame MAGNET; payload: in the frame PAYLOAD."""
+        self._drop, self._face, self._payload = scenario.drop_point, face, payload
+
+    def message(
+        self,
+        stamp: int,
+        status: MissionStatus,
+        ahead: np.ndarray,
+        flown: np.ndarray,
+        payload: bool,
+    ) -> MarkerArray:
+        """ahead, flown: points (n, 3) [m, world]; payload: whether its frame is there."""
+        markers = [
+            _line(stamp, "reference path", ahead, AHEAD),
+            _line(stamp, "flown path", flown, FLOWN),
+            self._magnet(stamp, status.magnet),
+            _text(stamp, status),
+        ]
+        if self._drop is not None:
+            markers.append(_disc(stamp, self._drop))
+        if payload:
+            markers.append(_box(stamp, "payload", PAYLOAD, self._payload, CUBE))
+        return MarkerArray(markers=markers)
+
+    def _magnet(self, stamp: int, on: bool) -> Marker:
+        around = Box(self._face.centre, self._face.edges + MAGNET_MARGIN)
+        return _box(stamp, "magnet", MAGNET, around, ENERGISED if on else OFF)
+
+
+def _marker(
+    stamp: int, name: str, frame: str, kind: int, scale: Sequence[float], colour: Sequence[float]
+) -> Marker:
+    marker = Marker(ns=name, type=kind, action=Marker.ADD, frame_locked=frame != WORLD)
+    marker.header.frame_id = frame
+    set_stamp(marker.header.stamp, stamp)
+    marker.pose.orientation.w = 1.0
+    marker.scale.x, marker.scale.y, marker.scale.z = (float(length) for length in scale)
+    marker.color = ColorRGBA(**dict(zip("rgba", colour, strict=True)))
+    return marker
+
+
+def _line(stamp: int, name: str, points: np.ndarray, colour: Sequence[float]) -> Marker:
+    scale = (LINE_WIDTH, 0.0, 0.0)
+    marker = _marker(stamp, name, WORLD, Marker.LINE_STRIP, scale, colour)
+    if len(points) < 2:
+        marker.action = Marker.DELETE
+    else:
+        marker.points = [Point(x=x, y=y, z=z) for x, y, z in points.tolist()]
+    return marker
+
+
+def _box(stamp: int, name: str, frame: str, box: Box, colour: Sequence[float]) -> Marker:
+    marker = _marker(stamp, name, frame, Marker.CUBE, box.edges, colour)
+    _place(marker, box.centre)
+    return marker
+
+
+def _disc(stamp: int, place: tuple[float, float]) -> Marker:
+    scale = (2.0 * DROP_RADIUS, 2.0 * DROP_RADIUS, 0.004)
+    marker = _marker(stamp, "drop point", WORLD, Marker.CYLINDER, scale, TARGET)
+    _place(marker, (*place, 0.0))
+    return marker
+
+
+def _text(stamp: int, status: MissionStatus) -> Marker:
+    colour, scale = FAILED if status.abort_reason else TEXT, (0.0, 0.0, TEXT_HEIGHT)
+    marker = _marker(stamp, "phase", BODY, Marker.TEXT_VIEW_FACING, scale, colour)
+    _place(marker, (0.0, 0.0, TEXT_ABOVE))
+    marker.text = status.summary
+    return marker
+
+
+def _place(marker: Marker, at: Sequence[float]) -> None:
+    position = marker.pose.position
+    position.x, position.y, position.z = (float(x) for x in at)

@@ -1,0 +1,1 @@
+"""Processes of a flight: start, watch, signal, environment."""

@@ -1,0 +1,1 @@
+"""log.mcap: writing it, and reading a flight back from it."""

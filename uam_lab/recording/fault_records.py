@@ -1,0 +1,27 @@
+"""Faults of a flight, read back from its log."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from typing import Any
+
+from diagnostic_msgs.msg import DiagnosticArray
+from rclpy.serialization import deserialize_message
+
+from uam_msgs_py.messages.faults import FaultEvent
+from uam_sim_bridge.faults.timeline import record
+
+SECOND = 1e9
+
+
+def records(messages: Iterable[bytes], takeoff: int) -> list[dict[str, Any]]:
+    """What a log tells, see `timeline.record`; takeoff: stamp [ns] of mission time 0."""
+    found: dict[tuple[str, int], dict[str, Any]] = {}
+    for data in messages:
+        stamp, event = FaultEvent.from_message(deserialize_message(data, DiagnosticArray))
+        time, key = (stamp - takeoff) / SECOND, (event.place, event.number)
+        if event.active:
+            found[key] = record(event.name, time, None, event.parameters)
+        elif key in found:
+            found[key]["end_s"] = round(time, 6)
+    return sorted(found.values(), key=lambda entry: entry["begin_s"])

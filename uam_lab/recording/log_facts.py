@@ -1,0 +1,63 @@
+"""What a flight was asked to be, as text in its own log: so the log alone tells the whole flight.
+
+    flight       the entries of info.json that are known beforehand, each as JSON
+    scenario     name and text of its file
+    parameters   the effective parameters, a ROS parameter file
+    versions     versions.json
+
+The recorder writes them first, so that a flight killed in the middle has them.
+"""
+
+from __future__ import annotations
+
+import json
+import tempfile
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from uam_control.mission import Scenario, load_scenario
+from uam_control.settings import configuration
+from uam_lab.recording.mcap_reader import read_metadata
+from uam_lab.results.atomic import write_text
+from uam_lab.results.result_folder import as_json
+
+FLIGHT, SCENARIO, TEXTS = "flight", "scenario", "files"
+Records = dict[str, dict[str, str]]
+
+
+@dataclass(frozen=True)
+class LogFacts:
+    """info: see `conclude.asked`; texts: name → content of parameters.yaml and versions.json."""
+
+    info: dict[str, Any] = field(default_factory=dict)
+    scenario: Scenario | None = None
+    texts: dict[str, str] = field(default_factory=dict)
+
+
+def write(file: Path, info: Mapping[str, Any], scenario: str, texts: Mapping[str, str]) -> None:
+    """Write what the recorder is to put into the log; scenario: a name or a file."""
+    source = configuration.named("scenarios", scenario)
+    records: Records = {
+        FLIGHT: {name: json.dumps(value) for name, value in info.items()},
+        SCENARIO: {"name": source.name, "text": source.read_text()},
+        TEXTS: dict(texts),
+    }
+    write_text(file, as_json(records))
+
+
+def read(log: Path) -> LogFacts:
+    """Read them back from a log; nothing where it has none. Raises UnreadableLog, OSError."""
+    records = read_metadata(log)
+    info = {name: json.loads(text) for name, text in records.get(FLIGHT, {}).items()}
+    return LogFacts(info, _scenario(records.get(SCENARIO)), records.get(TEXTS, {}))
+
+
+def _scenario(record: Mapping[str, str] | None) -> Scenario | None:
+    if not record:
+        return None
+    with tempfile.TemporaryDirectory() as folder:
+        file = Path(folder) / Path(record["name"]).name
+        file.write_text(record["text"])
+        return load_scenario(str(file))

@@ -1,0 +1,324 @@
+"""A flight's log.mcap → the table of its control ticks.
+
+A tick is a stamp of /uam/truth/state at which the mission had a reference; everything else is
+joined to it by stamp. What a tick has no message of its own for (the gains, at 50 Hz; in real time
+a message that was lost) holds the last value, as it did for whoever received it.
+"""
+
+from __future__ import annotations
+
+from bisect import bisect_right
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from diagnostic_msgs.msg import DiagnosticArray
+from rclpy.serialization import deserialize_message
+
+from uam_control.coordinates import ARM, COORDINATES
+from uam_control.mission import Scenario
+from uam_control.mission.mission import ABORTED, LANDED, WAITING
+from uam_control.supervision import State
+from uam_lab.recording import cdr
+from uam_lab.recording import fault_records as fault_log
+from uam_lab.recording.mcap_reader import TopicLog, UnreadableLog, read_log
+from uam_lab.results.outcome import transition
+from uam_lab.results.timeseries import (
+    COLUMNS,
+    SUBSYSTEMS,
+    Recording,
+    Series,
+    gain_columns,
+)
+from uam_msgs_py.messages import topics
+from uam_msgs_py.messages.changes import Change
+from uam_msgs_py.messages.status import MissionStatus
+
+SECOND = 1e9
+SILENCE = 1e9  # [ns] without references, until the mission counts as lost
+STATE_ROWS = ("positions", "velocities", "accelerations")
+TRUTH, STATE, REFERENCE = (t.name for t in (topics.TRUTH_STATE, topics.STATE, topics.REFERENCE))
+POSITION, ATTITUDE, JOINTS = (
+    t.name for t in (topics.POSITION_COMMAND, topics.ATTITUDE_COMMAND, topics.ARM_COMMAND)
+)
+SETPOINT, STATUS = topics.SETPOINT.name, topics.MISSION_STATUS.name
+THRUST, CHANGES, FAULTS = (t.name for t in (topics.THRUST, topics.CHANGES, topics.FAULTS))
+PAYLOAD, ROTORS, MAGNET = (
+    t.name for t in (topics.TRUTH_PAYLOAD, topics.TRUTH_ROTORS, topics.TRUTH_MAGNET)
+)
+ADAPTATION = {
+    "position": topics.POSITION_ADAPTATION.name,
+    "attitude": topics.ATTITUDE_ADAPTATION.name,
+    "arm": topics.ARM_ADAPTATION.name,
+}
+TOPICS = {
+    *(TRUTH, STATE, REFERENCE, POSITION, ATTITUDE, JOINTS, SETPOINT, STATUS),
+    *(PAYLOAD, ROTORS, MAGNET, THRUST, CHANGES, FAULTS, *ADAPTATION.values()),
+}
+
+
+class Samples:
+    """Values of one topic in the order of their stamps: stamps (m,) [ns], rows (m, n)."""
+
+    def __init__(self, stamps: np.ndarray, rows: np.ndarray):
+        order = np.argsort(stamps, kind="stable")
+        self.stamps, self.rows = stamps[order], rows[order]
+
+    def at(self, ticks: np.ndarray) -> np.ndarray:
+        """Rows (len(ticks), n) at the stamps `ticks` [ns] or last before; NaN before the first."""
+        out = np.full((len(ticks), self.rows.shape[1]), np.nan)
+        if not len(self.stamps):
+            return out
+        index = np.searchsorted(self.stamps, ticks, side="right") - 1
+        there = index >= 0
+        out[there] = self.rows[index[there]]
+        return out
+
+
+class Log:
+    """The topics of a log, decoded when asked for."""
+
+    def __init__(self, found: Mapping[str, TopicLog]):
+        self._topics = found
+
+    def messages(self, topic: str) -> list[bytes]:
+        """Serialized messages of a topic in file order; [] where there are none."""
+        log = self._topics.get(topic)
+        return log.messages if log else []
+
+    def wall_seconds(self, topic: str) -> float:
+        """Wall time between the first and the last message of a topic [s]; 0 without."""
+        log = self._topics.get(topic)
+        return (max(log.published) - min(log.published)) / SECOND if log and log.published else 0.0
+
+    def blocks(self, topic: str) -> list[cdr.Block]:
+        """Decoded messages of a topic; [] where there are none."""
+        log = self._topics.get(topic)
+        return cdr.read(log.type_name, log.messages) if log and log.messages else []
+
+    def samples(self, topic: str, fields: Sequence[str], width: int) -> Samples:
+        """`fields` side by side, `width` numbers each; zeros for messages that are idle (empty)."""
+        stamps, rows = [], []
+        for block in self.blocks(topic):
+            stamps.append(block.stamps)
+            rows.append(np.hstack([_field(block, field, width) for field in fields]))
+        if not stamps:
+            return Samples(np.zeros(0, np.int64), np.zeros((0, width * len(fields))))
+        return Samples(np.concatenate(stamps), np.vstack(rows))
+
+    def statuses(self) -> list[tuple[int, MissionStatus]]:
+        """What the mission said of itself, and at which stamp [ns], in order."""
+        return [
+            MissionStatus.from_message(deserialize_message(data, DiagnosticArray))
+            for data in self.messages(STATUS)
+        ]
+
+
+def _field(block: cdr.Block, field: str, width: int) -> np.ndarray:
+    found = block.fields.get(field)
+    if found is None:
+        return np.zeros((len(block.stamps), width))
+    return found[:, :width]
+
+
+class References:
+    """What the mission asked for, and when: rows (m, 24), flying (m,), take-off stamp."""
+
+    def __init__(self, log: Log):
+        stamps, rows, flying = [], [], []
+        self.takeoff: int | None = None  # stamp [ns] of mission time 0
+        for block in log.blocks(REFERENCE):
+            whole = len(block.names) == len(COORDINATES)
+            values = np.zeros((len(block.stamps), 3, len(COORDINATES)))
+            for i, row in enumerate(STATE_ROWS):
+                values[:, i, slice(None) if whole else ARM] = block.fields[row]
+            stamps.append(block.stamps)
+            rows.append(values.reshape(len(values), -1))
+            flying.append(np.full((len(values), 1), float(whole)))
+            if whole:
+                self.takeoff = int(np.min(block.stamps - block.fields["time_from_start"]))
+        if not stamps:
+            raise UnreadableLog("the log has no reference: the mission never began")
+        joined = np.hstack([np.vstack(rows), np.vstack(flying)])
+        self.samples = Samples(np.concatenate(stamps), joined)
+        self._hold_after_landing()
+
+    def _hold_after_landing(self) -> None:
+        """After the flight nothing is asked of the pose any more; its last reference stays."""
+        rows = self.samples.rows
+        flights = np.flatnonzero(rows[:, -1])
+        if len(flights):
+            pose = [c for c in range(3 * len(COORDINATES)) if c % len(COORDINATES) < ARM.start]
+            rows[flights[-1] + 1 :, pose] = rows[flights[-1], pose]
+
+
+@dataclass(frozen=True)
+class Flight:
+    """What a log tells: the table, whether the mission ended by itself, why it was given up, what
+    was asked of the parameters, how the states followed each other, which faults there were, how
+    long it took [s of wall time]."""
+
+    series: Series
+    done: bool
+    abort_reason: str
+    parameter_changes: list[dict[str, Any]]
+    transitions: list[dict[str, Any]]
+    faults: list[dict[str, Any]]
+    wall_s: float
+
+
+def read_flight(path: Path, scenario: Scenario, info: Mapping[str, Any] | None = None) -> Flight:
+    """The flight of `scenario` that is recorded in `path`.
+
+    Raises UnreadableLog when the file is no log, or the log of a flight that never began.
+    """
+    log = Log(read_log(path, TOPICS))
+    statuses = log.statuses()
+    end = next((stamp for stamp, status in statuses if status.done), None)
+    abort_reason = statuses[-1][1].abort_reason if statuses else ""
+    references = References(log)
+    truth = log.samples(TRUTH, STATE_ROWS, len(COORDINATES))
+    first, last = references.samples.stamps[[0, -1]]
+    # The mission is one tick ahead: its last reference is of a tick that nobody controlled. What
+    # follows its end depends on how fast the plant heard of it.
+    last = min(last, end + 1) if end is not None else _last_of_all(last, truth.stamps)
+    ticks = truth.stamps[(truth.stamps >= first) & (truth.stamps < last)]
+    if not len(ticks):
+        raise UnreadableLog(f"{path} has no control tick")
+    recording = Recording(len(ticks))
+    values = recording.values
+    takeoff = references.takeoff if references.takeoff is not None else int(last)
+    time = values[:, COLUMNS["time"]] = (ticks - takeoff) / SECOND
+    values[:, COLUMNS.block("truth.")] = truth.at(ticks)
+    values[:, COLUMNS.block("estimate.")] = log.samples(STATE, STATE_ROWS, 8).at(ticks)
+    reference = references.samples.at(ticks)
+    flying = reference[:, -1] > 0.5
+    values[:, COLUMNS.block("reference.")] = reference[:, :-1]
+    _commands(log, ticks, values)
+    for subsystem in SUBSYSTEMS:
+        adaptation(log, subsystem, ticks, values)
+    _truth(log, ticks, values)
+    for number, name in enumerate(phases(ticks, time, flying, scenario, statuses)):
+        recording.phases[number] = recording.phase_names.setdefault(
+            name, len(recording.phase_names)
+        )
+    recording.count = len(ticks)
+    changes = parameter_changes(log, takeoff)
+    told = transitions(statuses, takeoff)
+    wall = log.wall_seconds(TRUTH)
+    faults = fault_log.records(log.messages(FAULTS), takeoff)
+    series = recording.series(info)
+    return Flight(series, end is not None, abort_reason, changes, told, faults, wall)
+
+
+def _last_of_all(last: int, truth: np.ndarray) -> int:
+    """Where the table of a flight ends that the mission did not end; stamps [ns].
+
+    last: of the last reference. A mission that fell silent in flight still has a vehicle.
+    """
+    return int(truth[-1]) + 1 if len(truth) and truth[-1] - last > SILENCE else int(last)
+
+
+def parameter_changes(log: Log, takeoff: int) -> list[dict[str, Any]]:
+    """What was asked of the nodes' parameters, in order; takeoff: stamp [ns] of mission time 0.
+
+    time_s: mission time after which it counts; node, by, reason, values: see `changes.Change`.
+    """
+    found = []
+    for data in log.messages(CHANGES):
+        stamp, change = Change.from_message(deserialize_message(data, DiagnosticArray))
+        entry = {
+            "time_s": (stamp - takeoff) / SECOND,
+            "node": change.node,
+            "by": change.by,
+            "accepted": change.accepted,
+            "reason": change.reason,
+            "values": {name: list(pair) for name, pair in change.values.items()},
+        }
+        found.append(entry)
+    return sorted(found, key=lambda entry: entry["time_s"])
+
+
+def adaptation(log: Log, subsystem: str, ticks: np.ndarray, values: np.ndarray) -> None:
+    """Fill in the gains of a subsystem's law: one block of messages, as a law has one set."""
+    for block in log.blocks(ADAPTATION[subsystem]):
+        gains = Samples(block.stamps, block.fields["position"])
+        values[:, gain_columns(subsystem, block.names)] = gains.at(ticks)
+
+
+def _commands(log: Log, ticks: np.ndarray, values: np.ndarray) -> None:
+    """Fill in what the controllers commanded, and the attitude that the position law asked for."""
+    position = log.samples(POSITION, (*STATE_ROWS, "effort"), 6).at(ticks)
+    asked = [COLUMNS[f"reference.{angle}"] for angle in ("roll", "pitch", "yaw")]
+    for row in range(3):
+        columns = [column + row * len(COORDINATES) for column in asked]
+        values[:, columns] = position[:, 6 * row + 3 : 6 * row + 6]
+    values[:, COLUMNS.block("tau_p.")] = position[:, 18:21]
+    values[:, COLUMNS.block("tau_q.")] = log.samples(ATTITUDE, ("effort",), 3).at(ticks)
+    values[:, COLUMNS.block("tau_alpha.")] = log.samples(JOINTS, ("effort",), 2).at(ticks)
+    setpoint = log.samples(SETPOINT, ("angular", "linear"), 3).at(ticks)
+    values[:, COLUMNS.block("setpoint.")] = setpoint[:, [0, 1, 2, 5]]
+    factor = log.samples(THRUST, ("position",), 1).at(ticks)
+    values[:, COLUMNS["thrust.factor"]] = factor[:, 0]
+
+
+def _truth(log: Log, ticks: np.ndarray, values: np.ndarray) -> None:
+    """Fill in what only the simulator knew."""
+    rotors = log.samples(ROTORS, ("position", "effort"), 4).at(ticks)
+    for i in range(4):
+        values[:, COLUMNS[f"rotor_{i + 1}.command"]] = rotors[:, i]
+        values[:, COLUMNS[f"rotor_{i + 1}.thrust"]] = rotors[:, 4 + i]
+    position = log.samples(PAYLOAD, ("position",), 3).at(ticks)
+    x, y, z, w = log.samples(PAYLOAD, ("orientation",), 4).at(ticks).T
+    values[:, COLUMNS.block("payload.")] = np.column_stack([position, w, x, y, z])
+    magnet = log.samples(MAGNET, ("position", "effort"), 2).at(ticks)
+    values[:, COLUMNS.block("magnet.")] = magnet[:, [0, 2, 1]]
+
+
+def transitions(
+    statuses: Sequence[tuple[int, MissionStatus]], takeoff: int
+) -> list[dict[str, Any]]:
+    """How the states of the supervisor followed each other: see `outcome.transition`."""
+    found = []
+    for (_, before), (stamp, now) in pairwise(statuses):
+        if now.state != before.state:
+            time = (stamp - takeoff) / SECOND
+            found.append(transition(time, before.state, now.state, now.cause))
+    return found
+
+
+def phases(
+    ticks: np.ndarray,
+    time: np.ndarray,
+    flying: np.ndarray,
+    scenario: Scenario,
+    statuses: Sequence[tuple[int, MissionStatus]],
+) -> Iterator[str]:
+    """The phase of each tick; ticks (m,) [ns], time (m,) [s], flying (m,): position and attitude
+    are controlled.
+
+    The scenario's, unless the mission has left it; then what the mission said last.
+    """
+    left = any(
+        status.state == State.HOLDING.value
+        or (status.state == State.LANDING.value and status.abort_reason)
+        for _, status in statuses
+    )
+    flights = np.flatnonzero(flying)
+    takeoff = flights[0] if len(flights) else len(time)
+    last = statuses[-1][1] if statuses else MissionStatus()
+    ended = last.phase
+    if ended not in (LANDED, ABORTED):  # the log was cut off
+        ended = ABORTED if last.abort_reason else LANDED
+    stamps = [stamp for stamp, _ in statuses]
+    for number, now in enumerate(time.tolist()):
+        if flying[number]:
+            told = bisect_right(stamps, ticks[number]) - 1 if left else -1
+            yield statuses[told][1].phase if told >= 0 else scenario.phase(max(now, 0.0))
+        elif number < takeoff:
+            yield WAITING
+        else:
+            yield ended

@@ -1,0 +1,69 @@
+"""Everything of the report in one call; each step can also be had alone.
+
+| step | function | writes |
+|---|---|---|
+| stability | `stability_of` | stability.json |
+| figures | `figures.draw` | figures/*.png, *.svg |
+| pictures | `rendering.render` | figures/snapshots/*.png, snapshots.png, flight.mp4 |
+| page | `page.write_page` | report.html |
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+from uam_control.laws import catalogue
+from uam_control.profile import ProfileError
+from uam_lab.analysis.folder import analyse_folder
+from uam_lab.analysis.stability import Stability
+from uam_lab.report.figures import figures
+from uam_lab.report.page import page
+from uam_lab.report.video import rendering
+from uam_lab.results import timeseries
+from uam_lab.results.atomic import write_text
+from uam_lab.results.result_folder import as_json
+
+
+@dataclass(frozen=True)
+class Report:
+    """Where the page is, and a line on what could not be made (empty when all was)."""
+
+    page: Path
+    problem: str
+
+
+def build_report(
+    directory: Path,
+    progress: Callable[[str], None] = lambda text: None,
+    video: bool = True,
+    pictures: bool = True,
+) -> Report:
+    """Make the report of the flight in a result folder.
+
+    Needs timeseries.parquet and metrics.json; shows info.json, parameters.yaml and versions.json
+    where they are. progress: called with a short text as each step begins. Raises
+    timeseries.UnreadableFlight, never for want of a renderer.
+    """
+    directory = Path(directory)
+    series = timeseries.read(directory / "timeseries.parquet")
+    label = catalogue.label(series.info.get("controller") or directory.name)
+    progress("stability")
+    flight = figures.Flight(label, series, stability_of(directory, series))
+    figures.draw([flight], directory / "figures", progress)
+    rendered = rendering.render(directory, video, progress) if pictures else None
+    progress("page")
+    written = page.write_page(directory, rendered)
+    return Report(written, rendered.problem if rendered else "")
+
+
+def stability_of(directory: Path, series: timeseries.Series) -> Stability | None:
+    """The analysis, also written to stability.json; None where it has nothing to say."""
+    try:
+        found = analyse_folder(directory, series)
+    except ProfileError:  # the page says that the parameters are missing
+        return None
+    if found is not None:
+        write_text(directory / "stability.json", as_json(found.summary()))
+    return found

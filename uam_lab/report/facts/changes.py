@@ -1,0 +1,63 @@
+"""Changes of parameters in flight: numbered in the figures, listed on the page."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from uam_lab.report.facts.parameter_table import text
+
+LABELS = 40  # more numbers than this would only hide the lines
+
+
+@dataclass(frozen=True)
+class Row:
+    """One request: its number in the figures, mission time [s], and what became of it."""
+
+    number: int
+    time: float
+    node: str
+    by: str
+    accepted: bool
+    reason: str
+    values: tuple[tuple[str, str, str], ...]  # name, old, new
+
+
+def rows(info: Mapping[str, Any]) -> list[Row]:
+    """Every request of a flight, in order; info: see `log_reader.parameter_changes`."""
+    return [
+        Row(
+            number=number,
+            time=one["time_s"],
+            node=one["node"],
+            by=one["by"],
+            accepted=one["accepted"],
+            reason=one["reason"],
+            values=tuple(
+                (name, _text(old), _text(new)) for name, (old, new) in one["values"].items()
+            ),
+        )
+        for number, one in enumerate(info.get("parameter_changes") or [], start=1)
+    ]
+
+
+def labels(shown: Sequence[Row], apart: float) -> list[tuple[float, str]]:
+    """(time, text) of the numbers; those nearer to each other than `apart` [s] share one."""
+    groups: list[list[Row]] = []
+    for row in shown:
+        if groups and row.time - groups[-1][0].time < apart:
+            groups[-1].append(row)
+        else:
+            groups.append([row])
+    if len(groups) > LABELS:
+        return []
+    return [(group[0].time, _span(group[0].number, group[-1].number)) for group in groups]
+
+
+def _span(first: int, last: int) -> str:
+    return str(first) if first == last else f"{first}–{last}"
+
+
+def _text(value: Any) -> str:
+    return "–" if value is None else text(value)

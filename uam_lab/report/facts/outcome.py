@@ -1,0 +1,107 @@
+"""What happened in words and rows, shared by the page and the console."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+from uam_control.supervision import ORDINARY
+from uam_lab.report.facts import paper
+
+
+@dataclass(frozen=True)
+class ErrorRow:
+    """One coordinate: RMS of this flight, the paper's, the largest error; None where unknown."""
+
+    group: str
+    name: str
+    unit: str
+    digits: int
+    rms: float | None
+    paper: float
+    largest: float | None
+
+    @property
+    def better(self) -> bool | None:
+        """Whether the RMS is not above the paper's."""
+        return None if self.rms is None else self.rms <= self.paper
+
+    def shown(self, value: float | None) -> str:
+        """`value` with the unit and the digits of this row."""
+        if value is None:
+            return "–"
+        gap = "" if self.unit == "°" else " "
+        return f"{value:.{self.digits}f}{gap}{self.unit}"
+
+
+def error_rows(metrics: Mapping[str, Any]) -> list[ErrorRow]:
+    """One row per coordinate."""
+    rows = []
+    for group, heading, unit, digits, names in paper.TABLES:
+        columns = zip(
+            names,
+            metrics["rms"][group],
+            paper.RMS[group],
+            metrics["max"][group],
+            strict=True,
+        )
+        rows += [ErrorRow(heading, name, unit, digits, *figures) for name, *figures in columns]
+    return rows
+
+
+def verdict(metrics: Mapping[str, Any]) -> str:
+    """The headline."""
+    if metrics["mission_completed"]:
+        return "Mission completed"
+    return "Mission aborted" if metrics.get("abort_reason") else "Mission not completed"
+
+
+def payload_story(metrics: Mapping[str, Any]) -> str:
+    """What became of the payload, in one line."""
+    if metrics.get("payload_lifted") is None:
+        there = metrics.get("payload_mass_kg")
+        return "the magnet was never on" if there else "no payload in this flight"
+    if not metrics["payload_lifted"]:
+        return "not lifted"
+    error = metrics.get("payload_place_error_m")
+    if error is None:
+        return "lifted"
+    return f"lifted, came to rest {distance(error)} from the drop point"
+
+
+def landing_story(metrics: Mapping[str, Any]) -> str:
+    """Where the vehicle landed, in one line."""
+    error = metrics.get("landing_error_m")
+    return "not landed" if error is None else f"{distance(error)} from the landing point"
+
+
+def supervision_story(metrics: Mapping[str, Any]) -> str | None:
+    """Where the supervisor stepped in, in one line; None where it did not."""
+    steps = [
+        f"{one['to']} at {one['time_s']:.1f} s ({one['cause']})"
+        for one in metrics.get("transitions") or []
+        if one["cause"] not in ORDINARY.values()
+    ]
+    return ", ".join(steps) or None
+
+
+def clamp_story(metrics: Mapping[str, Any]) -> str:
+    """How often each law left its prescribed performance and was clamped, in one line."""
+    return ", ".join(f"{subsystem} {count}" for subsystem, count in metrics["clamps"].items())
+
+
+def thrust_story(metrics: Mapping[str, Any]) -> str | None:
+    """True thrust beside the assumed one as identified in flight, in one line."""
+    found = metrics.get("thrust_factor")
+    if found is None:
+        return None
+    return (
+        f"{found['end']:.3f} of the assumed thrust at the end"
+        f" ({found['least']:.3f} to {found['largest']:.3f} in flight)"
+    )
+
+
+def distance(metres: float) -> str:
+    """A distance as a person says it."""
+    return f"{metres:.2f} m" if metres >= 1.0 else f"{100.0 * metres:.1f} cm"

@@ -1,0 +1,122 @@
+"""The flown parameters beside the paper's Table I, and which safeguards were on."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from uam_control.laws.law_parameters import SAFEGUARD
+from uam_control.profile import (
+    CONTROLLERS,
+    NODES,
+    ProfileError,
+    load_profile,
+    parameter_set,
+    read_sections,
+)
+from uam_control.settings.parameter_set import ParameterError, ParameterSet
+
+PAPER_PROFILE = "paper_table1"
+
+
+@dataclass(frozen=True)
+class Row:
+    """One parameter: `paper` is empty where Table I's profile has no such parameter."""
+
+    name: str
+    description: str
+    unit: str
+    flown: str
+    paper: str
+    differs: bool
+    safeguard_on: bool
+
+
+@dataclass(frozen=True)
+class Comparison:
+    """Rows per controller, those of the other nodes, and the names of safeguards that were on."""
+
+    controllers: dict[str, list[Row]]
+    others: dict[str, list[Row]]
+
+    @property
+    def safeguards(self) -> dict[str, list[str]]:
+        """controller → what was on, with its value; controllers without any are left out."""
+        on = {
+            node: [f"{row.name} = {row.flown}" for row in rows if row.safeguard_on]
+            for node, rows in self.controllers.items()
+        }
+        return {node: names for node, names in on.items() if names}
+
+
+def compare(parameter_file: Path) -> Comparison:
+    """Compare the effective parameters of a flight with the verbatim Table I.
+
+    Raises ProfileError when the file is missing or not a ROS parameter file.
+    """
+    flown = read_sections(parameter_file)
+    paper = load_profile(PAPER_PROFILE).sets
+    rows = {}
+    for node, values in flown.items():
+        specs = _specs(parameter_file, node, values)
+        table = _table(paper[node], specs) if node in paper else {}
+        rows[node] = [_row(name, value, table, specs) for name, value in values.items()]
+    return Comparison(
+        {node: rows[node] for node in CONTROLLERS if node in rows},
+        {node: found for node, found in rows.items() if node not in CONTROLLERS and found},
+    )
+
+
+def _specs(file: Path, node: str, values: Mapping[str, Any]) -> Mapping[str, Any]:
+    """What the parameters mean to the law that flew."""
+    try:
+        return parameter_set(node, values)[0].specs() if node in NODES else {}
+    except ParameterError as error:
+        raise ProfileError(f"{file}: {node}: {error}") from None
+
+
+def _table(paper: ParameterSet, specs: Mapping[str, Any]) -> dict[str, Any]:
+    """Table I's values of those parameters that mean the same to the law that flew."""
+    known = paper.specs()
+    return {name: value for name, value in asdict(paper).items() if specs.get(name) == known[name]}
+
+
+def _row(name: str, value: Any, table: Mapping[str, Any], specs: Mapping[str, Any]) -> Row:
+    spec = specs.get(name)
+    description = getattr(spec, "description", "")
+    known = name in table
+    return Row(
+        name=name,
+        description=description,
+        unit=getattr(spec, "unit", ""),
+        flown=text(value),
+        paper=text(table[name]) if known else "",
+        differs=known and not _same(value, table[name]),
+        safeguard_on=description.startswith(SAFEGUARD) and bool(np.any(value)),
+    )
+
+
+def _same(one: Any, other: Any) -> bool:
+    """Equality of parameters; YAML has lists where the sets have tuples."""
+    if isinstance(one, list | tuple) and isinstance(other, list | tuple):
+        return list(one) == list(other)
+    return one == other
+
+
+def text(value: Any) -> str:
+    """A parameter as a person writes it; equal entries of a list once."""
+    if isinstance(value, bool):
+        return "on" if value else "off"
+    if isinstance(value, int | float):
+        return f"{value:g}"
+    if isinstance(value, list | tuple):
+        parts = [text(item) for item in value]
+        return f"{parts[0]} (each)" if len(parts) > 1 and len(set(parts)) == 1 else ", ".join(parts)
+    return str(value)
+
+
+__all__ = ["Comparison", "ProfileError", "Row", "compare", "text"]

@@ -1,0 +1,88 @@
+"""Faults that were put into a flight: shaded in the figures, listed on the page."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from matplotlib.lines import Line2D
+
+from uam_lab.report.facts.parameter_table import text
+from uam_lab.report.figures import style
+
+APART = 0.02  # of the time axis; letters nearer to each other share one place
+SHADE = 0.16  # opacity
+
+
+@dataclass(frozen=True)
+class Row:
+    """One fault: its letter in the figures, mission times [s], and what it was."""
+
+    letter: str
+    name: str
+    begin: float
+    end: float | None  # None: it was there until the flight ended
+    values: tuple[tuple[str, str], ...]
+
+
+def rows(info: Mapping[str, Any]) -> list[Row]:
+    """Every fault of a flight, in order; info: with `faults` as in metrics.json."""
+    return [
+        Row(
+            letter=letter(number),
+            name=one["fault"],
+            begin=one["begin_s"],
+            end=one["end_s"],
+            values=tuple((name, text(value)) for name, value in one["parameters"].items()),
+        )
+        for number, one in enumerate(info.get("faults") or [])
+    ]
+
+
+def letter(number: int) -> str:
+    """A, B ... Z, AA, AB ... for 0, 1 ..."""
+    first, last = divmod(number, 26)
+    return (letter(first - 1) if first else "") + chr(ord("A") + last)
+
+
+def shade(axes: np.ndarray, info: Mapping[str, Any], start: float, end: float) -> None:
+    """Shade the span of each fault in all panels, with its letter in the uppermost ones."""
+    shown = [row for row in rows(info) if row.begin <= end and (row.end or end) >= start]
+    for row in shown:
+        begin, over = max(row.begin, start), min(end if row.end is None else row.end, end)
+        for axis in axes.flat:
+            axis.axvspan(begin, over, color=style.FAULT, alpha=SHADE, linewidth=0.0, zorder=0.5)
+            axis.axvline(begin, color=style.FAULT, linewidth=0.8, zorder=2.3)
+    for axis in axes[0]:
+        for at, letters in _together(shown, start, APART * (end - start)):
+            axis.annotate(
+                letters,
+                (at, 0.0),
+                xycoords=("data", "axes fraction"),
+                xytext=(2, 2),
+                textcoords="offset points",
+                fontsize=7.0,
+                fontweight="bold",
+                color=style.FAULT,
+            )
+
+
+def handles(info: Mapping[str, Any]) -> list[Line2D]:
+    """What the legend says of them."""
+    if not rows(info):
+        return []
+    return [Line2D([], [], color=style.FAULT, linewidth=6, alpha=2.0 * SHADE, label="fault")]
+
+
+def _together(shown: Sequence[Row], start: float, apart: float) -> list[tuple[float, str]]:
+    """(time, letters): those nearer to each other than `apart` [s] side by side."""
+    groups: list[tuple[float, list[str]]] = []
+    for row in sorted(shown, key=lambda row: row.begin):
+        at = max(row.begin, start)
+        if groups and at - groups[-1][0] < apart:
+            groups[-1][1].append(row.letter)
+        else:
+            groups.append((at, [row.letter]))
+    return [(at, " ".join(letters)) for at, letters in groups]

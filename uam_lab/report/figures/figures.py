@@ -1,0 +1,256 @@
+"""The figures of a flight, or of several over one another: the paper's five and more.
+
+`draw(flights, directory)` writes each as PNG and SVG; every figure can also be had alone.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from pathlib import Path
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+from matplotlib.ticker import NullFormatter
+
+from uam_lab.report.facts import paper
+from uam_lab.report.figures import panels, style
+from uam_lab.report.figures.panels import Flight, Panel
+from uam_lab.report.figures.path_figure import path_figure
+from uam_lab.report.figures.stability_figures import coupling, lyapunov
+from uam_lab.results import metrics
+from uam_lab.results.atomic import replacing
+from uam_lab.results.timeseries import SUBSYSTEMS
+
+DEGREES = 180.0 / np.pi
+ROLL, PITCH, YAW = "roll φ", "pitch θ", "yaw ψ"
+
+
+def position_errors(flights: Sequence[Flight]) -> Figure:
+    """The paper's first figure: position error over time."""
+    drawn = [Panel(f"{axis} error [m]", f"error.{axis}") for axis in "xyz"]
+    return _errors("Position tracking error", flights, drawn, "position_m", "m", 3)
+
+
+def attitude_errors(flights: Sequence[Flight]) -> Figure:
+    """The paper's second figure: attitude error over time."""
+    drawn = [
+        Panel(f"{label} error [°]", f"error.{name}", DEGREES)
+        for label, name in ((ROLL, "roll"), (PITCH, "pitch"), (YAW, "yaw"))
+    ]
+    return _errors("Attitude tracking error", flights, drawn, "attitude_deg", "°", 2)
+
+
+def arm_errors(flights: Sequence[Flight]) -> Figure:
+    """The paper's third figure: joint error over time."""
+    drawn = [
+        Panel(f"{label} error [°]", f"error.alpha_{joint}", DEGREES)
+        for label, joint in (("α₁", 1), ("α₂", 2))
+    ]
+    return _errors("Arm tracking error", flights, drawn, "arm_deg", "°", 2)
+
+
+def vehicle_inputs(flights: Sequence[Flight]) -> Figure:
+    """The paper's fourth figure: what position and attitude law ask for."""
+    drawn = [Panel(f"$\\tau_{{p,{axis}}}$ [N]", f"tau_p.{axis}") for axis in "xyz"]
+    drawn += [
+        Panel(f"$\\tau_{{q,\\{symbol}}}$ [N m]", f"tau_q.{name}")
+        for symbol, name in (("phi", "roll"), ("theta", "pitch"), ("psi", "yaw"))
+    ]
+    return panels.stack("Vehicle control inputs", flights, drawn, columns=2)[0]
+
+
+def arm_inputs(flights: Sequence[Flight]) -> Figure:
+    """The paper's fifth figure: what the arm law asks for."""
+    drawn = [Panel(f"$\\tau_{{\\alpha {joint}}}$ [N m]", f"tau_alpha.{joint}") for joint in "12"]
+    return panels.stack("Arm control inputs", flights, drawn)[0]
+
+
+def setpoints(flights: Sequence[Flight]) -> Figure:
+    """What was sent to the autopilot."""
+    drawn = [
+        Panel(f"{name} rate [°/s]", f"setpoint.rate_{axis}", DEGREES)
+        for name, axis in (("roll", "x"), ("pitch", "y"), ("yaw", "z"))
+    ]
+    drawn.append(Panel("thrust [1]", "setpoint.thrust"))
+    drawn.append(Panel("true / assumed [1]", "thrust.factor"))
+    return panels.stack("Setpoints sent to the autopilot", flights, drawn, panel_height=1.25)[0]
+
+
+def payload(flights: Sequence[Flight]) -> Figure | None:
+    """Where the payload was; None where no flight had one."""
+    flights = [f for f in flights if not np.isnan(f.series["payload.z"]).all()]
+    if not any(f.series.info.get("payload_mass_kg") for f in flights):
+        return None
+    drawn = [Panel(f"payload {axis} [m]", f"payload.{axis}", on_ground=True) for axis in "xyz"]
+    return panels.stack("Payload", flights, drawn, panel_height=1.15)[0]
+
+
+# rows of the figure of the adaptation: gains of one law → label
+GAINS = {
+    ("K0", "K1", "K2", "K3"): "$K_0 \\ldots K_3$",
+    ("zeta",): "ζ",
+    ("rho",): "ρ",
+    ("D1", "D2", "D3"): "$\\hat D$",
+    ("s_norm",): "‖s‖",
+    ("theta0", "theta1", "theta2"): "$\\theta_0 \\ldots \\theta_2$",
+    ("w_norm",): "‖w‖",
+    ("eta",): "largest |η|",
+}
+SIGNED = ("D1", "D2", "D3")  # drawn on a linear scale
+SYMBOLS = {"K": "K", "D": "D", "theta": "\\theta"}
+
+
+def adaptation(flights: Sequence[Flight]) -> Figure | None:
+    """Adapted gains and what drives them, by subsystem, for the laws flown; None without any."""
+    shown = [names for names in GAINS if any(_adapted(f, names) for f in flights)]
+    if not shown:
+        return None
+    figure, axes = panels.grid("Adaptation", len(shown), 3, 1.65)
+    for column, subsystem in enumerate(("position", "attitude", "arm")):
+        for number, flight in enumerate(flights):
+            for axis, names in zip(axes[:, column], shown, strict=True):
+                _adaptation_of(axis, flight, subsystem, names, number, len(flights))
+        axes[0, column].annotate(
+            subsystem,
+            (0.0, 1.0),
+            xycoords="axes fraction",
+            xytext=(0, 14),
+            textcoords="offset points",
+            fontweight="bold",
+        )
+    for row, names in zip(axes, shown, strict=True):
+        row[0].set_ylabel(GAINS[names])
+        if len(names) > 1:
+            _gain_legend(row[2], names, above=1.06 if names == shown[0] else 0.97)
+        for axis in row if names != SIGNED else ():
+            axis.set_yscale("log")
+            low, high = axis.get_ylim()
+            axis.set_ylim(10.0 ** np.floor(np.log10(low)), 10.0 ** np.ceil(np.log10(high)))
+            axis.yaxis.set_minor_formatter(NullFormatter())
+    panels.finish(figure, axes, flights)
+    for axis in axes[-1]:
+        axis.set_xlabel("time [s]")
+    return figure
+
+
+def _gain_legend(axis: Axes, names: tuple[str, ...], above: float) -> None:
+    """Names of the gains of a row; above the names of the phases in the first."""
+    lines = zip(style.GAINS, names, strict=False)
+    axis.legend(
+        handles=[
+            Line2D([], [], color=c, label=f"${SYMBOLS[name[:-1]]}_{name[-1]}$") for c, name in lines
+        ],
+        loc="lower right",
+        bbox_to_anchor=(1.02, above),
+        ncols=len(names),
+        handlelength=1.0,
+        columnspacing=0.8,
+        fontsize=8.0,
+    )
+
+
+def _adapted(flight: Flight, names: tuple[str, ...]) -> bool:
+    """Whether the flight has any of these gains, in any subsystem."""
+    columns = [f"adaptation.{s}.{name}" for s in SUBSYSTEMS for name in names]
+    return any(np.isfinite(flight.series[column]).any() for column in columns)
+
+
+def _adaptation_of(
+    axis: Axes, flight: Flight, subsystem: str, names: tuple[str, ...], number: int, flights: int
+) -> None:
+    series = flight.series
+    for i, name in enumerate(names):
+        values = series[f"adaptation.{subsystem}.{name}"]
+        shown = series.flown & (np.isfinite(values) if names == SIGNED else values > 0.0)
+        if shown.any():
+            several = len(names) > 1  # then the colour tells the gain, the dash the flight
+            axis.plot(
+                *panels.thin(series.time[shown], values[shown], 400),
+                color=style.GAINS[i] if several else style.FLIGHTS[number % len(style.FLIGHTS)],
+                linestyle=("-", "--", ":", "-.")[number % 4] if several and flights > 1 else "-",
+                linewidth=1.0,
+            )
+
+
+def _errors(
+    title: str, flights: Sequence[Flight], drawn: list[Panel], group: str, unit: str, digits: int
+) -> Figure:
+    """Error panels; a single flight gets its RMS and the paper's beside them."""
+    single = len(flights) == 1
+    figure, axes = panels.stack(title, flights, drawn, right=0.875 if single else panels.RIGHT)
+    if single:
+        own = metrics.errors(flights[0].series)[group]
+        for axis, value, published in zip(axes, own, paper.RMS[group], strict=True):
+            for text, height, size, colour in (
+                ("RMS", 0.74, 7.5, style.MUTED),
+                (f"{value:.{digits}f} {unit}".replace(" °", "°"), 0.58, 10.5, style.INK),
+                (f"paper {published:g} {unit}".replace(" °", "°"), 0.42, 7.5, style.MUTED),
+            ):
+                axis.text(
+                    1.02,
+                    height,
+                    text,
+                    transform=axis.transAxes,
+                    fontsize=size,
+                    color=colour,
+                    va="center",
+                )
+    for axis in axes:
+        axis.axhline(0.0, color=style.REFERENCE, linewidth=0.8, zorder=2)
+    return figure
+
+
+# file name → (figure, caption in the report), in the order shown
+FIGURES: dict[str, tuple[Callable[[Sequence[Flight]], Figure | None], str]] = {
+    "position_errors": (position_errors, "Position error, truth minus reference."),
+    "attitude_errors": (
+        attitude_errors,
+        "Attitude error; the reference of roll and pitch is what the position law asks for.",
+    ),
+    "arm_errors": (arm_errors, "Joint error of the arm, truth minus reference."),
+    "vehicle_inputs": (vehicle_inputs, "Forces and torques that the two vehicle laws ask for."),
+    "arm_inputs": (arm_inputs, "Joint torques that the arm law asks for."),
+    "path": (path_figure, "Vehicle, arm and payload in the plane of the mission."),
+    "payload": (payload, "The payload on its stand, on the magnet and on the mat."),
+    "adaptation": (adaptation, "Adapted gains and what drives them, in flight."),
+    "coupling": (
+        coupling,
+        "The plant's true coupling force on each axis, less the weight fed forward, and what meets "
+        "it: the adaptive term, the feedback, and what the actuators do beyond the law's wish "
+        "(on the attitude the integrator of the autopilot). Means over 0.2 s.",
+    ),
+    "lyapunov": (
+        lyapunov,
+        "The Appendix's Lyapunov functions with the constants K* of this flight, their three "
+        "terms, what the proof's differential inequality allows, and the ultimate bound.",
+    ),
+    "setpoints": (
+        setpoints,
+        "Body rates and collective thrust sent to the autopilot; the thrust that the motors truly "
+        "have / that their curve says, as identified in flight.",
+    ),
+}
+
+
+def draw(
+    flights: Sequence[Flight],
+    directory: Path,
+    progress: Callable[[str], None] = lambda text: None,
+    names: Sequence[str] | None = None,
+) -> list[str]:
+    """Write the figures (all, or those of `names`) to `directory`; return the names written."""
+    directory.mkdir(parents=True, exist_ok=True)
+    written = []
+    with style.styled():
+        for name in names or FIGURES:
+            progress(f"figure {name}")
+            figure = FIGURES[name][0](flights)
+            if figure is None:
+                continue
+            for suffix, metadata in ((".png", None), (".svg", {"Date": None})):
+                with replacing(directory / (name + suffix)) as temporary:
+                    figure.savefig(temporary, dpi=style.PIXELS_PER_INCH, metadata=metadata)
+            written.append(name)
+    return written

@@ -1,0 +1,265 @@
+"""Stacked panels over mission time: phases shaded, payload events marked, long lines thinned."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+from matplotlib.ticker import MaxNLocator
+
+from uam_lab.report.facts import changes
+from uam_lab.report.figures import fault_marks, style
+from uam_lab.results.timeseries import ON_GROUND, Series
+
+if TYPE_CHECKING:
+    from uam_lab.analysis.stability import Stability
+
+BUCKETS = 900  # about one per pixel column of a panel
+RIGHT = 0.985  # right edge of the panels as part of the width
+# whether accepted → how a change of parameters is drawn, and its name
+CHANGES = (
+    (True, style.CHANGE, "-", "parameters changed"),
+    (False, style.REFUSED, ":", "change refused"),
+)
+MARGIN_S = 1.0  # shown before take-off and after touchdown
+
+
+@dataclass(frozen=True)
+class Flight:
+    """A flight to be drawn: its series, its name in a legend, its analysis if there is one."""
+
+    label: str
+    series: Series
+    stability: Stability | None = None
+
+
+@dataclass(frozen=True)
+class Panel:
+    """One axis over time: label with unit, column of the table, factor to the unit of the label.
+
+    Where nothing flies nothing is drawn, unless `on_ground` asks for it.
+    """
+
+    label: str
+    column: str
+    factor: float = 1.0
+    on_ground: bool = False
+
+
+def window(flights: Sequence[Flight]) -> tuple[float, float]:
+    """Mission times [s] between which anything flew, with a margin."""
+    times = [f.series.time[f.series.flown] for f in flights]
+    times = [t for t in times if len(t)] or [f.series.time for f in flights]
+    return min(t[0] for t in times) - MARGIN_S, max(t[-1] for t in times) + MARGIN_S
+
+
+def thin(
+    time: np.ndarray, values: np.ndarray, buckets: int = BUCKETS
+) -> tuple[np.ndarray, np.ndarray]:
+    """Fewer points of the same picture: lowest and highest of each of `buckets` stretches.
+
+    Unlike taking every n-th point this keeps every peak. time, values: (ticks,).
+    """
+    length = len(time) // buckets
+    if length <= 2:
+        return time, values
+    whole = length * buckets
+    blocks = np.nan_to_num(values[:whole]).reshape(buckets, length)
+    first = np.arange(buckets) * length
+    low, high = first + blocks.argmin(axis=1), first + blocks.argmax(axis=1)
+    rows = np.unique(np.concatenate([low, high, np.arange(whole, len(time))]))
+    return time[rows], values[rows]
+
+
+def stack(
+    title: str,
+    flights: Sequence[Flight],
+    panels: Sequence[Panel],
+    columns: int = 1,
+    panel_height: float = 1.45,
+    right: float = RIGHT,
+) -> tuple[Figure, list[Axes]]:
+    """One panel below the other (column by column), one line per flight in each."""
+    rows = -(-len(panels) // columns)
+    figure, axes = grid(title, rows, columns, panel_height, right)
+    ordered = list(axes.T.flat)
+    for axis, panel in zip(ordered, panels, strict=True):
+        lines(axis, flights, panel)
+    finish(figure, axes, flights)
+    return figure, ordered
+
+
+def grid(
+    title: str, rows: int, columns: int, panel_height: float, right: float = RIGHT
+) -> tuple[Figure, np.ndarray]:
+    """An empty grid of panels (rows, columns) with a title and room for phase names and legend."""
+    height = rows * panel_height + 1.05
+    figure = Figure(figsize=(style.WIDTH, height), layout=None)
+    axes = figure.subplots(rows, columns, sharex=True, squeeze=False)
+    figure.subplots_adjust(
+        left=0.085,
+        right=right,
+        top=1.0 - 0.62 / height,
+        bottom=0.44 / height,
+        hspace=0.16,
+        wspace=0.2,
+    )
+    figure.text(0.012, 1.0 - 0.1 / height, title, va="top", fontsize=11.5, fontweight="bold")
+    return figure, axes
+
+
+def lines(axis: Axes, flights: Sequence[Flight], panel: Panel) -> None:
+    """Draw one column of every flight."""
+    for number, flight in enumerate(flights):
+        series = flight.series
+        shown = slice(None) if panel.on_ground else series.flown
+        width = 1.1 if number == 0 else 0.9
+        axis.plot(
+            *thin(series.time[shown], series[panel.column][shown] * panel.factor),
+            color=style.FLIGHTS[number % len(style.FLIGHTS)],
+            linewidth=width,
+            zorder=3 + len(flights) - number,
+        )
+    axis.set_ylabel(panel.label)
+    axis.yaxis.set_major_locator(MaxNLocator(nbins=4, min_n_ticks=3, symmetric=False))
+    axis.margins(y=0.12)
+
+
+def finish(
+    figure: Figure,
+    axes: np.ndarray,
+    flights: Sequence[Flight],
+    handles: Sequence[Line2D] | None = None,
+) -> None:
+    """Phases, events, time axis and legend, common to every figure over time.
+
+    handles: what the legend names instead of flights and events.
+    """
+    start, end = window(flights)
+    axes[0, 0].set_xlim(start, end)
+    first = flights[0].series
+    for axis in axes.flat:
+        bands(axis, first, end)
+        for time, colour, _ in events(first):
+            axis.axvline(time, color=colour, linewidth=0.9, linestyle=(0, (4, 2.5)), zorder=2.5)
+    mark_changes(axes, first, start, end)
+    fault_marks.shade(axes, first.info, start, end)
+    for axis in axes[0]:
+        phase_names(figure, axis, first, start, end)
+    for axis in axes[-1]:
+        axis.set_xlabel("time from take-off command [s]")
+    figure.align_ylabels(axes)
+    if handles is None:
+        legend(figure, flights, events(first))
+    else:
+        corner_legend(figure, handles)
+
+
+def bands(axis: Axes, series: Series, end: float) -> None:
+    """Every second phase on a light ground."""
+    for number, (name, begin, until) in enumerate(series.phase_spans()):
+        if number % 2 == 1 and name not in ON_GROUND:
+            axis.axvspan(begin, min(until, end), color=style.BAND, linewidth=0.0, zorder=0)
+
+
+def phase_names(figure: Figure, axis: Axes, series: Series, start: float, end: float) -> None:
+    """Names of the phases above a panel; one that would run into its neighbour is left out."""
+    inches = figure.get_figwidth() * axis.get_position().width
+    per_character = 0.068 * (end - start) / inches  # seconds that one letter of 7.5 pt takes
+    reached = -np.inf
+    for name, begin, until in series.phase_spans():
+        middle, half = 0.5 * (begin + until), 0.5 * per_character * len(name)
+        if name in ON_GROUND or middle - half < reached or middle + half > end + 3 * half:
+            continue
+        axis.annotate(
+            name,
+            (middle, 1.0),
+            xycoords=("data", "axes fraction"),
+            xytext=(0, 3),
+            textcoords="offset points",
+            ha="center",
+            va="bottom",
+            fontsize=7.5,
+            color=style.MUTED,
+        )
+        reached = middle + half + per_character
+
+
+def mark_changes(axes: np.ndarray, series: Series, start: float, end: float) -> None:
+    """A thin line where parameters were changed, dotted where that was refused, and its number."""
+    shown = [row for row in changes.rows(series.info) if start <= row.time <= end]
+    for accepted, colour, dashes, _ in CHANGES:
+        times = [row.time for row in shown if row.accepted == accepted]
+        for axis in axes.flat if times else ():
+            axis.vlines(
+                times,
+                0.0,
+                1.0,
+                transform=axis.get_xaxis_transform(),
+                color=colour,
+                linewidth=0.6,
+                linestyle=dashes,
+                zorder=2.4,
+            )
+    for axis in axes[0]:
+        for time, text in changes.labels(shown, apart=0.02 * (end - start)):
+            axis.annotate(
+                text,
+                (time, 1.0),
+                xycoords=("data", "axes fraction"),
+                xytext=(2, -2),
+                textcoords="offset points",
+                va="top",
+                fontsize=6.5,
+                color=style.CHANGE,
+            )
+
+
+def events(series: Series) -> list[tuple[float, str, str]]:
+    """(time [s], colour, name) of the magnet's switching."""
+    found = []
+    for on, off in series.magnet_spans():
+        found.append((on, style.PICK, "magnet on"))
+        found.append((off, style.DROP, "magnet off"))
+    return found
+
+
+def legend(
+    figure: Figure, flights: Sequence[Flight], marked: Sequence[tuple[float, str, str]]
+) -> None:
+    """Flights and events in the upper right corner."""
+    handles = [
+        Line2D([], [], color=style.FLIGHTS[n % len(style.FLIGHTS)], label=flight.label)
+        for n, flight in enumerate(flights)
+    ]
+    named = dict.fromkeys((name, colour) for _, colour, name in marked)
+    handles += [
+        Line2D([], [], color=colour, linewidth=0.9, linestyle=(0, (4, 2.5)), label=name)
+        for name, colour in named
+    ]
+    told = {row.accepted for row in changes.rows(flights[0].series.info)}
+    handles += [
+        Line2D([], [], color=colour, linewidth=0.8, linestyle=dashes, label=name)
+        for accepted, colour, dashes, name in CHANGES
+        if accepted in told
+    ]
+    handles += fault_marks.handles(flights[0].series.info)
+    corner_legend(figure, handles)
+
+
+def corner_legend(figure: Figure, handles: Sequence[Line2D]) -> None:
+    """One row of handles in the upper right corner."""
+    corner = (0.99, 1.0 - 0.02 / figure.get_figheight())
+    figure.legend(
+        handles=handles,
+        loc="upper right",
+        bbox_to_anchor=corner,
+        ncols=len(handles),
+        handlelength=1.7,
+        columnspacing=1.4,
+    )

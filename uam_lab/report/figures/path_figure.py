@@ -1,0 +1,185 @@
+"""The mission seen from the side: paths in the x-z plane with poses of vehicle and arm on them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import mujoco
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+from matplotlib.patches import Rectangle
+
+from uam_lab.report.figures import style
+from uam_lab.report.figures.panels import Flight, corner_legend
+from uam_lab.report.figures.poses import Poses
+from uam_lab.results.timeseries import Series
+
+POSES = 5
+TALLEST, ABOVE, BELOW = 4.5, 0.62, 0.45  # [in] of a panel, above it, below it
+MOVING = [0, 2, 6, 7]  # x, z and the joints among the coordinates
+REACH = 0.35  # [m] shown around the path, for rotors and arm
+SCENERY = {"stand_post": "#b9a58f", "stand_top": "#8c7660", "drop_mat": "#e3c552"}
+CHAIN = ("base", "link_1", "link_2", "magnet")
+
+
+def path_figure(flights: Sequence[Flight]) -> Figure:
+    """One panel per stretch of the flight: before, during and after the magnet was on."""
+    stretches = _stretches(flights[0].series)
+    columns = len(stretches)
+    across, up = _limits(flights)
+    scale = 0.93 * style.WIDTH / columns / (across[1] - across[0])
+    drawn = min(scale * (up[1] - up[0]), TALLEST)
+    height = drawn + ABOVE + BELOW
+    figure = Figure(figsize=(style.WIDTH, height))
+    axes = figure.subplots(1, columns, sharex=True, sharey=True, squeeze=False)[0]
+    figure.subplots_adjust(
+        left=0.06, right=0.99, top=1.0 - ABOVE / height, bottom=BELOW / height, wspace=0.04
+    )
+    title = "Path in the x-z plane"
+    figure.text(0.012, 1.0 - 0.1 / height, title, va="top", fontsize=11.5, fontweight="bold")
+    poses = Poses(flights[0].series)
+    for axis, (name, start, end) in zip(axes, stretches, strict=True):
+        _scenery(axis, poses)
+        for number, flight in enumerate(flights):
+            _path(axis, flight.series, start, end, number)
+        _poses(axis, poses, start, end)
+        axis.set_title(name, loc="left", fontsize=9.0, color=style.INK, pad=6)
+        axis.set_xlabel("x [m]")
+        axis.set(xlim=across, ylim=up, aspect="equal")
+    axes[0].set_ylabel("z [m]")
+    _legend(figure, flights)
+    return figure
+
+
+def _limits(flights: Sequence[Flight]) -> tuple[tuple[float, float], tuple[float, float]]:
+    """Range of x and of z [m] that holds every path and the ground."""
+    shown = [f.series.flown if f.series.flown.any() else slice(None) for f in flights]
+    x = np.concatenate([f.series["truth.x"][s] for f, s in zip(flights, shown, strict=True)])
+    z = np.concatenate([f.series["truth.z"][s] for f, s in zip(flights, shown, strict=True)])
+    up = (min(z.min(), 0.0) - 0.05, z.max() + 0.25)
+    middle, half = 0.5 * (x.min() + x.max()), 0.5 * (x.max() - x.min()) + REACH
+    half = max(half, up[1] - up[0])  # at least twice as wide as high
+    return (middle - half, middle + half), up
+
+
+def _stretches(series: Series) -> list[tuple[str, float, float]]:
+    """(name, first, last time [s]) of the parts of a flight between the magnet's switchings."""
+    time = series.time[series.flown]
+    if not len(time):
+        return [("", float(series.time[0]), float(series.time[-1]))]
+    spans = series.magnet_spans()
+    if not spans:
+        return [("", float(time[0]), float(time[-1]))]
+    on, off = spans[0][0], spans[-1][1]
+    return [
+        (f"to the payload, 0 to {on:.0f} s", float(time[0]), on),
+        (f"magnet on, {on:.0f} to {off:.0f} s", on, off),
+        (f"back and down, {off:.0f} to {time[-1]:.0f} s", off, float(time[-1])),
+    ]
+
+
+def _path(axis: Axes, series: Series, start: float, end: float, number: int) -> None:
+    rows = slice(series.row_at(start), series.row_at(end) + 1, max(1, len(series) // 6000))
+    if number == 0:
+        axis.plot(
+            series["reference.x"][rows],
+            series["reference.z"][rows],
+            color=style.REFERENCE,
+            linewidth=1.2,
+            linestyle=(0, (3, 2)),
+            zorder=6,
+        )
+    axis.plot(
+        series["truth.x"][rows],
+        series["truth.z"][rows],
+        color=style.FLIGHTS[number % len(style.FLIGHTS)],
+        linewidth=1.2,
+        zorder=7,
+    )
+
+
+def _poses(axis: Axes, poses: Poses, start: float, end: float) -> None:
+    """Vehicle, arm and payload, evenly spread along the way, the last one darkest."""
+    series = poses.series
+    first, last = series.row_at(start), series.row_at(end)
+    steps = np.abs(np.diff(series.block("reference.")[first : last + 1, MOVING], axis=0))
+    # The arm's turning counts as well; a little per tick keeps a hover from having no length.
+    way = np.append(0.0, np.cumsum(steps @ [1.0, 1.0, 0.2, 0.2] + 1e-9))
+    for number, part in enumerate(np.linspace(0.0, way[-1], POSES)):
+        poses.put(first + int(np.searchsorted(way, part)))
+        opacity = 0.25 + 0.75 * number / (POSES - 1)
+        _pose(axis, poses, opacity, 8 + number)
+
+
+def _pose(axis: Axes, poses: Poses, opacity: float, order: int) -> None:
+    fade = {"alpha": opacity, "zorder": order, "solid_capstyle": "round"}
+    feet = np.array([poses.data.geom(f"foot_{i}").xpos for i in (1, 2)])
+    rotors = np.array([poses.site(f"rotor_{i}") for i in (2, 1)])
+    base = poses.body("base")
+    axis.plot(rotors[:, 0], rotors[:, 2], color=style.INK, linewidth=2.6, **fade)
+    for rotor in rotors:
+        half = 0.11
+        axis.plot(
+            [rotor[0] - half, rotor[0] + half],
+            [rotor[2] + 0.02] * 2,
+            color="#7fa6cf",
+            linewidth=1.6,
+            **fade,
+        )
+    axis.plot(feet[:, 0], feet[:, 2], color=style.MUTED, linewidth=1.0, **fade)
+    middle = feet.mean(axis=0)
+    axis.plot([base[0], middle[0]], [base[2], middle[2]], color=style.MUTED, linewidth=1.0, **fade)
+    chain = np.array([*(poses.body(name) for name in CHAIN), poses.site("magnet_face")])
+    axis.plot(chain[:, 0], chain[:, 2], color="#5b6670", linewidth=2.0, **fade)
+    axis.plot(
+        chain[1:4, 0],
+        chain[1:4, 2],
+        linestyle="none",
+        marker="o",
+        markersize=2.8,
+        color=style.DROP,
+        alpha=opacity,
+        zorder=order + 0.1,
+    )
+    if poses.has_payload:
+        _boxed(axis, poses, "payload", style.PAYLOAD, opacity, order)
+
+
+def _scenery(axis: Axes, poses: Poses) -> None:
+    poses.put(0)
+    axis.axhline(0.0, color="#a7afb7", linewidth=1.0, zorder=1)
+    for name, colour in SCENERY.items():
+        _boxed(axis, poses, name, colour, 1.0, 2)
+
+
+def _boxed(axis: Axes, poses: Poses, geom: str, colour: str, opacity: float, order: int) -> None:
+    """A geom as its upright bounding rectangle, which is exact for what stands upright."""
+    size = poses.model.geom(geom).size
+    kind = poses.model.geom(geom).type[0]
+    half = (size[0], size[1]) if kind == mujoco.mjtGeom.mjGEOM_CYLINDER else (size[0], size[2])
+    centre = poses.data.geom(geom).xpos
+    corner = (centre[0] - half[0], centre[2] - half[1])
+    axis.add_patch(
+        Rectangle(
+            corner,
+            2 * half[0],
+            2 * half[1],
+            facecolor=colour,
+            edgecolor="none",
+            alpha=opacity,
+            zorder=order,
+        )
+    )
+
+
+def _legend(figure: Figure, flights: Sequence[Flight]) -> None:
+    handles = [
+        Line2D([], [], color=style.REFERENCE, linestyle=(0, (3, 2)), label="reference"),
+        *(
+            Line2D([], [], color=style.FLIGHTS[n % len(style.FLIGHTS)], label=flight.label)
+            for n, flight in enumerate(flights)
+        ),
+    ]
+    corner_legend(figure, handles)

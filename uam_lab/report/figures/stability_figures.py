@@ -1,0 +1,127 @@
+"""Figures of the stability analysis of one flight: V beside its bound, coupling beside supply."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+from matplotlib.ticker import LogLocator, MaxNLocator, NullLocator
+
+from uam_lab.report.figures import panels, style
+from uam_lab.report.figures.panels import Flight
+from uam_lab.results.timeseries import SUBSYSTEMS
+
+if TYPE_CHECKING:
+    from uam_lab.analysis.lyapunov import Comparison
+    from uam_lab.analysis.stability import Subsystem
+
+SYMBOLS = {"position": "p", "attitude": "q", "arm": "\\alpha"}
+BOUND, ENVELOPE = (0, (6, 2)), (0, (1, 1.4))
+LOWEST = 1e-6  # drawn of the tracking term, which is zero now and then
+MEAN_S = 0.2  # [s] over which forces are averaged: the law passes on the noise of the estimate
+COUPLING, ADAPTIVE, FEEDBACK, ACTUATORS = style.INK, *style.FLIGHTS[:2], "#9aa5af"
+
+
+def lyapunov(flights: Sequence[Flight]) -> Figure | None:
+    """V, V_p, V_q, V_alpha with their terms and bounds; None unless one flight was analysed."""
+    found = _only(flights)
+    if found is None:
+        return None
+    figure, axes = panels.grid("Lyapunov function of the Appendix", 4, 1, 1.7, right=0.985)
+    total, *each = axes[:, 0]
+    _bounded(total, found.time, found.total, found.comparison)
+    total.set_ylabel("$V$")
+    for axis, name in zip(each, SUBSYSTEMS, strict=True):
+        subsystem = found.subsystems[name]
+        for values, colour in zip(_terms(subsystem), style.GAINS[1:], strict=True):
+            axis.plot(
+                *panels.thin(found.time, np.maximum(values, LOWEST)), color=colour, linewidth=0.9
+            )
+        _bounded(axis, found.time, subsystem.parts.total, subsystem.comparison)
+        axis.set_ylabel(f"$V_{{{SYMBOLS[name]}}}$")
+    handles = [
+        _key("$V$", style.INK, 1.5),
+        _key("tracking", style.GAINS[1]),
+        _key("gains", style.GAINS[2]),
+        _key("$\\zeta$", style.GAINS[3]),
+        _key("allowed by $\\dot V\\leq-\\varrho V+\\gamma$", style.DROP, 1.0, ENVELOPE),
+        _key("ultimate bound", style.DROP, 1.0, BOUND),
+    ]
+    panels.finish(figure, axes, flights, handles)
+    return figure
+
+
+def coupling(flights: Sequence[Flight]) -> Figure | None:
+    """The plant's true coupling force per axis and what meets it; None unless one was analysed."""
+    found = _only(flights)
+    if found is None:
+        return None
+    figure, axes = panels.grid("Coupling force, and what supplies it", 4, 2, 1.45)
+    figure.subplots_adjust(wspace=0.26)  # small torques have long labels
+    supply = found.supply
+    drawn = (
+        (supply.applied - supply.asked, ACTUATORS, 0.9),
+        (supply.feedback, FEEDBACK, 0.9),
+        (supply.adaptive, ADAPTIVE, 1.2),
+        (found.coupling.plant, COUPLING, 1.2),
+    )
+    labels = [f"{axis} [N]" for axis in "xyz"] + ["$\\alpha_1$ [N m]"]
+    labels += [f"{name} [N m]" for name in ("roll φ", "pitch θ", "yaw ψ")] + ["$\\alpha_2$ [N m]"]
+    for axis, label, column in zip(axes.T.flat, labels, (0, 1, 2, 6, 3, 4, 5, 7), strict=True):
+        for values, colour, width in drawn:
+            if colour == ACTUATORS and column >= 6:
+                continue  # the servos' torque is not recorded
+            mean = moving_mean(found.time, values[:, column])
+            axis.plot(*panels.thin(found.time, mean), color=colour, linewidth=width)
+        axis.set_ylabel(label)
+        axis.yaxis.set_major_locator(MaxNLocator(nbins=4, min_n_ticks=3))
+        axis.margins(y=0.12)
+    handles = [
+        _key("true coupling", COUPLING, 1.4),
+        _key("adaptive term", ADAPTIVE, 1.4),
+        _key("feedback Λξ", FEEDBACK),
+        _key("actuators beyond τ", ACTUATORS),
+    ]
+    panels.finish(figure, axes, flights, handles)
+    return figure
+
+
+def moving_mean(time: np.ndarray, values: np.ndarray) -> np.ndarray:
+    """Mean of values (m,) over MEAN_S around each tick; shorter at the ends."""
+    width = max(1, round(MEAN_S / float(np.median(np.diff(time)))))
+    if len(values) <= width:
+        return values
+    weight = np.ones(width)
+    full = np.convolve(values, weight, mode="same")
+    return full / np.convolve(np.ones(len(values)), weight, mode="same")
+
+
+def _only(flights: Sequence[Flight]):
+    """The analysis of the flight, if there is but one."""
+    return flights[0].stability if len(flights) == 1 else None
+
+
+def _terms(subsystem: Subsystem) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    return subsystem.parts.tracking, subsystem.parts.gains, subsystem.parts.zeta
+
+
+def _bounded(axis: Axes, time: np.ndarray, value: np.ndarray, comparison: Comparison) -> None:
+    """V with the ultimate bound and what the differential inequality allows until then."""
+    axis.plot(*panels.thin(time, value), color=style.INK, linewidth=1.5, zorder=4)
+    envelope = comparison.envelope(value[0], time - time[0])
+    axis.plot(time, envelope, color=style.DROP, linewidth=1.0, linestyle=ENVELOPE, zorder=3.5)
+    limit = max(value[0], comparison.bound)
+    axis.axhline(limit, color=style.DROP, linewidth=1.0, linestyle=BOUND, zorder=3)
+    axis.set_yscale("log")
+    axis.yaxis.set_major_locator(LogLocator(numticks=5))
+    axis.yaxis.set_minor_locator(NullLocator())
+
+
+def _key(
+    label: str, colour: str, width: float = 1.0, dash: str | tuple[int, tuple[float, ...]] = "-"
+) -> Line2D:
+    return Line2D([], [], color=colour, linewidth=width, linestyle=dash, label=label)

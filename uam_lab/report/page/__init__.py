@@ -1,0 +1,1 @@
+"""The report page, the overlay page and the table on the console."""

@@ -1,0 +1,101 @@
+"""For the terminal: progress of the report, and the table at the end of a flight."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+from rich.console import Console, Group
+from rich.table import Table
+from rich.text import Text
+
+from uam_control.laws import catalogue
+from uam_lab.report.facts import outcome
+
+
+@contextmanager
+def reporting(console: Console) -> Iterator[Callable[[str], None]]:
+    """Progress for `build_report`: a live line on a terminal, one line per kind of step elsewhere.
+
+    with reporting(console) as progress:
+        build_report(directory, progress)
+    """
+    if console.is_terminal:
+        with console.status("report") as status:
+            yield lambda text: status.update(f"report: {text}")
+        return
+    said: set[str] = set()
+
+    def say(text: str) -> None:
+        kind = text.split()[0]
+        if kind not in said:
+            said.add(kind)
+            console.print(f"report: {text}", highlight=False, markup=False)
+
+    yield say
+
+
+def summary(metrics: Mapping[str, Any], directory: Path | None = None) -> Group:
+    """Verdict, RMS errors beside the paper's, payload, landing, folder; print it with rich."""
+    done = metrics["mission_completed"]
+    headline = Text(outcome.verdict(metrics), style="bold green" if done else "bold red")
+    for shortfall in metrics.get("shortfalls") or []:
+        headline.append(f"\n  {shortfall}", style="red")
+    return Group(headline, error_table(metrics), facts(metrics, directory))
+
+
+def error_table(metrics: Mapping[str, Any]) -> Table:
+    """RMS over the whole flight beside the paper's."""
+    table = Table(title="RMS error, take-off to touchdown command", title_justify="left")
+    table.add_column("")
+    for heading in ("this flight", "paper", "largest"):
+        table.add_column(heading, justify="right")
+    table.add_column("")
+    group = None
+    for row in outcome.error_rows(metrics):
+        if group is not None and row.group != group:
+            table.add_section()
+        group = row.group
+        good = {True: ("green", "better"), False: ("yellow", "worse"), None: ("dim", "")}
+        colour, word = good[row.better]
+        if row.rms is not None and row.rms == row.paper:
+            word = "equal"
+        table.add_row(
+            row.name,
+            Text(row.shown(row.rms), style=f"bold {colour}"),
+            row.shown(row.paper),
+            row.shown(row.largest),
+            Text(word, style=colour),
+        )
+    return table
+
+
+def facts(metrics: Mapping[str, Any], directory: Path | None) -> Table:
+    """Payload, landing, times and folder, one per line."""
+    table = Table.grid(padding=(0, 2))
+    table.add_column(style="dim")
+    table.add_column(overflow="fold")
+    table.add_row("controller", catalogue.label(metrics["controller"]))
+    table.add_row("payload", outcome.payload_story(metrics))
+    table.add_row("landing", outcome.landing_story(metrics))
+    stepped_in = outcome.supervision_story(metrics)
+    if stepped_in:
+        table.add_row("supervisor", stepped_in)
+    factor = metrics.get("real_time_factor")
+    speed = f", {factor:.2f} × real time" if factor else ""
+    table.add_row("flown", f"{metrics['duration_s']:.1f} s{speed}")
+    latency = metrics.get("latency_ms")
+    if latency and latency.get("p50") is not None:
+        figures = ", ".join(f"{name} {latency[name]:.1f} ms" for name in ("p50", "p99", "max"))
+        table.add_row("latency", figures)
+    if metrics.get("missed_ticks") is not None:
+        table.add_row("missed", f"{metrics['missed_ticks']} control ticks")
+    if metrics.get("clamps"):
+        table.add_row("clamps", outcome.clamp_story(metrics))
+    if directory is not None:
+        table.add_row("results", str(directory))
+        if (directory / "report.html").exists():
+            table.add_row("report", str(directory / "report.html"))
+    return table

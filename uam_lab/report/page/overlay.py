@@ -1,0 +1,56 @@
+"""Several flights over one another: the figures, and a page with them and the errors of each."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from pathlib import Path
+
+from uam_lab.report.facts import paper
+from uam_lab.report.figures import figures
+from uam_lab.report.figures.panels import Flight
+from uam_lab.report.page import html
+from uam_lab.results import metrics
+from uam_lab.results.atomic import write_text
+
+
+def build_overlay(
+    flights: Sequence[Flight], out: Path, progress: Callable[[str], None] = lambda text: None
+) -> Path:
+    """Write figures/ and report.html to `out`; return the page."""
+    drawn = figures.draw(flights, out / "figures", progress)
+    progress("page")
+    text = html.template("uam_lab.report.page", "overlay.html.j2").render(
+        labels=[flight.label for flight in flights],
+        tables=[_table(flights, *table) for table in paper.TABLES],
+        figures=[
+            (name, figures.FIGURES[name][1], html.embedded(out / "figures" / f"{name}.png"))
+            for name in drawn
+        ],
+    )
+    write_text(out / "report.html", text)
+    return out / "report.html"
+
+
+def labelled(directories: Sequence[Path]) -> list[str]:
+    """A name for each result folder: its own, with its parents' where two have the same."""
+    names = [directory.resolve().name for directory in directories]
+    return [
+        name if names.count(name) == 1 else str(directory)
+        for name, directory in zip(names, directories, strict=True)
+    ]
+
+
+def _table(
+    flights: Sequence[Flight],
+    group: str,
+    heading: str,
+    unit: str,
+    digits: int,
+    names: Sequence[str],
+) -> dict:
+    """RMS of one group of coordinates, a row per flight."""
+    rows = []
+    for flight in flights:
+        found = metrics.errors(flight.series)[group]
+        rows.append((flight.label, [f"{value:.{digits}f}" for value in found]))
+    return {"heading": heading, "unit": unit, "names": names, "rows": rows}

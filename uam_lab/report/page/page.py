@@ -1,0 +1,100 @@
+"""report.html: one page that shows the whole flight, without any request to the network."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from uam_control.laws import catalogue
+from uam_lab.report.facts import changes, outcome, stability
+from uam_lab.report.facts import parameter_table as parameters
+from uam_lab.report.figures import fault_marks
+from uam_lab.report.figures.figures import FIGURES
+from uam_lab.report.page import html
+from uam_lab.report.video.rendering import Rendered, existing
+from uam_lab.results.atomic import write_text
+
+PAPER_SCENARIO = "pick_and_place"
+FACTS = (
+    ("controller", "controller"),
+    ("profile", "profile"),
+    ("scenario", "scenario"),
+    ("engine", "engine"),
+    ("clock", "clock"),
+    ("autopilot", "autopilot"),
+    ("seed", "seed"),
+    ("payload_mass_kg", "payload mass [kg]"),
+)
+
+
+def write_page(directory: Path, rendered: Rendered | None = None) -> Path:
+    """Write `directory`/report.html from what the result folder has, and return its path.
+
+    rendered: what the renderer said, if it ran; else the pictures that are there are shown.
+    """
+    metrics = _json(directory / "metrics.json")
+    info = _json(directory / "info.json")
+    controller = catalogue.label(metrics.get("controller"))
+    rendered = rendered or existing(directory)
+    try:
+        comparison, no_parameters = parameters.compare(directory / "parameters.yaml"), ""
+    except parameters.ProfileError as error:
+        comparison, no_parameters = None, str(error)
+    text = html.template("uam_lab.report.page", "page.html.j2").render(
+        metrics=metrics,
+        info={"notes": [], "vehicle_changes": {}} | info,
+        verdict=outcome.verdict(metrics),
+        payload=outcome.payload_story(metrics),
+        landing=outcome.landing_story(metrics),
+        thrust=outcome.thrust_story(metrics),
+        errors=outcome.error_rows(metrics),
+        clamps=outcome.clamp_story(metrics) if metrics.get("clamps") else None,
+        changes=changes.rows(info),
+        faults=fault_marks.rows(info),
+        facts=[(label, (metrics | {"controller": controller}).get(key)) for key, label in FACTS],
+        controller=controller,
+        papers_mission=metrics.get("scenario") == PAPER_SCENARIO,
+        strip=_embedded(rendered.strip),
+        video=_embedded(rendered.video),
+        problem=rendered.problem,
+        figures=_figures(directory / "figures"),
+        stability=_stability(directory / "stability.json"),
+        comparison=comparison,
+        no_parameters=no_parameters,
+        versions=_json(directory / "versions.json"),
+        command=info.get("command"),
+    )
+    write_text(directory / "report.html", text)
+    return directory / "report.html"
+
+
+def _figures(folder: Path) -> list[tuple[str, str, str]]:
+    """(name, caption, data URI) of the figures that were drawn."""
+    return [
+        (name, caption, _embedded(folder / f"{name}.png"))
+        for name, (_, caption) in FIGURES.items()
+        if (folder / f"{name}.png").exists()
+    ]
+
+
+def _stability(file: Path) -> dict[str, Any] | None:
+    """What the page says about the Appendix; None where nothing was analysed."""
+    found = _json(file)
+    if not found:
+        return None
+    return {
+        "verdict": stability.verdict(found),
+        "rows": stability.rows(found),
+        "caveats": stability.caveats(found),
+    }
+
+
+def _embedded(file: Path | None) -> str | None:
+    """The file as a data URI, if there is one."""
+    return None if file is None else html.embedded(file)
+
+
+def _json(file: Path) -> Mapping[str, Any]:
+    return json.loads(file.read_text()) if file.exists() else {}

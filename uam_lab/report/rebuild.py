@@ -1,0 +1,111 @@
+"""A result folder made anew from its log alone: table, metrics, facts, then figures and page."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from uam_control.mission import Scenario, load_scenario
+from uam_control.settings import configuration
+from uam_lab.flight.conclude import complete
+from uam_lab.recording import log_facts
+from uam_lab.recording.log_reader import read_flight
+from uam_lab.results import timeseries
+from uam_lab.results.atomic import write_text
+from uam_lab.results.outcome import Outcome
+from uam_lab.results.result_folder import ResultFolder
+
+LOG, TABLE = "log.mcap", "timeseries.parquet"
+CUT_OFF = "the log ends before the mission was over"
+FILES = ("parameters.yaml", "versions.json")
+PARTIAL = "partial: "
+
+
+class NothingToReport(ValueError):
+    """A folder without a flight, or a log that does not say which scenario was flown; one line."""
+
+
+def rebuild(directory: Path, out: Path, scenario: str | None = None) -> dict[str, Any]:
+    """Make table, metrics and facts of the flight logged in `directory` again, in the folder `out`.
+
+    scenario: name or file, for a log that does not say. Returns the metrics. What only the flight
+    itself knew (wall time, why it was ended) is taken from `directory` where it is still there.
+    Raises NothingToReport, UnreadableLog, OSError.
+    """
+    log = directory / LOG
+    if not log.exists():
+        raise NothingToReport(f"{directory} has no {LOG}")
+    facts = log_facts.read(log)
+    before = _json(directory / "info.json")
+    known = facts.info or before
+    flown = _scenario(directory, facts, known, scenario)
+    flight = read_flight(log, flown)
+    numbers = _json(directory / "logs" / "mujoco_sim.json")
+    realtime = known.get("clock") == "realtime"
+    outcome = Outcome(
+        series=flight.series,
+        wall_s=numbers.get("wall_s") or before.get("wall_s") or flight.wall_s,
+        abort_reason=flight.abort_reason,
+        latency_s=numbers.get("latency_s") if realtime else None,
+        missed_ticks=numbers.get("missed_ticks") if realtime else None,
+        notes=[note for note in before.get("notes") or [] if not note.startswith(PARTIAL)],
+        parameter_changes=flight.parameter_changes,
+        transitions=flight.transitions,
+        faults=flight.faults,
+    )
+    if not flight.done:
+        outcome.failure = before.get("abort_reason") or CUT_OFF
+    out.mkdir(parents=True, exist_ok=True)
+    for name in FILES:
+        _take_over(name, directory, out, facts.texts)
+    return complete(ResultFolder(out), known, outcome)
+
+
+def series_of(directory: Path) -> timeseries.Series:
+    """The flight in a result folder, from its table or else from its log; writes nothing.
+
+    Raises NothingToReport, UnreadableLog, UnreadableFlight, OSError.
+    """
+    if (directory / TABLE).exists():
+        return timeseries.read(directory / TABLE)
+    log = directory / LOG
+    if not log.exists():
+        raise NothingToReport(f"{directory} has neither {TABLE} nor {LOG}")
+    facts = log_facts.read(log)
+    known = facts.info or _json(directory / "info.json")
+    flight = read_flight(log, _scenario(directory, facts, known, None), known)
+    flight.series.info["parameter_changes"] = flight.parameter_changes
+    flight.series.info["faults"] = flight.faults
+    return flight.series
+
+
+def _scenario(
+    directory: Path, facts: log_facts.LogFacts, known: Mapping[str, Any], asked: str | None
+) -> Scenario:
+    """What was flown: what the user says, else the log, else the facts beside it."""
+    name = asked or (None if facts.scenario else known.get("scenario"))
+    if name is not None:
+        return load_scenario(str(configuration.named("scenarios", name)))
+    if facts.scenario is None:
+        raise NothingToReport(f"{directory / LOG} does not say what was flown: give --scenario")
+    return facts.scenario
+
+
+def _take_over(name: str, directory: Path, out: Path, texts: Mapping[str, str]) -> None:
+    """Have a file of the flight in `out`: the one there, else that of the log or of its folder."""
+    if (out / name).exists():
+        return
+    if name in texts:
+        write_text(out / name, texts[name])
+    elif (directory / name).exists():
+        write_text(out / name, (directory / name).read_text())
+
+
+def _json(file: Path) -> dict[str, Any]:
+    """{} where there is none, or a broken one."""
+    try:
+        return json.loads(file.read_text())
+    except (OSError, ValueError):
+        return {}

@@ -1,0 +1,205 @@
+"""Snapshots and video of a flight, rendered without a screen.
+
+    python -m uam_lab.report.video.rendering DIR [--no-video]
+
+renders the flight in the result folder DIR; `render` does so in a child process, because the
+choice of OpenGL has to be made before MuJoCo is imported and a broken driver may take its process
+with it. The child writes its progress to standard output, a line per step.
+"""
+
+from __future__ import annotations
+
+import argparse
+import os
+import subprocess
+import sys
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+
+from uam_lab.results import timeseries
+from uam_lab.results.atomic import replacing
+from uam_lab.results.timeseries import Series
+
+SNAPSHOT_SIZE = (1280, 720)
+CAPTION_PART = 0.11  # of the height, to be read in the strip
+SNAPSHOTS, STRIP, VIDEO = "snapshots", "snapshots.png", "flight.mp4"
+PLATFORM = "egl"  # needs neither screen nor GPU
+PROGRESS = "progress: "
+NO_RENDERER = 3  # exit status of the child
+HOW_TO_GET_ONE = (
+    "no offscreen renderer found, so no pictures of the flight; "
+    "on Debian or Ubuntu: sudo apt install libegl1 libgl1-mesa-dri"
+)
+
+
+@dataclass(frozen=True)
+class Rendered:
+    """What there is now; `problem` is a line for the user, empty when all went well."""
+
+    snapshots: tuple[Path, ...] = ()
+    strip: Path | None = None
+    video: Path | None = None
+    problem: str = ""
+
+
+def render(
+    directory: Path,
+    video: bool = True,
+    progress: Callable[[str], None] = lambda text: None,
+    platforms: Sequence[str] | None = None,
+) -> Rendered:
+    """Render the flight in `directory` to `directory`/figures; never raises for want of OpenGL.
+
+    platforms: values of MUJOCO_GL to try; by default the user's, if he has set it, and PLATFORM.
+    """
+    if platforms is None:
+        platforms = dict.fromkeys(filter(None, (os.environ.get("MUJOCO_GL"), PLATFORM)))
+    for platform in platforms:
+        status, last_line = _child(directory, video, progress, platform)
+        if status != NO_RENDERER:
+            break
+    problem = ""
+    if status == NO_RENDERER:
+        problem = f"{HOW_TO_GET_ONE} ({last_line[:120]})"
+    elif status != 0:
+        problem = f"rendering failed: {last_line or f'exit status {status}'}"
+    return replace(existing(directory), problem=problem)
+
+
+def _child(
+    directory: Path, video: bool, progress: Callable[[str], None], platform: str
+) -> tuple[int, str]:
+    """Run this module as a process; (exit status, last line that was not progress)."""
+    command = [sys.executable, "-m", "uam_lab.report.video.rendering", str(directory)]
+    child = subprocess.Popen(
+        command if video else [*command, "--no-video"],
+        env=os.environ | {"MUJOCO_GL": platform},
+        stdout=subprocess.PIPE,
+        stderr=subprocess.STDOUT,
+        text=True,
+        errors="replace",
+    )
+    last_line = ""
+    try:
+        for line in child.stdout:
+            if line.startswith(PROGRESS):
+                progress(line.removeprefix(PROGRESS).strip())
+            elif line.strip():
+                last_line = line.strip()
+        return child.wait(), last_line
+    finally:
+        if child.poll() is None:
+            child.terminate()
+            child.wait()
+
+
+def existing(directory: Path) -> Rendered:
+    """The pictures that `directory` has."""
+    figures = directory / "figures"
+    strip, video = figures / STRIP, figures / VIDEO
+    return Rendered(
+        tuple(sorted((figures / SNAPSHOTS).glob("*.png"))),
+        strip if strip.exists() else None,
+        video if video.exists() else None,
+    )
+
+
+def snapshot_times(series: Series) -> list[tuple[float, str]]:
+    """(mission time [s], caption): the scenario's, of those reached; else six over the flight."""
+    flown = series.time[series.flown]
+    if not len(flown):
+        return [(float(series.time[-1]), "on the ground")]
+    wanted = [(float(t), str(c)) for t, c in series.info.get("snapshots") or []]
+    reached = [(t, c) for t, c in wanted if t <= flown[-1]]
+    if reached:
+        return reached
+    times = np.linspace(flown[0], flown[-1], 8)[1:-1]
+    return [
+        (float(t), f"({letter}) {series.phase_names[series.phases[series.row_at(t)]]}")
+        for letter, t in zip("abcdef", times, strict=True)
+    ]
+
+
+def render_here(directory: Path, video: bool, report: Callable[[str], None]) -> None:
+    """Render in this process, which must have been started with MUJOCO_GL set."""
+    series = timeseries.read(directory / "timeseries.parquet")
+    report("opening the renderer")
+    figures = directory / "figures"
+    _snapshots(series, figures, report)
+    if video:
+        _video(series, figures / VIDEO, report)
+
+
+def _snapshots(series: Series, figures: Path, report: Callable[[str], None]) -> None:
+    from uam_lab.report.video import captions
+
+    folder = figures / SNAPSHOTS
+    folder.mkdir(parents=True, exist_ok=True)
+    scene = _scene(series, SNAPSHOT_SIZE)
+    wanted = snapshot_times(series)
+    pictures = []
+    for number, (time, caption) in enumerate(wanted):
+        report(f"snapshot {number + 1} of {len(wanted)}")
+        pixels = scene.picture(series.row_at(time))
+        pictures.append(captions.labelled(pixels, caption, f"t = {time:.1f} s", CAPTION_PART))
+        with replacing(folder / f"{'abcdefghijklmnopqrstuvwxyz'[number % 26]}.png") as temporary:
+            pictures[-1].save(temporary)
+    scene.close()
+    with replacing(figures / STRIP) as temporary:
+        captions.strip(pictures).save(temporary)
+
+
+def _video(series: Series, path: Path, report: Callable[[str], None]) -> None:
+    from uam_lab.report.video import video
+
+    scene = _scene(series, video.SIZE)
+
+    def say(done: int, of: int) -> None:
+        if done % 10 == 0 or done == of:
+            report(f"video {100 * done // of} %")
+
+    video.write(series, scene.picture, path, say)
+    scene.close()
+
+
+class NoRenderer(RuntimeError):
+    """There is no OpenGL that draws without a screen."""
+
+
+def _scene(series: Series, size: tuple[int, int]):
+    try:
+        # Already the import of MuJoCo fails where the library that MUJOCO_GL names is missing.
+        from uam_lab.report.video.scene import Scene
+
+        return Scene(series, *size)
+    except Exception as error:  # MuJoCo, PyOpenGL and GLFW each have their own
+        raise NoRenderer(f"{type(error).__name__}: {error}") from error
+
+
+def main(arguments: list[str] | None = None) -> int:
+    """Command line, see the module's text."""
+    parser = argparse.ArgumentParser(prog="python -m uam_lab.report.video.rendering")
+    parser.add_argument("directory", type=Path)
+    parser.add_argument("--no-video", action="store_true")
+    options = parser.parse_args(arguments)
+    os.environ.setdefault("MUJOCO_GL", PLATFORM)
+
+    def report(text: str) -> None:
+        print(PROGRESS + text, flush=True)
+
+    try:
+        render_here(options.directory, not options.no_video, report)
+    except NoRenderer as error:
+        print(error, file=sys.stderr)
+        return NO_RENDERER
+    except timeseries.UnreadableFlight as error:
+        print(error, file=sys.stderr)
+        return 2
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,111 @@
+"""The recorded flight as pictures: camera, light and paths around the plant's own model.
+
+MuJoCo reads MUJOCO_GL when it is imported, so this belongs in a process of its own with
+MUJOCO_GL=egl; see `rendering`.
+"""
+
+from __future__ import annotations
+
+import mujoco
+import numpy as np
+
+from uam_lab.report.figures.poses import Poses
+from uam_lab.results.timeseries import Series
+
+FOLLOW = 0.62  # part of the vehicle's way that the camera goes along, so that motion is seen
+SMOOTHING_S = 2.0
+CAMERA = {"azimuth": 108.0, "elevation": -11.0, "distance": 2.0, "height": 0.52}
+TRAIL_RGBA = (0.12, 0.37, 0.66, 0.95)
+REFERENCE_RGBA = (0.35, 0.40, 0.45, 0.55)
+SEGMENTS = 140  # of a path; a reference is drawn in every second one
+GEOMS = 2000
+
+
+class Scene:
+    """Renders any row of a series at a fixed size."""
+
+    def __init__(self, series: Series, width: int, height: int):
+        """width, height: pixels. Raises what `mujoco.Renderer` raises where there is no OpenGL."""
+        self.poses = Poses(series)
+        self.series = series
+        self._thickness = height / 480  # lines are measured in pixels
+        _light(self.poses.model)
+        vis = self.poses.model.vis
+        vis.global_.offwidth, vis.global_.offheight = width, height
+        self._renderer = mujoco.Renderer(self.poses.model, height, width, GEOMS)
+        self._camera = mujoco.MjvCamera()
+        self._camera.azimuth, self._camera.elevation = CAMERA["azimuth"], CAMERA["elevation"]
+        self._camera.distance = CAMERA["distance"]
+        self._look_at = FOLLOW * _smooth(series)
+        self._path_rows = _path_rows(series)
+
+    def close(self) -> None:
+        """Give the OpenGL context back."""
+        self._renderer.close()
+
+    def picture(self, row: int) -> np.ndarray:
+        """Image (height, width, 3) uint8 of a row, with the path flown so far and the reference."""
+        self.poses.put(row)
+        # Positions alone are not enough to draw: cameras and lights follow from this.
+        mujoco.mj_camlight(self.poses.model, self.poses.data)
+        x, y = self._look_at[row]
+        self._camera.lookat[:] = x, y, CAMERA["height"]
+        self._renderer.update_scene(self.poses.data, self._camera)
+        self._draw_path("reference.", self._path_rows, REFERENCE_RGBA, 1.5, dashed=True)
+        flown = self._path_rows[self._path_rows <= row]
+        self._draw_path("truth.", np.append(flown, row), TRAIL_RGBA, 2.5, dashed=False)
+        return self._renderer.render()
+
+    def _draw_path(
+        self, group: str, rows: np.ndarray, rgba: tuple[float, ...], pixels: float, dashed: bool
+    ) -> None:
+        columns = [f"{group}{axis}" for axis in "xyz"]
+        points = np.column_stack([self.series[c][rows] for c in columns])
+        scene = self._renderer.scene
+        for i in range(0, len(points) - 1, 2 if dashed else 1):
+            if scene.ngeom >= scene.maxgeom or np.isnan(points[i : i + 2]).any():
+                continue
+            geom = scene.geoms[scene.ngeom]
+            line = mujoco.mjtGeom.mjGEOM_LINE
+            mujoco.mjv_initGeom(
+                geom, line, np.zeros(3), np.zeros(3), np.zeros(9), np.array(rgba, np.float32)
+            )
+            mujoco.mjv_connector(geom, line, self._thickness * pixels, points[i], points[i + 1])
+            geom.category = mujoco.mjtCatBit.mjCAT_DECOR  # no shadow
+            scene.ngeom += 1
+
+
+def _light(model: mujoco.MjModel) -> None:
+    """Bright surroundings and light shadows; no mirror in the floor, which costs a pass."""
+    model.vis.headlight.ambient[:] = 0.50
+    model.vis.headlight.diffuse[:] = 0.22
+    model.light_diffuse[:] = 0.42
+    model.light_specular[:] = 0.25
+    model.mat_reflectance[:] = 0.0
+    model.vis.quality.offsamples = 4
+    model.vis.quality.shadowsize = 2048
+    model.vis.map.fogstart, model.vis.map.fogend = 4.0, 12.0
+
+
+def _smooth(series: Series) -> np.ndarray:
+    """Horizontal path (ticks, 2) of the vehicle, averaged over SMOOTHING_S around each tick."""
+    path = np.column_stack([series["truth.x"], series["truth.y"]])
+    path = np.nan_to_num(path)
+    time = series.time
+    half = int(0.5 * SMOOTHING_S * (len(time) - 1) / max(time[-1] - time[0], 1e-9))
+    if half < 1 or 2 * half + 1 > len(path):
+        return path
+    padded = np.pad(path, ((half, half), (0, 0)), mode="edge")
+    total = np.cumsum(np.vstack([np.zeros(2), padded]), axis=0)
+    return (total[2 * half + 1 :] - total[: -2 * half - 1]) / (2 * half + 1)
+
+
+def _path_rows(series: Series) -> np.ndarray:
+    """Rows of the flight, spread evenly along the reference's way rather than over time."""
+    flown = np.flatnonzero(series.flown)
+    if len(flown) < 2:
+        return flown
+    points = np.column_stack([series[f"reference.{axis}"][flown] for axis in "xyz"])
+    way = np.cumsum(np.linalg.norm(np.diff(points, axis=0), axis=1) + 1e-9)
+    marks = np.linspace(0.0, way[-1], SEGMENTS + 1)
+    return flown[np.minimum(np.searchsorted(way, marks), len(flown) - 1)]

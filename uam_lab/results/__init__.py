@@ -1,0 +1,1 @@
+"""The result folder: time series, metrics and outcome of a flight."""

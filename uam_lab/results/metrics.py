@@ -1,0 +1,254 @@
+"""The figures of a flight: metrics.json, from the recorded series and what is known about it.
+
+Errors are truth minus reference. RMS and maximum run over the whole flight, from the take-off
+command to the touchdown command (`Series.flown`); every control tick weighs the same.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from uam_control.coordinates import ARM, ATTITUDE, POSITION
+from uam_lab.results.timeseries import SUBSYSTEMS, Series
+
+# (key, columns of the error block, factor from SI to the unit that the key names)
+GROUPS = (
+    ("position_m", POSITION, 1.0),
+    ("attitude_deg", ATTITUDE, 180.0 / np.pi),
+    ("arm_deg", ARM, 180.0 / np.pi),
+)
+PASSED_ON = (
+    "controller",
+    "profile",
+    "scenario",
+    "engine",
+    "clock",
+    "autopilot",
+    "seed",
+    "payload_mass_kg",
+)
+
+
+@dataclass(frozen=True)
+class Criteria:
+    """What counts as a completed mission."""
+
+    away_m: float = 0.05  # from where the payload stood, and above where it lies in the end
+    held_s: float = 0.5  # how long it must be both; a fall from the stand is shorter
+    place_m: float = 0.15  # horizontal distance of the payload from the drop point
+    landing_m: float = 0.15  # horizontal distance of the vehicle from the landing point
+    rest_m_s: float = 0.02  # speed below which the payload is at rest
+
+
+@dataclass(frozen=True)
+class Payload:
+    """What happened to the payload; None where there was none or it cannot be told."""
+
+    lifted: bool | None = None
+    lifted_at_s: float | None = None
+    lift_height_m: float | None = None
+    place_error_m: float | None = None
+    at_rest: bool | None = None
+
+
+def compute(
+    series: Series,
+    info: Mapping[str, Any],
+    latency_s: Sequence[float] | np.ndarray | None = None,
+    criteria: Criteria | None = None,
+) -> dict[str, Any]:
+    """The content of metrics.json.
+
+    info: PASSED_ON, `wall_s`, `abort_reason` ("" or None when there was none); optionally
+    `transitions` (of the supervisor, see `outcome.transition`), `faults`, `drop_point` [x, y] and
+    `landing_point` [x, y] (default the origin) [m], `missed_ticks`.
+    latency_s: sensor-to-setpoint latency per tick [s], used when `clock` is "realtime".
+    """
+    criteria = criteria or Criteria()
+    payload = payload_facts(series, info.get("payload_mass_kg"), info.get("drop_point"), criteria)
+    landing = landing_error(series, info.get("landing_point") or (0.0, 0.0))
+    shortfalls = what_is_missing(
+        flown=bool(series.flown.any()),
+        landed=bool(series.in_phase("landed").any()),
+        landing_error_m=landing,
+        abort_reason=info.get("abort_reason") or "",
+        payload=payload,
+        criteria=criteria,
+    )
+    duration = _span(series.time[series.flown])
+    wall = info.get("wall_s")
+    simulated = _span(series.time)
+    metrics = {key: info.get(key) for key in PASSED_ON}
+    metrics |= {
+        "duration_s": round(duration, 6),
+        "wall_s": wall,
+        "real_time_factor": simulated / wall if wall else None,
+        "mission_completed": not shortfalls,
+        "shortfalls": shortfalls,
+        "abort_reason": info.get("abort_reason") or None,
+        "transitions": info.get("transitions") or [],
+        "payload_lifted": payload.lifted,
+        "payload_lifted_at_s": payload.lifted_at_s,
+        "payload_lift_height_m": payload.lift_height_m,
+        "payload_place_error_m": payload.place_error_m,
+        "landing_error_m": landing,
+        "rms": errors(series, rms),
+        "max": errors(series, largest),
+        "faults": info.get("faults") or [],
+    }
+    if info.get("clock") == "realtime":
+        metrics["latency_ms"] = latency_figures(latency_s)
+        metrics["missed_ticks"] = info.get("missed_ticks")
+    factor = thrust_factor(series)
+    if factor is not None:
+        metrics["thrust_factor"] = factor
+    counted = clamps(series)
+    if counted is not None:
+        metrics["clamps"] = counted
+    return plain(metrics)
+
+
+def rms(errors: np.ndarray) -> np.ndarray:
+    """Root of the mean square over the rows of (ticks, n); NaN without rows."""
+    return np.sqrt(np.mean(np.square(errors), axis=0)) if len(errors) else _nothing(errors)
+
+
+def largest(errors: np.ndarray) -> np.ndarray:
+    """Largest magnitude over the rows of (ticks, n); NaN without rows."""
+    return np.max(np.abs(errors), axis=0) if len(errors) else _nothing(errors)
+
+
+def _nothing(errors: np.ndarray) -> np.ndarray:
+    return np.full(errors.shape[1], np.nan)
+
+
+def errors(
+    series: Series, figure: Callable[[np.ndarray], np.ndarray] = rms
+) -> dict[str, list[float]]:
+    """`figure` of the tracking errors over the flight, in the units and shape of metrics.json."""
+    error = series.block("error.")[series.flown]
+    return {key: (factor * figure(error[:, columns])).tolist() for key, columns, factor in GROUPS}
+
+
+def payload_facts(
+    series: Series,
+    mass: float | None,
+    drop_point: Sequence[float] | None,
+    criteria: Criteria,
+) -> Payload:
+    """Whether the payload was lifted by the magnet and where it came to rest.
+
+    Lifted: while the magnet was on, it was for `held_s` more than `away_m` from where it stood and
+    more than that above the lowest place where it ever lay. Not told by height alone, because the
+    hanging arm carries it lower than the stand.
+    """
+    spans = series.magnet_spans()
+    place = series.block("payload.")[:, :3]
+    if not mass or not spans or np.isnan(place).all():
+        return Payload()
+    start, end = series.row_at(spans[0][0]), series.row_at(spans[-1][1])
+    carried, time = place[start : end + 1], series.time[start : end + 1]
+    rise = float(np.max(carried[:, 2] - place[start, 2]))
+    away = np.linalg.norm(carried - place[start], axis=1) >= criteria.away_m
+    above = carried[:, 2] - np.nanmin(place[:, 2]) >= criteria.away_m
+    when = _first_held(time, away & above, criteria.held_s)
+    lifted = when is not None
+    if drop_point is None:
+        return Payload(lifted, when, rise)
+    distance = float(np.hypot(*(place[-1, :2] - np.asarray(drop_point, dtype=float))))
+    # Half a second of travel, so that one bounce is not taken for rest.
+    before = series.row_at(series.time[-1] - 0.5)
+    elapsed = series.time[-1] - series.time[before]
+    speed = float(np.linalg.norm(place[-1] - place[before])) / elapsed if elapsed > 0.0 else 0.0
+    return Payload(lifted, when, rise, distance, speed <= criteria.rest_m_s)
+
+
+def _first_held(time: np.ndarray, true: np.ndarray, span: float) -> float | None:
+    """Beginning [s] of the first stretch of `true` (ticks,) that lasts `span` [s]."""
+    edges = np.flatnonzero(np.diff(true.astype(np.int8), prepend=0, append=0))
+    for begin, end in zip(edges[::2], edges[1::2] - 1, strict=True):
+        if time[end] - time[begin] >= span:
+            return float(time[begin])
+    return None
+
+
+def landing_error(series: Series, point: Sequence[float]) -> float | None:
+    """Horizontal distance [m] of the vehicle from `point` at the end; None unless it landed."""
+    if not series.in_phase("landed").any():
+        return None
+    return float(np.hypot(series["truth.x"][-1] - point[0], series["truth.y"][-1] - point[1]))
+
+
+def what_is_missing(
+    flown: bool,
+    landed: bool,
+    landing_error_m: float | None,
+    abort_reason: str,
+    payload: Payload,
+    criteria: Criteria,
+) -> list[str]:
+    """What keeps the mission from being completed, one line each; empty when it is."""
+    if abort_reason:
+        return [f"aborted: {abort_reason}"]
+    if not flown:
+        return ["never took off"]
+    missing = []
+    if not landed:
+        missing.append("not landed")
+    elif landing_error_m is None or not landing_error_m <= criteria.landing_m:
+        missing.append(f"landed {landing_error_m:.2f} m from the landing point")
+    if payload.lifted is False:
+        missing.append(f"payload not lifted (rose {payload.lift_height_m:.3f} m)")
+    elif payload.place_error_m is not None:
+        if not payload.place_error_m <= criteria.place_m:
+            missing.append(f"payload {payload.place_error_m:.2f} m from the drop point")
+        elif not payload.at_rest:
+            missing.append("payload still moving at the end")
+    return missing
+
+
+def latency_figures(latency_s: Sequence[float] | np.ndarray | None) -> dict[str, float | None]:
+    """Percentiles and maximum [ms] of latencies [s]."""
+    if latency_s is None or not len(latency_s):
+        return {"p50": None, "p99": None, "max": None}
+    milliseconds = 1e3 * np.asarray(latency_s, dtype=float)
+    p50, p99 = np.percentile(milliseconds, [50.0, 99.0])
+    return {"p50": float(p50), "p99": float(p99), "max": float(np.max(milliseconds))}
+
+
+def thrust_factor(series: Series) -> dict[str, float] | None:
+    """True / assumed thrust as identified: at the end, and its range in flight; None unknown."""
+    factor = series["thrust.factor"][series.flown]
+    factor = factor[np.isfinite(factor)]
+    if not len(factor):
+        return None
+    return {"end": factor[-1], "least": np.min(factor), "largest": np.max(factor)}
+
+
+def clamps(series: Series) -> dict[str, int] | None:
+    """How often each subsystem's law clamped its error; None for laws that never do."""
+    counts = {s: series[f"adaptation.{s}.clamps"] for s in SUBSYSTEMS}
+    if not any(np.isfinite(count).any() for count in counts.values()):
+        return None
+    return {s: int(np.nanmax(count, initial=0.0)) for s, count in counts.items()}
+
+
+def _span(times: np.ndarray) -> float:
+    return float(times[-1] - times[0]) if len(times) else 0.0
+
+
+def plain(value: Any) -> Any:
+    """`value` made of what JSON has: no numpy types, and null instead of NaN and infinity."""
+    if isinstance(value, Mapping):
+        return {str(key): plain(item) for key, item in value.items()}
+    if isinstance(value, list | tuple | np.ndarray):
+        return [plain(item) for item in value]
+    if isinstance(value, np.generic):
+        value = value.item()
+    if isinstance(value, float) and not np.isfinite(value):
+        return None
+    return value

@@ -1,0 +1,214 @@
+"""The folder that a flight leaves behind, and what is written to it besides logs and pictures."""
+
+from __future__ import annotations
+
+import json
+import os
+import platform
+import re
+import subprocess
+import sys
+from collections.abc import Mapping
+from datetime import datetime
+from importlib import metadata
+from pathlib import Path
+from typing import Any
+
+import yaml
+
+from uam_lab.results import timeseries
+from uam_lab.results.atomic import replacing, write_text
+from uam_lab.results.metrics import plain
+
+RESULTS = Path("results")
+LATEST = "latest"
+# Distributions whose version can change what a flight does or how its results read.
+DISTRIBUTIONS = (
+    "uam",
+    "mujoco",
+    "numpy",
+    "numba",
+    "pymavlink",
+    "ros-jazzy-rclpy",
+    "ros-jazzy-common-interfaces",
+    "mcap",
+    "pyarrow",
+    "matplotlib",
+)
+
+
+class ResultFolderError(ValueError):
+    """The result folder cannot be used; the text is one line."""
+
+
+class ResultFolder:
+    """A flight's folder. Every file in it appears whole or not at all."""
+
+    def __init__(self, path: Path):
+        self.path = path
+        self.metrics = path / "metrics.json"
+        self.timeseries = path / "timeseries.parquet"
+        self.parameters = path / "parameters.yaml"
+        self.versions = path / "versions.json"
+        self.info = path / "info.json"
+        self.log = path / "log.mcap"
+        self.figures = path / "figures"
+        self.report = path / "report.html"
+
+    @classmethod
+    def create(
+        cls,
+        scenario: str,
+        controller: str,
+        out: Path | None = None,
+        now: datetime | None = None,
+    ) -> ResultFolder:
+        """Make `out`, or results/<time>-<scenario>-<controller>.
+
+        scenario: name or file, of which the stem is used. results/latest is turned to the new
+        folder if it lies in results/.
+        Raises ResultFolderError: not writable, not a directory, or `out` already has a flight.
+        """
+        if out is not None:
+            folder = cls(Path(out).expanduser())
+            _usable(folder.path)
+            if folder.metrics.exists() or folder.timeseries.exists():
+                raise ResultFolderError(
+                    f"result folder {folder.path} already holds a flight; give another --out"
+                )
+            if folder.path.absolute().parent == RESULTS.absolute():
+                _point_latest_at(folder.path)
+            return folder
+        folder = cls(make_folder(None, Path(scenario).stem, controller, now=now))
+        _point_latest_at(folder.path)
+        return folder
+
+    def write_parameters(self, parameters: Mapping[str, Any]) -> None:
+        """Effective parameters, node by node, in the form of a ROS parameter file."""
+        document = {node: {"ros__parameters": plain(values)} for node, values in parameters.items()}
+        write_text(self.parameters, yaml.safe_dump(document, sort_keys=False))
+
+    def write_metrics(self, metrics: Mapping[str, Any]) -> None:
+        """metrics.json; the same metrics give the same bytes."""
+        write_text(self.metrics, as_json(metrics))
+
+    def write_versions(self) -> None:
+        """versions.json, see `versions`."""
+        write_text(self.versions, as_json(versions()))
+
+    def write_info(self, info: Mapping[str, Any]) -> None:
+        """info.json: what the report needs to know beside the series."""
+        write_text(self.info, as_json(info))
+
+    def write_series(self, series: timeseries.Series) -> None:
+        """timeseries.parquet."""
+        series.write(self.timeseries)
+
+
+def as_json(value: Any) -> str:
+    """Indented JSON with a final newline; numpy and NaN as in `metrics.plain`, paths as text."""
+    return json.dumps(plain(value), indent=2, allow_nan=False, default=str) + "\n"
+
+
+def versions() -> dict[str, Any]:
+    """What this flight ran on: python, packages, git commit where there is one, platform."""
+    packages = {}
+    for name in DISTRIBUTIONS:
+        try:
+            packages[name] = metadata.version(name)
+        except metadata.PackageNotFoundError:
+            packages[name] = None
+    return {
+        "python": platform.python_version(),
+        "packages": packages,
+        "git_commit": git_commit(),
+        "platform": platform.platform(),
+        "machine": platform.machine(),
+        "processors": os.cpu_count(),
+    }
+
+
+def git_commit(directory: Path | None = None) -> str | None:
+    """Commit of the checkout that the code runs from, "+changes" if edited; None without git."""
+    directory = directory or Path(__file__).resolve().parent
+
+    def git(*arguments: str) -> str:
+        command = ["git", "-C", str(directory), *arguments]
+        done = subprocess.run(command, capture_output=True, text=True, timeout=5, check=True)
+        return done.stdout.strip()
+
+    try:
+        # Installed inside someone else's checkout, that commit would say nothing about this code.
+        if not git("ls-files", "--", str(directory)):
+            return None
+        changed = git("status", "--porcelain", "--untracked-files=no")
+        return git("rev-parse", "--short=12", "HEAD") + ("+changes" if changed else "")
+    except (OSError, subprocess.SubprocessError):
+        return None
+
+
+def make_folder(out: Path | None, *words: str, now: datetime | None = None) -> Path:
+    """Make `out`, or results/<time>-<words>; returns it. Raises ResultFolderError."""
+    if out is not None:
+        out = Path(out).expanduser()
+        _usable(out)
+        return out
+    stamp = (now or datetime.now()).strftime("%Y%m%d-%H%M%S")
+    return new_folder(RESULTS, "-".join([stamp, *map(in_a_name, words)]))
+
+
+def in_a_name(text: str) -> str:
+    """The text without what a file's name had better not have."""
+    return re.sub(r"[^A-Za-z0-9_.]+", "_", text).strip("._") or "flight"
+
+
+def _usable(path: Path) -> None:
+    """Make the directory and prove that it can be written to."""
+    try:
+        path.mkdir(parents=True, exist_ok=True)
+        _try_to_write(path)
+    except OSError as error:
+        raise _refusal(path, error) from None
+
+
+def new_folder(parent: Path, name: str) -> Path:
+    """Make a new directory `name` under `parent`, numbered where there is one of that name.
+
+    Raises ResultFolderError.
+    """
+    try:
+        parent.mkdir(parents=True, exist_ok=True)
+        path, number = parent / name, 1
+        while True:
+            try:
+                path.mkdir()
+                return path
+            except FileExistsError:
+                number += 1
+                path = parent / f"{name}-{number}"
+    except OSError as error:
+        raise _refusal(parent, error) from None
+
+
+def _try_to_write(path: Path) -> None:
+    probe = path / f".writable.{os.getpid()}"
+    probe.touch()
+    probe.unlink()
+
+
+def _refusal(path: Path, error: OSError) -> ResultFolderError:
+    reason = (error.strerror or str(error)).lower()
+    return ResultFolderError(f"result folder {path} cannot be written: {reason}")
+
+
+def _point_latest_at(path: Path) -> None:
+    """Turn results/latest to `path`; what is there and not a link is left alone."""
+    link = path.parent / LATEST
+    if link.exists() and not link.is_symlink():
+        print(f"{link} is not a link and stays as it is", file=sys.stderr)
+        return
+    try:
+        with replacing(link) as temporary:
+            temporary.symlink_to(path.name, target_is_directory=True)
+    except OSError as error:
+        print(f"{link} could not be set: {error.strerror}", file=sys.stderr)

@@ -1,0 +1,263 @@
+"""The recorded flight: one row per control tick, the columns named once, here.
+
+Both engines write the same table and everything downstream (metrics, figures, pictures) reads it
+by name. While flying, an engine fills one preallocated float64 array by column number:
+
+    recording = Recording(ticks)
+    TRUTH = COLUMNS.block("truth.")
+    recording.values[k, TRUTH] = state.ravel()          # state (3, 8): chi, chi_dot, chi_ddot
+
+In the file a column is called "name [unit]"; in the code it is called by its name alone.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pyarrow as pa
+import pyarrow.parquet as pq
+
+from uam_control.coordinates import COORDINATES as NAMES
+from uam_control.coordinates import POSITION, SIZE
+from uam_control.laws.catalogue import ADAPTATION
+from uam_control.maths.rotations import wrap_angle
+from uam_lab.results.atomic import replacing
+
+UNITS = {name: "m" if name in NAMES[POSITION] else "rad" for name in NAMES}
+ANGLES = slice(3, 8)
+SUBSYSTEMS = ("position", "attitude", "arm")
+# Phases between flights of the mission node; those in flight are named by the scenario.
+ON_GROUND = ("waiting", "landed", "aborted")
+PHASE_COLUMN = "phase"
+METADATA_KEY = b"uam"
+
+
+def _declare() -> dict[str, str]:
+    """Every numeric column in file order: name → unit."""
+    columns = {"time": "s"}
+    for group in ("truth", "estimate", "reference"):
+        for suffix, per in (("", ""), ("_dot", "/s"), ("_ddot", "/s^2")):
+            columns |= {f"{group}.{c}{suffix}": unit + per for c, unit in UNITS.items()}
+    columns |= {f"error.{c}": unit for c, unit in UNITS.items()}
+    columns |= {f"tau_p.{axis}": "N" for axis in "xyz"}
+    columns |= {f"tau_q.{axis}": "N m" for axis in ("roll", "pitch", "yaw")}
+    columns |= {f"tau_alpha.{joint}": "N m" for joint in "12"}
+    columns |= {f"setpoint.rate_{axis}": "rad/s" for axis in "xyz"} | {"setpoint.thrust": "1"}
+    columns |= {"thrust.factor": "1"}  # true / assumed, identified and applied
+    # The gains of every law, NaN for those that did not fly. Their units differ with subsystem and
+    # power of ||xi||; rho and zeta are those of tau before the multiplication by Mbar, so a unit
+    # per column would mislead.
+    columns |= {f"adaptation.{s}.{gain}": "1" for s in SUBSYSTEMS for gain in ADAPTATION}
+    columns |= {f"rotor_{i}.command": "1" for i in range(1, 5)}
+    columns |= {f"rotor_{i}.thrust": "N" for i in range(1, 5)}
+    columns |= {f"payload.{axis}": "m" for axis in "xyz"}
+    columns |= {f"payload.q{axis}": "1" for axis in "wxyz"}
+    columns |= {"magnet.on": "1", "magnet.force": "N", "magnet.swing": "rad"}
+    return columns
+
+
+class Columns:
+    """Numbers of the numeric columns by name or by prefix."""
+
+    def __init__(self, units: Mapping[str, str]):
+        self.units = dict(units)
+        self.names = tuple(units)
+        self._number = {name: i for i, name in enumerate(self.names)}
+
+    def __len__(self) -> int:
+        return len(self.names)
+
+    def __getitem__(self, name: str) -> int:
+        return self._number[name]
+
+    def __contains__(self, name: str) -> bool:
+        return name in self._number
+
+    def block(self, prefix: str) -> slice:
+        """The adjacent columns whose names start with `prefix`, as a slice.
+
+        Raises:
+            KeyError: no column starts so, or those that do are not adjacent.
+        """
+        found = [i for i, name in enumerate(self.names) if name.startswith(prefix)]
+        if not found or found[-1] - found[0] + 1 != len(found):
+            raise KeyError(f"no block of columns {prefix!r}")
+        return slice(found[0], found[-1] + 1)
+
+    def label(self, name: str) -> str:
+        """Column name in the file: "name [unit]"."""
+        return f"{name} [{self.units[name]}]"
+
+
+COLUMNS = Columns(_declare())
+
+
+def gain_columns(subsystem: str, names: Iterable[str]) -> np.ndarray:
+    """Numbers (n,) of the columns of a law's gains, called `names`."""
+    return np.array([COLUMNS[f"adaptation.{subsystem}.{name}"] for name in names])
+
+
+class UnreadableFlight(ValueError):
+    """A file that should hold a recorded flight does not."""
+
+
+class Recording:
+    """Preallocated store of a flight while it is flown; unwritten entries are NaN."""
+
+    def __init__(self, capacity: int):
+        self.values = np.full((capacity, len(COLUMNS)), np.nan)
+        self.phases = np.zeros(capacity, dtype=np.int8)
+        self.phase_names: dict[str, int] = {}
+        self.count = 0
+
+    def next_row(self, phase: str) -> np.ndarray:
+        """The (columns,) row of the next tick, to be filled in place; grows when full."""
+        if self.count == len(self.values):
+            self.values = np.concatenate([self.values, np.full_like(self.values, np.nan)])
+            self.phases = np.concatenate([self.phases, np.zeros_like(self.phases)])
+        self.phases[self.count] = self.phase_names.setdefault(phase, len(self.phase_names))
+        self.count += 1
+        return self.values[self.count - 1]
+
+    def series(self, info: Mapping[str, Any] | None = None) -> Series:
+        """What has been recorded so far; error columns and the countdown are computed here."""
+        values = self.values[: self.count]
+        count_down(values[:, COLUMNS["time"]])
+        truth, reference = (values[:, COLUMNS.block(group)] for group in ("truth.", "reference."))
+        error = truth[:, :SIZE] - reference[:, :SIZE]
+        error[:, ANGLES] = wrap_angle(error[:, ANGLES])
+        values[:, COLUMNS.block("error.")] = error
+        names = tuple(self.phase_names)
+        return Series(values, self.phases[: self.count], names, dict(info or {}))
+
+
+def count_down(time: np.ndarray) -> None:
+    """Let mission time (ticks,) [s] run up to the first tick not before take-off, in place.
+
+    Until take-off nobody can know how long it still takes; the recorded value stands still.
+    """
+    start = int(np.argmax(time >= 0.0)) if np.any(time >= 0.0) else len(time)
+    if 0 < start < len(time) - 1:
+        time[:start] = time[start] - (time[start + 1] - time[start]) * np.arange(start, 0, -1)
+
+
+@dataclass
+class Series:
+    """A whole flight: `values` (ticks, columns), `phases` (ticks,) numbers into `phase_names`."""
+
+    values: np.ndarray
+    phases: np.ndarray
+    phase_names: tuple[str, ...]
+    info: dict[str, Any] = field(default_factory=dict)
+
+    def __getitem__(self, name: str) -> np.ndarray:
+        """Column (ticks,) by its name without unit."""
+        return self.values[:, COLUMNS[name]]
+
+    def __len__(self) -> int:
+        return len(self.values)
+
+    def block(self, prefix: str) -> np.ndarray:
+        """Columns (ticks, n) whose names start with `prefix`."""
+        return self.values[:, COLUMNS.block(prefix)]
+
+    @cached_property
+    def time(self) -> np.ndarray:
+        """Mission time [s], 0 at the take-off command."""
+        return self["time"]
+
+    @cached_property
+    def flown(self) -> np.ndarray:
+        """Mask (ticks,): from the take-off command to the touchdown command.
+
+        The touchdown command is where the mission, its vehicle on the ground, switches it off:
+        the beginning of the phase "landed". In an aborted flight it is the abort.
+        """
+        on_ground = [name in ON_GROUND for name in self.phase_names]
+        return (self.time >= 0.0) & ~np.array(on_ground)[self.phases]
+
+    def in_phase(self, name: str) -> np.ndarray:
+        """Mask (ticks,) of a phase."""
+        if name not in self.phase_names:
+            return np.zeros(len(self), dtype=bool)
+        return self.phases == self.phase_names.index(name)
+
+    def phase_spans(self) -> list[tuple[str, float, float]]:
+        """Phases in the order flown: (name, first time, time of the following phase) [s]."""
+        if not len(self):
+            return []
+        starts = np.flatnonzero(np.diff(self.phases, prepend=-1))
+        ends = np.append(starts[1:], len(self) - 1)
+        return [
+            (self.phase_names[self.phases[a]], float(self.time[a]), float(self.time[b]))
+            for a, b in zip(starts, ends, strict=True)
+        ]
+
+    def magnet_spans(self) -> list[tuple[float, float]]:
+        """Times [s] between which the magnet was on."""
+        on = np.nan_to_num(self["magnet.on"]) > 0.5
+        edges = np.flatnonzero(np.diff(on.astype(np.int8), prepend=0, append=0))
+        last = len(self) - 1
+        return [
+            (float(self.time[a]), float(self.time[min(b, last)]))
+            for a, b in zip(edges[::2], edges[1::2], strict=True)
+        ]
+
+    def row_at(self, time: float) -> int:
+        """Number of the first row not before `time` [s]."""
+        return int(min(np.searchsorted(self.time, time), len(self) - 1))
+
+    def table(self) -> pa.Table:
+        """Arrow table of the file: "name [unit]" columns, phase dictionary-encoded, info beside."""
+        phase = pa.DictionaryArray.from_arrays(
+            pa.array(self.phases, pa.int8()), pa.array(self.phase_names, pa.string())
+        )
+        arrays = [pa.array(np.ascontiguousarray(column)) for column in self.values.T]
+        labels = [COLUMNS.label(name) for name in COLUMNS.names]
+        table = pa.table([arrays[0], phase, *arrays[1:]], [labels[0], PHASE_COLUMN, *labels[1:]])
+        return table.replace_schema_metadata(
+            {METADATA_KEY: json.dumps(self.info, sort_keys=True, default=str).encode()}
+        )
+
+    def write(self, path: Path) -> None:
+        """Write the table to `path`; the file appears whole or not at all."""
+        with replacing(path) as temporary:
+            pq.write_table(self.table(), temporary, compression="zstd")
+
+
+def read(path: Path) -> Series:
+    """Read a flight back.
+
+    Raises:
+        UnreadableFlight: not a parquet file, or columns of the contract are missing.
+    """
+    try:
+        table = pq.read_table(path)
+    except (OSError, pa.ArrowException) as error:
+        reason = str(error).splitlines()[0]
+        raise UnreadableFlight(f"{path}: not a readable flight ({reason})") from None
+    missing = _missing(table.column_names)
+    if missing:
+        more = f" and {len(missing) - 1} more" if len(missing) > 1 else ""
+        raise UnreadableFlight(f"{path}: column {missing[0]!r}{more} missing")
+    values = np.column_stack([table[COLUMNS.label(name)].to_numpy() for name in COLUMNS.names])
+    phase = table[PHASE_COLUMN].combine_chunks().dictionary_encode()
+    if isinstance(phase, pa.ChunkedArray):
+        phase = phase.combine_chunks()
+    codes = phase.indices.to_numpy().astype(np.int8)
+    names = tuple(phase.dictionary.to_pylist())
+    info = json.loads((table.schema.metadata or {}).get(METADATA_KEY, b"{}"))
+    return Series(values, codes, names, info)
+
+
+def _missing(present: Iterable[str]) -> list[str]:
+    """Labels of the contract that `present` lacks."""
+    present = set(present)
+    wanted = [COLUMNS.label(name) for name in COLUMNS.names] + [PHASE_COLUMN]
+    return [label for label in wanted if label not in present]

@@ -1,0 +1,179 @@
+"""What a search may change, flies and judges by: a file of config/tuning, checked as it is read."""
+
+from __future__ import annotations
+
+import copy
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from uam_control.profile import NODES, Profile, load_profile, profile_of
+from uam_control.settings import configuration, yaml_file
+from uam_lab.campaign.trial import ERRORS, Result, Trial
+
+DIGITS = 4  # significant ones of a found value
+
+
+class TuningError(ValueError):
+    """A search that cannot be made; the text is one line."""
+
+
+@dataclass(frozen=True)
+class Knob:
+    """One number of the search: some entries of a parameter, moved together, logarithmically.
+
+    nodes: those that it is set in, as a rule one.
+    """
+
+    nodes: tuple[str, ...]
+    parameter: str
+    low: float
+    high: float
+    entries: tuple[int, ...] = ()  # () for a parameter that is one number
+
+    @property
+    def name(self) -> str:
+        """As "arm_controller.lambda_1[0]"."""
+        where = ",".join(map(str, self.entries))
+        node = self.nodes[0] if len(self.nodes) == 1 else "all"
+        return f"{node}.{self.parameter}" + (f"[{where}]" if where else "")
+
+    def value(self, profile: Profile) -> float:
+        """The value in a profile (its first entry), moved into the range."""
+        value = getattr(profile.sets[self.nodes[0]], self.parameter)
+        value = value[self.entries[0]] if self.entries else value
+        return min(max(float(value), self.low), self.high)
+
+
+@dataclass(frozen=True)
+class Cost:
+    """How a flight is judged; see config/tuning/modular.yaml for the formula."""
+
+    aim: tuple[float, ...]
+    peak_weight: float
+    restless_weight: float
+    restless_allowed: tuple[float, float]
+    not_completed: float
+    lost: float
+
+    def of(self, result: Result) -> float:
+        """The cost of a campaign.trial.Result; finite in any case."""
+        if result.cut_short or not all(map(math.isfinite, result.rms)):
+            return self.lost * (2.0 - result.flown)
+        share = [(value / aim) ** 2 for value, aim in zip(result.rms, self.aim, strict=True)]
+        peak = [
+            (value / (5.0 * aim)) ** 2 for value, aim in zip(result.largest, self.aim, strict=True)
+        ]
+        restless = [
+            (value / allowed) ** 2
+            for value, allowed in zip(result.restless, self.restless_allowed, strict=True)
+        ]
+        return (
+            sum(share) / len(share)
+            + self.peak_weight * sum(peak) / len(peak)
+            + self.restless_weight * sum(restless)
+            + (0.0 if result.completed else self.not_completed)
+        )
+
+
+@dataclass(frozen=True)
+class Space:
+    """A search: start profile, knobs, flights of an evaluation, cost."""
+
+    name: str
+    start: Profile
+    knobs: tuple[Knob, ...]
+    flights: tuple[dict[str, Any], ...]
+    cost: Cost
+
+    def profile(self, values: Mapping[str, float], name: str = "candidate") -> Profile:
+        """The start profile with the knobs at `values` (by name). Raises ProfileError."""
+        sections = copy.deepcopy(self.start.sections)
+        for knob, node in [(k, node) for k in self.knobs for node in k.nodes]:
+            value = float(f"{values[knob.name]:.{DIGITS}g}")
+            section = sections.setdefault(node, {})
+            if not knob.entries:
+                section[knob.parameter] = value
+                continue
+            vector = list(getattr(self.start.sets[node], knob.parameter))
+            vector = list(section.get(knob.parameter, vector))
+            for entry in knob.entries:
+                vector[entry] = value
+            section[knob.parameter] = vector
+        return profile_of(sections, Path(f"{name}.yaml"))
+
+    def trials(self, profile: Profile) -> list[Trial]:
+        """The flights that judge a profile."""
+        return [
+            Trial(
+                self.name,
+                profile,
+                flight["payload_mass"],
+                flight["seed"],
+                flight.get("scenario", "pick_and_place"),
+                vehicle_changes=flight.get("vehicle", {}),
+            )
+            for flight in self.flights
+        ]
+
+
+def load_space(name_or_file: str, start: Profile | None = None) -> Space:
+    """Read a file of config/tuning, or another one. start: instead of the profile that it names.
+
+    Raises TuningError, and what loading the profile raises; one line each.
+    """
+    try:
+        file = configuration.named("tuning", name_or_file)
+        document = yaml_file.read(file, TuningError)
+        if "judged_as" in document:  # flights and cost of another space: a fair comparison
+            other = configuration.named("tuning", document["judged_as"])
+            document = {**yaml_file.read(other, TuningError), **document}
+        start = start or load_profile(document["profile"])
+        knobs = tuple(_knob(entry, start) for entry in document["knobs"])
+        cost = {
+            key: tuple(map(float, value)) if isinstance(value, list) else float(value)
+            for key, value in document["cost"].items()
+        }
+        flights = tuple(
+            {**flight, "payload_mass": float(flight["payload_mass"]), "seed": int(flight["seed"])}
+            for flight in document["flights"]
+        )
+        space = Space(file.stem, start, knobs, flights, Cost(**cost))
+    except (KeyError, TypeError) as error:
+        raise TuningError(f"{name_or_file}: {error.args[0]} is missing or not allowed") from None
+    if len(space.cost.aim) != len(ERRORS):
+        raise TuningError(
+            f"{file}: cost.aim has {len(space.cost.aim)} numbers, {len(ERRORS)} are "
+            f"expected: {', '.join(ERRORS)}"
+        )
+    if not flights or not knobs:
+        raise TuningError(f"{file}: at least one flight and one knob are expected")
+    return space
+
+
+def _knob(entry: dict[str, Any], start: Profile) -> Knob:
+    entry = dict(entry)
+    nodes = (entry.pop("node"),) if "node" in entry else tuple(entry.pop("nodes"))
+    knob = Knob(nodes, **{**entry, "entries": tuple(entry.get("entries", ()))})
+    for node in nodes:
+        if node not in NODES:
+            raise TuningError(f"{knob.name}: no such node; there are: {', '.join(NODES)}")
+        _check(knob, getattr(start.sets[node], knob.parameter, None))
+    if not 0.0 < knob.low < knob.high:
+        raise TuningError(f"{knob.name}: 0 < low < high is expected")
+    return knob
+
+
+def _check(knob: Knob, value: Any) -> None:
+    """Refuse a knob that does not fit the parameter's `value`."""
+    length = len(value) if isinstance(value, tuple) else 0
+    if value is None or isinstance(value, str | bool):
+        raise TuningError(f"{knob.name}: no such parameter, or not a number")
+    if bool(length) != bool(knob.entries) or any(not 0 <= i < length for i in knob.entries):
+        raise TuningError(
+            f"{knob.name}: entries 0 to {length - 1} are expected"
+            if length
+            else f"{knob.name}: one number, has no entries"
+        )

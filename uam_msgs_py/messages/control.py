@@ -1,0 +1,141 @@
+"""The messages of the control loop and what "idle" means in each.
+
+On the ground the vehicle is not controlled, only its arm is: the reference then names the joints
+alone, and the position and attitude commands are stamped but empty.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from uam_control.coordinates import ARM, ATTITUDE, COORDINATES, JOINTS, POSITION, SIZE
+from uam_msgs_py.messages.layouts import BadMessage
+from uam_msgs_py.messages.trajectories import (
+    IdleWriter,
+    TrajectoryReader,
+    TrajectoryWriter,
+    trajectory,
+)
+
+ALL = list(COORDINATES)
+ARM_NAMES = list(JOINTS)
+POSE_NAMES = list(COORDINATES[:6])
+ATTITUDE_NAMES = list(COORDINATES[ATTITUDE])
+ROWS = TrajectoryWriter.ROWS[:3]
+WHOLE, ARM_ALONE = TrajectoryReader(ALL), TrajectoryReader(ARM_NAMES)
+POSE = TrajectoryReader(POSE_NAMES, TrajectoryWriter.ROWS)
+TAU_Q = TrajectoryReader(ATTITUDE_NAMES, ["effort"])
+TAU_ALPHA = TrajectoryReader(ARM_NAMES, ["effort"])
+
+
+def read_state(data: bytes) -> tuple[int, np.ndarray]:
+    """Return (stamp [ns], chi, chi_dot, chi_ddot (3, 8)); raises BadMessage."""
+    message = trajectory(data)
+    return message.stamp, WHOLE.read(message)
+
+
+@dataclass(frozen=True)
+class Reference:
+    """chi_d, chi_d_dot, chi_d_ddot (3, 8); only the arm's columns count while not flying."""
+
+    values: np.ndarray
+    flying: bool
+
+
+class ReferenceWriter:
+    """Writes references of the whole vehicle or, while it is grounded, of the arm alone."""
+
+    def __init__(self):
+        self._whole, self._arm = TrajectoryWriter(ALL), TrajectoryWriter(ARM_NAMES)
+
+    def fill(self, stamp: int, reference: np.ndarray, flying: bool, mission_time: int) -> bytes:
+        """Return the message; reference (3, 8), mission_time [ns] (not negative)."""
+        if flying:
+            return self._whole.fill(stamp, reference, mission_time)
+        return self._arm.fill(stamp, reference[:, ARM], mission_time)
+
+
+def read_reference(data: bytes) -> tuple[int, Reference]:
+    """Return (stamp [ns], reference); raises BadMessage."""
+    message = trajectory(data)
+    if message.layout.names != ARM_NAMES:
+        return message.stamp, Reference(WHOLE.read(message), True)
+    values = np.zeros((3, SIZE))
+    values[:, ARM] = ARM_ALONE.read(message)
+    return message.stamp, Reference(values, False)
+
+
+@dataclass(frozen=True)
+class PositionCommand:
+    """tau_p (3,) [N, world]; attitude (3, 3): rows q_d, Omega_d, Omega_d_dot. Zeros while idle."""
+
+    tau: np.ndarray
+    attitude: np.ndarray
+    flying: bool
+
+
+NO_COMMAND = PositionCommand(np.zeros(3), np.zeros((3, 3)), False)
+
+
+class PositionCommandWriter:
+    """Writes what the position controller asks for."""
+
+    def __init__(self):
+        self._writer = TrajectoryWriter(POSE_NAMES, TrajectoryWriter.ROWS)
+        self._idle = IdleWriter()
+
+    def fill(
+        self, stamp: int, reference: np.ndarray, attitude: np.ndarray, tau: np.ndarray
+    ) -> bytes:
+        """Return the message; reference (3, 8), attitude (3, 3), tau (3,) [N, world]."""
+        for i, row in enumerate(ROWS):
+            values = self._writer.values[row]
+            values[POSITION] = reference[i, POSITION]
+            values[ATTITUDE] = attitude[i]
+        self._writer.values["effort"][POSITION] = tau
+        return self._writer.stamped(stamp)
+
+    def idle(self, stamp: int) -> bytes:
+        """Return the empty message of this stamp [ns]."""
+        return self._idle.stamped(stamp)
+
+
+def read_position_command(data: bytes) -> tuple[int, PositionCommand]:
+    """Return (stamp [ns], command); raises BadMessage."""
+    message = trajectory(data)
+    if not message.layout.names:
+        if message.layout.points:
+            raise BadMessage("points without joint names")
+        return message.stamp, NO_COMMAND
+    values = POSE.read(message)
+    # a copy, as strided arrays would have the control path compiled a second time, in flight
+    attitude = values[:3, ATTITUDE].copy()
+    return message.stamp, PositionCommand(values[3, POSITION], attitude, True)
+
+
+class TorqueWriter:
+    """Writes tau_q or tau_alpha as the effort of a trajectory point."""
+
+    def __init__(self, names: list[str]):
+        self._writer = TrajectoryWriter(names, ["effort"])
+        self._idle = IdleWriter()
+
+    def fill(self, stamp: int, tau: np.ndarray) -> bytes:
+        """Return the message; tau (n,) [N m]."""
+        self._writer.values["effort"][:] = tau
+        return self._writer.stamped(stamp)
+
+    def idle(self, stamp: int) -> bytes:
+        """Return the empty message of this stamp [ns]."""
+        return self._idle.stamped(stamp)
+
+
+def read_torque(data: bytes, reader: TrajectoryReader) -> tuple[int, np.ndarray | None]:
+    """Return (stamp [ns], torque (n,) [N m], or None while idle); raises BadMessage.
+
+    reader: TAU_Q or TAU_ALPHA, for the attitude's or the arm's torques.
+    """
+    message = trajectory(data)
+    if not message.layout.names and not message.layout.points:
+        return message.stamp, None
+    return message.stamp, reader.read(message)[0]

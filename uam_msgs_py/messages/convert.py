@@ -1,0 +1,177 @@
+"""numpy ↔ serialized ROS messages, with what costs time at 250 Hz left out.
+
+Writers put numbers into a serialized message (`serialized.py`); readers take serialized messages
+(raw subscriptions), check names, lengths, frames and numbers, and raise BadMessage with one line.
+This is the only place where quaternions change between [w x y z] (maths) and x, y, z, w (ROS).
+Trajectories have a file of their own. Stamps are integer nanoseconds.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+from geometry_msgs.msg import PoseStamped, TwistStamped
+from rclpy.serialization import serialize_message
+from sensor_msgs.msg import Imu, JointState
+from std_msgs.msg import Bool, Float64MultiArray
+
+from uam_msgs_py.messages.layouts import ENCAPSULATION, BadMessage
+from uam_msgs_py.messages.name_checks import check_length, check_names, refuse_infinite
+from uam_msgs_py.messages.serialized import Serialized, Template
+from uam_msgs_py.messages.topics import BODY, WORLD
+
+SWITCH = {on: serialize_message(Bool(data=on)) for on in (False, True)}
+
+
+class JointStateWriter(Template):
+    """A JointState whose views position, velocity, effort (n,) are written and published."""
+
+    def __init__(self, names: Sequence[str]):
+        """names: of the n joints."""
+        zeros = [0.0] * len(names)
+        super().__init__(JointState(name=list(names), position=zeros, velocity=zeros, effort=zeros))
+        self.position, self.velocity, self.effort = self.values.values()
+
+
+def read_joints(data: bytes, names: Sequence[str]) -> tuple[int, np.ndarray, np.ndarray]:
+    """Return (stamp [ns], position (n,) [rad], velocity (n,) [rad/s]) in the order of `names`.
+
+    The message may hold further joints, in any order, as /joint_states does on robots. Raises
+    BadMessage where one of `names` or a number is missing or not finite.
+    """
+    message = Serialized(JointState, data)
+    order, found = message.layout.names, []
+    for what, field in (("positions", "position"), ("velocities", "velocity")):
+        values = message.numbers(field)
+        if len(values) != len(order):
+            raise BadMessage(f"{len(values)} {what} for {len(order)} joints")
+        if order != names:
+            try:
+                values = values[[order.index(name) for name in names]]
+            except ValueError:
+                check_names(order, names)
+        refuse_infinite(what, values, names)
+        found.append(values)
+    return message.stamp, *found
+
+
+def read_values(data: bytes, field: str) -> tuple[int, list[str], np.ndarray]:
+    """Return (stamp [ns], names, values (n,)) of one field of a JointState, finite or not.
+
+    The values are NaN where the message leaves the field empty; raises BadMessage where there are
+    more or fewer than names.
+    """
+    message = Serialized(JointState, data)
+    names, values = message.layout.names, message.numbers(field)
+    if not len(values):
+        return message.stamp, names, np.full(len(names), math.nan)
+    check_length(field, len(values), names)
+    return message.stamp, names, values
+
+
+class ImuWriter(Template):
+    """An Imu without orientation (orientation_covariance[0] = -1)."""
+
+    def __init__(self):
+        message = Imu()
+        message.header.frame_id = BODY
+        message.orientation_covariance[0] = -1.0
+        super().__init__(message)
+        self._gyro = self.values["angular_velocity"]
+        self._force = self.values["linear_acceleration"]
+
+    def fill(self, stamp: int, gyro: np.ndarray, specific_force: np.ndarray) -> bytes:
+        """Return the message; gyro (3,) [rad/s], specific_force (3,) [m/s^2], FLU."""
+        self._gyro[:], self._force[:] = gyro, specific_force
+        return self.stamped(stamp)
+
+
+def read_imu(data: bytes) -> tuple[int, np.ndarray, np.ndarray]:
+    """Return (stamp [ns], gyro (3,) [rad/s], specific force (3,) [m/s^2]), FLU."""
+    message = Serialized(Imu, data)
+    return message.stamp, message.vector("angular_velocity"), message.vector("linear_acceleration")
+
+
+class PoseWriter(Template):
+    """A PoseStamped in the world frame."""
+
+    def __init__(self):
+        message = PoseStamped()
+        message.header.frame_id = WORLD
+        super().__init__(message)
+        self._position, self._orientation = self.values["position"], self.values["orientation"]
+
+    def fill(self, stamp: int, position: np.ndarray, quaternion: np.ndarray) -> bytes:
+        """Return the message; position (3,) [m], quaternion [w x y z] body → world."""
+        self._position[:] = position
+        self._orientation[:3], self._orientation[3] = quaternion[1:], quaternion[0]
+        return self.stamped(stamp)
+
+
+def read_pose(data: bytes, frame: str = WORLD) -> tuple[int, np.ndarray, np.ndarray]:
+    """Return (stamp [ns], position (3,) [m], quaternion [w x y z], normalised).
+
+    Raises BadMessage for another frame, or numbers that are not finite or not a rotation.
+    """
+    message = Serialized(PoseStamped, data)
+    if message.layout.frame != frame:
+        raise BadMessage(f"frame '{message.layout.frame}', expected '{frame}'")
+    quaternion = np.roll(message.numbers("orientation"), 1)
+    norm = math.sqrt(quaternion @ quaternion)
+    if not abs(norm - 1.0) < 0.01:
+        raise BadMessage(f"orientation has norm {norm:.3g}, 1 expected")
+    if not abs(norm - 1.0) < 1e-12:  # rounding errors may stay
+        quaternion = quaternion / norm
+    return message.stamp, message.vector("position"), quaternion
+
+
+class EffortWriter(Template):
+    """A Float64MultiArray of the ros2_control effort controllers."""
+
+    def __init__(self, count: int):
+        super().__init__(Float64MultiArray(data=[0.0] * count))
+        self._effort = self.values["data"]
+
+    def fill(self, effort: np.ndarray) -> bytes:
+        """Return the message; effort (n,) [N m]."""
+        self._effort[:] = effort
+        return self.plain()
+
+
+def read_effort(data: bytes, names: Sequence[str]) -> np.ndarray:
+    """Return the efforts (n,) [N m]; raises BadMessage on a wrong number of joints or a NaN."""
+    effort = Serialized(Float64MultiArray, data).numbers("data")
+    check_length("efforts", len(effort), names)
+    refuse_infinite("effort", effort, names)
+    return effort
+
+
+class SetpointWriter(Template):
+    """The TwistStamped that repeats what was sent to the autopilot."""
+
+    def __init__(self):
+        message = TwistStamped()
+        message.header.frame_id = BODY
+        super().__init__(message)
+        self._rates, self._linear = self.values["angular"], self.values["linear"]
+
+    def fill(self, stamp: int, rates: np.ndarray, thrust: float) -> bytes:
+        """Return the message; rates (3,) [rad/s, FLU], thrust 0..1."""
+        self._rates[:] = rates
+        self._linear[2] = thrust
+        return self.stamped(stamp)
+
+
+def read_setpoint(data: bytes) -> tuple[int, np.ndarray, float]:
+    """Return (stamp [ns], body rates (3,) [rad/s, FLU], thrust 0..1)."""
+    message = Serialized(TwistStamped, data)
+    return message.stamp, message.vector("angular"), float(message.vector("linear")[2])
+
+
+def read_switch(data: bytes) -> bool:
+    """Whether a Bool is true; raises BadMessage."""
+    if len(data) <= ENCAPSULATION:
+        raise BadMessage(f"{len(data)} bytes, too short for a Bool")
+    return data[ENCAPSULATION] != 0

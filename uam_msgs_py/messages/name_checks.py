@@ -1,0 +1,33 @@
+"""Whether the numbers of a message are those of the joints that are expected."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+
+from uam_msgs_py.messages.layouts import BadMessage
+
+
+def check_names(given: Sequence[str], expected: Sequence[str]) -> None:
+    """Raise BadMessage unless `given` are exactly the expected joint names, in order."""
+    if list(given) != list(expected):
+        raise BadMessage(
+            f"joint names {', '.join(given) or '(none)'}; expected {', '.join(expected)}"
+        )
+
+
+def check_length(what: str, length: int, names: Sequence[str]) -> None:
+    """Raise BadMessage unless there is one of `what` for each of `names`."""
+    if length != len(names):
+        raise BadMessage(f"{length} {what}, {len(names)} expected ({', '.join(names)})")
+
+
+def refuse_infinite(what: str, values: np.ndarray, names: Sequence[str]) -> None:
+    """Raise BadMessage unless all values (n,), those of `names`, are finite."""
+    if not math.isfinite(values.sum()):
+        for name, value in zip(names, values, strict=True):
+            if not math.isfinite(value):
+                raise BadMessage(f"{what} of {name} is {value}")
+        raise BadMessage(f"{what} overflow")

@@ -1,0 +1,123 @@
+"""Serialized messages as they are written and read in place.
+
+A template serializes one message when it is made; afterwards only numbers and stamp are put into
+its bytes, which are what is published. A received message is its bytes and where the numbers lie in
+them. Stamps are integer nanoseconds.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from geometry_msgs.msg import PoseStamped, TwistStamped
+from rclpy.serialization import deserialize_message, serialize_message
+from rosgraph_msgs.msg import Clock
+from sensor_msgs.msg import Imu, JointState
+from std_msgs.msg import Float64MultiArray
+from trajectory_msgs.msg import JointTrajectory
+
+from uam_msgs_py.messages.layouts import (
+    SECOND,
+    STAMP,
+    BadMessage,
+    Layout,
+    Layouts,
+    is_little_endian,
+    stamp_of,
+)
+
+
+def type_name(message_type: type) -> str:
+    """`package/msg/Name` of a generated message class."""
+    return f"{message_type.__module__.split('.')[0]}/msg/{message_type.__name__}"
+
+
+KINDS = (JointTrajectory, JointState, Imu, PoseStamped, TwistStamped, Float64MultiArray, Clock)
+LAYOUTS = {kind: Layouts(type_name(kind)) for kind in KINDS}
+
+
+def stays_serialized(message_type: type) -> bool:
+    """Whether messages of this type are read and written here, serialized."""
+    return message_type in LAYOUTS
+
+
+class Template:
+    """A serialized message; `values` holds a view for each of its fields of numbers."""
+
+    def __init__(
+        self,
+        message: JointTrajectory
+        | JointState
+        | Imu
+        | PoseStamped
+        | TwistStamped
+        | Float64MultiArray
+        | Clock,
+    ):
+        """message: of a type in LAYOUTS, with its names and with arrays as long as they will be."""
+        data = serialize_message(message)
+        layout = LAYOUTS[type(message)].of(data)
+        # Numbers are aligned from the end of the encapsulation: let that be aligned in memory.
+        self._bytes = np.zeros(4 + len(data), dtype=np.uint8)[4:]
+        self._bytes[:] = np.frombuffer(data, dtype=np.uint8)
+        self.values = {
+            name: self._bytes[where].view("<f8") for name, where in layout.fields.items()
+        }
+        self._stamp = self._time(STAMP)
+        self._duration = None if layout.duration is None else self._time(layout.duration)
+
+    def _time(self, where: slice) -> np.ndarray:
+        return self._bytes[where].view("<i4")  # seconds; nanoseconds fit an int32 as well
+
+    def stamped(self, stamp: int, time_from_start: int = 0) -> bytes:
+        """Return the message with this stamp [ns]; time_from_start [ns], of trajectories only."""
+        self._stamp[:] = divmod(stamp, SECOND)
+        if self._duration is not None:
+            self._duration[:] = divmod(time_from_start, SECOND)
+        return self._bytes.tobytes()
+
+    def plain(self) -> bytes:
+        """Return the message, of a type that has no stamp."""
+        return self._bytes.tobytes()
+
+
+class Serialized:
+    """A received message: its bytes and their layout."""
+
+    def __init__(self, kind: type, data: bytes):
+        """kind: a type in LAYOUTS. Raises BadMessage."""
+        if not is_little_endian(data):
+            data = _here(kind, data)
+        self.data = data
+        self.layout: Layout = LAYOUTS[kind].of(data)
+
+    @property
+    def stamp(self) -> int:
+        """Its stamp [ns]."""
+        return stamp_of(self.data)
+
+    def numbers(self, field: str) -> np.ndarray:
+        """A read-only view (n,) of a field of numbers, (0,) where it is empty."""
+        length = self.layout.length(field)
+        if not length:
+            return _NOTHING
+        return np.frombuffer(self.data, "<f8", length, self.layout.fields[field].start)
+
+    def vector(self, field: str) -> np.ndarray:
+        """A copy of a field of numbers; raises BadMessage unless all are finite."""
+        values = self.numbers(field).copy()
+        if not math.isfinite(values.sum()):
+            raise BadMessage(f"{field} is {values.tolist()}, finite numbers expected")
+        return values
+
+
+_NOTHING = np.zeros(0)
+
+
+def _here(kind: type, data: bytes) -> bytes:
+    """Serialize anew, in the byte order of this machine, what another one has sent."""
+    try:
+        return serialize_message(deserialize_message(data, kind))
+    except Exception as error:  # rclpy raises its own classes, without a common base
+        raise BadMessage(f"cannot be deserialized ({error})") from None

@@ -1,0 +1,153 @@
+"""States that travel as diagnostic_msgs/DiagnosticArray: one status with key-value pairs."""
+
+from dataclasses import dataclass, fields
+from typing import ClassVar, Self
+
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
+
+from uam_msgs_py.messages.layouts import BadMessage
+from uam_msgs_py.messages.stamps import nanoseconds, set_stamp
+
+OK, WARN, ERROR, STALE = (
+    DiagnosticStatus.OK,
+    DiagnosticStatus.WARN,
+    DiagnosticStatus.ERROR,
+    DiagnosticStatus.STALE,
+)
+
+
+def diagnostic(
+    stamp: int, name: str, level: bytes, message: str, values: dict[str, object]
+) -> DiagnosticArray:
+    """Return a DiagnosticArray with one status. stamp [ns]; None becomes an empty value."""
+    status = DiagnosticStatus(
+        level=level,
+        name=name,
+        hardware_id="uam",
+        message=message,
+        values=[
+            KeyValue(key=key, value="" if value is None else str(value))
+            for key, value in values.items()
+        ],
+    )
+    array = DiagnosticArray(status=[status])
+    set_stamp(array.header.stamp, stamp)
+    return array
+
+
+class _Status:
+    """Conversion of a dataclass to and from the key-value pairs of one status."""
+
+    LATER: ClassVar[tuple[str, ...]] = ()  # entries that older logs lack
+
+    def to_message(self, stamp: int) -> DiagnosticArray:
+        """Return the message; stamp [ns]."""
+        values = {item.name: getattr(self, item.name) for item in fields(self)}
+        return diagnostic(stamp, self.NAME, self.level, self.summary, values)
+
+    @classmethod
+    def from_message(cls, message: DiagnosticArray) -> tuple[int, Self]:
+        """Return (stamp [ns], status); raises BadMessage where an entry is missing or strange."""
+        found = [status for status in message.status if status.name == cls.NAME]
+        if not found:
+            raise BadMessage(f"no status '{cls.NAME}' in the message")
+        texts = {pair.key: pair.value for pair in found[0].values}
+        values = {}
+        for item in fields(cls):
+            if item.name not in texts:
+                if item.name in cls.LATER:
+                    continue
+                raise BadMessage(f"{cls.NAME}: '{item.name}' is missing")
+            try:
+                values[item.name] = _READ[item.type](texts[item.name])
+            except ValueError:
+                raise BadMessage(
+                    f"{cls.NAME}: '{item.name}' is {texts[item.name]!r}, {item.type} expected"
+                ) from None
+        return nanoseconds(message.header.stamp), cls(**values)
+
+
+def _truth(text: str) -> bool:
+    if text not in ("True", "False"):
+        raise ValueError(text)
+    return text == "True"
+
+
+_READ = {
+    str: str,
+    float: float,
+    bool: _truth,
+    int: int,
+    int | None: lambda text: int(text) if text else None,
+    float | None: lambda text: float(text) if text else None,
+}
+
+
+@dataclass(frozen=True)
+class AutopilotState(_Status):
+    """What the bridge knows of the autopilot, on change and five times a second.
+
+    armed_since: stamp [ns] of the tick at which it was first reported armed, None while disarmed.
+    reasons: why it is not armed or left OFFBOARD, "; " between them. round_trip: of the quickest
+    answer of the last second [s], None while not known.
+    """
+
+    connected: bool = False
+    mode: str = ""
+    armed: bool = False
+    armed_since: int | None = None
+    reasons: str = ""
+    round_trip: float | None = None
+
+    NAME = "autopilot"
+    LATER = ("round_trip",)
+
+    @property
+    def level(self) -> bytes:
+        """OK when connected and nothing is wrong."""
+        if not self.connected:
+            return STALE
+        return WARN if self.reasons else OK
+
+    @property
+    def summary(self) -> str:
+        """The state in a few words."""
+        if not self.connected:
+            return "not connected"
+        return f"{self.mode}, {'armed' if self.armed else 'disarmed'}"
+
+
+@dataclass(frozen=True)
+class MissionStatus(_Status):
+    """Where the mission is, on every change of phase and twice a second.
+
+    time: mission time [s], negative before take-off. Errors are norms of estimate − reference:
+    [m], [rad], [rad]. magnet: whether it is on; unlike /uam/magnet this has a stamp. state, cause:
+    of the supervisor (uam_control.supervision.State), and why it is in it.
+    """
+
+    phase: str = "waiting"
+    time: float = -1.0
+    position_error: float = 0.0
+    attitude_error: float = 0.0
+    arm_error: float = 0.0
+    done: bool = False
+    abort_reason: str = ""
+    magnet: bool = False
+    state: str = "grounded"
+    cause: str = ""
+
+    NAME = "mission"
+    LATER = ("state", "cause")
+
+    @property
+    def level(self) -> bytes:
+        """ERROR when the mission was given up, WARN while it holds."""
+        if self.abort_reason:
+            return ERROR
+        return WARN if self.state == "holding" else OK
+
+    @property
+    def summary(self) -> str:
+        """Phase, or why the flight was given up."""
+        return self.abort_reason or self.phase

@@ -1,0 +1,180 @@
+"""Every topic of the stack: name, message type, quality of service. Nothing is named elsewhere.
+
+Frames are REP-103: ENU world, FLU body. Names can be remapped the ROS way.
+"""
+
+from dataclasses import dataclass, field
+
+from diagnostic_msgs.msg import DiagnosticArray
+from geometry_msgs.msg import PoseStamped, TwistStamped
+from rcl_interfaces.msg import Log
+from rclpy.qos import (
+    QoSDurabilityPolicy,
+    QoSHistoryPolicy,
+    QoSProfile,
+    QoSReliabilityPolicy,
+)
+from rosgraph_msgs.msg import Clock
+from sensor_msgs.msg import BatteryState, Imu, JointState, Temperature
+from std_msgs.msg import Bool, Float64MultiArray, String
+from trajectory_msgs.msg import JointTrajectory
+from visualization_msgs.msg import MarkerArray
+
+try:
+    from tf2_msgs.msg import TFMessage
+except ImportError:  # not among the wheels of PyPI
+    from uam_msgs_py.messages.tf_message import TFMessage
+
+WORLD = "world"  # frame of poses and states, ENU
+BODY = "base_link"  # frame of rates, forces and torques, FLU
+
+
+def _qos(depth: int, reliable: bool = True, latched: bool = False) -> QoSProfile:
+    return QoSProfile(
+        history=QoSHistoryPolicy.KEEP_LAST,
+        depth=depth,
+        reliability=QoSReliabilityPolicy.RELIABLE if reliable else QoSReliabilityPolicy.BEST_EFFORT,
+        durability=(
+            QoSDurabilityPolicy.TRANSIENT_LOCAL if latched else QoSDurabilityPolicy.VOLATILE
+        ),
+    )
+
+
+# 128 ms at control rate: what a short stall of a process leaves behind is still worked through.
+DEPTH = 32
+SENSOR_DATA = _qos(DEPTH, reliable=False)  # rclpy.qos.qos_profile_sensor_data, but deeper
+RELIABLE = _qos(DEPTH)
+NEWEST = _qos(4, reliable=False)  # for who looks now and then, and wants the present alone
+LATCHED = _qos(1, latched=True)  # a late subscriber gets the last message
+
+
+@dataclass(frozen=True)
+class Topic:
+    """One topic. `one_publisher`: its sequence numbers have no gap unless a message was lost."""
+
+    name: str
+    type: type
+    qos: QoSProfile = field(hash=False)  # has none
+    content: str
+    one_publisher: bool = True
+
+    @property
+    def reading(self) -> QoSProfile:
+        """What the stack's own nodes ask for.
+
+        Best effort for what comes at every tick: the next message makes up for a lost one, and
+        thousands of acknowledgements a second are saved. Whoever wants them may ask for them.
+        """
+        return SENSOR_DATA if self.qos is RELIABLE and self is not DIAGNOSTICS else self.qos
+
+
+CLOCK = Topic("/clock", Clock, _qos(1, reliable=False), "simulation time")
+
+# Sensors
+IMU = Topic("/imu/data", Imu, SENSOR_DATA, "body rates and specific force, FLU, 250 Hz")
+JOINTS = Topic("/joint_states", JointState, SENSOR_DATA, "alpha_1, alpha_2, 250 Hz")
+MOCAP = Topic("/vrpn_mocap/uam/pose", PoseStamped, SENSOR_DATA, "motion capture, world, 120 Hz")
+
+# Control, once per tick, stamped with the IMU sample that the tick belongs to
+STATE = Topic("/uam/state", JointTrajectory, RELIABLE, "estimated chi, chi_dot, chi_ddot")
+REFERENCE = Topic(
+    "/uam/reference", JointTrajectory, RELIABLE, "chi_d ... of the coordinates to be controlled"
+)
+POSITION_COMMAND = Topic(
+    "/uam/position/command", JointTrajectory, RELIABLE, "p_d, q_d, their derivatives, and tau_p"
+)
+ATTITUDE_COMMAND = Topic("/uam/attitude/command", JointTrajectory, RELIABLE, "tau_q, FLU")
+ARM_COMMAND = Topic("/uam/arm/command", JointTrajectory, RELIABLE, "tau_alpha")
+ARM_EFFORT = Topic(
+    "/arm_effort_controller/commands", Float64MultiArray, RELIABLE, "tau_alpha [N m]"
+)
+MAGNET = Topic("/uam/magnet", Bool, RELIABLE, "magnet on")
+SETPOINT = Topic(
+    "/uam/setpoint", TwistStamped, RELIABLE, "body rates FLU and thrust 0..1 (linear.z) as sent"
+)
+THRUST = Topic(
+    "/uam/thrust", JointState, RELIABLE, "factor: true / assumed thrust as identified, 10 Hz"
+)
+POSITION_ADAPTATION = Topic(
+    "/uam/position/adaptation", JointState, RELIABLE, "the gains of the law, by its names, 50 Hz"
+)
+ATTITUDE_ADAPTATION = Topic("/uam/attitude/adaptation", JointState, RELIABLE, "as for position")
+ARM_ADAPTATION = Topic("/uam/arm/adaptation", JointState, RELIABLE, "as for position")
+
+# States of mission and autopilot
+ARMING = Topic("/uam/arming", Bool, LATCHED, "the autopilot is to be armed and in OFFBOARD")
+AUTOPILOT_STATE = Topic(
+    "/uam/autopilot/state",
+    DiagnosticArray,
+    LATCHED,
+    "see uam_msgs_py.messages.status.AutopilotState",
+)
+AUTOPILOT_BATTERY = Topic(
+    "/uam/autopilot/battery", BatteryState, RELIABLE, "as the autopilot tells it, 1 Hz; NaN unknown"
+)
+ARM_TEMPERATURE = Topic(
+    "/uam/arm/temperature",
+    Temperature,
+    RELIABLE,
+    "of a servo, whose joint frame_id names; from a vehicle's driver, the simulation has none",
+    one_publisher=False,
+)
+MISSION_STATUS = Topic(
+    "/uam/mission/status", DiagnosticArray, LATCHED, "see uam_msgs_py.messages.status.MissionStatus"
+)
+
+# What was asked of the nodes in flight; reliable and kept, as each comes only once
+CHANGES = Topic(
+    "/uam/parameter_changes",
+    DiagnosticArray,
+    _qos(1000, latched=True),
+    "see uam_msgs_py.messages.changes.Change",
+    one_publisher=False,
+)
+
+FAULTS = Topic(
+    "/uam/faults",
+    DiagnosticArray,
+    _qos(1000, latched=True),
+    "faults put into the flight; see uam_msgs_py.messages.faults.FaultEvent",
+    one_publisher=False,
+)
+
+RESTARTS = Topic(
+    "/uam/restarts",
+    DiagnosticArray,
+    _qos(100, latched=True),
+    "nodes that were lost and are started again, as uam fly says; name: the node",
+    one_publisher=False,
+)
+
+# What only a simulator knows
+TRUTH_STATE = Topic("/uam/truth/state", JointTrajectory, RELIABLE, "true chi, chi_dot, chi_ddot")
+TRUTH_PAYLOAD = Topic("/uam/truth/payload", PoseStamped, RELIABLE, "payload, world")
+TRUTH_ROTORS = Topic(
+    "/uam/truth/rotors", JointState, RELIABLE, "rotor_1..4: command 0..1, speed rad/s, thrust N"
+)
+TRUTH_MAGNET = Topic(
+    "/uam/truth/magnet", JointState, RELIABLE, "magnet: on 0/1, holding force N; swing: angle rad"
+)
+
+# To be seen, in RViz and Foxglove. Losses do not count: the next message says it all again.
+ROBOT_DESCRIPTION = Topic("/robot_description", String, LATCHED, "URDF", one_publisher=False)
+TF = Topic("/tf", TFMessage, _qos(100), "vehicle, reference, payload, 25 Hz", one_publisher=False)
+TF_STATIC = Topic("/tf_static", TFMessage, LATCHED, "what never moves", one_publisher=False)
+TRACKING_ERROR = Topic(
+    "/uam/tracking/error",
+    JointState,
+    RELIABLE,
+    "estimate - reference: chi, chi_dot; 0 where nothing is asked; 25 Hz",
+    one_publisher=False,
+)
+MARKERS = Topic(
+    "/uam/markers", MarkerArray, LATCHED, "paths, payload, magnet, phase", one_publisher=False
+)
+
+# ROS conventions
+DIAGNOSTICS = Topic("/diagnostics", DiagnosticArray, RELIABLE, "health, 1 Hz", one_publisher=False)
+ROSOUT = Topic("/rosout", Log, _qos(1000, latched=True), "log of all nodes", one_publisher=False)
+
+ALL = [topic for topic in list(vars().values()) if isinstance(topic, Topic)]

@@ -1,0 +1,93 @@
+"""numpy ↔ serialized JointTrajectory: references, states, commands."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
+
+from uam_msgs_py.messages.layouts import BadMessage, Layout
+from uam_msgs_py.messages.name_checks import check_length, check_names, refuse_infinite
+from uam_msgs_py.messages.serialized import Serialized, Template
+from uam_msgs_py.messages.topics import WORLD
+
+
+class TrajectoryWriter(Template):
+    """A JointTrajectory with one point: rows positions, velocities, accelerations, effort.
+
+    `values` holds a view (n,) for each row in use; write to them and publish `stamped(stamp)`.
+    """
+
+    ROWS = ("positions", "velocities", "accelerations", "effort")
+
+    def __init__(self, names: Sequence[str], rows: Sequence[str] = ROWS[:3]):
+        """names: of the n joints; rows: those of ROWS that are used."""
+        point = JointTrajectoryPoint(**{row: [0.0] * len(names) for row in rows})
+        message = JointTrajectory(joint_names=list(names), points=[point])
+        message.header.frame_id = WORLD
+        super().__init__(message)
+
+    def fill(self, stamp: int, state: np.ndarray, time_from_start: int = 0) -> bytes:
+        """Return the message with state (3, n): positions, velocities, accelerations."""
+        values = self.values
+        values["positions"][:] = state[0]
+        values["velocities"][:] = state[1]
+        values["accelerations"][:] = state[2]
+        return self.stamped(stamp, time_from_start)
+
+
+class IdleWriter(Template):
+    """A JointTrajectory without names and points: nothing is commanded at its stamp."""
+
+    def __init__(self):
+        message = JointTrajectory()
+        message.header.frame_id = WORLD
+        super().__init__(message)
+
+
+def trajectory(data: bytes) -> Serialized:
+    """A received JointTrajectory; raises BadMessage."""
+    return Serialized(JointTrajectory, data)
+
+
+class TrajectoryReader:
+    """Reads `rows` of trajectories of the joints `names`.
+
+    Rows that lie next to each other in a message are as far apart as any two of them, so that one
+    strided view holds them all.
+    """
+
+    def __init__(self, names: Sequence[str], rows: Sequence[str] = TrajectoryWriter.ROWS[:3]):
+        """names: of the n joints; rows: adjacent ones of TrajectoryWriter.ROWS."""
+        self._names, self._rows = list(names), list(rows)
+
+    def read(self, message: Serialized) -> np.ndarray:
+        """Return a copy (rows, n) of the first point's rows.
+
+        Raises BadMessage on other joint names, wrong lengths, no point, or a number that is not
+        finite.
+        """
+        checked = message.layout.checked.get(self)
+        if checked is None:
+            checked = message.layout.checked[self] = self._check(message.layout)
+        shape, start, strides = checked
+        values = np.ndarray(shape, "<f8", message.data, start, strides).copy()
+        if not math.isfinite(values.sum()):
+            for row, numbers in zip(self._rows, values, strict=True):
+                refuse_infinite(row, numbers, self._names)
+            raise BadMessage("overflow")
+        return values
+
+    def _check(self, layout: Layout) -> tuple[tuple[int, int], int, tuple[int, int]]:
+        """Shape, first byte and strides [bytes] of the rows; raises BadMessage."""
+        names, rows = self._names, self._rows
+        check_names(layout.names, names)
+        if layout.points != 1:
+            raise BadMessage(f"{layout.points} points, 1 expected")
+        for row in rows:
+            check_length(row, layout.length(row), names)
+        starts = [layout.fields[row].start for row in rows]
+        stride = starts[1] - starts[0] if len(starts) > 1 else 0
+        return (len(rows), len(names)), starts[0], (stride, 8)

@@ -1,0 +1,1 @@
+"""The base of every node: executor, joins, parameters, connections."""

@@ -1,0 +1,85 @@
+"""A node whose parameters may be changed in flight: every request is answered and told.
+
+| service | does |
+|---|---|
+| `~/set_parameters`, `~/set_parameters_atomically` | rclpy's; what they did is told to the log |
+| `~/check_parameters` | whether `~/set_parameters_atomically` would accept; changes nothing |
+
+Services are served between two ticks, see `executor`.
+"""
+
+from typing import Any
+
+from rcl_interfaces.msg import SetParametersResult
+from rcl_interfaces.srv import SetParametersAtomically
+from rclpy.node import Node
+from rclpy.parameter import Parameter
+
+from uam_msgs_py.messages import topics
+from uam_msgs_py.messages.changes import Change
+
+SERVICE = "parameter service"
+CHECK = "check_parameters"
+
+
+class TunableNode(Node):
+    """Publishes each change of its parameters, accepted or refused, on /uam/parameter_changes."""
+
+    def __init__(self, name: str):
+        super().__init__(name)
+        self.stamp = 0  # [ns] of the newest tick
+        self._changes = self.create_publisher(
+            topics.CHANGES.type, topics.CHANGES.name, topics.CHANGES.qos
+        )
+        self.create_service(SetParametersAtomically, f"~/{CHECK}", self._on_check)
+
+    def set_parameters_atomically(self, parameter_list: list[Parameter]) -> SetParametersResult:
+        """Change all or none, between two ticks; what rclpy's services call."""
+        return self.change_parameters(parameter_list, SERVICE)
+
+    def set_parameters(self, parameter_list: list[Parameter]) -> list[SetParametersResult]:
+        """Change one after the other, each by itself."""
+        return [self.set_parameters_atomically([item]) for item in parameter_list]
+
+    def change_parameters(self, changes: list[Parameter], by: str) -> SetParametersResult:
+        """Change all or none and tell the log; by: who asked."""
+        old = {change.name: self._value(change.name) for change in changes}
+        result = self.check_parameters(changes)
+        if result.successful:
+            result = super().set_parameters_atomically(changes)
+        if not result.successful:
+            self.get_logger().warning(f"refused, the old values fly on: {result.reason}")
+        values = {change.name: (old[change.name], change.value) for change in changes}
+        self.tell(Change(self.get_name(), by, values, "" if result.successful else result.reason))
+        return result
+
+    def check_parameters(self, changes: list[Parameter]) -> SetParametersResult:
+        """Return whether these changes as a whole would be accepted, and why not."""
+        for name in (change.name for change in changes):
+            if not self.has_parameter(name):
+                return _refusal(f"{name}: unknown")
+            if self.describe_parameter(name).read_only:
+                return _refusal(f"{name}: read-only, fixed once the node runs")
+        for check in list(self._on_set_parameters_callbacks):
+            result = check(changes)
+            if not result.successful:
+                return result
+        return SetParametersResult(successful=True)
+
+    def tell(self, change: Change) -> None:
+        """Publish a change, with the stamp of the newest tick."""
+        self._changes.publish(change.to_message(self.stamp))
+
+    def _on_check(
+        self, request: SetParametersAtomically.Request, response: SetParametersAtomically.Response
+    ) -> SetParametersAtomically.Response:
+        changes = [Parameter.from_parameter_msg(item) for item in request.parameters]
+        response.result = self.check_parameters(changes)
+        return response
+
+    def _value(self, name: str) -> Any:
+        return self.get_parameter(name).value if self.has_parameter(name) else None
+
+
+def _refusal(reason: str) -> SetParametersResult:
+    return SetParametersResult(successful=False, reason=reason)

@@ -1,0 +1,1 @@
+"""The simulator link of PX4, and the router for hardware in the loop."""

@@ -1,0 +1,238 @@
+"""The simulator's side of the HIL link: a TCP server that an autopilot (PX4 SITL, or the stand-in)
+connects to. Each tick: HIL_SENSOR out, HIL_ACTUATOR_CONTROLS back, within a bounded time.
+
+How long an answer is waited for: an autopilot that answered the last tick gets `answer_timeout`;
+one that did not (booting, or silent as PX4 is while disarmed without a stream) `silent_timeout`.
+"""
+
+from __future__ import annotations
+
+import select
+import socket
+from dataclasses import dataclass
+
+import numpy as np
+
+from uam_control.settings.parameter_set import ParameterSet, number
+from uam_sim_bridge.mavlink.hil.hil_sensors import TEMPERATURE, SlowSensors
+from uam_sim_bridge.mavlink.link.vision import vision_message
+from uam_sim_bridge.mavlink.protocol.frames import swap_body, swap_quaternion
+from uam_sim_bridge.mavlink.protocol.wire import Codec, Framer, Message, mavlink2
+from uam_sim_bridge.patience import SLICE, Patience
+from uam_sim_bridge.ports import PortError
+
+_IMU, _MAG, _BARO = 0x3F, 0x1C0, 0x1A00  # HIL_SENSOR.fields_updated
+_ARMED = 128
+_SLOW_PERIOD = 0.02  # s
+
+
+class HilError(PortError):
+    """The simulator's port cannot be had; the text is one line."""
+
+
+@dataclass(frozen=True)
+class HilParameters(ParameterSet):
+    """Waiting times of the HIL link (wall time)."""
+
+    answer_timeout: float = number(
+        2.0, "wait for the answer of an autopilot that answered the last tick", "s", 0.001, 60.0
+    )
+    silent_timeout: float = number(
+        0.05, "wait for the answer of one that did not", "s", 0.0005, 10.0
+    )
+
+
+class HilServer:
+    """The server; one autopilot at a time.
+
+    `motors` (4,): the latest commands 0..1 in PX4's order, zero while disarmed; `armed`;
+    `answered`: whether the last tick was answered; `missed`: ticks without an answer after the
+    first answer.
+    """
+
+    def __init__(
+        self,
+        port: int,
+        host: str = "127.0.0.1",
+        parameters: HilParameters | None = None,
+        seed: int = 0,
+    ) -> None:
+        """Listen on TCP `port`; raises HilError in one line where it is taken."""
+        self.parameters = (parameters or HilParameters()).validated()
+        self.motors = np.zeros(4)
+        self.armed = False
+        self.answered = False
+        self.missed = 0
+        self._ever = False
+        self._stamp = 0
+        self._codec = Codec(1, 200)
+        self._framer = Framer(self._codec)
+        self._slow = SlowSensors(seed)
+        self._slow_due = 0.0
+        self._mag = [0.0, 0.0, 0.0]
+        self._baro = (0.0, 0.0)
+        self._link: socket.socket | None = None
+        self._listener = socket.socket(socket.AF_INET, socket.SOCK_STREAM)
+        self._listener.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+        try:
+            self._listener.bind((host, port))
+            self._listener.listen(1)
+        except (OSError, OverflowError) as error:
+            self._listener.close()
+            reason = getattr(error, "strerror", None) or str(error)
+            raise HilError(
+                f"TCP port {port} for the autopilot: {reason}; stop the program that "
+                "uses it or choose another instance"
+            ) from None
+
+    @property
+    def connected(self) -> bool:
+        """Whether an autopilot is connected."""
+        return self._link is not None
+
+    def accept(self, timeout: float) -> bool:
+        """Wait up to `timeout` seconds for an autopilot to connect; whether one is connected."""
+        if self._link is None and select.select([self._listener], [], [], timeout)[0]:
+            self._link, _ = self._listener.accept()
+            self._link.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+            self._link.setblocking(False)
+        return self.connected
+
+    def exchange(
+        self,
+        time: float,
+        gyro: np.ndarray,
+        accel: np.ndarray,
+        position: np.ndarray,
+        quaternion: np.ndarray,
+    ) -> np.ndarray:
+        """Send the sensors of a tick, wait for the answer and return `motors`: `send`, `receive`.
+
+        Without an autopilot, or when it hangs up (then `connected` turns false), they stand still.
+        """
+        self.send(time, gyro, accel, position, quaternion)
+        return self.receive()
+
+    def send(
+        self,
+        time: float,
+        gyro: np.ndarray,
+        accel: np.ndarray,
+        position: np.ndarray,
+        quaternion: np.ndarray,
+    ) -> None:
+        """Send the sensors of the tick at `time` [s].
+
+        gyro (3,) [rad/s], specific force accel (3,) [m/s^2], FLU; true position (3,) [m, ENU] and
+        quaternion [w x y z] FLU → ENU, for magnetometer and barometer.
+        """
+        if self._link is None:
+            return
+        self._stamp = round(time * 1e6)
+        if not self._send(self._sensor(time, gyro, accel, position, quaternion)):
+            self._stop()
+
+    def receive(self, timeout: float | None = None) -> np.ndarray:
+        """Wait for the answer to the last `send` and return `motors`; a late one counts as missed.
+
+        timeout [s of wall time]: None takes `answer_timeout` or `silent_timeout`, see above.
+        """
+        if self._link is None:
+            return self.motors
+        if timeout is None:
+            p = self.parameters
+            timeout = p.answer_timeout if self.answered else p.silent_timeout
+        self.answered = False
+        patience = Patience(timeout)
+        while not self.answered:
+            left = patience.left
+            if select.select([self._link], [], [], min(left, SLICE / 2))[0]:
+                if not self._receive():
+                    return self._stop()
+            elif not left:
+                break
+        self._ever = self._ever or self.answered
+        self.missed += self._ever and not self.answered
+        return self.motors
+
+    def send_vision(
+        self,
+        stamp: float,
+        position: np.ndarray,
+        quaternion: np.ndarray,
+        position_deviation: float,
+        attitude_deviation: float,
+    ) -> None:
+        """Send a mocap pose (ENU, FLU → ENU) to the autopilot over this link; stamp [s]."""
+        if self._link is not None and not self._send(
+            vision_message(stamp, position, quaternion, position_deviation, attitude_deviation)
+        ):
+            self._stop()
+
+    def close(self) -> None:
+        """Hang up and give the port back."""
+        self._stop()
+        self._listener.close()
+
+    def _sensor(
+        self,
+        time: float,
+        gyro: np.ndarray,
+        accel: np.ndarray,
+        position: np.ndarray,
+        quaternion: np.ndarray,
+    ) -> Message:
+        fields = _IMU
+        if time + 1e-9 >= self._slow_due:
+            self._slow_due = time + _SLOW_PERIOD
+            fields |= _MAG | _BARO
+            self._mag = self._slow.magnetometer(swap_quaternion(quaternion))
+            self._baro = self._slow.barometer(float(position[2]))
+        return mavlink2.MAVLink_hil_sensor_message(
+            self._stamp,
+            *swap_body(accel).tolist(),
+            *swap_body(gyro).tolist(),
+            *self._mag,
+            self._baro[0],
+            0.0,
+            self._baro[1],
+            TEMPERATURE,
+            fields,
+            0,
+        )
+
+    def _send(self, message: Message) -> bool:
+        try:
+            self._link.settimeout(self.parameters.answer_timeout)
+            self._link.sendall(self._codec.encode(message))
+            self._link.setblocking(False)
+        except (ConnectionError, TimeoutError):
+            return False
+        return True
+
+    def _receive(self) -> bool:
+        try:
+            data = self._link.recv(65536)
+        except BlockingIOError:
+            return True
+        except ConnectionError:
+            return False
+        for message in self._framer.stream(data):
+            if message.get_type() != "HIL_ACTUATOR_CONTROLS":
+                continue
+            self.armed = bool(message.mode & _ARMED)
+            commands = np.array(message.controls[:4])
+            good = self.armed and bool(np.all(np.isfinite(commands)))
+            self.motors[:] = np.clip(commands, 0.0, 1.0) if good else 0.0
+            self.answered = self.answered or message.time_usec >= self._stamp
+        return bool(data)
+
+    def _stop(self) -> np.ndarray:
+        if self._link is not None:
+            self._link.close()
+            self._link = None
+        self._ever = self.answered = False
+        self._framer = Framer(self._codec)
+        self.armed = False
+        self.motors[:] = 0.0
+        return self.motors

@@ -1,0 +1,250 @@
+"""Executable `hitl_router`: puts a flight controller in HITL mode in the place of PX4 SITL.
+
+    plant ◀─TCP 4560 + N─▶ hitl_router ◀─one link, typically serial─▶ flight controller
+    bridge ◀─UDP 14540 + N, 14580 + N─▶ ↑
+
+| from | message | to |
+|---|---|---|
+| flight controller | HIL_ACTUATOR_CONTROLS | plant |
+| flight controller | all others of the common dialect | bridge |
+| plant, bridge | all of the common dialect | flight controller |
+
+On a full line HIL_SENSOR, HIL_GPS and SET_ATTITUDE_TARGET go first (`outbox.py`); HIL_SENSOR are
+thinned to what the line carries (`hil_thinning.py`). A flight controller has a clock of its own:
+its commands go to the plant with the time of the newest sensors, and a sensor message that was
+left out is answered with the commands known. When the flight controller's link is lost, the plant
+is told once that the motors stand still.
+"""
+
+from __future__ import annotations
+
+import argparse
+import math
+import select
+import signal
+import socket
+import sys
+import time as clock
+from collections.abc import Sequence
+
+from uam_sim_bridge.mavlink.hil.hil_thinning import Thinner, sustainable_rate
+from uam_sim_bridge.mavlink.hil.sitl_options import add_port_options, fill_ports, number
+from uam_sim_bridge.mavlink.hil.sitl_ports import UdpPort, connect
+from uam_sim_bridge.mavlink.protocol.wire import Codec, Framer, Message, mavlink2
+from uam_sim_bridge.mavlink.transport.outbox import Outbox
+from uam_sim_bridge.mavlink.transport.pacing import Meter
+from uam_sim_bridge.mavlink.transport.transport import ALLOWED, Transport, open_transport
+from uam_sim_bridge.ports import PortError
+
+NAME = "hitl_router"
+LOOK_PERIOD = 0.1  # s, the longest wait: a lost link is tried again, the load looked at
+FULL = 0.8  # of the line, from which a warning is given
+WARN_PERIOD = 10.0  # s between two warnings of the same direction
+PLANT_PATIENCE = 5.0  # s for the plant to take a message
+AUTOPILOT_IDS, PLANT_IDS = (1, 1), (1, 200)  # system and component, where a message is packed anew
+TO, FROM = "to the flight controller", "from the flight controller"
+
+
+class Router:
+    """One flight controller, one plant, one bridge; `run` serves until the plant hangs up."""
+
+    def __init__(
+        self, controller: Transport, plant: socket.socket, bridge: UdpPort, hil_rate: float
+    ) -> None:
+        """hil_rate [Hz]: HIL_SENSOR to the flight controller, at most."""
+        self._controller, self._plant, self._bridge = controller, plant, bridge
+        plant.settimeout(PLANT_PATIENCE)
+        self._as_autopilot, self._as_plant = Codec(*AUTOPILOT_IDS), Codec(*PLANT_IDS)
+        self._from_controller = Framer(self._as_autopilot)
+        self._from_plant = Framer(self._as_plant)
+        self._outbox = Outbox(controller)
+        self._thinner = Thinner(hil_rate)
+        self.meters = {TO: Meter(), FROM: Meter()}
+        self._warned = dict.fromkeys(self.meters, -math.inf)
+        self._stamp = 0  # us, of the newest HIL_SENSOR
+        self._commands: Message | None = None  # the newest HIL_ACTUATOR_CONTROLS
+        self._there = controller.connected
+
+    def run(self) -> None:
+        """Serve until the plant hangs up."""
+        while self._step():
+            pass
+
+    def _step(self) -> bool:
+        """Wait for something, carry it on; False once the plant has hung up."""
+        readable = self._wait()
+        going_on = True
+        if self._plant in readable:
+            going_on = self._take_plant()
+        for message in self._bridge.receive():
+            self._to_controller(message)
+        for data in self._controller.receive():
+            self.meters[FROM].add(len(data))
+            for message in self._from_controller.take(data, self._controller.stream):
+                going_on = self._take_controller(message) and going_on
+        now = clock.monotonic()
+        self.meters[TO].add(self._outbox.flush(now))
+        self._watch(now)
+        return going_on and self._look_at_link()
+
+    def _wait(self) -> list:
+        sources: list = [self._plant, self._bridge]
+        number, pause, drain = self._controller.fileno(), self._outbox.wait, []
+        if number >= 0:
+            sources.append(number)
+            if pause is not None and pause <= 0.0:
+                drain = [number]  # the device itself is full
+        timeout = LOOK_PERIOD if pause is None or drain else min(pause, LOOK_PERIOD)
+        return select.select(sources, drain, [], timeout)[0]
+
+    def _take_plant(self) -> bool:
+        try:
+            data = self._plant.recv(65536)
+        except OSError:
+            return False
+        for message in self._from_plant.stream(data):
+            if message.get_type() == "HIL_SENSOR":
+                if not self._sensor(message):
+                    return False
+            else:
+                self._to_controller(message)
+        return bool(data)
+
+    def _sensor(self, message: Message) -> bool:
+        """Carry sensors on, or answer them; False where the plant does not take the answer."""
+        self._stamp = message.time_usec
+        before = message.fields_updated
+        if not self._controller.connected:
+            return True
+        if not self._thinner.take(message):
+            return self._commands is None or self._to_plant(self._commands)
+        if message.fields_updated == before:
+            self._to_controller(message)
+        else:
+            self._outbox.put(message.get_type(), self._as_plant.encode(message))
+        return True
+
+    def _take_controller(self, message: Message) -> bool:
+        if message.get_type() != "HIL_ACTUATOR_CONTROLS":
+            self._bridge.send_frame(bytes(message.get_msgbuf()))
+            return True
+        self._commands = message
+        return self._to_plant(message)
+
+    def _to_controller(self, message: Message) -> None:
+        self._outbox.put(message.get_type(), bytes(message.get_msgbuf()))
+
+    def _to_plant(self, message: Message) -> bool:
+        message.time_usec = self._stamp
+        try:
+            self._plant.sendall(self._as_autopilot.encode(message))
+        except OSError:
+            return False
+        return True
+
+    def _look_at_link(self) -> bool:
+        """Notice that the flight controller's link is lost or back."""
+        there = self._controller.connected
+        if there == self._there:
+            return True
+        self._there = there
+        if there:
+            say("the link to the flight controller is up")
+            return True
+        say("the link to the flight controller is lost: the motors stand still")
+        self._outbox.clear()
+        self._commands = None
+        self._from_controller = Framer(self._as_autopilot)
+        return self._to_plant(
+            mavlink2.MAVLink_hil_actuator_controls_message(self._stamp, [0.0] * 16, 0, 0)
+        )
+
+    def _watch(self, now: float) -> None:
+        """Warn when the line is nearly full."""
+        capacity = self._controller.bytes_per_second
+        for direction, meter in self.meters.items():
+            if not meter.update(now) or capacity is None or meter.rate <= FULL * capacity:
+                continue
+            if now - self._warned[direction] >= WARN_PERIOD:
+                self._warned[direction] = now
+                say(
+                    f"{meter.rate:.0f} bytes/s {direction}, {100.0 * meter.rate / capacity:.0f} % "
+                    f"of the line ({self._outbox.dropped} messages dropped so far)"
+                )
+
+    def summary(self) -> str:
+        """Return in one line what the link carried."""
+        rates = ", ".join(f"{m.highest:.0f} bytes/s {d}" for d, m in self.meters.items())
+        return (
+            f"at most {rates}; {self._outbox.dropped} messages dropped, "
+            f"{self._from_controller.bad_bytes} bytes of garbage"
+        )
+
+
+def say(text: str) -> None:
+    """Print a line."""
+    print(f"{NAME}: {text}", flush=True)
+
+
+def _stop(*_: object) -> None:
+    """End quietly, however often the signal comes."""
+    for each in (signal.SIGINT, signal.SIGTERM):
+        signal.signal(each, signal.SIG_IGN)
+    sys.exit(0)
+
+
+def parser() -> argparse.ArgumentParser:
+    """The command line."""
+    p = argparse.ArgumentParser(
+        prog=NAME,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+        description="Puts a flight controller in HITL mode in the place of PX4 SITL: one link to "
+        "it,\nTCP to the simulator, UDP to the bridge.",
+        epilog="examples:\n"
+        "  hitl_router serial:/dev/ttyACM0:921600               instance 0\n"
+        "  hitl_router serial:/dev/ttyUSB0:460800 --hil-rate 200\n"
+        "  hitl_router udp:192.168.1.20:14550 --instance 3      every port + 3\n",
+    )
+    p.add_argument("link", metavar="LINK", help=f"to the flight controller: {ALLOWED}")
+    p.add_argument(
+        "--hil-rate",
+        type=number("rate in Hz", 1.0, 1000.0),
+        metavar="HZ",
+        help="HIL_SENSOR per second, at most (default: what the line carries, up to 250)",
+    )
+    add_port_options(p)
+    return p
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run until the simulator hangs up or a signal comes: 0; wrong use, no port or device: 2."""
+    options = parser().parse_args(arguments)
+    fill_ports(options)
+    for each in (signal.SIGINT, signal.SIGTERM):
+        signal.signal(each, _stop)
+    closables = []
+    try:
+        closables.append(controller := open_transport(options.link))
+        rate = options.hil_rate or sustainable_rate(controller.bytes_per_second)
+        closables.append(
+            bridge := UdpPort(options.mavlink_port, options.companion_port, Codec(*AUTOPILOT_IDS))
+        )
+        closables.append(plant := connect(NAME, options.sim_host, options.sim_port, options.wait))
+        say(
+            f"connected to the simulator at {options.sim_host}:{options.sim_port}; HIL_SENSOR at "
+            f"{rate:.0f} Hz to {options.link}"
+        )
+        router = Router(controller, plant, bridge, rate)
+        router.run()
+        say(f"the simulator closed the link; {router.summary()}")
+        return 0
+    except (PortError, ValueError) as error:
+        print(f"{NAME}: {error}", file=sys.stderr, flush=True)
+        return 2
+    finally:
+        for closable in closables:
+            closable.close()
+
+
+if __name__ == "__main__":
+    sys.exit(main())

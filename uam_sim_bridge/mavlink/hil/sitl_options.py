@@ -1,0 +1,77 @@
+"""Command line options of the programs on PX4 SITL's ports: the autopilot, the HITL router."""
+
+from __future__ import annotations
+
+import argparse
+import math
+from collections.abc import Callable
+
+from uam_sim_bridge.mavlink.hil.sitl_ports import HOST
+from uam_sim_bridge.ports import AUTOPILOT_UDP, OFFBOARD_UDP, SIMULATOR_TCP
+
+
+def port(text: str) -> int:
+    if not text.isdecimal() or not 1 <= int(text) <= 65535:
+        raise argparse.ArgumentTypeError(f"{text} is not a port (1..65535)")
+    return int(text)
+
+
+def instance(text: str) -> int:
+    if not text.isdecimal() or int(text) > 254:
+        raise argparse.ArgumentTypeError(f"{text} is not an instance number (0..254)")
+    return int(text)
+
+
+def number(what: str, low: float, high: float) -> Callable[[str], float]:
+    """Return an argparse type: a number from `low` to `high`, called `what` when refused."""
+
+    def read(text: str) -> float:
+        try:
+            value = float(text)
+        except ValueError:
+            value = math.nan
+        if not low <= value <= high:
+            raise argparse.ArgumentTypeError(f"{text} is not a {what} ({low:g}..{high:g})")
+        return value
+
+    return read
+
+
+def add_port_options(p: argparse.ArgumentParser) -> None:
+    """Add the options of simulator and companion ports to a command line."""
+    p.add_argument(
+        "-i",
+        "--instance",
+        type=instance,
+        default=0,
+        metavar="N",
+        help="PX4 instance number, added to the default ports",
+    )
+    p.add_argument(
+        "--sim-host", default=HOST, metavar="HOST", help="simulator (default %(default)s)"
+    )
+    p.add_argument("--sim-port", type=port, metavar="PORT", help="simulator (default 4560 + N)")
+    p.add_argument(
+        "--mavlink-port", type=port, metavar="PORT", help="own UDP port (default 14580 + N)"
+    )
+    p.add_argument(
+        "--companion-port",
+        type=port,
+        metavar="PORT",
+        help="UDP port told unasked until a peer speaks (default 14540 + N)",
+    )
+    p.add_argument(
+        "--wait",
+        type=number("time in seconds", 0.0, 86400.0),
+        default=60.0,
+        metavar="SECONDS",
+        help="how long to wait for the simulator (default %(default)g)",
+    )
+
+
+def fill_ports(options: argparse.Namespace) -> None:
+    """Put the instance's ports where none were given."""
+    n = options.instance
+    options.sim_port = options.sim_port or SIMULATOR_TCP + n
+    options.mavlink_port = options.mavlink_port or AUTOPILOT_UDP + n
+    options.companion_port = options.companion_port or OFFBOARD_UDP + n

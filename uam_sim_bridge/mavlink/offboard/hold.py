@@ -1,0 +1,147 @@
+"""What the autopilot gets while no good command is there: level for a bounded time, then nothing.
+
+Nothing means that the stream stops, and the autopilot's own failsafe (COM_OF_LOSS_T) takes over.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from uam_control.settings.parameter_set import ParameterSet, number
+from uam_sim_bridge.mavlink.offboard.thrust_identification import GRAVITY
+
+_LAST = 0.05  # s, before the end: the autopilot keeps to the last setpoint until its failsafe
+UNKNOWN = np.full(3, math.nan)  # an attitude or a velocity
+_THRUST_TIME = 0.5  # s, over which the thrust of normal flight is averaged
+
+
+@dataclass(frozen=True)
+class HoldParameters(ParameterSet):
+    """The reaction to missing or bad commands in flight."""
+
+    hold_time: float = number(
+        2.0,
+        "how long level setpoints go out in place of commands, before the stream stops",
+        "s",
+        0.0,
+        10.0,
+    )
+    release_time: float = number(
+        1.0,
+        "the same where no commands are to be expected: no estimate, or the mission has given up",
+        "s",
+        0.0,
+        10.0,
+    )
+    hold_gain: float = number(6.0, "tilt → body rate while holding level", "1/s", 0.0, 20.0)
+    hold_integral: float = number(
+        6.0, "integral of the tilt → body rate, against the arm's torque", "1/s^2", 0.0, 50.0
+    )
+    hold_braking: float = number(
+        1.0, "velocity → acceleration against it, as long as it is known", "1/s", 0.0, 5.0
+    )
+    hold_acceleration_limit: float = number(
+        1.5, "largest acceleration against the velocity, along each axis", "m/s^2", 0.0, 5.0
+    )
+    hold_rate_limit: float = number(
+        2.0, "largest body rate while holding level", "rad/s", 0.1, 10.0
+    )
+    ground_margin: float = number(
+        0.3,
+        "height above the start, from which an idle command means hold instead of thrust 0",
+        "m",
+        0.01,
+        10.0,
+    )
+
+
+class LevelHold:
+    """Level setpoints with the thrust of the flight so far; `rates` (3,) is reused.
+
+    The autopilot's rate loop alone gives way to the arm's torque, hence the integral; and an arm
+    that swings on pushes the vehicle, hence the tilt and thrust against its velocity.
+    """
+
+    def __init__(self, parameters: HoldParameters) -> None:
+        self.parameters = parameters
+        self.rates = np.zeros(3)
+        self._integral = np.zeros(2)  # rad/s
+        self._thrust: float | None = None
+        self._time = -math.inf
+        self._since: float | None = None
+
+    @property
+    def active(self) -> bool:
+        """Whether the last tick was one without a good command."""
+        return self._since is not None
+
+    def good(self, time: float, thrust: float) -> None:
+        """Note a good command at `time` [s] with its normalised thrust."""
+        self._since = None
+        dt = time - self._time
+        self._time = time
+        if self._thrust is None or not 0.0 < dt < _THRUST_TIME:
+            self._thrust = thrust
+        else:
+            self._thrust += dt / _THRUST_TIME * (thrust - self._thrust)
+
+    def reset(self) -> None:
+        """Forget the flight: the vehicle is on the ground."""
+        self._thrust = self._since = None
+
+    def setpoint(
+        self, time: float, attitude: np.ndarray, velocity: np.ndarray, hopeless: bool = False
+    ) -> tuple[np.ndarray, float] | None:
+        """Return body rates (3,) [rad/s, FLU] and thrust, or None when the stream is to stop.
+
+        attitude (3,): roll, pitch, yaw [rad], FLU in ENU; no rates about an axis of which it is not
+        finite. velocity (3,): [m/s], ENU; nothing is done against what is not finite of it.
+        hopeless: no commands are to be expected.
+        """
+        if self._thrust is None:
+            return None
+        if self._since is None:
+            self._since = self._time = time
+            self._integral[:] = 0.0
+        longest = self.parameters.release_time if hopeless else self.parameters.hold_time
+        remaining = longest - (time - self._since)
+        dt, self._time = max(0.0, time - self._time), time
+        if remaining < 0.0:
+            return None
+        if remaining <= _LAST:
+            self.rates[:] = 0.0
+            return self.rates, self._thrust
+        forward, left, up = self._braking(velocity, attitude[2])
+        self._turn(0, attitude[0] + left / GRAVITY, dt)
+        self._turn(1, attitude[1] - forward / GRAVITY, dt)
+        return self.rates, min(1.0, self._thrust * (1.0 + up / GRAVITY))
+
+    def _turn(self, axis: int, tilt: float, dt: float) -> None:
+        """Set the rate against what the angle is off by [rad]."""
+        parameters = self.parameters
+        limit = parameters.hold_rate_limit
+        if not math.isfinite(tilt):
+            tilt = 0.0
+        integral = self._integral[axis] + parameters.hold_integral * tilt * dt
+        self._integral[axis] = min(limit, max(-limit, integral))
+        rate = -parameters.hold_gain * tilt - self._integral[axis]
+        self.rates[axis] = min(limit, max(-limit, rate))
+
+    def _braking(self, velocity: np.ndarray, yaw: float) -> tuple[float, float, float]:
+        """Return accelerations forward, left and up [m/s^2] against the velocity."""
+        cosine, sine = (math.cos(yaw), math.sin(yaw)) if math.isfinite(yaw) else (math.nan,) * 2
+        x, y, z = velocity
+        return (
+            self._against(cosine * x + sine * y),
+            self._against(cosine * y - sine * x),
+            self._against(z),
+        )
+
+    def _against(self, speed: float) -> float:
+        if not math.isfinite(speed):
+            return 0.0
+        limit = self.parameters.hold_acceleration_limit
+        return min(limit, max(-limit, -self.parameters.hold_braking * speed))

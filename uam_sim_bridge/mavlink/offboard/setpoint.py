@@ -1,0 +1,231 @@
+"""tau_p [N] and tau_q [N m] → body-rate setpoint [rad/s] and normalised thrust.
+
+Thrust. The collective is what tau_p asks along the body's thrust axis, u1 = tau_p · (R e3), clamped
+to [thrust_min, thrust_max] and turned into 0..1 by the inverse of the thrust curve.
+
+Rates. PX4's rate loop makes the torque
+
+    tau = S ( K P (omega_sp - omega) + integral - K D omega_dot )
+
+with S the torque [N m] of a normalised torque of 1 (torque_scale). Sending
+
+    omega_sp = omega + tau_q / (S K P)
+
+makes the proportional path equal to tau_q. What the loop does beyond is welcome: its integral acts
+as integral action on tau_q (K I / (K P) of it per second) and takes up constant torques such as the
+arm's weight; its D acts as rate damping.
+
+Both stand on the thrust of the motors: full thrust × battery × `thrust_factor`, the last one
+identified in flight (thrust_identification.py). Where it is wrong, u1 and tau_q are off by the same
+factor.
+
+Assumptions: omega is the rate that the loop sees (its gyro filter is ignored); K P, the thrust
+curve and the rotor geometry here are those of the autopilot (the bridge reads and compares them);
+the motors do not saturate. Where the autopilot's thrust model differs from the motors' curve, S is
+scaled by the local slope of the composed curve.
+
+Body vectors are FLU. The map is the same in FRD, as signs cancel.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from uam_control.maths.compiled import jit
+from uam_control.settings.parameter_set import ParameterSet, number, vector
+from uam_sim_bridge.mavlink.offboard.rotor_geometry import torque_scale
+from uam_sim_bridge.mavlink.offboard.thrust_curve import (
+    command_of_thrust,
+    thrust_of_command,
+    thrust_slope,
+)
+
+# entries of the flat parameter array of the compiled map
+(_FULL, _BATTERY, _MOTOR, _MODEL, _MIN, _MAX, _COMMAND_MAX, _GAIN, _LIMIT) = (
+    0, 1, 2, 3, 4, 5, 6, 7, 10,
+)  # fmt: skip
+_LENGTH = 13
+
+INPUTS = (
+    *(f"tau_p.{axis}" for axis in "xyz"),
+    *(f"tau_q.{axis}" for axis in ("roll", "pitch", "yaw")),
+    *(f"attitude.{axis}" for axis in ("roll", "pitch", "yaw")),
+    *(f"body rate {axis}" for axis in "xyz"),
+)
+
+
+class SetpointRefused(ValueError):
+    """The input of the map is not finite; the text names the first such value."""
+
+
+@dataclass(frozen=True)
+class RateThrustParameters(ParameterSet):
+    """What the map needs to know of vehicle and autopilot; defaults: S-500 with PX4 gains."""
+
+    rotor_thrust_max: float = number(
+        10.34, "thrust of one rotor at full command and full battery", "N", 0.1, 1000.0
+    )
+    motor_curve_factor: float = number(
+        0.3, "f in thrust/full thrust = f u^2 + (1 - f) u of motor command u", "1", 0.0, 1.0
+    )
+    battery_factor: float = number(
+        1.0, "full thrust now / full thrust with a full battery", "1", 0.2, 1.5
+    )
+    thr_mdl_fac: float = number(0.3, "THR_MDL_FAC of the autopilot", "1", 0.0, 1.0)
+    rotor_arm_x: float = number(0.171, "rotor offset forward", "m", 0.01, 5.0)
+    rotor_arm_y: float = number(0.171, "rotor offset to the side", "m", 0.01, 5.0)
+    rotor_moment_ratio: float = number(
+        0.016, "reaction torque per thrust of a rotor", "m", 1e-4, 1.0
+    )
+    rate_p: tuple = vector(
+        (0.15, 0.15, 0.2),
+        "MC_ROLLRATE_P, MC_PITCHRATE_P, MC_YAWRATE_P of the autopilot",
+        "1/(rad/s)",
+        0.001,
+        10.0,
+        3,
+    )
+    rate_k: tuple = vector(
+        (1.0, 1.0, 1.0),
+        "MC_ROLLRATE_K, MC_PITCHRATE_K, MC_YAWRATE_K of the autopilot",
+        "1",
+        0.01,
+        10.0,
+        3,
+    )
+    rate_limit: tuple = vector(
+        (6.0, 6.0, 3.0), "largest body-rate setpoint about roll, pitch, yaw", "rad/s", 0.05, 50.0, 3
+    )
+    thrust_min: float = number(1.0, "smallest collective sent in flight", "N", 0.0, 1000.0)
+    thrust_max: float = number(40.0, "largest collective sent", "N", 0.1, 4000.0)
+    command_max: float = number(
+        1.0, "largest normalised thrust sent; below 1 leaves room for torques", "1", 0.1, 1.0
+    )
+
+    @property
+    def torque_scale(self) -> np.ndarray:
+        """Torque (3,) [N m] of a normalised torque of 1 about roll, pitch, yaw (PX4 allocation)."""
+        x, y, m = self.rotor_arm_x, self.rotor_arm_y, self.rotor_moment_ratio
+        return torque_scale(
+            np.array([x, -x, x, -x]),
+            np.array([y, -y, -y, y]),
+            np.array([m, m, -m, -m]),
+            self.rotor_thrust_max,
+        )
+
+    def flat(self) -> np.ndarray:
+        """Return the array that the compiled map reads."""
+        p = np.empty(_LENGTH)
+        p[_FULL] = 4.0 * self.rotor_thrust_max
+        p[_BATTERY] = self.battery_factor
+        p[_MOTOR] = self.motor_curve_factor
+        p[_MODEL] = self.thr_mdl_fac
+        p[_MIN] = self.thrust_min
+        p[_MAX] = self.thrust_max
+        p[_COMMAND_MAX] = self.command_max
+        p[_GAIN : _GAIN + 3] = self.torque_scale * np.array(self.rate_p) * np.array(self.rate_k)
+        p[_LIMIT : _LIMIT + 3] = self.rate_limit
+        return p
+
+
+@jit
+def rate_thrust_map(
+    tau_p: np.ndarray,
+    tau_q: np.ndarray,
+    attitude: np.ndarray,
+    body_rates: np.ndarray,
+    p: np.ndarray,
+    rates: np.ndarray,
+) -> float:
+    """Write the body-rate setpoint into rates (3,) and return the normalised thrust.
+
+    Returns -1 - i, touching nothing, where INPUTS[i] is not finite.
+    """
+    for i in range(3):
+        if not math.isfinite(tau_p[i]):
+            return -1.0 - i
+        if not math.isfinite(tau_q[i]):
+            return -4.0 - i
+        if not math.isfinite(attitude[i]):
+            return -7.0 - i
+        if not math.isfinite(body_rates[i]):
+            return -10.0 - i
+    # third column of R_B^W: the thrust axis in the world
+    cr, sr = math.cos(attitude[0]), math.sin(attitude[0])
+    cp, sp = math.cos(attitude[1]), math.sin(attitude[1])
+    cy, sy = math.cos(attitude[2]), math.sin(attitude[2])
+    newtons = (
+        tau_p[0] * (cy * sp * cr + sy * sr)
+        + tau_p[1] * (sy * sp * cr - cy * sr)
+        + tau_p[2] * cp * cr
+    )
+    newtons = min(p[_MAX], max(p[_MIN], newtons))
+    thrust = command_of_thrust(newtons, p[_FULL], p[_BATTERY], p[_MOTOR], p[_MODEL])
+    thrust = min(p[_COMMAND_MAX], thrust)
+    slope = thrust_slope(thrust, p[_FULL], p[_BATTERY], p[_MOTOR], p[_MODEL]) / p[_FULL]
+    for i in range(3):
+        wanted = body_rates[i] + tau_q[i] / (p[_GAIN + i] * slope)
+        limit = p[_LIMIT + i]
+        rates[i] = min(limit, max(-limit, wanted))
+    return thrust
+
+
+class RateThrustMap:
+    """The map above with its parameters; one instance per flight.
+
+    `rates` (3,) is reused by every call: copy it to keep it. `thrust_factor`: true thrust / thrust
+    of the parameters' curve, 1 until something else is set.
+    """
+
+    def __init__(self, parameters: RateThrustParameters | None = None) -> None:
+        self.rates = np.zeros(3)
+        self._factor = 1.0
+        self.configure(parameters or RateThrustParameters())
+
+    def configure(self, parameters: RateThrustParameters) -> None:
+        """Take new parameters, whole or not at all; raises ParameterError naming the wrong one."""
+        checked = parameters.validated()
+        self._flat = checked.flat()
+        self.parameters = checked
+        self.thrust_factor = self._factor
+
+    @property
+    def thrust_factor(self) -> float:
+        """True thrust / thrust of the parameters' curve."""
+        return self._factor
+
+    @thrust_factor.setter
+    def thrust_factor(self, factor: float) -> None:
+        """Raises ValueError, the old factor staying, where it is not a positive number."""
+        if not (math.isfinite(factor) and factor > 0.0):
+            raise ValueError(f"thrust factor {factor} is not a positive number")
+        self._factor = factor
+        self._flat[_BATTERY] = self.parameters.battery_factor * factor
+
+    def map(
+        self, tau_p: np.ndarray, tau_q: np.ndarray, attitude: np.ndarray, body_rates: np.ndarray
+    ) -> tuple[np.ndarray, float]:
+        """Return the body-rate setpoint (3,) [rad/s, FLU] and the normalised thrust 0..1.
+
+        tau_p (3,) [N, world ENU], tau_q (3,) [N m, FLU], attitude (3,) roll, pitch, yaw [rad],
+        body_rates (3,) [rad/s, FLU]; float64. Raises SetpointRefused where one is not finite.
+        """
+        thrust = rate_thrust_map(tau_p, tau_q, attitude, body_rates, self._flat, self.rates)
+        if thrust < 0.0:
+            raise SetpointRefused(f"{INPUTS[int(-thrust) - 1]} is not finite")
+        return self.rates, thrust
+
+    def assumed_thrust(self, command: float) -> float:
+        """Return the collective [N] of a normalised thrust by the curve, without the factor."""
+        p = self._flat
+        return thrust_of_command(
+            command, p[_FULL], self.parameters.battery_factor, p[_MOTOR], p[_MODEL]
+        )
+
+    def thrust_command(self, newtons: float) -> float:
+        """Return the normalised thrust of a collective [N], unclamped by thrust_min/max."""
+        p = self._flat
+        return command_of_thrust(newtons, p[_FULL], p[_BATTERY], p[_MOTOR], p[_MODEL])

@@ -1,0 +1,131 @@
+"""What goes out at a tick: the map's setpoint, idle, the level hold's, or nothing.
+
+| commands | sent |
+|---|---|
+| good | body rates and thrust from the map |
+| idle (not flying) | rates 0, thrust 0: the stream goes on, the vehicle stays on the ground |
+| not finite, malformed or none, on the ground | as idle |
+| the same in flight; the mission in failsafe; idle high above the start | level hold for \
+`hold_time`, `release_time` where nothing is to be expected, then nothing: the autopilot's \
+failsafe acts |
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from typing import NamedTuple
+
+import numpy as np
+
+from uam_control.coordinates import ATTITUDE, POSITION
+from uam_control.maths.rotations import euler_from_quaternion
+from uam_sim_bridge.mavlink.offboard.hold import UNKNOWN, HoldParameters, LevelHold
+from uam_sim_bridge.mavlink.offboard.setpoint import RateThrustMap, SetpointRefused
+
+Setpoint = tuple[np.ndarray, float] | None  # body rates (3,) [rad/s, FLU], thrust 0..1; None: none
+IDLE = (np.zeros(3), 0.0)
+
+
+class Situation(NamedTuple):
+    """What the autopilot says, and let_go: the mission wants its failsafe."""
+
+    armed: bool
+    landed: bool
+    let_go: bool
+
+
+def _silent(text: str, key: str | None) -> None:
+    """For who does not want to know."""
+
+
+class SetpointSource:
+    """Of the bridge's node and of the direct engine; holds the map, and what is known without
+    commands."""
+
+    def __init__(
+        self,
+        rate_map: RateThrustMap,
+        hold: HoldParameters,
+        fresh: float = math.inf,
+        say: Callable[[str, str | None], None] = _silent,
+    ) -> None:
+        """fresh [s]: until when an attitude or a velocity is good; say(text, kind): of warnings."""
+        self.map = rate_map
+        self._hold = LevelHold(hold)
+        self._margin = hold.ground_margin
+        self._fresh_for = fresh
+        self._say = say
+        self._estimated = self._seen = (-math.inf, UNKNOWN)  # stamp [s], roll, pitch, yaw
+        self._velocity = UNKNOWN
+        self._height = 0.0
+        self._ground: float | None = None  # height [m] at which the vehicle stood
+
+    @property
+    def holding(self) -> bool:
+        """Whether the last tick was one of the level hold."""
+        return self._hold.active
+
+    def note_state(self, stamp: float, state: np.ndarray) -> None:
+        """Note an estimate (3, 8) of `stamp` [s]; the array is kept, not copied."""
+        self._estimated, self._velocity = (stamp, state[0, ATTITUDE]), state[1, POSITION]
+        self._height = float(state[0, 2])
+
+    def note_pose(self, stamp: float, quaternion: np.ndarray) -> None:
+        """Note an attitude [w x y z] that the motion capture saw at `stamp` [s]."""
+        self._seen = stamp, euler_from_quaternion(quaternion)
+
+    def commanded(
+        self,
+        now: float,
+        state: np.ndarray,
+        flying: bool,
+        tau_p: np.ndarray,
+        tau_q: np.ndarray | None,
+        situation: Situation,
+    ) -> Setpoint:
+        """Return the setpoint of a tick with commands.
+
+        now [s]; state (3, 8); flying: whether tau_p (3,) [N] is meant; tau_q (3,) [N m], None for
+        idle.
+        """
+        if situation.let_go:
+            return self.without(now, situation)
+        if flying and tau_q is not None:
+            try:
+                rates, thrust = self.map.map(tau_p, tau_q, state[0, ATTITUDE], state[1, ATTITUDE])
+            except SetpointRefused as error:
+                self._say(f"setpoint refused: {error}", None)
+            else:
+                self._hold.good(now, thrust)
+                return rates, thrust
+        elif not flying and tau_q is None and not self._high(situation.armed):
+            self._hold.reset()
+            return IDLE
+        return self.without(now, situation)
+
+    def without(self, now: float, situation: Situation) -> Setpoint:
+        """Return the setpoint at `now` [s] where there are no commands to be used."""
+        armed, landed, let_go = situation
+        if not armed or (landed and not self._high(armed)):
+            return IDLE
+        hopeless = let_go or not self._fresh(self._estimated[0], now)
+        velocity = UNKNOWN if hopeless else self._velocity
+        setpoint = self._hold.setpoint(now, self._attitude(now), velocity, hopeless)
+        doing = "holding level" if setpoint else "stream stopped, the failsafe acts"
+        self._say(f"no usable commands in flight: {doing}", "hold")
+        return setpoint
+
+    def _high(self, armed: bool) -> bool:
+        """Whether the vehicle is armed and well above the place where it stood disarmed."""
+        if self._ground is None or not armed:
+            self._ground = self._height
+        return self._height - self._ground > self._margin
+
+    def _attitude(self, now: float) -> np.ndarray:
+        """Roll, pitch, yaw [rad]: the estimate, the mocap's where that is old; NaN without both."""
+        known = (self._estimated, self._seen)
+        return next((angles for stamp, angles in known if self._fresh(stamp, now)), UNKNOWN)
+
+    def _fresh(self, stamp: float, now: float) -> bool:
+        return now - stamp < self._fresh_for

@@ -1,0 +1,255 @@
+"""What the motors really give: true thrust / thrust that the curve says, identified in flight.
+
+So newtons stay newtons on a vehicle whose motors, propellers or battery are not those of the
+parameters. In steady flight Newton's law along the body's thrust axis,
+
+    measured = m (p_ddot + g e3) · R e3 / thrust of the command by the curve
+
+needs what the bridge has anyway: attitude and acceleration of /uam/state, the thrust sent, and the
+mass. The command goes through the lag of the motors and of the acceleration's filter first, so that
+both sides of the quotient belong to the same instant. The factor follows it as first-order low pass
+within bounds and a slew limit: with a short time constant at first, then with one as long as has
+been measured (which makes it a mean), in the end with a long one, much slower than the position
+law.
+
+| while | the factor |
+|---|---|
+| on the ground, near it, tilted, accelerating, thrust near its ends, numbers missing | is held |
+| `identification_settling` after any of these | is held |
+| the magnet is on, as nobody knows the payload's mass | is held |
+| after it, until the quotient is back where it was: then nothing hangs on the vehicle | is held |
+| `thrust_identification` freeze | is held |
+| `thrust_identification` off | goes back to 1 |
+
+A held factor is still applied. The landed vehicle keeps it: battery and motors are the same.
+"""
+
+from __future__ import annotations
+
+import math
+from collections import deque
+from dataclasses import dataclass, replace
+from typing import Self
+
+import numpy as np
+
+from uam_control.maths.compiled import jit
+from uam_control.settings.parameter_set import ParameterSet, choice, number
+
+GRAVITY = 9.81  # m/s^2
+USABLE = (0.1, 0.9)  # normalised thrust: beyond, torques take their share of it (allocation)
+LONGEST_GAP = 0.1  # s between two ticks; longer ones begin anew
+SETTLED = 3.0  # times `identification_start`: learnt so long, it can tell whether something hangs
+# The word of the magnet comes from another process. It counts from a stamp on by which it has
+# arrived everywhere, so that a lockstep flight is the same every time.
+MAGNET_DELAY = 0.01  # s
+
+
+@dataclass(frozen=True)
+class ThrustIdentificationParameters(ParameterSet):
+    """When to trust a comparison of thrust and acceleration, and how fast to follow it."""
+
+    thrust_identification: str = choice(
+        "on",
+        "on: identify true thrust / assumed thrust in flight; freeze: hold it; off: 1",
+        ("off", "on", "freeze"),
+    )
+    identification_mass: float = number(
+        2.2, "mass of the vehicle with its arm, without payload", "kg", 0.05, 500.0
+    )
+    identification_time: float = number(
+        30.0,
+        "time constant with which the factor follows the measurement in the long run",
+        "s",
+        0.5,
+        3600.0,
+    )
+    identification_start: float = number(
+        4.0, "the same at the beginning of the first flight", "s", 0.5, 600.0
+    )
+    identification_lag: float = number(
+        0.05, "lag of motors and acceleration filter behind the thrust command", "s", 0.0, 0.5
+    )
+    identification_height: float = number(
+        0.3, "height above the start from which on thrust is compared", "m", 0.05, 100.0
+    )
+    identification_tilt: float = number(
+        0.15, "tilt up to which thrust is compared", "rad", 0.01, 1.0
+    )
+    identification_acceleration: float = number(
+        1.0, "acceleration of the vehicle up to which thrust is compared", "m/s^2", 0.05, 20.0
+    )
+    identification_settling: float = number(
+        0.5, "how long all that must have been so without a break", "s", 0.0, 60.0
+    )
+    identification_release: float = number(
+        1.0,
+        "wait after the magnet went off, before it is judged whether something hangs",
+        "s",
+        0.1,
+        60.0,
+    )
+    hanging_mass: float = number(
+        0.05,
+        "payload from which on it counts as hanging after the magnet went off",
+        "kg",
+        1e-3,
+        50.0,
+    )
+    factor_min: float = number(0.5, "smallest factor", "1", 0.2, 1.0)
+    factor_max: float = number(1.3, "largest factor", "1", 1.0, 2.0)
+    factor_slew: float = number(0.05, "largest change of the factor", "1/s", 1e-4, 1.0)
+
+    def validated(self, axes: int = 0) -> Self:
+        """As of every set; YAML's `on` and `off` arrive as true and false and are taken as well."""
+        said = self.thrust_identification
+        if isinstance(said, bool):
+            return replace(self, thrust_identification="on" if said else "off").validated(axes)
+        return super().validated(axes)
+
+
+@jit
+def steady_force(state: np.ndarray, tilt_max: float, acceleration_max: float) -> float:
+    """Return the specific force [m/s^2] along the thrust axis of state (3, 8), 0 if not steady.
+
+    0 as well where a number is not finite: every comparison with NaN is false.
+    """
+    ax, ay, az = state[2, 0], state[2, 1], state[2, 2]
+    if not ax * ax + ay * ay + az * az <= acceleration_max * acceleration_max:
+        return 0.0
+    roll, pitch, yaw = state[0, 3], state[0, 4], state[0, 5]
+    cr, sr, cp, sp = math.cos(roll), math.sin(roll), math.cos(pitch), math.sin(pitch)
+    if not cp * cr >= math.cos(tilt_max):
+        return 0.0
+    cy, sy = math.cos(yaw), math.sin(yaw)
+    force = ax * (cy * sp * cr + sy * sr) + ay * (sy * sp * cr - cy * sr) + (az + GRAVITY) * cp * cr
+    return force if force > 0.0 else 0.0
+
+
+class ThrustIdentification:
+    """The estimate and when it may move.
+
+    `factor`: true / assumed thrust, to be applied; always within its bounds. `learning`: whether
+    the last tick moved it by a measurement.
+    """
+
+    def __init__(self, parameters: ThrustIdentificationParameters | None = None) -> None:
+        self.factor = 1.0
+        self.learning = False
+        self._time = -math.inf
+        self._assumed = 0.0  # N, lagged as the motors
+        self._ground: float | None = None  # m, where it stood
+        self._learnt = 0.0  # s of learning so far
+        self._unsteady = -math.inf  # s, when the flight was not steady last
+        self._switches: deque[tuple[float, bool]] = deque()
+        self._magnet = False
+        self._released: float | None = None  # s, magnet off and not yet judged
+        self._recent = math.nan  # measurement since the release, followed fast
+        self._before: float | None = None  # factor that was settled when the magnet went on
+        self.configure(parameters or ThrustIdentificationParameters())
+
+    def configure(self, parameters: ThrustIdentificationParameters) -> None:
+        """Take new parameters, whole or not at all; raises ParameterError naming the wrong one."""
+        p = self.parameters = parameters.validated()
+        self.factor = min(p.factor_max, max(p.factor_min, self.factor))
+
+    def switch(self, time: float, on: bool) -> None:
+        """Take the word of the magnet at `time` [s]; it counts a little later, see MAGNET_DELAY."""
+        if not math.isfinite(time):
+            return
+        if self._switches and time < self._switches[-1][0]:  # a clock that began anew
+            self._switches.clear()
+        self._switches.append((time, bool(on)))
+        while len(self._switches) > 100:  # nobody takes them: keep the latest
+            self._switches.popleft()
+
+    def update(
+        self, time: float, state: np.ndarray, command: float, assumed: float, flying: bool
+    ) -> float:
+        """Take one tick and return `factor`.
+
+        time [s]; state (3, 8); command: normalised thrust sent at this tick; assumed [N]: the
+        collective that it makes by the curve, without the factor; flying: armed and controlled.
+        """
+        self.learning = False
+        if not math.isfinite(time + assumed + command):
+            return self.factor
+        dt, self._time = time - self._time, time
+        if not 0.0 < dt <= LONGEST_GAP:  # the first tick, or ticks are missing
+            self._assumed, self._unsteady = assumed, time
+            return self.factor
+        p = self.parameters
+        self._assumed += (1.0 - math.exp(-dt / max(p.identification_lag, 1e-3))) * (
+            assumed - self._assumed
+        )
+        self._follow_magnet(time)
+        if p.thrust_identification == "off":
+            self._learnt = 0.0
+            self._move(1.0 - self.factor, dt)
+            return self.factor
+        height = float(state[0, 2])
+        if not flying or self._ground is None:
+            self._land(height)
+            self._unsteady = time
+        elif not self._magnet and p.identification_height < height - self._ground < math.inf:
+            self._compare(time, dt, state, command)
+        return self.factor
+
+    def _compare(self, time: float, dt: float, state: np.ndarray, command: float) -> None:
+        """Measure, where the flight is steady, and follow the measurement."""
+        p = self.parameters
+        force = steady_force(state, p.identification_tilt, p.identification_acceleration)
+        if force == 0.0 or self._assumed <= 0.0 or not USABLE[0] <= command <= USABLE[1]:
+            self._unsteady = time
+        # A vehicle that sways passes through rest, and its motors clip: rest has to last.
+        if time - self._unsteady <= p.identification_settling:
+            return
+        measured = p.identification_mass * force / self._assumed
+        measured = min(p.factor_max, max(p.factor_min, measured))
+        if self._released is not None and self._hanging(time, dt, measured):
+            return
+        if p.thrust_identification == "on":
+            self.learning = True
+            self._learnt += dt
+            span = min(p.identification_time, max(p.identification_start, self._learnt))
+            gain = 1.0 - math.exp(-dt / span)
+            self._move(gain * (measured - self.factor), dt)
+
+    def _hanging(self, time: float, dt: float, measured: float) -> bool:
+        """Whether something may still hang on the magnet that is off."""
+        p = self.parameters
+        if math.isnan(self._recent):
+            self._recent = measured
+        self._recent += min(1.0, 2.0 * dt / p.identification_release) * (measured - self._recent)
+        if time - self._released < p.identification_release:
+            return True
+        if self._before is None:  # never known without payload: only landing tells
+            return True
+        mass = p.identification_mass
+        if self._recent < self._before * mass / (mass + p.hanging_mass):
+            return True
+        self._released = None
+        return False
+
+    def _follow_magnet(self, time: float) -> None:
+        while self._switches and self._switches[0][0] <= time - MAGNET_DELAY:
+            on = self._switches.popleft()[1]
+            if on and not self._magnet:
+                settled = self._learnt >= SETTLED * self.parameters.identification_start
+                # a payload that never came off leaves what was known before it
+                if self._released is None:
+                    self._before = self.factor if settled else None
+            elif self._magnet and not on:
+                self._released, self._recent = time, math.nan
+            self._magnet = on
+
+    def _land(self, height: float) -> None:
+        if math.isfinite(height):
+            self._ground = height
+        self._released = None
+
+    def _move(self, step: float, dt: float) -> None:
+        p = self.parameters
+        limit = p.factor_slew * dt
+        step = min(limit, max(-limit, step))
+        self.factor = min(p.factor_max, max(p.factor_min, self.factor + step))

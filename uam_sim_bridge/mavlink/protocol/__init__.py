@@ -1,0 +1,1 @@
+"""MAVLink messages, frames, modes and signing; no sockets."""

@@ -1,0 +1,73 @@
+"""ENU/FLU (REP-103, used everywhere else) ↔ NED/FRD (MAVLink, aerospace).
+
+| | world | body |
+|---|---|---|
+| ROS side | ENU: x east, y north, z up | FLU: x forward, y left, z up |
+| MAVLink side | NED: x north, y east, z down | FRD: x forward, y right, z down |
+
+Every map here is its own inverse, so one function serves both directions. None changes the
+handedness: each is a half turn (world: about the north-east diagonal; body: about forward).
+Euler angles are Z-Y-X; quaternions are [w x y z], body → world.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from uam_control.maths.compiled import jit
+
+_HALF = math.sqrt(0.5)
+
+
+@jit
+def swap_world(v: np.ndarray) -> np.ndarray:
+    """Return the world vector v (3,) given in ENU, in NED; or the other way round."""
+    out = np.empty(3)
+    out[0] = v[1]
+    out[1] = v[0]
+    out[2] = -v[2]
+    return out
+
+
+@jit
+def swap_body(v: np.ndarray) -> np.ndarray:
+    """Return the body vector v (3,) given in FLU, in FRD; or the other way round."""
+    out = np.empty(3)
+    out[0] = v[0]
+    out[1] = -v[1]
+    out[2] = -v[2]
+    return out
+
+
+@jit
+def swap_quaternion(q: np.ndarray) -> np.ndarray:
+    """Return the attitude FLU → ENU given by q (4,) as FRD → NED; or the other way round.
+
+    It is the product (half turn about (1, 1, 0)) ⊗ q ⊗ (half turn about x), up to sign.
+    """
+    out = np.empty(4)
+    out[0] = _HALF * (q[0] + q[3])
+    out[1] = _HALF * (q[1] + q[2])
+    out[2] = _HALF * (q[1] - q[2])
+    out[3] = _HALF * (q[0] - q[3])
+    return out
+
+
+@jit
+def swap_euler(euler: np.ndarray) -> np.ndarray:
+    """Return roll, pitch, yaw (3,) [rad] of FLU in ENU as those of FRD in NED; or back.
+
+    ENU yaw counts from east, counter-clockwise; NED yaw from north, clockwise. Yaw in [-pi, pi).
+    """
+    out = np.empty(3)
+    out[0] = euler[0]
+    out[1] = -euler[1]
+    out[2] = (1.5 * math.pi - euler[2]) % (2.0 * math.pi) - math.pi
+    return out
+
+
+def swap_world_variance(variance: np.ndarray) -> np.ndarray:
+    """Return variances (3,) along the ENU axes as those along NED; or back: no sign, only order."""
+    return np.array([variance[1], variance[0], variance[2]])

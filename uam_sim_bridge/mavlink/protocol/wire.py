@@ -1,0 +1,214 @@
+"""Bytes ↔ MAVLink 2 messages, robust against whatever else arrives.
+
+pymavlink's own stream parser believes the length byte of a false start and swallows what follows.
+`Framer` goes on one byte after a start that turns out false, so that garbage never costs a valid
+message behind it.
+"""
+
+from __future__ import annotations
+
+import re
+import struct
+
+from pymavlink.dialects.v20 import common as mavlink2
+
+from uam_sim_bridge.mavlink.protocol.signing import Seal, Signing
+
+MARKER_1, MARKER_2 = 0xFE, 0xFD
+_OVERHEAD_1, _OVERHEAD_2, _SIGNATURE = 8, 12, 13
+_SIGNED = 1  # incompatibility flag
+_MARKERS = re.compile(b"[\xfd\xfe]")
+
+# What PX4 sends and pymavlink leaves out, as MAVLink calls it unfinished: message id → CRC_EXTRA.
+# Enough to tell these frames from garbage; none is read here. (EVENT is: event_messages.py.)
+UNREAD = {8: 117, 290: 251, 291: 10, 361: 93, 371: 10, 380: 232, 413: 77, 435: 134, 436: 193}
+
+Message = mavlink2.MAVLink_message
+
+
+class Codec:
+    """Packs messages of one sender (system and component id) and unpacks those of others.
+
+    With `signing`, what it packs is signed, and only what is signed well is unpacked.
+    """
+
+    def __init__(self, system: int, component: int, signing: Signing | None = None) -> None:
+        self._mav = mavlink2.MAVLink(None, srcSystem=system, srcComponent=component)
+        self._seal = None if signing is None else Seal(self._mav, signing)
+
+    @property
+    def refused(self) -> int:
+        """Whole messages refused: not signed, signed with another key, or heard before."""
+        return 0 if self._seal is None else self._seal.refused
+
+    def encode(self, message: Message) -> bytes:
+        """Return the frame of `message` with the next sequence number.
+
+        Raises struct.error where a value does not fit its field.
+        """
+        if self._seal is not None:
+            self._seal.refresh()
+        frame = message.pack(self._mav)
+        self._mav.seq = (self._mav.seq + 1) % 256
+        return frame
+
+    def decode(self, frame: bytes) -> Message | None:
+        """Return the message of a whole frame, None where it is not a valid one.
+
+        Messages unknown to the dialect count as not valid: their checksum cannot be tested.
+        """
+        if self._seal is not None:
+            self._seal.refresh()
+        message = None
+        try:
+            message = self._mav.decode(bytearray(frame))
+        except (mavlink2.MAVError, struct.error, ValueError, IndexError, KeyError):
+            pass
+        if self._seal is not None:
+            self._seal.settle(message is not None)
+        return None if isinstance(message, mavlink2.MAVLink_unknown) else message
+
+
+class Framer:
+    """Cuts a byte stream (TCP, serial) or single datagrams into messages.
+
+    `bad_bytes` counts what belonged to no message, `unread` the frames of messages in UNREAD. What
+    the codec refuses is passed over whole.
+    """
+
+    def __init__(self, codec: Codec) -> None:
+        self._codec = codec
+        self._rest = b""
+        self.bad_bytes = self.unread = 0
+
+    def stream(self, data: bytes) -> list[Message]:
+        """Return the messages completed by `data`; an incomplete end is kept for the next call."""
+        data = self._rest + data
+        messages, used = self._cut(data, final=False)
+        self._rest = data[used:]
+        return messages
+
+    def datagram(self, data: bytes) -> list[Message]:
+        """Return the messages of one datagram; nothing is carried over to the next."""
+        return self._cut(data, final=True)[0]
+
+    def take(self, data: bytes, stream: bool) -> list[Message]:
+        """Return the messages of a chunk of a stream, or of one datagram."""
+        return self.stream(data) if stream else self.datagram(data)
+
+    def _cut(self, data: bytes, final: bool) -> tuple[list[Message], int]:
+        messages: list[Message] = []
+        at, size = 0, len(data)
+        while at < size:
+            marker = data[at]
+            if marker not in (MARKER_1, MARKER_2):
+                start = _next_marker(data, at)
+                self.bad_bytes += start - at
+                at = start
+                continue
+            end = _frame_end(data, at)
+            if end is None or end > size:
+                if not final:
+                    break
+            elif checksum_fits(data, at, end):
+                refused = self._codec.refused
+                message = self._codec.decode(data[at:end])
+                if message is not None:
+                    messages.append(message)
+                if message is not None or self._codec.refused > refused:  # refused: whole as well
+                    at = end
+                    continue
+                if message_number(data, at) in UNREAD:
+                    self.unread += 1
+                    at = end
+                    continue
+            at += 1  # a false start: look again behind it
+            self.bad_bytes += 1
+        return messages, at
+
+
+def _next_marker(data: bytes, at: int) -> int:
+    found = _MARKERS.search(data, at)
+    return found.start() if found else len(data)
+
+
+def message_number(data: bytes, at: int) -> int:
+    """Return the message id of the frame that begins at data[at], at least 10 bytes of it there."""
+    if data[at] == MARKER_1:
+        return data[at + 5]
+    return int.from_bytes(data[at + 7 : at + 10], "little")
+
+
+def checksum_fits(data: bytes, at: int, end: int) -> bool:
+    """Whether data[at:end], as long as its header says, is of a known type and has its checksum.
+
+    Asked before decoding, which costs ten times as much: a full datagram of false starts would
+    else stop the control path for half a second.
+    """
+    if end - at < (_OVERHEAD_1 if data[at] == MARKER_1 else _OVERHEAD_2):
+        return False
+    number, tail = message_number(data, at), end - 2
+    if data[at] == MARKER_2 and data[at + 2] & _SIGNED:
+        tail -= _SIGNATURE
+    kind = mavlink2.mavlink_map.get(number)
+    extra = UNREAD.get(number) if kind is None else kind.crc_extra
+    if extra is None:
+        return False
+    checksum = mavlink2.x25crc(data[at + 1 : tail] + bytes((extra,))).crc
+    return checksum == data[tail] | data[tail + 1] << 8
+
+
+def _frame_end(data: bytes, at: int) -> int | None:
+    """Return where the frame that starts at `at` would end; None where that is not known yet."""
+    if len(data) - at < 3:
+        return None
+    if data[at] == MARKER_1:
+        return at + data[at + 1] + _OVERHEAD_1
+    flags = data[at + 2]
+    if flags & ~_SIGNED:
+        return at + 1  # unknown flags: too short to decode, hence refused
+    return at + data[at + 1] + _OVERHEAD_2 + (_SIGNATURE if flags & _SIGNED else 0)
+
+
+def text_chunks(severity: int, text: str, number: int) -> list[Message]:
+    """Return the STATUSTEXT messages of `text`, in pieces of 50 bytes; number: its id if long."""
+    raw = text.encode()
+    pieces = [raw[i : i + 50] for i in range(0, len(raw), 50)] or [b""]
+    if len(pieces) > 1 and len(pieces[-1]) == 50:
+        pieces.append(b"")  # a piece that is not full says that the text ends
+    identity = number % 65535 + 1 if len(pieces) > 1 else 0
+    return [
+        mavlink2.MAVLink_statustext_message(severity, piece, id=identity, chunk_seq=i)
+        for i, piece in enumerate(pieces)
+    ]
+
+
+class TextAssembler:
+    """Puts the pieces of long STATUSTEXTs together again."""
+
+    def __init__(self) -> None:
+        self._identity = 0
+        self._pieces: list[str] = []
+
+    def add(self, message: Message) -> str | None:
+        """Return the whole text once its last piece is there."""
+        text = clean_text(message.text)
+        if message.id == 0:
+            return text
+        if message.id != self._identity or message.chunk_seq == 0:
+            self._identity, self._pieces = message.id, []
+        if message.chunk_seq != len(self._pieces):  # a piece was lost
+            self._pieces = []
+            return None
+        self._pieces.append(text)
+        if len(text.encode()) == 50:
+            return None
+        whole, self._pieces = "".join(self._pieces), []
+        return whole
+
+
+def clean_text(value: str | bytes) -> str:
+    """Return a MAVLink string up to its first zero byte."""
+    if isinstance(value, bytes):
+        value = value.decode(errors="replace")
+    return value.split("\x00", 1)[0]

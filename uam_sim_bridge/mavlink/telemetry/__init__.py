@@ -1,0 +1,1 @@
+"""What the autopilot reports: health, events, parameters, time."""

@@ -1,0 +1,117 @@
+"""The messages that the bridge wants regularly: asked for one by one, then counted.
+
+COMMAND_ACK does not say which SET_MESSAGE_INTERVAL it answers, so the next one waits for the answer
+to the last. PX4 refuses to change HEARTBEAT, which therefore is only counted.
+"""
+
+from __future__ import annotations
+
+import math
+
+from uam_sim_bridge.mavlink.protocol.modes import Result, result_word
+from uam_sim_bridge.mavlink.protocol.wire import mavlink2
+
+# message id → wanted rate [Hz]
+RATES: dict[int, float] = {
+    mavlink2.MAVLINK_MSG_ID_HEARTBEAT: 1.0,
+    mavlink2.MAVLINK_MSG_ID_EXTENDED_SYS_STATE: 5.0,
+    mavlink2.MAVLINK_MSG_ID_ATTITUDE_QUATERNION: 10.0,
+    mavlink2.MAVLINK_MSG_ID_ODOMETRY: 10.0,
+    mavlink2.MAVLINK_MSG_ID_SYS_STATUS: 2.0,
+    mavlink2.MAVLINK_MSG_ID_BATTERY_STATUS: 1.0,
+    mavlink2.MAVLINK_MSG_ID_ESTIMATOR_STATUS: 2.0,
+}
+ONLY_COUNTED = (mavlink2.MAVLINK_MSG_ID_HEARTBEAT,)
+ENOUGH = 0.5  # of the wanted rate
+WINDOW = 4.0  # s over which is counted
+ANSWER_TIMEOUT = 0.5  # s after which the next request goes out without an answer
+ATTEMPTS = 3  # requests for one stream
+
+
+class StreamCheck:
+    """What to ask for, and what does not come. `rates`: message id → rate [Hz] of the last window.
+
+    `warnings`: one line per stream that is too slow or was refused.
+    """
+
+    def __init__(self) -> None:
+        self.restart()
+
+    def restart(self) -> None:
+        """Ask for everything anew: the autopilot is new, or has rebooted."""
+        self.warnings: tuple[str, ...] = ()
+        self.rates: dict[int, float] = {}
+        self._queue = [number for number in RATES if number not in ONLY_COUNTED]
+        self._attempts = dict.fromkeys(RATES, 0)
+        self._refused: dict[int, str] = {}
+        self._counts = dict.fromkeys(RATES, 0)
+        self._pending: int | None = None
+        self._asked_at = -math.inf
+        self._window: float | None = None  # start of the window, None while still asking
+
+    def count(self, number: int) -> None:
+        """Note that a message has arrived."""
+        if number in self._counts:
+            self._counts[number] += 1
+
+    def answer(self, result: int) -> None:
+        """Take the result of the last request."""
+        number, self._pending = self._pending, None
+        if number is None:
+            return
+        if result == Result.ACCEPTED:
+            self._refused.pop(number, None)
+        else:
+            self._refused[number] = result_word(result)
+
+    def request(self, time: float) -> tuple[int, float] | None:
+        """Return message id and interval [us] to ask for at `time` [s], None for nothing now."""
+        if self._pending is not None and time - self._asked_at < ANSWER_TIMEOUT:
+            return None
+        self._pending = None
+        if not self._queue:
+            self._judge(time)
+            return None
+        number = self._queue.pop(0)
+        self._attempts[number] += 1
+        self._pending, self._asked_at = number, time
+        return number, 1e6 / RATES[number]
+
+    def _judge(self, time: float) -> None:
+        if self._window is None:
+            self._begin(time)
+        if time - self._window < WINDOW:
+            return
+        self.rates = {
+            number: count / (time - self._window) for number, count in self._counts.items()
+        }
+        slow = [
+            number
+            for number, rate in RATES.items()
+            if self.rates[number] < ENOUGH * rate or number in self._refused
+        ]
+        self.warnings = tuple(self._words(number) for number in slow)
+        self._queue = [
+            number
+            for number in slow
+            if number not in ONLY_COUNTED and self._attempts[number] < ATTEMPTS
+        ]
+        self._begin(time)
+        if self._queue:
+            self._window = None
+
+    def _begin(self, time: float) -> None:
+        self._window = time
+        self._counts = dict.fromkeys(RATES, 0)
+
+    def _words(self, number: int) -> str:
+        name = mavlink2.mavlink_map[number].msgname
+        rate, wanted = self.rates[number], RATES[number]
+        came = f"comes at {rate:.1f} Hz" if rate > 0.0 else "does not come"
+        refused = self._refused.get(number)
+        asked = (
+            f"asked for {wanted:g} Hz"
+            if refused is None
+            else (f"{wanted:g} Hz were refused ({refused})")
+        )
+        return f"{name} {came}, {asked}"

@@ -1,0 +1,98 @@
+"""What carries MAVLink's bytes, and its choice by URL.
+
+| URL | link |
+|---|---|
+| `udp:HOST:PORT` | datagrams to HOST:PORT, answers to a port of the system's choice |
+| `udp:HOST:PORT:LOCAL` | the same, from and to the local port LOCAL |
+| `tcp:HOST:PORT` | client; connects again after a loss |
+| `serial:DEVICE:BAUD` | serial line or USB; opened again after unplugging |
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Protocol
+
+from uam_sim_bridge.mavlink.transport.serial_transport import SerialTransport
+from uam_sim_bridge.mavlink.transport.tcp_transport import TcpTransport
+from uam_sim_bridge.mavlink.transport.udp_transport import READ_LIMIT, UdpTransport
+from uam_sim_bridge.ports import PortError
+
+ALLOWED = "udp:HOST:PORT[:LOCAL_PORT], tcp:HOST:PORT, serial:DEVICE:BAUD"
+SLOWEST, FASTEST = 9600, 12_500_000  # baud
+
+
+class Transport(Protocol):
+    """What carries the bytes.
+
+    `stream`: whether `receive` returns chunks cut anywhere (TCP, serial) or whole datagrams;
+    `bytes_per_second`: what the line carries, None where nothing is known; `connected`: whether
+    the link is open as far as this end can tell; `dropped`: what could not be sent.
+    """
+
+    stream: bool
+    bytes_per_second: float | None
+    connected: bool
+    dropped: int
+
+    def send(self, data: bytes) -> bool: ...
+
+    def receive(self) -> list[bytes]: ...
+
+    def fileno(self) -> int: ...
+
+    def close(self) -> None: ...
+
+
+@dataclass(frozen=True)
+class LinkUrl:
+    """A link's URL, taken apart. kind: udp, tcp or serial; place: host or device.
+
+    number: port or baud rate; local: local UDP port, 0 for any.
+    """
+
+    kind: str
+    place: str
+    number: int
+    local: int = 0
+
+
+def parse_url(url: str) -> LinkUrl:
+    """Take `url` apart; raises PortError in one line where it is none of the table above."""
+    kind, _, rest = url.partition(":")
+    if kind == "serial":
+        device, _, baud = rest.rpartition(":")  # a device's name may contain colons
+        if not device or not _within(baud, SLOWEST, FASTEST):
+            raise _bad(url, f"a device and {SLOWEST}..{FASTEST} baud expected")
+        return LinkUrl(kind, device, int(baud))
+    parts = rest.split(":")
+    if kind not in ("udp", "tcp"):
+        raise _bad(url, "unknown kind of link" if kind else "empty")
+    if not parts[0] or len(parts) not in ((2, 3) if kind == "udp" else (2,)):
+        raise _bad(url, "a host and a port expected")
+    for port in parts[1:]:
+        if not _within(port, 1, 65535):
+            raise _bad(url, f"port {port} is not in 1..65535")
+    return LinkUrl(kind, parts[0], *map(int, parts[1:]))
+
+
+def open_transport(url: str, read_limit: int = READ_LIMIT) -> Transport:
+    """Open the link that `url` names.
+
+    read_limit: bytes taken per `receive` from a UDP link. Raises PortError in one line where the
+    URL is none of the table above, or the link cannot be had.
+    """
+    link = parse_url(url)
+    if link.kind == "serial":
+        return SerialTransport(link.place, link.number)
+    if link.kind == "tcp":
+        return TcpTransport((link.place, link.number))
+    return UdpTransport(link.local, (link.place, link.number), read_limit)
+
+
+def _within(text: str, low: int, high: int) -> bool:
+    return text.isascii() and text.isdecimal() and len(text) < 10 and low <= int(text) <= high
+
+
+def _bad(url: str, why: str) -> PortError:
+    return PortError(f"link {url!r}: {why}; allowed: {ALLOWED}")

@@ -1,0 +1,26 @@
+"""/uam/faults: each fault that begins or ends."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+from rclpy.node import Node
+
+from uam_msgs_py.messages import topics
+from uam_msgs_py.messages.faults import FaultEvent
+from uam_sim_bridge.faults.timeline import Happened
+
+
+class FaultTopic:
+    """Publishes what came and went."""
+
+    def __init__(self, node: Node):
+        topic = topics.FAULTS
+        self._publisher = node.create_publisher(topic.type, topic.name, topic.qos)
+
+    def tell(self, stamp: int, changed: Iterable[Happened]) -> None:
+        """Publish the events of the moment `stamp` [ns]."""
+        for one in changed:
+            fault = one.fault
+            event = FaultEvent(fault.NAME, fault.PLACE, one.number, one.active, fault.values)
+            self._publisher.publish(event.to_message(stamp))
