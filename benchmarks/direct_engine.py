@@ -17,7 +17,7 @@ import time
 import mujoco
 
 from uam_control.mission import load_scenario
-from uam_control.profile import load_profile
+from uam_control.profiles.profile import load_profile
 from uam_lab.flight.direct.flight import DirectFlight
 from uam_lab.flight.direct.warm_up import warm_up
 from uam_sim_bridge.plant import Vehicle

@@ -13,7 +13,7 @@ from pathlib import Path
 from soaking.samples import Soak, usage
 from soaking.scenario import shuttle
 from uam_control.mission import load_scenario
-from uam_control.profile import load_profile
+from uam_control.profiles.profile import load_profile
 from uam_lab.flight.direct.flight import DirectFlight
 from uam_lab.processes.process_table import node_name, parent, pids
 from uam_lab.results.result_folder import new_folder

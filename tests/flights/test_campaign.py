@@ -5,7 +5,7 @@ import json
 
 import numpy as np
 
-from uam_control.profile import load_profile
+from uam_control.profiles.profile import load_profile
 from uam_lab.campaign.variations import common, draw, ranges
 from uam_lab.cli.main import main
 

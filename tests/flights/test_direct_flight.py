@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from uam_control.mission import load_scenario
-from uam_control.profile import load_profile
+from uam_control.profiles.profile import load_profile
 from uam_lab.flight.direct.flight import DirectFlight
 from uam_lab.results.metrics import compute
 from uam_sim_bridge.plant import Vehicle

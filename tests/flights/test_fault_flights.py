@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 
 from uam_control.mission import load_scenario
-from uam_control.profile import load_profile
+from uam_control.profiles.profile import load_profile
 from uam_lab.campaign.fault_outcome import classify
 from uam_lab.cli.main import main
 from uam_lab.flight.direct.flight import DirectFlight

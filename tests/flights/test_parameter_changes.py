@@ -11,7 +11,7 @@ from rcl_interfaces.srv import SetParametersAtomically
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.parameter import Parameter
 
-from uam_control.profile import load_profile
+from uam_control.profiles.profile import load_profile
 from uam_control.settings.parameter_set import Bound
 from uam_lab.processes.environment import transport_environment
 from uam_lab.processes.guest import Guest

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 import yaml
 
-from uam_control.profile import CONTROLLERS, NODES, load_profile
+from uam_control.profiles.profile import CONTROLLERS, NODES, load_profile
 from uam_msgs_py.node.wiring import BRIDGE, PLANT, RECORDER, SCENE
 
 # topic → rate [Hz of simulated time], as docs/architecture.md and messages/topics.py promise

@@ -7,7 +7,7 @@ import pytest
 from whole_flight import assert_nothing_left
 
 from uam_control.mission import load_scenario
-from uam_control.profile import load_profile
+from uam_control.profiles.profile import load_profile
 from uam_lab.cli.main import main
 from uam_lab.flight.direct.flight import DirectFlight
 from uam_lab.report.rebuild import rebuild

@@ -9,7 +9,7 @@ from mcap_ros2.decoder import DecoderFactory
 
 from uam_control.laws.modular import ADAPTATION
 from uam_control.mission import load_scenario
-from uam_control.profile import load_profile
+from uam_control.profiles.profile import load_profile
 from uam_lab.flight.direct.flight import DirectFlight
 from uam_lab.flight.settings import settings
 from uam_lab.recording.log_reader import read_flight

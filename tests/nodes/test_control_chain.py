@@ -7,7 +7,7 @@ from uam_control.control.controllers import ArmController, AttitudeController, P
 from uam_control.coordinates import COORDINATES, JOINTS
 from uam_control.estimation import StateEstimator
 from uam_control.mission import Mission, load_scenario
-from uam_control.profile import load_profile
+from uam_control.profiles.profile import load_profile
 from uam_msgs_py.messages import topics
 from uam_msgs_py.messages.control import (
     TAU_Q,

@@ -15,7 +15,7 @@ from std_srvs.srv import SetBool, Trigger
 
 from uam_control.coordinates import COORDINATES
 from uam_control.nodes.controller_node import ADAPTATION_PERIOD
-from uam_control.profile import CONTROLLERS, NODES, load_profile
+from uam_control.profiles.profile import CONTROLLERS, NODES, load_profile
 from uam_control.settings import configuration
 from uam_lab.flight.ros.profile_switch import ProfileSwitch, SwitchRefused
 from uam_lab.processes.guest import Guest

@@ -9,7 +9,7 @@ from whole_flight import SHORT
 
 from uam_control.laws.modular import ADAPTATION
 from uam_control.mission import load_scenario
-from uam_control.profile import load_profile
+from uam_control.profiles.profile import load_profile
 from uam_lab.flight.direct.flight import DirectFlight
 from uam_lab.results import metrics
 from uam_lab.results.result_folder import ResultFolder

@@ -8,7 +8,7 @@ import pytest
 
 from uam_control.control.controllers import AttitudeController, PositionController
 from uam_control.laws.catalogue import LAWS
-from uam_control.profile import load_profile
+from uam_control.profiles.profile import load_profile
 from uam_control.settings.parameter_set import ParameterError
 
 DT = 0.004

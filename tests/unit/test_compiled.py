@@ -13,7 +13,7 @@ PROGRAM = """
 import json, sys
 if {without_numba}: sys.modules["numba"] = None  # as if it were not installed
 from uam_control.mission import load_scenario
-from uam_control.profile import load_profile
+from uam_control.profiles.profile import load_profile
 from uam_lab.flight.direct.flight import DirectFlight
 from uam_sim_bridge.plant import Vehicle
 sets = load_scenario("pick_and_place"), load_profile({profile!r}), Vehicle.load()

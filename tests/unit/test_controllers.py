@@ -19,7 +19,7 @@ from uam_control.control.thrust_direction import AttitudeReference
 from uam_control.laws.catalogue import LAWS
 from uam_control.laws.errors import attitude_errors
 from uam_control.maths.rotations import matrix_from_euler
-from uam_control.profile import ProfileError, load_profile
+from uam_control.profiles.profile import ProfileError, load_profile
 from uam_control.settings import configuration
 from uam_control.settings.parameter_set import ParameterError
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from uam_control.profile import load_profile
+from uam_control.profiles.profile import load_profile
 from uam_lab.analysis.stability import analyse
 from uam_lab.report.figures import figures, panels
 from uam_lab.report.figures.panels import Flight

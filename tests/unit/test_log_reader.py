@@ -7,7 +7,7 @@ pytest.importorskip("rclpy")
 
 from uam_control.laws.catalogue import LAWS
 from uam_control.mission import load_scenario
-from uam_control.profile import load_profile
+from uam_control.profiles.profile import load_profile
 from uam_lab.recording import log_reader
 from uam_lab.recording.mcap_reader import TopicLog
 from uam_lab.results.timeseries import COLUMNS, gain_columns

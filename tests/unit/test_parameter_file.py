@@ -2,7 +2,7 @@
 
 import pytest
 
-from uam_control.profile import ProfileError, load_profile
+from uam_control.profiles.profile import ProfileError, load_profile
 from uam_control.settings import configuration
 
 DUMP = """\

@@ -7,7 +7,7 @@ import pytest
 
 from uam_control.laws.law_parameters import ModularParameters
 from uam_control.laws.modular import ModularLaw
-from uam_control.profile import load_profile
+from uam_control.profiles.profile import load_profile
 from uam_lab.analysis import constants, lyapunov, stability, ticks
 from uam_lab.analysis.folder import analyse_folder
 from uam_lab.analysis.lyapunov import Comparison

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from uam_control.profile import load_profile
+from uam_control.profiles.profile import load_profile
 from uam_lab.analysis import dynamics, supply, ticks
 from uam_lab.analysis.dynamics import Body
 from uam_sim_bridge.plant import Vehicle

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 import yaml
 
-from uam_control.profile import load_profile
+from uam_control.profiles.profile import load_profile
 from uam_control.settings import configuration
 from uam_lab.campaign.trial import Result
 from uam_lab.cli.main import main

@@ -10,7 +10,7 @@ from uam_control.control.controllers import Controller
 from uam_control.coordinates import SIZE
 from uam_control.laws import catalogue
 from uam_control.nodes.timing import Ticks, Timing
-from uam_control.profile import load_profile, parameter_set
+from uam_control.profiles.profile import load_profile, parameter_set
 from uam_msgs_py.messages import topics
 from uam_msgs_py.messages.changes import Change
 from uam_msgs_py.messages.control import read_position_command, read_reference, read_state

@@ -13,7 +13,7 @@ from uam_control.mission import Mission, MissionOutput, MissionParameters, load_
 from uam_control.nodes.mission_inputs import MissionInputs
 from uam_control.nodes.mission_services import offer
 from uam_control.nodes.timing import Ticks, Timing
-from uam_control.profile import load_profile
+from uam_control.profiles.profile import load_profile
 from uam_control.supervision import State
 from uam_msgs_py.messages import topics
 from uam_msgs_py.messages.control import ReferenceWriter, read_state

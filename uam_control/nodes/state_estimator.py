@@ -6,7 +6,7 @@ import numpy as np
 
 from uam_control.coordinates import COORDINATES, JOINTS
 from uam_control.estimation import EstimatorParameters, StateEstimator
-from uam_control.profile import load_profile
+from uam_control.profiles.profile import load_profile
 from uam_msgs_py.messages import topics
 from uam_msgs_py.messages.convert import read_imu, read_joints, read_pose
 from uam_msgs_py.messages.stamps import seconds

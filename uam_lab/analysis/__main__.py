@@ -6,7 +6,7 @@ import argparse
 import sys
 from pathlib import Path
 
-from uam_control.profile import ProfileError
+from uam_control.profiles.profile import ProfileError
 from uam_lab.analysis.folder import analyse_folder
 from uam_lab.results import timeseries
 from uam_lab.results.result_folder import as_json

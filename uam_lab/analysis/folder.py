@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from uam_control.profile import load_profile
+from uam_control.profiles.profile import load_profile
 from uam_lab.analysis.stability import Stability, analyse
 from uam_lab.results.timeseries import Series
 from uam_sim_bridge.plant import Vehicle

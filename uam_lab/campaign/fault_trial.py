@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from uam_control.mission import load_scenario
-from uam_control.profile import Profile
+from uam_control.profiles.profile import Profile
 from uam_lab.campaign import quiet
 from uam_lab.campaign.fault_matrix import Cell
 from uam_lab.campaign.fault_outcome import COMPLETED, LOST, classify, down_after

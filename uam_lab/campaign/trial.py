@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from uam_control.mission import Scenario, load_scenario
-from uam_control.profile import Profile
+from uam_control.profiles.profile import Profile
 from uam_lab.campaign.fault_outcome import COMPLETED, LOST, classify
 from uam_lab.flight.direct.flight import DirectFlight
 from uam_lab.results import metrics

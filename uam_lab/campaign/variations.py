@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import yaml
 
-from uam_control.profile import Profile
+from uam_control.profiles.profile import Profile
 from uam_control.settings.configuration import path
 from uam_lab.campaign.trial import Trial
 

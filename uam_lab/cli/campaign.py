@@ -7,7 +7,7 @@ import shlex
 import sys
 from pathlib import Path
 
-from uam_control.profile import Profile, ProfileError, load_profile
+from uam_control.profiles.profile import Profile, ProfileError, load_profile
 from uam_control.settings import configuration
 from uam_control.settings.configuration import ConfigurationError
 from uam_lab.campaign.pool import cores, fly_all

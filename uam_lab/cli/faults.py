@@ -8,7 +8,7 @@ import sys
 from pathlib import Path
 
 from uam_control.mission import ScenarioError, load_scenario
-from uam_control.profile import ProfileError, load_profile
+from uam_control.profiles.profile import ProfileError, load_profile
 from uam_control.settings import configuration
 from uam_control.settings.configuration import ConfigurationError
 from uam_lab.campaign.pool import cores, fly_all

@@ -11,7 +11,7 @@ from rich.console import Console
 
 from uam_control.laws.catalogue import LAWS
 from uam_control.mission import ScenarioError
-from uam_control.profile import ProfileError
+from uam_control.profiles.profile import ProfileError
 from uam_control.settings import configuration
 from uam_control.settings.configuration import ConfigurationError
 from uam_lab.flight import settings as flight_settings

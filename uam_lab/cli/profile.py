@@ -6,7 +6,7 @@ import argparse
 import sys
 from typing import Any
 
-from uam_control.profile import Profile, ProfileError, load_profile
+from uam_control.profiles.profile import Profile, ProfileError, load_profile
 from uam_control.settings import configuration
 from uam_control.settings.configuration import ConfigurationError
 from uam_lab.flight.settings import SettingsError, require_ros

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from uam_control.mission import ScenarioError
-from uam_control.profile import ProfileError, load_profile
+from uam_control.profiles.profile import ProfileError, load_profile
 from uam_control.settings import configuration
 from uam_control.settings.configuration import ConfigurationError
 from uam_lab.campaign.pool import cores

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import viser
 from std_srvs.srv import SetBool, Trigger
 
-from uam_control.profile import CONTROLLERS
+from uam_control.profiles.profile import CONTROLLERS
 from uam_lab.cockpit.services import Services
 
 Later = Callable[[Callable[[], None]], None]

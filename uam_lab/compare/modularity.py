@@ -17,7 +17,7 @@ import numpy as np
 
 from uam_control.control.controllers import ArmController, AttitudeController, PositionController
 from uam_control.coordinates import COORDINATES, SIZE
-from uam_control.profile import Profile, profile_of
+from uam_control.profiles.profile import Profile, profile_of
 from uam_lab.campaign.trial import ERRORS, Result, Trial
 from uam_lab.results import timeseries
 from uam_lab.results.timeseries import Series

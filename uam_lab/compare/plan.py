@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from uam_control.laws import catalogue
-from uam_control.profile import CONTROLLERS, Profile, load_profile, profile_of
+from uam_control.profiles.profile import CONTROLLERS, Profile, load_profile, profile_of
 from uam_lab.campaign.trial import Trial
 
 POSITION = "position_controller"

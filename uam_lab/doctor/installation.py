@@ -75,7 +75,7 @@ def _requirements() -> list[str] | None:
 def config() -> Finding:
     """Whether the files of config/ are found, and the default profile and scenario can be read."""
     from uam_control.mission import ScenarioError, load_scenario
-    from uam_control.profile import ProfileError, load_profile
+    from uam_control.profiles.profile import ProfileError, load_profile
 
     try:
         load_profile("s500")

@@ -9,7 +9,7 @@ from pathlib import Path
 
 from uam_control.laws.catalogue import LAWS
 from uam_control.mission import Scenario, load_scenario
-from uam_control.profile import Profile, load_profile
+from uam_control.profiles.profile import Profile, load_profile
 from uam_control.settings import configuration
 from uam_lab.processes.environment import without_discovery
 from uam_sim_bridge.faults import Schedule, limits, read_schedule

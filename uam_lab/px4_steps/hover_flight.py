@@ -13,7 +13,7 @@ import numpy as np
 from uam_control.control.controllers import ArmController, AttitudeController, PositionController
 from uam_control.coordinates import ATTITUDE, POSITION
 from uam_control.mission.trajectory import empty_reference
-from uam_control.profile import load_profile
+from uam_control.profiles.profile import load_profile
 from uam_sim_bridge.mavlink.hil.hil_server import HilParameters, HilServer
 from uam_sim_bridge.mavlink.link.link import OffboardLink
 from uam_sim_bridge.mavlink.offboard.sequence import OffboardSequence, Phase

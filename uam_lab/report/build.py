@@ -15,7 +15,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from uam_control.laws import catalogue
-from uam_control.profile import ProfileError
+from uam_control.profiles.profile import ProfileError
 from uam_lab.analysis.folder import analyse_folder
 from uam_lab.analysis.stability import Stability
 from uam_lab.report.figures import figures

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from uam_control.profile import NODES, Profile, load_profile, profile_of
+from uam_control.profiles.profile import NODES, Profile, load_profile, profile_of
 from uam_control.settings import configuration, yaml_file
 from uam_lab.campaign.trial import ERRORS, Result, Trial
 

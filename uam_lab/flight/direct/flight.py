@@ -17,7 +17,7 @@ from uam_control.control.controllers import ArmController, AttitudeController, P
 from uam_control.estimation import StateEstimator
 from uam_control.mission import Mission, Scenario
 from uam_control.mission.time_limit import DISARMED, Settled, time_limit
-from uam_control.profile import Profile
+from uam_control.profiles.profile import Profile
 from uam_control.supervision import Inputs
 from uam_lab.flight.direct.bridge import DirectBridge
 from uam_lab.flight.direct.record import Snapshot, record, record_blind, record_switches

@@ -11,7 +11,7 @@ from collections.abc import Iterable, Iterator
 
 from uam_control.laws.catalogue import LAWS
 from uam_control.mission import load_scenario
-from uam_control.profile import load_profile
+from uam_control.profiles.profile import load_profile
 from uam_lab.flight.direct.flight import DirectFlight
 from uam_sim_bridge.plant import Vehicle
 

@@ -10,7 +10,7 @@ from __future__ import annotations
 import time
 from pathlib import Path
 
-from uam_control.profile import CONTROLLERS
+from uam_control.profiles.profile import CONTROLLERS
 from uam_lab.cockpit import place
 from uam_lab.flight.direct.warm_up import is_cold, warm_up
 from uam_lab.flight.progress import Progress

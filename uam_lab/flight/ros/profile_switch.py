@@ -18,7 +18,7 @@ from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 from rclpy.parameter import Parameter
 
-from uam_control.profile import CONTROLLERS, NODES, Profile
+from uam_control.profiles.profile import CONTROLLERS, NODES, Profile
 from uam_msgs_py.node import wiring
 from uam_msgs_py.node.node_parameters import plain
 from uam_msgs_py.node.tunable import CHECK

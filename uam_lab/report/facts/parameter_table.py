@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from uam_control.laws.law_parameters import SAFEGUARD
-from uam_control.profile import (
+from uam_control.profiles.profile import (
     CONTROLLERS,
     NODES,
     ProfileError,

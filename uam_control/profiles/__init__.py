@@ -1,0 +1,1 @@
+"""Profiles: the parameters of every node of a flight."""
