@@ -36,8 +36,8 @@ test: setup      ## the tests but the slow ones; options: make test ARGS="tests/
 slow: setup      ## the slow tests: whole missions, browser, PX4 if it is there; a quarter of an hour
 	@$(BIN)/python -m pytest -m slow tests
 
-lint: setup      ## style and errors that need no run
-	@$(BIN)/ruff check . && $(BIN)/ruff format --check --quiet .
+lint: setup      ## style, errors that need no run, and who may import whom
+	@$(BIN)/ruff check . && $(BIN)/ruff format --check --quiet . && $(BIN)/lint-imports --no-cache --no-logo
 
 clean:           ## remove what setup, tests and colcon made; results/ stays
 	rm -rf $(VENV) build install log .pytest_cache .hypothesis .ruff_cache

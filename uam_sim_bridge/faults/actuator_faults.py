@@ -5,16 +5,12 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, ClassVar
+from typing import ClassVar
 
 import numpy as np
 
 from uam_control.settings.parameter_set import number
-from uam_sim_bridge.faults.fault import Effect, PlantFault
-
-if TYPE_CHECKING:
-    from uam_sim_bridge.faults.fault import Commands
-    from uam_sim_bridge.faults.plant import FaultyPlant
+from uam_sim_bridge.faults.fault import Commands, Disturbable, Effect, PlantFault
 
 JOINT = "which joint"
 
@@ -22,10 +18,10 @@ JOINT = "which joint"
 class ActEffect(Effect):
     """Calls `action(plant, commands)` at each tick."""
 
-    def __init__(self, action: Callable[[FaultyPlant, Commands], None]):
+    def __init__(self, action: Callable[[Disturbable, Commands], None]):
         self._action = action
 
-    def act(self, plant: FaultyPlant, commands: Commands) -> None:
+    def act(self, plant: Disturbable, commands: Commands) -> None:
         self._action(plant, commands)
 
 
@@ -62,7 +58,7 @@ class Sag(Effect):
         self._remaining, self._over = remaining, over
         self._since = 0.0
 
-    def act(self, plant: FaultyPlant, commands: Commands) -> None:
+    def act(self, plant: Disturbable, commands: Commands) -> None:
         done = 1.0 if self._since >= self._over else self._since / self._over
         plant.weaken_rotors(np.full(4, 1.0 + done * (self._remaining - 1.0)))
         self._since += plant.period
@@ -77,7 +73,7 @@ class ServoWeak(PlantFault):
     remaining: float = number(0.0, "part of the torque that is left", "1", 0.0, 1.0)
 
     def effect(self, noise: np.random.Generator) -> Effect:
-        def weaken(plant: FaultyPlant, commands: Commands) -> None:
+        def weaken(plant: Disturbable, commands: Commands) -> None:
             commands.effort[int(self.joint) - 1] *= self.remaining
 
         return ActEffect(weaken)
@@ -121,7 +117,7 @@ class Remanent(Effect):
     def __init__(self):
         self._on = False
 
-    def act(self, plant: FaultyPlant, commands: Commands) -> None:
+    def act(self, plant: Disturbable, commands: Commands) -> None:
         self._on = commands.magnet = commands.magnet or self._on
 
 
@@ -161,7 +157,7 @@ class Gust(Effect):
         self._full, self._rise = full, rise
         self._since = 0.0
 
-    def act(self, plant: FaultyPlant, commands: Commands) -> None:
+    def act(self, plant: Disturbable, commands: Commands) -> None:
         risen = 1.0 if self._since >= self._rise else self._since / self._rise
         plant.add_wind(0.5 * (1.0 - math.cos(math.pi * risen)) * self._full)
         self._since += plant.period

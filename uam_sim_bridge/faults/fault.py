@@ -3,15 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import asdict, dataclass
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import Any, ClassVar, Protocol
 
 import numpy as np
 
 from uam_control.settings.parameter_set import ParameterSet
-
-if TYPE_CHECKING:
-    from uam_sim_bridge.faults.plant import FaultyPlant
-    from uam_sim_bridge.plant import Samples
+from uam_sim_bridge.plant import Samples
 
 PLANT, LINK, PROCESS = "plant", "MAVLink", "process"
 
@@ -46,6 +43,25 @@ class Commands:
     magnet: bool
 
 
+class Disturbable(Protocol):
+    """What an effect can do to the plant; each call counts for the period that begins."""
+
+    def weaken_rotors(self, parts: np.ndarray) -> None:
+        """Scale the thrust of each rotor by parts (n_rotors,) [1]."""
+
+    def brake_joint(self, joint: int, torque: float) -> None:
+        """Add dry friction `torque` [N m] to joint number `joint` (from 0)."""
+
+    def weaken_magnet(self, part: float) -> None:
+        """Scale the magnet's holding force by `part` [1]."""
+
+    def add_wind(self, wind: np.ndarray) -> None:
+        """Add wind (3,) [m/s, ENU]."""
+
+    def swing_payload(self, commands: Commands, rate: float) -> None:
+        """Hang the payload on a hinge while the magnet is on; rate [rad/s]: its first rate."""
+
+
 class Effect:
     """What a fault of the plant does from its beginning to its end, tick by tick.
 
@@ -56,7 +72,7 @@ class Effect:
     def sense(self, samples: Samples) -> None:
         """Alter what arrives at this tick; the arrays in it are not to be written to."""
 
-    def act(self, plant: FaultyPlant, commands: Commands) -> None:
+    def act(self, plant: Disturbable, commands: Commands) -> None:
         """Alter plant and commands for the period that begins."""
 
 

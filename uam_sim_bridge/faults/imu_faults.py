@@ -4,15 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, ClassVar
+from typing import ClassVar
 
 import numpy as np
 
 from uam_control.settings.parameter_set import choice, number
 from uam_sim_bridge.faults.fault import Effect, PlantFault
-
-if TYPE_CHECKING:
-    from uam_sim_bridge.plant import Samples
+from uam_sim_bridge.plant import Samples
 
 COMPANION, AUTOPILOT, BOTH = "companion", "autopilot", "both"
 UNIT = "the companion computer's IMU, the autopilot's, or both"

@@ -6,16 +6,14 @@ import math
 from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, ClassVar
+from typing import ClassVar
 
 import numpy as np
 
 from uam_control.maths.rotations import quaternion_from_rotation_vector, quaternion_multiply
 from uam_control.settings.parameter_set import choice, number
 from uam_sim_bridge.faults.fault import Effect, PlantFault
-
-if TYPE_CHECKING:
-    from uam_sim_bridge.plant import Samples
+from uam_sim_bridge.plant import Samples
 
 AXES = {"xy": [1, 0, 2], "xz": [2, 1, 0], "yz": [0, 2, 1]}
 
