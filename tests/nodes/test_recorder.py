@@ -93,9 +93,9 @@ def test_a_gap_in_the_sequence_is_counted_as_lost(recorder, probe):
         for _ in range(1000):
             publish()
             time.sleep(0.02)
-            times = read_log(file)[SETPOINT].times
-            if times and times[-1] > newest:
-                return times
+            written = read_log(file).get(SETPOINT)
+            if written is not None and written.times[-1] > newest:
+                return written.times
         raise AssertionError(f"nothing after {newest} is written")
 
     times = written_after(-1)

@@ -6,9 +6,6 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from uam_lab.recording import cdr
-from uam_lab.recording.mcap_reader import UnreadableLog, read_log
-from uam_lab.recording.mcap_writer import McapWriter
-from uam_lab.recording.message_definitions import schema
 
 serialization = pytest.importorskip("rclpy.serialization")
 serialize = serialization.serialize_message
@@ -111,29 +108,3 @@ def test_states_poses_and_twists():
     assert block.fields["linear"].tolist() == [[0.0, 0.0, 0.5]]
     assert block.fields["angular"].tolist() == [[1.0, 2.0, 3.0]]
     assert block.stamps.tolist() == [3_000_000_004]
-
-
-@pytest.mark.parametrize("more", [0, 1, 30])
-def test_a_log_without_its_end_is_read_up_to_there(tmp_path, more):
-    file = tmp_path / "log.mcap"
-    writer = McapWriter(file)
-    name = "trajectory_msgs/msg/JointTrajectory"
-    channel = writer.add_channel("/uam/state", name, schema(name), {})
-    sizes = []
-    for k in range(20):
-        data = serialize(trajectory(k, ["x"], [[float(k)], [], [], []]))
-        writer.write(channel, k, k, data)
-        if k % 5 == 4:
-            writer.flush()
-            sizes.append(file.stat().st_size)
-    writer.close()
-    (tmp_path / "cut.mcap").write_bytes(file.read_bytes()[: sizes[2] + more])
-    assert read_log(tmp_path / "cut.mcap")["/uam/state"].times == list(range(15))
-    assert read_log(file)["/uam/state"].times == list(range(20))
-    assert read_log(file, {"/other"}) == {}
-
-
-def test_what_is_no_log_is_refused(tmp_path):
-    (tmp_path / "log.mcap").write_text("something else")
-    with pytest.raises(UnreadableLog, match="not an MCAP file"):
-        read_log(tmp_path / "log.mcap")

@@ -18,7 +18,7 @@ from visualization_msgs.msg import Marker
 from uam_control.maths.rotations import matrix_from_quaternion, quaternion_from_euler
 from uam_control.mission import load_scenario
 from uam_lab.nodes.scene_markers import PATH_POINTS, FlownPath, Markers, ReferencePath
-from uam_lab.recording.mcap_writer import McapWriter
+from uam_lab.recording.bounded_log import BoundedLog
 from uam_lab.recording.message_definitions import schema
 from uam_msgs_py.messages import tf_message
 from uam_msgs_py.messages.status import MissionStatus
@@ -78,9 +78,10 @@ def test_transforms_are_decoded_as_they_were_sent(tmp_path):
         (5, "base_link", "link_1", np.array([0.1, 0.2, 0.3]), np.array([0.5, 0.1, 0.2, 0.8])),
     ]
     name = "tf2_msgs/msg/TFMessage"
-    with McapWriter(tmp_path / "log.mcap") as writer:
-        channel = writer.add_channel("/tf", name, schema(name), {})
-        writer.write(channel, 7, 7, transforms_message([Transform(*entry) for entry in sent]))
+    log = BoundedLog(tmp_path / "log.mcap", limit=0.0)
+    channel = log.add_channel("/tf", name, schema(name), {})
+    log.write(channel, 7, 7, transforms_message([Transform(*entry) for entry in sent]), 1)
+    log.close()
     content = BytesIO((tmp_path / "log.mcap").read_bytes())
     reader = make_reader(content, decoder_factories=[DecoderFactory()])
     ((_, _, _, message),) = reader.iter_decoded_messages()
