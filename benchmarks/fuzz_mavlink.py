@@ -20,7 +20,6 @@ from __future__ import annotations
 import argparse
 import gc
 import json
-import os
 import random
 import sys
 import time
@@ -29,6 +28,7 @@ from collections import Counter, deque
 from collections.abc import Callable
 from pathlib import Path
 
+import psutil
 from fuzzing.messages import Messages, garbage
 from fuzzing.targets import Bridge, Plant, StandIn
 
@@ -118,8 +118,7 @@ class Campaign:
 def resident() -> float:
     """Resident set of this process [MB]."""
     gc.collect()
-    pages = int(Path("/proc/self/statm").read_text().split()[1])
-    return pages * os.sysconf("SC_PAGE_SIZE") / 1e6
+    return psutil.Process().memory_info().rss / 1e6
 
 
 def run(

@@ -5,7 +5,7 @@
     .venv/bin/python benchmarks/soak.py --minutes 600 --engine direct         # missions in a row
 
 With nodes it is one flight, to and fro with the arm swinging; in the direct engine mission after
-mission in one process. Every process is looked at every few seconds in /proc. Leaves soak.json and
+mission in one process. Every process is looked at every few seconds. Leaves soak.json and
 soak.png in --out; the exit status is 1 where something has grown.
 After Ctrl-C what was flown until then is judged.
 """

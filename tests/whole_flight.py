@@ -10,6 +10,8 @@ import time
 from collections.abc import Callable
 from pathlib import Path
 
+import psutil
+
 from uam_lab.processes import process_table
 from uam_sim_bridge.ports import SIMULATOR_TCP
 
@@ -76,12 +78,8 @@ class Flight:
 
     def children(self) -> dict[str, int]:
         """Its nodes: name → process id."""
-        found = {}
-        for pid in process_table.pids():
-            name = process_table.node_name(pid)
-            forker = process_table.parent(pid)
-            if name and process_table.parent(forker) == self.process.pid:
-                found[name] = pid
+        below = psutil.Process(self.process.pid).children(recursive=True)
+        found = {name: node.pid for node, name in process_table.nodes(below).items()}
         assert found, "no nodes"
         return found
 
@@ -101,10 +99,9 @@ class Flight:
 def is_gone(pid: int) -> bool:
     """Whether no process has this id any more (a zombie is gone, too)."""
     try:
-        state = Path(f"/proc/{pid}/stat").read_text().rsplit(")", 1)[1].split()[0]
-    except OSError:
+        return psutil.Process(pid).status() == psutil.STATUS_ZOMBIE
+    except psutil.NoSuchProcess:
         return True
-    return state == "Z"
 
 
 def lock_is_held(instance: int) -> bool:

@@ -1,11 +1,11 @@
-"""What a process uses, from /proc, over the time of a soak."""
+"""What a process uses, over the time of a soak."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass, field
 
-from uam_lab.processes.process_table import PROC
+import psutil
 
 
 @dataclass(frozen=True)
@@ -20,15 +20,11 @@ class Usage:
 def usage(pid: int) -> Usage | None:
     """What a process uses now; None where it is gone."""
     try:
-        status = (PROC / str(pid) / "status").read_text()
-        handles = len(list((PROC / str(pid) / "fd").iterdir()))
-    except OSError:
+        process = psutil.Process(pid)
+        memory = process.memory_info()
+        return Usage((memory.rss - memory.shared) / 1e6, process.num_fds(), process.num_threads())
+    except psutil.Error:
         return None
-    fields = dict(line.split(":", 1) for line in status.splitlines() if ":" in line)
-    if "RssAnon" not in fields:
-        return None
-    memory = int(fields["RssAnon"].split()[0]) * 1024 / 1e6
-    return Usage(memory, handles, int(fields["Threads"]))
 
 
 @dataclass

@@ -10,12 +10,14 @@ import sys
 import time
 from pathlib import Path
 
+import psutil
+
 from soaking.samples import Soak, usage
 from soaking.scenario import shuttle
 from uam_control.mission import load_scenario
 from uam_control.profiles.profile import load_profile
 from uam_lab.flight.direct.flight import DirectFlight
-from uam_lab.processes.process_table import node_name, parent, pids
+from uam_lab.processes.process_table import nodes
 from uam_lab.results.result_folder import new_folder
 from uam_sim_bridge.plant import Vehicle
 
@@ -56,7 +58,8 @@ def _look(soak: Soak, run: subprocess.Popen, ended: Path) -> None:
     begin, looks = time.monotonic(), 0
     while run.poll() is None and not ended.exists():
         now = time.monotonic() - begin
-        found = {node_name(pid): pid for pid in pids() if node_name(pid) and _below(pid, run.pid)}
+        below = psutil.Process(run.pid).children(recursive=True)
+        found = {name: node.pid for node, name in nodes(below).items()}
         for name, pid in {ORCHESTRATOR: run.pid, **found}.items():
             used = usage(pid)
             if used is not None:
@@ -66,14 +69,6 @@ def _look(soak: Soak, run: subprocess.Popen, ended: Path) -> None:
             total = sum(samples[-1][1].memory for samples in soak.usage.values())
             print(f"soak: {now / 60.0:.0f} min, {total:.0f} MB in all", flush=True)
         time.sleep(PERIOD)
-
-
-def _below(pid: int, ancestor: int) -> bool:
-    while pid > 1:
-        if pid == ancestor:
-            return True
-        pid = parent(pid)
-    return False
 
 
 def _conclude(soak: Soak, folder: Path, duration: float) -> None:

@@ -6,6 +6,7 @@ import subprocess
 import sys
 import time
 
+import psutil
 import pytest
 
 from uam_lab.processes import process_table, processes
@@ -68,7 +69,7 @@ def test_a_child_obeys_the_interrupt(children):
     children.start("a", "sleeper")
     ready(children, "a")
     children.check()
-    assert process_table.node_name(children.pid("a")) == "a"
+    assert process_table.node_name(psutil.Process(children.pid("a"))) == "a"
     assert children.stop(["a"]) == []
     assert gone(children.pid("a"))
 

@@ -6,6 +6,7 @@ import subprocess
 import sys
 import time
 
+import psutil
 import pytest
 
 from uam_sim_bridge.autopilot.params import DEFINITIONS
@@ -114,10 +115,10 @@ def test_nothing_is_left_but_the_logs(build, tmp_path, signum):
     seen = (folder / "seen").read_text()
     assert "PX4_PARAM_THR_MDL_FAC=0.3" in seen and "MC_ROLL_P" not in seen
     assert f"arguments -i 7 -d {build / 'etc'}" in _until(output.read_text)
-    px4 = _children(process.pid)
+    px4 = psutil.Process(process.pid).children()
     process.send_signal(signum)
     process.wait(10)
-    _until(lambda: not any(map(_alive, px4)))
+    assert psutil.wait_procs(px4, timeout=20.0)[1] == []
     if signum != signal.SIGKILL:
         assert process.returncode == 0 and not folder.exists()
         assert log.read_text() == "first\n"
@@ -130,16 +131,3 @@ def _until(found, patience=20.0):
         assert time.monotonic() < end
         time.sleep(0.02)
     return value
-
-
-def _children(pid):
-    with open(f"/proc/{pid}/task/{pid}/children") as file:
-        return [int(child) for child in file.read().split()]
-
-
-def _alive(pid):
-    try:
-        with open(f"/proc/{pid}/stat") as file:
-            return file.read().rsplit(")", 1)[1].split()[0] != "Z"
-    except OSError:
-        return False

@@ -37,7 +37,7 @@ def locks(folder: Path) -> Finding:
 
 def orphans() -> Finding:
     """Nodes whose `uam fly` has gone; they end by themselves within seconds, as a rule."""
-    left = process_table.orphans()
+    left = [process.pid for process in process_table.orphans()]
     if left:
         return warn(
             "processes",

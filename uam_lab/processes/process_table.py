@@ -1,50 +1,48 @@
-"""Processes as /proc tells of them, among them nodes that have lost their flight."""
+"""The nodes of flights among the processes of this machine, also those that lost their flight."""
 
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Iterator
-from pathlib import Path
+from collections.abc import Callable, Iterable
+
+import psutil
 
 from uam_lab.processes.child import GRACE, TITLE
 
-PROC = Path("/proc")
-INIT = 1
+INIT = 1  # the parent of a process whose own parent has ended
 POLL = 0.1  # [s]
 
 
-def pids() -> Iterator[int]:
-    """Every process there is now."""
-    for entry in PROC.glob("[0-9]*"):
-        yield int(entry.name)
-
-
-def command(pid: int) -> list[str]:
-    """The command line of a process; empty where it is gone or a kernel thread."""
+def command(process: psutil.Process) -> list[str]:
+    """The words of its command line; empty where it is gone or a kernel thread."""
     try:
-        text = (PROC / str(pid) / "cmdline").read_bytes().decode(errors="replace")
-    except OSError:
+        return " ".join(process.cmdline()).split()
+    except psutil.Error:
         return []
-    return [word for word in text.split("\0") if word]
 
 
-def parent(pid: int) -> int:
-    """The process that started it, INIT where that is gone; 0 where the process itself is."""
-    try:
-        return int((PROC / str(pid) / "stat").read_text().rsplit(")", 1)[1].split()[1])
-    except OSError:
-        return 0
+def node_name(process: psutil.Process) -> str:
+    """The name under which a flight started it, "" where it is no node of a flight."""
+    title, *name = command(process) or [""]
+    return " ".join(name) if title == TITLE else ""
 
 
-def node_name(pid: int) -> str:
-    """What a flight has started it as, "" where it is no node of a flight."""
-    title, _, name = "".join(command(pid)[:1]).partition(" ")
-    return name if title == TITLE else ""
+def nodes(processes: Iterable[psutil.Process]) -> dict[psutil.Process, str]:
+    """Those of `processes` that are nodes of flights, with their names."""
+    found = {process: node_name(process) for process in processes}
+    return {process: name for process, name in found.items() if name}
 
 
-def orphans() -> list[int]:
+def orphans() -> list[psutil.Process]:
     """Nodes whose `uam fly` has gone; they end by themselves within child.GRACE, as a rule."""
-    return [pid for pid in pids() if node_name(pid) and parent(pid) == INIT]
+    return [process for process in nodes(psutil.process_iter()) if _parent(process) == INIT]
+
+
+def _parent(process: psutil.Process) -> int:
+    try:
+        return process.ppid()
+    except psutil.Error:  # ended meanwhile
+        return 0
 
 
 def await_orphans(say: Callable[[str], None]) -> None:
