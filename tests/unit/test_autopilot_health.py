@@ -1,4 +1,4 @@
-"""Battery, estimator flags and sensor health, decoded; unknown stays unknown."""
+"""Decoding of battery, estimator flags and sensor health; unknown values are NaN."""
 
 import math
 
@@ -62,7 +62,7 @@ def test_unknown_is_nan():
     )
 
 
-def test_sys_status_has_it_as_well():
+def test_battery_from_sys_status():
     m = mavlink2.MAVLink_sys_status_message(0, 0, 0, 0, 15000, 250, 80, 0, 0, 0, 0, 0, 0)
     battery = from_sys_status(m)
     assert (battery.voltage, battery.current, battery.left) == pytest.approx((15.0, 2.5, 0.8))

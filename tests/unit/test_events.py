@@ -1,4 +1,4 @@
-"""PX4's events: their numbers, their texts, and which of them keep OFFBOARD from being armed."""
+"""PX4's events: ids, texts, and the selection of those that block arming in OFFBOARD."""
 
 import struct
 
@@ -26,7 +26,7 @@ CRITICAL, ERROR, WARNING, INFO, PROTOCOL = 2, 3, 4, 6, 8
 
 
 class Autopilot:
-    """Sends events over the wire to a reader."""
+    """Packs events, decodes them again and passes them to an EventReader."""
 
     def __init__(self):
         self.reader = EventReader()
@@ -49,7 +49,7 @@ class Autopilot:
 
 
 def test_numbers_are_px4s():
-    # FNV-1a of "a" and of "foobar" are published; the high byte is the autopilot's
+    # FNV-1a of "a" and "foobar" are published test vectors; the high byte is the component
     assert event_id("a") == 0x010C292C and event_id("foobar") == 0x019CF968
     names = [*CHECKS, *OTHERS, SUMMARY, HEALTH_SUMMARY]
     assert len({event_id(name) for name in names}) == len(names)
@@ -81,11 +81,11 @@ def test_a_denied_arming_in_px4s_order():
     )
 
 
-def test_what_does_not_concern_offboard_is_silent():
+def test_checks_that_do_not_block_offboard_give_no_text():
     px4 = Autopilot()
     px4.summary(can_arm=ALL_MODES & ~OFFBOARD)
     assert px4.check("check_modes_mission", INFO, modes=8) is None
-    assert px4.check("check_modes_manual_control", WARNING) is None  # told for all, blocks none
+    assert px4.check("check_modes_manual_control", WARNING) is None  # lists all modes, blocks none
     assert px4.check("check_modes_manual_control", ERROR) is not None
     assert px4.check("check_modes_offboard_signal", ERROR, modes=OFFBOARD) == (
         ERROR,
@@ -93,7 +93,7 @@ def test_what_does_not_concern_offboard_is_silent():
     )
 
 
-def test_checks_are_silent_where_offboard_may_be_armed():
+def test_checks_give_no_text_if_offboard_may_be_armed():
     px4 = Autopilot()
     px4.summary(can_arm=ALL_MODES)
     assert px4.check("check_battery_low", WARNING) is None
@@ -118,7 +118,7 @@ def test_checks_are_silent_where_offboard_may_be_armed():
         ("commander_failsafe_enter_generic", "IB", (0, 99), "Failsafe activated: switching to 99"),
     ],
 )
-def test_failsafes_say_cause_and_action(name, layout, values, text):
+def test_failsafe_texts_name_cause_and_action(name, layout, values, text):
     assert Autopilot().send(name, CRITICAL, struct.pack("<" + layout, *values)) == (CRITICAL, text)
 
 

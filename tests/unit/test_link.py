@@ -1,4 +1,4 @@
-"""The link against the stand-in in memory: set-up, cuts, reboots, lost modes."""
+"""OffboardLink with the autopilot stand-in in memory: set-up, cuts, reboots, lost modes."""
 
 import struct
 
@@ -24,18 +24,18 @@ ARM = (Command.ARM_DISARM, 1.0)
 
 
 class Memory:
-    """A transport of two lists."""
+    """A transport of two lists: `to_autopilot`, `to_link`."""
 
     stream, connected, dropped = False, True, 0
 
     def __init__(self):
-        self.there, self.here = [], []
+        self.to_autopilot, self.to_link = [], []
 
     def send(self, data):
-        self.there.append(data)
+        self.to_autopilot.append(data)
 
     def receive(self):
-        arrived, self.here = self.here, []
+        arrived, self.to_link = self.to_link, []
         return arrived
 
     def close(self):
@@ -43,9 +43,10 @@ class Memory:
 
 
 class Rig:
-    """Link and autopilot, tick by tick. `cut`: nothing gets through; `deaf`: what it never hears.
+    """Link and autopilot, tick by tick, with a body at rest.
 
-    The body does not move; what matters here are words, not flight.
+    `cut`: all messages are lost; `lost_kinds`: message types that never reach the autopilot;
+    `received`: the messages that did; `reasons_seen`: all reasons of the sequence.
     """
 
     def __init__(self):
@@ -53,13 +54,13 @@ class Rig:
         self.link = OffboardLink(self.memory, self.sequence, RateThrustParameters())
         self.codec, self.framer = Codec(1, 1), Framer(Codec(1, 1))
         self.ticks, self.cut, self.vision = 0, False, True
-        self.deaf = ()
-        self.asked = []  # messages that reached the autopilot
-        self.said = set()
+        self.lost_kinds = ()
+        self.received = []
+        self.reasons_seen = set()
         self.boot()
 
     def boot(self):
-        """Start the autopilot anew: its clock at zero, disarmed, numbering from zero."""
+        """Start a new autopilot: clock at zero, disarmed, sequence numbers from zero."""
         self.autopilot = Autopilot()
         for name in ("THR_MDL_FAC",):
             self.autopilot.set_parameter(name, 0.3)
@@ -75,48 +76,48 @@ class Rig:
     def uptime(self):
         return 0.004 * (self.ticks - self.booted)
 
-    def say(self, *messages):
+    def send(self, *messages):
         for message in messages:
             frame = self.codec.encode(message)
             if not self.cut:
-                self.memory.here.append(frame)
+                self.memory.to_link.append(frame)
 
     def run(self, seconds, autopilot=True):
-        """autopilot: False while it boots, all silent."""
+        """Run both for `seconds`; autopilot: False while it boots and sends nothing."""
         for _ in range(round(seconds / 0.004)):
             link = self.link
             link.poll(self.time)
             link.tick(self.time)
             if self.sequence.streaming:
                 link.send_setpoint(np.zeros(3), 0.5, self.time)
-            self.said.update(self.sequence.reasons)
-            sent, self.memory.there = self.memory.there, []
+            self.reasons_seen.update(self.sequence.reasons)
+            sent, self.memory.to_autopilot = self.memory.to_autopilot, []
             if autopilot:
                 self._autopilot(b"" if self.cut else b"".join(sent))
             self.ticks += 1
 
     def _autopilot(self, data):
         for message in self.framer.datagram(data):
-            if message.get_type() not in self.deaf:
-                self.asked.append(message)
+            if message.get_type() not in self.lost_kinds:
+                self.received.append(message)
                 self.companion.handle(self.uptime, message)
         if self.vision and self.ticks % 5 == 0:
             self.autopilot.vision(self.uptime, np.zeros(3), LEVEL)
         self.autopilot.update(self.uptime, np.zeros(3), DOWN)
-        self.say(*self.companion.tick(self.uptime))
+        self.send(*self.companion.tick(self.uptime))
 
     def fly(self):
         self.sequence.want(True)
         self.run(2.0)
         assert self.sequence.phase is Phase.FLYING, self.sequence.reasons
-        self.asked.clear()
+        self.received.clear()
         return self
 
     def commands(self):
-        return [(m.command, m.param1) for m in self.asked if m.get_type() == "COMMAND_LONG"]
+        return [(m.command, m.param1) for m in self.received if m.get_type() == "COMMAND_LONG"]
 
     def reasons(self):
-        return "; ".join(self.said)
+        return "; ".join(self.reasons_seen)
 
 
 @pytest.fixture
@@ -127,11 +128,13 @@ def rig():
 def test_set_up(rig):
     rig.run(6.0)
     link = rig.link
-    asked = [first for command, first in rig.commands() if command == Command.SET_MESSAGE_INTERVAL]
-    assert asked == [number for number in RATES if number not in ONLY_COUNTED]
-    read = [clean_text(m.param_id) for m in rig.asked if m.get_type() == "PARAM_REQUEST_READ"]
+    streams = [
+        first for command, first in rig.commands() if command == Command.SET_MESSAGE_INTERVAL
+    ]
+    assert streams == [number for number in RATES if number not in ONLY_COUNTED]
+    read = [clean_text(m.param_id) for m in rig.received if m.get_type() == "PARAM_REQUEST_READ"]
     assert sorted(read) == sorted(WATCHED)
-    assert link.mapping_told and link.warnings == ()
+    assert link.mapping_read and link.warnings == ()
     assert link.lost == link.bad_bytes == 0 and link.statistics.rate > 30.0
 
 
@@ -140,7 +143,7 @@ def test_time_is_compared_both_ways(rig):
     sync = rig.link.time_sync
     assert sync.round_trip == pytest.approx(0.004, abs=0.0041)
     assert sync.offset == pytest.approx(0.0, abs=0.005)
-    ours = [m for m in rig.asked if m.get_type() == "TIMESYNC"]
+    ours = [m for m in rig.received if m.get_type() == "TIMESYNC"]
     assert len([m for m in ours if m.tc1 == 0]) == pytest.approx(15, abs=2)
     assert len([m for m in ours if m.tc1 != 0]) == pytest.approx(30, abs=2)
 
@@ -156,10 +159,10 @@ def test_the_report_shows_the_autopilots_health(rig):
     assert report(rig.link)["sensors unhealthy"] == "vision_position"
 
 
-def test_a_battery_that_sys_status_alone_knows(rig):
+def test_a_battery_that_only_sys_status_reports(rig):
     rig.run(2.5)
     assert not rig.link.vitals.battery.known
-    rig.say(mavlink2.MAVLink_sys_status_message(0, 0, 0, 0, 15200, 250, 80, 0, 0, 0, 0, 0, 0))
+    rig.send(mavlink2.MAVLink_sys_status_message(0, 0, 0, 0, 15200, 250, 80, 0, 0, 0, 0, 0, 0))
     rig.run(0.008)
     assert rig.link.vitals.battery.voltage == pytest.approx(15.2)
 
@@ -174,7 +177,7 @@ def test_cut_of_a_fifth_of_a_second_changes_nothing(rig):
     assert not any(c == Command.DO_SET_MODE for c, _ in rig.commands())
 
 
-def test_cut_of_two_seconds_is_a_failsafe_and_offboard_is_asked_for_again(rig):
+def test_cut_of_two_seconds_is_a_failsafe_and_offboard_is_requested_again(rig):
     rig.fly().cut = True
     rig.run(2.0)
     assert rig.autopilot.status.mode is Mode.LAND and rig.link.connected(rig.time)
@@ -191,7 +194,7 @@ def test_cut_for_good(rig):
     rig.fly().cut = True
     rig.run(5.0)
     assert not rig.link.connected(rig.time)
-    # what it sends may arrive: the stream goes on for as long as the bridge lives
+    # the link to the autopilot may still work: the bridge continues the stream
     assert rig.sequence.phase is Phase.FLYING and rig.sequence.streaming
     assert rig.autopilot.status.mode is Mode.LAND
 
@@ -219,15 +222,15 @@ def test_the_autopilot_leaves_offboard_by_itself(rig):
     assert "left OFFBOARD for LAND" in rig.reasons()
 
 
-def test_reboot_on_the_ground_asks_for_everything_again(rig):
+def test_reboot_on_the_ground_repeats_all_requests(rig):
     rig.run(8.0)
-    rig.asked.clear()
+    rig.received.clear()
     rig.boot()
     rig.run(1.0)
     assert rig.link.reboots == 1 and rig.sequence.phase is Phase.STREAMING
     intervals = [c for c, _ in rig.commands() if c == Command.SET_MESSAGE_INTERVAL]
     assert len(intervals) == len(RATES) - len(ONLY_COUNTED)
-    assert rig.link.mapping_told and rig.link.time_sync.offset == pytest.approx(-8.0, abs=0.01)
+    assert rig.link.mapping_read and rig.link.time_sync.offset == pytest.approx(-8.0, abs=0.01)
     rig.sequence.want(True)
     rig.run(2.0)
     assert rig.sequence.phase is Phase.FLYING and rig.link.reboots == 1
@@ -242,7 +245,7 @@ def test_reboot_in_flight_is_never_armed_again(rig):
     assert rig.link.reboots == 1 and rig.sequence.phase is Phase.FAILED
     assert "the autopilot rebooted in flight → check its power supply" in rig.reasons()
     assert not rig.autopilot.status.armed and ARM not in rig.commands()
-    assert rig.sequence.streaming  # should the autopilot fly on after all, it has setpoints
+    assert rig.sequence.streaming  # setpoints for an autopilot that continues to fly
 
 
 def test_slow_reboot_in_flight_behind_a_heartbeat_gap(rig):
@@ -256,21 +259,21 @@ def test_slow_reboot_in_flight_behind_a_heartbeat_gap(rig):
     assert ARM not in rig.commands()
 
 
-def test_messages_that_overtake_each_other_are_no_reboot(rig):
+def test_messages_out_of_order_are_no_reboot(rig):
     rig.run(5.0)
     late = round((rig.uptime - 0.5) * 1e3)
-    rig.say(mavlink2.MAVLink_attitude_quaternion_message(late, 1, 0, 0, 0, 0, 0, 0))
+    rig.send(mavlink2.MAVLink_attitude_quaternion_message(late, 1, 0, 0, 0, 0, 0, 0))
     rig.run(0.1)
     assert rig.link.reboots == 0
 
 
 def test_a_parameter_that_never_arrives_is_a_warning(rig):
-    rig.deaf = ("PARAM_REQUEST_READ",)
+    rig.lost_kinds = ("PARAM_REQUEST_READ",)
     rig.run(7.0)
-    assert "THR_MDL_FAC was not told by the autopilot in 10 requests" in rig.link.warnings
-    asked = len([m for m in rig.asked if m.get_type() == "PARAM_REQUEST_READ"])
+    assert "THR_MDL_FAC: no answer from the autopilot to 10 requests" in rig.link.warnings
+    requests = len([m for m in rig.received if m.get_type() == "PARAM_REQUEST_READ"])
     rig.run(5.0)
-    assert asked == 0 and not rig.link.mapping_told
+    assert requests == 0 and not rig.link.mapping_read
 
 
 def test_differences_and_a_short_loss_time_are_warnings():
@@ -280,14 +283,15 @@ def test_differences_and_a_short_loss_time_are_warnings():
     rig.run(1.0)
     assert rig.link.warnings == (
         "MC_ROLLRATE_P is 0.3 on the autopilot, the bridge assumes 0.15",
-        "COM_OF_LOSS_T is 0.3 s on the autopilot: a hiccup of 0.5 s should not be a failsafe",
+        "COM_OF_LOSS_T is 0.3 s on the autopilot: a gap of 0.5 s between setpoints starts its "
+        "failsafe; set a longer time",
     )
 
 
 def test_integer_parameters_are_read_by_type(rig):
     rig.run(0.1)
     value = struct.unpack("<f", struct.pack("<i", 7))[0]
-    rig.say(
+    rig.send(
         mavlink2.MAVLink_param_value_message(
             b"MC_ROLLRATE_P", value, mavlink2.MAV_PARAM_TYPE_INT32, 900, 17
         )
@@ -296,14 +300,14 @@ def test_integer_parameters_are_read_by_type(rig):
     assert rig.link.values["MC_ROLLRATE_P"] == 7
 
 
-def test_a_refused_arming_is_asked_to_be_explained(rig):
+def test_the_link_requests_the_reasons_of_a_refused_arming(rig):
     rig.vision = False
     rig.sequence.want(True)
     rig.run(3.0)
-    asked = [c for c, _ in rig.commands()]
-    assert asked.count(Command.RUN_PREARM_CHECKS) == 1 < asked.count(Command.ARM_DISARM)
+    sent = [c for c, _ in rig.commands()]
+    assert sent.count(Command.RUN_PREARM_CHECKS) == 1 < sent.count(Command.ARM_DISARM)
     summary = struct.pack("<BIIII", 0, 0, 0, 1, 1)
-    rig.say(
+    rig.send(
         EventMessage(0, 0, event_id(SUMMARY), 0, 1, 8, summary),
         EventMessage(
             0, 0, event_id("check_modes_attitude"), 0, 2, 2, struct.pack("<IB", 0xFFFFFFFF, 16)
@@ -313,10 +317,10 @@ def test_a_refused_arming_is_asked_to_be_explained(rig):
     assert "No valid attitude estimate → hold the vehicle still" in rig.reasons()
 
 
-def test_answers_to_others_are_not_ours(rig):
+def test_answers_to_other_components_are_ignored(rig):
     rig.sequence.want(True)
     rig.run(0.02)
-    rig.say(
+    rig.send(
         mavlink2.MAVLink_command_ack_message(
             Command.ARM_DISARM, Result.DENIED, 0, 0, 255, mavlink2.MAV_COMP_ID_MISSIONPLANNER
         )
@@ -325,16 +329,16 @@ def test_answers_to_others_are_not_ours(rig):
     assert "denied" not in rig.reasons() and rig.sequence.phase is Phase.FLYING
 
 
-def test_the_same_words_twice():
-    """What the link does depends on ticks and messages alone."""
+def test_the_same_messages_twice():
+    """The link depends on ticks and messages only."""
 
-    def words():
+    def messages():
         rig = Rig()
         rig.fly()
         rig.cut = True
         rig.run(1.5)
         rig.cut = False
         rig.run(1.0)
-        return [rig.codec.encode(m) for m in rig.asked]
+        return [rig.codec.encode(m) for m in rig.received]
 
-    assert words() == words()
+    assert messages() == messages()

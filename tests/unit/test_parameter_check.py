@@ -1,4 +1,4 @@
-"""Parameters of the autopilot: read by type, compared, adopted, missed."""
+"""Parameters of the autopilot: decoded by type, compared, adopted, missing."""
 
 import math
 import struct
@@ -13,13 +13,13 @@ from uam_sim_bridge.mavlink.telemetry.parameter_check import (
     differences,
     expected,
     stream_loss,
-    untold,
+    unanswered,
     value_of,
 )
 
 
-def told(value, kind, layout=None):
-    """The value as it comes out of a frame."""
+def decoded(value, kind, layout=None):
+    """Return `value` after packing and decoding of a PARAM_VALUE."""
     if layout:
         value = struct.unpack("<f", struct.pack(layout, value).ljust(4, b"\0"))[0]
     message = mavlink2.MAVLink_param_value_message(b"NAME", value, kind, 1, 0)
@@ -28,11 +28,11 @@ def told(value, kind, layout=None):
 
 
 def test_values_by_type():
-    assert told(0.15, mavlink2.MAV_PARAM_TYPE_REAL32) == pytest.approx(0.15)
+    assert decoded(0.15, mavlink2.MAV_PARAM_TYPE_REAL32) == pytest.approx(0.15)
     for value in (0, 1, 7, 21196, -3, 2**31 - 1):
-        assert told(value, mavlink2.MAV_PARAM_TYPE_INT32, "<i") == value
-    assert told(200, mavlink2.MAV_PARAM_TYPE_UINT8, "<B") == 200
-    assert told(-2, mavlink2.MAV_PARAM_TYPE_INT16, "<h") == -2
+        assert decoded(value, mavlink2.MAV_PARAM_TYPE_INT32, "<i") == value
+    assert decoded(200, mavlink2.MAV_PARAM_TYPE_UINT8, "<B") == 200
+    assert decoded(-2, mavlink2.MAV_PARAM_TYPE_INT16, "<h") == -2
 
 
 def test_the_same_values_change_nothing():
@@ -57,7 +57,7 @@ def test_adopted():
     assert list(differences(new, values)) == []
 
 
-def test_what_the_mapping_cannot_take_is_refused():
+def test_values_outside_the_range_of_the_mapping_are_refused():
     with pytest.raises(ParameterError, match="rate_p"):
         adopted(RateThrustParameters(), {"MC_ROLLRATE_P": 0.0})
     with pytest.raises(ParameterError, match="thr_mdl_fac"):
@@ -68,12 +68,13 @@ def test_loss_of_the_stream():
     assert list(stream_loss({})) == []
     assert list(stream_loss({"COM_OF_LOSS_T": 0.5})) == []
     assert list(stream_loss({"COM_OF_LOSS_T": 0.3})) == [
-        "COM_OF_LOSS_T is 0.3 s on the autopilot: a hiccup of 0.5 s should not be a failsafe"
+        "COM_OF_LOSS_T is 0.3 s on the autopilot: a gap of 0.5 s between setpoints starts its "
+        "failsafe; set a longer time"
     ]
     assert "COM_OF_LOSS_T is 0 on the autopilot" in next(stream_loss({"COM_OF_LOSS_T": 0.0}))
 
 
-def test_untold():
-    assert list(untold(["THR_MDL_FAC"], 10)) == [
-        "THR_MDL_FAC was not told by the autopilot in 10 requests"
+def test_unanswered():
+    assert list(unanswered(["THR_MDL_FAC"], 10)) == [
+        "THR_MDL_FAC: no answer from the autopilot to 10 requests"
     ]

@@ -1,4 +1,4 @@
-"""Streams are asked for one by one, counted, asked for again boundedly and complained about."""
+"""StreamCheck: one request at a time, counted rates, bounded repetition, warnings."""
 
 import pytest
 
@@ -18,8 +18,8 @@ BATTERY = mavlink2.MAVLINK_MSG_ID_BATTERY_STATUS
 
 
 def run(streams, seconds, start=0.0, rates=RATES, result=Result.ACCEPTED, answered=True):
-    """Tick at 250 Hz against an autopilot that sends at `rates`; return (time, id) asked."""
-    asked, due = [], dict.fromkeys(rates, start)
+    """Tick at 250 Hz with an autopilot that sends at `rates`; return (time, id) of the requests."""
+    requests, due = [], dict.fromkeys(rates, start)
     for k in range(round(seconds / 0.004)):
         time = start + 0.004 * k
         for number, rate in rates.items():
@@ -28,18 +28,18 @@ def run(streams, seconds, start=0.0, rates=RATES, result=Result.ACCEPTED, answer
                 streams.count(number)
         request = streams.request(time)
         if request:
-            asked.append((round(time, 3), request[0]))
+            requests.append((round(time, 3), request[0]))
             assert request[1] == pytest.approx(1e6 / RATES[request[0]])
             if answered:
                 streams.answer(result)
-    return asked
+    return requests
 
 
-def test_each_is_asked_for_once_and_nothing_is_wrong():
+def test_each_stream_is_requested_once_without_a_warning():
     streams = StreamCheck()
-    asked = run(streams, 10.0)
-    assert [number for _, number in asked] == [n for n in RATES if n not in ONLY_COUNTED]
-    assert asked[-1][0] < 0.1
+    requests = run(streams, 10.0)
+    assert [number for _, number in requests] == [n for n in RATES if n not in ONLY_COUNTED]
+    assert requests[-1][0] < 0.1
     assert streams.warnings == ()
     assert streams.rates[ODOMETRY] == pytest.approx(10.0, abs=0.5)
 
@@ -49,32 +49,32 @@ def test_the_next_request_waits_for_the_answer():
     assert times[:3] == [0.0, 0.5, 1.0]
 
 
-def test_a_slow_stream_is_asked_for_again_boundedly():
+def test_a_slow_stream_is_requested_a_bounded_number_of_times():
     streams = StreamCheck()
     slow = RATES | {ODOMETRY: 1.0}
-    asked = run(streams, 10 * WINDOW, rates=slow)
-    assert [number for _, number in asked].count(ODOMETRY) == ATTEMPTS
-    assert streams.warnings == ("ODOMETRY comes at 1.0 Hz, asked for 10 Hz",)
+    requests = run(streams, 10 * WINDOW, rates=slow)
+    assert [number for _, number in requests].count(ODOMETRY) == ATTEMPTS
+    assert streams.warnings == ("ODOMETRY received at 1.0 Hz, requested at 10 Hz",)
     run(streams, 3 * WINDOW, start=10 * WINDOW)
-    assert streams.warnings == ()  # it comes after all
+    assert streams.warnings == ()  # the rate has recovered
 
 
-def test_silence_and_a_heartbeat_that_cannot_be_asked_for():
+def test_missing_streams_and_heartbeat_without_request():
     streams = StreamCheck()
-    asked = run(streams, 3 * WINDOW, rates=RATES | {HEARTBEAT: 0.0, BATTERY: 0.0})
-    assert HEARTBEAT not in [number for _, number in asked]
-    assert "HEARTBEAT does not come, asked for 1 Hz" in streams.warnings
-    assert "BATTERY_STATUS does not come, asked for 1 Hz" in streams.warnings
+    requests = run(streams, 3 * WINDOW, rates=RATES | {HEARTBEAT: 0.0, BATTERY: 0.0})
+    assert HEARTBEAT not in [number for _, number in requests]
+    assert "HEARTBEAT not received, requested at 1 Hz" in streams.warnings
+    assert "BATTERY_STATUS not received, requested at 1 Hz" in streams.warnings
 
 
-def test_refusals_are_said():
+def test_refusals_are_warnings():
     streams = StreamCheck()
-    asked = run(streams, 5 * WINDOW, result=Result.FAILED)
-    assert len(asked) == ATTEMPTS * (len(RATES) - len(ONLY_COUNTED))
-    assert "ODOMETRY comes at 10.0 Hz, 10 Hz were refused (failed)" in streams.warnings
+    requests = run(streams, 5 * WINDOW, result=Result.FAILED)
+    assert len(requests) == ATTEMPTS * (len(RATES) - len(ONLY_COUNTED))
+    assert "ODOMETRY received at 10.0 Hz, request for 10 Hz refused (failed)" in streams.warnings
 
 
-def test_somewhat_slow_is_enough():
+def test_a_rate_above_half_of_the_desired_one_is_no_warning():
     streams = StreamCheck()
     run(
         streams,
@@ -84,14 +84,14 @@ def test_somewhat_slow_is_enough():
     assert streams.warnings == ()
 
 
-def test_restart_asks_anew():
+def test_restart_requests_all_streams_again():
     streams = StreamCheck()
     run(streams, 1.0)
     streams.restart()
     assert len(run(streams, 1.0, start=1.0)) == len(RATES) - len(ONLY_COUNTED)
 
 
-def test_an_answer_to_nobody_is_ignored():
+def test_an_answer_without_a_request_is_ignored():
     streams = StreamCheck()
     streams.answer(Result.DENIED)
     assert streams.warnings == ()

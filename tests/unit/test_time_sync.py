@@ -1,4 +1,4 @@
-"""Clock offset and round trip against a simulated autopilot with delays, losses and reboots."""
+"""Clock offset and round trip with a simulated autopilot: delays, losses, reboots."""
 
 import numpy as np
 import pytest
@@ -7,9 +7,9 @@ from uam_sim_bridge.mavlink.telemetry.time_sync import PERIOD, TimeSync, nanosec
 
 
 def run(sync, seconds, start, offset, delay, back=None, lost=0.0, seed=1):
-    """Tick at 250 Hz with an autopilot `offset` [s] ahead; delays [s]: callables or numbers.
+    """Tick at 250 Hz with an autopilot whose clock is `offset` [s] ahead; return times of jumps.
 
-    Returns the times at which a jump was said.
+    delay, back: one-way delays [s], numbers or callables; lost: fraction of requests.
     """
     noise = np.random.default_rng(seed)
     waiting, jumps = [], []
@@ -27,10 +27,10 @@ def run(sync, seconds, start, offset, delay, back=None, lost=0.0, seed=1):
     return jumps
 
 
-def test_nothing_is_known_before_an_answer():
+def test_no_estimate_before_the_first_answer():
     sync = TimeSync()
     assert sync.offset is None and sync.round_trip is None
-    assert sync.request(0.0) == 1  # 0 would be taken for an answer
+    assert sync.request(0.0) == 1  # 0 would mark an answer
     assert sync.request(PERIOD / 2) is None
     assert sync.request(PERIOD) == 200_000_000
 
@@ -42,10 +42,10 @@ def test_constant_delay():
     assert sync.round_trip == pytest.approx(0.008, abs=0.0041)
 
 
-def test_the_quickest_of_a_second_tells_a_slow_link_at_once_and_ignores_a_late_answer():
+def test_the_shortest_round_trip_shows_a_slow_link_and_ignores_one_late_answer():
     sync = TimeSync()
     run(sync, 0.7, 10.0, offset=5.0, delay=0.004)
-    assert sync.quickest is None  # too few
+    assert sync.quickest is None  # too few answers
     run(sync, 2.0, 11.0, offset=5.0, delay=0.004)
     assert sync.quickest == pytest.approx(0.008, abs=0.0041)
     run(sync, 0.15, 13.1, offset=5.0, delay=0.05)  # one answer
@@ -57,7 +57,7 @@ def test_the_quickest_of_a_second_tells_a_slow_link_at_once_and_ignores_a_late_a
 def test_random_delays_and_losses():
     sync = TimeSync()
     run(sync, 30.0, 20.0, offset=-7.0, delay=lambda n: n.exponential(0.02), back=0.002, lost=0.3)
-    # a single answer is wrong by up to half the round trip, some 50 ms here
+    # the error of one answer is at most half the round trip, about 50 ms here
     assert sync.offset == pytest.approx(-7.0, abs=0.008)
     assert 0.01 < sync.round_trip < 0.06 and sync.resets == 0
 
@@ -70,7 +70,7 @@ def test_a_reboot_resets_at_once_and_only_once():
     assert sync.resets == 1 and sync.offset == pytest.approx(-4.0, abs=0.003)
 
 
-def test_a_single_wild_answer_does_no_harm():
+def test_a_single_outlier_is_ignored():
     sync = TimeSync()
     run(sync, 2.0, 0.0, offset=1.0, delay=0.0)
     ts1 = sync.request(2.0)

@@ -210,7 +210,7 @@ class MavlinkBridgeNode(UamNode):
         """Take the autopilot's parameters over where that is wished; never while it is armed."""
         link = self.link
         wished = self._options.autopilot_parameters == "adopt"
-        if not wished or link.armed or not link.mapping_told:
+        if not wished or link.armed or not link.mapping_read:
             return
         old, changes = self.map.parameters, tuple(differences(self.map.parameters, link.values))
         if not changes or changes == self._adopted:

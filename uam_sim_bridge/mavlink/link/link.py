@@ -80,9 +80,9 @@ class OffboardLink:
         return self._parameters.warnings + self.streams.warnings
 
     @property
-    def mapping_told(self) -> bool:
-        """Whether the autopilot has told every parameter that the mapping assumes."""
-        return self._parameters.mapping_told
+    def mapping_read(self) -> bool:
+        """Return whether every parameter that the mapping assumes has been received."""
+        return self._parameters.mapping_read
 
     @property
     def bad_bytes(self) -> int:

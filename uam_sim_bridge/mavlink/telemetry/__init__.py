@@ -1,1 +1,1 @@
-"""What the autopilot reports: health, events, parameters, time."""
+"""Telemetry of the autopilot: health, battery, events, parameters, streams, time."""

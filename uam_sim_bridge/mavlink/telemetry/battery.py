@@ -1,4 +1,4 @@
-"""The battery as BATTERY_STATUS or, where that does not come, SYS_STATUS tells it."""
+"""Battery state from BATTERY_STATUS, or from SYS_STATUS until BATTERY_STATUS reports a voltage."""
 
 from __future__ import annotations
 
@@ -14,10 +14,10 @@ _NAN = math.nan
 
 @dataclass(frozen=True)
 class Battery:
-    """NaN stands for unknown.
+    """State of the battery; NaN means unknown.
 
-    voltage [V]; current [A] out of the battery; charge left 0..1; consumed [A h]; temperature
-    [deg C]; cells: voltages [V], () where only their sum is known.
+    voltage [V]; current [A], positive for discharge; left: state of charge 0..1; consumed [A h];
+    temperature [deg C]; cells: cell voltages [V], () if only their sum is measured.
     """
 
     voltage: float = _NAN
@@ -29,15 +29,15 @@ class Battery:
 
     @property
     def known(self) -> bool:
-        """Whether the autopilot measures a battery at all."""
+        """Return whether the autopilot measures a battery voltage."""
         return math.isfinite(self.voltage)
 
 
 def from_battery_status(m: Message) -> Battery:
-    """Return what BATTERY_STATUS says.
+    """Return the battery state of a BATTERY_STATUS.
 
-    PX4 puts the sum into the first cell where it does not know the cells, and carries what a field
-    cannot hold (65.534 V) over into the next.
+    Without cell voltages PX4 puts the sum into the first cell. A cell field holds at most
+    65.534 V; PX4 puts the remainder into the next field.
     """
     cells = [v for v in m.voltages if v != _UNKNOWN_VOLTAGE]
     cells += [v for v in m.voltages_ext if v not in (0, _UNKNOWN_VOLTAGE)]
@@ -53,7 +53,7 @@ def from_battery_status(m: Message) -> Battery:
 
 
 def from_sys_status(m: Message) -> Battery:
-    """Return what SYS_STATUS says."""
+    """Return the battery state of a SYS_STATUS."""
     voltage = _unless(m.voltage_battery, _UNKNOWN_VOLTAGE, 1e-3)
     return Battery(
         voltage=voltage if voltage > 0.0 else _NAN,

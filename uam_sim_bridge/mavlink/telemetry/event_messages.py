@@ -1,7 +1,7 @@
-"""EVENT and CURRENT_EVENT_SEQUENCE, which pymavlink leaves out: MAVLink marks them as unfinished.
+"""The messages EVENT and CURRENT_EVENT_SEQUENCE, added to pymavlink's dialect on import.
 
-PX4 sends them all the same, and most of its reasons for not arming come as nothing else. Importing
-this module adds them to the dialect, so that they are decoded and checked like all others.
+MAVLink marks both as work in progress, so pymavlink omits them. PX4 sends them: it reports most
+failed arming checks only as EVENT.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ ARGUMENTS = 40  # bytes
 
 
 class EventMessage(mavlink2.MAVLink_message):
-    """EVENT; `arguments`: bytes, trailing zeros cut off in one that was received."""
+    """EVENT; `arguments`: up to ARGUMENTS bytes; decoding removes trailing zeros."""
 
     id = 410
     msgname = "EVENT"
@@ -64,7 +64,7 @@ class EventMessage(mavlink2.MAVLink_message):
         self._instance_field, self._instance_offset = None, -1
         self.destination_component = destination_component
         self.destination_system = destination_system
-        self.event = id  # `id` of the object stays that of the message
+        self.event = id  # not `self.id`: that is the message id
         self.event_time_boot_ms = event_time_boot_ms
         self.sequence = sequence
         self.log_levels = log_levels

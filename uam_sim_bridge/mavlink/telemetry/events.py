@@ -1,12 +1,13 @@
-"""PX4's events as texts: what EVENT says without the metadata file that a ground station has.
+"""Converts PX4's EVENT messages to text without the metadata file of a ground station.
 
-An event is a hash of its name and up to 40 bytes of arguments. The names that matter for arming and
-for losing OFFBOARD are listed here with PX4's texts (v1.16.0). Arming checks come as one report:
+An EVENT carries a hash of the event's name and up to 40 bytes of arguments. The tables below list
+the events about arming and about loss of OFFBOARD, with PX4's texts (v1.16.0). PX4 sends the
+arming checks as one report:
 
     summary (which modes may be armed)  →  one event per failed check  →  health summary
 
-Each check names the modes that it concerns, and some concern all modes without keeping any from
-being armed; so a report speaks only where its summary says that OFFBOARD may not be armed.
+A check lists the modes that it concerns, but some checks list all modes and block none. The reader
+therefore returns checks only if the summary excludes arming in OFFBOARD.
 """
 
 from __future__ import annotations
@@ -20,8 +21,8 @@ OFFBOARD = 1 << 14  # PX4's navigation_mode_group of OFFBOARD
 _AUTOPILOT = 1 << 24  # component of the event's name
 SUMMARY, HEALTH_SUMMARY = "commander_arming_check_summary", "commander_health_summary"
 
-# arming and health checks: name → text; arguments: modes uint32, component uint8, then what
-# {0}, {1} ... stand for, as the struct format says
+# Arming and health checks: name → text, struct format of {0}, {1}, ... in the text. The arguments
+# of the event: modes uint32, component uint8, then the values of {0}, {1}, ...
 CHECKS: dict[str, tuple[str, str]] = {
     # mode requirements: events only, never a STATUSTEXT
     "check_modes_angular_velocity": ("Angular velocity not valid", ""),
@@ -78,7 +79,7 @@ CHECKS: dict[str, tuple[str, str]] = {
     "check_avionics_power_high": ("Avionics Power high: {0:.2f} Volt", "f"),
     "check_avionics_power_redundancy": ("Power redundancy not met", ""),
     "check_missing_system_power": ("System power unavailable", ""),
-    # the rest
+    # other checks
     "check_missing_cpuload": ("No CPU and RAM load information", ""),
     "check_cpuload_too_high": ("CPU load too high: {0:.1f}%", "f"),
     "check_ram_usage_too_high": ("RAM usage too high: {0:.1f}%", "f"),
@@ -104,7 +105,7 @@ CHECKS: dict[str, tuple[str, str]] = {
     "check_system_arm_auth_failed": ("Arm authorization denied", ""),
     "check_armable_configuration": ("Vehicle is in safety configuration", ""),
 }
-# concern all modes, but keep OFFBOARD from being armed only where PX4 calls them an error
+# PX4 lists all modes for these checks; they block OFFBOARD only from severity ERROR on
 _OPTIONAL = {"check_modes_manual_control", "check_rc_dl_no_dllink"}
 
 _ACTIONS = (
@@ -130,7 +131,7 @@ _CAUSES = (
     "Remaining flight time low",
 )
 
-# other events: name → text and struct format of its arguments
+# other events: name → text, struct format of the arguments
 OTHERS: dict[str, tuple[str, str]] = {
     "commander_arm_denied_resolve_failures": (
         "Arming denied: Resolve system health failures first",
@@ -161,11 +162,11 @@ OTHERS: dict[str, tuple[str, str]] = {
     "commander_rc_override": ("Pilot took over using sticks", ""),
     "failsafe_rc_override": ("Pilot took over using sticks", ""),
 }
-_TOLD_ANYWAY = {"commander_rc_override", "failsafe_rc_override"}  # PX4 calls them information
+_RAISED = {"commander_rc_override", "failsafe_rc_override"}  # severity INFO in PX4, WARNING here
 
 
 def event_id(name: str) -> int:
-    """Return the number of an event of the autopilot: the low 24 bits of FNV-1a, and component."""
+    """Return the id of an autopilot event: 24 low bits of FNV-1a(name), component in the high 8."""
     value = 0x811C9DC5
     for byte in name.encode():
         value = (value ^ byte) * 0x1000193 & 0xFFFFFFFF
@@ -176,15 +177,15 @@ _NAMES = {event_id(name): name for name in (*CHECKS, *OTHERS, SUMMARY, HEALTH_SU
 
 
 class EventReader:
-    """Turns EVENT messages into texts; holds what a report of the arming checks has said so far."""
+    """Converts EVENT messages to text; stores whether the last summary excludes OFFBOARD."""
 
     def __init__(self) -> None:
         self._blocked = False
         self._last: int | None = None
 
     def read(self, message: EventMessage) -> tuple[int, str] | None:
-        """Return severity and text; None where the event says nothing that matters here."""
-        if message.sequence == self._last:  # sent again
+        """Return severity (MAV_SEVERITY) and text; None for events without a text here."""
+        if message.sequence == self._last:  # repeated event
             return None
         self._last = message.sequence
         name = _NAMES.get(message.event, "")
@@ -197,11 +198,11 @@ class EventReader:
             return self._check(name, severity, arguments)
         elif name in OTHERS:
             text, layout = OTHERS[name]
-            if name in _TOLD_ANYWAY:
+            if name in _RAISED:
                 severity = min(severity, Severity.WARNING)
             return severity, _failsafe_text(text, struct.unpack_from("<" + layout, arguments))
         elif severity <= Severity.ERROR:
-            return severity, f"event {message.event:#010x}, not in our table: see PX4's log"
+            return severity, f"event {message.event:#010x} has no text here: see PX4's log"
         return None
 
     def _check(self, name: str, severity: int, arguments: bytes) -> tuple[int, str] | None:
@@ -211,7 +212,7 @@ class EventReader:
             return None
         if name in _OPTIONAL and severity > Severity.ERROR:
             return None
-        # what keeps it from being armed is told, even where PX4 calls it information
+        # blocks arming: at least WARNING, also where PX4 sends INFO
         return min(severity, Severity.WARNING), text.format(*values)
 
 

@@ -1,7 +1,8 @@
-"""What the autopilot says of its estimate and of itself: flags of ESTIMATOR_STATUS and SYS_STATUS.
+"""Health of the autopilot: the flags of ESTIMATOR_STATUS and SYS_STATUS as names and faults.
 
-PX4's EKF2 sets `attitude`, the velocities and positions once it has them; `const_pos_mode` when it
-knows of no aiding and pretends to stand still; `accel_error` when vibration spoils the height.
+PX4's EKF2 sets `attitude`, velocity and position flags when these estimates are valid. It sets
+`const_pos_mode` without an aiding source (it then assumes zero velocity), and `accel_error` when
+vibration degrades the height estimate.
 """
 
 from __future__ import annotations
@@ -34,7 +35,7 @@ def names(flags: int, table: dict[int, str]) -> tuple[str, ...]:
 
 
 def estimate_faults(flags: int) -> tuple[str, ...]:
-    """Return what is wrong with the estimate, in words; empty when attitude and position are good.
+    """Return one text per fault of the estimate; () if attitude and position are valid.
 
     flags: ESTIMATOR_STATUS.flags.
     """
@@ -51,5 +52,5 @@ def estimate_faults(flags: int) -> tuple[str, ...]:
 
 
 def unhealthy(present: int, enabled: int, health: int) -> tuple[str, ...]:
-    """Return the names of sensors that are there and enabled, but not healthy (SYS_STATUS)."""
+    """Return the names of the present, enabled and unhealthy sensors (bit masks of SYS_STATUS)."""
     return names(present & enabled & ~health, SENSORS)

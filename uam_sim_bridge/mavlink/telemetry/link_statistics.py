@@ -1,14 +1,14 @@
-"""How well the link carries: messages per second, and those lost, by gaps in sequence numbers."""
+"""Link statistics: received messages per second; lost messages from gaps in sequence numbers."""
 
 from __future__ import annotations
 
 import math
 
-PERIOD = 1.0  # s over which the rate is taken
+PERIOD = 1.0  # s, window of the rate
 
 
 class LinkStatistics:
-    """Counts what arrives. `rate` [1/s] over the last second; `received`: all so far."""
+    """Counts received messages. `rate` [1/s]: over the last second; `received`: in total."""
 
     def __init__(self) -> None:
         self.rate = 0.0
@@ -18,25 +18,25 @@ class LinkStatistics:
         self._at, self._before = -math.inf, 0
 
     def count(self, component: int, sequence: int) -> None:
-        """Note a message of one component of the autopilot's system."""
+        """Count a message of one component of the autopilot's system."""
         self.received += 1
         last = self._sequences.get(component)
         self._sequences[component] = sequence
         if last is not None:
             gap = (sequence - last - 1) % 256
-            if gap < 128:  # a larger one is a message that was overtaken
+            if gap < 128:  # larger: messages arrived out of order
                 self._gaps += gap
 
     def lost(self, unread: int) -> int:
-        """Return the messages lost; `unread`: those that came but were not counted here."""
+        """Return the number of lost messages; unread: messages received but not counted here."""
         return max(0, self._gaps - unread)
 
     def restart(self) -> None:
-        """The autopilot counts anew: what its numbers jump by is no loss."""
+        """Accept any next sequence number: after a reboot a jump is no loss."""
         self._sequences.clear()
 
     def tick(self, time: float) -> None:
-        """Take the rate at the tick `time` [s]."""
+        """Update `rate` at the tick `time` [s]."""
         since = time - self._at
         if since < PERIOD:
             return

@@ -1,4 +1,4 @@
-"""Asks for the autopilot's parameters until they are known, and compares them with the mapping."""
+"""Requests the autopilot's parameters until all have arrived; compares them with the mapping."""
 
 from __future__ import annotations
 
@@ -11,15 +11,15 @@ from uam_sim_bridge.mavlink.telemetry.parameter_check import (
     differences,
     expected,
     stream_loss,
-    untold,
+    unanswered,
     value_of,
 )
 
-RETRY, ATTEMPTS = 0.5, 10  # s, times
+RETRY, ATTEMPTS = 0.5, 10  # s between requests, number of requests
 
 
 class ParameterWatch:
-    """`values`: by name, the autopilot's parameters that are WATCHED; `warnings`: one line each."""
+    """`values`: received parameters (of WATCHED) by name; `warnings`: one line per problem."""
 
     def __init__(self, mapping: RateThrustParameters) -> None:
         self.values: dict[str, float] = {}
@@ -28,38 +28,41 @@ class ParameterWatch:
         self.restart()
 
     def restart(self) -> None:
-        """Ask for all of them anew."""
+        """Discard all values and request them again."""
         self.values.clear()
-        self._asked, self._attempts = -math.inf, 0
+        self._requested, self._attempts = -math.inf, 0
         self._compare()
 
     def set_mapping(self, mapping: RateThrustParameters) -> None:
-        """Compare with another mapping from now on."""
+        """Compare with this mapping from now on."""
         self._mapping = mapping
         self._compare()
 
     @property
-    def mapping_told(self) -> bool:
-        """Whether the autopilot has told every parameter that the mapping assumes."""
+    def mapping_read(self) -> bool:
+        """Return whether every parameter that the mapping assumes has been received."""
         return all(name in self.values for name in expected(self._mapping))
 
     def take(self, message: Message) -> None:
-        """Note a PARAM_VALUE; of those that are not WATCHED there may be any number."""
+        """Store the value of a PARAM_VALUE; parameters outside WATCHED are ignored."""
         name = clean_text(message.param_id)
         if name in WATCHED:
             self.values[name] = value_of(message)
             self._compare()
 
     def due(self, time: float) -> list[str]:
-        """Names to ask for at the tick `time` [s]; after ATTEMPTS times none, and a warning."""
-        if time - self._asked < RETRY or self._attempts > ATTEMPTS:
+        """Return the names to request at the tick `time` [s].
+
+        After ATTEMPTS requests the list is empty and `warnings` names the missing parameters.
+        """
+        if time - self._requested < RETRY or self._attempts > ATTEMPTS:
             return []
         missing = self._missing
         if not missing:
             return []
-        self._asked = time
+        self._requested = time
         self._attempts += 1
-        if self._attempts > ATTEMPTS:  # the last answers have had their time
+        if self._attempts > ATTEMPTS:  # RETRY has passed since the last request
             self._compare()
             return []
         return missing
@@ -72,5 +75,5 @@ class ParameterWatch:
         self.warnings = (
             *differences(self._mapping, self.values),
             *stream_loss(self.values),
-            *untold(self._missing if self._attempts > ATTEMPTS else [], ATTEMPTS),
+            *unanswered(self._missing if self._attempts > ATTEMPTS else [], ATTEMPTS),
         )

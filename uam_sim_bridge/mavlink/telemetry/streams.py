@@ -1,7 +1,8 @@
-"""The messages that the bridge wants regularly: asked for one by one, then counted.
+"""The telemetry streams of the bridge: requests each rate, then counts the messages.
 
-COMMAND_ACK does not say which SET_MESSAGE_INTERVAL it answers, so the next one waits for the answer
-to the last. PX4 refuses to change HEARTBEAT, which therefore is only counted.
+COMMAND_ACK does not name the message of the SET_MESSAGE_INTERVAL that it answers, so each request
+waits for the answer to the previous one. PX4 refuses to change the rate of HEARTBEAT; HEARTBEAT is
+therefore only counted.
 """
 
 from __future__ import annotations
@@ -11,7 +12,7 @@ import math
 from uam_sim_bridge.mavlink.protocol.modes import Result, result_word
 from uam_sim_bridge.mavlink.protocol.wire import mavlink2
 
-# message id → wanted rate [Hz]
+# message id → desired rate [Hz]
 RATES: dict[int, float] = {
     mavlink2.MAVLINK_MSG_ID_HEARTBEAT: 1.0,
     mavlink2.MAVLINK_MSG_ID_EXTENDED_SYS_STATE: 5.0,
@@ -22,23 +23,24 @@ RATES: dict[int, float] = {
     mavlink2.MAVLINK_MSG_ID_ESTIMATOR_STATUS: 2.0,
 }
 ONLY_COUNTED = (mavlink2.MAVLINK_MSG_ID_HEARTBEAT,)
-ENOUGH = 0.5  # of the wanted rate
-WINDOW = 4.0  # s over which is counted
-ANSWER_TIMEOUT = 0.5  # s after which the next request goes out without an answer
+ENOUGH = 0.5  # fraction of the desired rate, below which a stream is too slow
+WINDOW = 4.0  # s, counting window
+ANSWER_TIMEOUT = 0.5  # s, then the next request is sent without an answer
 ATTEMPTS = 3  # requests for one stream
 
 
 class StreamCheck:
-    """What to ask for, and what does not come. `rates`: message id → rate [Hz] of the last window.
+    """Requests the streams and checks their rates.
 
-    `warnings`: one line per stream that is too slow or was refused.
+    `rates`: message id → rate [Hz] over the last window; `warnings`: one line per stream that is
+    too slow or was refused.
     """
 
     def __init__(self) -> None:
         self.restart()
 
     def restart(self) -> None:
-        """Ask for everything anew: the autopilot is new, or has rebooted."""
+        """Request all streams again, for a new or rebooted autopilot."""
         self.warnings: tuple[str, ...] = ()
         self.rates: dict[int, float] = {}
         self._queue = [number for number in RATES if number not in ONLY_COUNTED]
@@ -46,16 +48,16 @@ class StreamCheck:
         self._refused: dict[int, str] = {}
         self._counts = dict.fromkeys(RATES, 0)
         self._pending: int | None = None
-        self._asked_at = -math.inf
-        self._window: float | None = None  # start of the window, None while still asking
+        self._requested_at = -math.inf
+        self._window: float | None = None  # s, start of the window; None during requests
 
     def count(self, number: int) -> None:
-        """Note that a message has arrived."""
+        """Count a received message of this id."""
         if number in self._counts:
             self._counts[number] += 1
 
     def answer(self, result: int) -> None:
-        """Take the result of the last request."""
+        """Store the result (MAV_RESULT) of the last request."""
         number, self._pending = self._pending, None
         if number is None:
             return
@@ -65,8 +67,8 @@ class StreamCheck:
             self._refused[number] = result_word(result)
 
     def request(self, time: float) -> tuple[int, float] | None:
-        """Return message id and interval [us] to ask for at `time` [s], None for nothing now."""
-        if self._pending is not None and time - self._asked_at < ANSWER_TIMEOUT:
+        """Return message id and interval [us] of the request due at `time` [s]; None if none is."""
+        if self._pending is not None and time - self._requested_at < ANSWER_TIMEOUT:
             return None
         self._pending = None
         if not self._queue:
@@ -74,7 +76,7 @@ class StreamCheck:
             return None
         number = self._queue.pop(0)
         self._attempts[number] += 1
-        self._pending, self._asked_at = number, time
+        self._pending, self._requested_at = number, time
         return number, 1e6 / RATES[number]
 
     def _judge(self, time: float) -> None:
@@ -106,12 +108,12 @@ class StreamCheck:
 
     def _words(self, number: int) -> str:
         name = mavlink2.mavlink_map[number].msgname
-        rate, wanted = self.rates[number], RATES[number]
-        came = f"comes at {rate:.1f} Hz" if rate > 0.0 else "does not come"
+        rate, desired = self.rates[number], RATES[number]
+        received = f"received at {rate:.1f} Hz" if rate > 0.0 else "not received"
         refused = self._refused.get(number)
-        asked = (
-            f"asked for {wanted:g} Hz"
+        request = (
+            f"requested at {desired:g} Hz"
             if refused is None
-            else (f"{wanted:g} Hz were refused ({refused})")
+            else f"request for {desired:g} Hz refused ({refused})"
         )
-        return f"{name} {came}, {asked}"
+        return f"{name} {received}, {request}"

@@ -1,8 +1,9 @@
-"""How far the autopilot's clock is from ours, and how long a question takes: TIMESYNC, our side.
+"""Clock offset and round trip of the autopilot from TIMESYNC, the companion's side.
 
-A request carries our time, the answer repeats it and adds the autopilot's. Half-way between the two
-is when the autopilot read its clock, give or take half the round trip: quick answers count more.
-Times are those of the control ticks, so a round trip is seen in steps of a tick.
+A request carries the companion's time; the answer repeats it and adds the autopilot's time. The
+autopilot is assumed to read its clock at the middle of the round trip, so the error is at most half
+of it: short round trips get a higher weight. All times are tick times, which gives round trips a
+resolution of one tick.
 """
 
 from __future__ import annotations
@@ -11,30 +12,30 @@ import math
 from collections import deque
 
 PERIOD = 0.2  # s between two requests
-JUMP = 0.1  # s beyond what the round trip explains: another clock, not another delay
-JUMPS_TO_RESET = 2  # in a row: one may be a damaged answer
-_OUTSTANDING = 16  # requests whose answers are still accepted
-_RECENT = 25  # answers over which the quickest is looked for
-_SLOWEST_GAIN = 0.05
-_SHORTEST = 1e-3  # s: what counts as no round trip at all
-_NEWEST = 5  # answers, those of a second
+JUMP = 0.1  # s of offset error beyond half the round trip: the autopilot's clock has jumped
+JUMPS_TO_RESET = 2  # in a row: a single one may be a damaged answer
+_OUTSTANDING = 16  # newest requests whose answers are accepted
+_RECENT = 25  # answers, window of the shortest round trip for the weights
+_SLOWEST_GAIN = 0.05  # lowest gain of the averages
+_SHORTEST = 1e-3  # s, lower bound of a round trip in the weights
+_NEWEST = 5  # answers of one second
 
 
 class TimeSync:
-    """Requests to send and the estimate from their answers.
+    """Creates the TIMESYNC requests and estimates the offset from the answers.
 
-    `offset` [s] or None: autopilot's clock − ours; `round_trip` [s] or None: smoothed; `resets`:
-    how often the autopilot's clock jumped.
+    `offset` [s] or None: autopilot's clock − companion's clock; `round_trip` [s] or None:
+    smoothed; `resets`: number of jumps of the autopilot's clock.
     """
 
     def __init__(self) -> None:
         self.resets = 0
-        self._asked: deque[int] = deque(maxlen=_OUTSTANDING)
+        self._requested: deque[int] = deque(maxlen=_OUTSTANDING)
         self._last = -math.inf
         self.restart()
 
     def restart(self) -> None:
-        """Forget the estimate, for a new autopilot or one that has rebooted."""
+        """Discard the estimate, for a new or rebooted autopilot."""
         self.offset: float | None = None
         self.round_trip: float | None = None
         self._count = self._jumps = 0
@@ -42,32 +43,33 @@ class TimeSync:
 
     @property
     def quickest(self) -> float | None:
-        """Round trip [s] of the quickest answer of the last second; None before there are enough.
+        """Return the shortest round trip [s] of the last _NEWEST answers; None with fewer answers.
 
-        A single late answer does not count, a slow link does at once.
+        The minimum ignores a single late answer but shows a slow link within a second.
         """
         newest = list(self._recent)[-_NEWEST:]
         return min(newest) if len(newest) == _NEWEST else None
 
     def request(self, time: float) -> int | None:
-        """Return the ts1 [ns] of the request due at `time` [s], None where none is due."""
+        """Return ts1 [ns] of the request due at `time` [s]; None if none is due."""
         if time - self._last < PERIOD - 1e-9:
             return None
         self._last = time
         ts1 = nanoseconds(time)
-        self._asked.append(ts1)
+        self._requested.append(ts1)
         return ts1
 
     def answer(self, time: float, tc1: int, ts1: int) -> bool:
-        """Take an answer arriving at `time` [s]; True where the autopilot's clock has jumped.
+        """Process an answer received at `time` [s]; True if the autopilot's clock has jumped.
 
-        tc1: the autopilot's time [ns]; ts1: that of our request, others are ignored.
+        tc1: autopilot's time [ns]; ts1: time of the request [ns]. Answers to other requests are
+        ignored.
         """
-        if ts1 not in self._asked:
+        if ts1 not in self._requested:
             return False
-        self._asked.remove(ts1)
+        self._requested.remove(ts1)
         round_trip = time - ts1 * 1e-9
-        if round_trip < 0.0:  # our own clock went back: a new flight of the simulator
+        if round_trip < 0.0:  # the companion's clock went back: a new simulation
             self.restart()
             return False
         offset = tc1 * 1e-9 - (ts1 * 1e-9 + time) / 2.0
@@ -91,11 +93,11 @@ class TimeSync:
             self.offset, self.round_trip = offset, round_trip
             return
         self.round_trip += gain * (round_trip - self.round_trip)
-        # the error of an offset is up to half its round trip: weigh by the square of its quickness
-        quickness = min(self._recent) / self._recent[-1]
-        self.offset += gain * quickness**2 * (offset - self.offset)
+        # the offset error is at most half the round trip: weight by the inverse square
+        weight = (min(self._recent) / self._recent[-1]) ** 2
+        self.offset += gain * weight * (offset - self.offset)
 
 
 def nanoseconds(time: float) -> int:
-    """Return `time` [s] as TIMESYNC carries it; 0 would say "a request", hence at least 1."""
+    """Return `time` [s] in TIMESYNC's unit [ns], at least 1: tc1 = 0 marks a request."""
     return max(1, round(time * 1e9))

@@ -1,4 +1,4 @@
-"""What the autopilot says of its battery, estimate, sensors and processor."""
+"""Newest battery, estimator, sensor and processor state that the autopilot has reported."""
 
 from __future__ import annotations
 
@@ -11,15 +11,19 @@ from uam_sim_bridge.mavlink.telemetry.health import unhealthy
 
 @dataclass
 class Vitals:
-    """Its latest word, None before the first; `load` of the processor: 0..1."""
+    """Newest values; None before the first message.
+
+    estimator_flags: ESTIMATOR_STATUS.flags; unhealthy: names of sensors; load: of the processor,
+    0..1.
+    """
 
     battery: Battery | None = None
     estimator_flags: int | None = None
-    unhealthy: tuple[str, ...] = ()  # sensors
+    unhealthy: tuple[str, ...] = ()
     load: float | None = None
 
     def take(self, kind: str, m: Message) -> None:
-        """Note BATTERY_STATUS, SYS_STATUS, ESTIMATOR_STATUS; others say nothing here."""
+        """Store BATTERY_STATUS, SYS_STATUS or ESTIMATOR_STATUS; other messages are ignored."""
         if kind == "BATTERY_STATUS" and m.id == 0:
             self.battery = from_battery_status(m)
         elif kind == "SYS_STATUS":
