@@ -1,4 +1,4 @@
-"""The MAVLink connection loses, delays and spoils what it is told to, and nothing else."""
+"""FaultyTransport loses, delays and corrupts packets as scheduled, and changes no others."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ HEARTBEAT = mavlink2.MAVLink_heartbeat_message(2, 3, 0, 0, 0, 3)
 
 
 class Line:
-    """A good transport."""
+    """A transport without faults."""
 
     stream, bytes_per_second, connected, dropped = False, None, True, 0
 
@@ -49,18 +49,18 @@ def faulty(*texts):
 
 def test_a_cut_lasts_from_its_beginning_to_its_end():
     line, transport = faulty("mavlink_cut@1+2")
-    told = []
+    changes = []
     for second in range(5):
-        told += [(c.active, second) for c in transport.update(10.0 + second)]
+        changes += [(c.active, second) for c in transport.update(10.0 + second)]
         assert transport.send(b"%d" % second)
         line.arriving.append(b"%d" % second)
         arrived = transport.receive()
         assert arrived == ([] if second in (1, 2) else [b"%d" % second])
     assert line.sent == [b"0", b"3", b"4"]
-    assert told == [(True, 1), (False, 3)]
+    assert changes == [(True, 1), (False, 3)]
 
 
-def test_a_direction_is_left_alone():
+def test_a_fault_of_one_direction_leaves_the_other_unchanged():
     for direction, sent, arrived in (("to_autopilot", [], [b"x"]), ("from_autopilot", [b"y"], [])):
         line, transport = faulty(f"mavlink_cut@0:direction={direction}")
         transport.update(10.0)
@@ -70,7 +70,7 @@ def test_a_direction_is_left_alone():
 
 
 @given(st.lists(st.floats(0.0, 0.3), min_size=1, max_size=30))
-def test_what_is_delayed_comes_later_in_order_and_complete(steps):
+def test_delayed_packets_arrive_later_in_order_and_complete(steps):
     line, transport = faulty("mavlink_delay@0+1:delay=0.1")
     now, begun, arrived = 10.0, [], []
     for step in [*steps, 1.0]:
@@ -85,21 +85,21 @@ def test_what_is_delayed_comes_later_in_order_and_complete(steps):
         assert end - start >= (0.1 - 1e-6 if start < 11.0 - 1e-6 else 0.0)
 
 
-def test_a_spoiled_packet_is_another_and_is_not_used():
+def test_a_corrupted_packet_is_another_and_is_not_used():
     line, transport = faulty("mavlink_corruption@0:share=0.5")
     transport.update(10.0)
     codec = Codec(1, 191)
     frame = codec.encode(HEARTBEAT)
     for _ in range(200):
         transport.send(frame)
-    spoiled = [data for data in line.sent if data != frame]
-    assert len(line.sent) == 200 and 60 < len(spoiled) < 140
-    assert all(len(data) == len(frame) for data in spoiled)
+    corrupted = [data for data in line.sent if data != frame]
+    assert len(line.sent) == 200 and 60 < len(corrupted) < 140
+    assert all(len(data) == len(frame) for data in corrupted)
     framer = Framer(Codec(1, 191))
-    assert sum(len(framer.datagram(data)) for data in spoiled) == 0
+    assert sum(len(framer.datagram(data)) for data in corrupted) == 0
 
 
-def test_what_is_not_a_fault_is_passed_on():
+def test_other_members_are_those_of_the_wrapped_transport():
     line, transport = faulty("mavlink_cut@1")
     assert (transport.stream, transport.connected, transport.fileno()) == (False, True, 7)
     transport.close()

@@ -1,4 +1,4 @@
-"""The ground station beside the bridge: what passes, in which bounds, and whose word it is."""
+"""Forwarding for a ground station: passing messages, limits, separation from the link."""
 
 import random
 import socket
@@ -22,7 +22,7 @@ SPEED = 92160.0  # bytes/s
 
 
 class Line:
-    """An autopilot's transport by hand."""
+    """The autopilot's transport; the test sets the received bytes."""
 
     stream, connected, dropped = True, True, 0
 
@@ -46,7 +46,7 @@ class Line:
 
 
 class Rig:
-    """A station's socket, the forwarder and the line; `now` is wall time by hand."""
+    """A station's socket, the forwarder and the line; `now`: wall time [s] set by the test."""
 
     def __init__(self, bytes_per_second=None, signing=None):
         self.socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
@@ -65,12 +65,12 @@ class Rig:
         _, self.place = self.socket.recvfrom(100)
         self.codec = Codec(255, 190)
 
-    def say(self, *messages):
+    def send(self, *messages):
         for message in messages:
             self.socket.sendto(self.codec.encode(message), self.place)
 
     def forward_all(self, count):
-        """Forward until `count` messages have been decided upon."""
+        """Forward until `count` messages were forwarded or held back."""
         end = time.monotonic() + PATIENCE
         while self.gcs.forwarded + self.gcs.held_back < count:
             assert time.monotonic() < end
@@ -99,7 +99,7 @@ def heartbeat():
     return mavlink2.MAVLink_heartbeat_message(2, 12, 0x81, 6 << 16, 4, 3)
 
 
-def test_the_station_gets_the_bytes_as_they_came(make):
+def test_the_station_receives_the_bytes_unchanged(make):
     rig = make()
     chunks = [b"\xfd\x01garbage", Codec(1, 1).encode(heartbeat())[:7], bytes(range(200))]
     rig.line.arriving = list(chunks)
@@ -118,7 +118,7 @@ def test_long_chunks_reach_the_station_in_pieces(make):
     assert got == chunk
 
 
-def test_whole_valid_messages_reach_the_autopilot_as_they_are(make):
+def test_whole_valid_messages_reach_the_autopilot_unchanged(make):
     rig = make()
     frame = rig.codec.encode(arm())
     for data in (b"garbage\xfd\xfe" + frame, frame[:20], frame[20:], frame[:-1] + b"\x00" + frame):
@@ -127,10 +127,10 @@ def test_whole_valid_messages_reach_the_autopilot_as_they_are(make):
     assert rig.line.sent == [frame, frame]
 
 
-def test_a_flood_costs_a_tick_a_bounded_number_of_bytes(make):
+def test_the_bytes_forwarded_per_tick_are_bounded(make):
     rig = make()
     size = len(rig.codec.encode(arm()))
-    rig.say(*[arm()] * 200)
+    rig.send(*[arm()] * 200)
     before = 0
     end = time.monotonic() + PATIENCE
     while rig.gcs.forwarded < 200:
@@ -141,24 +141,24 @@ def test_a_flood_costs_a_tick_a_bounded_number_of_bytes(make):
     assert len(rig.line.sent) == 200
 
 
-def test_garbage_without_end_is_bounded_as_well(make):
+def test_invalid_bytes_do_not_block_later_messages(make):
     rig = make()
     noise = random.Random(4)
     for _ in range(100):
         rig.socket.sendto(noise.randbytes(1400), rig.place)
     for _ in range(200):
         rig.gcs.forward()
-    rig.say(arm())
+    rig.send(arm())
     rig.forward_all(1)
     assert len(rig.line.sent) == 1
 
 
-def test_on_a_slow_line_the_station_has_its_share_and_no_more(make):
+def test_on_a_slow_line_the_station_gets_its_share_and_no_more(make):
     rig = make(SPEED)
     ticks = 500
     for k in range(ticks):
         rig.now = 0.004 * k
-        rig.say(*[arm()] * 10)
+        rig.send(*[arm()] * 10)
         rig.gcs.forward()
     rig.forward_all(10 * ticks)
     size = len(rig.line.sent[0])
@@ -167,10 +167,10 @@ def test_on_a_slow_line_the_station_has_its_share_and_no_more(make):
     assert rig.gcs.held_back > 0
 
 
-def test_with_signing_only_a_station_with_the_key_may_speak(make):
+def test_with_signing_only_messages_with_the_key_pass(make):
     signing = Signing(bytes(range(32)))
     rig = make(signing=signing)
-    rig.say(arm())
+    rig.send(arm())
     signed = Codec(255, 190, signing).encode(arm())
     for frame in (signed, signed):  # the second is a replay
         rig.socket.sendto(frame, rig.place)
@@ -179,16 +179,16 @@ def test_with_signing_only_a_station_with_the_key_may_speak(make):
     assert rig.line.sent == [signed]
 
 
-def test_nothing_a_station_says_counts_as_the_autopilots_word(make):
+def test_the_link_does_not_receive_the_stations_messages(make):
     rig = make()
     sequence = OffboardSequence()
     link = OffboardLink(rig.gcs, sequence, RateThrustParameters())
-    rig.codec = Codec(1, 1)  # it pretends
-    rig.say(heartbeat(), mavlink2.MAVLink_statustext_message(2, b"down with it"))
+    rig.codec = Codec(1, 1)  # the station uses the autopilot's ids
+    rig.send(heartbeat(), mavlink2.MAVLink_statustext_message(2, b"critical"))
     rig.forward_all(2)
     link.poll(1.0)
     assert not link.connected(1.0) and link.mode is Mode.UNKNOWN and sequence.reasons == ()
-    # the autopilot's answer to the station is not one to us
+    # the link ignores the autopilot's answer to the station
     ack = mavlink2.MAVLink_command_ack_message(400, 0, 0, 0, 255, 190)
     link._asked[400] = Request.ARM
     rig.line.arriving = [Codec(1, 1).encode(ack)]

@@ -1,4 +1,4 @@
-"""What waits for a slow line, and how many sensor messages it is given."""
+"""Send queue of a slow line, pacing, and thinning of HIL_SENSOR."""
 
 import pytest
 
@@ -9,7 +9,7 @@ from uam_sim_bridge.mavlink.transport.pacing import BURST, Meter, Pacer
 
 
 class Line:
-    """A transport that takes `room` frames."""
+    """A transport that accepts `room` frames."""
 
     stream = True
 
@@ -50,7 +50,7 @@ def test_the_newest_urgent_frames_are_kept():
     assert len(line.sent) == URGENT_KEPT + OTHERS_KEPT and box.wait is None
 
 
-def test_no_more_goes_out_than_the_line_carries_so_that_urgent_frames_need_not_queue():
+def test_pacing_limits_the_rate_and_the_delay_of_urgent_frames():
     line = Line(bytes_per_second=10_000.0)
     box = Outbox(line)
     delays, seconds = [], 4.0
@@ -63,10 +63,12 @@ def test_no_more_goes_out_than_the_line_carries_so_that_urgent_frames_need_not_q
         box.flush(time)
         delays += [time - 0.001 * int(s) for s in line.sent[seen:] if len(s) == 4]
     assert 0.9 * seconds <= sum(map(len, line.sent)) / 1e4 <= seconds + BURST + 0.01
-    assert len(delays) >= 995 and max(delays) < 0.0125  # one other frame, and those before it
+    assert (
+        len(delays) >= 995 and max(delays) < 0.0125
+    )  # at most one other frame and the burst before it
 
 
-def test_a_lost_line_forgets_what_waits():
+def test_a_lost_line_drops_queued_frames():
     line = Line(room=0)
     box = Outbox(line)
     box.put("HIL_SENSOR", b"old")
@@ -77,7 +79,7 @@ def test_a_lost_line_forgets_what_waits():
     assert line.sent == [] and box.dropped == 1
 
 
-def test_pacer_without_a_rate_lets_everything_go():
+def test_pacer_without_a_rate_has_no_limit():
     pacer = Pacer(None)
     pacer.sent(10**9)
     assert pacer.may_send(0.0) and pacer.wait == 0.0
@@ -105,7 +107,7 @@ def test_thinning_keeps_the_rate_and_loses_no_slow_sensor(rate, passed):
     assert all(m.fields_updated & 0x3F == 0x3F for m in taken)
 
 
-def test_thinning_starts_anew_with_the_simulator():
+def test_thinning_restarts_with_the_simulator():
     thinner = Thinner(100.0)
     assert thinner.take(sensor(10_000, 1)) and thinner.take(sensor(0, 1))
 

@@ -1,4 +1,4 @@
-"""Links by URL, over real sockets and pseudo-terminals; waiting is for conditions, not times."""
+"""Links by URL, over real sockets and pseudo-terminals; tests wait for conditions, not times."""
 
 import os
 import socket
@@ -13,7 +13,7 @@ from uam_sim_bridge.mavlink.transport.tcp_transport import TcpTransport
 from uam_sim_bridge.mavlink.transport.transport import UdpTransport, open_transport
 from uam_sim_bridge.ports import PortError
 
-PATIENCE = 30.0  # s, only spent by a test that fails
+PATIENCE = 30.0  # s, time limit of a wait
 
 
 def until(condition, what):
@@ -33,7 +33,7 @@ def udp(port=0):
 
 @pytest.fixture
 def opened():
-    """Things to be closed at the end."""
+    """List of objects that are closed after the test."""
     things = []
     yield things
     for thing in things:
@@ -75,7 +75,7 @@ def test_a_bad_url_is_refused_with_what_is_allowed(url, why):
         ("tcp:" + "x" * 70 + ":14550", "host xxx"),
     ],
 )
-def test_what_cannot_be_opened_is_said_in_one_line(url, why):
+def test_a_link_that_cannot_be_opened_is_a_one_line_error(url, why):
     with pytest.raises(PortError) as error:
         open_transport(url)
     assert why in str(error.value) and "\n" not in str(error.value)
@@ -102,11 +102,11 @@ def test_udp_local_port_can_be_chosen(opened):
         open_transport(f"udp:127.0.0.1:9:{port}")
 
 
-def test_udp_is_open_to_the_network_only_for_a_peer_out_there(opened):
+def test_udp_is_open_to_the_network_only_for_a_remote_peer(opened):
     opened += [near := UdpTransport(0, ("localhost", 9)), far := UdpTransport(0, ("192.0.2.1", 9))]
     assert near._socket.getsockname()[0] == "127.0.0.1"
     assert far._socket.getsockname()[0] == "0.0.0.0"
-    far.send(b"x")  # to nowhere: lost or dropped, no error
+    far.send(b"x")  # no receiver: lost or dropped, no error
 
 
 def test_udp_reads_a_flood_in_bounded_pieces(opened):
@@ -127,7 +127,7 @@ def test_udp_reads_a_flood_in_bounded_pieces(opened):
 
 
 class Clock:
-    """Wall time by hand."""
+    """Wall time [s], set by the test."""
 
     def __init__(self):
         self.now = 0.0
@@ -159,8 +159,8 @@ def test_tcp_connects_again_after_a_loss_with_growing_intervals(opened):
     assert link.losses == 1 and link.fileno() == -1 and not link.send(b"lost")
     tried, attempt = [], link._open
     link._open = lambda now: (tried.append(now), attempt(now))[1]
-    for k in range(2560):  # 40 s by hand; a refusal on loopback comes at once
-        clock.now = k / 64  # no rounding
+    for k in range(2560):  # 40 s; loopback refuses a connection at once
+        clock.now = k / 64  # exact in binary
         link.receive()
     starts = [t for k, t in enumerate(tried) if not k or t - tried[k - 1] > 0.05]
     gaps = [b - a for a, b in zip(starts, starts[1:], strict=False)]
@@ -187,7 +187,7 @@ def sample(k):
     return mavlink2.MAVLink_statustext_message(6, (b"%05d" % k).ljust(50, b"x"))
 
 
-def test_tcp_that_is_full_drops_whole_frames(opened):
+def test_a_full_tcp_link_drops_whole_frames(opened):
     server = listener()
     link = TcpTransport(("127.0.0.1", server.getsockname()[1]))
     opened += [server, link]
@@ -209,7 +209,7 @@ def test_tcp_that_is_full_drops_whole_frames(opened):
         try:
             found.extend(framer.stream(peer.recv(65536)))
         except BlockingIOError:
-            link.receive()  # sends the rest of the frame that went in part
+            link.receive()  # sends the rest of the partly written frame
         return len(found) == len(sent)
 
     until(drained, "what was sent")
@@ -234,7 +234,7 @@ def line(opened, tmp_path):
 def test_serial_carries_frames_in_chunks(line):
     far, link, _, _ = line
     assert link.stream and link.bytes_per_second == 92160.0
-    assert link.receive() == [] and link.connected  # quiet is not lost
+    assert link.receive() == [] and link.connected  # an idle line is not lost
     codec = Codec(1, 1)
     frames = b"".join(codec.encode(sample(k)) for k in range(20))
     framer, found = Framer(Codec(2, 2)), []
@@ -251,13 +251,13 @@ def test_serial_carries_frames_in_chunks(line):
     os.close(far)
 
 
-def test_serial_device_is_this_programs_alone(line):
+def test_serial_device_is_opened_exclusively(line):
     _, link, device, _ = line
-    with pytest.raises(PortError, match="another program has it"):
+    with pytest.raises(PortError, match="in use by another program"):
         open_transport(f"serial:{device}:921600")
 
 
-def test_serial_that_is_full_drops_and_does_not_wait(line):
+def test_a_full_serial_line_drops_frames_and_does_not_block(line):
     far, link, _, _ = line
     until(lambda: (link.send(bytes(500)), link.dropped > 3)[1], "a full line")
     assert link.connected

@@ -1,1 +1,1 @@
-"""Bytes over UDP, TCP and serial lines."""
+"""MAVLink byte transports: UDP, TCP and serial lines, with queues and pacing."""

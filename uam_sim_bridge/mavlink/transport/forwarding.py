@@ -1,9 +1,9 @@
-"""A ground station beside the bridge: it hears all that the autopilot sends, and may speak to it.
+"""Forwards MAVLink between the autopilot and a ground station beside the bridge.
 
-`GroundStation` stands between `OffboardLink` and the autopilot's transport, which notices nothing.
-To the station go the bytes as they came. From it go whole valid messages only, a bounded number of
-bytes at each tick and, on a line of known speed, a bounded share of it. They pass by the link:
-whatever a station says, it is not the autopilot's word.
+`GroundStation` wraps the autopilot's transport for `OffboardLink`. It forwards the autopilot's
+bytes unchanged to the station. From the station it forwards only whole valid messages, with a
+limit of bytes per tick and, on a line of known rate, a limited share of this rate. `OffboardLink`
+does not receive the station's messages, so they cannot change the autopilot's state in the bridge.
 """
 
 from __future__ import annotations
@@ -16,13 +16,13 @@ from uam_sim_bridge.mavlink.transport.pacing import Pacer
 from uam_sim_bridge.mavlink.transport.transport import Transport, open_transport
 from uam_sim_bridge.ports import PortError
 
-BYTES_PER_TICK = 2048  # read from the station, hence forwarded at most
-DATAGRAM = 1400  # bytes to the station at once: what passes any network in one piece
-LINE_SHARE = 0.2  # of a line of known speed: the setpoints come first
+BYTES_PER_TICK = 2048  # limit of bytes read from the station per tick
+DATAGRAM = 1400  # bytes, largest datagram to the station: below the usual network MTU
+LINE_SHARE = 0.2  # of the line's rate; the rest is for setpoints
 
 
 class GroundStation:
-    """A transport around the autopilot's; `forwarded` and `held_back` count messages to it."""
+    """Transport with forwarding; `forwarded`, `held_back`: messages from the station, counted."""
 
     def __init__(
         self,
@@ -31,7 +31,7 @@ class GroundStation:
         codec: Codec,
         clock: Callable[[], float] = time.monotonic,
     ) -> None:
-        """url: udp:HOST:PORT; codec: decides what a valid message is; clock [s] of wall time.
+        """url: udp:HOST:PORT; codec: validates the station's messages; clock: wall time [s].
 
         Raises PortError in one line for another kind of URL.
         """
@@ -48,12 +48,12 @@ class GroundStation:
 
     @property
     def connected(self) -> bool:
-        """Whether the autopilot's link is open."""
+        """Return whether the autopilot's link is open."""
         return self._autopilot.connected
 
     @property
     def dropped(self) -> int:
-        """What could not be sent to the autopilot."""
+        """Return the number of frames that could not be sent to the autopilot."""
         return self._autopilot.dropped
 
     def send(self, data: bytes) -> bool:
@@ -61,7 +61,7 @@ class GroundStation:
         return self._autopilot.send(data)
 
     def receive(self) -> list[bytes]:
-        """Return what the autopilot sent; the station gets it too."""
+        """Return the bytes received from the autopilot; forward them to the station."""
         chunks = self._autopilot.receive()
         for chunk in chunks:
             for at in range(0, len(chunk), DATAGRAM):
@@ -69,7 +69,7 @@ class GroundStation:
         return chunks
 
     def forward(self) -> None:
-        """Send the autopilot what the station said; to be called after the setpoint is out."""
+        """Forward the station's messages to the autopilot; call after the setpoint is sent."""
         for data in self._station.receive():
             for message in self._framer.datagram(data):
                 frame = bytes(message.get_msgbuf())
@@ -84,6 +84,6 @@ class GroundStation:
         return self._autopilot.fileno()
 
     def close(self) -> None:
-        """Close both."""
+        """Close both links."""
         self._autopilot.close()
         self._station.close()

@@ -1,24 +1,24 @@
-"""How much a line may carry: a budget that grows with time, and a meter of what it carries."""
+"""Rate limit (token bucket) and rate meter of a line."""
 
 from __future__ import annotations
 
-BURST = 0.01  # s of the line's rate that may go out at once: what queues up in the device's buffer
+BURST = 0.01  # s of the line's rate, largest burst: it waits in the device's buffer
 
 
 class Pacer:
-    """Bytes that may be sent now, so that they do not queue up where nothing overtakes them.
+    """Token bucket. It keeps the device's buffer short: urgent frames cannot overtake there.
 
-    Without a rate everything may go. All times [s] are of one clock, whichever.
+    Without a rate there is no limit. All times [s] must be of one clock.
     """
 
     def __init__(self, bytes_per_second: float | None, share: float = 1.0) -> None:
-        """share: of the rate, which this sender may use."""
+        """bytes_per_second: rate of the line, None: unlimited; share: 0..1, of this sender."""
         self._rate = None if bytes_per_second is None else share * bytes_per_second
         self._credit = 0.0
         self._time: float | None = None
 
     def may_send(self, time: float) -> bool:
-        """Whether a frame may go out at `time`; it may overdraw the budget."""
+        """Return whether a frame may be sent at `time` [s]; it may overdraw the budget."""
         if self._rate is None:
             return True
         elapsed = 0.0 if self._time is None else time - self._time
@@ -27,12 +27,12 @@ class Pacer:
         return self._credit >= 0.0
 
     def sent(self, size: int) -> None:
-        """Take `size` bytes off the budget."""
+        """Subtract `size` bytes from the budget."""
         self._credit -= size
 
     @property
     def wait(self) -> float:
-        """Seconds until a frame may go out, as far as known at the last `may_send`."""
+        """Return the seconds until a frame may be sent, as of the last `may_send`."""
         return 0.0 if self._rate is None else max(0.0, -self._credit / self._rate)
 
 
@@ -51,7 +51,7 @@ class Meter:
         self._bytes += size
 
     def update(self, time: float) -> bool:
-        """Close the window at `time` [s] if it is over; whether `rate` [bytes/s] is a new one."""
+        """End the window at `time` [s] if it is over; return whether `rate` [bytes/s] is new."""
         if self._since is None:
             self._since = time
         elapsed = time - self._since

@@ -18,10 +18,10 @@ BITS_PER_BYTE = 10  # start, eight data bits, stop
 
 
 class SerialTransport(StreamTransport):
-    """A device of this program alone; opened again when it comes back after unplugging."""
+    """A serial device, opened exclusively; opened again after it was unplugged."""
 
     def __init__(self, device: str, baud: int, clock: Callable[[], float] = time.monotonic) -> None:
-        """Raises PortError in one line where the device cannot be opened now."""
+        """Open `device` at `baud` [bit/s]; raises PortError in one line if that fails."""
         super().__init__(clock)
         self._device, self._baud = device, baud
         self.bytes_per_second = baud / BITS_PER_BYTE
@@ -34,13 +34,13 @@ class SerialTransport(StreamTransport):
     def _open(self, now: float) -> bool:
         try:
             self._port = serial.Serial(self._device, self._baud, timeout=0, exclusive=True)
-        except termios.error as error:  # unplugged just now: pyserial lets it through
+        except termios.error as error:  # unplugged during open; pyserial does not convert it
             raise OSError(*error.args) from None
         return True
 
     def _read(self) -> bytes:
-        # A device that is gone is readable without end and has nothing: read alone cannot tell it
-        # from a line that is quiet.
+        # An unplugged device is always readable and returns no bytes. Without select, read would
+        # not distinguish it from an idle line.
         if not select.select([self._port.fileno()], [], [], 0.0)[0]:
             return b""
         data = os.read(self._port.fileno(), CHUNK)
@@ -66,7 +66,7 @@ class SerialTransport(StreamTransport):
 def _reason(error: Exception) -> str:
     number = getattr(error, "errno", None)
     if number == errno.EWOULDBLOCK:
-        return "another program has it"
+        return "in use by another program"
     if number:
         return os.strerror(number)
     return " ".join(str(error).split())

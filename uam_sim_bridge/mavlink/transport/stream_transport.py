@@ -1,8 +1,8 @@
-"""MAVLink over a byte stream that may break: kept open, whole frames only, never waited for.
+"""MAVLink over a byte stream (TCP, serial): whole frames, no blocking, reopened after a loss.
 
-What does not fit into the system's buffer is dropped whole and counted; of a frame that went out
-in part the rest goes first, so that the far end never sees half a frame. After a loss the link is
-opened again at growing intervals, from within `send` and `receive`: there is no thread.
+A frame that does not fit into the system's buffer is dropped and counted. The rest of a partly
+written frame is sent before the next frame, so the receiver never gets half a frame. After a loss
+`send` and `receive` try to open the link again at growing intervals; there is no thread.
 """
 
 from __future__ import annotations
@@ -10,23 +10,24 @@ from __future__ import annotations
 import time
 from collections.abc import Callable
 
-FIRST_RETRY, LAST_RETRY = 0.1, 5.0  # s between two attempts to open: doubled each time
-CHUNK = 65536
-READ_LIMIT = 1 << 20  # bytes per call: an end to a flood
+FIRST_RETRY, LAST_RETRY = 0.1, 5.0  # s between attempts to open: first value, doubled up to last
+CHUNK = 65536  # bytes
+READ_LIMIT = 1 << 20  # bytes per call: bounds the time of a call
 
 
 class StreamTransport:
-    """Base of TCP and serial links.
+    """Base class of TCP and serial links.
 
-    `connected`; `dropped`: frames not sent; `losses`: how often the open link broke. A subclass
-    opens, reads and writes: `_open` returns whether the link is up, raises OSError where it failed.
+    `connected`: link is open; `dropped`: frames not sent; `losses`: number of link losses. A
+    subclass implements `_open` (returns whether the link is up, raises OSError on failure),
+    `_read`, `_write`, `_number` and `_shut`.
     """
 
     stream = True
     bytes_per_second: float | None = None
 
     def __init__(self, clock: Callable[[], float] = time.monotonic) -> None:
-        """clock: seconds of wall time, for the intervals between attempts."""
+        """clock: wall time [s], for the intervals between attempts."""
         self.connected = False
         self.dropped = self.losses = 0
         self._clock = clock
@@ -35,7 +36,7 @@ class StreamTransport:
         self._due = -float("inf")
 
     def send(self, data: bytes) -> bool:
-        """Send one frame or drop it; whether it will go out whole."""
+        """Send one frame or drop it; return whether it is sent."""
         if self._ready() and self._flush():
             self._rest = data
             self._flush()
@@ -92,7 +93,7 @@ class StreamTransport:
         return self.connected
 
     def _flush(self) -> bool:
-        """Write what is left; whether nothing is left."""
+        """Write the rest of the last frame; return whether all of it is written."""
         while self._rest and self.connected:
             try:
                 written = self._write(self._rest)
@@ -117,7 +118,7 @@ class StreamTransport:
         raise NotImplementedError
 
     def _read(self) -> bytes:
-        """Return bytes, b"" where none are there; raise OSError where the far end is gone."""
+        """Return the available bytes, b"" if there are none; raise OSError if the link is lost."""
         raise NotImplementedError
 
     def _write(self, data: bytes) -> int:

@@ -1,4 +1,4 @@
-"""MAVLink over TCP, as its client."""
+"""MAVLink over TCP, as a client."""
 
 from __future__ import annotations
 
@@ -12,18 +12,18 @@ from collections.abc import Callable
 from uam_sim_bridge.mavlink.transport.stream_transport import CHUNK, StreamTransport
 from uam_sim_bridge.mavlink.transport.udp_transport import resolve
 
-CONNECT_PATIENCE = 3.0  # s for the far end to take a connection
+CONNECT_PATIENCE = 3.0  # s, time limit of one attempt to connect
 
 
 class TcpTransport(StreamTransport):
-    """Client of a server that may not be there yet, and may go and come back."""
+    """TCP client; connects later if the server is not listening yet, and again after a loss."""
 
     def __init__(
         self, remote: tuple[str, int], clock: Callable[[], float] = time.monotonic
     ) -> None:
-        """Raises PortError where the host is unknown; nobody listening yet is no error."""
+        """remote: host, port. Raises PortError for an unknown host; a closed port is no error."""
         super().__init__(clock)
-        self._remote = (resolve(remote[0]), remote[1])  # here, not in flight: names take seconds
+        self._remote = (resolve(remote[0]), remote[1])  # at start-up: DNS may take seconds
         self._socket: socket.socket | None = None
         self._until = 0.0
         self._ready()
@@ -45,7 +45,7 @@ class TcpTransport(StreamTransport):
         if code:
             raise OSError(code, os.strerror(code))
         if self._socket.getsockname() == self._socket.getpeername():
-            raise ConnectionRefusedError  # nobody listens: on loopback it found itself
+            raise ConnectionRefusedError  # no server: on loopback the socket connected to itself
         return True
 
     def _read(self) -> bytes:

@@ -1,9 +1,9 @@
-"""What carries MAVLink's bytes, and its choice by URL.
+"""The interface `Transport` of MAVLink links, and `open_transport`, which opens one by URL.
 
 | URL | link |
 |---|---|
-| `udp:HOST:PORT` | datagrams to HOST:PORT, answers to a port of the system's choice |
-| `udp:HOST:PORT:LOCAL` | the same, from and to the local port LOCAL |
+| `udp:HOST:PORT` | datagrams to HOST:PORT, from a local port that the system chooses |
+| `udp:HOST:PORT:LOCAL` | the same, from local port LOCAL |
 | `tcp:HOST:PORT` | client; connects again after a loss |
 | `serial:DEVICE:BAUD` | serial line or USB; opened again after unplugging |
 """
@@ -23,11 +23,11 @@ SLOWEST, FASTEST = 9600, 12_500_000  # baud
 
 
 class Transport(Protocol):
-    """What carries the bytes.
+    """A link that carries bytes.
 
-    `stream`: whether `receive` returns chunks cut anywhere (TCP, serial) or whole datagrams;
-    `bytes_per_second`: what the line carries, None where nothing is known; `connected`: whether
-    the link is open as far as this end can tell; `dropped`: what could not be sent.
+    `stream`: True if `receive` returns arbitrary chunks (TCP, serial), False for whole datagrams;
+    `bytes_per_second`: rate of the line, None if unknown; `connected`: whether the local end is
+    open; `dropped`: number of frames that could not be sent.
     """
 
     stream: bool
@@ -46,7 +46,7 @@ class Transport(Protocol):
 
 @dataclass(frozen=True)
 class LinkUrl:
-    """A link's URL, taken apart. kind: udp, tcp or serial; place: host or device.
+    """Parts of a link's URL. kind: udp, tcp or serial; place: host or device.
 
     number: port or baud rate; local: local UDP port, 0 for any.
     """
@@ -58,7 +58,7 @@ class LinkUrl:
 
 
 def parse_url(url: str) -> LinkUrl:
-    """Take `url` apart; raises PortError in one line where it is none of the table above."""
+    """Return the parts of `url`; raises PortError in one line for other than the table above."""
     kind, _, rest = url.partition(":")
     if kind == "serial":
         device, _, baud = rest.rpartition(":")  # a device's name may contain colons
@@ -77,10 +77,10 @@ def parse_url(url: str) -> LinkUrl:
 
 
 def open_transport(url: str, read_limit: int = READ_LIMIT) -> Transport:
-    """Open the link that `url` names.
+    """Open the link of `url`.
 
-    read_limit: bytes taken per `receive` from a UDP link. Raises PortError in one line where the
-    URL is none of the table above, or the link cannot be had.
+    read_limit: bytes read per `receive` of a UDP link. Raises PortError in one line if the URL is
+    not of the table above or the link cannot be opened.
     """
     link = parse_url(url)
     if link.kind == "serial":

@@ -1,4 +1,4 @@
-"""MAVLink over UDP: one message or several per datagram, one peer."""
+"""MAVLink over UDP: one or several messages per datagram, one peer."""
 
 from __future__ import annotations
 
@@ -8,11 +8,11 @@ import socket
 from uam_sim_bridge.ports import PortError
 
 LOOPBACK, EVERYWHERE = "127.0.0.1", "0.0.0.0"
-READ_LIMIT = 1 << 20  # bytes per call: far more than any tick brings, yet an end to a flood
+READ_LIMIT = 1 << 20  # bytes per call: more than a tick's traffic; bounds the time of a call
 
 
 def resolve(host: str) -> str:
-    """Return the IPv4 address of a host name; raises PortError in one line where it has none."""
+    """Return the IPv4 address of a host name; raises PortError in one line if there is none."""
     try:
         return socket.gethostbyname(host)
     except (OSError, UnicodeError) as error:
@@ -21,10 +21,10 @@ def resolve(host: str) -> str:
 
 
 class UdpTransport:
-    """UDP between a local port and the peer's; packets from elsewhere are ignored.
+    """UDP between a local port and one peer; packets of other senders are ignored.
 
-    Open to the network only where the peer is not on this machine. `dropped`: datagrams that the
-    system did not take.
+    The local port is bound to loopback if the peer is on this machine. `dropped`: datagrams that
+    could not be sent.
     """
 
     stream = False
@@ -34,9 +34,9 @@ class UdpTransport:
     def __init__(
         self, local_port: int, remote: tuple[str, int], read_limit: int = READ_LIMIT
     ) -> None:
-        """local_port: 0 for any; read_limit: bytes taken per `receive`, the rest waits.
+        """local_port: 0 for any; remote: host, port; read_limit: bytes read per `receive`.
 
-        Raises PortError in one line where the local port is taken or the host unknown.
+        Raises PortError in one line if the local port is in use or the host is unknown.
         """
         self._remote = (resolve(remote[0]), remote[1])
         self._read_limit = read_limit
@@ -55,7 +55,7 @@ class UdpTransport:
         self._socket.setblocking(False)
 
     def send(self, data: bytes) -> bool:
-        """Send one datagram; whether it went. Nobody listening or no network is no error."""
+        """Send one datagram; return whether it was sent. A failure is counted, not raised."""
         try:
             self._socket.sendto(data, self._remote)
         except OSError:
@@ -64,15 +64,15 @@ class UdpTransport:
         return True
 
     def receive(self) -> list[bytes]:
-        """Return the datagrams that have arrived; those of strangers count for the limit too."""
+        """Return the peer's datagrams; those of other senders count towards the limit as well."""
         datagrams, left = [], self._read_limit
         while left > 0:
             try:
                 data, sender = self._socket.recvfrom(65535)
-            except ConnectionError:  # our last datagram found nobody
+            except ConnectionError:  # the peer's port was closed at the last send
                 left -= 1
                 continue
-            except OSError:  # nothing there, or the network is gone
+            except OSError:  # no datagram, or no network
                 break
             left -= max(1, len(data))
             if sender == self._remote:
@@ -80,9 +80,9 @@ class UdpTransport:
         return datagrams
 
     def fileno(self) -> int:
-        """Return the socket's number, for select."""
+        """Return the socket's file descriptor, for select."""
         return self._socket.fileno()
 
     def close(self) -> None:
-        """Give the port back."""
+        """Release the port."""
         self._socket.close()
