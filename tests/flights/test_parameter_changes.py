@@ -17,7 +17,7 @@ from uam_lab.processes.environment import transport_environment
 from uam_lab.processes.guest import Guest
 from uam_lab.results import timeseries
 from uam_msgs_py.messages import topics
-from uam_msgs_py.messages.changes import Change
+from uam_msgs_py.messages.changes import ParameterChange
 from uam_msgs_py.messages.layouts import SECOND, stamp_of
 from uam_msgs_py.node.polling import listen
 
@@ -71,7 +71,10 @@ class Tuner:
         self.told = []  # (stamp [ns], change)
         topic = topics.CHANGES
         self._changes = self.node.create_subscription(
-            topic.type, topic.name, lambda m: self.told.append(Change.from_message(m)), topic.qos
+            topic.type,
+            topic.name,
+            lambda m: self.told.append(ParameterChange.from_message(m)),
+            topic.qos,
         )
 
     def now(self):

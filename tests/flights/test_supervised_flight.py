@@ -9,7 +9,7 @@ import pytest
 
 from uam_control.mission import load_scenario
 from uam_control.profiles.profile import load_profile
-from uam_control.supervision import Command, State
+from uam_control.supervision import OperatorCommand, State
 from uam_lab.flight.direct.flight import DirectFlight
 from uam_lab.results.metrics import compute
 from uam_sim_bridge.plant import Vehicle
@@ -45,12 +45,12 @@ def landed_softly(a_flight):
 def test_a_mission_that_is_held_with_the_payload_and_resumed_is_completed():
     made = flight()
     until(made, lambda o: o.time > 50.0)
-    assert made.mission.request(Command.HOLD)[0]
+    assert made.mission.request(OperatorCommand.HOLD)[0]
     until(made, lambda o: o.time > 53.0)
     series = made.recording.series()
     held = series.row_at(52.0)
     assert np.max(np.abs(series["truth.x_dot"][held:])) < 0.02 and made.mission.output.magnet
-    assert made.mission.request(Command.RESUME)[0]
+    assert made.mission.request(OperatorCommand.RESUME)[0]
     until(made, lambda o: o.done)
     assert made.mission.output.time > 90.0
     point = made.mission.scenario.drop_point
@@ -65,7 +65,7 @@ def test_a_command_to_land_is_followed_where_the_vehicle_is_with_the_payload_rel
     made = flight(magnet_landing="release")
     until(made, lambda o: o.time > 45.0)
     x = made.recording.series()["truth.x"][-1]
-    assert made.mission.request(Command.LAND)[0]
+    assert made.mission.request(OperatorCommand.LAND)[0]
     output = until(made, lambda o: o.done)
     assert output.abort_reason == "land by command" and output.phase == "landed"
     at, _ = landed_softly(made)

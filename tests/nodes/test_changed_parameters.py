@@ -5,7 +5,7 @@ from rclpy.node import Node
 from rclpy.parameter import Parameter
 
 from uam_lab.flight.ros.changed_parameters import ChangedParameters
-from uam_msgs_py.messages.changes import Change
+from uam_msgs_py.messages.changes import ParameterChange
 
 
 class Silent:
@@ -24,8 +24,8 @@ def test_the_newest_accepted_values_come_back_as_ros_arguments():
         ({"rho_0": (1e-12, -1.0)}, "rho_0: -1 is outside"),
         ({"law": ("modular", "pid"), "integral": (True, False), "K": (3, 4)}, ""),
     ):
-        changed.note(Change("arm_controller", "set_parameters", values, reason))
-    changed.note(Change("mission", "set_parameters", {"tilt_hold": (0.8, 0.7)}))
+        changed.note(ParameterChange("arm_controller", "set_parameters", values, reason))
+    changed.note(ParameterChange("mission", "set_parameters", {"tilt_hold": (0.8, 0.7)}))
     context = rclpy.Context()
     rclpy.init(args=["--ros-args", *changed.arguments("arm_controller")], context=context)
     node = Node(

@@ -20,7 +20,7 @@ from uam_control.settings import configuration
 from uam_lab.flight.ros.profile_switch import ProfileSwitch, SwitchRefused
 from uam_lab.processes.guest import Guest
 from uam_msgs_py.messages import topics
-from uam_msgs_py.messages.changes import Change
+from uam_msgs_py.messages.changes import ParameterChange
 from uam_msgs_py.messages.control import ReferenceWriter
 from uam_msgs_py.messages.convert import read_joints
 from uam_msgs_py.messages.layouts import stamp_of
@@ -56,7 +56,7 @@ def changes_of(probe):
     found = []
     topic = topics.CHANGES
     probe.node.create_subscription(
-        topic.type, topic.name, lambda m: found.append(Change.from_message(m)), topic.qos
+        topic.type, topic.name, lambda m: found.append(ParameterChange.from_message(m)), topic.qos
     )
     return found
 

@@ -8,7 +8,7 @@ from px4_at_hand import NO_PX4, installation
 
 from uam_lab.px4_steps.rate_steps import flown_by
 from uam_sim_bridge.mavlink.offboard.sequence import Phase
-from uam_sim_bridge.mavlink.protocol.modes import CUSTOM_MODE_ENABLED, Command, Mode
+from uam_sim_bridge.mavlink.protocol.modes import CUSTOM_MODE_ENABLED, MavCmd, Mode
 from uam_sim_bridge.mavlink.protocol.wire import Codec, mavlink2
 
 AUTOPILOTS = [
@@ -63,7 +63,7 @@ def test_another_mode_from_a_ground_station_is_taken_back(hovering):
     command = mavlink2.MAVLink_command_long_message(
         hovering.system,
         mavlink2.MAV_COMP_ID_AUTOPILOT1,
-        Command.DO_SET_MODE,
+        MavCmd.DO_SET_MODE,
         0,
         CUSTOM_MODE_ENABLED,
         *Mode.LAND.value,

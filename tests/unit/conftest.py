@@ -13,7 +13,7 @@ from uam_control.profiles.profile import load_profile
 from uam_lab.flight.direct.flight import DirectFlight
 from uam_lab.results import metrics
 from uam_lab.results.result_folder import ResultFolder
-from uam_lab.results.timeseries import COLUMNS, Recording, gain_columns
+from uam_lab.results.timeseries import COLUMNS, FlightTable, gain_columns
 from uam_sim_bridge.plant import Vehicle
 
 PERIOD = 0.04  # ten times the control period: enough for a picture
@@ -29,7 +29,7 @@ def made_up_flight(seed=1, scale=1.0, info=None):
     start = np.zeros(8)
     start[2], start[6:] = 0.285, scenario.arm_start
     trajectory = scenario.trajectory(start)
-    recording = Recording(len(times))
+    recording = FlightTable(len(times))
     reference = np.zeros((3, 8))
     phase_of_error = noise.uniform(0, 6, 8)
     amplitude = scale * np.array([0.02, 0.01, 0.015, 0.02, 0.015, 0.01, 0.01, 0.012])

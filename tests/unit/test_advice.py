@@ -6,7 +6,7 @@ import pytest
 
 from uam_sim_bridge.mavlink.offboard.advice import ADVICE, SEPARATOR, advice, with_advice
 from uam_sim_bridge.mavlink.offboard.sequence import OffboardSequence, Request
-from uam_sim_bridge.mavlink.protocol.modes import Result
+from uam_sim_bridge.mavlink.protocol.modes import MavResult
 from uam_sim_bridge.mavlink.telemetry.events import CHECKS, OTHERS
 
 TEXTS = [  # PX4 v1.16.0, STATUSTEXT
@@ -94,7 +94,7 @@ def test_unknown_texts_stay_as_they_are():
 def test_the_sequences_reasons_carry_it():
     s = OffboardSequence()
     s.text(2, "Preflight Fail: ekf2 missing data\t")
-    s.answer(Request.ARM, Result.TEMPORARILY_REJECTED)
+    s.answer(Request.ARM, MavResult.TEMPORARILY_REJECTED)
     assert s.reasons[0] == (
         "Preflight Fail: ekf2 missing data → the estimator has no vision pose "
         "yet: check mocap and EKF2_EV_CTRL"

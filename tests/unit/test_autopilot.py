@@ -13,7 +13,7 @@ from uam_sim_bridge.autopilot.core import Autopilot
 from uam_sim_bridge.autopilot.params import Parameters
 from uam_sim_bridge.mavlink.offboard.setpoint import RateThrustMap
 from uam_sim_bridge.mavlink.protocol.frames import swap_body, swap_quaternion, swap_world
-from uam_sim_bridge.mavlink.protocol.modes import FORCE, Command, Mode, Result
+from uam_sim_bridge.mavlink.protocol.modes import FORCE, MavCmd, MavResult, Mode
 
 OFFBOARD = (1.0, 6.0, 0.0)
 HOVER = MASS * 9.81 / (4 * 10.34)
@@ -59,8 +59,8 @@ class Bench:
     def fly(self):
         """Arm on the ground or in the air, OFFBOARD, idle setpoints."""
         self.run(1.0, ((0, 0, 0), 0.0))
-        assert self.command(Command.DO_SET_MODE, *OFFBOARD) == Result.ACCEPTED
-        assert self.command(Command.ARM_DISARM, 1.0) == Result.ACCEPTED
+        assert self.command(MavCmd.DO_SET_MODE, *OFFBOARD) == MavResult.ACCEPTED
+        assert self.command(MavCmd.ARM_DISARM, 1.0) == MavResult.ACCEPTED
         return self
 
 
@@ -76,23 +76,23 @@ def airborne():
 def test_offboard_needs_a_stream():
     bench = Bench()
     bench.run(0.5)
-    assert bench.command(Command.DO_SET_MODE, *OFFBOARD) == Result.TEMPORARILY_REJECTED
+    assert bench.command(MavCmd.DO_SET_MODE, *OFFBOARD) == MavResult.TEMPORARILY_REJECTED
     assert "no offboard signal" in bench.texts()
     for _ in range(3):  # 1 Hz is too slow
         bench.tick(((0, 0, 0), 0.0))
         bench.run(1.0)
-    assert bench.command(Command.DO_SET_MODE, *OFFBOARD) == Result.TEMPORARILY_REJECTED
+    assert bench.command(MavCmd.DO_SET_MODE, *OFFBOARD) == MavResult.TEMPORARILY_REJECTED
     bench.run(0.6, ((0, 0, 0), 0.0))
-    assert bench.command(Command.DO_SET_MODE, *OFFBOARD) == Result.ACCEPTED
+    assert bench.command(MavCmd.DO_SET_MODE, *OFFBOARD) == MavResult.ACCEPTED
     assert bench.autopilot.status.mode is Mode.OFFBOARD
 
 
 def test_arming_refused_without_stream():
     bench = Bench()
     bench.run(1.0, ((0, 0, 0), 0.0))
-    bench.command(Command.DO_SET_MODE, *OFFBOARD)
+    bench.command(MavCmd.DO_SET_MODE, *OFFBOARD)
     bench.run(2.0)
-    assert bench.command(Command.ARM_DISARM, 1.0) == Result.TEMPORARILY_REJECTED
+    assert bench.command(MavCmd.ARM_DISARM, 1.0) == MavResult.TEMPORARILY_REJECTED
     assert "no offboard signal" in bench.texts()
 
 
@@ -100,41 +100,41 @@ def test_arming_refused_without_vision():
     bench = Bench()
     bench.vision = False
     bench.run(1.0, ((0, 0, 0), 0.0))
-    bench.command(Command.DO_SET_MODE, *OFFBOARD)
-    assert bench.command(Command.ARM_DISARM, 1.0) == Result.TEMPORARILY_REJECTED
+    bench.command(MavCmd.DO_SET_MODE, *OFFBOARD)
+    assert bench.command(MavCmd.ARM_DISARM, 1.0) == MavResult.TEMPORARILY_REJECTED
     assert "vision" in bench.texts()
     bench.vision = True
     bench.run(0.2, ((0, 0, 0), 0.0))
-    assert bench.command(Command.ARM_DISARM, 1.0) == Result.ACCEPTED
+    assert bench.command(MavCmd.ARM_DISARM, 1.0) == MavResult.ACCEPTED
 
 
 def test_arming_refused_when_vision_and_gravity_disagree():
     bench = Bench()
     bench.vision_tilt = np.array([math.cos(0.3), math.sin(0.3), 0.0, 0.0])  # 34 deg of roll
     bench.run(1.0, ((0, 0, 0), 0.0))
-    bench.command(Command.DO_SET_MODE, *OFFBOARD)
-    assert bench.command(Command.ARM_DISARM, 1.0) == Result.TEMPORARILY_REJECTED
+    bench.command(MavCmd.DO_SET_MODE, *OFFBOARD)
+    assert bench.command(MavCmd.ARM_DISARM, 1.0) == MavResult.TEMPORARILY_REJECTED
     assert "tilt differs" in bench.texts()
 
 
 def test_arming_refused_outside_offboard():
     bench = Bench()
     bench.run(1.0, ((0, 0, 0), 0.0))
-    assert bench.command(Command.ARM_DISARM, 1.0) == Result.TEMPORARILY_REJECTED
+    assert bench.command(MavCmd.ARM_DISARM, 1.0) == MavResult.TEMPORARILY_REJECTED
     assert "Offboard" in bench.texts()
 
 
 @pytest.mark.parametrize(
     ("command", "parameters", "result"),
     [
-        (Command.ARM_DISARM, (0.5,), Result.DENIED),
-        (Command.ARM_DISARM, (math.nan,), Result.DENIED),
-        (Command.DO_SET_MODE, (1.0, 3.0, 0.0), Result.DENIED),
-        (Command.DO_SET_MODE, (1.0, 99.0, 0.0), Result.DENIED),
-        (Command.DO_SET_MODE, (0.0, 6.0, 0.0), Result.DENIED),
-        (Command.DO_SET_MODE, (1.0, math.nan, 0.0), Result.DENIED),
-        (Command.DO_SET_MODE, (math.inf, 6.0, 0.0), Result.DENIED),
-        (12345, (), Result.UNSUPPORTED),
+        (MavCmd.ARM_DISARM, (0.5,), MavResult.DENIED),
+        (MavCmd.ARM_DISARM, (math.nan,), MavResult.DENIED),
+        (MavCmd.DO_SET_MODE, (1.0, 3.0, 0.0), MavResult.DENIED),
+        (MavCmd.DO_SET_MODE, (1.0, 99.0, 0.0), MavResult.DENIED),
+        (MavCmd.DO_SET_MODE, (0.0, 6.0, 0.0), MavResult.DENIED),
+        (MavCmd.DO_SET_MODE, (1.0, math.nan, 0.0), MavResult.DENIED),
+        (MavCmd.DO_SET_MODE, (math.inf, 6.0, 0.0), MavResult.DENIED),
+        (12345, (), MavResult.UNSUPPORTED),
     ],
 )
 def test_odd_commands(command, parameters, result):
@@ -242,16 +242,16 @@ def test_offboard_comes_back_only_when_asked():
     bench.run(1.5)
     bench.run(1.0, ((0, 0, 0), HOVER))
     assert bench.autopilot.status.mode is Mode.LAND
-    assert bench.command(Command.DO_SET_MODE, *OFFBOARD) == Result.ACCEPTED
+    assert bench.command(MavCmd.DO_SET_MODE, *OFFBOARD) == MavResult.ACCEPTED
     bench.run(0.1, ((0, 0, 0), HOVER))
     assert bench.autopilot.status.mode is Mode.OFFBOARD and bench.autopilot.status.armed
 
 
 def test_disarming_in_flight_needs_force():
     bench = airborne()
-    assert bench.command(Command.ARM_DISARM, 0.0) == Result.TEMPORARILY_REJECTED
+    assert bench.command(MavCmd.ARM_DISARM, 0.0) == MavResult.TEMPORARILY_REJECTED
     assert "not landed" in bench.texts()
-    assert bench.command(Command.ARM_DISARM, 0.0, FORCE) == Result.ACCEPTED
+    assert bench.command(MavCmd.ARM_DISARM, 0.0, FORCE) == MavResult.ACCEPTED
     assert np.all(bench.tick(((0, 0, 0), HOVER)) == 0.0)
 
 
@@ -259,8 +259,8 @@ def test_forced_arming_skips_the_estimator():
     bench = Bench()
     bench.vision = False
     bench.run(1.0, ((0, 0, 0), 0.0))
-    bench.command(Command.DO_SET_MODE, *OFFBOARD)
-    assert bench.command(Command.ARM_DISARM, 1.0, FORCE) == Result.ACCEPTED
+    bench.command(MavCmd.DO_SET_MODE, *OFFBOARD)
+    assert bench.command(MavCmd.ARM_DISARM, 1.0, FORCE) == MavResult.ACCEPTED
 
 
 def test_auto_disarm_without_take_off():
@@ -277,7 +277,7 @@ def test_integral_is_frozen_on_the_ground_and_cleared_when_disarmed():
     assert np.all(bench.autopilot._memory[4] == 0.0)
     bench.run(1.0, ((0.3, 0.0, 0.0), 0.4))  # pushes, does not lift
     assert bench.autopilot._memory[4, 0] > 0.02
-    bench.command(Command.ARM_DISARM, 0.0, FORCE)
+    bench.command(MavCmd.ARM_DISARM, 0.0, FORCE)
     bench.tick()
     assert np.all(bench.autopilot._memory[4] == 0.0)
 

@@ -11,7 +11,7 @@ from pymavlink.dialects.v20 import common as mavlink2
 from uam_sim_bridge.autopilot.companion import Companion
 from uam_sim_bridge.autopilot.core import Autopilot
 from uam_sim_bridge.mavlink.link.vision import odometry_message, vision_message
-from uam_sim_bridge.mavlink.protocol.modes import Command, Mode, Result
+from uam_sim_bridge.mavlink.protocol.modes import MavCmd, MavResult, Mode
 from uam_sim_bridge.mavlink.protocol.wire import Codec, Framer, clean_text
 
 DOWN = np.array([0.0, 0.0, -9.81])
@@ -72,14 +72,14 @@ def test_message_intervals():
     rig = Rig()
     number = mavlink2.MAVLINK_MSG_ID_ATTITUDE_QUATERNION
     assert len(rig.heard("ATTITUDE_QUATERNION", 250)) == 50
-    assert rig.command(Command.SET_MESSAGE_INTERVAL, number, 4000.0) == Result.ACCEPTED
+    assert rig.command(MavCmd.SET_MESSAGE_INTERVAL, number, 4000.0) == MavResult.ACCEPTED
     assert len(rig.heard("ATTITUDE_QUATERNION", 250)) == 250
-    assert rig.command(Command.SET_MESSAGE_INTERVAL, number, -1.0) == Result.ACCEPTED
+    assert rig.command(MavCmd.SET_MESSAGE_INTERVAL, number, -1.0) == MavResult.ACCEPTED
     assert rig.heard("ATTITUDE_QUATERNION", 250) == []
-    assert rig.command(Command.SET_MESSAGE_INTERVAL, number, 0.0) == Result.ACCEPTED
+    assert rig.command(MavCmd.SET_MESSAGE_INTERVAL, number, 0.0) == MavResult.ACCEPTED
     assert len(rig.heard("ATTITUDE_QUATERNION", 250)) == 50
     for bad in ((9999.0, 1000.0), (math.nan, 1000.0), (float(number), math.nan)):
-        assert rig.command(Command.SET_MESSAGE_INTERVAL, *bad) == Result.DENIED
+        assert rig.command(MavCmd.SET_MESSAGE_INTERVAL, *bad) == MavResult.DENIED
 
 
 def test_request_message():
@@ -87,12 +87,12 @@ def test_request_message():
     rig.tick(10)
     rig.send(
         mavlink2.MAVLink_command_long_message(
-            1, 1, Command.REQUEST_MESSAGE, 0, mavlink2.MAVLINK_MSG_ID_ODOMETRY, 0, 0, 0, 0, 0, 0
+            1, 1, MavCmd.REQUEST_MESSAGE, 0, mavlink2.MAVLINK_MSG_ID_ODOMETRY, 0, 0, 0, 0, 0, 0
         )
     )
     kinds = [m.get_type() for m in rig.tick()]
     assert "ODOMETRY" in kinds and "COMMAND_ACK" in kinds
-    assert rig.command(Command.REQUEST_MESSAGE, 9999.0) == Result.UNSUPPORTED
+    assert rig.command(MavCmd.REQUEST_MESSAGE, 9999.0) == MavResult.UNSUPPORTED
 
 
 def test_parameters_read_list_set():
@@ -145,7 +145,7 @@ def test_vision_reaches_the_estimate(odometry):
         rig.tick()
     rig.send(
         mavlink2.MAVLink_command_long_message(
-            1, 1, Command.REQUEST_MESSAGE, 0, mavlink2.MAVLINK_MSG_ID_ODOMETRY, 0, 0, 0, 0, 0, 0
+            1, 1, MavCmd.REQUEST_MESSAGE, 0, mavlink2.MAVLINK_MSG_ID_ODOMETRY, 0, 0, 0, 0, 0, 0
         )
     )
     found = rig.heard("ODOMETRY")[0]

@@ -3,14 +3,14 @@
 import numpy as np
 import pytest
 
-from uam_lab.campaign.trial import Result
+from uam_lab.campaign.trial import TrialResult
 from uam_lab.compare import tables
 from uam_lab.compare.plan import ASMC1, ASMC2, PROPOSED
 
 
 def flight(label, seed, rms, mass=0.2, outcome="completed"):
     why = "" if outcome == "completed" else "fell"
-    return Result(
+    return TrialResult(
         label,
         mass,
         seed,

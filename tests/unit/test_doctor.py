@@ -13,7 +13,7 @@ import pytest
 from uam_lab.cli import doctor as command
 from uam_lab.cli.main import main
 from uam_lab.doctor import installation, run
-from uam_lab.doctor.child import TOO_LATE, Child
+from uam_lab.doctor.child import TOO_LATE, CheckProcess
 from uam_lab.doctor.finding import Verdict, fail, ok, warn
 
 OK, WARN, FAIL = Verdict
@@ -88,7 +88,7 @@ def test_a_child_that_hangs_is_ended_in_time(tmp_path):
     )
     path = os.pathsep.join([str(tmp_path), *sys.path])
     begun = time.monotonic()
-    with Child("hangs", environment={"PYTHONPATH": path}) as child:
+    with CheckProcess("hangs", environment={"PYTHONPATH": path}) as child:
         said = child.wait(3.0)
     assert said.problem.startswith(TOO_LATE) and time.monotonic() - begun < 30.0
     if "pid" in said.facts:
@@ -99,7 +99,7 @@ def test_a_child_that_hangs_is_ended_in_time(tmp_path):
 def test_a_child_says_facts_and_why_it_failed(tmp_path):
     (tmp_path / "fails.py").write_text("print('{\"a\": 1}')\nraise SystemExit('no libEGL')\n")
     path = os.pathsep.join([str(tmp_path), *sys.path])
-    with Child("fails", environment={"PYTHONPATH": path}) as child:
+    with CheckProcess("fails", environment={"PYTHONPATH": path}) as child:
         said = child.wait(60.0)
     assert said.facts == {"a": 1} and said.problem == "no libEGL"
 

@@ -15,7 +15,7 @@ from uam_lab.campaign.fault_trial import FaultResult
 from uam_lab.cli.main import main
 from uam_lab.report.figures import fault_marks, figures
 from uam_lab.report.figures.figures import draw
-from uam_lab.report.figures.panels import Flight
+from uam_lab.report.figures.panels import DrawnFlight
 from uam_lab.report.page import page
 from uam_lab.results import metrics
 from uam_lab.results.timeseries import COLUMNS
@@ -56,7 +56,7 @@ def test_faults_are_shaded_and_listed(flight_folder, flight, make_flight):
         record(500.0, None),
     ]
     marked = make_flight(info={"faults": faults})
-    figure = figures.arm_inputs([Flight("x", marked)])
+    figure = figures.arm_inputs([DrawnFlight("x", marked)])
     axis = figure.axes[0]
     assert {"A", "B C"} <= {text.get_text() for text in axis.texts}
     assert not any("D" == text.get_text() for text in axis.texts)
@@ -64,7 +64,7 @@ def test_faults_are_shaded_and_listed(flight_folder, flight, make_flight):
     end = round(axis.get_xlim()[1], 3)
     assert {(10.0, 12.0), (50.0, end), (50.1, 60.0)} <= spans
     assert [t.get_text() for t in figure.legends[0].texts][-1] == "fault"
-    draw([Flight("x", marked)], flight_folder / "figures", names=["arm_inputs"])
+    draw([DrawnFlight("x", marked)], flight_folder / "figures", names=["arm_inputs"])
     (flight_folder / "info.json").write_text(json.dumps(marked.info))
     html = page.write_page(flight_folder).read_text()
     assert "Faults put into this flight" in html and "<code>clock_jump</code>" in html

@@ -7,7 +7,7 @@ from PIL import Image
 from uam_control.profiles.profile import load_profile
 from uam_lab.analysis.stability import analyse
 from uam_lab.report.figures import figures, panels
-from uam_lab.report.figures.panels import Flight
+from uam_lab.report.figures.panels import DrawnFlight
 from uam_lab.results import metrics
 from uam_lab.results.timeseries import COLUMNS, Series, gain_columns
 from uam_sim_bridge.plant import Vehicle
@@ -51,7 +51,7 @@ def test_short_series_are_not_thinned():
 def test_all_figures_are_written_as_png_and_svg(flight, tmp_path):
     steps = []
     found = analyse(flight, load_profile("s500").sets, Vehicle.load(), 0.2)
-    written = figures.draw([Flight("modular", flight, found)], tmp_path, steps.append)
+    written = figures.draw([DrawnFlight("modular", flight, found)], tmp_path, steps.append)
     assert written == list(figures.FIGURES)
     assert len(steps) == len(written)
     for name in written:
@@ -62,13 +62,13 @@ def test_all_figures_are_written_as_png_and_svg(flight, tmp_path):
 
 def test_the_same_flight_gives_the_same_picture(flight, tmp_path):
     for place in ("a", "b"):
-        figures.draw([Flight("modular", flight)], tmp_path / place, names=["arm_errors"])
+        figures.draw([DrawnFlight("modular", flight)], tmp_path / place, names=["arm_errors"])
     first, second = (tmp_path / place / "arm_errors.svg" for place in ("a", "b"))
     assert first.read_bytes() == second.read_bytes()
 
 
 def test_an_error_figure_names_phases_events_and_rms(flight):
-    figure = figures.position_errors([Flight("modular", flight)])
+    figure = figures.position_errors([DrawnFlight("modular", flight)])
     shown = words(figure)
     for phase in ("take-off", "approach", "pick", "carry", "drop", "return", "land"):
         assert phase in shown
@@ -82,7 +82,7 @@ def test_an_error_figure_names_phases_events_and_rms(flight):
 
 
 def test_a_line_shows_the_flight_in_the_unit_of_its_label(flight):
-    figure = figures.attitude_errors([Flight("modular", flight)])
+    figure = figures.attitude_errors([DrawnFlight("modular", flight)])
     line = figure.axes[1].lines[0]
     assert figure.axes[1].get_ylabel() == "pitch θ error [°]"
     drawn = line.get_ydata()
@@ -92,7 +92,7 @@ def test_a_line_shows_the_flight_in_the_unit_of_its_label(flight):
 
 def test_several_flights_lie_over_one_another(flight, make_flight):
     other = make_flight(seed=2, scale=3.0)
-    figure = figures.arm_errors([Flight("modular", flight), Flight("ASMC-1", other)])
+    figure = figures.arm_errors([DrawnFlight("modular", flight), DrawnFlight("ASMC-1", other)])
     shown = words(figure)
     assert {"modular", "ASMC-1"} <= set(shown)
     assert not any("RMS" in text for text in shown)
@@ -101,31 +101,31 @@ def test_several_flights_lie_over_one_another(flight, make_flight):
 
 
 def test_a_flight_without_payload_has_no_payload_figure_and_one_path(flight, tmp_path):
-    plain = Flight("modular", without_magnet(flight))
+    plain = DrawnFlight("modular", without_magnet(flight))
     written = figures.draw([plain], tmp_path, names=["path", "payload", "position_errors"])
     assert written == ["path", "position_errors"]
     assert len(figures.path_figure([plain]).axes) == 1
-    assert len(figures.path_figure([Flight("modular", flight)]).axes) == 3
+    assert len(figures.path_figure([DrawnFlight("modular", flight)]).axes) == 3
 
 
 def test_a_law_without_adaptation_has_no_adaptation_figure(flight):
     values = flight.values.copy()
     values[:, COLUMNS.block("adaptation.")] = np.nan
     series = Series(values, flight.phases, flight.phase_names, flight.info)
-    assert figures.adaptation([Flight("other", series)]) is None
+    assert figures.adaptation([DrawnFlight("other", series)]) is None
 
 
 def test_each_law_has_its_own_rows_in_the_adaptation_figure(flight):
     values = flight.values.copy()
     values[:, COLUMNS.block("adaptation.")] = np.nan
     values[:, gain_columns("position", ("D1", "D2", "D3", "s_norm"))] = [-0.1, 0.2, 0.3, 0.4]
-    other = Flight("ASMC-1", Series(values, flight.phases, flight.phase_names, flight.info))
+    other = DrawnFlight("ASMC-1", Series(values, flight.phases, flight.phase_names, flight.info))
     rows = ["$\\hat D$", "‖s‖"]
     alone = figures.adaptation([other])
     assert [axis.get_ylabel() for axis in alone.axes[::3]] == rows
     assert alone.axes[0].lines[0].get_ydata().max() == -0.1  # signed, hence linear
     assert [axis.get_yscale() for axis in alone.axes[::3]] == ["linear", "log"]
-    both = figures.adaptation([Flight("modular", flight), other])
+    both = figures.adaptation([DrawnFlight("modular", flight), other])
     assert [axis.get_ylabel() for axis in both.axes[::3]][3:] == rows
 
 
@@ -133,4 +133,4 @@ def test_a_flight_that_never_took_off_is_drawn_too(flight, tmp_path):
     rows = flight.time < -0.5
     series = Series(flight.values[rows], flight.phases[rows], flight.phase_names, flight.info)
     wanted = ["position_errors", "path", "adaptation"]
-    assert figures.draw([Flight("modular", series)], tmp_path, names=wanted)[:2] == wanted[:2]
+    assert figures.draw([DrawnFlight("modular", series)], tmp_path, names=wanted)[:2] == wanted[:2]

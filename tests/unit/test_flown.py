@@ -5,13 +5,13 @@ import pytest
 
 from uam_control.settings.configuration import ConfigurationError
 from uam_lab.campaign.flown import FILE, Flown
-from uam_lab.campaign.trial import Result
+from uam_lab.campaign.trial import TrialResult
 
 
 def flight(seed):
     rms = np.linspace(0.1, np.pi, 8)
     rms[3] = np.nan
-    return Result(
+    return TrialResult(
         "random", 0.1, seed, rms, 2 * rms, 0.5, True, "lost", "fell", None, (0.1, 0.2), {"K0": 1.0}
     )
 

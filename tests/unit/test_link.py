@@ -11,7 +11,7 @@ from uam_sim_bridge.mavlink.link.link import OffboardLink
 from uam_sim_bridge.mavlink.link.link_report import faults, report
 from uam_sim_bridge.mavlink.offboard.sequence import OffboardSequence, Phase
 from uam_sim_bridge.mavlink.offboard.setpoint import RateThrustParameters
-from uam_sim_bridge.mavlink.protocol.modes import Command, Mode, Result
+from uam_sim_bridge.mavlink.protocol.modes import MavCmd, MavResult, Mode
 from uam_sim_bridge.mavlink.protocol.wire import Codec, Framer, clean_text, mavlink2
 from uam_sim_bridge.mavlink.telemetry.event_messages import EventMessage
 from uam_sim_bridge.mavlink.telemetry.events import SUMMARY, event_id
@@ -20,7 +20,7 @@ from uam_sim_bridge.mavlink.telemetry.streams import ONLY_COUNTED, RATES
 
 DOWN = np.array([0.0, 0.0, -9.81])
 LEVEL = np.array([1.0, 0.0, 0.0, 0.0])
-ARM = (Command.ARM_DISARM, 1.0)
+ARM = (MavCmd.ARM_DISARM, 1.0)
 
 
 class Memory:
@@ -128,9 +128,7 @@ def rig():
 def test_set_up(rig):
     rig.run(6.0)
     link = rig.link
-    streams = [
-        first for command, first in rig.commands() if command == Command.SET_MESSAGE_INTERVAL
-    ]
+    streams = [first for command, first in rig.commands() if command == MavCmd.SET_MESSAGE_INTERVAL]
     assert streams == [number for number in RATES if number not in ONLY_COUNTED]
     read = [clean_text(m.param_id) for m in rig.received if m.get_type() == "PARAM_REQUEST_READ"]
     assert sorted(read) == sorted(WATCHED)
@@ -174,7 +172,7 @@ def test_cut_of_a_fifth_of_a_second_changes_nothing(rig):
     rig.run(1.0)
     assert rig.sequence.phase is Phase.FLYING and rig.autopilot.status.mode is Mode.OFFBOARD
     assert rig.reasons() == "" and rig.link.lost > 0
-    assert not any(c == Command.DO_SET_MODE for c, _ in rig.commands())
+    assert not any(c == MavCmd.DO_SET_MODE for c, _ in rig.commands())
 
 
 def test_cut_of_two_seconds_is_a_failsafe_and_offboard_is_requested_again(rig):
@@ -216,7 +214,7 @@ def test_disarmed_behind_a_cut_is_not_armed_again(rig):
 
 def test_the_autopilot_leaves_offboard_by_itself(rig):
     rig.fly()
-    rig.autopilot.command(rig.uptime, Command.DO_SET_MODE, (1.0, 4.0, 6.0))
+    rig.autopilot.command(rig.uptime, MavCmd.DO_SET_MODE, (1.0, 4.0, 6.0))
     rig.run(2.0)
     assert rig.autopilot.status.mode is Mode.OFFBOARD
     assert "left OFFBOARD for LAND" in rig.reasons()
@@ -228,7 +226,7 @@ def test_reboot_on_the_ground_repeats_all_requests(rig):
     rig.boot()
     rig.run(1.0)
     assert rig.link.reboots == 1 and rig.sequence.phase is Phase.STREAMING
-    intervals = [c for c, _ in rig.commands() if c == Command.SET_MESSAGE_INTERVAL]
+    intervals = [c for c, _ in rig.commands() if c == MavCmd.SET_MESSAGE_INTERVAL]
     assert len(intervals) == len(RATES) - len(ONLY_COUNTED)
     assert rig.link.mapping_read and rig.link.time_sync.offset == pytest.approx(-8.0, abs=0.01)
     rig.sequence.want(True)
@@ -305,7 +303,7 @@ def test_the_link_requests_the_reasons_of_a_refused_arming(rig):
     rig.sequence.want(True)
     rig.run(3.0)
     sent = [c for c, _ in rig.commands()]
-    assert sent.count(Command.RUN_PREARM_CHECKS) == 1 < sent.count(Command.ARM_DISARM)
+    assert sent.count(MavCmd.RUN_PREARM_CHECKS) == 1 < sent.count(MavCmd.ARM_DISARM)
     summary = struct.pack("<BIIII", 0, 0, 0, 1, 1)
     rig.send(
         EventMessage(0, 0, event_id(SUMMARY), 0, 1, 8, summary),
@@ -322,7 +320,7 @@ def test_answers_to_other_components_are_ignored(rig):
     rig.run(0.02)
     rig.send(
         mavlink2.MAVLink_command_ack_message(
-            Command.ARM_DISARM, Result.DENIED, 0, 0, 255, mavlink2.MAV_COMP_ID_MISSIONPLANNER
+            MavCmd.ARM_DISARM, MavResult.DENIED, 0, 0, 255, mavlink2.MAV_COMP_ID_MISSIONPLANNER
         )
     )
     rig.run(2.0)

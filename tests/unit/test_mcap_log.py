@@ -70,9 +70,11 @@ def test_the_public_reader_decodes_what_was_written(tmp_path):
 
 
 def test_our_reader_gives_the_same_and_only_the_topics_that_were_named(tmp_path):
-    log, _ = filled(tmp_path / "log.mcap", 1)
+    log, messages = BoundedLog(tmp_path / "log.mcap", limit=0.0), [serialized(0), serialized(1)]
+    channel = log.add_channel("/uam/state", TRAJECTORY, schema(TRAJECTORY), {})
+    for k, message in enumerate(messages):
+        log.write(channel, k * SECOND, k * SECOND + 7, message, k)
     log.close()
-    messages = [serialized(0), serialized(1)]
     expected = TopicLog(TRAJECTORY, [0, SECOND], messages, [7, SECOND + 7])
     assert read_log(tmp_path / "log.mcap") == {"/uam/state": expected}
     assert read_log(tmp_path / "log.mcap", {"/other"}) == {}

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from uam_lab.results import metrics
-from uam_lab.results.timeseries import COLUMNS, Recording
+from uam_lab.results.timeseries import COLUMNS, FlightTable
 
 INFO = {
     "controller": "modular",
@@ -29,7 +29,7 @@ def flight(phases=None, payload=True):
 
     The payload is raised by 0.3 m while the magnet is on and ends 0.05 m from (0.8, 0).
     """
-    made = Recording(10)
+    made = FlightTable(10)
     for k in range(10):
         name = "waiting" if k < 2 else "hover" if k < 8 else "landed"
         row = made.next_row(phases[k] if phases else name)

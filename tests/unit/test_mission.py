@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from uam_control.mission import Mission, MissionParameters, ScenarioError, load_scenario
 from uam_control.mission.scenario import CSV_REQUIRED
 from uam_control.mission.trajectory import Move, Moves, Sampled
-from uam_control.supervision import Command, State
+from uam_control.supervision import OperatorCommand, State
 
 START = np.array([0.0, 0.0, 0.28, 0.0, 0.0, 0.0, 0.0, np.pi / 2])
 
@@ -252,15 +252,15 @@ def test_a_vehicle_that_is_off_its_path_holds_then_lands_where_it_is():
 def test_hold_stops_the_scenario_and_resume_goes_on_with_it():
     flight = Flight("pick_and_place")
     flight.until(lambda o: o.time > 10.0)
-    assert flight.mission.request(Command.RESUME) == (False, "refused: not while flying")
-    assert flight.mission.request(Command.HOLD) == (True, "hold by command")
+    assert flight.mission.request(OperatorCommand.RESUME) == (False, "refused: not while flying")
+    assert flight.mission.request(OperatorCommand.HOLD) == (True, "hold by command")
     assert flight.step().state is State.HOLDING
     flight.until(lambda o: o.time > 13.0)
     held = flight.step().reference.copy()
     np.testing.assert_array_equal(held[1:], 0.0)
     flight.until(lambda o: o.time > 20.0)
     np.testing.assert_array_equal(flight.step().reference, held)
-    assert flight.mission.request(Command.RESUME)[0]
+    assert flight.mission.request(OperatorCommand.RESUME)[0]
     assert flight.step().phase == "approach"
     output = flight.until(lambda o: o.done, limit=120.0)
     assert not output.abort_reason and output.phase == "landed"
@@ -278,7 +278,7 @@ def test_land_goes_down_from_where_it_is_and_stows_the_arm():
     flight = Flight("pick_and_place")
     flight.until(lambda o: o.time > 25.0)
     x = flight.state[0, 0]
-    assert flight.mission.request(Command.LAND)[0]
+    assert flight.mission.request(OperatorCommand.LAND)[0]
     output = flight.until(lambda o: o.phase == "landed", limit=60.0)
     assert output.abort_reason == "land by command" and output.time < 35.0
     assert output.reference[0, 0] == pytest.approx(x, abs=0.06)
@@ -287,14 +287,14 @@ def test_land_goes_down_from_where_it_is_and_stows_the_arm():
 
 def test_disarming_in_the_air_is_refused_and_on_the_ground_done():
     flight = Flight()
-    assert flight.mission.request(Command.DISARM) == (False, "no state of the vehicle yet")
+    assert flight.mission.request(OperatorCommand.DISARM) == (False, "no state of the vehicle yet")
     flight.until(lambda o: o.time > 4.0)
     refused = (False, "refused: flying and not on the ground: land first")
-    assert flight.mission.request(Command.DISARM) == refused
+    assert flight.mission.request(OperatorCommand.DISARM) == refused
     assert flight.step().arm
     waiting = Flight()
     waiting.step()
-    assert waiting.mission.request(Command.DISARM)[0]
+    assert waiting.mission.request(OperatorCommand.DISARM)[0]
     output = waiting.step()
     assert not output.arm and output.state is State.DISARMED and output.time < 0.0
     assert waiting.mission.switch_magnet(True)[0] is False
@@ -335,7 +335,7 @@ def test_disarming_in_flight_is_noticed():
 STRANGE = st.floats(-10.0, 10.0) | st.sampled_from([np.nan, np.inf, -np.inf])
 HAPPENINGS = st.tuples(
     st.integers(1, 300), st.integers(0, 2), st.integers(0, 7), STRANGE,
-    st.sampled_from([None, *Command]), st.booleans(), st.booleans(),
+    st.sampled_from([None, *OperatorCommand]), st.booleans(), st.booleans(),
 )  # fmt: skip
 
 

@@ -10,13 +10,13 @@ from uam_sim_bridge.mavlink.offboard.sequence import (
     Phase,
     Request,
 )
-from uam_sim_bridge.mavlink.protocol.modes import Command, Mode, Result, Severity
+from uam_sim_bridge.mavlink.protocol.modes import MavCmd, MavResult, Mode, Severity
 
 DOWN = np.array([0.0, 0.0, -9.81])
 COMMANDS = {
-    Request.OFFBOARD: (Command.DO_SET_MODE, (1.0, 6.0, 0.0)),
-    Request.ARM: (Command.ARM_DISARM, (1.0, 0.0)),
-    Request.DISARM: (Command.ARM_DISARM, (0.0, 0.0)),
+    Request.OFFBOARD: (MavCmd.DO_SET_MODE, (1.0, 6.0, 0.0)),
+    Request.ARM: (MavCmd.ARM_DISARM, (1.0, 0.0)),
+    Request.DISARM: (MavCmd.ARM_DISARM, (0.0, 0.0)),
 }
 
 
@@ -64,7 +64,7 @@ def test_gives_up_with_the_reasons():
     s = OffboardSequence(OffboardParameters(attempts=3))
     s.want(True)
     run(s, 1.1, 0.0)
-    s.answer(Request.OFFBOARD, Result.TEMPORARILY_REJECTED)
+    s.answer(Request.OFFBOARD, MavResult.TEMPORARILY_REJECTED)
     s.text(Severity.CRITICAL, "no offboard signal")
     s.text(Severity.INFO, "chatter")
     asked = run(s, 5.0, 1.1)
@@ -99,7 +99,7 @@ def test_disarm():
     s = flying()
     s.want(False)
     assert run(s, 0.1, 2.0, armed=True, mode=Mode.OFFBOARD) == [(2.0, Request.DISARM)]
-    s.answer(Request.DISARM, Result.TEMPORARILY_REJECTED)
+    s.answer(Request.DISARM, MavResult.TEMPORARILY_REJECTED)
     run(s, 0.1, 3.0, armed=False, mode=Mode.OFFBOARD)
     assert s.phase is Phase.DISARMED and s.reasons == () and s.streaming
 

@@ -8,7 +8,7 @@ import pytest
 from uam_lab.report.facts import changes
 from uam_lab.report.figures import figures
 from uam_lab.report.figures.figures import draw
-from uam_lab.report.figures.panels import Flight
+from uam_lab.report.figures.panels import DrawnFlight
 from uam_lab.report.page import page
 
 
@@ -25,14 +25,14 @@ def entry(time, accepted=True, **values):
 
 def test_a_change_is_read_back_from_its_message():
     pytest.importorskip("rclpy")
-    from uam_msgs_py.messages.changes import Change
+    from uam_msgs_py.messages.changes import ParameterChange
 
     values = {"varpi": (0.1, math.inf), "law": ("a -> b", None), "nu": ([1.0, 2.0], [1.0])}
-    change = Change("arm_controller", "parameter service", values, "varpi: no")
-    assert Change.from_message(change.to_message(1_500_000_000)) == (1_500_000_000, change)
-    accepted = Change("mission", "x", {"adapt": (True, False)})
+    change = ParameterChange("arm_controller", "parameter service", values, "varpi: no")
+    assert ParameterChange.from_message(change.to_message(1_500_000_000)) == (1_500_000_000, change)
+    accepted = ParameterChange("mission", "x", {"adapt": (True, False)})
     assert accepted.accepted and not change.accepted
-    assert Change.from_message(accepted.to_message(0)) == (0, accepted)
+    assert ParameterChange.from_message(accepted.to_message(0)) == (0, accepted)
 
 
 def test_numbers_that_would_overlap_share_one_label():
@@ -45,7 +45,7 @@ def test_numbers_that_would_overlap_share_one_label():
 def test_changes_are_drawn_and_listed(flight_folder, flight, make_flight):
     told = [entry(10.0, varpi=[0.1, 0.2]), entry(20.0, False, varpi=[0.2, -1.0]), entry(-5.0)]
     marked = make_flight(info={"parameter_changes": told})
-    figure = figures.arm_inputs([Flight("x", marked)])
+    figure = figures.arm_inputs([DrawnFlight("x", marked)])
     axis = figure.axes[0]
     lines = [c for c in axis.collections if len(c.get_segments()) == 1]
     assert [line.get_segments()[0][0][0] for line in lines] == [10.0, 20.0]
@@ -54,7 +54,7 @@ def test_changes_are_drawn_and_listed(flight_folder, flight, make_flight):
         "parameters changed",
         "change refused",
     ]
-    draw([Flight("x", marked)], flight_folder / "figures", names=["arm_inputs"])
+    draw([DrawnFlight("x", marked)], flight_folder / "figures", names=["arm_inputs"])
     (flight_folder / "info.json").write_text(json.dumps(marked.info))
     html = page.write_page(flight_folder).read_text()
     assert "Parameters changed in flight" in html and "varpi: &lt;no&gt;" in html

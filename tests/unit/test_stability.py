@@ -10,7 +10,7 @@ from uam_control.laws.modular import ModularLaw
 from uam_control.profiles.profile import load_profile
 from uam_lab.analysis import constants, lyapunov, stability, ticks
 from uam_lab.analysis.folder import analyse_folder
-from uam_lab.analysis.lyapunov import Comparison
+from uam_lab.analysis.lyapunov import ComparisonSystem
 from uam_lab.analysis.tracking import Tracking
 from uam_lab.report.figures import figures, panels
 from uam_lab.results.timeseries import COLUMNS, Series
@@ -91,12 +91,12 @@ def test_v_and_bound_worked_by_hand():
     assert found.growth == pytest.approx(growth)
     assert found.bound == pytest.approx(growth / found.rate)
     np.testing.assert_allclose(lyapunov.eigenvalues(record), np.linalg.eigvalsh(matrix))
-    both = found + Comparison(0.5, 1.0)
+    both = found + ComparisonSystem(0.5, 1.0)
     assert (both.rate, both.growth) == pytest.approx((0.5, growth + 1.0))
 
 
 def test_the_envelope_solves_the_comparison_equation():
-    law = Comparison(rate=0.5, growth=2.0)
+    law = ComparisonSystem(rate=0.5, growth=2.0)
     time = np.linspace(0.0, 20.0, 2001)
     envelope = law.envelope(10.0, time)
     assert envelope[0] == 10.0
@@ -141,7 +141,7 @@ def test_v_falls_outside_the_bound_and_stays_within():
 
 def test_a_v_that_leaves_its_bound_is_reported():
     time = np.arange(100) * 0.1
-    found = stability.check(time, np.exp(time), Comparison(rate=0.1, growth=1.0))
+    found = stability.check(time, np.exp(time), ComparisonSystem(rate=0.1, growth=1.0))
     assert found["within_bound"] == pytest.approx(np.mean(np.exp(time) <= 10.0))
     assert found["largest_ratio_to_bound"] == pytest.approx(np.exp(9.9) / 10.0)
     assert found["within_envelope"] < 0.1
@@ -187,7 +187,7 @@ def test_sigma_is_what_the_error_equation_says(analysed, direct_flight):
 
 def test_figures_of_a_flight_of_three_seconds(short_direct_flight, tmp_path):
     found = stability.analyse(short_direct_flight, load_profile("s500").sets, Vehicle.load(), 0.2)
-    flight = panels.Flight("modular", short_direct_flight, found)
+    flight = panels.DrawnFlight("modular", short_direct_flight, found)
     wanted = ["lyapunov", "coupling"]
     assert figures.draw([flight], tmp_path, names=wanted) == wanted
     assert figures.draw([flight, flight], tmp_path / "two", names=wanted) == []

@@ -2,7 +2,7 @@
 
 import pytest
 
-from uam_sim_bridge.mavlink.protocol.modes import Result
+from uam_sim_bridge.mavlink.protocol.modes import MavResult
 from uam_sim_bridge.mavlink.protocol.wire import mavlink2
 from uam_sim_bridge.mavlink.telemetry.streams import (
     ATTEMPTS,
@@ -17,7 +17,7 @@ HEARTBEAT = mavlink2.MAVLINK_MSG_ID_HEARTBEAT
 BATTERY = mavlink2.MAVLINK_MSG_ID_BATTERY_STATUS
 
 
-def run(streams, seconds, start=0.0, rates=RATES, result=Result.ACCEPTED, answered=True):
+def run(streams, seconds, start=0.0, rates=RATES, result=MavResult.ACCEPTED, answered=True):
     """Tick at 250 Hz with an autopilot that sends at `rates`; return (time, id) of the requests."""
     requests, due = [], dict.fromkeys(rates, start)
     for k in range(round(seconds / 0.004)):
@@ -69,7 +69,7 @@ def test_missing_streams_and_heartbeat_without_request():
 
 def test_refusals_are_warnings():
     streams = StreamCheck()
-    requests = run(streams, 5 * WINDOW, result=Result.FAILED)
+    requests = run(streams, 5 * WINDOW, result=MavResult.FAILED)
     assert len(requests) == ATTEMPTS * (len(RATES) - len(ONLY_COUNTED))
     assert "ODOMETRY received at 10.0 Hz, request for 10 Hz refused (failed)" in streams.warnings
 
@@ -93,5 +93,5 @@ def test_restart_requests_all_streams_again():
 
 def test_an_answer_without_a_request_is_ignored():
     streams = StreamCheck()
-    streams.answer(Result.DENIED)
+    streams.answer(MavResult.DENIED)
     assert streams.warnings == ()

@@ -14,11 +14,11 @@ from hypothesis.stateful import RuleBasedStateMachine, invariant, rule
 
 from uam_control.settings.parameter_set import ParameterError
 from uam_control.supervision import (
-    Command,
     Event,
     Guide,
     Inputs,
     Observation,
+    OperatorCommand,
     Readings,
     State,
     SupervisionParameters,
@@ -252,18 +252,18 @@ def test_a_limit_that_is_not_on_any_more_lets_it_go_on_only_when_that_is_wanted(
     for automatic, expected in ((False, State.HOLDING), (True, State.FLYING)):
         supervisor = flying(resume_automatically=automatic)
         assert watch(supervisor, far, 0.6).state is State.HOLDING
-        assert supervisor.refusal(Command.RESUME, far).startswith("position error")
+        assert supervisor.refusal(OperatorCommand.RESUME, far).startswith("position error")
         assert watch(supervisor, near, 0.9, 2.0).state is State.HOLDING
         assert watch(supervisor, near, 3.0, 3.0).state is expected
     supervisor = flying()
     watch(supervisor, far, 0.6)
     watch(supervisor, near, 2.0, 2.0)
-    assert supervisor.step(5.0, near, Command.RESUME).state is State.FLYING
+    assert supervisor.step(5.0, near, OperatorCommand.RESUME).state is State.FLYING
 
 
 def test_a_hold_by_command_is_not_ended_by_itself():
     supervisor = flying(resume_automatically=True)
-    supervisor.step(1.0, observation(), Command.HOLD)
+    supervisor.step(1.0, observation(), OperatorCommand.HOLD)
     assert watch(supervisor, observation(), 60.0, 2.0).state is State.HOLDING
 
 
@@ -304,9 +304,9 @@ def test_another_limit_that_is_clear_again_waits_for_a_command():
 @pytest.mark.parametrize("keep", ["keep", "release"])
 def test_arm_and_magnet_follow_the_policy(keep):
     supervisor = flying(arm_holding="stow", arm_landing="stay", magnet_holding=keep)
-    decision = supervisor.step(1.0, observation(), Command.HOLD)
+    decision = supervisor.step(1.0, observation(), OperatorCommand.HOLD)
     assert decision.stow and decision.keep_magnet is (keep == "keep")
-    decision = supervisor.step(1.1, observation(), Command.LAND)
+    decision = supervisor.step(1.1, observation(), OperatorCommand.LAND)
     assert not decision.stow and decision.keep_magnet
 
 
@@ -364,7 +364,7 @@ class AnySequence(RuleBasedStateMachine):
         self.decision = self.supervisor.step(stamp, self.seen, command)
         assert armed or not self.decision.arm  # never arms
         if self.before is State.FAILSAFE and self.decision.state is not State.FAILSAFE:
-            assert command is Command.DISARM
+            assert command is OperatorCommand.DISARM
         new = self.supervisor.changes[changes:]
         assert len(new) <= 1
         for change in new:
@@ -374,7 +374,7 @@ class AnySequence(RuleBasedStateMachine):
             if change.target is State.DISARMED:
                 seen = self.seen
                 on_ground = seen.on_ground or seen.touchdown
-                assert on_ground or not seen.armed or command is Command.DISARM
+                assert on_ground or not seen.armed or command is OperatorCommand.DISARM
 
     @rule(seconds=st.sampled_from([0.004, 0.05, 0.6, 2.0]), ticks=st.integers(1, 20))
     def time_passes(self, seconds, ticks):
@@ -388,7 +388,7 @@ class AnySequence(RuleBasedStateMachine):
         if math.isfinite(stamp):
             self.stamp = max(self.stamp, stamp)
 
-    @rule(command=st.sampled_from(Command))
+    @rule(command=st.sampled_from(OperatorCommand))
     def a_command(self, command):
         self.stamp += 0.004
         refusal = self.supervisor.refusal(command, self.seen)

@@ -5,12 +5,12 @@ import pyarrow.parquet as pq
 import pytest
 
 from uam_lab.results import timeseries
-from uam_lab.results.timeseries import COLUMNS, Recording, UnreadableFlight
+from uam_lab.results.timeseries import COLUMNS, FlightTable, UnreadableFlight
 
 
 def recording(phases, dt=0.5, start=-1.0):
     """A recording with one row per phase name and every number zero."""
-    made = Recording(2)
+    made = FlightTable(2)
     for k, phase in enumerate(phases):
         row = made.next_row(phase)
         row[:] = 0.0

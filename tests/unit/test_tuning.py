@@ -8,7 +8,7 @@ import yaml
 
 from uam_control.profiles.profile import load_profile
 from uam_control.settings import configuration
-from uam_lab.campaign.trial import Result
+from uam_lab.campaign.trial import TrialResult
 from uam_lab.cli.main import main
 from uam_lab.tuning.space import Cost, TuningError, load_space
 
@@ -20,7 +20,7 @@ COST = Cost(
     not_completed=3.0,
     lost=100.0,
 )
-FLIGHT = Result(
+FLIGHT = TrialResult(
     label="x",
     payload_mass=0.2,
     seed=1,

@@ -15,14 +15,14 @@ from uam_control.mission.mission_parameters import MissionParameters
 from uam_control.mission.scenario import Scenario
 from uam_control.mission.trajectory import empty_reference
 from uam_control.supervision import (
-    Change,
-    Command,
     Decision,
     Event,
     Guide,
     Observation,
+    OperatorCommand,
     Readings,
     State,
+    StateTransition,
     Supervisor,
 )
 
@@ -60,7 +60,7 @@ class Mission:
         self.output.reference[0, ARM] = scenario.arm_start
         self._supervisor = Supervisor(parameters)
         self._parameters = parameters
-        self._requests: deque[Command] = deque()
+        self._requests: deque[OperatorCommand] = deque()
         self._seen: Observation | None = None
         self._guidance: Guidance | None = None
         self._takeoff = self._ground = 0.0
@@ -78,7 +78,7 @@ class Mission:
             self._guidance.parameters = parameters
 
     @property
-    def changes(self) -> list[Change]:
+    def changes(self) -> list[StateTransition]:
         """Every change of state so far, in order."""
         return self._supervisor.changes
 
@@ -127,7 +127,7 @@ class Mission:
         """End a flight that has not taken off."""
         self._follow(stamp, self._supervisor.give_up(stamp, reason))
 
-    def request(self, command: Command) -> tuple[bool, str]:
+    def request(self, command: OperatorCommand) -> tuple[bool, str]:
         """Ask for something in flight, to be done at the next step.
 
         Returns whether it will be, and what or why not, in one line.

@@ -12,7 +12,7 @@ from uam_control.laws import catalogue
 from uam_control.nodes.timing import Ticks, Timing
 from uam_control.profiles.profile import load_profile, parameter_set
 from uam_msgs_py.messages import topics
-from uam_msgs_py.messages.changes import Change
+from uam_msgs_py.messages.changes import ParameterChange
 from uam_msgs_py.messages.control import read_position_command, read_reference, read_state
 from uam_msgs_py.messages.convert import JointStateWriter
 from uam_msgs_py.messages.topics import Topic
@@ -101,7 +101,7 @@ class ControllerNode(UamNode):
         controller.reset_adaptation()
         new = self._adapted()
         changed = {name: (old[name], new[name]) for name in new if new[name] != old[name]}
-        self.tell(Change(self.get_name(), RESET, changed))
+        self.tell(ParameterChange(self.get_name(), RESET, changed))
         response.success = True
         response.message = f"adapted gains at their initial values: {_listed(new)}"
         return response

@@ -17,9 +17,9 @@ from rclpy.node import Node
 from std_srvs.srv import SetBool, Trigger
 
 from uam_control.mission import Mission
-from uam_control.supervision import Command
+from uam_control.supervision import OperatorCommand
 
-COMMANDS = {command.name.lower(): command for command in Command}
+COMMANDS = {command.name.lower(): command for command in OperatorCommand}
 MAGNET = "magnet"
 
 
@@ -34,7 +34,7 @@ def offer(node: Node, mission: Mission) -> None:
         return response
 
     def on_command(
-        name: str, command: Command, request: Trigger.Request, response: Trigger.Response
+        name: str, command: OperatorCommand, request: Trigger.Request, response: Trigger.Response
     ) -> Trigger.Response:
         return answer(name, response, mission.request(command))
 

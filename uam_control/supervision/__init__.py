@@ -1,15 +1,15 @@
 """What watches over a flight: limits, states, and what each of them means for the vehicle."""
 
 from uam_control.supervision.inputs import Inputs
-from uam_control.supervision.observation import Command, Observation, Readings
+from uam_control.supervision.observation import Observation, OperatorCommand, Readings
 from uam_control.supervision.states import ORDINARY, Event, State
 from uam_control.supervision.supervision_parameters import SupervisionParameters
-from uam_control.supervision.supervisor import Change, Decision, Guide, Supervisor
+from uam_control.supervision.supervisor import Decision, Guide, StateTransition, Supervisor
 
 __all__ = [
     "ORDINARY",
-    "Change",
-    "Command",
+    "StateTransition",
+    "OperatorCommand",
     "Decision",
     "Event",
     "Guide",

@@ -77,7 +77,7 @@ CHECKS = (
 )  # fmt: skip
 
 
-class Finding(NamedTuple):
+class ExceededLimit(NamedTuple):
     """What is beyond a limit for long enough: how bad, in words, and the quantity's name."""
 
     level: Level
@@ -95,7 +95,7 @@ class Checks:
         self._monitors = [Monitor() for _ in CHECKS]
         self.quiet = True
         self._values = np.zeros(len(CHECKS))
-        self.finding: Finding | None = None
+        self.finding: ExceededLimit | None = None
         self.configure(parameters)
 
     def configure(self, parameters: SupervisionParameters) -> None:
@@ -115,7 +115,7 @@ class Checks:
         self._joints = np.array(p.joint_angle_hold)
         self._efforts, self._gains = np.array(p.joint_effort_hold), np.array(p.gain_hold)
 
-    def update(self, stamp: float, seen: Observation, in_flight: bool) -> Finding | None:
+    def update(self, stamp: float, seen: Observation, in_flight: bool) -> ExceededLimit | None:
         """Look at a tick at `stamp` [s]; return the worst that is beyond a limit, None for nothing.
 
         in_flight: whether the reference is one that the vehicle follows.
@@ -157,7 +157,7 @@ class Checks:
                 value = -math.inf
             level = monitor.update(stamp, value, limits, after, p.clear_after, p.hysteresis)
             if level and (worst is None or level > worst.level):
-                worst = Finding(level, _cause(check, value, limits[level - 1]), check.name)
+                worst = ExceededLimit(level, _cause(check, value, limits[level - 1]), check.name)
         self.quiet = all(monitor.quiet for monitor in self._monitors)
         self.finding = worst
         return worst

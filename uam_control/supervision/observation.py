@@ -11,7 +11,7 @@ import numpy as np
 from uam_control.supervision.states import Event
 
 
-class Command(Enum):
+class OperatorCommand(Enum):
     """What people may ask for in flight; the value is its event."""
 
     HOLD = Event.HOLD

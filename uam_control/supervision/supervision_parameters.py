@@ -19,7 +19,7 @@ _ARM = ("stay", "stow")
 
 
 @dataclass(frozen=True)
-class Limits(ParameterSet):
+class SupervisionLimits(ParameterSet):
     """What is too much. A limit ending in _hold makes it hold, _land land, _failsafe the rest."""
 
     position_error_hold: float = number(1.0, "position error to hold at", "m", 0.05, 100.0)
@@ -159,5 +159,5 @@ class Reactions(ParameterSet):
 
 
 @dataclass(frozen=True)
-class SupervisionParameters(Reactions, Limits):
+class SupervisionParameters(Reactions, SupervisionLimits):
     """Everything that the supervisor can be told."""

@@ -14,7 +14,7 @@ from typing import NamedTuple
 
 from uam_control.supervision.checks import CONTROLLERS, Checks
 from uam_control.supervision.monitor import Level
-from uam_control.supervision.observation import Command, Observation
+from uam_control.supervision.observation import Observation, OperatorCommand
 from uam_control.supervision.states import AIRBORNE_STATES, ORDINARY, TARGETS, Event, State
 from uam_control.supervision.supervision_parameters import SupervisionParameters
 
@@ -44,7 +44,7 @@ class Decision(NamedTuple):
     stow: bool
 
 
-class Change(NamedTuple):
+class StateTransition(NamedTuple):
     """One transition; stamp [s]."""
 
     stamp: float
@@ -63,7 +63,7 @@ class Supervisor:
     def __init__(self, parameters: SupervisionParameters) -> None:
         self.state = State.GROUNDED
         self.cause = "waiting to take off"
-        self.changes: list[Change] = []
+        self.changes: list[StateTransition] = []
         self._arm = True
         self._planned = False  # whether a landing is the scenario's
         self._stamp = -math.inf
@@ -79,7 +79,9 @@ class Supervisor:
         self._checks.configure(parameters)
         self.decision = self._decide()
 
-    def step(self, stamp: float, seen: Observation, command: Command | None = None) -> Decision:
+    def step(
+        self, stamp: float, seen: Observation, command: OperatorCommand | None = None
+    ) -> Decision:
         """Return what holds at `stamp` [s]; at most one transition per call.
 
         A stamp that is not finite or runs backwards counts as the last one.
@@ -110,15 +112,15 @@ class Supervisor:
             self._go(Event.GIVEN_UP, reason)
         return self.decision
 
-    def refusal(self, command: Command, seen: Observation) -> str:
+    def refusal(self, command: OperatorCommand, seen: Observation) -> str:
         """Return why `command` would do nothing now, "" if it would be followed."""
         event = self._event(command, seen)
         if (self.state, event) not in TARGETS:
-            if command is Command.DISARM and self.state in AIRBORNE_STATES:
+            if command is OperatorCommand.DISARM and self.state in AIRBORNE_STATES:
                 return f"{self.state.value} and not on the ground: land first"
             return f"not while {self.state.value}"
         finding = self._checks.finding
-        if command is Command.RESUME and finding is not None:
+        if command is OperatorCommand.RESUME and finding is not None:
             return finding.cause
         return ""
 
@@ -146,7 +148,9 @@ class Supervisor:
             keep = False
         return Decision(state, self.cause, guide, self._arm, keep, stow)
 
-    def _events(self, seen: Observation, command: Command | None) -> Iterator[tuple[Event, str]]:
+    def _events(
+        self, seen: Observation, command: OperatorCommand | None
+    ) -> Iterator[tuple[Event, str]]:
         """What happens at this tick, and why; what saves the vehicle first."""
         finding, p = self._checks.finding, self._parameters
         level, cause = (finding.level, finding.cause) if finding else (Level.FINE, "")
@@ -209,12 +213,16 @@ class Supervisor:
         self._beyond_since = None
         self._arm = self._arm and self.state is not State.DISARMED
         self.decision = self._decide()
-        self.changes.append(Change(self._stamp, source, self.state, event, cause))
+        self.changes.append(StateTransition(self._stamp, source, self.state, event, cause))
 
-    def _event(self, command: Command, seen: Observation) -> Event:
+    def _event(self, command: OperatorCommand, seen: Observation) -> Event:
         """The event of a command; on the ground disarming is another one where it matters."""
         event = command.value
-        if command is Command.DISARM and seen.on_ground and (self.state, event) not in TARGETS:
+        if (
+            command is OperatorCommand.DISARM
+            and seen.on_ground
+            and (self.state, event) not in TARGETS
+        ):
             return Event.DISARM_ON_GROUND
         return event
 

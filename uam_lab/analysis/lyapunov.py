@@ -24,7 +24,7 @@ from uam_lab.analysis.tracking import Tracking
 
 
 @dataclass(frozen=True)
-class Comparison:
+class ComparisonSystem:
     """dV/dt <= -rate V + growth [1/s], and what follows from it."""
 
     rate: float
@@ -40,9 +40,9 @@ class Comparison:
         decay = np.exp(-self.rate * elapsed)
         return decay * start + (1.0 - decay) * self.bound
 
-    def __add__(self, other: Comparison) -> Comparison:
+    def __add__(self, other: ComparisonSystem) -> ComparisonSystem:
         """Of the sum of two V_j, equation (new)."""
-        return Comparison(min(self.rate, other.rate), self.growth + other.growth)
+        return ComparisonSystem(min(self.rate, other.rate), self.growth + other.growth)
 
 
 @dataclass(frozen=True)
@@ -98,7 +98,7 @@ def decrease(
 
 def comparison(
     parameters: ModularParameters, zeta: np.ndarray, constants: np.ndarray
-) -> Comparison:
+) -> ComparisonSystem:
     """rate_j and growth_j of one subsystem; its ModularParameters, zeta (m,), constants K*.
 
     zeta_min and zeta_max are those of the flight.
@@ -108,7 +108,7 @@ def comparison(
     rate = min(smallest_q, nu.min()) / max(eigenvalues(record)[1], 1.0)
     low, high = float(zeta.min()), float(zeta.max())
     growth = rate * high / low + parameters.epsilon / low + 0.5 * float(nu @ constants**2)
-    return Comparison(float(rate), float(growth))
+    return ComparisonSystem(float(rate), float(growth))
 
 
 def error_bound(record: np.ndarray, value: float) -> float:

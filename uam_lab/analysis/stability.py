@@ -32,7 +32,7 @@ class Subsystem:
     constants: np.ndarray  # (4,) K*, the smallest
     printed: np.ndarray  # (4,) K* by the paper's expressions
     parts: lyapunov.Parts
-    comparison: lyapunov.Comparison
+    comparison: lyapunov.ComparisonSystem
     decrease: np.ndarray  # (m,) what dV_j/dt stays below, see lyapunov.decrease
     gains: np.ndarray  # (m, 4) K as flown
     zeta: np.ndarray  # (m,)
@@ -58,7 +58,7 @@ class Stability:
         return sum(s.parts.total for s in self.subsystems.values())
 
     @cached_property
-    def comparison(self) -> lyapunov.Comparison:
+    def comparison(self) -> lyapunov.ComparisonSystem:
         """Of V, equation (new)."""
         p, q, alpha = (self.subsystems[name].comparison for name in SUBSYSTEMS)
         return p + q + alpha
@@ -89,7 +89,9 @@ class Stability:
         return found
 
 
-def check(time: np.ndarray, value: np.ndarray, comparison: lyapunov.Comparison) -> dict[str, Any]:
+def check(
+    time: np.ndarray, value: np.ndarray, comparison: lyapunov.ComparisonSystem
+) -> dict[str, Any]:
     """V (m,) against max(V(0), B), against its envelope, and dV/dt against -rate V + growth.
 
     Also how often V falls where it is above B, None where it never is.

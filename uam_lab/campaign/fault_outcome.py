@@ -29,7 +29,7 @@ def counts(outcomes: Iterable[str]) -> dict[str, int]:
 
 
 @dataclass(frozen=True)
-class Limits:
+class OutcomeLimits:
     """What is still soft, upright, low and at rest."""
 
     impact: float = 1.0  # [m/s] speed downwards while it comes to the ground
@@ -49,9 +49,9 @@ class Ending:
     impact: float
 
 
-def ending(series: Series, limits: Limits | None = None) -> Ending:
+def ending(series: Series, limits: OutcomeLimits | None = None) -> Ending:
     """What the truth says of the end; series: with at least one tick."""
-    limits = limits or Limits()
+    limits = limits or OutcomeLimits()
     height = series["truth.z"] - series["truth.z"][0]
     velocity = np.column_stack([series[f"truth.{axis}_dot"] for axis in "xyz"])
     roll, pitch = series["truth.roll"][-1], series["truth.pitch"][-1]
@@ -64,9 +64,11 @@ def ending(series: Series, limits: Limits | None = None) -> Ending:
     )
 
 
-def classify(series: Series, figures: Mapping[str, Any], limits: Limits | None = None) -> str:
+def classify(
+    series: Series, figures: Mapping[str, Any], limits: OutcomeLimits | None = None
+) -> str:
     """One of OUTCOMES; figures: metrics.json of the flight."""
-    limits = limits or Limits()
+    limits = limits or OutcomeLimits()
     if figures["mission_completed"]:  # unless the autopilot had landed it unasked
         return FAILSAFE if _down_early(series, limits) else COMPLETED
     end = ending(series, limits)
@@ -80,9 +82,9 @@ def classify(series: Series, figures: Mapping[str, Any], limits: Limits | None =
     return LOST
 
 
-def down_after(series: Series, begun: float, limits: Limits | None = None) -> float | None:
+def down_after(series: Series, begun: float, limits: OutcomeLimits | None = None) -> float | None:
     """How long after the mission time `begun` [s] it was down to stay; None: it is still up."""
-    limits = limits or Limits()
+    limits = limits or OutcomeLimits()
     up = np.flatnonzero(series["truth.z"] - series["truth.z"][0] > limits.height)
     if not up.size:
         return 0.0
@@ -91,7 +93,7 @@ def down_after(series: Series, begun: float, limits: Limits | None = None) -> fl
     return max(0.0, float(series.time[up[-1]]) - begun)
 
 
-def _down_early(series: Series, limits: Limits) -> bool:
+def _down_early(series: Series, limits: OutcomeLimits) -> bool:
     """Whether it came to the ground, once it was up, while the mission still wanted it up."""
     height = series["truth.z"] - series["truth.z"][0]
     wanted = series["reference.z"] - series["truth.z"][0]

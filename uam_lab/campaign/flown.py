@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from uam_control.settings.configuration import ConfigurationError
-from uam_lab.campaign.trial import Result
+from uam_lab.campaign.trial import TrialResult
 from uam_lab.results.atomic import write_text
 
 FILE = "flown.jsonl"
@@ -27,7 +27,7 @@ class Flown:
 
         Raises ConfigurationError where the folder holds flights of something else.
         """
-        self.results: dict[int, Result] = {}
+        self.results: dict[int, TrialResult] = {}
         self._file = out / FILE
         mark = {"of": hashlib.sha256(repr(of).encode()).hexdigest()}
         if not self._file.exists():
@@ -46,20 +46,20 @@ class Flown:
             self.results[result.seed] = result
         write_text(self._file, "\n".join([first, *map(_line, self.results.values()), ""]))
 
-    def add(self, result: Result) -> None:
+    def add(self, result: TrialResult) -> None:
         """Note one more flight."""
         self.results[result.seed] = result
         with self._file.open("a") as file:
             file.write(_line(result) + "\n")
 
 
-def _line(result: Result) -> str:
+def _line(result: TrialResult) -> str:
     values = asdict(result) | {"rms": result.rms.tolist(), "largest": result.largest.tolist()}
     return json.dumps(values)
 
 
-def _read(line: str) -> Result:
+def _read(line: str) -> TrialResult:
     values = json.loads(line)
     for name in ("rms", "largest"):
         values[name] = np.array(values[name])
-    return Result(**values | {"restless": tuple(values["restless"])})
+    return TrialResult(**values | {"restless": tuple(values["restless"])})

@@ -10,7 +10,7 @@ import threading
 from collections.abc import Callable, Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
 
-from uam_lab.campaign.trial import Result, Trial, fly
+from uam_lab.campaign.trial import Trial, TrialResult, fly
 from uam_lab.flight.direct.warm_up import is_cold, warm_up
 from uam_lab.processes.child import SINGLE_THREAD
 
@@ -23,9 +23,9 @@ def cores() -> int:
 def fly_all(
     trials: Sequence[Trial],
     jobs: int,
-    work: Callable[[Trial], Result] | None = None,
-    progress: Callable[[int, Result], None] = lambda done, result: None,
-) -> list[Result]:
+    work: Callable[[Trial], TrialResult] | None = None,
+    progress: Callable[[int, TrialResult], None] = lambda done, result: None,
+) -> list[TrialResult]:
     """Fly every trial; results in the order of the trials, whatever order they finished in.
 
     work: what a process does with a trial (default: fly it, keep the figures); must be importable.
@@ -34,7 +34,7 @@ def fly_all(
     if is_cold():
         warm_up()
     work = work or figures_of
-    results: list[Result | None] = [None] * len(trials)
+    results: list[TrialResult | None] = [None] * len(trials)
     others = multiprocessing.active_children()
     with _executor(jobs) as executor:
         waiting = {executor.submit(work, trial): i for i, trial in enumerate(trials)}
@@ -52,7 +52,7 @@ def fly_all(
     return results
 
 
-def figures_of(trial: Trial) -> Result:
+def figures_of(trial: Trial) -> TrialResult:
     """Fly; the time series is thrown away."""
     return fly(trial)[0]
 

@@ -9,7 +9,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from uam_lab.campaign.fault_outcome import COMPLETED, OUTCOMES, counts
-from uam_lab.campaign.trial import ERRORS, Result
+from uam_lab.campaign.trial import ERRORS, TrialResult
 from uam_lab.campaign.variations import Draw, common
 from uam_lab.report.figures import style
 from uam_lab.results.atomic import replacing, write_rows, write_text
@@ -18,7 +18,7 @@ from uam_lab.results.result_folder import as_json, versions
 PERCENTILES = (50, 90, 99)
 
 
-def write(out: Path, draws: Sequence[Draw], results: Sequence[Result], command: str) -> str:
+def write(out: Path, draws: Sequence[Draw], results: Sequence[TrialResult], command: str) -> str:
     """Write flights.csv, campaign.json, campaign.png and summary.md; returns the summary."""
     failed = [not result.completed for result in results]
     rms = np.array([result.rms for result in results])
@@ -46,7 +46,7 @@ def write(out: Path, draws: Sequence[Draw], results: Sequence[Result], command: 
     return summary
 
 
-def _flights(file: Path, draws: Sequence[Draw], results: Sequence[Result]) -> None:
+def _flights(file: Path, draws: Sequence[Draw], results: Sequence[TrialResult]) -> None:
     head = ["flight", *draws[0].values, *(f"rms {n}" for n in ERRORS), "outcome", "why"]
     write_rows(
         file,
@@ -66,7 +66,7 @@ def _flights(file: Path, draws: Sequence[Draw], results: Sequence[Result]) -> No
 
 def _summary(
     draws: Sequence[Draw],
-    results: Sequence[Result],
+    results: Sequence[TrialResult],
     failed: Sequence[bool],
     rms: np.ndarray,
     command: str,
@@ -118,7 +118,7 @@ def _kind(why: str) -> str:
 
 
 def _figure(
-    draws: Sequence[Draw], results: Sequence[Result], failed: Sequence[bool], rms: np.ndarray
+    draws: Sequence[Draw], results: Sequence[TrialResult], failed: Sequence[bool], rms: np.ndarray
 ) -> Figure:
     """Above: distribution of every RMS error. Below: each variation, completed or not."""
     figure = Figure(figsize=(style.WIDTH, 5.6), layout="constrained")

@@ -5,15 +5,15 @@ from __future__ import annotations
 from uam_control.mission import load_scenario
 from uam_lab.campaign import quiet
 from uam_lab.campaign import trial as direct
-from uam_lab.campaign.trial import Result, Trial
+from uam_lab.campaign.trial import Trial, TrialResult
 from uam_lab.flight.settings import ONLOOKERS, FlightSettings
 
 
-class NotFlown(RuntimeError):
+class TrialFailed(RuntimeError):
     """The flight could not go on; the text is one line."""
 
 
-def fly(trial: Trial) -> Result:
+def fly(trial: Trial) -> TrialResult:
     """Fly it. Raises NotFlown."""
     scenario = load_scenario(trial.scenario)
     settings = FlightSettings(
@@ -27,7 +27,7 @@ def fly(trial: Trial) -> Result:
     )
     outcome = quiet.fly(settings)
     if outcome.partial or outcome.series is None:
-        raise NotFlown(
+        raise TrialFailed(
             f"{trial.label}, {trial.payload_mass:g} kg, seed {trial.seed}: "
             f"{outcome.reason or 'nothing was recorded'}"
         )

@@ -35,7 +35,7 @@ class Trial:
 
 
 @dataclass(frozen=True)
-class Result:
+class TrialResult:
     """What is kept of a flight. rms, largest (8,): ERRORS in m and deg, NaN if it never flew.
 
     flown: from take-off as a share of what was planned; cut_short: not landed by the mission.
@@ -68,7 +68,7 @@ class Result:
         return self.outcome == LOST
 
 
-def fly(trial: Trial) -> tuple[Result, Series]:
+def fly(trial: Trial) -> tuple[TrialResult, Series]:
     """Fly it; raises what loading a scenario or changing a vehicle raises."""
     scenario = load_scenario(trial.scenario)
     vehicle = Vehicle.load().changed(trial.vehicle_changes)
@@ -85,7 +85,7 @@ def result(
     series: Series,
     abort_reason: str,
     told: list[dict[str, Any]],
-) -> Result:
+) -> TrialResult:
     """Take the figures of a flight that was flown; writes its series where they are to be kept.
 
     told: the supervisor's transitions, see `flight.outcome`.
@@ -103,7 +103,7 @@ def result(
     )
     flown = series.flown
     planned = scenario.landing.at + scenario.landing.duration
-    return Result(
+    return TrialResult(
         label=trial.label,
         payload_mass=trial.payload_mass,
         seed=trial.seed,

@@ -11,7 +11,7 @@ from uam_control.profiles.profile import Profile, ProfileError, load_profile
 from uam_control.settings import configuration
 from uam_control.settings.configuration import ConfigurationError
 from uam_lab.campaign.pool import cores, fly_all
-from uam_lab.campaign.trial import Result
+from uam_lab.campaign.trial import TrialResult
 from uam_lab.cli.counting import Counting
 from uam_lab.results.result_folder import ResultFolderError, make_folder
 
@@ -83,7 +83,7 @@ def campaign(options: argparse.Namespace, profile: Profile, out: Path) -> int:
         print(f"campaign: {len(flown.results)} flights were flown before, going on", flush=True)
     with Counting("campaign", len(draws)) as counting:
 
-        def show(done: int, result: Result) -> None:
+        def show(done: int, result: TrialResult) -> None:
             flown.add(result)
             bad = sum(not one.completed for one in flown.results.values())
             counting.show(len(draws) - len(trials) + done, f"{bad} not completed")

@@ -12,7 +12,7 @@ from uam_control.profiles.profile import ProfileError, load_profile
 from uam_control.settings import configuration
 from uam_control.settings.configuration import ConfigurationError
 from uam_lab.campaign.pool import cores, figures_of, fly_all
-from uam_lab.campaign.trial import Result
+from uam_lab.campaign.trial import TrialResult
 from uam_lab.cli.counting import Counting
 from uam_lab.compare import plan
 from uam_lab.flight.settings import ENGINES, SettingsError, require_ros
@@ -105,11 +105,11 @@ def _further(text: str):
     label, _, file = text.partition("=")
     if not label or not file:
         raise ConfigurationError(f"--profile {text}: LABEL=FILE is expected")
-    return plan.Entry(label, load_profile(str(configuration.named("profiles", file))))
+    return plan.ComparedController(label, load_profile(str(configuration.named("profiles", file))))
 
 
 def compare(
-    rows: Sequence[plan.Entry],
+    rows: Sequence[plan.ComparedController],
     payloads: Sequence[float],
     seeds: Sequence[int],
     engine: str,
@@ -125,7 +125,7 @@ def compare(
     extra = modularity.trials(proposed, plan.middle(payloads), seeds[0], kept)
     with Counting("compare", len(trials) + len(extra)) as counting:
 
-        def show(done: int, result: Result) -> None:
+        def show(done: int, result: TrialResult) -> None:
             counting.show(done, f"{result.label}, {result.payload_mass:g} kg, seed {result.seed}")
 
         results = fly_all(trials, jobs, _work(engine), progress=show)

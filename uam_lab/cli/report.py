@@ -103,14 +103,14 @@ def several(options: argparse.Namespace) -> int:
     """Several flights over one another."""
     from rich.console import Console
 
-    from uam_lab.report.figures.panels import Flight
+    from uam_lab.report.figures.panels import DrawnFlight
     from uam_lab.report.page.console import reporting
     from uam_lab.report.page.overlay import build_overlay, labelled
     from uam_lab.report.rebuild import series_of
 
     names = labelled(options.directories)
     flights = [
-        Flight(name, series_of(directory))
+        DrawnFlight(name, series_of(directory))
         for name, directory in zip(names, options.directories, strict=True)
     ]
     out = make_folder(options.out, "report")

@@ -51,7 +51,7 @@ BUTTONS = (
 )  # fmt: skip
 
 
-class Commands:
+class CommandButtons:
     """Puts the buttons on the page. A click is worked on by whoever `later` gives it to."""
 
     def __init__(

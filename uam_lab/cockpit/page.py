@@ -13,7 +13,7 @@ import numpy as np
 import viser
 
 from uam_lab.cockpit.charts import Charts
-from uam_lab.cockpit.commands import Commands
+from uam_lab.cockpit.commands import CommandButtons
 from uam_lab.cockpit.gains import NodeGains
 from uam_lab.cockpit.headline import headline
 from uam_lab.cockpit.health import Health
@@ -22,7 +22,7 @@ from uam_lab.cockpit.services import Services
 from uam_lab.cockpit.vehicle_view import VehicleView
 from uam_lab.cockpit.watch import Watch
 from uam_msgs_py.messages import topics
-from uam_msgs_py.messages.changes import Change
+from uam_msgs_py.messages.changes import ParameterChange
 from uam_msgs_py.messages.layouts import BadMessage
 from uam_msgs_py.messages.status import AutopilotState, MissionStatus
 from uam_msgs_py.messages.topics import Topic
@@ -66,7 +66,7 @@ class Page:
         self._headline = gui.add_html("")
         self._shown = ""
         with gui.add_folder("Commands"):
-            self._commands = Commands(gui, self._services, self._todo.put, self.say)
+            self._commands = CommandButtons(gui, self._services, self._todo.put, self.say)
         self._follow = gui.add_checkbox("Camera follows the vehicle", False)
         self._answers = gui.add_markdown("")
         self._followed = np.zeros(3)
@@ -125,7 +125,7 @@ class Page:
         elif topic is topics.AUTOPILOT_STATE:
             health.autopilot = AutopilotState.from_message(message)[1]
         elif topic is topics.CHANGES:
-            self._changed(Change.from_message(message)[1])
+            self._changed(ParameterChange.from_message(message)[1])
         elif topic is topics.DIAGNOSTICS:
             health.diagnose(message)
         elif topic is topics.AUTOPILOT_BATTERY:
@@ -141,7 +141,7 @@ class Page:
         if topic is topics.TRACKING_ERROR:
             health.track(np.array(message.position))
 
-    def _changed(self, change: Change) -> None:
+    def _changed(self, change: ParameterChange) -> None:
         """Somebody asked a node for a change, perhaps this page."""
         if not change.accepted:
             return

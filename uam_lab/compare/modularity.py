@@ -18,7 +18,7 @@ import numpy as np
 from uam_control.control.controllers import ArmController, AttitudeController, PositionController
 from uam_control.coordinates import COORDINATES, SIZE
 from uam_control.profiles.profile import Profile, profile_of
-from uam_lab.campaign.trial import ERRORS, Result, Trial
+from uam_lab.campaign.trial import ERRORS, Trial, TrialResult
 from uam_lab.results import timeseries
 from uam_lab.results.timeseries import Series
 
@@ -98,11 +98,11 @@ def _replay(profile: Profile, series: Series, period: float) -> dict[str, np.nda
 class Evidence:
     """Both answers."""
 
-    flights: tuple[Result, ...]
+    flights: tuple[TrialResult, ...]
     replays: tuple[Untouched, ...]
 
     @classmethod
-    def of(cls, profile: Profile, series: Path, flights: Sequence[Result]) -> Evidence:
+    def of(cls, profile: Profile, series: Path, flights: Sequence[TrialResult]) -> Evidence:
         """From the recorded flight `series` and the results of `trials`."""
         flight = timeseries.read(series)
         period = float(np.median(np.diff(flight.time)))

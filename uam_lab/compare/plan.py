@@ -32,14 +32,14 @@ ROWS = {
 
 
 @dataclass(frozen=True)
-class Entry:
+class ComparedController:
     """One row of the tables."""
 
     label: str
     profile: Profile
 
 
-def entries(names: Sequence[str] = tuple(ROWS)) -> tuple[Entry, ...]:
+def entries(names: Sequence[str] = tuple(ROWS)) -> tuple[ComparedController, ...]:
     """Return the rows of these `names`, keys of ROWS."""
     proposed, verbatim = load_profile("s500"), load_profile("paper_table1")
     profiles = {
@@ -50,7 +50,7 @@ def entries(names: Sequence[str] = tuple(ROWS)) -> tuple[Entry, ...]:
         VERBATIM: verbatim,
         WITH_WEIGHT: with_weight(verbatim, proposed),
     }
-    return tuple(Entry(ROWS[name], profiles[ROWS[name]]) for name in names)
+    return tuple(ComparedController(ROWS[name], profiles[ROWS[name]]) for name in names)
 
 
 def frozen(profile: Profile) -> Profile:
@@ -75,7 +75,10 @@ def middle(payloads: Sequence[float]) -> float:
 
 
 def trials(
-    rows: Sequence[Entry], payloads: Sequence[float], seeds: Sequence[int], folder: Path
+    rows: Sequence[ComparedController],
+    payloads: Sequence[float],
+    seeds: Sequence[int],
+    folder: Path,
 ) -> list[Trial]:
     """Every row over every payload and seed. Those that the figures show keep their series.
 

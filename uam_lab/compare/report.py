@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from matplotlib.figure import Figure
 
-from uam_lab.campaign.trial import ERRORS, Result, Trial
+from uam_lab.campaign.trial import ERRORS, Trial, TrialResult
 from uam_lab.compare import plan, tables
 from uam_lab.compare.modularity import Evidence
 from uam_lab.report.figures import figures, style
@@ -38,7 +38,7 @@ class Written:
     page: Path
 
 
-def budgets(rows: Sequence[plan.Entry]) -> dict[str, str]:
+def budgets(rows: Sequence[plan.ComparedController]) -> dict[str, str]:
     """Where each profile's numbers come from: the comment that begins its file."""
     found = {}
     for row in rows:
@@ -57,7 +57,7 @@ def budgets(rows: Sequence[plan.Entry]) -> dict[str, str]:
 def write(
     out: Path,
     trials: Sequence[Trial],
-    results: Sequence[Result],
+    results: Sequence[TrialResult],
     modular: Evidence,
     facts: Mapping[str, Any],
 ) -> Written:
@@ -99,7 +99,7 @@ def write(
     return Written(markdown + "\n" + "\n".join(claims) + "\n", page)
 
 
-def _flights(file: Path, results: Sequence[Result]) -> None:
+def _flights(file: Path, results: Sequence[TrialResult]) -> None:
     head = [
         "controller",
         "payload_kg",
@@ -127,7 +127,7 @@ def _flights(file: Path, results: Sequence[Result]) -> None:
     )
 
 
-def _draw(out: Path, trials: Sequence[Trial], results: Sequence[Result]) -> list[str]:
+def _draw(out: Path, trials: Sequence[Trial], results: Sequence[TrialResult]) -> list[str]:
     kept = {trial.label: trial.keep for trial in trials if trial.keep is not None}
     flights = [
         figures.Flight(label, timeseries.read(kept[label])) for label in OVERLAID if label in kept
@@ -141,7 +141,7 @@ def _draw(out: Path, trials: Sequence[Trial], results: Sequence[Result]) -> list
     return drawn
 
 
-def _rms(found: Sequence[tables.Row]) -> Figure:
+def _rms(found: Sequence[tables.ControllerErrors]) -> Figure:
     """RMS of every row beside the paper's, per column, on a logarithmic scale."""
     figure = Figure(figsize=(style.WIDTH, 4.2), layout="constrained")
     axis = figure.subplots()
@@ -170,7 +170,7 @@ def _rms(found: Sequence[tables.Row]) -> Figure:
     return figure
 
 
-def _gains(results: Sequence[Result]) -> Figure:
+def _gains(results: Sequence[TrialResult]) -> Figure:
     """The largest value of each adapted gain of the proposed law, a dot per flight."""
     flights = [r for r in results if r.label == plan.PROPOSED]
     names = [n for n in (flights[0].peaks if flights else {}) if n.rsplit(".", 1)[1][0] in "Kz"]
@@ -204,7 +204,7 @@ def _markdown(head: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
 
 
 def _page(
-    found: Sequence[tables.Row],
+    found: Sequence[tables.ControllerErrors],
     claims: Sequence[str],
     modular: Evidence,
     drawn: Sequence[str],
@@ -232,7 +232,12 @@ def _page(
     )
 
 
-def _html_row(row: tables.Row, found: Sequence[tables.Row], columns: slice, title: str) -> dict:
+def _html_row(
+    row: tables.ControllerErrors,
+    found: Sequence[tables.ControllerErrors],
+    columns: slice,
+    title: str,
+) -> dict:
     digits = 4 if title == "position" else 3
     proposed = next((other for other in found if other.label == plan.PROPOSED), None)
     papers = tables.PAPER.get(row.label)

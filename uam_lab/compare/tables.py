@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.stats import t as student
 
-from uam_lab.campaign.trial import ERRORS, Result
+from uam_lab.campaign.trial import ERRORS, TrialResult
 from uam_lab.compare.plan import ASMC1, ASMC2, PROPOSED
 from uam_lab.report.facts import paper
 
@@ -24,7 +24,7 @@ TABLES = (("position", slice(0, 3)), ("attitude", slice(3, 6)), ("arm", slice(6,
 
 
 @dataclass(frozen=True)
-class Row:
+class ControllerErrors:
     """One controller. mean, half_width, worst (8,): RMS errors as ERRORS, m and deg.
 
     mean over all flights; half_width of its confidence interval over seeds, each seed being the
@@ -47,7 +47,7 @@ class Row:
         return f"{short} of {self.flights} not completed" if short else ""
 
 
-def rows(results: Sequence[Result]) -> list[Row]:
+def rows(results: Sequence[TrialResult]) -> list[ControllerErrors]:
     """One row per label, in the order in which labels first occur."""
     return [
         row(label, [r for r in results if r.label == label])
@@ -55,10 +55,10 @@ def rows(results: Sequence[Result]) -> list[Row]:
     ]
 
 
-def row(label: str, results: Sequence[Result]) -> Row:
+def row(label: str, results: Sequence[TrialResult]) -> ControllerErrors:
     """The row of these flights; one that ended early counts up to its end."""
     rms = np.array([result.rms for result in results])
-    return Row(
+    return ControllerErrors(
         label=label,
         flights=len(results),
         completed=sum(result.completed for result in results),
@@ -70,7 +70,7 @@ def row(label: str, results: Sequence[Result]) -> Row:
     )
 
 
-def half_width(results: Sequence[Result]) -> np.ndarray:
+def half_width(results: Sequence[TrialResult]) -> np.ndarray:
     """Half the width (8,) of Student's confidence interval of the mean over seeds."""
     seeds = sorted({result.seed for result in results})
     means = np.array(
@@ -88,7 +88,7 @@ def degradation(other: np.ndarray, proposed: np.ndarray) -> np.ndarray:
     return 100.0 * (np.asarray(other) - np.asarray(proposed)) / np.asarray(other)
 
 
-def claims(found: Sequence[Row]) -> list[str]:
+def claims(found: Sequence[ControllerErrors]) -> list[str]:
     """Where the paper's claims hold here and where not, a sentence each."""
     by_label = {row.label: row for row in found}
     said = []
@@ -109,7 +109,7 @@ def claims(found: Sequence[Row]) -> list[str]:
     return said
 
 
-def _smaller(better: Row, worse: Row) -> str:
+def _smaller(better: ControllerErrors, worse: ControllerErrors) -> str:
     """In which columns the errors of one are the smaller ones, beyond the confidence intervals."""
     apart, near, against = [], [], []
     for i, name in enumerate(ERRORS):
@@ -125,7 +125,7 @@ def _smaller(better: Row, worse: Row) -> str:
     )
 
 
-def _limit(what: str, row: Row, limit: Sequence[float]) -> str:
+def _limit(what: str, row: ControllerErrors, limit: Sequence[float]) -> str:
     missed = [name for i, name in enumerate(ERRORS) if not row.worst[i] <= limit[i]]
     return (
         f"Worst RMS of any {row.label} flight against {what}: "
@@ -134,7 +134,7 @@ def _limit(what: str, row: Row, limit: Sequence[float]) -> str:
     )
 
 
-def as_markdown(found: Sequence[Row]) -> str:
+def as_markdown(found: Sequence[ControllerErrors]) -> str:
     """The three tables with the paper's numbers beside ours."""
     proposed = next((row for row in found if row.label == PROPOSED), None)
     parts = []
@@ -166,7 +166,7 @@ def as_markdown(found: Sequence[Row]) -> str:
     return "\n\n".join(parts) + "\n"
 
 
-def _name(row: Row) -> str:
+def _name(row: ControllerErrors) -> str:
     return row.label + (f" ({row.shortfall})" if row.shortfall else "")
 
 

@@ -8,7 +8,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass, field
 
 from uam_lab.doctor.finding import Finding, fail, ok, warn
-from uam_sim_bridge.mavlink.protocol.modes import Command, Mode
+from uam_sim_bridge.mavlink.protocol.modes import MavCmd, Mode
 from uam_sim_bridge.mavlink.protocol.wire import Codec, Framer, Message, mavlink2
 from uam_sim_bridge.mavlink.transport.transport import Transport, open_transport
 from uam_sim_bridge.ports import PortError
@@ -165,7 +165,7 @@ def _request(system: int) -> Message:
     return mavlink2.MAVLink_command_long_message(
         system,
         mavlink2.MAV_COMP_ID_AUTOPILOT1,
-        Command.REQUEST_MESSAGE,
+        MavCmd.REQUEST_MESSAGE,
         0,
         mavlink2.MAVLINK_MSG_ID_AUTOPILOT_VERSION,
         0,

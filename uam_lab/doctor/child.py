@@ -23,7 +23,7 @@ class Said:
     problem: str = ""
 
 
-class Child:
+class CheckProcess:
     """`python -m module arguments...`. A context manager: nothing survives the `with` block."""
 
     def __init__(
@@ -64,7 +64,7 @@ class Child:
         if self._process.poll() is None:
             os.killpg(self._process.pid, signal.SIGKILL)
 
-    def __enter__(self) -> Child:
+    def __enter__(self) -> CheckProcess:
         return self
 
     def __exit__(self, *exception) -> None:

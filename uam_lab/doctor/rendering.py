@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 from collections.abc import Iterator
 
-from uam_lab.doctor.child import TOO_LATE, Child, Said
+from uam_lab.doctor.child import TOO_LATE, CheckProcess, Said
 from uam_lab.doctor.finding import Finding, ok, warn
 from uam_lab.report.video.rendering import HOW_TO_GET_ONE, PLATFORM
 
@@ -18,7 +18,7 @@ def checks() -> Iterator[Finding]:
     """The finding: of the first platform that draws, in the order in which reports try them."""
     problem, wanted = "", os.environ.get("MUJOCO_GL", "")
     for platform in dict.fromkeys(filter(None, (wanted, PLATFORM))):
-        with Child(MODULE, environment={"MUJOCO_GL": platform}) as child:
+        with CheckProcess(MODULE, environment={"MUJOCO_GL": platform}) as child:
             said = child.wait(PATIENCE)
         if "frame_s" in said.facts:
             yield drawn(platform, said)

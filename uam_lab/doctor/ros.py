@@ -9,7 +9,7 @@ from collections.abc import Iterator, Mapping
 from pathlib import Path
 
 from uam_lab.doctor import environment
-from uam_lab.doctor.child import Child, Said
+from uam_lab.doctor.child import CheckProcess, Said
 from uam_lab.doctor.finding import Finding, fail, ok, warn
 from uam_lab.processes.environment import ros_environment
 from uam_sim_bridge.ports import PortError, Reservation
@@ -44,7 +44,7 @@ def measure(domain: int) -> Said:
     """Let two processes exchange messages in `domain`; what the asking one said."""
     with tempfile.TemporaryDirectory(prefix="uam-doctor-") as logs:
         own = ros_environment(domain, Path(logs))
-        with Child(MODULE, ["answer"], own), Child(MODULE, ["ask"], own) as asking:
+        with CheckProcess(MODULE, ["answer"], own), CheckProcess(MODULE, ["ask"], own) as asking:
             return asking.wait(PATIENCE)
 
 

@@ -63,7 +63,7 @@ class Track:
     lost: int = 0
 
 
-class Recording:
+class TopicRecorder:
     """The open file and the subscriptions that feed it."""
 
     def __init__(
@@ -202,7 +202,7 @@ def _qos_text(qos: QoSProfile) -> str:
     )
 
 
-def _health(node: Node, recording: Recording, polls: LoopTime) -> DiagnosticArray:
+def _health(node: Node, recording: TopicRecorder, polls: LoopTime) -> DiagnosticArray:
     """The node's entry of /diagnostics: what it has lost, its loop, to whom it is connected."""
     lost = sum(recording.lost.values())
     summary = recording.ended or (f"{lost} messages lost" if lost else "recording")
@@ -230,7 +230,7 @@ def main() -> int:
     try:
         refuse_unknown(node)
         known = json.loads(Path(facts).read_text()) if facts else None
-        recording = Recording(node, file, topics.ALL, simulated, known, size_limit)
+        recording = TopicRecorder(node, file, topics.ALL, simulated, known, size_limit)
     except ParameterError as error:
         return refuse("recorder", error)
     except OSError as error:

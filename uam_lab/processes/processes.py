@@ -53,7 +53,7 @@ def tail(log: Path, count: int = LAST_LINES) -> list[str]:
 
 
 @dataclass
-class Child:
+class NodeProcess:
     """One running process."""
 
     name: str
@@ -72,7 +72,7 @@ class Processes:
         """Output goes to `logs`, which must exist; `environment` is the children's whole one."""
         self._logs = logs
         self._environment = dict(environment)
-        self._children: dict[str, Child] = {}
+        self._children: dict[str, NodeProcess] = {}
         self.hurry: Callable[[], bool] = lambda: False  # True: the next, harder signal at once
 
     def start(
@@ -83,7 +83,7 @@ class Processes:
         may_end: bool = False,
         optional: bool = False,
         again: int = 0,
-    ) -> Child:
+    ) -> NodeProcess:
         """Run `module.main()` as the process `name`.
 
         may_end: it stops by itself when done; optional: its end is no failure of the flight, see
@@ -94,7 +94,7 @@ class Processes:
         def run(further: Sequence[str]) -> Forked:
             return Forked(name, module, [*arguments, *further], log, self._environment)
 
-        child = Child(name, run([]), log, run, may_end, optional, again)
+        child = NodeProcess(name, run([]), log, run, may_end, optional, again)
         self._children[name] = child
         return child
 

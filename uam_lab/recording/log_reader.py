@@ -29,12 +29,12 @@ from uam_lab.results.outcome import transition
 from uam_lab.results.timeseries import (
     COLUMNS,
     SUBSYSTEMS,
-    Recording,
+    FlightTable,
     Series,
     gain_columns,
 )
 from uam_msgs_py.messages import topics
-from uam_msgs_py.messages.changes import Change
+from uam_msgs_py.messages.changes import ParameterChange
 from uam_msgs_py.messages.status import MissionStatus
 
 SECOND = 1e9
@@ -60,7 +60,7 @@ TOPICS = {
 }
 
 
-class Samples:
+class StampedRows:
     """Values of one topic in the order of their stamps: stamps (m,) [ns], rows (m, n)."""
 
     def __init__(self, stamps: np.ndarray, rows: np.ndarray):
@@ -99,15 +99,15 @@ class Log:
         log = self._topics.get(topic)
         return cdr.read(log.type_name, log.messages) if log and log.messages else []
 
-    def samples(self, topic: str, fields: Sequence[str], width: int) -> Samples:
+    def samples(self, topic: str, fields: Sequence[str], width: int) -> StampedRows:
         """`fields` side by side, `width` numbers each; zeros for messages that are idle (empty)."""
         stamps, rows = [], []
         for block in self.blocks(topic):
             stamps.append(block.stamps)
             rows.append(np.hstack([_field(block, field, width) for field in fields]))
         if not stamps:
-            return Samples(np.zeros(0, np.int64), np.zeros((0, width * len(fields))))
-        return Samples(np.concatenate(stamps), np.vstack(rows))
+            return StampedRows(np.zeros(0, np.int64), np.zeros((0, width * len(fields))))
+        return StampedRows(np.concatenate(stamps), np.vstack(rows))
 
     def statuses(self) -> list[tuple[int, MissionStatus]]:
         """What the mission said of itself, and at which stamp [ns], in order."""
@@ -143,7 +143,7 @@ class References:
         if not stamps:
             raise UnreadableLog("the log has no reference: the mission never began")
         joined = np.hstack([np.vstack(rows), np.vstack(flying)])
-        self.samples = Samples(np.concatenate(stamps), joined)
+        self.samples = StampedRows(np.concatenate(stamps), joined)
         self._hold_after_landing()
 
     def _hold_after_landing(self) -> None:
@@ -156,7 +156,7 @@ class References:
 
 
 @dataclass(frozen=True)
-class Flight:
+class LoggedFlight:
     """What a log tells: the table, whether the mission ended by itself, why it was given up, what
     was asked of the parameters, how the states followed each other, which faults there were, how
     long it took [s of wall time]."""
@@ -170,7 +170,9 @@ class Flight:
     wall_s: float
 
 
-def read_flight(path: Path, scenario: Scenario, info: Mapping[str, Any] | None = None) -> Flight:
+def read_flight(
+    path: Path, scenario: Scenario, info: Mapping[str, Any] | None = None
+) -> LoggedFlight:
     """The flight of `scenario` that is recorded in `path`.
 
     Raises UnreadableLog when the file is no log, or the log of a flight that never began.
@@ -188,7 +190,7 @@ def read_flight(path: Path, scenario: Scenario, info: Mapping[str, Any] | None =
     ticks = truth.stamps[(truth.stamps >= first) & (truth.stamps < last)]
     if not len(ticks):
         raise UnreadableLog(f"{path} has no control tick")
-    recording = Recording(len(ticks))
+    recording = FlightTable(len(ticks))
     values = recording.values
     takeoff = references.takeoff if references.takeoff is not None else int(last)
     time = values[:, COLUMNS["time"]] = (ticks - takeoff) / SECOND
@@ -211,7 +213,7 @@ def read_flight(path: Path, scenario: Scenario, info: Mapping[str, Any] | None =
     wall = log.wall_seconds(TRUTH)
     faults = fault_log.records(log.messages(FAULTS), takeoff)
     series = recording.series(info)
-    return Flight(series, end is not None, abort_reason, changes, told, faults, wall)
+    return LoggedFlight(series, end is not None, abort_reason, changes, told, faults, wall)
 
 
 def _last_of_all(last: int, truth: np.ndarray) -> int:
@@ -225,11 +227,11 @@ def _last_of_all(last: int, truth: np.ndarray) -> int:
 def parameter_changes(log: Log, takeoff: int) -> list[dict[str, Any]]:
     """What was asked of the nodes' parameters, in order; takeoff: stamp [ns] of mission time 0.
 
-    time_s: mission time after which it counts; node, by, reason, values: see `changes.Change`.
+    time_s: mission time after which it counts; node, by, reason, values: `ParameterChange`.
     """
     found = []
     for data in log.messages(CHANGES):
-        stamp, change = Change.from_message(deserialize_message(data, DiagnosticArray))
+        stamp, change = ParameterChange.from_message(deserialize_message(data, DiagnosticArray))
         entry = {
             "time_s": (stamp - takeoff) / SECOND,
             "node": change.node,
@@ -245,7 +247,7 @@ def parameter_changes(log: Log, takeoff: int) -> list[dict[str, Any]]:
 def adaptation(log: Log, subsystem: str, ticks: np.ndarray, values: np.ndarray) -> None:
     """Fill in the gains of a subsystem's law: one block of messages, as a law has one set."""
     for block in log.blocks(ADAPTATION[subsystem]):
-        gains = Samples(block.stamps, block.fields["position"])
+        gains = StampedRows(block.stamps, block.fields["position"])
         values[:, gain_columns(subsystem, block.names)] = gains.at(ticks)
 
 

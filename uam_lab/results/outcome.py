@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
-from uam_control.supervision import Change, State
+from uam_control.supervision import State, StateTransition
 from uam_lab.results.timeseries import Series
 
 
@@ -15,7 +15,7 @@ def transition(time: float, before: str, after: str, cause: str) -> dict[str, An
     return {"time_s": round(time, 6), "from": before, "to": after, "cause": cause}
 
 
-def transitions(changes: Sequence[Change]) -> list[dict[str, Any]]:
+def transitions(changes: Sequence[StateTransition]) -> list[dict[str, Any]]:
     """The supervisor's changes in mission time; from the last one where nothing took off."""
     takeoff = [change.stamp for change in changes if change.target is State.TAKING_OFF]
     begin = takeoff[0] if takeoff else changes[-1].stamp if changes else 0.0

@@ -3,7 +3,7 @@
 Both engines write the same table and everything downstream (metrics, figures, pictures) reads it
 by name. While flying, an engine fills one preallocated float64 array by column number:
 
-    recording = Recording(ticks)
+    recording = FlightTable(ticks)
     TRUTH = COLUMNS.block("truth.")
     recording.values[k, TRUTH] = state.ravel()          # state (3, 8): chi, chi_dot, chi_ddot
 
@@ -107,7 +107,7 @@ class UnreadableFlight(ValueError):
     """A file that should hold a recorded flight does not."""
 
 
-class Recording:
+class FlightTable:
     """Preallocated store of a flight while it is flown; unwritten entries are NaN."""
 
     def __init__(self, capacity: int):

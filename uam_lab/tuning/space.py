@@ -11,7 +11,7 @@ from typing import Any
 
 from uam_control.profiles.profile import NODES, Profile, load_profile, profile_of
 from uam_control.settings import configuration, yaml_file
-from uam_lab.campaign.trial import ERRORS, Result, Trial
+from uam_lab.campaign.trial import ERRORS, Trial, TrialResult
 
 DIGITS = 4  # significant ones of a found value
 
@@ -58,8 +58,8 @@ class Cost:
     not_completed: float
     lost: float
 
-    def of(self, result: Result) -> float:
-        """The cost of a campaign.trial.Result; finite in any case."""
+    def of(self, result: TrialResult) -> float:
+        """The cost of a campaign.trial.TrialResult; finite in any case."""
         if result.cut_short or not all(map(math.isfinite, result.rms)):
             return self.lost * (2.0 - result.flown)
         share = [(value / aim) ** 2 for value, aim in zip(result.rms, self.aim, strict=True)]

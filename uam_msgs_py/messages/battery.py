@@ -10,7 +10,7 @@ from uam_msgs_py.messages.stamps import set_stamp
 _NAN = math.nan
 
 
-class Battery(Protocol):
+class BatteryReading(Protocol):
     """What is asked for: [V], [A] out of the battery, 0..1, [deg C], [V]; NaN for unknown."""
 
     voltage: float
@@ -20,7 +20,7 @@ class Battery(Protocol):
     cells: tuple[float, ...]
 
 
-def battery_message(stamp: int, battery: Battery) -> BatteryState:
+def battery_message(stamp: int, battery: BatteryReading) -> BatteryState:
     """Return the message; stamp [ns]. A battery that nobody measures is not `present`."""
     message = BatteryState(
         voltage=battery.voltage,

@@ -18,7 +18,7 @@ BY = "by"
 
 
 @dataclass(frozen=True)
-class Change:
+class ParameterChange:
     """One request, which may change several values at once.
 
     values: name → (old, new); old is None where the node knows no such parameter. by: the service
@@ -44,7 +44,7 @@ class Change:
         return diagnostic(stamp, self.node, level, outcome, {BY: self.by} | said)
 
     @classmethod
-    def from_message(cls, message: DiagnosticArray) -> "tuple[int, Change]":
+    def from_message(cls, message: DiagnosticArray) -> "tuple[int, ParameterChange]":
         """Return (stamp [ns], change); raises BadMessage for something else."""
         try:
             (status,) = message.status

@@ -128,7 +128,7 @@ CHANGES = Topic(
     "/uam/parameter_changes",
     DiagnosticArray,
     _qos(1000, latched=True),
-    "see uam_msgs_py.messages.changes.Change",
+    "see uam_msgs_py.messages.changes.ParameterChange",
     one_publisher=False,
 )
 

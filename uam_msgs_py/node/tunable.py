@@ -16,7 +16,7 @@ from rclpy.node import Node
 from rclpy.parameter import Parameter
 
 from uam_msgs_py.messages import topics
-from uam_msgs_py.messages.changes import Change
+from uam_msgs_py.messages.changes import ParameterChange
 
 SERVICE = "parameter service"
 CHECK = "check_parameters"
@@ -50,7 +50,9 @@ class TunableNode(Node):
         if not result.successful:
             self.get_logger().warning(f"refused, the old values fly on: {result.reason}")
         values = {change.name: (old[change.name], change.value) for change in changes}
-        self.tell(Change(self.get_name(), by, values, "" if result.successful else result.reason))
+        self.tell(
+            ParameterChange(self.get_name(), by, values, "" if result.successful else result.reason)
+        )
         return result
 
     def check_parameters(self, changes: list[Parameter]) -> SetParametersResult:
@@ -66,7 +68,7 @@ class TunableNode(Node):
                 return result
         return SetParametersResult(successful=True)
 
-    def tell(self, change: Change) -> None:
+    def tell(self, change: ParameterChange) -> None:
         """Publish a change, with the stamp of the newest tick."""
         self._changes.publish(change.to_message(self.stamp))
 

@@ -16,7 +16,7 @@ from __future__ import annotations
 import math
 
 from uam_sim_bridge.autopilot.params import Parameters
-from uam_sim_bridge.mavlink.protocol.modes import Mode, Result, Severity
+from uam_sim_bridge.mavlink.protocol.modes import MavResult, Mode, Severity
 
 STREAM_GAP = 0.5  # s: slower than 2 Hz is no stream
 STREAM_TIME = 0.5  # s for which it must have lasted
@@ -48,7 +48,7 @@ class Commander:
         fresh = time - self._stream_last <= STREAM_GAP
         return fresh and self._stream_last - self._stream_start >= STREAM_TIME
 
-    def request_mode(self, time: float, mode: Mode) -> Result:
+    def request_mode(self, time: float, mode: Mode) -> MavResult:
         """Handle a request for a mode."""
         if mode is Mode.OFFBOARD:
             if not self.streaming(time):
@@ -56,18 +56,18 @@ class Commander:
                     Severity.CRITICAL,
                     "Switching to mode 'Offboard' is currently not possible: no offboard signal",
                 )
-                return Result.TEMPORARILY_REJECTED
+                return MavResult.TEMPORARILY_REJECTED
         elif mode not in (Mode.LAND, Mode.HOLD) or (mode is Mode.HOLD and self.armed):
             self._say(Severity.CRITICAL, f"Mode {mode.name.title()} is not available")
-            return Result.DENIED
+            return MavResult.DENIED
         self.mode = mode
         self.failsafe = False
-        return Result.ACCEPTED
+        return MavResult.ACCEPTED
 
-    def request_arm(self, time: float, faults: list[str]) -> Result:
+    def request_arm(self, time: float, faults: list[str]) -> MavResult:
         """Handle a request to arm; `faults` of the estimator refuse it."""
         if self.armed:
-            return Result.ACCEPTED
+            return MavResult.ACCEPTED
         reasons = list(faults)
         if self.mode is not Mode.OFFBOARD:
             reasons.append(
@@ -80,20 +80,20 @@ class Commander:
             for reason in reasons:
                 self._say(Severity.CRITICAL, reason)
             self._say(Severity.CRITICAL, "Arming denied: Resolve system health failures first")
-            return Result.TEMPORARILY_REJECTED
+            return MavResult.TEMPORARILY_REJECTED
         self.armed, self._armed_at = True, time
         self._flew, self._landed_at = False, None
         self._say(Severity.INFO, "Armed by external command")
-        return Result.ACCEPTED
+        return MavResult.ACCEPTED
 
-    def request_disarm(self, landed: bool, force: bool) -> Result:
+    def request_disarm(self, landed: bool, force: bool) -> MavResult:
         """Handle a request to disarm."""
         if self.armed and not landed and not force:
             self._say(Severity.CRITICAL, "Disarming denied: not landed")
-            return Result.TEMPORARILY_REJECTED
+            return MavResult.TEMPORARILY_REJECTED
         if self.armed:
             self._disarm("Disarmed by external command" + (" (forced)" if force else ""))
-        return Result.ACCEPTED
+        return MavResult.ACCEPTED
 
     def update(self, time: float, landed: bool) -> None:
         """Apply the rules that act by themselves; call once per tick."""

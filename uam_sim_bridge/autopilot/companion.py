@@ -12,7 +12,7 @@ from uam_control.settings.parameter_set import ParameterError
 from uam_sim_bridge.autopilot.core import Autopilot
 from uam_sim_bridge.autopilot.params import DEFINITIONS
 from uam_sim_bridge.autopilot.telemetry import Telemetry
-from uam_sim_bridge.mavlink.protocol.modes import Command, Result, Severity
+from uam_sim_bridge.mavlink.protocol.modes import MavCmd, MavResult, Severity
 from uam_sim_bridge.mavlink.protocol.wire import Message, clean_text, mavlink2, text_chunks
 
 ATTITUDE_IGNORED = 128  # the only type_mask of SET_ATTITUDE_TARGET that is flown
@@ -101,12 +101,12 @@ class Companion:
     def _run(self, time: float, m: Message, parameters: tuple[float, ...]) -> None:
         first, second = parameters[0], parameters[1]
         number = int(first) if math.isfinite(first) else -1
-        if m.command == Command.SET_MESSAGE_INTERVAL:
+        if m.command == MavCmd.SET_MESSAGE_INTERVAL:
             known = self.telemetry.set_interval(number, second)
-            result = Result.ACCEPTED if known else Result.DENIED
-        elif m.command == Command.REQUEST_MESSAGE:
+            result = MavResult.ACCEPTED if known else MavResult.DENIED
+        elif m.command == MavCmd.REQUEST_MESSAGE:
             message = self.telemetry.build(number, time)
-            result = Result.UNSUPPORTED if message is None else Result.ACCEPTED
+            result = MavResult.UNSUPPORTED if message is None else MavResult.ACCEPTED
             if message is not None:
                 self.out.append(message)
         else:
@@ -120,7 +120,7 @@ class Companion:
     def _set_mode(self, time: float, m: Message) -> None:
         main, sub = m.custom_mode >> 16 & 0xFF, m.custom_mode >> 24 & 0xFF
         self._autopilot.command(
-            time, Command.DO_SET_MODE, (float(m.base_mode), float(main), float(sub), 0, 0, 0, 0)
+            time, MavCmd.DO_SET_MODE, (float(m.base_mode), float(main), float(sub), 0, 0, 0, 0)
         )
 
     def _parameter_read(self, time: float, m: Message) -> None:
@@ -174,9 +174,9 @@ def warm_up() -> None:
         autopilot.setpoint(time, zero, 0.5)
         companion.tick(time)
         if k == 200:
-            autopilot.command(time, Command.DO_SET_MODE, (1.0, 6.0, 0.0))
-            autopilot.command(time, Command.ARM_DISARM, (1.0, 0.0))
+            autopilot.command(time, MavCmd.DO_SET_MODE, (1.0, 6.0, 0.0))
+            autopilot.command(time, MavCmd.ARM_DISARM, (1.0, 0.0))
         autopilot.update(time, zero, down)
     rotate(matrix_from_quaternion(quaternion_from_euler(zero)), zero)
-    autopilot.command(time, Command.DO_SET_MODE, (1.0, 4.0, 6.0))
+    autopilot.command(time, MavCmd.DO_SET_MODE, (1.0, 4.0, 6.0))
     autopilot.update(time + 0.004, zero, down)

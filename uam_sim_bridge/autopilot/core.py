@@ -31,7 +31,13 @@ from uam_sim_bridge.autopilot.rate_control import (
 )
 from uam_sim_bridge.mavlink.offboard.rotor_geometry import normalised_mixer
 from uam_sim_bridge.mavlink.offboard.thrust_curve import inverse_curve
-from uam_sim_bridge.mavlink.protocol.modes import CUSTOM_MODE_ENABLED, FORCE, Command, Mode, Result
+from uam_sim_bridge.mavlink.protocol.modes import (
+    CUSTOM_MODE_ENABLED,
+    FORCE,
+    MavCmd,
+    MavResult,
+    Mode,
+)
 
 FARTHEST_VISION = 1e5  # m
 SHORTEST_STEP, LONGEST_STEP = 0.000125, 0.02  # s, bounds of the time step (PX4)
@@ -156,28 +162,28 @@ class Autopilot:
         self.estimator.vision(time, position, quaternion / norm)
         return True
 
-    def command(self, time: float, command: int, parameters: tuple[float, ...]) -> Result:
+    def command(self, time: float, command: int, parameters: tuple[float, ...]) -> MavResult:
         """Handle DO_SET_MODE or ARM_DISARM with COMMAND_LONG's parameters; others: UNSUPPORTED."""
         first, second = parameters[0], parameters[1]
-        if command == Command.ARM_DISARM:
+        if command == MavCmd.ARM_DISARM:
             force = second == FORCE
             if first == 0.0:
                 return self.commander.request_disarm(self.landing.landed, force)
             if first != 1.0:
-                return Result.DENIED
+                return MavResult.DENIED
             return self.commander.request_arm(time, [] if force else self.estimator.faults(time))
-        if command == Command.DO_SET_MODE:
+        if command == MavCmd.DO_SET_MODE:
             if not (math.isfinite(first) and int(first) & CUSTOM_MODE_ENABLED):
-                return Result.DENIED
+                return MavResult.DENIED
             third = parameters[2]
             if not (math.isfinite(second) and math.isfinite(third)):
-                return Result.DENIED
+                return MavResult.DENIED
             try:
                 mode = Mode((int(second), int(third)))
             except ValueError:
-                return Result.DENIED
+                return MavResult.DENIED
             return self.commander.request_mode(time, mode)
-        return Result.UNSUPPORTED
+        return MavResult.UNSUPPORTED
 
     def update(self, time: float, gyro: np.ndarray, accel: np.ndarray) -> np.ndarray:
         """Advance to `time` [s] and return `motors`.

@@ -10,7 +10,7 @@ from typing import ClassVar
 import numpy as np
 
 from uam_control.settings.parameter_set import number
-from uam_sim_bridge.faults.fault import Commands, Disturbable, Effect, PlantFault
+from uam_sim_bridge.faults.fault import Disturbable, Effect, PlantCommands, PlantFault
 
 JOINT = "which joint"
 
@@ -18,10 +18,10 @@ JOINT = "which joint"
 class ActEffect(Effect):
     """Calls `action(plant, commands)` at each tick."""
 
-    def __init__(self, action: Callable[[Disturbable, Commands], None]):
+    def __init__(self, action: Callable[[Disturbable, PlantCommands], None]):
         self._action = action
 
-    def act(self, plant: Disturbable, commands: Commands) -> None:
+    def act(self, plant: Disturbable, commands: PlantCommands) -> None:
         self._action(plant, commands)
 
 
@@ -58,7 +58,7 @@ class Sag(Effect):
         self._remaining, self._over = remaining, over
         self._since = 0.0
 
-    def act(self, plant: Disturbable, commands: Commands) -> None:
+    def act(self, plant: Disturbable, commands: PlantCommands) -> None:
         done = 1.0 if self._since >= self._over else self._since / self._over
         plant.weaken_rotors(np.full(4, 1.0 + done * (self._remaining - 1.0)))
         self._since += plant.period
@@ -73,7 +73,7 @@ class ServoWeak(PlantFault):
     remaining: float = number(0.0, "part of the torque that is left", "1", 0.0, 1.0)
 
     def effect(self, noise: np.random.Generator) -> Effect:
-        def weaken(plant: Disturbable, commands: Commands) -> None:
+        def weaken(plant: Disturbable, commands: PlantCommands) -> None:
             commands.effort[int(self.joint) - 1] *= self.remaining
 
         return ActEffect(weaken)
@@ -117,7 +117,7 @@ class Remanent(Effect):
     def __init__(self):
         self._on = False
 
-    def act(self, plant: Disturbable, commands: Commands) -> None:
+    def act(self, plant: Disturbable, commands: PlantCommands) -> None:
         self._on = commands.magnet = commands.magnet or self._on
 
 
@@ -157,7 +157,7 @@ class Gust(Effect):
         self._full, self._rise = full, rise
         self._since = 0.0
 
-    def act(self, plant: Disturbable, commands: Commands) -> None:
+    def act(self, plant: Disturbable, commands: PlantCommands) -> None:
         risen = 1.0 if self._since >= self._rise else self._since / self._rise
         plant.add_wind(0.5 * (1.0 - math.cos(math.pi * risen)) * self._full)
         self._since += plant.period

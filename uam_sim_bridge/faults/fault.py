@@ -32,7 +32,7 @@ class Fault(ParameterSet):
 
 
 @dataclass
-class Commands:
+class PlantCommands:
     """What the plant is about to be told: motors (4,) 0..1, effort (2,) [N m], magnet's switch.
 
     The arrays are copies and may be changed.
@@ -58,7 +58,7 @@ class Disturbable(Protocol):
     def add_wind(self, wind: np.ndarray) -> None:
         """Add wind (3,) [m/s, ENU]."""
 
-    def swing_payload(self, commands: Commands, rate: float) -> None:
+    def swing_payload(self, commands: PlantCommands, rate: float) -> None:
         """Hang the payload on a hinge while the magnet is on; rate [rad/s]: its first rate."""
 
 
@@ -72,7 +72,7 @@ class Effect:
     def sense(self, samples: Samples) -> None:
         """Alter what arrives at this tick; the arrays in it are not to be written to."""
 
-    def act(self, plant: Disturbable, commands: Commands) -> None:
+    def act(self, plant: Disturbable, commands: PlantCommands) -> None:
         """Alter plant and commands for the period that begins."""
 
 

@@ -8,7 +8,7 @@ from __future__ import annotations
 import mujoco
 import numpy as np
 
-from uam_sim_bridge.faults.fault import Commands, Effect
+from uam_sim_bridge.faults.fault import Effect, PlantCommands
 from uam_sim_bridge.faults.schedule import Schedule
 from uam_sim_bridge.faults.timeline import Happened, Timeline
 from uam_sim_bridge.plant import Plant, Samples, Vehicle
@@ -74,7 +74,7 @@ class FaultyPlant(Plant):
     def step(self, motor_commands: np.ndarray, arm_effort: np.ndarray, magnet: bool) -> None:
         """As `Plant.step`, with what the faults make of it."""
         if self._effects or self._touched:
-            commands = Commands(np.array(motor_commands), np.array(arm_effort), bool(magnet))
+            commands = PlantCommands(np.array(motor_commands), np.array(arm_effort), bool(magnet))
             self._as_usual()
             for effect in self._effects.values():
                 effect.act(self, commands)
@@ -101,7 +101,7 @@ class FaultyPlant(Plant):
         """Add wind (3,) [m/s, ENU] for this period."""
         self._wanted_wind += wind
 
-    def swing_payload(self, commands: Commands, rate: float) -> None:
+    def swing_payload(self, commands: PlantCommands, rate: float) -> None:
         """Hang the payload on a hinge while the magnet is on; rate [rad/s]: at the beginning."""
         self._swinging = commands.magnet and (self._hinge.closed or self._hinge.close(rate))
         if self._swinging:

@@ -27,7 +27,7 @@ from uam_sim_bridge.mavlink.offboard.thrust_identification import (
     ThrustIdentificationParameters,
 )
 from uam_sim_bridge.mavlink.protocol.frames import swap_body, swap_quaternion, swap_world
-from uam_sim_bridge.mavlink.protocol.modes import CUSTOM_MODE_ENABLED, Command, Mode
+from uam_sim_bridge.mavlink.protocol.modes import CUSTOM_MODE_ENABLED, MavCmd, Mode
 
 
 class DirectBridge:
@@ -108,11 +108,11 @@ class DirectBridge:
     def _request(self, time: float, request: Request) -> None:
         if request is Request.OFFBOARD:
             result = self.autopilot.command(
-                time, Command.DO_SET_MODE, (CUSTOM_MODE_ENABLED, *Mode.OFFBOARD.value)
+                time, MavCmd.DO_SET_MODE, (CUSTOM_MODE_ENABLED, *Mode.OFFBOARD.value)
             )
         else:
             result = self.autopilot.command(
-                time, Command.ARM_DISARM, (float(request is Request.ARM), 0.0)
+                time, MavCmd.ARM_DISARM, (float(request is Request.ARM), 0.0)
             )
         self.sequence.answer(request, result)
 

@@ -21,7 +21,7 @@ from uam_control.profiles.profile import Profile
 from uam_control.supervision import Inputs
 from uam_lab.flight.direct.bridge import DirectBridge
 from uam_lab.flight.direct.record import Snapshot, record, record_blind, record_switches
-from uam_lab.results.timeseries import SUBSYSTEMS, Recording, gain_columns
+from uam_lab.results.timeseries import SUBSYSTEMS, FlightTable, gain_columns
 from uam_sim_bridge.faults import Schedule
 from uam_sim_bridge.faults.direct import DirectFaults
 from uam_sim_bridge.plant import Plant, Samples, Vehicle
@@ -74,9 +74,9 @@ class DirectFlight:
             for subsystem, controller in zip(SUBSYSTEMS, controllers, strict=True)
         )
         length = scenario.landing.at + scenario.landing.duration + 12.0
-        self.recording = Recording(int(length / self.plant.period))
+        self.recording = FlightTable(int(length / self.plant.period))
 
-    def run(self, progress: Callable[[float, str], None] | None = None) -> Recording:
+    def run(self, progress: Callable[[float, str], None] | None = None) -> FlightTable:
         """Fly until the mission is done; progress(mission time [s], phase) once a second."""
         plant, output = self.plant, self.mission.output
         ticks_a_second, settled = round(1.0 / plant.period), Settled()

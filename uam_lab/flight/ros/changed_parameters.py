@@ -8,7 +8,7 @@ from typing import Any
 from rclpy.node import Node
 
 from uam_msgs_py.messages import topics
-from uam_msgs_py.messages.changes import Change
+from uam_msgs_py.messages.changes import ParameterChange
 from uam_msgs_py.node.polling import listen, messages
 
 
@@ -22,9 +22,9 @@ class ChangedParameters:
     def poll(self) -> None:
         """Note what has arrived."""
         for message in messages(self._subscription):
-            self.note(Change.from_message(message)[1])
+            self.note(ParameterChange.from_message(message)[1])
 
-    def note(self, change: Change) -> None:
+    def note(self, change: ParameterChange) -> None:
         """Note a change; one that was refused changes nothing."""
         if change.accepted:
             values = {name: new for name, (_, new) in change.values.items()}

@@ -12,7 +12,7 @@ LABELS = 40  # more numbers than this would only hide the lines
 
 
 @dataclass(frozen=True)
-class Row:
+class ChangeRow:
     """One request: its number in the figures, mission time [s], and what became of it."""
 
     number: int
@@ -24,10 +24,10 @@ class Row:
     values: tuple[tuple[str, str, str], ...]  # name, old, new
 
 
-def rows(info: Mapping[str, Any]) -> list[Row]:
+def rows(info: Mapping[str, Any]) -> list[ChangeRow]:
     """Every request of a flight, in order; info: see `log_reader.parameter_changes`."""
     return [
-        Row(
+        ChangeRow(
             number=number,
             time=one["time_s"],
             node=one["node"],
@@ -42,9 +42,9 @@ def rows(info: Mapping[str, Any]) -> list[Row]:
     ]
 
 
-def labels(shown: Sequence[Row], apart: float) -> list[tuple[float, str]]:
+def labels(shown: Sequence[ChangeRow], apart: float) -> list[tuple[float, str]]:
     """(time, text) of the numbers; those nearer to each other than `apart` [s] share one."""
-    groups: list[list[Row]] = []
+    groups: list[list[ChangeRow]] = []
     for row in shown:
         if groups and row.time - groups[-1][0].time < apart:
             groups[-1].append(row)

@@ -24,7 +24,7 @@ PAPER_PROFILE = "paper_table1"
 
 
 @dataclass(frozen=True)
-class Row:
+class ParameterRow:
     """One parameter: `paper` is empty where Table I's profile has no such parameter."""
 
     name: str
@@ -37,11 +37,11 @@ class Row:
 
 
 @dataclass(frozen=True)
-class Comparison:
+class ParameterTable:
     """Rows per controller, those of the other nodes, and the names of safeguards that were on."""
 
-    controllers: dict[str, list[Row]]
-    others: dict[str, list[Row]]
+    controllers: dict[str, list[ParameterRow]]
+    others: dict[str, list[ParameterRow]]
 
     @property
     def safeguards(self) -> dict[str, list[str]]:
@@ -53,7 +53,7 @@ class Comparison:
         return {node: names for node, names in on.items() if names}
 
 
-def compare(parameter_file: Path) -> Comparison:
+def compare(parameter_file: Path) -> ParameterTable:
     """Compare the effective parameters of a flight with the verbatim Table I.
 
     Raises ProfileError when the file is missing or not a ROS parameter file.
@@ -65,7 +65,7 @@ def compare(parameter_file: Path) -> Comparison:
         specs = _specs(parameter_file, node, values)
         table = _table(paper[node], specs) if node in paper else {}
         rows[node] = [_row(name, value, table, specs) for name, value in values.items()]
-    return Comparison(
+    return ParameterTable(
         {node: rows[node] for node in CONTROLLERS if node in rows},
         {node: found for node, found in rows.items() if node not in CONTROLLERS and found},
     )
@@ -85,11 +85,11 @@ def _table(paper: ParameterSet, specs: Mapping[str, Any]) -> dict[str, Any]:
     return {name: value for name, value in asdict(paper).items() if specs.get(name) == known[name]}
 
 
-def _row(name: str, value: Any, table: Mapping[str, Any], specs: Mapping[str, Any]) -> Row:
+def _row(name: str, value: Any, table: Mapping[str, Any], specs: Mapping[str, Any]) -> ParameterRow:
     spec = specs.get(name)
     description = getattr(spec, "description", "")
     known = name in table
-    return Row(
+    return ParameterRow(
         name=name,
         description=description,
         unit=getattr(spec, "unit", ""),
@@ -119,4 +119,4 @@ def text(value: Any) -> str:
     return str(value)
 
 
-__all__ = ["Comparison", "ProfileError", "Row", "compare", "text"]
+__all__ = ["ParameterRow", "ParameterTable", "ProfileError", "compare", "text"]

@@ -12,7 +12,7 @@ LOOSE = 0.1  # of its bound that V fills at most for the bound to say little
 
 
 @dataclass(frozen=True)
-class Row:
+class StabilityRow:
     """One subsystem as text: V and its bound, error and what the bound leaves, K*, who supplies."""
 
     name: str
@@ -24,7 +24,7 @@ class Row:
     supplied: str
 
 
-def rows(found: Mapping[str, Any]) -> list[Row]:
+def rows(found: Mapping[str, Any]) -> list[StabilityRow]:
     """One per subsystem."""
     return [_row(name, found[name]) for name in SUBSYSTEMS]
 
@@ -70,11 +70,11 @@ def caveats(found: Mapping[str, Any]) -> list[str]:
     ]
 
 
-def _row(name: str, one: Mapping[str, Any]) -> Row:
+def _row(name: str, one: Mapping[str, Any]) -> StabilityRow:
     value, shares = one["V"], one["coupling"]
     met = (("adaptive_share", "adaptive"), ("feedback_share", "feedback"),
            ("actuators_share", "actuators"))  # fmt: skip
-    return Row(
+    return StabilityRow(
         name=name,
         value=_number(value["max"]),
         bound=_number(max(value["start"], value["bound"])),

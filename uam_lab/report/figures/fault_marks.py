@@ -17,7 +17,7 @@ SHADE = 0.16  # opacity
 
 
 @dataclass(frozen=True)
-class Row:
+class FaultMark:
     """One fault: its letter in the figures, mission times [s], and what it was."""
 
     letter: str
@@ -27,10 +27,10 @@ class Row:
     values: tuple[tuple[str, str], ...]
 
 
-def rows(info: Mapping[str, Any]) -> list[Row]:
+def rows(info: Mapping[str, Any]) -> list[FaultMark]:
     """Every fault of a flight, in order; info: with `faults` as in metrics.json."""
     return [
-        Row(
+        FaultMark(
             letter=letter(number),
             name=one["fault"],
             begin=one["begin_s"],
@@ -76,7 +76,7 @@ def handles(info: Mapping[str, Any]) -> list[Line2D]:
     return [Line2D([], [], color=style.FAULT, linewidth=6, alpha=2.0 * SHADE, label="fault")]
 
 
-def _together(shown: Sequence[Row], start: float, apart: float) -> list[tuple[float, str]]:
+def _together(shown: Sequence[FaultMark], start: float, apart: float) -> list[tuple[float, str]]:
     """(time, letters): those nearer to each other than `apart` [s] side by side."""
     groups: list[tuple[float, list[str]]] = []
     for row in sorted(shown, key=lambda row: row.begin):

@@ -16,7 +16,7 @@ from matplotlib.ticker import NullFormatter
 
 from uam_lab.report.facts import paper
 from uam_lab.report.figures import panels, style
-from uam_lab.report.figures.panels import Flight, Panel
+from uam_lab.report.figures.panels import DrawnFlight, Panel
 from uam_lab.report.figures.path_figure import path_figure
 from uam_lab.report.figures.stability_figures import coupling, lyapunov
 from uam_lab.results import metrics
@@ -27,13 +27,13 @@ DEGREES = 180.0 / np.pi
 ROLL, PITCH, YAW = "roll φ", "pitch θ", "yaw ψ"
 
 
-def position_errors(flights: Sequence[Flight]) -> Figure:
+def position_errors(flights: Sequence[DrawnFlight]) -> Figure:
     """The paper's first figure: position error over time."""
     drawn = [Panel(f"{axis} error [m]", f"error.{axis}") for axis in "xyz"]
     return _errors("Position tracking error", flights, drawn, "position_m", "m", 3)
 
 
-def attitude_errors(flights: Sequence[Flight]) -> Figure:
+def attitude_errors(flights: Sequence[DrawnFlight]) -> Figure:
     """The paper's second figure: attitude error over time."""
     drawn = [
         Panel(f"{label} error [°]", f"error.{name}", DEGREES)
@@ -42,7 +42,7 @@ def attitude_errors(flights: Sequence[Flight]) -> Figure:
     return _errors("Attitude tracking error", flights, drawn, "attitude_deg", "°", 2)
 
 
-def arm_errors(flights: Sequence[Flight]) -> Figure:
+def arm_errors(flights: Sequence[DrawnFlight]) -> Figure:
     """The paper's third figure: joint error over time."""
     drawn = [
         Panel(f"{label} error [°]", f"error.alpha_{joint}", DEGREES)
@@ -51,7 +51,7 @@ def arm_errors(flights: Sequence[Flight]) -> Figure:
     return _errors("Arm tracking error", flights, drawn, "arm_deg", "°", 2)
 
 
-def vehicle_inputs(flights: Sequence[Flight]) -> Figure:
+def vehicle_inputs(flights: Sequence[DrawnFlight]) -> Figure:
     """The paper's fourth figure: what position and attitude law ask for."""
     drawn = [Panel(f"$\\tau_{{p,{axis}}}$ [N]", f"tau_p.{axis}") for axis in "xyz"]
     drawn += [
@@ -61,13 +61,13 @@ def vehicle_inputs(flights: Sequence[Flight]) -> Figure:
     return panels.stack("Vehicle control inputs", flights, drawn, columns=2)[0]
 
 
-def arm_inputs(flights: Sequence[Flight]) -> Figure:
+def arm_inputs(flights: Sequence[DrawnFlight]) -> Figure:
     """The paper's fifth figure: what the arm law asks for."""
     drawn = [Panel(f"$\\tau_{{\\alpha {joint}}}$ [N m]", f"tau_alpha.{joint}") for joint in "12"]
     return panels.stack("Arm control inputs", flights, drawn)[0]
 
 
-def setpoints(flights: Sequence[Flight]) -> Figure:
+def setpoints(flights: Sequence[DrawnFlight]) -> Figure:
     """What was sent to the autopilot."""
     drawn = [
         Panel(f"{name} rate [°/s]", f"setpoint.rate_{axis}", DEGREES)
@@ -78,7 +78,7 @@ def setpoints(flights: Sequence[Flight]) -> Figure:
     return panels.stack("Setpoints sent to the autopilot", flights, drawn, panel_height=1.25)[0]
 
 
-def payload(flights: Sequence[Flight]) -> Figure | None:
+def payload(flights: Sequence[DrawnFlight]) -> Figure | None:
     """Where the payload was; None where no flight had one."""
     flights = [f for f in flights if not np.isnan(f.series["payload.z"]).all()]
     if not any(f.series.info.get("payload_mass_kg") for f in flights):
@@ -102,7 +102,7 @@ SIGNED = ("D1", "D2", "D3")  # drawn on a linear scale
 SYMBOLS = {"K": "K", "D": "D", "theta": "\\theta"}
 
 
-def adaptation(flights: Sequence[Flight]) -> Figure | None:
+def adaptation(flights: Sequence[DrawnFlight]) -> Figure | None:
     """Adapted gains and what drives them, by subsystem, for the laws flown; None without any."""
     shown = [names for names in GAINS if any(_adapted(f, names) for f in flights)]
     if not shown:
@@ -151,14 +151,19 @@ def _gain_legend(axis: Axes, names: tuple[str, ...], above: float) -> None:
     )
 
 
-def _adapted(flight: Flight, names: tuple[str, ...]) -> bool:
+def _adapted(flight: DrawnFlight, names: tuple[str, ...]) -> bool:
     """Whether the flight has any of these gains, in any subsystem."""
     columns = [f"adaptation.{s}.{name}" for s in SUBSYSTEMS for name in names]
     return any(np.isfinite(flight.series[column]).any() for column in columns)
 
 
 def _adaptation_of(
-    axis: Axes, flight: Flight, subsystem: str, names: tuple[str, ...], number: int, flights: int
+    axis: Axes,
+    flight: DrawnFlight,
+    subsystem: str,
+    names: tuple[str, ...],
+    number: int,
+    flights: int,
 ) -> None:
     series = flight.series
     for i, name in enumerate(names):
@@ -175,7 +180,12 @@ def _adaptation_of(
 
 
 def _errors(
-    title: str, flights: Sequence[Flight], drawn: list[Panel], group: str, unit: str, digits: int
+    title: str,
+    flights: Sequence[DrawnFlight],
+    drawn: list[Panel],
+    group: str,
+    unit: str,
+    digits: int,
 ) -> Figure:
     """Error panels; a single flight gets its RMS and the paper's beside them."""
     single = len(flights) == 1
@@ -203,7 +213,7 @@ def _errors(
 
 
 # file name → (figure, caption in the report), in the order shown
-FIGURES: dict[str, tuple[Callable[[Sequence[Flight]], Figure | None], str]] = {
+FIGURES: dict[str, tuple[Callable[[Sequence[DrawnFlight]], Figure | None], str]] = {
     "position_errors": (position_errors, "Position error, truth minus reference."),
     "attitude_errors": (
         attitude_errors,
@@ -235,7 +245,7 @@ FIGURES: dict[str, tuple[Callable[[Sequence[Flight]], Figure | None], str]] = {
 
 
 def draw(
-    flights: Sequence[Flight],
+    flights: Sequence[DrawnFlight],
     directory: Path,
     progress: Callable[[str], None] = lambda text: None,
     names: Sequence[str] | None = None,

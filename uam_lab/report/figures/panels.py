@@ -30,7 +30,7 @@ MARGIN_S = 1.0  # shown before take-off and after touchdown
 
 
 @dataclass(frozen=True)
-class Flight:
+class DrawnFlight:
     """A flight to be drawn: its series, its name in a legend, its analysis if there is one."""
 
     label: str
@@ -51,7 +51,7 @@ class Panel:
     on_ground: bool = False
 
 
-def window(flights: Sequence[Flight]) -> tuple[float, float]:
+def window(flights: Sequence[DrawnFlight]) -> tuple[float, float]:
     """Mission times [s] between which anything flew, with a margin."""
     times = [f.series.time[f.series.flown] for f in flights]
     times = [t for t in times if len(t)] or [f.series.time for f in flights]
@@ -78,7 +78,7 @@ def thin(
 
 def stack(
     title: str,
-    flights: Sequence[Flight],
+    flights: Sequence[DrawnFlight],
     panels: Sequence[Panel],
     columns: int = 1,
     panel_height: float = 1.45,
@@ -113,7 +113,7 @@ def grid(
     return figure, axes
 
 
-def lines(axis: Axes, flights: Sequence[Flight], panel: Panel) -> None:
+def lines(axis: Axes, flights: Sequence[DrawnFlight], panel: Panel) -> None:
     """Draw one column of every flight."""
     for number, flight in enumerate(flights):
         series = flight.series
@@ -133,7 +133,7 @@ def lines(axis: Axes, flights: Sequence[Flight], panel: Panel) -> None:
 def finish(
     figure: Figure,
     axes: np.ndarray,
-    flights: Sequence[Flight],
+    flights: Sequence[DrawnFlight],
     handles: Sequence[Line2D] | None = None,
 ) -> None:
     """Phases, events, time axis and legend, common to every figure over time.
@@ -230,7 +230,7 @@ def events(series: Series) -> list[tuple[float, str, str]]:
 
 
 def legend(
-    figure: Figure, flights: Sequence[Flight], marked: Sequence[tuple[float, str, str]]
+    figure: Figure, flights: Sequence[DrawnFlight], marked: Sequence[tuple[float, str, str]]
 ) -> None:
     """Flights and events in the upper right corner."""
     handles = [

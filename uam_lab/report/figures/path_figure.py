@@ -12,7 +12,7 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Rectangle
 
 from uam_lab.report.figures import style
-from uam_lab.report.figures.panels import Flight, corner_legend
+from uam_lab.report.figures.panels import DrawnFlight, corner_legend
 from uam_lab.report.figures.poses import Poses
 from uam_lab.results.timeseries import Series
 
@@ -24,7 +24,7 @@ SCENERY = {"stand_post": "#b9a58f", "stand_top": "#8c7660", "drop_mat": "#e3c552
 CHAIN = ("base", "link_1", "link_2", "magnet")
 
 
-def path_figure(flights: Sequence[Flight]) -> Figure:
+def path_figure(flights: Sequence[DrawnFlight]) -> Figure:
     """One panel per stretch of the flight: before, during and after the magnet was on."""
     stretches = _stretches(flights[0].series)
     columns = len(stretches)
@@ -53,7 +53,7 @@ def path_figure(flights: Sequence[Flight]) -> Figure:
     return figure
 
 
-def _limits(flights: Sequence[Flight]) -> tuple[tuple[float, float], tuple[float, float]]:
+def _limits(flights: Sequence[DrawnFlight]) -> tuple[tuple[float, float], tuple[float, float]]:
     """Range of x and of z [m] that holds every path and the ground."""
     shown = [f.series.flown if f.series.flown.any() else slice(None) for f in flights]
     x = np.concatenate([f.series["truth.x"][s] for f, s in zip(flights, shown, strict=True)])
@@ -174,7 +174,7 @@ def _boxed(axis: Axes, poses: Poses, geom: str, colour: str, opacity: float, ord
     )
 
 
-def _legend(figure: Figure, flights: Sequence[Flight]) -> None:
+def _legend(figure: Figure, flights: Sequence[DrawnFlight]) -> None:
     handles = [
         Line2D([], [], color=style.REFERENCE, linestyle=(0, (3, 2)), label="reference"),
         *(

@@ -12,11 +12,11 @@ from matplotlib.lines import Line2D
 from matplotlib.ticker import LogLocator, MaxNLocator, NullLocator
 
 from uam_lab.report.figures import panels, style
-from uam_lab.report.figures.panels import Flight
+from uam_lab.report.figures.panels import DrawnFlight
 from uam_lab.results.timeseries import SUBSYSTEMS
 
 if TYPE_CHECKING:
-    from uam_lab.analysis.lyapunov import Comparison
+    from uam_lab.analysis.lyapunov import ComparisonSystem
     from uam_lab.analysis.stability import Subsystem
 
 SYMBOLS = {"position": "p", "attitude": "q", "arm": "\\alpha"}
@@ -26,7 +26,7 @@ MEAN_S = 0.2  # [s] over which forces are averaged: the law passes on the noise 
 COUPLING, ADAPTIVE, FEEDBACK, ACTUATORS = style.INK, *style.FLIGHTS[:2], "#9aa5af"
 
 
-def lyapunov(flights: Sequence[Flight]) -> Figure | None:
+def lyapunov(flights: Sequence[DrawnFlight]) -> Figure | None:
     """V, V_p, V_q, V_alpha with their terms and bounds; None unless one flight was analysed."""
     found = _only(flights)
     if found is None:
@@ -55,7 +55,7 @@ def lyapunov(flights: Sequence[Flight]) -> Figure | None:
     return figure
 
 
-def coupling(flights: Sequence[Flight]) -> Figure | None:
+def coupling(flights: Sequence[DrawnFlight]) -> Figure | None:
     """The plant's true coupling force per axis and what meets it; None unless one was analysed."""
     found = _only(flights)
     if found is None:
@@ -100,7 +100,7 @@ def moving_mean(time: np.ndarray, values: np.ndarray) -> np.ndarray:
     return full / np.convolve(np.ones(len(values)), weight, mode="same")
 
 
-def _only(flights: Sequence[Flight]):
+def _only(flights: Sequence[DrawnFlight]):
     """The analysis of the flight, if there is but one."""
     return flights[0].stability if len(flights) == 1 else None
 
@@ -109,7 +109,7 @@ def _terms(subsystem: Subsystem) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     return subsystem.parts.tracking, subsystem.parts.gains, subsystem.parts.zeta
 
 
-def _bounded(axis: Axes, time: np.ndarray, value: np.ndarray, comparison: Comparison) -> None:
+def _bounded(axis: Axes, time: np.ndarray, value: np.ndarray, comparison: ComparisonSystem) -> None:
     """V with the ultimate bound and what the differential inequality allows until then."""
     axis.plot(*panels.thin(time, value), color=style.INK, linewidth=1.5, zorder=4)
     envelope = comparison.envelope(value[0], time - time[0])

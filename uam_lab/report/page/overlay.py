@@ -7,14 +7,14 @@ from pathlib import Path
 
 from uam_lab.report.facts import paper
 from uam_lab.report.figures import figures
-from uam_lab.report.figures.panels import Flight
+from uam_lab.report.figures.panels import DrawnFlight
 from uam_lab.report.page import html
 from uam_lab.results import metrics
 from uam_lab.results.atomic import write_text
 
 
 def build_overlay(
-    flights: Sequence[Flight], out: Path, progress: Callable[[str], None] = lambda text: None
+    flights: Sequence[DrawnFlight], out: Path, progress: Callable[[str], None] = lambda text: None
 ) -> Path:
     """Write figures/ and report.html to `out`; return the page."""
     drawn = figures.draw(flights, out / "figures", progress)
@@ -41,7 +41,7 @@ def labelled(directories: Sequence[Path]) -> list[str]:
 
 
 def _table(
-    flights: Sequence[Flight],
+    flights: Sequence[DrawnFlight],
     group: str,
     heading: str,
     unit: str,

@@ -14,7 +14,7 @@ from uam_sim_bridge.mavlink.link.vision import vision_message
 from uam_sim_bridge.mavlink.offboard.sequence import HEARTBEAT_TIMEOUT, OffboardSequence, Request
 from uam_sim_bridge.mavlink.offboard.setpoint import RateThrustParameters
 from uam_sim_bridge.mavlink.protocol.frames import swap_body
-from uam_sim_bridge.mavlink.protocol.modes import CUSTOM_MODE_ENABLED, Command, Mode, Result
+from uam_sim_bridge.mavlink.protocol.modes import CUSTOM_MODE_ENABLED, MavCmd, MavResult, Mode
 from uam_sim_bridge.mavlink.protocol.signing import Signing
 from uam_sim_bridge.mavlink.protocol.wire import Codec, Framer, Message, TextAssembler, mavlink2
 from uam_sim_bridge.mavlink.telemetry.events import EventReader
@@ -258,18 +258,18 @@ class OffboardLink:
         self.mode, self.armed = mode, armed
 
     def _acknowledged(self, time: float, command: int, result: int) -> None:
-        if command == Command.SET_MESSAGE_INTERVAL:
+        if command == MavCmd.SET_MESSAGE_INTERVAL:
             self.streams.answer(result)
             return
         request = self._asked.pop(command, None)
         if request is None:
             return
         self.sequence.answer(request, result)
-        if result != Result.ACCEPTED:
+        if result != MavResult.ACCEPTED:
             # PX4 tells a failed check once, when it begins to fail: that may have been before us
             if request is Request.ARM and time - self._explained >= EXPLAIN_PERIOD:
                 self._explained = time
-                self._command(Command.RUN_PREARM_CHECKS)
+                self._command(MavCmd.RUN_PREARM_CHECKS)
             return
         # the heartbeat that says so may be a second away
         mode = Mode.OFFBOARD if request is Request.OFFBOARD else self.mode
@@ -279,11 +279,11 @@ class OffboardLink:
     def _request(self, request: Request) -> None:
         if request is Request.OFFBOARD:
             main, sub = Mode.OFFBOARD.value
-            self._command(Command.DO_SET_MODE, CUSTOM_MODE_ENABLED, main, sub)
-            self._asked[Command.DO_SET_MODE] = request
+            self._command(MavCmd.DO_SET_MODE, CUSTOM_MODE_ENABLED, main, sub)
+            self._asked[MavCmd.DO_SET_MODE] = request
         else:
-            self._command(Command.ARM_DISARM, 1.0 if request is Request.ARM else 0.0)
-            self._asked[Command.ARM_DISARM] = request
+            self._command(MavCmd.ARM_DISARM, 1.0 if request is Request.ARM else 0.0)
+            self._asked[MavCmd.ARM_DISARM] = request
 
     def _command(self, command: int, *parameters: float) -> None:
         values = (*parameters, *[0.0] * (7 - len(parameters)))
@@ -299,7 +299,7 @@ class OffboardLink:
             self._send(mavlink2.MAVLink_timesync_message(0, ts1))
         wanted = self.streams.request(time)
         if wanted is not None:
-            self._command(Command.SET_MESSAGE_INTERVAL, *wanted)
+            self._command(MavCmd.SET_MESSAGE_INTERVAL, *wanted)
         for name in self._parameters.due(time):
             self._send(
                 mavlink2.MAVLink_param_request_read_message(

@@ -23,7 +23,7 @@ from enum import Enum
 
 from uam_control.settings.parameter_set import ParameterSet, number
 from uam_sim_bridge.mavlink.offboard.advice import with_advice
-from uam_sim_bridge.mavlink.protocol.modes import Mode, Result, Severity, result_word
+from uam_sim_bridge.mavlink.protocol.modes import MavResult, Mode, Severity, result_word
 
 HEARTBEAT_TIMEOUT = 3.0  # s without one: not connected
 _KEPT_REASONS = 5
@@ -143,7 +143,7 @@ class OffboardSequence:
 
     def answer(self, request: Request, result: int) -> None:
         """Take a COMMAND_ACK's result for a request; a refusal becomes a reason."""
-        if result == Result.ACCEPTED:
+        if result == MavResult.ACCEPTED:
             return
         self._reason(f"{request.value} refused ({result_word(result)})")
 

@@ -36,7 +36,7 @@ class Mode(Enum):
             return cls.UNKNOWN
 
 
-class Result(IntEnum):
+class MavResult(IntEnum):
     """MAV_RESULT."""
 
     ACCEPTED = 0
@@ -49,7 +49,7 @@ class Result(IntEnum):
 def result_word(result: int) -> str:
     """Return a MAV_RESULT in words."""
     try:
-        return Result(result).name.lower().replace("_", " ")
+        return MavResult(result).name.lower().replace("_", " ")
     except ValueError:
         return f"result {result}"
 
@@ -63,7 +63,7 @@ class Severity(IntEnum):
     INFO = 6
 
 
-class Command(IntEnum):
+class MavCmd(IntEnum):
     """MAV_CMD, as far as used."""
 
     DO_SET_MODE = 176

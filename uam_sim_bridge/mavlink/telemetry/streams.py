@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 
-from uam_sim_bridge.mavlink.protocol.modes import Result, result_word
+from uam_sim_bridge.mavlink.protocol.modes import MavResult, result_word
 from uam_sim_bridge.mavlink.protocol.wire import mavlink2
 
 # message id → desired rate [Hz]
@@ -61,7 +61,7 @@ class StreamCheck:
         number, self._pending = self._pending, None
         if number is None:
             return
-        if result == Result.ACCEPTED:
+        if result == MavResult.ACCEPTED:
             self._refused.pop(number, None)
         else:
             self._refused[number] = result_word(result)
