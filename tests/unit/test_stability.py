@@ -1,4 +1,4 @@
-"""K*, V and its bound: worked by hand, in a loop that obeys the proof, and of a real flight."""
+"""K*, V and its bound: worked by hand, in a closed loop that fits the proof, in a flight."""
 
 from dataclasses import replace
 
@@ -32,7 +32,7 @@ LAW = ModularParameters(
 
 
 def tracking_of(e, e_dot, acceleration=0.0):
-    """Errors (m, 3) of the position, everything else at rest."""
+    """Return a Tracking with errors e, e_dot (m, 3) of the position, all others zero."""
     whole = [np.hstack([x, np.zeros((len(x), 5))]) for x in (e, e_dot, np.zeros_like(e))]
     xi = np.linalg.norm(np.hstack([e, e_dot]), axis=1)
     still = np.zeros(len(e))
@@ -42,14 +42,14 @@ def tracking_of(e, e_dot, acceleration=0.0):
 def test_constants_worked_by_hand():
     regressors = np.column_stack([np.ones(3), [0, 1, 2], [0, 1, 4], np.zeros(3)])
     nu = np.ones(4)
-    # only the first tick binds, and only K*0 helps it
+    # only the first constraint is active, and only K*0 enters it
     np.testing.assert_allclose(
         constants.smallest(np.array([3.0, 1.0, 0.0]), regressors, nu), [3, 0, 0, 0], atol=1e-9
     )
     # one constraint a K >= s: the shortest K is s a / ||a||^2
     row = np.array([[1.0, 2.0, 4.0, 2.0]])
     np.testing.assert_allclose(constants.smallest(np.array([5.0]), row, nu), row[0] / 5.0)
-    # a leakage four times as large makes that gain count twice: sqrt(nu) K is the shortest
+    # the norm of sqrt(nu) K is minimised: nu = 4 doubles the weight of that gain
     heavy = constants.smallest(np.array([5.0]), row, np.array([4.0, 1.0, 1.0, 1.0]))
     np.testing.assert_allclose(heavy, np.array([0.25, 2.0, 4.0, 2.0]) * 5.0 / 24.25)
 
@@ -106,7 +106,7 @@ def test_the_envelope_solves_the_comparison_equation():
 
 
 def closed_loop(start, sigma):
-    """The error equation (err1) with the law itself and a constant sigma (3,): 1 kHz, 10 s."""
+    """Simulate eq. (9), err1, with the law and a constant sigma (3,): 1 kHz, 10 s."""
     law, dt, steps = ModularLaw(LAW), 0.001, 10_000
     e, e_dot = np.array(start, float), np.zeros(3)
     rows = []
@@ -150,7 +150,7 @@ def test_a_v_that_leaves_its_bound_is_reported():
 
 @pytest.fixture(scope="module")
 def analysed(direct_flight):
-    """The analysis of a real pick-and-place flight."""
+    """Return the analysis of a pick-and-place flight."""
     return stability.analyse(direct_flight, load_profile("s500").sets, Vehicle.load(), 0.2)
 
 
@@ -159,7 +159,7 @@ def test_a_real_flight(analysed):
     assert found["V"]["within_bound"] == 1.0
     assert min(found[name]["step_inequality_holds"] for name in analysed.subsystems) > 0.99
     position, attitude, arm = (found[name] for name in ("position", "attitude", "arm"))
-    # the law adapts to the payload's weight; the pitching torque of the arm is the autopilot's
+    # the law adapts to the payload's weight; the autopilot compensates the arm's pitching torque
     assert position["coupling"]["rms"][2] == pytest.approx(1.23, abs=0.1)
     assert 0.7 < position["coupling"]["adaptive_share"] < 1.0
     assert attitude["coupling"]["actuators_share"] > 0.9
@@ -172,10 +172,10 @@ def test_a_real_flight(analysed):
         assert np.all(one.parts.tracking >= 0.0)
 
 
-def test_sigma_is_what_the_error_equation_says(analysed, direct_flight):
-    """(err1): Mbar chi_ddot = tau + Mbar sigma, tau less the weight that is fed forward."""
-    asked = analysed.supply.asked[:, :3] - analysed.supply.weight[:, :3]
-    acceleration = analysed.coupling.sigma[:, :3] + asked / 2.2
+def test_sigma_satisfies_the_error_equation(analysed, direct_flight):
+    """Eq. (9), err1: Mbar chi_ddot = tau + Mbar sigma, tau without the weight fed forward."""
+    force = analysed.supply.tau[:, :3] - analysed.supply.weight[:, :3]
+    acceleration = analysed.coupling.sigma[:, :3] + force / 2.2
     true = direct_flight.block("truth.")[analysed.rows, 16:19]
     np.testing.assert_allclose(acceleration, true, atol=1e-9)
     regressors = constants.regressor(analysed.truth)
@@ -188,13 +188,13 @@ def test_sigma_is_what_the_error_equation_says(analysed, direct_flight):
 def test_figures_of_a_flight_of_three_seconds(short_direct_flight, tmp_path):
     found = stability.analyse(short_direct_flight, load_profile("s500").sets, Vehicle.load(), 0.2)
     flight = panels.DrawnFlight("modular", short_direct_flight, found)
-    wanted = ["lyapunov", "coupling"]
-    assert figures.draw([flight], tmp_path, names=wanted) == wanted
-    assert figures.draw([flight, flight], tmp_path / "two", names=wanted) == []
-    assert figures.draw([replace(flight, stability=None)], tmp_path / "no", names=wanted) == []
+    names = ["lyapunov", "coupling"]
+    assert figures.draw([flight], tmp_path, names=names) == names
+    assert figures.draw([flight, flight], tmp_path / "two", names=names) == []
+    assert figures.draw([replace(flight, stability=None)], tmp_path / "no", names=names) == []
 
 
-def test_nothing_to_say_of_other_laws_and_of_a_vehicle_on_the_ground(short_direct_flight, tmp_path):
+def test_no_analysis_of_other_laws_and_of_a_vehicle_on_the_ground(short_direct_flight, tmp_path):
     series, sets = short_direct_flight, load_profile("s500").sets
     values = series.values.copy()
     values[:, COLUMNS.block("adaptation.")] = np.nan

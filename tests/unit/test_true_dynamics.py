@@ -1,4 +1,4 @@
-"""M, C, g along a flight against cases worked by hand and against recorded accelerations."""
+"""M, C, g of the analysis: cases worked by hand and recorded accelerations."""
 
 import numpy as np
 import pytest
@@ -15,7 +15,7 @@ MOMENT = 0.095 * 0.0525 + 0.082 * 0.1 + 0.090 * 0.175 + 0.010 * 0.249 + 0.060 * 
 
 
 def evaluate(body, chi, chi_dot=None, swing=(0.0, 0.0, 0.0)):
-    """M, C chi_dot, g, pivot of one state."""
+    """Return M, C chi_dot, g and pivot force of one state."""
     mass, rest = np.empty((8, 8)), [np.empty(8) for _ in range(3)]
     body.evaluate(np.array(chi, float), chi_dot or [0.0] * 8, np.array(swing), mass, *rest)
     return mass, *rest
@@ -25,16 +25,16 @@ def test_level_with_the_arm_hanging():
     mass, coriolis, gravity, pivot = evaluate(Body(VEHICLE), [0, 0, 1, 0, 0, 0, 0, 0])
     np.testing.assert_allclose(mass[:3, :3], 2.2 * np.eye(3), atol=1e-12)
     np.testing.assert_allclose(mass, mass.T, atol=1e-12)
-    assert mass[0, 6] == pytest.approx(MOMENT)  # swinging forward throws the mass forward
+    assert mass[0, 6] == pytest.approx(MOMENT)  # alpha_1 > 0 moves the arm's mass forward
     assert mass[2, 6] == pytest.approx(0.0, abs=1e-12)
     np.testing.assert_allclose(gravity, [0, 0, 2.2 * G, 0, 0, 0, 0, 0], atol=1e-12)
     np.testing.assert_allclose([*coriolis, *pivot], 0.0, atol=1e-12)
 
 
-def test_an_arm_held_out_needs_its_moment():
+def test_a_horizontal_arm_has_its_gravity_moment():
     gravity = evaluate(Body(VEHICLE), [0, 0, 1, 0, 0, 0, np.pi / 2, 0])[2]
     assert gravity[6] == pytest.approx(MOMENT * G)
-    assert gravity[4] == pytest.approx(-MOMENT * G)  # FLU: a mass in front wants a nose-up torque
+    assert gravity[4] == pytest.approx(-MOMENT * G)  # FLU: a mass in front needs nose-up torque
 
 
 def test_a_turning_arm_pulls_with_its_centripetal_force():
@@ -62,11 +62,11 @@ def test_free_fall_at_any_pose(seed):
 
 
 @pytest.mark.parametrize("seed", range(4))
-def test_coriolis_forces_are_quadratic_and_do_what_the_energy_says(seed):
-    """C chi_dot(2 v) = 4 C chi_dot(v), and without forces the kinetic energy stays."""
+def test_coriolis_forces_are_quadratic_and_conserve_the_kinetic_energy(seed):
+    """C chi_dot(2 v) = 4 C chi_dot(v); chi_dot^T C chi_dot = chi_dot^T M_dot chi_dot / 2."""
     rng = np.random.default_rng(seed)
     body, chi, rate = Body(VEHICLE), rng.uniform(-1.0, 1.0, 8), rng.uniform(-1.0, 1.0, 8)
-    chi[3:6] = 0.0  # level: body rates are Euler rates, so that chi can be moved along chi_dot
+    chi[3:6] = 0.0  # level: body rates equal Euler rates, so chi + dt chi_dot is valid
     mass, coriolis, _, _ = evaluate(body, chi, list(rate))
     np.testing.assert_allclose(evaluate(body, chi, list(2 * rate))[1], 4 * coriolis, atol=1e-10)
     step = 1e-6
@@ -76,7 +76,7 @@ def test_coriolis_forces_are_quadratic_and_do_what_the_energy_says(seed):
 
 
 def balance(series, payload_mass):
-    """Rotor wrench and drag less M chi_ddot + C chi_dot + g and the pivot (m, 6), and the ticks."""
+    """Return rotor wrench + drag - (M chi_ddot + C chi_dot + g) - pivot (m, 6), and the ticks."""
     rows = ticks.in_the_air(series)
     truth = series.block("truth.").reshape(-1, 3, 8)[rows]
     found = dynamics.along(series, rows, VEHICLE, payload_mass)
@@ -96,14 +96,14 @@ def test_recorded_accelerations_are_those_of_the_model(short_direct_flight):
 def test_recorded_accelerations_with_payload(direct_flight):
     residual, found, time = balance(direct_flight, 0.2)
     held = time[found.carrying]
-    assert 35.0 < held[0] < 37.0  # the stand bears some of it until it is lifted
+    assert 35.0 < held[0] < 37.0  # the stand carries a part of the weight until the lift
     assert held[-1] == pytest.approx(70.0, abs=0.05)
     carried = residual[found.carrying & (time > held[0] + 0.5)]
     assert np.sqrt(np.mean(carried[:, :3] ** 2, axis=0)).max() < 0.02  # [N], payload 1.96 N
     assert np.sqrt(np.mean(carried[:, 3:] ** 2, axis=0)).max() < 0.01  # [N m]
 
 
-def test_terms_of_the_law_add_up_to_what_it_asked_for(direct_flight):
+def test_terms_of_the_law_add_up_to_the_recorded_tau(direct_flight):
     from uam_lab.analysis import tracking
 
     rows = ticks.in_the_air(direct_flight)
@@ -111,4 +111,4 @@ def test_terms_of_the_law_add_up_to_what_it_asked_for(direct_flight):
     estimate = tracking.along(direct_flight, rows, "estimate", printed=False)
     terms = supply.along(direct_flight, rows, estimate, sets, Body(VEHICLE))
     law = terms.feedforward + terms.feedback + terms.adaptive + terms.weight
-    np.testing.assert_allclose(law, terms.asked, atol=1e-9)
+    np.testing.assert_allclose(law, terms.tau, atol=1e-9)

@@ -1,4 +1,4 @@
-"""After a flight: the paper's stability proof held against the simulator's truth. No ROS.
+"""Check of the paper's stability proof (Appendix) with the simulator's truth, after a flight.
 
-`stability.analyse` does it all; docs/stability.md says what is computed from which equation.
+`stability.analyse` is the entry point; docs/stability.md lists the equation of each quantity.
 """

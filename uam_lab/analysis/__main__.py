@@ -1,4 +1,4 @@
-"""`python -m uam_lab.analysis FOLDER`: the analysis of a recorded flight, as JSON."""
+"""`python -m uam_lab.analysis FOLDER`: analyse a recorded flight and print the result as JSON."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from uam_lab.results.result_folder import as_json
 
 
 def main() -> int:
-    """Print stability.json of the flight in a result folder; 2 where there is none to analyse."""
+    """Print stability.json of the flight in a result folder; 2 if it cannot be analysed."""
     parser = argparse.ArgumentParser(prog="python -m uam_lab.analysis", description=__doc__)
     parser.add_argument("folder", type=Path, help="result folder of a flight of the modular law")
     folder = parser.parse_args().folder
@@ -23,7 +23,7 @@ def main() -> int:
         print(error, file=sys.stderr)
         return 2
     if found is None:
-        print(f"{folder}: no flight of the modular law that left the ground", file=sys.stderr)
+        print(f"{folder}: no airborne flight of the modular law in this folder", file=sys.stderr)
         return 2
     print(as_json(found.summary()), end="")
     return 0

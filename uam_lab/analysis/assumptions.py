@@ -1,12 +1,12 @@
-"""What the Appendix assumes and a flight does not quite have: how far off, in numbers.
+"""How far a flight departs from the assumptions of the Appendix, in numbers.
 
 | assumption | entry |
 |---|---|
-| M and Mbar close enough that ||sigma|| is not driven by its own tau | `mass_matrix` |
-| tau is applied as asked | `saturated` |
-| nothing holds the adapted gains down | `at_ceiling`, `safeguards` |
-| K_j3 sees ||chi_ddot|| | `acceleration` |
-| chi, chi_dot are known | `estimator` |
+| M and Mbar are close enough that tau does not drive ||sigma|| | `mass_matrix` |
+| the actuators apply tau without saturation | `saturated` |
+| no safeguard limits the adapted gains | `at_ceiling`, `safeguards` |
+| the true ||chi_ddot|| multiplies K_j3 in rho_j, eq. (12), rho_p | `acceleration` |
+| chi and chi_dot are known without error | `estimator` |
 | e_q_dot is the derivative of e_q, Lambda_j = [lambda_j1 lambda_j2] | `error_rate`, `lambda` |
 | zeta_min > 0 | `zeta` |
 """
@@ -30,10 +30,11 @@ AT = 1.0 - 1e-6  # of a limit or ceiling
 
 
 def mass_matrix(dynamics: Dynamics, sets: dict) -> dict[str, Any]:
-    """How far Mbar is from M, the largest along the flight.
+    """Return the largest distance between Mbar and M along the flight.
 
-    radius: spectral radius of I - M^-1 Mbar for the whole vehicle, free of units; below 1 tau
-    feeds back through chi_ddot with a factor below 1. norm: ||I - M_jj Mbar_j^-1|| per subsystem.
+    radius: spectral radius of I - M^-1 Mbar of the whole vehicle, dimensionless; if it is below
+    1, tau feeds back through chi_ddot with a factor below 1. norm: ||I - M_jj Mbar_j^-1|| per
+    subsystem. m_smallest, m_largest: eigenvalues of M, Property 1.
     """
     inertia, mass = nominal_inertia(sets), dynamics.mass
     identity = np.eye(mass.shape[1])
@@ -55,21 +56,21 @@ def mass_matrix(dynamics: Dynamics, sets: dict) -> dict[str, Any]:
 
 
 def saturated(supply: Supply, sets: dict) -> dict[str, float]:
-    """Fraction of the ticks in which tau_j, as recorded, is at one of its limits."""
-    force, limits = supply.asked[:, POSITION], sets[NODE_OF["position"]]
+    """Return, per subsystem, the fraction of the ticks with the recorded tau_j at a limit."""
+    force, limits = supply.tau[:, POSITION], sets[NODE_OF["position"]]
     tilted = np.hypot(force[:, 0], force[:, 1]) >= AT * force[:, 2] * np.tan(limits.tilt_max)
     large = np.linalg.norm(force, axis=1) >= AT * limits.thrust_max
     small = force[:, 2] <= limits.thrust_min / AT
     found = {"position": float((tilted | large | small).mean())}
     for name in ("attitude", "arm"):
         most = np.array(sets[NODE_OF[name]].torque_max)
-        at = np.abs(supply.asked[:, COLUMNS_OF[name]]) >= AT * most
+        at = np.abs(supply.tau[:, COLUMNS_OF[name]]) >= AT * most
         found[name] = float(at.any(axis=1).mean())
     return found
 
 
 def at_ceiling(gains: np.ndarray, ceiling: tuple) -> list[float]:
-    """Fraction of the ticks (4,) that each of the gains (m, 4) is held down by its ceiling."""
+    """Return the fraction of the ticks (4,) with each gain K0..K3 (m, 4) at its ceiling (4,)."""
     limit = np.array(ceiling)
     return np.where(limit > 0.0, np.mean(gains >= AT * limit, axis=0), 0.0).tolist()
 
@@ -77,9 +78,10 @@ def at_ceiling(gains: np.ndarray, ceiling: tuple) -> list[float]:
 def acceleration(
     series: Series, rows: np.ndarray, truth: Tracking, parameters: ModularParameters
 ) -> dict[str, float]:
-    """||chi_ddot|| that K_j3 saw, beside the true one: fraction of ticks below it, its mean, peak.
+    """Compare ||chi_ddot|| in rho_j with the true value at `rows` (m,): mean, peak.
 
-    The law's limit and low-pass are run again on the recorded estimate, from the first tick on.
+    below_true: fraction of the ticks with the law's value below the true one. The law's limit and
+    low-pass are applied again to the recorded estimate, from the first tick on.
     """
     estimate = series.block("estimate.")[:, 16:]
     raw = np.nan_to_num(np.linalg.norm(estimate, axis=1))
@@ -103,7 +105,7 @@ def acceleration(
 
 
 def estimator(truth: Tracking, estimate: Tracking) -> dict[str, float]:
-    """RMS of ||xi_estimate - xi|| beside that of ||xi||, and how much of it is in e."""
+    """Return the RMS of ||xi_estimate - xi||, of its e part, and of ||xi||."""
     e, e_dot = estimate.e - truth.e, estimate.e_dot - truth.e_dot
     return {
         "rms_error": float(np.sqrt(np.mean(np.sum(e**2 + e_dot**2, axis=1)))),
@@ -113,13 +115,13 @@ def estimator(truth: Tracking, estimate: Tracking) -> dict[str, float]:
 
 
 def error_rate(truth: Tracking) -> float:
-    """Largest ||T - I|| of d e_q/dt = T e_q_dot: sin(angle / 2), where ||e_q|| = sin(angle)."""
+    """Return the largest ||T - I|| of d e_q/dt = T e_q_dot: sin(angle/2), ||e_q|| = sin(angle)."""
     sine = np.minimum(np.linalg.norm(truth.e[:, ATTITUDE], axis=1).max(), 1.0)
     return float(np.sin(0.5 * np.arcsin(sine)))
 
 
 def switches(sets: dict) -> dict[str, Any]:
-    """Safeguards that are on, and forms that are not those of the proof, per subsystem."""
+    """Return the active safeguards and the forms of Lambda and of e_q_dot, per subsystem."""
     return {
         name: {
             "safeguards": sets[node].safeguards,

@@ -1,12 +1,12 @@
-"""The paper's unknown constants K*_j0..K*_j3 of ||sigma_j||, found along a flight.
+"""The paper's unknown constants K*_j0..K*_j3 in the bound of ||sigma_j||, computed from a flight.
 
-(up_bound_p), (up_bound_q), (up_bound_alpha):
+Eq. (11), up_bound_p; (20), up_bound_q; (27), up_bound_alpha:
 
     ||sigma_j|| <= K*0 + K*1 ||xi|| + K*2 ||xi||^2 + K*3 ||chi_ddot||
 
-Any constants that satisfy it at every tick make the proof go through. `smallest` takes those that
-make the sum nu_i K*_i^2, and with it the ultimate bound, smallest; `from_the_paper` evaluates the
-expressions below (up_bound_p), products of norms, which are far larger.
+The proof holds for any constants that satisfy the bound at every tick. `smallest` minimises
+sum nu_i K*_i^2, and with it the ultimate bound. `from_the_paper` evaluates the expressions below
+eq. (11), products of norms, which are much larger.
 """
 
 from __future__ import annotations
@@ -18,23 +18,24 @@ from uam_lab.analysis.dynamics import Dynamics
 from uam_lab.analysis.supply import COLUMNS_OF, Supply
 from uam_lab.analysis.tracking import Tracking
 
-SLOWEST = 0.05  # ||chi_dot|| below which C chi_dot / ||chi_dot||^2 is rounding, not dynamics
+SLOWEST = 0.05  # ||chi_dot||; below it rounding dominates C chi_dot / ||chi_dot||^2
 
 
 def regressor(truth: Tracking) -> np.ndarray:
-    """1, ||xi||, ||xi||^2, ||chi_ddot|| (m, 4)."""
+    """Return 1, ||xi||, ||xi||^2, ||chi_ddot|| (m, 4), the factors of K*0..K*3 in eq. (11)."""
     xi = truth.xi
     return np.column_stack([np.ones_like(xi), xi, xi**2, truth.acceleration])
 
 
 def smallest(sigma: np.ndarray, regressors: np.ndarray, nu: np.ndarray) -> np.ndarray:
-    """K* (4,) >= 0 of least sum nu_i K*_i^2 with regressors @ K* >= sigma (m,) at every tick.
+    """Return K* (4,) >= 0 of least sum nu_i K*_i^2 with regressors @ K* >= sigma at every tick.
 
-    A least-distance programme, solved as Lawson and Hanson do, by non-negative least squares: with
-    y = sqrt(nu) K*, min ||y|| subject to G y >= h is y = -s[:4] / s[4], s the residual of NNLS on
-    [G^T; h^T] u = (0, 0, 0, 0, 1).
+    sigma (m,) is ||sigma_j|| [m/s^2 or rad/s^2], regressors (m, 4), nu (4,). A least-distance
+    problem, solved after Lawson and Hanson by non-negative least squares: with y = sqrt(nu) K*,
+    the solution of min ||y|| subject to G y >= h is y = -s[:4] / s[4], where s is the residual of
+    NNLS on [G^T; h^T] u = (0, 0, 0, 0, 1).
     """
-    from scipy.optimize import nnls  # takes half a second, which `uam --help` should not wait
+    from scipy.optimize import nnls  # the import takes half a second; `uam --help` skips it
 
     scale = float(np.max(sigma))
     if scale <= 0.0:
@@ -46,11 +47,11 @@ def smallest(sigma: np.ndarray, regressors: np.ndarray, nu: np.ndarray) -> np.nd
     target = np.array([0.0, 0.0, 0.0, 0.0, 1.0])
     try:
         weights, _ = nnls(system, target, maxiter=30 * system.shape[1])
-    except RuntimeError:  # no convergence: K*0 alone is a bound, too
+    except RuntimeError:  # no convergence: K*0 alone is also a bound
         return np.array([scale, 0.0, 0.0, 0.0])
     residual = system @ weights - target
     found = np.maximum(scale * -residual[:4] / residual[4] / root, 0.0)
-    # rounding must not let one tick escape
+    # scale up, so that the bound holds at every tick despite rounding
     return found * max(1.0, float(np.max(sigma / np.maximum(regressors @ found, 1e-12))))
 
 
@@ -62,9 +63,9 @@ def from_the_paper(
     truth: Tracking,
     sets: dict,
 ) -> np.ndarray:
-    """K* (4,) by the expressions below (up_bound_p), every norm the largest along the flight.
+    """Return K* (4,) from the expressions below eq. (11), each norm the largest of the flight.
 
-    g_bar is that of g less the weight fed forward; d_bar that of `coupling.rest`.
+    g_bar is the bound of g minus the weight fed forward; d_bar is the bound of `coupling.rest`.
     """
     columns = COLUMNS_OF[subsystem]
     inertia = nominal_inertia(sets)[columns]
@@ -94,5 +95,5 @@ def from_the_paper(
 
 
 def _norm(matrices: np.ndarray) -> float:
-    """Largest 2-norm of matrices (m, a, b)."""
+    """Return the largest 2-norm of matrices (m, a, b)."""
     return float(np.linalg.norm(matrices, ord=2, axis=(1, 2)).max())

@@ -1,15 +1,15 @@
 """The true coupling force on each subsystem, and the paper's E_j and sigma_j.
 
-Equations (dynamics_p), (dynamics_q), (dynamics_alpha):
+Eq. (6), dynamics_p; (16), dynamics_q; (23), dynamics_alpha:
 
     Mbar_j chi_j_ddot + E_j = tau_j
     E_j = (M_jj - Mbar_j) chi_j_ddot + sum_{i != j} M_ji chi_i_ddot + C_j chi_dot + g_j + d_j
 
-Here E_j = H_j + d_j: H_j is what the rigid-body model of the plant says, d_j is the rest. tau_j is
-what the law asked for, so d_j holds whatever the actuators do beyond or short of it (rotor lag,
-delays, and the integrator of the autopilot's rate loop), friction, drag, contacts and the magnet's
-pivot. The weight that is fed forward (law.md, decision 3) is known and no uncertainty: it is taken
-out of H_p, so that sigma_j = -Mbar_j^-1 E_j is exactly what (err1) has.
+Here E_j = H_j + d_j. H_j comes from the rigid-body model of the plant, d_j is the remainder. tau_j
+is the command of the law, so d_j contains the difference between command and actuators (rotor
+lag, delays, integrator of the autopilot's rate loop), friction, drag, contacts and the pivot of
+the magnet. The weight fed forward (`gravity_feedforward_mass`) is known, so it is no uncertainty:
+H_p does not contain it, and sigma_j = -Mbar_j^-1 E_j is the sigma_j of eq. (9), err1.
 """
 
 from __future__ import annotations
@@ -25,28 +25,31 @@ from uam_lab.analysis.supply import COLUMNS_OF, NODE_OF, Supply
 
 @dataclass(frozen=True)
 class Coupling:
-    """m ticks, all (m, 8); N (p), N m (q, alpha), sigma in m/s^2, rad/s^2."""
+    """Coupling forces at m ticks, all (m, 8): N, world (p), N m, FLU (q), N m (alpha).
+
+    sigma: m/s^2 (p), rad/s^2 (q, alpha).
+    """
 
     plant: np.ndarray  # H
     rest: np.ndarray  # d
     sigma: np.ndarray  # -Mbar^-1 (H + d)
 
     def sigma_norm(self, subsystem: str) -> np.ndarray:
-        """||sigma_j|| (m,)."""
+        """Return ||sigma_j|| (m,) [m/s^2 or rad/s^2]."""
         return np.linalg.norm(self.sigma[:, COLUMNS_OF[subsystem]], axis=1)
 
 
 def along(dynamics: Dynamics, acceleration: np.ndarray, supply: Supply, sets: dict) -> Coupling:
-    """H, d and sigma from the true dynamics, chi_ddot (m, 8) and what the law asked for."""
+    """Return H, d and sigma from the true dynamics, the true chi_ddot (m, 8) and tau."""
     inertia = nominal_inertia(sets)
     required = dynamics.required(acceleration)
     plant = required - inertia * acceleration - supply.weight
-    rest = supply.asked - required
+    rest = supply.tau - required
     return Coupling(plant, rest, -(plant + rest) / inertia)
 
 
 def nominal_inertia(sets: dict) -> np.ndarray:
-    """The diagonal of Mbar (8,) [kg, kg m^2]."""
+    """Return the diagonal of Mbar (8,) [kg (p), kg m^2 (q, alpha)]."""
     inertia = np.empty(SIZE)
     for name, columns in COLUMNS_OF.items():
         inertia[columns] = sets[NODE_OF[name]].inertia

@@ -1,17 +1,17 @@
-"""The true M(chi), C(chi, chi_dot) chi_dot and g(chi) along a flight, out of MuJoCo.
+"""The true M(chi), C(chi, chi_dot) chi_dot and g(chi) along a flight, computed by MuJoCo.
 
-The paper's equation (EL_dynamics): M chi_ddot + C chi_dot + g + d = tau, chi = (p, q, alpha).
+Eq. (1), EL_dynamics: M chi_ddot + C chi_dot + g + d = tau, chi = (p, q, alpha).
 
 Coordinates. This stack uses quasi-velocities for the attitude (docs/law.md): chi_dot[3:6] are the
-body rates Omega (FLU) and chi_ddot[3:6] their derivative, tau_q is a torque in FLU. MuJoCo's free
-joint uses the same: qvel = (velocity in the world, angular velocity in the body). So MuJoCo's mass
-matrix and bias force are those of this chi without any change of coordinates. With body rates the
-matrix C of Euler-Lagrange is that of Boltzmann-Hamel; C chi_dot still is quadratic in chi_dot.
+body rates Omega (FLU), chi_ddot[3:6] is their derivative, tau_q is a torque in FLU. MuJoCo's free
+joint uses the same: qvel = (velocity in the world, angular velocity in the body). MuJoCo's mass
+matrix and bias force therefore need no change of coordinates. With body rates the equations are
+those of Boltzmann and Hamel; C chi_dot is still quadratic in chi_dot.
 
-The magnet hangs on a passive pivot, which the paper's arm does not have. In M, C and g it is frozen
-at its recorded angle; the force of its recorded motion is `pivot` and belongs to the paper's d.
-The payload is part of the magnet while it hangs on it. M contains the reflected inertia of the
-servos (armature); friction, drag and contacts are not in M, C, g.
+The magnet hangs on a passive pivot, which the paper's arm does not have. M, C and g are computed
+with the pivot fixed at its recorded angle; the force of its recorded motion is `pivot`, a part of
+the paper's d. The payload is part of the magnet while the magnet carries it. M contains the
+reflected inertia of the servos (armature). Friction, drag and contacts are not in M, C, g.
 """
 
 from __future__ import annotations
@@ -32,21 +32,21 @@ PIVOT = SIZE
 
 @dataclass(frozen=True)
 class Dynamics:
-    """m ticks of the true dynamics, SI units, force rows as chi: N (p), N m (q, alpha)."""
+    """True dynamics at m ticks. Forces in the order of chi: N, world (p), N m, FLU (q), N m."""
 
     mass: np.ndarray  # (m, 8, 8)
     coriolis: np.ndarray  # (m, 8) C chi_dot
     gravity: np.ndarray  # (m, 8) g
-    pivot: np.ndarray  # (m, 8) what the swinging magnet adds; part of d
+    pivot: np.ndarray  # (m, 8) force of the swinging magnet; part of d
     carrying: np.ndarray  # (m,) payload on the magnet
 
     def required(self, acceleration: np.ndarray) -> np.ndarray:
-        """M chi_ddot + C chi_dot + g (m, 8) for chi_ddot (m, 8)."""
+        """Return M chi_ddot + C chi_dot + g (m, 8), units as above, for chi_ddot (m, 8)."""
         return np.einsum("kij,kj->ki", self.mass, acceleration) + self.coriolis + self.gravity
 
 
 class Body:
-    """Vehicle, with or without the payload as part of its magnet, evaluated state by state."""
+    """MuJoCo model of the vehicle, with or without the payload fixed to its magnet."""
 
     def __init__(
         self,
@@ -54,9 +54,9 @@ class Body:
         payload_mass: float = 0.0,
         payload_position: np.ndarray = (0.0, 0.0, -0.0505),
     ) -> None:
-        """payload_mass [kg]; payload_position (3,) [m]: its centre in the magnet's frame."""
+        """payload_mass [kg]; payload_position (3,) [m]: centre, in the frame of the magnet."""
         spec = mujoco.MjSpec.from_file(str(vehicle.model_path))
-        spec.geom("payload").mass = 1e-3  # the free payload; a tree of its own, never looked at
+        spec.geom("payload").mass = 1e-3  # the free payload: a separate tree, not evaluated
         if payload_mass > 0.0:
             spec.body("magnet").add_geom(
                 name="held",
@@ -74,7 +74,7 @@ class Body:
         self._unit, self._column = np.zeros(model.nv), np.zeros(model.nv)
 
     def place(self, chi: np.ndarray, swing: float) -> None:
-        """Set the pose: chi (8,) with Euler angles, angle of the pivot [rad]."""
+        """Set the pose: chi (8,) [m, world; rad, Euler angles; rad, joints], pivot angle [rad]."""
         qpos = self.data.qpos
         qpos[0:3] = chi[0:3]
         half = 0.5 * chi[3:6]
@@ -95,9 +95,10 @@ class Body:
         gravity: np.ndarray,
         pivot: np.ndarray,
     ) -> None:
-        """Write M (8, 8), C chi_dot, g, pivot (8,) of one state into the last four.
+        """Write M (8, 8), C chi_dot, g and pivot force (8,) of one state into the last four.
 
-        swing (3,): angle, rate, acceleration of the pivot.
+        chi, chi_dot (8,): SI units, position in the world, body rates in FLU. swing (3,): angle
+        [rad], rate, acceleration of the pivot. Units of the results: see `Dynamics`.
         """
         model, data = self.model, self.data
         self.place(chi, swing[0])
@@ -120,7 +121,7 @@ class Body:
 
 
 def along(series: Series, rows: np.ndarray, vehicle: Vehicle, payload_mass: float) -> Dynamics:
-    """The true dynamics at `rows` (m,) of a flight with a payload of payload_mass [kg]."""
+    """Return the true dynamics at `rows` (m,) of a flight; payload_mass in kg."""
     count = len(rows)
     truth = series.block("truth.").reshape(-1, 3, SIZE)[rows]
     swing = pivot_motion(series)[rows]
@@ -141,14 +142,14 @@ def along(series: Series, rows: np.ndarray, vehicle: Vehicle, payload_mass: floa
 
 
 def pivot_motion(series: Series) -> np.ndarray:
-    """Angle, rate and acceleration (ticks, 3) of the pivot, by differences of its angle."""
+    """Return angle [rad], rate and acceleration (ticks, 3) of the pivot, by differences."""
     angle = np.nan_to_num(series["magnet.swing"])
     rate = np.gradient(angle, ticks.period(series))
     return np.column_stack([angle, rate, np.gradient(rate, ticks.period(series))])
 
 
 def hold(series: Series, rows: np.ndarray, body: Body) -> np.ndarray:
-    """Centre of the payload in the magnet's frame (3,) [m], the median over some of `rows`."""
+    """Return the payload's centre in the magnet's frame (3,) [m]: median over some of `rows`."""
     truth, swing = series.block("truth."), series["magnet.swing"]
     place = series.block("payload.")[:, :3]
     magnet = body.data.body("magnet")

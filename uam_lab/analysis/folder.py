@@ -1,4 +1,4 @@
-"""The analysis of a flight in a result folder, with the parameters that it was flown with."""
+"""Analyse the flight in a result folder with the parameters stored beside it."""
 
 from __future__ import annotations
 
@@ -13,9 +13,9 @@ LAW = "modular"
 
 
 def analyse_folder(directory: Path, series: Series) -> Stability | None:
-    """None where another law flew or the vehicle hardly left the ground.
+    """Return the analysis, or None for another law or for a flight with too few airborne ticks.
 
-    Raises ProfileError where parameters.yaml is missing or not a profile of the modular law.
+    Raises ProfileError if parameters.yaml is missing or is no profile of the modular law.
     """
     info = series.info
     if info.get("controller", LAW) != LAW:

@@ -1,4 +1,4 @@
-"""The whole analysis of one flight: `analyse`, and its numbers as JSON has them."""
+"""The whole analysis of one flight: `analyse`, and its result as the dictionary for JSON."""
 
 from __future__ import annotations
 
@@ -27,17 +27,17 @@ from uam_sim_bridge.plant import Vehicle
 
 @dataclass(frozen=True)
 class Subsystem:
-    """V_j along the flight and what the Appendix says about it."""
+    """V_j of one subsystem along the flight, and its bounds by the Appendix."""
 
     constants: np.ndarray  # (4,) K*, the smallest
     printed: np.ndarray  # (4,) K* by the paper's expressions
     parts: lyapunov.Parts
     comparison: lyapunov.ComparisonSystem
-    decrease: np.ndarray  # (m,) what dV_j/dt stays below, see lyapunov.decrease
-    gains: np.ndarray  # (m, 4) K as flown
+    decrease: np.ndarray  # (m,) upper bound of dV_j/dt, see lyapunov.decrease
+    gains: np.ndarray  # (m, 4) K0..K3 as flown
     zeta: np.ndarray  # (m,)
     error: np.ndarray  # (m,) ||xi_j||
-    error_bound: float  # what V_j <= max(V_j(0), B_j) leaves for ||xi_j||
+    error_bound: float  # bound of ||xi_j|| from V_j <= max(V_j(0), B_j)
 
 
 @dataclass(frozen=True)
@@ -54,17 +54,17 @@ class Stability:
 
     @cached_property
     def total(self) -> np.ndarray:
-        """V (m,)."""
+        """Return V (m,), eq. (31)."""
         return sum(s.parts.total for s in self.subsystems.values())
 
     @cached_property
     def comparison(self) -> lyapunov.ComparisonSystem:
-        """Of V, equation (new)."""
+        """Return rate and growth of V, eq. (51), new."""
         p, q, alpha = (self.subsystems[name].comparison for name in SUBSYSTEMS)
         return p + q + alpha
 
     def summary(self) -> dict[str, Any]:
-        """stability.json: SI units, gains and V without unit as in the paper."""
+        """Return the content of stability.json: SI units, gains and V without unit."""
         found = {"ticks": len(self.time), "from_s": self.time[0], "until_s": self.time[-1]}
         found["V"] = check(self.time, self.total, self.comparison)
         for name, s in self.subsystems.items():
@@ -92,9 +92,10 @@ class Stability:
 def check(
     time: np.ndarray, value: np.ndarray, comparison: lyapunov.ComparisonSystem
 ) -> dict[str, Any]:
-    """V (m,) against max(V(0), B), against its envelope, and dV/dt against -rate V + growth.
+    """Compare V (m,) with max(V(0), B) and with its envelope, and dV/dt with -rate V + growth.
 
-    Also how often V falls where it is above B, None where it never is.
+    time (m,) [s]. falls_above_bound: fraction of the ticks with V > B in which V decreases, None
+    if there is no such tick.
     """
     limit = max(value[0], comparison.bound)
     envelope = comparison.envelope(value[0], time - time[0])
@@ -116,29 +117,29 @@ def check(
 
 
 def shares(forces: coupling.Coupling, terms: supply.Supply, columns: slice) -> dict[str, Any]:
-    """RMS [N, N m] of the true coupling force and of what meets it, per axis.
+    """Return the RMS [N, N m] of the true coupling force and of each term against it, per axis.
 
-    *_share: the part of the coupling that a term supplies, <term, H> / <H, H> over all axes.
+    *_share: the part of the coupling that a term compensates, <term, H> / <H, H> over all axes.
     """
     plant = forces.plant[:, columns]
     met = {
         "adaptive": terms.adaptive[:, columns],
         "feedback": terms.feedback[:, columns],
         "feedforward": terms.feedforward[:, columns],
-        "actuators": (terms.applied - terms.asked)[:, columns],
+        "actuators": (terms.applied - terms.tau)[:, columns],
     }
     found = {"rms": rms(plant), "rest_rms": rms(forces.rest[:, columns])}
     power = float(np.sum(plant**2))
     for name, term in met.items():
         found[f"{name}_rms"] = rms(term)
         found[f"{name}_share"] = float(np.sum(term * plant)) / power if power else None
-    if columns == COLUMNS_OF["arm"]:  # what its servos made of tau is not recorded
+    if columns == COLUMNS_OF["arm"]:  # the torque of its servos is not recorded
         found["actuators_rms"] = found["actuators_share"] = None
     return found
 
 
 def rms(values: np.ndarray) -> np.ndarray:
-    """Root of the mean square over the ticks, per axis."""
+    """Return the root mean square of values (m, axes) over the ticks: (axes,)."""
     return np.sqrt(np.mean(values**2, axis=0))
 
 
@@ -149,10 +150,10 @@ def analyse(
     payload_mass: float,
     frequency: float = ticks.FREQUENCY,
 ) -> Stability | None:
-    """The analysis of a flight of the modular law; None where it hardly left the ground.
+    """Return the analysis of a flight of the modular law.
 
     sets: the profile's parameter sets by node; payload_mass [kg]; frequency [Hz] of the ticks used.
-    A law that adapts nothing has no numbers in adaptation.*: None as well.
+    Returns None if fewer than ticks.FEWEST airborne ticks have finite adaptation.* columns.
     """
     rows = ticks.in_the_air(series, frequency)
     if len(rows) < ticks.FEWEST:
@@ -197,7 +198,7 @@ def _subsystem(
     best: np.ndarray,
     printed_ones: np.ndarray,
 ) -> Subsystem:
-    """V_j with the constants `best` (4,) and its bound; parameters: the subsystem's own set."""
+    """Return V_j and its bound for the constants K* `best` (4,); parameters: of this subsystem."""
     columns = COLUMNS_OF[name]
     gains = np.column_stack([series[f"adaptation.{name}.K{i}"][rows] for i in range(4)])
     zeta = np.maximum(series[f"adaptation.{name}.zeta"][rows], 1e-12)

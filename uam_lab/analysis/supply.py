@@ -1,4 +1,4 @@
-"""What each term of the law supplies, and what the actuators made of it, per axis."""
+"""The terms of tau_j and the forces of the actuators along a flight, per axis."""
 
 from __future__ import annotations
 
@@ -18,21 +18,25 @@ NODE_OF = {name: f"{name}_controller" for name in SUBSYSTEMS}
 
 @dataclass(frozen=True)
 class Supply:
-    """m ticks, all (m, 8), N (p) and N m (q, alpha); equations (ct1), (ct2), (ct3).
+    """Terms of tau at m ticks, eq. (8a), tau_p; (18a), tau_q; (25a), tau_alpha.
 
-    Without saturation asked = feedforward + feedback + adaptive + weight.
+    All (m, 8): N, world (p), N m, FLU (q), N m (alpha). Without saturation
+    tau = feedforward + feedback + adaptive + weight.
     """
 
     feedforward: np.ndarray  # Mbar chi_d_ddot
     feedback: np.ndarray  # -Mbar Lambda xi
     adaptive: np.ndarray  # -Mbar dtau
     weight: np.ndarray  # gravity_feedforward_mass g e3
-    asked: np.ndarray  # tau as recorded, after its limits
-    applied: np.ndarray  # what rotors made; for the arm, whose torque is not recorded, asked
+    tau: np.ndarray  # as recorded, after its limits
+    applied: np.ndarray  # force and torque of the rotors; tau for the arm (no recorded torque)
 
 
 def along(series: Series, rows: np.ndarray, estimate: Tracking, sets: dict, body: Body) -> Supply:
-    """The terms at `rows` (m,). estimate: the errors that the law saw; sets: of the profile."""
+    """Return the terms at `rows` (m,).
+
+    estimate: errors of the estimated state, the input of the law. sets: parameter sets by node.
+    """
     shape = (len(rows), SIZE)
     feedforward, feedback, adaptive, weight = (np.zeros(shape) for _ in range(4))
     for name, columns in COLUMNS_OF.items():
@@ -47,16 +51,16 @@ def along(series: Series, rows: np.ndarray, estimate: Tracking, sets: dict, body
     limits = sets["position_controller"]
     weight[:, 2] = limits.gravity_feedforward_mass * limits.gravity
     blocks = [series.block(f"{tau}.")[rows] for tau in ("tau_p", "tau_q", "tau_alpha")]
-    asked = np.hstack(blocks)
+    recorded = np.hstack(blocks)
     applied = np.hstack([rotor_wrench(series, rows, body), blocks[2]])
-    return Supply(feedforward, feedback, adaptive, weight, asked, applied)
+    return Supply(feedforward, feedback, adaptive, weight, recorded, applied)
 
 
 def rotor_wrench(series: Series, rows: np.ndarray, body: Body) -> np.ndarray:
-    """Force [N, world] and torque [N m, FLU] (m, 6) of the recorded rotor thrusts."""
+    """Return force [N, world] and torque [N m, FLU] (m, 6) of the recorded rotor thrusts."""
     model = body.model
     thrust = np.column_stack([series[f"rotor_{i}.thrust"][rows] for i in range(1, 5)])
-    torque = np.zeros((4, 3))  # per newton: r x e3 and the reaction
+    torque = np.zeros((4, 3))  # per newton of thrust: r x e3 and the drag torque
     for i in range(4):
         x, y, _ = model.site(f"rotor_{i + 1}").pos
         torque[i] = y, -x, model.actuator(f"rotor_{i + 1}").gear[5]

@@ -1,4 +1,4 @@
-"""Which ticks of a flight the analysis looks at: in the air, thinned, and whether with payload."""
+"""Selection of the ticks for the analysis: airborne, thinned out, with or without payload."""
 
 from __future__ import annotations
 
@@ -7,18 +7,18 @@ import numpy as np
 from uam_control.laws.modular import ADAPTATION
 from uam_lab.results.timeseries import SUBSYSTEMS, Series, gain_columns
 
-CLEARANCE = 0.01  # [m] above where the vehicle stood: no ground under its feet
-LIFTED = 0.001  # [m] above where the payload stood: nothing but the magnet carries it
-FIRM = 0.5  # of the magnet's largest force: less and there is an air gap
+CLEARANCE = 0.01  # [m] above the start position: the feet have no ground contact
+LIFTED = 0.001  # [m] above the payload's start position: only the magnet carries it
+FIRM = 0.5  # fraction of the magnet's largest force; below it there is an air gap
 FREQUENCY = 50.0  # [Hz]
 NEEDED = ("truth.", "estimate.", "reference.", "tau_", "rotor_")
-FEWEST = 10  # ticks; below that there is nothing to say
+FEWEST = 10  # ticks that the analysis needs
 
 
 def in_the_air(series: Series, frequency: float = FREQUENCY) -> np.ndarray:
-    """Row numbers (m,), ascending, thinned to `frequency` [Hz]; empty if it never flew.
+    """Return the airborne rows (m,), ascending, thinned to `frequency` [Hz]; may be empty.
 
-    On the ground the feet carry the weight, which the paper's model does not have.
+    Rows on the ground are left out: the paper's model has no ground contact.
     """
     if len(series) < FEWEST:
         return np.zeros(0, dtype=int)
@@ -32,17 +32,17 @@ def in_the_air(series: Series, frequency: float = FREQUENCY) -> np.ndarray:
 
 
 def period(series: Series) -> float:
-    """Time between two ticks [s]."""
+    """Return the time between two ticks [s]."""
     return float(np.median(np.diff(series.time)))
 
 
 def carrying(series: Series) -> np.ndarray:
-    """Mask (ticks,): the payload hangs on the magnet, and on nothing else."""
+    """Return the mask (ticks,) of the ticks in which only the magnet carries the payload."""
     force, height = series["magnet.force"], series["payload.z"]
     on = np.flatnonzero(np.nan_to_num(series["magnet.on"]) > 0.5)
     if not len(on) or not np.isfinite(height[on[0]]):
         return np.zeros(len(series), dtype=bool)
     firm = np.nan_to_num(force) > FIRM * np.nanmax(force)
     held = firm & (height > height[on[0]] + LIFTED)
-    # before it was first lifted the stand bears it; later it may hang lower than the stand
+    # the stand carries the payload until its first lift; later it may hang lower than the stand
     return firm & np.logical_or.accumulate(held)

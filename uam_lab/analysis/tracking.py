@@ -1,4 +1,4 @@
-"""Tracking errors along a flight as the law defines them, of the truth or of the estimate."""
+"""Tracking errors of a flight by the law's definition, from the true or the estimated state."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from uam_lab.results.timeseries import Series
 
 @dataclass(frozen=True)
 class Tracking:
-    """m ticks; equations (err) and those of e_q. SI units."""
+    """Tracking errors at m ticks: eq. (5), err; e_q: (14), (15). SI units, world (p), FLU (q)."""
 
     e: np.ndarray  # (m, 8)
     e_dot: np.ndarray  # (m, 8)
@@ -25,9 +25,9 @@ class Tracking:
 
 
 def along(series: Series, rows: np.ndarray, source: str, printed: bool) -> Tracking:
-    """Errors at `rows` (m,) in flight. source: "truth" or "estimate"; printed: the paper's e_q_dot.
+    """Return the errors at `rows` (m,). source: "truth" or "estimate".
 
-    The reference of the attitude is the one asked for in the same tick.
+    printed: use e_q_dot as in eq. (15). The desired attitude is that of the same tick.
     """
     states = np.ascontiguousarray(series.block(f"{source}.")[rows]).reshape(-1, 3, SIZE)
     references = np.ascontiguousarray(series.block("reference.")[rows]).reshape(-1, 3, SIZE)

@@ -64,7 +64,7 @@ def coupling(flights: Sequence[DrawnFlight]) -> Figure | None:
     figure.subplots_adjust(wspace=0.26)  # small torques have long labels
     supply = found.supply
     drawn = (
-        (supply.applied - supply.asked, ACTUATORS, 0.9),
+        (supply.applied - supply.tau, ACTUATORS, 0.9),
         (supply.feedback, FEEDBACK, 0.9),
         (supply.adaptive, ADAPTIVE, 1.2),
         (found.coupling.plant, COUPLING, 1.2),
