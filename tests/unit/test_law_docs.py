@@ -14,7 +14,9 @@ CITED = re.compile(r"`((?:\w+/)*\w+\.py)(?:: (\w+))?`")
 
 def names(file):
     tree = ast.parse(file.read_text())
-    return {node.name for node in ast.walk(tree) if isinstance(node, ast.FunctionDef | ast.ClassDef)}
+    return {
+        node.name for node in ast.walk(tree) if isinstance(node, ast.FunctionDef | ast.ClassDef)
+    }
 
 
 @pytest.mark.parametrize(("path", "name"), sorted(set(CITED.findall(PAGE))))
