@@ -12,7 +12,7 @@ import numpy as np
 from uam_control.settings.parameter_set import number
 from uam_sim_bridge.faults.fault import Disturbable, Effect, PlantCommands, PlantFault
 
-JOINT = "which joint"
+JOINT = "joint number"
 
 
 class ActEffect(Effect):
@@ -28,10 +28,10 @@ class ActEffect(Effect):
 @dataclass(frozen=True)
 class MotorLoss(PlantFault):
     NAME: ClassVar[str] = "motor_loss"
-    ABOUT: ClassVar[str] = "a motor gives a part of its thrust, as with a broken propeller"
+    ABOUT: ClassVar[str] = "a motor gives only a fraction of its thrust, as with a broken propeller"
 
-    motor: float = number(1, "which one, in PX4's order", "1", 1, 4)
-    remaining: float = number(0.5, "part of the thrust that is left", "1", 0.0, 1.0)
+    motor: float = number(1, "motor number, in PX4's order", "1", 1, 4)
+    remaining: float = number(0.5, "fraction of the thrust that remains", "1", 0.0, 1.0)
 
     def effect(self, noise: np.random.Generator) -> Effect:
         thrust = np.ones(4)
@@ -42,10 +42,10 @@ class MotorLoss(PlantFault):
 @dataclass(frozen=True)
 class BatterySag(PlantFault):
     NAME: ClassVar[str] = "battery_sag"
-    ABOUT: ClassVar[str] = "the battery's voltage falls, and with it the thrust of all motors"
+    ABOUT: ClassVar[str] = "the battery voltage falls, and with it the thrust of all motors"
 
-    remaining: float = number(0.8, "part of the thrust that is left", "1", 0.1, 1.0)
-    over: float = number(2.0, "how long it takes to get there", "s", 0.0, 1000.0)
+    remaining: float = number(0.8, "fraction of the thrust that remains", "1", 0.1, 1.0)
+    over: float = number(2.0, "time in which the thrust falls", "s", 0.0, 1000.0)
 
     def effect(self, noise: np.random.Generator) -> Effect:
         return Sag(self.remaining, self.over)
@@ -67,10 +67,10 @@ class Sag(Effect):
 @dataclass(frozen=True)
 class ServoWeak(PlantFault):
     NAME: ClassVar[str] = "servo_weak"
-    ABOUT: ClassVar[str] = "a servo gives a part of the torque that it is told"
+    ABOUT: ClassVar[str] = "a servo gives only a fraction of the commanded torque"
 
     joint: float = number(1, JOINT, "1", 1, 2)
-    remaining: float = number(0.0, "part of the torque that is left", "1", 0.0, 1.0)
+    remaining: float = number(0.0, "fraction of the torque that remains", "1", 0.0, 1.0)
 
     def effect(self, noise: np.random.Generator) -> Effect:
         def weaken(plant: Disturbable, commands: PlantCommands) -> None:
@@ -82,10 +82,10 @@ class ServoWeak(PlantFault):
 @dataclass(frozen=True)
 class ServoJam(PlantFault):
     NAME: ClassVar[str] = "servo_jam"
-    ABOUT: ClassVar[str] = "a joint's gear holds the angle that it has"
+    ABOUT: ClassVar[str] = "a joint's gear jams and holds its present angle"
 
     joint: float = number(1, JOINT, "1", 1, 2)
-    torque: float = number(20.0, "that it takes to move it", "N m", 0.1, 1000.0)
+    torque: float = number(20.0, "torque that still moves the joint", "N m", 0.1, 1000.0)
 
     def effect(self, noise: np.random.Generator) -> Effect:
         return ActEffect(lambda plant, _: plant.brake_joint(int(self.joint) - 1, self.torque))
@@ -94,9 +94,9 @@ class ServoJam(PlantFault):
 @dataclass(frozen=True)
 class MagnetWeak(PlantFault):
     NAME: ClassVar[str] = "magnet_weak"
-    ABOUT: ClassVar[str] = "the magnet holds with a part of its force, or not at all"
+    ABOUT: ClassVar[str] = "the magnet holds with a fraction of its force, or with none"
 
-    remaining: float = number(0.0, "part of the force that is left", "1", 0.0, 1.0)
+    remaining: float = number(0.0, "fraction of the force that remains", "1", 0.0, 1.0)
 
     def effect(self, noise: np.random.Generator) -> Effect:
         return ActEffect(lambda plant, _: plant.weaken_magnet(self.remaining))
@@ -105,7 +105,7 @@ class MagnetWeak(PlantFault):
 @dataclass(frozen=True)
 class MagnetStuck(PlantFault):
     NAME: ClassVar[str] = "magnet_stuck"
-    ABOUT: ClassVar[str] = "the magnet, once it is on, does not release when switched off"
+    ABOUT: ClassVar[str] = "the magnet does not release the payload when it is switched off"
 
     def effect(self, noise: np.random.Generator) -> Effect:
         return Remanent()
@@ -124,11 +124,9 @@ class Remanent(Effect):
 @dataclass(frozen=True)
 class PayloadSwing(PlantFault):
     NAME: ClassVar[str] = "payload_swing"
-    ABOUT: ClassVar[str] = (
-        "the payload no longer sits flat on the magnet but swings freely about one point of it"
-    )
+    ABOUT: ClassVar[str] = "the payload hangs from one point of the magnet and swings freely"
 
-    rate: float = number(5.0, "pitch rate of the payload at the beginning", "rad/s", -20.0, 20.0)
+    rate: float = number(5.0, "initial pitch rate of the payload", "rad/s", -20.0, 20.0)
 
     def effect(self, noise: np.random.Generator) -> Effect:
         return ActEffect(lambda plant, commands: plant.swing_payload(commands, self.rate))
@@ -137,12 +135,14 @@ class PayloadSwing(PlantFault):
 @dataclass(frozen=True)
 class WindGust(PlantFault):
     NAME: ClassVar[str] = "wind_gust"
-    ABOUT: ClassVar[str] = "wind on top of what there is, rising softly"
+    ABOUT: ClassVar[str] = "additional wind that rises smoothly"
 
     speed: float = number(4.0, "horizontal speed", "m/s", 0.0, 40.0)
-    towards: float = number(0.0, "where it blows to, from x to y", "deg", -360.0, 360.0)
+    towards: float = number(
+        0.0, "direction of the flow, 0 along x, 90 along y", "deg", -360.0, 360.0
+    )
     up: float = number(0.0, "vertical speed", "m/s", -20.0, 20.0)
-    rise: float = number(0.5, "how long it rises", "s", 0.0, 100.0)
+    rise: float = number(0.5, "rise time", "s", 0.0, 100.0)
 
     def effect(self, noise: np.random.Generator) -> Effect:
         angle = math.radians(self.towards)

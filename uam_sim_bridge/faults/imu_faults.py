@@ -13,7 +13,7 @@ from uam_sim_bridge.faults.fault import Effect, PlantFault
 from uam_sim_bridge.plant import Samples
 
 COMPANION, AUTOPILOT, BOTH = "companion", "autopilot", "both"
-UNIT = "the companion computer's IMU, the autopilot's, or both"
+UNIT = "affected IMU: the companion computer's, the autopilot's or both"
 UNITS = (BOTH, COMPANION, AUTOPILOT)
 AXES = ("x", "y", "z")
 
@@ -38,11 +38,11 @@ class ImuEffect(Effect):
 @dataclass(frozen=True)
 class ImuBias(PlantFault):
     NAME: ClassVar[str] = "imu_bias"
-    ABOUT: ClassVar[str] = "gyroscope and accelerometer are off by a constant on one axis"
+    ABOUT: ClassVar[str] = "gyroscope and accelerometer have a constant bias on one axis"
 
     gyro: float = number(0.05, "bias of the gyroscope", "rad/s", -5.0, 5.0)
     accelerometer: float = number(0.5, "bias of the accelerometer", "m/s^2", -50.0, 50.0)
-    axis: str = choice("x", "axis, FLU", AXES)
+    axis: str = choice("x", "biased axis, FLU", AXES)
     unit: str = choice(BOTH, UNIT, UNITS)
 
     def effect(self, noise: np.random.Generator) -> Effect:
@@ -54,7 +54,7 @@ class ImuBias(PlantFault):
 @dataclass(frozen=True)
 class ImuSaturation(PlantFault):
     NAME: ClassVar[str] = "imu_saturation"
-    ABOUT: ClassVar[str] = "gyroscope and accelerometer end at a small range on every axis"
+    ABOUT: ClassVar[str] = "gyroscope and accelerometer saturate at a small value on every axis"
 
     gyro: float = number(0.2, "largest body rate", "rad/s", 0.0, 50.0)
     accelerometer: float = number(10.0, "largest specific force", "m/s^2", 0.0, 200.0)
@@ -74,7 +74,7 @@ class ImuSaturation(PlantFault):
 class ImuDropout(PlantFault):
     NAME: ClassVar[str] = "imu_dropout"
     ABOUT: ClassVar[str] = (
-        "no samples reach the companion computer; the autopilot's own IMU repeats its last one"
+        "an IMU fails: the companion's gives no samples, the autopilot's repeats its last sample"
     )
 
     unit: str = choice(COMPANION, UNIT, UNITS)
@@ -101,9 +101,9 @@ class Silent(Effect):
 @dataclass(frozen=True)
 class EncoderStuck(PlantFault):
     NAME: ClassVar[str] = "encoder_stuck"
-    ABOUT: ClassVar[str] = "a joint's encoder repeats its angle and tells no velocity"
+    ABOUT: ClassVar[str] = "a joint's encoder repeats its angle and reports zero velocity"
 
-    joint: float = number(1, "which joint", "1", 1, 2)
+    joint: float = number(1, "joint number", "1", 1, 2)
 
     def effect(self, noise: np.random.Generator) -> Effect:
         return Stuck(int(self.joint) - 1)

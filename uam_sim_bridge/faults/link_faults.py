@@ -17,7 +17,7 @@ class LinkFault(Fault):
 
     PLACE: ClassVar[str] = LINK
 
-    direction: str = choice(BOTH, "which way", (BOTH, TO, FROM))
+    direction: str = choice(BOTH, "affected direction", (BOTH, TO, FROM))
 
     @property
     def outwards(self) -> bool:
@@ -33,20 +33,20 @@ class LinkFault(Fault):
 @dataclass(frozen=True)
 class MavlinkCut(LinkFault):
     NAME: ClassVar[str] = "mavlink_cut"
-    ABOUT: ClassVar[str] = "nothing gets through"
+    ABOUT: ClassVar[str] = "no message arrives"
 
 
 @dataclass(frozen=True)
 class MavlinkDelay(LinkFault):
     NAME: ClassVar[str] = "mavlink_delay"
-    ABOUT: ClassVar[str] = "everything gets through later"
+    ABOUT: ClassVar[str] = "every message arrives later"
 
-    delay: float = number(0.05, "by how much", "s", 0.0, 10.0)
+    delay: float = number(0.05, "added delay", "s", 0.0, 10.0)
 
 
 @dataclass(frozen=True)
 class MavlinkCorruption(LinkFault):
     NAME: ClassVar[str] = "mavlink_corruption"
-    ABOUT: ClassVar[str] = "one byte is wrong in some of the packets, which are then not used"
+    ABOUT: ClassVar[str] = "some packets have one wrong byte, and the receiver discards them"
 
-    share: float = number(0.2, "part of the packets", "1", 0.0, 1.0)
+    share: float = number(0.2, "fraction of wrong packets", "1", 0.0, 1.0)

@@ -37,7 +37,7 @@ class PoseEffect(Effect):
 @dataclass(frozen=True)
 class MocapDropout(PlantFault):
     NAME: ClassVar[str] = "mocap_dropout"
-    ABOUT: ClassVar[str] = "no poses of the motion capture arrive"
+    ABOUT: ClassVar[str] = "no motion-capture poses arrive"
 
     def effect(self, noise: np.random.Generator) -> Effect:
         return PoseEffect(lambda *pose: None)
@@ -46,7 +46,7 @@ class MocapDropout(PlantFault):
 @dataclass(frozen=True)
 class MocapFreeze(PlantFault):
     NAME: ClassVar[str] = "mocap_freeze"
-    ABOUT: ClassVar[str] = "poses go on arriving with new stamps, but always the same one"
+    ABOUT: ClassVar[str] = "the motion capture repeats its last pose, with new stamps"
 
     def effect(self, noise: np.random.Generator) -> Effect:
         held = []
@@ -61,12 +61,12 @@ class MocapFreeze(PlantFault):
 @dataclass(frozen=True)
 class MocapJump(PlantFault):
     NAME: ClassVar[str] = "mocap_jump"
-    ABOUT: ClassVar[str] = "poses are displaced and turned, as after a shifted origin"
+    ABOUT: ClassVar[str] = "poses are displaced and rotated, as after a shift of the origin"
 
-    x: float = number(0.3, "displacement", "m", -10.0, 10.0)
-    y: float = number(0.0, "displacement", "m", -10.0, 10.0)
-    z: float = number(0.0, "displacement", "m", -10.0, 10.0)
-    yaw: float = number(0.0, "turn about the vertical", "rad", -math.pi, math.pi)
+    x: float = number(0.3, "displacement along x", "m", -10.0, 10.0)
+    y: float = number(0.0, "displacement along y", "m", -10.0, 10.0)
+    z: float = number(0.0, "displacement along z", "m", -10.0, 10.0)
+    yaw: float = number(0.0, "rotation of the attitude about z", "rad", -math.pi, math.pi)
 
     def effect(self, noise: np.random.Generator) -> Effect:
         offset = np.array([self.x, self.y, self.z])
@@ -81,7 +81,7 @@ class MocapSwap(PlantFault):
     NAME: ClassVar[str] = "mocap_swap"
     ABOUT: ClassVar[str] = "two axes of the position are exchanged, as after a wrong calibration"
 
-    axes: str = choice("xy", "which two", tuple(AXES))
+    axes: str = choice("xy", "exchanged axes", tuple(AXES))
 
     def effect(self, noise: np.random.Generator) -> Effect:
         order = AXES[self.axes]
@@ -91,9 +91,9 @@ class MocapSwap(PlantFault):
 @dataclass(frozen=True)
 class MocapLatency(PlantFault):
     NAME: ClassVar[str] = "mocap_latency"
-    ABOUT: ClassVar[str] = "poses arrive later, still with the stamp of their exposure"
+    ABOUT: ClassVar[str] = "poses arrive later; their stamp is still that of the exposure"
 
-    delay: float = number(0.1, "on top of the usual latency", "s", 0.0, 5.0)
+    delay: float = number(0.1, "delay added to the usual latency", "s", 0.0, 5.0)
 
     def effect(self, noise: np.random.Generator) -> Effect:
         return Late(self.delay)
@@ -117,10 +117,10 @@ class Late(Effect):
 @dataclass(frozen=True)
 class MocapOutliers(PlantFault):
     NAME: ClassVar[str] = "mocap_outliers"
-    ABOUT: ClassVar[str] = "single poses are far off, in random directions"
+    ABOUT: ClassVar[str] = "single poses are displaced in random directions"
 
-    share: float = number(0.05, "part of the poses that are", "1", 0.0, 1.0)
-    distance: float = number(0.5, "how far", "m", 0.0, 100.0)
+    share: float = number(0.05, "fraction of displaced poses", "1", 0.0, 1.0)
+    distance: float = number(0.5, "displacement", "m", 0.0, 100.0)
 
     def effect(self, noise: np.random.Generator) -> Effect:
         def alter(
@@ -137,9 +137,11 @@ class MocapOutliers(PlantFault):
 @dataclass(frozen=True)
 class ClockJump(PlantFault):
     NAME: ClassVar[str] = "clock_jump"
-    ABOUT: ClassVar[str] = "the clock of the motion capture's computer is off: wrong stamps"
+    ABOUT: ClassVar[str] = (
+        "the clock of the motion-capture computer is wrong, and so are the stamps"
+    )
 
-    step: float = number(0.5, "by how much, ahead or behind", "s", -100.0, 100.0)
+    step: float = number(0.5, "error of the clock, positive if ahead", "s", -100.0, 100.0)
 
     def effect(self, noise: np.random.Generator) -> Effect:
         return PoseEffect(lambda stamp, *pose: (max(0.0, stamp + self.step), *pose))

@@ -19,7 +19,7 @@ NODES = (
     "scene",
     "recorder",
 )
-NODE = "which process"
+NODE = "affected process"
 
 
 @dataclass(frozen=True)
@@ -34,23 +34,21 @@ class ProcessFault(Fault):
 @dataclass(frozen=True)
 class NodeKill(ProcessFault):
     NAME: ClassVar[str] = "node_kill"
-    ABOUT: ClassVar[str] = (
-        "a process is killed (SIGKILL); a controller is started again, others are not"
-    )
+    ABOUT: ClassVar[str] = "a process is killed (SIGKILL); only a controller is started again"
 
 
 @dataclass(frozen=True)
 class NodeStall(ProcessFault):
     NAME: ClassVar[str] = "node_stall"
-    ABOUT: ClassVar[str] = "a process is stopped (SIGSTOP), and goes on when the fault ends"
+    ABOUT: ClassVar[str] = "a process is stopped (SIGSTOP) and continues when the fault ends"
 
 
 @dataclass(frozen=True)
 class DiscoveryLoss(ProcessFault):
     NAME: ClassVar[str] = "discovery_loss"
     ABOUT: ClassVar[str] = (
-        "a process neither hears nor tells anything of DDS discovery; "
-        "what flows does so until the others' lease of it runs out"
+        "a process neither sends nor receives DDS discovery data; "
+        "its connections last until its lease at the other processes expires"
     )
 
     node: str = choice("arm_controller", NODE, tuple(one for one in NODES if one != "autopilot"))
@@ -59,7 +57,9 @@ class DiscoveryLoss(ProcessFault):
 @dataclass(frozen=True)
 class NodeSlow(ProcessFault):
     NAME: ClassVar[str] = "node_slow"
-    ABOUT: ClassVar[str] = "a process is stopped for a part of each cycle, as on a busy computer"
+    ABOUT: ClassVar[str] = (
+        "a process is stopped for a fraction of each cycle, as on a busy computer"
+    )
 
-    stopped: float = number(0.5, "part of the time in which it is stopped", "1", 0.0, 0.95)
+    stopped: float = number(0.5, "fraction of the cycle in which it is stopped", "1", 0.0, 0.95)
     cycle: float = number(0.02, "length of a cycle", "s", 0.005, 1.0)
