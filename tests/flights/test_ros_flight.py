@@ -7,7 +7,7 @@ import pytest
 from mcap.reader import make_reader
 from mcap_ros2.decoder import DecoderFactory
 
-from uam_control.laws.modular import ADAPTATION
+from uam_control.laws.modular import ModularLaw
 from uam_control.mission import load_scenario
 from uam_control.profiles.profile import load_profile
 from uam_lab.flight.direct.flight import DirectFlight
@@ -75,7 +75,8 @@ def test_every_tick_is_in_the_table(two_flights):
     names = [name for name, _, _ in series.phase_spans()]
     assert names == ["waiting", "take-off", "hover", "land", "landed"]
     flown = series.values[series.flown]
-    own = [gain_columns(subsystem, ADAPTATION) for subsystem in timeseries.SUBSYSTEMS]
+    names = ModularLaw.gain_names(3)
+    own = [gain_columns(subsystem, names) for subsystem in timeseries.SUBSYSTEMS]
     others = np.ones(flown.shape[1], dtype=bool)
     others[timeseries.COLUMNS.block("adaptation.")] = False
     others[np.concatenate(own)] = True

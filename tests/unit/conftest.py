@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from whole_flight import SHORT
 
-from uam_control.laws.modular import ADAPTATION
+from uam_control.laws.modular import ModularLaw
 from uam_control.mission import load_scenario
 from uam_control.profiles.profile import load_profile
 from uam_lab.flight.direct.flight import DirectFlight
@@ -58,7 +58,7 @@ def made_up_flight(seed=1, scale=1.0, info=None):
         for subsystem in ("position", "attitude", "arm"):
             gains = np.abs(1.0 + np.sin(0.1 * time + np.arange(7)))
             row[COLUMNS.block(f"adaptation.{subsystem}.")] = np.nan
-            row[gain_columns(subsystem, ADAPTATION)] = gains if flying else 0.0
+            row[gain_columns(subsystem, ModularLaw.gain_names(3))] = gains if flying else 0.0
         for i in range(1, 5):
             row[COLUMNS[f"rotor_{i}.command"]] = 0.6 * flying
             row[COLUMNS[f"rotor_{i}.thrust"]] = 5.4 * flying

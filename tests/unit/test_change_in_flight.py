@@ -8,7 +8,7 @@ import pytest
 
 from uam_control.control.controllers import AttitudeController, PositionController
 from uam_control.laws.catalogue import LAWS
-from uam_control.profiles.profile import load_profile
+from uam_control.profiles.profile import default_profile, load_profile
 from uam_control.settings.parameter_set import ParameterError
 
 DT = 0.004
@@ -33,7 +33,7 @@ def update(controller, state, reference):
 @pytest.mark.parametrize("law", LAWS)
 @pytest.mark.parametrize("node", ["position_controller", "attitude_controller"])
 def test_new_gains_meet_the_old_adaptation_and_the_output_moves_by_the_gains_alone(law, node):
-    parameters = load_profile(LAWS[law].profile).sets[node]
+    parameters = default_profile(law).sets[node]
     kind = PositionController if node == "position_controller" else AttitudeController
     controller = kind(parameters)
     state, reference = flown(controller)
@@ -54,7 +54,7 @@ def test_new_gains_meet_the_old_adaptation_and_the_output_moves_by_the_gains_alo
 
 @pytest.mark.parametrize("law", LAWS)
 def test_a_reset_of_the_adaptation_leaves_filters_and_time_alone(law):
-    parameters = load_profile(LAWS[law].profile).sets["attitude_controller"]
+    parameters = default_profile(law).sets["attitude_controller"]
     controller = AttitudeController(parameters)
     initial = controller.law.adaptation.copy()
     flown(controller)

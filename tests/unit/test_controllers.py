@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import pickle
 from dataclasses import replace
 
 import numpy as np
@@ -13,13 +14,13 @@ from uam_control.control.controllers import (
     ArmController,
     AttitudeController,
     PositionController,
-    limit_force,
 )
+from uam_control.control.limits import limit_force
 from uam_control.control.thrust_direction import AttitudeReference
 from uam_control.laws.catalogue import LAWS
 from uam_control.laws.errors import attitude_errors
 from uam_control.maths.rotations import matrix_from_euler
-from uam_control.profiles.profile import ProfileError, load_profile
+from uam_control.profiles.profile import ProfileError, default_profile, load_profile
 from uam_control.settings import configuration
 from uam_control.settings.parameter_set import ParameterError
 
@@ -103,7 +104,7 @@ def test_limited_force_is_within_thrust_and_tilt(tau):
     assert np.hypot(out[0], out[1]) <= out[2] * np.tan(0.35) + 1e-9
 
 
-PROFILES = [entry.profile for entry in LAWS.values()]
+PROFILES = [law.profile for law in LAWS.values()]
 
 
 def trio(profile="s500"):
@@ -170,10 +171,9 @@ def test_gravity_feedforward_carries_the_weight_and_zero_is_the_printed_law():
 
 @pytest.mark.parametrize("law", LAWS)
 def test_a_profile_says_which_law_flies(law):
-    entry = LAWS[law]
-    assert set(load_profile(entry.profile).laws().values()) == {law}
-    for controller, axes in zip(trio(entry.profile), (3, 3, 2), strict=True):
-        assert type(controller.law) is entry.law
+    assert set(load_profile(LAWS[law].profile).laws().values()) == {law}
+    for controller, axes in zip(trio(LAWS[law].profile), (3, 3, 2), strict=True):
+        assert type(controller.law) is LAWS[law]
         assert len(controller.names) == len(controller.adaptation)
         assert len(controller.law.update(*np.zeros((3, axes)), np.zeros(3), False, DT)) == axes
 
@@ -186,6 +186,13 @@ def test_a_profile_without_law_is_modular_and_an_unknown_law_is_refused(tmp_path
     file.write_text(head + "arm_controller:" + tail.replace("law: asmc1", "law: pid"))
     with pytest.raises(ProfileError, match="arm_controller: law: 'pid' is not one of modular, as"):
         load_profile(str(file))
+
+
+@pytest.mark.parametrize("law", LAWS)
+def test_the_parameters_of_a_controller_survive_pickling(law):
+    for node, values in default_profile(law).sets.items():
+        again = pickle.loads(pickle.dumps(values))  # noqa: S301 (our own)
+        assert again == values and type(again) is type(values), node
 
 
 @pytest.mark.parametrize("law", ["asmc1", "asmc2"])

@@ -7,7 +7,7 @@ pytest.importorskip("rclpy")
 
 from uam_control.laws.catalogue import LAWS
 from uam_control.mission import load_scenario
-from uam_control.profiles.profile import load_profile
+from uam_control.profiles.profile import default_profile
 from uam_lab.recording import log_reader
 from uam_lab.recording.mcap_reader import TopicLog
 from uam_lab.results.timeseries import COLUMNS, gain_columns
@@ -17,8 +17,7 @@ from uam_msgs_py.messages.status import MissionStatus
 
 @pytest.mark.parametrize("law", LAWS)
 def test_the_gains_of_every_law_are_read_by_name(law):
-    entry = LAWS[law]
-    names = entry.law(load_profile(entry.profile).sets["arm_controller"]).names
+    names = LAWS[law](default_profile(law).sets["arm_controller"]).names
     writer = JointStateWriter(names)
     messages = []
     for k in (1, 2):

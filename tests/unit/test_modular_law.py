@@ -11,8 +11,7 @@ from hypothesis import strategies as st
 from scipy.linalg import solve_continuous_lyapunov
 
 from uam_control.laws import lyapunov
-from uam_control.laws.law_parameters import ModularParameters
-from uam_control.laws.modular import ModularLaw
+from uam_control.laws.modular import ModularLaw, ModularParameters
 from uam_control.settings.parameter_set import ParameterError
 
 ONE_AXIS = {

@@ -5,8 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from uam_control.laws.law_parameters import ModularParameters
-from uam_control.laws.modular import ModularLaw
+from uam_control.laws.modular import ModularLaw, ModularParameters
 from uam_control.profiles.profile import load_profile
 from uam_lab.analysis import constants, lyapunov, stability, ticks
 from uam_lab.analysis.folder import analyse_folder

@@ -7,83 +7,15 @@ parameters; errors, limits and weight are the same for all. Nothing here knows R
 
 from __future__ import annotations
 
-import math
-from dataclasses import dataclass
-
 import numpy as np
 
+from uam_control.control.limits import PositionLimits, TorqueLimits, limit_force, limit_torque
 from uam_control.control.thrust_direction import AttitudeReference
 from uam_control.coordinates import ARM, ATTITUDE, POSITION, SIZE
 from uam_control.laws import catalogue
-from uam_control.laws.asmc1 import Asmc1Parameters
-from uam_control.laws.asmc2 import Asmc2Parameters
 from uam_control.laws.errors import tracking_errors
-from uam_control.laws.law_parameters import LawParameters, ModularParameters
-from uam_control.maths.compiled import jit
-from uam_control.settings.parameter_set import TINY, ParameterError, ParameterSet, number, vector
-
-
-@dataclass(frozen=True)
-class PositionLimits(ParameterSet):
-    """What surrounds the position law: weight, limits of tau_p, filter of the attitude it asks."""
-
-    gravity_feedforward_mass: float = number(
-        0.0, "mass whose weight is added to tau_p, 0 = the printed law", "kg", 0.0, 50.0
-    )
-    gravity: float = number(9.81, "acceleration of gravity", "m/s^2", 0.0, 30.0)
-    thrust_min: float = number(1.0, "least upward force", "N", TINY, 1e3)
-    thrust_max: float = number(36.0, "largest force", "N", TINY, 1e3)
-    tilt_max: float = number(0.35, "largest angle of tau_p from the vertical", "rad", 0.01, 1.5)
-    attitude_cutoff: float = number(5.0, "filter on the attitude asked for", "Hz", 0.1, 100.0)
-
-    def check_together(self) -> None:
-        """See `ParameterSet.check_together`."""
-        super().check_together()
-        if self.thrust_min > self.thrust_max:
-            raise ParameterError(
-                f"thrust_min: {self.thrust_min:g} N is above thrust_max, {self.thrust_max:g} N"
-            )
-
-
-@dataclass(frozen=True)
-class TorqueLimits(ParameterSet):
-    """Largest torque per axis, of tau_q or tau_alpha."""
-
-    torque_max: tuple = vector((), "largest torque per axis", "N m", TINY, 1e3)
-
-
-@dataclass(frozen=True)
-class ModularPosition(ModularParameters, PositionLimits):
-    """Everything the position controller can be told."""
-
-
-@dataclass(frozen=True)
-class ModularTorque(ModularParameters, TorqueLimits):
-    """Everything the attitude or the arm controller can be told."""
-
-
-@dataclass(frozen=True)
-class Asmc1Position(Asmc1Parameters, PositionLimits):
-    """See `ModularPosition`."""
-
-
-@dataclass(frozen=True)
-class Asmc1Torque(Asmc1Parameters, TorqueLimits):
-    """See `ModularTorque`."""
-
-
-@dataclass(frozen=True)
-class Asmc2Position(Asmc2Parameters, PositionLimits):
-    """See `ModularPosition`."""
-
-
-@dataclass(frozen=True)
-class Asmc2Torque(Asmc2Parameters, TorqueLimits):
-    """See `ModularTorque`."""
-
-
-POSITION_SETS = {"modular": ModularPosition, "asmc1": Asmc1Position, "asmc2": Asmc2Position}
-TORQUE_SETS = {"modular": ModularTorque, "asmc1": Asmc1Torque, "asmc2": Asmc2Torque}
+from uam_control.laws.law_parameters import LawParameters
+from uam_control.settings.parameter_set import ParameterError
 
 
 class Controller:
@@ -95,7 +27,7 @@ class Controller:
     columns: slice
 
     def __init__(self, parameters: LawParameters) -> None:
-        self.law = catalogue.entry(parameters.law).law(parameters)
+        self.law = catalogue.law(parameters.law)(parameters)
         self.names = self.law.names
         self.adaptation = self.law.adaptation[: len(self.names)]
         self.saturated = False
@@ -259,39 +191,3 @@ class ArmController(TorqueController):
     ) -> np.ndarray:
         """Return tau_alpha (n,) [N m]."""
         return self._torque(state, reference, attitude_reference, flying, dt)
-
-
-@jit
-def limit_force(
-    tau: np.ndarray,
-    weight: float,
-    thrust_min: float,
-    thrust_max: float,
-    tilt_max: float,
-    limited: np.ndarray,
-) -> bool:
-    """Write tau + weight e3 within the limits to limited (3,); return whether anything was cut.
-
-    The vertical part goes first: altitude is kept while the horizontal part is reduced.
-    """
-    upward = tau[2] + weight
-    limited[2] = min(max(upward, thrust_min), thrust_max)
-    horizontal = math.sqrt(tau[0] * tau[0] + tau[1] * tau[1])
-    room = min(
-        limited[2] * math.tan(tilt_max),
-        math.sqrt(max(thrust_max * thrust_max - limited[2] * limited[2], 0.0)),
-    )
-    scale = 1.0 if horizontal <= room else room / horizontal
-    limited[0] = scale * tau[0]
-    limited[1] = scale * tau[1]
-    return limited[2] != upward or scale != 1.0
-
-
-@jit
-def limit_torque(tau: np.ndarray, torque_max: np.ndarray, limited: np.ndarray) -> bool:
-    """Write tau within ±torque_max to limited (n,); return whether anything was cut."""
-    cut = False
-    for i in range(len(tau)):
-        limited[i] = min(max(tau[i], -torque_max[i]), torque_max[i])
-        cut = cut or limited[i] != tau[i]
-    return cut

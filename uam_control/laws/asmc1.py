@@ -18,7 +18,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from uam_control.laws.law import Law
+from uam_control.laws.law import GainGroup, Law
 from uam_control.laws.law_parameters import LawParameters, structured
 from uam_control.maths.compiled import jit
 from uam_control.settings.parameter_set import HUGE, TINY, choice, number, switch, vector
@@ -109,11 +109,19 @@ def asmc1_step(
 class Asmc1Law(Law):
     """`adaptation` (n + 1,): Dhat per axis and ||s||."""
 
+    kind = Asmc1Parameters
+    label = "ASMC-1 (reconstructed)"
+    profile = "asmc1"
     step = asmc1_step
 
-    def __init__(self, parameters: Asmc1Parameters) -> None:
-        axes = range(1, len(parameters.inertia) + 1)
-        super().__init__(parameters, (*(f"D{i}" for i in axes), "s_norm"))
+    @classmethod
+    def gain_groups(cls, axes: int) -> tuple[GainGroup, ...]:
+        """See `Law.gain_groups`."""
+        disturbance = tuple(f"D{i}" for i in range(1, axes + 1))
+        return (
+            GainGroup("$\\hat D$", disturbance, "D", signed=True),
+            GainGroup("‖s‖", ("s_norm",)),
+        )
 
     def reset_adaptation(self) -> None:
         """Forget the disturbance."""

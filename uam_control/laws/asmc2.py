@@ -23,13 +23,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from uam_control.laws.law import Law
+from uam_control.laws.law import GainGroup, Law
 from uam_control.laws.law_parameters import LawParameters, ceiling, structured
 from uam_control.maths.compiled import jit
 from uam_control.settings.parameter_set import HUGE, TINY, choice, number, switch, vector
 
 ETA_MAX = 0.98
-ADAPTATION = ("theta0", "theta1", "theta2", "w_norm", "eta", "clamps")
 W_NORM, ETA, CLAMPS, TIME = 3, 4, 5, 6
 
 
@@ -156,10 +155,21 @@ def adapt(
 class Asmc2Law(Law):
     """`adaptation` (7,): theta_0..theta_2, ||w||, largest |eta|, number of clamps, time [s]."""
 
+    kind = Asmc2Parameters
+    label = "ASMC-2 (reconstructed)"
+    profile = "asmc2"
+    memory = 1
     step = asmc2_step
 
-    def __init__(self, parameters: Asmc2Parameters) -> None:
-        super().__init__(parameters, ADAPTATION, memory=1)
+    @classmethod
+    def gain_groups(cls, axes: int) -> tuple[GainGroup, ...]:
+        """See `Law.gain_groups`."""
+        return (
+            GainGroup("$\\theta_0 \\ldots \\theta_2$", ("theta0", "theta1", "theta2"), "\\theta"),
+            GainGroup("‖w‖", ("w_norm",)),
+            GainGroup("largest |η|", ("eta",)),
+            GainGroup("", ("clamps",)),
+        )
 
     @property
     def clamps(self) -> int:

@@ -1,45 +1,41 @@
-"""Every law by name: what flies it, what people call it, and the profile it flies with."""
+"""Every law by its name. A new law is a file beside this one and its class in `LAWS`."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 from uam_control.laws.asmc1 import Asmc1Law
-from uam_control.laws.asmc2 import ADAPTATION as ASMC2
 from uam_control.laws.asmc2 import Asmc2Law
-from uam_control.laws.law import Law
-from uam_control.laws.modular import ADAPTATION as MODULAR
+from uam_control.laws.law import GainGroup, Law
 from uam_control.laws.modular import ModularLaw
 from uam_control.settings.parameter_set import ParameterError
 
-
-@dataclass(frozen=True)
-class Entry:
-    """A law, its label in tables and figures, its default profile in config/profiles."""
-
-    law: type[Law]
-    label: str
-    profile: str
-
-
-LAWS = {
-    "modular": Entry(ModularLaw, "modular", "s500"),
-    "asmc1": Entry(Asmc1Law, "ASMC-1 (reconstructed)", "asmc1"),
-    "asmc2": Entry(Asmc2Law, "ASMC-2 (reconstructed)", "asmc2"),
+LAWS: dict[str, type[Law]] = {
+    law.kind.law: law
+    for law in (
+        ModularLaw,
+        Asmc1Law,
+        Asmc2Law,
+    )
 }
-DEFAULT = "modular"
-
-# Names of all published gains, of whatever law and number of axes.
-ADAPTATION = (*MODULAR, "D1", "D2", "D3", "s_norm", *ASMC2)
+DEFAULT = ModularLaw.kind.law
 
 
-def entry(law: str) -> Entry:
+def law(name: str) -> type[Law]:
     """Return the law of that name; raises ParameterError."""
-    if law not in tuple(LAWS):
-        raise ParameterError(f"law: '{law}' is not one of {', '.join(LAWS)}")
-    return LAWS[law]
+    if name not in tuple(LAWS):
+        raise ParameterError(f"law: '{name}' is not one of {', '.join(LAWS)}")
+    return LAWS[name]
 
 
-def label(law: str) -> str:
-    """Return what people call a law; a name that is none stays what it is."""
-    return LAWS[law].label if law in LAWS else law
+def label(name: str) -> str:
+    """Return the label of a law in tables and figures; of an unknown law its name."""
+    return LAWS[name].label if name in LAWS else name
+
+
+def gain_names(axes: int) -> tuple[str, ...]:
+    """Return the names of the gains in `gain_groups`."""
+    return tuple(name for group in gain_groups(axes) for name in group.names)
+
+
+def gain_groups(axes: int) -> tuple[GainGroup, ...]:
+    """Return the published gains of every law for a subsystem of up to `axes` axes."""
+    return tuple(group for law in LAWS.values() for group in law.gain_groups(axes))

@@ -10,7 +10,7 @@ from uam_control.control.controllers import Controller
 from uam_control.coordinates import SIZE
 from uam_control.laws import catalogue
 from uam_control.nodes.timing import Ticks, Timing
-from uam_control.profiles.profile import load_profile, parameter_set
+from uam_control.profiles.profile import default_profile, parameter_set
 from uam_msgs_py.messages import topics
 from uam_msgs_py.messages.changes import ParameterChange
 from uam_msgs_py.messages.control import read_position_command, read_reference, read_state
@@ -44,7 +44,7 @@ class ControllerNode(UamNode):
         law = given(self).get("law", catalogue.DEFAULT)
         kind, axes = parameter_set(name, {"law": law})
         # for what no parameter file says
-        defaults = load_profile(catalogue.entry(law).profile).section(name)
+        defaults = default_profile(law).section(name)
         self.parameter_set = NodeParameters(self, kind, axes, defaults)
         timing = NodeParameters(self, Timing, read_only=True).current
         self._ticks = Ticks(timing)

@@ -16,7 +16,8 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
-from uam_control.control.controllers import POSITION_SETS, TORQUE_SETS
+from uam_control.control.controller_parameters import controller_parameters
+from uam_control.control.limits import PositionLimits, TorqueLimits
 from uam_control.coordinates import ARM, ATTITUDE, COORDINATES, POSITION
 from uam_control.estimation import EstimatorParameters
 from uam_control.laws import catalogue
@@ -25,11 +26,11 @@ from uam_control.settings import configuration
 from uam_control.settings.parameter_file import ProfileError, read_sections
 from uam_control.settings.parameter_set import ParameterError, ParameterSet
 
-# controller → (law → parameter set, names of the entries of its per-axis vectors)
-CONTROLLERS: dict[str, tuple[dict[str, type[ParameterSet]], tuple[str, ...]]] = {
-    "position_controller": (POSITION_SETS, COORDINATES[POSITION]),
-    "attitude_controller": (TORQUE_SETS, COORDINATES[ATTITUDE]),
-    "arm_controller": (TORQUE_SETS, COORDINATES[ARM]),
+# controller → (parameters of its limits, names of the entries of its per-axis vectors)
+CONTROLLERS: dict[str, tuple[type[ParameterSet], tuple[str, ...]]] = {
+    "position_controller": (PositionLimits, COORDINATES[POSITION]),
+    "attitude_controller": (TorqueLimits, COORDINATES[ATTITUDE]),
+    "arm_controller": (TorqueLimits, COORDINATES[ARM]),
 }
 OTHERS = {"state_estimator": EstimatorParameters, "mission": MissionParameters}
 NODES = (*CONTROLLERS, *OTHERS)
@@ -81,10 +82,9 @@ def parameter_set(
     """
     if node in OTHERS:
         return OTHERS[node], ()
-    sets, axes = CONTROLLERS[node]
-    law = values.get("law", catalogue.DEFAULT)
-    catalogue.entry(law)
-    return sets[law], axes
+    limits, axes = CONTROLLERS[node]
+    law = catalogue.law(values.get("law", catalogue.DEFAULT))
+    return controller_parameters(law.kind, limits), axes
 
 
 def load_profile(*names_or_files: str) -> Profile:
@@ -99,6 +99,24 @@ def load_profile(*names_or_files: str) -> Profile:
             sections[node] = sections.get(node, {}) | values
     found = profile_of(sections, files[-1])
     return replace(found, name="+".join(file.stem for file in files))
+
+
+def default_profile(law: str) -> Profile:
+    """Return the profile that `law` flies with when the user names none; raises ProfileError.
+
+    A law without a profile of its own takes the default law's values of the parameters that both
+    have (same name, meaning, unit and range); the others have their defaults.
+    """
+    own = catalogue.law(law).profile
+    if own:
+        return load_profile(own)
+    sections = dict(load_profile(catalogue.law(catalogue.DEFAULT).profile).sections)
+    for node in CONTROLLERS:
+        known = parameter_set(node, {})[0].specs()
+        specs = parameter_set(node, {"law": law})[0].specs()
+        shared = {k: v for k, v in sections[node].items() if specs.get(k) == known[k]}
+        sections[node] = {"law": law} | shared
+    return profile_of(sections, Path(f"{law}.yaml"))
 
 
 def _file(name_or_file: str) -> Path:

@@ -59,7 +59,10 @@ def number(default: float, description: str, unit: str, low: float, high: float)
 def vector(
     default: tuple, description: str, unit: str, low: float, high: float, length: int = 0
 ) -> Any:
-    """Declare a field of `length` numbers (0: one per axis), each within [low, high]."""
+    """Declare a field of `length` numbers (0: one per axis), each within [low, high].
+
+    A default of one number per axis has one entry, which every axis gets; () is no default.
+    """
     spec = Bound(description, unit, low, high, length)
     return field(default=default, metadata={"spec": spec})
 
@@ -115,6 +118,8 @@ class ParameterSet:
         for name, spec in self.specs().items():
             value = getattr(self, name)
             if isinstance(spec, Bound):
+                if spec.length == 0 and value is getattr(type(self), name):
+                    value = axes * value  # the default, the same for every axis
                 clean[name] = _number(name, value, spec, axes)
             elif isinstance(spec, Choice) and value not in spec.choices:
                 raise ParameterError(f"{name}: '{value}' is not one of {', '.join(spec.choices)}")

@@ -18,7 +18,7 @@ from typing import Any
 import numpy as np
 
 from uam_control.coordinates import ATTITUDE, POSITION
-from uam_control.laws.law_parameters import ModularParameters
+from uam_control.laws.modular import ModularParameters
 from uam_lab.analysis import ticks
 from uam_lab.analysis.coupling import nominal_inertia
 from uam_lab.analysis.dynamics import Dynamics

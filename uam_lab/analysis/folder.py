@@ -4,12 +4,13 @@ from __future__ import annotations
 
 from pathlib import Path
 
+from uam_control.laws.modular import ModularLaw
 from uam_control.profiles.profile import load_profile
 from uam_lab.analysis.stability import Stability, analyse
 from uam_lab.results.timeseries import Series
 from uam_sim_bridge.plant import Vehicle
 
-LAW = "modular"
+LAW = ModularLaw.kind.law
 
 
 def analyse_folder(directory: Path, series: Series) -> Stability | None:

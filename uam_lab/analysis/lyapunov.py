@@ -19,7 +19,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from uam_control.laws.law_parameters import ModularParameters
+from uam_control.laws.modular import ModularParameters
 from uam_lab.analysis.supply import COLUMNS_OF
 from uam_lab.analysis.tracking import Tracking
 

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from uam_control.coordinates import SIZE
-from uam_control.laws.law_parameters import ModularParameters
+from uam_control.laws.modular import ModularParameters
 from uam_lab.analysis import (
     assumptions,
     constants,

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from uam_control.laws.modular import ADAPTATION
-from uam_lab.results.timeseries import SUBSYSTEMS, Series, gain_columns
+from uam_control.laws.modular import ModularLaw
+from uam_lab.results.timeseries import AXES, SUBSYSTEMS, Series, gain_columns
 
 CLEARANCE = 0.01  # [m] above the start position: the feet have no ground contact
 LIFTED = 0.001  # [m] above the payload's start position: only the magnet carries it
@@ -23,7 +23,8 @@ def in_the_air(series: Series, frequency: float = FREQUENCY) -> np.ndarray:
     if len(series) < FEWEST:
         return np.zeros(0, dtype=int)
     flown = series.flown & (series["truth.z"] > series["truth.z"][0] + CLEARANCE)
-    gains = np.hstack([series.values[:, gain_columns(s, ADAPTATION)] for s in SUBSYSTEMS])
+    names = ModularLaw.gain_names(AXES)
+    gains = np.hstack([series.values[:, gain_columns(s, names)] for s in SUBSYSTEMS])
     complete = np.logical_and.reduce(
         [np.isfinite(block).all(axis=1) for block in (*map(series.block, NEEDED), gains)]
     )

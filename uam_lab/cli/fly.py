@@ -9,7 +9,7 @@ from pathlib import Path
 
 from rich.console import Console
 
-from uam_control.laws.catalogue import LAWS
+from uam_control.laws import catalogue
 from uam_control.mission import ScenarioError
 from uam_control.profiles.profile import ProfileError
 from uam_control.settings import configuration
@@ -78,9 +78,9 @@ def add(commands: argparse._SubParsersAction) -> None:
     option = parser.add_argument
     option(
         "--controller",
-        default="modular",
+        default=catalogue.DEFAULT,
         metavar="NAME",
-        help="; ".join(f"{name}: {entry.label}" for name, entry in LAWS.items())
+        help="; ".join(f"{name}: {law.label}" for name, law in catalogue.LAWS.items())
         + " (default %(default)s)",
     )
     option(

@@ -9,6 +9,7 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from uam_control.laws import catalogue
 from uam_control.mission import ScenarioError
 from uam_control.profiles.profile import ProfileError, load_profile
 from uam_control.settings import configuration
@@ -50,7 +51,7 @@ def add(commands: argparse._SubParsersAction) -> None:
     option = parser.add_argument
     option(
         "--controller",
-        default="modular",
+        default=catalogue.DEFAULT,
         metavar="NAME",
         help="which space of config/tuning: "
         + ", ".join(configuration.names("tuning"))

@@ -8,7 +8,13 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from uam_control.laws import catalogue
-from uam_control.profiles.profile import CONTROLLERS, Profile, load_profile, profile_of
+from uam_control.profiles.profile import (
+    CONTROLLERS,
+    Profile,
+    default_profile,
+    load_profile,
+    profile_of,
+)
 from uam_lab.campaign.trial import Trial
 
 POSITION = "position_controller"
@@ -19,11 +25,9 @@ VERBATIM, WITH_WEIGHT = "Table I verbatim", "Table I and the weight"
 PAYLOADS = (0.1, 0.2, 0.3)  # [kg]
 
 
-# What the command line calls the rows: the paper's three controllers in its order, then what else
-# the reader should see.
+# The rows by their names on the command line: every other law, the paper's own, its variants.
 ROWS = {
-    "asmc1": ASMC1,
-    "asmc2": ASMC2,
+    **{name: law.label for name, law in catalogue.LAWS.items() if name != catalogue.DEFAULT},
     "proposed": PROPOSED,
     "frozen": FROZEN,
     "table1": VERBATIM,
@@ -41,16 +45,19 @@ class ComparedController:
 
 def entries(names: Sequence[str] = tuple(ROWS)) -> tuple[ComparedController, ...]:
     """Return the rows of these `names`, keys of ROWS."""
-    proposed, verbatim = load_profile("s500"), load_profile("paper_table1")
+    proposed, verbatim = default_profile(catalogue.DEFAULT), load_profile("paper_table1")
     profiles = {
-        ASMC1: load_profile("asmc1"),
-        ASMC2: load_profile("asmc2"),
-        PROPOSED: proposed,
-        FROZEN: frozen(proposed),
-        VERBATIM: verbatim,
-        WITH_WEIGHT: with_weight(verbatim, proposed),
+        "proposed": proposed,
+        "frozen": frozen(proposed),
+        "table1": verbatim,
+        "table1_weight": with_weight(verbatim, proposed),
     }
-    return tuple(ComparedController(ROWS[name], profiles[ROWS[name]]) for name in names)
+    return tuple(
+        ComparedController(
+            ROWS[name], profiles[name] if name in profiles else default_profile(name)
+        )
+        for name in names
+    )
 
 
 def frozen(profile: Profile) -> Profile:

@@ -7,9 +7,9 @@ from collections.abc import Collection, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from uam_control.laws.catalogue import LAWS
+from uam_control.laws import catalogue
 from uam_control.mission import Scenario, load_scenario
-from uam_control.profiles.profile import Profile, load_profile
+from uam_control.profiles.profile import Profile, default_profile, load_profile
 from uam_control.settings import configuration
 from uam_lab.processes.environment import without_discovery
 from uam_sim_bridge.faults import Schedule, limits, read_schedule
@@ -47,7 +47,7 @@ class FlightSettings:
     profile: Profile
     payload_mass: float
     out: Path | None = None
-    controller: str = "modular"
+    controller: str = catalogue.DEFAULT
     engine: str = "ros"
     clock: str = "lockstep"
     autopilot: str = BUILTIN
@@ -71,7 +71,7 @@ class FlightSettings:
 
 def settings(
     scenario: str = "pick_and_place",
-    controller: str = "modular",
+    controller: str = catalogue.DEFAULT,
     profile: str | Sequence[str] | None = None,
     engine: str = "ros",
     clock: str = "lockstep",
@@ -96,7 +96,7 @@ def settings(
     Raises SettingsError, and what loading raises (ConfigurationError, ScenarioError, ProfileError,
     Px4Error, PortError, FaultError); each is one line for the user.
     """
-    _choice("controller", controller, LAWS)
+    _choice("controller", controller, catalogue.LAWS)
     _choice("engine", engine, ENGINES)
     _choice("clock", clock, CLOCKS)
     if engine == "direct" and clock == "realtime":
@@ -124,8 +124,12 @@ def settings(
     if not 0 <= seed < 2**31:
         raise SettingsError(f"seed {seed} is outside 0..{2**31 - 1}")
     loaded = load_scenario(str(configuration.named("scenarios", scenario)))
-    asked = [profile] if isinstance(profile, str) else profile or [LAWS[controller].profile]
-    flown = load_profile(*(str(configuration.named("profiles", one)) for one in asked))
+    given = [profile] if isinstance(profile, str) else profile
+    flown = (
+        load_profile(*(str(configuration.named("profiles", one)) for one in given))
+        if given
+        else default_profile(controller)
+    )
     for node, law in flown.laws().items():
         if law != controller:
             raise SettingsError(

@@ -25,13 +25,14 @@ import pyarrow.parquet as pq
 
 from uam_control.coordinates import COORDINATES as NAMES
 from uam_control.coordinates import POSITION, SIZE
-from uam_control.laws.catalogue import ADAPTATION
+from uam_control.laws import catalogue
 from uam_control.maths.rotations import wrap_angle
 from uam_lab.results.atomic import replacing
 
 UNITS = {name: "m" if name in NAMES[POSITION] else "rad" for name in NAMES}
 ANGLES = slice(3, 8)
 SUBSYSTEMS = ("position", "attitude", "arm")
+AXES = 3  # the largest number of axes of a subsystem
 # Phases between flights of the mission node; those in flight are named by the scenario.
 ON_GROUND = ("waiting", "landed", "aborted")
 PHASE_COLUMN = "phase"
@@ -53,7 +54,8 @@ def _declare() -> dict[str, str]:
     # The gains of every law, NaN for those that did not fly. Their units differ with subsystem and
     # power of ||xi||; rho and zeta are those of tau before the multiplication by Mbar, so a unit
     # per column would mislead.
-    columns |= {f"adaptation.{s}.{gain}": "1" for s in SUBSYSTEMS for gain in ADAPTATION}
+    gains = catalogue.gain_names(AXES)
+    columns |= {f"adaptation.{s}.{gain}": "1" for s in SUBSYSTEMS for gain in gains}
     columns |= {f"rotor_{i}.command": "1" for i in range(1, 5)}
     columns |= {f"rotor_{i}.thrust": "N" for i in range(1, 5)}
     columns |= {f"payload.{axis}": "m" for axis in "xyz"}
@@ -100,7 +102,7 @@ COLUMNS = Columns(_declare())
 
 def gain_columns(subsystem: str, names: Iterable[str]) -> np.ndarray:
     """Numbers (n,) of the columns of a law's gains, called `names`."""
-    return np.array([COLUMNS[f"adaptation.{subsystem}.{name}"] for name in names])
+    return np.array([COLUMNS[f"adaptation.{subsystem}.{name}"] for name in names], dtype=int)
 
 
 class UnreadableFlight(ValueError):

@@ -11,7 +11,7 @@ from collections.abc import Iterable, Iterator
 
 from uam_control.laws.catalogue import LAWS
 from uam_control.mission import load_scenario
-from uam_control.profiles.profile import load_profile
+from uam_control.profiles.profile import default_profile
 from uam_lab.flight.direct.flight import DirectFlight
 from uam_sim_bridge.plant import Vehicle
 
@@ -37,7 +37,7 @@ def warm_up(laws: Iterable[str] = tuple(LAWS)) -> None:
     """Fly a few seconds in the direct engine with each law: it runs every function of the nodes."""
     scenario, vehicle = load_scenario("hover"), Vehicle.load()
     for law in laws:
-        profile = load_profile(LAWS[law].profile)
+        profile = default_profile(law)
         flight = DirectFlight(scenario, profile, vehicle, 0.0, seed=1)
         for _ in range(TICKS):
             flight.tick()

@@ -14,6 +14,8 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.ticker import NullFormatter
 
+from uam_control.laws import catalogue
+from uam_control.laws.law import GainGroup
 from uam_lab.report.facts import paper
 from uam_lab.report.figures import panels, style
 from uam_lab.report.figures.panels import DrawnFlight, Panel
@@ -21,7 +23,7 @@ from uam_lab.report.figures.path_figure import path_figure
 from uam_lab.report.figures.stability_figures import coupling, lyapunov
 from uam_lab.results import metrics
 from uam_lab.results.atomic import replacing
-from uam_lab.results.timeseries import SUBSYSTEMS
+from uam_lab.results.timeseries import AXES, SUBSYSTEMS
 
 DEGREES = 180.0 / np.pi
 ROLL, PITCH, YAW = "roll φ", "pitch θ", "yaw ψ"
@@ -87,31 +89,20 @@ def payload(flights: Sequence[DrawnFlight]) -> Figure | None:
     return panels.stack("Payload", flights, drawn, panel_height=1.15)[0]
 
 
-# rows of the figure of the adaptation: gains of one law → label
-GAINS = {
-    ("K0", "K1", "K2", "K3"): "$K_0 \\ldots K_3$",
-    ("zeta",): "ζ",
-    ("rho",): "ρ",
-    ("D1", "D2", "D3"): "$\\hat D$",
-    ("s_norm",): "‖s‖",
-    ("theta0", "theta1", "theta2"): "$\\theta_0 \\ldots \\theta_2$",
-    ("w_norm",): "‖w‖",
-    ("eta",): "largest |η|",
-}
-SIGNED = ("D1", "D2", "D3")  # drawn on a linear scale
-SYMBOLS = {"K": "K", "D": "D", "theta": "\\theta"}
-
-
 def adaptation(flights: Sequence[DrawnFlight]) -> Figure | None:
     """Adapted gains and what drives them, by subsystem, for the laws flown; None without any."""
-    shown = [names for names in GAINS if any(_adapted(f, names) for f in flights)]
+    shown = [
+        group
+        for group in catalogue.gain_groups(AXES)
+        if group.label and any(_adapted(f, group.names) for f in flights)
+    ]
     if not shown:
         return None
     figure, axes = panels.grid("Adaptation", len(shown), 3, 1.65)
     for column, subsystem in enumerate(("position", "attitude", "arm")):
         for number, flight in enumerate(flights):
-            for axis, names in zip(axes[:, column], shown, strict=True):
-                _adaptation_of(axis, flight, subsystem, names, number, len(flights))
+            for axis, group in zip(axes[:, column], shown, strict=True):
+                _adaptation_of(axis, flight, subsystem, group, number, len(flights))
         axes[0, column].annotate(
             subsystem,
             (0.0, 1.0),
@@ -120,11 +111,11 @@ def adaptation(flights: Sequence[DrawnFlight]) -> Figure | None:
             textcoords="offset points",
             fontweight="bold",
         )
-    for row, names in zip(axes, shown, strict=True):
-        row[0].set_ylabel(GAINS[names])
-        if len(names) > 1:
-            _gain_legend(row[2], names, above=1.06 if names == shown[0] else 0.97)
-        for axis in row if names != SIGNED else ():
+    for row, group in zip(axes, shown, strict=True):
+        row[0].set_ylabel(group.label)
+        if len(group.names) > 1:
+            _gain_legend(row[2], group, above=1.06 if group == shown[0] else 0.97)
+        for axis in () if group.signed else row:
             axis.set_yscale("log")
             low, high = axis.get_ylim()
             axis.set_ylim(10.0 ** np.floor(np.log10(low)), 10.0 ** np.ceil(np.log10(high)))
@@ -135,16 +126,16 @@ def adaptation(flights: Sequence[DrawnFlight]) -> Figure | None:
     return figure
 
 
-def _gain_legend(axis: Axes, names: tuple[str, ...], above: float) -> None:
+def _gain_legend(axis: Axes, group: GainGroup, above: float) -> None:
     """Names of the gains of a row; above the names of the phases in the first."""
-    lines = zip(style.GAINS, names, strict=False)
+    lines = zip(style.GAINS, group.names, strict=False)
     axis.legend(
         handles=[
-            Line2D([], [], color=c, label=f"${SYMBOLS[name[:-1]]}_{name[-1]}$") for c, name in lines
+            Line2D([], [], color=c, label=f"${group.symbol}_{name[-1]}$") for c, name in lines
         ],
         loc="lower right",
         bbox_to_anchor=(1.02, above),
-        ncols=len(names),
+        ncols=len(group.names),
         handlelength=1.0,
         columnspacing=0.8,
         fontsize=8.0,
@@ -158,19 +149,14 @@ def _adapted(flight: DrawnFlight, names: tuple[str, ...]) -> bool:
 
 
 def _adaptation_of(
-    axis: Axes,
-    flight: DrawnFlight,
-    subsystem: str,
-    names: tuple[str, ...],
-    number: int,
-    flights: int,
+    axis: Axes, flight: DrawnFlight, subsystem: str, group: GainGroup, number: int, flights: int
 ) -> None:
     series = flight.series
-    for i, name in enumerate(names):
+    for i, name in enumerate(group.names):
         values = series[f"adaptation.{subsystem}.{name}"]
-        shown = series.flown & (np.isfinite(values) if names == SIGNED else values > 0.0)
+        shown = series.flown & (np.isfinite(values) if group.signed else values > 0.0)
         if shown.any():
-            several = len(names) > 1  # then the colour tells the gain, the dash the flight
+            several = len(group.names) > 1  # then the colour tells the gain, the dash the flight
             axis.plot(
                 *panels.thin(series.time[shown], values[shown], 400),
                 color=style.GAINS[i] if several else style.FLIGHTS[number % len(style.FLIGHTS)],

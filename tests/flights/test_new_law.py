@@ -1,0 +1,75 @@
+"""A law that is one file and one line flies, is recorded, and is in the report."""
+
+import json
+import subprocess
+import sys
+
+import numpy as np
+import pyarrow.parquet as pq
+import pytest
+from whole_flight import ROOT, SHORT
+
+# what the line in uam_control/laws/catalogue.py does
+WITH_PID = """\
+import sys
+sys.path.insert(0, "tests")
+from pid_law import PidLaw
+from uam_control.laws import catalogue
+catalogue.LAWS["pid"] = PidLaw
+from uam_lab.cli.main import main
+sys.exit(main())
+"""
+
+
+def uam(*options):
+    """Run `uam` with the law registered."""
+    command = [sys.executable, "-c", WITH_PID, *options]
+    return subprocess.run(command, capture_output=True, text=True, cwd=ROOT, timeout=240)
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    """The result folder of a short flight with it."""
+    place = tmp_path_factory.mktemp("pid")
+    (place / "short.yaml").write_text(SHORT)
+    options = ("--engine", "direct", "--no-video", "--out", str(place / "out"))
+    scenario = ("--scenario", str(place / "short.yaml"))
+    flown = uam("fly", "--controller", "pid", *scenario, *options)
+    assert flown.returncode == 0, flown.stdout + flown.stderr
+    return place / "out"
+
+
+def test_a_law_of_one_file_completes_a_flight(folder):
+    metrics = json.loads((folder / "metrics.json").read_text())
+    assert metrics["mission_completed"] and metrics["controller"] == "pid"
+    assert max(metrics["rms"]["position_m"]) < 0.1
+
+
+def test_its_gains_are_recorded_one_per_axis(folder):
+    table = pq.read_table(folder / "timeseries.parquet")
+    for subsystem, axes in (("position", 3), ("attitude", 3), ("arm", 2)):
+        for i in (1, 2, 3):
+            values = table[f"adaptation.{subsystem}.Z{i} [1]"].to_numpy()
+            assert np.isfinite(values).any() == (i <= axes)
+
+
+def test_the_parameters_flown_are_the_shared_ones_of_the_default_profile_and_its_own(folder):
+    from uam_control.profiles.profile import load_profile
+    from uam_control.settings.parameter_file import read_sections
+
+    flown = read_sections(folder / "parameters.yaml")
+    for node, axes in (("position_controller", 3), ("arm_controller", 2)):
+        shared = load_profile("s500").section(node)
+        for name in ("inertia", "lambda_1", "lambda_2"):
+            assert flown[node][name] == shared[name]
+        assert flown[node]["kappa"] == [0.5] * axes
+        assert "varpi" not in flown[node]
+
+
+def test_the_report_calls_it_by_its_label(folder):
+    assert "PID" in (folder / "report.html").read_text()
+
+
+def test_the_command_line_offers_it():
+    assert "pid: PID" in uam("fly", "--help").stdout
+    assert "pid" in uam("compare", "--help").stdout
