@@ -14,6 +14,7 @@ from uam_lab.campaign.trial import ERRORS, Trial, TrialResult
 from uam_lab.compare import plan, tables
 from uam_lab.compare.modularity import Evidence
 from uam_lab.report.figures import figures, style
+from uam_lab.report.figures.panels import DrawnFlight
 from uam_lab.report.page import html
 from uam_lab.results import timeseries
 from uam_lab.results.atomic import replacing, write_rows, write_text
@@ -130,7 +131,7 @@ def _flights(file: Path, results: Sequence[TrialResult]) -> None:
 def _draw(out: Path, trials: Sequence[Trial], results: Sequence[TrialResult]) -> list[str]:
     kept = {trial.label: trial.keep for trial in trials if trial.keep is not None}
     flights = [
-        figures.Flight(label, timeseries.read(kept[label])) for label in OVERLAID if label in kept
+        DrawnFlight(label, timeseries.read(kept[label])) for label in OVERLAID if label in kept
     ]
     drawn = figures.draw(flights, out / "figures", names=PAPERS_FIGURES)
     with style.styled():

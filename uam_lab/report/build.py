@@ -19,6 +19,7 @@ from uam_control.profiles.profile import ProfileError
 from uam_lab.analysis.folder import analyse_folder
 from uam_lab.analysis.stability import Stability
 from uam_lab.report.figures import figures
+from uam_lab.report.figures.panels import DrawnFlight
 from uam_lab.report.page import page
 from uam_lab.report.video import rendering
 from uam_lab.results import timeseries
@@ -50,7 +51,7 @@ def build_report(
     series = timeseries.read(directory / "timeseries.parquet")
     label = catalogue.label(series.info.get("controller") or directory.name)
     progress("stability")
-    flight = figures.Flight(label, series, stability_of(directory, series))
+    flight = DrawnFlight(label, series, stability_of(directory, series))
     figures.draw([flight], directory / "figures", progress)
     rendered = rendering.render(directory, video, progress) if pictures else None
     progress("page")
