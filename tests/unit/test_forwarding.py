@@ -190,7 +190,7 @@ def test_the_link_does_not_receive_the_stations_messages(make):
     assert not link.connected(1.0) and link.mode is Mode.UNKNOWN and sequence.reasons == ()
     # the link ignores the autopilot's answer to the station
     ack = mavlink2.MAVLink_command_ack_message(400, 0, 0, 0, 255, 190)
-    link._asked[400] = Request.ARM
+    link._pending[400] = Request.ARM
     rig.line.arriving = [Codec(1, 1).encode(ack)]
     link.poll(2.0)
     assert not link.armed and link.ignored == 1

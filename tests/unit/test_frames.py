@@ -1,4 +1,4 @@
-"""ENU/FLU ↔ NED/FRD: hand-worked cases, handedness, and agreement of the maps with each other."""
+"""ENU/FLU ↔ NED/FRD: hand-worked cases, handedness, consistency of the conversions."""
 
 import math
 
@@ -58,13 +58,13 @@ def test_handedness_is_kept(a, b):
 
 @given(eulers, vectors)
 def test_quaternion_map_agrees_with_the_vector_maps(euler, v):
-    """Rotating in FLU/ENU and converting is converting and rotating in FRD/NED."""
+    """Rotation in FLU/ENU then conversion equals conversion then rotation in FRD/NED."""
     q = quaternion_from_euler(euler)
     swapped = frames.swap_quaternion(q)
     assert np.linalg.norm(swapped) == pytest.approx(1.0)
-    there = frames.swap_world(matrix_from_quaternion(q) @ v)
-    here = matrix_from_quaternion(swapped) @ frames.swap_body(v)
-    assert here == pytest.approx(there, abs=1e-9)
+    converted = frames.swap_world(matrix_from_quaternion(q) @ v)
+    rotated = matrix_from_quaternion(swapped) @ frames.swap_body(v)
+    assert rotated == pytest.approx(converted, abs=1e-9)
     assert frames.swap_quaternion(swapped) == pytest.approx(q)
 
 

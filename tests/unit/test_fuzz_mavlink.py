@@ -1,4 +1,4 @@
-"""A seeded share of benchmarks/fuzz_mavlink.py, and what the full amount found."""
+"""A short seeded run of benchmarks/fuzz_mavlink.py, and the errors that its full run found."""
 
 import struct
 import sys
@@ -16,7 +16,7 @@ from uam_sim_bridge.mavlink.offboard.setpoint import RateThrustParameters
 from uam_sim_bridge.mavlink.protocol.wire import Codec, Framer, _frame_end, checksum_fits, mavlink2
 
 
-def test_neither_garbage_nor_mutated_messages_do_harm():
+def test_random_bytes_and_mutated_messages_raise_no_error():
     campaign = fuzz_mavlink.Campaign(seed=11)
     try:
         campaign.random_bytes(400_000, lambda share: None)
@@ -25,7 +25,7 @@ def test_neither_garbage_nor_mutated_messages_do_harm():
         campaign.close()
     counts = campaign.counts
     assert campaign.bytes >= 400_000 and campaign.messages >= 8_000
-    # it went deep: armed, flown, answered
+    # the campaign reached arming, flight and answers
     for what in ("setpoints", "arm requests", "armed motor answers", "motor commands"):
         assert counts[what] > 0, counts
 
@@ -56,7 +56,7 @@ def test_a_failure_leaves_its_seed_and_input(tmp_path, monkeypatch, capsys):
 
 
 class Silence:
-    """A transport or socket of which only what arrives matters."""
+    """A transport or socket with given received chunks."""
 
     stream, connected, dropped = False, True, 0
 
@@ -76,8 +76,8 @@ class Silence:
     sendall = send
 
 
-def test_parameters_that_nobody_asked_for_are_not_kept():
-    """Found: every new name of a PARAM_VALUE took memory for good."""
+def test_parameters_without_a_request_are_not_stored():
+    """Error found: every new name in a PARAM_VALUE was stored forever."""
     codec = Codec(1, 1)
     names = [f"P{k}".encode() for k in range(500)] + [b"MC_ROLLRATE_P"]
     transport = Silence(
@@ -92,8 +92,8 @@ def test_parameters_that_nobody_asked_for_are_not_kept():
 
 
 @pytest.mark.parametrize("microseconds", [2**63 // 1000, 2**63, 2**64 - 1])
-def test_a_sample_from_the_end_of_time_does_not_end_the_autopilot(microseconds):
-    """Found: telemetry at such a time does not fit MAVLink's fields, and the server ended."""
+def test_a_sample_with_a_huge_time_does_not_end_the_autopilot(microseconds):
+    """Error found: telemetry at such a time overflowed MAVLink's fields, and the server ended."""
     codec = Codec(1, 200)
 
     def sample(time):
@@ -114,8 +114,8 @@ def test_a_sample_from_the_end_of_time_does_not_end_the_autopilot(microseconds):
     assert udp.sent
 
 
-def test_what_is_not_worth_decoding_is_what_decoding_refuses():
-    """checksum_fits saves the decoder's time and changes nothing else."""
+def test_checksum_fits_skips_only_frames_that_decoding_refuses():
+    """checksum_fits saves decoding time and changes no result."""
     random = np.random.default_rng(2)
     codec = Codec(1, 1)
     good = codec.encode(mavlink2.MAVLink_attitude_quaternion_message(1, 1, 0, 0, 0, 0, 0, 0))

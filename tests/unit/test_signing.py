@@ -1,4 +1,4 @@
-"""MAVLink 2 signing: what passes and what is refused."""
+"""MAVLink 2 signing: accepted and refused packets."""
 
 import pytest
 
@@ -11,7 +11,7 @@ MINUTE = 6_000_000
 
 
 class Clock:
-    """Steps of 10 us by hand."""
+    """Time of signatures, set by the test."""
 
     def __init__(self, now=10 * MINUTE):
         self.now = now
@@ -25,7 +25,7 @@ def message(k=1):
 
 
 def pair(sender_key=KEY, clock=None, **options):
-    """A sender and a receiver's framer that demands KEY."""
+    """Return a sender and the framer of a receiver that requires KEY."""
     clock = clock or Clock()
     sender = Codec(1, 1, Signing(sender_key, clock=clock, **options))
     return sender, Framer(Codec(2, 2, Signing(KEY, clock=clock)))
@@ -67,7 +67,7 @@ def test_replay_is_refused_also_of_an_older_packet():
     assert refused(framer) == 2
 
 
-def test_a_sender_not_heard_before_may_be_a_minute_behind():
+def test_the_first_packet_of_a_sender_may_be_a_minute_old():
     clock = Clock()
     old = Codec(1, 1, Signing(KEY, clock=clock))
     early = [old.encode(message()) for _ in range(2)]
@@ -83,7 +83,7 @@ def test_one_flipped_bit_of_the_signature_is_refused():
     assert framer.datagram(bytes(frame)) == [] and refused(framer) == 1
 
 
-def test_a_forged_packet_from_the_future_does_not_shut_its_sender_out():
+def test_a_forged_packet_from_the_future_does_not_lock_out_its_sender():
     sender, framer = pair()
     assert len(framer.datagram(sender.encode(message()))) == 1
     forger, _ = pair(OTHER, Clock(1000 * MINUTE))
@@ -101,7 +101,7 @@ def test_time_grows_with_every_packet_and_never_goes_back():
         return int.from_bytes(frame[-12:-6], "little")
 
     stamps = [stamp(), stamp()]
-    clock.now -= MINUTE  # somebody sets the clock
+    clock.now -= MINUTE  # the wall clock is set back
     stamps += [stamp(), stamp()]
     clock.now += 2 * MINUTE
     stamps += [stamp()]

@@ -1,4 +1,4 @@
-"""Framing: every valid message comes through, whatever stands around it."""
+"""Framing: every valid message is decoded, with any invalid bytes around it."""
 
 import random
 
@@ -18,7 +18,7 @@ from uam_sim_bridge.mavlink.protocol.wire import (
 
 
 def sample(k):
-    """A message with content k."""
+    """Return a message with content k."""
     if k % 2:
         return mavlink2.MAVLink_attitude_quaternion_message(k, 1, 0, 0, 0, 0.1, 0.2, 0.3)
     return mavlink2.MAVLink_timesync_message(k, 7)
@@ -39,7 +39,7 @@ def test_sequence_numbers_count_and_wrap():
 
 @given(st.lists(st.binary(max_size=60), min_size=1, max_size=8), st.integers(1, 50))
 def test_stream_survives_garbage_between_messages(garbage, step):
-    """Cut anywhere: all messages arrive, in order, once enough bytes follow."""
+    """With any chunk length all messages arrive in order, once enough bytes follow."""
     good = frames(len(garbage))
     data = b"".join(g + f for g, f in zip(garbage, good, strict=True)) + bytes(300)
     framer = Framer(Codec(2, 2))
@@ -50,7 +50,7 @@ def test_stream_survives_garbage_between_messages(garbage, step):
 
 
 @given(st.binary(max_size=40), st.binary(max_size=40))
-def test_datagram_carries_nothing_over(before, after):
+def test_an_incomplete_frame_is_dropped_with_its_datagram(before, after):
     good = frames(1)[0]
     framer = Framer(Codec(2, 2))
     assert framer.datagram(good[:-5]) == []
@@ -64,7 +64,7 @@ def test_false_start_that_claims_a_long_frame():
 
 
 @pytest.mark.parametrize("place", range(4, 30))
-def test_a_flipped_bit_is_noticed(place):
+def test_a_flipped_bit_is_detected(place):
     good = bytearray(frames(2)[1])
     good[place] ^= 0x10
     framer = Framer(Codec(2, 2))
@@ -73,14 +73,14 @@ def test_a_flipped_bit_is_noticed(place):
 
 
 def unread_frame(number, payload, sequence=7):
-    """A frame as another dialect makes it."""
+    """Return a frame of a message that pymavlink's dialect omits."""
     body = bytes([len(payload), 0, 0, sequence, 1, 1, *number.to_bytes(3, "little")]) + payload
     crc = mavlink2.x25crc(body + bytes([UNREAD[number]])).crc
     return b"\xfd" + body + crc.to_bytes(2, "little")
 
 
 @pytest.mark.parametrize("number", UNREAD)
-def test_messages_that_the_dialect_lacks_are_no_garbage(number):
+def test_messages_that_the_dialect_omits_are_not_bad_bytes(number):
     good = frames(2)
     framer = Framer(Codec(2, 2))
     other = unread_frame(number, b"\xfd\x03\x00abc")
@@ -92,7 +92,7 @@ def test_messages_that_the_dialect_lacks_are_no_garbage(number):
     assert framer.bad_bytes == len(other) and framer.unread == 1
 
 
-def test_random_bytes_do_no_harm():
+def test_a_valid_message_after_random_bytes_is_decoded():
     random.seed(5)
     framer = Framer(Codec(2, 2))
     for _ in range(300):
@@ -104,7 +104,7 @@ def test_random_bytes_do_no_harm():
 
 
 @given(st.text(max_size=160).filter(lambda t: "\x00" not in t))
-def test_long_texts_come_back(text):
+def test_long_texts_are_joined(text):
     if not text.isascii():
         text = text.encode("ascii", "replace").decode()
     codec, assembler = Codec(1, 1), TextAssembler()

@@ -1,1 +1,1 @@
-"""The link to the autopilot, from both directions."""
+"""MAVLink link of the companion computer to the autopilot."""

@@ -1,7 +1,7 @@
 """The bridge's side of the link to the autopilot: heartbeats, commands, texts, parameters, time.
 
-Protocol and transport are apart: `OffboardLink` works on any `Transport`. All times are those of
-the control ticks; there are no wall timers.
+`OffboardLink` works on any `Transport`. All times are times of control ticks; there are no timers
+on wall time.
 """
 
 from __future__ import annotations
@@ -27,18 +27,18 @@ from uam_sim_bridge.mavlink.telemetry.vitals import Vitals
 from uam_sim_bridge.mavlink.transport.transport import Transport
 
 HEARTBEAT_PERIOD = 1.0  # s
-EXPLAIN_PERIOD = 3.0  # s between two requests to say again what keeps it from arming
+EXPLAIN_PERIOD = 3.0  # s between two requests for the failed arming checks
 _NO_ATTITUDE = [1.0, 0.0, 0.0, 0.0]
-ATTITUDE_IGNORED = 128  # type_mask of SET_ATTITUDE_TARGET: body rates and thrust count
+ATTITUDE_IGNORED = 128  # type_mask of SET_ATTITUDE_TARGET: only body rates and thrust
 
 
 class OffboardLink:
-    """The autopilot as the bridge sees it, and the way to it.
+    """State of the autopilot from its messages, and the messages to it.
 
-    `armed`, `mode`, `landed`: its latest word; `armed_since` [s] or None: tick at which it was
-    first known armed; `values`: by name, those of its parameters that are WATCHED; `ignored`:
-    messages of other systems, and answers to others; `vitals`: how it is; `reboots`: how often it
-    has restarted.
+    `armed`, `mode`, `landed`: latest report; `armed_since` [s] or None: tick of the first report
+    that it is armed; `values`: its parameters (of WATCHED) by name; `ignored`: number of messages
+    from other systems or for other receivers; `vitals`: battery, estimator and sensors; `reboots`:
+    number of restarts.
     """
 
     def __init__(
@@ -66,17 +66,17 @@ class OffboardLink:
         self._codec = Codec(target_system, mavlink2.MAV_COMP_ID_ONBOARD_COMPUTER, signing)
         self._framer = Framer(self._codec)
         self._texts = TextAssembler()
-        self._asked: dict[int, Request] = {}
-        self._heard = self._beat = self._explained = -math.inf
-        self._met = False  # connected at the last tick
+        self._pending: dict[int, Request] = {}
+        self._heartbeat_in = self._heartbeat_out = self._explained = -math.inf
+        self._was_connected = False  # at the last tick
 
     def set_mapping(self, mapping: RateThrustParameters) -> None:
-        """Compare the autopilot's parameters with another mapping from now on."""
+        """Compare the autopilot's parameters with this mapping from now on."""
         self._parameters.set_mapping(mapping)
 
     @property
     def warnings(self) -> tuple[str, ...]:
-        """One line for each thing about parameters and streams that is not as it should be."""
+        """Return one line per problem with the autopilot's parameters and streams."""
         return self._parameters.warnings + self.streams.warnings
 
     @property
@@ -86,35 +86,35 @@ class OffboardLink:
 
     @property
     def bad_bytes(self) -> int:
-        """Bytes that belonged to no message."""
+        """Return the number of bytes outside valid messages."""
         return self._framer.bad_bytes
 
     @property
     def lost(self) -> int:
-        """Messages lost on their way to us, by gaps in their numbers."""
+        """Return the number of lost messages, from gaps in the sequence numbers."""
         return self.statistics.lost(self._framer.unread)
 
     @property
     def refused(self) -> int:
-        """Messages refused for their signature."""
+        """Return the number of messages with a missing or invalid signature."""
         return self._codec.refused
 
     @property
     def open(self) -> bool:
-        """Whether the transport is open, as far as this end can tell."""
+        """Return whether the local end of the transport is open."""
         return self._transport.connected
 
     @property
     def dropped(self) -> int:
-        """Frames that the transport did not take."""
+        """Return the number of frames that the transport did not send."""
         return self._transport.dropped
 
     def connected(self, time: float) -> bool:
-        """Whether a heartbeat came within the last seconds."""
-        return time - self._heard < HEARTBEAT_TIMEOUT
+        """Return whether a heartbeat arrived in the last HEARTBEAT_TIMEOUT before `time` [s]."""
+        return time - self._heartbeat_in < HEARTBEAT_TIMEOUT
 
     def poll(self, time: float) -> None:
-        """Handle everything that has arrived, at the tick `time` [s]."""
+        """Process all received messages at the tick `time` [s]."""
         for data in self._transport.receive():
             for message in self._framer.take(data, self._transport.stream):
                 if message.get_srcSystem() != self._target or not self._for_us(message):
@@ -126,9 +126,9 @@ class OffboardLink:
         self.statistics.tick(time)
 
     def tick(self, time: float) -> None:
-        """Send what is due besides setpoints: heartbeat, requests of the sequence, questions."""
-        if time - self._beat >= HEARTBEAT_PERIOD - 1e-9:
-            self._beat = time
+        """Send heartbeat, mode and arming requests, and telemetry requests due at `time` [s]."""
+        if time - self._heartbeat_out >= HEARTBEAT_PERIOD - 1e-9:
+            self._heartbeat_out = time
             self._send(
                 mavlink2.MAVLink_heartbeat_message(
                     mavlink2.MAV_TYPE_ONBOARD_CONTROLLER,
@@ -140,20 +140,26 @@ class OffboardLink:
                 )
             )
         connected = self.connected(time)
-        if connected and not self._met:
-            self._meet()
-        self._met = connected
+        if connected and not self._was_connected:
+            self._restart_requests()
+        self._was_connected = connected
         if connected:
-            self._ask_set_up(time)
+            self._request_telemetry(time)
         request = self.sequence.update(time, connected, self.armed, self.mode)
         if request is not None:
             self._request(request)
 
     def send_setpoint(self, rates: np.ndarray, thrust: float, time: float) -> None:
-        """Send body rates (3,) [rad/s, FLU] and normalised thrust; raises ValueError on NaN."""
+        """Send the setpoint of the tick `time` [s]: SET_ATTITUDE_TARGET.
+
+        rates (3,): body rates [rad/s, FLU]; thrust: normalised, 0..1. Raises ValueError if a value
+        is not finite or thrust is out of range.
+        """
         roll, pitch, yaw = swap_body(rates).tolist()
         if not math.isfinite(roll + pitch + yaw + thrust) or not 0.0 <= thrust <= 1.0:
-            raise ValueError(f"setpoint rates {rates} thrust {thrust} must not be sent")
+            raise ValueError(
+                f"setpoint: rates {rates}, thrust {thrust}; finite rates and thrust 0..1 allowed"
+            )
         self._send(
             mavlink2.MAVLink_set_attitude_target_message(
                 round(time * 1e3) & 0xFFFFFFFF,
@@ -176,7 +182,10 @@ class OffboardLink:
         position_deviation: float,
         attitude_deviation: float,
     ) -> None:
-        """Send a mocap pose: stamp [s], position (3,) [m, ENU], quaternion FLU → ENU."""
+        """Send a mocap pose: stamp [s], position (3,) [m, ENU], quaternion (4,) FLU → ENU, wxyz.
+
+        Standard deviations [m] and [rad].
+        """
         self._send(
             vision_message(stamp, position, quaternion, position_deviation, attitude_deviation)
         )
@@ -186,7 +195,7 @@ class OffboardLink:
         self._transport.close()
 
     def _for_us(self, m: Message) -> bool:
-        """Whether it is for everybody or for us: a ground station gets answers of its own."""
+        """Return whether the message is a broadcast or addressed to this companion computer."""
         return getattr(m, "target_system", 0) in (0, self._target) and getattr(
             m, "target_component", 0
         ) in (0, mavlink2.MAV_COMP_ID_ONBOARD_COMPUTER)
@@ -199,7 +208,7 @@ class OffboardLink:
         self._watch_clock(time, kind, m)
         if kind == "HEARTBEAT":
             if m.autopilot != mavlink2.MAV_AUTOPILOT_INVALID:
-                self._heard = time
+                self._heartbeat_in = time
                 self._take_state(
                     time,
                     Mode.from_custom_mode(m.custom_mode),
@@ -214,9 +223,9 @@ class OffboardLink:
             if text is not None:
                 self.sequence.text(m.severity, text)
         elif kind == "EVENT":
-            said = self._events.read(m)
-            if said is not None:
-                self.sequence.text(*said)
+            event = self._events.read(m)
+            if event is not None:
+                self.sequence.text(*event)
         elif kind == "PARAM_VALUE":
             self._parameters.take(m)
         elif kind == "TIMESYNC" and m.tc1 == 0:
@@ -225,7 +234,7 @@ class OffboardLink:
             self.vitals.take(kind, m)
 
     def _watch_clock(self, time: float, kind: str, m: Message) -> None:
-        """Follow the autopilot's clock, and notice that it starts again."""
+        """Pass the autopilot's time to the reboot detection and the time synchronisation."""
         if m.get_srcComponent() != mavlink2.MAV_COMP_ID_AUTOPILOT1:
             return
         if kind == "TIMESYNC":
@@ -240,14 +249,14 @@ class OffboardLink:
         if restarted:
             self.reboots += 1
             self.time_sync.restart()
-            self._meet()
+            self._restart_requests()
             self.sequence.rebooted(time)
 
-    def _meet(self) -> None:
-        """Ask for everything anew: the autopilot is there for the first time, or again."""
+    def _restart_requests(self) -> None:
+        """Request streams and parameters again: the autopilot has connected or rebooted."""
         self.statistics.restart()
         self.streams.restart()
-        self._asked.clear()
+        self._pending.clear()
         self._parameters.restart()
 
     def _take_state(self, time: float, mode: Mode, armed: bool) -> None:
@@ -261,17 +270,17 @@ class OffboardLink:
         if command == MavCmd.SET_MESSAGE_INTERVAL:
             self.streams.answer(result)
             return
-        request = self._asked.pop(command, None)
+        request = self._pending.pop(command, None)
         if request is None:
             return
         self.sequence.answer(request, result)
         if result != MavResult.ACCEPTED:
-            # PX4 tells a failed check once, when it begins to fail: that may have been before us
+            # PX4 reports a failed check once, when it begins to fail; that may be before connection
             if request is Request.ARM and time - self._explained >= EXPLAIN_PERIOD:
                 self._explained = time
                 self._command(MavCmd.RUN_PREARM_CHECKS)
             return
-        # the heartbeat that says so may be a second away
+        # take the new state now: the next heartbeat may be a second later
         mode = Mode.OFFBOARD if request is Request.OFFBOARD else self.mode
         armed = {Request.ARM: True, Request.DISARM: False}.get(request, self.armed)
         self._take_state(time, mode, armed)
@@ -280,10 +289,10 @@ class OffboardLink:
         if request is Request.OFFBOARD:
             main, sub = Mode.OFFBOARD.value
             self._command(MavCmd.DO_SET_MODE, CUSTOM_MODE_ENABLED, main, sub)
-            self._asked[MavCmd.DO_SET_MODE] = request
+            self._pending[MavCmd.DO_SET_MODE] = request
         else:
             self._command(MavCmd.ARM_DISARM, 1.0 if request is Request.ARM else 0.0)
-            self._asked[MavCmd.ARM_DISARM] = request
+            self._pending[MavCmd.ARM_DISARM] = request
 
     def _command(self, command: int, *parameters: float) -> None:
         values = (*parameters, *[0.0] * (7 - len(parameters)))
@@ -293,7 +302,7 @@ class OffboardLink:
             )
         )
 
-    def _ask_set_up(self, time: float) -> None:
+    def _request_telemetry(self, time: float) -> None:
         ts1 = self.time_sync.request(time)
         if ts1 is not None:
             self._send(mavlink2.MAVLink_timesync_message(0, ts1))

@@ -1,4 +1,4 @@
-"""What /diagnostics shows of the link and of the autopilot's own health."""
+"""Values of the link and of the autopilot's health for /diagnostics."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from uam_sim_bridge.mavlink.telemetry.health import ESTIMATOR_FLAGS, estimate_fa
 
 
 def report(link: OffboardLink) -> dict[str, str | int | None]:
-    """Return the values by name; None where nothing is known yet."""
+    """Return the values by name; None before the first message with the value."""
     vitals, sync = link.vitals, link.time_sync
     flags, battery = vitals.estimator_flags, vitals.battery
     return {
@@ -25,7 +25,7 @@ def report(link: OffboardLink) -> dict[str, str | int | None]:
 
 
 def faults(link: OffboardLink) -> tuple[str, ...]:
-    """Return what is wrong with the autopilot's estimate while it is armed, in words."""
+    """Return one text per fault of the autopilot's estimate; () while it is disarmed."""
     if not link.armed or link.vitals.estimator_flags is None:
         return ()
     return tuple(f"autopilot: {fault}" for fault in estimate_faults(link.vitals.estimator_flags))

@@ -1,4 +1,4 @@
-"""External vision for the autopilot's estimator: VISION_POSITION_ESTIMATE or ODOMETRY."""
+"""Mocap poses for the autopilot's estimator: VISION_POSITION_ESTIMATE or ODOMETRY messages."""
 
 from __future__ import annotations
 
@@ -13,12 +13,12 @@ from uam_sim_bridge.mavlink.protocol.frames import (
 )
 from uam_sim_bridge.mavlink.protocol.wire import Message, mavlink2
 
-# places of the diagonal in the upper triangle of the 6x6 covariance, row by row
+# indices of the diagonal in the upper triangle of the 6x6 covariance, stored row by row
 _DIAGONAL = (0, 6, 11, 15, 18, 20)
 
 
 def covariance(position_deviation: float, attitude_deviation: float) -> list[float]:
-    """Return the 21 numbers of the upper triangle; standard deviations in [m] and [rad]."""
+    """Return the upper triangle (21,) of the covariance; standard deviations [m] and [rad]."""
     triangle = [0.0] * 21
     for k, place in enumerate(_DIAGONAL):
         triangle[place] = (position_deviation if k < 3 else attitude_deviation) ** 2
@@ -32,7 +32,10 @@ def vision_message(
     position_deviation: float,
     attitude_deviation: float,
 ) -> Message:
-    """Return the message of a pose at `stamp` [s]: position (3,) [m, ENU], FLU → ENU [w x y z]."""
+    """Return the VISION_POSITION_ESTIMATE of a pose at `stamp` [s].
+
+    position (3,) [m, ENU]; quaternion (4,) FLU → ENU [w x y z]; standard deviations [m] and [rad].
+    """
     return mavlink2.MAVLink_vision_position_estimate_message(
         round(stamp * 1e6),
         *swap_world(position).tolist(),
@@ -52,9 +55,10 @@ def odometry_message(
     attitude_deviation: float,
     velocity_deviation: float,
 ) -> Message:
-    """Return an ODOMETRY (EKF2_EV_CTRL = 15): the pose as above with velocity.
+    """Return the ODOMETRY of a pose as in `vision_message` and its velocity (EKF2_EV_CTRL = 15).
 
-    velocity (3,) [m/s] and rates (3,) [rad/s] in the body, FLU.
+    velocity (3,) [m/s] and rates (3,) [rad/s], both in the body frame FLU; velocity_deviation:
+    standard deviation [m/s].
     """
     return mavlink2.MAVLink_odometry_message(
         round(stamp * 1e6),

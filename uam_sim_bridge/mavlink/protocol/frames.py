@@ -1,12 +1,12 @@
-"""ENU/FLU (REP-103, used everywhere else) ↔ NED/FRD (MAVLink, aerospace).
+"""Conversion of ENU/FLU (REP-103, the ROS side) ↔ NED/FRD (the MAVLink side).
 
 | | world | body |
 |---|---|---|
 | ROS side | ENU: x east, y north, z up | FLU: x forward, y left, z up |
 | MAVLink side | NED: x north, y east, z down | FRD: x forward, y right, z down |
 
-Every map here is its own inverse, so one function serves both directions. None changes the
-handedness: each is a half turn (world: about the north-east diagonal; body: about forward).
+Every conversion is a half turn (world: about the north-east diagonal; body: about forward), hence
+its own inverse: one function serves both directions.
 Euler angles are Z-Y-X; quaternions are [w x y z], body → world.
 """
 
@@ -23,7 +23,7 @@ _HALF = math.sqrt(0.5)
 
 @jit
 def swap_world(v: np.ndarray) -> np.ndarray:
-    """Return the world vector v (3,) given in ENU, in NED; or the other way round."""
+    """Convert a world vector v (3,) from ENU to NED, or back."""
     out = np.empty(3)
     out[0] = v[1]
     out[1] = v[0]
@@ -33,7 +33,7 @@ def swap_world(v: np.ndarray) -> np.ndarray:
 
 @jit
 def swap_body(v: np.ndarray) -> np.ndarray:
-    """Return the body vector v (3,) given in FLU, in FRD; or the other way round."""
+    """Convert a body vector v (3,) from FLU to FRD, or back."""
     out = np.empty(3)
     out[0] = v[0]
     out[1] = -v[1]
@@ -57,9 +57,9 @@ def swap_quaternion(q: np.ndarray) -> np.ndarray:
 
 @jit
 def swap_euler(euler: np.ndarray) -> np.ndarray:
-    """Return roll, pitch, yaw (3,) [rad] of FLU in ENU as those of FRD in NED; or back.
+    """Convert roll, pitch, yaw (3,) [rad] of FLU in ENU to those of FRD in NED, or back.
 
-    ENU yaw counts from east, counter-clockwise; NED yaw from north, clockwise. Yaw in [-pi, pi).
+    ENU yaw is counter-clockwise from east, NED yaw clockwise from north. Returned yaw: [-pi, pi).
     """
     out = np.empty(3)
     out[0] = euler[0]
@@ -69,5 +69,5 @@ def swap_euler(euler: np.ndarray) -> np.ndarray:
 
 
 def swap_world_variance(variance: np.ndarray) -> np.ndarray:
-    """Return variances (3,) along the ENU axes as those along NED; or back: no sign, only order."""
+    """Convert variances (3,) along the axes of ENU to those of NED, or back: no sign, only order."""
     return np.array([variance[1], variance[0], variance[2]])

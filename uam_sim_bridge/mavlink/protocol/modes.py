@@ -1,4 +1,4 @@
-"""PX4's flight modes as MAVLink carries them, command results and message severities."""
+"""PX4's flight modes in MAVLink's encoding, command results, severities and command ids."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from enum import Enum, IntEnum
 
 
 class Mode(Enum):
-    """Flight modes that matter here; the value is PX4's (main mode, sub mode)."""
+    """Flight modes that the bridge uses; value: PX4's (main mode, sub mode)."""
 
     MANUAL = (1, 0)
     ALTITUDE = (2, 0)
@@ -15,7 +15,7 @@ class Mode(Enum):
     HOLD = (4, 3)
     MISSION = (4, 4)
     RETURN = (4, 5)
-    LAND = (4, 6)  # PX4 reports its failsafe mode Descend as this one, too
+    LAND = (4, 6)  # also PX4's failsafe mode Descend
     ACRO = (5, 0)
     OFFBOARD = (6, 0)
     STABILIZED = (7, 0)
@@ -23,7 +23,7 @@ class Mode(Enum):
 
     @property
     def custom_mode(self) -> int:
-        """HEARTBEAT.custom_mode: main mode in bits 16..23, sub mode in bits 24..31."""
+        """Return HEARTBEAT.custom_mode: main mode in bits 16..23, sub mode in bits 24..31."""
         main, sub = self.value
         return main << 16 | sub << 24
 
@@ -47,7 +47,7 @@ class MavResult(IntEnum):
 
 
 def result_word(result: int) -> str:
-    """Return a MAV_RESULT in words."""
+    """Return the name of a MAV_RESULT in lower case."""
     try:
         return MavResult(result).name.lower().replace("_", " ")
     except ValueError:
@@ -55,7 +55,7 @@ def result_word(result: int) -> str:
 
 
 class Severity(IntEnum):
-    """MAV_SEVERITY, as far as used."""
+    """MAV_SEVERITY: the values in use."""
 
     CRITICAL = 2
     ERROR = 3
@@ -64,7 +64,7 @@ class Severity(IntEnum):
 
 
 class MavCmd(IntEnum):
-    """MAV_CMD, as far as used."""
+    """MAV_CMD: the values in use."""
 
     DO_SET_MODE = 176
     ARM_DISARM = 400
@@ -73,5 +73,5 @@ class MavCmd(IntEnum):
     REQUEST_MESSAGE = 512
 
 
-FORCE = 21196  # second parameter of ARM_DISARM: without asking
+FORCE = 21196  # second parameter of ARM_DISARM: skip the checks
 CUSTOM_MODE_ENABLED = 1  # MAV_MODE_FLAG in the first parameter of DO_SET_MODE

@@ -1,8 +1,8 @@
-"""MAVLink 2 signing: what is not signed with the shared key, or was heard before, is refused.
+"""MAVLink 2 signing: refuses packets without the shared key's signature, and replays.
 
-pymavlink signs and checks. Its time runs in steps of 10 us since 2015-01-01, from the wall clock,
-and never backwards within a process: a packet whose time is not above that of the last one of
-its sender and link is a replay. A sender not heard before may be at most a minute behind.
+pymavlink signs and checks. The time of signatures has steps of 10 us since 2015-01-01 (wall clock)
+and never decreases within a process. A packet is a replay if its time is not above that of the
+last packet of its sender and link. The first packet of a sender may be at most a minute old.
 """
 
 from __future__ import annotations
@@ -26,13 +26,13 @@ _FILE_LIMIT = 200  # bytes: a key and some white space
 
 
 def wall_steps() -> int:
-    """Return the time of signatures now: 10 us since 2015-01-01."""
+    """Return the current time of signatures: steps of 10 us since 2015-01-01."""
     return max(0, time.time_ns() // 10_000 - EPOCH * _STEPS)
 
 
 @dataclass(frozen=True)
 class Signing:
-    """The shared key (32 bytes, never shown), the number of this link (0..255) and the clock."""
+    """Shared key (32 bytes, not in repr), id of this link (0..255) and clock (see wall_steps)."""
 
     key: bytes = field(repr=False)
     link_id: int = 0
@@ -40,9 +40,9 @@ class Signing:
 
     @classmethod
     def from_text(cls, text: str, link_id: int = 0) -> Signing | None:
-        """Return the signing that `text` asks for: 64 hex digits, or a file of them; '' is none.
+        """Return the signing of `text`: 64 hex digits, or a file with them; None for ''.
 
-        Raises PortError in one line, which does not repeat the text: it may be a key.
+        Raises PortError in one line. The message does not contain the text, which may be a key.
         """
         if not text:
             return None
@@ -61,32 +61,32 @@ class Signing:
 
 
 class Seal:
-    """Switches signing on in one pymavlink object (`mav`) and keeps its time and counts."""
+    """Enables signing in one pymavlink object (`mav`); updates its time, counts refused packets."""
 
     def __init__(self, mav: MAVLink, signing: Signing) -> None:
         self._state, self._clock = mav.signing, signing.clock
         self._state.secret_key = signing.key
         self._state.link_id = signing.link_id
         self._state.sign_outgoing = True
-        self._state.allow_unsigned_callback = lambda *_: False  # makes it count what it refuses
-        self._heard: dict[tuple[int, int, int], int] = {}
+        self._state.allow_unsigned_callback = lambda *_: False  # needed for reject_count
+        self._accepted: dict[tuple[int, int, int], int] = {}
 
     @property
     def refused(self) -> int:
-        """How many whole messages were refused."""
+        """Return the number of refused messages."""
         return self._state.reject_count
 
     def refresh(self) -> None:
-        """Bring the time of signatures up to the clock; it never goes back."""
+        """Set the time of signatures to the clock; it never decreases."""
         self._state.timestamp = max(self._state.timestamp, self._clock())
 
     def settle(self, accepted: bool) -> None:
-        """Keep the times of the senders after a good signature, take them back after a bad one.
+        """Save the senders' times after a valid signature, restore them after an invalid one.
 
-        pymavlink notes a packet's time before it checks the signature: one forged packet from the
-        future would shut its sender out.
+        pymavlink stores a packet's time before it checks the signature: a forged packet with a
+        future time would otherwise lock out the true sender.
         """
         if accepted:
-            self._heard = dict(self._state.stream_timestamps)
+            self._accepted = dict(self._state.stream_timestamps)
         else:
-            self._state.stream_timestamps = dict(self._heard)
+            self._state.stream_timestamps = dict(self._accepted)

@@ -1,8 +1,8 @@
-"""Bytes ↔ MAVLink 2 messages, robust against whatever else arrives.
+"""Bytes ↔ MAVLink 2 messages, robust against invalid bytes.
 
-pymavlink's own stream parser believes the length byte of a false start and swallows what follows.
-`Framer` goes on one byte after a start that turns out false, so that garbage never costs a valid
-message behind it.
+After a false start byte pymavlink's stream parser skips as many bytes as the false length says.
+`Framer` continues one byte after a false start, so that invalid bytes never hide a valid message
+behind them.
 """
 
 from __future__ import annotations
@@ -19,17 +19,17 @@ _OVERHEAD_1, _OVERHEAD_2, _SIGNATURE = 8, 12, 13
 _SIGNED = 1  # incompatibility flag
 _MARKERS = re.compile(b"[\xfd\xfe]")
 
-# What PX4 sends and pymavlink leaves out, as MAVLink calls it unfinished: message id → CRC_EXTRA.
-# Enough to tell these frames from garbage; none is read here. (EVENT is: event_messages.py.)
+# Messages that PX4 sends and pymavlink omits (work in progress in MAVLink): id → CRC_EXTRA. The
+# framer recognises these frames but does not decode them. (EVENT is decoded: event_messages.py.)
 UNREAD = {8: 117, 290: 251, 291: 10, 361: 93, 371: 10, 380: 232, 413: 77, 435: 134, 436: 193}
 
 Message = mavlink2.MAVLink_message
 
 
 class Codec:
-    """Packs messages of one sender (system and component id) and unpacks those of others.
+    """Encodes messages of one sender (system and component id) and decodes those of others.
 
-    With `signing`, what it packs is signed, and only what is signed well is unpacked.
+    With `signing` it signs every frame and decodes only frames with a valid signature.
     """
 
     def __init__(self, system: int, component: int, signing: Signing | None = None) -> None:
@@ -38,13 +38,13 @@ class Codec:
 
     @property
     def refused(self) -> int:
-        """Whole messages refused: not signed, signed with another key, or heard before."""
+        """Return the number of refused frames: unsigned, signed with another key, or replayed."""
         return 0 if self._seal is None else self._seal.refused
 
     def encode(self, message: Message) -> bytes:
         """Return the frame of `message` with the next sequence number.
 
-        Raises struct.error where a value does not fit its field.
+        Raises struct.error if a value does not fit its field.
         """
         if self._seal is not None:
             self._seal.refresh()
@@ -53,9 +53,9 @@ class Codec:
         return frame
 
     def decode(self, frame: bytes) -> Message | None:
-        """Return the message of a whole frame, None where it is not a valid one.
+        """Return the message of a whole frame, None if the frame is invalid.
 
-        Messages unknown to the dialect count as not valid: their checksum cannot be tested.
+        A message that is not in the dialect is invalid: its checksum cannot be tested.
         """
         if self._seal is not None:
             self._seal.refresh()
@@ -70,10 +70,10 @@ class Codec:
 
 
 class Framer:
-    """Cuts a byte stream (TCP, serial) or single datagrams into messages.
+    """Extracts messages from a byte stream (TCP, serial) or from single datagrams.
 
-    `bad_bytes` counts what belonged to no message, `unread` the frames of messages in UNREAD. What
-    the codec refuses is passed over whole.
+    `bad_bytes`: number of bytes outside valid frames; `unread`: number of frames of messages in
+    UNREAD. A frame that the codec refuses for its signature is skipped whole.
     """
 
     def __init__(self, codec: Codec) -> None:
@@ -82,14 +82,14 @@ class Framer:
         self.bad_bytes = self.unread = 0
 
     def stream(self, data: bytes) -> list[Message]:
-        """Return the messages completed by `data`; an incomplete end is kept for the next call."""
+        """Return the messages completed by `data`; store an incomplete frame for the next call."""
         data = self._rest + data
         messages, used = self._cut(data, final=False)
         self._rest = data[used:]
         return messages
 
     def datagram(self, data: bytes) -> list[Message]:
-        """Return the messages of one datagram; nothing is carried over to the next."""
+        """Return the messages of one datagram; an incomplete frame is dropped."""
         return self._cut(data, final=True)[0]
 
     def take(self, data: bytes, stream: bool) -> list[Message]:
@@ -115,14 +115,14 @@ class Framer:
                 message = self._codec.decode(data[at:end])
                 if message is not None:
                     messages.append(message)
-                if message is not None or self._codec.refused > refused:  # refused: whole as well
+                if message is not None or self._codec.refused > refused:  # refused: skip it
                     at = end
                     continue
                 if message_number(data, at) in UNREAD:
                     self.unread += 1
                     at = end
                     continue
-            at += 1  # a false start: look again behind it
+            at += 1  # false start: continue one byte later
             self.bad_bytes += 1
         return messages, at
 
@@ -133,17 +133,17 @@ def _next_marker(data: bytes, at: int) -> int:
 
 
 def message_number(data: bytes, at: int) -> int:
-    """Return the message id of the frame that begins at data[at], at least 10 bytes of it there."""
+    """Return the message id of the frame that begins at data[at]; needs 10 bytes from there."""
     if data[at] == MARKER_1:
         return data[at + 5]
     return int.from_bytes(data[at + 7 : at + 10], "little")
 
 
 def checksum_fits(data: bytes, at: int, end: int) -> bool:
-    """Whether data[at:end], as long as its header says, is of a known type and has its checksum.
+    """Return whether the frame data[at:end] is of a known message type and its checksum is right.
 
-    Asked before decoding, which costs ten times as much: a full datagram of false starts would
-    else stop the control path for half a second.
+    end: from the length in the frame's header. This check is ten times faster than decoding; it
+    prevents a datagram full of false starts from blocking the control loop for half a second.
     """
     if end - at < (_OVERHEAD_1 if data[at] == MARKER_1 else _OVERHEAD_2):
         return False
@@ -159,23 +159,26 @@ def checksum_fits(data: bytes, at: int, end: int) -> bool:
 
 
 def _frame_end(data: bytes, at: int) -> int | None:
-    """Return where the frame that starts at `at` would end; None where that is not known yet."""
+    """Return the end index of the frame that starts at `at`; None without enough bytes."""
     if len(data) - at < 3:
         return None
     if data[at] == MARKER_1:
         return at + data[at + 1] + _OVERHEAD_1
     flags = data[at + 2]
     if flags & ~_SIGNED:
-        return at + 1  # unknown flags: too short to decode, hence refused
+        return at + 1  # unknown flags: a length that checksum_fits refuses
     return at + data[at + 1] + _OVERHEAD_2 + (_SIGNATURE if flags & _SIGNED else 0)
 
 
 def text_chunks(severity: int, text: str, number: int) -> list[Message]:
-    """Return the STATUSTEXT messages of `text`, in pieces of 50 bytes; number: its id if long."""
+    """Return the STATUSTEXT messages of `text`, in pieces of 50 bytes.
+
+    number: selects the id of a text with several pieces.
+    """
     raw = text.encode()
     pieces = [raw[i : i + 50] for i in range(0, len(raw), 50)] or [b""]
     if len(pieces) > 1 and len(pieces[-1]) == 50:
-        pieces.append(b"")  # a piece that is not full says that the text ends
+        pieces.append(b"")  # a piece below 50 bytes marks the end of the text
     identity = number % 65535 + 1 if len(pieces) > 1 else 0
     return [
         mavlink2.MAVLink_statustext_message(severity, piece, id=identity, chunk_seq=i)
@@ -184,14 +187,14 @@ def text_chunks(severity: int, text: str, number: int) -> list[Message]:
 
 
 class TextAssembler:
-    """Puts the pieces of long STATUSTEXTs together again."""
+    """Joins the pieces of long STATUSTEXT messages."""
 
     def __init__(self) -> None:
         self._identity = 0
         self._pieces: list[str] = []
 
     def add(self, message: Message) -> str | None:
-        """Return the whole text once its last piece is there."""
+        """Return the whole text with its last piece, None before or if a piece is missing."""
         text = clean_text(message.text)
         if message.id == 0:
             return text
@@ -208,7 +211,7 @@ class TextAssembler:
 
 
 def clean_text(value: str | bytes) -> str:
-    """Return a MAVLink string up to its first zero byte."""
+    """Return the text of a MAVLink string: up to its first zero byte."""
     if isinstance(value, bytes):
         value = value.decode(errors="replace")
     return value.split("\x00", 1)[0]
