@@ -306,9 +306,9 @@ class OffboardLink:
         ts1 = self.time_sync.request(time)
         if ts1 is not None:
             self._send(mavlink2.MAVLink_timesync_message(0, ts1))
-        wanted = self.streams.request(time)
-        if wanted is not None:
-            self._command(MavCmd.SET_MESSAGE_INTERVAL, *wanted)
+        stream = self.streams.request(time)
+        if stream is not None:
+            self._command(MavCmd.SET_MESSAGE_INTERVAL, *stream)
         for name in self._parameters.due(time):
             self._send(
                 mavlink2.MAVLink_param_request_read_message(

@@ -43,7 +43,7 @@ def swap_body(v: np.ndarray) -> np.ndarray:
 
 @jit
 def swap_quaternion(q: np.ndarray) -> np.ndarray:
-    """Return the attitude FLU → ENU given by q (4,) as FRD → NED; or the other way round.
+    """Convert an attitude quaternion (4,) [w x y z] from FLU → ENU to FRD → NED, or back.
 
     It is the product (half turn about (1, 1, 0)) ⊗ q ⊗ (half turn about x), up to sign.
     """
@@ -69,5 +69,5 @@ def swap_euler(euler: np.ndarray) -> np.ndarray:
 
 
 def swap_world_variance(variance: np.ndarray) -> np.ndarray:
-    """Convert variances (3,) along the axes of ENU to those of NED, or back: no sign, only order."""
+    """Convert variances (3,) along the ENU axes to those along NED, or back: reorders them."""
     return np.array([variance[1], variance[0], variance[2]])
