@@ -1,32 +1,32 @@
-"""How long something is waited for, on a machine that may itself stand still for a while."""
+"""Time limit of a wait that does not count pauses of the machine (suspend, stopped VM)."""
 
 from __future__ import annotations
 
 import time
 
-SLICE = 0.5  # [s] the most that one look may use up
+SLICE = 0.5  # s, most that counts between two readings of `left`
 
 
 class Patience:
-    """Runs out after `seconds` of wall time in which this process has looked.
+    """Time limit of `seconds` of wall time.
 
-    A virtual machine that was stopped for a minute, a laptop that was closed: whoever is waited for
-    stood still as well, and the first look afterwards must not give up on him.
+    A stopped virtual machine or a suspended laptop also stops the process that is waited for.
+    Between two readings of `left` at most SLICE counts, so the wait continues after such a pause.
     """
 
     def __init__(self, seconds: float):
         self._left = seconds
-        self._looked = time.monotonic()
+        self._read = time.monotonic()
 
     @property
     def left(self) -> float:
-        """Seconds left, never negative. To be looked at more often than every SLICE."""
+        """Return the seconds left, at least 0. Read it more often than every SLICE."""
         now = time.monotonic()
-        self._left = max(0.0, self._left - min(now - self._looked, SLICE))
-        self._looked = now
+        self._left = max(0.0, self._left - min(now - self._read, SLICE))
+        self._read = now
         return self._left
 
     @property
     def over(self) -> bool:
-        """Whether it has run out."""
+        """Return whether no time is left."""
         return self.left == 0.0

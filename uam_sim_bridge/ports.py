@@ -1,6 +1,6 @@
-"""A private instance number for each flight, so that flights side by side never meet.
+"""Reserves an instance number for each flight, so that parallel flights share no port or domain.
 
-Instance N owns ROS domain FIRST_DOMAIN + N and PX4's ports of its own instance N (px4_sitl -i N):
+Instance N uses ROS domain FIRST_DOMAIN + N and the ports of PX4's instance N (px4_sitl -i N):
 TCP 4560 + N for the simulator link, UDP 14540 + N (offboard side) and 14580 + N (autopilot side).
 """
 
@@ -15,19 +15,19 @@ from types import TracebackType
 from typing import NamedTuple
 
 SIMULATOR_TCP, OFFBOARD_UDP, AUTOPILOT_UDP = 4560, 14540, 14580  # PX4's own, instance 0
-FIRST_DOMAIN = 1  # domain 0 is everybody's default
-LAST_DOMAIN = 101  # above, the middleware's ports run into the system's ephemeral ones
+FIRST_DOMAIN = 1  # domain 0 is the default of all ROS programs
+LAST_DOMAIN = 101  # above it the middleware's ports overlap the system's ephemeral ports
 KINDS = {"TCP": socket.SOCK_STREAM, "UDP": socket.SOCK_DGRAM}
 INSTANCES = min(LAST_DOMAIN - FIRST_DOMAIN + 1, AUTOPILOT_UDP - OFFBOARD_UDP)
 
 
 class PortError(ValueError):
-    """A port is in use or no instance is free; the text is one line for the user."""
+    """A port, link or instance is not available; the text is one line for the user."""
 
 
 @dataclass(frozen=True)
 class Ports:
-    """What one flight may use. All on 127.0.0.1."""
+    """Instance number, ROS domain and ports of one flight. All ports are on 127.0.0.1."""
 
     instance: int
     domain: int
@@ -37,7 +37,7 @@ class Ports:
 
 
 def ports_of(instance: int) -> Ports:
-    """The ports of an instance, 0 <= instance < INSTANCES."""
+    """Return the ports of an instance; raises PortError outside 0..INSTANCES - 1."""
     if not 0 <= instance < INSTANCES:
         raise PortError(f"instance {instance} is not in 0..{INSTANCES - 1}")
     return Ports(
@@ -50,9 +50,9 @@ def ports_of(instance: int) -> Ports:
 
 
 def in_use(kind: int, port: int, host: str = "127.0.0.1") -> bool:
-    """True if `port` cannot be bound; kind is socket.SOCK_STREAM (TCP) or SOCK_DGRAM (UDP)."""
+    """Return whether `port` cannot be bound; kind: socket.SOCK_STREAM (TCP), SOCK_DGRAM (UDP)."""
     with socket.socket(socket.AF_INET, kind) as probe:
-        if kind == socket.SOCK_STREAM:  # a closed connection's TIME_WAIT does not count
+        if kind == socket.SOCK_STREAM:  # ignore TIME_WAIT of a closed connection
             probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
         try:
             probe.bind((host, port))
@@ -64,17 +64,20 @@ def in_use(kind: int, port: int, host: str = "127.0.0.1") -> bool:
 
 
 def discovery_port(domain: int, participant: int = 0) -> int:
-    """UDP port of a participant's discovery (RTPS 2.2, 9.6.1.1); the next one has all else."""
+    """Return the UDP port of a participant's discovery traffic (RTPS 2.2, 9.6.1.1).
+
+    The participant's other traffic uses the next port.
+    """
     return 7400 + 250 * domain + 10 + 2 * participant
 
 
 def is_discovery_port(port: int) -> bool:
-    """Whether a port of the middleware is one of `discovery_port`."""
+    """Return whether a port of the middleware is a discovery port (see `discovery_port`)."""
     return port % 2 == 0
 
 
 def require_free(kind: int, port: int, purpose: str) -> None:
-    """Raise PortError naming the port and its purpose when it cannot be bound."""
+    """Raise PortError with the port and its purpose if it cannot be bound."""
     if not 1 <= port <= 65535:
         raise PortError(f"{purpose}: port {port} is not in 1..65535")
     if in_use(kind, port):
@@ -97,28 +100,28 @@ class BusyPort(NamedTuple):
 
 
 def busy_port(ports: Ports, own_autopilot: bool = True) -> BusyPort | None:
-    """The first port of an instance that another program holds; None if all are free.
+    """Return the first port of an instance that another program holds; None if all are free.
 
-    own_autopilot: the autopilot is to be started, so its port must be free, too.
+    own_autopilot: the flight starts the autopilot, so the autopilot's port must be free as well.
     """
-    wanted = [
+    required = [
         BusyPort("TCP", ports.simulator_tcp, "simulator link"),
         BusyPort("UDP", ports.offboard_udp, "offboard link"),
-        # of the domain's first participant: taken means that the domain lives
+        # of the domain's first participant: in use if any participant is in the domain
         BusyPort("UDP", discovery_port(ports.domain), "ROS discovery"),
     ]
     if own_autopilot:
-        wanted.append(BusyPort("UDP", ports.autopilot_udp, "autopilot"))
-    return next((one for one in wanted if in_use(KINDS[one.protocol], one.number)), None)
+        required.append(BusyPort("UDP", ports.autopilot_udp, "autopilot"))
+    return next((one for one in required if in_use(KINDS[one.protocol], one.number)), None)
 
 
 def instances_in_use(folder: Path | None = None) -> list[int]:
-    """The instances that flights of this user have reserved now."""
+    """Return the instances that flights of this user have reserved."""
     return [number for number in range(INSTANCES) if held(lock_file(folder, number))]
 
 
 def held(lock: Path) -> bool:
-    """Whether some process holds the lock; a file that nobody locks is none."""
+    """Return whether a process holds the lock; False for a missing or unlocked file."""
     try:
         opened = os.open(lock, os.O_RDONLY | os.O_CLOEXEC | os.O_NOFOLLOW)
     except OSError:
@@ -133,15 +136,15 @@ def held(lock: Path) -> bool:
 
 
 def lock_file(folder: Path | None, instance: int) -> Path:
-    """Where the flight of an instance has its lock; folder: None for the temporary one."""
+    """Return the lock file of an instance; folder: None for the system's temporary folder."""
     return (folder or Path(tempfile.gettempdir())) / f"uam-{os.getuid()}-{instance}.lock"
 
 
 class Reservation:
-    """Holds one instance until released. A context manager.
+    """Reserves one instance until `release`. A context manager.
 
-    The lock is a flock on <folder>/uam-<user>-<N>.lock: the system drops it with the process that
-    holds it, so a crashed flight blocks nothing and its file is used again.
+    The lock is a flock on <folder>/uam-<user>-<N>.lock. The system releases it when its process
+    ends, so a crashed flight leaves the instance free.
     """
 
     def __init__(
@@ -150,20 +153,19 @@ class Reservation:
         folder: Path | None = None,
         own_autopilot: bool = True,
     ):
-        """Take `instance`, or the first one that is free; locks are kept in the temporary folder.
+        """Reserve `instance`, or the first free one; folder: of the locks, see `lock_file`.
 
-        own_autopilot: see `busy_port`.
-        Raises PortError when the wanted one, or every one, is taken.
+        own_autopilot: see `busy_port`. Raises PortError if the instance, or every one, is in use.
         """
         self._folder = folder or Path(tempfile.gettempdir())
         self._lock: int | None = None
-        wanted = range(INSTANCES) if instance is None else [instance]
+        candidates = range(INSTANCES) if instance is None else [instance]
         why = ""
-        for number in wanted:
+        for number in candidates:
             ports = ports_of(number)
             self._lock = self._take(self._path(number))
             if self._lock is None:
-                why = "another flight has it"
+                why = "reserved by another flight"
                 continue
             busy = busy_port(ports, own_autopilot)
             if busy is None:
@@ -184,7 +186,7 @@ class Reservation:
         lock = os.open(path, flags, 0o600)
         try:
             fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
-            # The holder before us may have removed the file between our open and our lock.
+            # the last holder may have removed the file between open and flock
             if os.stat(path).st_ino == os.fstat(lock).st_ino:
                 return lock
         except OSError:
@@ -199,7 +201,7 @@ class Reservation:
             self._lock = None
 
     def release(self) -> None:
-        """Give the instance back and remove its lock file."""
+        """Release the instance and remove its lock file."""
         self._drop(self._path(self.ports.instance))
 
     def __enter__(self) -> "Reservation":
@@ -215,14 +217,15 @@ class Reservation:
 
 
 def domain_of_flight(instance: int | None) -> int | None:
-    """The ROS domain of the flight `instance`, None for the one that is under way.
+    """Return the ROS domain of the flight `instance`; instance None: the only running flight.
 
-    None where none is: the environment's then. Raises PortError where there are several.
+    Returns None without a running flight: the environment's domain applies. Raises PortError if
+    several flights are running.
     """
     if instance is not None:
         return ports_of(instance).domain
     flying = instances_in_use()
     if len(flying) > 1:
         numbers = ", ".join(map(str, flying))
-        raise PortError(f"several flights are under way: --instance {numbers}?")
+        raise PortError(f"several flights are running: choose one by --instance ({numbers})")
     return ports_of(flying[0]).domain if flying else None

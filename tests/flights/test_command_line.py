@@ -112,7 +112,7 @@ def test_a_taken_instance_is_refused_before_anything_flies(capsys, tmp_path):
     with Reservation() as taken:
         number = str(taken.ports.instance)
         line = refused(capsys, "--scenario", "hover", "--instance", number, "--out", "new")
-    assert f"instance {number} is not free: another flight has it" in line
+    assert f"instance {number} is not free: reserved by another flight" in line
     assert not (tmp_path / "new").exists()
 
 

@@ -1,5 +1,5 @@
-"""The HITL router as a process, over pseudo-terminals: plant and bridge on one side, the stand-in
-at the end of the line on the other."""
+"""The HITL router as a process, over pseudo-terminals: plant and bridge on one side, the autopilot
+stand-in on the serial line on the other."""
 
 import os
 import random
@@ -24,13 +24,13 @@ from uam_sim_bridge.mavlink.transport.transport import UdpTransport
 
 ROUTER, AUTOPILOT = "uam_sim_bridge.mavlink.hil.router", "uam_sim_bridge.autopilot.server"
 PATIENCE = 60.0  # s for a process to start: the stand-in compiles
-# a frame cut short by garbage is waited for; only then does the time matter
+# the server waits this long only for a frame that invalid bytes have cut short
 HIL = HilParameters(answer_timeout=2.0, silent_timeout=0.5)
 PATIENT = HilParameters(answer_timeout=30.0, silent_timeout=10.0)
 
 
 class Cable:
-    """Two pseudo-terminals joined back to back: `ends` are the devices; it can be cut."""
+    """Two connected pseudo-terminals; `ends`: their device names. `cut` closes both."""
 
     def __init__(self):
         pairs = [os.openpty(), os.openpty()]
@@ -50,7 +50,7 @@ class Cable:
                 self.put(1 - self._far.index(source), data)
 
     def put(self, end, data):
-        """Let bytes come out at an end."""
+        """Output bytes at one end."""
         with self._lock:
             os.write(self._far[end], data)
 
@@ -106,7 +106,7 @@ class Bench:
         body.step(motors)
 
     def until(self, condition, what, thrust=0.0):
-        """Tick until it is so."""
+        """Tick until the condition is true."""
         end = time.monotonic() + PATIENCE
         while not condition():
             assert time.monotonic() < end, f"{what}: not within {PATIENCE:g} s\n" + (
@@ -152,7 +152,7 @@ def test_arms_over_the_line_and_ends_with_the_simulator(bench):
     assert "the serial line is gone" in b.autopilot.output
 
 
-def test_garbage_on_the_line_is_survived(bench):
+def test_invalid_bytes_on_the_line_do_not_end_the_exchange(bench):
     b = bench()
     b.arm()
     noise = random.Random(7)
@@ -164,25 +164,25 @@ def test_garbage_on_the_line_is_survived(bench):
     assert b.router.process.poll() is None and b.autopilot.process.poll() is None
 
 
-def test_a_cut_line_stops_the_motors_and_both_ends_say_so(bench):
+def test_a_cut_line_stops_the_motors_and_both_ends_report_it(bench):
     b = bench()
     b.arm()
     b.cable.cut()
-    b.router.until_said("lost: the motors stand still")
+    b.router.until_said("lost: motor commands are zero")
     b.until(lambda: not b.hil.armed, "motors at rest")
     assert np.all(b.hil.motors == 0.0) and b.hil.connected
     assert b.autopilot.process.wait(PATIENCE) == 0
     assert b.router.interrupt() == 0 and "Traceback" not in b.router.output
 
 
-def test_sensors_left_out_are_answered_with_what_is_known(bench):
+def test_dropped_sensors_are_answered_with_the_newest_commands(bench):
     b = bench("--hil-rate", "50", hil=PATIENT)
     b.until(lambda: b.answered > 100, "answers")
     assert b.hil.missed == 0
 
 
 class Wires:
-    """A router between plain sockets and the hand-made flight controller."""
+    """A router between plain sockets and a flight controller that the test plays."""
 
     def __init__(self, start, device, *arguments, baud=921600):
         self.device = device
@@ -206,7 +206,7 @@ class Wires:
         self.listener.settimeout(PATIENCE)
         self.plant, _ = self.listener.accept()
         self.plant.settimeout(PATIENCE)
-        self.codec, self.heard, self.framer = Codec(1, 200), [], Framer(Codec(9, 9))
+        self.codec, self.received, self.framer = Codec(1, 200), [], Framer(Codec(9, 9))
 
     def plug(self):
         self.far, self.near = os.openpty()
@@ -219,13 +219,13 @@ class Wires:
         os.close(self.far)
         os.close(self.near)
 
-    def hear(self):
-        """Messages that have come out of the line."""
+    def read(self):
+        """Return all messages received from the line so far."""
         try:
-            self.heard += self.framer.stream(os.read(self.far, 65536))
+            self.received += self.framer.stream(os.read(self.far, 65536))
         except BlockingIOError:
             time.sleep(0.001)
-        return self.heard
+        return self.received
 
     def until(self, condition):
         end = time.monotonic() + PATIENCE
@@ -233,7 +233,7 @@ class Wires:
             assert time.monotonic() < end, self.router.output
         return True
 
-    def say(self, *messages):
+    def send(self, *messages):
         for message in messages:
             os.write(self.far, self.codec.encode(message))
 
@@ -268,31 +268,31 @@ def test_commands_go_to_the_plant_with_its_time_and_the_rest_to_the_bridge(wires
     w = wires()
     heartbeat = mavlink2.MAVLink_heartbeat_message(2, 12, 0x81, 6 << 16, 4, 3)
     w.plant.sendall(w.codec.encode(sensor(8_000)))
-    w.until(lambda: [m for m in w.hear() if m.get_type() == "HIL_SENSOR"])
-    w.say(heartbeat, controls(77_000_000))
+    w.until(lambda: [m for m in w.read() if m.get_type() == "HIL_SENSOR"])
+    w.send(heartbeat, controls(77_000_000))
     frame = w.bridge.recv(500)
     assert Framer(Codec(9, 9)).datagram(frame)[0].custom_mode == 6 << 16
     answer = Framer(Codec(9, 9)).stream(w.plant.recv(500))[0]
     assert answer.time_usec == 8_000 and answer.mode == 129 and answer.controls[0] == 0.5
     request = w.codec.encode(mavlink2.MAVLink_param_request_list_message(1, 1))
     w.bridge.sendto(request, ("127.0.0.1", w.udp))
-    w.until(lambda: [m for m in w.hear() if m.get_type() == "PARAM_REQUEST_LIST"])
-    assert bytes(w.heard[-1].get_msgbuf()) == request
+    w.until(lambda: [m for m in w.read() if m.get_type() == "PARAM_REQUEST_LIST"])
+    assert bytes(w.received[-1].get_msgbuf()) == request
 
 
-def test_no_commands_at_all_are_no_trouble(wires):
-    """PX4 in HITL may be silent while disarmed."""
+def test_a_flight_controller_without_commands_is_no_error(wires):
+    """PX4 in HITL may send no commands while disarmed."""
     w = wires()
     for k in range(200):
         w.plant.sendall(w.codec.encode(sensor(4_000 * k)))
         time.sleep(0.0005)
     w.until(
-        lambda: [m for m in w.hear() if m.get_type() == "HIL_SENSOR" and m.time_usec == 199 * 4_000]
+        lambda: [m for m in w.read() if m.get_type() == "HIL_SENSOR" and m.time_usec == 199 * 4_000]
     )
     assert w.router.process.poll() is None
 
 
-def test_a_line_that_is_too_full_is_said_and_sensors_go_first(wires):
+def test_a_full_line_gives_a_warning_and_sensors_go_first(wires):
     w = wires("--hil-rate", "250", baud=57600)
     request = w.codec.encode(mavlink2.MAVLink_param_request_list_message(1, 1))
     k = 0
@@ -303,25 +303,25 @@ def test_a_line_that_is_too_full_is_said_and_sensors_go_first(wires):
         w.plant.sendall(w.codec.encode(sensor(4_000 * k)))
         for _ in range(5):
             w.bridge.sendto(request, ("127.0.0.1", w.udp))
-        w.hear()
+        w.read()
         return "% of the line" in w.router.output
 
     w.until(warned)
     assert "bytes/s to the flight controller" in w.router.output
-    kinds = [m.get_type() for m in w.heard]
+    kinds = [m.get_type() for m in w.received]
     assert kinds.count("HIL_SENSOR") > kinds.count("PARAM_REQUEST_LIST")
 
 
-def test_plugged_in_again_it_goes_on(wires):
+def test_the_router_continues_after_reconnection(wires):
     w = wires()
     w.unplug()
-    w.router.until_said("lost: the motors stand still")
+    w.router.until_said("lost: motor commands are zero")
     answer = Framer(Codec(9, 9)).stream(w.plant.recv(500))[0]
     assert answer.mode == 0 and set(answer.controls) == {0.0}
     w.plug()
-    w.router.until_said("flight controller is up")
+    w.router.until_said("flight controller is open")
     w.plant.sendall(w.codec.encode(sensor(8_000)))
-    w.until(lambda: [m for m in w.hear() if m.get_type() == "HIL_SENSOR"])
+    w.until(lambda: [m for m in w.read() if m.get_type() == "HIL_SENSOR"])
     assert w.router.interrupt(times=3) == 0 and "Traceback" not in w.router.output
 
 

@@ -1,4 +1,4 @@
-"""Waiting on a machine that stands still now and then."""
+"""Patience: time limits that do not count pauses of the machine."""
 
 import math
 
@@ -16,7 +16,7 @@ def clock(monkeypatch):
     return now
 
 
-def test_it_runs_out_after_its_seconds(clock):
+def test_it_is_over_after_its_seconds(clock):
     waiting = Patience(1.0)
     for _ in range(9):
         clock[0] += 0.1
@@ -26,7 +26,7 @@ def test_it_runs_out_after_its_seconds(clock):
     assert waiting.left == 0.0
 
 
-def test_a_machine_that_stood_still_does_not_use_it_up(clock):
+def test_a_pause_of_the_machine_counts_one_slice(clock):
     waiting = Patience(10.0)
     clock[0] += 3600.0
     assert waiting.left == pytest.approx(10.0 - SLICE)

@@ -1,4 +1,4 @@
-"""Private instances: two flights never share one, and a dead flight blocks nothing."""
+"""Instances: two flights never share one, and a killed flight leaves its instance free."""
 
 import socket
 import subprocess
@@ -31,7 +31,7 @@ def test_two_reservations_differ_and_leave_no_file(tmp_path):
 
 def test_a_taken_instance_is_refused_by_name(tmp_path):
     with Reservation(folder=tmp_path) as first:
-        with pytest.raises(PortError, match="another flight has it"):
+        with pytest.raises(PortError, match="reserved by another flight"):
             Reservation(first.ports.instance, folder=tmp_path)
     with Reservation(first.ports.instance, folder=tmp_path) as again:
         assert again.ports == first.ports

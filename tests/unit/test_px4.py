@@ -1,4 +1,4 @@
-"""Finding PX4, its parameters, and what remains of a run; the program here is a script."""
+"""Search for PX4, its parameters, its log and process; a shell script replaces PX4."""
 
 import os
 import signal
@@ -24,7 +24,7 @@ while true; do sleep 0.05; done
 
 @pytest.fixture
 def build(tmp_path):
-    """A directory like a PX4 build."""
+    """Return a directory with the files of a PX4 build."""
     folder = tmp_path / "build" / "px4_sitl_default"
     (folder / "bin").mkdir(parents=True)
     (folder / "etc" / "init.d-posix").mkdir(parents=True)
@@ -71,11 +71,11 @@ def test_px4_flies_with_the_stand_ins_rate_loop_and_mocap_alone():
     "text, said",
     [
         ("[1, 2]", "NAME: value"),
-        ("mc_roll_p: 1.0", "no name"),
+        ("mc_roll_p: 1.0", "no PX4 parameter name"),
         ("MC_ROLL_P: high", "not a number"),
         ("MC_ROLL_P: .nan", "not a number"),
         ("A: [", "not valid YAML"),
-        ("A_NAME_THAT_IS_TOO_LONG: 1", "no name"),
+        ("A_NAME_THAT_IS_TOO_LONG: 1", "no PX4 parameter name"),
     ],
 )
 def test_bad_parameters_are_refused(text, said, tmp_path):

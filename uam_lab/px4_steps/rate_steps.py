@@ -26,7 +26,7 @@ from uam_lab.report.figures import style
 from uam_lab.results.atomic import replacing, write_rows, write_text
 from uam_lab.results.result_folder import ResultFolderError, as_json, make_folder
 from uam_sim_bridge.ports import PortError, Reservation
-from uam_sim_bridge.px4.installation import WANTED, Px4Error, Px4Installation
+from uam_sim_bridge.px4.installation import REQUIRED, Px4Error, Px4Installation
 
 STAND_IN, PX4 = "stand-in", "PX4"
 STAND_IN_MODULE, SITL_MODULE = "uam_sim_bridge.autopilot.server", "uam_sim_bridge.px4.sitl"
@@ -119,7 +119,7 @@ def main() -> int:
         epilog="example: python -m uam_lab.px4_steps.rate_steps --px4-dir "
         "~/PX4-Autopilot/build/px4_sitl_default --out results/rate-steps",
     )
-    parser.add_argument("--px4-dir", metavar="DIR", help=WANTED)
+    parser.add_argument("--px4-dir", metavar="DIR", help=REQUIRED)
     parser.add_argument(
         "--out", type=Path, metavar="DIR", help="result folder (default results/<time>-rate-steps)"
     )

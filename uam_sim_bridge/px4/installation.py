@@ -1,4 +1,4 @@
-"""Where PX4 is: a build directory of PX4 SITL that the user points at. None is contained here."""
+"""Finds a PX4 SITL build in the directory that the user gives. This project contains no PX4."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 VARIABLE = "PX4_SITL_DIR"
-WANTED = (
+REQUIRED = (
     f"--px4-dir DIR or {VARIABLE}: a PX4 build directory with bin/px4 and etc/, "
     "as build/px4_sitl_default after `make px4_sitl_default`"
 )
@@ -16,7 +16,7 @@ _IN_SOURCES = "build/px4_sitl_default"
 
 
 class Px4Error(ValueError):
-    """No PX4 can be run; the text is one line and says what is wanted."""
+    """PX4 cannot be run; the text is one line: what is wrong and what is required."""
 
 
 @dataclass(frozen=True)
@@ -27,26 +27,26 @@ class Px4Installation:
 
     @property
     def binary(self) -> Path:
-        """The program."""
+        """Return the path of the program."""
         return self.directory / "bin" / "px4"
 
     @property
     def etc(self) -> Path:
-        """Its start-up scripts."""
+        """Return the directory of the start-up scripts."""
         return self.directory / "etc"
 
     @classmethod
     def find(cls, directory: str | Path | None = None) -> Px4Installation:
-        """Return the build in `directory`, by default that of the environment variable.
+        """Return the build in `directory`; None: in the directory of the variable PX4_SITL_DIR.
 
-        PX4's source directory is taken for the build in it. Raises Px4Error.
+        For PX4's source directory it returns the build in build/px4_sitl_default. Raises Px4Error.
         """
         given = directory or os.environ.get(VARIABLE)
         if not given:
-            raise Px4Error(f"no PX4 to fly with: give {WANTED}")
+            raise Px4Error(f"no PX4 build given: set {REQUIRED}")
         base = Path(given).expanduser().absolute()
         for place in (base, base / _IN_SOURCES):
             found = cls(place)
             if os.access(found.binary, os.X_OK) and (place / _STARTUP).is_file():
                 return found
-        raise Px4Error(f"{given} holds no PX4 build; give {WANTED}")
+        raise Px4Error(f"{given} holds no PX4 build: set {REQUIRED}")

@@ -1,4 +1,4 @@
-"""The parameters that a PX4 of ours flies with: names and values, as PX4 calls them."""
+"""PX4's parameters for this vehicle: PX4's names and their values, from config/."""
 
 from __future__ import annotations
 
@@ -10,16 +10,16 @@ from pathlib import Path
 from uam_control.settings import configuration, yaml_file
 from uam_sim_bridge.px4.installation import Px4Error
 
-FILES = ("autopilot/s500.yaml", "px4/s500.yaml")  # of config/; a later one overrides
-AIRFRAME = "SYS_AUTOSTART"  # chosen before parameters are set
-_NAME = re.compile(r"[A-Z][A-Z0-9_]{0,15}")  # MAVLink carries 16 bytes
+FILES = ("autopilot/s500.yaml", "px4/s500.yaml")  # of config/; later files override earlier ones
+AIRFRAME = "SYS_AUTOSTART"  # PX4 selects the airframe before it sets parameters
+_NAME = re.compile(r"[A-Z][A-Z0-9_]{0,15}")  # at most 16 bytes in MAVLink
 Value = int | float
 
 
 def load(files: Sequence[str | Path] | None = None) -> dict[str, Value]:
-    """Read YAML files of `NAME: value` and merge them; by default those of config/.
+    """Read and merge YAML files of `NAME: value`; files None: those of config/.
 
-    An integer stays one: PX4 tells its INT32 parameters by that. Raises Px4Error.
+    Integers stay integers: PX4 requires them for INT32 parameters. Raises Px4Error.
     """
     values: dict[str, Value] = {}
     for file in files or [configuration.path(name) for name in FILES]:
@@ -28,7 +28,7 @@ def load(files: Sequence[str | Path] | None = None) -> dict[str, Value]:
 
 
 def environment(values: dict[str, Value]) -> dict[str, str]:
-    """The variables from which PX4's start-up script takes airframe and parameters."""
+    """Return the environment variables for PX4's start-up script: airframe and parameters."""
     return {
         "PX4_SYS_AUTOSTART" if name == AIRFRAME else f"PX4_PARAM_{name}": f"{value}"
         for name, value in values.items()
@@ -41,7 +41,7 @@ def _read(file: Path) -> dict[str, Value]:
         raise Px4Error(f"{file}: 'NAME: value' lines expected")
     for name, value in values.items():
         if not isinstance(name, str) or not _NAME.fullmatch(name):
-            raise Px4Error(f"{file}: '{name}' is no name of a PX4 parameter")
+            raise Px4Error(f"{file}: '{name}' is no PX4 parameter name: A-Z, 0-9, _, at most 16")
         if isinstance(value, bool) or not isinstance(value, Value) or not math.isfinite(value):
             raise Px4Error(f"{file}: {name}: {value!r} is not a number")
     return values

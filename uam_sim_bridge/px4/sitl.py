@@ -1,8 +1,8 @@
 """Executable `px4_sitl`: PX4 in software as the autopilot of a flight.
 
-It runs in a fresh directory, so that no parameter of an earlier flight is left, on the ports of its
-instance (TCP 4560 + N of the simulator, UDP 14580 + N), with the parameters of config/. PX4's own
-log (ULog) is kept. Its clock is the simulator's: PX4 waits for each HIL_SENSOR.
+It runs in a new directory, so that no parameter of an earlier flight remains. It uses the ports of
+its instance (TCP 4560 + N of the simulator, UDP 14580 + N) and the parameters of config/. PX4's log
+(ULog) is saved on request. PX4's clock is the simulator's: PX4 waits for each HIL_SENSOR.
 """
 
 from __future__ import annotations
@@ -22,16 +22,16 @@ from pathlib import Path
 from uam_control.settings.configuration import ConfigurationError
 from uam_sim_bridge.mavlink.hil.sitl_options import instance
 from uam_sim_bridge.px4 import px4_parameters as parameters
-from uam_sim_bridge.px4.installation import WANTED, Px4Error, Px4Installation
+from uam_sim_bridge.px4.installation import REQUIRED, Px4Error, Px4Installation
 
-PATIENCE = 2.0  # [s] for PX4 to end when asked; without a simulator its clock stands still
-POLL = 0.05  # [s]
+PATIENCE = 2.0  # s between SIGINT and SIGKILL; PX4 cannot end while its clock is stopped
+POLL = 0.05  # s
 LOG_SUFFIX = ".ulg"
 _PR_SET_PDEATHSIG = 1  # Linux's <sys/prctl.h>
 
 
 class Sitl:
-    """One running PX4. A context manager: PX4 ends with the `with` block."""
+    """A running PX4. A context manager: stops PX4 at the end of the `with` block."""
 
     def __init__(
         self,
@@ -40,7 +40,7 @@ class Sitl:
         values: dict[str, parameters.Value],
         folder: Path,
     ) -> None:
-        """Start PX4 with working directory `folder` (existing, empty)."""
+        """Start PX4; values: parameters by name; folder: working directory, existing and empty."""
         surroundings = {k: v for k, v in os.environ.items() if not k.startswith("PX4_")}
         self._folder = folder
         self.process = subprocess.Popen(
@@ -53,12 +53,12 @@ class Sitl:
         )
 
     def logs(self) -> list[Path]:
-        """PX4's own logs, oldest first."""
+        """Return PX4's log files, oldest first."""
         found = self._folder.glob(f"log/**/*{LOG_SUFFIX}")
         return sorted(found, key=lambda file: file.stat().st_mtime)
 
     def stop(self) -> None:
-        """Interrupt PX4, then kill it: with the simulator gone it cannot end by itself."""
+        """Send SIGINT, then SIGKILL: without a simulator PX4 does not end on SIGINT."""
         if self.process.poll() is None:
             os.killpg(self.process.pid, signal.SIGINT)
             try:
@@ -75,15 +75,15 @@ class Sitl:
 
 
 def _end_with_parent() -> None:
-    """In the child: be killed when the parent is, however that happens. Linux alone has this."""
+    """In the child process: end when the parent ends (Linux only)."""
     if sys.platform == "linux":
         ctypes.CDLL(None).prctl(_PR_SET_PDEATHSIG, signal.SIGKILL)
 
 
 def keep(logs: Sequence[Path], target: Path) -> list[Path]:
-    """Move PX4's logs to `target`, further ones to <stem>-2<suffix> and so on; returns the files.
+    """Move PX4's logs to `target`, `target`-2, ...; return the new paths.
 
-    More than one exist where PX4 was armed more than once.
+    PX4 writes one log per arming.
     """
     kept = []
     for number, log in enumerate(logs, 1):
@@ -94,7 +94,7 @@ def keep(logs: Sequence[Path], target: Path) -> list[Path]:
 
 
 def parser() -> argparse.ArgumentParser:
-    """The command line."""
+    """Return the parser of the command line."""
     p = argparse.ArgumentParser(
         prog="px4_sitl",
         formatter_class=argparse.RawDescriptionHelpFormatter,
@@ -113,7 +113,7 @@ def parser() -> argparse.ArgumentParser:
         metavar="N",
         help="PX4 instance number, added to the ports (default %(default)s)",
     )
-    p.add_argument("--px4-dir", metavar="DIR", help=WANTED)
+    p.add_argument("--px4-dir", metavar="DIR", help=REQUIRED)
     p.add_argument(
         "--params",
         metavar="FILE",
@@ -124,13 +124,16 @@ def parser() -> argparse.ArgumentParser:
         "--log",
         type=Path,
         metavar="FILE",
-        help=f"keep PX4's log as FILE{LOG_SUFFIX} (default: it is thrown away)",
+        help=f"save PX4's log as FILE{LOG_SUFFIX} (default: the log is deleted)",
     )
     return p
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Run until interrupted: 0; PX4 ended by itself: its status; no PX4 or wrong use: 2."""
+    """Run PX4 until interrupted; return the exit status.
+
+    0: interrupted; PX4's status if PX4 ended by itself; 2: no PX4 or wrong use.
+    """
     options = parser().parse_args(arguments)
     signal.signal(signal.SIGTERM, lambda *_: sys.exit(0))
     try:

@@ -1,1 +1,1 @@
-"""The simulator link of PX4, and the router for hardware in the loop."""
+"""PX4's simulator link (software in the loop) and the router for hardware in the loop."""

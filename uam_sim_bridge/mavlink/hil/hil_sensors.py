@@ -1,7 +1,7 @@
-"""Magnetometer and barometer of HIL_SENSOR, derived from the truth; noise is seeded.
+"""Magnetometer and barometer of HIL_SENSOR, from the true state plus seeded noise.
 
-The control laws use neither; PX4 wants to see both alive (its data validator takes a constant value
-for a dead sensor).
+The control laws use neither sensor. PX4 requires both: its data validator reports a sensor with a
+constant value as failed.
 """
 
 from __future__ import annotations
@@ -28,18 +28,18 @@ def pressure_at(altitude: float) -> float:
 
 
 def altitude_of(pressure: float) -> float:
-    """Return the pressure altitude [m] of a static pressure [hPa]: the inverse."""
+    """Return the pressure altitude [m] of a static pressure [hPa]: inverse of pressure_at."""
     return _SEA_TEMPERATURE / _LAPSE * (1.0 - (pressure / _SEA_PRESSURE) ** (1.0 / _EXPONENT))
 
 
 class SlowSensors:
-    """The two sensors that update at 50 Hz."""
+    """Magnetometer and barometer, both updated at 50 Hz."""
 
     def __init__(self, seed: int) -> None:
         self._noise = np.random.default_rng(seed)
 
     def magnetometer(self, quaternion_ned: np.ndarray) -> list[float]:
-        """Return the field (3,) [gauss, FRD] for the attitude FRD → NED [w x y z]."""
+        """Return the field (3,) [gauss, FRD]; quaternion_ned (4,): attitude FRD → NED [w x y z]."""
         field = rotate_back(matrix_from_quaternion(quaternion_ned), FIELD)
         return (field + self._noise.normal(0.0, _MAG_NOISE, 3)).tolist()
 

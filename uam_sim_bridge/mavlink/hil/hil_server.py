@@ -1,8 +1,8 @@
-"""The simulator's side of the HIL link: a TCP server that an autopilot (PX4 SITL, or the stand-in)
-connects to. Each tick: HIL_SENSOR out, HIL_ACTUATOR_CONTROLS back, within a bounded time.
+"""The simulator's side of the HIL link: a TCP server to which an autopilot (PX4 SITL, or the
+stand-in) connects. Each tick sends HIL_SENSOR and waits for HIL_ACTUATOR_CONTROLS.
 
-How long an answer is waited for: an autopilot that answered the last tick gets `answer_timeout`;
-one that did not (booting, or silent as PX4 is while disarmed without a stream) `silent_timeout`.
+The wait is limited by `answer_timeout` if the autopilot answered the last tick, else by
+`silent_timeout`. PX4 sends no answer during boot and while disarmed without a setpoint stream.
 """
 
 from __future__ import annotations
@@ -27,27 +27,27 @@ _SLOW_PERIOD = 0.02  # s
 
 
 class HilError(PortError):
-    """The simulator's port cannot be had; the text is one line."""
+    """The simulator's port cannot be opened; the text is one line."""
 
 
 @dataclass(frozen=True)
 class HilParameters(ParameterSet):
-    """Waiting times of the HIL link (wall time)."""
+    """Time limits of the HIL link (wall time)."""
 
     answer_timeout: float = number(
-        2.0, "wait for the answer of an autopilot that answered the last tick", "s", 0.001, 60.0
+        2.0, "longest wait for an answer after an answered tick", "s", 0.001, 60.0
     )
     silent_timeout: float = number(
-        0.05, "wait for the answer of one that did not", "s", 0.0005, 10.0
+        0.05, "longest wait for an answer after a tick without answer", "s", 0.0005, 10.0
     )
 
 
 class HilServer:
-    """The server; one autopilot at a time.
+    """TCP server for one autopilot at a time.
 
-    `motors` (4,): the latest commands 0..1 in PX4's order, zero while disarmed; `armed`;
-    `answered`: whether the last tick was answered; `missed`: ticks without an answer after the
-    first answer.
+    `motors` (4,): newest motor commands 0..1 in PX4's order, zero while disarmed; `armed`: from
+    HIL_ACTUATOR_CONTROLS; `answered`: whether the last tick was answered; `missed`: number of
+    ticks without an answer after the first answer.
     """
 
     def __init__(
@@ -57,7 +57,7 @@ class HilServer:
         parameters: HilParameters | None = None,
         seed: int = 0,
     ) -> None:
-        """Listen on TCP `port`; raises HilError in one line where it is taken."""
+        """Listen on TCP `port`; seed: of the noise. Raises HilError if the port is in use."""
         self.parameters = (parameters or HilParameters()).validated()
         self.motors = np.zeros(4)
         self.armed = False
@@ -87,11 +87,11 @@ class HilServer:
 
     @property
     def connected(self) -> bool:
-        """Whether an autopilot is connected."""
+        """Return whether an autopilot is connected."""
         return self._link is not None
 
     def accept(self, timeout: float) -> bool:
-        """Wait up to `timeout` seconds for an autopilot to connect; whether one is connected."""
+        """Wait up to `timeout` [s] for a connection; return whether an autopilot is connected."""
         if self._link is None and select.select([self._listener], [], [], timeout)[0]:
             self._link, _ = self._listener.accept()
             self._link.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
@@ -106,9 +106,9 @@ class HilServer:
         position: np.ndarray,
         quaternion: np.ndarray,
     ) -> np.ndarray:
-        """Send the sensors of a tick, wait for the answer and return `motors`: `send`, `receive`.
+        """Send the sensors of a tick, wait for the answer, return `motors` (4,): send and receive.
 
-        Without an autopilot, or when it hangs up (then `connected` turns false), they stand still.
+        Arguments: see `send`. Without a connection, or if the autopilot closes it, they are zero.
         """
         self.send(time, gyro, accel, position, quaternion)
         return self.receive()
@@ -123,8 +123,8 @@ class HilServer:
     ) -> None:
         """Send the sensors of the tick at `time` [s].
 
-        gyro (3,) [rad/s], specific force accel (3,) [m/s^2], FLU; true position (3,) [m, ENU] and
-        quaternion [w x y z] FLU → ENU, for magnetometer and barometer.
+        gyro (3,) [rad/s, FLU]; accel (3,): specific force [m/s^2, FLU]; true position (3,)
+        [m, ENU] and quaternion (4,) FLU → ENU [w x y z], for magnetometer and barometer.
         """
         if self._link is None:
             return
@@ -133,9 +133,9 @@ class HilServer:
             self._stop()
 
     def receive(self, timeout: float | None = None) -> np.ndarray:
-        """Wait for the answer to the last `send` and return `motors`; a late one counts as missed.
+        """Wait for the answer to the last `send`; return `motors` (4,), also without an answer.
 
-        timeout [s of wall time]: None takes `answer_timeout` or `silent_timeout`, see above.
+        timeout: wall time [s]; None for `answer_timeout` or `silent_timeout` (module docstring).
         """
         if self._link is None:
             return self.motors
@@ -163,14 +163,14 @@ class HilServer:
         position_deviation: float,
         attitude_deviation: float,
     ) -> None:
-        """Send a mocap pose (ENU, FLU → ENU) to the autopilot over this link; stamp [s]."""
+        """Send a mocap pose to the autopilot over this link: see `vision_message`."""
         if self._link is not None and not self._send(
             vision_message(stamp, position, quaternion, position_deviation, attitude_deviation)
         ):
             self._stop()
 
     def close(self) -> None:
-        """Hang up and give the port back."""
+        """Close the connection and release the port."""
         self._stop()
         self._listener.close()
 

@@ -1,4 +1,4 @@
-"""As many HIL_SENSOR per second as a serial line carries next to the setpoints."""
+"""Reduces the rate of HIL_SENSOR to what a serial line carries beside setpoints and vision."""
 
 from __future__ import annotations
 
@@ -8,14 +8,14 @@ from uam_sim_bridge.mavlink.protocol.wire import Message
 
 SENSOR_BYTES, SETPOINT_BYTES, VISION_BYTES = 77, 51, 129  # longest frames on the line
 FULL_RATE, VISION_RATE = 250.0, 50.0  # Hz, of the control ticks and of vision poses
-LEAST_RATE = 50.0  # Hz, below which no flight controller flies on them
-USABLE = 0.8  # of the line: what is more queues up
+LEAST_RATE = 50.0  # Hz, lowest sensor rate with which a flight controller flies
+USABLE = 0.8  # of the line's rate; above it frames wait in the queue
 
 
 def sustainable_rate(bytes_per_second: float | None) -> float:
     """Return the rate [Hz] of HIL_SENSOR that a line carries, at most FULL_RATE.
 
-    Raises ValueError where that is below LEAST_RATE. None stands for a line without a limit.
+    bytes_per_second: None for a line without limit. Raises ValueError below LEAST_RATE.
     """
     if bytes_per_second is None:
         return FULL_RATE
@@ -31,20 +31,20 @@ def sustainable_rate(bytes_per_second: float | None) -> float:
 
 
 class Thinner:
-    """Lets HIL_SENSOR through at a rate; what the others said to be new counts for the next."""
+    """Passes HIL_SENSOR at a rate, with the `fields_updated` of the dropped messages included."""
 
     def __init__(self, rate: float) -> None:
-        """rate [Hz] on the sensors' own time."""
+        """rate [Hz], in the time of the sensor messages."""
         self._interval = 1e6 / rate
         self._due = -math.inf
         self._last = -math.inf
         self._fields = 0
 
     def take(self, message: Message) -> bool:
-        """Whether the message goes on; its `fields_updated` then tells of those before as well."""
+        """Return whether the message passes; its `fields_updated` then covers the dropped ones."""
         stamp = message.time_usec
         self._fields |= message.fields_updated
-        if stamp < self._last:  # the simulator began anew
+        if stamp < self._last:  # the simulator has restarted
             self._due = -math.inf
         self._last = stamp
         if stamp < self._due - 1.0:

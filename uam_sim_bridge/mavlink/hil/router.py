@@ -9,11 +9,11 @@
 | flight controller | all others of the common dialect | bridge |
 | plant, bridge | all of the common dialect | flight controller |
 
-On a full line HIL_SENSOR, HIL_GPS and SET_ATTITUDE_TARGET go first (`outbox.py`); HIL_SENSOR are
-thinned to what the line carries (`hil_thinning.py`). A flight controller has a clock of its own:
-its commands go to the plant with the time of the newest sensors, and a sensor message that was
-left out is answered with the commands known. When the flight controller's link is lost, the plant
-is told once that the motors stand still.
+On a full line HIL_SENSOR, HIL_GPS and SET_ATTITUDE_TARGET are sent first (`outbox.py`). HIL_SENSOR
+is thinned to the rate that the line carries (`hil_thinning.py`). A flight controller has its own
+clock: the router stamps its motor commands with the time of the newest HIL_SENSOR, and answers a
+dropped HIL_SENSOR with the newest motor commands. When the link to the flight controller is lost,
+the router sends zero motor commands to the plant once.
 """
 
 from __future__ import annotations
@@ -37,21 +37,21 @@ from uam_sim_bridge.mavlink.transport.transport import ALLOWED, Transport, open_
 from uam_sim_bridge.ports import PortError
 
 NAME = "hitl_router"
-LOOK_PERIOD = 0.1  # s, the longest wait: a lost link is tried again, the load looked at
-FULL = 0.8  # of the line, from which a warning is given
+CHECK_PERIOD = 0.1  # s, longest wait; then a lost link is opened again and the load checked
+FULL = 0.8  # of the line's rate, threshold of the warning
 WARN_PERIOD = 10.0  # s between two warnings of the same direction
-PLANT_PATIENCE = 5.0  # s for the plant to take a message
-AUTOPILOT_IDS, PLANT_IDS = (1, 1), (1, 200)  # system and component, where a message is packed anew
+PLANT_PATIENCE = 5.0  # s, time limit of a send to the plant
+AUTOPILOT_IDS, PLANT_IDS = (1, 1), (1, 200)  # system and component of messages encoded here
 TO, FROM = "to the flight controller", "from the flight controller"
 
 
 class Router:
-    """One flight controller, one plant, one bridge; `run` serves until the plant hangs up."""
+    """Connects one flight controller, one plant and one bridge."""
 
     def __init__(
         self, controller: Transport, plant: socket.socket, bridge: UdpPort, hil_rate: float
     ) -> None:
-        """hil_rate [Hz]: HIL_SENSOR to the flight controller, at most."""
+        """hil_rate [Hz]: highest rate of HIL_SENSOR to the flight controller."""
         self._controller, self._plant, self._bridge = controller, plant, bridge
         plant.settimeout(PLANT_PATIENCE)
         self._as_autopilot, self._as_plant = Codec(*AUTOPILOT_IDS), Codec(*PLANT_IDS)
@@ -63,29 +63,29 @@ class Router:
         self._warned = dict.fromkeys(self.meters, -math.inf)
         self._stamp = 0  # us, of the newest HIL_SENSOR
         self._commands: Message | None = None  # the newest HIL_ACTUATOR_CONTROLS
-        self._there = controller.connected
+        self._was_connected = controller.connected
 
     def run(self) -> None:
-        """Serve until the plant hangs up."""
+        """Forward messages until the plant closes its connection."""
         while self._step():
             pass
 
     def _step(self) -> bool:
-        """Wait for something, carry it on; False once the plant has hung up."""
+        """Wait for messages and forward them; False after the plant has closed its connection."""
         readable = self._wait()
-        going_on = True
+        plant_open = True
         if self._plant in readable:
-            going_on = self._take_plant()
+            plant_open = self._take_plant()
         for message in self._bridge.receive():
             self._to_controller(message)
         for data in self._controller.receive():
             self.meters[FROM].add(len(data))
             for message in self._from_controller.take(data, self._controller.stream):
-                going_on = self._take_controller(message) and going_on
+                plant_open = self._take_controller(message) and plant_open
         now = clock.monotonic()
         self.meters[TO].add(self._outbox.flush(now))
         self._watch(now)
-        return going_on and self._look_at_link()
+        return plant_open and self._check_link()
 
     def _wait(self) -> list:
         sources: list = [self._plant, self._bridge]
@@ -93,8 +93,8 @@ class Router:
         if number >= 0:
             sources.append(number)
             if pause is not None and pause <= 0.0:
-                drain = [number]  # the device itself is full
-        timeout = LOOK_PERIOD if pause is None or drain else min(pause, LOOK_PERIOD)
+                drain = [number]  # wait until the device accepts bytes
+        timeout = CHECK_PERIOD if pause is None or drain else min(pause, CHECK_PERIOD)
         return select.select(sources, drain, [], timeout)[0]
 
     def _take_plant(self) -> bool:
@@ -111,7 +111,7 @@ class Router:
         return bool(data)
 
     def _sensor(self, message: Message) -> bool:
-        """Carry sensors on, or answer them; False where the plant does not take the answer."""
+        """Forward a HIL_SENSOR, or answer it if dropped; False if the plant's link is lost."""
         self._stamp = message.time_usec
         before = message.fields_updated
         if not self._controller.connected:
@@ -142,16 +142,16 @@ class Router:
             return False
         return True
 
-    def _look_at_link(self) -> bool:
-        """Notice that the flight controller's link is lost or back."""
-        there = self._controller.connected
-        if there == self._there:
+    def _check_link(self) -> bool:
+        """Handle a loss or reconnection of the flight controller's link; False: plant closed."""
+        connected = self._controller.connected
+        if connected == self._was_connected:
             return True
-        self._there = there
-        if there:
-            say("the link to the flight controller is up")
+        self._was_connected = connected
+        if connected:
+            say("the link to the flight controller is open")
             return True
-        say("the link to the flight controller is lost: the motors stand still")
+        say("the link to the flight controller is lost: motor commands are zero")
         self._outbox.clear()
         self._commands = None
         self._from_controller = Framer(self._as_autopilot)
@@ -173,33 +173,33 @@ class Router:
                 )
 
     def summary(self) -> str:
-        """Return in one line what the link carried."""
+        """Return highest rates and losses of the link in one line."""
         rates = ", ".join(f"{m.highest:.0f} bytes/s {d}" for d, m in self.meters.items())
         return (
             f"at most {rates}; {self._outbox.dropped} messages dropped, "
-            f"{self._from_controller.bad_bytes} bytes of garbage"
+            f"{self._from_controller.bad_bytes} invalid bytes"
         )
 
 
 def say(text: str) -> None:
-    """Print a line."""
+    """Print a line with the program's name."""
     print(f"{NAME}: {text}", flush=True)
 
 
 def _stop(*_: object) -> None:
-    """End quietly, however often the signal comes."""
+    """Exit without a traceback; ignore further signals."""
     for each in (signal.SIGINT, signal.SIGTERM):
         signal.signal(each, signal.SIG_IGN)
     sys.exit(0)
 
 
 def parser() -> argparse.ArgumentParser:
-    """The command line."""
+    """Return the parser of the command line."""
     p = argparse.ArgumentParser(
         prog=NAME,
         formatter_class=argparse.RawDescriptionHelpFormatter,
-        description="Puts a flight controller in HITL mode in the place of PX4 SITL: one link to "
-        "it,\nTCP to the simulator, UDP to the bridge.",
+        description="Connects a flight controller in HITL mode in place of PX4 SITL: one link to\n"
+        "the flight controller, TCP to the simulator, UDP to the bridge.",
         epilog="examples:\n"
         "  hitl_router serial:/dev/ttyACM0:921600               instance 0\n"
         "  hitl_router serial:/dev/ttyUSB0:460800 --hil-rate 200\n"
@@ -210,14 +210,17 @@ def parser() -> argparse.ArgumentParser:
         "--hil-rate",
         type=number("rate in Hz", 1.0, 1000.0),
         metavar="HZ",
-        help="HIL_SENSOR per second, at most (default: what the line carries, up to 250)",
+        help="highest rate of HIL_SENSOR (default: the rate that the line carries, up to 250)",
     )
     add_port_options(p)
     return p
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Run until the simulator hangs up or a signal comes: 0; wrong use, no port or device: 2."""
+    """Run until the simulator closes the link or a signal; return the exit status.
+
+    0: ended by simulator or signal; 2: wrong use, or a port or device cannot be opened.
+    """
     options = parser().parse_args(arguments)
     fill_ports(options)
     for each in (signal.SIGINT, signal.SIGTERM):

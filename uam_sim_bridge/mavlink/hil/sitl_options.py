@@ -1,4 +1,4 @@
-"""Command line options of the programs on PX4 SITL's ports: the autopilot, the HITL router."""
+"""Command line options for the ports of PX4 SITL: shared by autopilot stand-in and HITL router."""
 
 from __future__ import annotations
 
@@ -11,19 +11,21 @@ from uam_sim_bridge.ports import AUTOPILOT_UDP, OFFBOARD_UDP, SIMULATOR_TCP
 
 
 def port(text: str) -> int:
+    """Return a port number; an argparse type."""
     if not text.isdecimal() or not 1 <= int(text) <= 65535:
         raise argparse.ArgumentTypeError(f"{text} is not a port (1..65535)")
     return int(text)
 
 
 def instance(text: str) -> int:
+    """Return a PX4 instance number; an argparse type."""
     if not text.isdecimal() or int(text) > 254:
         raise argparse.ArgumentTypeError(f"{text} is not an instance number (0..254)")
     return int(text)
 
 
 def number(what: str, low: float, high: float) -> Callable[[str], float]:
-    """Return an argparse type: a number from `low` to `high`, called `what` when refused."""
+    """Return an argparse type: a number from `low` to `high`; what: its name in errors."""
 
     def read(text: str) -> float:
         try:
@@ -58,19 +60,19 @@ def add_port_options(p: argparse.ArgumentParser) -> None:
         "--companion-port",
         type=port,
         metavar="PORT",
-        help="UDP port told unasked until a peer speaks (default 14540 + N)",
+        help="UDP destination until a peer sends a message (default 14540 + N)",
     )
     p.add_argument(
         "--wait",
         type=number("time in seconds", 0.0, 86400.0),
         default=60.0,
         metavar="SECONDS",
-        help="how long to wait for the simulator (default %(default)g)",
+        help="longest wait for the simulator (default %(default)g)",
     )
 
 
 def fill_ports(options: argparse.Namespace) -> None:
-    """Put the instance's ports where none were given."""
+    """Fill in the instance's default for each port that is not given."""
     n = options.instance
     options.sim_port = options.sim_port or SIMULATOR_TCP + n
     options.mavlink_port = options.mavlink_port or AUTOPILOT_UDP + n

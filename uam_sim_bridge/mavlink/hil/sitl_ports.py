@@ -1,4 +1,4 @@
-"""The autopilot's ends of PX4 SITL's ports: UDP to the companion computer, TCP to the simulator."""
+"""The autopilot's ports as in PX4 SITL: UDP to the companion computer, TCP to the simulator."""
 
 from __future__ import annotations
 
@@ -12,12 +12,12 @@ HOST = "127.0.0.1"
 
 
 class UdpPort:
-    """The companion side: answers only the first peer that sends a valid message, as PX4 does."""
+    """UDP to the companion computer; like PX4, answers only the first peer with a valid message."""
 
     def __init__(self, local: int, remote: int, codec: Codec) -> None:
-        """local: port to listen on; remote: port told unasked until a peer has spoken.
+        """local: port to listen on; remote: destination until the first peer sends a message.
 
-        Raises PortError where the port is taken.
+        Raises PortError if the local port is in use.
         """
         self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
         try:
@@ -35,14 +35,14 @@ class UdpPort:
         self._locked = False
 
     def receive(self) -> list[Message]:
-        """Return all messages that have arrived."""
+        """Return all received messages."""
         messages: list[Message] = []
         while True:
             try:
                 data, sender = self._socket.recvfrom(65535)
             except BlockingIOError:
                 return messages
-            except ConnectionError:  # the peer's port was closed when we sent last
+            except ConnectionError:  # the peer's port was closed at the last send
                 continue
             if self._locked and sender != self._peer:
                 continue
@@ -52,33 +52,33 @@ class UdpPort:
             messages += new
 
     def send(self, messages: list[Message]) -> None:
-        """Send each message in a datagram of its own; nobody listening is no error."""
+        """Send each message in its own datagram; a closed port of the peer is no error."""
         for message in messages:
             self.send_frame(self._codec.encode(message))
 
     def send_frame(self, frame: bytes) -> None:
-        """Send one packed message as it is."""
+        """Send one encoded message unchanged."""
         try:
             self._socket.sendto(frame, self._peer)
         except (BlockingIOError, ConnectionError):
             pass
 
     def fileno(self) -> int:
-        """Return the socket's number, for select."""
+        """Return the socket's file descriptor, for select."""
         return self._socket.fileno()
 
     def close(self) -> None:
-        """Give the port back."""
+        """Release the port."""
         self._socket.close()
 
 
 def connect(name: str, host: str, port: int, patience: float) -> socket.socket:
-    """Return the link to the simulator, waiting up to `patience` seconds for it to listen.
+    """Return a TCP connection to the simulator; waits up to `patience` [s] for its port to open.
 
-    name: of the program, for what it says meanwhile. Raises PortError when it does not.
+    name: program name in the printed line. Raises PortError after this time.
     """
     end = clock.monotonic() + patience
-    said = False
+    printed = False
     while True:
         try:
             link = socket.create_connection((host, port), timeout=max(0.1, patience))
@@ -91,9 +91,9 @@ def connect(name: str, host: str, port: int, patience: float) -> socket.socket:
                     f"no simulator at {host}:{port} within {patience:g} s "
                     f"({error.strerror or 'no answer'})"
                 ) from None
-            if not said:
+            if not printed:
                 print(f"{name}: waiting for the simulator at {host}:{port}", flush=True)
-                said = True
+                printed = True
             clock.sleep(0.05)
     link.settimeout(None)
     link.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
