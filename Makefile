@@ -10,7 +10,7 @@ ARGS ?=
 INSTALLED_FROM := pyproject.toml package.xml Makefile $(shell find ros -type f)
 
 .DEFAULT_GOAL := help
-.PHONY: help setup fly test slow lint clean
+.PHONY: help setup fly test slow mutants lint clean
 
 help:            ## this list
 	@sed -n 's/^\([a-z]*\):.*##/  make \1\t/p' Makefile
@@ -35,6 +35,10 @@ test: setup      ## the tests but the slow ones; options: make test ARGS="tests/
 
 slow: setup      ## the slow tests: whole missions, browser, PX4 if it is there; a quarter of an hour
 	@$(BIN)/python -m pytest -m slow tests
+
+mutants: setup   ## do the unit tests notice small errors? half an hour; make mutants ARGS="laws/"
+	@$(BIN)/python -m pip install --quiet --disable-pip-version-check -e ".[mutation]"
+	@$(BIN)/python benchmarks/mutants.py $(ARGS)
 
 lint: setup      ## style, errors that need no run, and who may import whom
 	@$(BIN)/ruff check . && $(BIN)/ruff format --check --quiet . && $(BIN)/lint-imports --no-cache --no-logo

@@ -5,10 +5,15 @@ import subprocess
 import sys
 from pathlib import Path
 
+import numba
 import pytest
 
 from uam_lab.flight.direct import warm_up
 from uam_lab.flight.ros import nodes as ros_nodes
+
+pytestmark = pytest.mark.skipif(
+    numba.config.DISABLE_JIT, reason="NUMBA_DISABLE_JIT: nothing is compiled"
+)
 
 CALLER = """
 from uam_control.maths.compiled import jit

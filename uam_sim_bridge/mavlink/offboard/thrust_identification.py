@@ -112,12 +112,15 @@ class ThrustIdentificationParameters(ParameterSet):
 def steady_force(state: np.ndarray, tilt_max: float, acceleration_max: float) -> float:
     """Return the specific force [m/s^2] along the thrust axis of state (3, 8), 0 if not steady.
 
-    0 as well where a number is not finite: every comparison with NaN is false.
+    0 as well where a number is not finite: a comparison with NaN is false, and math.cos of an
+    infinite angle raises an error in plain Python, while compiled it is NaN.
     """
     ax, ay, az = state[2, 0], state[2, 1], state[2, 2]
     if not ax * ax + ay * ay + az * az <= acceleration_max * acceleration_max:
         return 0.0
     roll, pitch, yaw = state[0, 3], state[0, 4], state[0, 5]
+    if not (math.isfinite(roll) and math.isfinite(pitch) and math.isfinite(yaw)):
+        return 0.0
     cr, sr, cp, sp = math.cos(roll), math.sin(roll), math.cos(pitch), math.sin(pitch)
     if not cp * cr >= math.cos(tilt_max):
         return 0.0

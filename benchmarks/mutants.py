@@ -1,0 +1,73 @@
+"""Do the unit tests notice errors? Puts small errors into modules, one at a time, and counts.
+
+    .venv/bin/python benchmarks/mutants.py                     # all modules of modules.toml
+    .venv/bin/python benchmarks/mutants.py laws/ rotations     # those whose path has such a text
+
+An error (a mutant) is killed where a test fails. mutating/modules.toml says which tests judge which
+module; mutating/survivors.toml lists the mutants that no test can kill, with the reason. Prints a
+table, and every survivor that is not listed. The exit status is 1 where there is one, or where too
+few were killed. Needs the extra `mutation` of the project.
+"""
+
+from __future__ import annotations
+
+import argparse
+import os
+import sys
+import tomllib
+from pathlib import Path
+
+os.environ["NUMBA_DISABLE_JIT"] = "1"  # before numba is imported: mutants are plain Python
+os.environ["OPENBLAS_NUM_THREADS"] = "1"
+os.environ["PYTEST_DISABLE_PLUGIN_AUTOLOAD"] = "1"
+
+from mutating import judge, table
+from mutating.mutants import Mutant, mutants
+
+DATA = Path(__file__).parent / "mutating"
+LEAST_TIME, TIMES = 10.0, 10.0  # a mutant may need 10 s, or ten times what the module needs
+
+
+def main() -> int:
+    """Judge the mutants and print the table; return the exit status."""
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument("modules", nargs="*", help="texts that paths must have (default: all)")
+    parser.add_argument("-j", type=int, default=2, help="processes (default %(default)s)")
+    options = parser.parse_args()
+    data = tomllib.loads((DATA / "modules.toml").read_text())
+    modules = {
+        path: tests
+        for path, tests in data["modules"].items()
+        if not options.modules or any(text in path for text in options.modules)
+    }
+    if not modules:
+        parser.error("no module of modules.toml has such a text in its path")
+    sources = {path: (judge.ROOT / path).read_text() for path in modules}
+    judge.prepare(data["examples"])
+
+    plain = ((path, path, sources[path], tests, 120.0) for path, tests in modules.items())
+    allowed = {}
+    for path, status, spent in judge.run(plain, options.j):
+        if status != 0:
+            sys.exit(f"mutants: the tests of {path} fail without a mutant (status {status})")
+        allowed[path] = max(LEAST_TIME, TIMES * spent)
+
+    found: dict[str, list[Mutant]] = {}
+    survivors: dict[str, list[Mutant]] = {}
+    for path, tests in modules.items():
+        found[path] = list(mutants(sources[path], data["operators"]))
+        jobs = ((one, path, one.source, tests, allowed[path]) for one in found[path])
+        survivors[path] = [one for one, status, _ in judge.run(jobs, options.j) if status == 0]
+        print(f"{path}: {len(survivors[path])} of {len(found[path])} left", file=sys.stderr)
+    listed = tomllib.loads((DATA / "survivors.toml").read_text())
+    result = table.Result(found, survivors, listed, data["least_percent"])
+    print(result.markdown())
+    for line in result.complaints():
+        print(line, file=sys.stderr)
+    return 1 if result.complaints() else 0
+
+
+if __name__ == "__main__":
+    raise SystemExit(main())
