@@ -1,4 +1,4 @@
-"""docs/faults.md says what the code has."""
+"""docs/faults.md agrees with the code."""
 
 from __future__ import annotations
 
@@ -24,10 +24,10 @@ def test_the_outcomes_are_those_of_the_code():
 
 def test_the_examples_can_be_typed():
     lines = re.findall(r"^\.venv/bin/uam (.*?)(?: {2,}#.*)?$", TEXT, re.M)
-    asked = [vars(parser().parse_args(shlex.split(line))).get("fault") or [] for line in lines]
-    words = [text for found in asked for text in found if not text.endswith(".yaml")]
-    assert len(lines) == 7 and len(words) == 3
-    read_schedule(words, load_scenario("pick_and_place"), 1)
+    options = [vars(parser().parse_args(shlex.split(line))).get("fault") or [] for line in lines]
+    texts = [text for found in options for text in found if not text.endswith(".yaml")]
+    assert len(lines) == 7 and len(texts) == 3
+    read_schedule(texts, load_scenario("pick_and_place"), 1)
 
 
 def test_every_fault_is_listed_for_the_terminal():

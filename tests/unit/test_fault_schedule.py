@@ -1,4 +1,4 @@
-"""Faults are read from words, files and scenarios, and refused in one line."""
+"""Faults are read from options, files and scenarios, and refused in one line."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ from uam_sim_bridge.faults import (
     limits,
     read_schedule,
 )
-from uam_sim_bridge.faults.schedule import WORDS, TimedFault, in_words
+from uam_sim_bridge.faults.schedule import KEYS, TimedFault, parse_spec
 from uam_sim_bridge.faults.timeline import Timeline
 
 SCENARIO = load_scenario("pick_and_place")
@@ -63,7 +63,7 @@ def test_a_schedule_is_read_back_from_the_parameter_of_a_node_and_from_a_file(fo
 
 
 @given(faults(), times, times | st.none())
-def test_words_say_the_same_as_an_entry(fault, at, duration):
+def test_an_option_equals_an_entry(fault, at, duration):
     lasting = "" if duration is None else f"+{duration!r}"
     values = ",".join(f"{name}={value}" for name, value in fault.values.items())
     found = one(f"{fault.NAME}@{at!r}{lasting}" + (f":{values}" if values else ""))
@@ -71,7 +71,7 @@ def test_words_say_the_same_as_an_entry(fault, at, duration):
 
 
 @given(st.text(max_size=40))
-def test_any_words_are_understood_or_refused_in_one_line(text):
+def test_any_option_is_read_or_refused(text):
     try:
         read_schedule([text], SCENARIO, 1)
     except FaultError as error:
@@ -79,7 +79,7 @@ def test_any_words_are_understood_or_refused_in_one_line(text):
 
 
 @pytest.mark.parametrize("name", FAULTS)
-def test_every_fault_can_be_asked_for_by_its_name(name):
+def test_every_fault_is_found_by_its_name(name):
     found = one(f"{name}@20+3")
     assert (type(found.fault), found.at, found.duration) == (FAULTS[name], 20.0, 3.0)
     assert FAULTS[name].ABOUT and FAULTS[name].PLACE in (PLANT, LINK, PROCESS)
@@ -90,7 +90,7 @@ def test_every_fault_can_be_asked_for_by_its_name(name):
 )
 def test_every_parameter_has_a_range_that_is_kept(name, parameter):
     spec = FAULTS[name].specs()[parameter]
-    assert parameter not in WORDS
+    assert parameter not in KEYS
     bad = "nonsense"
     if isinstance(spec, Bound):
         assert spec.unit and spec.low <= getattr(FAULTS[name](), parameter) <= spec.high
@@ -134,7 +134,7 @@ REFUSED = {
 
 
 @pytest.mark.parametrize("text", REFUSED)
-def test_what_is_refused_is_named(text):
+def test_bad_options_are_refused_in_one_line(text):
     with pytest.raises(FaultError, match=re.escape(REFUSED[text])) as refusal:
         one(text)
     assert "\n" not in str(refusal.value)
@@ -148,7 +148,7 @@ def test_a_bad_file_is_named(tmp_path, text):
         read_schedule([str(file)], SCENARIO, 1)
 
 
-def test_files_words_and_the_scenario_add_up(tmp_path):
+def test_faults_of_file_option_and_scenario_are_joined(tmp_path):
     file = tmp_path / "mine.yaml"
     file.write_text("- {fault: servo_jam, at: carry, after: 2, duration: 5, joint: 2}\n")
     text = configuration.path("scenarios/hover.yaml").read_text()
@@ -174,7 +174,7 @@ def test_files_words_and_the_scenario_add_up(tmp_path):
         ("mavlink_cut@20:direction=from_autopilot", "connection from the autopilot: needs"),
     ],
 )
-def test_the_direct_engine_says_what_it_cannot_have(text, why):
+def test_faults_that_the_direct_engine_refuses(text, why):
     found = read_schedule([text], SCENARIO, 1)
     with pytest.raises(FaultError, match=why):
         limits.check(found, "direct")
@@ -187,7 +187,7 @@ def test_a_process_that_is_not_started_cannot_be_killed():
         limits.check(found, "ros", ("scene",))
 
 
-def test_what_the_machine_refuses_is_refused_with_its_reason(monkeypatch, tmp_path):
+def test_a_fault_that_the_machine_does_not_allow_is_refused_with_the_reason(monkeypatch, tmp_path):
     found = read_schedule(["discovery_loss@20+1"], SCENARIO, 1)
     scope = tmp_path / "ptrace_scope"
     monkeypatch.setattr(thread_stop, "SCOPE", scope)
@@ -208,10 +208,10 @@ def test_what_the_machine_refuses_is_refused_with_its_reason(monkeypatch, tmp_pa
 def test_a_fault_lasts_from_its_time_to_its_end(at, duration, takeoff):
     line = Timeline(Schedule((TimedFault(FAULTS["mocap_dropout"](), at, duration),)))
     line.update(takeoff + at)
-    assert line.records == []  # nobody has told the mission's time
+    assert line.records == []  # no mission time yet
     line.mission_at(takeoff - 1.0, -1.0)
     line.mission_at(takeoff + 0.25, 0.25)
-    line.mission_at(takeoff + 9.0, 1.0)  # held: its own clock stood still
+    line.mission_at(takeoff + 9.0, 1.0)  # after a hold, which stops the mission time
     step = max(0.5, (at + duration) / 200.0)
     for tick in range(int((at + duration) / step) + 3):
         line.update(takeoff + tick * step)
@@ -220,8 +220,8 @@ def test_a_fault_lasts_from_its_time_to_its_end(at, duration, takeoff):
     assert 0.0 <= record["end_s"] - at - duration + 1e-5 <= 2.0 * step + 1e-5
 
 
-def test_a_word_of_numbers_keeps_its_form():
-    assert in_words("x@1e1+2:a=3,b=c") == {
+def test_numbers_of_an_option():
+    assert parse_spec("x@1e1+2:a=3,b=c") == {
         "fault": "x",
         "at": 10.0,
         "duration": 2.0,

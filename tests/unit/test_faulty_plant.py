@@ -1,4 +1,4 @@
-"""Each fault of the plant does what the catalogue says, and nothing when it is over."""
+"""Each fault of the plant has the effect in the catalogue, and none before begin and after end."""
 
 from __future__ import annotations
 
@@ -24,22 +24,22 @@ def plant_with(text):
 
 
 def run(plant, until=0.4, effort=(0.05, 0.1), magnet=False, motors=HOVER):
-    """What arrives at each tick: (time, samples, truth before it)."""
-    told = []
+    """Return (time, samples, truth before the step) of each tick."""
+    rows = []
     while plant.time < until - 1e-9:
         time, truth = plant.time, plant.truth()
-        told.append((time, plant.sense(), truth))
+        rows.append((time, plant.sense(), truth))
         plant.step(motors, np.array(effort), magnet)
-    return told
+    return rows
 
 
-def ticks(told, begin, end):
-    """Those from a time [s] on, before another."""
-    return [entry for entry in told if begin - 1e-9 <= entry[0] < end - 1e-9]
+def ticks(rows, begin, end):
+    """Return the entries with begin <= time < end, times in [s]."""
+    return [entry for entry in rows if begin - 1e-9 <= entry[0] < end - 1e-9]
 
 
-def during(told):
-    return ticks(told, BEGIN, END)
+def during(rows):
+    return ticks(rows, BEGIN, END)
 
 
 def poses(entries):
@@ -69,10 +69,10 @@ NEEDS_THE_MAGNET = ("magnet_weak", "magnet_stuck", "payload_swing")
 
 
 @pytest.mark.parametrize("name", PLANT_FAULTS)
-def test_before_its_beginning_a_fault_changes_not_one_bit(name):
-    told = faulty(name, VALUES.get(name, ""))
+def test_before_its_beginning_a_fault_changes_nothing(name):
+    rows = faulty(name, VALUES.get(name, ""))
     for (_, ours, truth), (_, usual, true) in zip(
-        ticks(told, 0.0, BEGIN), ticks(NOMINAL, 0.0, BEGIN), strict=True
+        ticks(rows, 0.0, BEGIN), ticks(NOMINAL, 0.0, BEGIN), strict=True
     ):
         assert all(
             equal(getattr(ours, k), getattr(usual, k)) for k in ("imu", "joints", "mocap", "hil")
@@ -81,29 +81,31 @@ def test_before_its_beginning_a_fault_changes_not_one_bit(name):
 
 
 @pytest.mark.parametrize("name", [n for n in PLANT_FAULTS if n not in NEEDS_THE_MAGNET])
-def test_every_fault_is_felt(name):
-    told = faulty(name, VALUES.get(name, ""))
+def test_every_fault_changes_the_samples(name):
+    rows = faulty(name, VALUES.get(name, ""))
     assert not all(
         equal(getattr(ours, kind), getattr(usual, kind))
-        for (_, ours, _), (_, usual, _) in zip(during(told), during(NOMINAL), strict=True)
+        for (_, ours, _), (_, usual, _) in zip(during(rows), during(NOMINAL), strict=True)
         for kind in ("imu", "joints", "mocap", "hil")
     )
 
 
 @pytest.mark.parametrize("name", [n for n in PLANT_FAULTS if n.startswith(("mocap", "clock"))])
-def test_faults_of_the_motion_capture_are_over_when_they_are_over(name):
-    """The vehicle itself knows nothing of them here: nobody controls it."""
-    told = faulty(name)
-    after = 0.05 if name == "mocap_latency" else 0.0  # what was late is not sent again
+def test_faults_of_the_motion_capture_leave_no_trace_after_their_end(name):
+    """Without a controller these faults do not act on the motion of the vehicle."""
+    rows = faulty(name)
+    after = (
+        0.05 if name == "mocap_latency" else 0.0
+    )  # delayed poses of that time have arrived already
     for (_, ours, _), (_, usual, _) in zip(
-        ticks(told, END + after, 1.0), ticks(NOMINAL, END + after, 1.0), strict=True
+        ticks(rows, END + after, 1.0), ticks(NOMINAL, END + after, 1.0), strict=True
     ):
         assert equal(ours.mocap, usual.mocap)
 
 
 def test_no_poses_arrive():
-    told = faulty("mocap_dropout")
-    assert poses(during(told)) == [] and len(poses(told)) > 10
+    rows = faulty("mocap_dropout")
+    assert poses(during(rows)) == [] and len(poses(rows)) > 10
 
 
 def test_a_frozen_pose_repeats_with_new_stamps():
@@ -128,12 +130,12 @@ def test_axes_are_exchanged():
 
 
 def test_poses_come_late_and_none_twice():
-    told = faulty("mocap_latency", "delay=0.04")
+    rows = faulty("mocap_latency", "delay=0.04")
     usual = poses(NOMINAL)
-    late = [(t, s.mocap[0]) for t, s, _ in during(told) if s.mocap is not None]
+    late = [(t, s.mocap[0]) for t, s, _ in during(rows) if s.mocap is not None]
     assert late[0][0] == pytest.approx(BEGIN + 0.04, abs=0.009)
     assert all(t - stamp == pytest.approx(0.012 + 0.04, abs=1e-9) for t, stamp in late)
-    stamps = [pose[0] for pose in poses(told)]
+    stamps = [pose[0] for pose in poses(rows)]
     assert stamps == sorted(set(stamps)) and set(stamps) <= {pose[0] for pose in usual}
 
 
@@ -158,8 +160,8 @@ def test_stamps_are_off():
     ("unit", "felt"), [("both", ("imu", "hil")), ("companion", ("imu",)), ("autopilot", ("hil",))]
 )
 def test_an_imu_is_biased(unit, felt):
-    told = faulty("imu_bias", f"gyro=0.5,accelerometer=2,axis=y,unit={unit}")
-    for (_, ours, _), (_, usual, _) in zip(during(told), during(NOMINAL), strict=True):
+    rows = faulty("imu_bias", f"gyro=0.5,accelerometer=2,axis=y,unit={unit}")
+    for (_, ours, _), (_, usual, _) in zip(during(rows), during(NOMINAL), strict=True):
         for kind in ("imu", "hil"):
             size = float(kind in felt)
             _, gyro, force = getattr(ours, kind)
@@ -174,45 +176,45 @@ def test_an_imu_saturates():
 
 
 def test_an_imu_is_silent_but_the_autopilot_gets_a_sample_at_each_tick():
-    told = faulty("imu_dropout")
-    assert all(samples.imu is None for _, samples, _ in during(told))
-    assert all(samples.imu is not None for _, samples, _ in ticks(told, END, 1.0))
+    rows = faulty("imu_dropout")
+    assert all(samples.imu is None for _, samples, _ in during(rows))
+    assert all(samples.imu is not None for _, samples, _ in ticks(rows, END, 1.0))
     held = during(faulty("imu_dropout", "unit=autopilot"))
     assert all(equal(s.hil[1:], held[0][1].hil[1:]) and s.imu is not None for _, s, _ in held)
     assert [s.hil[0] for _, s, _ in held] == [t for t, _, _ in held]
 
 
 def test_an_encoder_is_stuck():
-    told = faulty("encoder_stuck", "joint=2")
-    angles = [samples.joints[1] for _, samples, _ in during(told)]
+    rows = faulty("encoder_stuck", "joint=2")
+    angles = [samples.joints[1] for _, samples, _ in during(rows)]
     assert len({alpha[1] for alpha in angles}) == 1 and len({alpha[0] for alpha in angles}) > 1
-    assert all(samples.joints[2][1] == 0.0 for _, samples, _ in during(told))
-    moved = [truth.state[0, 7] for _, _, truth in during(told)]
+    assert all(samples.joints[2][1] == 0.0 for _, samples, _ in during(rows))
+    moved = [truth.state[0, 7] for _, _, truth in during(rows)]
     assert np.ptp(moved) > 0.01
 
 
 def test_a_servo_gives_a_part_of_its_torque():
     unit = 1.304 * 0.00269
     for remaining in (0.0, 0.5):
-        told = run(plant_with(f"servo_weak@{BEGIN}:joint=2,remaining={remaining}"), 0.2)
-        torque = told[-1][1].joints[3]
+        rows = run(plant_with(f"servo_weak@{BEGIN}:joint=2,remaining={remaining}"), 0.2)
+        torque = rows[-1][1].joints[3]
         assert torque[1] == pytest.approx(0.1 * remaining, abs=unit)
         assert torque[0] == pytest.approx(0.05, abs=unit)
 
 
 def test_a_jammed_joint_holds_its_angle_and_is_free_afterwards():
-    told = run(plant_with(f"servo_jam@{BEGIN}+0.2:joint=1"), 0.6, effort=(1.0, 0.0))
+    rows = run(plant_with(f"servo_jam@{BEGIN}+0.2:joint=1"), 0.6, effort=(1.0, 0.0))
     # it is braked first
-    held = [truth.state[0, 6] for _, _, truth in ticks(told, BEGIN + 0.1, END)]
-    free = [truth.state[0, 6] for _, _, truth in ticks(told, END, 0.6)]
+    held = [truth.state[0, 6] for _, _, truth in ticks(rows, BEGIN + 0.1, END)]
+    free = [truth.state[0, 6] for _, _, truth in ticks(rows, END, 0.6)]
     assert np.ptp(held) < 0.005 and np.ptp(free) > 0.05
 
 
 def test_a_motor_gives_a_part_of_its_thrust():
-    told = faulty("motor_loss", "motor=3,remaining=0.25")
+    rows = faulty("motor_loss", "motor=3,remaining=0.25")
     usual = NOMINAL[-1][2].rotor_thrust
-    np.testing.assert_allclose(during(told)[-1][2].rotor_thrust, usual * [1, 1, 0.25, 1], rtol=1e-6)
-    np.testing.assert_allclose(told[-1][2].rotor_thrust, usual, rtol=1e-6)
+    np.testing.assert_allclose(during(rows)[-1][2].rotor_thrust, usual * [1, 1, 0.25, 1], rtol=1e-6)
+    np.testing.assert_allclose(rows[-1][2].rotor_thrust, usual, rtol=1e-6)
 
 
 def test_two_faults_of_one_motor_multiply_and_end_one_by_one():
@@ -232,9 +234,9 @@ def test_two_faults_of_one_motor_multiply_and_end_one_by_one():
 
 
 def test_thrust_sags_slowly():
-    told = faulty("battery_sag", "remaining=0.6,over=0.1")
+    rows = faulty("battery_sag", "remaining=0.6,over=0.1")
     usual = {t: truth.rotor_thrust for t, _, truth in NOMINAL}
-    part = [(truth.rotor_thrust / usual[t]) for t, _, truth in ticks(told, BEGIN + 0.004, END)]
+    part = [(truth.rotor_thrust / usual[t]) for t, _, truth in ticks(rows, BEGIN + 0.004, END)]
     assert np.all(np.diff(part, axis=0) < 1e-9)
     np.testing.assert_allclose(part[12], 0.8, atol=0.03)
     np.testing.assert_allclose(part[-1], 0.6)
@@ -276,28 +278,31 @@ def test_nothing_happens_before_the_mission_begins():
 
 
 def lifted(text, until=1.5):
-    """The payload on the magnet of a vehicle held in the air, then whatever the fault does."""
+    """Return plant and (time, truth) per tick: payload at the magnet of a vehicle held in the air.
+
+    The magnet is on until 1 s.
+    """
     plant = plant_with(text)
     plant._alpha[:] = 0.0
     plant.data.qpos[plant._swing] = 0.0
     base = np.array([0.0, 0.0, 2.0, 1.0, 0.0, 0.0, 0.0])
     face = 2.0 - 0.073 - 0.100 - 0.140 - 0.030
     plant._payload_pose[:] = [0.0, 0.0, face - 0.0205, 1.0, 0.0, 0.0, 0.0]
-    told = []
+    rows = []
     while plant.time < until - 1e-9:
         plant._position[:], plant._quaternion[:] = base[:3], base[3:]
         plant._velocity[:] = plant._rates[:] = 0.0
         plant.sense()
         plant.step(np.zeros(4), np.zeros(2), plant.time < 1.0)
-        told.append((plant.time, plant.truth()))
-    return plant, told
+        rows.append((plant.time, plant.truth()))
+    return plant, rows
 
 
-def height(told, time):
-    return next(truth.payload_position[2] for t, truth in told if t >= time - 1e-9)
+def height(rows, time):
+    return next(truth.payload_position[2] for t, truth in rows if t >= time - 1e-9)
 
 
-def test_a_magnet_that_holds_no_more_drops_the_payload():
+def test_a_weak_magnet_drops_the_payload():
     _, held = lifted("mocap_dropout@9")
     _, weak = lifted("magnet_weak@0.5+0.3")
     assert height(held, 0.99) > height(held, 0.1) - 0.02
@@ -318,10 +323,10 @@ def test_a_payload_swings_but_stays_until_the_magnet_is_off():
     _, flat = lifted("mocap_dropout@9")
     _, swinging = lifted("payload_swing@0.5:rate=4")
 
-    def tilt(told, begin, end):
+    def tilt(rows, begin, end):
         upright = [
             1.0 - 2.0 * float(np.sum(truth.payload_quaternion[1:3] ** 2))
-            for t, truth in told
+            for t, truth in rows
             if begin < t < end
         ]
         return np.degrees(np.arccos(np.clip(min(upright), -1.0, 1.0)))

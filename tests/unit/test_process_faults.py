@@ -1,4 +1,4 @@
-"""Processes of a flight are killed, stopped and slowed down, and none stays stopped."""
+"""Processes of a flight are killed, stopped and slowed down; none remains stopped."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ def main():
     while True:
         time.sleep(0.05)
 """
-# With threads named as Fast DDS names its own.
+# a process with the thread names of Fast DDS
 NAMED = ("dds.udp.7660", "dds.ev.0", "dds.udp.7661")
 NODE = f"""
 import threading, time
@@ -41,7 +41,7 @@ SCENARIO = load_scenario("hover")
 
 @contextmanager
 def started(folder, code, *names):
-    """Processes with these names, each of which runs the `code` of a module."""
+    """Start processes with these names; each runs the module text `code`."""
     (folder / "own_code.py").write_text(code)
     path = os.pathsep.join([str(folder), *sys.path])
     with Processes(folder, {**os.environ, "PYTHONPATH": path}) as running:
@@ -58,14 +58,14 @@ def children(tmp_path):
 
 @pytest.fixture
 def node(tmp_path):
-    """The process `mission`, with its threads."""
+    """Start the process `mission` with its threads."""
     with started(tmp_path, NODE, "mission") as running:
         until(lambda: {*NAMED, "main"} <= dict(threads(running, "mission")).keys())
         yield running
 
 
 def stat(folder):
-    """Name and state, as /proc has them: T stopped, t traced and stopped, S or R running."""
+    """Return name and state from /proc: T stopped, t traced and stopped, S or R running."""
     text = (folder / "stat").read_text()
     return text.split("(", 1)[1].rsplit(")", 1)[0], text.rsplit(")", 1)[1].split()[0]
 
@@ -75,7 +75,7 @@ def state(children, name):
 
 
 def threads(children, name):
-    """The threads of a process: name and state of each."""
+    """Return name and state of each thread of a process."""
     return [stat(one) for one in Path(f"/proc/{children.pid(name)}/task").iterdir()]
 
 
@@ -87,12 +87,12 @@ def until(condition, seconds=5.0):
 
 
 def faults(children, *texts):
-    told, clock = [], [0.0]
+    changes, clock = [], [0.0]
     schedule = read_schedule(texts, SCENARIO, 1)
     made = ProcessFaults(
-        children, schedule, lambda one: told.append((one.number, one.active)), lambda: clock[0]
+        children, schedule, lambda one: changes.append((one.number, one.active)), lambda: clock[0]
     )
-    return made, told, clock
+    return made, changes, clock
 
 
 def test_a_kill_is_no_failure_of_the_flight(children):
@@ -109,22 +109,22 @@ def test_a_kill_is_no_failure_of_the_flight(children):
         assert children.running("mission")
 
 
-def test_who_is_stopped_goes_on_when_it_is_over(children):
-    made, told, clock = faults(children, "node_stall@3+2:node=mission")
+def test_a_stopped_process_continues_after_the_fault(children):
+    made, changes, clock = faults(children, "node_stall@3+2:node=mission")
     with made:
         made.update(3.0)
         until(lambda: state(children, "mission") == "T")
         assert state(children, "arm_controller") != "T"
         clock[0] = 1.9
-        made.update(3.0)  # in lockstep the mission's time stands still meanwhile
-        assert told == [(0, True)]
+        made.update(3.0)  # in lockstep the mission time does not advance meanwhile
+        assert changes == [(0, True)]
         clock[0] = 2.1
         made.update(3.0)
         until(lambda: state(children, "mission") != "T")
-        assert told == [(0, True), (0, False)]
+        assert changes == [(0, True), (0, False)]
 
 
-def test_nobody_stays_stopped_at_the_end(children):
+def test_no_process_remains_stopped_at_the_end(children):
     with faults(children, "node_stall@0:node=mission", "node_slow@0:stopped=0.9")[0] as made:
         made.update(0.0)
         until(lambda: state(children, "mission") == "T")
@@ -133,7 +133,7 @@ def test_nobody_stays_stopped_at_the_end(children):
     assert state(children, "arm_controller") != "T"
 
 
-def test_who_is_slow_is_stopped_for_its_part_of_the_time(children):
+def test_a_slow_process_is_stopped_for_a_fraction_of_the_time(children):
     with faults(children, "node_slow@0:stopped=0.8,cycle=0.05")[0] as made:
         made.update(0.0)
         seen = []
@@ -143,7 +143,7 @@ def test_who_is_slow_is_stopped_for_its_part_of_the_time(children):
     assert 0.5 < sum(seen) / len(seen) < 0.97
 
 
-def test_threads_of_discovery_are_stopped_alone_and_go_on(node):
+def test_only_discovery_threads_are_stopped_and_they_continue(node):
     with faults(node, "discovery_loss@1:node=mission")[0] as made:
         made.update(1.0)
         states = dict(threads(node, "mission"))
@@ -152,17 +152,17 @@ def test_threads_of_discovery_are_stopped_alone_and_go_on(node):
     assert all(state != "t" for _, state in threads(node, "mission"))
 
 
-def test_who_is_killed_with_stopped_threads_has_ended(node):
+def test_a_killed_process_with_stopped_threads_ends(node):
     with faults(node, "discovery_loss@1:node=mission")[0] as made:
         made.update(1.0)
         os.kill(node.pid("mission"), signal.SIGKILL)
         until(lambda: made.update(1.1) or not node.running("mission"))
 
 
-def test_who_has_ended_already_is_left_alone(children):
+def test_a_fault_on_an_ended_process_is_no_error(children):
     os.kill(children.pid("mission"), signal.SIGKILL)
     until(lambda: not children.running("mission"))
-    made, told, _ = faults(children, "node_stall@0+1:node=mission")
+    made, changes, _ = faults(children, "node_stall@0+1:node=mission")
     with made:
         made.update(0.0)
-    assert told == [(0, True)]
+    assert changes == [(0, True)]

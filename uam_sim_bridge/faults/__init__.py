@@ -1,4 +1,4 @@
-"""Faults that are put into a flight on purpose: what there is, when they come, what they do."""
+"""Fault injection: the faults, their schedule, and their effects on plant, link and processes."""
 
 from uam_sim_bridge.faults.catalogue import FAULTS
 from uam_sim_bridge.faults.fault import LINK, PLANT, PROCESS, Fault, FaultError

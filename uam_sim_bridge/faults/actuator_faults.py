@@ -1,4 +1,4 @@
-"""Motors, battery, servos and magnet that do less than they should; and the wind."""
+"""Faults of motors, battery, servos, magnet and payload; and wind gusts."""
 
 from __future__ import annotations
 
@@ -52,7 +52,7 @@ class BatterySag(PlantFault):
 
 
 class Sag(Effect):
-    """Thrust that falls linearly with time."""
+    """Linear decrease of the thrust."""
 
     def __init__(self, remaining: float, over: float):
         self._remaining, self._over = remaining, over
@@ -112,7 +112,7 @@ class MagnetStuck(PlantFault):
 
 
 class Remanent(Effect):
-    """Keeps the magnet on as soon as it has been."""
+    """Keeps the magnet on after it was switched on once."""
 
     def __init__(self):
         self._on = False
@@ -151,7 +151,7 @@ class WindGust(PlantFault):
 
 
 class Gust(Effect):
-    """Wind (3,) [m/s] that comes up as half a cosine."""
+    """Adds wind `full` (3,) [m/s, ENU] that rises in `rise` [s] as half a cosine."""
 
     def __init__(self, full: np.ndarray, rise: float):
         self._full, self._rise = full, rise

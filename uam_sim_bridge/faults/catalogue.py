@@ -1,4 +1,4 @@
-"""Every fault there is, by name; and the same as a table."""
+"""All faults by name, their creation from parameters, and their tables for docs and terminal."""
 
 from __future__ import annotations
 
@@ -43,11 +43,11 @@ FAULTS: dict[str, type[Fault]] = {
         process_faults.DiscoveryLoss,
     )
 }
-WHOLE = ("joint", "motor")  # parameters that count something
+WHOLE = ("joint", "motor")  # parameters that must be whole numbers
 
 
 def make(name: object, values: dict[str, object]) -> Fault:
-    """Return a fault by name with these parameters; raises FaultError in one line."""
+    """Return the fault `name` with the parameters `values`; raises FaultError in one line."""
     if not isinstance(name, str) or name not in FAULTS:
         raise FaultError(f"unknown fault {name!r}; there are: {', '.join(FAULTS)}")
     for parameter, value in values.items():
@@ -63,7 +63,7 @@ def make(name: object, values: dict[str, object]) -> Fault:
 
 
 def table() -> str:
-    """The catalogue as a table in Markdown, as docs/faults.md has it."""
+    """Return the catalogue as a Markdown table: the table of docs/faults.md."""
     lines = ["| fault | does | acts on | parameters (range: default) |", "|---|---|---|---|"]
     for name, kind in FAULTS.items():
         words = "; ".join(parameters(kind)) or "–"
@@ -72,7 +72,7 @@ def table() -> str:
 
 
 def listing() -> str:
-    """The catalogue for a terminal."""
+    """Return the catalogue as text for a terminal."""
     lines = []
     for name, kind in FAULTS.items():
         lines.append(f"{name:<20}{kind.ABOUT} [{kind.PLACE}]")
@@ -81,7 +81,7 @@ def listing() -> str:
 
 
 def parameters(kind: type[Fault]) -> list[str]:
-    """Each of its parameters in words: meaning, then range or choices, and the default."""
+    """Return one text per parameter of `kind`: description, range or choices, default."""
     words, usual = [], kind()
     for name, spec in kind.specs().items():
         default = getattr(usual, name)

@@ -1,4 +1,4 @@
-"""The faults of a flight in the direct engine."""
+"""Fault injection in the direct engine."""
 
 from __future__ import annotations
 
@@ -13,10 +13,10 @@ from uam_sim_bridge.plant import Plant, Vehicle
 
 
 class DirectFaults:
-    """Makes the plant, knows the link, and tells both the mission's time."""
+    """Creates the plant and the link with their faults and passes them the mission time."""
 
     def __init__(self, schedule: Schedule) -> None:
-        """schedule: one that passed `limits.check`."""
+        """schedule: checked by `limits.check`."""
         self._schedule = schedule
         self.link = DirectLink(schedule.only(LINK))
         self._timelines: list[Timeline] = [self.link.timeline]
@@ -24,7 +24,7 @@ class DirectFaults:
     def plant(
         self, vehicle: Vehicle, payload_mass: float, seed: int, arm_start: tuple[float, float]
     ) -> Plant:
-        """The plant of this flight; see `Plant`."""
+        """Return the plant of this flight; arguments as in `Plant`."""
         acting = self._schedule.only(PLANT)
         if not acting:
             return Plant(vehicle, payload_mass, seed, arm_start)
@@ -33,13 +33,13 @@ class DirectFaults:
         return made
 
     def update(self, stamp: float, time: float) -> None:
-        """At `stamp` [s], a control tick's, the mission's time is `time` [s]."""
+        """Set the mission time `time` [s] of the control tick at `stamp` [s]."""
         for timeline in self._timelines:
             timeline.mission_at(stamp, time)
         self.link.timeline.update(stamp)
 
     @property
     def records(self) -> list[dict[str, Any]]:
-        """What has happened so far, in order of time."""
+        """Return the records of all faults that have begun, in order of time."""
         found = [record for timeline in self._timelines for record in timeline.records]
         return sorted(found, key=lambda record: record["begin_s"])

@@ -1,4 +1,4 @@
-"""Faults of the MAVLink connection where there is none: the direct engine skips what is lost."""
+"""Faults of the MAVLink connection in the direct engine, which skips the lost messages."""
 
 from __future__ import annotations
 
@@ -10,25 +10,26 @@ from uam_sim_bridge.faults.timeline import Timeline
 
 
 class DirectLink:
-    """Says of each message to the autopilot whether it gets through.
+    """Decides for each message whether it arrives.
 
-    Of cuts and corruption it knows the way to the autopilot; see `limits.needs_nodes` for the rest.
+    It covers cuts, and corruption of messages to the autopilot; `limits.needs_nodes` lists the
+    faults that the direct engine refuses.
     """
 
     def __init__(self, schedule: Schedule) -> None:
-        """schedule: faults of the link alone."""
+        """schedule: faults of the link only."""
         self.timeline = Timeline(schedule)
         self._noise = np.random.default_rng(np.random.SeedSequence(schedule.seed, spawn_key=(1,)))
 
-    def hears(self) -> bool:
-        """Whether what the autopilot says arrives."""
+    def receives(self) -> bool:
+        """Return whether messages from the autopilot arrive."""
         return not any(
             one.active and isinstance(one.fault, MavlinkCut) and one.fault.inwards
             for one in self.timeline.all
         )
 
     def passes(self) -> bool:
-        """Whether the message that is being sent arrives in good order."""
+        """Return whether the next message to the autopilot arrives uncorrupted."""
         for one in self.timeline.all:
             if not one.active:
                 continue

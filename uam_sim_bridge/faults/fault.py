@@ -1,4 +1,4 @@
-"""What a fault is: a parameter set with a name, some words, and the place where it acts."""
+"""Base classes of faults: parameter sets with a name, a description and the place of action."""
 
 from __future__ import annotations
 
@@ -14,12 +14,12 @@ PLANT, LINK, PROCESS = "plant", "MAVLink", "process"
 
 
 class FaultError(ValueError):
-    """A fault that cannot be injected; the text is one line: what was wrong, what is allowed."""
+    """A fault that cannot be injected; the text is one line: what is wrong, what is allowed."""
 
 
 @dataclass(frozen=True)
 class Fault(ParameterSet):
-    """Base of all faults. NAME: as the user calls it; ABOUT: what it does; PLACE: where it acts."""
+    """Base of all faults. NAME: for the user; ABOUT: its effect; PLACE: PLANT, LINK or PROCESS."""
 
     NAME: ClassVar[str] = ""
     ABOUT: ClassVar[str] = ""
@@ -27,15 +27,15 @@ class Fault(ParameterSet):
 
     @property
     def values(self) -> dict[str, Any]:
-        """Its parameters by name."""
+        """Return the parameters by name."""
         return asdict(self)
 
 
 @dataclass
 class PlantCommands:
-    """What the plant is about to be told: motors (4,) 0..1, effort (2,) [N m], magnet's switch.
+    """Commands of a period: motors (4,) 0..1, effort (2,) [N m], magnet on or off.
 
-    The arrays are copies and may be changed.
+    The arrays are copies; an effect may change them.
     """
 
     motors: np.ndarray
@@ -44,13 +44,13 @@ class PlantCommands:
 
 
 class Disturbable(Protocol):
-    """What an effect can do to the plant; each call counts for the period that begins."""
+    """The plant as an effect changes it; each call applies to the next period only."""
 
     def weaken_rotors(self, parts: np.ndarray) -> None:
         """Scale the thrust of each rotor by parts (n_rotors,) [1]."""
 
     def brake_joint(self, joint: int, torque: float) -> None:
-        """Add dry friction `torque` [N m] to joint number `joint` (from 0)."""
+        """Add dry friction `torque` [N m] to joint `joint`, counted from 0."""
 
     def weaken_magnet(self, part: float) -> None:
         """Scale the magnet's holding force by `part` [1]."""
@@ -59,29 +59,29 @@ class Disturbable(Protocol):
         """Add wind (3,) [m/s, ENU]."""
 
     def swing_payload(self, commands: PlantCommands, rate: float) -> None:
-        """Hang the payload on a hinge while the magnet is on; rate [rad/s]: its first rate."""
+        """Attach the payload by a hinge while the magnet is on; rate [rad/s]: initial rate."""
 
 
 class Effect:
-    """What a fault of the plant does from its beginning to its end, tick by tick.
+    """Effect of a plant fault at each tick between its begin and end.
 
-    Whatever it does to the plant in `act` is undone before the next tick; so effects add up, and
-    an end needs no care.
+    The plant undoes the changes of `act` before the next tick. Effects therefore add up, and the
+    end of a fault needs no code.
     """
 
     def sense(self, samples: Samples) -> None:
-        """Alter what arrives at this tick; the arrays in it are not to be written to."""
+        """Change the samples of this tick. Replace the arrays, do not write into them."""
 
     def act(self, plant: Disturbable, commands: PlantCommands) -> None:
-        """Alter plant and commands for the period that begins."""
+        """Change plant and commands for the next period."""
 
 
 @dataclass(frozen=True)
 class PlantFault(Fault):
-    """A fault of sensors, actuators, payload or air."""
+    """A fault of sensors, actuators, payload or wind."""
 
     PLACE: ClassVar[str] = PLANT
 
     def effect(self, noise: np.random.Generator) -> Effect:
-        """What begins now; noise: of this fault alone, seeded by the flight."""
+        """Return the effect that begins now; noise: generator of this fault, seeded per flight."""
         raise NotImplementedError

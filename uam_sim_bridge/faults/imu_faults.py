@@ -1,4 +1,4 @@
-"""An IMU that is biased, saturated or silent, and an encoder that is stuck."""
+"""Faults of the IMUs (bias, saturation, dropout) and of the joint encoders."""
 
 from __future__ import annotations
 
@@ -19,7 +19,10 @@ AXES = ("x", "y", "z")
 
 
 class ImuEffect(Effect):
-    """Alters the samples (stamp, gyro, specific force) of one IMU or both."""
+    """Changes the samples of one IMU or both.
+
+    alter: takes and returns stamp [s], gyro (3,) [rad/s, FLU], specific force (3,) [m/s^2, FLU].
+    """
 
     def __init__(
         self,
@@ -84,7 +87,7 @@ class ImuDropout(PlantFault):
 
 
 class Silent(Effect):
-    """The autopilot must get a sample at each tick, hence one that stands still."""
+    """Removes the companion's samples; repeats the autopilot's, which needs one at each tick."""
 
     def __init__(self, unit: str):
         self._unit = unit
@@ -110,7 +113,7 @@ class EncoderStuck(PlantFault):
 
 
 class Stuck(Effect):
-    """Holds the first angle that it sees."""
+    """Holds the joint's first angle, with zero velocity."""
 
     def __init__(self, joint: int):
         self._joint = joint

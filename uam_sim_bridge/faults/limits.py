@@ -1,4 +1,4 @@
-"""Which faults a flight cannot have."""
+"""Checks whether engine, processes and machine allow the faults of a flight."""
 
 from __future__ import annotations
 
@@ -16,10 +16,10 @@ def check(
     absent: Collection[str] = (),
     refused: Mapping[str, str] | None = None,
 ) -> None:
-    """Raise FaultError for the first fault that this flight cannot have.
+    """Raise FaultError for the first fault that is not possible in this flight.
 
-    engine: ros or direct; absent: processes that the flight does not start itself; refused: by
-    name, why this machine cannot have a fault, empty where it can.
+    engine: ros or direct; absent: processes that the flight does not start itself; refused: fault
+    name → reason why this machine does not allow it, "" if it does.
     """
     for one in schedule.faults:
         fault = one.fault
@@ -33,7 +33,7 @@ def check(
 
 
 def needs_nodes(fault: Fault) -> str:
-    """Why the direct engine cannot have this fault; "" where it can."""
+    """Return the reason why the direct engine cannot inject this fault; "" if it can."""
     if fault.PLACE == PROCESS:
         return "the direct engine has no processes"
     if isinstance(fault, MavlinkDelay):

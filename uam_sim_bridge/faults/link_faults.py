@@ -1,4 +1,4 @@
-"""A MAVLink connection between bridge and autopilot that is cut, late or noisy."""
+"""Faults of the MAVLink connection between bridge and autopilot: cut, delay, corruption."""
 
 from __future__ import annotations
 
@@ -21,12 +21,12 @@ class LinkFault(Fault):
 
     @property
     def outwards(self) -> bool:
-        """Whether it concerns what goes to the autopilot."""
+        """Return whether it acts on messages to the autopilot."""
         return self.direction != FROM
 
     @property
     def inwards(self) -> bool:
-        """Whether it concerns what comes from the autopilot."""
+        """Return whether it acts on messages from the autopilot."""
         return self.direction != TO
 
 

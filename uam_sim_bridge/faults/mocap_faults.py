@@ -1,4 +1,4 @@
-"""Motion capture that is silent, stuck, displaced, late or wrong now and then."""
+"""Faults of the motion capture: dropout, freeze, jump, exchanged axes, latency, outliers, clock."""
 
 from __future__ import annotations
 
@@ -19,7 +19,11 @@ AXES = {"xy": [1, 0, 2], "xz": [2, 1, 0], "yz": [0, 2, 1]}
 
 
 class PoseEffect(Effect):
-    """Alters each pose that arrives."""
+    """Changes each pose.
+
+    alter: takes and returns stamp [s], position (3,) [m, ENU], quaternion (4,) FLU → ENU [w x y z];
+    it returns None for a dropped pose.
+    """
 
     def __init__(
         self,
@@ -100,7 +104,7 @@ class MocapLatency(PlantFault):
 
 
 class Late(Effect):
-    """Hands poses on when `delay` [s] have passed by the clock of the autopilot's IMU."""
+    """Delays poses by `delay` [s], by the stamps of the autopilot's IMU."""
 
     def __init__(self, delay: float):
         self._delay = delay

@@ -1,6 +1,6 @@
-"""The plant with faults: samples and commands are altered at its edge, tick by tick.
+"""The plant with fault injection: changes samples, commands and model at each tick.
 
-Only flights with such faults have it; all others fly the `Plant` itself.
+Flights without plant faults use `Plant` itself.
 """
 
 from __future__ import annotations
@@ -10,15 +10,15 @@ import numpy as np
 
 from uam_sim_bridge.faults.fault import Effect, PlantCommands
 from uam_sim_bridge.faults.schedule import Schedule
-from uam_sim_bridge.faults.timeline import Happened, Timeline
+from uam_sim_bridge.faults.timeline import FaultState, Timeline
 from uam_sim_bridge.plant import Plant, Samples, Vehicle
 from uam_sim_bridge.plant.payload_hinge import PayloadHinge, add_to
 
-STIFF = 0.9999  # impedance of a friction that does not creep, see MuJoCo's solimp
+STIFF = 0.9999  # constraint impedance of a friction without creep, see MuJoCo's solimp
 
 
 class FaultyPlant(Plant):
-    """A Plant whose faults begin and end at mission times; `mission_at` tells it that time."""
+    """A Plant with faults that begin and end at mission times; `mission_at` sets the time."""
 
     def __init__(
         self,
@@ -28,10 +28,10 @@ class FaultyPlant(Plant):
         arm_start: tuple[float, float],
         schedule: Schedule,
     ) -> None:
-        """See `Plant`; schedule: faults of the plant alone."""
+        """See `Plant`; schedule: faults of the plant only."""
         super().__init__(vehicle, payload_mass, seed, arm_start)
         self.timeline = Timeline(schedule)
-        self.changed: list[Happened] = []  # what came or went with this tick
+        self.changed: list[FaultState] = []  # faults that began or ended at this tick
         self._effects: dict[int, Effect] = {}
         self._touched = False
         streams = np.random.SeedSequence(schedule.seed, spawn_key=(0xFA,)).spawn(
@@ -47,7 +47,7 @@ class FaultyPlant(Plant):
             model.dof_solimp[self._arm_dofs].copy(),
             self._magnet_gain,
         )
-        self._added_wind, self._wanted_wind = np.zeros(3), np.zeros(3)
+        self._added_wind, self._fault_wind = np.zeros(3), np.zeros(3)
         self._hinge = PayloadHinge(model, self.data)
         self._swinging = False
 
@@ -59,7 +59,7 @@ class FaultyPlant(Plant):
         self.timeline.mission_at(stamp, time)
 
     def sense(self) -> Samples:
-        """As `Plant.sense`, with what the faults make of it."""
+        """Return the samples of `Plant.sense`, changed by the active faults."""
         self.changed = self.timeline.update(self.time)
         for one in self.changed:
             if one.active:
@@ -72,7 +72,7 @@ class FaultyPlant(Plant):
         return samples
 
     def step(self, motor_commands: np.ndarray, arm_effort: np.ndarray, magnet: bool) -> None:
-        """As `Plant.step`, with what the faults make of it."""
+        """Step as in `Plant.step`, with commands and model changed by the active faults."""
         if self._effects or self._touched:
             commands = PlantCommands(np.array(motor_commands), np.array(arm_effort), bool(magnet))
             self._as_usual()
@@ -85,42 +85,42 @@ class FaultyPlant(Plant):
         super().step(motor_commands, arm_effort, magnet)
 
     def weaken_rotors(self, parts: np.ndarray) -> None:
-        """Leave parts (4,) of the rotors' thrust for this period."""
+        """Scale the rotors' thrust by parts (n_rotors,) [1] for this period."""
         self.rotors.efficiency *= parts
 
     def brake_joint(self, joint: int, torque: float) -> None:
-        """Let it take `torque` [N m] to move joint 0 or 1 for this period."""
+        """Add dry friction `torque` [N m] to joint 0 or 1 for this period."""
         self.model.dof_frictionloss[self._arm_dofs[joint]] += torque
         self.model.dof_solimp[self._arm_dofs[joint], 0:2] = STIFF
 
     def weaken_magnet(self, part: float) -> None:
-        """Leave a part of the magnet's holding force for this period."""
+        """Scale the magnet's holding force by `part` [1] for this period."""
         self._magnet_gain *= part
 
     def add_wind(self, wind: np.ndarray) -> None:
         """Add wind (3,) [m/s, ENU] for this period."""
-        self._wanted_wind += wind
+        self._fault_wind += wind
 
     def swing_payload(self, commands: PlantCommands, rate: float) -> None:
-        """Hang the payload on a hinge while the magnet is on; rate [rad/s]: at the beginning."""
+        """Attach the payload by a hinge while the magnet is on; rate [rad/s]: initial rate."""
         self._swinging = commands.magnet and (self._hinge.closed or self._hinge.close(rate))
         if self._swinging:
-            commands.magnet = False  # the hinge holds it instead, at one point alone
+            commands.magnet = False  # the hinge replaces the magnet's rigid contact
 
     def _as_usual(self) -> None:
-        """Undo what the faults did to this plant in the last period."""
+        """Undo the changes of the last period."""
         efficiency, friction, softness, gain = self._usual
         self.rotors.efficiency[:] = efficiency
         self.model.dof_frictionloss[self._arm_dofs] = friction
         self.model.dof_solimp[self._arm_dofs] = softness
         self._magnet_gain = gain
-        self._wanted_wind[:] = 0.0
+        self._fault_wind[:] = 0.0
         self._swinging = False
 
     def _settle(self) -> None:
-        """Give MuJoCo what the faults left of it."""
+        """Write the magnet's gain, the wind and the hinge's state to the model."""
         self.model.actuator_gainprm[self._magnet_id, 0] = self._magnet_gain
-        change = self._wanted_wind - self._added_wind
+        change = self._fault_wind - self._added_wind
         self.wind += change
         self._wind_mean += change
         self._added_wind += change

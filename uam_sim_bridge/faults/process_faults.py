@@ -1,4 +1,4 @@
-"""Nodes that are killed, stopped, slow, or unheard of. They need processes: the ROS engine."""
+"""Faults of processes: killed, stopped, slow, without discovery. They require the ROS engine."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ NODE = "affected process"
 
 @dataclass(frozen=True)
 class ProcessFault(Fault):
-    """A fault of one process; times are those of the wall clock."""
+    """A fault of one process; its times are wall times."""
 
     PLACE: ClassVar[str] = PROCESS
 

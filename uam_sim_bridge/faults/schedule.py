@@ -1,13 +1,15 @@
-"""Which faults a flight has, and when: read from words, files and scenarios, checked at the door.
+"""The faults of a flight and their times, read and checked from options, files and scenarios.
+
+The text of an option --fault:
 
     NAME@SECONDS[+DURATION][:parameter=value,...]        mocap_dropout@20+3
     NAME@PHASE[+AFTER[+DURATION]][:parameter=value,...]  motor_loss@pick+1:motor=2,remaining=0.7
 
-or, in a file (a list, or a mapping with the list `faults`) and in a scenario's `faults`:
+The entry of a file (a list, or a mapping with the list `faults`) and of a scenario's `faults`:
 
     - {fault: motor_loss, at: pick, after: 1, duration: 5, motor: 2, remaining: 0.7}
 
-Without a duration a fault stays for good.
+A fault without a duration lasts until the end of the flight.
 """
 
 from __future__ import annotations
@@ -25,14 +27,14 @@ from uam_sim_bridge.faults.catalogue import make
 from uam_sim_bridge.faults.fault import Fault, FaultError
 
 FORM = "NAME@SECONDS[+DURATION] or NAME@PHASE[+AFTER[+DURATION]], then :parameter=value,..."
-WORDS = ("fault", "at", "after", "duration")
+KEYS = ("fault", "at", "after", "duration")
 LATEST = 1e5  # [s] of mission time
 SUFFIXES = (".yaml", ".yml")
 
 
 @dataclass(frozen=True)
 class TimedFault:
-    """A fault from mission time `at` [s], for `duration` [s] or, with infinity, for good."""
+    """A fault from mission time `at` [s] for `duration` [s]; inf: until the end of the flight."""
 
     fault: Fault
     at: float
@@ -40,14 +42,14 @@ class TimedFault:
 
     @property
     def entry(self) -> dict[str, Any]:
-        """As an entry of a file."""
+        """Return the fault as an entry of a file."""
         lasting = {} if math.isinf(self.duration) else {"duration": self.duration}
         return {"fault": self.fault.NAME, "at": self.at, **lasting, **self.fault.values}
 
 
 @dataclass(frozen=True)
 class Schedule:
-    """All faults of a flight; seed: of what is random in them."""
+    """All faults of a flight; seed: of their random numbers."""
 
     faults: tuple[TimedFault, ...] = ()
     seed: int = 1
@@ -56,22 +58,22 @@ class Schedule:
         return bool(self.faults)
 
     def only(self, place: str) -> Schedule:
-        """Those that act on `place`: PLANT, LINK or PROCESS."""
+        """Return the faults that act on `place`: PLANT, LINK or PROCESS."""
         chosen = tuple(one for one in self.faults if one.fault.PLACE == place)
         return Schedule(chosen, self.seed)
 
     @property
     def entries(self) -> list[dict[str, Any]]:
-        """All as entries of a file."""
+        """Return all faults as entries of a file."""
         return [one.entry for one in self.faults]
 
     def to_text(self) -> str:
-        """As a parameter of a node; "" without any fault."""
+        """Return the value of a node's parameter; "" without faults."""
         return json.dumps({"seed": self.seed, "faults": self.entries}) if self else ""
 
     @classmethod
     def from_text(cls, text: str) -> Schedule:
-        """Read what `to_text` wrote; raises FaultError in one line."""
+        """Return the schedule of a text by `to_text`; raises FaultError in one line."""
         if not text:
             return cls()
         try:
@@ -84,7 +86,7 @@ class Schedule:
 
 
 def read_schedule(given: Sequence[str], scenario: Scenario, seed: int) -> Schedule:
-    """The scenario's own faults and those `given`: in words, or files of them.
+    """Return the scenario's faults and those `given`, as option texts or names of YAML files.
 
     Raises FaultError in one line.
     """
@@ -97,12 +99,12 @@ def read_schedule(given: Sequence[str], scenario: Scenario, seed: int) -> Schedu
         if Path(text).suffix in SUFFIXES:
             found += [timed(entry, phases, text) for entry in from_file(Path(text))]
         else:
-            found.append(timed(in_words(text), phases, f"fault '{text}'"))
+            found.append(timed(parse_spec(text), phases, f"fault '{text}'"))
     return Schedule(tuple(found), seed)
 
 
 def beginnings(scenario: Scenario) -> dict[str, float]:
-    """Phases by name, and the mission time [s] at which each begins for the first time."""
+    """Return by phase name the mission time [s] at which the phase begins first."""
     found: dict[str, float] = {}
     for start, name in scenario.phases:
         found.setdefault(name, start)
@@ -110,22 +112,22 @@ def beginnings(scenario: Scenario) -> dict[str, float]:
 
 
 def from_file(file: Path) -> list[Mapping[str, Any]]:
-    """Entries of a YAML file; raises FaultError."""
+    """Return the entries of a YAML file; raises FaultError."""
     document = yaml_file.read(file, FaultError)
     entries = document.get("faults") if isinstance(document, dict) else document
     return listed(entries, str(file))
 
 
 def listed(entries: Any, where: str) -> list[Mapping[str, Any]]:
-    """The same, if it is a list of mappings; raises FaultError otherwise."""
+    """Return `entries` if it is a list of mappings; raises FaultError otherwise."""
     good = isinstance(entries, list) and all(isinstance(entry, dict) for entry in entries)
     if not good:
         raise FaultError(f"{where}: a list of faults expected, each as {{fault: NAME, at: ...}}")
     return entries
 
 
-def in_words(text: str) -> dict[str, Any]:
-    """Take SPEC apart into an entry; raises FaultError where it has another form."""
+def parse_spec(text: str) -> dict[str, Any]:
+    """Return the entry of an option text; raises FaultError if it has another form."""
     head, colon, tail = text.partition(":")
     name, at, when = head.partition("@")
     first, *numbers = when.split("+")
@@ -147,8 +149,11 @@ def in_words(text: str) -> dict[str, Any]:
 
 
 def timed(entry: Mapping[str, Any], phases: Mapping[str, float], where: str) -> TimedFault:
-    """Check an entry; raises FaultError that begins with `where`."""
-    values = {key: value for key, value in entry.items() if key not in WORDS}
+    """Return the fault of an entry; raises FaultError with `where` in front.
+
+    phases: mission time [s] of each phase's begin.
+    """
+    values = {key: value for key, value in entry.items() if key not in KEYS}
     try:
         fault = make(entry.get("fault"), values)
         at = entry.get("at")

@@ -1,4 +1,4 @@
-"""Which faults of a schedule are there at a moment, and when each came and went."""
+"""Begin and end of the faults of a schedule, tick by tick."""
 
 from __future__ import annotations
 
@@ -9,12 +9,12 @@ from typing import Any
 from uam_sim_bridge.faults.fault import Fault
 from uam_sim_bridge.faults.schedule import Schedule, TimedFault
 
-TOLERANCE = 1e-6  # [s] stamps are whole microseconds
+TOLERANCE = 1e-6  # s; stamps are whole microseconds
 
 
 @dataclass
-class Happened:
-    """What became of one fault; times are mission times [s], None: not yet."""
+class FaultState:
+    """State of a fault; begin, end: mission times [s], None before they occur."""
 
     planned: TimedFault
     number: int
@@ -23,49 +23,49 @@ class Happened:
 
     @property
     def fault(self) -> Fault:
-        """The fault itself."""
+        """Return the fault."""
         return self.planned.fault
 
     @property
     def active(self) -> bool:
-        """Whether it is there now."""
+        """Return whether the fault has begun and not ended."""
         return self.begin is not None and self.end is None
 
     @property
     def record(self) -> dict[str, Any]:
-        """As metrics.json and info.json have it."""
+        """Return the entry of `faults` in metrics.json and info.json."""
         return record(self.fault.NAME, self.begin, self.end, self.fault.values)
 
 
 def record(name: str, begin: float, end: float | None, values: dict[str, Any]) -> dict[str, Any]:
-    """An entry of `faults` in metrics.json; end None: it was there until the flight ended."""
+    """Return an entry of `faults` in metrics.json; end None: active at the end of the flight."""
     over = None if end is None else round(end, 6)
     return {"fault": name, "begin_s": round(begin, 6), "end_s": over, "parameters": values}
 
 
 class Timeline:
-    """Steps through a schedule. Its time is counted from take-off by whoever calls it.
+    """Begins and ends the faults of a schedule at their mission times.
 
-    The take-off is told once, as stamp and mission time of any status; from then on the clock of
-    the stamps counts, so that a mission that stops its own time has no say in it.
+    The first mission status after take-off fixes the stamp of take-off. After that only the stamps
+    count: a hold, which stops the mission time, does not delay the faults.
     """
 
     def __init__(self, schedule: Schedule) -> None:
-        self.all = [Happened(one, number) for number, one in enumerate(schedule.faults)]
+        self.all = [FaultState(one, number) for number, one in enumerate(schedule.faults)]
         self._takeoff: float | None = None
         self._pending = bool(self.all)
 
     def mission_at(self, stamp: float, time: float) -> None:
-        """At `stamp` [s] the mission's time was `time` [s], negative before take-off."""
+        """Set the mission time `time` [s] at `stamp` [s]; time is negative before take-off."""
         if self._takeoff is None and time >= 0.0:
             self._takeoff = stamp - time
 
     def time(self, stamp: float) -> float | None:
-        """Mission time [s] at a stamp [s]; None before take-off."""
+        """Return the mission time [s] at `stamp` [s]; None before take-off."""
         return None if self._takeoff is None else stamp - self._takeoff
 
-    def update(self, stamp: float) -> list[Happened]:
-        """Switch to `stamp` [s]; returns what came or went with it."""
+    def update(self, stamp: float) -> list[FaultState]:
+        """Advance to `stamp` [s]; return the faults that began or ended."""
         if self._takeoff is None or not self._pending:
             return []
         now, changed = stamp - self._takeoff + TOLERANCE, []
@@ -85,5 +85,5 @@ class Timeline:
 
     @property
     def records(self) -> list[dict[str, Any]]:
-        """What has happened so far, in the order of the schedule."""
+        """Return the records of all faults that have begun, in the order of the schedule."""
         return [one.record for one in self.all if one.begin is not None]

@@ -8,7 +8,7 @@ from rclpy.node import Node
 
 from uam_msgs_py.messages import topics
 from uam_msgs_py.messages.faults import FaultEvent
-from uam_sim_bridge.faults.timeline import Happened
+from uam_sim_bridge.faults.timeline import FaultState
 
 
 class FaultTopic:
@@ -18,7 +18,7 @@ class FaultTopic:
         topic = topics.FAULTS
         self._publisher = node.create_publisher(topic.type, topic.name, topic.qos)
 
-    def tell(self, stamp: int, changed: Iterable[Happened]) -> None:
+    def tell(self, stamp: int, changed: Iterable[FaultState]) -> None:
         """Publish the events of the moment `stamp` [ns]."""
         for one in changed:
             fault = one.fault

@@ -48,8 +48,8 @@ class DirectBridge:
         self.setpoint = np.zeros(4)
         self.factor = 1.0
         self.passes: Callable[[], bool] = lambda: True  # whether a message reaches the autopilot
-        self.hears: Callable[[], bool] = lambda: True  # whether one of the autopilot arrives
-        self._heard = 0.0  # stamp [s] of the last one
+        self.receives: Callable[[], bool] = lambda: True  # whether one of the autopilot arrives
+        self._received_at = 0.0  # stamp [s] of the last one
 
     @property
     def armed_since(self) -> float | None:
@@ -58,7 +58,7 @@ class DirectBridge:
 
     def connected(self, stamp: float) -> bool:
         """Whether a heartbeat came within the last seconds before `stamp` [s]."""
-        return stamp - self._heard < HEARTBEAT_TIMEOUT
+        return stamp - self._received_at < HEARTBEAT_TIMEOUT
 
     def send(
         self,
@@ -79,8 +79,8 @@ class DirectBridge:
         autopilot, setpoint = self.autopilot, self.setpoint
         if mocap is not None and not self._frozen(mocap) and self.passes():
             autopilot.vision(time, swap_world(mocap[1]), swap_quaternion(mocap[2]))
-        if self.hears():
-            self._heard = stamp
+        if self.receives():
+            self._received_at = stamp
         self.sequence.want(wanted.arm)
         self.sequence.let_go = wanted.state is State.FAILSAFE
         status = autopilot.commander

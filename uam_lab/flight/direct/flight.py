@@ -59,7 +59,7 @@ class DirectFlight:
         self.inputs = Inputs(self.plant.period)
         if self._faults:
             self.bridge.passes = self._faults.link.passes
-            self.bridge.hears = self._faults.link.hears
+            self.bridge.receives = self._faults.link.receives
         self.ended_by = ""  # why it was ended although the mission was not done
         self._limit = time_limit(scenario)
         self._ahead = math.inf  # [s] stamp of the tick that the mission is ready for

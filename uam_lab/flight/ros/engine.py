@@ -32,7 +32,7 @@ from uam_lab.results.outcome import Outcome
 from uam_lab.results.result_folder import ResultFolder
 from uam_msgs_py.node import wiring
 from uam_sim_bridge.faults import PROCESS
-from uam_sim_bridge.faults.timeline import Happened
+from uam_sim_bridge.faults.timeline import FaultState
 from uam_sim_bridge.nodes.fault_topic import FaultTopic
 from uam_sim_bridge.nodes.plant_options import NOT_READY
 from uam_sim_bridge.ports import Ports, Reservation
@@ -154,7 +154,7 @@ def _process_faults(
     schedule = settings.faults.only(PROCESS)
     topic = FaultTopic(listener.node) if schedule else None
 
-    def tell(one: Happened) -> None:
+    def tell(one: FaultState) -> None:
         stage = f"begins at {one.begin:.2f} s" if one.active else f"is over at {one.end:.2f} s"
         progress.message(f"fault {one.fault.NAME} of {one.fault.values['node']} {stage}")
         topic.tell(listener.stamp, [one])

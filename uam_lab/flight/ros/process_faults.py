@@ -17,7 +17,7 @@ from uam_lab.processes.processes import Processes
 from uam_lab.processes.thread_stop import StoppedThreads
 from uam_sim_bridge.faults import Schedule
 from uam_sim_bridge.faults.process_faults import DiscoveryLoss, NodeKill, NodeSlow, ProcessFault
-from uam_sim_bridge.faults.timeline import Happened
+from uam_sim_bridge.faults.timeline import FaultState
 from uam_sim_bridge.ports import is_discovery_port
 
 # Fast DDS's threads: one that tells of itself, one for each UDP port that it listens at
@@ -39,12 +39,12 @@ class ProcessFaults:
         self,
         children: Processes,
         schedule: Schedule,
-        tell: Callable[[Happened], None],
+        tell: Callable[[FaultState], None],
         clock: Callable[[], float] = time.monotonic,
     ):
         """schedule: faults of processes alone; tell: called as each begins or ends; clock [s]."""
         self._children, self._tell, self._clock = children, tell, clock
-        self._all = [Happened(one, number) for number, one in enumerate(schedule.faults)]
+        self._all = [FaultState(one, number) for number, one in enumerate(schedule.faults)]
         self._ends: dict[int, float] = {}  # by the clock
         self._hindering: dict[int, _Hindrance | StoppedThreads] = {}
 
@@ -65,7 +65,7 @@ class ProcessFaults:
                 self._release(one.number)
                 self._tell(one)
 
-    def _begin(self, one: Happened) -> None:
+    def _begin(self, one: FaultState) -> None:
         fault = one.fault
         assert isinstance(fault, ProcessFault)
         pid = self._children.pid(fault.node)

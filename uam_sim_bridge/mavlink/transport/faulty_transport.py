@@ -8,7 +8,7 @@ import numpy as np
 
 from uam_sim_bridge.faults import Schedule
 from uam_sim_bridge.faults.link_faults import LinkFault, MavlinkCorruption, MavlinkCut, MavlinkDelay
-from uam_sim_bridge.faults.timeline import Happened, Timeline
+from uam_sim_bridge.faults.timeline import FaultState, Timeline
 from uam_sim_bridge.mavlink.transport.transport import Transport
 
 
@@ -44,7 +44,7 @@ class FaultyTransport:
         """See `Timeline.mission_at`."""
         self._timeline.mission_at(stamp, time)
 
-    def update(self, stamp: float) -> list[Happened]:
+    def update(self, stamp: float) -> list[FaultState]:
         """Set the time to `stamp` [s], send delayed packets; return faults that began or ended."""
         self._now = max(self._now, stamp)
         changed = self._timeline.update(stamp)
