@@ -5,9 +5,8 @@ import json
 import numpy as np
 import pytest
 from px4_at_hand import NO_PX4, installation
+from rate_steps import LIMIT, compared, measure
 from whole_flight import Flight
-
-from uam_lab.px4_steps.rate_steps import LIMIT, compared, measure
 
 PLACED = 0.25  # [m]
 TIMES_THE_STAND_INS = 2.0

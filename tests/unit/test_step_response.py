@@ -2,9 +2,8 @@
 
 import numpy as np
 import pytest
-
-from uam_lab.px4_steps.rate_experiment import AXES, experiment, steps
-from uam_lab.px4_steps.step_response import distance, figures
+from px4_steps.rate_experiment import AXES, experiment, steps
+from px4_steps.step_response import distance, figures
 
 TIME = np.arange(-10, 500) * 0.004
 

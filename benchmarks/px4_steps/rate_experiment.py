@@ -13,8 +13,8 @@ from typing import Any
 import numpy as np
 import yaml
 
+from px4_steps.hover_flight import HoverFlight, NotFlown
 from uam_control.settings import configuration
-from uam_lab.px4_steps.hover_flight import HoverFlight, NotFlown
 
 AXES = ("roll", "pitch", "yaw")
 

@@ -1,4 +1,4 @@
-"""`python -m uam_lab.px4_steps.rate_steps`: body-rate steps of the stand-in beside PX4's.
+"""Body-rate steps of the stand-in beside those of PX4, in hover.
 
 Both fly the same experiment (`rate_experiment`) with the same parameters. Left in --out: steps.csv,
 steps.json, steps.png.
@@ -15,13 +15,13 @@ from dataclasses import asdict
 from pathlib import Path
 
 import numpy as np
+from px4_steps.hover_flight import HoverFlight, NotFlown
+from px4_steps.rate_experiment import AXES, experiment, responses
+from px4_steps.step_response import distance, figures
 
 from uam_lab.flight.direct.warm_up import is_cold, warm_up
 from uam_lab.processes.environment import environment
 from uam_lab.processes.processes import NodeFailed, Processes
-from uam_lab.px4_steps.hover_flight import HoverFlight, NotFlown
-from uam_lab.px4_steps.rate_experiment import AXES, experiment, responses
-from uam_lab.px4_steps.step_response import distance, figures
 from uam_lab.report.figures import style
 from uam_lab.results.atomic import replacing, write_rows, write_text
 from uam_lab.results.result_folder import ResultFolderError, as_json, make_folder
@@ -114,9 +114,9 @@ def write(out: Path, stand_in: Responses, px4: Responses, found: dict[str, dict]
 def main() -> int:
     """Compare: 0 all axes within LIMIT, 1 not; 2 where nothing could be flown."""
     parser = argparse.ArgumentParser(
-        prog="python -m uam_lab.px4_steps.rate_steps",
+        prog="benchmarks/rate_steps.py",
         description=__doc__.splitlines()[0],
-        epilog="example: python -m uam_lab.px4_steps.rate_steps --px4-dir "
+        epilog="example: .venv/bin/python benchmarks/rate_steps.py --px4-dir "
         "~/PX4-Autopilot/build/px4_sitl_default --out results/rate-steps",
     )
     parser.add_argument("--px4-dir", metavar="DIR", help=REQUIRED)

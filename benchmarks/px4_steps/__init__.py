@@ -1,0 +1,1 @@
+"""What benchmarks/rate_steps.py is made of."""
