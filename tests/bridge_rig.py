@@ -4,13 +4,15 @@ import socket
 
 import numpy as np
 from free_port import free_port
+from geometry_msgs.msg import TwistStamped
 from quadrotor import MASS, Quadrotor
 from std_msgs.msg import Bool
 
 from uam_control.maths.rotations import euler_from_quaternion
 from uam_msgs_py.messages import topics
 from uam_msgs_py.messages.control import ATTITUDE_NAMES, PositionCommandWriter, TorqueWriter
-from uam_msgs_py.messages.convert import PoseWriter, read_setpoint
+from uam_msgs_py.messages.convert import PoseWriter
+from uam_msgs_py.messages.serialized import Serialized
 from uam_msgs_py.messages.trajectories import TrajectoryWriter
 from uam_sim_bridge.autopilot.companion import Companion
 from uam_sim_bridge.autopilot.core import Autopilot
@@ -21,6 +23,12 @@ MODULE = "uam_sim_bridge.nodes.mavlink_bridge"
 PERIOD = 4_000_000
 NAMES = ["x", "y", "z", "roll", "pitch", "yaw", "alpha_1", "alpha_2"]
 WEIGHT = MASS * 9.81
+
+
+def read_setpoint(data: bytes) -> tuple[int, np.ndarray, float]:
+    """The acknowledged setpoint: stamp [ns], body rates (3,) [rad/s, FLU], thrust 0..1."""
+    message = Serialized(TwistStamped, data)
+    return message.stamp, message.vector("angular"), float(message.vector("linear")[2])
 
 
 class Rig:

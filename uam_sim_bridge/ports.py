@@ -76,18 +76,6 @@ def is_discovery_port(port: int) -> bool:
     return port % 2 == 0
 
 
-def require_free(kind: int, port: int, purpose: str) -> None:
-    """Raise PortError with the port and its purpose if it cannot be bound."""
-    if not 1 <= port <= 65535:
-        raise PortError(f"{purpose}: port {port} is not in 1..65535")
-    if in_use(kind, port):
-        protocol = "TCP" if kind == socket.SOCK_STREAM else "UDP"
-        raise PortError(
-            f"{purpose}: {protocol} port {port} is in use by another program; "
-            "stop it or choose another port"
-        )
-
-
 class BusyPort(NamedTuple):
     """A port that another program holds; protocol: TCP or UDP."""
 

@@ -5,11 +5,11 @@ import time
 
 import numpy as np
 import pytest
-from bridge_rig import PERIOD, WEIGHT
+from bridge_rig import PERIOD, WEIGHT, read_setpoint
 
 from uam_control.maths.rotations import quaternion_from_euler
 from uam_msgs_py.messages import topics
-from uam_msgs_py.messages.convert import PoseWriter, read_setpoint
+from uam_msgs_py.messages.convert import PoseWriter
 from uam_msgs_py.messages.status import MissionStatus
 from uam_sim_bridge.mavlink.protocol.modes import Mode
 

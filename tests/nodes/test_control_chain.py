@@ -10,7 +10,6 @@ from uam_control.mission import Mission, load_scenario
 from uam_control.profiles.profile import load_profile
 from uam_msgs_py.messages import topics
 from uam_msgs_py.messages.control import (
-    TAU_Q,
     read_position_command,
     read_reference,
     read_state,
@@ -168,7 +167,7 @@ def test_the_nodes_compute_what_the_maths_does_bit_for_bit(start, probe):
         np.testing.assert_array_equal(published, state)
         at, command = read_position_command(plant.position[i])
         assert at == stamp and command.flying == (tau_p is not None)
-        at, torque = read_torque(plant.attitude[i], TAU_Q)
+        at, torque = read_torque(plant.attitude[i])
         assert at == stamp and (torque is None) == (tau_q is None)
         np.testing.assert_array_equal(read_effort(plant.effort[i], JOINTS), tau_alpha)
         if tau_p is not None:

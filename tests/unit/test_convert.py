@@ -5,7 +5,7 @@ import struct
 
 import numpy as np
 import pytest
-from geometry_msgs.msg import PoseStamped
+from geometry_msgs.msg import PoseStamped, TwistStamped
 from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
@@ -18,8 +18,6 @@ from uam_control.coordinates import COORDINATES, JOINTS
 from uam_msgs_py.messages.control import (
     ARM_NAMES,
     ATTITUDE_NAMES,
-    TAU_ALPHA,
-    TAU_Q,
     PositionCommandWriter,
     ReferenceWriter,
     TorqueWriter,
@@ -39,7 +37,6 @@ from uam_msgs_py.messages.convert import (
     read_imu,
     read_joints,
     read_pose,
-    read_setpoint,
     read_switch,
 )
 from uam_msgs_py.messages.layouts import KNOWN_LAYOUTS, BadMessage, stamp_of
@@ -213,15 +210,15 @@ def test_position_command_round_trip():
 def test_idle_commands_are_empty_but_stamped():
     stamp, command = read_position_command(PositionCommandWriter().idle(12))
     assert stamp == 12 and not command.flying and not command.tau.any()
-    assert read_torque(TorqueWriter(ATTITUDE_NAMES).idle(12), TAU_Q) == (12, None)
+    assert read_torque(TorqueWriter(ATTITUDE_NAMES).idle(12)) == (12, None)
 
 
 def test_torque_round_trip_and_refusal():
-    message = TorqueWriter(ARM_NAMES).fill(3, np.array([0.5, -0.25]))
-    stamp, torque = read_torque(message, TAU_ALPHA)
-    assert stamp == 3 and list(torque) == [0.5, -0.25]
+    message = TorqueWriter(ATTITUDE_NAMES).fill(3, np.array([0.5, -0.25, 0.125]))
+    stamp, torque = read_torque(message)
+    assert stamp == 3 and list(torque) == [0.5, -0.25, 0.125]
     with pytest.raises(BadMessage, match="expected roll, pitch, yaw"):
-        read_torque(message, TAU_Q)
+        read_torque(TorqueWriter(ARM_NAMES).fill(3, np.array([0.5, -0.25])))
 
 
 def test_effort_and_setpoint():
@@ -230,9 +227,11 @@ def test_effort_and_setpoint():
     assert list(read_effort(data, JOINTS)) == [0.5, -0.5]
     with pytest.raises(BadMessage, match="3 efforts, 2 expected"):
         read_effort(serialize_message(Float64MultiArray(data=[1.0, 2.0, 3.0])), JOINTS)
-    message = SetpointWriter().fill(6, np.array([0.1, 0.2, 0.3]), 0.6)
-    stamp, rates, thrust = read_setpoint(message)
-    assert stamp == 6 and list(rates) == [0.1, 0.2, 0.3] and thrust == 0.6
+    data = SetpointWriter().fill(6, np.array([0.1, 0.2, 0.3]), 0.6)
+    setpoint = deserialize_message(data, TwistStamped)
+    rates = setpoint.twist.angular
+    assert setpoint.header.stamp.nanosec == 6 and (rates.x, rates.y, rates.z) == (0.1, 0.2, 0.3)
+    assert setpoint.twist.linear.z == 0.6
 
 
 def test_a_switch():

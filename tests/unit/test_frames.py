@@ -73,7 +73,3 @@ def test_euler_map_agrees_with_the_quaternion_map(euler):
     by_quaternion = euler_from_quaternion(frames.swap_quaternion(quaternion_from_euler(euler)))
     difference = by_quaternion - frames.swap_euler(euler)
     assert np.sin(difference / 2) == pytest.approx(0.0, abs=1e-6)
-
-
-def test_variances_keep_their_sign():
-    assert frames.swap_world_variance(np.array([1.0, 2.0, 3.0])) == pytest.approx([2.0, 1.0, 3.0])

@@ -62,11 +62,4 @@ def test_a_port_held_by_another_program_is_skipped_and_named(tmp_path):
             assert other.ports.instance != held.instance
         with pytest.raises(PortError, match=f"TCP {held.simulator_tcp}"):
             Reservation(held.instance, folder=tmp_path)
-        with pytest.raises(PortError, match=f"TCP port {held.simulator_tcp} is in use"):
-            ports.require_free(socket.SOCK_STREAM, held.simulator_tcp, "--autopilot")
     assert list(tmp_path.iterdir()) == []
-
-
-def test_a_port_number_out_of_range_is_refused():
-    with pytest.raises(PortError, match="70000 is not in 1..65535"):
-        ports.require_free(socket.SOCK_DGRAM, 70000, "--autopilot")

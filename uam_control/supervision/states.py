@@ -1,7 +1,7 @@
 """The states of a supervised flight and every way from one to another, as data.
 
 `TRANSITIONS` is all there is: what it does not list does not happen. docs/supervision.md shows it
-as a diagram, which a test compares with `mermaid()`.
+as a diagram, which a test compares with the table.
 """
 
 from __future__ import annotations
@@ -102,19 +102,3 @@ ORDINARY = {
     Event.TOUCHDOWN: "touchdown",
 }
 AIRBORNE_STATES = (State.TAKING_OFF, State.FLYING, State.HOLDING, State.LANDING)
-
-
-def mermaid() -> str:
-    """The table as a mermaid state diagram, events between the same two states on one arrow."""
-    arrows: dict[tuple[State, State], list[str]] = {}
-    for source, event, target in TRANSITIONS:
-        arrows.setdefault((source, target), []).append(event.value)
-    lines = ["stateDiagram-v2"]
-    lines += [f'    state "{state.value}" as {state.name}' for state in State]
-    lines.append(f"    [*] --> {State.GROUNDED.name}")
-    lines += [
-        f"    {source.name} --> {target.name}: {' / '.join(events)}"
-        for (source, target), events in arrows.items()
-    ]
-    lines.append(f"    {State.DISARMED.name} --> [*]")
-    return "\n".join(lines)

@@ -25,7 +25,6 @@ ROWS = TrajectoryWriter.ROWS[:3]
 WHOLE, ARM_ALONE = TrajectoryReader(ALL), TrajectoryReader(ARM_NAMES)
 POSE = TrajectoryReader(POSE_NAMES, TrajectoryWriter.ROWS)
 TAU_Q = TrajectoryReader(ATTITUDE_NAMES, ["effort"])
-TAU_ALPHA = TrajectoryReader(ARM_NAMES, ["effort"])
 
 
 def read_state(data: bytes) -> tuple[int, np.ndarray]:
@@ -130,12 +129,9 @@ class TorqueWriter:
         return self._idle.stamped(stamp)
 
 
-def read_torque(data: bytes, reader: TrajectoryReader) -> tuple[int, np.ndarray | None]:
-    """Return (stamp [ns], torque (n,) [N m], or None while idle); raises BadMessage.
-
-    reader: TAU_Q or TAU_ALPHA, for the attitude's or the arm's torques.
-    """
+def read_torque(data: bytes) -> tuple[int, np.ndarray | None]:
+    """Return (stamp [ns], tau_q (3,) [N m, FLU], or None while idle); raises BadMessage."""
     message = trajectory(data)
     if not message.layout.names and not message.layout.points:
         return message.stamp, None
-    return message.stamp, reader.read(message)[0]
+    return message.stamp, TAU_Q.read(message)[0]

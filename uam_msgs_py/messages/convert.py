@@ -164,12 +164,6 @@ class SetpointWriter(Template):
         return self.stamped(stamp)
 
 
-def read_setpoint(data: bytes) -> tuple[int, np.ndarray, float]:
-    """Return (stamp [ns], body rates (3,) [rad/s, FLU], thrust 0..1)."""
-    message = Serialized(TwistStamped, data)
-    return message.stamp, message.vector("angular"), float(message.vector("linear")[2])
-
-
 def read_switch(data: bytes) -> bool:
     """Whether a Bool is true; raises BadMessage."""
     if len(data) <= ENCAPSULATION:

@@ -26,7 +26,6 @@ from uam_control.settings.parameter_set import ParameterError
 from uam_control.supervision import State
 from uam_msgs_py.messages import topics
 from uam_msgs_py.messages.control import (
-    TAU_Q,
     PositionCommand,
     read_position_command,
     read_state,
@@ -156,7 +155,7 @@ class MavlinkBridgeNode(UamNode):
 
     @staticmethod
     def _read_attitude_command(data: bytes) -> tuple[int, tuple[np.ndarray | None]]:
-        stamp, torque = read_torque(data, TAU_Q)
+        stamp, torque = read_torque(data)
         return stamp, (torque,)  # None means "idle" here, but "not there" to the join
 
     def _on_arming(self, message: Bool) -> None:

@@ -1,4 +1,4 @@
-"""Mocap poses for the autopilot's estimator: VISION_POSITION_ESTIMATE or ODOMETRY messages."""
+"""Mocap poses for the autopilot's estimator: VISION_POSITION_ESTIMATE messages."""
 
 from __future__ import annotations
 
@@ -6,9 +6,7 @@ import numpy as np
 
 from uam_control.maths.rotations import euler_from_quaternion
 from uam_sim_bridge.mavlink.protocol.frames import (
-    swap_body,
     swap_euler,
-    swap_quaternion,
     swap_world,
 )
 from uam_sim_bridge.mavlink.protocol.wire import Message, mavlink2
@@ -42,32 +40,4 @@ def vision_message(
         *swap_euler(euler_from_quaternion(quaternion)).tolist(),
         covariance(position_deviation, attitude_deviation),
         0,
-    )
-
-
-def odometry_message(
-    stamp: float,
-    position: np.ndarray,
-    quaternion: np.ndarray,
-    velocity: np.ndarray,
-    rates: np.ndarray,
-    position_deviation: float,
-    attitude_deviation: float,
-    velocity_deviation: float,
-) -> Message:
-    """Return the ODOMETRY of a pose as in `vision_message` and its velocity (EKF2_EV_CTRL = 15).
-
-    velocity (3,) [m/s] and rates (3,) [rad/s], both in the body frame FLU; velocity_deviation:
-    standard deviation [m/s].
-    """
-    return mavlink2.MAVLink_odometry_message(
-        round(stamp * 1e6),
-        mavlink2.MAV_FRAME_LOCAL_NED,
-        mavlink2.MAV_FRAME_BODY_FRD,
-        *swap_world(position).tolist(),
-        swap_quaternion(quaternion).tolist(),
-        *swap_body(velocity).tolist(),
-        *swap_body(rates).tolist(),
-        covariance(position_deviation, attitude_deviation),
-        covariance(velocity_deviation, attitude_deviation),
     )

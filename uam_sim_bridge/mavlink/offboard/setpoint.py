@@ -224,8 +224,3 @@ class RateThrustMap:
         return thrust_of_command(
             command, p[_FULL], self.parameters.battery_factor, p[_MOTOR], p[_MODEL]
         )
-
-    def thrust_command(self, newtons: float) -> float:
-        """Return the normalised thrust of a collective [N], unclamped by thrust_min/max."""
-        p = self._flat
-        return command_of_thrust(newtons, p[_FULL], p[_BATTERY], p[_MOTOR], p[_MODEL])

@@ -66,8 +66,3 @@ def swap_euler(euler: np.ndarray) -> np.ndarray:
     out[1] = -euler[1]
     out[2] = (1.5 * math.pi - euler[2]) % (2.0 * math.pi) - math.pi
     return out
-
-
-def swap_world_variance(variance: np.ndarray) -> np.ndarray:
-    """Convert variances (3,) along the ENU axes to those along NED, or back: reorders them."""
-    return np.array([variance[1], variance[0], variance[2]])
