@@ -1,1 +1,1 @@
-"""Topics, message conversion, ROS parameters and the base of the nodes."""
+"""The ROS side of all packages: topics, message conversion, parameters, base class of nodes."""

@@ -1,1 +1,1 @@
-"""Topics, and messages <-> arrays."""
+"""Topics, and conversion between messages and arrays."""

@@ -1,4 +1,4 @@
-"""The battery as sensor_msgs/BatteryState."""
+"""Conversion of a battery state to sensor_msgs/BatteryState."""
 
 import math
 from typing import Protocol
@@ -11,7 +11,9 @@ _NAN = math.nan
 
 
 class BatteryReading(Protocol):
-    """What is asked for: [V], [A] out of the battery, 0..1, [deg C], [V]; NaN for unknown."""
+    """A battery state: voltage [V], current [A] (positive: discharge), left 0..1, temperature
+    [deg C], cells [V]; NaN means unknown.
+    """
 
     voltage: float
     current: float
@@ -21,7 +23,7 @@ class BatteryReading(Protocol):
 
 
 def battery_message(stamp: int, battery: BatteryReading) -> BatteryState:
-    """Return the message; stamp [ns]. A battery that nobody measures is not `present`."""
+    """Return the message; stamp [ns]. `present` is False for an unknown voltage."""
     message = BatteryState(
         voltage=battery.voltage,
         temperature=battery.temperature,

@@ -1,4 +1,4 @@
-"""What /uam/parameter_changes says: each change that was asked of a node, and what became of it."""
+"""Content of /uam/parameter_changes: each request to change parameters, and its result."""
 
 import json
 import re
@@ -21,9 +21,9 @@ BY = "by"
 class ParameterChange:
     """One request, which may change several values at once.
 
-    values: name → (old, new); old is None where the node knows no such parameter. by: the service
-    through which it was asked, or what in the node itself asked. reason: why it was refused, one
-    line, "" where it was accepted.
+    values: name → (old, new); old is None if the node has no such parameter. by: the service of the
+    request, or the part of the node that requested the change. reason: of a refusal, one line; ""
+    if accepted.
     """
 
     node: str
@@ -33,24 +33,24 @@ class ParameterChange:
 
     @property
     def accepted(self) -> bool:
-        """Whether it counts since the stamp of the message."""
+        """Return whether the change is in effect from the stamp of the message on."""
         return not self.reason
 
     def to_message(self, stamp: int) -> DiagnosticArray:
         """Return the message; stamp [ns]: the node's newest tick, 0 before the first."""
-        said = {name: _json(old) + ARROW + _json(new) for name, (old, new) in self.values.items()}
+        texts = {name: _json(old) + ARROW + _json(new) for name, (old, new) in self.values.items()}
         outcome = REFUSED + self.reason if self.reason else ACCEPTED
         level = WARN if self.reason else OK
-        return diagnostic(stamp, self.node, level, outcome, {BY: self.by} | said)
+        return diagnostic(stamp, self.node, level, outcome, {BY: self.by} | texts)
 
     @classmethod
     def from_message(cls, message: DiagnosticArray) -> "tuple[int, ParameterChange]":
         """Return (stamp [ns], change); raises BadMessage for something else."""
         try:
             (status,) = message.status
-            said = {pair.key: pair.value for pair in status.values}
-            by = said.pop(BY)
-            values = {name: _pair(text) for name, text in said.items()}
+            texts = {pair.key: pair.value for pair in status.values}
+            by = texts.pop(BY)
+            values = {name: _pair(text) for name, text in texts.items()}
         except (KeyError, ValueError):
             raise BadMessage("not a change of parameters") from None
         reason = "" if status.message == ACCEPTED else status.message.removeprefix(REFUSED)
@@ -62,12 +62,12 @@ def _json(value: Any) -> str:
 
 
 def _plain(value: Any) -> Any:
-    """What JSON has no word for: arrays, tuples come by themselves, bytes as text."""
+    """Convert a value that JSON cannot encode: arrays to lists, bytes to text."""
     return value.decode(errors="replace") if isinstance(value, bytes) else list(value)
 
 
 def _pair(text: str) -> tuple[Any, Any]:
-    """The old and the new value of `to_message`; a text may hold an arrow, too."""
+    """Return the old and new value of a text of `to_message`; a value may contain ARROW itself."""
     for arrow in re.finditer(re.escape(ARROW), text):
         try:
             return json.loads(text[: arrow.start()]), json.loads(text[arrow.end() :])

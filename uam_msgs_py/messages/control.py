@@ -1,7 +1,7 @@
-"""The messages of the control loop and what "idle" means in each.
+"""The messages of the control loop: state, reference, commands.
 
-On the ground the vehicle is not controlled, only its arm is: the reference then names the joints
-alone, and the position and attitude commands are stamped but empty.
+On the ground only the arm is controlled: the reference then contains only the joints, and the
+position and attitude commands are idle messages, with a stamp but without values.
 """
 
 from dataclasses import dataclass
@@ -42,7 +42,7 @@ class Reference:
 
 
 class ReferenceWriter:
-    """Writes references of the whole vehicle or, while it is grounded, of the arm alone."""
+    """Writes references of all coordinates or, on the ground, of the arm only."""
 
     def __init__(self):
         self._whole, self._arm = TrajectoryWriter(ALL), TrajectoryWriter(ARM_NAMES)
@@ -77,7 +77,7 @@ NO_COMMAND = PositionCommand(np.zeros(3), np.zeros((3, 3)), False)
 
 
 class PositionCommandWriter:
-    """Writes what the position controller asks for."""
+    """Writes the position controller's command: desired pose, its derivatives, and tau_p."""
 
     def __init__(self):
         self._writer = TrajectoryWriter(POSE_NAMES, TrajectoryWriter.ROWS)
@@ -107,7 +107,7 @@ def read_position_command(data: bytes) -> tuple[int, PositionCommand]:
             raise BadMessage("points without joint names")
         return message.stamp, NO_COMMAND
     values = POSE.read(message)
-    # a copy, as strided arrays would have the control path compiled a second time, in flight
+    # a copy: a strided array would make Numba compile the control path a second time, in flight
     attitude = values[:3, ATTITUDE].copy()
     return message.stamp, PositionCommand(values[3, POSITION], attitude, True)
 

@@ -1,9 +1,9 @@
-"""numpy ↔ serialized ROS messages, with what costs time at 250 Hz left out.
+"""NumPy arrays ↔ serialized ROS messages, without message objects to save time at 250 Hz.
 
-Writers put numbers into a serialized message (`serialized.py`); readers take serialized messages
-(raw subscriptions), check names, lengths, frames and numbers, and raise BadMessage with one line.
-This is the only place where quaternions change between [w x y z] (maths) and x, y, z, w (ROS).
-Trajectories have a file of their own. Stamps are integer nanoseconds.
+Writers put numbers into a serialized message (`serialized.py`). Readers take serialized messages
+(raw subscriptions), check names, lengths, frames and numbers, and raise BadMessage in one line.
+Only this module converts quaternions between [w x y z] (maths) and x, y, z, w (ROS).
+Trajectories: `trajectories.py`. Stamps are integer nanoseconds.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ SWITCH = {on: serialize_message(Bool(data=on)) for on in (False, True)}
 
 
 class JointStateWriter(Template):
-    """A JointState whose views position, velocity, effort (n,) are written and published."""
+    """Writes a JointState: set the views position, velocity, effort (n,), publish `stamped`."""
 
     def __init__(self, names: Sequence[str]):
         """names: of the n joints."""
@@ -38,8 +38,8 @@ class JointStateWriter(Template):
 def read_joints(data: bytes, names: Sequence[str]) -> tuple[int, np.ndarray, np.ndarray]:
     """Return (stamp [ns], position (n,) [rad], velocity (n,) [rad/s]) in the order of `names`.
 
-    The message may hold further joints, in any order, as /joint_states does on robots. Raises
-    BadMessage where one of `names` or a number is missing or not finite.
+    The message may contain further joints and any order, as /joint_states of a robot. Raises
+    BadMessage if one of `names` or a number is missing, or a number is not finite.
     """
     message = Serialized(JointState, data)
     order, found = message.layout.names, []
@@ -58,10 +58,10 @@ def read_joints(data: bytes, names: Sequence[str]) -> tuple[int, np.ndarray, np.
 
 
 def read_values(data: bytes, field: str) -> tuple[int, list[str], np.ndarray]:
-    """Return (stamp [ns], names, values (n,)) of one field of a JointState, finite or not.
+    """Return (stamp [ns], names, values (n,)) of one field of a JointState.
 
-    The values are NaN where the message leaves the field empty; raises BadMessage where there are
-    more or fewer than names.
+    Values may be infinite or NaN; all are NaN if the field is empty. Raises BadMessage if the
+    numbers of values and names differ.
     """
     message = Serialized(JointState, data)
     names, values = message.layout.names, message.numbers(field)
@@ -72,7 +72,7 @@ def read_values(data: bytes, field: str) -> tuple[int, list[str], np.ndarray]:
 
 
 class ImuWriter(Template):
-    """An Imu without orientation (orientation_covariance[0] = -1)."""
+    """Writes an Imu without orientation (orientation_covariance[0] = -1)."""
 
     def __init__(self):
         message = Imu()
@@ -95,7 +95,7 @@ def read_imu(data: bytes) -> tuple[int, np.ndarray, np.ndarray]:
 
 
 class PoseWriter(Template):
-    """A PoseStamped in the world frame."""
+    """Writes a PoseStamped in the world frame."""
 
     def __init__(self):
         message = PoseStamped()
@@ -104,16 +104,17 @@ class PoseWriter(Template):
         self._position, self._orientation = self.values["position"], self.values["orientation"]
 
     def fill(self, stamp: int, position: np.ndarray, quaternion: np.ndarray) -> bytes:
-        """Return the message; position (3,) [m], quaternion [w x y z] body → world."""
+        """Return the message; position (3,) [m, world], quaternion (4,) body → world [w x y z]."""
         self._position[:] = position
         self._orientation[:3], self._orientation[3] = quaternion[1:], quaternion[0]
         return self.stamped(stamp)
 
 
 def read_pose(data: bytes, frame: str = WORLD) -> tuple[int, np.ndarray, np.ndarray]:
-    """Return (stamp [ns], position (3,) [m], quaternion [w x y z], normalised).
+    """Return (stamp [ns], position (3,) [m], unit quaternion (4,) body → world [w x y z]).
 
-    Raises BadMessage for another frame, or numbers that are not finite or not a rotation.
+    Raises BadMessage for another frame, numbers that are not finite, or a quaternion whose norm is
+    not 1.
     """
     message = Serialized(PoseStamped, data)
     if message.layout.frame != frame:
@@ -122,13 +123,13 @@ def read_pose(data: bytes, frame: str = WORLD) -> tuple[int, np.ndarray, np.ndar
     norm = math.sqrt(quaternion @ quaternion)
     if not abs(norm - 1.0) < 0.01:
         raise BadMessage(f"orientation has norm {norm:.3g}, 1 expected")
-    if not abs(norm - 1.0) < 1e-12:  # rounding errors may stay
+    if not abs(norm - 1.0) < 1e-12:  # unchanged within rounding errors
         quaternion = quaternion / norm
     return message.stamp, message.vector("position"), quaternion
 
 
 class EffortWriter(Template):
-    """A Float64MultiArray of the ros2_control effort controllers."""
+    """Writes the Float64MultiArray of a ros2_control effort controller."""
 
     def __init__(self, count: int):
         super().__init__(Float64MultiArray(data=[0.0] * count))
@@ -141,7 +142,7 @@ class EffortWriter(Template):
 
 
 def read_effort(data: bytes, names: Sequence[str]) -> np.ndarray:
-    """Return the efforts (n,) [N m]; raises BadMessage on a wrong number of joints or a NaN."""
+    """Return the efforts (n,) [N m]; raises BadMessage for a wrong length or a value not finite."""
     effort = Serialized(Float64MultiArray, data).numbers("data")
     check_length("efforts", len(effort), names)
     refuse_infinite("effort", effort, names)
@@ -149,7 +150,7 @@ def read_effort(data: bytes, names: Sequence[str]) -> np.ndarray:
 
 
 class SetpointWriter(Template):
-    """The TwistStamped that repeats what was sent to the autopilot."""
+    """Writes the TwistStamped with the setpoint that was sent to the autopilot."""
 
     def __init__(self):
         message = TwistStamped()
@@ -165,7 +166,7 @@ class SetpointWriter(Template):
 
 
 def read_switch(data: bytes) -> bool:
-    """Whether a Bool is true; raises BadMessage."""
+    """Return the value of a Bool; raises BadMessage."""
     if len(data) <= ENCAPSULATION:
         raise BadMessage(f"{len(data)} bytes, too short for a Bool")
     return data[ENCAPSULATION] != 0

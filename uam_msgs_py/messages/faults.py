@@ -1,4 +1,4 @@
-"""What /uam/faults says: a fault that was put into the flight has come, or has gone."""
+"""Content of /uam/faults: begin or end of an injected fault."""
 
 import json
 from dataclasses import dataclass, field
@@ -16,9 +16,10 @@ NUMBER = "number"
 
 @dataclass(frozen=True)
 class FaultEvent:
-    """The beginning or the end of one fault.
+    """Begin (active) or end of a fault.
 
-    place: what it acts on; number: in the order of those of its place, the same at both ends.
+    place: plant, MAVLink or process; number: index in the schedule of its place, the same at begin
+    and end.
     """
 
     name: str
@@ -28,9 +29,9 @@ class FaultEvent:
     parameters: dict[str, Any] = field(default_factory=dict)
 
     def to_message(self, stamp: int) -> DiagnosticArray:
-        """Return the message; stamp [ns]: when it came or went."""
-        said = {name: json.dumps(value) for name, value in self.parameters.items()}
-        values = {NUMBER: self.number, "place": self.place} | said
+        """Return the message; stamp [ns]: of the begin or end."""
+        texts = {name: json.dumps(value) for name, value in self.parameters.items()}
+        values = {NUMBER: self.number, "place": self.place} | texts
         level = WARN if self.active else OK
         return diagnostic(stamp, self.name, level, BEGUN if self.active else OVER, values)
 
@@ -39,9 +40,9 @@ class FaultEvent:
         """Return (stamp [ns], event); raises BadMessage for something else."""
         try:
             (status,) = message.status
-            said = {pair.key: pair.value for pair in status.values}
-            number, place = int(said.pop(NUMBER)), said.pop("place")
-            parameters = {name: json.loads(text) for name, text in said.items()}
+            texts = {pair.key: pair.value for pair in status.values}
+            number, place = int(texts.pop(NUMBER)), texts.pop("place")
+            parameters = {name: json.loads(text) for name, text in texts.items()}
             active = {BEGUN: True, OVER: False}[status.message]
         except (KeyError, ValueError):
             raise BadMessage("not a fault") from None

@@ -1,12 +1,12 @@
-"""Where the numbers lie in a serialized message.
+"""Byte positions of the numbers in a serialized message.
 
-Messages of one topic that carry the same names have the same layout, byte for byte. So a message is
-walked through once, and those after it are only compared with it where it does not consist of
-numbers: at 250 Hz in eight processes that costs a fraction of building ROS's message objects, and
-a log is read through NumPy in a second.
+Messages of one topic with the same names have the same layout. The first message is parsed; later
+ones are only compared with it in the bytes that are not numbers. This takes a fraction of the time
+of ROS's message objects at 250 Hz in eight processes, and NumPy reads a log within a second.
 
-Plain CDR, little-endian (what ROS 2 sends): numbers are aligned to their size, counted from the end
-of the four bytes of encapsulation; a sequence is its length (uint32) and its elements.
+Encoding: plain CDR, little-endian (the default of ROS 2). Numbers are aligned to their size,
+counted from the end of the four bytes of encapsulation; a sequence is its length (uint32) followed
+by its elements.
 """
 
 from __future__ import annotations
@@ -19,21 +19,21 @@ from typing import Any
 SECOND = 1_000_000_000  # [ns]
 ENCAPSULATION = 4
 STAMP = slice(4, 12)  # std_msgs/Header and rosgraph_msgs/Clock begin with it
-KNOWN_LAYOUTS = 32  # kept per message type
+KNOWN_LAYOUTS = 32  # stored per message type
 _STAMP = {True: struct.Struct("<iI"), False: struct.Struct(">iI")}
 
 
 class BadMessage(ValueError):
-    """A message that must not be used; the text is one line: what was wrong, what is expected."""
+    """An invalid message; the text is one line: what is wrong, what is expected."""
 
 
 def is_little_endian(data: bytes) -> bool:
-    """Whether serialized `data` is; the second byte of the encapsulation says so."""
+    """Return whether serialized `data` is little-endian: second byte of the encapsulation."""
     return data[1:2] == b"\x01"
 
 
 def stamp_of(data: bytes) -> int:
-    """The stamp [ns] at the beginning of a serialized message; raises BadMessage if too short."""
+    """Return the stamp [ns] of a serialized message with header; raises BadMessage if too short."""
     if len(data) < STAMP.stop:
         raise BadMessage(f"{len(data)} bytes, too short for a header")
     seconds, nanoseconds = _STAMP[is_little_endian(data)].unpack_from(data, STAMP.start)
@@ -42,28 +42,28 @@ def stamp_of(data: bytes) -> int:
 
 @dataclass
 class Layout:
-    """The layout of one message and of all that fit it."""
+    """Layout of a message and of all messages that fit it."""
 
     frame: str = ""
     names: list[str] = field(default_factory=list)  # of the joints
-    points: int = 0  # of a trajectory; the fields are those of the first
-    fields: dict[str, slice] = field(default_factory=dict)  # float64, in bytes
-    duration: slice | None = None  # time_from_start
-    checked: dict[object, Any] = field(default_factory=dict)  # what readers found out about it
+    points: int = 0  # of a trajectory; `fields` are those of the first point
+    fields: dict[str, slice] = field(default_factory=dict)  # name → bytes of float64 numbers
+    duration: slice | None = None  # bytes of time_from_start
+    checked: dict[object, Any] = field(default_factory=dict)  # reader → result of its check
     _fixed: struct.Struct = struct.Struct("")
     _expected: tuple[bytes, ...] = ()
 
     def length(self, name: str) -> int:
-        """How many numbers a field has; 0 when it is empty."""
+        """Return the number of values in a field, 0 if it is empty."""
         where = self.fields.get(name)
         return (where.stop - where.start) // 8 if where else 0
 
     def fits(self, data: bytes) -> bool:
-        """Whether `data` (as long as the message of this layout) is laid out alike."""
+        """Return whether `data` has this layout; data: of the same length."""
         return self._fixed.unpack_from(data) == self._expected
 
     def fix(self, data: bytes, ranges: list[tuple[int, int]]) -> None:
-        """Note the bytes that make up the layout: texts and lengths, not numbers and padding."""
+        """Store the bytes that define the layout: texts and lengths, not numbers and padding."""
         form, at = "<", 0
         for start, stop in ranges:
             form += f"{start - at}x{stop - start}s"
@@ -73,7 +73,7 @@ class Layout:
 
 
 class Cursor:
-    """Walks through one message and notes where things are. Raises BadMessage at its early end."""
+    """Parses a message and stores its layout. Raises BadMessage if the message ends early."""
 
     def __init__(self, data: bytes):
         self.data, self.at = data, ENCAPSULATION
@@ -81,11 +81,11 @@ class Cursor:
         self.fixed = [(0, 2)]
 
     def forward(self, size: int, align: int) -> slice:
-        """Walk over `size` bytes, after the padding before them; returns where they are."""
+        """Skip padding and `size` bytes; return the slice of these bytes."""
         start = self.at + -(self.at - ENCAPSULATION) % align
         self.at = start + size
         if self.at > len(self.data):
-            raise BadMessage(f"ends after {len(self.data)} bytes, in the middle")
+            raise BadMessage(f"truncated after {len(self.data)} bytes")
         return slice(start, self.at)
 
     def count(self) -> int:
@@ -105,14 +105,14 @@ class Cursor:
         return [self.string() for _ in range(self.count())]
 
     def doubles(self, name: str, length: int | None = None) -> None:
-        """Note where `length` float64 are (default: a sequence)."""
+        """Store the position of `length` float64; None: of a sequence."""
         if length is None:
             length = self.count()
         if length:
             self.layout.fields[name] = self.forward(8 * length, align=8)
 
     def header(self) -> None:
-        """Walk over a std_msgs/Header."""
+        """Read a std_msgs/Header."""
         self.forward(8, align=4)
         self.layout.frame = self.string()
 
@@ -176,7 +176,7 @@ WALKS: dict[str, Callable[[Cursor], None]] = {
 
 
 class Layouts:
-    """The layouts of one message type that have been met."""
+    """The layouts of the received messages of one type."""
 
     def __init__(self, type_name: str):
         """type_name: one of WALKS; raises KeyError for another."""
@@ -185,9 +185,9 @@ class Layouts:
         self._count = 0
 
     def of(self, data: bytes) -> Layout:
-        """Return the layout of `data`, the same object for all that are laid out alike.
+        """Return the layout of `data`, the same object for equal layouts.
 
-        Raises BadMessage when it is not such a message.
+        Raises BadMessage if it is not a message of this type.
         """
         for layout in self._known.get(len(data), ()):
             if layout.fits(data):
@@ -198,7 +198,7 @@ class Layouts:
         self._walk(cursor)
         layout = cursor.layout
         layout.fix(data, cursor.fixed)
-        if self._count >= KNOWN_LAYOUTS:  # somebody sends ever new names: forget, but go on
+        if self._count >= KNOWN_LAYOUTS:  # a sender with ever new names: bound the memory
             self._known.clear()
             self._count = 0
         self._known.setdefault(len(data), []).append(layout)

@@ -1,4 +1,4 @@
-"""Whether the numbers of a message are those of the joints that are expected."""
+"""Checks of a message's joint names and numbers."""
 
 from __future__ import annotations
 
@@ -19,13 +19,13 @@ def check_names(given: Sequence[str], expected: Sequence[str]) -> None:
 
 
 def check_length(what: str, length: int, names: Sequence[str]) -> None:
-    """Raise BadMessage unless there is one of `what` for each of `names`."""
+    """Raise BadMessage unless `length` equals the number of `names`; what: text for the error."""
     if length != len(names):
         raise BadMessage(f"{length} {what}, {len(names)} expected ({', '.join(names)})")
 
 
 def refuse_infinite(what: str, values: np.ndarray, names: Sequence[str]) -> None:
-    """Raise BadMessage unless all values (n,), those of `names`, are finite."""
+    """Raise BadMessage unless all values (n,) of the joints `names` (n) are finite."""
     if not math.isfinite(values.sum()):
         for name, value in zip(names, values, strict=True):
             if not math.isfinite(value):

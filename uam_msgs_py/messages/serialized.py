@@ -1,8 +1,8 @@
-"""Serialized messages as they are written and read in place.
+"""Serialized messages, written and read in place.
 
-A template serializes one message when it is made; afterwards only numbers and stamp are put into
-its bytes, which are what is published. A received message is its bytes and where the numbers lie in
-them. Stamps are integer nanoseconds.
+A Template serializes its message once; later it only replaces numbers and stamp in the bytes, which
+are then published. A received message consists of its bytes and their layout. Stamps are integer
+nanoseconds.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ from uam_msgs_py.messages.layouts import (
 
 
 def type_name(message_type: type) -> str:
-    """`package/msg/Name` of a generated message class."""
+    """Return `package/msg/Name` of a generated message class."""
     return f"{message_type.__module__.split('.')[0]}/msg/{message_type.__name__}"
 
 
@@ -38,12 +38,12 @@ LAYOUTS = {kind: Layouts(type_name(kind)) for kind in KINDS}
 
 
 def stays_serialized(message_type: type) -> bool:
-    """Whether messages of this type are read and written here, serialized."""
+    """Return whether messages of this type are read and written in serialized form."""
     return message_type in LAYOUTS
 
 
 class Template:
-    """A serialized message; `values` holds a view for each of its fields of numbers."""
+    """A serialized message to publish; `values`: field name → writable view (n,) of its numbers."""
 
     def __init__(
         self,
@@ -55,10 +55,10 @@ class Template:
         | Float64MultiArray
         | Clock,
     ):
-        """message: of a type in LAYOUTS, with its names and with arrays as long as they will be."""
+        """message: of a type in LAYOUTS, with all names and with arrays of the final lengths."""
         data = serialize_message(message)
         layout = LAYOUTS[type(message)].of(data)
-        # Numbers are aligned from the end of the encapsulation: let that be aligned in memory.
+        # CDR aligns numbers from the end of the encapsulation: align this byte in memory
         self._bytes = np.zeros(4 + len(data), dtype=np.uint8)[4:]
         self._bytes[:] = np.frombuffer(data, dtype=np.uint8)
         self.values = {
@@ -71,14 +71,14 @@ class Template:
         return self._bytes[where].view("<i4")  # seconds; nanoseconds fit an int32 as well
 
     def stamped(self, stamp: int, time_from_start: int = 0) -> bytes:
-        """Return the message with this stamp [ns]; time_from_start [ns], of trajectories only."""
+        """Return the message with this stamp [ns]; time_from_start [ns]: only of trajectories."""
         self._stamp[:] = divmod(stamp, SECOND)
         if self._duration is not None:
             self._duration[:] = divmod(time_from_start, SECOND)
         return self._bytes.tobytes()
 
     def plain(self) -> bytes:
-        """Return the message, of a type that has no stamp."""
+        """Return the message, for types without a stamp."""
         return self._bytes.tobytes()
 
 
@@ -88,24 +88,24 @@ class Serialized:
     def __init__(self, kind: type, data: bytes):
         """kind: a type in LAYOUTS. Raises BadMessage."""
         if not is_little_endian(data):
-            data = _here(kind, data)
+            data = _converted(kind, data)
         self.data = data
         self.layout: Layout = LAYOUTS[kind].of(data)
 
     @property
     def stamp(self) -> int:
-        """Its stamp [ns]."""
+        """Return the stamp [ns]."""
         return stamp_of(self.data)
 
     def numbers(self, field: str) -> np.ndarray:
-        """A read-only view (n,) of a field of numbers, (0,) where it is empty."""
+        """Return a read-only view (n,) of a field of numbers, (0,) if it is empty."""
         length = self.layout.length(field)
         if not length:
             return _NOTHING
         return np.frombuffer(self.data, "<f8", length, self.layout.fields[field].start)
 
     def vector(self, field: str) -> np.ndarray:
-        """A copy of a field of numbers; raises BadMessage unless all are finite."""
+        """Return a copy (n,) of a field of numbers; raises BadMessage unless all are finite."""
         values = self.numbers(field).copy()
         if not math.isfinite(values.sum()):
             raise BadMessage(f"{field} is {values.tolist()}, finite numbers expected")
@@ -115,8 +115,8 @@ class Serialized:
 _NOTHING = np.zeros(0)
 
 
-def _here(kind: type, data: bytes) -> bytes:
-    """Serialize anew, in the byte order of this machine, what another one has sent."""
+def _converted(kind: type, data: bytes) -> bytes:
+    """Return the message in the byte order of this machine."""
     try:
         return serialize_message(deserialize_message(data, kind))
     except Exception as error:  # rclpy raises its own classes, without a common base

@@ -11,15 +11,15 @@ if TYPE_CHECKING:
 
 
 def set_stamp(stamp: Time, nanoseconds: int) -> None:
-    """Integer nanoseconds → builtin_interfaces/Time, in place."""
+    """Set `stamp` to integer nanoseconds, in place."""
     stamp.sec, stamp.nanosec = divmod(nanoseconds, SECOND)
 
 
 def nanoseconds(stamp: Time) -> int:
-    """builtin_interfaces/Time → integer nanoseconds."""
+    """Return a builtin_interfaces/Time in integer nanoseconds."""
     return stamp.sec * SECOND + stamp.nanosec
 
 
 def seconds(nanoseconds: int) -> float:
-    """Nanoseconds [ns] → the maths' seconds [s]."""
+    """Return integer nanoseconds in seconds."""
     return nanoseconds / SECOND

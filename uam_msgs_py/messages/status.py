@@ -1,4 +1,4 @@
-"""States that travel as diagnostic_msgs/DiagnosticArray: one status with key-value pairs."""
+"""States in a diagnostic_msgs/DiagnosticArray: one status with key-value pairs."""
 
 from dataclasses import dataclass, fields
 from typing import ClassVar, Self
@@ -19,7 +19,7 @@ OK, WARN, ERROR, STALE = (
 def diagnostic(
     stamp: int, name: str, level: bytes, message: str, values: dict[str, object]
 ) -> DiagnosticArray:
-    """Return a DiagnosticArray with one status. stamp [ns]; None becomes an empty value."""
+    """Return a DiagnosticArray with one status; stamp [ns]; a None in `values` becomes ""."""
     status = DiagnosticStatus(
         level=level,
         name=name,
@@ -47,7 +47,7 @@ class _Status:
 
     @classmethod
     def from_message(cls, message: DiagnosticArray) -> tuple[int, Self]:
-        """Return (stamp [ns], status); raises BadMessage where an entry is missing or strange."""
+        """Return (stamp [ns], status); raises BadMessage for a missing or invalid entry."""
         found = [status for status in message.status if status.name == cls.NAME]
         if not found:
             raise BadMessage(f"no status '{cls.NAME}' in the message")
@@ -85,11 +85,11 @@ _READ = {
 
 @dataclass(frozen=True)
 class AutopilotState(_Status):
-    """What the bridge knows of the autopilot, on change and five times a second.
+    """State of the autopilot as the bridge receives it; sent on change and five times a second.
 
-    armed_since: stamp [ns] of the tick at which it was first reported armed, None while disarmed.
-    reasons: why it is not armed or left OFFBOARD, "; " between them. round_trip: of the quickest
-    answer of the last second [s], None while not known.
+    armed_since: stamp [ns] of the first tick at which it was reported armed, None while disarmed.
+    reasons: why it is not armed or has left OFFBOARD, joined by "; ". round_trip [s]: shortest of
+    the last second, None if unknown.
     """
 
     connected: bool = False
@@ -104,14 +104,14 @@ class AutopilotState(_Status):
 
     @property
     def level(self) -> bytes:
-        """OK when connected and nothing is wrong."""
+        """Return STALE without a connection, WARN with reasons, else OK."""
         if not self.connected:
             return STALE
         return WARN if self.reasons else OK
 
     @property
     def summary(self) -> str:
-        """The state in a few words."""
+        """Return the state in one line."""
         if not self.connected:
             return "not connected"
         return f"{self.mode}, {'armed' if self.armed else 'disarmed'}"
@@ -119,11 +119,11 @@ class AutopilotState(_Status):
 
 @dataclass(frozen=True)
 class MissionStatus(_Status):
-    """Where the mission is, on every change of phase and twice a second.
+    """State of the mission; sent on each change of phase and twice a second.
 
-    time: mission time [s], negative before take-off. Errors are norms of estimate − reference:
-    [m], [rad], [rad]. magnet: whether it is on; unlike /uam/magnet this has a stamp. state, cause:
-    of the supervisor (uam_control.supervision.State), and why it is in it.
+    time: mission time [s], negative before take-off. Errors: norms of estimate − reference [m],
+    [rad], [rad]. magnet: whether it is on (/uam/magnet has no stamp, this message has one). state,
+    cause: the supervisor's state (uam_control.supervision.State) and the reason for it.
     """
 
     phase: str = "waiting"
@@ -142,12 +142,12 @@ class MissionStatus(_Status):
 
     @property
     def level(self) -> bytes:
-        """ERROR when the mission was given up, WARN while it holds."""
+        """Return ERROR after an abort, WARN during a hold, else OK."""
         if self.abort_reason:
             return ERROR
         return WARN if self.state == "holding" else OK
 
     @property
     def summary(self) -> str:
-        """Phase, or why the flight was given up."""
+        """Return the phase, or the reason of an abort."""
         return self.abort_reason or self.phase

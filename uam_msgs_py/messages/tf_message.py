@@ -1,12 +1,12 @@
-"""tf2_msgs/msg/TFMessage, also where the package tf2_msgs is not installed.
+"""tf2_msgs/msg/TFMessage, for installations without the package tf2_msgs.
 
-RViz and Foxglove place what they draw by /tf, whose type comes with ROS from apt but is not among
-the wheels of PyPI. It is a sequence of TransformStamped and nothing else, so that its C type
-support can be put together from what common_interfaces brings: the descriptions of a sequence of
-messages (MarkerArray) under another name and with other elements. Such a type can only be sent and
-received serialized, which is all this stack does; the middleware sees no difference.
+RViz and Foxglove require /tf. Its type is part of ROS's apt packages, but not of the wheels on
+PyPI. TFMessage is a sequence of TransformStamped. Its C type support is assembled from
+common_interfaces: the type support of MarkerArray (also a sequence of messages) with another name
+and another element type. Messages of this type can only be sent and received serialized; this
+stack uses no other form, and the middleware sees no difference.
 
-The structures below are those of ROS 2 Jazzy, whose binary interface does not change any more.
+The C structures are those of ROS 2 Jazzy, whose binary interface is frozen.
 """
 
 import ctypes
@@ -17,10 +17,10 @@ from visualization_msgs.msg import MarkerArray
 
 PACKAGE, NAME, FIELD = "tf2_msgs", "TFMessage", "transforms"
 DEFINITION = "geometry_msgs/TransformStamped[] transforms\n"
-# sha256 of the type's description, by which both ends of a topic see that they mean the same
+# sha256 of the type's description; publishers and subscribers compare it
 HASH = bytes.fromhex("e369d0f05a23ae52508854b66f6aa0437f3449d652e8cbf22d5abe85d020f087")
 FASTRTPS, INTROSPECTION = b"rosidl_typesupport_fastrtps_c", b"rosidl_typesupport_introspection_c"
-NESTED_SEQUENCE = 145  # type_description_interfaces/msg/FieldType: messages, as many as there are
+NESTED_SEQUENCE = 145  # type_description_interfaces/msg/FieldType: unbounded sequence of messages
 
 
 class _Hash(ctypes.Structure):
@@ -137,7 +137,7 @@ _capsule.restype, _capsule.argtypes = ctypes.py_object, [c_void_p, c_char_p, c_v
 
 
 def _capsule_of(message_type: type):
-    """The type support of a generated message class, as rclpy holds it."""
+    """Return the type support capsule of a generated message class."""
     if type(message_type)._TYPE_SUPPORT is None:
         type(message_type).__import_type_support__()
     return type(message_type)._TYPE_SUPPORT
@@ -149,7 +149,7 @@ def _support_of(message_type: type) -> _Support:
 
 
 def _found(support: _Support, identifier: bytes) -> _Support:
-    """The type support of one middleware; raises ImportError where there is none."""
+    """Return the type support for `identifier`; raises ImportError if there is none."""
     address = support.find(ctypes.byref(support), identifier)
     if not address:
         raise ImportError(f"no {identifier.decode()} to make {PACKAGE} from")
@@ -157,13 +157,13 @@ def _found(support: _Support, identifier: bytes) -> _Support:
 
 
 def _getter(held: ctypes.Structure):
-    """A function for C that returns where `held` is, whatever it is asked about."""
+    """Return a C function that returns the address of `held`."""
     address = ctypes.addressof(held)
     return _GET(lambda _: address)
 
 
 class _Assembled:
-    """The type support of TFMessage. It must live as long as the process."""
+    """The type support of TFMessage. Keep the object until the process ends."""
 
     def __init__(self):
         array, element = _support_of(MarkerArray), _support_of(TransformStamped)
@@ -196,7 +196,7 @@ class _Assembled:
         self.capsule = _capsule(ctypes.addressof(self._handle), self._capsule_name, None)
 
     def _describe(self, element: _Description) -> None:
-        """Note the type's description for whoever asks a node for it."""
+        """Build the type description that a node's service get_type_description returns."""
         known = (_IndividualDescription * element.referenced.size).from_address(
             element.referenced.data
         )
@@ -215,9 +215,9 @@ class _Assembled:
 
 
 class _Metaclass(type):
-    """What rclpy looks for at a message class."""
+    """The attributes that rclpy requires of a message class."""
 
-    # rclpy wants them, but calls them for messages that are not serialized alone: it raises then.
+    # rclpy requires these but calls them only for deserialized messages, and would then raise
     _CREATE_ROS_MESSAGE = _CONVERT_FROM_PY = _CONVERT_TO_PY = _DESTROY_ROS_MESSAGE = "none"
     _TYPE_SUPPORT = None
     _assembled: _Assembled | None = None
@@ -229,13 +229,13 @@ class _Metaclass(type):
 
 
 class TFMessage(metaclass=_Metaclass):
-    """Names the type to rclpy; has no instances, as its messages stay serialized."""
+    """The type for rclpy's publishers and subscriptions; it has no instances."""
 
     _fields_and_field_types = {FIELD: "sequence<geometry_msgs/TransformStamped>"}
 
     @classmethod
     def get_fields_and_field_types(cls) -> dict[str, str]:
-        """The fields, as of a generated class."""
+        """Return the fields, as a generated class does."""
         return dict(cls._fields_and_field_types)
 
 

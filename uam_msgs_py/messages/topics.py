@@ -1,6 +1,6 @@
-"""Every topic of the stack: name, message type, quality of service. Nothing is named elsewhere.
+"""All topics of the stack: name, message type, quality of service.
 
-Frames are REP-103: ENU world, FLU body. Names can be remapped the ROS way.
+Frames are those of REP-103: ENU world, FLU body. Names can be remapped as usual in ROS.
 """
 
 from dataclasses import dataclass, field
@@ -40,30 +40,30 @@ def _qos(depth: int, reliable: bool = True, latched: bool = False) -> QoSProfile
     )
 
 
-# 128 ms at control rate: what a short stall of a process leaves behind is still worked through.
+# 128 ms at control rate: a process that stalls for less loses no message
 DEPTH = 32
 SENSOR_DATA = _qos(DEPTH, reliable=False)  # rclpy.qos.qos_profile_sensor_data, but deeper
 RELIABLE = _qos(DEPTH)
-NEWEST = _qos(4, reliable=False)  # for who looks now and then, and wants the present alone
+NEWEST = _qos(4, reliable=False)  # for readers that poll and use only the newest message
 LATCHED = _qos(1, latched=True)  # a late subscriber gets the last message
 
 
 @dataclass(frozen=True)
 class Topic:
-    """One topic. `one_publisher`: its sequence numbers have no gap unless a message was lost."""
+    """A topic. one_publisher: a gap in its sequence numbers is then a lost message."""
 
     name: str
     type: type
-    qos: QoSProfile = field(hash=False)  # has none
+    qos: QoSProfile = field(hash=False)  # not hashable
     content: str
     one_publisher: bool = True
 
     @property
     def reading(self) -> QoSProfile:
-        """What the stack's own nodes ask for.
+        """Return the quality of service of the subscriptions in this stack.
 
-        Best effort for what comes at every tick: the next message makes up for a lost one, and
-        thousands of acknowledgements a second are saved. Whoever wants them may ask for them.
+        Best effort for messages of every tick: the next message replaces a lost one, and thousands
+        of acknowledgements per second are saved. Other subscribers may request reliable delivery.
         """
         return SENSOR_DATA if self.qos is RELIABLE and self is not DIAGNOSTICS else self.qos
 
@@ -78,7 +78,7 @@ MOCAP = Topic("/vrpn_mocap/uam/pose", PoseStamped, SENSOR_DATA, "motion capture,
 # Control, once per tick, stamped with the IMU sample that the tick belongs to
 STATE = Topic("/uam/state", JointTrajectory, RELIABLE, "estimated chi, chi_dot, chi_ddot")
 REFERENCE = Topic(
-    "/uam/reference", JointTrajectory, RELIABLE, "chi_d ... of the coordinates to be controlled"
+    "/uam/reference", JointTrajectory, RELIABLE, "chi_d ... of the controlled coordinates"
 )
 POSITION_COMMAND = Topic(
     "/uam/position/command", JointTrajectory, RELIABLE, "p_d, q_d, their derivatives, and tau_p"
@@ -102,7 +102,7 @@ ATTITUDE_ADAPTATION = Topic("/uam/attitude/adaptation", JointState, RELIABLE, "a
 ARM_ADAPTATION = Topic("/uam/arm/adaptation", JointState, RELIABLE, "as for position")
 
 # States of mission and autopilot
-ARMING = Topic("/uam/arming", Bool, LATCHED, "the autopilot is to be armed and in OFFBOARD")
+ARMING = Topic("/uam/arming", Bool, LATCHED, "desired: autopilot armed and in OFFBOARD")
 AUTOPILOT_STATE = Topic(
     "/uam/autopilot/state",
     DiagnosticArray,
@@ -110,20 +110,20 @@ AUTOPILOT_STATE = Topic(
     "see uam_msgs_py.messages.status.AutopilotState",
 )
 AUTOPILOT_BATTERY = Topic(
-    "/uam/autopilot/battery", BatteryState, RELIABLE, "as the autopilot tells it, 1 Hz; NaN unknown"
+    "/uam/autopilot/battery", BatteryState, RELIABLE, "autopilot's battery, 1 Hz; NaN: unknown"
 )
 ARM_TEMPERATURE = Topic(
     "/uam/arm/temperature",
     Temperature,
     RELIABLE,
-    "of a servo, whose joint frame_id names; from a vehicle's driver, the simulation has none",
+    "servo temperature; frame_id: its joint; from a vehicle's driver, not simulated",
     one_publisher=False,
 )
 MISSION_STATUS = Topic(
     "/uam/mission/status", DiagnosticArray, LATCHED, "see uam_msgs_py.messages.status.MissionStatus"
 )
 
-# What was asked of the nodes in flight; reliable and kept, as each comes only once
+# Events: reliable and latched, as each is sent only once
 CHANGES = Topic(
     "/uam/parameter_changes",
     DiagnosticArray,
@@ -144,11 +144,11 @@ RESTARTS = Topic(
     "/uam/restarts",
     DiagnosticArray,
     _qos(100, latched=True),
-    "nodes that were lost and are started again, as uam fly says; name: the node",
+    "nodes that uam fly starts again after a loss; name: the node",
     one_publisher=False,
 )
 
-# What only a simulator knows
+# True values, from the simulator only
 TRUTH_STATE = Topic("/uam/truth/state", JointTrajectory, RELIABLE, "true chi, chi_dot, chi_ddot")
 TRUTH_PAYLOAD = Topic("/uam/truth/payload", PoseStamped, RELIABLE, "payload, world")
 TRUTH_ROTORS = Topic(
@@ -158,15 +158,15 @@ TRUTH_MAGNET = Topic(
     "/uam/truth/magnet", JointState, RELIABLE, "magnet: on 0/1, holding force N; swing: angle rad"
 )
 
-# To be seen, in RViz and Foxglove. Losses do not count: the next message says it all again.
+# For RViz and Foxglove. A lost message is no problem: the next one is complete.
 ROBOT_DESCRIPTION = Topic("/robot_description", String, LATCHED, "URDF", one_publisher=False)
 TF = Topic("/tf", TFMessage, _qos(100), "vehicle, reference, payload, 25 Hz", one_publisher=False)
-TF_STATIC = Topic("/tf_static", TFMessage, LATCHED, "what never moves", one_publisher=False)
+TF_STATIC = Topic("/tf_static", TFMessage, LATCHED, "fixed frames", one_publisher=False)
 TRACKING_ERROR = Topic(
     "/uam/tracking/error",
     JointState,
     RELIABLE,
-    "estimate - reference: chi, chi_dot; 0 where nothing is asked; 25 Hz",
+    "estimate - reference: chi, chi_dot; 0 without a reference; 25 Hz",
     one_publisher=False,
 )
 MARKERS = Topic(

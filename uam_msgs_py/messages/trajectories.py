@@ -1,4 +1,4 @@
-"""numpy ↔ serialized JointTrajectory: references, states, commands."""
+"""NumPy arrays ↔ serialized JointTrajectory: references, states, commands."""
 
 from __future__ import annotations
 
@@ -15,15 +15,15 @@ from uam_msgs_py.messages.topics import WORLD
 
 
 class TrajectoryWriter(Template):
-    """A JointTrajectory with one point: rows positions, velocities, accelerations, effort.
+    """Writes a JointTrajectory with one point: rows positions, velocities, accelerations, effort.
 
-    `values` holds a view (n,) for each row in use; write to them and publish `stamped(stamp)`.
+    `values`: row name → view (n,). Write to the views, then publish `stamped(stamp)`.
     """
 
     ROWS = ("positions", "velocities", "accelerations", "effort")
 
     def __init__(self, names: Sequence[str], rows: Sequence[str] = ROWS[:3]):
-        """names: of the n joints; rows: those of ROWS that are used."""
+        """names: of the n joints; rows: used rows, a subset of ROWS."""
         point = JointTrajectoryPoint(**{row: [0.0] * len(names) for row in rows})
         message = JointTrajectory(joint_names=list(names), points=[point])
         message.header.frame_id = WORLD
@@ -39,7 +39,7 @@ class TrajectoryWriter(Template):
 
 
 class IdleWriter(Template):
-    """A JointTrajectory without names and points: nothing is commanded at its stamp."""
+    """Writes a JointTrajectory without names and points: no command at its stamp."""
 
     def __init__(self):
         message = JointTrajectory()
@@ -48,15 +48,14 @@ class IdleWriter(Template):
 
 
 def trajectory(data: bytes) -> Serialized:
-    """A received JointTrajectory; raises BadMessage."""
+    """Return a received JointTrajectory; raises BadMessage."""
     return Serialized(JointTrajectory, data)
 
 
 class TrajectoryReader:
     """Reads `rows` of trajectories of the joints `names`.
 
-    Rows that lie next to each other in a message are as far apart as any two of them, so that one
-    strided view holds them all.
+    Adjacent rows have equal distances in the message, so one strided view covers all rows.
     """
 
     def __init__(self, names: Sequence[str], rows: Sequence[str] = TrajectoryWriter.ROWS[:3]):
@@ -66,8 +65,8 @@ class TrajectoryReader:
     def read(self, message: Serialized) -> np.ndarray:
         """Return a copy (rows, n) of the first point's rows.
 
-        Raises BadMessage on other joint names, wrong lengths, no point, or a number that is not
-        finite.
+        Raises BadMessage for other joint names, wrong lengths, not one point, or a number that is
+        not finite.
         """
         checked = message.layout.checked.get(self)
         if checked is None:
@@ -81,7 +80,7 @@ class TrajectoryReader:
         return values
 
     def _check(self, layout: Layout) -> tuple[tuple[int, int], int, tuple[int, int]]:
-        """Shape, first byte and strides [bytes] of the rows; raises BadMessage."""
+        """Return shape, first byte and strides [bytes] of the rows; raises BadMessage."""
         names, rows = self._names, self._rows
         check_names(layout.names, names)
         if layout.points != 1:

@@ -14,9 +14,9 @@ NUMBERS = 7  # translation x y z, rotation x y z w
 
 @dataclass(frozen=True)
 class Transform:
-    """Where frame `child` is in frame `parent` at `stamp` [ns].
+    """Pose of frame `child` in frame `parent` at `stamp` [ns].
 
-    position (3,) [m]; quaternion [w x y z], child → parent.
+    position (3,) [m]; quaternion (4,) [w x y z], child → parent.
     """
 
     stamp: int
@@ -27,7 +27,7 @@ class Transform:
 
 
 def transforms_message(transforms: Sequence[Transform]) -> bytes:
-    """Return the TFMessage that holds `transforms`."""
+    """Return the serialized TFMessage of `transforms`."""
     data = bytearray(LITTLE_ENDIAN + struct.pack("<I", len(transforms)))
     for transform in transforms:
         _align(data, 4)
@@ -43,7 +43,7 @@ def transforms_message(transforms: Sequence[Transform]) -> bytes:
 
 
 def read_transforms(data: bytes) -> list[Transform]:
-    """Return what a TFMessage holds; raises BadMessage for what is none."""
+    """Return the transforms of a serialized TFMessage; raises BadMessage for other data."""
     if not is_little_endian(data):
         raise BadMessage("transforms in the byte order of another machine")
     reader = _Reader(data)
@@ -57,11 +57,11 @@ class _Reader:
     def __init__(self, data: bytes):
         self._data, self._at = data, ENCAPSULATION
 
-    def take(self, what: str, alignment: int) -> tuple:
-        """The next numbers, in the words of `struct`."""
+    def take(self, form: str, alignment: int) -> tuple:
+        """Return the next values; form: format of `struct`."""
         self._at += -(self._at - ENCAPSULATION) % alignment
-        found = struct.unpack_from(what, self._data, self._at)
-        self._at += struct.calcsize(what)
+        found = struct.unpack_from(form, self._data, self._at)
+        self._at += struct.calcsize(form)
         return found
 
     def text(self) -> str:

@@ -1,4 +1,4 @@
-"""What every node of the stack has in common: inputs, diagnostics, clean start, clean end."""
+"""Base class of all nodes: inputs, diagnostics, start and end of the process."""
 
 import gc
 import re
@@ -27,18 +27,19 @@ from uam_msgs_py.node.joins import StampJoin
 from uam_msgs_py.node.node_parameters import refuse_unknown
 from uam_msgs_py.node.tunable import TunableNode
 
-DIAGNOSTICS_PERIOD = 1.0  # [s]
-SAY_PERIOD = 2.0  # [s] between two lines of the same kind in the log
+DIAGNOSTICS_PERIOD = 1.0  # s
+SAY_PERIOD = 2.0  # s, shortest time between two log lines of the same kind
 
 
 class UamNode(TunableNode):
-    """A node that acts when messages arrive; it has no clock of its own.
+    """A node that acts on messages, not on timers.
 
-    A subclass sets up with `publisher` and `listen`, and calls `done_tick` after each control tick.
-    Timers run on the steady clock of the machine and only report: no state depends on them.
+    A subclass creates its topics by `publisher` and `listen` and calls `done_tick` after each
+    control tick. Timers run on the machine's steady clock and only report: no state depends on
+    them.
     """
 
-    wake_up = 0.1  # [s] of wall time after which it looks around even if no trigger has come
+    wake_up = 0.1  # s of wall time, longest wait for a trigger
 
     def __init__(self, name: str):
         super().__init__(name)
@@ -73,11 +74,10 @@ class UamNode(TunableNode):
         required: bool = True,
         qos: QoSProfile | None = None,
     ) -> Subscription:
-        """Call `handle(message)` for each message; a BadMessage it raises is refused and said.
+        """Call `handle(message)` for each message; if it raises BadMessage, count and log it.
 
-        The message comes serialized where uam_msgs_py.messages.serialized knows its type.
-        required: the node reports that it waits while this input is silent. qos: if not what the
-        stack's nodes ask for (`Topic.reading`).
+        The message is serialized if uam_msgs_py.messages.serialized reads its type. required: the
+        node reports that it waits while no message arrives. qos: None for `Topic.reading`.
         """
         counts, arrivals, name = self._counts, self._arrivals, topic.name
         counts[name] = 0
@@ -100,47 +100,47 @@ class UamNode(TunableNode):
         return made
 
     def take_waiting(self, subscription: Subscription) -> None:
-        """Deliver at once what has arrived on `subscription`.
+        """Deliver all received messages of `subscription` now.
 
-        Messages of one publishing process arrive in the order of publication. A node that acts on
-        the last of them calls this for the others, and so has what was published before, although
-        a spin loop may deliver topics in another order.
+        Messages of one process arrive in the order of publication, but a spin loop may deliver
+        topics in another order. A node that acts on the last message of a tick calls this first for
+        its other inputs.
         """
         kind, raw = subscription.msg_type, subscription.raw
         while (taken := subscription.handle.take_message(kind, raw)) is not None:
             subscription.callback(taken[0])
 
     def defer(self) -> None:
-        """From now on act in `settle`, when all that has arrived is delivered."""
+        """From now on act in `settle`, after all received messages are delivered."""
         self.deferred = True
         for join in self.joins:
             join.deferred = True
 
     def stalled(self) -> bool:
-        """Whether a trigger has come before the other inputs of its tick."""
+        """Return whether a trigger arrived before the other inputs of its tick."""
         return any(join.incomplete_after(name) for join in self.joins for name in self.triggers)
 
     def settle(self) -> None:
-        """Act on complete inputs; called when all that has arrived is delivered."""
+        """Act on complete ticks; called after all received messages are delivered."""
         for join in self.joins:
             join.settle()
 
     def say(self, text: str, key: str | None = None) -> None:
-        """Log a warning, the same kind (`key`) at most once in SAY_PERIOD."""
+        """Log a warning, at most once per SAY_PERIOD for each `key` (default: the text)."""
         now = time.monotonic()
         if now - self._said.get(key or text, -SAY_PERIOD) >= SAY_PERIOD:
             self._said[key or text] = now
             self.get_logger().warning(text)
 
     def done_tick(self, stamp: int, begun: float) -> None:
-        """Note that the tick `stamp` [ns], begun at time.perf_counter() `begun`, is finished."""
+        """Count the tick `stamp` [ns] as done; begun: time.perf_counter() [s] at its start."""
         self.stamp = stamp
         self.ticks += 1
         self._loop.add(begun)
 
     @property
     def waiting_for(self) -> list[str]:
-        """Required inputs that were silent when last looked for."""
+        """Return the required inputs without a message in the last SAY_PERIOD."""
         return self._waiting
 
     def _look_for_inputs(self) -> None:
@@ -153,7 +153,7 @@ class UamNode(TunableNode):
             self.get_logger().info("waiting for " + ", ".join(names))
 
     def diagnose(self) -> tuple[bytes, str, dict[str, object]]:
-        """Return level, summary and values of this node beyond the common ones; for subclasses."""
+        """Return level, summary and further values for /diagnostics; overridden by subclasses."""
         return OK, "running", {}
 
     def _report(self) -> None:
@@ -168,7 +168,10 @@ class UamNode(TunableNode):
         elif self.refused and level == OK:
             level, summary = WARN, f"{self.refused} messages refused"
         elif dropped > self._dropped_before and level == OK:
-            level, summary = WARN, f"{dropped - self._dropped_before} ticks dropped of late"
+            level, summary = (
+                WARN,
+                f"{dropped - self._dropped_before} ticks dropped since last report",
+            )
         self._dropped_before = dropped
         common = {
             "ticks": self.ticks,
@@ -186,10 +189,9 @@ class UamNode(TunableNode):
 
 
 class StopSignal:
-    """Turns SIGINT and SIGTERM into a flag, however often they come.
+    """Turns SIGINT and SIGTERM into the flag `raised`.
 
-    No exception is thrown into whatever runs, so nothing breaks half-way, the second Ctrl-C of an
-    impatient user least of all.
+    No exception interrupts the running code, also not at a second Ctrl-C.
     """
 
     def __init__(self):
@@ -202,24 +204,24 @@ class StopSignal:
 
     @staticmethod
     def ignore() -> None:
-        """Let no signal harm what is left to do: ending the process.
+        """Ignore further signals until the process ends.
 
-        At its own end the interpreter gives handlers of Python back to the system, which would
-        kill the process, and with it the exit status.
+        At exit the interpreter restores the system's handlers; a signal would then kill the process
+        and change its exit status.
         """
         for number in (signal.SIGINT, signal.SIGTERM):
             signal.signal(number, signal.SIG_IGN)
 
 
 def run(make: Callable[[], UamNode], name: str) -> int:
-    """Build a node and serve it until SIGINT or SIGTERM; return the exit status.
+    """Create a node and spin it until SIGINT or SIGTERM; return the exit status.
 
-    0: stopped when asked; 1: the node gave up (its `failure`, if it has one, says why); 2: bad
-    parameters or arguments, said in one line.
+    0: stopped by a signal; 1: failure of the node (text in its `failure`, if it has one); 2: bad
+    parameters or arguments, with one line on stderr.
     """
     stop = StopSignal()
     try:
-        # The context must outlive the signal, so that what a node says last is still sent.
+        # no handlers of rclpy: the context must still send the node's last messages
         rclpy.init(args=sys.argv, signal_handler_options=SignalHandlerOptions.NO)
     except Exception as error:  # rclpy's own classes for a bad parameter file or argument
         return refuse(name, error)
@@ -231,7 +233,7 @@ def run(make: Callable[[], UamNode], name: str) -> int:
         except (ValueError, OSError) as error:  # ParameterError, ProfileError, ScenarioError ...
             return refuse(name, error)
         gc.collect()
-        gc.freeze()  # what lives now lives on: the collector need not look at it in flight
+        gc.freeze()  # excludes the existing objects from collections in flight
         spin(node, lambda: not stop.raised and not getattr(node, "failure", ""), node.wake_up)
         failure = getattr(node, "failure", "")
         if failure:
@@ -245,7 +247,7 @@ def run(make: Callable[[], UamNode], name: str) -> int:
 
 
 def refuse(name: str, error: Exception) -> int:
-    """Say in one line why the node does not start; return its exit status, 2."""
-    text = re.sub(r", at \S+:\d+", "", str(error))  # rcl appends the places in its own sources
+    """Print in one line why the node does not start; return its exit status, 2."""
+    text = re.sub(r", at \S+:\d+", "", str(error))  # rcl appends positions in its own sources
     print(f"{name}: {' '.join(text.split())}", file=sys.stderr, flush=True)
     return 2

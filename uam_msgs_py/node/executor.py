@@ -1,15 +1,15 @@
-"""A spin loop that does less for each message than rclpy's own.
+"""A spin loop with less work per message than rclpy's.
 
-rclpy's SingleThreadedExecutor gathers every entity of the node, builds a wait set, a task and a
-coroutine for each callback. A control node's entities hardly ever change after its start, so
-`LeanExecutor` keeps a wait set of its subscriptions and calls the callbacks of ready ones
-directly. What is rare is looked for fifty times a second, of the wall clock and of the node's
-ticks. Of requests and timers one is served at a tick: many at once must not keep one from its time.
-Clients and events of the middleware are handed to a SingleThreadedExecutor, which knows how to
-serve them; it would serve waiting messages first, so requests do not go that way.
+For each callback rclpy's SingleThreadedExecutor collects all entities of the node and builds a
+wait set, a task and a coroutine. A control node's entities rarely change after its start, so
+`LeanExecutor` reuses one wait set of its subscriptions and calls their callbacks directly. It
+checks services, timers, clients and events only fifty times a second, of wall time or of tick
+time. It serves at most one service request per check, so that many requests do not delay a tick.
+Clients and events are passed to a SingleThreadedExecutor. Service requests are not: that executor
+would serve waiting messages first.
 
-`WaitSet` is not public in rclpy. Where it is missing, `spin` falls back to the
-SingleThreadedExecutor alone: slower, otherwise the same.
+`WaitSet` is not part of rclpy's public API. Without it `spin` uses the SingleThreadedExecutor
+alone, which is slower but otherwise equivalent.
 """
 
 import time
@@ -27,22 +27,22 @@ except (ImportError, AttributeError):
     WaitSet = None
 
 
-REST_PERIOD = 0.02  # [s] between two looks at services, timers and events
-REST_STAMPS = round(REST_PERIOD * 1e9)  # [ns] of ticks, which a simulation may do faster
+REST_PERIOD = 0.02  # s between two checks of services, timers, clients and events
+REST_STAMPS = round(REST_PERIOD * 1e9)  # ns of ticks: a simulation may run faster than wall time
 
 
 class LeanExecutor:
-    """Spins one node, whose subscriptions, services and timers were made before.
+    """Spins one node; create its subscriptions, services and timers before.
 
-    Within one wake-up messages are delivered in the order of the node's subscriptions, triggers
-    last. A callback that raises ends `spin` with that exception.
+    After a wake-up messages are delivered in the order of the node's subscriptions, triggers last.
+    An exception of a callback ends `spin`.
 
-    A node with `defer` and `settle` is asked to settle after each wake-up, when all that had
-    arrived has been delivered: it then knows how far it is behind.
+    If the node has `defer` and `settle`, `settle` is called after all received messages of a
+    wake-up are delivered; the node then has its whole backlog.
 
-    A wake-up costs more than the work of a tick. So a node may name the input that completes a
-    tick, as a rule (`triggers`): only that wakes it, and the others are taken along. When it came
-    first for once (`stalled()`), the next message of any input wakes the node.
+    A wake-up costs more time than a tick. A node may therefore name the input that normally
+    completes a tick (`triggers`): only this input wakes the node, and the others are read along. If
+    a trigger arrived before another input of its tick (`stalled()`), any input wakes the node.
     """
 
     def __init__(
@@ -51,7 +51,7 @@ class LeanExecutor:
         triggers: Iterable[str] | None = None,
         stalled: Callable[[], bool] | None = None,
     ):
-        """triggers: names of topics; stalled: see above; both default to what the node says."""
+        """triggers: names of topics; stalled: see class; None: those of the node."""
         self._node = node
         self._trigger_names = set(getattr(node, "triggers", ()) if triggers is None else triggers)
         self._stalled = stalled or getattr(node, "stalled", lambda: False)
@@ -60,11 +60,11 @@ class LeanExecutor:
         self._settle = getattr(node, "settle", lambda: None)
         if hasattr(node, "defer"):
             node.defer()
-        self._next_look, self._looked_at = 0.0, 0
+        self._next_check, self._checked_at = 0.0, 0
         self._gather()
 
     def _gather(self) -> None:
-        """Take note of the node's entities and make the wait sets for them."""
+        """Collect the node's entities and create their wait sets."""
         node, context = self._node, self._node.context.handle
         names = {node.resolve_topic_name(name) for name in self._trigger_names}
         by_trigger = sorted(node.subscriptions, key=lambda s: s.topic_name in names)
@@ -81,15 +81,15 @@ class LeanExecutor:
         self._others = WaitSet(0, 0, *counts, context)
 
     def spin_once(self, timeout: float) -> None:
-        """Serve what is ready, waiting at most `timeout` seconds for a message.
+        """Serve all ready entities; wait for a message at most `timeout` [s].
 
-        Shorter than `timeout` by itself when it is time to look for services and timers.
+        The wait is shorter if a check of services and timers is due.
         """
-        left = self._next_look - time.monotonic()
+        left = self._next_check - time.monotonic()
         stamp = getattr(self._node, "stamp", 0)
-        if left <= 0.0 or stamp - self._looked_at >= REST_STAMPS:
+        if left <= 0.0 or stamp - self._checked_at >= REST_STAMPS:
             left = 0.0 if self._serve_others() else REST_PERIOD
-            self._next_look, self._looked_at = time.monotonic() + left, stamp
+            self._next_check, self._checked_at = time.monotonic() + left, stamp
         inputs = self._inputs if not self._triggers or self._stalled() else self._triggers
         messages = self._messages
         messages.clear_entities()
@@ -102,7 +102,10 @@ class LeanExecutor:
         self._settle()
 
     def _serve_others(self) -> bool:
-        """Serve services, clients, timers and events that are ready now; whether any was."""
+        """Serve ready services, clients, timers and events.
+
+        Returns whether a service, client or event was ready.
+        """
         others = self._others
         others.clear_entities()
         for handle in self._services:
@@ -126,7 +129,7 @@ class LeanExecutor:
         if request is not None:
             self._answer(request)
         if handed or services:
-            self._gather()  # a service may have changed them, as setting use_sim_time does
+            self._gather()  # a service may change the entities, e.g. by setting use_sim_time
         return bool(handed or services)
 
     @staticmethod
@@ -138,12 +141,12 @@ class LeanExecutor:
             service.send_response(response, header)
 
     def shutdown(self) -> None:
-        """Let go of the node."""
+        """Shut down the inner executor."""
         self._rest.shutdown()
 
 
 def spin(node: Node, running: Callable[[], bool], wake_up: float = 0.1) -> None:
-    """Serve `node` until `running()` is false, asked after every message and each `wake_up` s."""
+    """Spin `node` until `running()` is false, checked after messages and each `wake_up` [s]."""
     lean = LeanExecutor(node) if WaitSet is not None else None
     executor = lean or SingleThreadedExecutor(context=node.context)
     if lean is None:

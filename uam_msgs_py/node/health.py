@@ -1,4 +1,4 @@
-"""What a node says of its own health: how long its ticks take, how old its inputs are."""
+"""Diagnostic values of a node: processing time of its ticks, age of its inputs."""
 
 import time
 from collections.abc import Iterable, Mapping
@@ -12,14 +12,14 @@ class LoopTime:
         self._count = 0
 
     def add(self, begun: float) -> None:
-        """Note that what began at time.perf_counter() `begun` is finished."""
+        """Add the time since `begun`, a value of time.perf_counter() [s]."""
         spent = time.perf_counter() - begun
         self._sum += spent
         self._max = max(self._max, spent)
         self._count += 1
 
     def report(self, what: str = "tick") -> dict[str, str]:
-        """Return the diagnostic values, "" where nothing was done, and begin anew."""
+        """Return the diagnostic values since the last report, "" without any; reset them."""
         count, total, most = self._count, self._sum, self._max
         self._sum = self._max = 0.0
         self._count = 0
@@ -30,9 +30,9 @@ class LoopTime:
 
 
 def ages(inputs: Iterable[str], arrivals: Mapping[str, float]) -> dict[str, str]:
-    """Return the diagnostic values: how long ago [wall time] each input had its last good message.
+    """Return the diagnostic values: age (wall time) of each input's newest valid message.
 
-    arrivals: time.monotonic() [s] by topic; "" stands for never.
+    arrivals: topic → time.monotonic() [s]; the age is "" for an input without a message.
     """
     now = time.monotonic()
     return {

@@ -1,20 +1,20 @@
-"""Joins the messages of several topics that carry the same stamp.
+"""Joins the messages of several topics by their stamps.
 
-Never by order of arrival: between processes that order is chance, and a lockstep flight must be the
-same to the last bit.
+The order of arrival is not used: it is random between processes, and a lockstep flight must be
+reproducible bit for bit.
 """
 
 from collections.abc import Callable, Sequence
 from typing import Any
 
-BACKLOG = 3  # [ticks] as many control periods as a setpoint may be late, see mujoco_sim
+BACKLOG = 3  # ticks; equals the allowed delay of a setpoint in mujoco_sim
 
 
 class Backlog:
-    """Ticks that have arrived and wait to be worked on.
+    """Queue of complete ticks.
 
-    Who is a little behind works off all of them, in order. Who is far behind goes on with the
-    newest: working off a long backlog would only keep the delay.
+    Up to BACKLOG ticks are all processed, in order. Of a longer queue only the newest tick is
+    processed: otherwise the delay would remain.
     """
 
     def __init__(self):
@@ -26,7 +26,7 @@ class Backlog:
         self._items.append(item)
 
     def take(self) -> list[Any]:
-        """Return what is to be worked on now, in order."""
+        """Remove and return the ticks to process now, in order."""
         items = self._items
         if not items:
             return items
@@ -38,16 +38,16 @@ class Backlog:
 
 
 class StampJoin:
-    """Calls `fire(stamp, *values)` once every input has delivered its value for a stamp.
+    """Calls `fire(stamp, *values)` when all inputs have delivered their values for a stamp.
 
-    Ticks fire in the order of their stamps. When one fires, older incomplete ones can no longer
-    matter; they are dropped and counted, as is whatever arrives for them later.
+    Ticks fire in the order of their stamps. A firing tick drops older incomplete ticks; these, and
+    later messages for them, are counted in `dropped`.
 
-    deferred: `settle` fires, once all that has arrived has been added, see `Backlog`.
+    deferred: complete ticks fire in `settle`, not in `add`; see `Backlog`.
     """
 
     def __init__(self, inputs: Sequence[str], fire: Callable[..., None], depth: int = 32):
-        """inputs: names, in the order of the values; depth: incomplete stamps kept at most."""
+        """inputs: names, in the order of the values; depth: most incomplete stamps stored."""
         self._index = {name: i for i, name in enumerate(inputs)}
         self._fire = fire
         self._depth = depth
@@ -60,7 +60,7 @@ class StampJoin:
         self.last_seen: dict[str, int | None] = dict.fromkeys(inputs)
 
     def add(self, name: str, stamp: int, value: Any) -> None:
-        """Take the value of input `name` for `stamp` [ns]; may fire. None is not a value."""
+        """Add the value (not None) of input `name` for `stamp` [ns]; may fire."""
         self.last_seen[name] = stamp
         if stamp <= self._last:
             self._dropped += 1
@@ -80,7 +80,7 @@ class StampJoin:
             self.settle()
 
     def _close(self, stamp: int) -> int:
-        """Let go of the ticks up to `stamp` [ns]; return how many were open."""
+        """Remove the ticks up to `stamp` [ns]; return their number."""
         self._last = stamp
         closed = [key for key in self._open if key <= stamp]
         for old in closed:
@@ -88,26 +88,26 @@ class StampJoin:
         return len(closed)
 
     def settle(self) -> None:
-        """Where `deferred`: fire what is complete."""
+        """Fire the complete ticks of the backlog."""
         for stamp, values in self._backlog.take():
             self.fired += 1
             self._fire(stamp, *values)
 
     def skip(self, stamp: int) -> None:
-        """Let nothing up to `stamp` [ns] fire any more."""
+        """Drop all ticks up to `stamp` [ns]."""
         if stamp > self._last:
             self._dropped += self._close(stamp)
 
     @property
     def dropped(self) -> int:
-        """Ticks and values that came to nothing."""
+        """Return the number of dropped ticks and values."""
         return self._dropped + self._backlog.dropped
 
     def incomplete_after(self, name: str) -> bool:
-        """Whether input `name` has delivered a stamp that still lacks others."""
+        """Return whether the newest tick of input `name` still lacks other inputs."""
         return self.last_seen.get(name) in self._open
 
     @property
     def waiting_for(self) -> list[str]:
-        """Inputs that have never arrived."""
+        """Return the inputs without any value so far."""
         return [name for name, stamp in self.last_seen.items() if stamp is None]

@@ -1,7 +1,7 @@
-"""ROS parameters of a node from a ParameterSet: declared, checked as a whole, swapped at once.
+"""ROS parameters of a node from a ParameterSet: declared, checked as a whole, replaced at once.
 
-A change is tried on a copy of the whole set. If the set as a whole may fly it is accepted and takes
-effect between two control ticks; otherwise ROS gets the reason and the old values fly on.
+A change is checked on a copy of the whole set. A valid set takes effect between two control ticks.
+An invalid one is refused with the reason; the old values stay in effect.
 """
 
 from collections.abc import Callable, Sequence
@@ -24,10 +24,10 @@ S = TypeVar("S", bound=ParameterSet)
 def descriptor(
     spec: Bound | Choice | Switch, read_only: bool, axes: Sequence[str] = ()
 ) -> ParameterDescriptor:
-    """Return what `ros2 param describe` shows: meaning, unit, range, and the order in a vector.
+    """Return the texts of `ros2 param describe`: meaning, unit, range, and the order of a vector.
 
-    axes: what the entries of a per-axis vector belong to.
-    Typing is dynamic because people write `5` where a float is meant; the set checks types itself.
+    axes: names of the entries of a per-axis vector. Typing is dynamic, so that a user may write `5`
+    for a float; the set checks the types.
     """
     text = ParameterDescriptor(
         description=spec.description,
@@ -49,10 +49,10 @@ def descriptor(
 
 
 class NodeParameters(Generic[S]):
-    """The parameter set of one node, kept equal to its ROS parameters.
+    """The parameter set of one node, equal to its ROS parameters.
 
-    `current` is the set that flies. `apply` is called with each accepted new set, from the thread
-    that spins the node, hence between two ticks.
+    `current`: the set in effect. `apply` is called with each accepted new set by the thread that
+    spins the node, hence between two ticks.
     """
 
     def __init__(
@@ -66,16 +66,15 @@ class NodeParameters(Generic[S]):
     ):
         """Declare all parameters of `kind`.
 
-        axes: names of the entries of a per-axis vector. defaults: the values of the default
-        profile, used for what the parameter file does not say, unless that file is complete by
-        itself. read_only: fixed once the node runs. Raises ParameterError for values that must not
-        fly.
+        axes: names of the entries of a per-axis vector. defaults: values of the default profile for
+        parameters that the parameter file omits; not used if that file is complete. read_only: no
+        changes after the start. Raises ParameterError for invalid values.
         """
         self._axes = len(axes)
         self.apply = apply
-        told = {name: value for name, value in given(node).items() if name in kind.specs()}
-        base = {} if complete(kind, told) else dict(defaults or {})
-        self.current = kind.from_mapping(base | told, self._axes)
+        own = {name: value for name, value in given(node).items() if name in kind.specs()}
+        base = {} if complete(kind, own) else dict(defaults or {})
+        self.current = kind.from_mapping(base | own, self._axes)
         for name, spec in kind.specs().items():
             value = getattr(self.current, name)
             node.declare_parameter(
@@ -110,24 +109,24 @@ class NodeParameters(Generic[S]):
 
 
 def given(node: Node) -> dict[str, Any]:
-    """Return what the parameter file and the command line say, by name."""
+    """Return the values of the parameter file and the command line, by name."""
     return {name: value.value for name, value in node._parameter_overrides.items()}
 
 
 def plain(message: ParameterValue) -> Any:
-    """The value of a parameter that a service told, as YAML has it: arrays as lists."""
+    """Return the value of a parameter message as in YAML: arrays as lists."""
     value = parameter_value_to_python(message)
     return list(value) if hasattr(value, "__len__") and not isinstance(value, str) else value
 
 
 def complete(kind: type[ParameterSet], given: dict[str, Any]) -> bool:
-    """Whether `given` holds every value that has no default of its own."""
+    """Return whether `given` has a value for every parameter without a default."""
     empty = [name for name in kind.specs() if getattr(kind, name, ()) == ()]
     return bool(given) and all(name in given for name in empty)
 
 
 def refuse_unknown(node: Node) -> None:
-    """Raise ParameterError for a value in the parameter file that no declared parameter takes."""
+    """Raise ParameterError for a name in the parameter file that the node has not declared."""
     own = ("use_sim_time", "qos_overrides.", "start_type_description_service")
     for name in node._parameter_overrides:
         if not node.has_parameter(name) and not name.startswith(own):

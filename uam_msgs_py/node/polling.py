@@ -1,4 +1,4 @@
-"""Topics that are polled: messages are taken when looked at, not called back; hence no executor."""
+"""Polling of topics: the program takes messages when it needs them, without executor."""
 
 from __future__ import annotations
 
@@ -15,14 +15,14 @@ from uam_msgs_py.messages.topics import Topic
 def listen(
     node: Node, topic: Topic, qos: QoSProfile | None = None, raw: bool = False
 ) -> Subscription:
-    """Subscribe to a topic that is to be polled; qos: None for the topic's, raw: serialized."""
+    """Return a subscription for polling; qos: None for the topic's, raw: serialized messages."""
     return node.create_subscription(
         topic.type, topic.name, lambda _: None, qos or topic.qos, raw=raw
     )
 
 
 def messages(subscription: Subscription) -> Iterator[Any]:
-    """Take what has arrived, oldest first."""
+    """Take and yield the received messages, oldest first."""
     kind, raw = subscription.msg_type, subscription.raw
     while (taken := subscription.handle.take_message(kind, raw)) is not None:
         yield taken[0]

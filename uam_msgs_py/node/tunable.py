@@ -1,9 +1,9 @@
-"""A node whose parameters may be changed in flight: every request is answered and told.
+"""Base class of nodes whose parameters can be changed in flight; it publishes every request.
 
 | service | does |
 |---|---|
-| `~/set_parameters`, `~/set_parameters_atomically` | rclpy's; what they did is told to the log |
-| `~/check_parameters` | whether `~/set_parameters_atomically` would accept; changes nothing |
+| `~/set_parameters`, `~/set_parameters_atomically` | rclpy's, plus a message per request |
+| `~/check_parameters` | only checks: would `~/set_parameters_atomically` accept? |
 
 Services are served between two ticks, see `executor`.
 """
@@ -34,21 +34,21 @@ class TunableNode(Node):
         self.create_service(SetParametersAtomically, f"~/{CHECK}", self._on_check)
 
     def set_parameters_atomically(self, parameter_list: list[Parameter]) -> SetParametersResult:
-        """Change all or none, between two ticks; what rclpy's services call."""
+        """Change all parameters or none, between two ticks; called by rclpy's services."""
         return self.change_parameters(parameter_list, SERVICE)
 
     def set_parameters(self, parameter_list: list[Parameter]) -> list[SetParametersResult]:
-        """Change one after the other, each by itself."""
+        """Change the parameters one by one; each may be refused."""
         return [self.set_parameters_atomically([item]) for item in parameter_list]
 
     def change_parameters(self, changes: list[Parameter], by: str) -> SetParametersResult:
-        """Change all or none and tell the log; by: who asked."""
+        """Change all or none and publish the result; by: origin of the request."""
         old = {change.name: self._value(change.name) for change in changes}
         result = self.check_parameters(changes)
         if result.successful:
             result = super().set_parameters_atomically(changes)
         if not result.successful:
-            self.get_logger().warning(f"refused, the old values fly on: {result.reason}")
+            self.get_logger().warning(f"refused, old values stay in effect: {result.reason}")
         values = {change.name: (old[change.name], change.value) for change in changes}
         self.tell(
             ParameterChange(self.get_name(), by, values, "" if result.successful else result.reason)
@@ -56,7 +56,7 @@ class TunableNode(Node):
         return result
 
     def check_parameters(self, changes: list[Parameter]) -> SetParametersResult:
-        """Return whether these changes as a whole would be accepted, and why not."""
+        """Return whether these changes as a whole are valid, with the reason if not."""
         for name in (change.name for change in changes):
             if not self.has_parameter(name):
                 return _refusal(f"{name}: unknown")

@@ -1,8 +1,8 @@
-"""Who talks to whom: which nodes of a flight publish and which subscribe to each topic.
+"""Publishers and subscribers of each topic in a flight.
 
-A lockstep flight is the same from the first tick on only if everyone hears it. So the plant waits
-until every connection listed here exists, as the nodes at both of its ends say. A test compares the
-list with the running nodes.
+A lockstep flight is reproducible only if no node misses its first tick. The plant therefore waits
+until both ends of every connection listed here report it. A test compares the list with the
+running nodes.
 """
 
 from __future__ import annotations
@@ -18,14 +18,17 @@ from uam_msgs_py.node.connections import READERS, WRITERS, Connections
 ESTIMATOR, MISSION = "state_estimator", "mission"
 POSITION, ATTITUDE, ARM = "position_controller", "attitude_controller", "arm_controller"
 BRIDGE, PLANT, RECORDER = "mavlink_bridge", "mujoco_sim", "recorder"
-SCENE, COCKPIT = "scene", "cockpit"  # only look on, nobody waits for them: in none of WIRES
+SCENE, COCKPIT = (
+    "scene",
+    "cockpit",
+)  # observers; the flight does not wait for them: in none of WIRES
 
 
 @dataclass(frozen=True)
 class Wire:
-    """One topic from one node to several; the recorder comes on top of them.
+    """A topic from one node to several; the recorder is added by `listeners`.
 
-    optional: those who listen can do without.
+    optional: the subscribers also work without the topic.
     """
 
     topic: topics.Topic
@@ -34,7 +37,7 @@ class Wire:
     optional: bool = False
 
     def listeners(self, recorded: bool) -> tuple[str, ...]:
-        """The subscribers, the recorder among them if it is there."""
+        """Return the subscribers, with the recorder if recorded."""
         return (*self.subscribers, RECORDER) if recorded else self.subscribers
 
 
@@ -68,10 +71,10 @@ WIRES = (
 
 
 def with_foreign(node: Node, foreign: Collection[str]) -> Sequence[Wire]:
-    """WIRES where some nodes, by their names in `foreign`, are the user's own.
+    """Return WIRES for a flight in which the nodes `foreign` (names) are the user's own.
 
-    Such a node must publish what others listen to; it listens to what it likes, as the graph that
-    `node` sees tells.
+    A foreign node must publish the topics that other nodes require. Its own subscriptions are free;
+    they are read from the ROS graph of `node`.
     """
     if not foreign:
         return WIRES
@@ -80,16 +83,16 @@ def with_foreign(node: Node, foreign: Collection[str]) -> Sequence[Wire]:
         if wire.publisher in foreign and (wire.optional or not wire.subscribers):
             continue
         name = node.resolve_topic_name(wire.topic.name)
-        hearing = {info.node_name for info in node.get_subscriptions_info_by_topic(name)}
-        wanted = tuple(who for who in wire.subscribers if who not in foreign or who in hearing)
-        found.append(replace(wire, subscribers=wanted))
+        listeners = {info.node_name for info in node.get_subscriptions_info_by_topic(name)}
+        required = tuple(one for one in wire.subscribers if one not in foreign or one in listeners)
+        found.append(replace(wire, subscribers=required))
     return found
 
 
 def missing(node: Node, recorded: bool, wires: Sequence[Wire] = WIRES) -> list[str]:
-    """Ends of `wires` that the graph, as `node` sees it, does not have yet, in words.
+    """Return one text per end of `wires` that the ROS graph of `node` does not contain yet.
 
-    recorded: the recorder must listen to each of these topics too.
+    recorded: the recorder must subscribe to each of these topics as well.
     """
     found = []
     for wire in wires:
@@ -98,34 +101,35 @@ def missing(node: Node, recorded: bool, wires: Sequence[Wire] = WIRES) -> list[s
         listeners = {info.node_name for info in node.get_subscriptions_info_by_topic(name)}
         if wire.publisher not in publishers:
             found.append(f"{wire.publisher} to publish {name}")
-        wanted = wire.listeners(recorded)
-        found += [f"{who} to listen to {name}" for who in wanted if who not in listeners]
+        required = wire.listeners(recorded)
+        found += [f"{one} to listen to {name}" for one in required if one not in listeners]
     return found
 
 
 def unconnected(
-    said: Connections,
+    reported: Connections,
     plant: Mapping[str, int],
     recorded: bool,
     wires: Sequence[Wire] = WIRES,
     foreign: Collection[str] = (),
 ) -> Iterator[str]:
-    """Ends of `wires` that have not found all their counterparts, in words.
+    """Yield one text per end of `wires` that lacks a connection.
 
-    said: what the other nodes say; plant: what the plant itself knows (`connections.of`); foreign:
-    nodes that say nothing about it.
+    reported: connections that the other nodes report; plant: those of the plant itself
+    (`connections.of`); foreign: nodes without such reports.
     """
 
     def count(node: str, kind: str, topic: str) -> int:
         if node == PLANT:
             return plant.get(kind + topic, 0)
-        return said.readers(node, topic) if kind == READERS else said.writers(node, topic)
+        read = reported.readers if kind == READERS else reported.writers
+        return read(node, topic)
 
     for wire in wires:
-        name, wanted = wire.topic.name, wire.listeners(recorded)
-        silent = wire.publisher in foreign
-        if not silent and count(wire.publisher, READERS, name) < len(wanted):
-            yield f"{wire.publisher} to find the listeners of {name}"
-        for who in wanted:
-            if who not in foreign and count(who, WRITERS, name) < 1:
-                yield f"{who} to find the publisher of {name}"
+        name, required = wire.topic.name, wire.listeners(recorded)
+        reports = wire.publisher not in foreign
+        if reports and count(wire.publisher, READERS, name) < len(required):
+            yield f"{wire.publisher} to connect to the subscribers of {name}"
+        for one in required:
+            if one not in foreign and count(one, WRITERS, name) < 1:
+                yield f"{one} to connect to the publisher of {name}"
