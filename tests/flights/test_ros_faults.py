@@ -33,7 +33,7 @@ def test_without_the_autopilots_voice_it_lands_by_itself(fly):
     assert flight.wait() == 1
     figures = json.loads((flight.out / "metrics.json").read_text())
     passed = [(one["to"], one["cause"]) for one in figures["transitions"]]
-    assert passed[-2][0] == "landing" and "nothing of the autopilot for" in passed[-2][1]
+    assert passed[-2][0] == "landing" and "no message of the autopilot for" in passed[-2][1]
     assert passed[-1] == ("disarmed", "touchdown")
     assert max(figures["max"]["position_m"]) < 0.1
     assert "no heartbeat" in (flight.out / "logs/mavlink_bridge.log").read_text()

@@ -1,4 +1,4 @@
-"""The supervisor: its table, its limits, and what no sequence of inputs makes it do."""
+"""The supervisor: its transitions, its limits, and properties for arbitrary inputs."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ DOCS = Path(__file__).resolve().parents[2] / "docs" / "supervision.md"
 
 
 def mermaid() -> str:
-    """The table as a mermaid state diagram, events between the same two states on one arrow."""
+    """Return the transitions as a mermaid state diagram, one arrow per pair of states."""
     arrows: dict[tuple[State, State], list[str]] = {}
     for source, event, target in TRANSITIONS:
         arrows.setdefault((source, target), []).append(event.value)
@@ -65,15 +65,15 @@ def test_the_table_is_unambiguous_and_every_state_can_be_reached_and_left():
     assert {event for _, event, _ in TRANSITIONS} == set(Event)
 
 
-def test_nothing_leads_out_of_failsafe_but_a_command_and_motors_go_off_on_the_ground():
+def test_failsafe_ends_only_by_command_and_motors_go_off_on_the_ground():
     ways_out = [event for source, event, _ in TRANSITIONS if source is State.FAILSAFE]
     assert ways_out == [Event.DISARM]
     aloft = {State.FLYING, State.HOLDING}
     off = {e for s, e, target in TRANSITIONS if s in aloft and target is State.DISARMED}
-    assert off == {Event.LOST_ARMING}  # what the autopilot did, not we
+    assert off == {Event.LOST_ARMING}  # the autopilot has disarmed by itself
 
 
-def test_as_many_quantities_are_measured_as_are_named():
+def test_every_check_has_a_value():
     values, seen, two, three = np.full(len(CHECKS), np.nan), observation(), np.ones(2), np.ones(3)
     measure(seen.state, seen.reference, three, 0.0, 0.0, np.zeros((2, 3)), two, values)
     assert np.isnan(values).sum() == 11
@@ -102,7 +102,7 @@ LIMITS, AFTER = (1.0, 2.0, math.inf), (0.25, 0.05, 0.0)
 
 
 def run(monitor, values, begin=0.0, step=0.1):
-    """Levels over values that come every `step` s."""
+    """Return the levels for values at intervals of `step` [s]."""
     return [
         monitor.update(begin + step * k, value, LIMITS, AFTER, 0.5, 0.2)
         for k, value in enumerate(values)
@@ -113,7 +113,7 @@ def test_a_monitor_waits_rises_and_falls_with_hysteresis_in_value_and_time():
     monitor = Monitor()
     assert run(monitor, [1.1, 1.1, 1.1]) == [Level.FINE] * 3
     assert run(monitor, [1.1, 2.1, 2.1, 2.1], 0.3) == [1, 1, 2, 2]
-    # below the limit, but not by the hysteresis: nothing changes
+    # below the limit, but not by the hysteresis: no change
     assert run(monitor, [1.7] * 10, 0.8) == [2] * 10
     # clear of the second limit, for long enough: the first one still holds
     assert run(monitor, [1.5] * 8, 2.0)[-1] is Level.HOLD
@@ -123,13 +123,13 @@ def test_a_monitor_waits_rises_and_falls_with_hysteresis_in_value_and_time():
 
 @given(st.lists(st.floats(0.81, 1.5), min_size=5, max_size=60))
 def test_noise_about_a_limit_does_not_toggle(values):
-    """Once held, the level stays as long as nothing is clear of the limit by the hysteresis."""
+    """The level HOLD remains until a value is clear of the limit by the hysteresis."""
     monitor = Monitor()
     run(monitor, [1.2] * 10)
     assert set(run(monitor, values, 1.0)) == {Level.HOLD}
 
 
-def test_a_short_excess_and_one_that_is_not_known_do_nothing():
+def test_a_short_excess_and_an_unknown_value_have_no_effect():
     monitor = Monitor()
     assert set(run(monitor, [5.0, 0.1] * 20)) == {Level.FINE}
     assert not any(run(Monitor(), [-math.inf] * 20))
@@ -137,7 +137,7 @@ def test_a_short_excess_and_one_that_is_not_known_do_nothing():
 
 
 def observation(**changes):
-    """A vehicle that is where it should be, 1 m above its start."""
+    """Return an observation without tracking error, 1 m above the start."""
     state, reference = np.zeros((3, 8)), np.zeros((3, 8))
     state[0, 2] = reference[0, 2] = 1.0
     seen = Observation(state, reference, 0.0, armed=True, ready=True)
@@ -147,7 +147,7 @@ def observation(**changes):
 
 
 def flying(**parameters):
-    """A supervisor that has taken off, and a clock."""
+    """A supervisor after take-off, and the time of its steps."""
     made = Supervisor(dataclasses.replace(SupervisionParameters(), **parameters).validated())
     for stamp in (0.0, 0.01):
         made.step(stamp, observation())
@@ -156,7 +156,7 @@ def flying(**parameters):
 
 
 def watch(supervisor, seen, seconds, begin=1.0):
-    """Step for a while; the last decision."""
+    """Step for a while; return the last decision."""
     for k in range(round(seconds / 0.01) + 1):
         decision = supervisor.step(begin + 0.01 * k, seen)
     return decision
@@ -190,7 +190,7 @@ def with_state(entry, value):
         (
             observation(readings=Readings(autopilot_age=0.8)),
             State.LANDING,
-            "nothing of the autopilot for 0.80 s, 0.75 s allowed",
+            "no message of the autopilot for 0.80 s, 0.75 s allowed",
         ),
         (
             observation(readings=Readings(round_trip=0.038)),
@@ -242,20 +242,20 @@ def with_state(entry, value):
         (observation(armed=False), State.DISARMED, "the autopilot disarmed in flight"),
     ],
 )
-def test_what_is_beyond_a_limit_has_its_reaction_and_says_so(seen, state, cause):
+def test_an_exceeded_limit_has_its_reaction_and_cause(seen, state, cause):
     supervisor = flying()
     decision = watch(supervisor, seen, 0.6)
     assert decision.state is state and decision.cause.startswith(cause)
 
 
-def test_poses_away_from_the_estimate_are_left_to_the_autopilot_as_late_as_no_poses():
+def test_poses_away_from_the_estimate_start_failsafe_after_the_same_time_as_no_poses():
     seen = observation(readings=Readings(mocap_age=0.01, mocap_position=np.array([0.3, -0.4, 1])))
     supervisor = flying()
     assert watch(supervisor, seen, 0.95).state is State.HOLDING
     assert watch(supervisor, seen, 0.1, 1.96).state is State.FAILSAFE
 
 
-def test_a_fence_left_is_a_landing():
+def test_leaving_the_geofence_starts_a_landing():
     seen = observation()
     seen.state[0, 0] = seen.reference[0, 0] = 5.2
     decision = watch(flying(), seen, 0.4)
@@ -263,7 +263,7 @@ def test_a_fence_left_is_a_landing():
     assert decision.cause == "geofence left by 0.20 m, 0.1 m allowed"
 
 
-def test_a_limit_that_is_not_on_any_more_lets_it_go_on_only_when_that_is_wanted():
+def test_a_cleared_limit_resumes_only_with_resume_automatically():
     far, near = with_state((0, 0), 1.2), observation()
     for automatic, expected in ((False, State.HOLDING), (True, State.FLYING)):
         supervisor = flying(resume_automatically=automatic)
@@ -277,13 +277,13 @@ def test_a_limit_that_is_not_on_any_more_lets_it_go_on_only_when_that_is_wanted(
     assert supervisor.step(5.0, near, OperatorCommand.RESUME).state is State.FLYING
 
 
-def test_a_hold_by_command_is_not_ended_by_itself():
+def test_a_hold_by_command_ends_only_by_command():
     supervisor = flying(resume_automatically=True)
     supervisor.step(1.0, observation(), OperatorCommand.HOLD)
     assert watch(supervisor, observation(), 60.0, 2.0).state is State.HOLDING
 
 
-def test_a_hard_limit_on_the_ground_stops_the_motors_there():
+def test_a_hard_limit_on_the_ground_disarms():
     supervisor = Supervisor(SupervisionParameters())
     seen = observation(on_ground=True)
     seen.state[0, 2] = 0.0
@@ -302,7 +302,7 @@ def test_a_hard_limit_on_the_ground_stops_the_motors_there():
         ("stay", State.HOLDING, "a controller's gains are 0.30 s old, 0.25 s allowed"),
     ],
 )
-def test_a_controller_that_is_back_is_followed_by_what_the_policy_says(policy, state, cause):
+def test_the_reaction_to_a_restarted_controller_follows_the_policy(policy, state, cause):
     supervisor = flying(after_restart=policy)
     assert watch(supervisor, observation(readings=Readings(controller_age=0.3)), 1.0).state is (
         State.HOLDING
@@ -311,7 +311,7 @@ def test_a_controller_that_is_back_is_followed_by_what_the_policy_says(policy, s
     assert (decision.state, decision.cause) == (state, cause)
 
 
-def test_another_limit_that_is_clear_again_waits_for_a_command():
+def test_other_cleared_limits_wait_for_a_command():
     supervisor = flying(after_restart="go_on")
     watch(supervisor, observation(readings=Readings(joint_age=0.3)), 1.0)
     assert watch(supervisor, observation(), 2.0, 3.0).state is State.HOLDING
@@ -326,7 +326,7 @@ def test_arm_and_magnet_follow_the_policy(keep):
     assert not decision.stow and decision.keep_magnet
 
 
-def test_inputs_tell_ages_by_stamps_and_count_missed_ticks_of_a_second():
+def test_inputs_compute_ages_by_stamps_and_count_missed_ticks_of_a_second():
     inputs = Inputs(0.004)
     assert math.isnan(inputs.at(1.0).mocap_age) and math.isnan(inputs.at(1.0).autopilot_age)
     inputs.mocap(0.5, np.ones(3), np.ones(4))
@@ -364,7 +364,7 @@ READINGS = st.builds(
 
 
 class AnySequence(RuleBasedStateMachine):
-    """Whatever comes, in whatever order, the supervisor keeps its promises."""
+    """The supervisor's properties hold for any sequence of inputs."""
 
     def __init__(self):
         super().__init__()

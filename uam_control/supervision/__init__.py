@@ -1,4 +1,4 @@
-"""What watches over a flight: limits, states, and what each of them means for the vehicle."""
+"""Supervision of a flight: limits, states, and the reaction of the vehicle in each state."""
 
 from uam_control.supervision.inputs import Inputs
 from uam_control.supervision.observation import Observation, OperatorCommand, Readings

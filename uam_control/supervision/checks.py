@@ -1,6 +1,6 @@
-"""Every quantity that is watched, against its limits.
+"""Checks of all monitored quantities against their limits.
 
-Nearly always all is in order, and the monitors are asked only otherwise.
+The monitors run only if a value is near or beyond a limit, or was so recently.
 """
 
 from __future__ import annotations
@@ -17,15 +17,15 @@ from uam_control.supervision.supervision_parameters import SupervisionParameters
 
 NONE = math.inf
 CONTROLLERS = "controllers"
-LATEST = 0.25  # [s] later than this, a pose is not compared with the estimate of its time
+LATEST = 0.25  # s, largest age of a pose for which the estimate is extrapolated back to its stamp
 
 
 class Check(NamedTuple):
-    """A quantity: its name, a format for value and limit in a cause, and its limits.
+    """A monitored quantity: its name, the text of a cause, and its limits.
 
-    A limit is a parameter's name or a number. in_flight: means nothing on the ground.
-    sign -1: less is worse. failsafe_after: the parameter that says how long, if it is not the
-    common one.
+    hold, land, failsafe: name of a parameter, or a number. in_flight: checked only while airborne.
+    sign: -1 if a smaller value is worse. failsafe_after: name of the parameter with the time beyond
+    the limit before failsafe.
     """
 
     name: str
@@ -38,7 +38,7 @@ class Check(NamedTuple):
     failsafe_after: str = "failsafe_after"
 
 
-# in the order in which `measure` writes them
+# in the order of the values of `measure` and `read`
 CHECKS = (
     Check("estimate", "{name} is not finite", failsafe=0.5),
     Check(
@@ -64,7 +64,7 @@ CHECKS = (
     Check("joint angles", "{name} are {value:.2f} s old, {limit:g} s allowed", "joint_age_hold"),
     Check(CONTROLLERS, "a controller's gains are {value:.2f} s old, {limit:g} s allowed",
           "controller_age_hold"),
-    Check("autopilot", "nothing of the {name} for {value:.2f} s, {limit:g} s allowed",
+    Check("autopilot", "no message of the {name} for {value:.2f} s, {limit:g} s allowed",
           land="autopilot_age_land"),
     Check("autopilot's link", "{name} takes {value:.3f} s there and back, {limit:g} s allowed",
           land="round_trip_land", failsafe="round_trip_failsafe"),
@@ -78,7 +78,7 @@ CHECKS = (
 
 
 class ExceededLimit(NamedTuple):
-    """What is beyond a limit for long enough: how bad, in words, and the quantity's name."""
+    """A limit exceeded for its time: the reaction's level, the cause and the quantity's name."""
 
     level: Level
     cause: str
@@ -88,7 +88,8 @@ class ExceededLimit(NamedTuple):
 class Checks:
     """The monitors of all quantities.
 
-    `finding`: the worst that is beyond a limit for long enough; `quiet`: nothing is, however short.
+    `finding`: the worst exceeded limit, None without one; `quiet`: no value is beyond a limit, not
+    even for a short time.
     """
 
     def __init__(self, parameters: SupervisionParameters) -> None:
@@ -108,7 +109,7 @@ class Checks:
         self._after = tuple(
             (p.hold_after, p.land_after, getattr(p, check.failsafe_after)) for check in CHECKS
         )
-        # below these a monitor has nothing to do unless something was beyond a limit before
+        # below these values no monitor changes, unless a limit was exceeded before
         first = [min(limits) for limits in self._limits]
         self._calm = np.array([limit - p.hysteresis * abs(limit) for limit in first])
         self._box = np.array([p.geofence_low, p.geofence_high])
@@ -116,9 +117,9 @@ class Checks:
         self._efforts, self._gains = np.array(p.joint_effort_hold), np.array(p.gain_hold)
 
     def update(self, stamp: float, seen: Observation, in_flight: bool) -> ExceededLimit | None:
-        """Look at a tick at `stamp` [s]; return the worst that is beyond a limit, None for nothing.
+        """Check the tick at `stamp` [s]; return the worst exceeded limit, None without one.
 
-        in_flight: whether the reference is one that the vehicle follows.
+        in_flight: whether the vehicle follows the reference.
         """
         readings, values = seen.readings, self._values
         measure(
@@ -184,8 +185,8 @@ def measure(
     joints: np.ndarray,
     values: np.ndarray,
 ) -> None:
-    """Write what state and reference tell into values[:8]; only the first where the state is not
-    finite.
+    """Write the quantities of state and reference into values[:8]; of a state that is not finite
+    only values[0].
 
     mocap (3,), age: position [m] of the newest pose and its age [s], NaN for none; box (2, 3): low
     and high corner [m]; joints (2,): limits of the angles [rad].
@@ -230,7 +231,7 @@ def read(
     gain_limits: np.ndarray,
     values: np.ndarray,
 ) -> None:
-    """Write the readings (see `Readings`) into values[8:]; unknown ones are in order."""
+    """Write the readings (see `Readings`) into values[8:]; NaN (unknown) passes every check."""
     values[8] = _known(-battery)
     values[9], values[10], values[11] = _known(mocap), _known(still), _known(joints)
     values[12], values[13] = _known(controllers), _known(autopilot)
@@ -257,7 +258,7 @@ def _largest(values: np.ndarray, limits: np.ndarray) -> float:
 
 @jit
 def _below(values: np.ndarray, limits: np.ndarray) -> bool:
-    """Whether every value is below its limit; one that is not a number is not."""
+    """Return whether every value (n,) is below its limit (n,); False for a NaN."""
     for i in range(len(limits)):
         if not values[i] < limits[i]:
             return False

@@ -1,4 +1,4 @@
-"""What the supervisor knows besides state and reference, gathered message by message."""
+"""The supervisor's readings besides state and reference, collected message by message."""
 
 from __future__ import annotations
 
@@ -11,14 +11,14 @@ import numpy as np
 from uam_control.estimation.repeats import Repeats
 from uam_control.supervision.observation import Readings
 
-POSE = ("position", "attitude")  # without these nobody flies the vehicle
-WATCHED = ("K", "zeta")  # how the names of gains with a limit begin
+POSE = ("position", "attitude")  # controllers without which the vehicle does not follow its path
+WATCHED = ("K", "zeta")  # prefixes of the names of gains with a limit
 SUBSYSTEMS = (*POSE, "arm")
 
 
 class Inputs:
-    """Newest values and their stamps; ages are by stamps, hence the same however late a message
-    was delivered."""
+    """Newest values and their stamps. Ages are differences of stamps and do not depend on the time
+    of delivery."""
 
     def __init__(self, period: float) -> None:
         """period [s]: of control ticks."""
@@ -34,7 +34,10 @@ class Inputs:
         self._watched: dict[tuple[str, ...], list[int]] = {}
 
     def mocap(self, stamp: float, position: np.ndarray, quaternion: np.ndarray) -> None:
-        """Note a pose, position (3,) and quaternion (4,), that was exposed at `stamp` [s]."""
+        """Store a mocap pose exposed at `stamp` [s].
+
+        position (3,) [m, world]; quaternion (4,) body → world [w x y z].
+        """
         self._mocap = stamp
         self._readings.mocap_position[:] = position
         if not self._repeats(position, quaternion):
@@ -46,25 +49,25 @@ class Inputs:
         self._readings.joint_effort[:] = effort  # as compiled maths wants it, writable
 
     def temperature(self, joint: str, degrees: float) -> None:
-        """Note the temperature [deg C] of a joint's servo."""
+        """Store the temperature [deg C] of a joint's servo."""
         self._temperatures[joint] = degrees
         known = [value for value in self._temperatures.values() if not math.isnan(value)]
         self._readings.temperature = max(known, default=math.nan)
 
     def battery(self, left: float) -> None:
-        """Note the charge left, 0..1; NaN where nobody knows."""
+        """Store the state of charge 0..1; NaN if unknown."""
         self._readings.battery = left
 
     def autopilot(self, stamp: float, round_trip: float) -> None:
-        """Note that the bridge was connected with the autopilot at `stamp` [s].
+        """Store that the bridge was connected to the autopilot at `stamp` [s].
 
-        round_trip: how long its answers take [s], NaN where not known.
+        round_trip [s]: of the link, NaN if unknown.
         """
         self._autopilot = stamp
         self._readings.round_trip = round_trip
 
     def gains(self, stamp: float, subsystem: str, names: Sequence[str], values: np.ndarray) -> None:
-        """Note the gains (n,) that one of SUBSYSTEMS had at `stamp` [s], and their names."""
+        """Store the adapted gains of one of SUBSYSTEMS at `stamp` [s]: names (n), values (n,)."""
         key = tuple(names)
         if key not in self._watched:
             self._watched[key] = [i for i, n in enumerate(names) if n.startswith(WATCHED)]
@@ -74,7 +77,7 @@ class Inputs:
         self._controllers[subsystem] = stamp
 
     def at(self, stamp: float) -> Readings:
-        """Return what is known at the tick `stamp` [s]; the object is reused by the next call."""
+        """Return the readings at the tick `stamp` [s]; the next call reuses the object."""
         readings, gaps = self._readings, self._gaps
         if self._last is not None:
             missed = round((stamp - self._last) / self._period) - 1

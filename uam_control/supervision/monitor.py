@@ -1,4 +1,4 @@
-"""One quantity against its limits, with hysteresis in time and value."""
+"""Monitor of one quantity against its limits, with hysteresis in time and value."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from enum import IntEnum
 
 
 class Level(IntEnum):
-    """How bad something is: what it calls for."""
+    """Required reaction, in order of severity."""
 
     FINE = 0
     HOLD = 1
@@ -19,10 +19,11 @@ REACTIONS = (Level.HOLD, Level.LAND, Level.FAILSAFE)
 
 
 class Monitor:
-    """Rises to a level when a value went beyond that level's limit long enough ago and has not been
-    clear of it since; falls back when it has been clear for long enough.
+    """Level of one quantity.
 
-    Clear is what is within the limit by the hysteresis. `level`: now; `value`: the last one.
+    The level rises when the value has exceeded the limit of a higher level for the time `after`,
+    without being clear in between. It falls when the value has been clear for `clear_after`. Clear
+    means: within the limit by at least the hysteresis. `level`: current one; `value`: last one.
     """
 
     def __init__(self) -> None:
@@ -33,7 +34,7 @@ class Monitor:
 
     @property
     def quiet(self) -> bool:
-        """Whether nothing is beyond a limit, or was lately."""
+        """Return whether no limit is exceeded or waits to become clear."""
         return not self.level and self._since == [None] * len(REACTIONS)
 
     def update(
@@ -45,10 +46,10 @@ class Monitor:
         clear_after: float,
         hysteresis: float,
     ) -> Level:
-        """Take a value at `stamp` [s] and return the level; larger is worse, NaN beyond all.
+        """Update with a value at `stamp` [s] and return the level; NaN exceeds all limits.
 
-        limits: of REACTIONS, infinite where there is none. after, clear_after: times [s].
-        hysteresis: part of the size of a limit.
+        limits, after: of each of REACTIONS, the limit (inf: none) and the time beyond it [s].
+        clear_after [s]; hysteresis: fraction of a limit's size.
         """
         self.value = value
         reached = Level.FINE

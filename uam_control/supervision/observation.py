@@ -1,4 +1,4 @@
-"""What the supervisor is shown at a tick, and what it may be told to do."""
+"""Inputs of the supervisor at a tick: observation, readings, operator commands."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from uam_control.supervision.states import Event
 
 
 class OperatorCommand(Enum):
-    """What people may ask for in flight; the value is its event."""
+    """Commands of the operator in flight; the value is the event."""
 
     HOLD = Event.HOLD
     RESUME = Event.RESUME
@@ -22,13 +22,13 @@ class OperatorCommand(Enum):
 
 @dataclass
 class Readings:
-    """What is known besides state and reference; NaN where it is not, and then nothing follows.
+    """Readings besides state and reference; NaN means unknown and has no effect.
 
-    battery: charge left, 0..1. mocap_age, joint_age [s]: of the newest message by its stamp;
-    mocap_still [s]: since the pose last was another one; mocap_position (3,): of the newest [m];
-    controller_age [s]: of the oldest of the newest gains, which every controller tells;
-    pose_controller_age: the same without the arm's. autopilot_age [s]: since the bridge last told
-    that it hears the autopilot; round_trip [s]: how long the autopilot's answers take.
+    battery: state of charge 0..1. mocap_age, joint_age [s]: of the newest message, by its stamp;
+    mocap_still [s]: since the last change of the pose; mocap_position (3,) [m]: of the newest pose;
+    controller_age [s]: of the newest gains of each controller, the largest age;
+    pose_controller_age [s]: the same without the arm controller. autopilot_age [s]: since the
+    bridge last reported a connection to the autopilot; round_trip [s]: of the autopilot's link.
     missed_ticks: within the last second. temperature: of the hottest servo [deg C]. joint_effort
     (2,): measured [N m]. gains (3,): largest adapted gain of position, attitude, arm.
     """
@@ -53,9 +53,9 @@ class Observation:
     """One tick.
 
     state, reference (3, 8): the estimate, and what was asked of it. ground: height at take-off [m].
-    ready: nothing of the mission's own is in the way of a take-off. landing_due: the scenario's
-    landing has begun. on_ground: low and slow now; touchdown: for long enough; overdue: should have
-    been by now.
+    armed: by the autopilot's report. ready: the mission allows the take-off. landing_due: the
+    scenario's landing has begun. on_ground: low and slow now; touchdown: on the ground for
+    touchdown_time; overdue: no touchdown in the allowed time.
     """
 
     state: np.ndarray

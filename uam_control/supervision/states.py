@@ -1,7 +1,7 @@
-"""The states of a supervised flight and every way from one to another, as data.
+"""States, events and transitions of a supervised flight, as data.
 
-`TRANSITIONS` is all there is: what it does not list does not happen. docs/supervision.md shows it
-as a diagram, which a test compares with the table.
+There are no other transitions than those of `TRANSITIONS`. docs/supervision.md shows them as a
+diagram; a test compares the two.
 """
 
 from __future__ import annotations
@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 
 class State(Enum):
-    """Where the flight is; the value is for people and messages."""
+    """State of the flight; the value is used in texts and messages."""
 
     GROUNDED = "grounded"
     TAKING_OFF = "taking off"
@@ -23,7 +23,7 @@ class State(Enum):
 
 
 class Event(Enum):
-    """Why a state is left; the value is for people."""
+    """Reason of a transition; the value is used in texts."""
 
     READY = "armed, nothing against it"
     AIRBORNE = "airborne"
@@ -48,7 +48,7 @@ class Event(Enum):
 
 
 class Transition(NamedTuple):
-    """One way from a state to another."""
+    """A transition from one state to another."""
 
     source: State
     event: Event
@@ -94,7 +94,7 @@ TRANSITIONS = (
     Transition(_S.FAILSAFE, _E.DISARM, _S.DISARMED),
 )
 TARGETS = {(source, event): target for source, event, target in TRANSITIONS}
-# causes in a flight that goes as planned
+# causes in a flight without incidents
 ORDINARY = {
     Event.READY: "armed",
     Event.AIRBORNE: "airborne",

@@ -1,8 +1,8 @@
-"""The supervisor: observation and command in, state and what follows from it out.
+"""The supervisor: from observation and operator command to state and decision.
 
-It never arms: `Decision.arm` goes from true to false once and never back. It never leaves failsafe
-without a command. Motors go off on the ground, by a command in failsafe, or when the autopilot has
-disarmed by itself; in the air the worst is failsafe, in which the autopilot descends on its own.
+It never arms again: `Decision.arm` changes from true to false once. It leaves failsafe only by a
+command. It disarms on the ground, by a command in failsafe, or after the autopilot has disarmed.
+In the air the last resort is failsafe, in which the autopilot descends without the companion.
 """
 
 from __future__ import annotations
@@ -20,20 +20,20 @@ from uam_control.supervision.supervision_parameters import SupervisionParameters
 
 
 class Guide(Enum):
-    """What the reference does."""
+    """Behaviour of the reference."""
 
-    NOTHING = "nothing is asked of position and attitude"
+    NOTHING = "no reference for position and attitude"
     SCENARIO = "follows the scenario"
-    STOP = "stops on the scenario's path and waits there"
-    DESCEND = "goes straight down"
+    STOP = "stops on the scenario's path and stays there"
+    DESCEND = "descends vertically"
 
 
 class Decision(NamedTuple):
-    """What holds now.
+    """The supervisor's output.
 
-    cause: why the state was entered. arm: the autopilot is to be armed. keep_magnet: an energised
-    magnet stays so; stow: the arm goes to its place for landing. Both only where the guide is not
-    the scenario.
+    cause: why the state was entered. arm: desired arming of the autopilot. keep_magnet: an
+    energised magnet stays energised; stow: the arm moves to its landing angles. Both apply only if
+    the guide is not SCENARIO.
     """
 
     state: State
@@ -45,7 +45,7 @@ class Decision(NamedTuple):
 
 
 class StateTransition(NamedTuple):
-    """One transition; stamp [s]."""
+    """A transition at `stamp` [s]."""
 
     stamp: float
     source: State
@@ -55,9 +55,9 @@ class StateTransition(NamedTuple):
 
 
 class Supervisor:
-    """The state machine of `states.TRANSITIONS`; no clock but the stamps it is given.
+    """The state machine of `states.TRANSITIONS`; its only time is the stamps of the inputs.
 
-    `state`, `cause`, `decision` as of the last step; `changes`: all transitions so far, in order.
+    `state`, `cause`, `decision`: after the last step; `changes`: all transitions so far, in order.
     """
 
     def __init__(self, parameters: SupervisionParameters) -> None:
@@ -67,8 +67,8 @@ class Supervisor:
         self._arm = True
         self._planned = False  # whether a landing is the scenario's
         self._stamp = -math.inf
-        self._beyond_since: float | None = None  # while holding
-        self._held_for = ""  # the quantity beyond its limit for which it holds
+        self._beyond_since: float | None = None  # stamp [s], during a hold beyond a limit
+        self._held_for = ""  # name of the quantity whose limit started the hold
         self._checks = Checks(parameters)
         self._parameters = parameters
         self.decision = self._decide()
@@ -82,9 +82,9 @@ class Supervisor:
     def step(
         self, stamp: float, seen: Observation, command: OperatorCommand | None = None
     ) -> Decision:
-        """Return what holds at `stamp` [s]; at most one transition per call.
+        """Return the decision at `stamp` [s]; at most one transition per call.
 
-        A stamp that is not finite or runs backwards counts as the last one.
+        A stamp that is not finite or not increasing is replaced by the last one.
         """
         if stamp > self._stamp and math.isfinite(stamp):
             self._stamp = stamp
@@ -101,11 +101,11 @@ class Supervisor:
         return self.decision
 
     def _as_usual(self, seen: Observation) -> bool:
-        """Whether a tick without finding and command is like nearly all: flying, nothing due."""
+        """Return whether a tick without finding and command needs no event: flying, no landing."""
         return self.state is State.FLYING and seen.armed and not seen.landing_due
 
     def give_up(self, stamp: float, reason: str) -> Decision:
-        """End a flight that has not begun; does nothing in one that has."""
+        """End a flight before take-off at `stamp` [s]; no effect after take-off."""
         if stamp > self._stamp:
             self._stamp = stamp
         if (self.state, Event.GIVEN_UP) in TARGETS:
@@ -113,7 +113,7 @@ class Supervisor:
         return self.decision
 
     def refusal(self, command: OperatorCommand, seen: Observation) -> str:
-        """Return why `command` would do nothing now, "" if it would be followed."""
+        """Return why `command` is refused now, "" if it is accepted."""
         event = self._event(command, seen)
         if (self.state, event) not in TARGETS:
             if command is OperatorCommand.DISARM and self.state in AIRBORNE_STATES:
@@ -126,12 +126,12 @@ class Supervisor:
 
     @property
     def beyond(self) -> str:
-        """What is beyond a limit now, "" where nothing is."""
+        """Return the cause of the worst exceeded limit, "" without one."""
         finding = self._checks.finding
         return finding.cause if finding else ""
 
     def _decide(self) -> Decision:
-        """What follows from the state; the policy of docs/supervision.md."""
+        """Return the decision for the state, by the policy of docs/supervision.md."""
         p, state = self._parameters, self.state
         guide, keep, stow = Guide.NOTHING, True, False
         if state in (State.TAKING_OFF, State.FLYING) or self._planned:
@@ -151,7 +151,7 @@ class Supervisor:
     def _events(
         self, seen: Observation, command: OperatorCommand | None
     ) -> Iterator[tuple[Event, str]]:
-        """What happens at this tick, and why; what saves the vehicle first."""
+        """Yield the events of this tick and their causes, the most urgent first."""
         finding, p = self._checks.finding, self._parameters
         level, cause = (finding.level, finding.cause) if finding else (Level.FINE, "")
         if not seen.armed:
@@ -196,7 +196,7 @@ class Supervisor:
         return self._stamp - self._beyond_since >= self._parameters.hold_timeout
 
     def _clear(self) -> Iterator[tuple[Event, str]]:
-        """What follows when that for which it holds is within its limit again."""
+        """Yield the event for a hold whose quantity is within its limit again."""
         p, back = self._parameters, "the controller is back"
         if p.resume_automatically:
             yield Event.CLEAR, "clear again"
@@ -216,7 +216,7 @@ class Supervisor:
         self.changes.append(StateTransition(self._stamp, source, self.state, event, cause))
 
     def _event(self, command: OperatorCommand, seen: Observation) -> Event:
-        """The event of a command; on the ground disarming is another one where it matters."""
+        """Return the event of a command; DISARM on the ground has its own event."""
         event = command.value
         if (
             command is OperatorCommand.DISARM
