@@ -20,13 +20,13 @@ from px4_steps.rate_experiment import AXES, experiment, responses
 from px4_steps.step_response import distance, figures
 
 from uam_lab.flight.direct.warm_up import is_cold, warm_up
-from uam_lab.processes.environment import environment
+from uam_lab.processes.node_environment import environment
 from uam_lab.processes.processes import NodeFailed, Processes
 from uam_lab.report.figures import style
 from uam_lab.results.atomic import replacing, write_rows, write_text
 from uam_lab.results.result_folder import ResultFolderError, as_json, make_folder
 from uam_sim_bridge.ports import PortError, Reservation
-from uam_sim_bridge.px4.installation import REQUIRED, Px4Error, Px4Installation
+from uam_sim_bridge.px4.px4_installation import REQUIRED, Px4Error, Px4Installation
 
 STAND_IN, PX4 = "stand-in", "PX4"
 STAND_IN_MODULE, SITL_MODULE = "uam_sim_bridge.autopilot.server", "uam_sim_bridge.px4.sitl"

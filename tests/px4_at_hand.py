@@ -2,7 +2,7 @@
 
 import os
 
-from uam_sim_bridge.px4.installation import VARIABLE, Px4Error, Px4Installation
+from uam_sim_bridge.px4.px4_installation import VARIABLE, Px4Error, Px4Installation
 
 NO_PX4 = f"no PX4 to fly with: set {VARIABLE} to a build of PX4 v1.16 SITL" + (
     f" ({os.environ[VARIABLE]} is none)" if os.environ.get(VARIABLE) else ""

@@ -12,8 +12,8 @@ from rclpy.executors import SingleThreadedExecutor
 from websockets.exceptions import InvalidStatus
 from websockets.sync.client import connect
 
-from uam_lab.processes.environment import transport_environment
 from uam_lab.processes.guest import Guest
+from uam_lab.processes.node_environment import transport_environment
 from uam_msgs_py.node.node_parameters import plain
 
 PATIENCE = 60_000  # [ms] only a failing test waits that long

@@ -14,7 +14,7 @@ from bridge_rig import Rig
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 
-from uam_lab.processes.environment import ros_environment
+from uam_lab.processes.node_environment import ros_environment
 from uam_msgs_py.messages.serialized import stays_serialized
 from uam_msgs_py.node.connections import Connections
 from uam_sim_bridge.ports import Reservation

@@ -5,7 +5,7 @@ from rclpy.node import Node
 from rclpy.parameter import Parameter
 
 from uam_lab.flight.ros.changed_parameters import ChangedParameters
-from uam_msgs_py.messages.changes import ParameterChange
+from uam_msgs_py.messages.parameter_changes import ParameterChange
 
 
 class Silent:

@@ -20,10 +20,10 @@ from uam_control.settings import configuration
 from uam_lab.flight.ros.profile_switch import ProfileSwitch, SwitchRefused
 from uam_lab.processes.guest import Guest
 from uam_msgs_py.messages import topics
-from uam_msgs_py.messages.changes import ParameterChange
 from uam_msgs_py.messages.control import ReferenceWriter
 from uam_msgs_py.messages.convert import read_joints
 from uam_msgs_py.messages.layouts import stamp_of
+from uam_msgs_py.messages.parameter_changes import ParameterChange
 from uam_msgs_py.messages.trajectories import TrajectoryWriter
 
 PERIOD = 4_000_000  # [ns]

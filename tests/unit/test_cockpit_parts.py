@@ -12,9 +12,9 @@ from hypothesis import strategies as st
 from uam_lab.cockpit import place
 from uam_lab.cockpit.entry import axes, bounds, reach, text_of, value_of
 from uam_lab.cockpit.headline import headline
-from uam_lab.cockpit.health import BAD, CAUTION, GOOD, UNKNOWN, Health, grade
 from uam_lab.cockpit.remote_parameters import About
 from uam_lab.cockpit.urdf_shapes import shapes
+from uam_lab.cockpit.vehicle_health import BAD, CAUTION, GOOD, UNKNOWN, Health, grade
 from uam_msgs_py.messages.layouts import BadMessage
 from uam_msgs_py.messages.status import ERROR, OK, AutopilotState, MissionStatus, diagnostic
 from uam_msgs_py.messages.transforms import Transform, read_transforms, transforms_message

@@ -13,7 +13,7 @@ import pytest
 from uam_lab.cli import doctor as command
 from uam_lab.cli.main import main
 from uam_lab.doctor import installation, run
-from uam_lab.doctor.child import TOO_LATE, CheckProcess
+from uam_lab.doctor.check_process import TOO_LATE, CheckProcess
 from uam_lab.doctor.finding import Verdict, fail, ok, warn
 
 OK, WARN, FAIL = Verdict

@@ -9,7 +9,7 @@ from uam_lab.doctor import autopilot
 from uam_lab.doctor.finding import Verdict
 from uam_sim_bridge.mavlink.protocol.modes import Mode
 from uam_sim_bridge.mavlink.protocol.wire import Codec, Framer, mavlink2
-from uam_sim_bridge.px4.installation import VARIABLE
+from uam_sim_bridge.px4.px4_installation import VARIABLE
 
 OK, WARN, FAIL = Verdict
 PATIENCE = 20.0  # [s] only a failing test, or a very busy machine, waits that long

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from uam_lab.doctor import machine, rendering
-from uam_lab.doctor.child import TOO_LATE, Said
+from uam_lab.doctor.check_process import TOO_LATE, Said
 from uam_lab.doctor.finding import Verdict
 
 OK, WARN, FAIL = Verdict

@@ -4,7 +4,7 @@ import pytest
 
 from uam_control.settings import configuration
 from uam_lab.doctor import environment, ros
-from uam_lab.doctor.child import Said
+from uam_lab.doctor.check_process import Said
 from uam_lab.doctor.finding import Verdict
 from uam_sim_bridge.ports import Reservation
 

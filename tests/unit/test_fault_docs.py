@@ -9,13 +9,13 @@ from pathlib import Path
 from uam_control.mission import load_scenario
 from uam_lab.campaign.fault_outcome import OUTCOMES
 from uam_lab.cli.main import parser
-from uam_sim_bridge.faults import FAULTS, catalogue, read_schedule
+from uam_sim_bridge.faults import FAULTS, fault_catalogue, read_schedule
 
 TEXT = (Path(__file__).resolve().parents[2] / "docs/faults.md").read_text()
 
 
 def test_the_catalogue_is_that_of_the_code():
-    assert catalogue.table() in TEXT
+    assert fault_catalogue.table() in TEXT
 
 
 def test_the_outcomes_are_those_of_the_code():
@@ -31,6 +31,6 @@ def test_the_examples_can_be_typed():
 
 
 def test_every_fault_is_listed_for_the_terminal():
-    listing = catalogue.listing()
+    listing = fault_catalogue.listing()
     for name, kind in FAULTS.items():
         assert name in listing and all(f" {parameter}: " in listing for parameter in kind.specs())

@@ -16,7 +16,7 @@ from uam_lab.cli.main import main
 from uam_lab.report.figures import fault_marks, figures
 from uam_lab.report.figures.figures import draw
 from uam_lab.report.figures.panels import DrawnFlight
-from uam_lab.report.page import page
+from uam_lab.report.page import flight_page
 from uam_lab.results import metrics
 from uam_lab.results.timeseries import COLUMNS
 from uam_sim_bridge.faults import FAULTS, FaultError
@@ -33,7 +33,7 @@ def test_an_event_is_read_back_from_its_message_and_a_log():
     from rclpy.serialization import serialize_message
 
     from uam_lab.recording import fault_records as fault_log
-    from uam_msgs_py.messages.faults import FaultEvent
+    from uam_msgs_py.messages.fault_events import FaultEvent
 
     first = FaultEvent("motor_loss", "plant", 0, True, {"motor": 2.0, "remaining": 0.7})
     other = FaultEvent("mavlink_cut", "MAVLink", 0, True, {"direction": "both"})
@@ -66,7 +66,7 @@ def test_faults_are_shaded_and_listed(flight_folder, flight, make_flight):
     assert [t.get_text() for t in figure.legends[0].texts][-1] == "fault"
     draw([DrawnFlight("x", marked)], flight_folder / "figures", names=["arm_inputs"])
     (flight_folder / "info.json").write_text(json.dumps(marked.info))
-    html = page.write_page(flight_folder).read_text()
+    html = flight_page.write_page(flight_folder).read_text()
     assert "Faults put into this flight" in html and "<code>clock_jump</code>" in html
     assert fault_marks.handles(flight.info) == []
 

@@ -22,7 +22,7 @@ from uam_sim_bridge.faults import (
     PROCESS,
     FaultError,
     Schedule,
-    catalogue,
+    fault_catalogue,
     limits,
     read_schedule,
 )
@@ -46,7 +46,7 @@ def faults(draw):
     for name, spec in kind.specs().items():
         if isinstance(spec, Choice):
             values[name] = draw(st.sampled_from(spec.choices))
-        elif name in catalogue.WHOLE:
+        elif name in fault_catalogue.WHOLE:
             values[name] = draw(st.integers(round(spec.low), round(spec.high)))
         else:
             values[name] = draw(st.floats(spec.low, spec.high))

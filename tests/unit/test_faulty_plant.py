@@ -7,7 +7,7 @@ import pytest
 
 from uam_control.mission import load_scenario
 from uam_sim_bridge.faults import FAULTS, PLANT, read_schedule
-from uam_sim_bridge.faults.plant import FaultyPlant
+from uam_sim_bridge.faults.faulty_plant import FaultyPlant
 from uam_sim_bridge.plant import Plant, Vehicle
 
 VEHICLE = Vehicle.load()

@@ -4,16 +4,16 @@ from pathlib import Path
 
 import pytest
 
-from uam_lab.processes import environment
+from uam_lab.processes import node_environment
 
 
 def test_the_environment_is_private_and_local(tmp_path, monkeypatch):
-    monkeypatch.delenv(environment.PROFILES_FILE, raising=False)
+    monkeypatch.delenv(node_environment.PROFILES_FILE, raising=False)
     monkeypatch.delenv("RMW_IMPLEMENTATION", raising=False)
-    made = environment.environment(42, tmp_path)
+    made = node_environment.environment(42, tmp_path)
     assert made["ROS_DOMAIN_ID"] == "42"
     assert made["ROS_AUTOMATIC_DISCOVERY_RANGE"] == "SYSTEM_DEFAULT"
-    assert "<address>127.0.0.1</address>" in Path(made[environment.PROFILES_FILE]).read_text()
+    assert "<address>127.0.0.1</address>" in Path(made[node_environment.PROFILES_FILE]).read_text()
     assert made["ROS_LOG_DIR"] == str(tmp_path)
     assert made["OMP_NUM_THREADS"] == made["NUMBA_NUM_THREADS"] == "1"
 
@@ -21,7 +21,7 @@ def test_the_environment_is_private_and_local(tmp_path, monkeypatch):
 @pytest.mark.parametrize(
     "name, value",
     [
-        (environment.PROFILES_FILE, "/home/me/mine.xml"),
+        (node_environment.PROFILES_FILE, "/home/me/mine.xml"),
         ("RMW_IMPLEMENTATION", "rmw_cyclonedds_cpp"),
     ],
 )
@@ -29,13 +29,13 @@ def test_with_the_users_own_middleware_ros_keeps_it_on_this_machine(
     name, value, tmp_path, monkeypatch
 ):
     monkeypatch.setenv(name, value)
-    made = environment.environment(42, tmp_path)
+    made = node_environment.environment(42, tmp_path)
     assert made[name] == value and made["ROS_AUTOMATIC_DISCOVERY_RANGE"] == "LOCALHOST"
 
 
 def test_threads_of_another_middleware_are_not_known(monkeypatch):
     monkeypatch.setenv("RMW_IMPLEMENTATION", "rmw_cyclonedds_cpp")
-    assert "not those of rmw_cyclonedds_cpp" in environment.without_discovery()
+    assert "not those of rmw_cyclonedds_cpp" in node_environment.without_discovery()
     monkeypatch.delenv("RMW_IMPLEMENTATION")
-    monkeypatch.setattr(environment.thread_stop, "refusal", lambda: "")
-    assert environment.without_discovery() == ""
+    monkeypatch.setattr(node_environment.thread_stop, "refusal", lambda: "")
+    assert node_environment.without_discovery() == ""

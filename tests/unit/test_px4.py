@@ -11,7 +11,7 @@ import pytest
 
 from uam_sim_bridge.autopilot.params import DEFINITIONS
 from uam_sim_bridge.px4 import px4_parameters as parameters
-from uam_sim_bridge.px4.installation import VARIABLE, Px4Error, Px4Installation
+from uam_sim_bridge.px4.px4_installation import VARIABLE, Px4Error, Px4Installation
 
 SCRIPT = """#!/bin/sh
 env | grep ^PX4_ > seen

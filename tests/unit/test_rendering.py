@@ -11,7 +11,7 @@ from PIL import Image
 from uam_lab.report.build import build_report
 from uam_lab.report.figures import figures
 from uam_lab.report.figures.poses import Poses
-from uam_lab.report.video import rendering, video
+from uam_lab.report.video import flight_video, video
 from uam_lab.results.timeseries import Series
 
 
@@ -44,11 +44,11 @@ def test_a_flight_without_payload_shows_none(flight):
 
 
 def test_snapshots_are_the_scenarios_as_far_as_the_flight_went(flight):
-    times = rendering.snapshot_times(flight)
+    times = flight_video.snapshot_times(flight)
     assert [caption[:3] for _, caption in times] == ["(a)", "(b)", "(c)", "(d)", "(e)", "(f)"]
-    assert rendering.snapshot_times(cut(flight, 3.0)) == [(1.5, "(a) take-off")]
+    assert flight_video.snapshot_times(cut(flight, 3.0)) == [(1.5, "(a) take-off")]
     plain = Series(flight.values, flight.phases, flight.phase_names, {})
-    spread = rendering.snapshot_times(plain)
+    spread = flight_video.snapshot_times(plain)
     assert len(spread) == 6
     assert spread[0][1] == "(a) approach"
 
@@ -66,11 +66,11 @@ def test_a_video_is_short_whatever_the_flight_and_its_speed_is_a_whole_number(fl
 def test_without_a_renderer_the_report_goes_on_and_says_how_to_get_one(flight_folder, monkeypatch):
     for screen in ("DISPLAY", "WAYLAND_DISPLAY"):
         monkeypatch.delenv(screen, raising=False)
-    monkeypatch.setattr(rendering, "PLATFORM", "glfw")
+    monkeypatch.setattr(flight_video, "PLATFORM", "glfw")
     monkeypatch.delenv("MUJOCO_GL", raising=False)
     monkeypatch.setattr(figures, "FIGURES", {})
     report = build_report(flight_folder)
-    assert report.problem.startswith(rendering.HOW_TO_GET_ONE)
+    assert report.problem.startswith(flight_video.HOW_TO_GET_ONE)
     assert "\n" not in report.problem
     html = report.page.read_text()
     assert "apt install libegl1 libgl1-mesa-dri" in html
@@ -78,7 +78,7 @@ def test_without_a_renderer_the_report_goes_on_and_says_how_to_get_one(flight_fo
 
 
 def test_a_folder_without_a_flight_is_one_line(tmp_path):
-    rendered = rendering.render(tmp_path)
+    rendered = flight_video.render(tmp_path)
     assert rendered.problem.startswith("rendering failed: ")
     assert "timeseries.parquet" in rendered.problem
 
@@ -88,14 +88,14 @@ def test_snapshots_and_video_are_rendered_without_a_screen(tmp_path, flight):
     short.write(tmp_path / "timeseries.parquet")
     (tmp_path / "metrics.json").write_text(json.dumps({}))
     steps = []
-    rendered = rendering.render(tmp_path, progress=steps.append)
-    if rendered.problem.startswith(rendering.HOW_TO_GET_ONE):
+    rendered = flight_video.render(tmp_path, progress=steps.append)
+    if rendered.problem.startswith(flight_video.HOW_TO_GET_ONE):
         pytest.skip(rendered.problem)
     assert rendered.problem == ""
     assert steps[-1] == "video 100 %"
     assert [file.name for file in rendered.snapshots] == ["a.png"]
     with Image.open(rendered.snapshots[0]) as picture:
-        assert picture.size == rendering.SNAPSHOT_SIZE
+        assert picture.size == flight_video.SNAPSHOT_SIZE
         pixels = np.asarray(picture.convert("RGB"), dtype=float)
     # sky above, floor below, and a vehicle that is neither
     assert pixels[20, :, 2].mean() > pixels[20, :, 0].mean() + 20.0

@@ -9,11 +9,11 @@ import pytest
 from rich.console import Console
 
 from uam_lab.report.build import build_report
-from uam_lab.report.facts import outcome
+from uam_lab.report.facts import flight_summary
 from uam_lab.report.facts import parameter_table as parameters
 from uam_lab.report.figures import figures
-from uam_lab.report.page import console, page
-from uam_lab.report.video import rendering
+from uam_lab.report.page import console, flight_page
+from uam_lab.report.video import flight_video
 from uam_lab.results import timeseries
 
 
@@ -46,7 +46,7 @@ def test_the_report_is_one_page_that_asks_for_nothing_else(flight_folder, monkey
 def test_the_page_says_how_stable_it_was(flight_folder, monkeypatch):
     for name in list(figures.FIGURES):
         monkeypatch.delitem(figures.FIGURES, name)
-    assert "Appendix" not in text_of(page.write_page(flight_folder).read_text())
+    assert "Appendix" not in text_of(flight_page.write_page(flight_folder).read_text())
     build_report(flight_folder, pictures=False)
     found = json.loads((flight_folder / "stability.json").read_text())
     words = text_of((flight_folder / "report.html").read_text())
@@ -57,7 +57,7 @@ def test_the_page_says_how_stable_it_was(flight_folder, monkeypatch):
 
 
 def test_the_page_says_what_happened_and_how_to_repeat_it(flight_folder):
-    words = text_of(page.write_page(flight_folder).read_text())
+    words = text_of(flight_page.write_page(flight_folder).read_text())
     metrics = json.loads((flight_folder / "metrics.json").read_text())
     assert metrics["mission_completed"] is True
     assert "Mission completed" in words
@@ -74,7 +74,7 @@ def test_the_page_says_what_happened_and_how_to_repeat_it(flight_folder):
 def test_the_page_says_what_the_motors_gave(flight_folder):
     found = {"end": 0.859, "least": 0.8586, "largest": 1.0}
     change_metrics(flight_folder, thrust_factor=found)
-    words = text_of(page.write_page(flight_folder).read_text())
+    words = text_of(flight_page.write_page(flight_folder).read_text())
     assert "0.859 of the assumed thrust at the end (0.859 to 1.000 in flight)" in words
 
 
@@ -92,7 +92,7 @@ def test_the_page_marks_what_is_worse_than_the_paper_and_says_why_not_completed(
         latency_ms={"p50": 2.5, "p99": 10.25, "max": None},
         missed_ticks=7,
     )
-    html = page.write_page(flight_folder).read_text()
+    html = flight_page.write_page(flight_folder).read_text()
     words = text_of(html)
     assert "aborted: tilt &lt;70&gt;" in html
     assert "Mission aborted" in words
@@ -106,12 +106,12 @@ def test_page_and_console_say_where_the_supervisor_stepped_in(flight_folder):
         {"time_s": 0.0, "from": "grounded", "to": "taking off", "cause": "armed"},
         {"time_s": 3.25, "from": "flying", "to": "holding", "cause": "tilt 0.90 rad"},
     ]
-    assert outcome.supervision_story({"transitions": steps[:1]}) is None
+    assert flight_summary.supervision_story({"transitions": steps[:1]}) is None
     change_metrics(flight_folder, transitions=steps)
-    words = text_of(page.write_page(flight_folder).read_text())
+    words = text_of(flight_page.write_page(flight_folder).read_text())
     assert "3.250 s flying → holding tilt 0.90 rad" in words
     metrics = json.loads((flight_folder / "metrics.json").read_text())
-    assert outcome.supervision_story(metrics) == "holding at 3.2 s (tilt 0.90 rad)"
+    assert flight_summary.supervision_story(metrics) == "holding at 3.2 s (tilt 0.90 rad)"
 
 
 def test_the_page_names_every_safeguard_and_every_difference(flight_folder):
@@ -127,7 +127,7 @@ def test_the_page_names_every_safeguard_and_every_difference(flight_folder):
     assert rows["lambda_1"].differs
     assert not rows["epsilon"].differs
     assert found.safeguards == {"position_controller": ["k_ceiling = 5 (each)"]}
-    words = text_of(page.write_page(flight_folder).read_text())
+    words = text_of(flight_page.write_page(flight_folder).read_text())
     assert "position_controller: k_ceiling = 5 (each)" in words
     assert "No safeguard was on" not in words
 
@@ -151,7 +151,7 @@ def test_a_reconstructed_law_is_called_so_and_is_not_compared_with_table_one(fli
     (flight_folder / "parameters.yaml").write_text(file.read_text())
     clamps = {"position": 0, "attitude": 3, "arm": 12}
     change_metrics(flight_folder, controller="asmc2", clamps=clamps)
-    words = text_of(page.write_page(flight_folder).read_text())
+    words = text_of(flight_page.write_page(flight_folder).read_text())
     assert "controller ASMC-2 (reconstructed)" in words
     assert "controller asmc2" not in words and "flew as printed" not in words
     assert "position 0, attitude 3, arm 12" in words
@@ -164,15 +164,15 @@ def test_a_reconstructed_law_is_called_so_and_is_not_compared_with_table_one(fli
 def test_a_folder_with_little_in_it_still_gets_a_page(flight_folder):
     for name in ("parameters.yaml", "versions.json", "info.json"):
         (flight_folder / name).unlink()
-    words = text_of(page.write_page(flight_folder).read_text())
+    words = text_of(flight_page.write_page(flight_folder).read_text())
     assert "parameters.yaml" in words
     with pytest.raises(timeseries.UnreadableFlight):
         build_report(flight_folder.parent / "nothing")
 
 
 def test_the_page_says_when_there_was_no_renderer(flight_folder):
-    rendered = rendering.Rendered(problem=rendering.HOW_TO_GET_ONE)
-    words = text_of(page.write_page(flight_folder, rendered).read_text())
+    rendered = flight_video.Rendered(problem=flight_video.HOW_TO_GET_ONE)
+    words = text_of(flight_page.write_page(flight_folder, rendered).read_text())
     assert "apt install libegl1 libgl1-mesa-dri" in words
 
 
@@ -206,17 +206,19 @@ def test_notes_and_changes_of_the_vehicle_are_on_the_page(flight_folder):
     info = json.loads((flight_folder / "info.json").read_text())
     info |= {"notes": ["2 messages lost"], "vehicle_changes": {"air.wind": [2.0, 0.0, 0.0]}}
     (flight_folder / "info.json").write_text(json.dumps(info))
-    words = text_of(page.write_page(flight_folder).read_text())
+    words = text_of(flight_page.write_page(flight_folder).read_text())
     assert "Note: 2 messages lost" in words
     assert "air.wind 2.0, 0.0, 0.0" in words
 
 
 def test_outcomes_in_words():
-    assert outcome.payload_story({"payload_lifted": None}) == "no payload in this flight"
+    assert flight_summary.payload_story({"payload_lifted": None}) == "no payload in this flight"
     never = {"payload_lifted": None, "payload_mass_kg": 0.2}
-    assert outcome.payload_story(never) == "the magnet was never on"
-    assert outcome.payload_story({"payload_lifted": False}) == "not lifted"
+    assert flight_summary.payload_story(never) == "the magnet was never on"
+    assert flight_summary.payload_story({"payload_lifted": False}) == "not lifted"
     story = {"payload_lifted": True, "payload_place_error_m": 0.034}
-    assert outcome.payload_story(story) == "lifted, came to rest 3.4 cm from the drop point"
-    assert outcome.landing_story({"landing_error_m": None}) == "not landed"
-    assert outcome.landing_story({"landing_error_m": 1.234}) == "1.23 m from the landing point"
+    assert flight_summary.payload_story(story) == "lifted, came to rest 3.4 cm from the drop point"
+    assert flight_summary.landing_story({"landing_error_m": None}) == "not landed"
+    assert (
+        flight_summary.landing_story({"landing_error_m": 1.234}) == "1.23 m from the landing point"
+    )

@@ -7,9 +7,9 @@ import pytest
 
 from uam_control.laws.modular import ModularLaw, ModularParameters
 from uam_control.profiles.profile import load_profile
-from uam_lab.analysis import constants, lyapunov, stability, ticks
+from uam_lab.analysis import constants, lyapunov_bound, stability, ticks
 from uam_lab.analysis.folder import analyse_folder
-from uam_lab.analysis.lyapunov import ComparisonSystem
+from uam_lab.analysis.lyapunov_bound import ComparisonSystem
 from uam_lab.analysis.tracking import Tracking
 from uam_lab.report.figures import figures, panels
 from uam_lab.results.timeseries import COLUMNS, Series
@@ -78,18 +78,18 @@ def test_v_and_bound_worked_by_hand():
     e, e_dot = np.array([[2.0, 0, 0], [0, 0, 0]]), np.array([[1.0, 0, 0], [0, 0, 0]])
     gains = np.array([[1.0, 0, 0, 0], [3.0, 1, 0, 0]])
     zeta, star = np.array([0.2, 0.1]), np.array([2.0, 0, 0, 1.0])
-    parts = lyapunov.parts("position", record, tracking_of(e, e_dot), gains, zeta, star)
+    parts = lyapunov_bound.parts("position", record, tracking_of(e, e_dot), gains, zeta, star)
     np.testing.assert_allclose(parts.tracking, [0.5 * (4 * 1.125 + 2 * 2 * 0.125 + 0.15625), 0.0])
     np.testing.assert_allclose(parts.gains, [1.0, 1.5])
     np.testing.assert_allclose(parts.zeta, [2.0, 1.0])
     matrix = np.array([[1.125, 0.125], [0.125, 0.15625]])
     largest = np.linalg.eigvalsh(matrix)[1]
-    found = lyapunov.comparison(LAW, zeta, star)
+    found = lyapunov_bound.comparison(LAW, zeta, star)
     assert found.rate == pytest.approx(1.0 / largest)
     growth = found.rate * 2.0 + 0.1 / 0.1 + 0.5 * (1.0 * 4.0 + 2.0 * 1.0)
     assert found.growth == pytest.approx(growth)
     assert found.bound == pytest.approx(growth / found.rate)
-    np.testing.assert_allclose(lyapunov.eigenvalues(record), np.linalg.eigvalsh(matrix))
+    np.testing.assert_allclose(lyapunov_bound.eigenvalues(record), np.linalg.eigvalsh(matrix))
     both = found + ComparisonSystem(0.5, 1.0)
     assert (both.rate, both.growth) == pytest.approx((0.5, growth + 1.0))
 
@@ -124,17 +124,17 @@ def test_v_falls_outside_the_bound_and_stays_within():
     star = np.array([1.0, 0.0, 0.0, 0.0])  # ||sigma|| = 1
     zeta = rows[:, 10]
     truth = tracking_of(rows[:, :3], rows[:, 3:6])
-    parts = lyapunov.parts("position", LAW.record()[0], truth, rows[:, 6:10], zeta, star)
-    found = stability.check(time, parts.total, lyapunov.comparison(LAW, zeta, star))
+    parts = lyapunov_bound.parts("position", LAW.record()[0], truth, rows[:, 6:10], zeta, star)
+    found = stability.check(time, parts.total, lyapunov_bound.comparison(LAW, zeta, star))
     assert np.all(parts.total > 0.0)
     assert found["start"] > 1.5 * found["bound"]
     assert found["falls_above_bound"] == 1.0
     assert found["within_bound"] == found["within_envelope"] == 1.0
     assert found["rate_inequality_holds"] == 1.0
     assert parts.total[-1] < found["bound"]
-    sharper = lyapunov.decrease("position", LAW, truth, rows[:, 6:10], zeta, star)
+    sharper = lyapunov_bound.decrease("position", LAW, truth, rows[:, 6:10], zeta, star)
     assert np.all(np.gradient(parts.total, time) <= sharper)
-    coarse = lyapunov.comparison(LAW, zeta, star)
+    coarse = lyapunov_bound.comparison(LAW, zeta, star)
     assert np.all(sharper <= -coarse.rate * parts.total + coarse.growth + 1e-9)
 
 

@@ -12,9 +12,9 @@ from uam_control.laws import catalogue
 from uam_control.nodes.timing import Ticks, Timing
 from uam_control.profiles.profile import default_profile, parameter_set
 from uam_msgs_py.messages import topics
-from uam_msgs_py.messages.changes import ParameterChange
 from uam_msgs_py.messages.control import read_position_command, read_reference, read_state
 from uam_msgs_py.messages.convert import JointStateWriter
+from uam_msgs_py.messages.parameter_changes import ParameterChange
 from uam_msgs_py.messages.topics import Topic
 from uam_msgs_py.node.base_node import UamNode
 from uam_msgs_py.node.joins import StampJoin

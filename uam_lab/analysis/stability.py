@@ -15,7 +15,7 @@ from uam_lab.analysis import (
     constants,
     coupling,
     dynamics,
-    lyapunov,
+    lyapunov_bound,
     supply,
     ticks,
     tracking,
@@ -31,8 +31,8 @@ class Subsystem:
 
     constants: np.ndarray  # (4,) K*, the smallest
     printed: np.ndarray  # (4,) K* by the paper's expressions
-    parts: lyapunov.Parts
-    comparison: lyapunov.ComparisonSystem
+    parts: lyapunov_bound.Parts
+    comparison: lyapunov_bound.ComparisonSystem
     decrease: np.ndarray  # (m,) upper bound of dV_j/dt, see lyapunov.decrease
     gains: np.ndarray  # (m, 4) K0..K3 as flown
     zeta: np.ndarray  # (m,)
@@ -58,7 +58,7 @@ class Stability:
         return sum(s.parts.total for s in self.subsystems.values())
 
     @cached_property
-    def comparison(self) -> lyapunov.ComparisonSystem:
+    def comparison(self) -> lyapunov_bound.ComparisonSystem:
         """Return rate and growth of V, eq. (51), new."""
         p, q, alpha = (self.subsystems[name].comparison for name in SUBSYSTEMS)
         return p + q + alpha
@@ -90,7 +90,7 @@ class Stability:
 
 
 def check(
-    time: np.ndarray, value: np.ndarray, comparison: lyapunov.ComparisonSystem
+    time: np.ndarray, value: np.ndarray, comparison: lyapunov_bound.ComparisonSystem
 ) -> dict[str, Any]:
     """Compare V (m,) with max(V(0), B) and with its envelope, and dV/dt with -rate V + growth.
 
@@ -203,8 +203,8 @@ def _subsystem(
     gains = np.column_stack([series[f"adaptation.{name}.K{i}"][rows] for i in range(4)])
     zeta = np.maximum(series[f"adaptation.{name}.zeta"][rows], 1e-12)
     record = parameters.record()[0]
-    parts = lyapunov.parts(name, record, truth, gains, zeta, best)
-    comparison = lyapunov.comparison(parameters, zeta, best)
+    parts = lyapunov_bound.parts(name, record, truth, gains, zeta, best)
+    comparison = lyapunov_bound.comparison(parameters, zeta, best)
     largest = max(parts.total[0], comparison.bound)
     xi = np.hstack([truth.e[:, columns], truth.e_dot[:, columns]])
     return Subsystem(
@@ -212,9 +212,9 @@ def _subsystem(
         printed=printed_ones,
         parts=parts,
         comparison=comparison,
-        decrease=lyapunov.decrease(name, parameters, truth, gains, zeta, best),
+        decrease=lyapunov_bound.decrease(name, parameters, truth, gains, zeta, best),
         gains=gains,
         zeta=zeta,
         error=np.linalg.norm(xi, axis=1),
-        error_bound=lyapunov.error_bound(record, largest),
+        error_bound=lyapunov_bound.error_bound(record, largest),
     )

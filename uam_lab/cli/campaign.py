@@ -72,7 +72,7 @@ def run(options: argparse.Namespace) -> int:
 
 def campaign(options: argparse.Namespace, profile: Profile, out: Path) -> int:
     """Fly, then write everything; returns the exit status."""
-    from uam_lab.campaign import report
+    from uam_lab.campaign import campaign_report
     from uam_lab.campaign.flown import Flown
     from uam_lab.campaign.variations import draw, ranges
 
@@ -90,6 +90,6 @@ def campaign(options: argparse.Namespace, profile: Profile, out: Path) -> int:
 
         fly_all(trials, options.jobs, progress=show)
     results = [flown.results[one.trial.seed] for one in draws]
-    print(report.write(out, draws, results, shlex.join(["uam", *sys.argv[1:]])))
+    print(campaign_report.write(out, draws, results, shlex.join(["uam", *sys.argv[1:]])))
     print(f"results  {out}")
     return 0

@@ -117,7 +117,7 @@ def compare(
     out: Path,
 ) -> int:
     """Fly, then write everything; returns the exit status."""
-    from uam_lab.compare import modularity, report
+    from uam_lab.compare import comparison_report, modularity
 
     trials = plan.trials(rows, payloads, list(seeds), out / "flights")
     proposed = load_profile("s500")
@@ -140,9 +140,9 @@ def compare(
         "payloads_kg": list(payloads),
         "seeds": list(seeds),
         "profiles": {row.label: row.profile.file.name for row in rows},
-        "budgets": report.budgets(rows),
+        "budgets": comparison_report.budgets(rows),
     }
-    written = report.write(out, trials, results, modular, facts)
+    written = comparison_report.write(out, trials, results, modular, facts)
     print(written.text)
     print(f"results  {out}\nreport   {written.page}")
     return 0

@@ -16,7 +16,7 @@ from uam_lab.cli.counting import Counting
 from uam_lab.flight import settings as flight_settings
 from uam_lab.flight.settings import CLOCKS, ENGINES, SettingsError
 from uam_lab.results.result_folder import ResultFolderError, make_folder
-from uam_sim_bridge.faults import FaultError, catalogue
+from uam_sim_bridge.faults import FaultError, fault_catalogue
 from uam_sim_bridge.ports import PortError
 
 BROKEN, INTERRUPTED, WRONG_USE = 1, 130, 2
@@ -96,7 +96,7 @@ def add(commands: argparse._SubParsersAction) -> None:
 def run(options: argparse.Namespace) -> int:
     """Fly as asked; returns the exit status."""
     if options.list:
-        print(catalogue.listing())
+        print(fault_catalogue.listing())
         return 0
     try:
         return campaign(options)

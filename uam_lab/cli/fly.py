@@ -30,7 +30,7 @@ from uam_lab.results.result_folder import ResultFolder, ResultFolderError
 from uam_sim_bridge.faults import FaultError
 from uam_sim_bridge.mavlink.transport.transport import ALLOWED
 from uam_sim_bridge.ports import INSTANCES, PortError
-from uam_sim_bridge.px4.installation import Px4Error
+from uam_sim_bridge.px4.px4_installation import Px4Error
 
 COMPLETED, NOT_COMPLETED, WRONG_USE, INTERRUPTED = 0, 1, 2, 130
 USER_ERRORS = (

@@ -67,8 +67,8 @@ def run(options: argparse.Namespace) -> int:
 def switch(profile: Profile, domain: int | None) -> int:
     """Switch the nodes of a ROS domain, say what changed; returns the exit status."""
     from uam_lab.flight.ros.profile_switch import ProfileSwitch, SwitchRefused
-    from uam_lab.processes.environment import transport_environment
     from uam_lab.processes.guest import Guest
+    from uam_lab.processes.node_environment import transport_environment
 
     environment = {} if domain is None else transport_environment()  # of uam fly, or the user's
     with Guest("uam_profile", environment, domain) as guest:

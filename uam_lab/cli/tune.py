@@ -139,7 +139,7 @@ def run(options: argparse.Namespace) -> int:
 
 def tune(options: argparse.Namespace, space: Space) -> int:
     """Search, show how far it is, write what was found."""
-    from uam_lab.tuning import outcome
+    from uam_lab.tuning import search_results
     from uam_lab.tuning.search import Task, open_study, search
     from uam_lab.tuning.space import TuningError
 
@@ -174,9 +174,9 @@ def tune(options: argparse.Namespace, space: Space) -> int:
     if not any(trial.value is not None for trial in study.trials):
         return status or 1
     command = shlex.join(["uam", *sys.argv[1:]])
-    outcome.write_best(out / "best.yaml", space, study, command)
-    outcome.write_evaluations(out / "evaluations.csv", space, study)
-    outcome.plot(out / "search.png", space, study)
+    search_results.write_best(out / "best.yaml", space, study, command)
+    search_results.write_evaluations(out / "evaluations.csv", space, study)
+    search_results.plot(out / "search.png", space, study)
     best = study.best_trial
     print(
         f"best      evaluation {best.number}, cost {best.value:.4g}; start "

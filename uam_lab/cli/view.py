@@ -78,7 +78,7 @@ def run(options: argparse.Namespace) -> int:
         print(f"uam view: {error}", file=sys.stderr)
         return WRONG_USE
     from uam_lab.nodes import cockpit
-    from uam_lab.processes.environment import transport_environment
+    from uam_lab.processes.node_environment import transport_environment
 
     if domain is not None:  # of uam fly; else the user's own
         os.environ.update(transport_environment(), ROS_DOMAIN_ID=str(domain))

@@ -6,7 +6,7 @@ import math
 from collections.abc import Mapping
 from html import escape
 
-from uam_lab.cockpit.health import BAD, CAUTION, GOOD, UNKNOWN, Health, grade
+from uam_lab.cockpit.vehicle_health import BAD, CAUTION, GOOD, UNKNOWN, Health, grade
 
 COLOURS = {GOOD: "#1b8a5a", CAUTION: "#c77700", BAD: "#c62828", UNKNOWN: "#777777"}
 MARKS = {GOOD: "●", CAUTION: "▲", BAD: "■", UNKNOWN: "○"}

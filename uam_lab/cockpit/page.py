@@ -16,14 +16,14 @@ from uam_lab.cockpit.charts import Charts
 from uam_lab.cockpit.commands import CommandButtons
 from uam_lab.cockpit.gains import NodeGains
 from uam_lab.cockpit.headline import headline
-from uam_lab.cockpit.health import Health
 from uam_lab.cockpit.remote_parameters import RemoteParameters
 from uam_lab.cockpit.services import Services
+from uam_lab.cockpit.vehicle_health import Health
 from uam_lab.cockpit.vehicle_view import VehicleView
 from uam_lab.cockpit.watch import Watch
 from uam_msgs_py.messages import topics
-from uam_msgs_py.messages.changes import ParameterChange
 from uam_msgs_py.messages.layouts import BadMessage
+from uam_msgs_py.messages.parameter_changes import ParameterChange
 from uam_msgs_py.messages.status import AutopilotState, MissionStatus
 from uam_msgs_py.messages.topics import Topic
 from uam_msgs_py.messages.transforms import read_transforms

@@ -12,7 +12,7 @@ from uam_sim_bridge.mavlink.protocol.modes import MavCmd, Mode
 from uam_sim_bridge.mavlink.protocol.wire import Codec, Framer, Message, mavlink2
 from uam_sim_bridge.mavlink.transport.transport import Transport, open_transport
 from uam_sim_bridge.ports import PortError
-from uam_sim_bridge.px4.installation import VARIABLE, Px4Error, Px4Installation
+from uam_sim_bridge.px4.px4_installation import VARIABLE, Px4Error, Px4Installation
 
 PATIENCE = 5.0  # [s] for a heartbeat, which comes once a second
 VERSION_PATIENCE = 2.0  # [s] for AUTOPILOT_VERSION after it

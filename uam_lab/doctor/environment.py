@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 
 from uam_lab.doctor.finding import Finding, fail, ok, warn
-from uam_lab.processes.environment import PROFILES_FILE
+from uam_lab.processes.node_environment import PROFILES_FILE
 from uam_sim_bridge.ports import LAST_DOMAIN
 
 BY_HAND = "flights have a domain of their own; nodes started by hand"

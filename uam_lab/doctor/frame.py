@@ -8,7 +8,7 @@ from __future__ import annotations
 import sys
 import time
 
-from uam_lab.doctor.child import say
+from uam_lab.doctor.check_process import say
 
 HEIGHT, WIDTH = 240, 320
 FRAMES = 3

@@ -5,9 +5,9 @@ from __future__ import annotations
 import os
 from collections.abc import Iterator
 
-from uam_lab.doctor.child import TOO_LATE, CheckProcess, Said
+from uam_lab.doctor.check_process import TOO_LATE, CheckProcess, Said
 from uam_lab.doctor.finding import Finding, ok, warn
-from uam_lab.report.video.rendering import HOW_TO_GET_ONE, PLATFORM
+from uam_lab.report.video.flight_video import HOW_TO_GET_ONE, PLATFORM
 
 MODULE = "uam_lab.doctor.frame"
 PATIENCE = 30.0  # [s] for one platform

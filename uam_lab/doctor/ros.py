@@ -9,9 +9,9 @@ from collections.abc import Iterator, Mapping
 from pathlib import Path
 
 from uam_lab.doctor import environment
-from uam_lab.doctor.child import CheckProcess, Said
+from uam_lab.doctor.check_process import CheckProcess, Said
 from uam_lab.doctor.finding import Finding, fail, ok, warn
-from uam_lab.processes.environment import ros_environment
+from uam_lab.processes.node_environment import ros_environment
 from uam_sim_bridge.ports import PortError, Reservation
 
 MODULE = "uam_lab.doctor.round_trip"

@@ -12,7 +12,7 @@ import statistics
 import sys
 import time
 
-from uam_lab.doctor.child import say
+from uam_lab.doctor.check_process import say
 
 THERE, BACK = "/uam/doctor/there", "/uam/doctor/back"
 COUNT = 50  # messages

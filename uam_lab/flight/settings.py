@@ -11,12 +11,12 @@ from uam_control.laws import catalogue
 from uam_control.mission import Scenario, load_scenario
 from uam_control.profiles.profile import Profile, default_profile, load_profile
 from uam_control.settings import configuration
-from uam_lab.processes.environment import without_discovery
+from uam_lab.processes.node_environment import without_discovery
 from uam_sim_bridge.faults import Schedule, limits, read_schedule
 from uam_sim_bridge.faults.process_faults import DiscoveryLoss
 from uam_sim_bridge.mavlink.transport.transport import ALLOWED, LinkUrl, parse_url
 from uam_sim_bridge.ports import AUTOPILOT_UDP, INSTANCES
-from uam_sim_bridge.px4.installation import Px4Installation
+from uam_sim_bridge.px4.px4_installation import Px4Installation
 
 ENGINES = ("ros", "direct")
 CLOCKS = ("lockstep", "realtime")

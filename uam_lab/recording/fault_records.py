@@ -8,7 +8,7 @@ from typing import Any
 from diagnostic_msgs.msg import DiagnosticArray
 from rclpy.serialization import deserialize_message
 
-from uam_msgs_py.messages.faults import FaultEvent
+from uam_msgs_py.messages.fault_events import FaultEvent
 from uam_sim_bridge.faults.timeline import record
 
 SECOND = 1e9

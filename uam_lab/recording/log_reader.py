@@ -34,7 +34,7 @@ from uam_lab.results.timeseries import (
     gain_columns,
 )
 from uam_msgs_py.messages import topics
-from uam_msgs_py.messages.changes import ParameterChange
+from uam_msgs_py.messages.parameter_changes import ParameterChange
 from uam_msgs_py.messages.status import MissionStatus
 
 SECOND = 1e9

@@ -4,8 +4,8 @@
 |---|---|---|
 | stability | `stability_of` | stability.json |
 | figures | `figures.draw` | figures/*.png, *.svg |
-| pictures | `rendering.render` | figures/snapshots/*.png, snapshots.png, flight.mp4 |
-| page | `page.write_page` | report.html |
+| pictures | `flight_video.render` | figures/snapshots/*.png, snapshots.png, flight.mp4 |
+| page | `flight_page.write_page` | report.html |
 """
 
 from __future__ import annotations
@@ -20,8 +20,8 @@ from uam_lab.analysis.folder import analyse_folder
 from uam_lab.analysis.stability import Stability
 from uam_lab.report.figures import figures
 from uam_lab.report.figures.panels import DrawnFlight
-from uam_lab.report.page import page
-from uam_lab.report.video import rendering
+from uam_lab.report.page import flight_page
+from uam_lab.report.video import flight_video
 from uam_lab.results import timeseries
 from uam_lab.results.atomic import write_text
 from uam_lab.results.result_folder import as_json
@@ -53,9 +53,9 @@ def build_report(
     progress("stability")
     flight = DrawnFlight(label, series, stability_of(directory, series))
     figures.draw([flight], directory / "figures", progress)
-    rendered = rendering.render(directory, video, progress) if pictures else None
+    rendered = flight_video.render(directory, video, progress) if pictures else None
     progress("page")
-    written = page.write_page(directory, rendered)
+    written = flight_page.write_page(directory, rendered)
     return Report(written, rendered.problem if rendered else "")
 
 

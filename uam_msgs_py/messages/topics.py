@@ -128,7 +128,7 @@ CHANGES = Topic(
     "/uam/parameter_changes",
     DiagnosticArray,
     _qos(1000, latched=True),
-    "see uam_msgs_py.messages.changes.ParameterChange",
+    "see uam_msgs_py.messages.parameter_changes.ParameterChange",
     one_publisher=False,
 )
 
@@ -136,7 +136,7 @@ FAULTS = Topic(
     "/uam/faults",
     DiagnosticArray,
     _qos(1000, latched=True),
-    "faults put into the flight; see uam_msgs_py.messages.faults.FaultEvent",
+    "faults put into the flight; see uam_msgs_py.messages.fault_events.FaultEvent",
     one_publisher=False,
 )
 

@@ -16,7 +16,7 @@ from rclpy.node import Node
 from rclpy.parameter import Parameter
 
 from uam_msgs_py.messages import topics
-from uam_msgs_py.messages.changes import ParameterChange
+from uam_msgs_py.messages.parameter_changes import ParameterChange
 
 SERVICE = "parameter service"
 CHECK = "check_parameters"

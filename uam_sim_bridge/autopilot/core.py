@@ -14,9 +14,9 @@ import numpy as np
 
 from uam_control.maths.compiled import jit
 from uam_sim_bridge.autopilot.allocation import allocate, unallocated_torque
+from uam_sim_bridge.autopilot.autopilot_estimator import Estimator
 from uam_sim_bridge.autopilot.commander import Commander
 from uam_sim_bridge.autopilot.descent import Descent
-from uam_sim_bridge.autopilot.estimator import Estimator
 from uam_sim_bridge.autopilot.landing import LandDetector
 from uam_sim_bridge.autopilot.params import Parameters
 from uam_sim_bridge.autopilot.rate_control import (

@@ -8,7 +8,7 @@ import numpy as np
 
 from uam_control.maths.compiled import jit
 from uam_control.maths.rotations import euler_from_quaternion
-from uam_sim_bridge.autopilot.estimator import ATTITUDE, GRAVITY
+from uam_sim_bridge.autopilot.autopilot_estimator import ATTITUDE, GRAVITY
 from uam_sim_bridge.autopilot.params import Parameters
 
 _MIN_COSINE = 0.5  # of the tilt, when thrust makes up for it

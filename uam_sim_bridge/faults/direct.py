@@ -6,7 +6,7 @@ from typing import Any
 
 from uam_sim_bridge.faults.direct_link import DirectLink
 from uam_sim_bridge.faults.fault import LINK, PLANT
-from uam_sim_bridge.faults.plant import FaultyPlant
+from uam_sim_bridge.faults.faulty_plant import FaultyPlant
 from uam_sim_bridge.faults.schedule import Schedule
 from uam_sim_bridge.faults.timeline import Timeline
 from uam_sim_bridge.plant import Plant, Vehicle

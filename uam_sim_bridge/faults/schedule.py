@@ -23,8 +23,8 @@ from typing import Any
 
 from uam_control.mission import Scenario
 from uam_control.settings import yaml_file
-from uam_sim_bridge.faults.catalogue import make
 from uam_sim_bridge.faults.fault import Fault, FaultError
+from uam_sim_bridge.faults.fault_catalogue import make
 
 FORM = "NAME@SECONDS[+DURATION] or NAME@PHASE[+AFTER[+DURATION]], then :parameter=value,..."
 KEYS = ("fault", "at", "after", "duration")

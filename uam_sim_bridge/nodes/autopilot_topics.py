@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from uam_msgs_py.messages import topics
-from uam_msgs_py.messages.battery import battery_message
+from uam_msgs_py.messages.battery_state import battery_message
 from uam_msgs_py.messages.stamps import seconds
 from uam_msgs_py.messages.status import AutopilotState
 from uam_msgs_py.node.base_node import UamNode

@@ -44,7 +44,7 @@ from uam_msgs_py.node.executor import LeanExecutor
 from uam_msgs_py.node.node_parameters import refuse_unknown
 from uam_msgs_py.node.tunable import TunableNode
 from uam_sim_bridge.faults import PLANT, Schedule
-from uam_sim_bridge.faults.plant import FaultyPlant
+from uam_sim_bridge.faults.faulty_plant import FaultyPlant
 from uam_sim_bridge.mavlink.hil.hil_server import HilParameters, HilServer
 from uam_sim_bridge.nodes.fault_topic import FaultTopic
 from uam_sim_bridge.nodes.latencies import Latencies

@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from uam_control.settings import configuration, yaml_file
-from uam_sim_bridge.px4.installation import Px4Error
+from uam_sim_bridge.px4.px4_installation import Px4Error
 
 FILES = ("autopilot/s500.yaml", "px4/s500.yaml")  # of config/; later files override earlier ones
 AIRFRAME = "SYS_AUTOSTART"  # PX4 selects the airframe before it sets parameters

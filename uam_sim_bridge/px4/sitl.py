@@ -22,7 +22,7 @@ from pathlib import Path
 from uam_control.settings.configuration import ConfigurationError
 from uam_sim_bridge.mavlink.hil.sitl_options import instance
 from uam_sim_bridge.px4 import px4_parameters as parameters
-from uam_sim_bridge.px4.installation import REQUIRED, Px4Error, Px4Installation
+from uam_sim_bridge.px4.px4_installation import REQUIRED, Px4Error, Px4Installation
 
 PATIENCE = 2.0  # s between SIGINT and SIGKILL; PX4 cannot end while its clock is stopped
 POLL = 0.05  # s

@@ -8,7 +8,7 @@ from typing import Any
 from rclpy.node import Node
 
 from uam_msgs_py.messages import topics
-from uam_msgs_py.messages.changes import ParameterChange
+from uam_msgs_py.messages.parameter_changes import ParameterChange
 from uam_msgs_py.node.polling import listen, messages
 
 

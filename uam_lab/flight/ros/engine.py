@@ -16,16 +16,16 @@ from uam_lab.flight.direct.warm_up import is_cold, warm_up
 from uam_lab.flight.progress import Progress
 from uam_lab.flight.ros import nodes as ros_nodes
 from uam_lab.flight.ros.changed_parameters import ChangedParameters
+from uam_lab.flight.ros.logged_outcome import read_outcome
 from uam_lab.flight.ros.node_arguments import parameters, write_facts
 from uam_lab.flight.ros.nodes import users_autopilot
-from uam_lab.flight.ros.outcome import read_outcome
-from uam_lab.flight.ros.process_faults import ProcessFaults
+from uam_lab.flight.ros.process_fault_injection import ProcessFaults
 from uam_lab.flight.ros.restart_topic import RestartTopic
 from uam_lab.flight.ros.status_listener import StatusListener
 from uam_lab.flight.settings import ONLOOKERS, FlightSettings
 from uam_lab.processes import child
-from uam_lab.processes.environment import environment
 from uam_lab.processes.interrupts import Interrupts
+from uam_lab.processes.node_environment import environment
 from uam_lab.processes.process_table import await_orphans
 from uam_lab.processes.processes import NodeFailed, Processes
 from uam_lab.results.outcome import Outcome

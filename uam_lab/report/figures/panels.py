@@ -12,7 +12,7 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.ticker import MaxNLocator
 
-from uam_lab.report.facts import changes
+from uam_lab.report.facts import change_rows
 from uam_lab.report.figures import fault_marks, style
 from uam_lab.results.timeseries import ON_GROUND, Series
 
@@ -192,7 +192,7 @@ def phase_names(figure: Figure, axis: Axes, series: Series, start: float, end: f
 
 def mark_changes(axes: np.ndarray, series: Series, start: float, end: float) -> None:
     """A thin line where parameters were changed, dotted where that was refused, and its number."""
-    shown = [row for row in changes.rows(series.info) if start <= row.time <= end]
+    shown = [row for row in change_rows.rows(series.info) if start <= row.time <= end]
     for accepted, colour, dashes, _ in CHANGES:
         times = [row.time for row in shown if row.accepted == accepted]
         for axis in axes.flat if times else ():
@@ -207,7 +207,7 @@ def mark_changes(axes: np.ndarray, series: Series, start: float, end: float) -> 
                 zorder=2.4,
             )
     for axis in axes[0]:
-        for time, text in changes.labels(shown, apart=0.02 * (end - start)):
+        for time, text in change_rows.labels(shown, apart=0.02 * (end - start)):
             axis.annotate(
                 text,
                 (time, 1.0),
@@ -242,7 +242,7 @@ def legend(
         Line2D([], [], color=colour, linewidth=0.9, linestyle=(0, (4, 2.5)), label=name)
         for name, colour in named
     ]
-    told = {row.accepted for row in changes.rows(flights[0].series.info)}
+    told = {row.accepted for row in change_rows.rows(flights[0].series.info)}
     handles += [
         Line2D([], [], color=colour, linewidth=0.8, linestyle=dashes, label=name)
         for accepted, colour, dashes, name in CHANGES

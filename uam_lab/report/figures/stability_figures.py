@@ -16,7 +16,7 @@ from uam_lab.report.figures.panels import DrawnFlight
 from uam_lab.results.timeseries import SUBSYSTEMS
 
 if TYPE_CHECKING:
-    from uam_lab.analysis.lyapunov import ComparisonSystem
+    from uam_lab.analysis.lyapunov_bound import ComparisonSystem
     from uam_lab.analysis.stability import Subsystem
 
 SYMBOLS = {"position": "p", "attitude": "q", "arm": "\\alpha"}

@@ -12,7 +12,7 @@ from rich.table import Table
 from rich.text import Text
 
 from uam_control.laws import catalogue
-from uam_lab.report.facts import outcome
+from uam_lab.report.facts import flight_summary
 
 
 @contextmanager
@@ -40,7 +40,7 @@ def reporting(console: Console) -> Iterator[Callable[[str], None]]:
 def summary(metrics: Mapping[str, Any], directory: Path | None = None) -> Group:
     """Verdict, RMS errors beside the paper's, payload, landing, folder; print it with rich."""
     done = metrics["mission_completed"]
-    headline = Text(outcome.verdict(metrics), style="bold green" if done else "bold red")
+    headline = Text(flight_summary.verdict(metrics), style="bold green" if done else "bold red")
     for shortfall in metrics.get("shortfalls") or []:
         headline.append(f"\n  {shortfall}", style="red")
     return Group(headline, error_table(metrics), facts(metrics, directory))
@@ -54,7 +54,7 @@ def error_table(metrics: Mapping[str, Any]) -> Table:
         table.add_column(heading, justify="right")
     table.add_column("")
     group = None
-    for row in outcome.error_rows(metrics):
+    for row in flight_summary.error_rows(metrics):
         if group is not None and row.group != group:
             table.add_section()
         group = row.group
@@ -78,9 +78,9 @@ def facts(metrics: Mapping[str, Any], directory: Path | None) -> Table:
     table.add_column(style="dim")
     table.add_column(overflow="fold")
     table.add_row("controller", catalogue.label(metrics["controller"]))
-    table.add_row("payload", outcome.payload_story(metrics))
-    table.add_row("landing", outcome.landing_story(metrics))
-    stepped_in = outcome.supervision_story(metrics)
+    table.add_row("payload", flight_summary.payload_story(metrics))
+    table.add_row("landing", flight_summary.landing_story(metrics))
+    stepped_in = flight_summary.supervision_story(metrics)
     if stepped_in:
         table.add_row("supervisor", stepped_in)
     factor = metrics.get("real_time_factor")
@@ -93,7 +93,7 @@ def facts(metrics: Mapping[str, Any], directory: Path | None) -> Table:
     if metrics.get("missed_ticks") is not None:
         table.add_row("missed", f"{metrics['missed_ticks']} control ticks")
     if metrics.get("clamps"):
-        table.add_row("clamps", outcome.clamp_story(metrics))
+        table.add_row("clamps", flight_summary.clamp_story(metrics))
     if directory is not None:
         table.add_row("results", str(directory))
         if (directory / "report.html").exists():

@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from uam_sim_bridge.mavlink.protocol.wire import Message
+from uam_sim_bridge.mavlink.telemetry.autopilot_health import unhealthy
 from uam_sim_bridge.mavlink.telemetry.battery import Battery, from_battery_status, from_sys_status
-from uam_sim_bridge.mavlink.telemetry.health import unhealthy
 
 
 @dataclass

@@ -1,6 +1,6 @@
 """Snapshots and video of a flight, rendered without a screen.
 
-    python -m uam_lab.report.video.rendering DIR [--no-video]
+    python -m uam_lab.report.video.flight_video DIR [--no-video]
 
 renders the flight in the result folder DIR; `render` does so in a child process, because the
 choice of OpenGL has to be made before MuJoCo is imported and a broken driver may take its process
@@ -73,7 +73,7 @@ def _child(
     directory: Path, video: bool, progress: Callable[[str], None], platform: str
 ) -> tuple[int, str]:
     """Run this module as a process; (exit status, last line that was not progress)."""
-    command = [sys.executable, "-m", "uam_lab.report.video.rendering", str(directory)]
+    command = [sys.executable, "-m", "uam_lab.report.video.flight_video", str(directory)]
     child = subprocess.Popen(
         command if video else [*command, "--no-video"],
         env=os.environ | {"MUJOCO_GL": platform},
@@ -172,7 +172,7 @@ class NoRenderer(RuntimeError):
 def _scene(series: Series, size: tuple[int, int]):
     try:
         # Already the import of MuJoCo fails where the library that MUJOCO_GL names is missing.
-        from uam_lab.report.video.scene import Scene
+        from uam_lab.report.video.flight_pictures import Scene
 
         return Scene(series, *size)
     except Exception as error:  # MuJoCo, PyOpenGL and GLFW each have their own
@@ -181,7 +181,7 @@ def _scene(series: Series, size: tuple[int, int]):
 
 def main(arguments: list[str] | None = None) -> int:
     """Command line, see the module's text."""
-    parser = argparse.ArgumentParser(prog="python -m uam_lab.report.video.rendering")
+    parser = argparse.ArgumentParser(prog="python -m uam_lab.report.video.flight_video")
     parser.add_argument("directory", type=Path)
     parser.add_argument("--no-video", action="store_true")
     options = parser.parse_args(arguments)

@@ -8,12 +8,12 @@ from pathlib import Path
 from typing import Any
 
 from uam_control.laws import catalogue
-from uam_lab.report.facts import changes, outcome, stability
+from uam_lab.report.facts import change_rows, flight_summary, stability_rows
 from uam_lab.report.facts import parameter_table as parameters
 from uam_lab.report.figures import fault_marks
 from uam_lab.report.figures.figures import FIGURES
 from uam_lab.report.page import html
-from uam_lab.report.video.rendering import Rendered, existing
+from uam_lab.report.video.flight_video import Rendered, existing
 from uam_lab.results.atomic import write_text
 
 PAPER_SCENARIO = "pick_and_place"
@@ -45,13 +45,13 @@ def write_page(directory: Path, rendered: Rendered | None = None) -> Path:
     text = html.template("uam_lab.report.page", "page.html.j2").render(
         metrics=metrics,
         info={"notes": [], "vehicle_changes": {}} | info,
-        verdict=outcome.verdict(metrics),
-        payload=outcome.payload_story(metrics),
-        landing=outcome.landing_story(metrics),
-        thrust=outcome.thrust_story(metrics),
-        errors=outcome.error_rows(metrics),
-        clamps=outcome.clamp_story(metrics) if metrics.get("clamps") else None,
-        changes=changes.rows(info),
+        verdict=flight_summary.verdict(metrics),
+        payload=flight_summary.payload_story(metrics),
+        landing=flight_summary.landing_story(metrics),
+        thrust=flight_summary.thrust_story(metrics),
+        errors=flight_summary.error_rows(metrics),
+        clamps=flight_summary.clamp_story(metrics) if metrics.get("clamps") else None,
+        changes=change_rows.rows(info),
         faults=fault_marks.rows(info),
         facts=[(label, (metrics | {"controller": controller}).get(key)) for key, label in FACTS],
         controller=controller,
@@ -85,9 +85,9 @@ def _stability(file: Path) -> dict[str, Any] | None:
     if not found:
         return None
     return {
-        "verdict": stability.verdict(found),
-        "rows": stability.rows(found),
-        "caveats": stability.caveats(found),
+        "verdict": stability_rows.verdict(found),
+        "rows": stability_rows.rows(found),
+        "caveats": stability_rows.caveats(found),
     }
 
 
