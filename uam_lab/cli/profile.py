@@ -21,7 +21,7 @@ examples:
   ros2 param dump /arm_controller > arm.yaml; uam profile s500 arm.yaml    the later one counts
 
 Adapted gains, filters and the attitude asked for stay as they are; the outputs move by what the new
-gains make of the same errors (docs/tuning.md). What changed is recorded in the log.
+gains make of the same errors (docs/tuning_in_flight.md). What changed is recorded in the log.
 """
 
 

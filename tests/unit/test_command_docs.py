@@ -1,0 +1,40 @@
+"""docs/commands.md names every command and option of `uam`, and its examples parse."""
+
+from __future__ import annotations
+
+import argparse
+import re
+import shlex
+from pathlib import Path
+
+import pytest
+
+from uam_lab.cli.main import parser
+
+TEXT = (Path(__file__).resolve().parents[2] / "docs/commands.md").read_text()
+SECTIONS = dict(re.findall(r"^## uam (\w+)\n(.*?)(?=^## )", TEXT, re.M | re.S))
+
+
+def commands() -> dict[str, argparse.ArgumentParser]:
+    """Name → parser of every subcommand."""
+    (found,) = (a for a in parser()._actions if isinstance(a, argparse._SubParsersAction))
+    return found.choices
+
+
+def test_there_is_a_section_for_every_command():
+    assert set(SECTIONS) == set(commands())
+
+
+@pytest.mark.parametrize("name", commands())
+def test_the_table_of_a_command_has_its_options(name):
+    documented = re.findall(r"^\| `(--[\w-]+)` \|", SECTIONS[name], re.M)
+    options = {o for a in commands()[name]._actions for o in a.option_strings if o[:2] == "--"}
+    assert sorted(documented) == sorted(options - {"--help"})
+
+
+@pytest.mark.parametrize("name", commands())
+def test_the_examples_of_a_command_parse(name):
+    found = re.findall(rf"^(?:\w+=\S+ )?uam ({name}.*?)(?: {{2,}}#.*)?$", SECTIONS[name], re.M)
+    assert found
+    for line in found:
+        parser().parse_args(shlex.split(line))
