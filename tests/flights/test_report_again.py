@@ -1,4 +1,4 @@
-"""`uam report`: a flight's report again from its log alone, of one that was cut off, of several."""
+"""`uam report`: from the log alone, from a truncated log, for several flights."""
 
 import json
 import shutil
@@ -13,13 +13,13 @@ from uam_lab.results import timeseries
 
 @pytest.fixture
 def few_figures(monkeypatch):
-    """Two figures are enough."""
+    """Draw only two figures."""
     for name in list(figures.FIGURES)[2:]:
         monkeypatch.delitem(figures.FIGURES, name)
 
 
 def alone(flight, folder, part=1.0):
-    """A folder with nothing but the (first part of the) log of a flight."""
+    """Return a folder that contains only the first `part` of the log of a flight."""
     folder.mkdir()
     data = (flight.out / "log.mcap").read_bytes()
     (folder / "log.mcap").write_bytes(data[: int(part * len(data))])
@@ -41,7 +41,7 @@ def test_the_log_alone_gives_the_same_table_metrics_and_page(two_flights, tmp_pa
     assert "Mission completed" in page and "--seed 3" in page
 
 
-def test_the_log_of_a_killed_flight_gives_what_there_is_and_says_so(two_flights, tmp_path):
+def test_a_truncated_log_gives_a_partial_report(two_flights, tmp_path):
     cut = alone(two_flights[0], tmp_path / "cut", 0.6)
     metrics = rebuild(cut, tmp_path / "out")
     assert not metrics["mission_completed"]
@@ -50,13 +50,13 @@ def test_the_log_of_a_killed_flight_gives_what_there_is_and_says_so(two_flights,
     assert info["notes"] == [
         "partial: the recording ends with the flight (the log ends before the mission was over)"
     ]
-    assert [file.name for file in cut.iterdir()] == ["log.mcap"], "left as it was"
+    assert [file.name for file in cut.iterdir()] == ["log.mcap"], "unchanged"
     whole = timeseries.read(two_flights[0].out / "timeseries.parquet")
     part = timeseries.read(tmp_path / "out/timeseries.parquet")
     assert 500 < len(part) < len(whole)
 
 
-def test_two_flights_over_one_another(two_flights, tmp_path, few_figures, capsys):
+def test_two_flights_overlaid(two_flights, tmp_path, few_figures, capsys):
     cut = alone(two_flights[1], tmp_path / "cut", 0.6)
     out = tmp_path / "both"
     assert main.main(["report", str(two_flights[0].out), str(cut), "--out", str(out)]) == 0
@@ -66,7 +66,7 @@ def test_two_flights_over_one_another(two_flights, tmp_path, few_figures, capsys
     assert [file.name for file in cut.iterdir()] == ["log.mcap"]
 
 
-def test_what_is_no_flight_is_refused_in_one_line(tmp_path, capsys):
+def test_a_folder_without_flight_is_refused_in_one_line(tmp_path, capsys):
     assert main.main(["report", str(tmp_path)]) == 2
     (tmp_path / "log.mcap").write_bytes(b"no log")
     assert main.main(["report", str(tmp_path)]) == 2

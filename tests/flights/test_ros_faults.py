@@ -64,7 +64,7 @@ def test_faults_come_when_they_should_and_the_log_knows_them(fly, short_scenario
     assert 0.5 <= found["node_kill"]["begin_s"] <= 2.5
 
     page = (flight.out / "report.html").read_text()
-    assert "Faults put into this flight" in page
+    assert "Faults injected in this flight" in page
     alone = tmp_path / "alone"
     alone.mkdir()
     shutil.copy(flight.out / "log.mcap", alone)

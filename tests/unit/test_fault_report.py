@@ -67,7 +67,7 @@ def test_faults_are_shaded_and_listed(flight_folder, flight, make_flight):
     draw([DrawnFlight("x", marked)], flight_folder / "figures", names=["arm_inputs"])
     (flight_folder / "info.json").write_text(json.dumps(marked.info))
     html = flight_page.write_page(flight_folder).read_text()
-    assert "Faults put into this flight" in html and "<code>clock_jump</code>" in html
+    assert "Faults injected in this flight" in html and "<code>clock_jump</code>" in html
     assert fault_marks.handles(flight.info) == []
 
 

@@ -1,4 +1,4 @@
-"""What the figures show: lines, phases, events, RMS, one flight or several."""
+"""Content of the figures: lines, phases, events, RMS, one flight or several."""
 
 import numpy as np
 import pytest
@@ -14,7 +14,7 @@ from uam_sim_bridge.plant import Vehicle
 
 
 def words(figure):
-    """Every text of a figure."""
+    """Return all texts of a figure."""
     found = [text.get_text() for text in figure.texts]
     for axis in figure.axes:
         found += [text.get_text() for text in axis.texts] + [axis.get_ylabel()]
@@ -24,7 +24,7 @@ def words(figure):
 
 
 def without_magnet(flight):
-    """The same flight as if there had been neither magnet nor payload."""
+    """Return the flight without the data of magnet and payload."""
     values = flight.values.copy()
     values[:, COLUMNS.block("magnet.")] = 0.0
     values[:, COLUMNS.block("payload.")] = np.nan
@@ -132,5 +132,5 @@ def test_each_law_has_its_own_rows_in_the_adaptation_figure(flight):
 def test_a_flight_that_never_took_off_is_drawn_too(flight, tmp_path):
     rows = flight.time < -0.5
     series = Series(flight.values[rows], flight.phases[rows], flight.phase_names, flight.info)
-    wanted = ["position_errors", "path", "adaptation"]
-    assert figures.draw([DrawnFlight("modular", series)], tmp_path, names=wanted)[:2] == wanted[:2]
+    names = ["position_errors", "path", "adaptation"]
+    assert figures.draw([DrawnFlight("modular", series)], tmp_path, names=names)[:2] == names[:2]

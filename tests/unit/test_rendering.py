@@ -1,4 +1,4 @@
-"""Snapshots and video: what they show, when, and what happens without a renderer."""
+"""Snapshots and video: content, times, and behaviour without a renderer."""
 
 import json
 import subprocess
@@ -16,13 +16,13 @@ from uam_lab.results.timeseries import Series
 
 
 def cut(series, end):
-    """The first part of a flight, up to mission time `end` [s], one snapshot in it."""
+    """Return the flight up to mission time `end` [s], with one snapshot."""
     rows = series.time < end
     info = series.info | {"snapshots": [[0.5 * end, "(a) take-off"], [80.0, "never reached"]]}
     return Series(series.values[rows], series.phases[rows], series.phase_names, info)
 
 
-def test_a_pose_puts_every_body_where_it_was(flight):
+def test_a_pose_reproduces_the_recorded_positions(flight):
     poses = Poses(flight)
     row = flight.row_at(50.0)
     poses.put(row)
@@ -36,14 +36,14 @@ def test_a_pose_puts_every_body_where_it_was(flight):
     np.testing.assert_allclose(link_2 / 0.1, down, atol=0.03)
 
 
-def test_a_flight_without_payload_shows_none(flight):
+def test_without_payload_its_body_is_out_of_sight(flight):
     info = flight.info | {"payload_mass_kg": 0.0}
     poses = Poses(Series(flight.values, flight.phases, flight.phase_names, info))
     poses.put(flight.row_at(50.0))
     assert np.linalg.norm(poses.body("payload")) > 20.0
 
 
-def test_snapshots_are_the_scenarios_as_far_as_the_flight_went(flight):
+def test_snapshots_are_those_of_the_scenario_up_to_the_end_of_the_flight(flight):
     times = flight_video.snapshot_times(flight)
     assert [caption[:3] for _, caption in times] == ["(a)", "(b)", "(c)", "(d)", "(e)", "(f)"]
     assert flight_video.snapshot_times(cut(flight, 3.0)) == [(1.5, "(a) take-off")]
@@ -53,7 +53,7 @@ def test_snapshots_are_the_scenarios_as_far_as_the_flight_went(flight):
     assert spread[0][1] == "(a) approach"
 
 
-def test_a_video_is_short_whatever_the_flight_and_its_speed_is_a_whole_number(flight):
+def test_a_video_has_a_limited_length_and_an_integer_speed_factor(flight):
     rows, speed = video.frame_rows(flight)
     assert speed == 6
     assert 12.0 < len(rows) / video.RATE <= video.LONGEST_S
@@ -63,7 +63,7 @@ def test_a_video_is_short_whatever_the_flight_and_its_speed_is_a_whole_number(fl
     assert video.speed_up(15.1) == 2
 
 
-def test_without_a_renderer_the_report_goes_on_and_says_how_to_get_one(flight_folder, monkeypatch):
+def test_without_a_renderer_the_report_is_written_with_advice(flight_folder, monkeypatch):
     for screen in ("DISPLAY", "WAYLAND_DISPLAY"):
         monkeypatch.delenv(screen, raising=False)
     monkeypatch.setattr(flight_video, "PLATFORM", "glfw")
@@ -97,7 +97,7 @@ def test_snapshots_and_video_are_rendered_without_a_screen(tmp_path, flight):
     with Image.open(rendered.snapshots[0]) as picture:
         assert picture.size == flight_video.SNAPSHOT_SIZE
         pixels = np.asarray(picture.convert("RGB"), dtype=float)
-    # sky above, floor below, and a vehicle that is neither
+    # blue sky at the top, dark pixels of the vehicle in the middle
     assert pixels[20, :, 2].mean() > pixels[20, :, 0].mean() + 20.0
     assert (pixels[:600].sum(axis=2) < 150.0).sum() > 500
     probe = subprocess.run(

@@ -1,4 +1,4 @@
-"""The page and the closing table: what they say, and that the page needs nothing else."""
+"""The page and the final table: their texts; the page loads no other file."""
 
 import io
 import json
@@ -18,7 +18,7 @@ from uam_lab.results import timeseries
 
 
 def text_of(html):
-    """The words of a page."""
+    """Return the text of a page without tags."""
     bare = re.sub(r"<style>.*?</style>|<[^>]+>", " ", html, flags=re.S)
     return re.sub(r"\s+", " ", bare)
 
@@ -29,7 +29,7 @@ def change_metrics(folder, **changes):
     file.write_text(json.dumps(json.loads(file.read_text()) | changes))
 
 
-def test_the_report_is_one_page_that_asks_for_nothing_else(flight_folder, monkeypatch):
+def test_the_report_is_one_page_without_external_files(flight_folder, monkeypatch):
     for name in list(figures.FIGURES)[2:]:
         monkeypatch.delitem(figures.FIGURES, name)
     steps = []
@@ -43,20 +43,20 @@ def test_the_report_is_one_page_that_asks_for_nothing_else(flight_folder, monkey
     assert not re.search(r"@import|url\(|<link|<script", html)
 
 
-def test_the_page_says_how_stable_it_was(flight_folder, monkeypatch):
+def test_the_page_shows_the_stability_analysis(flight_folder, monkeypatch):
     for name in list(figures.FIGURES):
         monkeypatch.delitem(figures.FIGURES, name)
     assert "Appendix" not in text_of(flight_page.write_page(flight_folder).read_text())
     build_report(flight_folder, pictures=False)
     found = json.loads((flight_folder / "stability.json").read_text())
     words = text_of((flight_folder / "report.html").read_text())
-    assert "Stability: the Appendix along this flight" in words
-    assert f"of {found['ticks']} ticks in the air" in words
+    assert "Stability proof (Appendix), checked along this flight" in words
+    assert f"of {found['ticks']} airborne ticks" in words
     assert f"{found['arm']['xi_max']:.3g}" in words
     assert "spectral radius" in words
 
 
-def test_the_page_says_what_happened_and_how_to_repeat_it(flight_folder):
+def test_the_page_shows_the_result_and_the_command(flight_folder):
     words = text_of(flight_page.write_page(flight_folder).read_text())
     metrics = json.loads((flight_folder / "metrics.json").read_text())
     assert metrics["mission_completed"] is True
@@ -71,14 +71,14 @@ def test_the_page_says_what_happened_and_how_to_repeat_it(flight_folder):
     assert "latency" not in words
 
 
-def test_the_page_says_what_the_motors_gave(flight_folder):
+def test_the_page_shows_the_identified_thrust(flight_folder):
     found = {"end": 0.859, "least": 0.8586, "largest": 1.0}
     change_metrics(flight_folder, thrust_factor=found)
     words = text_of(flight_page.write_page(flight_folder).read_text())
     assert "0.859 of the assumed thrust at the end (0.859 to 1.000 in flight)" in words
 
 
-def test_the_page_marks_what_is_worse_than_the_paper_and_says_why_not_completed(flight_folder):
+def test_the_page_marks_errors_above_the_papers_and_shows_the_abort_reason(flight_folder):
     metrics = json.loads((flight_folder / "metrics.json").read_text())
     metrics["rms"]["arm_deg"] = [1.19, 5.0]
     metrics["rms"]["position_m"][0] = None
@@ -101,7 +101,7 @@ def test_the_page_marks_what_is_worse_than_the_paper_and_says_why_not_completed(
     assert "missed control ticks 7" in words
 
 
-def test_page_and_console_say_where_the_supervisor_stepped_in(flight_folder):
+def test_page_and_console_show_the_supervisors_interventions(flight_folder):
     steps = [
         {"time_s": 0.0, "from": "grounded", "to": "taking off", "cause": "armed"},
         {"time_s": 3.25, "from": "flying", "to": "holding", "cause": "tilt 0.90 rad"},
@@ -140,12 +140,12 @@ def test_table_one_has_no_safeguard_and_no_difference_from_itself(tmp_path):
     assert not any(row.differs for rows in found.controllers.values() for row in rows)
 
 
-def test_a_reconstructed_law_is_called_so_and_is_not_compared_with_table_one(flight_folder):
+def test_a_reconstructed_law_is_labelled_and_not_compared_with_table_one(flight_folder):
     from uam_control.settings import configuration
 
     file = configuration.path("profiles/asmc2.yaml")
     rows = {row.name: row for row in parameters.compare(file).controllers["arm_controller"]}
-    assert rows["varpi"].paper == "" and not rows["varpi"].differs  # another varpi
+    assert rows["varpi"].paper == "" and not rows["varpi"].differs  # varpi of another law
     assert rows["kappa"].description.startswith("kappa")
     assert rows["torque_max"].paper != ""
     (flight_folder / "parameters.yaml").write_text(file.read_text())
@@ -170,7 +170,7 @@ def test_a_folder_with_little_in_it_still_gets_a_page(flight_folder):
         build_report(flight_folder.parent / "nothing")
 
 
-def test_the_page_says_when_there_was_no_renderer(flight_folder):
+def test_the_page_reports_a_missing_renderer(flight_folder):
     rendered = flight_video.Rendered(problem=flight_video.HOW_TO_GET_ONE)
     words = text_of(flight_page.write_page(flight_folder, rendered).read_text())
     assert "apt install libegl1 libgl1-mesa-dri" in words

@@ -43,8 +43,8 @@ def test_numbers_that_would_overlap_share_one_label():
 
 
 def test_changes_are_drawn_and_listed(flight_folder, flight, make_flight):
-    told = [entry(10.0, varpi=[0.1, 0.2]), entry(20.0, False, varpi=[0.2, -1.0]), entry(-5.0)]
-    marked = make_flight(info={"parameter_changes": told})
+    entries = [entry(10.0, varpi=[0.1, 0.2]), entry(20.0, False, varpi=[0.2, -1.0]), entry(-5.0)]
+    marked = make_flight(info={"parameter_changes": entries})
     figure = figures.arm_inputs([DrawnFlight("x", marked)])
     axis = figure.axes[0]
     lines = [c for c in axis.collections if len(c.get_segments()) == 1]

@@ -1,1 +1,1 @@
-"""What a flight looked like: figures, pictures, video, one offline page."""
+"""Report of a flight: figures, pictures, video and one offline page."""

@@ -1,4 +1,4 @@
-"""Everything of the report in one call; each step can also be had alone.
+"""The whole report in one call; each step can also be called separately.
 
 | step | function | writes |
 |---|---|---|
@@ -29,7 +29,7 @@ from uam_lab.results.result_folder import as_json
 
 @dataclass(frozen=True)
 class Report:
-    """Where the page is, and a line on what could not be made (empty when all was)."""
+    """Path of the page, and one line about missing pictures (empty if there is none)."""
 
     page: Path
     problem: str
@@ -43,9 +43,9 @@ def build_report(
 ) -> Report:
     """Make the report of the flight in a result folder.
 
-    Needs timeseries.parquet and metrics.json; shows info.json, parameters.yaml and versions.json
-    where they are. progress: called with a short text as each step begins. Raises
-    timeseries.UnreadableFlight, never for want of a renderer.
+    Requires timeseries.parquet and metrics.json; uses info.json, parameters.yaml and versions.json
+    if they exist. progress: called with a short text at the start of each step. Raises
+    timeseries.UnreadableFlight. A missing renderer is no error: see Report.problem.
     """
     directory = Path(directory)
     series = timeseries.read(directory / "timeseries.parquet")
@@ -60,10 +60,10 @@ def build_report(
 
 
 def stability_of(directory: Path, series: timeseries.Series) -> Stability | None:
-    """The analysis, also written to stability.json; None where it has nothing to say."""
+    """Analyse the flight, write stability.json and return the analysis; None if not applicable."""
     try:
         found = analyse_folder(directory, series)
-    except ProfileError:  # the page says that the parameters are missing
+    except ProfileError:  # the page reports the missing parameters
         return None
     if found is not None:
         write_text(directory / "stability.json", as_json(found.summary()))

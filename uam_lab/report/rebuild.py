@@ -1,4 +1,4 @@
-"""A result folder made anew from its log alone: table, metrics, facts, then figures and page."""
+"""Rebuild a result folder from its log alone: table, metrics, facts."""
 
 from __future__ import annotations
 
@@ -24,15 +24,15 @@ PARTIAL = "partial: "
 
 
 class NothingToReport(ValueError):
-    """A folder without a flight, or a log that does not say which scenario was flown; one line."""
+    """The folder has no flight, or the log does not contain its scenario; one line."""
 
 
 def rebuild(directory: Path, out: Path, scenario: str | None = None) -> dict[str, Any]:
-    """Make table, metrics and facts of the flight logged in `directory` again, in the folder `out`.
+    """Write table, metrics and facts of the flight logged in `directory` to the folder `out`.
 
-    scenario: name or file, for a log that does not say. Returns the metrics. What only the flight
-    itself knew (wall time, why it was ended) is taken from `directory` where it is still there.
-    Raises NothingToReport, UnreadableLog, OSError.
+    scenario: name or file, for a log without one. Returns the metrics. Facts that are not in the
+    log (wall time, reason of the end) are read from `directory` if they are there. Raises
+    NothingToReport, UnreadableLog, OSError.
     """
     log = directory / LOG
     if not log.exists():
@@ -64,7 +64,7 @@ def rebuild(directory: Path, out: Path, scenario: str | None = None) -> dict[str
 
 
 def series_of(directory: Path) -> timeseries.Series:
-    """The flight in a result folder, from its table or else from its log; writes nothing.
+    """Return the flight in a result folder from its table, else from its log; write nothing.
 
     Raises NothingToReport, UnreadableLog, UnreadableFlight, OSError.
     """
@@ -84,17 +84,17 @@ def series_of(directory: Path) -> timeseries.Series:
 def _scenario(
     directory: Path, facts: log_facts.LogFacts, known: Mapping[str, Any], asked: str | None
 ) -> Scenario:
-    """What was flown: what the user says, else the log, else the facts beside it."""
+    """Return the flown scenario: from the user, else from the log, else from info.json."""
     name = asked or (None if facts.scenario else known.get("scenario"))
     if name is not None:
         return load_scenario(str(configuration.named("scenarios", name)))
     if facts.scenario is None:
-        raise NothingToReport(f"{directory / LOG} does not say what was flown: give --scenario")
+        raise NothingToReport(f"{directory / LOG} contains no scenario: give --scenario")
     return facts.scenario
 
 
 def _take_over(name: str, directory: Path, out: Path, texts: Mapping[str, str]) -> None:
-    """Have a file of the flight in `out`: the one there, else that of the log or of its folder."""
+    """Write file `name` to `out` if it is missing there, from the log's texts or `directory`."""
     if (out / name).exists():
         return
     if name in texts:
@@ -104,7 +104,7 @@ def _take_over(name: str, directory: Path, out: Path, texts: Mapping[str, str]) 
 
 
 def _json(file: Path) -> dict[str, Any]:
-    """{} where there is none, or a broken one."""
+    """Return the content of a JSON file, {} if it is missing or broken."""
     try:
         return json.loads(file.read_text())
     except (OSError, ValueError):

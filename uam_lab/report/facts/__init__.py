@@ -1,1 +1,1 @@
-"""What a report says in words and numbers."""
+"""Texts and tables of a report."""

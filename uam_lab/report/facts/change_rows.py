@@ -8,12 +8,12 @@ from typing import Any
 
 from uam_lab.report.facts.parameter_table import text
 
-LABELS = 40  # more numbers than this would only hide the lines
+LABELS = 40  # largest number of labels in a figure; more would cover the lines
 
 
 @dataclass(frozen=True)
 class ChangeRow:
-    """One request: its number in the figures, mission time [s], and what became of it."""
+    """One request: its number in the figures, mission time [s], and its result."""
 
     number: int
     time: float
@@ -25,7 +25,7 @@ class ChangeRow:
 
 
 def rows(info: Mapping[str, Any]) -> list[ChangeRow]:
-    """Every request of a flight, in order; info: see `log_reader.parameter_changes`."""
+    """Return every request of a flight, in order; info: see `log_reader.parameter_changes`."""
     return [
         ChangeRow(
             number=number,
@@ -43,7 +43,7 @@ def rows(info: Mapping[str, Any]) -> list[ChangeRow]:
 
 
 def labels(shown: Sequence[ChangeRow], apart: float) -> list[tuple[float, str]]:
-    """(time, text) of the numbers; those nearer to each other than `apart` [s] share one."""
+    """Return (time, text) of the labels; requests closer than `apart` [s] share one label."""
     groups: list[list[ChangeRow]] = []
     for row in shown:
         if groups and row.time - groups[-1][0].time < apart:

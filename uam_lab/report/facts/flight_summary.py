@@ -1,4 +1,4 @@
-"""What happened in words and rows, shared by the page and the console."""
+"""Result of a flight as texts and rows, for the page and the console."""
 
 from __future__ import annotations
 
@@ -24,11 +24,11 @@ class ErrorRow:
 
     @property
     def better(self) -> bool | None:
-        """Whether the RMS is not above the paper's."""
+        """Return whether the RMS is at most the paper's, None without an RMS."""
         return None if self.rms is None else self.rms <= self.paper
 
     def shown(self, value: float | None) -> str:
-        """`value` with the unit and the digits of this row."""
+        """Return `value` with the unit and the digits of this row."""
         if value is None:
             return "–"
         gap = "" if self.unit == "°" else " "
@@ -36,7 +36,7 @@ class ErrorRow:
 
 
 def error_rows(metrics: Mapping[str, Any]) -> list[ErrorRow]:
-    """One row per coordinate."""
+    """Return one row per coordinate."""
     rows = []
     for group, heading, unit, digits, names in paper.TABLES:
         columns = zip(
@@ -51,14 +51,14 @@ def error_rows(metrics: Mapping[str, Any]) -> list[ErrorRow]:
 
 
 def verdict(metrics: Mapping[str, Any]) -> str:
-    """The headline."""
+    """Return the headline."""
     if metrics["mission_completed"]:
         return "Mission completed"
     return "Mission aborted" if metrics.get("abort_reason") else "Mission not completed"
 
 
 def payload_story(metrics: Mapping[str, Any]) -> str:
-    """What became of the payload, in one line."""
+    """Return the result of the payload's transport, in one line."""
     if metrics.get("payload_lifted") is None:
         there = metrics.get("payload_mass_kg")
         return "the magnet was never on" if there else "no payload in this flight"
@@ -71,13 +71,13 @@ def payload_story(metrics: Mapping[str, Any]) -> str:
 
 
 def landing_story(metrics: Mapping[str, Any]) -> str:
-    """Where the vehicle landed, in one line."""
+    """Return the landing error, in one line."""
     error = metrics.get("landing_error_m")
     return "not landed" if error is None else f"{distance(error)} from the landing point"
 
 
 def supervision_story(metrics: Mapping[str, Any]) -> str | None:
-    """Where the supervisor stepped in, in one line; None where it did not."""
+    """Return the interventions of the supervisor, in one line; None without any."""
     steps = [
         f"{one['to']} at {one['time_s']:.1f} s ({one['cause']})"
         for one in metrics.get("transitions") or []
@@ -87,12 +87,12 @@ def supervision_story(metrics: Mapping[str, Any]) -> str | None:
 
 
 def clamp_story(metrics: Mapping[str, Any]) -> str:
-    """How often each law left its prescribed performance and was clamped, in one line."""
+    """Return the number of clamped errors per subsystem (ASMC-2), in one line."""
     return ", ".join(f"{subsystem} {count}" for subsystem, count in metrics["clamps"].items())
 
 
 def thrust_story(metrics: Mapping[str, Any]) -> str | None:
-    """True thrust beside the assumed one as identified in flight, in one line."""
+    """Return the ratio of true to assumed thrust, as identified in flight, in one line."""
     found = metrics.get("thrust_factor")
     if found is None:
         return None
@@ -103,5 +103,5 @@ def thrust_story(metrics: Mapping[str, Any]) -> str | None:
 
 
 def distance(metres: float) -> str:
-    """A distance as a person says it."""
+    """Return a distance in m, or in cm if it is below 1 m."""
     return f"{metres:.2f} m" if metres >= 1.0 else f"{100.0 * metres:.1f} cm"

@@ -1,4 +1,4 @@
-"""The flown parameters beside the paper's Table I, and which safeguards were on."""
+"""The flown parameters beside the paper's Table I, and the active safeguards."""
 
 from __future__ import annotations
 
@@ -38,14 +38,14 @@ class ParameterRow:
 
 @dataclass(frozen=True)
 class ParameterTable:
-    """Rows per controller, those of the other nodes, and the names of safeguards that were on."""
+    """Rows per controller and per other node, and the active safeguards."""
 
     controllers: dict[str, list[ParameterRow]]
     others: dict[str, list[ParameterRow]]
 
     @property
     def safeguards(self) -> dict[str, list[str]]:
-        """controller → what was on, with its value; controllers without any are left out."""
+        """Return controller → active safeguards with values; controllers without any are absent."""
         on = {
             node: [f"{row.name} = {row.flown}" for row in rows if row.safeguard_on]
             for node, rows in self.controllers.items()
@@ -56,7 +56,7 @@ class ParameterTable:
 def compare(parameter_file: Path) -> ParameterTable:
     """Compare the effective parameters of a flight with the verbatim Table I.
 
-    Raises ProfileError when the file is missing or not a ROS parameter file.
+    Raises ProfileError if the file is missing or is no ROS parameter file.
     """
     flown = read_sections(parameter_file)
     paper = load_profile(PAPER_PROFILE).sets
@@ -72,7 +72,7 @@ def compare(parameter_file: Path) -> ParameterTable:
 
 
 def _specs(file: Path, node: str, values: Mapping[str, Any]) -> Mapping[str, Any]:
-    """What the parameters mean to the law that flew."""
+    """Return the specifications of the parameters of the flown law."""
     try:
         return parameter_set(node, values)[0].specs() if node in NODES else {}
     except ParameterError as error:
@@ -80,7 +80,7 @@ def _specs(file: Path, node: str, values: Mapping[str, Any]) -> Mapping[str, Any
 
 
 def _table(paper: ParameterSet, specs: Mapping[str, Any]) -> dict[str, Any]:
-    """Table I's values of those parameters that mean the same to the law that flew."""
+    """Return Table I's values of the parameters with the same specification in the flown law."""
     known = paper.specs()
     return {name: value for name, value in asdict(paper).items() if specs.get(name) == known[name]}
 
@@ -101,14 +101,14 @@ def _row(name: str, value: Any, table: Mapping[str, Any], specs: Mapping[str, An
 
 
 def _same(one: Any, other: Any) -> bool:
-    """Equality of parameters; YAML has lists where the sets have tuples."""
+    """Return whether two values are equal; YAML gives lists, parameter sets have tuples."""
     if isinstance(one, list | tuple) and isinstance(other, list | tuple):
         return list(one) == list(other)
     return one == other
 
 
 def text(value: Any) -> str:
-    """A parameter as a person writes it; equal entries of a list once."""
+    """Return a parameter value as text; a list of equal entries is written once."""
     if isinstance(value, bool):
         return "on" if value else "off"
     if isinstance(value, int | float):

@@ -1,4 +1,4 @@
-"""stability.json in words and rows for the page."""
+"""Texts and rows of stability.json for the page."""
 
 from __future__ import annotations
 
@@ -8,12 +8,12 @@ from typing import Any
 
 from uam_lab.results.timeseries import SUBSYSTEMS
 
-LOOSE = 0.1  # of its bound that V fills at most for the bound to say little
+LOOSE = 0.1  # V / bound; below it the page calls the bound loose
 
 
 @dataclass(frozen=True)
 class StabilityRow:
-    """One subsystem as text: V and its bound, error and what the bound leaves, K*, who supplies."""
+    """One subsystem as text: V and its bound, error and its bound, K*, compensating terms."""
 
     name: str
     value: str
@@ -25,12 +25,12 @@ class StabilityRow:
 
 
 def rows(found: Mapping[str, Any]) -> list[StabilityRow]:
-    """One per subsystem."""
+    """Return one row per subsystem."""
     return [_row(name, found[name]) for name in SUBSYSTEMS]
 
 
 def verdict(found: Mapping[str, Any]) -> str:
-    """Whether V stayed within its bound, and how tight that is."""
+    """Return a text: fraction of the ticks with V within its bounds, and how tight they are."""
     whole = found["V"]
     inside = min(whole["within_bound"], *(found[n]["V"]["within_bound"] for n in SUBSYSTEMS))
     envelope = min(
@@ -38,19 +38,19 @@ def verdict(found: Mapping[str, Any]) -> str:
     )
     ratio = whole["largest_ratio_to_bound"]
     step = min(found[n]["step_inequality_holds"] for n in SUBSYSTEMS)
-    loose = ": it holds, but says little" if inside == 1.0 and ratio < LOOSE else ""
+    loose = ": the bound holds, but it is loose" if inside == 1.0 and ratio < LOOSE else ""
     return (
-        f"V and each V_j stayed within the ultimate bound at {_percent(inside)} and within what "
-        f"the differential inequality allows until then at {_percent(envelope)} of "
-        f"{found['ticks']} ticks in the air. "
+        f"V and each V_j are within the ultimate bound at {_percent(inside)} and within the "
+        f"solution of the differential inequality at {_percent(envelope)} of "
+        f"{found['ticks']} airborne ticks. "
         f"The largest V is {_number(ratio)} of its bound{loose}. "
-        "The sharper inequality for dV_j/dt, before the proof divides by the largest eigenvalue "
+        "The sharper inequality for dV_j/dt, without the division by the largest eigenvalue "
         f"of P_j, holds at {_percent(step, 2)} of the ticks."
     )
 
 
 def caveats(found: Mapping[str, Any]) -> list[str]:
-    """What the proof assumes, measured, one sentence each."""
+    """Return the measured assumptions of the proof, one sentence each."""
     a = found["assumptions"]
     radius, norm = a["mass_matrix"]["radius"], a["mass_matrix"]["norm"]
     ceilings = {name: max(a["at_ceiling"][name]) for name in SUBSYSTEMS}
@@ -60,10 +60,10 @@ def caveats(found: Mapping[str, Any]) -> list[str]:
         "acceleration that tau causes feeds back with a factor below 1); ‖I − M_jj Mbar_j⁻¹‖ is "
         + _list(norm, "{:.2f}")
         + ".",
-        f"Acceleration: the ‖chi_ddot‖ that K3 sees was below the true one at {_percent(max(seen))}"
-        " of the ticks: estimate, limit and filter lie between.",
-        "Limits cut tau at " + _list(a["saturated"], "{:.1f} %", 100.0) + " of the ticks.",
-        "A ceiling held a gain down at " + _list(ceilings, "{:.1f} %", 100.0) + " of the ticks.",
+        "Acceleration: because of estimate, limit and filter, ‖chi_ddot‖ in rho_j was below the "
+        f"true value at {_percent(max(seen))} of the ticks.",
+        "tau was at a limit at " + _list(a["saturated"], "{:.1f} %", 100.0) + " of the ticks.",
+        "A gain was at its ceiling at " + _list(ceilings, "{:.1f} %", 100.0) + " of the ticks.",
         f"Estimator: ‖xi‖ is {_number(a['estimator']['rms_xi'])} RMS, the error of its estimate "
         f"{_number(a['estimator']['rms_error'])}.",
         f"Attitude error: e_q_dot is the derivative of e_q to within {_percent(a['error_rate'])}.",

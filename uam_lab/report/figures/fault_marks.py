@@ -1,4 +1,4 @@
-"""Faults that were put into a flight: shaded in the figures, listed on the page."""
+"""Injected faults of a flight: shaded in the figures, listed on the page."""
 
 from __future__ import annotations
 
@@ -12,23 +12,23 @@ from matplotlib.lines import Line2D
 from uam_lab.report.facts.parameter_table import text
 from uam_lab.report.figures import style
 
-APART = 0.02  # of the time axis; letters nearer to each other share one place
+APART = 0.02  # of the time axis; closer letters share one place
 SHADE = 0.16  # opacity
 
 
 @dataclass(frozen=True)
 class FaultMark:
-    """One fault: its letter in the figures, mission times [s], and what it was."""
+    """One fault: its letter in the figures, name, mission times [s], parameters."""
 
     letter: str
     name: str
     begin: float
-    end: float | None  # None: it was there until the flight ended
+    end: float | None  # None: active until the end of the flight
     values: tuple[tuple[str, str], ...]
 
 
 def rows(info: Mapping[str, Any]) -> list[FaultMark]:
-    """Every fault of a flight, in order; info: with `faults` as in metrics.json."""
+    """Return every fault of a flight, in order; info: with `faults` as in metrics.json."""
     return [
         FaultMark(
             letter=letter(number),
@@ -42,13 +42,13 @@ def rows(info: Mapping[str, Any]) -> list[FaultMark]:
 
 
 def letter(number: int) -> str:
-    """A, B ... Z, AA, AB ... for 0, 1 ..."""
+    """Return A, B ... Z, AA, AB ... for 0, 1 ..."""
     first, last = divmod(number, 26)
     return (letter(first - 1) if first else "") + chr(ord("A") + last)
 
 
 def shade(axes: np.ndarray, info: Mapping[str, Any], start: float, end: float) -> None:
-    """Shade the span of each fault in all panels, with its letter in the uppermost ones."""
+    """Shade the time span of each fault in all panels, with its letter in the top row."""
     shown = [row for row in rows(info) if row.begin <= end and (row.end or end) >= start]
     for row in shown:
         begin, over = max(row.begin, start), min(end if row.end is None else row.end, end)
@@ -70,14 +70,14 @@ def shade(axes: np.ndarray, info: Mapping[str, Any], start: float, end: float) -
 
 
 def handles(info: Mapping[str, Any]) -> list[Line2D]:
-    """What the legend says of them."""
+    """Return the legend entry of the faults, if there are any."""
     if not rows(info):
         return []
     return [Line2D([], [], color=style.FAULT, linewidth=6, alpha=2.0 * SHADE, label="fault")]
 
 
 def _together(shown: Sequence[FaultMark], start: float, apart: float) -> list[tuple[float, str]]:
-    """(time, letters): those nearer to each other than `apart` [s] side by side."""
+    """Return (time, letters); faults closer than `apart` [s] share one text."""
     groups: list[tuple[float, list[str]]] = []
     for row in sorted(shown, key=lambda row: row.begin):
         at = max(row.begin, start)

@@ -1,6 +1,6 @@
-"""The figures of a flight, or of several over one another: the paper's five and more.
+"""The figures of one flight or of several flights overlaid: the paper's five and more.
 
-`draw(flights, directory)` writes each as PNG and SVG; every figure can also be had alone.
+`draw(flights, directory)` writes them as PNG and SVG; each figure has its own function.
 """
 
 from __future__ import annotations
@@ -30,13 +30,13 @@ ROLL, PITCH, YAW = "roll φ", "pitch θ", "yaw ψ"
 
 
 def position_errors(flights: Sequence[DrawnFlight]) -> Figure:
-    """The paper's first figure: position error over time."""
+    """Draw the position error over time, as in the paper's plot1."""
     drawn = [Panel(f"{axis} error [m]", f"error.{axis}") for axis in "xyz"]
     return _errors("Position tracking error", flights, drawn, "position_m", "m", 3)
 
 
 def attitude_errors(flights: Sequence[DrawnFlight]) -> Figure:
-    """The paper's second figure: attitude error over time."""
+    """Draw the attitude error over time, as in the paper's plot3."""
     drawn = [
         Panel(f"{label} error [°]", f"error.{name}", DEGREES)
         for label, name in ((ROLL, "roll"), (PITCH, "pitch"), (YAW, "yaw"))
@@ -45,7 +45,7 @@ def attitude_errors(flights: Sequence[DrawnFlight]) -> Figure:
 
 
 def arm_errors(flights: Sequence[DrawnFlight]) -> Figure:
-    """The paper's third figure: joint error over time."""
+    """Draw the joint error over time, as in the paper's plot5."""
     drawn = [
         Panel(f"{label} error [°]", f"error.alpha_{joint}", DEGREES)
         for label, joint in (("α₁", 1), ("α₂", 2))
@@ -54,7 +54,7 @@ def arm_errors(flights: Sequence[DrawnFlight]) -> Figure:
 
 
 def vehicle_inputs(flights: Sequence[DrawnFlight]) -> Figure:
-    """The paper's fourth figure: what position and attitude law ask for."""
+    """Draw tau_p and tau_q over time, as in the paper's plot6."""
     drawn = [Panel(f"$\\tau_{{p,{axis}}}$ [N]", f"tau_p.{axis}") for axis in "xyz"]
     drawn += [
         Panel(f"$\\tau_{{q,\\{symbol}}}$ [N m]", f"tau_q.{name}")
@@ -64,13 +64,13 @@ def vehicle_inputs(flights: Sequence[DrawnFlight]) -> Figure:
 
 
 def arm_inputs(flights: Sequence[DrawnFlight]) -> Figure:
-    """The paper's fifth figure: what the arm law asks for."""
+    """Draw tau_alpha over time, as in the paper's plot7."""
     drawn = [Panel(f"$\\tau_{{\\alpha {joint}}}$ [N m]", f"tau_alpha.{joint}") for joint in "12"]
     return panels.stack("Arm control inputs", flights, drawn)[0]
 
 
 def setpoints(flights: Sequence[DrawnFlight]) -> Figure:
-    """What was sent to the autopilot."""
+    """Draw the setpoints sent to the autopilot."""
     drawn = [
         Panel(f"{name} rate [°/s]", f"setpoint.rate_{axis}", DEGREES)
         for name, axis in (("roll", "x"), ("pitch", "y"), ("yaw", "z"))
@@ -81,7 +81,7 @@ def setpoints(flights: Sequence[DrawnFlight]) -> Figure:
 
 
 def payload(flights: Sequence[DrawnFlight]) -> Figure | None:
-    """Where the payload was; None where no flight had one."""
+    """Draw the position of the payload; return None if no flight had one."""
     flights = [f for f in flights if not np.isnan(f.series["payload.z"]).all()]
     if not any(f.series.info.get("payload_mass_kg") for f in flights):
         return None
@@ -90,7 +90,7 @@ def payload(flights: Sequence[DrawnFlight]) -> Figure | None:
 
 
 def adaptation(flights: Sequence[DrawnFlight]) -> Figure | None:
-    """Adapted gains and what drives them, by subsystem, for the laws flown; None without any."""
+    """Draw the adapted gains and their inputs by subsystem; return None without any."""
     shown = [
         group
         for group in catalogue.gain_groups(AXES)
@@ -127,7 +127,7 @@ def adaptation(flights: Sequence[DrawnFlight]) -> Figure | None:
 
 
 def _gain_legend(axis: Axes, group: GainGroup, above: float) -> None:
-    """Names of the gains of a row; above the names of the phases in the first."""
+    """Add the legend of a row of gains; in the first row it is above the phase names."""
     lines = zip(style.GAINS, group.names, strict=False)
     axis.legend(
         handles=[
@@ -143,7 +143,7 @@ def _gain_legend(axis: Axes, group: GainGroup, above: float) -> None:
 
 
 def _adapted(flight: DrawnFlight, names: tuple[str, ...]) -> bool:
-    """Whether the flight has any of these gains, in any subsystem."""
+    """Return whether the flight has any of these gains, in any subsystem."""
     columns = [f"adaptation.{s}.{name}" for s in SUBSYSTEMS for name in names]
     return any(np.isfinite(flight.series[column]).any() for column in columns)
 
@@ -156,7 +156,7 @@ def _adaptation_of(
         values = series[f"adaptation.{subsystem}.{name}"]
         shown = series.flown & (np.isfinite(values) if group.signed else values > 0.0)
         if shown.any():
-            several = len(group.names) > 1  # then the colour tells the gain, the dash the flight
+            several = len(group.names) > 1  # then the colour marks the gain, the dash the flight
             axis.plot(
                 *panels.thin(series.time[shown], values[shown], 400),
                 color=style.GAINS[i] if several else style.FLIGHTS[number % len(style.FLIGHTS)],
@@ -173,7 +173,7 @@ def _errors(
     unit: str,
     digits: int,
 ) -> Figure:
-    """Error panels; a single flight gets its RMS and the paper's beside them."""
+    """Draw error panels; for a single flight with its RMS and the paper's beside them."""
     single = len(flights) == 1
     figure, axes = panels.stack(title, flights, drawn, right=0.875 if single else panels.RIGHT)
     if single:
@@ -198,34 +198,34 @@ def _errors(
     return figure
 
 
-# file name → (figure, caption in the report), in the order shown
+# file name → (figure, caption in the report), in the order of the page
 FIGURES: dict[str, tuple[Callable[[Sequence[DrawnFlight]], Figure | None], str]] = {
     "position_errors": (position_errors, "Position error, truth minus reference."),
     "attitude_errors": (
         attitude_errors,
-        "Attitude error; the reference of roll and pitch is what the position law asks for.",
+        "Attitude error; the reference of roll and pitch is the desired attitude of tau_p.",
     ),
     "arm_errors": (arm_errors, "Joint error of the arm, truth minus reference."),
-    "vehicle_inputs": (vehicle_inputs, "Forces and torques that the two vehicle laws ask for."),
-    "arm_inputs": (arm_inputs, "Joint torques that the arm law asks for."),
+    "vehicle_inputs": (vehicle_inputs, "Force and torque commands of the two vehicle laws."),
+    "arm_inputs": (arm_inputs, "Joint torque commands of the arm law."),
     "path": (path_figure, "Vehicle, arm and payload in the plane of the mission."),
     "payload": (payload, "The payload on its stand, on the magnet and on the mat."),
-    "adaptation": (adaptation, "Adapted gains and what drives them, in flight."),
+    "adaptation": (adaptation, "Adapted gains and their inputs, in flight."),
     "coupling": (
         coupling,
-        "The plant's true coupling force on each axis, less the weight fed forward, and what meets "
-        "it: the adaptive term, the feedback, and what the actuators do beyond the law's wish "
-        "(on the attitude the integrator of the autopilot). Means over 0.2 s.",
+        "The plant's true coupling force on each axis, minus the weight fed forward, and the terms "
+        "that compensate it: the adaptive term, the feedback, and the difference between actuators "
+        "and command (for the attitude: the integrator of the autopilot). Means over 0.2 s.",
     ),
     "lyapunov": (
         lyapunov,
         "The Appendix's Lyapunov functions with the constants K* of this flight, their three "
-        "terms, what the proof's differential inequality allows, and the ultimate bound.",
+        "terms, the solution of the proof's differential inequality, and the ultimate bound.",
     ),
     "setpoints": (
         setpoints,
-        "Body rates and collective thrust sent to the autopilot; the thrust that the motors truly "
-        "have / that their curve says, as identified in flight.",
+        "Body rates and collective thrust sent to the autopilot; ratio of the true thrust to that "
+        "of the assumed thrust curve, as identified in flight.",
     ),
 }
 

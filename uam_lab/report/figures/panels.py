@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
 BUCKETS = 900  # about one per pixel column of a panel
 RIGHT = 0.985  # right edge of the panels as part of the width
-# whether accepted → how a change of parameters is drawn, and its name
+# change of parameters accepted or refused → colour, line style, name in the legend
 CHANGES = (
     (True, style.CHANGE, "-", "parameters changed"),
     (False, style.REFUSED, ":", "change refused"),
@@ -31,7 +31,7 @@ MARGIN_S = 1.0  # shown before take-off and after touchdown
 
 @dataclass(frozen=True)
 class DrawnFlight:
-    """A flight to be drawn: its series, its name in a legend, its analysis if there is one."""
+    """A flight to draw: name in the legend, series, stability analysis if there is one."""
 
     label: str
     series: Series
@@ -42,7 +42,7 @@ class DrawnFlight:
 class Panel:
     """One axis over time: label with unit, column of the table, factor to the unit of the label.
 
-    Where nothing flies nothing is drawn, unless `on_ground` asks for it.
+    Ticks on the ground are drawn only with `on_ground`.
     """
 
     label: str
@@ -52,7 +52,7 @@ class Panel:
 
 
 def window(flights: Sequence[DrawnFlight]) -> tuple[float, float]:
-    """Mission times [s] between which anything flew, with a margin."""
+    """Return the mission times [s] of first take-off and last touchdown, with a margin."""
     times = [f.series.time[f.series.flown] for f in flights]
     times = [t for t in times if len(t)] or [f.series.time for f in flights]
     return min(t[0] for t in times) - MARGIN_S, max(t[-1] for t in times) + MARGIN_S
@@ -61,9 +61,9 @@ def window(flights: Sequence[DrawnFlight]) -> tuple[float, float]:
 def thin(
     time: np.ndarray, values: np.ndarray, buckets: int = BUCKETS
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Fewer points of the same picture: lowest and highest of each of `buckets` stretches.
+    """Reduce a line to the lowest and the highest point of each of `buckets` intervals.
 
-    Unlike taking every n-th point this keeps every peak. time, values: (ticks,).
+    This keeps every peak. time [s], values: (ticks,).
     """
     length = len(time) // buckets
     if length <= 2:
@@ -84,7 +84,7 @@ def stack(
     panel_height: float = 1.45,
     right: float = RIGHT,
 ) -> tuple[Figure, list[Axes]]:
-    """One panel below the other (column by column), one line per flight in each."""
+    """Draw panels below each other (column by column), with one line per flight in each."""
     rows = -(-len(panels) // columns)
     figure, axes = grid(title, rows, columns, panel_height, right)
     ordered = list(axes.T.flat)
@@ -97,7 +97,7 @@ def stack(
 def grid(
     title: str, rows: int, columns: int, panel_height: float, right: float = RIGHT
 ) -> tuple[Figure, np.ndarray]:
-    """An empty grid of panels (rows, columns) with a title and room for phase names and legend."""
+    """Return an empty grid of panels (rows, columns) with title, space for phases and legend."""
     height = rows * panel_height + 1.05
     figure = Figure(figsize=(style.WIDTH, height), layout=None)
     axes = figure.subplots(rows, columns, sharex=True, squeeze=False)
@@ -136,9 +136,9 @@ def finish(
     flights: Sequence[DrawnFlight],
     handles: Sequence[Line2D] | None = None,
 ) -> None:
-    """Phases, events, time axis and legend, common to every figure over time.
+    """Add phases, events, time axis and legend, common to all figures over time.
 
-    handles: what the legend names instead of flights and events.
+    handles: entries of the legend, instead of flights and events.
     """
     start, end = window(flights)
     axes[0, 0].set_xlim(start, end)
@@ -161,16 +161,16 @@ def finish(
 
 
 def bands(axis: Axes, series: Series, end: float) -> None:
-    """Every second phase on a light ground."""
+    """Shade every second phase."""
     for number, (name, begin, until) in enumerate(series.phase_spans()):
         if number % 2 == 1 and name not in ON_GROUND:
             axis.axvspan(begin, min(until, end), color=style.BAND, linewidth=0.0, zorder=0)
 
 
 def phase_names(figure: Figure, axis: Axes, series: Series, start: float, end: float) -> None:
-    """Names of the phases above a panel; one that would run into its neighbour is left out."""
+    """Write the phase names above a panel; a name that would overlap another is left out."""
     inches = figure.get_figwidth() * axis.get_position().width
-    per_character = 0.068 * (end - start) / inches  # seconds that one letter of 7.5 pt takes
+    per_character = 0.068 * (end - start) / inches  # width of a 7.5 pt letter [s]
     reached = -np.inf
     for name, begin, until in series.phase_spans():
         middle, half = 0.5 * (begin + until), 0.5 * per_character * len(name)
@@ -191,7 +191,7 @@ def phase_names(figure: Figure, axis: Axes, series: Series, start: float, end: f
 
 
 def mark_changes(axes: np.ndarray, series: Series, start: float, end: float) -> None:
-    """A thin line where parameters were changed, dotted where that was refused, and its number."""
+    """Mark each change of parameters by a thin line (dotted: refused) and its number."""
     shown = [row for row in change_rows.rows(series.info) if start <= row.time <= end]
     for accepted, colour, dashes, _ in CHANGES:
         times = [row.time for row in shown if row.accepted == accepted]
@@ -221,7 +221,7 @@ def mark_changes(axes: np.ndarray, series: Series, start: float, end: float) -> 
 
 
 def events(series: Series) -> list[tuple[float, str, str]]:
-    """(time [s], colour, name) of the magnet's switching."""
+    """Return (time [s], colour, name) of each switching of the magnet."""
     found = []
     for on, off in series.magnet_spans():
         found.append((on, style.PICK, "magnet on"))
@@ -232,7 +232,7 @@ def events(series: Series) -> list[tuple[float, str, str]]:
 def legend(
     figure: Figure, flights: Sequence[DrawnFlight], marked: Sequence[tuple[float, str, str]]
 ) -> None:
-    """Flights and events in the upper right corner."""
+    """Add the legend of flights and events in the upper right corner."""
     handles = [
         Line2D([], [], color=style.FLIGHTS[n % len(style.FLIGHTS)], label=flight.label)
         for n, flight in enumerate(flights)
@@ -242,18 +242,18 @@ def legend(
         Line2D([], [], color=colour, linewidth=0.9, linestyle=(0, (4, 2.5)), label=name)
         for name, colour in named
     ]
-    told = {row.accepted for row in change_rows.rows(flights[0].series.info)}
+    results = {row.accepted for row in change_rows.rows(flights[0].series.info)}
     handles += [
         Line2D([], [], color=colour, linewidth=0.8, linestyle=dashes, label=name)
         for accepted, colour, dashes, name in CHANGES
-        if accepted in told
+        if accepted in results
     ]
     handles += fault_marks.handles(flights[0].series.info)
     corner_legend(figure, handles)
 
 
 def corner_legend(figure: Figure, handles: Sequence[Line2D]) -> None:
-    """One row of handles in the upper right corner."""
+    """Add one row of legend entries in the upper right corner."""
     corner = (0.99, 1.0 - 0.02 / figure.get_figheight())
     figure.legend(
         handles=handles,

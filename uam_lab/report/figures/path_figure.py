@@ -1,4 +1,4 @@
-"""The mission seen from the side: paths in the x-z plane with poses of vehicle and arm on them."""
+"""Side view of the mission: paths in the x-z plane with poses of vehicle and arm."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ CHAIN = ("base", "link_1", "link_2", "magnet")
 
 
 def path_figure(flights: Sequence[DrawnFlight]) -> Figure:
-    """One panel per stretch of the flight: before, during and after the magnet was on."""
+    """Draw one panel per part of the flight: before, during and after the magnet is on."""
     stretches = _stretches(flights[0].series)
     columns = len(stretches)
     across, up = _limits(flights)
@@ -54,7 +54,7 @@ def path_figure(flights: Sequence[DrawnFlight]) -> Figure:
 
 
 def _limits(flights: Sequence[DrawnFlight]) -> tuple[tuple[float, float], tuple[float, float]]:
-    """Range of x and of z [m] that holds every path and the ground."""
+    """Return the ranges of x and z [m] that contain every path and the ground."""
     shown = [f.series.flown if f.series.flown.any() else slice(None) for f in flights]
     x = np.concatenate([f.series["truth.x"][s] for f, s in zip(flights, shown, strict=True)])
     z = np.concatenate([f.series["truth.z"][s] for f, s in zip(flights, shown, strict=True)])
@@ -65,7 +65,7 @@ def _limits(flights: Sequence[DrawnFlight]) -> tuple[tuple[float, float], tuple[
 
 
 def _stretches(series: Series) -> list[tuple[str, float, float]]:
-    """(name, first, last time [s]) of the parts of a flight between the magnet's switchings."""
+    """Return (name, first, last time [s]) of the parts between switchings of the magnet."""
     time = series.time[series.flown]
     if not len(time):
         return [("", float(series.time[0]), float(series.time[-1]))]
@@ -101,11 +101,11 @@ def _path(axis: Axes, series: Series, start: float, end: float, number: int) -> 
 
 
 def _poses(axis: Axes, poses: Poses, start: float, end: float) -> None:
-    """Vehicle, arm and payload, evenly spread along the way, the last one darkest."""
+    """Draw vehicle, arm and payload at points evenly spaced along the path, the last darkest."""
     series = poses.series
     first, last = series.row_at(start), series.row_at(end)
     steps = np.abs(np.diff(series.block("reference.")[first : last + 1, MOVING], axis=0))
-    # The arm's turning counts as well; a little per tick keeps a hover from having no length.
+    # joint motion counts too; the small constant gives a hover a length
     way = np.append(0.0, np.cumsum(steps @ [1.0, 1.0, 0.2, 0.2] + 1e-9))
     for number, part in enumerate(np.linspace(0.0, way[-1], POSES)):
         poses.put(first + int(np.searchsorted(way, part)))
@@ -155,7 +155,7 @@ def _scenery(axis: Axes, poses: Poses) -> None:
 
 
 def _boxed(axis: Axes, poses: Poses, geom: str, colour: str, opacity: float, order: int) -> None:
-    """A geom as its upright bounding rectangle, which is exact for what stands upright."""
+    """Draw a geom as its upright bounding rectangle; exact for an upright geom."""
     size = poses.model.geom(geom).size
     kind = poses.model.geom(geom).type[0]
     half = (size[0], size[1]) if kind == mujoco.mjtGeom.mjGEOM_CYLINDER else (size[0], size[2])

@@ -1,4 +1,4 @@
-"""Where every part of the vehicle was: the plant's own MJCF posed from a row of the series."""
+"""Poses of all parts of the vehicle: the plant's MJCF model set to a row of the series."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ OUT_OF_SIGHT = (50.0, 50.0, -1.0)
 
 
 class Poses:
-    """A MuJoCo model and data that can be put into any recorded state."""
+    """A MuJoCo model with its data, which can be set to any recorded state."""
 
     def __init__(self, series: Series, vehicle: Vehicle | None = None):
         mass = series.info.get("payload_mass_kg") or 0.0
@@ -31,7 +31,7 @@ class Poses:
         self._swing = joint("magnet_swing").qposadr[0]
 
     def put(self, row: int) -> None:
-        """Pose the model as in `row` of the series."""
+        """Set the model to the pose in `row` of the series."""
         values, qpos = self.series.values[row], self.data.qpos
         chi = values[CHI]
         qpos[self._base : self._base + 3] = chi[:3]
@@ -45,9 +45,9 @@ class Poses:
         mujoco.mj_kinematics(self.model, self.data)
 
     def body(self, name: str) -> np.ndarray:
-        """World position (3,) [m] of a body's frame."""
+        """Return the world position (3,) [m] of a body's frame."""
         return self.data.body(name).xpos.copy()
 
     def site(self, name: str) -> np.ndarray:
-        """World position (3,) [m] of a site."""
+        """Return the world position (3,) [m] of a site."""
         return self.data.site(name).xpos.copy()

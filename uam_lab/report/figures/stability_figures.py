@@ -1,4 +1,4 @@
-"""Figures of the stability analysis of one flight: V beside its bound, coupling beside supply."""
+"""Figures of the stability analysis: V and its bounds, coupling and compensating terms."""
 
 from __future__ import annotations
 
@@ -21,13 +21,13 @@ if TYPE_CHECKING:
 
 SYMBOLS = {"position": "p", "attitude": "q", "arm": "\\alpha"}
 BOUND, ENVELOPE = (0, (6, 2)), (0, (1, 1.4))
-LOWEST = 1e-6  # drawn of the tracking term, which is zero now and then
-MEAN_S = 0.2  # [s] over which forces are averaged: the law passes on the noise of the estimate
+LOWEST = 1e-6  # lower limit of the drawn tracking term, which may be zero
+MEAN_S = 0.2  # [s] averaging time of the forces, against the noise of the estimate
 COUPLING, ADAPTIVE, FEEDBACK, ACTUATORS = style.INK, *style.FLIGHTS[:2], "#9aa5af"
 
 
 def lyapunov(flights: Sequence[DrawnFlight]) -> Figure | None:
-    """V, V_p, V_q, V_alpha with their terms and bounds; None unless one flight was analysed."""
+    """Draw V, V_p, V_q, V_alpha with terms and bounds; None unless one analysis is given."""
     found = _only(flights)
     if found is None:
         return None
@@ -48,7 +48,7 @@ def lyapunov(flights: Sequence[DrawnFlight]) -> Figure | None:
         _key("tracking", style.GAINS[1]),
         _key("gains", style.GAINS[2]),
         _key("$\\zeta$", style.GAINS[3]),
-        _key("allowed by $\\dot V\\leq-\\varrho V+\\gamma$", style.DROP, 1.0, ENVELOPE),
+        _key("bound by $\\dot V\\leq-\\varrho V+\\gamma$", style.DROP, 1.0, ENVELOPE),
         _key("ultimate bound", style.DROP, 1.0, BOUND),
     ]
     panels.finish(figure, axes, flights, handles)
@@ -56,11 +56,11 @@ def lyapunov(flights: Sequence[DrawnFlight]) -> Figure | None:
 
 
 def coupling(flights: Sequence[DrawnFlight]) -> Figure | None:
-    """The plant's true coupling force per axis and what meets it; None unless one was analysed."""
+    """Draw the true coupling force and its compensation; None unless one analysis is given."""
     found = _only(flights)
     if found is None:
         return None
-    figure, axes = panels.grid("Coupling force, and what supplies it", 4, 2, 1.45)
+    figure, axes = panels.grid("Coupling force and its compensation", 4, 2, 1.45)
     figure.subplots_adjust(wspace=0.26)  # small torques have long labels
     supply = found.supply
     drawn = (
@@ -84,14 +84,14 @@ def coupling(flights: Sequence[DrawnFlight]) -> Figure | None:
         _key("true coupling", COUPLING, 1.4),
         _key("adaptive term", ADAPTIVE, 1.4),
         _key("feedback Λξ", FEEDBACK),
-        _key("actuators beyond τ", ACTUATORS),
+        _key("actuators − τ", ACTUATORS),
     ]
     panels.finish(figure, axes, flights, handles)
     return figure
 
 
 def moving_mean(time: np.ndarray, values: np.ndarray) -> np.ndarray:
-    """Mean of values (m,) over MEAN_S around each tick; shorter at the ends."""
+    """Return the mean of values (m,) over MEAN_S around each time (m,) [s]; shorter at the ends."""
     width = max(1, round(MEAN_S / float(np.median(np.diff(time)))))
     if len(values) <= width:
         return values
@@ -101,7 +101,7 @@ def moving_mean(time: np.ndarray, values: np.ndarray) -> np.ndarray:
 
 
 def _only(flights: Sequence[DrawnFlight]):
-    """The analysis of the flight, if there is but one."""
+    """Return the analysis of the flight if there is exactly one flight."""
     return flights[0].stability if len(flights) == 1 else None
 
 
@@ -110,7 +110,7 @@ def _terms(subsystem: Subsystem) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
 
 
 def _bounded(axis: Axes, time: np.ndarray, value: np.ndarray, comparison: ComparisonSystem) -> None:
-    """V with the ultimate bound and what the differential inequality allows until then."""
+    """Draw V, its ultimate bound and the solution of the differential inequality."""
     axis.plot(*panels.thin(time, value), color=style.INK, linewidth=1.5, zorder=4)
     envelope = comparison.envelope(value[0], time - time[0])
     axis.plot(time, envelope, color=style.DROP, linewidth=1.0, linestyle=ENVELOPE, zorder=3.5)

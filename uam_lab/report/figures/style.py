@@ -1,4 +1,4 @@
-"""Colours and type of every figure, in one place so that they read as one set."""
+"""Colours and fonts of all figures."""
 
 from __future__ import annotations
 
@@ -51,11 +51,11 @@ SETTINGS = {
     "legend.fontsize": 8.5,
     "figure.facecolor": "white",
     "savefig.facecolor": "white",
-    # The same flight gives the same bytes.
+    # constant, so that the same flight gives the same bytes
     "svg.hashsalt": "uam",
 }
 
 
 def styled() -> AbstractContextManager[None]:
-    """Context in which figures are drawn and saved."""
+    """Return the context in which figures are drawn and saved."""
     return mpl.rc_context(SETTINGS)

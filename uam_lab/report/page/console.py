@@ -1,4 +1,4 @@
-"""For the terminal: progress of the report, and the table at the end of a flight."""
+"""Terminal output: progress of the report, and the table at the end of a flight."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from uam_lab.report.facts import flight_summary
 
 @contextmanager
 def reporting(console: Console) -> Iterator[Callable[[str], None]]:
-    """Progress for `build_report`: a live line on a terminal, one line per kind of step elsewhere.
+    """Progress for `build_report`: a live line on a terminal, otherwise one line per kind of step.
 
     with reporting(console) as progress:
         build_report(directory, progress)
@@ -26,19 +26,19 @@ def reporting(console: Console) -> Iterator[Callable[[str], None]]:
         with console.status("report") as status:
             yield lambda text: status.update(f"report: {text}")
         return
-    said: set[str] = set()
+    printed: set[str] = set()
 
-    def say(text: str) -> None:
+    def show(text: str) -> None:
         kind = text.split()[0]
-        if kind not in said:
-            said.add(kind)
+        if kind not in printed:
+            printed.add(kind)
             console.print(f"report: {text}", highlight=False, markup=False)
 
-    yield say
+    yield show
 
 
 def summary(metrics: Mapping[str, Any], directory: Path | None = None) -> Group:
-    """Verdict, RMS errors beside the paper's, payload, landing, folder; print it with rich."""
+    """Return verdict, RMS errors beside the paper's, payload, landing and folder for rich."""
     done = metrics["mission_completed"]
     headline = Text(flight_summary.verdict(metrics), style="bold green" if done else "bold red")
     for shortfall in metrics.get("shortfalls") or []:
@@ -47,7 +47,7 @@ def summary(metrics: Mapping[str, Any], directory: Path | None = None) -> Group:
 
 
 def error_table(metrics: Mapping[str, Any]) -> Table:
-    """RMS over the whole flight beside the paper's."""
+    """Return the table of the RMS errors of the whole flight beside the paper's."""
     table = Table(title="RMS error, take-off to touchdown command", title_justify="left")
     table.add_column("")
     for heading in ("this flight", "paper", "largest"):
@@ -73,16 +73,16 @@ def error_table(metrics: Mapping[str, Any]) -> Table:
 
 
 def facts(metrics: Mapping[str, Any], directory: Path | None) -> Table:
-    """Payload, landing, times and folder, one per line."""
+    """Return the table of payload, landing, times and folder, one per line."""
     table = Table.grid(padding=(0, 2))
     table.add_column(style="dim")
     table.add_column(overflow="fold")
     table.add_row("controller", catalogue.label(metrics["controller"]))
     table.add_row("payload", flight_summary.payload_story(metrics))
     table.add_row("landing", flight_summary.landing_story(metrics))
-    stepped_in = flight_summary.supervision_story(metrics)
-    if stepped_in:
-        table.add_row("supervisor", stepped_in)
+    interventions = flight_summary.supervision_story(metrics)
+    if interventions:
+        table.add_row("supervisor", interventions)
     factor = metrics.get("real_time_factor")
     speed = f", {factor:.2f} × real time" if factor else ""
     table.add_row("flown", f"{metrics['duration_s']:.1f} s{speed}")

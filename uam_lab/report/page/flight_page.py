@@ -1,4 +1,4 @@
-"""report.html: one page that shows the whole flight, without any request to the network."""
+"""report.html: one page about the whole flight; it loads nothing from the network."""
 
 from __future__ import annotations
 
@@ -30,9 +30,9 @@ FACTS = (
 
 
 def write_page(directory: Path, rendered: Rendered | None = None) -> Path:
-    """Write `directory`/report.html from what the result folder has, and return its path.
+    """Write `directory`/report.html from the files in the result folder; return its path.
 
-    rendered: what the renderer said, if it ran; else the pictures that are there are shown.
+    rendered: result of the renderer; without it the page shows the existing pictures.
     """
     metrics = _json(directory / "metrics.json")
     info = _json(directory / "info.json")
@@ -71,7 +71,7 @@ def write_page(directory: Path, rendered: Rendered | None = None) -> Path:
 
 
 def _figures(folder: Path) -> list[tuple[str, str, str]]:
-    """(name, caption, data URI) of the figures that were drawn."""
+    """Return (name, caption, data URI) of the figures in `folder`."""
     return [
         (name, caption, _embedded(folder / f"{name}.png"))
         for name, (_, caption) in FIGURES.items()
@@ -80,7 +80,7 @@ def _figures(folder: Path) -> list[tuple[str, str, str]]:
 
 
 def _stability(file: Path) -> dict[str, Any] | None:
-    """What the page says about the Appendix; None where nothing was analysed."""
+    """Return the texts of the stability section; None without an analysis."""
     found = _json(file)
     if not found:
         return None
@@ -92,7 +92,7 @@ def _stability(file: Path) -> dict[str, Any] | None:
 
 
 def _embedded(file: Path | None) -> str | None:
-    """The file as a data URI, if there is one."""
+    """Return the file as a data URI, None without a file."""
     return None if file is None else html.embedded(file)
 
 

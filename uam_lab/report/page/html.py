@@ -1,4 +1,4 @@
-"""What every page of ours is made with: one environment for the templates, pictures within it."""
+"""Template environment of the HTML pages, and pictures as data URIs."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ MEDIA = {".png": "image/png", ".mp4": "video/mp4"}
 
 
 def template(package: str, name: str) -> jinja2.Template:
-    """Return a template that lies beside the code of `package`; unknown names are refused."""
+    """Return a template from the folder of `package`; unknown variables raise an error."""
     environment = jinja2.Environment(
         loader=jinja2.PackageLoader(package, "."),
         autoescape=True,

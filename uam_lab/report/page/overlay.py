@@ -1,4 +1,4 @@
-"""Several flights over one another: the figures, and a page with them and the errors of each."""
+"""Overlay of several flights: common figures, and a page with them and the errors of each."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ def build_overlay(
 
 
 def labelled(directories: Sequence[Path]) -> list[str]:
-    """A name for each result folder: its own, with its parents' where two have the same."""
+    """Return a label per result folder: its name, or its whole path if two names are equal."""
     names = [directory.resolve().name for directory in directories]
     return [
         name if names.count(name) == 1 else str(directory)
@@ -48,7 +48,7 @@ def _table(
     digits: int,
     names: Sequence[str],
 ) -> dict:
-    """RMS of one group of coordinates, a row per flight."""
+    """Return the RMS errors of one group of coordinates, one row per flight."""
     rows = []
     for flight in flights:
         found = metrics.errors(flight.series)[group]

@@ -1,4 +1,4 @@
-"""Words on pictures."""
+"""Captions on pictures, and the strip of snapshots."""
 
 from __future__ import annotations
 
@@ -16,13 +16,13 @@ SHADE = (20, 30, 40, 150)
 
 @cache
 def font(size: int, bold: bool = False) -> ImageFont.FreeTypeFont:
-    """DejaVu Sans as matplotlib ships it, at `size` pixels."""
+    """Return DejaVu Sans, as shipped with matplotlib, at `size` pixels."""
     name = "DejaVuSans-Bold.ttf" if bold else "DejaVuSans.ttf"
     return ImageFont.truetype(str(Path(matplotlib.get_data_path()) / "fonts/ttf" / name), size)
 
 
 def labelled(pixels: np.ndarray, left: str, right: str, part: float = 0.07) -> Image.Image:
-    """The picture (h, w, 3) with text at both ends of a translucent bar, `part` of its height."""
+    """Return the picture (h, w, 3) uint8 with a translucent caption bar, `part` of its height."""
     picture = Image.fromarray(pixels)
     height = round(part * picture.height)
     bar = Image.new("RGBA", (picture.width, height), SHADE)
@@ -36,7 +36,7 @@ def labelled(pixels: np.ndarray, left: str, right: str, part: float = 0.07) -> I
 
 
 def strip(pictures: list[Image.Image], columns: int = 3, width: int = 1560) -> Image.Image:
-    """The pictures side by side in rows, `width` pixels in all."""
+    """Return the pictures side by side in rows, `width` pixels in total."""
     gap = 6
     columns = min(columns, len(pictures))
     each = (width - gap * (columns - 1)) // columns

@@ -1,7 +1,7 @@
-"""The recorded flight as pictures: camera, light and paths around the plant's own model.
+"""Pictures of a recorded flight: the plant's model with camera, light and paths.
 
-MuJoCo reads MUJOCO_GL when it is imported, so this belongs in a process of its own with
-MUJOCO_GL=egl; see `rendering`.
+MuJoCo reads MUJOCO_GL at import, so this runs in a separate process with MUJOCO_GL=egl; see
+`rendering`.
 """
 
 from __future__ import annotations
@@ -12,12 +12,12 @@ import numpy as np
 from uam_lab.report.figures.poses import Poses
 from uam_lab.results.timeseries import Series
 
-FOLLOW = 0.62  # part of the vehicle's way that the camera goes along, so that motion is seen
+FOLLOW = 0.62  # camera motion / vehicle motion; below 1, so that the motion is visible
 SMOOTHING_S = 2.0
 CAMERA = {"azimuth": 108.0, "elevation": -11.0, "distance": 2.0, "height": 0.52}
 TRAIL_RGBA = (0.12, 0.37, 0.66, 0.95)
 REFERENCE_RGBA = (0.35, 0.40, 0.45, 0.55)
-SEGMENTS = 140  # of a path; a reference is drawn in every second one
+SEGMENTS = 140  # of a path; of the reference every second one is drawn
 GEOMS = 2000
 
 
@@ -25,7 +25,7 @@ class Scene:
     """Renders any row of a series at a fixed size."""
 
     def __init__(self, series: Series, width: int, height: int):
-        """width, height: pixels. Raises what `mujoco.Renderer` raises where there is no OpenGL."""
+        """width, height: pixels. Without OpenGL the errors of `mujoco.Renderer` are raised."""
         self.poses = Poses(series)
         self.series = series
         self._thickness = height / 480  # lines are measured in pixels
@@ -40,13 +40,13 @@ class Scene:
         self._path_rows = _path_rows(series)
 
     def close(self) -> None:
-        """Give the OpenGL context back."""
+        """Release the OpenGL context."""
         self._renderer.close()
 
     def picture(self, row: int) -> np.ndarray:
-        """Image (height, width, 3) uint8 of a row, with the path flown so far and the reference."""
+        """Return the image (height, width, 3) uint8 of a row, with flown path and reference."""
         self.poses.put(row)
-        # Positions alone are not enough to draw: cameras and lights follow from this.
+        # the renderer also needs the poses of cameras and lights
         mujoco.mj_camlight(self.poses.model, self.poses.data)
         x, y = self._look_at[row]
         self._camera.lookat[:] = x, y, CAMERA["height"]
@@ -76,7 +76,7 @@ class Scene:
 
 
 def _light(model: mujoco.MjModel) -> None:
-    """Bright surroundings and light shadows; no mirror in the floor, which costs a pass."""
+    """Set bright surroundings and light shadows; no floor reflection (one render pass less)."""
     model.vis.headlight.ambient[:] = 0.50
     model.vis.headlight.diffuse[:] = 0.22
     model.light_diffuse[:] = 0.42
@@ -88,7 +88,7 @@ def _light(model: mujoco.MjModel) -> None:
 
 
 def _smooth(series: Series) -> np.ndarray:
-    """Horizontal path (ticks, 2) of the vehicle, averaged over SMOOTHING_S around each tick."""
+    """Return the vehicle's path x, y (ticks, 2) [m, world], averaged over SMOOTHING_S."""
     path = np.column_stack([series["truth.x"], series["truth.y"]])
     path = np.nan_to_num(path)
     time = series.time
@@ -101,7 +101,7 @@ def _smooth(series: Series) -> np.ndarray:
 
 
 def _path_rows(series: Series) -> np.ndarray:
-    """Rows of the flight, spread evenly along the reference's way rather than over time."""
+    """Return airborne rows, evenly spaced along the path of the reference, not over time."""
     flown = np.flatnonzero(series.flown)
     if len(flown) < 2:
         return flown

@@ -2,9 +2,9 @@
 
     python -m uam_lab.report.video.flight_video DIR [--no-video]
 
-renders the flight in the result folder DIR; `render` does so in a child process, because the
-choice of OpenGL has to be made before MuJoCo is imported and a broken driver may take its process
-with it. The child writes its progress to standard output, a line per step.
+renders the flight in the result folder DIR. `render` does so in a child process: MuJoCo selects
+its OpenGL at import, and a broken driver may crash the process. The child writes its progress to
+standard output, one line per step.
 """
 
 from __future__ import annotations
@@ -24,20 +24,20 @@ from uam_lab.results.atomic import replacing
 from uam_lab.results.timeseries import Series
 
 SNAPSHOT_SIZE = (1280, 720)
-CAPTION_PART = 0.11  # of the height, to be read in the strip
+CAPTION_PART = 0.11  # of the height; large enough for the strip
 SNAPSHOTS, STRIP, VIDEO = "snapshots", "snapshots.png", "flight.mp4"
 PLATFORM = "egl"  # needs neither screen nor GPU
 PROGRESS = "progress: "
 NO_RENDERER = 3  # exit status of the child
 HOW_TO_GET_ONE = (
-    "no offscreen renderer found, so no pictures of the flight; "
+    "no offscreen renderer found, the report has no pictures of the flight; "
     "on Debian or Ubuntu: sudo apt install libegl1 libgl1-mesa-dri"
 )
 
 
 @dataclass(frozen=True)
 class Rendered:
-    """What there is now; `problem` is a line for the user, empty when all went well."""
+    """The existing pictures; `problem` is one line for the user, empty without a problem."""
 
     snapshots: tuple[Path, ...] = ()
     strip: Path | None = None
@@ -51,9 +51,9 @@ def render(
     progress: Callable[[str], None] = lambda text: None,
     platforms: Sequence[str] | None = None,
 ) -> Rendered:
-    """Render the flight in `directory` to `directory`/figures; never raises for want of OpenGL.
+    """Render the flight in `directory` to `directory`/figures; missing OpenGL is no error.
 
-    platforms: values of MUJOCO_GL to try; by default the user's, if he has set it, and PLATFORM.
+    platforms: values of MUJOCO_GL to try; default: that of the environment, then PLATFORM.
     """
     if platforms is None:
         platforms = dict.fromkeys(filter(None, (os.environ.get("MUJOCO_GL"), PLATFORM)))
@@ -72,7 +72,7 @@ def render(
 def _child(
     directory: Path, video: bool, progress: Callable[[str], None], platform: str
 ) -> tuple[int, str]:
-    """Run this module as a process; (exit status, last line that was not progress)."""
+    """Run this module as a process; return exit status and last line that is no progress."""
     command = [sys.executable, "-m", "uam_lab.report.video.flight_video", str(directory)]
     child = subprocess.Popen(
         command if video else [*command, "--no-video"],
@@ -97,7 +97,7 @@ def _child(
 
 
 def existing(directory: Path) -> Rendered:
-    """The pictures that `directory` has."""
+    """Return the existing pictures in `directory`."""
     figures = directory / "figures"
     strip, video = figures / STRIP, figures / VIDEO
     return Rendered(
@@ -108,12 +108,12 @@ def existing(directory: Path) -> Rendered:
 
 
 def snapshot_times(series: Series) -> list[tuple[float, str]]:
-    """(mission time [s], caption): the scenario's, of those reached; else six over the flight."""
+    """Return (mission time [s], caption): the reached ones of the scenario, else six times."""
     flown = series.time[series.flown]
     if not len(flown):
         return [(float(series.time[-1]), "on the ground")]
-    wanted = [(float(t), str(c)) for t, c in series.info.get("snapshots") or []]
-    reached = [(t, c) for t, c in wanted if t <= flown[-1]]
+    planned = [(float(t), str(c)) for t, c in series.info.get("snapshots") or []]
+    reached = [(t, c) for t, c in planned if t <= flown[-1]]
     if reached:
         return reached
     times = np.linspace(flown[0], flown[-1], 8)[1:-1]
@@ -124,7 +124,7 @@ def snapshot_times(series: Series) -> list[tuple[float, str]]:
 
 
 def render_here(directory: Path, video: bool, report: Callable[[str], None]) -> None:
-    """Render in this process, which must have been started with MUJOCO_GL set."""
+    """Render in this process; MUJOCO_GL must be set before its start."""
     series = timeseries.read(directory / "timeseries.parquet")
     report("opening the renderer")
     figures = directory / "figures"
@@ -139,10 +139,10 @@ def _snapshots(series: Series, figures: Path, report: Callable[[str], None]) -> 
     folder = figures / SNAPSHOTS
     folder.mkdir(parents=True, exist_ok=True)
     scene = _scene(series, SNAPSHOT_SIZE)
-    wanted = snapshot_times(series)
+    snapshots = snapshot_times(series)
     pictures = []
-    for number, (time, caption) in enumerate(wanted):
-        report(f"snapshot {number + 1} of {len(wanted)}")
+    for number, (time, caption) in enumerate(snapshots):
+        report(f"snapshot {number + 1} of {len(snapshots)}")
         pixels = scene.picture(series.row_at(time))
         pictures.append(captions.labelled(pixels, caption, f"t = {time:.1f} s", CAPTION_PART))
         with replacing(folder / f"{'abcdefghijklmnopqrstuvwxyz'[number % 26]}.png") as temporary:
@@ -157,30 +157,30 @@ def _video(series: Series, path: Path, report: Callable[[str], None]) -> None:
 
     scene = _scene(series, video.SIZE)
 
-    def say(done: int, of: int) -> None:
+    def show(done: int, of: int) -> None:
         if done % 10 == 0 or done == of:
             report(f"video {100 * done // of} %")
 
-    video.write(series, scene.picture, path, say)
+    video.write(series, scene.picture, path, show)
     scene.close()
 
 
 class NoRenderer(RuntimeError):
-    """There is no OpenGL that draws without a screen."""
+    """No OpenGL can draw without a screen."""
 
 
 def _scene(series: Series, size: tuple[int, int]):
     try:
-        # Already the import of MuJoCo fails where the library that MUJOCO_GL names is missing.
+        # The import of MuJoCo fails if the library that MUJOCO_GL selects is missing.
         from uam_lab.report.video.flight_pictures import Scene
 
         return Scene(series, *size)
-    except Exception as error:  # MuJoCo, PyOpenGL and GLFW each have their own
+    except Exception as error:  # MuJoCo, PyOpenGL and GLFW raise different types
         raise NoRenderer(f"{type(error).__name__}: {error}") from error
 
 
 def main(arguments: list[str] | None = None) -> int:
-    """Command line, see the module's text."""
+    """Run the command line, see the docstring of the module."""
     parser = argparse.ArgumentParser(prog="python -m uam_lab.report.video.flight_video")
     parser.add_argument("directory", type=Path)
     parser.add_argument("--no-video", action="store_true")

@@ -1,4 +1,4 @@
-"""A short video of a flight: H.264, sped up, phase and time written on it."""
+"""A short video of a flight: H.264, accelerated, with phase and time as caption."""
 
 from __future__ import annotations
 
@@ -21,12 +21,12 @@ BITS_PER_SECOND = 1_600_000  # keeps the longest video below 4 MB
 
 
 def speed_up(duration: float) -> int:
-    """Whole number by which a flight of `duration` [s] is sped up."""
+    """Return the integer speed factor of the video for a flight of `duration` [s]."""
     return max(1, math.ceil(duration / LONGEST_S))
 
 
 def frame_rows(series: Series) -> tuple[np.ndarray, int]:
-    """Rows of the series that become frames, and the speed-up."""
+    """Return the rows (frames,) of the series for the video, and the speed factor."""
     flown = series.time[series.flown]
     start, end = (flown[0], flown[-1]) if len(flown) else (series.time[0], series.time[-1])
     start, end = max(start - MARGIN_S, series.time[0]), min(end + MARGIN_S, series.time[-1])
@@ -42,7 +42,7 @@ def write(
     path: Path,
     progress: Callable[[int, int], None] = lambda done, of: None,
 ) -> None:
-    """Write `path` (.mp4) from picture(row) → (height, width, 3) of SIZE; progress(done, of)."""
+    """Write `path` (.mp4) from picture(row) → uint8 (height, width, 3); progress(done, of)."""
     rows, speed = frame_rows(series)
     with replacing(path) as temporary:
         encoder = imageio_ffmpeg.write_frames(
