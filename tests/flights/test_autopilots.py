@@ -105,7 +105,7 @@ def test_a_flight_controller_on_a_serial_line_flies_the_simulated_vehicle(
         (["--autopilot", "udp:127.0.0.1:0"], "port 0 is not in 1..65535"),
         (["--autopilot", "serial:/dev/null:921600"], "needs --clock realtime"),
         (["--autopilot", "udp:127.0.0.1:14580", "--engine", "direct"], "needs --engine ros"),
-        (["--gcs", "tcp:127.0.0.1:14550"], "--gcs is udp:HOST:PORT"),
+        (["--gcs", "tcp:127.0.0.1:14550"], "--gcs must be udp:HOST:PORT"),
     ],
 )
 def test_a_wrong_autopilot_is_refused_in_one_line(fly, options, said):

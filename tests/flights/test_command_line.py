@@ -104,7 +104,7 @@ def test_a_result_folder_that_cannot_be_written_is_refused(capsys, tmp_path):
 def test_a_folder_with_a_flight_in_it_is_not_overwritten(capsys, tmp_path):
     (tmp_path / "old").mkdir()
     (tmp_path / "old" / "metrics.json").write_text("{}")
-    assert "already holds a flight" in refused(capsys, "--out", "old")
+    assert "already contains a flight" in refused(capsys, "--out", "old")
     assert (tmp_path / "old" / "metrics.json").read_text() == "{}"
 
 

@@ -58,7 +58,7 @@ def test_a_killed_scene_is_announced_and_the_flight_goes_on(fly, short_scenario)
     flight.until_phase("take-off")
     os.kill(flight.children()["scene"], signal.SIGKILL)
     assert flight.wait() == 0
-    assert "scene was killed by SIGKILL; the flight goes on without it" in flight.said
+    assert "scene was killed by SIGKILL; the flight continues without it" in flight.said
     figures = json.loads((flight.out / "metrics.json").read_text())
     assert figures["mission_completed"]
     assert_nothing_left(flight, [])
@@ -88,7 +88,7 @@ def test_a_node_that_hangs_is_named_and_killed(fly, short_scenario):
     assert flight.wait() == 1
     assert "no effort for t = " in flight.complained
     assert "arm_controller is silent" in flight.complained
-    assert "had to be killed: arm_controller" in flight.said
+    assert "did not stop and were killed: arm_controller" in flight.said
     assert_nothing_left(flight, list(nodes.values()))
     kept(flight)
 
@@ -134,5 +134,5 @@ def test_who_does_not_find_the_others_is_started_once_more(short_scenario, tmp_p
         said.seek(0)
         text = said.read()
     assert text.count("processes in ROS domain") == 2
-    assert "no progress for 0.1 s" in text and "starting once more" in text
+    assert "no progress for 0.1 s" in text and "starting again" in text
     assert "no progress for 0.1 s" in flown.failure and flown.series is None

@@ -44,7 +44,7 @@ def test_faults_come_when_they_should_and_the_log_knows_them(fly, short_scenario
     options = [word for text in (*IN_BOTH, *IN_NODES) for word in ("--fault", text)]
     flight = fly("--scenario", str(short_scenario), *options)
     assert flight.wait() == 0, flight.said + flight.complained
-    assert "scene was killed by SIGKILL; the flight goes on without it" in flight.said
+    assert "scene was killed by SIGKILL; the flight continues without it" in flight.said
     figures = json.loads((flight.out / "metrics.json").read_text())
     found = {fault["fault"]: fault for fault in figures["faults"]}
     assert len(found) == len(IN_BOTH + IN_NODES)

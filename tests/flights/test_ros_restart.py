@@ -29,7 +29,7 @@ def states(flight):
 def test_a_killed_controller_is_started_again_and_the_flight_goes_on(fly, victim):
     flight = fly("--scenario", "hover", "--fault", f"node_kill@hover+0.5:node={victim}")
     assert flight.wait() == 0, flight.said + flight.complained
-    assert f"{victim} was killed by SIGKILL; started again" in flight.said
+    assert f"{victim} was killed by SIGKILL; restarted" in flight.said
     figures, passed = states(flight)
     assert figures["mission_completed"]
     held = any(state == "holding" for state, _ in passed)  # or it was back before that
@@ -62,7 +62,7 @@ def test_a_controller_that_is_back_has_what_was_changed_in_flight(fly):
         asked = [Parameter("tilt_max", value=0.3).to_parameter_msg()]
         (result,) = called(SetParameters, "set_parameters", parameters=asked).results
         assert result.successful, result.reason
-        flight.until(lambda: "started again" in flight.said, "the restart")
+        flight.until(lambda: "; restarted" in flight.said, "the restart")
         (kept,) = called(GetParameters, "get_parameters", names=["tilt_max"]).values
     assert kept.double_value == 0.3
     assert flight.wait() == 0, flight.said + flight.complained

@@ -1,4 +1,4 @@
-"""What a node that is started again is told of the changes in flight."""
+"""A restarted node gets the parameters changed in flight."""
 
 import rclpy
 from rclpy.node import Node

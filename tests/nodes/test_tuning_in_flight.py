@@ -242,7 +242,7 @@ def test_a_profile_is_taken_by_all_nodes_or_by_none(start, probe, switch, tmp_pa
     assert set(changed["arm_controller"]) == {"varpi", "nu"}
     assert get(probe, "arm_controller", "varpi") == [0.9]
     probe.until(lambda: len(changes) == 2, "both changes told")
-    with pytest.raises(SwitchRefused, match="the law modular flies and cannot change to asmc1"):
+    with pytest.raises(SwitchRefused, match="active law modular cannot change to asmc1 in flight"):
         switch.switch(load_profile("asmc1"))
 
     # one node refuses what only it can know

@@ -37,7 +37,7 @@ def test_latest_that_is_a_folder_of_the_user_stays(here, capsys):
     folder = ResultFolder.create("hover", "modular", now=NOON)
     assert folder.path.is_dir()
     assert not (here / "results/latest").is_symlink()
-    assert "stays as it is" in capsys.readouterr().err
+    assert "is not changed" in capsys.readouterr().err
 
 
 def test_a_folder_of_the_users_choice_is_used_unless_it_holds_a_flight(here):
@@ -46,7 +46,7 @@ def test_a_folder_of_the_users_choice_is_used_unless_it_holds_a_flight(here):
     assert not (here / "results").exists()
     ResultFolder.create("hover", "modular", out=here / "a/b")
     folder.write_metrics({"seed": 1})
-    with pytest.raises(ResultFolderError, match="already holds a flight"):
+    with pytest.raises(ResultFolderError, match="already contains a flight"):
         ResultFolder.create("hover", "modular", out=here / "a/b")
     assert json.loads(folder.metrics.read_text()) == {"seed": 1}
     inside = ResultFolder.create("hover", "modular", out=here / "results/mine")

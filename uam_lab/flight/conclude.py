@@ -1,4 +1,4 @@
-"""After a flight: the result folder is completed, and metrics.json says how it went."""
+"""After a flight: complete the result folder with table, facts and metrics."""
 
 from __future__ import annotations
 
@@ -14,12 +14,12 @@ from uam_lab.results.result_folder import ResultFolder
 
 
 def command_line() -> str:
-    """What the user typed."""
+    """Return the command line of the user."""
     return shlex.join(["uam", *sys.argv[1:]])
 
 
-def asked(settings: FlightSettings, command: str) -> dict[str, Any]:
-    """What a flight is asked to be."""
+def settings_facts(settings: FlightSettings, command: str) -> dict[str, Any]:
+    """Return the settings of a flight as facts for info.json and the log."""
     scenario = settings.scenario
     return {
         "controller": settings.controller,
@@ -41,15 +41,15 @@ def asked(settings: FlightSettings, command: str) -> dict[str, Any]:
 def conclude(
     settings: FlightSettings, folder: ResultFolder, outcome: Outcome, command: str
 ) -> dict[str, Any] | None:
-    """Write metrics, table and facts; returns the metrics, None where nothing was recorded."""
+    """Write metrics, table and facts; return the metrics, None if nothing was recorded."""
     folder.write_versions()
-    return complete(folder, asked(settings, command), outcome)
+    return complete(folder, settings_facts(settings, command), outcome)
 
 
 def complete(
     folder: ResultFolder, known: Mapping[str, Any], outcome: Outcome
 ) -> dict[str, Any] | None:
-    """Write metrics, table and facts of a flight of which is `known` what it was asked to be."""
+    """Write metrics, table and facts of a flight; known: its settings, see `settings_facts`."""
     if outcome.partial:
         outcome.notes.insert(0, f"partial: the recording ends with the flight ({outcome.reason})")
     info = {

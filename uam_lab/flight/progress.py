@@ -1,4 +1,4 @@
-"""What the user sees while a flight runs: a live panel on a terminal, plain lines elsewhere."""
+"""Progress of a flight: a live panel on a terminal, otherwise plain lines."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ PLAIN_INTERVAL = 10.0  # [s] of mission time between two plain lines within a ph
 
 @dataclass(frozen=True)
 class Status:
-    """Where a flight is. Errors are norms: [m], [rad], [rad]; time: mission time [s]."""
+    """State of a flight. Errors are norms: [m], [rad], [rad]; time: mission time [s]."""
 
     phase: str
     time: float
@@ -30,7 +30,7 @@ class Progress:
     """Shows messages and the newest status. A context manager."""
 
     def __init__(self, console: Console | None = None, duration: float | None = None):
-        """duration: how long the mission will take [s], if known."""
+        """duration: planned duration of the mission [s], if known."""
         self.console = console or Console()
         self._duration = duration
         self._live: Live | None = None
@@ -46,11 +46,11 @@ class Progress:
         self.finish()
 
     def message(self, text: str) -> None:
-        """One line that stays."""
+        """Print one permanent line."""
         self.console.print(text, highlight=False, markup=False)
 
     def update(self, status: Status) -> None:
-        """Show the newest status, which is kept as `last`."""
+        """Show the newest status and store it as `last`."""
         self.last = status
         if not self.console.is_terminal:
             self._plain(status)
@@ -63,7 +63,7 @@ class Progress:
         self._live.update(self._panel(status))
 
     def finish(self) -> None:
-        """Take the live panel away."""
+        """Remove the live panel."""
         if self._live is not None:
             self._live.stop()
             self._live = None

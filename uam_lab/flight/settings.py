@@ -1,4 +1,4 @@
-"""What a flight is asked to be: the command line's options, checked, before anything starts."""
+"""Settings of a flight: the options of the command line, checked before anything starts."""
 
 from __future__ import annotations
 
@@ -21,26 +21,26 @@ from uam_sim_bridge.px4.px4_installation import Px4Installation
 ENGINES = ("ros", "direct")
 CLOCKS = ("lockstep", "realtime")
 BUILTIN, PX4 = "builtin", "px4"
-# Nodes that a user's own can stand in for: their inputs and outputs are all there is to them.
+# Nodes that the user may replace by own nodes with the same topics.
 REPLACEABLE = ("state_estimator", "position_controller", "attitude_controller", "arm_controller")
 COCKPIT = "cockpit"
 LOG_LIMIT = 4000.0  # [MB] some four hours of flight
-ONLOOKERS = ("scene", COCKPIT)  # nodes that only look on: the flight goes on without
-PAYLOAD_MAX = 2.0  # [kg] more than the rotors could ever carry
+ONLOOKERS = ("scene", COCKPIT)  # nodes that only display: their end does not end the flight
+PAYLOAD_MAX = 2.0  # [kg] more than the rotors can carry
 
 
 class SettingsError(ValueError):
-    """An option that cannot be flown; the text is one line: what was wrong, what is allowed."""
+    """An invalid option; the text is one line: what is wrong and what is allowed."""
 
 
 @dataclass(frozen=True)
 class FlightSettings:
-    """One flight. Scenario and profile are loaded, hence valid.
+    """Checked settings of one flight, with scenario and profile loaded.
 
     payload_mass [kg]; vehicle_changes: dotted entries of config/vehicle/*.yaml to replace, as
-    {"air.wind": [3.0, 0.0, 0.0]}; out: the result folder, None for the default one. autopilot:
-    BUILTIN, PX4, or the URL of one that the user has started; link: that URL, taken apart. without:
-    nodes left out, see `foreign`.
+    {"air.wind": [3.0, 0.0, 0.0]}; out: the result folder, None for the default. autopilot:
+    BUILTIN, PX4, or the URL of an autopilot started by the user; link: that URL, parsed. without:
+    nodes that are not started, see `foreign`.
     """
 
     scenario: Scenario
@@ -51,12 +51,12 @@ class FlightSettings:
     engine: str = "ros"
     clock: str = "lockstep"
     autopilot: str = BUILTIN
-    px4: Px4Installation | None = None  # what flies as the autopilot px4
+    px4: Px4Installation | None = None  # for the autopilot PX4
     link: LinkUrl | None = None
-    gcs: str = ""  # URL of a ground station that watches
+    gcs: str = ""  # URL of a ground station
     seed: int = 1
     video: bool = True
-    scenario_source: str = ""  # what the user called it: a name or a file
+    scenario_source: str = ""  # as given by the user: a name or a file
     instance: int | None = None  # of ROS domain and ports; None: the first free one
     vehicle_changes: dict[str, object] = field(default_factory=dict)
     without: tuple[str, ...] = (COCKPIT,)
@@ -65,7 +65,7 @@ class FlightSettings:
 
     @property
     def foreign(self) -> tuple[str, ...]:
-        """Nodes that the user starts in place of the stack's, and that the flight waits for."""
+        """Return the nodes that the user starts and for which the flight waits."""
         return tuple(name for name in self.without if name in REPLACEABLE)
 
 
@@ -89,12 +89,11 @@ def settings(
     log_limit: float = LOG_LIMIT,
     faults: Sequence[str] = (),
 ) -> FlightSettings:
-    """Check the options and load what they name.
+    """Check the options and load scenario, profile and faults.
 
-    profile: see `load_profile` for several of them; faults: see `faults.read_schedule`; view: serve
-    the cockpit, too.
-    Raises SettingsError, and what loading raises (ConfigurationError, ScenarioError, ProfileError,
-    Px4Error, PortError, FaultError); each is one line for the user.
+    profile: see `load_profile` for several profiles; faults: see `faults.read_schedule`; view:
+    serve the cockpit. Raises SettingsError, ConfigurationError, ScenarioError, ProfileError,
+    Px4Error, PortError, FaultError; each text is one line for the user.
     """
     _choice("controller", controller, catalogue.LAWS)
     _choice("engine", engine, ENGINES)
@@ -103,24 +102,24 @@ def settings(
         raise SettingsError("the direct engine has no clock: --clock realtime needs --engine ros")
     if engine == "direct" and autopilot != BUILTIN:
         raise SettingsError(
-            f"the direct engine flies the stand-in alone: --autopilot {autopilot} "
-            "needs --engine ros"
+            "the direct engine has only the built-in autopilot: "
+            f"--autopilot {autopilot} needs --engine ros"
         )
     for node in without:
         _choice("node to fly without", node, REPLACEABLE + ONLOOKERS)
     if without and engine == "direct":
         raise SettingsError("the direct engine has no nodes: --without needs --engine ros")
     if view and engine == "direct":
-        raise SettingsError("the direct engine has no topics to look at: --view needs --engine ros")
+        raise SettingsError("the direct engine has no topics to show: --view needs --engine ros")
     px4 = Px4Installation.find(px4_dir) if autopilot == PX4 else None
     link = None if autopilot in (BUILTIN, PX4) else _link(autopilot)
     if link is not None and link.kind == "serial" and clock != "realtime":
         raise SettingsError(
-            "a flight controller has a clock of its own: --autopilot serial:... "
+            "a flight controller runs on its own clock: --autopilot serial:... "
             "needs --clock realtime"
         )
     if gcs and (parse_url(gcs).kind != "udp" or engine == "direct"):
-        raise SettingsError("--gcs is udp:HOST:PORT, and needs --engine ros")
+        raise SettingsError("--gcs must be udp:HOST:PORT and needs --engine ros")
     if not 0 <= seed < 2**31:
         raise SettingsError(f"seed {seed} is outside 0..{2**31 - 1}")
     loaded = load_scenario(str(configuration.named("scenarios", scenario)))
@@ -167,7 +166,7 @@ def settings(
 
 
 def require_ros() -> None:
-    """Raise SettingsError where ROS is not installed."""
+    """Raise SettingsError if ROS is not installed."""
     if importlib.util.find_spec("rclpy") is None:
         raise SettingsError(
             "the ROS engine needs rclpy, which is not installed: make setup, or source a ROS 2 "
@@ -184,9 +183,9 @@ def _link(autopilot: str) -> LinkUrl:
 
 
 def _instance_of(link: LinkUrl | None) -> int | None:
-    """The instance whose simulator port an autopilot that the user has started connects to.
+    """Return the instance whose simulator port the user's autopilot connects to.
 
-    PX4 tells it by its offboard port; instance 0 where that says nothing.
+    PX4's offboard port determines the instance; any other port means instance 0.
     """
     if link is None or link.kind == "serial":
         return None

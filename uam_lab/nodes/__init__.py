@@ -1,1 +1,1 @@
-"""Nodes that only watch a flight: recorder, scene and cockpit."""
+"""Nodes without influence on the flight: recorder, scene and cockpit."""

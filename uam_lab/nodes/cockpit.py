@@ -1,4 +1,4 @@
-"""Node: the cockpit, a local web page; see uam_lab.cockpit. Nobody waits for it."""
+"""Node: the cockpit, a local web page; see uam_lab.cockpit. No other node waits for it."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ def main() -> int:
     print(f"{NAME}: {web.url(server)}", flush=True)
     executor = SingleThreadedExecutor()
     executor.add_node(node)
-    # An executor would take the messages that the page looks at: this node is not spun.
+    # not spun: an executor would take the messages that the page polls
     watcher = Node(f"{NAME}_watch", start_parameter_services=False, enable_rosout=False)
     page = Page(server, Watch(watcher), Services(node), options)
     period = options["scene_period"]

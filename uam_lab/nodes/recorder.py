@@ -1,13 +1,13 @@
 """Records every topic of the stack to an MCAP file.
 
-Messages are taken raw, never decoded. The node polls its subscriptions instead of being called for
-each message: the middleware's own threads collect, and taking fifty messages in one go costs a
-tenth of being woken up for each.
+Messages are taken raw and not decoded. The node polls its subscriptions instead of using
+callbacks: the threads of the middleware collect the messages, and taking fifty messages in one
+poll costs a tenth of fifty callbacks.
 
-Log time is simulation time: the header's stamp; or the last /clock that was published before the
-message, for types without a header and for /diagnostics, whose publishers may not have seen a tick
-yet. Publish time is the publisher's wall clock. With `simulated: false` (on hardware, where nobody
-publishes /clock) both are wall time.
+Log time is simulation time: the stamp in the header. For types without a header, and for
+/diagnostics, whose publishers may not have received a tick yet, it is the last /clock published
+before the message. Publish time is the publisher's wall clock. With `simulated: false` (on
+hardware, without /clock) both are wall time.
 """
 
 import json
@@ -38,12 +38,12 @@ from uam_msgs_py.node.health import LoopTime, ages
 from uam_msgs_py.node.node_parameters import refuse_unknown
 from uam_msgs_py.node.polling import listen
 
-DEPTH = 2000  # messages per topic that may wait for one poll: 8 s at control rate
+DEPTH = 2000  # queue length per topic: 8 s at control rate
 CLOCK = "/clock"
 
 
 def begins_with_stamp(message_type: type) -> bool:
-    """Whether `stamp_of` applies."""
+    """Return whether `stamp_of` applies to the message type."""
     fields = list(message_type.get_fields_and_field_types().items())
     return fields[0] in (("header", "std_msgs/Header"), ("clock", "builtin_interfaces/Time"))
 
@@ -64,7 +64,7 @@ class Track:
 
 
 class TopicRecorder:
-    """The open file and the subscriptions that feed it."""
+    """The open file and its subscriptions."""
 
     def __init__(
         self,
@@ -75,7 +75,7 @@ class TopicRecorder:
         metadata: Mapping[str, Mapping[str, str]] | None = None,
         size_limit: float = 0.0,
     ):
-        """Subscribe to `chosen` and create `file`, which begins with the named texts `metadata`.
+        """Subscribe to `chosen` and create `file` with the named texts `metadata`.
 
         size_limit [MB], 0 for none.
         """
@@ -84,8 +84,8 @@ class TopicRecorder:
         for name, values in (metadata or {}).items():
             self._writer.add_metadata(name, values)
         self._tracks = [self._track(node, topic) for topic in chosen]
-        # The clock comes last in each poll: when it has been taken, every /clock that was
-        # published before any message taken in this poll is known.
+        # /clock is taken last in each poll: then every /clock published before any other message
+        # of this poll is available
         self._tracks.sort(key=lambda track: track.topic == CLOCK)
         self._clock_wall: list[int] = []  # publisher's wall clock of each /clock [ns]
         self._clock_sim: list[int] = []
@@ -105,7 +105,7 @@ class TopicRecorder:
         return Track(topic.name, subscription, topic.type, stamped, channel, topic.one_publisher)
 
     def poll(self) -> int:
-        """Write everything that has arrived; returns how many messages that was."""
+        """Write all received messages; return their number."""
         batch, now = [], time.monotonic()
         for track in self._tracks:
             take = track.subscription.handle.take_message
@@ -126,7 +126,7 @@ class TopicRecorder:
         return len(batch)
 
     def drain(self, quiet: float = 0.2, longest: float = 1.0) -> None:
-        """Write what is still on its way: until nothing came for `quiet` [s], or `longest` [s]."""
+        """Write the last messages until none arrives for `quiet` [s], for at most `longest` [s]."""
         now = last = time.monotonic()
         end = now + longest
         while now - last < quiet and now < end:
@@ -136,7 +136,7 @@ class TopicRecorder:
             now = time.monotonic()
 
     def _sim_time(self, published: int) -> int:
-        """Simulation time [ns] at the wall time `published` [ns]."""
+        """Return the simulation time [ns] at the wall time `published` [ns]."""
         if not self._simulated:
             return published
         before = bisect_right(self._clock_wall, published)
@@ -155,26 +155,26 @@ class TopicRecorder:
 
     @property
     def arrivals(self) -> dict[str, float]:
-        """time.monotonic() at which each topic's newest message was taken, if there was one."""
+        """time.monotonic() of the newest message of each topic with messages."""
         return {t.topic: t.arrived for t in self._tracks if t.arrived is not None}
 
     def flush(self) -> None:
-        """Bring what was written to the file."""
+        """Flush the written messages to the file."""
         self._writer.flush()
 
     @property
     def ended(self) -> str:
-        """Why nothing is written any more, "" while it is."""
+        """Reason of the end of the recording, "" while it runs."""
         return self._writer.ended
 
     @property
     def until(self) -> float:
-        """Simulation time [s] of the newest /clock that was taken, 0 before the first."""
+        """Simulation time [s] of the newest /clock, 0 before the first."""
         return self._clock_sim[-1] / SECOND if self._clock_sim else 0.0
 
     @property
     def lost(self) -> dict[str, int]:
-        """Messages known to be lost, for topics that lost any."""
+        """Number of lost messages, for topics with losses."""
         return {track.topic: track.lost for track in self._tracks if track.lost}
 
     @property
@@ -183,14 +183,14 @@ class TopicRecorder:
         return self._writer.counts
 
     def close(self) -> None:
-        """Index and end the file."""
+        """Write the index and close the file."""
         lost = {topic: str(count) for topic, count in self.lost.items()}
         self._writer.add_metadata("lost messages", lost)
         self._writer.close()
 
 
 def _qos_text(qos: QoSProfile) -> str:
-    """The QoS as rosbag2 notes it in a channel's metadata."""
+    """Return the QoS in the form of rosbag2 for a channel's metadata."""
     transient = qos.durability == QoSDurabilityPolicy.TRANSIENT_LOCAL
     return "\n".join(
         [
@@ -203,7 +203,7 @@ def _qos_text(qos: QoSProfile) -> str:
 
 
 def _health(node: Node, recording: TopicRecorder, polls: LoopTime) -> DiagnosticArray:
-    """The node's entry of /diagnostics: what it has lost, its loop, to whom it is connected."""
+    """Return the node's /diagnostics entry: lost messages, loop times, connections."""
     lost = sum(recording.lost.values())
     summary = recording.ended or (f"{lost} messages lost" if lost else "recording")
     values = {"messages lost": lost, connections.RECORDED_UNTIL: recording.until}
@@ -216,7 +216,7 @@ def _health(node: Node, recording: TopicRecorder, polls: LoopTime) -> Diagnostic
 
 def main() -> int:
     """Record until SIGINT or SIGTERM, then complete the file."""
-    # The context must outlive the signal: what has arrived by then is still to be written.
+    # the signal must not close the ROS context: received messages are still to be written
     rclpy.init(args=sys.argv, signal_handler_options=SignalHandlerOptions.NO)
     stop = StopSignal()
     node = Node("recorder", start_parameter_services=False)
@@ -241,7 +241,7 @@ def main() -> int:
     )
     print(f"recorder: {len(topics.ALL)} topics to {file}", flush=True)
     polls_per_flush = max(1, round(flush_period / poll_period))
-    polls, loop, told = 0, LoopTime(), ""
+    polls, loop, ended = 0, LoopTime(), ""
     while not stop.raised:
         time.sleep(poll_period)
         begun = time.perf_counter()
@@ -250,9 +250,9 @@ def main() -> int:
         polls += 1
         if polls % polls_per_flush == 0:
             recording.flush()
-            if recording.ended and not told:
-                told = recording.ended
-                print(f"recorder: {told}; recorded until {recording.until:g} s", flush=True)
+            if recording.ended and not ended:
+                ended = recording.ended
+                print(f"recorder: {ended}; recorded until {recording.until:g} s", flush=True)
             health.publish(_health(node, recording, loop))
     recording.drain()
     recording.close()

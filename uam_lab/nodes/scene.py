@@ -1,14 +1,14 @@
-"""Node: what RViz and Foxglove need to show the flight: /tf, URDF, markers, tracking errors.
+"""Node: /tf, URDF, markers and tracking errors, for RViz and Foxglove.
 
     world ─┬─ base_link (estimate) ─┬─ shoulder
            │                        └─ link_1 ─ link_2 ─ magnet
-           ├─ reference (while one is flown)
-           └─ payload (where a simulator tells the truth)
+           ├─ reference (in flight)
+           └─ payload (in simulation)
 
-Nobody waits for this node. It looks at the newest messages a hundred times a second, takes them
-best-effort, and shows `frame_rate` of them per second of their own time. Before the first tick of a
-simulated flight every publisher counts its listeners; so that this one never stands in for another,
-it listens to the control loop only when the mission has begun.
+No other node waits for this node. It polls the newest messages 100 times per second (best-effort
+QoS) and publishes `frame_rate` transforms per second of message time. Before the first tick of a
+simulated flight every publisher counts its subscribers. This node must not be counted in place of
+another, so it subscribes to the topics of the control loop only after the mission's first status.
 """
 
 from __future__ import annotations
@@ -40,14 +40,14 @@ from uam_sim_bridge.plant.frames import SWING, box, frames, hanging
 from uam_sim_bridge.plant.urdf import urdf
 
 NAME = "scene"
-REFERENCE = "reference"  # frame of the pose that the mission asks for
+REFERENCE = "reference"  # frame of the desired pose
 DEFAULT_SCENARIO, DEFAULT_VEHICLE = "pick_and_place", "s500_arm"
-REFERENCES = 8  # kept until the state of the same tick is there: they come one tick ahead
+REFERENCES = 8  # stored until the state of the same tick arrives: they come one tick earlier
 
 
 @dataclass(frozen=True)
 class SceneParameters(ParameterSet):
-    """How often it shows something."""
+    """Rates of the published transforms and markers."""
 
     frame_rate: float = number(25.0, "transforms per second of the messages' time", "Hz", 1.0, 60.0)
     marker_rate: float = number(2.0, "markers, likewise, unless they change", "Hz", 0.1, 25.0)
@@ -74,14 +74,14 @@ class SceneNode(UamNode):
         self._state: tuple[int, np.ndarray] | None = None
         self._references: dict[int, Reference] = {}
         self._payload: tuple[int, np.ndarray, np.ndarray] | None = None
-        self._payload_is_there = False  # only a simulator knows where
+        self._payload_is_there = False  # only a simulator publishes its pose
         self._status: tuple[int, MissionStatus] | None = None
         self._path: ReferencePath | None = None
-        self._on_its_way = False  # whether _path begins where the vehicle took off
+        self._in_flight = False  # whether _path begins at the take-off position
         self._flown = FlownPath()
         self._due = self._markers_due = 0  # [ns]
-        self._shown: tuple = ()  # what the last markers said
-        self._late: list = []  # subscriptions made when the mission has begun
+        self._shown: tuple = ()  # content of the last markers
+        self._late: list = []  # subscriptions made after the mission's first status
 
         self._tf = self.publisher(topics.TF)
         self._markers = self.publisher(topics.MARKERS)
@@ -89,11 +89,11 @@ class SceneNode(UamNode):
         self._error_writer = JointStateWriter(COORDINATES)
         self._describe(urdf(vehicle))
         self.listen(topics.MISSION_STATUS, self._on_status)
-        # All else is taken along when this comes, or `wake_up` is over.
+        # other topics are polled when a status arrives or after `wake_up`
         self.triggers = (topics.MISSION_STATUS.name,)
 
     def _describe(self, robot: str) -> None:
-        """Publish what does not change."""
+        """Publish the constant data: URDF and fixed transforms."""
         self.publisher(topics.ROBOT_DESCRIPTION).publish(String(data=robot))
         still = [Transform(0, f.parent, f.name, f.position, f.quaternion) for f in self._fixed]
         self.publisher(topics.TF_STATIC).publish(transforms_message(still))
@@ -125,7 +125,7 @@ class SceneNode(UamNode):
         self._payload = read_pose(data)
 
     def settle(self) -> None:
-        """Show the present, if it is time to."""
+        """Publish transforms, errors and markers of the newest state when they are due."""
         if self.deferred:
             for subscription in self._late:
                 self.take_waiting(subscription)
@@ -137,15 +137,15 @@ class SceneNode(UamNode):
         self._due = max(self._due, stamp - self._frame_period) + self._frame_period
         if reference is not None:
             self._compare(stamp, state, reference)
-        wanted = reference.values[0] if reference is not None and reference.flying else None
-        self._tf.publish(transforms_message(self._transforms(stamp, state[0], wanted)))
-        self._follow(stamp, state[0], wanted)
+        desired = reference.values[0] if reference is not None and reference.flying else None
+        self._tf.publish(transforms_message(self._transforms(stamp, state[0], desired)))
+        self._follow(stamp, state[0], desired)
         self._show(stamp)
         self._state = None
         self.done_tick(stamp, begun)
 
     def _compare(self, stamp: int, state: np.ndarray, reference: Reference) -> None:
-        """Publish the errors of this tick."""
+        """Publish the tracking errors of this tick; state (3, 8), see `coordinates`."""
         error = state[:2] - reference.values[:2]
         error[0, 3:] = wrap_angle(error[0, 3:])
         if not reference.flying:
@@ -155,9 +155,9 @@ class SceneNode(UamNode):
         self._error.publish(writer.stamped(stamp))
 
     def _transforms(
-        self, stamp: int, chi: np.ndarray, wanted: np.ndarray | None
+        self, stamp: int, chi: np.ndarray, desired: np.ndarray | None
     ) -> list[Transform]:
-        """What moves at `stamp` [ns]: chi (8,), what is asked of it (8,), and the payload."""
+        """Return the moving transforms at `stamp` [ns] for chi (8,) and the desired chi_d (8,)."""
         turned = quaternion_from_euler(chi[ATTITUDE])
         angles = dict(zip(JOINTS, chi[ARM], strict=True))
         angles[SWING] = hanging(chi[ATTITUDE][1], chi[ARM])
@@ -166,25 +166,25 @@ class SceneNode(UamNode):
             Transform(stamp, f.parent, f.name, f.position, f.turned(angles[f.joint]))
             for f in self._moving
         ]
-        if wanted is not None:
-            pose = wanted[POSITION], quaternion_from_euler(wanted[ATTITUDE])
+        if desired is not None:
+            pose = desired[POSITION], quaternion_from_euler(desired[ATTITUDE])
             found.append(Transform(stamp, WORLD, REFERENCE, *pose))
         if self._payload is not None:
             at, position, quaternion = self._payload
             found.append(Transform(at, WORLD, PAYLOAD, position, quaternion))
-            self._payload, self._payload_is_there = None, True  # a stamp is told but once
+            self._payload, self._payload_is_there = None, True  # publish each stamp only once
         return found
 
-    def _follow(self, stamp: int, chi: np.ndarray, wanted: np.ndarray | None) -> None:
-        """Keep the paths up to date; the reference begins where the vehicle takes off."""
+    def _follow(self, stamp: int, chi: np.ndarray, desired: np.ndarray | None) -> None:
+        """Update the paths; the reference path begins at the take-off position."""
         self._flown.add(stamp, chi[POSITION])
-        flying = wanted is not None
-        if self._path is None or flying and not self._on_its_way:
-            self._path = ReferencePath(self._scenario, wanted if flying else chi)
-            self._on_its_way = flying
+        flying = desired is not None
+        if self._path is None or flying and not self._in_flight:
+            self._path = ReferencePath(self._scenario, desired if flying else chi)
+            self._in_flight = flying
 
     def _show(self, stamp: int) -> None:
-        """Publish the markers when they change, and now and then."""
+        """Publish the markers when they change, and with `marker_rate`."""
         at, status = self._status
         now = (status.summary, status.magnet, self._payload_is_there)
         if now == self._shown and stamp < self._markers_due:
@@ -197,7 +197,7 @@ class SceneNode(UamNode):
         self._markers.publish(self._maker.message(stamp, status, ahead, self._flown.points, now[2]))
 
     def diagnose(self) -> tuple[bytes, str, dict[str, object]]:
-        """Phase as the mission says it; and what is shown."""
+        """Return level, phase of the mission, and whether the payload is shown."""
         if self._status is None:
             return OK, "waiting for the mission", {}
         status = self._status[1]

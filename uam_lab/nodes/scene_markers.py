@@ -1,6 +1,6 @@
-"""What is drawn around the vehicle: paths, payload, drop point, magnet, phase; as markers.
+"""Markers around the vehicle: paths, payload, drop point, magnet, phase.
 
-A marker in a moving frame moves with /tf, so it need only be sent when it changes.
+A marker in a moving frame moves with /tf; it is sent again only when it changes.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from uam_sim_bridge.plant.frames import Box
 
 PAYLOAD, MAGNET = "payload", "magnet"  # frames
 PATH_STEP = 0.2  # [s] of mission time between two points of a path
-PATH_POINTS = 2000  # of the flown path; a longer one is thinned out
+PATH_POINTS = 2000  # of the flown path; beyond it every second point is removed
 LINE_WIDTH, TEXT_HEIGHT, TEXT_ABOVE = 0.01, 0.08, 0.35  # [m]
 DROP_RADIUS, MAGNET_MARGIN = 0.06, 0.004  # [m]
 AHEAD, FLOWN = (0.95, 0.55, 0.10, 0.9), (0.12, 0.37, 0.66, 0.95)
@@ -30,10 +30,10 @@ ENERGISED, OFF, FAILED = (0.15, 0.90, 0.25, 0.9), (0.45, 0.45, 0.45, 0.6), (0.8,
 
 
 class ReferencePath:
-    """Where a scenario leads, sampled once."""
+    """The path of a scenario, sampled once."""
 
     def __init__(self, scenario: Scenario, start: np.ndarray):
-        """start: chi (8,) at take-off."""
+        """start: chi (8,) at take-off, SI units."""
         landing = scenario.landing
         self._times = np.arange(0.0, landing.at + landing.duration + PATH_STEP, PATH_STEP)
         self._points = np.empty((len(self._times), 3))
@@ -43,19 +43,19 @@ class ReferencePath:
             point[:] = reference[0, :3]
 
     def ahead(self, time: float) -> np.ndarray:
-        """Points (n, 3) [m] from mission time [s] to the landing."""
+        """Return the points (n, 3) [m, world] from mission time [s] to the landing."""
         return self._points[np.searchsorted(self._times, time) :]
 
 
 class FlownPath:
-    """Where the vehicle has been; thinned out when it gets long."""
+    """The flown path, with a limited number of points."""
 
     def __init__(self) -> None:
         self._points: list[np.ndarray] = []
         self._step, self._due = round(PATH_STEP * 1e9), 0  # [ns]
 
     def add(self, stamp: int, position: np.ndarray) -> None:
-        """Note the position (3,) [m] at `stamp` [ns]."""
+        """Add the position (3,) [m, world] at `stamp` [ns]."""
         if stamp < self._due:
             return
         self._due = stamp + self._step
@@ -66,15 +66,15 @@ class FlownPath:
 
     @property
     def points(self) -> np.ndarray:
-        """Points (n, 3) [m], oldest first."""
+        """Points (n, 3) [m, world], oldest first."""
         return np.array(self._points).reshape(-1, 3)
 
 
 class Markers:
-    """Makes the MarkerArray of one moment."""
+    """Builds the MarkerArray of one stamp."""
 
     def __init__(self, scenario: Scenario, face: Box, payload: Box):
-        """face: of the magnet, in the frame MAGNET; payload: in the frame PAYLOAD."""
+        """face: of the magnet, in frame MAGNET; payload: in frame PAYLOAD."""
         self._drop, self._face, self._payload = scenario.drop_point, face, payload
 
     def message(
@@ -85,7 +85,7 @@ class Markers:
         flown: np.ndarray,
         payload: bool,
     ) -> MarkerArray:
-        """ahead, flown: points (n, 3) [m, world]; payload: whether its frame is there."""
+        """Return all markers. ahead, flown: points (n, 3) [m, world]; payload: its frame exists."""
         markers = [
             _line(stamp, "reference path", ahead, AHEAD),
             _line(stamp, "flown path", flown, FLOWN),

@@ -1,4 +1,4 @@
-"""What a flight was asked to be, as text in its own log: so the log alone tells the whole flight.
+"""Settings of a flight as metadata of its log, so that the log alone describes the flight.
 
     flight       the entries of info.json that are known beforehand, each as JSON
     scenario     name and text of its file
@@ -29,7 +29,7 @@ Records = dict[str, dict[str, str]]
 
 @dataclass(frozen=True)
 class LogFacts:
-    """info: see `conclude.asked`; texts: name → content of parameters.yaml and versions.json."""
+    """info: see `conclude.settings_facts`; texts: content of parameters.yaml, versions.json."""
 
     info: dict[str, Any] = field(default_factory=dict)
     scenario: Scenario | None = None

@@ -1,4 +1,4 @@
-"""Files that appear whole or not at all, so that an interrupted flight leaves no half a file."""
+"""Atomic writing of files: an interrupted flight leaves no incomplete file."""
 
 from __future__ import annotations
 
@@ -11,9 +11,9 @@ from pathlib import Path
 
 @contextmanager
 def replacing(path: Path) -> Iterator[Path]:
-    """A temporary path beside `path`, renamed to it when the block ends without an exception.
+    """Yield a temporary path beside `path`; rename it to `path` if the block raises no exception.
 
-    The temporary name keeps the suffix, because writers choose their format by it.
+    The temporary name keeps the suffix, because writers select their format by it.
     """
     temporary = path.with_name(f".{path.stem}.{os.getpid()}{path.suffix}")
     try:
@@ -24,13 +24,13 @@ def replacing(path: Path) -> Iterator[Path]:
 
 
 def write_text(path: Path, text: str) -> None:
-    """Write `text` (UTF-8) to `path` whole."""
+    """Write `text` (UTF-8) to `path` atomically."""
     with replacing(path) as temporary:
         temporary.write_text(text, encoding="utf-8")
 
 
 def write_rows(path: Path, head: Iterable[object], rows: Iterable[Iterable[object]]) -> None:
-    """Write a CSV table; the file appears whole or not at all."""
+    """Write a CSV table atomically."""
     with replacing(path) as temporary, temporary.open("w", newline="") as out:
         writer = csv.writer(out)
         writer.writerow(head)

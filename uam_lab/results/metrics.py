@@ -1,4 +1,4 @@
-"""The figures of a flight: metrics.json, from the recorded series and what is known about it.
+"""Metrics of a flight (metrics.json), computed from the recorded series and the facts beside it.
 
 Errors are truth minus reference. RMS and maximum run over the whole flight, from the take-off
 command to the touchdown command (`Series.flown`); every control tick weighs the same.
@@ -35,10 +35,10 @@ PASSED_ON = (
 
 @dataclass(frozen=True)
 class Criteria:
-    """What counts as a completed mission."""
+    """Criteria of a completed mission."""
 
-    away_m: float = 0.05  # from where the payload stood, and above where it lies in the end
-    held_s: float = 0.5  # how long it must be both; a fall from the stand is shorter
+    away_m: float = 0.05  # from the payload's start position, and above its lowest position
+    held_s: float = 0.5  # minimum duration of both; a fall from the stand is shorter
     place_m: float = 0.15  # horizontal distance of the payload from the drop point
     landing_m: float = 0.15  # horizontal distance of the vehicle from the landing point
     rest_m_s: float = 0.02  # speed below which the payload is at rest
@@ -46,7 +46,7 @@ class Criteria:
 
 @dataclass(frozen=True)
 class Payload:
-    """What happened to the payload; None where there was none or it cannot be told."""
+    """Transport of the payload; None without payload or if it cannot be determined."""
 
     lifted: bool | None = None
     lifted_at_s: float | None = None
@@ -61,9 +61,9 @@ def compute(
     latency_s: Sequence[float] | np.ndarray | None = None,
     criteria: Criteria | None = None,
 ) -> dict[str, Any]:
-    """The content of metrics.json.
+    """Return the content of metrics.json.
 
-    info: PASSED_ON, `wall_s`, `abort_reason` ("" or None when there was none); optionally
+    info: PASSED_ON, `wall_s`, `abort_reason` ("" or None without an abort); optionally
     `transitions` (of the supervisor, see `outcome.transition`), `faults`, `drop_point` [x, y] and
     `landing_point` [x, y] (default the origin) [m], `missed_ticks`.
     latency_s: sensor-to-setpoint latency per tick [s], used when `clock` is "realtime".
@@ -113,12 +113,12 @@ def compute(
 
 
 def rms(errors: np.ndarray) -> np.ndarray:
-    """Root of the mean square over the rows of (ticks, n); NaN without rows."""
+    """Return the root mean square (n,) over the rows of errors (ticks, n); NaN without rows."""
     return np.sqrt(np.mean(np.square(errors), axis=0)) if len(errors) else _nothing(errors)
 
 
 def largest(errors: np.ndarray) -> np.ndarray:
-    """Largest magnitude over the rows of (ticks, n); NaN without rows."""
+    """Return the largest magnitude (n,) over the rows of errors (ticks, n); NaN without rows."""
     return np.max(np.abs(errors), axis=0) if len(errors) else _nothing(errors)
 
 
@@ -129,7 +129,7 @@ def _nothing(errors: np.ndarray) -> np.ndarray:
 def errors(
     series: Series, figure: Callable[[np.ndarray], np.ndarray] = rms
 ) -> dict[str, list[float]]:
-    """`figure` of the tracking errors over the flight, in the units and shape of metrics.json."""
+    """Return `figure` of the tracking errors over the flight, by group, in the group's unit."""
     error = series.block("error.")[series.flown]
     return {key: (factor * figure(error[:, columns])).tolist() for key, columns, factor in GROUPS}
 
@@ -140,11 +140,11 @@ def payload_facts(
     drop_point: Sequence[float] | None,
     criteria: Criteria,
 ) -> Payload:
-    """Whether the payload was lifted by the magnet and where it came to rest.
+    """Return whether the magnet lifted the payload, and its final position error.
 
-    Lifted: while the magnet was on, it was for `held_s` more than `away_m` from where it stood and
-    more than that above the lowest place where it ever lay. Not told by height alone, because the
-    hanging arm carries it lower than the stand.
+    Lifted: with the magnet on, the payload was for `held_s` at least `away_m` from its start
+    position and at least `away_m` above its lowest position. Height above the start is no
+    criterion, because the hanging arm carries the payload lower than the stand.
     """
     spans = series.magnet_spans()
     place = series.block("payload.")[:, :3]
@@ -160,7 +160,7 @@ def payload_facts(
     if drop_point is None:
         return Payload(lifted, when, rise)
     distance = float(np.hypot(*(place[-1, :2] - np.asarray(drop_point, dtype=float))))
-    # Half a second of travel, so that one bounce is not taken for rest.
+    # mean speed over half a second, so that the turning point of a bounce is not taken for rest
     before = series.row_at(series.time[-1] - 0.5)
     elapsed = series.time[-1] - series.time[before]
     speed = float(np.linalg.norm(place[-1] - place[before])) / elapsed if elapsed > 0.0 else 0.0
@@ -168,7 +168,7 @@ def payload_facts(
 
 
 def _first_held(time: np.ndarray, true: np.ndarray, span: float) -> float | None:
-    """Beginning [s] of the first stretch of `true` (ticks,) that lasts `span` [s]."""
+    """Return the start [s] of the first interval of `true` (ticks,) of at least `span` [s]."""
     edges = np.flatnonzero(np.diff(true.astype(np.int8), prepend=0, append=0))
     for begin, end in zip(edges[::2], edges[1::2] - 1, strict=True):
         if time[end] - time[begin] >= span:
@@ -177,7 +177,10 @@ def _first_held(time: np.ndarray, true: np.ndarray, span: float) -> float | None
 
 
 def landing_error(series: Series, point: Sequence[float]) -> float | None:
-    """Horizontal distance [m] of the vehicle from `point` at the end; None unless it landed."""
+    """Return the horizontal distance [m] of the vehicle to `point` at the end; None if not landed.
+
+    point: x, y [m, world].
+    """
     if not series.in_phase("landed").any():
         return None
     return float(np.hypot(series["truth.x"][-1] - point[0], series["truth.y"][-1] - point[1]))
@@ -191,7 +194,7 @@ def what_is_missing(
     payload: Payload,
     criteria: Criteria,
 ) -> list[str]:
-    """What keeps the mission from being completed, one line each; empty when it is."""
+    """Return the unmet criteria of a completed mission, one line each."""
     if abort_reason:
         return [f"aborted: {abort_reason}"]
     if not flown:
@@ -212,7 +215,7 @@ def what_is_missing(
 
 
 def latency_figures(latency_s: Sequence[float] | np.ndarray | None) -> dict[str, float | None]:
-    """Percentiles and maximum [ms] of latencies [s]."""
+    """Return percentiles and maximum [ms] of latencies (ticks,) [s]."""
     if latency_s is None or not len(latency_s):
         return {"p50": None, "p99": None, "max": None}
     milliseconds = 1e3 * np.asarray(latency_s, dtype=float)
@@ -221,7 +224,7 @@ def latency_figures(latency_s: Sequence[float] | np.ndarray | None) -> dict[str,
 
 
 def thrust_factor(series: Series) -> dict[str, float] | None:
-    """True / assumed thrust as identified: at the end, and its range in flight; None unknown."""
+    """Return identified true / assumed thrust: at the end, and its range; None if unknown."""
     factor = series["thrust.factor"][series.flown]
     factor = factor[np.isfinite(factor)]
     if not len(factor):
@@ -230,7 +233,7 @@ def thrust_factor(series: Series) -> dict[str, float] | None:
 
 
 def clamps(series: Series) -> dict[str, int] | None:
-    """How often each subsystem's law clamped its error; None for laws that never do."""
+    """Return the number of clamped errors per subsystem; None for laws without clamping."""
     counts = {s: series[f"adaptation.{s}.clamps"] for s in SUBSYSTEMS}
     if not any(np.isfinite(count).any() for count in counts.values()):
         return None
@@ -242,7 +245,7 @@ def _span(times: np.ndarray) -> float:
 
 
 def plain(value: Any) -> Any:
-    """`value` made of what JSON has: no numpy types, and null instead of NaN and infinity."""
+    """Return `value` with JSON types only: no numpy types, null instead of NaN and infinity."""
     if isinstance(value, Mapping):
         return {str(key): plain(item) for key, item in value.items()}
     if isinstance(value, list | tuple | np.ndarray):

@@ -1,4 +1,4 @@
-"""How a flight went, whichever engine flew it."""
+"""Result of a flight, the same for both engines."""
 
 from __future__ import annotations
 
@@ -11,12 +11,15 @@ from uam_lab.results.timeseries import Series
 
 
 def transition(time: float, before: str, after: str, cause: str) -> dict[str, Any]:
-    """One change of the supervisor's state, as metrics.json has it; time: mission time [s]."""
+    """Return one change of the supervisor's state for metrics.json; time: mission time [s]."""
     return {"time_s": round(time, 6), "from": before, "to": after, "cause": cause}
 
 
 def transitions(changes: Sequence[StateTransition]) -> list[dict[str, Any]]:
-    """The supervisor's changes in mission time; from the last one where nothing took off."""
+    """Return the supervisor's state changes in mission time.
+
+    Without a take-off the time counts from the last change.
+    """
     takeoff = [change.stamp for change in changes if change.target is State.TAKING_OFF]
     begin = takeoff[0] if takeoff else changes[-1].stamp if changes else 0.0
     return [transition(c.stamp - begin, c.source.value, c.target.value, c.cause) for c in changes]
@@ -24,13 +27,13 @@ def transitions(changes: Sequence[StateTransition]) -> list[dict[str, Any]]:
 
 @dataclass
 class Outcome:
-    """What an engine hands over.
+    """Result that an engine returns.
 
-    series: None when no control tick was recorded. wall_s: from the first tick to the last.
-    abort_reason: why the mission was given up. failure: why the flight could not go on, in one
-    line, and `details`, the last lines of the log that tell more. latency_s, missed_ticks: realtime
-    only. parameter_changes: see `log_reader.parameter_changes`; transitions: see `transition`;
-    faults: see `faults.timeline.record`.
+    series: None without a recorded control tick. wall_s: wall time from first to last tick.
+    abort_reason: reason of the mission's abort. failure: technical reason of the flight's end, one
+    line; details: last lines of the node's log. latency_s (ticks,), missed_ticks: realtime only.
+    parameter_changes: see `log_reader.parameter_changes`; transitions: see `transition`; faults:
+    see `faults.timeline.record`.
     """
 
     series: Series | None
@@ -48,12 +51,12 @@ class Outcome:
 
     @property
     def partial(self) -> bool:
-        """Whether the recording stops before the mission was over."""
+        """Return whether the recording ends before the mission."""
         return bool(self.failure) or self.interrupted
 
     @property
     def reason(self) -> str:
-        """Why the mission was not completed, as far as the engine knows; "" if it does not."""
+        """Return the engine's reason for an incomplete mission, "" without one."""
         if self.interrupted:
             return "interrupted by the user"
         return self.failure or self.abort_reason

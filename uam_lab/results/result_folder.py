@@ -1,4 +1,4 @@
-"""The folder that a flight leaves behind, and what is written to it besides logs and pictures."""
+"""The result folder of a flight, and its files apart from logs and pictures."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ from uam_lab.results.metrics import plain
 
 RESULTS = Path("results")
 LATEST = "latest"
-# Distributions whose version can change what a flight does or how its results read.
+# Distributions whose version can change a flight or its results.
 DISTRIBUTIONS = (
     "uam",
     "mujoco",
@@ -42,7 +42,7 @@ class ResultFolderError(ValueError):
 
 
 class ResultFolder:
-    """A flight's folder. Every file in it appears whole or not at all."""
+    """The result folder of a flight. All files are written atomically."""
 
     def __init__(self, path: Path):
         self.path = path
@@ -65,16 +65,16 @@ class ResultFolder:
     ) -> ResultFolder:
         """Make `out`, or results/<time>-<scenario>-<controller>.
 
-        scenario: name or file, of which the stem is used. results/latest is turned to the new
-        folder if it lies in results/.
-        Raises ResultFolderError: not writable, not a directory, or `out` already has a flight.
+        scenario: name, or file whose stem is used. results/latest points at the new folder if that
+        is in results/. Raises ResultFolderError: not writable, no directory, or `out` already
+        contains a flight.
         """
         if out is not None:
             folder = cls(Path(out).expanduser())
             _usable(folder.path)
             if folder.metrics.exists() or folder.timeseries.exists():
                 raise ResultFolderError(
-                    f"result folder {folder.path} already holds a flight; give another --out"
+                    f"result folder {folder.path} already contains a flight; give another --out"
                 )
             if folder.path.absolute().parent == RESULTS.absolute():
                 _point_latest_at(folder.path)
@@ -84,34 +84,34 @@ class ResultFolder:
         return folder
 
     def write_parameters(self, parameters: Mapping[str, Any]) -> None:
-        """Effective parameters, node by node, in the form of a ROS parameter file."""
+        """Write the effective parameters, node by node, as a ROS parameter file."""
         document = {node: {"ros__parameters": plain(values)} for node, values in parameters.items()}
         write_text(self.parameters, yaml.safe_dump(document, sort_keys=False))
 
     def write_metrics(self, metrics: Mapping[str, Any]) -> None:
-        """metrics.json; the same metrics give the same bytes."""
+        """Write metrics.json; the same metrics give the same bytes."""
         write_text(self.metrics, as_json(metrics))
 
     def write_versions(self) -> None:
-        """versions.json, see `versions`."""
+        """Write versions.json, see `versions`."""
         write_text(self.versions, as_json(versions()))
 
     def write_info(self, info: Mapping[str, Any]) -> None:
-        """info.json: what the report needs to know beside the series."""
+        """Write info.json: facts for the report that are not in the series."""
         write_text(self.info, as_json(info))
 
     def write_series(self, series: timeseries.Series) -> None:
-        """timeseries.parquet."""
+        """Write timeseries.parquet."""
         series.write(self.timeseries)
 
 
 def as_json(value: Any) -> str:
-    """Indented JSON with a final newline; numpy and NaN as in `metrics.plain`, paths as text."""
+    """Return indented JSON with a final newline; types as in `metrics.plain`, paths as text."""
     return json.dumps(plain(value), indent=2, allow_nan=False, default=str) + "\n"
 
 
 def versions() -> dict[str, Any]:
-    """What this flight ran on: python, packages, git commit where there is one, platform."""
+    """Return the versions of python and packages, the git commit if any, and the platform."""
     packages = {}
     for name in DISTRIBUTIONS:
         try:
@@ -129,7 +129,7 @@ def versions() -> dict[str, Any]:
 
 
 def git_commit(directory: Path | None = None) -> str | None:
-    """Commit of the checkout that the code runs from, "+changes" if edited; None without git."""
+    """Return the commit of the code's checkout, "+changes" if edited; None without git."""
     directory = directory or Path(__file__).resolve().parent
 
     def git(*arguments: str) -> str:
@@ -138,7 +138,7 @@ def git_commit(directory: Path | None = None) -> str | None:
         return done.stdout.strip()
 
     try:
-        # Installed inside someone else's checkout, that commit would say nothing about this code.
+        # code installed inside another checkout: that commit is not the version of this code
         if not git("ls-files", "--", str(directory)):
             return None
         changed = git("status", "--porcelain", "--untracked-files=no")
@@ -148,7 +148,7 @@ def git_commit(directory: Path | None = None) -> str | None:
 
 
 def make_folder(out: Path | None, *words: str, now: datetime | None = None) -> Path:
-    """Make `out`, or results/<time>-<words>; returns it. Raises ResultFolderError."""
+    """Make `out`, or results/<time>-<words>; return it. Raises ResultFolderError."""
     if out is not None:
         out = Path(out).expanduser()
         _usable(out)
@@ -158,12 +158,12 @@ def make_folder(out: Path | None, *words: str, now: datetime | None = None) -> P
 
 
 def in_a_name(text: str) -> str:
-    """The text without what a file's name had better not have."""
+    """Return the text with unusual characters replaced, for the name of a file."""
     return re.sub(r"[^A-Za-z0-9_.]+", "_", text).strip("._") or "flight"
 
 
 def _usable(path: Path) -> None:
-    """Make the directory and prove that it can be written to."""
+    """Make the directory and check that it is writable."""
     try:
         path.mkdir(parents=True, exist_ok=True)
         _try_to_write(path)
@@ -172,7 +172,7 @@ def _usable(path: Path) -> None:
 
 
 def new_folder(parent: Path, name: str) -> Path:
-    """Make a new directory `name` under `parent`, numbered where there is one of that name.
+    """Make a new directory `name` under `parent`; add a number if the name exists.
 
     Raises ResultFolderError.
     """
@@ -202,10 +202,10 @@ def _refusal(path: Path, error: OSError) -> ResultFolderError:
 
 
 def _point_latest_at(path: Path) -> None:
-    """Turn results/latest to `path`; what is there and not a link is left alone."""
+    """Point results/latest at `path`; a file or folder of that name is kept."""
     link = path.parent / LATEST
     if link.exists() and not link.is_symlink():
-        print(f"{link} is not a link and stays as it is", file=sys.stderr)
+        print(f"{link} is no link and is not changed", file=sys.stderr)
         return
     try:
         with replacing(link) as temporary:

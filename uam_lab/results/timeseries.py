@@ -1,7 +1,7 @@
-"""The recorded flight: one row per control tick, the columns named once, here.
+"""The recorded flight: a table with one row per control tick; this module names the columns.
 
-Both engines write the same table and everything downstream (metrics, figures, pictures) reads it
-by name. While flying, an engine fills one preallocated float64 array by column number:
+Both engines write the same table. Metrics, figures and pictures read it by column name. In flight,
+an engine fills a preallocated float64 array by column number:
 
     recording = FlightTable(ticks)
     TRUTH = COLUMNS.block("truth.")
@@ -33,14 +33,14 @@ UNITS = {name: "m" if name in NAMES[POSITION] else "rad" for name in NAMES}
 ANGLES = slice(3, 8)
 SUBSYSTEMS = ("position", "attitude", "arm")
 AXES = 3  # the largest number of axes of a subsystem
-# Phases between flights of the mission node; those in flight are named by the scenario.
+# Phases of the mission node on the ground; the scenario names those in flight.
 ON_GROUND = ("waiting", "landed", "aborted")
 PHASE_COLUMN = "phase"
 METADATA_KEY = b"uam"
 
 
 def _declare() -> dict[str, str]:
-    """Every numeric column in file order: name → unit."""
+    """Return all numeric columns in file order: name → unit."""
     columns = {"time": "s"}
     for group in ("truth", "estimate", "reference"):
         for suffix, per in (("", ""), ("_dot", "/s"), ("_ddot", "/s^2")):
@@ -82,10 +82,9 @@ class Columns:
         return name in self._number
 
     def block(self, prefix: str) -> slice:
-        """The adjacent columns whose names start with `prefix`, as a slice.
+        """Return the adjacent columns whose names start with `prefix`, as a slice.
 
-        Raises:
-            KeyError: no column starts so, or those that do are not adjacent.
+        Raises KeyError if there is none or if they are not adjacent.
         """
         found = [i for i, name in enumerate(self.names) if name.startswith(prefix)]
         if not found or found[-1] - found[0] + 1 != len(found):
@@ -93,7 +92,7 @@ class Columns:
         return slice(found[0], found[-1] + 1)
 
     def label(self, name: str) -> str:
-        """Column name in the file: "name [unit]"."""
+        """Return the column name in the file: "name [unit]"."""
         return f"{name} [{self.units[name]}]"
 
 
@@ -101,16 +100,16 @@ COLUMNS = Columns(_declare())
 
 
 def gain_columns(subsystem: str, names: Iterable[str]) -> np.ndarray:
-    """Numbers (n,) of the columns of a law's gains, called `names`."""
+    """Return the column numbers (n,) of a subsystem's gains `names`."""
     return np.array([COLUMNS[f"adaptation.{subsystem}.{name}"] for name in names], dtype=int)
 
 
 class UnreadableFlight(ValueError):
-    """A file that should hold a recorded flight does not."""
+    """The file contains no recorded flight."""
 
 
 class FlightTable:
-    """Preallocated store of a flight while it is flown; unwritten entries are NaN."""
+    """Preallocated table for recording a flight; unwritten entries are NaN."""
 
     def __init__(self, capacity: int):
         self.values = np.full((capacity, len(COLUMNS)), np.nan)
@@ -119,7 +118,7 @@ class FlightTable:
         self.count = 0
 
     def next_row(self, phase: str) -> np.ndarray:
-        """The (columns,) row of the next tick, to be filled in place; grows when full."""
+        """Return the row (columns,) of the next tick, to fill in place; a full table grows."""
         if self.count == len(self.values):
             self.values = np.concatenate([self.values, np.full_like(self.values, np.nan)])
             self.phases = np.concatenate([self.phases, np.zeros_like(self.phases)])
@@ -128,7 +127,7 @@ class FlightTable:
         return self.values[self.count - 1]
 
     def series(self, info: Mapping[str, Any] | None = None) -> Series:
-        """What has been recorded so far; error columns and the countdown are computed here."""
+        """Return the recorded rows, with error columns and countdown computed."""
         values = self.values[: self.count]
         count_down(values[:, COLUMNS["time"]])
         truth, reference = (values[:, COLUMNS.block(group)] for group in ("truth.", "reference."))
@@ -140,9 +139,9 @@ class FlightTable:
 
 
 def count_down(time: np.ndarray) -> None:
-    """Let mission time (ticks,) [s] run up to the first tick not before take-off, in place.
+    """Replace the mission time (ticks,) [s] before take-off by a countdown to it, in place.
 
-    Until take-off nobody can know how long it still takes; the recorded value stands still.
+    In flight the time until take-off is unknown: the recorded value is constant.
     """
     start = int(np.argmax(time >= 0.0)) if np.any(time >= 0.0) else len(time)
     if 0 < start < len(time) - 1:
@@ -178,20 +177,20 @@ class Series:
     def flown(self) -> np.ndarray:
         """Mask (ticks,): from the take-off command to the touchdown command.
 
-        The touchdown command is where the mission, its vehicle on the ground, switches it off:
-        the beginning of the phase "landed". In an aborted flight it is the abort.
+        The touchdown command is the start of the phase "landed", in which the mission disarms the
+        vehicle. In an aborted flight it is the abort.
         """
         on_ground = [name in ON_GROUND for name in self.phase_names]
         return (self.time >= 0.0) & ~np.array(on_ground)[self.phases]
 
     def in_phase(self, name: str) -> np.ndarray:
-        """Mask (ticks,) of a phase."""
+        """Return the mask (ticks,) of a phase."""
         if name not in self.phase_names:
             return np.zeros(len(self), dtype=bool)
         return self.phases == self.phase_names.index(name)
 
     def phase_spans(self) -> list[tuple[str, float, float]]:
-        """Phases in the order flown: (name, first time, time of the following phase) [s]."""
+        """Return the phases in order: (name, first time, first time of the next phase) [s]."""
         if not len(self):
             return []
         starts = np.flatnonzero(np.diff(self.phases, prepend=-1))
@@ -202,7 +201,7 @@ class Series:
         ]
 
     def magnet_spans(self) -> list[tuple[float, float]]:
-        """Times [s] between which the magnet was on."""
+        """Return the intervals [s] with the magnet on."""
         on = np.nan_to_num(self["magnet.on"]) > 0.5
         edges = np.flatnonzero(np.diff(on.astype(np.int8), prepend=0, append=0))
         last = len(self) - 1
@@ -212,11 +211,11 @@ class Series:
         ]
 
     def row_at(self, time: float) -> int:
-        """Number of the first row not before `time` [s]."""
+        """Return the number of the first row at or after `time` [s]."""
         return int(min(np.searchsorted(self.time, time), len(self) - 1))
 
     def table(self) -> pa.Table:
-        """Arrow table of the file: "name [unit]" columns, phase dictionary-encoded, info beside."""
+        """Return the Arrow table: "name [unit]" columns, phase as dictionary, info as metadata."""
         phase = pa.DictionaryArray.from_arrays(
             pa.array(self.phases, pa.int8()), pa.array(self.phase_names, pa.string())
         )
@@ -228,16 +227,15 @@ class Series:
         )
 
     def write(self, path: Path) -> None:
-        """Write the table to `path`; the file appears whole or not at all."""
+        """Write the table to `path` atomically."""
         with replacing(path) as temporary:
             pq.write_table(self.table(), temporary, compression="zstd")
 
 
 def read(path: Path) -> Series:
-    """Read a flight back.
+    """Read a flight from a file.
 
-    Raises:
-        UnreadableFlight: not a parquet file, or columns of the contract are missing.
+    Raises UnreadableFlight if it is no parquet file or if required columns are missing.
     """
     try:
         table = pq.read_table(path)
@@ -259,7 +257,7 @@ def read(path: Path) -> Series:
 
 
 def _missing(present: Iterable[str]) -> list[str]:
-    """Labels of the contract that `present` lacks."""
+    """Return the labels of the required columns that are not in `present`."""
     present = set(present)
-    wanted = [COLUMNS.label(name) for name in COLUMNS.names] + [PHASE_COLUMN]
-    return [label for label in wanted if label not in present]
+    required = [COLUMNS.label(name) for name in COLUMNS.names] + [PHASE_COLUMN]
+    return [label for label in required if label not in present]

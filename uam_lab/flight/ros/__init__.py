@@ -1,1 +1,1 @@
-"""The ROS engine: every node is a process of its own."""
+"""The ROS engine: each node runs in a separate process."""

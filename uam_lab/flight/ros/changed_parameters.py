@@ -1,4 +1,4 @@
-"""Which parameters were changed in flight: a node that is started again gets them back."""
+"""Parameters changed in flight: a restarted node starts with their newest values."""
 
 from __future__ import annotations
 
@@ -13,25 +13,25 @@ from uam_msgs_py.node.polling import listen, messages
 
 
 class ChangedParameters:
-    """Listens to /uam/parameter_changes through a node; polled, hence no executor."""
+    """Subscription to /uam/parameter_changes; polled, so it needs no executor."""
 
     def __init__(self, node: Node) -> None:
         self._subscription = listen(node, topics.CHANGES)
         self._newest: dict[str, dict[str, Any]] = {}  # node → parameter → value
 
     def poll(self) -> None:
-        """Note what has arrived."""
+        """Store the received changes."""
         for message in messages(self._subscription):
             self.note(ParameterChange.from_message(message)[1])
 
     def note(self, change: ParameterChange) -> None:
-        """Note a change; one that was refused changes nothing."""
+        """Store a change if it was accepted."""
         if change.accepted:
             values = {name: new for name, (_, new) in change.values.items()}
             self._newest.setdefault(change.node, {}).update(values)
 
     def arguments(self, node: str) -> list[str]:
-        """ROS arguments that give a node its newest values, to follow those of its start."""
+        """Return the ROS arguments with a node's newest values, to append to its arguments."""
         found = self._newest.get(node, {})
         return [
             text for name, value in found.items() for text in ("-p", f"{name}:={json.dumps(value)}")

@@ -1,8 +1,8 @@
-"""The ROS engine: every node a process of its own, supervised from here.
+"""The ROS engine: starts each node in a separate process and supervises the processes.
 
     ports → parameter file → processes → readiness → flight → stop in order → log → table
 
-Nothing is left behind, however it ends: no process, port or lock.
+It releases all processes, ports and locks, also after an error.
 """
 
 from __future__ import annotations
@@ -39,7 +39,7 @@ from uam_sim_bridge.ports import Ports, Reservation
 
 AUTOPILOT = "autopilot"
 FORKER = "uam_lab.flight.ros.forker"
-# Each child imports its parent's main module anew, as a rule the command and these.
+# Each child process imports its parent's main module again: the command and these modules.
 COMMANDS = [
     f"uam_lab.cli.{name}"
     for name in "campaign compare doctor faults fly profile report tune view".split()
@@ -49,9 +49,9 @@ POLL = 0.05  # [s]
 
 
 def fly(settings: FlightSettings, folder: ResultFolder, progress: Progress) -> Outcome:
-    """Fly; what was recorded lies in `folder` afterwards, also after a failure or Ctrl-C.
+    """Fly, and record to `folder`; a failure or Ctrl-C keeps the recording so far.
 
-    Raises PortError when no instance is free.
+    Raises PortError if no instance is free.
     """
     (folder.path / "logs").mkdir(exist_ok=True)
     own_autopilot = not users_autopilot(settings)
@@ -71,8 +71,8 @@ def fly(settings: FlightSettings, folder: ResultFolder, progress: Progress) -> O
                 progress.message(f"cockpit: {place.address(place.LOCAL, port)}")
             failure = _supervise(settings, folder, ports, progress, stop)
             if failure is not None and failure.status == NOT_READY and not settings.foreign:
-                # on a machine without processor time the middleware may not connect all of them
-                progress.message(f"{failure}; starting once more")
+                # on an overloaded machine the middleware may fail to connect all nodes
+                progress.message(f"{failure}; starting again")
                 _keep_logs(folder.path / "logs")
                 failure = _supervise(settings, folder, ports, progress, stop)
     outcome = read_outcome(settings, folder, failure, stop.raised)
@@ -83,7 +83,7 @@ def fly(settings: FlightSettings, folder: ResultFolder, progress: Progress) -> O
 
 
 def _keep_logs(logs: Path) -> None:
-    """Put aside what a start in vain has said."""
+    """Move the logs of a failed start to first_start/."""
     aside = logs / "first_start"
     aside.mkdir()
     for file in logs.glob("*.log"):
@@ -97,7 +97,7 @@ def _supervise(
     progress: Progress,
     stop: Interrupts,
 ) -> NodeFailed | None:
-    """Start everything, watch it until the plant ends, stop it; returns what failed."""
+    """Start all processes, watch them until the plant ends, stop them; return the failure."""
     logs = folder.path / "logs"
     surroundings = environment(ports.domain, logs)
     with Processes(logs, surroundings) as children:
@@ -109,9 +109,7 @@ def _supervise(
                 f"autopilot on TCP {ports.simulator_tcp}, UDP {ports.autopilot_udp}"
             )
             for name in settings.foreign:
-                progress.message(
-                    f"waiting for your {name}, to be started with ROS_DOMAIN_ID={ports.domain}"
-                )
+                progress.message(f"waiting for {name}: start it with ROS_DOMAIN_ID={ports.domain}")
             with (
                 StatusListener(surroundings, ports.domain) as listener,
                 _process_faults(settings, children, listener, progress) as faults,
@@ -123,14 +121,14 @@ def _supervise(
             others = [name for name in children.names if name != wiring.RECORDER]
             disobedient = children.stop(others) + children.stop([wiring.RECORDER])
             if disobedient and not stop.impatient:
-                progress.message(f"had to be killed: {', '.join(disobedient)}")
+                progress.message(f"did not stop and were killed: {', '.join(disobedient)}")
     return None
 
 
 def _start(
     children: Processes, settings: FlightSettings, folder: ResultFolder, ports: Ports
 ) -> None:
-    # What the nodes log is in their output already; files of their own would repeat it.
+    # the nodes' output already contains their log messages; separate files would repeat them
     arguments = ["--ros-args", "--disable-external-lib-logs"]
     arguments += ["--params-file", str(folder.parameters)]
     for name, module in ros_nodes.modules(settings).items():
@@ -150,16 +148,16 @@ def _start(
 def _process_faults(
     settings: FlightSettings, children: Processes, listener: StatusListener, progress: Progress
 ) -> ProcessFaults:
-    """What hinders the processes; each time it is said, and told to the log."""
+    """Return the process faults; their start and end are printed and recorded."""
     schedule = settings.faults.only(PROCESS)
     topic = FaultTopic(listener.node) if schedule else None
 
-    def tell(one: FaultState) -> None:
-        stage = f"begins at {one.begin:.2f} s" if one.active else f"is over at {one.end:.2f} s"
+    def announce(one: FaultState) -> None:
+        stage = f"begins at {one.begin:.2f} s" if one.active else f"ends at {one.end:.2f} s"
         progress.message(f"fault {one.fault.NAME} of {one.fault.values['node']} {stage}")
         topic.tell(listener.stamp, [one])
 
-    return ProcessFaults(children, schedule, tell)
+    return ProcessFaults(children, schedule, announce)
 
 
 def _watch(
@@ -174,12 +172,12 @@ def _watch(
     while children.running(wiring.PLANT) and not stop.raised:
         changed.poll()
         for lost in children.revive(changed.arguments):
-            text = f"{lost}; started again"
+            text = f"{lost}; restarted"
             progress.message(text)
             restarts.tell(listener.stamp, lost.name, text)
         children.check()
         for failure in children.missed():
-            progress.message(f"{failure}; the flight goes on without it")
+            progress.message(f"{failure}; the flight continues without it")
         status = listener.poll()
         faults.update(listener.mission_time)
         if status is not None:

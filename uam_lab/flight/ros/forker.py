@@ -1,6 +1,6 @@
-"""What the process that forks a flight's nodes does first; importing this does it.
+"""Preparation of the process that forks a flight's nodes; importing this module runs it.
 
-Compiled functions are loaded and run once, which each node would otherwise do for itself.
+It loads the compiled functions and runs them once, so that no node has to repeat this.
 """
 
 import gc
@@ -10,4 +10,4 @@ from uam_lab.flight.direct.warm_up import warm_up
 
 warm_up([catalogue.DEFAULT])
 gc.collect()
-gc.freeze()  # a collection in a child must not copy what it shares with the others
+gc.freeze()  # a garbage collection in a child must not copy the shared memory pages

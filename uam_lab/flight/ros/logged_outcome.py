@@ -1,4 +1,4 @@
-"""What became of a flight through the nodes: its log, and what plant and recorder reported."""
+"""Result of a flight with the ROS engine, from its log and the statistics of the nodes."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ def read_outcome(
     failure: NodeFailed | None,
     interrupted: bool,
 ) -> Outcome:
-    """The outcome of the flight in `folder`; failure: the node that ended it, if any."""
+    """Return the outcome of the flight in `folder`; failure: the failed node, if any."""
     outcome = Outcome(series=None, interrupted=interrupted)
     if failure is not None and not interrupted:
         outcome.failure, outcome.details = str(failure), failure.last_lines
@@ -29,10 +29,10 @@ def read_outcome(
     if settings.clock == "realtime":
         outcome.latency_s = numbers.get("latency_s", [])
         outcome.missed_ticks = numbers.get("missed_ticks")
-        late, asked = numbers.get("late_ticks", 0), numbers.get("answerable_ticks", 0)
+        late, total = numbers.get("late_ticks", 0), numbers.get("answerable_ticks", 0)
         if late:
             outcome.notes.append(
-                f"{late} of {asked} setpoints came later than one control period after their sample"
+                f"{late} of {total} setpoints were more than one control period late"
             )
     recorder = _statistics(folder.path / "logs" / "recorder.json")
     if lost := recorder.get("lost"):
@@ -53,7 +53,7 @@ def read_outcome(
 
 
 def _statistics(file: Path) -> dict[str, Any]:
-    """What a node reported at its end; {} when it did not get to it."""
+    """Return the statistics that a node wrote at its end, {} without them."""
     try:
         return json.loads(file.read_text())
     except (OSError, ValueError):

@@ -1,4 +1,4 @@
-"""What every node of a flight is told: the profile, and what belongs to this flight."""
+"""Parameters of all nodes of a flight: from the profile and from the settings."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from typing import Any
 
 from uam_control.mission.time_limit import time_limit
 from uam_lab.cockpit import place
-from uam_lab.flight.conclude import asked, command_line
+from uam_lab.flight.conclude import command_line, settings_facts
 from uam_lab.flight.ros.nodes import in_the_loop, users_autopilot
 from uam_lab.flight.settings import BUILTIN, FlightSettings
 from uam_lab.recording import log_facts
@@ -20,14 +20,14 @@ from uam_sim_bridge.ports import Ports
 FACTS = "facts.json"
 PX4_LINGER = 4.0  # [s] simulated, after the mission, in which PX4 disarms and closes its log
 START_TIMEOUT = 20.0  # [s] without progress until every node is connected to the others
-OWN_START_TIMEOUT = 600.0  # [s] the same where the user is to start one by hand
+OWN_START_TIMEOUT = 600.0  # [s] the same if the user starts a node by hand
 ANSWER_TIMEOUT = 10.0  # [s] for the answers to one lockstep tick
 
 
 def parameters(
     settings: FlightSettings, folder: ResultFolder, ports: Ports
 ) -> dict[str, dict[str, Any]]:
-    """Every node's parameters: those of the profile, and those of this flight."""
+    """Return the parameters of each node, from the profile and from the settings."""
     sections = {node: values.to_mapping() for node, values in settings.profile.sets.items()}
     sections[wiring.MISSION]["scenario"] = scenario_source(settings)
     sections[wiring.PLANT] = {
@@ -51,7 +51,7 @@ def parameters(
         "clock": settings.clock,
         "local_port": ports.offboard_udp,
         "autopilot_port": ports.autopilot_udp,
-        # as PX4 SITL numbers its instances; a flight controller is the first of its kind
+        # system id: as PX4 SITL numbers its instances; 1 for a flight controller
         "autopilot_system": 1.0 if in_the_loop(settings) else float(ports.instance + 1),
         "gcs": settings.gcs,
         "faults": settings.faults.only(LINK).to_text(),
@@ -71,16 +71,16 @@ def parameters(
 
 
 def write_facts(settings: FlightSettings, folder: ResultFolder) -> None:
-    """What the log is to say about the flight, apart from what flies by."""
+    """Write the facts for the log's metadata: settings, scenario, parameters, versions."""
     texts = {
         folder.parameters.name: folder.parameters.read_text(),
         folder.versions.name: as_json(versions()),
     }
-    known = asked(settings, command_line())
+    known = settings_facts(settings, command_line())
     log_facts.write(folder.path / "logs" / FACTS, known, scenario_source(settings), texts)
 
 
 def scenario_source(settings: FlightSettings) -> str:
-    """What the mission node is told to load: a name, or a file wherever the node runs."""
+    """Return the scenario for the mission node: a name, or the absolute path of a file."""
     given = Path(settings.scenario_source)
     return str(given.absolute()) if given.suffix else settings.scenario_source

@@ -1,4 +1,4 @@
-"""The processes of a flight through the nodes: executables, modules, the autopilot's arguments."""
+"""The processes of a flight with the ROS engine: executables, modules, autopilot arguments."""
 
 from __future__ import annotations
 
@@ -23,28 +23,28 @@ MODULES = {
 STAND_IN, SITL = "uam_sim_bridge.autopilot.server", "uam_sim_bridge.px4.sitl"
 HITL_ROUTER = "uam_sim_bridge.mavlink.hil.router"
 PX4_LOG = "px4.ulg"
-AUTOPILOT_WAIT = 60.0  # [s] of the autopilot for the simulator
+AUTOPILOT_WAIT = 60.0  # [s] for which the autopilot waits for the simulator
 
 
 def modules(settings: FlightSettings) -> dict[str, str]:
-    """The nodes of a flight: executable → module."""
+    """Return the nodes of a flight: executable → module."""
     return {name: module for name, module in MODULES.items() if name not in settings.without}
 
 
 def in_the_loop(settings: FlightSettings) -> bool:
-    """Whether a flight controller flies the simulated vehicle, all over one serial line."""
+    """Return whether a flight controller is connected by one serial line (hardware in the loop)."""
     return settings.link is not None and settings.link.kind == "serial"
 
 
 def users_autopilot(settings: FlightSettings) -> bool:
-    """Whether the user has started the autopilot, which connects to the plant by itself."""
+    """Return whether the user starts the autopilot, which itself connects to the plant."""
     return settings.link is not None and not in_the_loop(settings)
 
 
 def autopilot(
     settings: FlightSettings, folder: ResultFolder, ports: Ports
 ) -> tuple[str, list[str]]:
-    """Module and arguments of the autopilot's process; no module where the user started one."""
+    """Return module and arguments of the autopilot's process; "" if the user starts it."""
     instance = ["--instance", str(ports.instance)]
     patience = ["--wait", str(AUTOPILOT_WAIT)]
     if in_the_loop(settings):

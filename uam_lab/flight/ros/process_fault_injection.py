@@ -1,7 +1,8 @@
-"""Kills, stops and slows down processes of a flight at mission times.
+"""Process faults: kill, stop or slow down processes of a flight at mission times.
 
-The mission's time is known from its status, twice a second: a fault comes up to half a simulated
-second late. How long it lasts is wall time, since in lockstep the flight waits for who is stopped.
+The mission time comes from the mission's status, twice a second, so a fault starts up to half a
+simulated second late. Its duration is wall time, because in lockstep the flight waits for a
+stopped process.
 """
 
 from __future__ import annotations
@@ -20,12 +21,12 @@ from uam_sim_bridge.faults.process_faults import DiscoveryLoss, NodeKill, NodeSl
 from uam_sim_bridge.faults.timeline import FaultState
 from uam_sim_bridge.ports import is_discovery_port
 
-# Fast DDS's threads: one that tells of itself, one for each UDP port that it listens at
+# threads of Fast DDS: one sends the announcements, one per UDP port receives
 EVENTS, PORT = "dds.ev.", "dds.udp."
 
 
 def of_discovery(thread: str) -> bool:
-    """Whether a thread, by its name, does DDS discovery alone."""
+    """Return whether a thread of this name does only DDS discovery."""
     port = thread.removeprefix(PORT)
     return thread.startswith(EVENTS) or (
         thread.startswith(PORT) and port.isdecimal() and is_discovery_port(int(port))
@@ -33,7 +34,7 @@ def of_discovery(thread: str) -> bool:
 
 
 class ProcessFaults:
-    """A context manager; call `update` often. No process stays stopped at its end."""
+    """Context manager; call `update` often. At its end all stopped processes continue."""
 
     def __init__(
         self,
@@ -42,14 +43,14 @@ class ProcessFaults:
         tell: Callable[[FaultState], None],
         clock: Callable[[], float] = time.monotonic,
     ):
-        """schedule: faults of processes alone; tell: called as each begins or ends; clock [s]."""
+        """schedule: process faults; tell: called when a fault begins or ends; clock: [s]."""
         self._children, self._tell, self._clock = children, tell, clock
         self._all = [FaultState(one, number) for number, one in enumerate(schedule.faults)]
         self._ends: dict[int, float] = {}  # by the clock
         self._hindering: dict[int, _Hindrance | StoppedThreads] = {}
 
     def update(self, mission_time: float | None) -> None:
-        """Begin what is due at a mission time [s] (None: not known yet), end what is over."""
+        """Begin the due faults and end the expired ones; mission_time [s], None: unknown."""
         now = self._clock()
         for hindrance in self._hindering.values():
             hindrance.look()
@@ -97,7 +98,7 @@ class ProcessFaults:
 
 
 class _Hindrance:
-    """Stops a process: wholly, or for a part of each cycle by a thread."""
+    """Stops a process: completely, or for a part of each cycle, by a thread."""
 
     def __init__(self, pid: int, running: Callable[[], bool], stopped: float, cycle: float):
         self._pid, self._running = pid, running
@@ -111,10 +112,10 @@ class _Hindrance:
             self._thread.start()
 
     def look(self) -> None:
-        """Nothing to note."""
+        """Do nothing (a StoppedThreads looks for new threads)."""
 
     def end(self) -> None:
-        """Let it go on."""
+        """Let the process continue."""
         self._over.set()
         if self._thread is not None:
             self._thread.join()
@@ -127,6 +128,6 @@ class _Hindrance:
                 self._over.wait(wait)
 
     def _signal(self, number: signal.Signals) -> None:
-        """It is our child and not waited for yet where it runs, so the number is still its own."""
+        """Send a signal if the child runs; its pid is then valid, as it was not waited for."""
         if self._running():
             os.kill(self._pid, number)

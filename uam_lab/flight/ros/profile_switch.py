@@ -1,8 +1,8 @@
-"""Gives a whole profile to nodes that fly: all of them take it, or none does.
+"""Switches the profile in flight: all nodes apply it, or none.
 
-First every node is asked whether it would accept (`~/check_parameters`, which changes nothing).
-Only when all say yes do they get the values, each node all of its own at once and between two of
-its ticks. Should one refuse even then, the others get their old values back.
+First every node checks its values (`~/check_parameters`, without any change). If all accept, each
+node receives its values in one request and applies them between two ticks. If a node still
+refuses, the others get their old values back.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ from uam_msgs_py.node import wiring
 from uam_msgs_py.node.node_parameters import plain
 from uam_msgs_py.node.tunable import CHECK
 
-PATIENCE = 10.0  # [s] of wall time for a node to be found, and to answer
+PATIENCE = 10.0  # [s] wall time to find a service, and the same to receive its response
 AGAIN = 1.0  # [s] after which a request is repeated
 APPLY = "set_parameters_atomically"
 
@@ -31,11 +31,11 @@ Values = dict[str, Any]
 
 
 class SwitchRefused(ValueError):
-    """The profile was not taken and the old values fly on; one line for each node that refused."""
+    """The profile was refused and the old values stay active; one line per refusing node."""
 
 
 class ProfileSwitch:
-    """Talks to the nodes of one ROS domain through `node`."""
+    """Client of the parameter services of one ROS domain, through `node`."""
 
     def __init__(self, node: Node):
         self._node = node
@@ -43,15 +43,15 @@ class ProfileSwitch:
         self._executor.add_node(node)
 
     def switch(self, profile: Profile) -> dict[str, dict[str, tuple[Any, Any]]]:
-        """Have `profile` fly; return what changed: node → name → (old, new).
+        """Activate `profile`; return the changes: node → name → (old, new).
 
-        Raises SwitchRefused, with nothing changed.
+        Raises SwitchRefused without any change.
         """
-        wanted = _wanted(profile)
-        old = self._current(wanted)
+        desired = _desired(profile)
+        old = self._current(desired)
         new = {
             node: {name: value for name, value in values.items() if value != old[node].get(name)}
-            for node, values in wanted.items()
+            for node, values in desired.items()
         }
         new = {node: values for node, values in new.items() if values}
         self._all_accept(self._ask(CHECK, new))
@@ -67,30 +67,30 @@ class ProfileSwitch:
             for node, values in new.items()
         }
 
-    def _current(self, wanted: Mapping[str, Values]) -> dict[str, Values]:
-        """What flies now of the `wanted` parameters; a node leaves out those that it has not."""
+    def _current(self, desired: Mapping[str, Values]) -> dict[str, Values]:
+        """Return the active values of the `desired` parameters that the nodes have."""
         listed = self._call(
-            ListParameters, "list_parameters", {n: ListParameters.Request() for n in wanted}
+            ListParameters, "list_parameters", {n: ListParameters.Request() for n in desired}
         )
         names = {
             node: [name for name in values if name in listed[node].result.names]
-            for node, values in wanted.items()
+            for node, values in desired.items()
         }
-        asked = {node: GetParameters.Request(names=own) for node, own in names.items()}
-        found = self._call(GetParameters, "get_parameters", asked)
+        requests = {node: GetParameters.Request(names=own) for node, own in names.items()}
+        found = self._call(GetParameters, "get_parameters", requests)
         current = {
             node: dict(zip(own, map(plain, found[node].values), strict=True))
             for node, own in names.items()
         }
         laws = {node: current[node].get("law") for node in CONTROLLERS}
         self._all_accept({
-            node: f"the law {law} flies and cannot change to {wanted[node]['law']}"
-            for node, law in laws.items() if law != wanted[node]["law"]
+            node: f"the active law {law} cannot change to {desired[node]['law']} in flight"
+            for node, law in laws.items() if law != desired[node]["law"]
         })  # fmt: skip
         return current
 
     def _ask(self, service: str, changes: Mapping[str, Values]) -> dict[str, str]:
-        """Ask every node for its changes as a whole; node → why it refuses, "" if it does not."""
+        """Send each node its changes in one request; node → reason of refusal, "" if accepted."""
         requests = {
             node: SetParametersAtomically.Request(
                 parameters=[Parameter(n, value=v).to_parameter_msg() for n, v in values.items()]
@@ -110,12 +110,12 @@ class ProfileSwitch:
             raise SwitchRefused("\n".join(refused))
 
     def _call(self, kind: type, service: str, requests: Mapping[str, Any]) -> dict[str, Any]:
-        """Call a service of several nodes at a time; node → response. Raises SwitchRefused."""
+        """Call a service of several nodes in parallel; node → response. Raises SwitchRefused."""
         clients = {node: self._node.create_client(kind, f"/{node}/{service}") for node in requests}
         try:
-            self._until(lambda node: clients[node].service_is_ready(), clients, "is not there")
+            self._until(lambda node: clients[node].service_is_ready(), clients, "service not found")
             calls = {node: _Call(clients[node], requests[node]) for node in clients}
-            self._until(lambda node: calls[node].done(), calls, "does not answer")
+            self._until(lambda node: calls[node].done(), calls, "no response")
             return {node: call.response for node, call in calls.items()}
         finally:
             for client in clients.values():
@@ -130,8 +130,8 @@ class ProfileSwitch:
 
 
 class _Call:
-    """A request, repeated while it is not answered: a node that has found the client's request but
-    not its ear for the response answers to nobody. To be asked twice is the same as once here.
+    """A request, repeated until a response arrives: during discovery a service may receive a
+    request before it can reach the client with the response. The requests are idempotent.
     """
 
     def __init__(self, client: Client, request: Any):
@@ -141,7 +141,7 @@ class _Call:
         self.response: Any = None
 
     def done(self) -> bool:
-        """Whether there is a response; asks again when it is time to."""
+        """Return whether there is a response; repeat the request every AGAIN seconds."""
         for future in self._futures:
             if future.done():
                 self.response = future.result()
@@ -153,8 +153,8 @@ class _Call:
         return False
 
 
-def _wanted(profile: Profile) -> dict[str, Values]:
-    """The parameters of every node that the profile has; for the bridge those that it names."""
-    wanted = {node: profile.sets[node].to_mapping() for node in NODES}
+def _desired(profile: Profile) -> dict[str, Values]:
+    """Return the parameters of each node in the profile; for the bridge only the named ones."""
+    desired = {node: profile.sets[node].to_mapping() for node in NODES}
     bridge = profile.bridge()
-    return wanted | ({wiring.BRIDGE: bridge} if bridge else {})
+    return desired | ({wiring.BRIDGE: bridge} if bridge else {})

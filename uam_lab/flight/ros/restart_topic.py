@@ -1,4 +1,4 @@
-"""/uam/restarts and /diagnostics: a node was lost and is started again."""
+"""Publishes the restart of a node on /uam/restarts and /diagnostics."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from uam_msgs_py.messages.status import WARN, diagnostic
 
 
 class RestartTopic:
-    """Publishes each restart, for the plant, the log and those who watch."""
+    """Publishers of the restarts, for the plant, the log and the displays."""
 
     def __init__(self, node: Node) -> None:
         self._publishers = [
@@ -18,7 +18,7 @@ class RestartTopic:
         ]
 
     def tell(self, stamp: int, node: str, text: str) -> None:
-        """Say what became of a node; stamp [ns]: of the flight's clock."""
+        """Publish the restart of `node`; stamp [ns]: of the flight's clock."""
         message = diagnostic(stamp, node, WARN, text, {})
         for publisher in self._publishers:
             publisher.publish(message)

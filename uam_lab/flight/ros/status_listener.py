@@ -1,4 +1,4 @@
-"""Listens to a flight from outside, for the progress display: two topics, twice a second."""
+"""Receives the status of a flight for the progress display: two topics, twice a second."""
 
 from __future__ import annotations
 
@@ -16,10 +16,10 @@ from uam_msgs_py.node.polling import listen, messages
 
 
 class StatusListener:
-    """A node of its own ROS context. A context manager; polled, hence no executor."""
+    """Context manager with a node in a separate ROS context; polled, so it needs no executor."""
 
     def __init__(self, environment: Mapping[str, str], domain: int):
-        """environment: of the flight's processes, of which ROS reads some variables here too."""
+        """environment: of the flight's processes; ROS reads some of its variables here too."""
         self._guest = Guest("uam_fly", environment, domain)
         self._mission = listen(self._guest.node, topics.MISSION_STATUS)
         self._autopilot = listen(self._guest.node, topics.AUTOPILOT_STATE)
@@ -29,11 +29,11 @@ class StatusListener:
 
     @property
     def node(self) -> Node:
-        """The node that listens."""
+        """The subscribing node."""
         return self._guest.node
 
     def poll(self) -> Status | None:
-        """The newest status, None if there is none since the last call."""
+        """Return the newest status, None without a new one since the last call."""
         for message in messages(self._autopilot):
             _, state = AutopilotState.from_message(message)
             reasons = f": {state.reasons}" if state.reasons else ""
@@ -57,7 +57,7 @@ class StatusListener:
         )
 
     def _real_time_factor(self, simulated: float) -> float:
-        """Simulated over wall time since the first status."""
+        """Return simulated time / wall time since the first status."""
         wall = time.monotonic()
         if self._last is None:
             self._last = simulated, wall
