@@ -11,9 +11,11 @@ import math
 import numpy as np
 
 from uam_control.control.controllers import ArmController, AttitudeController, PositionController
-from uam_control.coordinates import ATTITUDE, POSITION
+from uam_control.coordinates import ARM, ATTITUDE, CHI, POSITION
+from uam_control.laws.catalogue import DEFAULT
 from uam_control.mission.trajectory import empty_reference
 from uam_control.profiles.profile import load_profile
+from uam_control.vehicle import load_description
 from uam_sim_bridge.mavlink.hil.hil_server import HilParameters, HilServer
 from uam_sim_bridge.mavlink.link.link import OffboardLink
 from uam_sim_bridge.mavlink.offboard.sequence import OffboardSequence, Phase
@@ -29,7 +31,6 @@ VISION_TICKS = 5  # a pose every 20 ms
 POSITION_DEVIATION, ATTITUDE_DEVIATION = 0.005, 0.02  # [m], [rad], as the bridge tells
 LONGEST_WAIT = 90.0  # [s] simulated, for an autopilot that boots
 NEAR_GROUND = 0.05  # [m] above where it stood
-ARM = np.array([0.0, np.pi / 2.0])  # hanging folded, as on the ground
 
 
 class NotFlown(RuntimeError):
@@ -45,8 +46,9 @@ class HoverFlight:
 
     def __init__(self, ports: Ports, always_answers: bool) -> None:
         """always_answers: the stand-in does; PX4 is silent while it boots."""
-        profile = load_profile("s500")
-        self.plant = Plant(Vehicle.load(), 0.0, SEED, tuple(ARM))
+        vehicle = load_description()
+        profile = load_profile(vehicle.profile(DEFAULT))
+        self.plant = Plant(Vehicle.of(vehicle), 0.0, SEED)
         self._position = PositionController(profile.sets["position_controller"])
         self._attitude = AttitudeController(profile.sets["attitude_controller"])
         self._arm = ArmController(profile.sets["arm_controller"])
@@ -55,14 +57,14 @@ class HoverFlight:
         waits = HilParameters()
         if always_answers:
             waits = HilParameters(silent_timeout=waits.answer_timeout)
-        self._hil = HilServer(ports.simulator_tcp, parameters=waits)
+        self._hil = HilServer(ports.simulator_tcp, len(vehicle.rotors), parameters=waits)
         self._transport = UdpTransport(ports.offboard_udp, (HOST, ports.autopilot_udp))
         self.system = ports.instance + 1  # MAVLink system id of the autopilot
         self._link = OffboardLink(
             self._transport, self._sequence, self._map.parameters, self.system
         )
         self._reference = empty_reference()
-        self._reference[0, 6:8] = ARM
+        self._reference[CHI, ARM] = vehicle.stowed
         self._state = np.zeros((3, 8))
         self._setpoint = np.zeros(4)
         self._flying = False

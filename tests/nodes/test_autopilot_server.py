@@ -40,7 +40,7 @@ class Flight:
     def __init__(self, signing=None, arguments=()):
         self.tcp, self.udp = free_port(socket.SOCK_STREAM), free_port(socket.SOCK_DGRAM)
         self.local = free_port(socket.SOCK_DGRAM)
-        self.hil = HilServer(self.tcp, parameters=PATIENT)
+        self.hil = HilServer(self.tcp, 4, parameters=PATIENT)
         self.process = start(
             "--sim-port",
             self.tcp,

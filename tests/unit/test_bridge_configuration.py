@@ -13,7 +13,7 @@ from uam_sim_bridge.mavlink.offboard.thrust_identification import ThrustIdentifi
 from uam_sim_bridge.mavlink.telemetry.parameter_check import WATCHED, differences, expected
 from uam_sim_bridge.plant import Vehicle
 
-BRIDGE = yaml.safe_load(path("bridge/s500.yaml").read_text())["mavlink_bridge"]["ros__parameters"]
+BRIDGE = yaml.safe_load(path("bridge/bridge.yaml").read_text())["mavlink_bridge"]["ros__parameters"]
 
 
 @pytest.mark.parametrize(

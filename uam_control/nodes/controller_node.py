@@ -9,6 +9,7 @@ from std_srvs.srv import SetBool, Trigger
 from uam_control.control.controllers import Controller
 from uam_control.coordinates import SIZE
 from uam_control.laws import catalogue
+from uam_control.nodes.described import described_vehicle
 from uam_control.nodes.timing import Ticks, Timing
 from uam_control.profiles.profile import default_profile, parameter_set
 from uam_msgs_py.messages import topics
@@ -42,10 +43,12 @@ class ControllerNode(UamNode):
         """
         super().__init__(name)
         law = given(self).get("law", catalogue.DEFAULT)
-        kind, axes = parameter_set(name, {"law": law})
+        self.vehicle = described_vehicle(self)
+        kind, axes = parameter_set(name, {"law": law}, self.vehicle)
         # for what no parameter file says
-        defaults = default_profile(law).section(name)
-        self.parameter_set = NodeParameters(self, kind, axes, defaults)
+        defaults = default_profile(law, self.vehicle).section(name)
+        derived = self.vehicle.node_parameters().get(name)
+        self.parameter_set = NodeParameters(self, kind, axes, defaults, derived)
         timing = NodeParameters(self, Timing, read_only=True).current
         self._ticks = Ticks(timing)
         self.controller = controller(self.parameter_set.current)

@@ -8,12 +8,14 @@ from rcl_interfaces.msg import ParameterDescriptor
 from std_msgs.msg import Bool
 
 from uam_control.coordinates import ARM, ATTITUDE, POSITION, SIZE
+from uam_control.laws.catalogue import DEFAULT
 from uam_control.maths.rotations import wrap_angle
 from uam_control.mission import Mission, MissionOutput, MissionParameters, load_scenario
+from uam_control.nodes.described import described_vehicle
 from uam_control.nodes.mission_inputs import MissionInputs
 from uam_control.nodes.mission_services import offer
 from uam_control.nodes.timing import Ticks, Timing
-from uam_control.profiles.profile import load_profile
+from uam_control.profiles.profile import default_profile
 from uam_control.supervision import State
 from uam_msgs_py.messages import topics
 from uam_msgs_py.messages.control import ReferenceWriter, read_state
@@ -26,7 +28,7 @@ from uam_msgs_py.node.joins import Backlog
 from uam_msgs_py.node.node_parameters import NodeParameters
 
 NAME = "mission"
-DEFAULT_PROFILE, DEFAULT_SCENARIO = "s500", "pick_and_place"
+DEFAULT_SCENARIO = "pick_and_place"
 STATUS_PERIOD = 500_000_000  # [ns]
 TOLD_BY = 200_000_000  # [ns] by which everybody has the status of a tick
 
@@ -39,8 +41,11 @@ class MissionNode(UamNode):
 
     def __init__(self):
         super().__init__(NAME)
-        section = load_profile(DEFAULT_PROFILE).section(NAME)
-        self.parameter_set = NodeParameters(self, MissionParameters, defaults=section)
+        vehicle = described_vehicle(self)
+        section = default_profile(DEFAULT, vehicle).section(NAME)
+        derived = vehicle.node_parameters()[NAME]
+        axes = vehicle.coordinates[ARM]
+        self.parameter_set = NodeParameters(self, MissionParameters, axes, section, derived)
         self._period = Ticks(NodeParameters(self, Timing, read_only=True).current).period
         about = ParameterDescriptor(
             description="name of a scenario, or its file; fixed once the node runs", read_only=True

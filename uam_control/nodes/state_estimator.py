@@ -6,7 +6,9 @@ import numpy as np
 
 from uam_control.coordinates import COORDINATES, JOINTS
 from uam_control.estimation import EstimatorParameters, StateEstimator
-from uam_control.profiles.profile import load_profile
+from uam_control.laws.catalogue import DEFAULT
+from uam_control.nodes.described import described_vehicle
+from uam_control.profiles.profile import default_profile
 from uam_msgs_py.messages import topics
 from uam_msgs_py.messages.convert import read_imu, read_joints, read_pose
 from uam_msgs_py.messages.stamps import seconds
@@ -17,7 +19,6 @@ from uam_msgs_py.node.joins import Backlog
 from uam_msgs_py.node.node_parameters import NodeParameters
 
 NAME = "state_estimator"
-DEFAULT_PROFILE = "s500"
 NAMES = list(JOINTS)
 
 
@@ -30,7 +31,8 @@ class StateEstimatorNode(UamNode):
 
     def __init__(self):
         super().__init__(NAME)
-        section = load_profile(DEFAULT_PROFILE).section(NAME)
+        vehicle = described_vehicle(self)
+        section = default_profile(DEFAULT, vehicle).section(NAME)
         self.parameter_set = NodeParameters(self, EstimatorParameters, defaults=section)
         self._estimator = StateEstimator(self.parameter_set.current)
         self.parameter_set.apply = self._estimator.set_parameters

@@ -18,31 +18,33 @@ from typing import Any
 
 from uam_control.control.controller_parameters import controller_parameters
 from uam_control.control.limits import PositionLimits, TorqueLimits
-from uam_control.coordinates import ARM, ATTITUDE, COORDINATES, POSITION
+from uam_control.coordinates import ARM, ATTITUDE, POSITION
 from uam_control.estimation import EstimatorParameters
 from uam_control.laws import catalogue
 from uam_control.mission import MissionParameters
 from uam_control.settings import configuration
 from uam_control.settings.parameter_file import ProfileError, read_sections
 from uam_control.settings.parameter_set import ParameterError, ParameterSet
+from uam_control.vehicle import VehicleDescription, load_description
 
-# controller → (parameters of its limits, names of the entries of its per-axis vectors)
-CONTROLLERS: dict[str, tuple[type[ParameterSet], tuple[str, ...]]] = {
-    "position_controller": (PositionLimits, COORDINATES[POSITION]),
-    "attitude_controller": (TorqueLimits, COORDINATES[ATTITUDE]),
-    "arm_controller": (TorqueLimits, COORDINATES[ARM]),
+# controller → (parameters of its limits, its part of chi)
+CONTROLLERS: dict[str, tuple[type[ParameterSet], slice]] = {
+    "position_controller": (PositionLimits, POSITION),
+    "attitude_controller": (TorqueLimits, ATTITUDE),
+    "arm_controller": (TorqueLimits, ARM),
 }
 OTHERS = {"state_estimator": EstimatorParameters, "mission": MissionParameters}
 NODES = (*CONTROLLERS, *OTHERS)
 BRIDGE = "mavlink_bridge"
 BRIDGE_LINKS = (
     *("clock", "local_port", "autopilot_port", "autopilot_host", "autopilot_system"),
-    *("autopilot", "gcs"),
+    *("autopilot", "gcs", "vehicle"),
 )
 # Parameters that a node has but a profile has not: they belong to a flight.
 FLIGHT_OWN = {
-    **dict.fromkeys(CONTROLLERS, ("control_period",)),
-    "mission": ("control_period", "scenario"),
+    **dict.fromkeys(CONTROLLERS, ("control_period", "vehicle")),
+    "state_estimator": ("vehicle",),
+    "mission": ("control_period", "scenario", "vehicle"),
 }
 
 
@@ -73,50 +75,55 @@ class Profile:
 
 
 def parameter_set(
-    node: str, values: Mapping[str, Any]
+    node: str, values: Mapping[str, Any], vehicle: VehicleDescription
 ) -> tuple[type[ParameterSet], tuple[str, ...]]:
     """Return the kind of parameters of a node and the names of its axes; a controller's follow
     from its law.
 
-    values: the node's section, whose `law` counts. Raises ParameterError for an unknown law.
+    The axes of the mission are the joints. values: the node's section, whose `law` counts. Raises
+    ParameterError for an unknown law.
     """
     if node in OTHERS:
-        return OTHERS[node], ()
-    limits, axes = CONTROLLERS[node]
+        return OTHERS[node], vehicle.coordinates[ARM]
+    limits, part = CONTROLLERS[node]
     law = catalogue.law(values.get("law", catalogue.DEFAULT))
-    return controller_parameters(law.kind, limits), axes
+    return controller_parameters(law.kind, limits), vehicle.coordinates[part]
 
 
-def load_profile(*names_or_files: str) -> Profile:
+def load_profile(*names_or_files: str, vehicle: VehicleDescription | None = None) -> Profile:
     """Return a profile by name (config/profiles) or from a .yaml file; raises ProfileError.
 
-    Of several what comes later counts, parameter by parameter.
+    Of several what comes later counts, parameter by parameter; what none of them has and follows
+    from the vehicle (None: the default one) is taken from there.
     """
     sections: dict[str, dict[str, Any]] = {}
     files = [_file(given) for given in names_or_files]
     for file in files:
         for node, values in read_sections(file).items():
             sections[node] = sections.get(node, {}) | values
-    found = profile_of(sections, files[-1])
+    found = profile_of(sections, files[-1], vehicle)
     return replace(found, name="+".join(file.stem for file in files))
 
 
-def default_profile(law: str) -> Profile:
+def default_profile(law: str, vehicle: VehicleDescription | None = None) -> Profile:
     """Return the profile that `law` flies with when the user names none; raises ProfileError.
+
+    vehicle: None for the default one; its description may name a profile for the law.
 
     A law without a profile of its own takes the default law's values of the parameters that both
     have (same name, meaning, unit and range); the others have their defaults.
     """
-    own = catalogue.law(law).profile
+    vehicle = vehicle or load_description()
+    own = vehicle.profile(law) or catalogue.law(law).profile
     if own:
-        return load_profile(own)
-    sections = dict(load_profile(catalogue.law(catalogue.DEFAULT).profile).sections)
+        return load_profile(own, vehicle=vehicle)
+    sections = dict(default_profile(catalogue.DEFAULT, vehicle).sections)
     for node in CONTROLLERS:
-        known = parameter_set(node, {})[0].specs()
-        specs = parameter_set(node, {"law": law})[0].specs()
+        known = parameter_set(node, {}, vehicle)[0].specs()
+        specs = parameter_set(node, {"law": law}, vehicle)[0].specs()
         shared = {k: v for k, v in sections[node].items() if specs.get(k) == known[k]}
         sections[node] = {"law": law} | shared
-    return profile_of(sections, Path(f"{law}.yaml"))
+    return profile_of(sections, Path(f"{law}.yaml"), vehicle)
 
 
 def _file(name_or_file: str) -> Path:
@@ -129,17 +136,21 @@ def _file(name_or_file: str) -> Path:
         raise ProfileError(str(error)) from None
 
 
-def profile_of(sections: dict[str, dict[str, Any]], file: Path) -> Profile:
+def profile_of(
+    sections: dict[str, dict[str, Any]], file: Path, vehicle: VehicleDescription | None = None
+) -> Profile:
     """Return the checked profile of the raw `sections`, which are those of `file` or belong there.
 
-    Raises ProfileError.
+    vehicle: see `load_profile`. Raises ProfileError.
     """
-    sets = {}
+    sets, vehicle = {}, vehicle or load_description()
+    derived = vehicle.node_parameters()
     for node in NODES:
         aside = FLIGHT_OWN.get(node, ())
         values = {k: v for k, v in sections.get(node, {}).items() if k not in aside}
+        values = derived.get(node, {}) | values
         try:
-            kind, axes = parameter_set(node, values)
+            kind, axes = parameter_set(node, values, vehicle)
             sets[node] = kind.from_mapping(values, len(axes))
         except ParameterError as error:
             raise ProfileError(f"{file}: {node}: {error}") from None

@@ -55,11 +55,12 @@ def path(relative: str) -> Path:
     )
 
 
-def named(folder: str, name: str) -> Path:
+def named(folder: str, name: str, suffixes: tuple[str, ...] = SUFFIXES) -> Path:
     """What the user calls `name`: a file of his own, or one of config/<folder> without its suffix.
 
     `named("profiles", "s500")` and `named("profiles", "./mine.yaml")` both work. A name with a
-    directory or a known suffix is a file. Raises ConfigurationError otherwise, listing the names.
+    directory or a known suffix is a file. suffixes: of the files that count. Raises
+    ConfigurationError otherwise, listing the names.
     """
     given = Path(name).expanduser()
     if given.is_file():
@@ -67,15 +68,14 @@ def named(folder: str, name: str) -> Path:
     kind = folder.rstrip("s")
     if given.suffix in SUFFIXES or len(given.parts) > 1:
         raise ConfigurationError(f"{kind} file {name} does not exist")
-    for suffix in SUFFIXES:
+    for suffix in suffixes:
         found = root() / folder / (name + suffix)
         if found.is_file():
             return found
-    raise ConfigurationError(
-        f"unknown {kind} '{name}'; there are: {', '.join(names(folder)) or 'none'}, or give a file"
-    )
+    known = ", ".join(names(folder, suffixes)) or "none"
+    raise ConfigurationError(f"unknown {kind} '{name}'; there are: {known}, or give a file")
 
 
-def names(folder: str) -> list[str]:
+def names(folder: str, suffixes: tuple[str, ...] = SUFFIXES) -> list[str]:
     """The names that `named` knows in config/<folder>, sorted."""
-    return sorted(p.stem for p in (root() / folder).glob("*") if p.suffix in SUFFIXES)
+    return sorted(p.stem for p in (root() / folder).glob("*") if p.suffix in suffixes)

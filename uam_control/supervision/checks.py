@@ -10,6 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from uam_control.coordinates import ALPHA, CHI, CHI_DOT, PITCH, ROLL, X, Z
 from uam_control.maths.compiled import jit
 from uam_control.supervision.monitor import Level, Monitor
 from uam_control.supervision.observation import Observation
@@ -189,28 +190,29 @@ def measure(
     only values[0].
 
     mocap (3,), age: position [m] of the newest pose and its age [s], NaN for none; box (2, 3): low
-    and high corner [m]; joints (2,): limits of the angles [rad].
+    and high corner [m]; joints (n,): limits of the angles [rad].
     """
     values[0] = 0.0
     for i in range(3):
-        for j in range(8):
+        for j in range(state.shape[1]):
             if not math.isfinite(state[i, j]):
                 values[0] = 1.0
                 return
     age = min(max(age, 0.0), LATEST)
     squared, apart, outside, rate = 0.0, 0.0, -math.inf, 0.0
     for i in range(3):
-        squared += (state[0, i] - reference[0, i]) ** 2
-        apart += (state[0, i] - state[1, i] * age - mocap[i]) ** 2
-        outside = max(outside, box[0, i] - state[0, i], state[0, i] - box[1, i])
-        rate = max(rate, abs(state[1, 3 + i]))
-    cosine = math.cos(state[0, 3]) * math.cos(state[0, 4])
+        position = state[CHI, X + i]
+        squared += (position - reference[CHI, X + i]) ** 2
+        apart += (position - state[CHI_DOT, X + i] * age - mocap[i]) ** 2
+        outside = max(outside, box[0, i] - position, position - box[1, i])
+        rate = max(rate, abs(state[CHI_DOT, ROLL + i]))
+    cosine = math.cos(state[CHI, ROLL]) * math.cos(state[CHI, PITCH])
     values[1] = math.sqrt(squared)
     values[2] = math.acos(min(1.0, max(-1.0, cosine)))
     values[3] = rate
-    values[4] = state[0, 2] - ground
+    values[4] = state[CHI, Z] - ground
     values[5] = outside
-    values[6] = max(abs(state[0, 6]) / joints[0], abs(state[0, 7]) / joints[1])
+    values[6] = _largest(state[CHI, ALPHA:], joints)
     values[7] = _known(math.sqrt(apart))
 
 
@@ -247,9 +249,9 @@ def _known(value: float) -> float:
 
 @jit
 def _largest(values: np.ndarray, limits: np.ndarray) -> float:
-    """The largest |value| / limit of those that are known."""
+    """The largest |value| / limit of those that are known and have a limit."""
     found = -math.inf
-    for i in range(len(limits)):
+    for i in range(min(len(values), len(limits))):
         ratio = abs(values[i]) / limits[i]
         if ratio > found:
             found = ratio

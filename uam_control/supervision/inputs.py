@@ -44,9 +44,9 @@ class Inputs:
             self._moved = stamp
 
     def joints(self, stamp: float, effort: np.ndarray) -> None:
-        """Note joint readings; effort (2,): measured torques [N m]."""
+        """Note joint readings; effort (n,): measured torques [N m]."""
         self._joints = stamp
-        self._readings.joint_effort[:] = effort  # as compiled maths wants it, writable
+        self._readings.joint_effort = np.array(effort, dtype=float)
 
     def temperature(self, joint: str, degrees: float) -> None:
         """Store the temperature [deg C] of a joint's servo."""

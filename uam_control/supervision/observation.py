@@ -30,7 +30,8 @@ class Readings:
     pose_controller_age [s]: the same without the arm controller. autopilot_age [s]: since the
     bridge last reported a connection to the autopilot; round_trip [s]: of the autopilot's link.
     missed_ticks: within the last second. temperature: of the hottest servo [deg C]. joint_effort
-    (2,): measured [N m]. gains (3,): largest adapted gain of position, attitude, arm.
+    (n,): measured [N m], empty where not known. gains (3,): largest adapted gain of position,
+    attitude, arm.
     """
 
     battery: float = math.nan
@@ -39,7 +40,7 @@ class Readings:
     controller_age: float = math.nan
     missed_ticks: float = math.nan
     temperature: float = math.nan
-    joint_effort: np.ndarray = field(default_factory=lambda: np.full(2, math.nan))
+    joint_effort: np.ndarray = field(default_factory=lambda: np.zeros(0))
     gains: np.ndarray = field(default_factory=lambda: np.full(3, math.nan))
     pose_controller_age: float = math.nan
     autopilot_age: float = math.nan
@@ -52,7 +53,7 @@ class Readings:
 class Observation:
     """One tick.
 
-    state, reference (3, 8): the estimate, and what was asked of it. ground: height at take-off [m].
+    state, reference (3, 6 + n): the estimate, and the reference. ground: height at take-off [m].
     armed: by the autopilot's report. ready: the mission allows the take-off. landing_due: the
     scenario's landing has begun. on_ground: low and slow now; touchdown: on the ground for
     touchdown_time; overdue: no touchdown in the allowed time.

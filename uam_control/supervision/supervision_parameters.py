@@ -47,10 +47,10 @@ class SupervisionLimits(ParameterSet):
         2.0, "distance outside the geofence that starts the failsafe", "m", 0.0, 1000.0
     )
     joint_angle_hold: tuple = vector(
-        (1.9, 2.05), "angle of alpha_1, alpha_2 to either side to hold at", "rad", 0.01, 6.3, 2
+        (), "angle of a joint to either side to hold at", "rad", 0.01, 6.3
     )
     joint_effort_hold: tuple = vector(
-        (2.8, 2.8), "measured torque of alpha_1, alpha_2 to hold at", "N m", 0.01, 100.0, 2
+        (), "measured torque of a joint to hold at", "N m", 0.01, 100.0
     )
     temperature_hold: float = number(
         70.0, "servo temperature that starts a hold (a Dynamixel X switches off at 80)", "deg C",

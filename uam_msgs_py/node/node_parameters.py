@@ -61,20 +61,23 @@ class NodeParameters(Generic[S]):
         kind: type[S],
         axes: Sequence[str] = (),
         defaults: dict[str, Any] | None = None,
+        derived: dict[str, Any] | None = None,
         apply: Callable[[S], None] | None = None,
         read_only: bool = False,
     ):
         """Declare all parameters of `kind`.
 
         axes: names of the entries of a per-axis vector. defaults: values of the default profile for
-        parameters that the parameter file omits; not used if that file is complete. read_only: no
-        changes after the start. Raises ParameterError for invalid values.
+        parameters that the parameter file omits; not used if that file is complete. derived: values
+        that follow from the vehicle, for what neither has. read_only: no changes after the start.
+        Raises ParameterError for invalid values.
         """
         self._axes = len(axes)
         self.apply = apply
         own = {name: value for name, value in given(node).items() if name in kind.specs()}
-        base = {} if complete(kind, own) else dict(defaults or {})
-        self.current = kind.from_mapping(base | own, self._axes)
+        follows = {k: v for k, v in (derived or {}).items() if k in kind.specs()}
+        base = {} if own and complete(kind, follows | own) else dict(defaults or {})
+        self.current = kind.from_mapping(follows | base | own, self._axes)
         for name, spec in kind.specs().items():
             value = getattr(self.current, name)
             node.declare_parameter(

@@ -1,11 +1,10 @@
-"""Normalised torques and thrust → four motor thrusts, as PX4's control allocator does it.
+"""Normalised torques and thrust → the thrusts of the motors, as PX4's control allocator does it.
 
 The mixer is that of `rotor_geometry.normalised_mixer`. Saturation is removed in the
 order of importance (PX4: sequential desaturation, MC_AIRMODE = 0): collective down, then roll and
 pitch, then yaw with a margin, then collective down again.
 
-Motor order and signs are PX4's quad X: front-right CCW, back-left CCW, front-left CW,
-back-right CW; torques FRD.
+Motor order and signs are those of PX4's CA_ROTORn; torques FRD.
 """
 
 from __future__ import annotations

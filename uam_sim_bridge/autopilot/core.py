@@ -13,6 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from uam_control.maths.compiled import jit
+from uam_control.vehicle import load_description
 from uam_sim_bridge.autopilot.allocation import allocate, unallocated_torque
 from uam_sim_bridge.autopilot.autopilot_estimator import Estimator
 from uam_sim_bridge.autopilot.commander import Commander
@@ -68,21 +69,21 @@ def control_tick(
     memory: np.ndarray,
     motors: np.ndarray,
 ) -> None:
-    """One cycle of the rate loop: gyro (3,) and setpoint (4,) → motors (4,), FRD."""
+    """One cycle of the rate loop: gyro (3,) and setpoint (4,) → motors (rotors,), FRD."""
     filter_gyro(gyro, dt, filters, memory)
     if not armed:
         for axis in range(3):
             memory[INTEGRAL, axis] = 0.0
             memory[TORQUE, axis] = 0.0
             memory[UNALLOCATED, axis] = 0.0
-        for i in range(4):
+        for i in range(len(motors)):
             motors[i] = 0.0
         return
     rate_torque(setpoint, dt, filters, gains, landed, memory)
     torque = memory[TORQUE]
     allocate(torque, setpoint[3], mixer, motors)
     unallocated_torque(torque, motors, inverse, memory[UNALLOCATED])
-    for i in range(4):
+    for i in range(len(motors)):
         motors[i] = inverse_curve(model_factor, motors[i])
 
 
@@ -102,14 +103,15 @@ def magnitude_of_usable(position: np.ndarray, quaternion: np.ndarray) -> float:
 class Autopilot:
     """PX4-class autopilot.
 
-    `motors` (4,): commands 0..1 in PX4's order (front-right CCW, back-left CCW, front-left CW,
-    back-right CW), zero while disarmed; rewritten by every `update`.
+    `motors` (rotors,): commands 0..1 in PX4's order, zero while disarmed; rewritten by every
+    `update`.
     """
 
     def __init__(self, parameters: Parameters | None = None, sample_rate: float = 250.0) -> None:
-        """sample_rate [Hz]: how often `update` will be called."""
-        self.parameters = parameters or Parameters()
-        self.motors = np.zeros(4)
+        """parameters: None for the default vehicle's; sample_rate [Hz]: how often `update` will be
+        called."""
+        self.parameters = parameters or Parameters.of(load_description())
+        self.motors = np.zeros(int(self.parameters["CA_ROTOR_COUNT"]))
         self.estimator = Estimator()
         self.commander = Commander(self.parameters)
         self.landing = LandDetector(self.parameters)

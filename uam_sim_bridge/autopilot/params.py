@@ -6,8 +6,9 @@ import math
 from dataclasses import dataclass
 from pathlib import Path
 
-from uam_control.settings import yaml_file
+from uam_control.settings import configuration, yaml_file
 from uam_control.settings.parameter_set import ParameterError
+from uam_control.vehicle import VehicleDescription
 
 
 @dataclass(frozen=True)
@@ -33,8 +34,7 @@ def _axis(rate: str, limit: str, axis: str, p: float, i: float, d: float) -> dic
     }
 
 
-# px, py, km of the S-500 rotors in PX4's motor order
-_ROTORS = ((1, 1, 1), (-1, -1, 1), (1, -1, -1), (-1, 1, -1))
+ROTORS_MAX = 12  # as PX4's control allocation
 
 DEFINITIONS: dict[str, Definition] = {
     "MAV_SYS_ID": Definition(1, 1, 250, "1", "system id", True),
@@ -62,13 +62,14 @@ DEFINITIONS: dict[str, Definition] = {
     "LNDMC_Z_VEL_MAX": Definition(0.25, 0.0, 10.0, "m/s", "vertical speed when landed"),
     "LNDMC_XY_VEL_MAX": Definition(1.5, 0.0, 10.0, "m/s", "horizontal speed when landed"),
     "LNDMC_ROT_MAX": Definition(20.0, 0.0, 1000.0, "deg/s", "rotation when landed"),
+    "CA_ROTOR_COUNT": Definition(0, 0, ROTORS_MAX, "1", "number of rotors", True),
     **{
-        f"CA_ROTOR{i}_{what}": Definition(sign * size, -limit, limit, unit, f"rotor {i + 1} {text}")
-        for i, signs in enumerate(_ROTORS)
-        for what, sign, size, limit, unit, text in (
-            ("PX", signs[0], 0.171, 5.0, "m", "forward"),
-            ("PY", signs[1], 0.171, 5.0, "m", "right"),
-            ("KM", signs[2], 0.016, 1.0, "m", "moment per thrust, > 0 counter-clockwise"),
+        f"CA_ROTOR{i}_{what}": Definition(default, -limit, limit, unit, f"rotor {i + 1} {text}")
+        for i in range(ROTORS_MAX)
+        for what, default, limit, unit, text in (
+            ("PX", 0.0, 5.0, "m", "forward"),
+            ("PY", 0.0, 5.0, "m", "right"),
+            ("KM", 0.05, 1.0, "m", "moment per thrust, > 0 counter-clockwise"),
         )
     },
 }
@@ -86,13 +87,26 @@ class Parameters:
             self.set(name, value)
 
     @classmethod
-    def load(cls, path: Path | str) -> Parameters:
-        """Read a YAML file `NAME: value`; raises ParameterError, one line with the file's name."""
-        values = yaml_file.read(Path(path), ParameterError)
+    def of(cls, vehicle: VehicleDescription, file: Path | str | None = None) -> Parameters:
+        """The parameters of a vehicle: those that follow from it, and those of a YAML file.
+
+        file: lines `NAME: value`, None for config/autopilot of the vehicle. Raises ParameterError,
+        one line with the file's name; also where the file repeats what follows from the vehicle
+        with another value.
+        """
+        path = Path(file or configuration.path(f"autopilot/{vehicle.autopilot}.yaml"))
+        values = yaml_file.read(path, ParameterError)
         if not isinstance(values, dict):
             raise ParameterError(f"{path}: 'NAME: value' lines expected")
+        derived = vehicle.autopilot_parameters()
+        for name in derived.keys() & values.keys():
+            if values[name] != derived[name]:
+                raise ParameterError(
+                    f"{path}: {name}: {values[name]!r}, but {vehicle.file.name} makes it "
+                    f"{derived[name]:g}"
+                )
         try:
-            return cls(values)
+            return cls(derived | values)
         except ParameterError as error:
             raise ParameterError(f"{path}: {error}") from None
 
@@ -118,8 +132,9 @@ class Parameters:
         return [self._values[name] for name in names]
 
     def rotors(self) -> tuple[list[float], list[float], list[float]]:
-        """Return px, py, km of the four rotors."""
+        """Return px, py, km (CA_ROTOR_COUNT,) of the rotors."""
+        rotors = range(int(self["CA_ROTOR_COUNT"]))
         px, py, km = (
-            self.vector(*(f"CA_ROTOR{i}_{what}" for i in range(4))) for what in ("PX", "PY", "KM")
+            self.vector(*(f"CA_ROTOR{i}_{what}" for i in rotors)) for what in ("PX", "PY", "KM")
         )
         return px, py, km

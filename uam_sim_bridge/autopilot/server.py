@@ -19,8 +19,9 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from uam_control.settings.configuration import ConfigurationError, path
+from uam_control.settings.configuration import ConfigurationError
 from uam_control.settings.parameter_set import ParameterError
+from uam_control.vehicle import DEFAULT_VEHICLE, load_description
 from uam_sim_bridge.autopilot.companion import Companion, warm_up
 from uam_sim_bridge.autopilot.core import Autopilot
 from uam_sim_bridge.autopilot.params import Parameters
@@ -34,6 +35,7 @@ _GYRO_AND_ACCELEROMETER = 0x3F  # HIL_SENSOR.fields_updated
 _LOCKSTEP = 1  # HIL_ACTUATOR_CONTROLS.flags
 _CUSTOM_MODE, _ARMED = 1, 128  # its mode
 _LATEST = 2**53  # µs: MAVLink's nanoseconds end a little later
+CONTROLS = 16  # of HIL_ACTUATOR_CONTROLS
 _RATE_SAMPLES = 8  # intervals from which the rate of HIL_SENSOR is measured
 
 
@@ -91,7 +93,7 @@ class Server:
         self._udp.send(self._companion.tick(time))
         mode = _CUSTOM_MODE | (_ARMED if self._autopilot.status.armed else 0)
         answer = mavlink2.MAVLink_hil_actuator_controls_message(
-            m.time_usec, [*motors.tolist(), *[0.0] * 12], mode, _LOCKSTEP
+            m.time_usec, [*motors.tolist(), *[0.0] * (CONTROLS - len(motors))], mode, _LOCKSTEP
         )
         try:
             self._simulator.sendall(self._codec.encode(answer))
@@ -121,7 +123,13 @@ def parser() -> argparse.ArgumentParser:
     )
     add_port_options(p)
     p.add_argument(
-        "--params", metavar="FILE", help="parameters (default: config/autopilot/s500.yaml)"
+        "--vehicle",
+        default=DEFAULT_VEHICLE,
+        metavar="NAME|FILE",
+        help="description, as in config/vehicle/ (default %(default)s)",
+    )
+    p.add_argument(
+        "--params", metavar="FILE", help="gains (default: the vehicle's, in config/autopilot/)"
     )
     p.add_argument(
         "--serial",
@@ -146,8 +154,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     try:
         if options.serial and options.signing_key:
             raise ValueError("--signing-key is for UDP, the line of --serial is not signed")
-        file = options.params or path("autopilot/s500.yaml")
-        autopilot = Autopilot(Parameters.load(file))
+        autopilot = Autopilot(Parameters.of(load_description(options.vehicle), options.params))
         # as PX4 SITL does; the highest instances do not fit MAVLink's one byte
         autopilot.set_parameter("MAV_SYS_ID", min(options.instance + 1, 250))
         codec = Codec(

@@ -34,9 +34,7 @@ class MotorLoss(PlantFault):
     remaining: float = number(0.5, "fraction of the thrust that remains", "1", 0.0, 1.0)
 
     def effect(self, noise: np.random.Generator) -> Effect:
-        thrust = np.ones(4)
-        thrust[int(self.motor) - 1] = self.remaining
-        return ActEffect(lambda plant, _: plant.weaken_rotors(thrust))
+        return ActEffect(lambda plant, _: plant.weaken_rotor(int(self.motor) - 1, self.remaining))
 
 
 @dataclass(frozen=True)
@@ -60,7 +58,7 @@ class Sag(Effect):
 
     def act(self, plant: Disturbable, commands: PlantCommands) -> None:
         done = 1.0 if self._since >= self._over else self._since / self._over
-        plant.weaken_rotors(np.full(4, 1.0 + done * (self._remaining - 1.0)))
+        plant.weaken_rotors(1.0 + done * (self._remaining - 1.0))
         self._since += plant.period
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 from uam_sim_bridge.faults.direct_link import DirectLink
@@ -22,7 +23,7 @@ class DirectFaults:
         self._timelines: list[Timeline] = [self.link.timeline]
 
     def plant(
-        self, vehicle: Vehicle, payload_mass: float, seed: int, arm_start: tuple[float, float]
+        self, vehicle: Vehicle, payload_mass: float, seed: int, arm_start: Sequence[float]
     ) -> Plant:
         """Return the plant of this flight; arguments as in `Plant`."""
         acting = self._schedule.only(PLANT)

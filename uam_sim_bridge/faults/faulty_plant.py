@@ -5,6 +5,8 @@ Flights without plant faults use `Plant` itself.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import mujoco
 import numpy as np
 
@@ -13,6 +15,7 @@ from uam_sim_bridge.faults.schedule import Schedule
 from uam_sim_bridge.faults.timeline import FaultState, Timeline
 from uam_sim_bridge.plant import Plant, Samples, Vehicle
 from uam_sim_bridge.plant.payload_hinge import PayloadHinge, add_to
+from uam_sim_bridge.plant.vehicle import MAGNET
 
 STIFF = 0.9999  # constraint impedance of a friction without creep, see MuJoCo's solimp
 
@@ -25,7 +28,7 @@ class FaultyPlant(Plant):
         vehicle: Vehicle,
         payload_mass: float,
         seed: int,
-        arm_start: tuple[float, float],
+        arm_start: Sequence[float],
         schedule: Schedule,
     ) -> None:
         """See `Plant`; schedule: faults of the plant only."""
@@ -39,8 +42,8 @@ class FaultyPlant(Plant):
         )
         self._noise = [np.random.default_rng(stream) for stream in streams]
         model = self.model
-        self._arm_dofs = [model.joint(name).dofadr[0] for name in ("alpha_1", "alpha_2")]
-        self._magnet_id = model.actuator("magnet").id
+        self._arm_dofs = [model.joint(name).dofadr[0] for name in vehicle.description.joint_names]
+        self._magnet_id = model.actuator(MAGNET).id
         self._usual = (
             self.rotors.efficiency.copy(),
             model.dof_frictionloss[self._arm_dofs].copy(),
@@ -84,12 +87,16 @@ class FaultyPlant(Plant):
             self._touched = bool(self._effects)
         super().step(motor_commands, arm_effort, magnet)
 
-    def weaken_rotors(self, parts: np.ndarray) -> None:
-        """Scale the rotors' thrust by parts (n_rotors,) [1] for this period."""
-        self.rotors.efficiency *= parts
+    def weaken_rotor(self, rotor: int, part: float) -> None:
+        """Scale the thrust of one rotor (0: the first) by `part` [1] for this period."""
+        self.rotors.efficiency[rotor] *= part
+
+    def weaken_rotors(self, part: float) -> None:
+        """Scale the thrust of all rotors by `part` [1] for this period."""
+        self.rotors.efficiency *= part
 
     def brake_joint(self, joint: int, torque: float) -> None:
-        """Add dry friction `torque` [N m] to joint 0 or 1 for this period."""
+        """Add dry friction `torque` [N m] to a joint (0: the first) for this period."""
         self.model.dof_frictionloss[self._arm_dofs[joint]] += torque
         self.model.dof_solimp[self._arm_dofs[joint], 0:2] = STIFF
 

@@ -22,6 +22,7 @@ from std_msgs.msg import Bool
 
 from uam_control.coordinates import ATTITUDE
 from uam_control.estimation.repeats import Repeats
+from uam_control.nodes.described import described_vehicle
 from uam_control.settings.parameter_set import ParameterError
 from uam_control.supervision import State
 from uam_msgs_py.messages import topics
@@ -82,14 +83,16 @@ class MavlinkBridgeNode(UamNode):
 
     def __init__(self) -> None:
         super().__init__(NAME)
-        self._map_parameters = NodeParameters(self, RateThrustParameters)
+        vehicle = described_vehicle(self)
+        derived = vehicle.node_parameters()[NAME]
+        self._map_parameters = NodeParameters(self, RateThrustParameters, derived=derived)
         self._options = NodeParameters(self, BridgeParameters, read_only=True).current
         offboard = NodeParameters(self, OffboardParameters, read_only=True).current
         hold = NodeParameters(self, HoldParameters, read_only=True).current
 
-        self.map = RateThrustMap(self._map_parameters.current)
+        self.map = RateThrustMap(self._map_parameters.current, vehicle)
         self._map_parameters.apply = self._configure
-        thrust = NodeParameters(self, ThrustIdentificationParameters)
+        thrust = NodeParameters(self, ThrustIdentificationParameters, derived=derived)
         self.identification = ThrustIdentification(thrust.current)
         thrust.apply = self.identification.configure
         self.sequence = OffboardSequence(offboard)

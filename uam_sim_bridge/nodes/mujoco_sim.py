@@ -89,10 +89,11 @@ class Simulator:
         self.connections = Connections(node)
         self.executor = LeanExecutor(node, [topics.SETPOINT.name], lambda: self._setpoint_is_there)
         patience = options.answer_timeout
+        rotors = len(vehicle.description.rotors)
         waits = HilParameters(answer_timeout=patience)
         if options.autopilot_always_answers:
             waits = HilParameters(answer_timeout=patience, silent_timeout=patience)
-        self.hil = HilServer(options.hil_port, parameters=waits, seed=options.seed)
+        self.hil = HilServer(options.hil_port, rotors, parameters=waits, seed=options.seed)
         self.statistics = Statistics(options.clock)
         self.health = PlantHealth(node, self.answers, self.statistics)
         self._foreign = tuple(filter(None, options.foreign.split(",")))
@@ -298,7 +299,7 @@ def _warm_up(spare: Plant) -> None:
     for _ in range(10):
         spare.sense()
         spare.truth()
-        spare.step(np.zeros(4), np.zeros(2), False)
+        spare.step(np.zeros(len(spare.rotors.speed)), np.zeros(spare.joints), False)
 
 
 def _listed(waiting: list[str]) -> str:

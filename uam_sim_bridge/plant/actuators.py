@@ -10,9 +10,9 @@ from uam_control.maths.compiled import jit
 
 
 class Rotors:
-    """Four rotors: motor command 0..1 → speed with lag → thrust.
+    """The rotors: motor command 0..1 → speed with lag → thrust.
 
-    `speed` (4,) [rad/s], `thrust` (4,) [N].
+    `speed` (rotors,) [rad/s], `thrust` (rotors,) [N].
     """
 
     def __init__(self, numbers: dict, step: float) -> None:
@@ -27,11 +27,11 @@ class Rotors:
                 1.0 - math.exp(-step / numbers["lag_down"]),
             ]
         )
-        self.speed = np.zeros(4)
-        self.thrust = np.zeros(4)
+        self.speed = np.zeros(len(self.efficiency))
+        self.thrust = np.zeros(len(self.efficiency))
 
     def step(self, commands: np.ndarray, output: np.ndarray) -> None:
-        """Advance one physics step; thrust [N] goes to `thrust` and to output (4,)."""
+        """Advance one physics step; thrust [N] goes to `thrust` and to output (rotors,)."""
         rotor_step(commands, self.constants, self.efficiency, self.speed, self.thrust, output)
 
 
@@ -47,7 +47,7 @@ def rotor_step(
     """First-order speed lag with separate rates up and down; T = c speed^2."""
     coefficient, thrust_max, factor = constants[0], constants[1], constants[2]
     gain_up, gain_down = constants[3], constants[4]
-    for i in range(4):
+    for i in range(len(commands)):
         u = min(max(commands[i], 0.0), 1.0)
         wanted = math.sqrt(thrust_max * (factor * u * u + (1.0 - factor) * u) / coefficient)
         gain = gain_up if wanted > speed[i] else gain_down

@@ -8,9 +8,8 @@ import mujoco
 import numpy as np
 
 from uam_control.maths.rotations import quaternion_from_rotation_vector, quaternion_multiply
-from uam_sim_bridge.plant.urdf import BASE_LINK, ROOT, carried
-
-SWING = "magnet_swing"  # the joint that nothing measures
+from uam_sim_bridge.plant.urdf import BASE_LINK, carried
+from uam_sim_bridge.plant.vehicle import BASE
 
 
 @dataclass(frozen=True)
@@ -44,7 +43,7 @@ class Box:
 
 def frames(model: mujoco.MjModel) -> list[Frame]:
     """The frames that hang on the vehicle's base, parents first."""
-    root = model.body(ROOT).id
+    root = model.body(BASE).id
     return [_frame(model, body, root) for body in carried(model)]
 
 
@@ -70,6 +69,6 @@ def box(model: mujoco.MjModel, name: str) -> Box:
 def hanging(pitch: float, alpha: np.ndarray) -> float:
     """Angle of the magnet's pivot [rad] at which its face is level, as its weight makes it.
 
-    pitch [rad] of the vehicle; alpha (2,) [rad]. Joints turn the other way than pitch.
+    pitch [rad] of the vehicle; alpha (n,) [rad]. Joints turn the other way than pitch.
     """
     return float(pitch - alpha.sum())

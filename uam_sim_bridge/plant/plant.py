@@ -2,17 +2,20 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import mujoco
 import numpy as np
 
+from uam_control.coordinates import ALPHA, CHI, CHI_DDOT, CHI_DOT, ROLL, X
 from uam_control.maths.compiled import jit
 from uam_control.maths.rotations import euler_from_quaternion
+from uam_control.vehicle import VehicleError
 from uam_sim_bridge.plant.actuators import Rotors, Servos, rotor_step, servo_step
 from uam_sim_bridge.plant.magnet import magnet_constants, pull_fraction
 from uam_sim_bridge.plant.sensors import Delay, Encoders, Imu, Mocap, Noise, generators
-from uam_sim_bridge.plant.vehicle import Vehicle
+from uam_sim_bridge.plant.vehicle import BASE, MAGNET, PAYLOAD, SWING, Vehicle
 
 
 @dataclass
@@ -32,7 +35,7 @@ class Samples:
 
 @dataclass
 class Truth:
-    """What no controller sees. state (3, 8) as in uam_control.coordinates; the rest SI."""
+    """What no controller sees. state (3, 6 + n) as in uam_control.coordinates; the rest SI."""
 
     state: np.ndarray
     quaternion: np.ndarray
@@ -45,7 +48,7 @@ class Truth:
 
 
 class Plant:
-    """S-500 with arm, magnet and payload; see config/vehicle/ for its numbers.
+    """The vehicle with arm and magnet, and the payload; see config/vehicle/ for the numbers.
 
     At a tick: `sense()`, then `step(...)`, which advances one control period.
     """
@@ -55,17 +58,19 @@ class Plant:
         vehicle: Vehicle,
         payload_mass: float,
         seed: int,
-        arm_start: tuple[float, float] = (0.0, np.pi / 2.0),
+        arm_start: Sequence[float] = (),
     ) -> None:
-        """payload_mass [kg], 0 for none; arm_start: joint angles on the ground [rad]."""
+        """payload_mass [kg], 0 for none; arm_start (n,): joint angles on the ground [rad], empty:
+        stowed as described."""
         numbers = vehicle.numbers
         self.vehicle = vehicle
-        self.period: float = numbers["control_period"]
+        self.joints = len(vehicle.description.joints)
+        self.period: float = vehicle.description.control_period
         self.tick = 0
         self.model = model = self._compile(vehicle, payload_mass)
         self.data = data = mujoco.MjData(model)
         self._steps = round(self.period / model.opt.timestep)
-        self._lay_out(payload_mass, arm_start)
+        self._lay_out(payload_mass, arm_start or vehicle.description.stowed)
 
         scale = numbers["sensors"]["noise_scale"]
         imu_noise, mocap_noise, gusts = generators(seed, 3)
@@ -77,10 +82,10 @@ class Plant:
             name: Delay(sensors[name]["latency_ticks"]) for name in ("imu", "mocap", "joints")
         }
         self._effort_delay = Delay(numbers["servos"]["command_latency_ticks"])
-        self._effort = np.zeros(2)
+        self._effort = np.zeros(self.joints)
 
         self.rotors = Rotors(numbers["rotors"], model.opt.timestep)
-        self.servos = Servos(numbers["servos"], 2)
+        self.servos = Servos(numbers["servos"], self.joints)
         air = numbers["air"]
         self._drag = np.array(air["drag"], dtype=float)
         self._wind_mean = np.array(air["wind"], dtype=float)
@@ -96,30 +101,34 @@ class Plant:
         """The model; payload_mass [kg]."""
         return vehicle.compile(payload_mass)
 
-    def _lay_out(self, payload_mass: float, arm_start: tuple[float, float]) -> None:
+    def _lay_out(self, payload_mass: float, arm_start: Sequence[float]) -> None:
         """Keep views into MuJoCo's arrays and set the starting pose."""
-        data, joint = self.data, self.model.joint
-        base_q, base_v = joint("base").qposadr[0], joint("base").dofadr[0]
+        data, joint, described = self.data, self.model.joint, self.vehicle.description
+        base_q, base_v = joint(BASE).qposadr[0], joint(BASE).dofadr[0]
         self._position = data.qpos[base_q : base_q + 3]
         self._quaternion = data.qpos[base_q + 3 : base_q + 7]
         self._velocity = data.qvel[base_v : base_v + 3]
         self._rates = data.qvel[base_v + 3 : base_v + 6]
-        arm_q, arm_v = joint("alpha_1").qposadr[0], joint("alpha_1").dofadr[0]
-        self._alpha = data.qpos[arm_q : arm_q + 2]
-        self._alpha_dot = data.qvel[arm_v : arm_v + 2]
+        first, names = described.joint_names[0], described.joint_names
+        arm_q, arm_v = joint(first).qposadr[0], joint(first).dofadr[0]
+        self._in_a_row("joint", [joint(name).dofadr[0] for name in names])
+        self._alpha = data.qpos[arm_q : arm_q + self.joints]
+        self._alpha_dot = data.qvel[arm_v : arm_v + self.joints]
         self._base_acceleration = data.qacc[base_v : base_v + 6]
-        self._alpha_ddot = data.qacc[arm_v : arm_v + 2]
-        self._swing = joint("magnet_swing").qposadr[0]
-        payload_q = joint("payload").qposadr[0]
+        self._alpha_ddot = data.qacc[arm_v : arm_v + self.joints]
+        self._swing = joint(SWING).qposadr[0]
+        payload_q = joint(PAYLOAD).qposadr[0]
         self._payload_pose = data.qpos[payload_q : payload_q + 7]
         self._payload_position = self._payload_pose[0:3]
-        self._sensed_force = data.sensordata[0:3]
-        self._control = data.ctrl[0:6]
-        self._force_on_base = data.xfrc_applied[self.model.body("base").id, 0:3]
-        self._magnet_gain = self.model.actuator("magnet").gainprm[0]
-        self._magnet_control = data.ctrl[6:7]
+        sensed = self.model.sensor("specific_force").adr[0]
+        self._sensed_force = data.sensordata[sensed : sensed + 3]
+        self._thrust_control = self._controls(described.rotor_names)
+        self._torque_control = self._controls(names)
+        self._force_on_base = data.xfrc_applied[self.model.body(BASE).id, 0:3]
+        self._magnet_gain = self.model.actuator(MAGNET).gainprm[0]
+        self._magnet_control = self._controls((MAGNET,))
         self._face = data.site_xpos[self.model.site("magnet_face").id]
-        self._payload_axes = data.xmat[self.model.body("payload").id]
+        self._payload_axes = data.xmat[self.model.body(PAYLOAD).id]
         gap_scale = self.vehicle.numbers["magnet"]["gap_scale"]
         self._magnet_constants = magnet_constants(self.model, gap_scale)
         self._alpha[:] = arm_start
@@ -127,6 +136,21 @@ class Plant:
         self._payload_position[0:2] += self.vehicle.numbers["variation"]["payload_offset"]
         if payload_mass <= 0.0:  # out of the way rather than another model
             self._payload_position[:] = (5.0, 5.0, 0.02)
+
+    def _controls(self, names: Sequence[str]) -> np.ndarray:
+        """A view (len(names),) of the controls of these actuators."""
+        found = [self.model.actuator(name).id for name in names]
+        self._in_a_row("actuator", found)
+        return self.data.ctrl[found[0] : found[-1] + 1]
+
+    def _in_a_row(self, kind: str, numbers: Sequence[int]) -> None:
+        """Raise VehicleError where the parts are not adjacent and in the description's order."""
+        if list(numbers) != list(range(numbers[0], numbers[0] + len(numbers))):
+            described = self.vehicle.description
+            raise VehicleError(
+                f"{described.model}: each {kind} must follow the one before it in "
+                f"{described.file.name}"
+            )
 
     @property
     def time(self) -> float:
@@ -151,10 +175,10 @@ class Plant:
     def step(self, motor_commands: np.ndarray, arm_effort: np.ndarray, magnet: bool) -> None:
         """Advance one control period.
 
-        motor_commands (4,) 0..1 in PX4 order, arm_effort (2,) [N m] as sent now (the bus delays
-        it), magnet: current on.
+        motor_commands (rotors,) 0..1 in PX4's order, arm_effort (n,) [N m] as sent now (the bus
+        delays it), magnet: current on.
         """
-        self._effort_delay.put(self.tick, (float(arm_effort[0]), float(arm_effort[1])))
+        self._effort_delay.put(self.tick, tuple(map(float, arm_effort)))
         due = self._effort_delay.take(self.tick)
         if due is not None:
             self._effort[:] = due
@@ -185,14 +209,15 @@ class Plant:
                 self._alpha_dot,
                 servos.constants,
                 servos.torque,
-                self._control,
+                self._thrust_control,
+                self._torque_control,
             )
             mujoco.mj_step(self.model, self.data)
             average(self._sensed_force, 1.0 / self._steps, self._specific_force)
         self.tick += 1
 
     def write_truth_state(self, state: np.ndarray) -> None:
-        """Write chi, chi_dot, chi_ddot into state (3, 8)."""
+        """Write chi, chi_dot, chi_ddot into state (3, 6 + n)."""
         write_state(
             self._position,
             self._quaternion,
@@ -217,12 +242,12 @@ class Plant:
 
     @property
     def magnet_swing(self) -> float:
-        """Angle of the magnet's pivot [rad], relative to link 2."""
+        """Angle of the magnet's pivot [rad], relative to the last link."""
         return float(self.data.qpos[self._swing])
 
     def truth(self) -> Truth:
         """Return a copy of everything true at this tick."""
-        state = np.empty((3, 8))
+        state = np.empty((3, ALPHA + self.joints))
         self.write_truth_state(state)
         return Truth(
             state=state,
@@ -248,14 +273,16 @@ def write_state(
     alpha_ddot: np.ndarray,
     state: np.ndarray,
 ) -> None:
-    """Gather chi, chi_dot, chi_ddot into state (3, 8)."""
+    """Gather chi, chi_dot, chi_ddot into state (3, 6 + n)."""
     euler = euler_from_quaternion(quaternion)
     for i in range(3):
-        state[0, i], state[0, 3 + i] = position[i], euler[i]
-        state[1, i], state[1, 3 + i] = velocity[i], rates[i]
-        state[2, i], state[2, 3 + i] = base_acceleration[i], base_acceleration[3 + i]
-    for i in range(2):
-        state[0, 6 + i], state[1, 6 + i], state[2, 6 + i] = alpha[i], alpha_dot[i], alpha_ddot[i]
+        state[CHI, X + i], state[CHI, ROLL + i] = position[i], euler[i]
+        state[CHI_DOT, X + i], state[CHI_DOT, ROLL + i] = velocity[i], rates[i]
+        state[CHI_DDOT, X + i] = base_acceleration[i]
+        state[CHI_DDOT, ROLL + i] = base_acceleration[3 + i]
+    for i in range(len(alpha)):
+        state[CHI, ALPHA + i], state[CHI_DOT, ALPHA + i] = alpha[i], alpha_dot[i]
+        state[CHI_DDOT, ALPHA + i] = alpha_ddot[i]
 
 
 @jit
@@ -293,11 +320,12 @@ def actuate(
     joint_rates: np.ndarray,
     servo_constants: np.ndarray,
     torque: np.ndarray,
-    control: np.ndarray,
+    thrust_control: np.ndarray,
+    torque_control: np.ndarray,
 ) -> None:
-    """Before a physics step: rotors into control[0:4] [N], servos into control[4:6] [N m]."""
-    rotor_step(commands, rotor_constants, efficiency, speed, thrust, control[0:4])
-    servo_step(effort, joint_rates, servo_constants, torque, control[4:6])
+    """Before a physics step: thrusts (rotors,) [N] and joint torques (n,) [N m] to the controls."""
+    rotor_step(commands, rotor_constants, efficiency, speed, thrust, thrust_control)
+    servo_step(effort, joint_rates, servo_constants, torque, torque_control)
 
 
 @jit

@@ -7,9 +7,10 @@ from xml.etree import ElementTree
 import mujoco
 import numpy as np
 
-from uam_sim_bridge.plant.vehicle import Vehicle
+from uam_control.vehicle import Servo
+from uam_sim_bridge.plant.vehicle import BASE, Vehicle
 
-ROOT, BASE_LINK = "base", "base_link"  # of the MJCF; of the URDF, as REP-105 has it
+BASE_LINK = "base_link"  # the base, as REP-105 has it
 SHAPES = {
     mujoco.mjtGeom.mjGEOM_BOX: lambda s: ("box", {"size": _text(2.0 * s)}),
     mujoco.mjtGeom.mjGEOM_SPHERE: lambda s: ("sphere", {"radius": _text(s[:1])}),
@@ -28,8 +29,8 @@ SHAPES = {
 def urdf(vehicle: Vehicle, root_name: str = BASE_LINK) -> str:
     """Return the URDF text: base and arm, inertia and visuals; frames as in the MJCF (FLU)."""
     model = vehicle.compile(0.0)
-    robot = ElementTree.Element("robot", name=model.body(ROOT).name)
-    root = model.body(ROOT).id
+    robot = ElementTree.Element("robot", name=model.body(BASE).name)
+    root = model.body(BASE).id
     for body in (root, *carried(model)):
         name = root_name if body == root else model.body(body).name
         link = ElementTree.SubElement(robot, "link", name=name)
@@ -39,14 +40,14 @@ def urdf(vehicle: Vehicle, root_name: str = BASE_LINK) -> str:
         if body != root:
             parent = model.body_parentid[body]
             owner = root_name if parent == root else model.body(parent).name
-            _joint(robot, model, body, owner, vehicle.numbers["servos"])
+            _joint(robot, model, body, owner, vehicle.description.servo)
     ElementTree.indent(robot)
     return ElementTree.tostring(robot, encoding="unicode")
 
 
 def carried(model: mujoco.MjModel) -> list[int]:
     """The bodies that hang on the vehicle's base, parents first, without mere contacts."""
-    root = model.body(ROOT).id
+    root = model.body(BASE).id
     return [
         body
         for body in range(root + 1, model.nbody)
@@ -92,7 +93,7 @@ def _visual(link: ElementTree.Element, model: mujoco.MjModel, geom: int) -> None
 
 
 def _joint(
-    robot: ElementTree.Element, model: mujoco.MjModel, body: int, parent: str, servos: dict
+    robot: ElementTree.Element, model: mujoco.MjModel, body: int, parent: str, servo: Servo
 ) -> None:
     hinge = model.body_jntnum[body] > 0
     index = model.body_jntadr[body]
@@ -117,8 +118,8 @@ def _joint(
             "limit",
             lower=_text([low]),
             upper=_text([high]),
-            effort=_text([servos["stall_torque"]]),
-            velocity=_text([servos["no_load_speed"]]),
+            effort=_text([servo.stall_torque]),
+            velocity=_text([servo.no_load_speed]),
         )
 
 

@@ -1,32 +1,52 @@
-"""The vehicle's data: its MJCF and the numbers around it, read from config/vehicle/."""
+"""The plant's vehicle: the description's numbers and the MuJoCo model made of its MJCF and them.
+
+The MJCF holds bodies, their masses and shapes, and the sites of the sensors. Rotors, actuators,
+ranges of the joints and gravity are added from the description.
+"""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from copy import deepcopy
 from dataclasses import dataclass
-from pathlib import Path
+from typing import Any
 
 import mujoco
 import numpy as np
-import yaml
 
-from uam_control.settings.configuration import path
+from uam_control.vehicle import (
+    DEFAULT_VEHICLE,
+    Joint,
+    VehicleDescription,
+    VehicleError,
+    load_description,
+)
+
+BASE, PAYLOAD, MAGNET = "base", "payload", "magnet"  # bodies of the MJCF
+SWING = "magnet_swing"  # the joint of the magnet's pivot, which nothing measures
+MASS_TOLERANCE = 1e-3  # relative
 
 
 @dataclass
 class Vehicle:
-    """Numbers of config/vehicle/<name>.yaml and the MJCF that it names."""
+    """A description and the numbers of its file, some of which a flight may change.
 
-    numbers: dict
-    model_path: Path
+    The controllers fly by the description, the plant by the numbers.
+    """
+
+    description: VehicleDescription
+    numbers: dict[str, Any]
 
     @classmethod
-    def load(cls, name: str = "s500_arm") -> Vehicle:
-        """Read a vehicle by name; raises what `configuration.path` raises for an unknown one."""
-        file = path(f"vehicle/{name}.yaml")
-        numbers = yaml.safe_load(file.read_text())
-        return cls(numbers, file.parent / numbers["model"])
+    def load(cls, name_or_file: str = DEFAULT_VEHICLE) -> Vehicle:
+        """Read a vehicle by name or file; raises VehicleError, ConfigurationError."""
+        return cls.of(load_description(name_or_file))
+
+    @classmethod
+    def of(cls, description: VehicleDescription) -> Vehicle:
+        """The vehicle as described."""
+        return cls(description, description.numbers)
 
     def changed(self, changes: dict[str, object]) -> Vehicle:
         """Return a copy with dotted entries replaced, e.g. {"air.gust": 1.0}."""
@@ -39,35 +59,125 @@ class Vehicle:
             if last not in entry:
                 raise KeyError(f"vehicle has no '{dotted}'")
             entry[last] = value
-        return Vehicle(numbers, self.model_path)
-
-    @property
-    def thrust_max(self) -> float:
-        """Largest thrust of one rotor [N]."""
-        rotors = self.numbers["rotors"]
-        return rotors["thrust_coefficient"] * rotors["speed_max"] ** 2
+        return Vehicle(self.description, numbers)
 
     def compile(
         self, payload_mass: float, extend: Callable[[mujoco.MjSpec], None] | None = None
     ) -> mujoco.MjModel:
         """Return the MuJoCo model with a payload of payload_mass [kg] (0: far away, massless).
 
-        extend: adds to the model what only some flights need.
+        extend: adds to the model what only some flights need. Raises VehicleError where the MJCF
+        contradicts the description.
         """
-        spec = mujoco.MjSpec.from_file(str(self.model_path))
-        spec.geom("payload").mass = max(payload_mass, 1e-3)
+        described = self.description
+        try:
+            spec = mujoco.MjSpec.from_file(str(described.model))
+        except ValueError as error:
+            raise VehicleError(f"{described.model}: {str(error).splitlines()[0]}") from None
+        self._check_parts(spec)
+        spec.option.gravity = (0.0, 0.0, -described.gravity)
+        self._add_rotors(spec)
+        for joint in described.joints:
+            self._limit(spec, joint)
+        self._add_actuators(spec)
+        spec.geom(PAYLOAD).mass = max(payload_mass, 1e-3)
         if extend is not None:
             extend(spec)
         model = spec.compile()
+        self._check_model(model)
         self._vary(model)
         return model
+
+    def _check_parts(self, spec: mujoco.MjSpec) -> None:
+        """Raise VehicleError for what the plant finds by name and the MJCF does not have."""
+        described = self.description
+        joints = {joint.name for joint in spec.joints}
+        for kind, wanted, there in (
+            ("body", (BASE, PAYLOAD, MAGNET), {body.name for body in spec.bodies}),
+            ("joint", (BASE, PAYLOAD, SWING, *described.joint_names), joints),
+            ("site", ("imu", "magnet_face"), {site.name for site in spec.sites}),
+            ("geom", (PAYLOAD, "payload_plate", "magnet_face"), {g.name for g in spec.geoms}),
+            ("sensor", ("specific_force", "body_rates"), {s.name for s in spec.sensors}),
+        ):
+            missing = [name for name in wanted if name not in there]
+            if missing:
+                raise VehicleError(f"{described.model}: no {kind} '{missing[0]}'")
+        strange = sorted(joints - {BASE, PAYLOAD, SWING, *described.joint_names})
+        if strange:
+            raise VehicleError(
+                f"{described.model}: joint '{strange[0]}' is not in {described.file.name}, "
+                f"which has: {', '.join(described.joint_names)}"
+            )
+        if spec.actuators:
+            raise VehicleError(
+                f"{described.model}: actuator '{spec.actuators[0].name}': actuators come from "
+                f"{described.file.name}"
+            )
+
+    def _add_rotors(self, spec: mujoco.MjSpec) -> None:
+        """Give the base a site and a propeller for each rotor."""
+        base, look = spec.body(BASE), spec.find_default("rotor")
+        described = self.description
+        for rotor in described.rotors:
+            base.add_site(look, name=rotor.name, pos=rotor.position)
+        for rotor in described.rotors:
+            propeller = base.add_geom(look, pos=rotor.position)
+            propeller.size[0] = described.rotor.radius
+
+    def _limit(self, spec: mujoco.MjSpec, joint: Joint) -> None:
+        """Give a joint its range; the MJCF may state the same one, but no other."""
+        element = spec.joint(joint.name)
+        scale = 180.0 / math.pi if spec.compiler.degree else 1.0
+        limits = [round(scale * limit, 9) for limit in (joint.low, joint.high)]
+        stated = list(element.range)
+        if any(stated) and not np.allclose(stated, limits):
+            raise VehicleError(
+                f"{self.description.model}: joint '{joint.name}' has the range {stated}, "
+                f"{self.description.file.name} has {limits}"
+            )
+        element.range = limits
+
+    def _add_actuators(self, spec: mujoco.MjSpec) -> None:
+        """Thrust [N] of each rotor, torque [N m] of each joint, pull of the magnet 0..1."""
+        described = self.description
+        for rotor in described.rotors:
+            motor = spec.add_actuator(
+                name=rotor.name, target=rotor.name, trntype=mujoco.mjtTrn.mjTRN_SITE
+            )
+            motor.set_to_motor()
+            # the air turns the base against the propeller: clockwise for a ccw one, -z
+            turn = -1.0 if rotor.counter_clockwise else 1.0
+            motor.gear = (0.0, 0.0, 1.0, 0.0, 0.0, turn * described.rotor.moment_ratio)
+        for name in described.joint_names:
+            motor = spec.add_actuator(name=name, target=name, trntype=mujoco.mjtTrn.mjTRN_JOINT)
+            motor.set_to_motor()
+        magnet = spec.add_actuator(
+            name=MAGNET, target=MAGNET, trntype=mujoco.mjtTrn.mjTRN_BODY, ctrlrange=(0.0, 1.0)
+        )
+        magnet.set_to_adhesion(self.numbers["magnet"]["holding_force"])
+
+    def _check_model(self, model: mujoco.MjModel) -> None:
+        """Raise VehicleError where mass or time step contradict the description."""
+        described = self.description
+        mass = float(model.body_subtreemass[model.body(BASE).id])
+        if not math.isclose(mass, described.mass, rel_tol=MASS_TOLERANCE):
+            raise VehicleError(
+                f"{described.model}: the bodies weigh {mass:.4g} kg in all, "
+                f"{described.file.name} has mass: {described.mass:g}"
+            )
+        steps = described.control_period / model.opt.timestep
+        if round(steps) < 1 or not math.isclose(steps, round(steps), rel_tol=1e-9):
+            raise VehicleError(
+                f"{described.model}: timestep {model.opt.timestep:g} s does not divide "
+                f"control_period of {described.file.name}, {described.control_period:g} s"
+            )
 
     def _vary(self, model: mujoco.MjModel) -> None:
         """Give vehicle and arm the masses of `variation`."""
         variation = self.numbers["variation"]
         if variation["mass"] == 1.0 and variation["inertia"] == 1.0:
             return
-        own = np.arange(model.nbody) != model.body("payload").id
+        own = np.arange(model.nbody) != model.body(PAYLOAD).id
         model.body_mass[own] *= variation["mass"]
         model.body_inertia[own] *= variation["mass"] * variation["inertia"]
         mujoco.mj_setConst(model, mujoco.MjData(model))

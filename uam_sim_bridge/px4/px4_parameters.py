@@ -8,21 +8,25 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from uam_control.settings import configuration, yaml_file
+from uam_control.vehicle import VehicleDescription
 from uam_sim_bridge.px4.px4_installation import Px4Error
 
-FILES = ("autopilot/s500.yaml", "px4/s500.yaml")  # of config/; later files override earlier ones
+SIMULATION = "px4/sitl.yaml"  # of config/: settings of the simulation, the same for all vehicles
 AIRFRAME = "SYS_AUTOSTART"  # PX4 selects the airframe before it sets parameters
 _NAME = re.compile(r"[A-Z][A-Z0-9_]{0,15}")  # at most 16 bytes in MAVLink
 Value = int | float
 
 
-def load(files: Sequence[str | Path] | None = None) -> dict[str, Value]:
-    """Read and merge YAML files of `NAME: value`; files None: those of config/.
+def load(
+    vehicle: VehicleDescription, files: Sequence[str | Path] | None = None
+) -> dict[str, Value]:
+    """Merge the vehicle's parameters and YAML files of `NAME: value`; files None: SIMULATION.
 
     Integers stay integers: PX4 requires them for INT32 parameters. Raises Px4Error.
     """
-    values: dict[str, Value] = {}
-    for file in files or [configuration.path(name) for name in FILES]:
+    values: dict[str, Value] = dict(vehicle.autopilot_parameters())
+    names = (f"autopilot/{vehicle.autopilot}.yaml", SIMULATION)
+    for file in files or [configuration.path(name) for name in names]:
         values |= _read(Path(file))
     return values
 

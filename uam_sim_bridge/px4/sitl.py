@@ -20,6 +20,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from uam_control.settings.configuration import ConfigurationError
+from uam_control.vehicle import DEFAULT_VEHICLE, VehicleError, load_description
 from uam_sim_bridge.mavlink.hil.sitl_options import instance
 from uam_sim_bridge.px4 import px4_parameters as parameters
 from uam_sim_bridge.px4.px4_installation import REQUIRED, Px4Error, Px4Installation
@@ -115,10 +116,16 @@ def parser() -> argparse.ArgumentParser:
     )
     p.add_argument("--px4-dir", metavar="DIR", help=REQUIRED)
     p.add_argument(
+        "--vehicle",
+        default=DEFAULT_VEHICLE,
+        metavar="NAME|FILE",
+        help="description, as in config/vehicle/ (default %(default)s)",
+    )
+    p.add_argument(
         "--params",
         metavar="FILE",
         nargs="+",
-        help=f"parameters (default: {', '.join(parameters.FILES)} of config/)",
+        help=f"parameters (default: the vehicle's in config/autopilot, {parameters.SIMULATION})",
     )
     p.add_argument(
         "--log",
@@ -138,8 +145,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     signal.signal(signal.SIGTERM, lambda *_: sys.exit(0))
     try:
         installation = Px4Installation.find(options.px4_dir)
-        values = parameters.load(options.params)
-    except (Px4Error, ConfigurationError) as error:
+        values = parameters.load(load_description(options.vehicle), options.params)
+    except (Px4Error, ConfigurationError, VehicleError) as error:
         print(f"px4_sitl: {error}", file=sys.stderr, flush=True)
         return 2
     with tempfile.TemporaryDirectory(prefix="uam-px4-") as folder:

@@ -9,8 +9,8 @@ import numpy as np
 
 from uam_control.estimation.repeats import Repeats
 from uam_control.mission import MissionOutput
-from uam_control.settings import configuration
 from uam_control.supervision import State
+from uam_control.vehicle import VehicleDescription
 from uam_sim_bridge.autopilot.core import Autopilot
 from uam_sim_bridge.autopilot.params import Parameters
 from uam_sim_bridge.mavlink.offboard.hold import HoldParameters
@@ -37,14 +37,15 @@ class DirectBridge:
     thrust factor it was made with.
     """
 
-    def __init__(self, section: Mapping[str, Any]) -> None:
+    def __init__(self, section: Mapping[str, Any], vehicle: VehicleDescription) -> None:
         """section: what the profile says of the mavlink_bridge node; {} for its defaults."""
-        self.map = RateThrustMap(RateThrustParameters.among(section))
-        self.identification = ThrustIdentification(ThrustIdentificationParameters.among(section))
+        self.map = RateThrustMap(RateThrustParameters.of(vehicle, section), vehicle)
+        thrust = ThrustIdentificationParameters.of(vehicle, section)
+        self.identification = ThrustIdentification(thrust)
         self.sequence = OffboardSequence(OffboardParameters.among(section))
         self._repeats = Repeats()
         self._source = SetpointSource(self.map, HoldParameters.among(section))
-        self.autopilot = Autopilot(Parameters.load(configuration.path("autopilot/s500.yaml")))
+        self.autopilot = Autopilot(Parameters.of(vehicle))
         self.setpoint = np.zeros(4)
         self.factor = 1.0
         self.passes: Callable[[], bool] = lambda: True  # whether a message reaches the autopilot
@@ -117,6 +118,6 @@ class DirectBridge:
         self.sequence.answer(request, result)
 
     def autopilot_tick(self, hil: tuple) -> np.ndarray:
-        """One cycle of the autopilot on its own IMU sample; returns its motor commands (4,)."""
+        """One cycle of the autopilot on its own IMU sample; returns the motor commands (n,)."""
         stamp, gyro, force = hil
         return self.autopilot.update(stamp, swap_body(gyro), swap_body(force))

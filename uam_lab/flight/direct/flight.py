@@ -55,7 +55,7 @@ class DirectFlight:
         self.position = PositionController(sets["position_controller"])
         self.attitude = AttitudeController(sets["attitude_controller"])
         self.arm = ArmController(sets["arm_controller"])
-        self.bridge = DirectBridge(profile.section("mavlink_bridge"))
+        self.bridge = DirectBridge(profile.section("mavlink_bridge"), vehicle.description)
         self.inputs = Inputs(self.plant.period)
         if self._faults:
             self.bridge.passes = self._faults.link.passes
@@ -63,7 +63,7 @@ class DirectFlight:
         self.ended_by = ""  # why it was ended although the mission was not done
         self._limit = time_limit(scenario)
         self._ahead = math.inf  # [s] stamp of the tick that the mission is ready for
-        self._effort, self._magnet = np.zeros(2), False  # as last commanded
+        self._effort, self._magnet = np.zeros(self.plant.joints), False  # as last commanded
         self._lag = 0  # ticks from an IMU sample to its arrival
         self._truths: deque[Snapshot] = deque()  # of ticks whose IMU sample is on its way
         self._complete = False  # every kind of sensor has delivered

@@ -45,7 +45,7 @@ class HilParameters(ParameterSet):
 class HilServer:
     """TCP server for one autopilot at a time.
 
-    `motors` (4,): newest motor commands 0..1 in PX4's order, zero while disarmed; `armed`: from
+    `motors` (n,): newest motor commands 0..1 in PX4's order, zero while disarmed; `armed`: from
     HIL_ACTUATOR_CONTROLS; `answered`: whether the last tick was answered; `missed`: number of
     ticks without an answer after the first answer.
     """
@@ -53,13 +53,15 @@ class HilServer:
     def __init__(
         self,
         port: int,
+        motors: int,
         host: str = "127.0.0.1",
         parameters: HilParameters | None = None,
         seed: int = 0,
     ) -> None:
-        """Listen on TCP `port`; seed: of the noise. Raises HilError if the port is in use."""
+        """Listen on TCP `port` for `motors` motors; seed: of the noise. Raises HilError if the
+        port is in use."""
         self.parameters = (parameters or HilParameters()).validated()
-        self.motors = np.zeros(4)
+        self.motors = np.zeros(motors)
         self.armed = False
         self.answered = False
         self.missed = 0
@@ -221,7 +223,7 @@ class HilServer:
             if message.get_type() != "HIL_ACTUATOR_CONTROLS":
                 continue
             self.armed = bool(message.mode & _ARMED)
-            commands = np.array(message.controls[:4])
+            commands = np.array(message.controls[: len(self.motors)])
             good = self.armed and bool(np.all(np.isfinite(commands)))
             self.motors[:] = np.clip(commands, 0.0, 1.0) if good else 0.0
             self.answered = self.answered or message.time_usec >= self._stamp

@@ -30,12 +30,15 @@ Body vectors are FLU. The map is the same in FRD, as signs cancel.
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import Any, Self
 
 import numpy as np
 
 from uam_control.maths.compiled import jit
 from uam_control.settings.parameter_set import ParameterSet, number, vector
+from uam_control.vehicle import VehicleDescription, load_description
 from uam_sim_bridge.mavlink.offboard.rotor_geometry import torque_scale
 from uam_sim_bridge.mavlink.offboard.thrust_curve import (
     command_of_thrust,
@@ -63,23 +66,21 @@ class SetpointRefused(ValueError):
 
 @dataclass(frozen=True)
 class RateThrustParameters(ParameterSet):
-    """What the map needs to know of vehicle and autopilot; defaults: S-500 with PX4 gains."""
+    """What the map needs to know of vehicle and autopilot.
+
+    What is NaN follows from the vehicle: `of`.
+    """
 
     rotor_thrust_max: float = number(
-        10.34, "thrust of one rotor at full command and full battery", "N", 0.1, 1000.0
+        math.nan, "thrust of one rotor at full command and full battery", "N", 0.1, 1000.0
     )
     motor_curve_factor: float = number(
-        0.3, "f in thrust/full thrust = f u^2 + (1 - f) u of motor command u", "1", 0.0, 1.0
+        math.nan, "f in thrust/full thrust = f u^2 + (1 - f) u of motor command u", "1", 0.0, 1.0
     )
     battery_factor: float = number(
         1.0, "full thrust now / full thrust with a full battery", "1", 0.2, 1.5
     )
-    thr_mdl_fac: float = number(0.3, "THR_MDL_FAC of the autopilot", "1", 0.0, 1.0)
-    rotor_arm_x: float = number(0.171, "rotor offset forward", "m", 0.01, 5.0)
-    rotor_arm_y: float = number(0.171, "rotor offset to the side", "m", 0.01, 5.0)
-    rotor_moment_ratio: float = number(
-        0.016, "reaction torque per thrust of a rotor", "m", 1e-4, 1.0
-    )
+    thr_mdl_fac: float = number(math.nan, "THR_MDL_FAC of the autopilot", "1", 0.0, 1.0)
     rate_p: tuple = vector(
         (0.15, 0.15, 0.2),
         "MC_ROLLRATE_P, MC_PITCHRATE_P, MC_YAWRATE_P of the autopilot",
@@ -105,28 +106,27 @@ class RateThrustParameters(ParameterSet):
         1.0, "largest normalised thrust sent; below 1 leaves room for torques", "1", 0.1, 1.0
     )
 
-    @property
-    def torque_scale(self) -> np.ndarray:
-        """Torque (3,) [N m] of a normalised torque of 1 about roll, pitch, yaw (PX4 allocation)."""
-        x, y, m = self.rotor_arm_x, self.rotor_arm_y, self.rotor_moment_ratio
-        return torque_scale(
-            np.array([x, -x, x, -x]),
-            np.array([y, -y, -y, y]),
-            np.array([m, m, -m, -m]),
-            self.rotor_thrust_max,
-        )
+    @classmethod
+    def of(cls, vehicle: VehicleDescription, values: Mapping[str, Any] | None = None) -> Self:
+        """Return the validated set of a vehicle, with those of `values` that belong to it."""
+        return cls.among(vehicle.node_parameters()["mavlink_bridge"] | dict(values or {}))
 
-    def flat(self) -> np.ndarray:
+    def torque_scale(self, vehicle: VehicleDescription) -> np.ndarray:
+        """Torque (3,) [N m] of a normalised torque of 1 about roll, pitch, yaw (PX4 allocation)."""
+        return torque_scale(*vehicle.geometry(), self.rotor_thrust_max)
+
+    def flat(self, vehicle: VehicleDescription) -> np.ndarray:
         """Return the array that the compiled map reads."""
         p = np.empty(_LENGTH)
-        p[_FULL] = 4.0 * self.rotor_thrust_max
+        p[_FULL] = len(vehicle.rotors) * self.rotor_thrust_max
         p[_BATTERY] = self.battery_factor
         p[_MOTOR] = self.motor_curve_factor
         p[_MODEL] = self.thr_mdl_fac
         p[_MIN] = self.thrust_min
         p[_MAX] = self.thrust_max
         p[_COMMAND_MAX] = self.command_max
-        p[_GAIN : _GAIN + 3] = self.torque_scale * np.array(self.rate_p) * np.array(self.rate_k)
+        scale = self.torque_scale(vehicle)
+        p[_GAIN : _GAIN + 3] = scale * np.array(self.rate_p) * np.array(self.rate_k)
         p[_LIMIT : _LIMIT + 3] = self.rate_limit
         return p
 
@@ -180,15 +180,21 @@ class RateThrustMap:
     of the parameters' curve, 1 until something else is set.
     """
 
-    def __init__(self, parameters: RateThrustParameters | None = None) -> None:
+    def __init__(
+        self,
+        parameters: RateThrustParameters | None = None,
+        vehicle: VehicleDescription | None = None,
+    ) -> None:
+        """parameters: None for those of the vehicle; vehicle: None for the default one."""
         self.rates = np.zeros(3)
         self._factor = 1.0
-        self.configure(parameters or RateThrustParameters())
+        self._vehicle = vehicle or load_description()
+        self.configure(parameters or RateThrustParameters.of(self._vehicle))
 
     def configure(self, parameters: RateThrustParameters) -> None:
         """Take new parameters, whole or not at all; raises ParameterError naming the wrong one."""
         checked = parameters.validated()
-        self._flat = checked.flat()
+        self._flat = checked.flat(self._vehicle)
         self.parameters = checked
         self.thrust_factor = self._factor
 

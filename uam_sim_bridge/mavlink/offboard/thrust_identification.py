@@ -28,13 +28,15 @@ from __future__ import annotations
 
 import math
 from collections import deque
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from typing import Self
+from typing import Any, Self
 
 import numpy as np
 
 from uam_control.maths.compiled import jit
 from uam_control.settings.parameter_set import ParameterSet, choice, number
+from uam_control.vehicle import VehicleDescription, load_description
 
 GRAVITY = 9.81  # m/s^2
 USABLE = (0.1, 0.9)  # normalised thrust: beyond, torques take their share of it (allocation)
@@ -47,7 +49,10 @@ MAGNET_DELAY = 0.01  # s
 
 @dataclass(frozen=True)
 class ThrustIdentificationParameters(ParameterSet):
-    """When to trust a comparison of thrust and acceleration, and how fast to follow it."""
+    """When to trust a comparison of thrust and acceleration, and how fast to follow it.
+
+    The mass follows from the vehicle: `of`.
+    """
 
     thrust_identification: str = choice(
         "on",
@@ -55,7 +60,7 @@ class ThrustIdentificationParameters(ParameterSet):
         ("off", "on", "freeze"),
     )
     identification_mass: float = number(
-        2.2, "mass of the vehicle with its arm, without payload", "kg", 0.05, 500.0
+        math.nan, "mass of the vehicle with its arm, without payload", "kg", 0.05, 500.0
     )
     identification_time: float = number(
         30.0,
@@ -99,6 +104,11 @@ class ThrustIdentificationParameters(ParameterSet):
     factor_min: float = number(0.5, "smallest factor", "1", 0.2, 1.0)
     factor_max: float = number(1.3, "largest factor", "1", 1.0, 2.0)
     factor_slew: float = number(0.05, "largest change of the factor", "1/s", 1e-4, 1.0)
+
+    @classmethod
+    def of(cls, vehicle: VehicleDescription, values: Mapping[str, Any] | None = None) -> Self:
+        """Return the validated set of a vehicle, with those of `values` that belong to it."""
+        return cls.among(vehicle.node_parameters()["mavlink_bridge"] | dict(values or {}))
 
     def validated(self, axes: int = 0) -> Self:
         """As of every set; YAML's `on` and `off` arrive as true and false and are taken as well."""
@@ -149,7 +159,7 @@ class ThrustIdentification:
         self._released: float | None = None  # s, magnet off and not yet judged
         self._recent = math.nan  # measurement since the release, followed fast
         self._before: float | None = None  # factor that was settled when the magnet went on
-        self.configure(parameters or ThrustIdentificationParameters())
+        self.configure(parameters or ThrustIdentificationParameters.of(load_description()))
 
     def configure(self, parameters: ThrustIdentificationParameters) -> None:
         """Take new parameters, whole or not at all; raises ParameterError naming the wrong one."""

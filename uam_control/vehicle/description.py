@@ -1,0 +1,186 @@
+"""A vehicle in numbers: rotors, joints, mass, gravity. Everything that repeats one derives it here.
+
+Frames: FLU body frame (x forward, y left, z up). PX4's parameters are FRD (y right).
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from uam_control.coordinates import coordinates
+
+ANGLE_STEP = 0.05  # [rad] the supervisor's limits are the joint's ranges rounded down to it
+
+
+@dataclass(frozen=True)
+class Rotor:
+    """One rotor, in PX4's motor order.
+
+    position: x, y, z in the base frame (FLU) [m]; counter_clockwise: seen from above.
+    """
+
+    name: str
+    position: tuple[float, float, float]
+    counter_clockwise: bool
+
+
+@dataclass(frozen=True)
+class RotorModel:
+    """What all rotors have in common.
+
+    thrust_coefficient [N s^2/rad^2]; speed_max [rad/s]; curve_factor f [1] in
+    T/Tmax = f u^2 + (1 - f) u for motor command u (PX4: THR_MDL_FAC); moment_ratio: reaction torque
+    per thrust [m]; lag_up, lag_down: time constants of the speed [s]; radius of the propeller [m].
+    """
+
+    thrust_coefficient: float
+    speed_max: float
+    curve_factor: float
+    moment_ratio: float
+    lag_up: float
+    lag_down: float
+    radius: float
+
+    @property
+    def thrust_max(self) -> float:
+        """Largest thrust of one rotor [N]."""
+        return self.thrust_coefficient * self.speed_max**2
+
+
+@dataclass(frozen=True)
+class Servo:
+    """What all joint servos have in common.
+
+    stall_torque [N m]; no_load_speed [rad/s]; effort_limit: measured torque at which the supervisor
+    holds [N m].
+    """
+
+    stall_torque: float
+    no_load_speed: float
+    effort_limit: float
+
+
+@dataclass(frozen=True)
+class Joint:
+    """One joint of the arm; name as in the MJCF and in /joint_states.
+
+    low, high: position limits [rad]; stowed: angle for take-off and landing [rad].
+    """
+
+    name: str
+    low: float
+    high: float
+    stowed: float
+
+
+@dataclass(frozen=True)
+class VehicleDescription:
+    """What the file config/vehicle/NAME.yaml says of a vehicle.
+
+    file: that file; model: its MJCF file. mass: with arm, without payload [kg]; gravity [m/s^2];
+    control_period [s]. profiles: parameter files by control law, see `profile`; autopilot:
+    the files of config/autopilot and config/px4 with the autopilot's gains. numbers: the whole
+    file, with what only the plant reads.
+    """
+
+    name: str
+    file: Path
+    model: Path
+    mass: float
+    gravity: float
+    control_period: float
+    rotor: RotorModel
+    rotors: tuple[Rotor, ...]
+    servo: Servo
+    joints: tuple[Joint, ...]
+    profiles: dict[str, str]
+    autopilot: str
+    numbers: dict[str, Any]
+
+    def profile(self, law: str) -> str:
+        """Return the profile that it flies a control law with, "" where the description names
+        none."""
+        return self.profiles.get(law, "")
+
+    @property
+    def joint_names(self) -> tuple[str, ...]:
+        """Names of the joints, base to tip."""
+        return tuple(joint.name for joint in self.joints)
+
+    @property
+    def rotor_names(self) -> tuple[str, ...]:
+        """Names of the rotors, in PX4's motor order."""
+        return tuple(rotor.name for rotor in self.rotors)
+
+    @property
+    def coordinates(self) -> tuple[str, ...]:
+        """Names of the entries of chi."""
+        return coordinates(len(self.joints))
+
+    @property
+    def stowed(self) -> tuple[float, ...]:
+        """Joint angles for take-off and landing (n,) [rad]."""
+        return tuple(joint.stowed for joint in self.joints)
+
+    @property
+    def rotor_thrust(self) -> float:
+        """Nominal full thrust of one rotor [N]: four digits, as a thrust stand resolves."""
+        return float(f"{self.rotor.thrust_max:.4g}")
+
+    @property
+    def hover_command(self) -> float:
+        """Normalised thrust in hover [1], to 1 %: weight / full thrust, as THR_MDL_FAC
+        linearises."""
+        return round(self.mass * self.gravity / (len(self.rotors) * self.rotor.thrust_max), 2)
+
+    def geometry(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """px, py, km (n,) [m] of the rotors as PX4 has them: forward, right, moment per thrust
+        (> 0: counter-clockwise)."""
+        positions = np.array([rotor.position for rotor in self.rotors])
+        turns = np.array([1.0 if rotor.counter_clockwise else -1.0 for rotor in self.rotors])
+        return positions[:, 0].copy(), -positions[:, 1], turns * self.rotor.moment_ratio
+
+    def autopilot_parameters(self) -> dict[str, float]:
+        """The parameters of PX4 that follow from the vehicle, by PX4's names."""
+        values: dict[str, float] = {
+            "CA_ROTOR_COUNT": len(self.rotors),
+            "THR_MDL_FAC": self.rotor.curve_factor,
+            "MPC_THR_HOVER": self.hover_command,
+        }
+        for i, (px, py, km) in enumerate(zip(*self.geometry(), strict=True)):
+            values |= {
+                f"CA_ROTOR{i}_PX": float(px),
+                f"CA_ROTOR{i}_PY": float(py),
+                f"CA_ROTOR{i}_KM": float(km),
+            }
+        return values
+
+    def node_parameters(self) -> dict[str, dict[str, Any]]:
+        """Parameters of the nodes that follow from the vehicle, where a profile has no other."""
+        return {
+            "position_controller": {
+                "gravity": self.gravity,
+                "gravity_feedforward_mass": self.mass,
+            },
+            "mission": {
+                "joint_angle_hold": [
+                    _rounded_down(min(-joint.low, joint.high)) for joint in self.joints
+                ],
+                "joint_effort_hold": [self.servo.effort_limit] * len(self.joints),
+            },
+            "mavlink_bridge": {
+                "rotor_thrust_max": self.rotor_thrust,
+                "motor_curve_factor": self.rotor.curve_factor,
+                "thr_mdl_fac": self.rotor.curve_factor,
+                "identification_mass": self.mass,
+            },
+        }
+
+
+def _rounded_down(angle: float) -> float:
+    return round(math.floor(angle / ANGLE_STEP) * ANGLE_STEP, 9)
