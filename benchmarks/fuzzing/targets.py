@@ -265,7 +265,7 @@ class Plant:
     def __init__(self, rng: random.Random, counts: Counter) -> None:
         self._counts = counts
         waits = HilParameters(answer_timeout=0.001, silent_timeout=0.0005)
-        self._server = HilServer(0, parameters=waits)
+        self._server = HilServer(0, 4, parameters=waits)
         self._server._link, self._far = socket.socketpair()
         self._far.setblocking(False)
         self._server._link.setblocking(False)

@@ -11,6 +11,7 @@ import pytest
 from free_port import free_port
 from quadrotor import MASS, Quadrotor
 
+from uam_control.vehicle import load_description
 from uam_sim_bridge.mavlink.hil.hil_server import HilError, HilParameters, HilServer
 from uam_sim_bridge.mavlink.link.link import OffboardLink
 from uam_sim_bridge.mavlink.offboard.sequence import OffboardSequence, Phase
@@ -54,7 +55,7 @@ class Flight:
         self.link = OffboardLink(
             UdpTransport(self.local, ("127.0.0.1", self.udp)),
             self.sequence,
-            RateThrustParameters(),
+            RateThrustParameters.of(load_description()),
             signing=signing,
         )
         self.body = Quadrotor()

@@ -14,6 +14,7 @@ import pytest
 from free_port import free_port
 from quadrotor import Quadrotor
 
+from uam_control.vehicle import load_description
 from uam_sim_bridge.mavlink.hil.hil_server import HilParameters, HilServer
 from uam_sim_bridge.mavlink.link.link import OffboardLink
 from uam_sim_bridge.mavlink.offboard.sequence import OffboardSequence, Phase
@@ -85,7 +86,9 @@ class Bench:
         )
         self.sequence = OffboardSequence()
         self.link = OffboardLink(
-            UdpTransport(local, ("127.0.0.1", self.udp)), self.sequence, RateThrustParameters()
+            UdpTransport(local, ("127.0.0.1", self.udp)),
+            self.sequence,
+            RateThrustParameters.of(load_description()),
         )
         self.body = Quadrotor()
         self.ticks = self.answered = 0

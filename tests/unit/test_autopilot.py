@@ -7,8 +7,8 @@ import pytest
 from quadrotor import MASS, Quadrotor
 
 from uam_control.maths.rotations import quaternion_multiply
-from uam_control.settings.configuration import path
 from uam_control.settings.parameter_set import ParameterError
+from uam_control.vehicle import load_description
 from uam_sim_bridge.autopilot.core import Autopilot
 from uam_sim_bridge.autopilot.params import Parameters
 from uam_sim_bridge.mavlink.offboard.setpoint import RateThrustMap
@@ -23,7 +23,7 @@ class Bench:
     """Quadrotor and autopilot in one loop, with vision at 125 Hz."""
 
     def __init__(self, height=0.0):
-        self.autopilot = Autopilot(Parameters.load(path("autopilot/s500.yaml")))
+        self.autopilot = Autopilot(Parameters.of(load_description()))
         self.body = Quadrotor(height=height)
         self.vision = True
         self.vision_tilt = np.array([1.0, 0.0, 0.0, 0.0])
@@ -303,14 +303,15 @@ def test_parameters_are_checked_and_take_effect():
 def test_parameter_files(tmp_path):
     bad = tmp_path / "bad.yaml"
     with pytest.raises(ParameterError, match="No such file"):
-        Parameters.load(bad)
+        Parameters.of(load_description(), bad)
     for text, message in (
         ("[1, 2]", "NAME: value"),
         ("MC_ROLLRATE_P: x", "not a number"),
         ("A: [", "not valid YAML"),
         ("FOO: 1", "unknown"),
+        ("CA_ROTOR1_PX: 0.2", "0.2, but s500_arm.yaml makes it -0.171"),
     ):
         bad.write_text(text)
         with pytest.raises(ParameterError, match=message) as error:
-            Parameters.load(bad)
+            Parameters.of(load_description(), bad)
         assert "\n" not in str(error.value) and "bad.yaml" in str(error.value)

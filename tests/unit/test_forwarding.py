@@ -7,6 +7,7 @@ import time
 import numpy as np
 import pytest
 
+from uam_control.vehicle import load_description
 from uam_sim_bridge.mavlink.link.link import OffboardLink
 from uam_sim_bridge.mavlink.offboard.sequence import OffboardSequence, Request
 from uam_sim_bridge.mavlink.offboard.setpoint import RateThrustParameters
@@ -182,7 +183,7 @@ def test_with_signing_only_messages_with_the_key_pass(make):
 def test_the_link_does_not_receive_the_stations_messages(make):
     rig = make()
     sequence = OffboardSequence()
-    link = OffboardLink(rig.gcs, sequence, RateThrustParameters())
+    link = OffboardLink(rig.gcs, sequence, RateThrustParameters.of(load_description()))
     rig.codec = Codec(1, 1)  # the station uses the autopilot's ids
     rig.send(heartbeat(), mavlink2.MAVLink_statustext_message(2, b"critical"))
     rig.forward_all(2)
@@ -202,7 +203,7 @@ def test_the_link_does_not_receive_the_stations_messages(make):
 
 def test_chunks_of_a_stream_are_joined_by_the_link(make):
     rig = make()
-    link = OffboardLink(rig.gcs, OffboardSequence(), RateThrustParameters())
+    link = OffboardLink(rig.gcs, OffboardSequence(), RateThrustParameters.of(load_description()))
     frame = Codec(1, 1).encode(heartbeat())
     for piece in (frame[:9], frame[9:]):
         rig.line.arriving = [piece]

@@ -8,6 +8,7 @@ import fuzz_mavlink
 import numpy as np
 import pytest
 
+from uam_control.vehicle import load_description
 from uam_sim_bridge.autopilot.core import Autopilot
 from uam_sim_bridge.autopilot.server import Server
 from uam_sim_bridge.mavlink.link.link import OffboardLink
@@ -86,7 +87,7 @@ def test_parameters_without_a_request_are_not_stored():
             for name in names
         )
     )
-    link = OffboardLink(transport, OffboardSequence(), RateThrustParameters())
+    link = OffboardLink(transport, OffboardSequence(), RateThrustParameters.of(load_description()))
     link.poll(0.0)
     assert list(link.values) == ["MC_ROLLRATE_P"]
 

@@ -5,6 +5,7 @@ import struct
 import numpy as np
 import pytest
 
+from uam_control.vehicle import load_description
 from uam_sim_bridge.autopilot.companion import Companion
 from uam_sim_bridge.autopilot.core import Autopilot
 from uam_sim_bridge.mavlink.link.link import OffboardLink
@@ -51,7 +52,9 @@ class Rig:
 
     def __init__(self):
         self.memory, self.sequence = Memory(), OffboardSequence()
-        self.link = OffboardLink(self.memory, self.sequence, RateThrustParameters())
+        self.link = OffboardLink(
+            self.memory, self.sequence, RateThrustParameters.of(load_description())
+        )
         self.codec, self.framer = Codec(1, 1), Framer(Codec(1, 1))
         self.ticks, self.cut, self.vision = 0, False, True
         self.lost_kinds = ()

@@ -6,6 +6,7 @@ import struct
 import pytest
 
 from uam_control.settings.parameter_set import ParameterError
+from uam_control.vehicle import load_description
 from uam_sim_bridge.mavlink.offboard.setpoint import RateThrustParameters
 from uam_sim_bridge.mavlink.protocol.wire import Codec, Framer, mavlink2
 from uam_sim_bridge.mavlink.telemetry.parameter_check import (
@@ -36,7 +37,7 @@ def test_values_by_type():
 
 
 def test_the_same_values_change_nothing():
-    mapping = RateThrustParameters()
+    mapping = RateThrustParameters.of(load_description())
     values = {
         name: struct.unpack("<f", struct.pack("<f", value))[0]
         for name, value in expected(mapping).items()
@@ -51,7 +52,7 @@ def test_adopted():
         "MC_YAWRATE_K": 2.0,
         "THR_MDL_FAC": struct.unpack("<f", struct.pack("<f", 0.1))[0],
     }
-    new = adopted(RateThrustParameters(), values)
+    new = adopted(RateThrustParameters.of(load_description()), values)
     assert new.rate_p == (0.3, 0.15, 0.2) and new.rate_k == (1.0, 1.0, 2.0)
     assert new.thr_mdl_fac == 0.1
     assert list(differences(new, values)) == []
@@ -59,9 +60,9 @@ def test_adopted():
 
 def test_values_outside_the_range_of_the_mapping_are_refused():
     with pytest.raises(ParameterError, match="rate_p"):
-        adopted(RateThrustParameters(), {"MC_ROLLRATE_P": 0.0})
+        adopted(RateThrustParameters.of(load_description()), {"MC_ROLLRATE_P": 0.0})
     with pytest.raises(ParameterError, match="thr_mdl_fac"):
-        adopted(RateThrustParameters(), {"THR_MDL_FAC": math.nan})
+        adopted(RateThrustParameters.of(load_description()), {"THR_MDL_FAC": math.nan})
 
 
 def test_loss_of_the_stream():

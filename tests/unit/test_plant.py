@@ -29,7 +29,7 @@ def rotors(commands, seconds, start=0.0):
 
 def test_rotor_thrust_curve_and_limit():
     settled = rotors([1.0, 0.5, 0.0, 7.0], 1.0)
-    full = VEHICLE.thrust_max
+    full = VEHICLE.description.rotor.thrust_max
     assert full == pytest.approx(10.34, abs=0.01)
     np.testing.assert_allclose(
         settled.thrust, [full, full * (0.3 * 0.25 + 0.7 * 0.5), 0.0, full], rtol=1e-9, atol=1e-9

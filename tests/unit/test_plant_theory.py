@@ -13,6 +13,7 @@ from uam_sim_bridge.plant.urdf import urdf
 pinocchio = pytest.importorskip("pinocchio")
 
 VEHICLE = Vehicle.load()
+ROTOR = VEHICLE.description.rotor
 TREE = 9  # dof of base, arm and magnet
 
 
@@ -111,11 +112,11 @@ def test_energy_is_kept_without_losses():
 def test_hover_thrust_is_the_weight():
     """Level, arm at the pose where its weight is balanced: weight in thrust keeps it in the air."""
     plant = Plant(VEHICLE, 0.0, seed=1, arm_start=(0.0, 0.0))
-    thrust = 2.2 * 9.81 / 4.0 / VEHICLE.thrust_max
+    thrust = 2.2 * 9.81 / 4.0 / ROTOR.thrust_max
     factor = VEHICLE.numbers["rotors"]["curve_factor"]
     command = (-(1 - factor) + np.sqrt((1 - factor) ** 2 + 4 * factor * thrust)) / (2 * factor)
     plant.rotors.speed[:] = np.sqrt(
-        thrust * VEHICLE.thrust_max / VEHICLE.numbers["rotors"]["thrust_coefficient"]
+        thrust * ROTOR.thrust_max / VEHICLE.numbers["rotors"]["thrust_coefficient"]
     )
     plant.data.qpos[2] = 5.0
     for _ in range(250):

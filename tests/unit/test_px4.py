@@ -9,6 +9,7 @@ import time
 import psutil
 import pytest
 
+from uam_control.vehicle import load_description
 from uam_sim_bridge.autopilot.params import DEFINITIONS
 from uam_sim_bridge.px4 import px4_parameters as parameters
 from uam_sim_bridge.px4.px4_installation import VARIABLE, Px4Error, Px4Installation
@@ -57,7 +58,7 @@ def test_a_build_without_its_startup_script_is_refused(build):
 
 
 def test_px4_flies_with_the_stand_ins_rate_loop_and_mocap_alone():
-    values = parameters.load()
+    values = parameters.load(load_description())
     shared = values.keys() & DEFINITIONS.keys()
     assert {"MC_ROLLRATE_P", "THR_MDL_FAC", "CA_ROTOR3_KM", "COM_OF_LOSS_T"} <= shared
     assert values["EKF2_EV_CTRL"] == 11 and values["EKF2_GPS_CTRL"] == 0
@@ -82,7 +83,7 @@ def test_bad_parameters_are_refused(text, said, tmp_path):
     file = tmp_path / "mine.yaml"
     file.write_text(text)
     with pytest.raises(Px4Error, match=said):
-        parameters.load([file])
+        parameters.load(load_description(), [file])
 
 
 @pytest.mark.parametrize("signum", [signal.SIGINT, signal.SIGTERM, signal.SIGKILL])

@@ -24,8 +24,9 @@ from uam_msgs_py.messages import tf_message
 from uam_msgs_py.messages.status import MissionStatus
 from uam_msgs_py.messages.transforms import Transform, transforms_message
 from uam_sim_bridge.plant import Vehicle
-from uam_sim_bridge.plant.frames import SWING, box, frames, hanging
+from uam_sim_bridge.plant.frames import box, frames, hanging
 from uam_sim_bridge.plant.urdf import BASE_LINK, urdf
+from uam_sim_bridge.plant.vehicle import SWING
 
 VEHICLE = Vehicle.load()
 MODEL = VEHICLE.compile(0.0)

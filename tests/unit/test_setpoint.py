@@ -10,6 +10,7 @@ from hypothesis import strategies as st
 
 from uam_control.maths.rotations import matrix_from_euler
 from uam_control.settings.parameter_set import ParameterError
+from uam_control.vehicle import load_description
 from uam_sim_bridge.mavlink.offboard.setpoint import (
     INPUTS,
     RateThrustMap,
@@ -18,6 +19,7 @@ from uam_sim_bridge.mavlink.offboard.setpoint import (
 )
 
 ZERO = np.zeros(3)
+VEHICLE = load_description()
 HOVER = np.array([0.0, 0.0, 2.2 * 9.81])
 angle = st.floats(-0.6, 0.6)
 
@@ -47,15 +49,17 @@ def test_thrust_is_the_share_along_the_thrust_axis(roll, pitch, yaw, fx, fy):
 @given(*[st.floats(-0.3, 0.3)] * 3, *[st.floats(-0.5, 0.5)] * 3)
 def test_proportional_path_of_the_autopilot_gives_the_torque_back(r, p, y, wx, wy, wz):
     """S K P (omega_sp - omega) = tau_q with gains and geometry of the autopilot."""
-    parameters = RateThrustParameters(rate_k=(1.2, 0.8, 1.0)).validated()
+    parameters = RateThrustParameters.of(VEHICLE, {"rate_k": (1.2, 0.8, 1.0)})
     tau_q, omega = np.array([r, p, y / 10]), np.array([wx, wy, wz])
     rates, _ = RateThrustMap(parameters).map(HOVER, tau_q, ZERO, omega)
-    gain = np.array(parameters.rate_p) * np.array(parameters.rate_k) * parameters.torque_scale
+    gain = (
+        np.array(parameters.rate_p) * np.array(parameters.rate_k) * parameters.torque_scale(VEHICLE)
+    )
     assert gain * (rates - omega) == pytest.approx(tau_q, abs=1e-12)
 
 
 def test_limits():
-    m = RateThrustMap(RateThrustParameters(command_max=0.9))
+    m = RateThrustMap(RateThrustParameters.of(VEHICLE, {"command_max": 0.9}))
     rates, thrust = m.map(np.array([0.0, 0.0, 1e6]), np.array([1e6, -1e6, 1e6]), ZERO, ZERO)
     assert rates == pytest.approx([6.0, -6.0, 3.0])
     assert thrust == pytest.approx(0.9)
@@ -65,7 +69,7 @@ def test_limits():
 
 def test_slope_of_an_unmatched_thrust_model_scales_the_rates():
     """With f = 1 and no model in the autopilot a rotor's thrust is u^2: slope 2u."""
-    parameters = RateThrustParameters(motor_curve_factor=1.0, thr_mdl_fac=0.0)
+    parameters = RateThrustParameters.of(VEHICLE, {"motor_curve_factor": 1.0, "thr_mdl_fac": 0.0})
     m = RateThrustMap(parameters)
     quarter = np.array([0.0, 0.0, 10.34])  # u = 0.5, slope 1
     at_slope_1 = m.map(quarter, np.array([0.1, 0.0, 0.0]), ZERO, ZERO)[0].copy()

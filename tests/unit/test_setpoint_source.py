@@ -114,7 +114,7 @@ def ticks(draw):
 @pytest.mark.filterwarnings("ignore:invalid value")  # of infinite velocities
 @given(st.lists(ticks(), min_size=1, max_size=30), st.floats(0.001, 1.0))
 def test_whatever_comes_rates_and_thrust_are_finite_and_within_their_limits(sequence, step):
-    source, limit = in_flight(), np.array(RateThrustParameters().rate_limit)
+    source, limit = in_flight(), np.array(RateThrustParameters.rate_limit)
     for k, (told, state, commands, situation) in enumerate(sequence):
         now = 1.0 + step * (k + 1)
         if told:

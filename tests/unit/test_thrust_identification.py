@@ -9,6 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from uam_control.settings.parameter_set import ParameterError
+from uam_control.vehicle import load_description
 from uam_sim_bridge.mavlink.offboard.setpoint import RateThrustMap
 from uam_sim_bridge.mavlink.offboard.thrust_identification import (
     GRAVITY,
@@ -26,7 +27,7 @@ class Hover:
     """A vehicle whose motors give `truth` of the assumed thrust, under a perfect position law."""
 
     def __init__(self, truth=0.85, noise=0.0, **parameters):
-        given = ThrustIdentificationParameters(**parameters)
+        given = ThrustIdentificationParameters.of(load_description(), parameters)
         self.identification = ThrustIdentification(given)
         self.truth, self.noise = truth, noise
         self.random = np.random.default_rng(3)
@@ -68,7 +69,9 @@ def test_it_converges_while_tilted_and_turned():
             math.cos(pitch) * math.cos(roll),
         ]
     )
-    hover.identification.configure(ThrustIdentificationParameters(identification_acceleration=2.0))
+    hover.identification.configure(
+        ThrustIdentificationParameters.of(load_description(), {"identification_acceleration": 2.0})
+    )
     thrust = MASS * GRAVITY
     acceleration = axis * GRAVITY - np.array([0.0, 0.0, GRAVITY])
     for k in range(15000):
@@ -103,7 +106,7 @@ def test_frozen_it_stays_and_off_it_goes_back_to_one():
 
 @pytest.mark.parametrize("yaml", [True, False])
 def test_the_on_and_off_of_yaml_are_understood(yaml):
-    checked = ThrustIdentificationParameters(thrust_identification=yaml).validated()
+    checked = ThrustIdentificationParameters.of(load_description(), {"thrust_identification": yaml})
     assert checked.thrust_identification == ("on" if yaml else "off")
 
 
@@ -111,7 +114,7 @@ def test_wrong_parameters_leave_the_old_ones():
     identification = ThrustIdentification()
     with pytest.raises(ParameterError, match="identification_mass"):
         identification.configure(ThrustIdentificationParameters(identification_mass=math.nan))
-    assert identification.parameters == ThrustIdentificationParameters().validated()
+    assert identification.parameters == ThrustIdentificationParameters.of(load_description())
 
 
 def on_the_ground(hover):

@@ -75,14 +75,15 @@ class Profile:
 
 
 def parameter_set(
-    node: str, values: Mapping[str, Any], vehicle: VehicleDescription
+    node: str, values: Mapping[str, Any], vehicle: VehicleDescription | None = None
 ) -> tuple[type[ParameterSet], tuple[str, ...]]:
     """Return the kind of parameters of a node and the names of its axes; a controller's follow
     from its law.
 
-    The axes of the mission are the joints. values: the node's section, whose `law` counts. Raises
-    ParameterError for an unknown law.
+    The axes of the mission are the joints. values: the node's section, whose `law` counts;
+    vehicle: None for the default one. Raises ParameterError for an unknown law.
     """
+    vehicle = vehicle or load_description()
     if node in OTHERS:
         return OTHERS[node], vehicle.coordinates[ARM]
     limits, part = CONTROLLERS[node]

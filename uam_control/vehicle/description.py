@@ -14,6 +14,7 @@ import numpy as np
 
 from uam_control.coordinates import coordinates
 
+AXES = ("ROLL", "PITCH", "YAW")  # of PX4's rate loop, MC_*RATE_P
 ANGLE_STEP = 0.05  # [rad] the supervisor's limits are the joint's ranges rounded down to it
 
 
@@ -84,8 +85,8 @@ class VehicleDescription:
 
     file: that file; model: its MJCF file. mass: with arm, without payload [kg]; gravity [m/s^2];
     control_period [s]. profiles: parameter files by control law, see `profile`; autopilot:
-    the files of config/autopilot and config/px4 with the autopilot's gains. numbers: the whole
-    file, with what only the plant reads.
+    the file of config/autopilot with the autopilot's gains; autopilot_gains: what it holds, by
+    PX4's names. numbers: the whole file, with what only the plant reads.
     """
 
     name: str
@@ -100,6 +101,7 @@ class VehicleDescription:
     joints: tuple[Joint, ...]
     profiles: dict[str, str]
     autopilot: str
+    autopilot_gains: dict[str, float]
     numbers: dict[str, Any]
 
     def profile(self, law: str) -> str:
@@ -146,8 +148,8 @@ class VehicleDescription:
         return positions[:, 0].copy(), -positions[:, 1], turns * self.rotor.moment_ratio
 
     def autopilot_parameters(self) -> dict[str, float]:
-        """The parameters of PX4 that follow from the vehicle, by PX4's names."""
-        values: dict[str, float] = {
+        """The autopilot's gains and what follows from the vehicle, by PX4's names."""
+        values: dict[str, float] = self.autopilot_gains | {
             "CA_ROTOR_COUNT": len(self.rotors),
             "THR_MDL_FAC": self.rotor.curve_factor,
             "MPC_THR_HOVER": self.hover_command,
@@ -178,6 +180,8 @@ class VehicleDescription:
                 "motor_curve_factor": self.rotor.curve_factor,
                 "thr_mdl_fac": self.rotor.curve_factor,
                 "identification_mass": self.mass,
+                "rate_p": [self.autopilot_gains[f"MC_{axis}RATE_P"] for axis in AXES],
+                "rate_k": [self.autopilot_gains.get(f"MC_{axis}RATE_K", 1.0) for axis in AXES],
             },
         }
 

@@ -7,7 +7,14 @@ from pathlib import Path
 from typing import Any
 
 from uam_control.settings import configuration, yaml_file
-from uam_control.vehicle.description import Joint, Rotor, RotorModel, Servo, VehicleDescription
+from uam_control.vehicle.description import (
+    AXES,
+    Joint,
+    Rotor,
+    RotorModel,
+    Servo,
+    VehicleDescription,
+)
 
 DEFAULT_VEHICLE = "s500_arm"
 DIRECTIONS = ("ccw", "cw")
@@ -55,12 +62,28 @@ def describe(document: dict[str, Any], file: Path) -> VehicleDescription:
         joints=tuple(_joint(entry) for entry in top.entries("joints")),
         profiles={law: profiles.text(law) for law in profiles.values},
         autopilot=top.text("autopilot"),
+        autopilot_gains=_autopilot_gains(top),
         numbers=document,
     )
     _check_names(described)
     _check_rotors(described, rotor)
     _check_servo(described.servo, servo)
     return described
+
+
+def _autopilot_gains(top: Section) -> dict[str, float]:
+    """What the file of config/autopilot holds; the geometry of the rotors is not its business."""
+    file = configuration.named("autopilot", top.text("autopilot"))
+    values = yaml_file.read(file, VehicleError)
+    if not isinstance(values, dict):
+        raise VehicleError(f"{file}: 'NAME: value' lines expected")
+    for name in values:
+        if str(name).startswith("CA_") or name in ("THR_MDL_FAC", "MPC_THR_HOVER"):
+            raise VehicleError(f"{file}: {name} follows from {top.where} it must not be here")
+    gains = Section(values, f"{file}:")
+    for axis in AXES:  # the bridge maps torques with them
+        gains.positive(f"MC_{axis}RATE_P")
+    return values
 
 
 def _rotor_model(rotor: Section) -> RotorModel:

@@ -25,6 +25,7 @@ from uam_control.coordinates import SIZE
 from uam_lab.analysis import ticks
 from uam_lab.results.timeseries import Series
 from uam_sim_bridge.plant import Vehicle
+from uam_sim_bridge.plant.vehicle import MAGNET, PAYLOAD
 
 TREE = SIZE + 1  # dof of base, arm and pivot: the first of the model
 PIVOT = SIZE
@@ -55,22 +56,24 @@ class Body:
         payload_position: np.ndarray = (0.0, 0.0, -0.0505),
     ) -> None:
         """payload_mass [kg]; payload_position (3,) [m]: centre, in the frame of the magnet."""
-        spec = mujoco.MjSpec.from_file(str(vehicle.model_path))
-        spec.geom("payload").mass = 1e-3  # the free payload: a separate tree, not evaluated
-        if payload_mass > 0.0:
-            spec.body("magnet").add_geom(
-                name="held",
-                type=mujoco.mjtGeom.mjGEOM_BOX,
-                size=np.array(spec.geom("payload").size),
-                pos=np.array(payload_position, dtype=float),
-                mass=payload_mass,
-            )
-        self.model = model = spec.compile()
+
+        def hold_payload(spec: mujoco.MjSpec) -> None:
+            if payload_mass > 0.0:
+                spec.body(MAGNET).add_geom(
+                    name="held",
+                    type=mujoco.mjtGeom.mjGEOM_BOX,
+                    size=np.array(spec.geom(PAYLOAD).size),
+                    pos=np.array(payload_position, dtype=float),
+                    mass=payload_mass,
+                )
+
+        # the free payload is a tree of its own, which is not evaluated
+        self.model = model = vehicle.compile(0.0, hold_payload)
         flags = mujoco.mjtDisableBit
         model.opt.disableflags |= flags.mjDSBL_CONSTRAINT | flags.mjDSBL_CONTACT
         model.opt.enableflags = 0  # no sleeping
         self.data = mujoco.MjData(model)
-        self.data.qpos[model.joint("payload").qposadr[0]] = 50.0
+        self.data.qpos[model.joint(PAYLOAD).qposadr[0]] = 50.0
         self._unit, self._column = np.zeros(model.nv), np.zeros(model.nv)
 
     def place(self, chi: np.ndarray, swing: float) -> None:

@@ -36,8 +36,9 @@ from uam_msgs_py.messages.transforms import Transform, transforms_message
 from uam_msgs_py.node.base_node import UamNode, run
 from uam_msgs_py.node.node_parameters import NodeParameters
 from uam_sim_bridge.plant import Vehicle
-from uam_sim_bridge.plant.frames import SWING, box, frames, hanging
+from uam_sim_bridge.plant.frames import box, frames, hanging
 from uam_sim_bridge.plant.urdf import urdf
+from uam_sim_bridge.plant.vehicle import SWING
 
 NAME = "scene"
 REFERENCE = "reference"  # frame of the desired pose

@@ -6,7 +6,7 @@ import math
 from dataclasses import dataclass
 from pathlib import Path
 
-from uam_control.settings import configuration, yaml_file
+from uam_control.settings import yaml_file
 from uam_control.settings.parameter_set import ParameterError
 from uam_control.vehicle import VehicleDescription
 
@@ -88,27 +88,27 @@ class Parameters:
 
     @classmethod
     def of(cls, vehicle: VehicleDescription, file: Path | str | None = None) -> Parameters:
-        """The parameters of a vehicle: those that follow from it, and those of a YAML file.
+        """The parameters of a vehicle, and those of a YAML file with lines `NAME: value`.
 
-        file: lines `NAME: value`, None for config/autopilot of the vehicle. Raises ParameterError,
-        one line with the file's name; also where the file repeats what follows from the vehicle
-        with another value.
+        Raises ParameterError, one line with the file's name; also where the file has another rotor
+        geometry (CA_*) than the vehicle.
         """
-        path = Path(file or configuration.path(f"autopilot/{vehicle.autopilot}.yaml"))
-        values = yaml_file.read(path, ParameterError)
-        if not isinstance(values, dict):
-            raise ParameterError(f"{path}: 'NAME: value' lines expected")
         derived = vehicle.autopilot_parameters()
-        for name in derived.keys() & values.keys():
-            if values[name] != derived[name]:
+        if file is None:
+            return cls(derived)
+        values = yaml_file.read(Path(file), ParameterError)
+        if not isinstance(values, dict):
+            raise ParameterError(f"{file}: 'NAME: value' lines expected")
+        for name in sorted(derived.keys() & values.keys()):
+            if name.startswith("CA_") and values[name] != derived[name]:
                 raise ParameterError(
-                    f"{path}: {name}: {values[name]!r}, but {vehicle.file.name} makes it "
+                    f"{file}: {name}: {values[name]!r}, but {vehicle.file.name} makes it "
                     f"{derived[name]:g}"
                 )
         try:
             return cls(derived | values)
         except ParameterError as error:
-            raise ParameterError(f"{path}: {error}") from None
+            raise ParameterError(f"{file}: {error}") from None
 
     def __getitem__(self, name: str) -> float:
         return self._values[name]

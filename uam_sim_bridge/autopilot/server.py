@@ -128,9 +128,7 @@ def parser() -> argparse.ArgumentParser:
         metavar="NAME|FILE",
         help="description, as in config/vehicle/ (default %(default)s)",
     )
-    p.add_argument(
-        "--params", metavar="FILE", help="gains (default: the vehicle's, in config/autopilot/)"
-    )
+    p.add_argument("--params", metavar="FILE", help="parameters beside the vehicle's; they count")
     p.add_argument(
         "--serial",
         metavar="DEVICE:BAUD",

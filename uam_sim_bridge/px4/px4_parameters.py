@@ -25,8 +25,7 @@ def load(
     Integers stay integers: PX4 requires them for INT32 parameters. Raises Px4Error.
     """
     values: dict[str, Value] = dict(vehicle.autopilot_parameters())
-    names = (f"autopilot/{vehicle.autopilot}.yaml", SIMULATION)
-    for file in files or [configuration.path(name) for name in names]:
+    for file in files or [configuration.path(SIMULATION)]:
         values |= _read(Path(file))
     return values
 

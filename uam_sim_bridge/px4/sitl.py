@@ -125,7 +125,7 @@ def parser() -> argparse.ArgumentParser:
         "--params",
         metavar="FILE",
         nargs="+",
-        help=f"parameters (default: the vehicle's in config/autopilot, {parameters.SIMULATION})",
+        help=f"parameters beside the vehicle's (default: {parameters.SIMULATION} of config/)",
     )
     p.add_argument(
         "--log",

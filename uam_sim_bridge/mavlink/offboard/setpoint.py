@@ -68,7 +68,7 @@ class SetpointRefused(ValueError):
 class RateThrustParameters(ParameterSet):
     """What the map needs to know of vehicle and autopilot.
 
-    What is NaN follows from the vehicle: `of`.
+    What is NaN or empty follows from the vehicle: `of`.
     """
 
     rotor_thrust_max: float = number(
@@ -82,7 +82,7 @@ class RateThrustParameters(ParameterSet):
     )
     thr_mdl_fac: float = number(math.nan, "THR_MDL_FAC of the autopilot", "1", 0.0, 1.0)
     rate_p: tuple = vector(
-        (0.15, 0.15, 0.2),
+        (),
         "MC_ROLLRATE_P, MC_PITCHRATE_P, MC_YAWRATE_P of the autopilot",
         "1/(rad/s)",
         0.001,
@@ -90,7 +90,7 @@ class RateThrustParameters(ParameterSet):
         3,
     )
     rate_k: tuple = vector(
-        (1.0, 1.0, 1.0),
+        (),
         "MC_ROLLRATE_K, MC_PITCHRATE_K, MC_YAWRATE_K of the autopilot",
         "1",
         0.01,

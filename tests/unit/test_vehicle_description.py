@@ -1,0 +1,148 @@
+"""The description of a vehicle: what follows from it, and what is refused."""
+
+import math
+from copy import deepcopy
+from pathlib import Path
+
+import numpy as np
+import pytest
+import yaml
+
+from uam_control.settings.configuration import ConfigurationError
+from uam_control.vehicle import VehicleError, load_description
+from uam_control.vehicle.loading import describe
+from uam_sim_bridge.autopilot.params import Parameters
+from uam_sim_bridge.plant import Vehicle
+
+S500 = load_description()
+
+
+def changed(*changes):
+    """The S-500 with entries replaced: (path of keys, value)."""
+    numbers = deepcopy(S500.numbers)
+    for keys, value in changes:
+        entry = numbers
+        for key in keys[:-1]:
+            entry = entry[key]
+        entry[keys[-1]] = value
+    return numbers
+
+
+def test_the_autopilot_of_the_s500():
+    # FLU y is left, PX4's is right; PX4 counts counter-clockwise rotors positive
+    values = S500.autopilot_parameters()
+    assert values["CA_ROTOR_COUNT"] == 4 and values["THR_MDL_FAC"] == 0.3
+    rotors = [[values[f"CA_ROTOR{i}_{what}"] for what in ("PX", "PY", "KM")] for i in range(4)]
+    assert rotors == [
+        [0.171, 0.171, 0.016], [-0.171, -0.171, 0.016],
+        [0.171, -0.171, -0.016], [-0.171, 0.171, -0.016],
+    ]  # fmt: skip
+    # 2.2 kg * 9.81 m/s^2 / (4 * 8.549e-6 * 1100^2 N) = 0.5216
+    assert values["MPC_THR_HOVER"] == 0.52
+    autopilot = Parameters.of(S500)
+    assert all(autopilot[name] == value for name, value in values.items())
+
+
+def test_the_nodes_of_the_s500():
+    nodes = S500.node_parameters()
+    # 110 and 120 deg are 1.9199 and 2.0944 rad
+    assert nodes["mission"]["joint_angle_hold"] == [1.9, 2.05]
+    assert nodes["mission"]["joint_effort_hold"] == [2.8, 2.8]
+    assert nodes["position_controller"]["gravity_feedforward_mass"] == 2.2
+    # 8.549e-6 * 1100^2 = 10.34429
+    assert nodes["mavlink_bridge"]["rotor_thrust_max"] == 10.34
+
+
+def test_what_the_model_is_made_of():
+    model = Vehicle.of(S500).compile(0.2)
+    low, high = model.joint("alpha_2").range
+    assert (low, high) == pytest.approx((-math.radians(120), math.radians(120)))
+    np.testing.assert_allclose(model.site("rotor_2").pos, [-0.171, 0.171, 0.050])
+    assert model.actuator("rotor_1").gear[5] == -0.016, "a ccw propeller turns the base clockwise"
+    assert model.opt.gravity[2] == -9.81
+    assert [model.actuator(i).name for i in range(model.nu)] == [
+        "rotor_1", "rotor_2", "rotor_3", "rotor_4", "alpha_1", "alpha_2", "magnet",
+    ]  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("change", "said"),
+    [
+        ((("model",), "none.xml"), "none.xml does not exist"),
+        ((("mass",), -1.0), "s500_arm.yaml: mass: -1 is not above 0"),
+        ((("mass",), "heavy"), "mass: a number expected, got 'heavy'"),
+        ((("mass",), 5.0), "a weight of 49.1 N is not below the full thrust of the rotors, 41.4 N"),
+        ((("gravity",), math.inf), "gravity: inf is not finite"),
+        ((("rotors", "curve_factor"), 1.5), "rotors.curve_factor: 1.5 is outside 0..1"),
+        ((("rotors", "efficiency"), [1.0]), "rotors.efficiency: a list of 4 numbers expected"),
+        ((("rotors", "layout"), []), "rotors.layout: a list of mappings expected"),
+        ((("rotors", "layout", 1, "direction"), "left"), "layout[1].direction: 'left' is not one"),
+        ((("rotors", "layout", 1, "name"), "rotor_1"), "rotor_1: the name of several parts"),
+        ((("rotors", "layout", 1, "position"), [0, 0]), "position: a list of 3 numbers expected"),
+        ((("joints", 0, "range_deg"), [0, 90]), "does not have 5.7 deg to either side of 0"),
+        ((("joints", 1, "stowed_deg"), 150), "joints[1].stowed_deg: 150 is outside the joint"),
+        ((("servos", "effort_limit"), 4.0), "4 N m is above stall_torque, 3 N m"),
+        ((("joints",), 2), "joints: a list of mappings expected, got 2"),
+    ],
+)
+def test_what_cannot_be_a_vehicle_is_refused_in_one_line(change, said):
+    with pytest.raises(VehicleError) as error:
+        describe(changed(change), S500.file)
+    assert said in str(error.value) and "\n" not in str(error.value)
+
+
+@pytest.mark.parametrize("key", ["model", "mass", "rotors", "joints", "servos", "autopilot"])
+def test_what_is_missing_is_named(key):
+    numbers = deepcopy(S500.numbers)
+    del numbers[key]
+    with pytest.raises(VehicleError, match=f"s500_arm.yaml: {key} is missing"):
+        describe(numbers, S500.file)
+
+
+@pytest.mark.parametrize(
+    ("change", "said"),
+    [
+        ((("mass",), 2.3), "the bodies weigh 2.2 kg in all, s500_arm.yaml has mass: 2.3"),
+        ((("control_period",), 0.005), "timestep 0.002 s does not divide control_period"),
+        ((("joints", 1, "name"), "elbow"), "no joint 'elbow'"),
+        (
+            (("joints",), S500.numbers["joints"][:1]),
+            "joint 'alpha_2' is not in s500_arm.yaml, which has: alpha_1",
+        ),
+        ((("joints",), S500.numbers["joints"][::-1]), "each joint must follow the one before it"),
+    ],
+)
+def test_what_contradicts_the_mjcf_is_refused_in_one_line(change, said):
+    from uam_sim_bridge.plant import Plant
+
+    described = describe(changed(change), S500.file)
+    with pytest.raises(VehicleError) as error:
+        Plant(Vehicle.of(described), 0.0, 1)
+    assert said in str(error.value) and "\n" not in str(error.value)
+
+
+def test_a_range_of_the_mjcf_may_repeat_but_not_contradict(tmp_path):
+    folder = S500.file.parent
+    for part in folder.glob("parts/*"):
+        (tmp_path / "parts").mkdir(exist_ok=True)
+        (tmp_path / "parts" / part.name).write_text(part.read_text())
+    (tmp_path / S500.model.name).write_text(S500.model.read_text())
+    (tmp_path / "mine.yaml").write_text(yaml.safe_dump(S500.numbers))
+    arm = tmp_path / "parts" / "arm_2r.xml"
+    plain, where = arm.read_text(), 'name="alpha_1" class="arm_link"'
+    assert where in plain
+    mine = Vehicle.load(str(tmp_path / "mine.yaml"))
+    arm.write_text(plain.replace(where, f'{where} range="-110 110"'))
+    assert mine.compile(0.0).joint("alpha_1").range[1] == pytest.approx(math.radians(110))
+    arm.write_text(plain.replace(where, f'{where} range="-90 110"'))
+    with pytest.raises(VehicleError, match=r"'alpha_1' has the range \[-90.0, 110.0\], mine.yaml"):
+        mine.compile(0.0)
+
+
+def test_unknown_vehicles_are_refused():
+    with pytest.raises(ConfigurationError, match="unknown vehicle 'bicycle'; .*s500_arm"):
+        load_description("bicycle")
+    with pytest.raises(ConfigurationError, match="does not exist"):
+        load_description("none.yaml")
+    with pytest.raises(VehicleError, match="not valid YAML|a mapping expected"):
+        load_description(str(Path(__file__)))
