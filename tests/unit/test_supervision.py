@@ -27,8 +27,11 @@ from uam_control.supervision import (
 from uam_control.supervision.checks import CHECKS, Checks, measure, read
 from uam_control.supervision.monitor import Level, Monitor
 from uam_control.supervision.states import TARGETS, TRANSITIONS
+from uam_control.vehicle import load_description
 
 DOCS = Path(__file__).resolve().parents[2] / "docs" / "supervision.md"
+
+S500 = SupervisionParameters.from_mapping(load_description().node_parameters()["mission"], 2)
 
 
 def mermaid() -> str:
@@ -79,7 +82,7 @@ def test_every_check_has_a_value():
     assert np.isnan(values).sum() == 11
     read(1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, two, two, three, three, values)
     assert not np.isnan(values).any()
-    checks = Checks(SupervisionParameters())
+    checks = Checks(S500)
     assert checks.update(0.0, seen, True) is None
 
 
@@ -95,7 +98,7 @@ def test_every_check_has_a_value():
 )
 def test_limits_that_do_not_escalate_are_refused(changes, text):
     with pytest.raises(ParameterError, match=text):
-        dataclasses.replace(SupervisionParameters(), **changes).validated()
+        dataclasses.replace(S500, **changes).validated(2)
 
 
 LIMITS, AFTER = (1.0, 2.0, math.inf), (0.25, 0.05, 0.0)
@@ -148,7 +151,7 @@ def observation(**changes):
 
 def flying(**parameters):
     """A supervisor after take-off, and the time of its steps."""
-    made = Supervisor(dataclasses.replace(SupervisionParameters(), **parameters).validated())
+    made = Supervisor(dataclasses.replace(S500, **parameters).validated(2))
     for stamp in (0.0, 0.01):
         made.step(stamp, observation())
     assert made.state is State.FLYING
@@ -284,7 +287,7 @@ def test_a_hold_by_command_ends_only_by_command():
 
 
 def test_a_hard_limit_on_the_ground_disarms():
-    supervisor = Supervisor(SupervisionParameters())
+    supervisor = Supervisor(S500)
     seen = observation(on_ground=True)
     seen.state[0, 2] = 0.0
     supervisor.step(0.0, seen)
@@ -368,7 +371,7 @@ class AnySequence(RuleBasedStateMachine):
 
     def __init__(self):
         super().__init__()
-        self.supervisor = Supervisor(SupervisionParameters())
+        self.supervisor = Supervisor(S500)
         self.seen = observation(ready=False)
         self.stamp = 0.0
         self.decision = self.supervisor.decision
