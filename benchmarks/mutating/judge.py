@@ -82,7 +82,8 @@ def notices(path: str, source: str, tests: list[str]) -> None:
     sys.meta_path.insert(0, Mutated(path, source))
     os.chdir(ROOT)
     files = [f"tests/unit/{name}.py" for name in tests]
-    options = ["-x", "-q", "--noconftest", "-p", "no:cacheprovider", "-p", "no:unraisableexception"]
+    options = ["-x", "-q", "--tb=no", "--noconftest"]
+    options += ["-p", "no:cacheprovider", "-p", "no:unraisableexception"]
     status = 1
     with contextlib.suppress(BaseException):
         status = pytest.main([*options, *files])

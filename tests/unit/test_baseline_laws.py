@@ -70,6 +70,21 @@ def test_asmc1_outside_the_boundary_layer_and_with_sign_by_hand():
     assert update(asmc1(switching_form="sign"), 0.0, 0.0) == 0.0
 
 
+def test_asmc1_axes_are_apart_and_frozen_ones_still_act():
+    values = {"inertia": [2.0, 1.0], "slope": [3.0, 1.0], "damping": [5.0, 2.0]}
+    values |= {"switching": [4.0, 1.0], "boundary": [0.5, 2.0]}
+    e, e_dot, none = np.array([0.5, 1.0]), np.array([0.0, -2.0]), np.zeros(2)
+    for adapt, expected in ((True, [-0.06, 0.02]), (False, [0.0, 0.0])):
+        law = Asmc1Law(Asmc1Parameters.from_mapping(ASMC1 | values | {"adapt": adapt}, 2))
+        tau = law.update(e, e_dot, none, np.zeros(3), False, DT)
+        # s = (1.5, 1 - 2 = -1); tau_1 = -10*1.5 - 8 = -23, tau_2 = 2 + 2 + 1*.5 = 4.5
+        np.testing.assert_allclose(tau, [-23.0, 4.5])
+        # -Gamma s dt = (-10*1.5*.004, 5*1*.004); ||s||^2 = 2.25 + 1
+        np.testing.assert_allclose(law.adaptation, [*expected, math.sqrt(3.25)])
+        law.reset_adaptation()
+        np.testing.assert_allclose(law.adaptation, [0.0, 0.0, math.sqrt(3.25)])
+
+
 def test_asmc2_by_hand():
     # rho = 0.5: eta = 0.5, R = 1/(0.5*0.75) = 8/3, epsilon = ln(3)/2 = 0.549306
     # epsilon_dot = 8/3*0.3 = 0.8, s = 0.8 + 2*0.549306 = 1.898612, w = 8/3 s = 5.062966
@@ -206,8 +221,27 @@ def test_without_adaptation_the_gains_keep_their_initial_values():
     first, second = asmc1(adapt=False), asmc2(adapt=False)
     for law in (first, second):
         update(law, 0.4, 1.0, rate=3.0)
-    assert first.adaptation[0] == 0.0
+    assert first.adaptation[0] == 0.0 and first.adaptation[1] == 2.2  # s = 1 + 3*.4
     np.testing.assert_array_equal(second.adaptation[:3], ASMC2["theta_initial"])
+
+
+@pytest.mark.parametrize("make", [asmc1, asmc2])
+@pytest.mark.parametrize(("freeze", "saturated"), [(False, True), (True, False)])
+def test_gains_grow_unless_they_are_frozen_and_the_actuator_saturates(make, freeze, saturated):
+    law, plain = make(freeze_when_saturated=freeze), make()
+    update(law, 0.4, 1.0, rate=3.0, saturated=saturated)
+    update(plain, 0.4, 1.0, rate=3.0)
+    np.testing.assert_array_equal(law.adaptation, plain.adaptation)
+
+
+def test_asmc2_keeps_its_count_and_its_time_apart():
+    law = asmc2()
+    for _ in range(3):
+        update(law, 3.0, 0.1)
+    # eta = 3/.5; clamped in each of three ticks of 4 ms
+    np.testing.assert_allclose(law.adaptation[4:], [6.0, 3.0, 0.012])
+    law.reset_adaptation()
+    np.testing.assert_allclose(law.adaptation[[0, 1, 2, 5, 6]], [0.5, 0.25, 0.125, 3.0, 0.012])
 
 
 @pytest.mark.parametrize(

@@ -28,6 +28,7 @@ ONE_AXIS = {
     "varpi": 0.5,
 }
 # by hand: p12 = 8 / (2*4) = 1, p22 = (4 + 2*1) / (2*3) = 1, p11 = 3*1 + 4*1 = 7
+AXIS_VECTORS = ("lambda_1", "lambda_2", "lambda_table", "q_position", "q_velocity")
 DT = 0.004
 positive = st.floats(1e-3, 1e3)
 
@@ -152,6 +153,55 @@ def test_one_long_step_equals_two_halves(dt, e, xi):
     np.testing.assert_allclose(whole.adaptation[:4], halves.adaptation[:4], rtol=1e-9)
 
 
+@pytest.mark.parametrize(
+    ("xi", "acceleration"),
+    [(2.0, 5.0), (3.0, 0.5)],  # xi^3 is not the acceleration
+)
+def test_each_gain_has_its_regressor(xi, acceleration):
+    """Over a tick so long that the gain forgets its start, K_i = r x_i / nu_i."""
+    a_law = law()
+    update(a_law, 1.5, -0.75, 0.0, (xi, acceleration, 9.0), dt=1e3)  # r = 0.75
+    expected = 0.75 * np.array([1.0, xi / 2.0, xi * xi / 4.0, acceleration / 8.0])
+    np.testing.assert_allclose(a_law.adaptation[:4], expected, rtol=1e-12)
+
+
+def test_low_pass_on_the_acceleration_by_hand():
+    # corner 1/(2 pi) Hz: time constant 1 s; after ln 2 s half of a step is there
+    a_law = law(acceleration_cutoff=0.5 / math.pi)
+    half = math.log(2.0)
+    update(a_law, 0.5, 0.25, 0.0, (2.0, 8.0, 0.0), dt=half)
+    # rho = .5 + .25*2 + .125*4 + .0625*4 + .1 = 1.85 with half of 8; K3 saw 4 as well
+    np.testing.assert_allclose(a_law.adaptation[5:], [1.85, 0.75, 4.0])
+    keep = math.exp(-8.0 * half)
+    assert a_law.adaptation[3] == pytest.approx(0.0625 * keep + (1.0 - keep) * 0.75 * 4.0 / 8.0)
+    update(a_law, 0.5, 0.25, 0.0, (2.0, 8.0, 0.0), dt=half)
+    assert a_law.adaptation[7] == pytest.approx(6.0)  # half of what was missing
+
+
+def test_three_axes_share_one_norm_of_r_by_hand():
+    three = {name: [value[0]] * 3 for name, value in ONE_AXIS.items() if name in AXIS_VECTORS}
+    three |= {"inertia": [1.0, 2.0, 4.0]}
+    a_law = ModularLaw(ModularParameters.from_mapping(ONE_AXIS | three, 3))
+    e, e_dot = np.array([1.0, 0.0, 2.0]), np.array([0.0, 2.0, 0.0])
+    tau = a_law.update(e, e_dot, np.array([0.0, 1.0, 0.0]), np.zeros(3), False, DT)
+    # r = (1, 2, 2), ||r|| = 3; rho = .5 + .1 = .6: dtau = .2 r; feedback = (4, 6, 8)
+    # tau = (-4 - .2, 2 (1 - 6 - .4), 4 (-8 - .4))
+    np.testing.assert_allclose(tau, [-4.2, -10.8, -33.6])
+    np.testing.assert_allclose(a_law.adaptation[5:], [0.6, 3.0, 0.0])
+
+
+def test_zeta_rests_at_the_edge_of_the_boundary_layer():
+    a_law = law()
+    update(a_law, 0.5, 0.0)  # r = varpi
+    assert a_law.adaptation[4] == 0.1
+
+
+def test_a_gain_that_has_decayed_keeps_the_floor():
+    a_law = law()
+    update(a_law, 0.0, 0.0, dt=1e6)
+    np.testing.assert_array_equal(a_law.adaptation[:4], 1e-12)
+
+
 def test_ceiling_projects_each_gain():
     a_law = law(k_ceiling=[0.6, 0.0, 0.2, 0.0])
     for _ in range(2000):
@@ -165,7 +215,17 @@ def test_saturation_freezes_growth_but_not_decay():
     update(a_law, 5.0, 0.0, 0.0, (2.0, 8.0, 0.0), saturated=True)
     np.testing.assert_array_equal(a_law.adaptation[:4], ONE_AXIS["k_initial"])
     update(a_law, 0.0, 0.0, 0.0, (0.0, 0.0, 0.0), saturated=True)
-    assert np.all(a_law.adaptation[:4] < ONE_AXIS["k_initial"])
+    # without r a gain decays by e^(-nu dt)
+    decayed = [0.5, 0.25, 0.125, 0.0625] * np.exp([-0.004, -0.008, -0.016, -0.032])
+    np.testing.assert_allclose(a_law.adaptation[:4], decayed, rtol=1e-12)
+
+
+@pytest.mark.parametrize(("freeze", "saturated"), [(False, True), (True, False)])
+def test_gains_grow_unless_they_are_frozen_and_the_actuator_saturates(freeze, saturated):
+    a_law, plain = law(freeze_when_saturated=freeze), law()
+    update(a_law, 5.0, 0.0, 0.0, (2.0, 8.0, 0.0), saturated=saturated)
+    update(plain, 5.0, 0.0, 0.0, (2.0, 8.0, 0.0))
+    np.testing.assert_array_equal(a_law.adaptation, plain.adaptation)
 
 
 def test_acceleration_limit_bounds_the_regressor():
@@ -182,8 +242,31 @@ def test_freeze_keeps_the_gains_and_reset_restores_them():
     np.testing.assert_array_equal(a_law.adaptation[:4], ONE_AXIS["k_initial"])
     a_law.frozen = False
     update(a_law, 5.0, 0.0)
+    a_law.reset_adaptation()
+    np.testing.assert_array_equal(a_law.adaptation[:5], [0.5, 0.25, 0.125, 0.0625, 0.1])
+    assert a_law.adaptation[6] == 5.0  # ||r|| of the last tick is no adapted gain
     a_law.reset()
-    np.testing.assert_array_equal(a_law.adaptation[:5], [*ONE_AXIS["k_initial"], 0.1])
+    np.testing.assert_array_equal(a_law.adaptation, [0.5, 0.25, 0.125, 0.0625, 0.1, 0.0, 0.0, 0.0])
+
+
+SINGULAR = {"lambda_1": [0.25], "lambda_2": [1e6], "q_position": [1e6]}
+
+
+def test_a_matrix_p_that_is_singular_in_double_precision_is_refused():
+    # p12 = 1e6/.5 = 2e6, p22 = (q_v + 4e6)/2e6 = 2, p11 = 2e12: p11 p22 is 4e12 = p12^2, and more
+    # by the shares lambda_1/lambda_2^2 = 2.5e-13 and q_v/(2 p12), of which 1e-12 is the least
+    with pytest.raises(ParameterError, match="a matrix P that is not positive definite"):
+        law(**SINGULAR, q_velocity=[1e-9])
+    p11, p12, p22 = law(**SINGULAR, q_velocity=[1e-5]).parameters.lyapunov_matrix()  # 2.5e-12
+    np.testing.assert_allclose([p11[0], p12[0], p22[0]], [2e12, 2e6, 2.0])
+
+
+def test_safeguards_that_are_on_are_named():
+    parameters = law(
+        k_ceiling=[0.0, 2.0, 0.0, 0.0], acceleration_cutoff=5.0, freeze_when_saturated=True
+    ).parameters
+    assert parameters.safeguards == ["k_ceiling", "freeze_when_saturated", "acceleration_cutoff"]
+    assert law().parameters.safeguards == []
 
 
 @pytest.mark.parametrize(

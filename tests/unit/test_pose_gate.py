@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from uam_control.estimation import EstimatorParameters, StateEstimator
-from uam_control.estimation.pose_gate import CONTRADICTED, LONGEST, MEMORY, PoseGate
+from uam_control.estimation.pose_gate import PoseGate
 
 PERIOD, TICK = 0.008, 0.004
 LEVEL, WEIGHT = np.array([1.0, 0.0, 0.0, 0.0]), np.array([0.0, 0.0, 9.81])
@@ -31,11 +31,53 @@ def test_only_what_is_far_from_the_estimate_is_refused_and_is_counted():
     assert gate.refused == 3
 
 
+def answers(gate: PoseGate, poses: list[tuple[float, float]], bias: float = 0.0) -> list[bool]:
+    """Of (stamp [s], distance [m]); stamps are quarters of a second, which are exact."""
+    return [gate(stamp, distance, bias) for stamp, distance in poses]
+
+
+def quarters(begin: float, end: float) -> list[tuple[float, float]]:
+    """Poses that agree with the estimate, one every 0.25 s from `begin` to before `end`."""
+    return [(float(stamp), 0.0) for stamp in np.arange(begin, end, 0.25)]
+
+
+def test_the_estimate_is_trusted_when_poses_have_come_for_more_than_a_second():
+    gate = PoseGate(0.4)
+    assert not any(answers(gate, [*quarters(0.0, 1.0), (1.0, 0.5)]))
+    assert answers(gate, [(1.25, 0.4), (1.25, 0.5)]) == [False, True]
+
+
+def test_a_gap_of_more_than_half_a_second_ends_the_trust():
+    gate = PoseGate(0.4)
+    answers(gate, quarters(0.0, 2.0))  # the last one at 1.75 s
+    assert answers(gate, [(2.25, 0.5), (3.0, 0.5), (3.5, 0.5)]) == [True, False, False]
+    assert answers(gate, [(4.0, 0.0), (4.25, 0.5)]) == [False, True]  # more than 1 s after 3 s
+
+
+@pytest.mark.parametrize(("bias", "refused"), [(1.0, True), (1.5, False)])
+def test_a_bias_of_more_than_1_m_per_s2_ends_the_trust(bias, refused):
+    gate = PoseGate(0.4)
+    answers(gate, quarters(0.0, 2.0))
+    assert answers(gate, [(2.0, 0.5)], bias) == [refused]
+    gate = PoseGate(0.4)  # the bias that comes while poses are refused is their doing
+    answers(gate, quarters(0.0, 2.0))
+    assert answers(gate, [(2.0, 0.5)]) + answers(gate, [(2.25, 0.5)], bias) == [True, True]
+
+
+def test_poses_are_refused_for_two_seconds_and_then_followed_for_more_than_one():
+    gate = PoseGate(0.4)
+    answers(gate, quarters(0.0, 2.0))
+    far = [(stamp, 0.5) for stamp, _ in quarters(2.0, 6.0)]
+    # refused from 2 to 4 s (nine), used from 4.25 to 5.25 s (five), then refused again
+    assert answers(gate, far) == [True] * 9 + [False] * 5 + [True] * 2
+    assert gate.refused == 11
+
+
 def test_an_estimate_that_the_imu_contradicts_refuses_nothing():
     gate = after_a_while()
-    assert not any(refusals(gate, [0.02] * 5, bias=1.1 * CONTRADICTED))
-    assert not any(refusals(gate, [0.7] * 100, begin=5 * PERIOD))  # within MEMORY
-    assert gate(5 * PERIOD + MEMORY, 0.7, 0.0)
+    assert not any(refusals(gate, [0.02] * 5, bias=1.1))
+    assert not any(refusals(gate, [0.7] * 100, begin=5 * PERIOD))  # for a second
+    assert gate(5 * PERIOD + 1.0, 0.7, 0.0)
 
 
 def test_nor_does_one_that_may_be_off_after_a_gap_of_poses_or_imu():
@@ -45,7 +87,7 @@ def test_nor_does_one_that_may_be_off_after_a_gap_of_poses_or_imu():
     gate = after_a_while()
     gate.doubt(0.0)
     assert not any(gate(PERIOD * k, 0.7, 0.0) for k in range(100))
-    assert gate(MEMORY + 0.1, 0.7, 0.0)
+    assert gate(1.1, 0.7, 0.0)
 
 
 @given(st.lists(st.floats(0.0, 10.0), min_size=400, max_size=400), st.floats(0.05, 10.0))
@@ -53,7 +95,7 @@ def test_nothing_is_refused_for_longer_than_it_helps(distances, limit):
     gate = after_a_while()
     gate.distance = limit
     refused = refusals(gate, distances)
-    longest = round(LONGEST / PERIOD) + 1
+    longest = round(2.0 / PERIOD) + 1
     assert all(not all(refused[k : k + longest + 1]) for k in range(len(refused) - longest))
 
 
@@ -81,6 +123,6 @@ def test_the_estimate_follows_a_small_jump_and_waits_for_the_end_of_a_large_one(
 
 
 def test_a_jump_that_stays_is_accepted_in_the_end():
-    estimator, worst = hover(np.array([1.0, 0.0, 0.0]), LONGEST + 0.5)
+    estimator, worst = hover(np.array([1.0, 0.0, 0.0]), 2.5)
     assert worst > 0.9
     np.testing.assert_allclose(estimator.update()[0, :3], 0.0, atol=0.05)
