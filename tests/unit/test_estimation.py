@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 
 from uam_control.estimation import EstimatorParameters, StateEstimator
-from uam_control.estimation.filters import derivative_step, low_pass_step
 from uam_control.estimation.repeats import Repeats
 from uam_control.maths.rotations import matrix_from_euler, quaternion_from_euler
 
@@ -95,16 +94,3 @@ def test_gravity_is_not_an_acceleration():
         estimator.imu(k * DT, np.zeros(3), np.array([0.0, 0.0, 9.81]))
         state = estimator.update()
     np.testing.assert_allclose(state, 0.0, atol=1e-9)
-
-
-def test_derivative_of_a_ramp_is_its_slope():
-    state, out = np.zeros((2, 1)), np.zeros(1)
-    for k in range(400):
-        derivative_step(np.array([0.7 * k * DT]), 10.0, DT, state, out)
-    assert out[0] == pytest.approx(0.7, rel=1e-2)  # the input counts as held over a tick
-
-
-def test_low_pass_step_response_by_hand():
-    state = np.zeros(1)
-    low_pass_step(np.ones(1), 1.0 / (2.0 * np.pi), 1.0, state)  # time constant 1 s, one step of 1 s
-    assert state[0] == pytest.approx(1.0 - np.exp(-1.0))

@@ -1,0 +1,177 @@
+"""The pose filter's steps against hand-worked numbers: prediction, correction, late poses."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from uam_control.estimation.pose_filter import PoseFilter, correct, nearest, predict, shift
+
+LEVEL = np.array([1.0, 0.0, 0.0, 0.0])
+HALF = math.sqrt(0.5)
+NOTHING, WEIGHT = np.zeros(3), np.array([0.0, 0.0, 9.81])
+# a turn by twice the angle whose sine is .6, about (.6, .8, 0): its rotation error is (.72, .96, 0)
+TURNED = np.array([0.8, 0.36, 0.48, 0.0])
+
+
+def predicted(dt, gyro, force, quaternion=LEVEL, velocity=NOTHING, biases=(NOTHING, NOTHING)):
+    """Predict from position (1, 2, 3); return all that it writes."""
+    position, velocity = np.array([1.0, 2.0, 3.0]), np.array(velocity)
+    quaternion, rates, acceleration = np.array(quaternion), np.zeros(3), np.zeros(3)
+    pose = np.zeros(7)
+    predict(
+        dt, np.array(gyro), np.array(force), position, velocity, quaternion, rates, acceleration,
+        np.array(biases[0]), np.array(biases[1]), pose,
+    )  # fmt: skip
+    np.testing.assert_array_equal(pose, [*position, *quaternion])
+    return position, velocity, quaternion, rates, acceleration
+
+
+def test_prediction_without_a_turn():
+    # gyro less its bias is 0; a = (1, 2, 10.81 - 9.81) - (.5, 1, -1) = (.5, 1, 2)
+    position, velocity, quaternion, rates, acceleration = predicted(
+        0.5, (0.1, 0.2, 0.3), (1.0, 2.0, 10.81), velocity=(2.0, 0.0, -2.0),
+        biases=((0.1, 0.2, 0.3), (0.5, 1.0, -1.0)),
+    )  # fmt: skip
+    np.testing.assert_allclose(acceleration, [0.5, 1.0, 2.0])
+    np.testing.assert_allclose(velocity, [2.25, 0.5, -1.0])  # + .5 a
+    # + .5 (2, 0, -2) + .125 a
+    np.testing.assert_allclose(position, [2.0625, 2.125, 2.25])
+    np.testing.assert_array_equal(rates, 0.0)
+    np.testing.assert_array_equal(quaternion, LEVEL)
+
+
+def test_prediction_turns_first_and_keeps_the_quaternion_of_unit_length():
+    # half a second at pi rad/s about z is a quarter turn: body x is world y
+    _, velocity, quaternion, rates, _ = predicted(
+        0.5, (0.0, 0.0, math.pi + 0.25), (2.0, 4.0, 9.81), 2.0 * LEVEL,
+        biases=((0.0, 0.0, 0.25), NOTHING),
+    )  # fmt: skip
+    np.testing.assert_allclose(rates, [0.0, 0.0, math.pi])
+    np.testing.assert_allclose(quaternion, [HALF, 0.0, 0.0, HALF])
+    np.testing.assert_allclose(velocity, [-2.0, 1.0, 0.0], atol=1e-15)
+
+
+def test_correction_gains():
+    # position, w = 2: 3w dt = .6, 3w^2 dt = 1.2, w^3 dt = .8 times (.5, -1, .25)
+    # attitude, w = 3: 2w dt = .6 and w^2 dt = .9 times (.72, .96, 0)
+    position, velocity, quaternion = np.ones(3), np.zeros(3), LEVEL.copy()
+    gyro_bias, accelerometer_bias = np.zeros(3), np.zeros(3)
+    pose = np.array([0.5, 1.0, 1.75, *LEVEL])
+    correct(
+        0.1, np.array([2.0, 3.0]), np.array([1.0, 0.0, 2.0]), TURNED, pose,
+        position, velocity, quaternion, gyro_bias, accelerometer_bias,
+    )  # fmt: skip
+    np.testing.assert_allclose(position, [1.3, 0.4, 1.15])
+    np.testing.assert_allclose(velocity, [0.6, -1.2, 0.3])
+    np.testing.assert_allclose(accelerometer_bias, [-0.4, 0.8, -0.2])
+    np.testing.assert_allclose(gyro_bias, [-0.648, -0.864, 0.0])
+    # the turn is .6 * 1.2 = .72 rad about (.6, .8, 0)
+    half = math.sin(0.36)
+    np.testing.assert_allclose(quaternion, [math.cos(0.36), 0.6 * half, 0.8 * half, 0.0])
+
+
+def test_the_nearest_stamp_and_of_two_the_first():
+    stamps = np.array([1.0, 2.0, -1.0, 4.0])
+    assert [nearest(stamps, stamp) for stamp in (0.75, 1.75, 9.0, -5.0, 3.0)] == [0, 1, 3, 2, 1]
+
+
+def test_what_was_predicted_since_a_stamp_is_shifted():
+    stamps, poses = np.array([3.0, 1.0, 2.0]), np.zeros((3, 7))
+    poses[:, 3] = 1.0
+    poses[:, 0] = 30.0, 10.0, 20.0
+    shift(stamps, poses, 2.0, np.array([5.0, 6.0, 7.0]), np.array([1.0, 0.5, -1.0]), TURNED)
+    # newest by (5, 6, 7); a second before by the velocity less; before `since` not at all
+    np.testing.assert_allclose(poses[0], [35.0, 6.0, 7.0, *TURNED])
+    np.testing.assert_allclose(poses[2], [24.0, 5.5, 8.0, *TURNED])
+    np.testing.assert_array_equal(poses[1], [10.0, 0.0, 0.0, *LEVEL])
+
+
+def at_rest(stamps, position=NOTHING) -> PoseFilter:
+    """A filter with bandwidths 2 and 3 rad/s that has been at rest at the stamps."""
+    found = PoseFilter(2.0, 3.0, 10.0)
+    found.start(np.array(position), LEVEL)
+    for stamp in stamps:
+        found.predict(stamp, 0.01, NOTHING, WEIGHT)
+    return found
+
+
+def test_corrections_count_for_the_time_since_the_last_but_no_less_than_1_and_no_more_than_50_ms():
+    found = at_rest([0.0])
+    gain = 6.0  # 3w per second
+    found.correct(0.0, np.array([1.0, 0.0, 0.0]), LEVEL)  # the first
+    np.testing.assert_allclose(found.position, [gain * 0.05, 0.0, 0.0])
+    found.correct(0.01, np.array([0.0, 1.0, 0.0]), LEVEL)
+    np.testing.assert_allclose(found.position, [gain * 0.05, gain * 0.01, 0.0])
+    found.correct(0.01, np.array([0.0, 0.0, 1.0]), LEVEL)
+    np.testing.assert_allclose(found.position, [gain * 0.05, gain * 0.01, gain * 0.001])
+
+
+def test_the_first_correction_of_early_stamps_counts_for_50_ms_too():
+    found = at_rest([-0.96])
+    found.correct(-0.96, np.array([1.0, 0.0, 0.0]), LEVEL)  # 40 ms after -1, where it begins
+    np.testing.assert_allclose(found.position, [6.0 * 0.04, 0.0, 0.0])
+
+
+@pytest.mark.parametrize(("stamp", "used"), [(0.02, True), (0.021, False), (-0.02, True)])
+def test_a_pose_needs_a_prediction_within_20_ms(stamp, used):
+    found = at_rest([0.0])
+    found.correct(stamp, np.array([1.0, 0.0, 0.0]), LEVEL)
+    assert found.position[0] == pytest.approx(0.3 if used else 0.0)
+
+
+def test_64_predictions_are_kept():
+    for count, used in ((64, True), (65, False)):
+        found = at_rest([0.1 * k for k in range(count)])
+        found.correct(0.0, np.array([1.0, 0.0, 0.0]), LEVEL)
+        assert bool(found.position.any()) is used
+
+
+def test_a_repeated_pose_is_used_once():
+    found = at_rest([0.0])
+    for _ in range(2):
+        found.correct(0.0, np.array([1.0, 0.0, 0.0]), LEVEL)
+    np.testing.assert_allclose(found.position, [0.3, 0.0, 0.0])
+
+
+def test_a_pose_later_than_30_ms_corrects_the_predictions_since():
+    found = at_rest([0.0, 0.01, 0.02, 0.03, 0.04, 0.05])
+    found.correct(0.01, np.array([0.5, 0.0, 0.0]), TURNED)
+    # dt .05: velocity by 12*.05*.5 = .3; position by 6*.05*.5 = .15, and .04*.3 since then
+    np.testing.assert_allclose(found.velocity, [0.3, 0.0, 0.0])
+    np.testing.assert_allclose(found.position, [0.162, 0.0, 0.0])
+    # turned by 2*3*.05*1.2 = .36 rad about (.6, .8, 0)
+    half = math.sin(0.18)
+    turned = np.array([math.cos(0.18), 0.6 * half, 0.8 * half, 0.0])
+    np.testing.assert_allclose(found.quaternion, turned)
+    # poses that agree with the shifted predictions change nothing: .15 + .01*.3 at .02 s
+    before = found.velocity.copy(), found.gyro_bias.copy()
+    for stamp, x in ((0.02, 0.153), (0.04, 0.159), (0.01, 0.15)):
+        found.correct(stamp, np.array([x, 0.0, 0.0]), turned)
+    found.correct(0.0, NOTHING, LEVEL)  # nor does one before the correction
+    np.testing.assert_allclose(found.position, [0.162, 0.0, 0.0], atol=1e-12)
+    np.testing.assert_allclose(found.velocity, before[0], atol=1e-12)
+    np.testing.assert_allclose(found.gyro_bias, before[1], atol=1e-12)
+    np.testing.assert_allclose(found.quaternion, turned, atol=1e-12)
+
+
+def test_a_pose_of_30_ms_does_not():
+    found = at_rest([0.0, 0.01, 0.02, 0.03])
+    found.correct(0.0, np.array([0.5, 0.0, 0.0]), LEVEL)
+    np.testing.assert_allclose(found.position, [0.15, 0.0, 0.0])
+    found.correct(0.01, NOTHING, LEVEL)  # agrees with the prediction as it was
+    np.testing.assert_allclose(found.position, [0.15, 0.0, 0.0])
+
+
+def test_other_bandwidths_from_the_next_pose_on():
+    found = at_rest([0.0], (1.0, 2.0, 3.0))
+    np.testing.assert_array_equal(found.position, [1.0, 2.0, 3.0])
+    found.set_bandwidths(4.0, 1.0)
+    found.correct(0.0, np.array([2.0, 2.0, 3.0]), TURNED)
+    # 3*4*.05, 3*16*.05, 64*.05; attitude 1*.05*(.72, .96, 0)
+    np.testing.assert_allclose(found.position, [1.6, 2.0, 3.0])
+    np.testing.assert_allclose(found.velocity, [2.4, 0.0, 0.0])
+    np.testing.assert_allclose(found.accelerometer_bias, [-3.2, 0.0, 0.0])
+    np.testing.assert_allclose(found.gyro_bias, [-0.036, -0.048, 0.0])
