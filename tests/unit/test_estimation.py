@@ -1,4 +1,4 @@
-"""The estimator on made-up motion with known truth, and its filters against closed forms."""
+"""The estimator on synthetic motion with known truth, and its filters against closed forms."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ DT = 0.004
 
 
 def motion(t):
-    """Position, velocity, acceleration, Euler angles and body rates of a gentle made-up flight."""
+    """Return position, velocity, acceleration, Euler angles, body rates of a synthetic flight."""
     p = np.array([np.sin(t), 0.5 * np.cos(t), 1.0 + 0.2 * np.sin(2 * t)])
     v = np.array([np.cos(t), -0.5 * np.sin(t), 0.4 * np.cos(2 * t)])
     a = np.array([-np.sin(t), -0.5 * np.cos(t), -0.8 * np.sin(2 * t)])
@@ -23,8 +23,8 @@ def motion(t):
 
 
 def feed(estimator, until, gyro_bias=0.0, force_bias=0.0, latency=3, frozen=np.inf):
-    """Feed samples up to `until` [s]: IMU and joints at once, motion capture `latency` ticks
-    late, and always the same from `frozen` [s] on."""
+    """Pass samples up to `until` [s]: IMU and joints without delay, motion capture `latency` ticks
+    late, with a constant pose from `frozen` [s] on."""
     late = []
     for k in range(round(until / DT)):
         t = k * DT
@@ -44,7 +44,7 @@ def feed(estimator, until, gyro_bias=0.0, force_bias=0.0, latency=3, frozen=np.i
 
 @pytest.mark.parametrize("latency", [1, 3, 10, 20, 50])
 def test_follows_a_motion_despite_late_motion_capture_and_biases(latency):
-    """Without the history being corrected, too, it rings from some 40 ms on."""
+    """Without correction of the stored predictions it oscillates from about 40 ms on."""
     estimator = StateEstimator(EstimatorParameters())
     t, state = feed(estimator, 12.0, gyro_bias=0.01, force_bias=0.1, latency=latency)
     p, v, a, euler, rates = motion(t)
@@ -58,8 +58,8 @@ def test_follows_a_motion_despite_late_motion_capture_and_biases(latency):
     np.testing.assert_allclose(state[2, 6:], [-0.3 * np.sin(t), 0.0], atol=3e-2)
 
 
-def test_a_frozen_motion_capture_is_not_believed():
-    """It goes on with the IMU; the pose that is repeated is 1.4 m away at the end."""
+def test_a_frozen_motion_capture_is_ignored():
+    """The estimate continues with the IMU; the repeated pose is 1.4 m away at the end."""
     estimator = StateEstimator(EstimatorParameters())
     t, state = feed(estimator, 12.0, gyro_bias=0.01, force_bias=0.1, frozen=10.0)
     p, v, *_ = motion(t)
@@ -74,7 +74,7 @@ def test_repeats_are_exact():
     assert not repeats(*pose)
 
 
-def test_says_what_it_waits_for():
+def test_names_of_missing_inputs():
     estimator = StateEstimator(EstimatorParameters())
     assert estimator.waiting_for == ["imu", "mocap", "joints"]
     estimator.imu(0.0, np.zeros(3), np.array([0, 0, 9.81]))

@@ -1,4 +1,4 @@
-"""Poses that jump: which are not used, for how long, and what the estimate makes of it."""
+"""Poses that jump: which are rejected, for how long, and the error of the estimate."""
 
 from __future__ import annotations
 
@@ -19,25 +19,25 @@ def refusals(gate: PoseGate, distances: list[float], bias: float = 0.0, begin: f
 
 
 def after_a_while() -> PoseGate:
-    """One that has seen poses until 0 s, long enough to trust the estimate."""
+    """Return a gate after poses until 0 s, long enough for it to be active."""
     gate = PoseGate(0.4)
     assert not any(refusals(gate, [0.0] * 200, begin=-200 * PERIOD))
     return gate
 
 
-def test_only_what_is_far_from_the_estimate_is_refused_and_is_counted():
+def test_only_poses_far_from_the_estimate_are_rejected_and_counted():
     gate = after_a_while()
     assert refusals(gate, [0.01, 0.5, 0.39, 0.7, 0.7, 0.02]) == [0, 1, 0, 1, 1, 0]
     assert gate.refused == 3
 
 
 def answers(gate: PoseGate, poses: list[tuple[float, float]], bias: float = 0.0) -> list[bool]:
-    """Of (stamp [s], distance [m]); stamps are quarters of a second, which are exact."""
+    """Return the gate's results for (stamp [s], distance [m])."""
     return [gate(stamp, distance, bias) for stamp, distance in poses]
 
 
 def quarters(begin: float, end: float) -> list[tuple[float, float]]:
-    """Poses that agree with the estimate, one every 0.25 s from `begin` to before `end`."""
+    """Return poses equal to the estimate, one per 0.25 s (exact in binary) in [begin, end)."""
     return [(float(stamp), 0.0) for stamp in np.arange(begin, end, 0.25)]
 
 
@@ -59,7 +59,7 @@ def test_a_bias_of_more_than_1_m_per_s2_ends_the_trust(bias, refused):
     gate = PoseGate(0.4)
     answers(gate, quarters(0.0, 2.0))
     assert answers(gate, [(2.0, 0.5)], bias) == [refused]
-    gate = PoseGate(0.4)  # the bias that comes while poses are refused is their doing
+    gate = PoseGate(0.4)  # a bias that grows during a rejection does not end it
     answers(gate, quarters(0.0, 2.0))
     assert answers(gate, [(2.0, 0.5)]) + answers(gate, [(2.25, 0.5)], bias) == [True, True]
 
@@ -73,25 +73,25 @@ def test_poses_are_refused_for_two_seconds_and_then_followed_for_more_than_one()
     assert gate.refused == 11
 
 
-def test_an_estimate_that_the_imu_contradicts_refuses_nothing():
+def test_no_rejection_while_the_imu_contradicts_the_estimate():
     gate = after_a_while()
     assert not any(refusals(gate, [0.02] * 5, bias=1.1))
     assert not any(refusals(gate, [0.7] * 100, begin=5 * PERIOD))  # for a second
     assert gate(5 * PERIOD + 1.0, 0.7, 0.0)
 
 
-def test_nor_does_one_that_may_be_off_after_a_gap_of_poses_or_imu():
+def test_no_rejection_after_a_gap_of_poses_or_imu():
     gate = after_a_while()
     assert gate(0.3, 0.7, 0.0)
     assert not any(gate(1.0 + PERIOD * k, 0.7, 0.0) for k in range(100))
     gate = after_a_while()
-    gate.doubt(0.0)
+    gate.suspend(0.0)
     assert not any(gate(PERIOD * k, 0.7, 0.0) for k in range(100))
     assert gate(1.1, 0.7, 0.0)
 
 
 @given(st.lists(st.floats(0.0, 10.0), min_size=400, max_size=400), st.floats(0.05, 10.0))
-def test_nothing_is_refused_for_longer_than_it_helps(distances, limit):
+def test_no_rejection_is_longer_than_its_limit(distances, limit):
     gate = after_a_while()
     gate.distance = limit
     refused = refusals(gate, distances)
@@ -100,8 +100,10 @@ def test_nothing_is_refused_for_longer_than_it_helps(distances, limit):
 
 
 def hover(jump: np.ndarray, seconds: float) -> tuple[StateEstimator, float]:
-    """An estimator of a vehicle at rest, whose poses jump at 1.5 s for so long; the largest
-    error [m] of its position until a second later."""
+    """Run an estimator of a vehicle at rest whose poses jump by `jump` at 1.5 s for `seconds`.
+
+    Returns the estimator and its largest position error [m] until a second after the jump.
+    """
     estimator, worst = StateEstimator(EstimatorParameters()), 0.0
     for k in range(round((2.5 + seconds) / TICK)):
         t = TICK * k

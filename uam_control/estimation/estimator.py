@@ -1,7 +1,8 @@
 """State estimator: motion capture + IMU + joints → chi, chi_dot, chi_ddot at the control rate.
 
-Position and attitude accelerations come from the IMU, joint accelerations numerically, as in the
-paper (Section IV); each goes through a low-pass whose corner is a parameter.
+Position accelerations come from the IMU, attitude accelerations from the derivative of its body
+rates, joint accelerations from the derivative of the joint velocities (paper, Section IV). Each is
+low-pass filtered; the corner frequencies are parameters.
 """
 
 from __future__ import annotations
@@ -17,12 +18,12 @@ from uam_control.maths.compiled import jit
 from uam_control.maths.rotations import euler_from_quaternion
 from uam_control.settings.parameter_set import ParameterSet, number
 
-LONGEST_STEP = 0.05  # [s] that filters are advanced by at once; beyond it samples were lost
+LONGEST_STEP = 0.05  # s, longest filter step; a longer gap means lost samples
 
 
 @dataclass(frozen=True)
 class EstimatorParameters(ParameterSet):
-    """Bandwidths and corners of the estimator's filters."""
+    """Bandwidths and corner frequencies of the estimator's filters."""
 
     position_bandwidth: float = number(
         12.0, "correction of position by motion capture", "rad/s", 0.5, 60.0
@@ -31,7 +32,7 @@ class EstimatorParameters(ParameterSet):
         8.0, "correction of attitude by motion capture", "rad/s", 0.5, 60.0
     )
     pose_gate: float = number(
-        0.15, "jump of the motion capture from which on its poses are not used", "m", 0.05, 1000.0
+        0.15, "jump of the motion capture from which its poses are rejected", "m", 0.05, 1000.0
     )
     joint_bandwidth: float = number(
         60.0, "correction of joint state by the encoder angle", "rad/s", 1.0, 125.0
@@ -51,7 +52,11 @@ class EstimatorParameters(ParameterSet):
 
 
 class StateEstimator:
-    """Feed the samples as they arrive, in any order; `update` gives the state at the newest IMU."""
+    """Estimates chi, chi_dot, chi_ddot.
+
+    Pass the samples in order of arrival by `mocap`, `imu` and `joints`; `update` returns the state
+    at the stamp of the newest IMU sample.
+    """
 
     def __init__(self, parameters: EstimatorParameters) -> None:
         self.parameters = parameters
@@ -76,42 +81,48 @@ class StateEstimator:
 
     @property
     def refused_poses(self) -> int:
-        """How many poses were not used because they had jumped away."""
+        """Return the number of poses rejected because of a jump."""
         return self._pose.gate.refused
 
     @property
     def waiting_for(self) -> list[str]:
-        """Names of the inputs not seen yet."""
+        """Return the names of the inputs without any sample so far."""
         seen = {
             "imu": self._imu_stamp is not None,
             "mocap": self._started,
             "joints": self._joint_stamp is not None,
         }
-        return [name for name, there in seen.items() if not there]
+        return [name for name, received in seen.items() if not received]
 
     @property
     def quaternion(self) -> np.ndarray:
-        """Attitude [w x y z] (4,)."""
+        """Return the attitude quaternion (4,), body → world [w x y z]."""
         return self._pose.quaternion
 
     def mocap(self, stamp: float, position: np.ndarray, quaternion: np.ndarray) -> None:
-        """Take a pose: position (3,) [m] world, quaternion [w x y z], exposed at stamp [s]."""
+        """Process a pose exposed at `stamp` [s].
+
+        position (3,) [m, world]; quaternion (4,) body → world [w x y z].
+        """
         if not self._started:
             self._pose.start(position, quaternion)
             self._started = True
         self._pose.correct(stamp, position, quaternion)
 
     def imu(self, stamp: float, gyro: np.ndarray, specific_force: np.ndarray) -> None:
-        """Take an IMU sample: gyro (3,) [rad/s], specific force (3,) [m/s^2], FLU."""
+        """Process an IMU sample at `stamp` [s].
+
+        gyro (3,) [rad/s, FLU]; specific_force (3,) [m/s^2, FLU].
+        """
         last, self._imu_stamp = self._imu_stamp, stamp
         self._period = 0.0 if last is None else min(max(stamp - last, 0.0), LONGEST_STEP)
         if last is not None and stamp - last > LONGEST_STEP:
-            self._pose.gate.doubt(stamp)
+            self._pose.gate.suspend(stamp)
         if self._started and self._period > 0.0:
             self._pose.predict(stamp, self._period, gyro, specific_force)
 
     def joints(self, stamp: float, alpha: np.ndarray, alpha_dot: np.ndarray) -> None:
-        """Take joint readings: alpha (n,) [rad], alpha_dot (n,) [rad/s]."""
+        """Process joint readings at `stamp` [s]: alpha (n,) [rad], alpha_dot (n,) [rad/s]."""
         p = self.parameters
         last, self._joint_stamp = self._joint_stamp, stamp
         if last is None:

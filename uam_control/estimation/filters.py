@@ -1,4 +1,4 @@
-"""Small digital filters on vectors."""
+"""Digital filters on vectors, advanced by one sample per call."""
 
 from __future__ import annotations
 
@@ -15,7 +15,8 @@ def derivative_step(
 ) -> None:
     """Differentiate value (n,) through a critically damped second-order low-pass at cutoff [Hz].
 
-    state (2, n): filtered value and its rate, advanced exactly by dt; the rate goes to derivative.
+    state (2, n): filtered value and its rate, advanced exactly by dt [s]. The rate is also written
+    into derivative (n,).
     """
     omega = 2.0 * math.pi * cutoff
     decay = math.exp(-omega * dt)
@@ -29,7 +30,7 @@ def derivative_step(
 
 @jit
 def low_pass_step(value: np.ndarray, cutoff: float, dt: float, state: np.ndarray) -> None:
-    """First-order low-pass of value (n,) at cutoff [Hz] into state (n,), exact over dt."""
+    """Advance state (n,), a first-order low-pass of value (n,) at cutoff [Hz], exactly by dt [s]."""
     keep = math.exp(-2.0 * math.pi * cutoff * dt)
     for i in range(len(value)):
         state[i] = keep * state[i] + (1.0 - keep) * value[i]
@@ -44,10 +45,10 @@ def joint_step(
     dt: float,
     state: np.ndarray,
 ) -> None:
-    """Tracking observer of joint angle and velocity from quantised encoder readings.
+    """Advance a tracking observer of the joints by dt [s], from quantised encoder readings.
 
-    state (2, n): angle [rad], velocity [rad/s]. bandwidth [rad/s] of the correction by the angle,
-    velocity_weight [1/s] of that by the measured velocity.
+    angle (n,) [rad], velocity (n,) [rad/s]: readings. state (2, n): estimated angle and velocity.
+    bandwidth [rad/s]: correction by the angle; velocity_weight [1/s]: by the velocity.
     """
     for i in range(len(angle)):
         state[0, i] += dt * state[1, i]

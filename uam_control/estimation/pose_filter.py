@@ -1,7 +1,7 @@
-"""Pose filter: integrates the IMU and corrects with motion capture that arrives late.
+"""Pose filter: integrates the IMU and corrects with delayed motion capture.
 
-A fixed-gain observer (what a Kalman filter with constant noise converges to). The pose in force
-when the camera exposed is kept in a ring, so that the correction compares like with like.
+It is a fixed-gain observer, the steady state of a Kalman filter with constant noise. A ring buffer
+stores the predicted poses, so that a measured pose is compared with the prediction at its exposure.
 """
 
 from __future__ import annotations
@@ -21,19 +21,19 @@ from uam_control.maths.rotations import (
     rotation_error,
 )
 
-HISTORY = 64  # ticks of pose kept, 256 ms at 250 Hz
-OLDEST_MATCH = 0.02  # [s] a pose without a prediction this near is not used
-LATE = 0.03  # [s] later than this, a pose corrects the predictions since, too
-GRAVITY = 9.81
+HISTORY = 64  # stored predictions, 256 ms at 250 Hz
+OLDEST_MATCH = 0.02  # s, largest distance in time between a pose and its prediction
+LATE = 0.03  # s, delay above which a pose also corrects the later predictions
+GRAVITY = 9.81  # m/s^2
 CONJUGATE = np.array([1.0, -1.0, -1.0, -1.0])
 
 
 class PoseFilter:
-    """Position, velocity, attitude and the biases of gyroscope and accelerometer.
+    """Estimates position, velocity, attitude and the biases of gyroscope and accelerometer.
 
-    position, velocity (3,) world; quaternion [w x y z]; rates (3,) body, bias removed;
-    acceleration (3,) world, gravity and bias removed; gyro_bias (3,) body; accelerometer_bias (3,)
-    world.
+    position (3,) [m, world]; velocity (3,) [m/s, world]; quaternion (4,) body → world [w x y z];
+    rates (3,) [rad/s, body], without bias; acceleration (3,) [m/s^2, world], without gravity and
+    bias; gyro_bias (3,) [rad/s, body]; accelerometer_bias (3,) [m/s^2, world].
     """
 
     def __init__(self, position_bandwidth: float, attitude_bandwidth: float, gate: float) -> None:
@@ -54,18 +54,21 @@ class PoseFilter:
         self._repeats = Repeats()
 
     def set_bandwidths(self, position: float, attitude: float) -> None:
-        """Change the corrections; the estimate goes on."""
+        """Set the bandwidths [rad/s] of the corrections; the estimate does not change."""
         self._bandwidths = np.array([position, attitude], dtype=float)
 
     def start(self, position: np.ndarray, quaternion: np.ndarray) -> None:
-        """Begin at rest at a measured pose."""
+        """Begin at rest at a measured pose: position (3,) [m, world], quaternion (4,) [w x y z]."""
         self.position[:] = position
         self.quaternion[:] = quaternion
 
     def predict(
         self, stamp: float, dt: float, gyro: np.ndarray, specific_force: np.ndarray
     ) -> None:
-        """Integrate one IMU sample over dt [s]; gyro [rad/s], specific force [m/s^2], FLU."""
+        """Integrate an IMU sample over dt [s].
+
+        stamp [s]: of the sample; gyro (3,) [rad/s, FLU]; specific_force (3,) [m/s^2, FLU].
+        """
         row = self._count % HISTORY
         self._count += 1
         self._stamps[row] = stamp
@@ -84,16 +87,17 @@ class PoseFilter:
         )
 
     def correct(self, stamp: float, position: np.ndarray, quaternion: np.ndarray) -> None:
-        """Correct with a pose exposed at `stamp`.
+        """Correct with a pose exposed at `stamp` [s].
 
-        Not used: one that is older than the history, one that repeats exactly what came before, see
-        `Repeats`, and one that has jumped away, see `PoseGate`.
+        position (3,) [m, world]; quaternion (4,) body → world [w x y z]. A pose is ignored if it is
+        older than the stored predictions, repeats the last pose exactly (`Repeats`), or has jumped
+        away from the estimate (`PoseGate`).
         """
         row = nearest(self._stamps, stamp)
         if abs(self._stamps[row] - stamp) > OLDEST_MATCH or self._repeats(position, quaternion):
             return
-        off, bias = math.dist(position, self._poses[row, :3]), math.hypot(*self.accelerometer_bias)
-        if self.gate(stamp, off, bias):
+        jump, bias = math.dist(position, self._poses[row, :3]), math.hypot(*self.accelerometer_bias)
+        if self.gate(stamp, jump, bias):
             return
         dt = min(max(stamp - self._last_correction, 1e-3), 0.05)
         self._last_correction = stamp
@@ -126,7 +130,7 @@ class PoseFilter:
 
 @jit
 def nearest(stamps: np.ndarray, stamp: float) -> int:
-    """Return the row of the stamp nearest to `stamp`."""
+    """Return the index of the value in stamps (m,) [s] that is nearest to `stamp` [s]."""
     best = 0
     for row in range(len(stamps)):
         if abs(stamps[row] - stamp) < abs(stamps[best] - stamp):
@@ -143,10 +147,11 @@ def shift(
     velocity: np.ndarray,
     turn: np.ndarray,
 ) -> None:
-    """Correct the predictions from `since` [s] on, as what was found then would have changed them.
+    """Apply the correction found for the stamp `since` [s] to all later predictions.
 
-    Without it every pose under way would ask for the same correction again, and the observer rings.
-    displacement (3,): of the newest one; velocity (3,): change at `since`; turn (4,): in the body.
+    Otherwise each delayed pose would cause the same correction again, and the observer would
+    oscillate. stamps (m,) [s]; poses (m, 7): position and quaternion; displacement (3,) [m]: of the
+    newest prediction; velocity (3,) [m/s]: change since `since`; turn (4,): rotation in the body.
     """
     newest = np.max(stamps)
     for row in range(len(stamps)):
@@ -170,7 +175,10 @@ def predict(
     accelerometer_bias: np.ndarray,
     pose: np.ndarray,
 ) -> None:
-    """Advance the pose by dt and write it, with its quaternion, into pose (7,)."""
+    """Advance the estimate in place by dt [s]; write position and quaternion into pose (7,).
+
+    gyro, specific_force: see `PoseFilter.predict`; the other arrays: see `PoseFilter`.
+    """
     for i in range(3):
         rates[i] = gyro[i] - gyro_bias[i]
     turned = quaternion_multiply(quaternion, quaternion_from_rotation_vector(rates * dt))
@@ -199,7 +207,12 @@ def correct(
     gyro_bias: np.ndarray,
     accelerometer_bias: np.ndarray,
 ) -> None:
-    """Observer gains 3w, 3w^2, w^3 (triple pole) for position, 2w, w^2 for attitude."""
+    """Correct the estimate in place with a measured pose and its prediction pose (7,).
+
+    Observer gains: 3w, 3w^2, w^3 (triple pole) for position; 2w, w^2 (double pole) for attitude.
+    dt [s]: since the last correction; bandwidths (2,): w of position and attitude [rad/s]; the
+    other arrays: see `PoseFilter`.
+    """
     w = bandwidths[0]
     for i in range(3):
         innovation = measured_position[i] - pose[i]

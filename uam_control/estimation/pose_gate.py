@@ -1,52 +1,53 @@
-"""A tracker whose poses jump away from an estimate that agreed with them: axes or origin changed,
-another body taken for the vehicle.
+"""Rejects mocap poses that jump away from the estimate: exchanged axes, a moved origin, or another
+body taken for the vehicle.
 
-Only a jump is to be told from the truth. Where poses lead the estimate away little by little, they
-are what it is made of, and what jumps is the way back: motion capture and IMU contradict each other
-then, which the bias that explains the difference shows.
+The gate detects jumps only. The estimate follows wrong poses that drift slowly; then the return to
+the true pose is the jump and must not be rejected. In that case motion capture and IMU contradict
+each other, and the estimated accelerometer bias is large: the gate then accepts all poses.
 """
 
 from __future__ import annotations
 
 import math
 
-CONTRADICTED = 1.0  # [m/s^2] bias of the accelerometer that no accelerometer has
-GAP = 0.5  # [s] without poses, after which the estimate may be off
-MEMORY = 1.0  # [s] for which the estimate is not trusted after such a bias, or a gap
-LONGEST = 2.0  # [s] after which poses are used again, as the estimate is worse by then
+CONTRADICTED = 1.0  # m/s^2, accelerometer bias larger than that of any real accelerometer
+GAP = 0.5  # s without poses, after which the estimate may have a large error
+MEMORY = 1.0  # s, no rejection for this time after such a bias or gap
+LONGEST = 2.0  # s, longest rejection: later the estimate without poses is worse than the poses
 
 
 class PoseGate:
-    """Tells of each pose whether it is not to be used; `refused`: how many were not."""
+    """Decides for each pose whether to reject it; `refused`: number of rejected poses."""
 
     def __init__(self, distance: float) -> None:
-        """distance [m]: from the estimate, from which on a pose is not used."""
+        """distance [m]: from the estimate, above which a pose is rejected."""
         self.distance = distance
         self.refused = 0
-        self._doubted = self._last = -math.inf  # stamps [s]
-        self._closed: float | None = None
+        self._suspended = self._last = -math.inf  # stamps [s]
+        self._rejecting_since: float | None = None
 
     def __call__(self, stamp: float, distance: float, bias: float) -> bool:
-        """Whether to refuse a pose of `stamp` [s], `distance` [m] from the estimate of its time.
+        """Return whether to reject the pose at `stamp` [s].
 
-        bias [m/s^2]: of the accelerometer, as estimated.
+        distance [m]: between the pose and the estimate at its stamp; bias [m/s^2]: norm of the
+        estimated accelerometer bias.
         """
-        if stamp - self._last > GAP or (self._closed is None and bias > CONTRADICTED):
-            self.doubt(stamp)
+        if stamp - self._last > GAP or (self._rejecting_since is None and bias > CONTRADICTED):
+            self.suspend(stamp)
         self._last = stamp
-        trusted = stamp - self._doubted > MEMORY
+        trusted = stamp - self._suspended > MEMORY
         if not (distance > self.distance and trusted):
-            self._closed = None
+            self._rejecting_since = None
             return False
-        if self._closed is None:
-            self._closed = stamp
-        if stamp - self._closed > LONGEST:
-            self._closed = None
-            self.doubt(stamp)
+        if self._rejecting_since is None:
+            self._rejecting_since = stamp
+        if stamp - self._rejecting_since > LONGEST:
+            self._rejecting_since = None
+            self.suspend(stamp)
             return False
         self.refused += 1
         return True
 
-    def doubt(self, stamp: float) -> None:
-        """Note at `stamp` [s] that the estimate may be off: for a while no pose is refused."""
-        self._doubted = stamp
+    def suspend(self, stamp: float) -> None:
+        """Reject no pose for MEMORY from `stamp` [s] on: the estimate may have a large error."""
+        self._suspended = stamp

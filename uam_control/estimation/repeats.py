@@ -1,4 +1,4 @@
-"""A tracker that has frozen repeats its last pose exactly, which noise never does."""
+"""Detection of a frozen tracker: it repeats its last pose exactly, without noise."""
 
 from __future__ import annotations
 
@@ -6,13 +6,13 @@ import numpy as np
 
 
 class Repeats:
-    """Tells of each pose whether it is the one before again."""
+    """Compares each pose with the last one."""
 
     def __init__(self) -> None:
         self._last = np.full(7, np.nan)
 
     def __call__(self, position: np.ndarray, quaternion: np.ndarray) -> bool:
-        """Whether position (3,) and quaternion (4,) are exactly those of the last call."""
+        """Return whether position (3,) and quaternion (4,) equal those of the last call exactly."""
         last = self._last
         if np.array_equal(last[:3], position) and np.array_equal(last[3:], quaternion):
             return True

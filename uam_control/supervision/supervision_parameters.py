@@ -76,7 +76,7 @@ class SupervisionLimits(ParameterSet):
         0.25, "age of a controller's newest gains that starts a hold", "s", 0.05, 10.0
     )
     autopilot_age_land: float = number(
-        0.75, "time without the autopilot or the bridge that starts a landing", "s", 0.3,
+        0.75, "time without a message of autopilot or bridge that starts a landing", "s", 0.3,
         60.0,
     )  # fmt: skip
     round_trip_land: float = number(
