@@ -1,4 +1,4 @@
-"""Stopping, going on and descending: smooth, within limits, from wherever it begins."""
+"""Stop, resume and descent: smooth and within limits, from any start."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ def guidance(**parameters):
 
 
 def fly(guide, begin, end, at=()):
-    """References (n, 3, 8) from `begin` to `end` [s]; at: (time, function of the stamp)."""
+    """Return references (n, 3, 8) from `begin` to `end` [s]; at: (time, function of the stamp)."""
     found, due = [], sorted(at, key=lambda item: item[0])
     for k in range(round(begin / DT), round(end / DT)):
         stamp = 100.0 + k * DT
@@ -36,7 +36,7 @@ def fly(guide, begin, end, at=()):
 
 
 def assert_smooth(references):
-    """Rows are derivatives of each other, without jumps, and bounded: vehicle, joints."""
+    """Check that rows are derivatives of each other, continuous, and bounded: vehicle, joints."""
     assert np.all(np.isfinite(references))
     middle = references[1:-1]
     np.testing.assert_allclose(
@@ -63,7 +63,7 @@ def test_undisturbed_it_is_the_trajectory_itself_bit_for_bit():
 
 @settings(deadline=None, max_examples=20, phases=NO_SHRINKING)
 @given(st.floats(0.5, 80.0), st.floats(0.1, 6.0), st.floats(0.1, 4.0), st.booleans())
-def test_hold_and_resume_are_smooth_and_come_to_rest_whenever_they_come(at, held, again, stow):
+def test_hold_and_resume_are_smooth_at_any_time(at, held, again, stow):
     guide = guidance()
     references = fly(guide, at - 0.1, at + held + again + 14.0, [
         (at, lambda stamp: guide.stop(stamp, stow)),
@@ -74,7 +74,7 @@ def test_hold_and_resume_are_smooth_and_come_to_rest_whenever_they_come(at, held
     np.testing.assert_allclose(references[-1, 1:], 0.0, atol=1e-12)
 
 
-def test_after_a_hold_with_stowed_arm_the_scenario_is_flown_as_if_it_were_later():
+def test_after_a_hold_with_stowed_arm_the_scenario_continues_with_a_delay():
     guide = guidance()
     references = fly(guide, 15.0, 45.0, [
         (20.0, lambda stamp: guide.stop(stamp, True)), (30.0, guide.go_on)])  # fmt: skip
@@ -115,7 +115,7 @@ def test_a_descent_is_smooth_from_anywhere_and_ends_below_the_vehicle(at, dx, dy
 
 
 @given(st.lists(st.tuples(st.floats(0.01, 3.0), st.sampled_from([0.0, 1.0])), max_size=6))
-def test_a_clock_never_jumps_however_it_is_changed(changes):
+def test_a_clock_never_jumps_for_any_changes(changes):
     clock, stamp = PathClock(0.0), 1.0
     before = clock.at(stamp)
     for wait, goal in changes:
@@ -138,7 +138,7 @@ def test_a_segment_takes_its_own_time_for_each_coordinate():
     assert reference[0, 3] == pytest.approx(1.5) and segment.end == 13.0
 
 
-def test_who_drifts_is_stayed_with_and_comes_back_to_the_path_smoothly():
+def test_the_reference_follows_a_drifting_vehicle_and_returns_smoothly():
     guide = guidance()
     state = np.zeros((3, 8))
 

@@ -1,4 +1,4 @@
-"""When a flight is over that its mission does not end."""
+"""End of a flight that its mission does not end."""
 
 from uam_control.mission.time_limit import SETTLED, Settled
 
@@ -12,7 +12,7 @@ def test_a_flight_is_over_a_while_after_the_autopilot_has_disarmed():
     assert settled.over(110.0 + SETTLED, armed=False)
 
 
-def test_who_arms_again_flies_on():
+def test_arming_again_continues_the_flight():
     settled = Settled()
     settled.over(0.0, armed=True)
     settled.over(1.0, armed=False)

@@ -1,4 +1,4 @@
-"""References, scenario files and the sequence of a flight."""
+"""References, scenario files and the sequence of a mission."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ def value(trajectory, time):
 
 
 def assert_smooth(trajectory, end, speed, acceleration, step=1e-3):
-    """Rates are derivatives of values, and everything is bounded."""
+    """Rates are derivatives of values, and all values are bounded."""
     for time in np.arange(step, end, 0.0317):
         before, now, after = (value(trajectory, time + d) for d in (-step, 0.0, step))
         np.testing.assert_allclose((after[0] - before[0]) / (2 * step), now[1], atol=1e-4)
@@ -165,13 +165,13 @@ def test_bad_scenario_is_refused(tmp_path, text, reason):
         load_scenario(str(file))
 
 
-def test_unknown_scenario_lists_what_there_is():
+def test_unknown_scenario_lists_the_known_ones():
     with pytest.raises(ScenarioError, match="hover.*pick_and_place"):
         load_scenario("nonsense")
 
 
 class Flight:
-    """Steps a mission with a state that follows the reference perfectly."""
+    """Steps a mission with a state equal to the reference."""
 
     def __init__(self, name="hover", armed_at=1.0):
         self.mission = Mission(load_scenario(name), MissionParameters())
@@ -208,7 +208,7 @@ def test_sequence_waits_for_arming_flies_and_lands():
 
 
 def disturb(flight, entry, value, seconds):
-    """Fly on for a while with one entry of the state as it should not be."""
+    """Continue for a while with one wrong entry of the state."""
     for _ in range(round(seconds / 0.01)):
         output = flight.step()
         flight.state[entry] = value
@@ -223,7 +223,7 @@ def disturb(flight, entry, value, seconds):
         ((0, 1), np.nan, "estimate is not finite"),
     ],
 )
-def test_a_lost_vehicle_is_left_to_the_autopilot_not_dropped(entry, value, reason):
+def test_hard_limits_in_flight_start_failsafe_without_disarming(entry, value, reason):
     flight = Flight()
     flight.until(lambda o: o.time > 4.0)
     output = disturb(flight, entry, value, 0.2)
@@ -235,10 +235,10 @@ def test_a_lost_vehicle_is_left_to_the_autopilot_not_dropped(entry, value, reaso
     assert output.phase == "aborted" and not output.arm
 
 
-def test_a_vehicle_that_is_off_its_path_holds_then_lands_where_it_is():
+def test_a_vehicle_off_its_path_holds_then_lands_at_its_position():
     flight = Flight()
     flight.until(lambda o: o.time > 4.0)
-    assert disturb(flight, (0, 0), 1.2, 0.3).state is State.FLYING  # not for long enough
+    assert disturb(flight, (0, 0), 1.2, 0.3).state is State.FLYING  # shorter than hold_after
     output = disturb(flight, (0, 0), 1.2, 0.4)
     assert output.state is State.HOLDING and output.phase == "hold" and not output.abort_reason
     output = disturb(flight, (0, 0), 1.2, 5.1)
@@ -249,7 +249,7 @@ def test_a_vehicle_that_is_off_its_path_holds_then_lands_where_it_is():
     assert flight.until(lambda o: o.done).abort_reason
 
 
-def test_hold_stops_the_scenario_and_resume_goes_on_with_it():
+def test_hold_stops_the_scenario_and_resume_continues_it():
     flight = Flight("pick_and_place")
     flight.until(lambda o: o.time > 10.0)
     assert flight.mission.request(OperatorCommand.RESUME) == (False, "refused: not while flying")
@@ -274,7 +274,7 @@ def test_hold_stops_the_scenario_and_resume_goes_on_with_it():
     ]
 
 
-def test_land_goes_down_from_where_it_is_and_stows_the_arm():
+def test_land_descends_from_the_current_position_and_stows_the_arm():
     flight = Flight("pick_and_place")
     flight.until(lambda o: o.time > 25.0)
     x = flight.state[0, 0]
@@ -300,7 +300,7 @@ def test_disarming_in_the_air_is_refused_and_on_the_ground_done():
     assert waiting.mission.switch_magnet(True)[0] is False
 
 
-def test_the_magnet_is_as_asked_for_until_the_scenario_switches_it():
+def test_the_magnet_command_holds_until_the_scenario_switches():
     flight = Flight("pick_and_place")
     flight.until(lambda o: o.time > 10.0)
     assert flight.mission.switch_magnet(True) == (
@@ -314,7 +314,7 @@ def test_the_magnet_is_as_asked_for_until_the_scenario_switches_it():
     assert not flight.until(lambda o: o.time > 71.0, limit=80.0).magnet
 
 
-def test_nothing_takes_off_while_a_limit_is_passed():
+def test_no_take_off_beyond_a_limit():
     flight = Flight()
     flight.state[0, 3] = 1.2  # lying on its side
     for _ in range(300):
@@ -324,7 +324,7 @@ def test_nothing_takes_off_while_a_limit_is_passed():
     assert flight.until(lambda o: o.flying).state is State.TAKING_OFF
 
 
-def test_disarming_in_flight_is_noticed():
+def test_disarming_in_flight_ends_the_mission():
     flight = Flight()
     flight.until(lambda o: o.time > 4.0)
     flight.armed_at = np.inf
@@ -341,7 +341,7 @@ HAPPENINGS = st.tuples(
 
 @settings(deadline=None, max_examples=60)
 @given(st.lists(HAPPENINGS, max_size=12))
-def test_a_reference_is_finite_and_never_jumps_whatever_happens(happenings):
+def test_a_reference_is_finite_and_never_jumps_for_any_events(happenings):
     flight = Flight("pick_and_place", armed_at=0.0)
     wanted, before = True, None
     for ticks, row, column, value, command, magnet, well in happenings:

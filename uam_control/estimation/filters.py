@@ -30,7 +30,7 @@ def derivative_step(
 
 @jit
 def low_pass_step(value: np.ndarray, cutoff: float, dt: float, state: np.ndarray) -> None:
-    """Advance state (n,), a first-order low-pass of value (n,) at cutoff [Hz], exactly by dt [s]."""
+    """Advance state (n,), first-order low-pass of value (n,) at cutoff [Hz], exactly by dt [s]."""
     keep = math.exp(-2.0 * math.pi * cutoff * dt)
     for i in range(len(value)):
         state[i] = keep * state[i] + (1.0 - keep) * value[i]

@@ -1,4 +1,4 @@
-"""What to fly: scenarios, smooth references, and the sequence from waiting to landed."""
+"""Missions: scenarios, smooth references, and the sequence of a flight from waiting to landed."""
 
 from uam_control.mission.mission import Mission, MissionOutput
 from uam_control.mission.mission_parameters import MissionParameters

@@ -1,7 +1,7 @@
-"""The reference under supervision: along the scenario, to a stop on it, on again, or down.
+"""The reference under supervision: follow the scenario, stop on it, resume, descend, or rest.
 
-Everything begins at the reference that holds now, with its rates and accelerations, so that nothing
-the controllers follow ever jumps, whatever comes when.
+Each manoeuvre starts at the current reference with its rates and accelerations, so the reference
+of the controllers never jumps.
 """
 
 from __future__ import annotations
@@ -22,9 +22,9 @@ _RAMP = 1.5  # largest slope of a cubic from rest to rest, times its mean slope
 
 
 class PathClock:
-    """Scenario time: goes with the stamps, or slows down to a stop, and up again.
+    """Scenario time as a function of the stamp: it advances, slows down to a stop, or restarts.
 
-    Its rate is a cubic of the stamp while it changes; rate and slope never jump.
+    During a change its rate is a cubic polynomial of the stamp; rate and slope are continuous.
     """
 
     def __init__(self, stamp: float) -> None:
@@ -51,16 +51,16 @@ class PathClock:
 
     @property
     def settled(self) -> float:
-        """Stamp [s] from which on the rate does not change any more."""
+        """Return the stamp [s] from which on the rate is constant."""
         return -math.inf if self._ramp is None else self._ramp[0] + self._ramp[1]
 
     def change(self, stamp: float, goal: float, length: float) -> None:
-        """From `stamp` [s] on go to the rate `goal` within `length` [s]."""
+        """Change the rate to `goal` [1] within `length` [s] from `stamp` [s] on."""
         self._ramp = (stamp, length, *self.at(stamp), goal)
 
 
 class Segment:
-    """Quintics from a reference to rest at a goal; each coordinate takes its own time."""
+    """Quintic polynomials from a reference to rest at a goal, one duration per coordinate."""
 
     def __init__(
         self, stamp: float, start: np.ndarray, goal: np.ndarray, lengths: np.ndarray
@@ -78,7 +78,7 @@ class Segment:
 
     @property
     def end(self) -> float:
-        """Stamp [s] at which all coordinates are at rest."""
+        """Return the stamp [s] at which all coordinates are at rest."""
         return self._stamp + float(np.max(self._lengths))
 
     def write(self, stamp: float, reference: np.ndarray) -> None:
@@ -90,17 +90,16 @@ class Segment:
         reference[1] = rate / self._lengths
         second = 2 * c[2] + u * (6 * c[3] + u * (12 * c[4] + u * 20 * c[5]))
         reference[2] = second / self._lengths**2
-        there = u >= 1.0  # exactly, not but for rounding
-        reference[0, there] = self._goal[there]
-        reference[1:, there] = 0.0
+        arrived = u >= 1.0  # without rounding errors
+        reference[0, arrived] = self._goal[arrived]
+        reference[1:, arrived] = 0.0
 
 
 class Guidance:
-    """Writes the reference of a flight; told by the mission when to stop, go on, descend and rest.
+    """Writes the reference of a flight; the mission calls `stop`, `go_on`, `descend` and `rest`.
 
-    `reference` (3, 8) is rewritten by every `write`; `scenario_time` [s] is where on the scenario
-    it is, which stands still while it holds. `end`: stamp [s] at which a descent will be at the
-    ground, infinite without one.
+    `reference` (3, 8): rewritten by every `write`; `scenario_time` [s]: time on the scenario, held
+    constant during a hold; `end` [s]: stamp at which a descent reaches the ground, inf without one.
     """
 
     def __init__(
@@ -111,7 +110,7 @@ class Guidance:
         stowed: Sequence[float],
         parameters: SupervisionParameters,
     ) -> None:
-        """stamp [s]: of the take-off; stowed (2,): angles of the arm on the ground [rad]."""
+        """stamp [s]: of the take-off; reference: array to write; stowed: landing angles [rad]."""
         self.parameters = parameters
         self.reference = reference
         self.scenario_time = 0.0
@@ -120,17 +119,17 @@ class Guidance:
         self._rate, self._slope = 1.0, 0.0  # of the clock
         self._path = np.zeros((3, SIZE))
         self._arm: Segment | None = None  # in place of the path's, while holding
-        self._away: Segment | None = None  # from the path, once nobody flew the vehicle
-        self._go_on_at = math.inf  # stamp at which the arm is back and the path goes on
-        self._last: Segment | None = None  # in place of the path, to the end of the flight
+        self._away: Segment | None = None  # offset from the path, after a drift
+        self._go_on_at = math.inf  # stamp [s] at which the arm is back and the path continues
+        self._last: Segment | None = None  # in place of the path, until the end of the flight
 
     @property
     def end(self) -> float:
-        """See the class."""
+        """Return the stamp [s] at which a descent reaches the ground, inf without one."""
         return math.inf if self._last is None else self._last.end
 
     def advance(self, stamp: float) -> None:
-        """Go to `stamp` [s] on the path, before `write`; off the path the scenario stands still."""
+        """Set the scenario time for `stamp` [s]; call before `write`. No effect in a descent."""
         if self._last is not None:
             return
         if stamp >= self._go_on_at:
@@ -158,8 +157,11 @@ class Guidance:
                 self._away = None
 
     def drift(self, stamp: float, state: np.ndarray) -> None:
-        """After `write`, while nobody flies the vehicle: stay with it, and come back to the path
-        from where it is; state (3, 8). Otherwise whoever takes over is met by a large error."""
+        """Move the reference to the vehicle's pose and plan the return to the path; call after
+        `write` while no controller is active.
+
+        Otherwise the restarted controller would begin with a large error. state: estimate.
+        """
         path = self.reference[0].copy()
         if self._away is not None:
             self._away.write(stamp, self._path)
@@ -175,14 +177,14 @@ class Guidance:
         self._away = Segment(stamp, offset, np.zeros(SIZE), np.full(SIZE, length))
 
     def stop(self, stamp: float, stow: bool) -> None:
-        """Slow down to a stop on the path; stow: the arm goes to its place meanwhile."""
+        """Slow down to a stop on the path from `stamp` [s] on; stow: move the arm to `stowed`."""
         self._clock.change(stamp, 0.0, self._ramp_length())
         self._go_on_at = math.inf
         if stow:
             self._arm = self._arm_segment(stamp, self._stowed)
 
     def go_on(self, stamp: float) -> None:
-        """Go on along the path once it has stopped and the arm is back where it belongs there."""
+        """Continue on the path once the stop is complete and the arm is back at its path angles."""
         self._go_on_at = max(stamp, self._clock.settled)
         if self._arm is not None:
             time, _, _ = self._clock.at(self._go_on_at)
@@ -193,10 +195,10 @@ class Guidance:
             self._go_on_at = max(self._go_on_at, self._away.end)
 
     def descend(self, stamp: float, state: np.ndarray, ground: float, stow: bool) -> None:
-        """Go straight down from where the vehicle is; state (3, 8), ground [m]: height there."""
+        """Descend vertically from the vehicle's position to `ground` [m]; state: estimate."""
         p, now = self.parameters, self.reference
         offset = state[0, POSITION] - now[0, POSITION]
-        if not np.all(np.isfinite(offset)):  # then from where it should be
+        if not np.all(np.isfinite(offset)):  # then descend from the reference
             offset = np.zeros(3)
         goal, lengths = self._at_rest(stow)
         across = float(np.hypot(offset[0], offset[1]))
@@ -204,16 +206,16 @@ class Guidance:
         goal[:2] += offset[:2]
         goal[2] = ground - SINK
         way = abs(goal[2] - now[0, 2])
-        # the ground is met when all else is at rest
+        # the other coordinates are at rest before touchdown
         lengths[2] = max(np.max(lengths) + p.stop_time, _PEAK * way / p.travel_speed)
         self._last = Segment(stamp, now, goal, lengths)
 
     def rest(self, stamp: float, stow: bool) -> None:
-        """Come to rest; what counts, while the autopilot flies by itself, is the arm."""
+        """Bring the reference to rest; in failsafe only its arm angles are used."""
         self._last = Segment(stamp, self.reference, *self._at_rest(stow))
 
     def _at_rest(self, stow: bool) -> tuple[np.ndarray, np.ndarray]:
-        """Where and in which times each coordinate can come to rest (8,), the arm at its place."""
+        """Return goal and duration [s] of each coordinate to rest; stow: the arm to `stowed`."""
         p, now = self.parameters, self.reference
         speed = float(np.linalg.norm(now[1, POSITION]))
         length = max(p.stop_time, 2.0 * _RAMP * speed / p.stop_acceleration)
@@ -229,12 +231,12 @@ class Guidance:
         return Segment(stamp, self.reference, goal, np.full(SIZE, self._arm_length(angles)))
 
     def _arm_length(self, angles: np.ndarray) -> float:
-        """Time [s] in which the arm can go to `angles` (2,) [rad]."""
+        """Return the time [s] for the arm to reach `angles` [rad] within stow_rate."""
         way = float(np.max(np.abs(angles - self.reference[0, ARM])))
         return max(self.parameters.stop_time, _PEAK * way / self.parameters.stow_rate)
 
     def _ramp_length(self) -> float:
-        """Time [s] in which the path may be stopped, or gone on with."""
+        """Return the time [s] to stop or to resume within stop_acceleration."""
         self._trajectory.write(self.scenario_time, self._path)
         speed = float(np.linalg.norm(self._path[1, POSITION]))
         return max(self.parameters.stop_time, _RAMP * speed / self.parameters.stop_acceleration)

@@ -1,5 +1,5 @@
-"""The sequence of a flight: waiting, take-off, the scenario's phases, landing, landed, or
-aborted; the supervisor decides what of it is done."""
+"""The sequence of a flight: waiting, take-off, the scenario's phases, landing, landed or aborted;
+the supervisor decides on all transitions."""
 
 from __future__ import annotations
 
@@ -26,17 +26,17 @@ from uam_control.supervision import (
     Supervisor,
 )
 
-# phases that no scenario has
+# phases in addition to those of a scenario
 WAITING, HOLD, LAND, LANDED, ABORTED = "waiting", "hold", "land", "landed", "aborted"
 
 
 @dataclass
 class MissionOutput:
-    """What the mission wants at one tick.
+    """Output of the mission at one tick.
 
-    reference (3, 8), reused by the next step; flying: position and attitude are to be controlled;
-    time: since take-off [s], negative before; arm: the autopilot is to be armed; state, cause: of
-    the supervisor, and why it is in it; abort_reason: why the scenario was given up.
+    reference (3, 8), reused by the next step; flying: position and attitude are controlled;
+    time [s]: since take-off, negative before; arm: desired arming of the autopilot; state, cause:
+    of the supervisor; abort_reason: why the scenario was aborted, "" if not.
     """
 
     reference: np.ndarray
@@ -52,7 +52,7 @@ class MissionOutput:
 
 
 class Mission:
-    """Steps through a scenario under supervision; no clock but the stamps it is given."""
+    """Steps through a scenario under supervision; its only time is the stamps of the steps."""
 
     def __init__(self, scenario: Scenario, parameters: MissionParameters) -> None:
         self.scenario = scenario
@@ -64,11 +64,11 @@ class Mission:
         self._seen: Observation | None = None
         self._guidance: Guidance | None = None
         self._takeoff = self._ground = 0.0
-        self._half_down = math.inf  # stamp from which a descent may touch down
+        self._half_down = math.inf  # stamp [s] from which a descent may detect touchdown
         self._at_rest_since: float | None = None
         self._failsafe_since = math.inf
         self._end: float | None = None
-        self._magnet: tuple[bool, bool] | None = None  # as overridden, as the scenario had it then
+        self._magnet: tuple[bool, bool] | None = None  # overriding value, scenario's value then
 
     def configure(self, parameters: MissionParameters) -> None:
         """Use `parameters` (validated) from the next step on."""
@@ -79,12 +79,12 @@ class Mission:
 
     @property
     def changes(self) -> list[StateTransition]:
-        """Every change of state so far, in order."""
+        """Return all transitions so far, in order."""
         return self._supervisor.changes
 
     @property
     def beyond(self) -> str:
-        """What is beyond a limit now, "" where nothing is."""
+        """Return the cause of the worst exceeded limit, "" without one."""
         return self._supervisor.beyond
 
     def step(
@@ -94,11 +94,10 @@ class Mission:
         armed_since: float | None,
         readings: Readings | None = None,
     ) -> MissionOutput:
-        """Return what holds at `stamp` [s].
+        """Return the output at `stamp` [s]; call it at every tick with the stamp of the next one.
 
-        state: newest estimate (3, 8). armed_since: stamp at which the autopilot reported armed,
-        None while it is not. readings: what else is known. Call it for every tick with the stamp of
-        the tick to come.
+        state: newest estimate (3, 8). armed_since: stamp [s] at which the autopilot reported
+        armed, None while disarmed. readings: for the supervisor.
         """
         output, guidance = self.output, self._guidance
         if guidance is not None:
@@ -116,21 +115,21 @@ class Mission:
                     guidance.drift(stamp, state)
             self._follow(stamp, decision)
             if output.state is State.FAILSAFE and self._end is None:
-                given = self._failsafe_since + self._parameters.failsafe_timeout
-                if armed_since is None or stamp >= given:
+                deadline = self._failsafe_since + self._parameters.failsafe_timeout
+                if armed_since is None or stamp >= deadline:
                     self._end = stamp + self._parameters.settle_time
         if self._end is not None:
             output.done = stamp >= self._end
         return output
 
     def give_up(self, stamp: float, reason: str) -> None:
-        """End a flight that has not taken off."""
+        """End a flight before take-off at `stamp` [s]; no effect after take-off."""
         self._follow(stamp, self._supervisor.give_up(stamp, reason))
 
     def request(self, command: OperatorCommand) -> tuple[bool, str]:
-        """Ask for something in flight, to be done at the next step.
+        """Queue a command for the next step.
 
-        Returns whether it will be, and what or why not, in one line.
+        Returns whether it is accepted, and the command or the reason of the refusal in one line.
         """
         if self._seen is None:
             return False, "no state of the vehicle yet"
@@ -141,7 +140,7 @@ class Mission:
         return True, command.value.value
 
     def switch_magnet(self, on: bool) -> tuple[bool, str]:
-        """Have the magnet on or off until the scenario switches it next; answers as `request`."""
+        """Override the magnet until the scenario switches it next; returns as `request` does."""
         if self.output.state is State.DISARMED:
             return False, "refused: not while disarmed"
         self._magnet = on, self._scenario_magnet()
@@ -169,7 +168,7 @@ class Mission:
         return seen
 
     def _at_rest(self, stamp: float, on_ground: bool) -> bool:
-        """Whether it has been on the ground for long enough."""
+        """Return whether the vehicle has been on the ground for touchdown_time."""
         if not on_ground:
             self._at_rest_since = None
             return False
@@ -178,7 +177,7 @@ class Mission:
         return stamp - self._at_rest_since >= self._parameters.touchdown_time
 
     def _follow(self, stamp: float, decision: Decision) -> None:
-        """Do what the supervisor has decided."""
+        """Apply the supervisor's decision."""
         output = self.output
         if decision.state is not output.state:
             before, output.state = output.state, decision.state
@@ -241,11 +240,11 @@ class Mission:
         return guidance is not None and self.scenario.magnet_on(guidance.scenario_time)
 
     def _magnet_on(self, decision: Decision) -> bool:
-        """What people want of the magnet, until the scenario has a new wish, else the scenario."""
-        wanted = self._scenario_magnet()
+        """Return the overriding value until the scenario switches, else the scenario's value."""
+        desired = self._scenario_magnet()
         if self._magnet is not None:
             on, before = self._magnet
-            if wanted == before:
+            if desired == before:
                 return on
             self._magnet = None
-        return wanted and decision.keep_magnet
+        return desired and decision.keep_magnet

@@ -1,4 +1,4 @@
-"""Scenarios: what the mission flies, read from YAML (config/scenarios) or a CSV trajectory."""
+"""Scenarios, read from YAML files (config/scenarios) or CSV trajectories."""
 
 from __future__ import annotations
 
@@ -21,12 +21,12 @@ JOINT_LIMIT = math.radians(110.0)
 
 
 class ScenarioError(ValueError):
-    """A scenario that cannot be flown; the message is one line: where, what, what is allowed."""
+    """An invalid scenario; the text is one line: where, what is wrong, what is allowed."""
 
 
 @dataclass(frozen=True)
 class Landing:
-    """When the descent begins and how long it takes; it ends at the ground under the take-off."""
+    """Descent from mission time `at` [s] for `duration` [s], to the height of the take-off."""
 
     at: float
     duration: float
@@ -34,8 +34,11 @@ class Landing:
 
 @dataclass(frozen=True)
 class Scenario:
-    """A flight: moves or samples, phases, magnet switching, landing. Times are mission times
-    [s]."""
+    """A flight: moves or samples, phases, magnet switching, landing.
+
+    Times are mission times [s]. arm_start: joint angles at take-off [rad]; payload_mass [kg];
+    drop_point: x, y [m]; phases, magnet, snapshots: (begin, value).
+    """
 
     name: str
     description: str
@@ -49,10 +52,10 @@ class Scenario:
     payload_mass: float = 0.0
     drop_point: tuple[float, float] | None = None
     snapshots: tuple[tuple[float, str], ...] = field(default=())
-    faults: tuple[object, ...] = ()  # as written; what injects them reads them
+    faults: tuple[object, ...] = ()  # unchecked entries, see uam_sim_bridge.faults
 
     def trajectory(self, start: np.ndarray) -> Trajectory:
-        """Return the reference from chi (8,) at take-off to the ground below the landing point."""
+        """Return the reference from `start`, chi at take-off, to the landing point on the ground."""
         ground = start[2]
         down = Move("z", self.landing.at, self.landing.at + self.landing.duration, ground - SINK)
         if self.samples is None:
@@ -75,19 +78,22 @@ class Scenario:
         )
 
     def phase(self, time: float) -> str:
-        """Return the name of the phase at mission time [s] >= 0."""
+        """Return the name of the phase at mission time `time` [s] >= 0."""
         return next(name for start, name in reversed(self.phases) if time >= start)
 
     def magnet_on(self, time: float) -> bool:
-        """Return whether the magnet is to be on at mission time [s]."""
+        """Return the desired state of the magnet at mission time `time` [s]."""
         return next((on for at, on in reversed(self.magnet) if time >= at), False)
 
 
-SINK = 0.03  # [m] the landing reference ends this far below the ground, so that contact is firm
+SINK = 0.03  # m, depth of the landing reference below the ground, for a firm contact
 
 
 def load_scenario(name_or_file: str) -> Scenario:
-    """Return a scenario by name, or from a .yaml or .csv file; raises ScenarioError."""
+    """Return a scenario by its name in config/scenarios, or of a .yaml or .csv file.
+
+    Raises ScenarioError.
+    """
     file = Path(name_or_file)
     if file.suffix not in (".yaml", ".csv"):
         try:
@@ -101,7 +107,7 @@ def load_scenario(name_or_file: str) -> Scenario:
 
 
 def from_yaml(file: Path) -> Scenario:
-    """Read a scenario file; see config/scenarios/pick_and_place.yaml for the form."""
+    """Return the scenario of a YAML file; form: config/scenarios/pick_and_place.yaml."""
     document = yaml_file.read(file, ScenarioError)
     if not isinstance(document, dict):
         raise ScenarioError(f"{file}: a mapping expected, see scenarios/pick_and_place.yaml")
@@ -144,7 +150,7 @@ def from_yaml(file: Path) -> Scenario:
 
 
 class Reader:
-    """Reads entries of a scenario file and says precisely what is wrong with one."""
+    """Reads entries of a scenario file; its errors name file and entry."""
 
     def __init__(self, where: str) -> None:
         self.where = where
@@ -184,7 +190,7 @@ class Reader:
         return value
 
     def move(self, entry: Any, index: int) -> Move:
-        """Return one entry of `moves`; angles are given in degrees (roll and pitch cannot be)."""
+        """Return an entry of `moves`; angles are in degrees; roll and pitch are not allowed."""
         owner = f"moves[{index}]"
         coordinate = entry.get("coordinate") if isinstance(entry, dict) else None
         allowed = [c for c in COORDINATES if c not in ("roll", "pitch")]
@@ -201,7 +207,7 @@ class Reader:
         return Move(coordinate, start, end, math.radians(target) if angle else target)
 
     def no_overlap(self, moves: list[Move]) -> None:
-        """Refuse two moves of one coordinate at the same time."""
+        """Raise ScenarioError if two moves of one coordinate overlap in time."""
         last: dict[str, Move] = {}
         for move in sorted(moves, key=lambda m: m.start):
             before = last.get(move.coordinate)
@@ -213,10 +219,10 @@ class Reader:
 
 
 def from_csv(file: Path, takeoff: float = 3.0, landing: float = 5.0) -> Scenario:
-    """Read a trajectory with the columns of CSV_REQUIRED (SI, ENU) and optionally CSV_OPTIONAL.
+    """Return the scenario of a CSV trajectory: columns CSV_REQUIRED and CSV_OPTIONAL (SI, ENU).
 
-    It is flown after a take-off of `takeoff` [s] to its first point, and followed by a landing of
-    `landing` [s] below its last. Raises ScenarioError naming line and column.
+    A take-off of `takeoff` [s] to the first point precedes it, a landing of `landing` [s] below the
+    last point follows. Raises ScenarioError with line and column.
     """
     with file.open(newline="") as lines:
         rows = csv.DictReader(lines)

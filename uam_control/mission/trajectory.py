@@ -12,7 +12,7 @@ from uam_control.maths.compiled import jit
 
 
 class Trajectory(Protocol):
-    """Anything that can fill a reference."""
+    """A reference as a function of mission time."""
 
     def write(self, time: float, reference: np.ndarray) -> None:
         """Write chi_d, chi_d_dot, chi_d_ddot at mission time [s] into reference (3, 8)."""
@@ -20,7 +20,7 @@ class Trajectory(Protocol):
 
 @dataclass(frozen=True)
 class Move:
-    """One coordinate goes to `to` between two times, with rate and acceleration zero at both."""
+    """Motion of one coordinate to `to` [m or rad] from time `start` to `end` [s], rest to rest."""
 
     coordinate: str
     start: float
@@ -70,10 +70,10 @@ def write_moves(time: float, start: np.ndarray, rows: np.ndarray, reference: np.
 
 
 class Sampled:
-    """A sampled trajectory: cubic between samples that carry value and rate, linear acceleration.
+    """A sampled trajectory: cubic Hermite interpolation of values and rates, linear acceleration.
 
     times (m,) [s], increasing; samples (m, 3, 8). Before the first and after the last sample the
-    value holds.
+    value is constant.
     """
 
     def __init__(self, times: np.ndarray, samples: np.ndarray) -> None:
@@ -82,7 +82,7 @@ class Sampled:
 
     @property
     def end(self) -> float:
-        """Time of the last sample [s]."""
+        """Return the time of the last sample [s]."""
         return float(self._times[-1])
 
     @property
@@ -121,7 +121,7 @@ class Sampled:
 
 
 class Chain:
-    """Trajectories one after the other, each on its own clock from its start time."""
+    """Successive trajectories; the time of each counts from its start."""
 
     def __init__(self, parts: list[tuple[float, Trajectory]]) -> None:
         """parts: (start in mission time [s], trajectory), in order."""
