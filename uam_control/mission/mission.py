@@ -94,7 +94,7 @@ class Mission:
         armed_since: float | None,
         readings: Readings | None = None,
     ) -> MissionOutput:
-        """Return the output at `stamp` [s]; call it at every tick with the stamp of the next one.
+        """Return the output of the next tick, at `stamp` [s]; call it once per tick.
 
         state: newest estimate (3, 8). armed_since: stamp [s] at which the autopilot reported
         armed, None while disarmed. readings: for the supervisor.

@@ -55,7 +55,7 @@ class Scenario:
     faults: tuple[object, ...] = ()  # unchecked entries, see uam_sim_bridge.faults
 
     def trajectory(self, start: np.ndarray) -> Trajectory:
-        """Return the reference from `start`, chi at take-off, to the landing point on the ground."""
+        """Return the reference from `start` (chi at take-off) to the landing point."""
         ground = start[2]
         down = Move("z", self.landing.at, self.landing.at + self.landing.duration, ground - SINK)
         if self.samples is None:
