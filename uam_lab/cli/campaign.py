@@ -15,7 +15,7 @@ from uam_lab.campaign.trial import TrialResult
 from uam_lab.cli.counting import Counting
 from uam_lab.results.result_folder import ResultFolderError, make_folder
 
-INTERRUPTED, WRONG_USE = 130, 2
+WRONG_USE = 2
 EXAMPLES = """\
 examples:
   uam campaign                             1,000 flights of the flying profile
@@ -65,9 +65,6 @@ def run(options: argparse.Namespace) -> int:
     except (ConfigurationError, ProfileError, ResultFolderError, OSError) as error:
         print(f"uam campaign: {error}", file=sys.stderr)
         return WRONG_USE
-    except KeyboardInterrupt:
-        print("uam campaign: interrupted", file=sys.stderr)
-        return INTERRUPTED
 
 
 def campaign(options: argparse.Namespace, profile: Profile, out: Path) -> int:

@@ -18,7 +18,7 @@ from uam_lab.compare import plan
 from uam_lab.flight.settings import ENGINES, SettingsError, require_ros
 from uam_lab.results.result_folder import ResultFolderError, make_folder
 
-INTERRUPTED, WRONG_USE = 130, 2
+WRONG_USE = 2
 EXAMPLES = """\
 examples:
   uam compare                          every controller, payloads 0.1 0.2 0.3 kg, 5 seeds
@@ -96,9 +96,6 @@ def run(options: argparse.Namespace) -> int:
     except (ConfigurationError, ProfileError, ResultFolderError, SettingsError, OSError) as error:
         print(f"uam compare: {error}", file=sys.stderr)
         return WRONG_USE
-    except KeyboardInterrupt:
-        print("uam compare: interrupted", file=sys.stderr)
-        return INTERRUPTED
 
 
 def _further(text: str):

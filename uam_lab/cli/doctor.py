@@ -13,7 +13,7 @@ from uam_lab.doctor.run import as_json, examine, worst
 from uam_sim_bridge.mavlink.transport.transport import ALLOWED, parse_url
 from uam_sim_bridge.ports import PortError
 
-FINE, BROKEN, WRONG_USE, INTERRUPTED = 0, 1, 2, 130
+FINE, BROKEN, WRONG_USE = 0, 1, 2
 STYLES = {Verdict.OK: "green", Verdict.WARN: "bold yellow", Verdict.FAIL: "bold red"}
 EXAMPLES = """\
 examples:
@@ -49,9 +49,6 @@ def run(options: argparse.Namespace) -> int:
     except PortError as error:
         print(f"uam doctor: {error}", file=sys.stderr)
         return WRONG_USE
-    except KeyboardInterrupt:
-        print("uam doctor: interrupted", file=sys.stderr)
-        return INTERRUPTED
 
 
 def _show(url: str, machine_readable: bool) -> int:

@@ -19,7 +19,7 @@ from uam_lab.results.result_folder import ResultFolderError, make_folder
 from uam_sim_bridge.faults import FaultError, fault_catalogue
 from uam_sim_bridge.ports import PortError
 
-BROKEN, INTERRUPTED, WRONG_USE = 1, 130, 2
+BROKEN, WRONG_USE = 1, 2
 EXAMPLES = """\
 examples:
   uam faults                                 the matrix of config/campaign/faults.yaml
@@ -112,9 +112,6 @@ def run(options: argparse.Namespace) -> int:
     ) as error:
         print(f"uam faults: {error}", file=sys.stderr)
         return WRONG_USE
-    except KeyboardInterrupt:
-        print("uam faults: interrupted", file=sys.stderr)
-        return INTERRUPTED
 
 
 def campaign(options: argparse.Namespace) -> int:

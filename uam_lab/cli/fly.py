@@ -250,9 +250,6 @@ def run(options: argparse.Namespace) -> int:
     except USER_ERRORS as error:
         print(f"uam fly: {error}", file=sys.stderr)
         return WRONG_USE
-    except KeyboardInterrupt:
-        print("uam fly: interrupted", file=sys.stderr)
-        return INTERRUPTED
 
 
 def _vehicle_changes(options: argparse.Namespace) -> dict[str, object]:

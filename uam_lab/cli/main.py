@@ -10,7 +10,7 @@ from uam_lab.cli import campaign, compare, doctor, faults, fly, profile, report,
 
 # each has add(subparsers), which sets `run`: arguments → exit status
 COMMANDS = (fly, view, profile, report, compare, tune, campaign, faults, doctor)
-WRONG_USE = 2
+WRONG_USE, INTERRUPTED = 2, 130
 
 
 class OneLineParser(argparse.ArgumentParser):
@@ -39,6 +39,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
     options = parser().parse_args(arguments)
     try:
         return options.run(options)
+    except KeyboardInterrupt:
+        print(f"uam {options.command}: interrupted", file=sys.stderr)
+        return INTERRUPTED
     except BrokenPipeError:  # the reader of our output has gone, as in `uam fly | head`
         return 1
 

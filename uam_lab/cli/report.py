@@ -13,7 +13,7 @@ from uam_lab.flight.settings import SettingsError, require_ros
 from uam_lab.results.result_folder import ResultFolderError, make_folder
 from uam_lab.results.timeseries import UnreadableFlight
 
-WRITTEN, WRONG_USE, INTERRUPTED = 0, 2, 130
+WRITTEN, WRONG_USE = 0, 2
 EXAMPLES = """\
 examples:
   uam report results/latest                everything anew from its log.mcap, also of a flight that
@@ -66,9 +66,6 @@ def run(options: argparse.Namespace) -> int:
     ) as error:
         print(f"uam report: {error}", file=sys.stderr)
         return WRONG_USE
-    except KeyboardInterrupt:
-        print("uam report: interrupted", file=sys.stderr)
-        return INTERRUPTED
 
 
 def one(options: argparse.Namespace) -> int:
