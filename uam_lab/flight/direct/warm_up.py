@@ -13,10 +13,13 @@ from uam_control.laws.catalogue import LAWS
 from uam_control.mission import load_scenario
 from uam_control.profiles.profile import default_profile
 from uam_lab.flight.direct.flight import DirectFlight
+from uam_sim_bridge.autopilot import companion
+from uam_sim_bridge.faults.schedule import read_schedule
 from uam_sim_bridge.plant import Vehicle
 
 PACKAGES = ("uam_control", "uam_sim_bridge", "uam_lab")
 TICKS = 1000  # 4 s: the vehicle is armed and in the air by then, and every function has run
+LATE_POSES = "mocap_latency@0+1:delay=0.05"  # the estimator corrects earlier predictions, too
 
 
 def compiled_functions() -> Iterator:
@@ -36,8 +39,10 @@ def is_cold() -> bool:
 def warm_up(laws: Iterable[str] = tuple(LAWS)) -> None:
     """Fly a few seconds in the direct engine with each law: it runs every function of the nodes."""
     scenario, vehicle = load_scenario("hover"), Vehicle.load()
+    faults = read_schedule([LATE_POSES], scenario, seed=1)
     for law in laws:
         profile = default_profile(law)
-        flight = DirectFlight(scenario, profile, vehicle, 0.0, seed=1)
+        flight = DirectFlight(scenario, profile, vehicle, 0.0, seed=1, faults=faults)
         for _ in range(TICKS):
             flight.tick()
+    companion.warm_up()  # the stand-in's descent, which no good flight calls
