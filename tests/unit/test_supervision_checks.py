@@ -1,0 +1,277 @@
+"""The quantities that the supervisor checks, and their limits, against hand-worked numbers."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from uam_control.supervision import Observation, Readings, SupervisionParameters
+from uam_control.supervision.checks import CHECKS, Checks, measure, read
+from uam_control.supervision.monitor import Level
+
+A, B = math.atan2(0.6, 0.8), math.atan2(0.8, 0.6)  # of the 3-4-5 triangle
+BOX = np.array([[-5.0, -6.0, 0.0], [5.0, 6.0, 4.0]])
+
+
+def measured(state, reference=None, mocap=(math.nan,) * 3, age=math.nan, ground=0.0, joints=None):
+    """What `measure` writes into the first eight values; those behind stay."""
+    values = np.full(19, 77.0)
+    reference = np.zeros(state.shape) if reference is None else reference
+    limits = np.ones(state.shape[1] - 6) if joints is None else np.array(joints)
+    measure(state, reference, np.array(mocap), age, ground, BOX, limits, values)
+    np.testing.assert_array_equal(values[8:], 77.0)
+    return values[:8]
+
+
+def test_quantities_of_a_state():
+    state, reference = np.zeros((3, 8)), np.zeros((3, 8))
+    state[0] = 2.0, -1.0, 3.0, A, -B, 0.7, -1.0, 0.5
+    state[1, 3:6] = 0.5, -4.0, 3.0
+    reference[0, :6] = 0.0, 1.0, 2.0, 9.0, 9.0, 9.0
+    values = measured(state, reference, ground=0.5, joints=[2.0, 2.5])
+    # error (2, -2, 1); tilt: cos A cos B = .48; 1 m below the top, 3 m to the nearest wall
+    expected = [0.0, 3.0, math.acos(0.48), 4.0, 2.5, -1.0, 0.5, -math.inf]
+    np.testing.assert_allclose(values, expected)
+
+
+@pytest.mark.parametrize(("position", "outside"), [
+    ((-5.5, 0.0, 1.0), 0.5), ((6.0, 0.0, 1.0), 1.0),
+    ((0.0, -6.25, 1.0), 0.25), ((0.0, 8.0, 1.0), 2.0),
+    ((0.0, 0.0, -0.5), 0.5), ((0.0, 0.0, 4.75), 0.75),
+    ((5.25, 6.5, 1.0), 0.5), ((0.0, 0.0, 1.0), -1.0),
+])  # fmt: skip
+def test_distance_outside_the_box(position, outside):
+    state = np.zeros((3, 8))
+    state[0, :3] = position
+    assert measured(state)[5] == outside
+
+
+@pytest.mark.parametrize(("rates", "largest"), [
+    ((-3.0, 1.0, 2.0), 3.0), ((1.0, 3.0, 2.0), 3.0), ((1.0, 2.0, -3.0), 3.0), ((0.0, 0.0, 0.5), 0.5)
+])  # fmt: skip
+def test_the_largest_body_rate(rates, largest):
+    state = np.zeros((3, 8))
+    state[1, 3:6] = rates
+    assert measured(state)[3] == largest
+
+
+@pytest.mark.parametrize(("age", "pose"), [
+    (0.1, (0.0, 0.0, 4.0)),  # where it was 0.1 s ago: (1, 2, 3) - .1 (10, 20, -10)
+    (-0.1, (1.0, 2.0, 3.0)),  # a pose of the future is compared with now
+    (0.4, (-1.5, -3.0, 5.5)),  # no further back than 0.25 s
+])  # fmt: skip
+def test_distance_of_motion_capture_from_the_estimate_of_its_time(age, pose):
+    state = np.zeros((3, 8))
+    state[0, :3], state[1, :3] = (1.0, 2.0, 3.0), (10.0, 20.0, -10.0)
+    assert measured(state, mocap=pose, age=age)[7] == pytest.approx(0.0, abs=1e-12)
+    off = np.array(pose) + [2.0, -1.0, 2.0]
+    assert measured(state, mocap=off, age=age)[7] == pytest.approx(3.0)
+
+
+@pytest.mark.parametrize("bad", [math.nan, math.inf, -math.inf])
+@pytest.mark.parametrize("where", [(0, 0), (1, 5), (2, 8)])
+def test_of_a_state_that_is_not_finite_nothing_else_is_said(where, bad):
+    state = np.zeros((3, 9))
+    state[where] = bad
+    values = measured(state)
+    assert values[0] == 1.0
+    np.testing.assert_array_equal(values[1:], 77.0)
+
+
+def test_readings_have_their_places():
+    values = np.full(19, 77.0)
+    effort, gains = np.array([1.0, -6.0, 2.0]), np.array([3.0, math.nan, 1.0])
+    read(
+        0.5, 9.0, 10.0, 11.0, 12.0, 13.0, 14.0, 15.0, 16.0,
+        effort, np.array([2.0, 4.0, 8.0]), gains, np.array([2.0, 1.0, 0.25]), values,
+    )  # fmt: skip
+    np.testing.assert_array_equal(values[:8], 77.0)
+    # effort: 6/4; gains: 1/.25, the unknown one left out
+    np.testing.assert_array_equal(values[8:], [-0.5, 9, 10, 11, 12, 13, 14, 15, 16, 1.5, 4.0])
+
+
+def test_what_is_unknown_is_below_every_limit():
+    values, unknown = np.zeros(19), [math.nan] * 9
+    nothing, three = np.zeros(0), np.full(3, math.nan)
+    read(*unknown, nothing, np.ones(2), three, np.ones(3), values)
+    np.testing.assert_array_equal(values[8:], -math.inf)
+
+
+# not the defaults: a test that judges by them would not notice another limit in their place
+AT_ONCE = SupervisionParameters(
+    position_error_hold=0.5, position_error_land=2.0, position_error_failsafe=4.0,
+    tilt_hold=0.5, tilt_failsafe=1.0, body_rate_hold=2.0, body_rate_failsafe=6.0,
+    altitude_hold=3.0, geofence_low=(-8.0, -8.0, -8.0), geofence_high=(8.0, 8.0, 8.0),
+    geofence_land=0.5, geofence_failsafe=3.0, joint_angle_hold=(1.0, 2.0),
+    joint_effort_hold=(2.0, 4.0), temperature_hold=50.0, temperature_land=60.0,
+    battery_land=0.25, mocap_age_hold=0.125, mocap_age_failsafe=0.5, mocap_distance_hold=0.25,
+    joint_age_hold=0.375, controller_age_hold=0.625, autopilot_age_land=0.875,
+    round_trip_land=0.0625, round_trip_failsafe=0.1875, missed_ticks_hold=10.0,
+    missed_ticks_failsafe=20.0, gain_hold=(10.0, 20.0, 30.0),
+    hold_after=0.0, land_after=0.0, failsafe_after=0.0, clear_after=1.0, hysteresis=0.5,
+)  # fmt: skip
+
+
+def seen(state=(), **readings) -> Observation:
+    """A vehicle at rest 1 m high; `state`: pairs of entry and value."""
+    found = Observation(np.zeros((3, 8)), np.zeros((3, 8)), 0.0, readings=Readings(**readings))
+    found.state[0, 2] = found.reference[0, 2] = 1.0
+    for entry, value in state:
+        found.state[entry] = value
+    return found
+
+
+def two(a: float, b: float) -> np.ndarray:
+    return np.array([a, b])
+
+
+HOLD, LAND, FAILSAFE = Level.HOLD, Level.LAND, Level.FAILSAFE
+LIMITS = [
+    ("estimate", FAILSAFE, lambda x: seen([((2, 7), math.inf if x > 0.5 else 0.0)]), 0.5),
+    ("position error", HOLD, lambda x: seen([((0, 0), x)]), 0.5),
+    ("position error", LAND, lambda x: seen([((0, 1), -x)]), 2.0),
+    ("position error", FAILSAFE, lambda x: seen([((0, 0), x)]), 4.0),
+    ("tilt", HOLD, lambda x: seen([((0, 3), x)]), 0.5),
+    ("tilt", FAILSAFE, lambda x: seen([((0, 4), -x)]), 1.0),
+    ("body rate", HOLD, lambda x: seen([((1, 3), x)]), 2.0),
+    ("body rate", FAILSAFE, lambda x: seen([((1, 5), -x)]), 6.0),
+    ("joint angle", HOLD, lambda x: seen([((0, 7), -2.0 * x)]), 1.0),
+    ("motion capture", HOLD,
+     lambda x: seen(mocap_position=np.array([x, 0.0, 1.0]), mocap_age=0.0), 0.25),
+    ("mocap", HOLD, lambda x: seen(mocap_age=x), 0.125),
+    ("mocap", FAILSAFE, lambda x: seen(mocap_age=x), 0.5),
+    ("mocap pose", HOLD, lambda x: seen(mocap_still=x), 0.125),
+    ("mocap pose", FAILSAFE, lambda x: seen(mocap_still=x), 0.5),
+    ("joint angles", HOLD, lambda x: seen(joint_age=x), 0.375),
+    ("controllers", HOLD, lambda x: seen(controller_age=x), 0.625),
+    ("autopilot", LAND, lambda x: seen(autopilot_age=x), 0.875),
+    ("autopilot's link", LAND, lambda x: seen(round_trip=x), 0.0625),
+    ("autopilot's link", FAILSAFE, lambda x: seen(round_trip=x), 0.1875),
+    ("control ticks", HOLD, lambda x: seen(missed_ticks=x), 10.0),
+    ("control ticks", FAILSAFE, lambda x: seen(missed_ticks=x), 20.0),
+    ("servo temperature", HOLD, lambda x: seen(temperature=x), 50.0),
+    ("servo temperature", LAND, lambda x: seen(temperature=x), 60.0),
+    ("joint torque", HOLD, lambda x: seen(joint_effort=two(-2.0 * x, 0.0)), 1.0),
+    ("joint torque", HOLD, lambda x: seen(joint_effort=two(0.0, 4.0 * x)), 1.0),
+    ("adapted gain", HOLD, lambda x: seen(gains=np.array([0.0, 0.0, 30.0 * x])), 1.0),
+    ("battery", LAND, lambda x: seen(battery=-x), -0.25),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(("name", "level", "at", "limit"), LIMITS)
+def test_a_level_begins_at_its_limit(name, level, at, limit):
+    step = 1e-6
+    below = Checks(AT_ONCE).update(0.0, at(limit - step), True)
+    assert below is None or below.level < level
+    checks = Checks(AT_ONCE)
+    found = checks.update(0.0, at(limit + step), True)
+    assert (found.name, found.level) == (name, level)
+    assert checks.finding is found and not checks.quiet
+
+
+def test_altitude_and_geofence():
+    # with the vehicle where its reference is
+    def high(z: float, ground: float = 0.0) -> Observation:
+        found = seen([((0, 2), z)])
+        found.reference[0, 2], found.ground = z, ground
+        return found
+
+    assert Checks(AT_ONCE).update(0.0, high(2.99), True) is None
+    assert Checks(AT_ONCE).update(0.0, high(1.5, -1.51), True).name == "altitude"
+    assert Checks(AT_ONCE).update(0.0, high(1.5, -1.51), False) is None  # not on the ground
+    inside = replace(AT_ONCE, altitude_hold=1000.0)
+    assert Checks(inside).update(0.0, high(8.49), True) is None
+    found = Checks(inside).update(0.0, high(8.51), True)
+    assert found == (LAND, "geofence left by 0.51 m, 0.5 m allowed", "geofence")
+    found = Checks(inside).update(0.0, high(11.01), True)
+    assert found == (FAILSAFE, "geofence left by 3.01 m, 3 m allowed", "geofence")
+
+
+def test_motion_capture_off_the_estimate_is_a_hold_and_a_failsafe_as_late_as_no_pose():
+    off = seen(mocap_position=np.array([0.0, 0.5, 1.0]), mocap_age=0.0)
+    checks = Checks(AT_ONCE)
+    cause = "motion capture is 0.50 m off the estimate, 0.25 m allowed"
+    assert checks.update(0.0, off, True) == (HOLD, cause, "motion capture")
+    assert checks.update(0.25, off, True)[0] is HOLD
+    assert checks.update(0.5, off, True) == (FAILSAFE, cause, "motion capture")
+
+
+@pytest.mark.parametrize(("times", "level", "at", "beyond"), [
+    ((0.5, 0.0, 0.0), HOLD, "tilt", 0.75),
+    ((0.0, 0.5, 0.0), LAND, "position error", 3.0),
+    ((0.0, 0.0, 0.5), FAILSAFE, "tilt", 1.5),
+])  # fmt: skip
+def test_a_limit_must_be_exceeded_for_the_time_of_its_level(times, level, at, beyond):
+    hold, land, failsafe = times
+    checks = Checks(replace(AT_ONCE, hold_after=hold, land_after=land, failsafe_after=failsafe))
+    look = seen([((0, 3) if at == "tilt" else (0, 0), beyond)])
+    early = checks.update(0.0, look, True)
+    assert early is None or early.level < level
+    assert not checks.quiet  # a limit is exceeded, if not yet for long enough
+    assert checks.update(0.5, look, True)[::2] == (level, at)
+
+
+@pytest.mark.parametrize("look", [
+    seen([((0, 0), 0.75)]),
+    seen(mocap_position=np.array([0.0, 0.5, 1.0]), mocap_age=0.0),
+    seen(mocap_still=0.25),
+])  # fmt: skip
+def test_some_quantities_mean_nothing_on_the_ground(look):
+    assert Checks(AT_ONCE).update(0.0, look, False) is None
+    assert Checks(AT_ONCE).update(0.0, look, True).level is HOLD
+
+
+@pytest.mark.parametrize("look", [
+    seen([((0, 3), 0.75)]), seen([((1, 3), 3.0)]), seen([((0, 6), 1.5)]), seen(battery=0.1),
+    seen(mocap_age=0.25), seen(joint_age=0.5), seen(controller_age=0.75), seen(autopilot_age=1.0),
+    seen(round_trip=0.125), seen(missed_ticks=15.0), seen(temperature=55.0),
+    seen(joint_effort=two(3.0, 0.0)), seen(gains=np.array([15.0, 0.0, 0.0])),
+])  # fmt: skip
+def test_the_others_count_there_too(look):
+    assert Checks(AT_ONCE).update(0.0, look, False).level is not Level.FINE
+
+
+def test_the_worst_counts_and_of_equals_the_first():
+    both = seen([((0, 3), 0.75)], battery=0.1, temperature=65.0)
+    found = Checks(AT_ONCE).update(0.0, both, True)
+    assert found == (LAND, "battery 0.10 full, below 0.25", "battery")
+    equals = seen([((0, 3), 0.75), ((1, 3), 3.0)])
+    assert Checks(AT_ONCE).update(0.0, equals, True) == (
+        HOLD, "tilt 0.75 rad exceeds 0.5 rad", "tilt",
+    )  # fmt: skip
+    worse_first = seen([((0, 3), 1.5), ((1, 3), 3.0)])
+    assert Checks(AT_ONCE).update(0.0, worse_first, True).name == "tilt"
+
+
+def test_a_value_is_clear_when_it_is_below_the_limit_by_the_hysteresis_for_long_enough():
+    checks, tilted = Checks(AT_ONCE), [seen([((0, 3), tilt)]) for tilt in (0.75, 0.3, 0.2)]
+    assert checks.quiet and checks.finding is None
+    assert checks.update(0.0, tilted[0], True).level is HOLD
+    assert checks.update(1.0, tilted[1], True).level is HOLD  # 0.5 less half of it is 0.25
+    assert checks.update(3.0, tilted[1], True).level is HOLD
+    assert checks.update(4.0, tilted[2], True).level is HOLD
+    assert checks.update(4.75, tilted[2], True).level is HOLD
+    assert checks.update(5.0, tilted[2], True) is None
+    assert checks.quiet and checks.finding is None
+
+
+def test_the_battery_is_clear_when_it_is_above_its_limit_by_the_hysteresis():
+    checks = Checks(AT_ONCE)
+    assert checks.update(0.0, seen(battery=0.2), True).level is LAND
+    for stamp, battery in ((1.0, 0.36), (3.0, 0.36), (4.0, 0.38), (4.75, 0.38)):
+        assert checks.update(stamp, seen(battery=battery), True).level is LAND
+    assert checks.update(5.0, seen(battery=0.38), True) is None
+
+
+def test_other_limits_are_those_of_the_next_tick():
+    checks = Checks(AT_ONCE)
+    checks.configure(replace(AT_ONCE, tilt_hold=0.9))
+    assert checks.update(0.0, seen([((0, 3), 0.75)]), True) is None
+    assert checks.update(0.0, seen([((0, 3), 0.95)]), True).name == "tilt"
+
+
+def test_every_quantity_is_named_once():
+    assert len({check.name for check in CHECKS}) == len(CHECKS) == 19
