@@ -65,6 +65,7 @@ def test_asmc1_inside_the_boundary_layer_by_hand():
 def test_asmc1_outside_the_boundary_layer_and_with_sign_by_hand():
     # s = 3*0.5 = 1.5: tau = -10*1.5 - 8 = -23
     assert update(asmc1(), 0.5, 0.0) == pytest.approx(-23.0)
+    assert update(asmc1(), -0.5, 0.0) == pytest.approx(23.0)
     # as in the first test, but K sign(s) = 8: tau = 2.6 - 2 - 8
     assert update(asmc1(switching_form="sign"), 0.1, -0.1, 1.0) == pytest.approx(-7.4)
     assert update(asmc1(switching_form="sign"), 0.0, 0.0) == 0.0

@@ -1,0 +1,98 @@
+"""Sensors against hand-worked numbers, with numbers of their own and noise that is known."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from uam_sim_bridge.plant.sensors import Delay, Encoders, Imu, Mocap, Noise, generators
+
+
+class Counting:
+    """Stands in for a random generator: 1, 2, 3 and so on."""
+
+    def __init__(self):
+        self.count = 0
+
+    def standard_normal(self, shape):
+        size = int(np.prod(shape))
+        values = self.count + np.arange(1.0, size + 1.0)
+        self.count += size
+        return values.reshape(shape)
+
+
+def test_noise_is_the_sequence_of_its_generator_whatever_the_block():
+    noise = Noise(np.random.default_rng(3), np.array([2.0, 0.5]))
+    rows = np.array([noise() for _ in range(5000)])
+    expected = np.random.default_rng(3).standard_normal((5000, 2)) * [2.0, 0.5]
+    np.testing.assert_array_equal(rows, expected)
+
+
+def test_generators_of_a_seed_are_numpys_and_independent():
+    drawn = [one.standard_normal() for one in generators(7, 3)]
+    spawned = np.random.SeedSequence(7).spawn(3)
+    assert drawn == [np.random.default_rng(one).standard_normal() for one in spawned]
+    assert len(set(drawn)) == 3
+
+
+def test_imu_adds_bias_and_noise_of_each_axis():
+    numbers = {
+        "gyro_bias": 0.25,
+        "accelerometer_bias": 0.5,
+        "gyro_noise": 1.0,
+        "accelerometer_noise": 2.0,
+    }
+    imu = Imu(numbers, 2.0, Counting())
+    # the bias takes 1..6 of the generator, doubled
+    np.testing.assert_array_equal(imu.bias, [0.5, 1.0, 1.5, 4.0, 5.0, 6.0])
+    gyro, force = imu.sample(np.array([10.0, 20.0, 30.0]), np.array([1.0, 2.0, 3.0]))
+    # the noise 7..12: gyro 14, 16, 18; accelerometer 40, 44, 48
+    np.testing.assert_array_equal(gyro, [24.5, 37.0, 49.5])
+    np.testing.assert_array_equal(force, [45.0, 51.0, 57.0])
+
+
+MOCAP = {"rate": 4.0, "position_noise": 0.5, "attitude_noise": 1e-3}
+
+
+def test_mocap_adds_noise_to_position_and_a_turn_in_the_body_to_attitude():
+    mocap = Mocap(MOCAP, 2.0, Counting())
+    position, quaternion = mocap.sample(
+        np.array([10.0, 20.0, 30.0]), np.array([0.0, 0.0, 0.0, 1.0])
+    )
+    np.testing.assert_array_equal(position, [11.0, 22.0, 33.0])
+    # turn by (8, 10, 12) mrad after the half turn about z: k (1 + i a + j b + k c)
+    angle = 1e-3 * math.sqrt(64.0 + 100.0 + 144.0)
+    s = math.sin(angle / 2.0) / angle * 1e-3
+    expected = [-12.0 * s, -10.0 * s, 8.0 * s, math.cos(angle / 2.0)]
+    np.testing.assert_allclose(quaternion, expected, rtol=1e-12)
+
+
+def test_mocap_exposes_at_its_rate_and_not_late_by_rounding():
+    mocap = Mocap(MOCAP, 1.0, Counting())
+    times = [0.0, 0.0, 0.2, 0.25, 0.3, 0.5 - 1e-8, 0.5 - 5e-10, 0.6, 0.75, 1.0]
+    due = [True, False, False, True, False, False, True, False, True, True]
+    assert [mocap.due(time) for time in times] == due
+
+
+def test_a_delay_hands_out_one_sample_when_it_is_due():
+    line = Delay(2)
+    assert line.take(0) is None
+    line.put(0, ("a",))
+    line.put(1, ("b",))
+    assert [line.take(tick) for tick in (1, 5, 5, 5)] == [None, ("a",), ("b",), None]
+    line = Delay(0)
+    line.put(3, ("c",))
+    assert line.take(2) is None and line.take(3) == ("c",)
+
+
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+def test_encoders_count(sign):
+    encoders = Encoders({"counts_per_turn": 8, "velocity_unit": 0.25})
+    angle, velocity = encoders.sample(
+        sign * np.array([1.0, 2.0, 0.3]), sign * np.array([0.6, 0.1, 1.15])
+    )
+    # an eighth of a turn is .785: 1.27, 2.55 and .38 of them are 1, 3 and 0
+    np.testing.assert_allclose(angle, sign * math.pi / 4.0 * np.array([1.0, 3.0, 0.0]))
+    np.testing.assert_allclose(velocity, sign * np.array([0.5, 0.0, 1.25]))
