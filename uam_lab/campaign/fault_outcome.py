@@ -14,11 +14,11 @@ from uam_lab.results.timeseries import Series
 
 COMPLETED, HELD, LANDED, FAILSAFE, LOST = "completed", "held", "landed", "failsafe", "lost"
 OUTCOMES = {
-    COMPLETED: "the mission was completed in spite of it",
+    COMPLETED: "the mission was completed in spite of the fault",
     HELD: "in the air at the end, upright and at rest",
-    LANDED: "the mission landed it softly, without completing what it was to do",
-    FAILSAFE: "it came down softly, but not by the mission's landing",
-    LOST: "anything else: a fall, a hard landing, or out of control",
+    LANDED: "the mission landed the vehicle softly, but was not completed",
+    FAILSAFE: "the vehicle came down softly, but not by the mission's landing",
+    LOST: "any other end: a fall, a hard landing, or out of control",
 }
 
 
