@@ -1,4 +1,4 @@
-"""Node tests run over real ROS, on this machine only, in a domain of their own."""
+"""Fixtures of the node tests: real ROS on the local machine, in a separate domain."""
 
 import os
 import signal
@@ -19,7 +19,7 @@ from uam_msgs_py.messages.serialized import stays_serialized
 from uam_msgs_py.node.connections import Connections
 from uam_sim_bridge.ports import Reservation
 
-PATIENCE = 60.0  # [s] for a process to get somewhere; only a failing test waits that long
+PATIENCE = 60.0  # s, time limit of a wait
 
 
 @pytest.fixture(scope="session", autouse=True)
@@ -41,20 +41,20 @@ class Probe:
         self._said = Connections(self.node)
 
     def until(self, condition: Callable[[], object], what: str) -> None:
-        """Spin until `condition()`; fail, saying `what` did not happen, after PATIENCE."""
+        """Spin until `condition()`; fail after PATIENCE with `what` in the error."""
         deadline = time.monotonic() + PATIENCE
         while not condition():
             assert time.monotonic() < deadline, f"{what}: not within {PATIENCE:g} s"
             self._executor.spin_once(timeout_sec=0.02)
 
     def collect(self, topic) -> list:
-        """Return a list that fills with the messages of `topic`, serialized where nodes take so."""
+        """Return a list of the received messages of `topic`, serialized if the nodes read it so."""
         messages, raw = [], stays_serialized(topic.type)
         self.node.create_subscription(topic.type, topic.name, messages.append, topic.qos, raw=raw)
         return messages
 
     def collect_raw(self, topic) -> list:
-        """The same, but serialized whatever the type."""
+        """Return a list of the received messages of `topic`, all serialized."""
         messages = []
         self.node.create_subscription(topic.type, topic.name, messages.append, topic.qos, raw=True)
         return messages
@@ -64,9 +64,9 @@ class Probe:
         return self.node.create_publisher(topic.type, topic.name, topic.qos)
 
     def until_connected(self, node: str, publishers=(), hears=()) -> None:
-        """Wait until `node` has found `publishers` of ours, and us as the reader of `hears`.
+        """Wait until `node` is connected to `publishers` and subscriptions `hears` of the test.
 
-        Both ends must have: what is published before is lost for a best-effort reader.
+        Both ends must be connected: a best-effort subscriber loses earlier messages.
         """
         said = self._said
         self.until(
@@ -83,7 +83,7 @@ class Probe:
         )
 
     def has_writers(self, topic) -> bool:
-        """Whether every listener of ours to `topic` has found who publishes it."""
+        """Return whether each of the test's subscriptions to `topic` has a publisher."""
         ours = [s for s in self.node.subscriptions if s.topic_name == topic.name]
         return all(listener.get_publisher_count() for listener in ours)
 
@@ -109,7 +109,7 @@ def probe() -> Iterator[Probe]:
 
 
 class Running:
-    """A node in a process of its own, its output in a file."""
+    """A node in a separate process; its output goes to a file."""
 
     def __init__(self, module: str, arguments: list[str], log: Path):
         self.log = log
@@ -124,7 +124,7 @@ class Running:
 
     @property
     def output(self) -> str:
-        """What it has printed so far."""
+        """Return the output so far."""
         return self.log.read_text()
 
     def until_said(self, text: str) -> None:

@@ -15,7 +15,7 @@ from uam_sim_bridge.mavlink.protocol.signing import Signing
 from uam_sim_bridge.mavlink.protocol.wire import Codec, Framer, mavlink2
 
 
-def test_taken_port_is_said(start):
+def test_a_port_in_use_is_a_one_line_error(start):
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as s:
         s.bind(("127.0.0.1", 0))
         port = s.getsockname()[1]
@@ -24,7 +24,7 @@ def test_taken_port_is_said(start):
     assert f"UDP port {port}" in node.output and "Traceback" not in node.output
 
 
-def test_garbage_from_the_autopilots_port_does_no_harm(make_rig):
+def test_invalid_bytes_from_the_autopilots_port_are_ignored(make_rig):
     rig = make_rig()
     noise = np.random.default_rng(2)
     for _ in range(50):
@@ -34,7 +34,7 @@ def test_garbage_from_the_autopilots_port_does_no_harm(make_rig):
 
 
 def values(messages):
-    """The newest values under /diagnostics."""
+    """Return the newest values in /diagnostics."""
     return {v.key: v.value for v in messages[-1].status[0].values}
 
 
@@ -44,7 +44,7 @@ def test_link_by_url(make_rig):
 
 
 class Line:
-    """A pseudo-terminal in the place of the rig's socket."""
+    """A pseudo-terminal in place of the rig's socket."""
 
     def __init__(self):
         self.far, self.near = os.openpty()
@@ -71,7 +71,7 @@ def test_serial_link_by_url(make_rig):
     rig.fly()
 
 
-def test_a_ground_station_watches_and_may_speak(make_rig):
+def test_a_ground_station_receives_all_and_may_send(make_rig):
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as station:
         station.bind(("127.0.0.1", 0))
         station.settimeout(60.0)
@@ -85,7 +85,7 @@ def test_a_ground_station_watches_and_may_speak(make_rig):
         rig.tick((0, 0, WEIGHT))
         while data != b"\xfd unknown to us":
             data = station.recv(65535)
-        # it pretends to be the autopilot, floods, and asks for something
+        # the station uses the autopilot's ids, floods the link, and sends a request
         fake, own = Codec(1, 1), Codec(255, 190)
         disarmed = mavlink2.MAVLink_heartbeat_message(2, 12, 1, 0, 3, 3)
         for _ in range(200):
@@ -107,7 +107,7 @@ def test_a_ground_station_watches_and_may_speak(make_rig):
         assert states[-1].armed and states[-1].mode == "OFFBOARD"
 
 
-def test_signed_on_both_sides_and_nothing_else_is_taken(make_rig, tmp_path):
+def test_with_signing_only_signed_messages_are_accepted(make_rig, tmp_path):
     key = "0f" * 32
     file = tmp_path / "key"
     file.write_text(key + "\n")

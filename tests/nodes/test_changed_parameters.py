@@ -1,4 +1,4 @@
-"""A restarted node gets the parameters changed in flight."""
+"""A restarted node receives the parameters that were changed in flight."""
 
 import rclpy
 from rclpy.node import Node
@@ -9,7 +9,7 @@ from uam_msgs_py.messages.parameter_changes import ParameterChange
 
 
 class Silent:
-    """A node without a middleware: nothing arrives by itself."""
+    """A node without middleware: the test passes the messages."""
 
     def create_subscription(self, *_, **__):
         return None

@@ -1,4 +1,4 @@
-"""The control nodes together, each in its process: the same numbers as the maths in one loop."""
+"""All control nodes, each in its process: the same numbers as the maths in one loop."""
 
 import numpy as np
 import pytest
@@ -51,7 +51,7 @@ def samples():
 
 
 def expected():
-    """What the maths gives for `samples`: state, tau_p, tau_q (None while idle), tau_alpha."""
+    """Return the maths' results for `samples`: state, tau_p, tau_q (None: idle), tau_alpha."""
     sets = load_profile("s500").sets
     estimator = StateEstimator(sets["state_estimator"])
     mission = Mission(load_scenario("pick_and_place"), sets["mission"])
@@ -69,16 +69,16 @@ def expected():
         output = mission.output
         flying = output.flying
         tau_p = position.update(state, output.reference, flying, dt).copy()
-        asked = position.attitude_reference
-        tau_q = attitude.update(state, output.reference, asked, flying, dt).copy()
-        tau_alpha = arm.update(state, output.reference, asked, flying, dt).copy()
+        desired = position.attitude_reference
+        tau_q = attitude.update(state, output.reference, desired, flying, dt).copy()
+        tau_alpha = arm.update(state, output.reference, desired, flying, dt).copy()
         yield state.copy(), tau_p if flying else None, tau_q if flying else None, tau_alpha
         armed = seconds(ARMED_AT) if stamp >= ARMED_AT else None
         mission.step(seconds(stamp + PERIOD), state, armed)
 
 
 class Plant:
-    """Publishes the samples of a tick and collects the answers."""
+    """Publishes the samples of a tick and collects the nodes' messages."""
 
     def __init__(self, probe):
         self.probe = probe
@@ -103,12 +103,12 @@ class Plant:
         self.pose, self.joint, self.imu_writer = PoseWriter(), JointStateWriter(JOINTS), ImuWriter()
 
     def wait_for_connections(self):
-        """Return when every publisher has found its listeners, and they it.
+        """Return when both ends of every connection have found each other.
 
-        One end is not enough: what comes from a writer not yet known is dropped.
+        One end is not enough: a subscriber drops messages of a publisher that it has not found yet.
         """
-        said = self.connections
-        readers = {  # the probe listens to all but the sensors
+        reported = self.connections
+        readers = {  # the probe subscribes to all topics but the sensors
             ("state_estimator", topics.STATE.name): 5,
             ("mission", topics.REFERENCE.name): 4,
             ("mission", topics.MAGNET.name): 1,
@@ -117,7 +117,7 @@ class Plant:
             ("arm_controller", topics.ARM_EFFORT.name): 1,
         }
         both = (topics.STATE, topics.REFERENCE)
-        hears = {
+        inputs = {
             "state_estimator": (topics.IMU, topics.JOINTS, topics.MOCAP),
             "mission": (topics.STATE, topics.AUTOPILOT_STATE),
             "position_controller": both,
@@ -126,8 +126,8 @@ class Plant:
         }
         self.probe.until(
             lambda: (
-                all(said.readers(*who) >= count for who, count in readers.items())
-                and all(said.writers(node, t.name) for node, heard in hears.items() for t in heard)
+                all(reported.readers(*end) >= count for end, count in readers.items())
+                and all(reported.writers(node, t.name) for node, own in inputs.items() for t in own)
                 and all(p.get_subscription_count() for p in (self.imu, self.joints, self.mocap))
                 and all(self.probe.has_writers(topic) for topic in self.heard)
             ),

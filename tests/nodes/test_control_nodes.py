@@ -1,4 +1,4 @@
-"""Each control node alone: starts, says what it waits for, takes parameters, stops cleanly."""
+"""Each control node alone: start, report of missing inputs, parameters, clean stop."""
 
 import signal
 
@@ -32,7 +32,7 @@ def test_it_stops_on_sigterm(start):
     assert node.interrupt(number=signal.SIGTERM) == 0
 
 
-def test_diagnostics_say_what_is_missing(start, probe):
+def test_diagnostics_name_missing_inputs(start, probe):
     diagnostics = probe.collect(topics.DIAGNOSTICS)
     start("uam_control.nodes.mission")
     probe.until(
@@ -104,7 +104,7 @@ def test_parameters_change_whole_or_not_at_all(start, probe):
     assert not set_parameter(probe, "attitude_controller", "control_period", 0.01).successful
 
 
-def test_every_parameter_says_meaning_unit_and_range(start, probe):
+def test_every_parameter_has_meaning_unit_and_range(start, probe):
     start("uam_control.nodes.arm_controller")
     request = DescribeParameters.Request(names=["nu", "varpi", "lambda_form"])
     nu, varpi, form = probe.call(

@@ -1,4 +1,4 @@
-"""What every node says under /diagnostics: level, loop time, ages of its inputs."""
+"""Diagnostics of every node: level, loop time, ages of its inputs."""
 
 import socket
 
@@ -26,7 +26,7 @@ NODES = {
 
 
 def arguments(name, folder):
-    """What keeps a node away from the ports and files of others."""
+    """Return arguments with free ports and a temporary file."""
     own = {
         "mujoco_sim": [f"hil_port:={free_port(socket.SOCK_STREAM)}"],
         "mavlink_bridge": [f"local_port:={free_port(socket.SOCK_DGRAM)}"],
@@ -35,8 +35,8 @@ def arguments(name, folder):
     return ["--ros-args", *(word for value in own for word in ("-p", value))]
 
 
-class Said:
-    """The newest entry of one node."""
+class NodeDiagnostics:
+    """The newest diagnostics of a node."""
 
     def __init__(self, probe, name):
         self._name, self._heard = name, probe.collect(topics.DIAGNOSTICS)
@@ -52,22 +52,22 @@ class Said:
 
 
 @pytest.mark.parametrize("module", NODES)
-def test_every_node_says_level_loop_time_and_ages(start, probe, tmp_path, module):
+def test_every_node_reports_level_loop_time_and_ages(start, probe, tmp_path, module):
     name = module.rpartition(".")[2]
-    said = Said(probe, name)
+    found = NodeDiagnostics(probe, name)
     start(module, *arguments(name, tmp_path))
-    probe.until(lambda: said.status, f"diagnostics of {name}")
+    probe.until(lambda: found.status, f"diagnostics of {name}")
     loop = "poll" if name == "recorder" else "tick"
-    assert {f"{loop} mean [ms]", f"{loop} max [ms]"} <= set(said.values)
-    assert said.values[f"age of {NODES[module]} [ms]"] == "", "nothing has come yet"
+    assert {f"{loop} mean [ms]", f"{loop} max [ms]"} <= set(found.values)
+    assert found.values[f"age of {NODES[module]} [ms]"] == "", "no message yet"
     if name != "recorder":
-        probe.until(lambda: said.status.level == STALE, f"{name} says that it waits")
-        assert "waiting for" in said.status.message
+        probe.until(lambda: found.status.level == STALE, f"{name} to report that it waits")
+        assert "waiting for" in found.status.message
 
 
 def test_loop_time_and_age_are_those_of_the_work(start, probe):
-    """A mission that is fed: it runs, a tick takes a fraction of a period, its input is new."""
-    said = Said(probe, "mission")
+    """A mission with inputs: it runs, a tick takes a fraction of a period, its input is new."""
+    found = NodeDiagnostics(probe, "mission")
     start("uam_control.nodes.mission")
     outlet, writer = probe.publisher(topics.STATE), TrajectoryWriter(COORDINATES)
     probe.until_connected("mission", [outlet])
@@ -77,20 +77,20 @@ def test_loop_time_and_age_are_those_of_the_work(start, probe):
         nonlocal stamp
         stamp += 4_000_000
         outlet.publish(writer.fill(stamp, np.zeros((3, SIZE))))
-        status = said.status
-        return status and status.level == OK and said.values["tick mean [ms]"]
+        status = found.status
+        return status and status.level == OK and found.values["tick mean [ms]"]
 
     probe.until(fed, "a report of work")
-    mean, most = (float(said.values[f"tick {kind} [ms]"]) for kind in ("mean", "max"))
+    mean, most = (float(found.values[f"tick {kind} [ms]"]) for kind in ("mean", "max"))
     assert 0.0 < mean <= most
-    assert 0.0 <= float(said.values["age of /uam/state [ms]"]) < 1000.0
-    assert said.values["age of /uam/autopilot/state [ms]"] == ""
-    probe.until(lambda: said.status.level == STALE, "it waits again")
-    assert float(said.values["age of /uam/state [ms]"]) > 1000.0
+    assert 0.0 <= float(found.values["age of /uam/state [ms]"]) < 1000.0
+    assert found.values["age of /uam/autopilot/state [ms]"] == ""
+    probe.until(lambda: found.status.level == STALE, "it waits again")
+    assert float(found.values["age of /uam/state [ms]"]) > 1000.0
 
 
-def test_an_estimator_whose_poses_jump_says_so(start, probe):
-    said = Said(probe, "state_estimator")
+def test_an_estimator_reports_rejected_poses(start, probe):
+    found = NodeDiagnostics(probe, "state_estimator")
     start("uam_control.nodes.state_estimator")
     mocap, joints, imu = map(probe.publisher, (topics.MOCAP, topics.JOINTS, topics.IMU))
     probe.until_connected("state_estimator", [mocap, joints, imu])
@@ -105,11 +105,11 @@ def test_an_estimator_whose_poses_jump_says_so(start, probe):
         mocap.publish(pose.fill(stamp, position, np.array([1.0, 0.0, 0.0, 0.0])))
         joints.publish(joint.stamped(stamp))
         imu.publish(sample.fill(stamp, np.zeros(3), np.array([0.0, 0.0, 9.81])))
-        return said.status and said.status.level == (WARN if jump else OK)
+        return found.status and found.status.level == (WARN if jump else OK)
 
     probe.until(lambda: fed() and stamp > 1_500_000_000, "an estimator that is content")
-    assert said.values["poses refused"] == "0"
+    assert found.values["poses refused"] == "0"
     jump = 1.0
     probe.until(fed, "a warning")
-    assert "poses of late jumped away from the estimate" in said.status.message
-    assert int(said.values["poses refused"]) > 0
+    assert "poses of late jumped away from the estimate" in found.status.message
+    assert int(found.values["poses refused"]) > 0

@@ -1,4 +1,4 @@
-"""The mission node's services, answered and followed, and what it tells of its states."""
+"""The mission node: its services and the states that it publishes."""
 
 import numpy as np
 import pytest
@@ -17,7 +17,7 @@ PERIOD = 4_000_000  # [ns]
 
 
 class Vehicle:
-    """One that follows its reference perfectly, a tick later."""
+    """A vehicle that follows its reference exactly, one tick later."""
 
     def __init__(self, probe):
         self.probe, self.stamp = probe, 0
@@ -93,7 +93,7 @@ def take_off(vehicle):
     vehicle.until_state("flying")
 
 
-def test_hold_resume_land_and_disarm_answer_and_are_followed(vehicle):
+def test_hold_resume_land_and_disarm_are_answered_and_executed(vehicle):
     take_off(vehicle)
     assert vehicle.ask("resume") == (False, "refused: not while flying")
     assert vehicle.ask("disarm") == (False, "refused: flying and not on the ground: land first")
@@ -123,7 +123,7 @@ def test_a_hot_servo_holds_and_an_unknown_joint_is_refused(vehicle, probe):
     assert "frame_id 'alpha_9' is no joint" in vehicle.node.output
 
 
-def test_an_empty_battery_lands_and_the_diagnostics_say_why(vehicle, probe):
+def test_an_empty_battery_lands_with_the_cause_in_the_diagnostics(vehicle, probe):
     said = []
     probe.node.create_subscription(
         DiagnosticArray, topics.DIAGNOSTICS.name, said.append, topics.DIAGNOSTICS.qos
@@ -142,8 +142,8 @@ def test_an_empty_battery_lands_and_the_diagnostics_say_why(vehicle, probe):
     probe.until(told, "diagnostics of the landing")
 
 
-def test_a_failsafe_is_told_before_its_reference_is_idle(vehicle):
-    """Idle commands in the air, to a bridge that does not know yet, switch motors off."""
+def test_a_failsafe_is_published_before_its_idle_reference(vehicle):
+    """The status must arrive first: idle commands in the air would make the bridge stop motors."""
     take_off(vehicle)
     for _ in range(150):
         vehicle.state[0, 3] = 1.2  # rad, beyond tilt_failsafe

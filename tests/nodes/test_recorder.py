@@ -1,4 +1,4 @@
-"""The recorder over real ROS: what is published is in the file, at the right time."""
+"""The recorder over real ROS: published messages are in the file, at the right time."""
 
 import itertools
 import json
@@ -24,7 +24,7 @@ SETPOINT = topics.SETPOINT.name
 
 @pytest.fixture
 def recorder(start, tmp_path, probe):
-    """A recorder that hears the probe: (process, file, statistics file)."""
+    """Start a recorder; return (process, file, statistics file)."""
     file, statistics = tmp_path / "log.mcap", tmp_path / "recorder.json"
     running = start(MODULE, "--ros-args", "-p", f"file:={file}", "-p", f"statistics:={statistics}")
     running.until_said("recorder: ")
@@ -32,7 +32,7 @@ def recorder(start, tmp_path, probe):
 
 
 def connected(probe, *publishers):
-    """Wait until both ends have found each other."""
+    """Wait until both ends are connected."""
     said = Connections(probe.node)
     probe.until(
         lambda: all(
@@ -70,7 +70,7 @@ def test_every_message_is_there_at_its_simulated_time(recorder, probe):
     sent = [(time, content) for topic, time, content in found if topic == topics.SETPOINT.name]
     assert [time for time, _ in sent] == [k * TICK - 1000 for k in range(1, 301)]
     assert [content.twist.angular.z for _, content in sent] == [0.001 * k for k in range(1, 301)]
-    # A message without a stamp gets the time that /clock showed when it was published.
+    # a message without a stamp gets the time of /clock at its publication
     switched = [(time, content.data) for topic, time, content in found if topic == "/uam/magnet"]
     assert switched == [(k * TICK, k > 150) for k in range(1, 301)]
     report = json.loads(statistics.read_text())
@@ -99,7 +99,7 @@ def test_a_gap_in_the_sequence_is_counted_as_lost(recorder, probe):
         raise AssertionError(f"nothing after {newest} is written")
 
     times = written_after(-1)
-    for _ in range(20):  # a stop may be over before anything is lost
+    for _ in range(20):  # a short stop may lose no message
         if len(times) <= times[-1] - times[0]:
             break
         running.process.send_signal(signal.SIGSTOP)
@@ -109,7 +109,7 @@ def test_a_gap_in_the_sequence_is_counted_as_lost(recorder, probe):
         times = written_after(newest)
     assert running.interrupt() == 0
     report = json.loads(statistics.read_text())
-    times = read_log(file)[SETPOINT].times  # the last that came are in it
+    times = read_log(file)[SETPOINT].times  # contains the last messages
     assert report["messages"][SETPOINT] == len(times)
     assert report["lost"][SETPOINT] == times[-1] - times[0] + 1 - len(times) > 0
 

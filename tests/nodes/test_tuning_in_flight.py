@@ -1,4 +1,4 @@
-"""A controller node while it runs: adaptation services, dry run, whole profiles, dumps."""
+"""A running controller node: adaptation services, parameter check, whole profiles, dumps."""
 
 import numpy as np
 import pytest
@@ -52,7 +52,7 @@ def list_names(probe, node):
 
 
 def changes_of(probe):
-    """A list that fills with the changes told, each with its stamp."""
+    """Return a list of the received parameter changes with their stamps."""
     found = []
     topic = topics.CHANGES
     probe.node.create_subscription(
@@ -62,7 +62,7 @@ def changes_of(probe):
 
 
 class Flying:
-    """The position controller, flown by the test: 0.1 m and 0.2 m/s away from its reference."""
+    """The position controller with inputs of the test: errors of 0.1 m and 0.2 m/s."""
 
     def __init__(self, start, probe):
         self.probe = probe
@@ -81,7 +81,7 @@ class Flying:
         )
 
     def tick(self, count=5):
-        """Fly `count` ticks, 5 at least at first; return the newest gains, by name."""
+        """Run `count` ticks (at least 5 at first); return the newest gains by name."""
         chi = np.zeros((3, 8))
         chi[0, 0], chi[1, 0] = 0.1, 0.2
         for _ in range(count):
@@ -122,7 +122,7 @@ def test_the_adaptation_can_be_frozen_freed_and_reset(flying, probe):
     flying.call(SetBool, "freeze_adaptation", SetBool.Request(data=False))
     assert get(probe, POSITION, "adapt") == [True]
     assert flying.tick(10)["K0"] != initial
-    probe.until(lambda: len(flying.changes) == 3, "three changes told")
+    probe.until(lambda: len(flying.changes) == 3, "three changes")
     (_, frozen), (stamp, reset), (_, freed) = flying.changes
     assert (frozen.by, frozen.values) == ("freeze_adaptation", {"adapt": (True, False)})
     assert reset.by == "reset_adaptation" and reset.values["K0"] == (held["K0"], initial)
@@ -130,7 +130,7 @@ def test_the_adaptation_can_be_frozen_freed_and_reset(flying, probe):
     assert freed.values == {"adapt": (False, True)}
 
 
-def test_a_change_counts_from_the_next_tick_and_refused_ones_are_told(flying, probe):
+def test_a_change_acts_from_the_next_tick_and_refused_ones_are_published(flying, probe):
     flying.tick(10)
     assert set_atomically(probe, POSITION, varpi=0.2, lambda_1=[1.0, 1.0, 5.0]).successful
     refused = set_atomically(probe, POSITION, varpi=0.3, lambda_1=[1.0, -1.0, 5.0])
@@ -140,17 +140,17 @@ def test_a_change_counts_from_the_next_tick_and_refused_ones_are_told(flying, pr
     for name, value in (("no_such", 1.0), ("varpi", "1"), ("varpi", True), ("law", "asmc1")):
         assert not set_atomically(probe, POSITION, **{name: value}).successful
     assert get(probe, POSITION, "varpi", "thrust_min")[0] == 0.2
-    probe.until(lambda: len(flying.changes) == 7, "seven changes told")
-    stamps, told = zip(*flying.changes, strict=True)
+    probe.until(lambda: len(flying.changes) == 7, "seven changes")
+    stamps, changes = zip(*flying.changes, strict=True)
     assert set(stamps) == {flying.stamp}
-    assert [one.accepted for one in told] == [True] + 6 * [False]
-    assert told[1].values["varpi"] == (0.2, 0.3)
-    assert told[3].values == {"no_such": (None, 1.0)} and told[3].reason == "no_such: unknown"
-    assert told[4].reason == "varpi: '1' is not numeric; allowed: 1e-09 to 1e+06 1"
-    assert told[6].reason == "law: read-only, fixed once the node runs"
+    assert [one.accepted for one in changes] == [True] + 6 * [False]
+    assert changes[1].values["varpi"] == (0.2, 0.3)
+    assert changes[3].values == {"no_such": (None, 1.0)} and changes[3].reason == "no_such: unknown"
+    assert changes[4].reason == "varpi: '1' is not numeric; allowed: 1e-09 to 1e+06 1"
+    assert changes[6].reason == "law: read-only, fixed once the node runs"
 
 
-def test_a_dry_run_changes_nothing_and_tells_nothing(flying, probe):
+def test_a_check_changes_and_publishes_nothing(flying, probe):
     flying.tick()
     assert set_atomically(probe, POSITION, "check_parameters", varpi=0.2).successful
     assert not set_atomically(probe, POSITION, "check_parameters", varpi=-0.2).successful
@@ -159,7 +159,7 @@ def test_a_dry_run_changes_nothing_and_tells_nothing(flying, probe):
 
 
 @pytest.mark.parametrize("node", NODES)
-def test_every_parameter_of_every_node_says_what_it_is(start, probe, node):
+def test_every_parameter_of_every_node_has_a_description(start, probe, node):
     start(f"uam_control.nodes.{node}")
     names = [
         n
@@ -180,7 +180,7 @@ def test_every_parameter_of_every_node_says_what_it_is(start, probe, node):
 
 
 def dump(probe, nodes):
-    """What `ros2 param dump` writes of each node, one after the other."""
+    """Return the output of `ros2 param dump` for each node."""
     text = ""
     for node in nodes:
         names = list_names(probe, node)
@@ -202,8 +202,8 @@ def test_a_dump_of_the_running_nodes_is_their_profile(start, probe, tmp_path, na
     for node in NODES:
         start(f"uam_control.nodes.{node}", "--ros-args", "--params-file", str(profile))
     changed = load_profile(name).sets["arm_controller"].inertia[0] * 1.5
-    asked = {"inertia": [changed, 0.02], "freeze_when_saturated": False}
-    request = SetParameters.Request(parameters=parameters(asked))
+    requested = {"inertia": [changed, 0.02], "freeze_when_saturated": False}
+    request = SetParameters.Request(parameters=parameters(requested))
     results = probe.call(SetParameters, "/arm_controller/set_parameters", request).results
     assert all(result.successful for result in results)
     file = tmp_path / "dump.yaml"
@@ -220,15 +220,15 @@ def test_a_dump_of_the_running_nodes_is_their_profile(start, probe, tmp_path, na
 
 @pytest.fixture
 def switch():
-    """A profile switch with a node of its own, as `uam profile` has."""
+    """A profile switch with its own node, as in `uam profile`."""
     with Guest("switch", {}) as guest:
         yield ProfileSwitch(guest.node)
 
 
-def test_a_profile_is_taken_by_all_nodes_or_by_none(start, probe, switch, tmp_path):
+def test_a_profile_is_accepted_by_all_nodes_or_by_none(start, probe, switch, tmp_path):
     for node in NODES:
         start(f"uam_control.nodes.{node}")
-    for node in NODES:  # `switch` itself is not as patient with nodes that start
+    for node in NODES:  # `switch` waits less for starting nodes
         list_names(probe, node)
     changes = changes_of(probe)
     assert switch.switch(load_profile("s500")) == {}
@@ -241,11 +241,11 @@ def test_a_profile_is_taken_by_all_nodes_or_by_none(start, probe, switch, tmp_pa
     assert changed["position_controller"] == {"thrust_max": (36.0, 30.0)}
     assert set(changed["arm_controller"]) == {"varpi", "nu"}
     assert get(probe, "arm_controller", "varpi") == [0.9]
-    probe.until(lambda: len(changes) == 2, "both changes told")
+    probe.until(lambda: len(changes) == 2, "both changes")
     with pytest.raises(SwitchRefused, match="active law modular cannot change to asmc1 in flight"):
         switch.switch(load_profile("asmc1"))
 
-    # one node refuses what only it can know
+    # one node refuses a value by its own check
     wrong = load_profile("s500")
     object.__setattr__(wrong.sets["mission"], "tilt_failsafe", 9.0)
     with pytest.raises(SwitchRefused, match="^mission: tilt_failsafe: 9.0 is outside"):

@@ -1,4 +1,4 @@
-"""New parameters and reset adaptation in flight: what moves, and what stays as it is."""
+"""New parameters and reset of the adaptation in flight: changed and unchanged variables."""
 
 from copy import deepcopy
 from dataclasses import replace
@@ -15,7 +15,7 @@ DT = 0.004
 
 
 def flown(controller, ticks=200):
-    """The controller after some ticks away from its reference, and the state it saw last."""
+    """Return a controller after some ticks with a tracking error, and its last state."""
     state, reference = np.zeros((3, 8)), np.zeros((3, 8))
     for tick in range(ticks):
         state[0] = 0.05 * np.sin(0.01 * tick + np.arange(8))
@@ -67,7 +67,7 @@ def test_a_reset_of_the_adaptation_leaves_filters_and_time_alone(law):
     assert not np.array_equal(before[:gains], initial[:gains])
 
 
-def test_values_that_do_not_go_together_are_refused():
+def test_inconsistent_values_are_refused():
     position = load_profile("s500").sets["position_controller"]
     with pytest.raises(ParameterError, match="thrust_min: 37 N is above thrust_max, 36 N"):
         replace(position, thrust_min=37.0).validated(3)
@@ -77,7 +77,7 @@ def test_values_that_do_not_go_together_are_refused():
 
 
 @pytest.mark.parametrize("value", [True, "0.1", None, [0.1], b"1", float("nan")])
-def test_what_is_no_number_is_refused(value):
+def test_values_that_are_not_numbers_are_refused(value):
     position = load_profile("s500").sets["position_controller"]
     with pytest.raises(ParameterError, match="^varpi: "):
         replace(position, varpi=value).validated(3)

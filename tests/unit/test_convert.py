@@ -67,7 +67,7 @@ def test_state_round_trip(state, stamp):
     np.testing.assert_array_equal(read, state)
 
 
-def test_a_writer_is_filled_again_and_again():
+def test_a_writer_is_reused():
     writer = TrajectoryWriter(COORDINATES)
     first = writer.fill(1, np.ones((3, 8)))
     second = writer.fill(2, np.full((3, 8), 2.0))
@@ -95,7 +95,7 @@ def test_unit_quaternions_pass_unchanged(raw):
 @pytest.mark.parametrize(
     "quaternion", [(0.0, 0.0, 0.0, 0.0), (2.0, 0.0, 0.0, 0.0), (math.nan, 0.0, 0.0, 0.0)]
 )
-def test_what_is_no_rotation_is_refused(quaternion):
+def test_a_quaternion_without_unit_norm_is_refused(quaternion):
     with pytest.raises(BadMessage, match="orientation has norm"):
         read_pose(PoseWriter().fill(0, np.zeros(3), np.array(quaternion)))
 
@@ -182,7 +182,7 @@ def test_bad_states_are_refused(change, complaint):
 
 
 @given(STATES, st.booleans())
-def test_reference_names_what_is_controlled(values, flying):
+def test_reference_contains_only_controlled_coordinates(values, flying):
     data = ReferenceWriter().fill(4, values, flying, 1_500_000_000)
     message = deserialize_message(data, JointTrajectory)
     assert message.joint_names == list(COORDINATES if flying else JOINTS)
@@ -243,9 +243,9 @@ def test_a_switch():
 
 
 @given(st.integers(0, 400), st.data())
-def test_what_ends_early_or_is_garbled_is_refused_or_read_never_worse(length, data):
+def test_a_truncated_or_corrupted_message_is_read_or_refused(length, data):
     good = TrajectoryWriter(COORDINATES).fill(5, np.ones((3, 8)))
-    read_state(good)  # its layout is known from here on
+    read_state(good)  # stores the layout
     end = LAYOUTS[JointTrajectory].of(good).duration.stop  # padding may follow
     cut = good[: min(length, end - 1)]
     with pytest.raises(BadMessage):
@@ -259,7 +259,7 @@ def test_what_ends_early_or_is_garbled_is_refused_or_read_never_worse(length, da
     assert np.isfinite(state).all()
 
 
-def test_rows_of_other_lengths_but_the_same_size_are_told_apart():
+def test_rows_of_other_lengths_but_the_same_total_size_are_refused():
     good = deserialize_message(
         TrajectoryWriter(COORDINATES).fill(0, np.ones((3, 8))), JointTrajectory
     )
@@ -280,7 +280,7 @@ def test_the_other_byte_order_is_read():
     assert position.tolist() == values[:3] and quaternion.tolist() == [1.0, 0.0, 0.0, 0.0]
 
 
-def test_ever_new_names_do_not_fill_the_memory():
+def test_new_names_use_bounded_memory():
     for number in range(3 * KNOWN_LAYOUTS):
         message = JointState(name=[f"joint_{number}"], position=[0.0], velocity=[0.0])
         with pytest.raises(BadMessage, match=f"joint_{number};"):

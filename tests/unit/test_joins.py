@@ -1,4 +1,4 @@
-"""Joining messages by stamp."""
+"""Joins of messages by stamp."""
 
 import numpy as np
 from hypothesis import given
@@ -22,7 +22,7 @@ def test_it_fires_when_the_last_input_of_a_stamp_arrives():
     assert fired == [(4, ("a4", "b4", "c4"))]
 
 
-def test_what_is_skipped_does_not_fire_any_more():
+def test_skipped_stamps_do_not_fire():
     join, fired = joined()
     join.add("a", 4, 1)
     join.skip(8)
@@ -70,14 +70,14 @@ def test_memory_is_bounded():
     assert [stamp for stamp, _ in fired] == [99]
 
 
-def test_it_says_what_never_came():
+def test_inputs_without_a_value_are_named():
     join, _ = joined()
     join.add("b", 4, 1)
     assert join.waiting_for == ["a", "c"]
 
 
 @given(st.integers(0, 3 * BACKLOG))
-def test_who_is_far_behind_goes_on_with_the_newest(ticks):
+def test_a_long_backlog_keeps_only_the_newest_tick(ticks):
     join, fired = joined()
     join.deferred = True
     for stamp in range(ticks):

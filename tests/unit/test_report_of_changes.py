@@ -1,4 +1,4 @@
-"""Changes of parameters as messages, in the figures and on the page."""
+"""Parameter changes in messages, figures and report."""
 
 import json
 import math

@@ -1,4 +1,4 @@
-"""When the plant in lockstep does not wait for a node that is being started again."""
+"""The plant in lockstep does not wait for a node that is being restarted."""
 
 from uam_sim_bridge.nodes.restart import IN_TIME, Restart
 
@@ -10,7 +10,7 @@ def test_without_a_restart_it_waits():
     assert not restart.going_on
 
 
-def test_it_goes_on_until_all_have_answered_in_time_for_a_while():
+def test_it_does_not_wait_until_all_have_answered_in_time_for_a_while():
     restart = Restart(10.0)
     restart.look(1)
     for complete in (False, *[True] * (IN_TIME - 1), False, *[True] * (IN_TIME - 1)):
@@ -24,7 +24,7 @@ def test_it_goes_on_until_all_have_answered_in_time_for_a_while():
     assert restart.going_on
 
 
-def test_it_does_not_go_on_for_ever():
+def test_it_waits_again_after_the_longest_restart():
     restart = Restart(0.0)
     restart.look(1)
     assert not restart.going_on

@@ -1,4 +1,4 @@
-"""States as key-value pairs of a diagnostic message."""
+"""Conversion of states to key-value pairs of a diagnostic message and back."""
 
 import pytest
 
@@ -37,7 +37,7 @@ def test_a_mission_that_holds_is_a_warning_and_an_older_log_has_no_states():
     assert MissionStatus.from_message(holding)[1] == MissionStatus("hold")
 
 
-def test_what_is_missing_or_strange_is_refused():
+def test_missing_or_invalid_entries_are_refused():
     message = MissionStatus().to_message(0)
     with pytest.raises(BadMessage, match="no status 'autopilot'"):
         AutopilotState.from_message(message)

@@ -240,10 +240,10 @@ def from_csv(file: Path, takeoff: float = 3.0, landing: float = 5.0) -> Scenario
                 f"{file} line 1: {optional[0]} without its twin; the arm has two "
                 "joints: alpha_1,alpha_2"
             )
-        strange = [c for c in columns if c.startswith("alpha") and c not in CSV_OPTIONAL]
-        if strange:
+        unknown = [c for c in columns if c.startswith("alpha") and c not in CSV_OPTIONAL]
+        if unknown:
             raise ScenarioError(
-                f"{file} line 1: column {strange[0]}: the arm has two joints: alpha_1,alpha_2"
+                f"{file} line 1: column {unknown[0]}: the arm has two joints: alpha_1,alpha_2"
             )
         table = np.array(
             [

@@ -104,7 +104,7 @@ class ControllerNode(UamNode):
         controller.reset_adaptation()
         new = self._adapted()
         changed = {name: (old[name], new[name]) for name in new if new[name] != old[name]}
-        self.tell(ParameterChange(self.get_name(), RESET, changed))
+        self.publish_change(ParameterChange(self.get_name(), RESET, changed))
         response.success = True
         response.message = f"adapted gains at their initial values: {_listed(new)}"
         return response

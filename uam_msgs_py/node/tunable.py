@@ -50,7 +50,7 @@ class TunableNode(Node):
         if not result.successful:
             self.get_logger().warning(f"refused, old values stay in effect: {result.reason}")
         values = {change.name: (old[change.name], change.value) for change in changes}
-        self.tell(
+        self.publish_change(
             ParameterChange(self.get_name(), by, values, "" if result.successful else result.reason)
         )
         return result
@@ -68,7 +68,7 @@ class TunableNode(Node):
                 return result
         return SetParametersResult(successful=True)
 
-    def tell(self, change: ParameterChange) -> None:
+    def publish_change(self, change: ParameterChange) -> None:
         """Publish a change, with the stamp of the newest tick."""
         self._changes.publish(change.to_message(self.stamp))
 

@@ -65,7 +65,7 @@ class StreamTransport:
         return self._number() if self.connected else -1
 
     def close(self) -> None:
-        """Close for good."""
+        """Close permanently."""
         self._due = float("inf")
         self._rest = b""
         self.connected = False
