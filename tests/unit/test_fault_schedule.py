@@ -40,7 +40,7 @@ def one(text):
 
 @st.composite
 def faults(draw):
-    """Any fault with any allowed parameters."""
+    """Draw a fault with allowed parameters."""
     kind = FAULTS[draw(st.sampled_from(sorted(FAULTS)))]
     values = {}
     for name, spec in kind.specs().items():

@@ -249,7 +249,7 @@ def _known(value: float) -> float:
 
 @jit
 def _largest(values: np.ndarray, limits: np.ndarray) -> float:
-    """The largest |value| / limit of those that are known and have a limit."""
+    """Return the largest |value| / limit; values (n,) without a limit and NaN are ignored."""
     found = -math.inf
     for i in range(min(len(values), len(limits))):
         ratio = abs(values[i]) / limits[i]

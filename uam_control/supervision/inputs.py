@@ -44,7 +44,7 @@ class Inputs:
             self._moved = stamp
 
     def joints(self, stamp: float, effort: np.ndarray) -> None:
-        """Note joint readings; effort (n,): measured torques [N m]."""
+        """Store joint readings at `stamp` [s]; effort (n,): measured torques [N m]."""
         self._joints = stamp
         self._readings.joint_effort = np.array(effort, dtype=float)
 

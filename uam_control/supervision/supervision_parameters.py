@@ -47,10 +47,10 @@ class SupervisionLimits(ParameterSet):
         2.0, "distance outside the geofence that starts the failsafe", "m", 0.0, 1000.0
     )
     joint_angle_hold: tuple = vector(
-        (), "angle of a joint to either side to hold at", "rad", 0.01, 6.3
+        (), "joint angle, to either side, that starts a hold", "rad", 0.01, 6.3
     )
     joint_effort_hold: tuple = vector(
-        (), "measured torque of a joint to hold at", "N m", 0.01, 100.0
+        (), "measured joint torque that starts a hold", "N m", 0.01, 100.0
     )
     temperature_hold: float = number(
         70.0, "servo temperature that starts a hold (a Dynamixel X switches off at 80)", "deg C",

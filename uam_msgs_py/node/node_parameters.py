@@ -69,8 +69,8 @@ class NodeParameters(Generic[S]):
 
         axes: names of the entries of a per-axis vector. defaults: values of the default profile for
         parameters that the parameter file omits; not used if that file is complete. derived: values
-        that follow from the vehicle, for what neither has. read_only: no changes after the start.
-        Raises ParameterError for invalid values.
+        from the vehicle's description, of lower priority than both. read_only: no changes after the
+        start. Raises ParameterError for invalid values.
         """
         self._axes = len(axes)
         self.apply = apply

@@ -33,7 +33,7 @@ class Fault(ParameterSet):
 
 @dataclass
 class PlantCommands:
-    """Commands of a period: motors (4,) 0..1, effort (2,) [N m], magnet on or off.
+    """Commands of a period: motors (n_rotors,) 0..1, effort (n_joints,) [N m], magnet on or off.
 
     The arrays are copies; an effect may change them.
     """
