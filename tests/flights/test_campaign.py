@@ -45,7 +45,7 @@ def test_most_random_flights_are_flown_to_the_end(tmp_path, capsys):
     kept = tmp_path / "flown.jsonl"
     kept.write_text(kept.read_text()[:-9])  # as after a kill while the last one was written
     assert main(["campaign", "--flights", str(FLIGHTS), "--out", str(tmp_path)]) == 0
-    assert f"{FLIGHTS - 1} flights were flown before" in capsys.readouterr().out
+    assert f"continuing after {FLIGHTS - 1} earlier flights" in capsys.readouterr().out
     assert (tmp_path / "flights.csv").read_bytes() == whole
     assert main(["campaign", "--seed", "2", "--out", str(tmp_path)]) == 2
     assert "choose another --out" in capsys.readouterr().err

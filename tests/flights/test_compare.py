@@ -33,7 +33,7 @@ def test_a_comparison_is_written_and_repeats(tmp_path, capsys):
     first = compare(tmp_path / "a")
     (row,) = first["rows"].values()
     assert row["flights"] == row["completed"] == 1 and row["lost"] == 0
-    assert "not one bit differs" in first["claims"][-1]
+    assert "equal bit for bit" in first["claims"][-1]
     assert first["seeds"] == [1] and first["payloads_kg"] == [0.2] and first["engine"] == "direct"
     assert "500 evaluations" in first["budgets"]["proposed"]
     for name in ("position_errors", "rms", "gains"):

@@ -72,5 +72,5 @@ def test_a_folder_without_flight_is_refused_in_one_line(tmp_path, capsys):
     assert main.main(["report", str(tmp_path)]) == 2
     shutil.rmtree(tmp_path)
     said = capsys.readouterr().err.splitlines()
-    assert said[0].endswith("has no log.mcap to make a report of")
+    assert said[0].endswith("has no log.mcap for a report")
     assert said[1].endswith("is not an MCAP file")

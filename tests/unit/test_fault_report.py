@@ -146,7 +146,7 @@ def test_the_matrix_of_the_configuration_has_every_fault_and_moment():
         ),
         (
             "{scenario: hover, moments: {a: {at: 3}}, faults: [{fault: servo_jam, at: 2}]}",
-            "at: the moments say when",
+            "at: not allowed here, the moments give the time",
         ),
         (
             "{scenario: hover, moments: {a: {at: 3}}, faults: [{fault: node_kill}]}",
@@ -169,8 +169,8 @@ def test_a_bad_matrix_is_refused_in_one_line(tmp_path, text, said):
         (["--matrix", "no"], "unknown campaign 'no'; there are: faults"),
         (["--engine", "fast"], "unknown engine 'fast'"),
         (["--clock", "realtime"], "the direct engine has no clock"),
-        (["--jobs", "0"], "--jobs and --repeat are 1 or more"),
-        (["--repeat", "0"], "--jobs and --repeat are 1 or more"),
+        (["--jobs", "0"], "--jobs and --repeat must be 1 or more"),
+        (["--repeat", "0"], "--jobs and --repeat must be 1 or more"),
     ],
 )
 def test_wrong_use_is_one_line(capsys, monkeypatch, tmp_path, options, said):
@@ -202,7 +202,7 @@ def test_what_is_promised_of_a_row_is_read_and_judged(tmp_path):
         ("landed", "{outcome: ..., within: seconds} expected"),
         ("{outcome: [[held]]}", "unknown outcome '['held']'; there are: completed"),
         ("{outcome: fine}", "unknown outcome 'fine'; there are: completed"),
-        ("{outcome: held, within: soon}", "within: 'soon' is no time"),
+        ("{outcome: held, within: soon}", "within: 'soon' is not a time"),
         ("{outcome: held, by: 3}", "{outcome: ..., within: seconds} expected"),
     ],
 )

@@ -1,1 +1,1 @@
-"""Many flights of the direct engine, in parallel: what `uam tune` and `uam compare` are made of."""
+"""Many flights in parallel, for `uam campaign`, `uam faults`, `uam tune` and `uam compare`."""

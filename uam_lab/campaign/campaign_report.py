@@ -1,4 +1,4 @@
-"""What a campaign of random flights leaves: every flight, the success rate, what losses share."""
+"""Results of `uam campaign`: every flight, success rate, and comparison of the failed flights."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ PERCENTILES = (50, 90, 99)
 
 
 def write(out: Path, draws: Sequence[Draw], results: Sequence[TrialResult], command: str) -> str:
-    """Write flights.csv, campaign.json, campaign.png and summary.md; returns the summary."""
+    """Write flights.csv, campaign.json, campaign.png and summary.md; return the summary."""
     failed = [not result.completed for result in results]
     rms = np.array([result.rms for result in results])
     _flights(out / "flights.csv", draws, results)
@@ -73,10 +73,10 @@ def _summary(
 ) -> str:
     count, bad = len(results), sum(failed)
     others = {o: n for o, n in counts(r.outcome for r in results).items() if n and o != COMPLETED}
-    told = ", ".join(f"{number} {outcome}" for outcome, number in others.items())
+    listed = ", ".join(f"{number} {outcome}" for outcome, number in others.items())
     lines = [
         f"{count - bad} of {count} flights completed the mission "
-        f"({100.0 * (count - bad) / count:.1f} %); {told or 'none lost'}.",
+        f"({100.0 * (count - bad) / count:.1f} %); {listed or 'none lost'}.",
         "",
         *(f"- {outcome}: {OUTCOMES[outcome]}" for outcome in others),
         "",
@@ -89,10 +89,10 @@ def _summary(
         lines.append(f"| {name} | " + " | ".join(cells) + " |")
     shared = common(draws, failed)
     if shared:
-        head = ("", "their mean", "mean of the others", "apart [standard deviations]")
+        head = ("", "their mean", "mean of the others", "distance [standard deviations]")
         lines += [
             "",
-            "What the flights that were not completed have in common, the most telling first:",
+            "Conditions of the flights that were not completed, the largest distance first:",
             "",
             f"| {' | '.join(head)} |",
             "|---|---|---|---|",
@@ -112,7 +112,7 @@ def _summary(
 
 
 def _kind(why: str) -> str:
-    """A reason without its numbers, so that alike ones are counted together."""
+    """Return a reason without its numbers, so that similar ones are counted together."""
     words = [word for word in why.split(";")[0].split() if not any(c.isdigit() for c in word)]
     return " ".join(words)
 
@@ -120,7 +120,7 @@ def _kind(why: str) -> str:
 def _figure(
     draws: Sequence[Draw], results: Sequence[TrialResult], failed: Sequence[bool], rms: np.ndarray
 ) -> Figure:
-    """Above: distribution of every RMS error. Below: each variation, completed or not."""
+    """Draw the distribution of each RMS error and, below, each variation, completed or not."""
     figure = Figure(figsize=(style.WIDTH, 5.6), layout="constrained")
     top, bottom = figure.subfigures(2, 1, height_ratios=(1.0, 1.2))
     axis = top.subplots()

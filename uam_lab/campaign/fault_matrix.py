@@ -31,8 +31,8 @@ class Cell:
 
 @dataclass(frozen=True)
 class Matrix:
-    """What is flown. moments: mission times [s] by name; promises: of each row; left_out: rows
-    that the engine cannot have."""
+    """Flights of a campaign. moments: mission times [s] by name; promises: one per row; left_out:
+    rows that the engine cannot fly."""
 
     scenario: str
     moments: dict[str, float]
@@ -46,9 +46,9 @@ class Matrix:
         return tuple(label(entry) for entry in self.faults)
 
     def cells(self, seed: int, repeat: int = 1) -> list[Cell]:
-        """Every flight, the one without any fault first; seed: of what is random in the faults.
+        """Return all flights, the one without a fault first; seed: of random faults.
 
-        repeat: how often each with a fault is flown, one after the other.
+        repeat: number of flights per fault and moment.
         """
         found = [Cell(NOMINAL, "", Schedule(seed=seed))]
         for entry, promised in zip(self.faults, self.promises, strict=True):
@@ -59,7 +59,7 @@ class Matrix:
 
 
 def label(entry: dict[str, Any]) -> str:
-    """A row's name: the fault, its duration, and the parameters that are given."""
+    """Return a row's name: the fault, its duration, and the given parameters."""
     shown = {key: value for key, value in entry.items() if key not in ("fault", "duration")}
     lasting = f" {entry['duration']:g} s" if "duration" in entry else ""
     values = ", ".join(
@@ -75,9 +75,9 @@ def read(
     moments: Sequence[str] = (),
     scenario: str | None = None,
 ) -> Matrix:
-    """Read a matrix for an engine; raises FaultError and what loading a scenario raises.
+    """Read a matrix for an engine. Raises FaultError, ConfigurationError, ScenarioError.
 
-    only: names of faults, () for all; moments: names of columns, () for all; scenario: in place of
+    only: names of faults, () for all; moments: names of columns, () for all; scenario: instead of
     the file's.
     """
     document = _document(file)
@@ -85,16 +85,16 @@ def read(
     times = _moments(document["moments"], load_scenario(name), str(file))
     entries = listed(document["faults"], str(file))
     rows = [_checked(dict(entry), str(file)) for entry in entries]
-    for asked, known in ((only, FAULTS), (moments, times)):
-        for one in asked:
+    for given, known in ((only, FAULTS), (moments, times)):
+        for one in given:
             if one not in known:
                 raise FaultError(
-                    f"unknown {'fault' if asked is only else 'moment'} '{one}'; "
+                    f"unknown {'fault' if given is only else 'moment'} '{one}'; "
                     f"there are: {', '.join(known)}"
                 )
-    wanted = [row for row in rows if not only or row.entry["fault"] in only]
-    out = [label(row.entry) for row in wanted if engine == "direct" and needs_nodes(row.fault)]
-    kept = [row for row in wanted if label(row.entry) not in out]
+    selected = [row for row in rows if not only or row.entry["fault"] in only]
+    out = [label(row.entry) for row in selected if engine == "direct" and needs_nodes(row.fault)]
+    kept = [row for row in selected if label(row.entry) not in out]
     if not kept:
         raise FaultError(f"{file}: nothing to fly with the {engine} engine")
     chosen = {k: v for k, v in times.items() if not moments or k in moments}
@@ -110,7 +110,7 @@ def _document(file: Path) -> dict[str, Any]:
 
 
 def _moments(given: Any, scenario: Scenario, where: str) -> dict[str, float]:
-    """Mission times [s]; a moment is a time of any fault."""
+    """Return the mission times [s] of the moments; they are written like times of faults."""
     if not isinstance(given, dict) or not all(isinstance(v, dict) for v in given.values()):
         raise FaultError(f"{where}: moments: names with {{at: ..., after: ...}} each expected")
     phases = beginnings(scenario)
@@ -130,7 +130,7 @@ class _Row(NamedTuple):
 def _checked(entry: dict[str, Any], where: str) -> _Row:
     for key in ("at", "after"):
         if key in entry:
-            raise FaultError(f"{where}: {key}: the moments say when")
+            raise FaultError(f"{where}: {key}: not allowed here, the moments give the time")
     promised = entry.pop("promise", None)
     fault = timed({**entry, "at": 0.0}, {}, where).fault
     return _Row(entry, fault, None if promised is None else promise.read(promised, where))

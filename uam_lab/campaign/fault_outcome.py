@@ -1,4 +1,4 @@
-"""How a flight with a fault ended, in one word."""
+"""Outcome of a flight with a fault, one of five classes."""
 
 from __future__ import annotations
 
@@ -23,19 +23,19 @@ OUTCOMES = {
 
 
 def counts(outcomes: Iterable[str]) -> dict[str, int]:
-    """How many there are of each, in the order of OUTCOMES."""
+    """Return the number of each outcome, in the order of OUTCOMES."""
     counted = Counter(outcomes)
     return {outcome: counted[outcome] for outcome in OUTCOMES}
 
 
 @dataclass(frozen=True)
 class OutcomeLimits:
-    """What is still soft, upright, low and at rest."""
+    """Limits of the classes: soft, upright, on the ground, at rest."""
 
-    impact: float = 1.0  # [m/s] speed downwards while it comes to the ground
+    impact: float = 1.0  # [m/s] downward speed near the ground
     tilt: float = 0.35  # [rad] at the end
     height: float = 0.08  # [m] above the start, at the end, for on the ground
-    near_ground: float = 0.15  # [m] above the start, where an impact is looked for
+    near_ground: float = 0.15  # [m] above the start; the impact is searched below it
     rest: float = 0.3  # [m/s] at the end
 
 
@@ -50,7 +50,7 @@ class Ending:
 
 
 def ending(series: Series, limits: OutcomeLimits | None = None) -> Ending:
-    """What the truth says of the end; series: with at least one tick."""
+    """Return the true state at the end; series: with at least one tick."""
     limits = limits or OutcomeLimits()
     height = series["truth.z"] - series["truth.z"][0]
     velocity = np.column_stack([series[f"truth.{axis}_dot"] for axis in "xyz"])
@@ -67,9 +67,9 @@ def ending(series: Series, limits: OutcomeLimits | None = None) -> Ending:
 def classify(
     series: Series, figures: Mapping[str, Any], limits: OutcomeLimits | None = None
 ) -> str:
-    """One of OUTCOMES; figures: metrics.json of the flight."""
+    """Return one of OUTCOMES; figures: metrics.json of the flight."""
     limits = limits or OutcomeLimits()
-    if figures["mission_completed"]:  # unless the autopilot had landed it unasked
+    if figures["mission_completed"]:  # except after a landing by the autopilot's failsafe
         return FAILSAFE if _down_early(series, limits) else COMPLETED
     end = ending(series, limits)
     upright = end.tilt <= limits.tilt and end.speed <= limits.rest
@@ -83,7 +83,7 @@ def classify(
 
 
 def down_after(series: Series, begun: float, limits: OutcomeLimits | None = None) -> float | None:
-    """How long after the mission time `begun` [s] it was down to stay; None: it is still up."""
+    """Return the time [s] from mission time `begun` [s] to final touchdown; None: in the air."""
     limits = limits or OutcomeLimits()
     up = np.flatnonzero(series["truth.z"] - series["truth.z"][0] > limits.height)
     if not up.size:
@@ -94,9 +94,9 @@ def down_after(series: Series, begun: float, limits: OutcomeLimits | None = None
 
 
 def _down_early(series: Series, limits: OutcomeLimits) -> bool:
-    """Whether it came to the ground, once it was up, while the mission still wanted it up."""
+    """Return whether the vehicle reached the ground in flight while the desired height was up."""
     height = series["truth.z"] - series["truth.z"][0]
-    wanted = series["reference.z"] - series["truth.z"][0]
+    desired = series["reference.z"] - series["truth.z"][0]
     been_up = np.maximum.accumulate(height) > limits.near_ground
     down = been_up & (height < limits.height) & series.flown
-    return bool(down.any()) and bool(wanted[np.argmax(down)] > limits.near_ground)
+    return bool(down.any()) and bool(desired[np.argmax(down)] > limits.near_ground)

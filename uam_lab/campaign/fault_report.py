@@ -1,4 +1,4 @@
-"""What a campaign of faults leaves: every flight as CSV, the matrix as Markdown, picture, page."""
+"""Results of `uam faults`: every flight as CSV; the matrix as Markdown, picture and page."""
 
 from __future__ import annotations
 
@@ -50,7 +50,7 @@ HEAD = (
 def write(
     out: Path, matrix: Matrix, results: Sequence[FaultResult], command: str
 ) -> tuple[str, Path]:
-    """Write flights.csv, faults.json, summary.md, matrix.png and report.html; (summary, page)."""
+    """Write flights.csv, faults.json, summary.md, matrix.png, report.html; return summary, page."""
     write_rows(
         out / "flights.csv",
         HEAD,
@@ -90,17 +90,17 @@ def write(
 
 @dataclass(frozen=True)
 class Group:
-    """The flights of one cell. As text: what a cell says."""
+    """The flights of one cell; str() gives the text of the cell."""
 
     results: tuple[FaultResult, ...]
 
     @property
     def outcome(self) -> str:
-        """The worst."""
+        """The worst outcome."""
         return max((r.outcome for r in self.results), key=list(OUTCOMES).index)
 
     def __str__(self) -> str:
-        """Outcome and how often, time to the ground, position error, and broken promises."""
+        """Outcome and its count, time to the ground, position error, and broken promises."""
         count = len(self.results)
         same = sum(r.outcome == self.outcome for r in self.results)
         often = f" {same}/{count}" if count > 1 else ""
@@ -115,7 +115,7 @@ class Group:
 
 
 def grouped(results: Sequence[FaultResult]) -> dict[tuple[str, str], Group]:
-    """The flights by fault and moment."""
+    """Return the flights by fault and moment."""
     found: dict[tuple[str, str], tuple[FaultResult, ...]] = {}
     for one in results:
         found[one.fault, one.moment] = (*found.get((one.fault, one.moment), ()), one)
@@ -123,13 +123,13 @@ def grouped(results: Sequence[FaultResult]) -> dict[tuple[str, str], Group]:
 
 
 def worst(result: FaultResult, key: str) -> float:
-    """Largest error of a group over its axes, in the unit of the key; NaN if it never flew."""
+    """Return the largest error of a group over its axes, in the unit of the key; may be NaN."""
     values = [v for v in result.worst.get(key, ()) if v is not None]
     return max(values, default=math.nan)
 
 
 def sentence(results: Sequence[FaultResult]) -> str:
-    """How many flights ended how."""
+    """Return a sentence with the number of flights per outcome."""
     counted = counts(result.outcome for result in results if result.fault != NOMINAL)
     parts = [f"{number} {outcome}" for outcome, number in counted.items() if number]
     nominal = next((r.outcome for r in results if r.fault == NOMINAL), "not flown")
@@ -142,7 +142,7 @@ def sentence(results: Sequence[FaultResult]) -> str:
 
 
 def markdown(matrix: Matrix, results: Sequence[FaultResult], command: str) -> str:
-    """The matrix as a table: outcome and largest position error."""
+    """Return the matrix as a Markdown table: outcome and largest position error."""
     cells = grouped(results)
     lines = [
         sentence(results),
@@ -155,9 +155,10 @@ def markdown(matrix: Matrix, results: Sequence[FaultResult], command: str) -> st
         lines.append(f"| {row} | {' | '.join(shown)} |")
     lines += [
         "",
-        "In each cell: how it ended, the worst where it was flown several times, the longest time "
-        "from the fault to the ground if it did not complete its mission, and the largest position "
-        "error. " + "; ".join(f"{name}: {about}" for name, about in OUTCOMES.items()) + ".",
+        "In each cell: the outcome (the worst of several flights), the longest time from the fault "
+        "to touchdown if the mission was not completed, and the largest position error. "
+        + "; ".join(f"{name}: {about}" for name, about in OUTCOMES.items())
+        + ".",
     ]
     if matrix.left_out:
         lines += ["", f"Only with --engine ros: {'; '.join(matrix.left_out)}."]
@@ -165,7 +166,7 @@ def markdown(matrix: Matrix, results: Sequence[FaultResult], command: str) -> st
 
 
 def picture(matrix: Matrix, results: Sequence[FaultResult]) -> Figure:
-    """The matrix in colours, with the largest position error in each cell."""
+    """Draw the matrix in colours, with the largest position error in each cell."""
     rows, columns = matrix.rows, list(matrix.moments)
     cells = grouped(results)
     figure = Figure(figsize=(style.WIDTH, 1.3 + 0.27 * len(rows)), layout="constrained")

@@ -1,4 +1,4 @@
-"""One flight of a fault matrix, in either engine, and what is kept of it."""
+"""One flight of a fault matrix, in either engine, and its result."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ from uam_sim_bridge.plant import Vehicle
 
 @dataclass(frozen=True)
 class FaultTrial:
-    """What is flown. scenario: name or file; payload_mass [kg]."""
+    """One flight. scenario: name or file; payload_mass [kg]."""
 
     cell: Cell
     scenario: str
@@ -35,12 +35,12 @@ class FaultTrial:
 
 @dataclass(frozen=True)
 class FaultResult:
-    """What is kept. why: what kept the mission from being completed.
+    """Result of one flight. why: unmet criteria of a completed mission.
 
-    down_after_s: from the fault until it was down for good, None where it completed its mission or
-    did not come down. kept: whether it did what is promised, None where nothing is.
-    worst: largest errors over the flight, the keys of `max` in metrics.json. happened: the faults
-    as they were, see `faults.timeline.record`.
+    down_after_s: from the fault to the final touchdown, None if the mission was completed or
+    without touchdown. kept: whether the promise was kept, None without a promise. worst: largest
+    errors of the flight, with the keys of `max` in metrics.json. happened: the injected faults, see
+    `faults.timeline.record`.
     """
 
     fault: str
@@ -55,7 +55,7 @@ class FaultResult:
 
 
 def fly(trial: FaultTrial) -> FaultResult:
-    """Fly it; raises what loading a scenario raises."""
+    """Fly a trial. Raises ConfigurationError, ScenarioError."""
     return _ros(trial) if trial.engine == "ros" else _direct(trial)
 
 
@@ -71,8 +71,8 @@ def _direct(trial: FaultTrial) -> FaultResult:
     )
     flight.run()
     reason = flight.mission.output.abort_reason or flight.ended_by
-    happened, told = flight.fault_records, transitions(flight.mission.changes)
-    return _result(trial, flight.recording.series(), reason, happened, told)
+    happened, changes = flight.fault_records, transitions(flight.mission.changes)
+    return _result(trial, flight.recording.series(), reason, happened, changes)
 
 
 def _ros(trial: FaultTrial) -> FaultResult:
@@ -101,14 +101,14 @@ def _result(
     series: Series,
     reason: str,
     happened: list[dict[str, Any]],
-    told: list[dict[str, Any]],
+    changes: list[dict[str, Any]],
 ) -> FaultResult:
     info = {
         "payload_mass_kg": trial.payload_mass,
         "abort_reason": reason,
         "faults": happened,
         "drop_point": load_scenario(trial.scenario).drop_point,
-        "transitions": told,
+        "transitions": changes,
     }
     figures = metrics.compute(series, info)
     outcome, promise = classify(series, figures), trial.cell.promise

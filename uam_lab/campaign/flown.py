@@ -1,4 +1,4 @@
-"""What a campaign has flown so far, kept so that an interrupted one goes on where it was."""
+"""Results of a campaign so far, stored so that an interrupted campaign can continue."""
 
 from __future__ import annotations
 
@@ -17,15 +17,14 @@ FILE = "flown.jsonl"
 
 
 class Flown:
-    """The results in FILE of a result folder: one line says what of, each other is one flight.
-
-    `results`: by the flight's seed.
+    """The results in FILE of a result folder: the first line identifies the campaign, each other
+    line is one flight. `results`: by the seed of the flight.
     """
 
     def __init__(self, out: Path, of: object) -> None:
-        """of: all that the flights depend on, with a repr that says so.
+        """of: all inputs of the flights; its repr identifies them.
 
-        Raises ConfigurationError where the folder holds flights of something else.
+        Raises ConfigurationError if the folder contains flights with other inputs.
         """
         self.results: dict[int, TrialResult] = {}
         self._file = out / FILE
@@ -36,18 +35,18 @@ class Flown:
         first, *lines = self._file.read_text().splitlines() or [""]
         if first != json.dumps(mark):
             raise ConfigurationError(
-                f"{out} holds flights with another profile, seed or range: choose another --out"
+                f"{out} contains flights with another profile, seed or range: give another --out"
             )
         for line in lines:
             try:
                 result = _read(line)
-            except (ValueError, TypeError):  # the last one, where the process was killed
+            except (ValueError, TypeError):  # an incomplete last line after a kill
                 continue
             self.results[result.seed] = result
         write_text(self._file, "\n".join([first, *map(_line, self.results.values()), ""]))
 
     def add(self, result: TrialResult) -> None:
-        """Note one more flight."""
+        """Add one flight."""
         self.results[result.seed] = result
         with self._file.open("a") as file:
             file.write(_line(result) + "\n")

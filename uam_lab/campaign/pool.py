@@ -1,4 +1,4 @@
-"""Flies the trials of a campaign in parallel processes, one per core unless told otherwise."""
+"""Flies the trials of a campaign in parallel processes, by default one per core."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from uam_lab.processes.child import SINGLE_THREAD
 
 
 def cores() -> int:
-    """How many processes may run at once on this machine."""
+    """Return the number of processor cores that this process may use."""
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
@@ -26,10 +26,10 @@ def fly_all(
     work: Callable[[Trial], TrialResult] | None = None,
     progress: Callable[[int, TrialResult], None] = lambda done, result: None,
 ) -> list[TrialResult]:
-    """Fly every trial; results in the order of the trials, whatever order they finished in.
+    """Fly every trial; return the results in the order of the trials.
 
-    work: what a process does with a trial (default: fly it, keep the figures); must be importable.
-    progress: called with the number of flights done and the newest result.
+    work: importable function from trial to result (default: `figures_of`). progress: called with
+    the number of finished flights and the newest result.
     """
     if is_cold():
         warm_up()
@@ -44,7 +44,7 @@ def fly_all(
                 progress(done, result)
         except BaseException:
             executor.shutdown(wait=False, cancel_futures=True)
-            # Those that fly now, and the next ones, would otherwise be waited for.
+            # without this the executor waits for the running and the next trials
             for worker in multiprocessing.active_children():
                 if worker not in others:
                     worker.terminate()
@@ -53,12 +53,12 @@ def fly_all(
 
 
 def figures_of(trial: Trial) -> TrialResult:
-    """Fly; the time series is thrown away."""
+    """Fly a trial; discard the time series."""
     return fly(trial)[0]
 
 
 def _executor(jobs: int) -> ProcessPoolExecutor:
-    """Fresh processes of one thread each, deaf to Ctrl-C, which is for the main process."""
+    """Return an executor of new single-threaded processes, each set up by `prepare_worker`."""
     for name, threads in SINGLE_THREAD.items():
         os.environ.setdefault(name, threads)
     return ProcessPoolExecutor(
@@ -67,12 +67,12 @@ def _executor(jobs: int) -> ProcessPoolExecutor:
 
 
 def prepare_worker() -> None:
-    """Make this child process deaf to Ctrl-C, and end it with the main process."""
+    """Ignore Ctrl-C in this child process (the main process handles it); end it with its parent."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     threading.Thread(target=_end_with_parent, daemon=True).start()
 
 
 def _end_with_parent() -> None:
-    """End this process when its parent is gone, however that happened: by itself none does."""
+    """End this process when its parent has ended; otherwise it would continue to run."""
     multiprocessing.connection.wait([multiprocessing.parent_process().sentinel])
     os._exit(1)

@@ -1,4 +1,4 @@
-"""What is promised of a row of a fault matrix: how its flights end, and how soon."""
+"""Promise of a row of a fault matrix: allowed outcomes, and time until touchdown."""
 
 from __future__ import annotations
 
@@ -15,20 +15,23 @@ KEYS = {"outcome", "within"}
 
 @dataclass(frozen=True)
 class Promise:
-    """outcomes: of OUTCOMES, those allowed; within [s]: from the fault until it is down, if it
-    does not complete its mission."""
+    """outcomes: the allowed ones of OUTCOMES; within [s]: longest time from the fault to the final
+    touchdown, if the mission is not completed."""
 
     outcomes: tuple[str, ...]
     within: float = math.inf
 
     def kept(self, outcome: str, down_after: float | None) -> bool:
-        """Whether a flight did as promised; down_after [s]: None where it did not come down."""
+        """Return whether a flight kept the promise; down_after [s]: None without touchdown."""
         soon = down_after is None or down_after <= self.within
         return outcome in self.outcomes and soon
 
 
 def read(given: Any, where: str) -> Promise:
-    """An entry `promise` of a matrix: {outcome: one or a list, within: seconds}; or FaultError."""
+    """Read an entry `promise` of a matrix: {outcome: one or a list, within: seconds}.
+
+    Raises FaultError.
+    """
     if not isinstance(given, Mapping) or not {"outcome"} <= set(given) <= KEYS:
         raise FaultError(f"{where}: promise: {{outcome: ..., within: seconds}} expected")
     named = given["outcome"]
@@ -40,5 +43,5 @@ def read(given: Any, where: str) -> Promise:
             )
     within = given.get("within", math.inf)
     if isinstance(within, bool) or not isinstance(within, int | float) or not within > 0.0:
-        raise FaultError(f"{where}: promise: within: {within!r} is no time above 0 s")
+        raise FaultError(f"{where}: promise: within: {within!r} is not a time above 0 s")
     return Promise(outcomes, float(within))

@@ -1,4 +1,4 @@
-"""A flight through the nodes of which only the outcome is kept."""
+"""A flight with the ROS engine of which only the outcome is kept."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from uam_lab.results.result_folder import ResultFolder
 
 
 def fly(settings: FlightSettings) -> Outcome:
-    """Fly as `uam fly` does; log and output of the nodes are thrown away."""
+    """Fly as `uam fly` does; discard log and output of the nodes."""
     from uam_lab.flight.ros import engine as ros_engine
 
     with (

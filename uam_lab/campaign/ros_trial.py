@@ -1,4 +1,4 @@
-"""A trial flown by the ROS engine: nodes, topics and MAVLink, as `uam fly` does, in lockstep."""
+"""A trial with the ROS engine in lockstep: nodes, topics and MAVLink, as in `uam fly`."""
 
 from __future__ import annotations
 
@@ -10,11 +10,11 @@ from uam_lab.flight.settings import ONLOOKERS, FlightSettings
 
 
 class TrialFailed(RuntimeError):
-    """The flight could not go on; the text is one line."""
+    """The flight ended with a failure; the text is one line."""
 
 
 def fly(trial: Trial) -> TrialResult:
-    """Fly it. Raises NotFlown."""
+    """Fly a trial. Raises TrialFailed."""
     scenario = load_scenario(trial.scenario)
     settings = FlightSettings(
         scenario=scenario,

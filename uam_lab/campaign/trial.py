@@ -1,4 +1,4 @@
-"""One flight of a campaign: what is flown, and the figures that remain of it."""
+"""One flight of a campaign, and its result."""
 
 from __future__ import annotations
 
@@ -17,13 +17,13 @@ from uam_lab.results.outcome import transitions
 from uam_lab.results.timeseries import COLUMNS, Series
 from uam_sim_bridge.plant import Vehicle
 
-# The eight columns of the paper's tables, in its order: group of metrics.json and place in it.
+# The eight columns of the paper's tables of RMS errors, in the paper's order.
 ERRORS = ("x", "y", "z", "roll", "pitch", "yaw", "alpha_1", "alpha_2")
 
 
 @dataclass(frozen=True)
 class Trial:
-    """One flight. label: the row of the tables that it counts for; keep: file for its series."""
+    """One flight. label: its row in the tables; keep: file for its time series, if any."""
 
     label: str
     profile: Profile
@@ -36,11 +36,11 @@ class Trial:
 
 @dataclass(frozen=True)
 class TrialResult:
-    """What is kept of a flight. rms, largest (8,): ERRORS in m and deg, NaN if it never flew.
+    """Result of a flight. rms, largest (8,): ERRORS in m and deg, NaN without a take-off.
 
-    flown: from take-off as a share of what was planned; cut_short: not landed by the mission.
-    outcome: one of `fault_outcome.OUTCOMES`; why: what kept the mission from being completed.
-    restless: RMS change from tick to tick of body-rate setpoints [rad/s] and joint torques [N m].
+    flown: flown time / planned time; cut_short: not landed by the mission. outcome: one of
+    `fault_outcome.OUTCOMES`; why: unmet criteria of a completed mission. restless: RMS change from
+    tick to tick of body-rate setpoints [rad/s] and joint torques [N m].
     peaks: the largest value of each adaptation column.
     """
 
@@ -59,24 +59,24 @@ class TrialResult:
 
     @property
     def completed(self) -> bool:
-        """Whether the whole mission was."""
+        """Whether the mission was completed."""
         return self.outcome == COMPLETED
 
     @property
     def lost(self) -> bool:
-        """Whether it fell, landed hard or was out of control."""
+        """Whether the vehicle fell, landed hard or was out of control."""
         return self.outcome == LOST
 
 
 def fly(trial: Trial) -> tuple[TrialResult, Series]:
-    """Fly it; raises what loading a scenario or changing a vehicle raises."""
+    """Fly a trial. Raises ConfigurationError, ScenarioError."""
     scenario = load_scenario(trial.scenario)
     vehicle = Vehicle.load().changed(trial.vehicle_changes)
     flight = DirectFlight(scenario, trial.profile, vehicle, trial.payload_mass, trial.seed)
     flight.run()
     series = flight.recording.series({"controller": trial.label})
-    reason, told = flight.mission.output.abort_reason, transitions(flight.mission.changes)
-    return result(trial, scenario, series, reason, told), series
+    reason, changes = flight.mission.output.abort_reason, transitions(flight.mission.changes)
+    return result(trial, scenario, series, reason, changes), series
 
 
 def result(
@@ -84,11 +84,11 @@ def result(
     scenario: Scenario,
     series: Series,
     abort_reason: str,
-    told: list[dict[str, Any]],
+    changes: list[dict[str, Any]],
 ) -> TrialResult:
-    """Take the figures of a flight that was flown; writes its series where they are to be kept.
+    """Return the result of a flight; write its series to `trial.keep` if given.
 
-    told: the supervisor's transitions, see `flight.outcome`.
+    changes: the supervisor's transitions, see `results.outcome.transitions`.
     """
     if trial.keep is not None:
         series.write(trial.keep)
@@ -98,7 +98,7 @@ def result(
             "payload_mass_kg": trial.payload_mass,
             "drop_point": scenario.drop_point,
             "abort_reason": abort_reason,
-            "transitions": told,
+            "transitions": changes,
         },
     )
     flown = series.flown
@@ -128,7 +128,7 @@ def _row(groups: dict[str, list[float | None]]) -> np.ndarray:
 
 
 def _change(values: np.ndarray) -> float:
-    """RMS of the change from one tick to the next, over all columns; 0 without two ticks."""
+    """Return the RMS change of values (ticks, n) per tick, over all columns; 0 for one tick."""
     return float(np.sqrt(np.mean(np.square(np.diff(values, axis=0))))) if len(values) > 1 else 0.0
 
 

@@ -1,4 +1,4 @@
-"""Random flights around the nominal one: what a controller that is to be trusted has to survive."""
+"""Random variations of the nominal flight, for robustness statistics."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ class Draw:
 
 
 def ranges(file: Path | None = None) -> dict[str, tuple[float, float]]:
-    """Least and largest of each variation: config/campaign/robustness.yaml, or another file."""
+    """Return lowest and highest value of each variation; default: campaign/robustness.yaml."""
     document = yaml.safe_load((file or path("campaign/robustness.yaml")).read_text())
     return {name: (float(low), float(high)) for name, (low, high) in document.items()}
 
@@ -31,7 +31,7 @@ def ranges(file: Path | None = None) -> dict[str, tuple[float, float]]:
 def draw(
     profile: Profile, count: int, seed: int, allowed: dict[str, tuple[float, float]] | None = None
 ) -> list[Draw]:
-    """`count` random flights; the same seed gives the same, and a longer campaign begins alike."""
+    """Return `count` random flights. Flight i depends on the seed and i, not on `count`."""
     allowed = allowed or ranges()
     return [
         _one(profile, np.random.default_rng([seed, i]), seed * 100_000 + i, allowed)
@@ -65,9 +65,9 @@ def _one(
 
 
 def common(draws: Sequence[Draw], failed: Sequence[bool]) -> list[tuple[str, float, float, float]]:
-    """What the failures have in common: (name, mean of them, of the others, distance), worst first.
+    """Compare failed and other flights: (name, mean of the failed, of the others, distance).
 
-    distance: of the two means, in standard deviations of all.
+    distance: of the two means, in standard deviations over all flights; the largest comes first.
     """
     failed = np.asarray(failed, dtype=bool)
     if not failed.any() or failed.all():

@@ -20,11 +20,11 @@ EXAMPLES = """\
 examples:
   uam campaign                             1,000 flights of the flying profile
   uam campaign --flights 100 --profile asmc2
-  uam campaign --out robust                until Ctrl-C; the same again goes on from there
+  uam campaign --out robust                stop with Ctrl-C; the same command continues
 
-Payload, its place, wind, gusts, sensor noise, masses, inertias and motors are drawn from the ranges
-of config/campaign/robustness.yaml. Left in --out: summary.md, flights.csv, campaign.json,
-campaign.png. The same seed gives the same flights, and more of them begin with the same.
+Mass and position of the payload, wind, gusts, sensor noise, masses, inertias and motors are drawn
+from the ranges of config/campaign/robustness.yaml. Results in --out: summary.md, flights.csv,
+campaign.json, campaign.png. The same seed gives the same flights; more --flights only add some.
 """
 
 
@@ -32,7 +32,7 @@ def add(commands: argparse._SubParsersAction) -> None:
     """Add the subcommand to the command line."""
     parser = commands.add_parser(
         "campaign",
-        help="many random flights: success rate, errors, what the losses have in common",
+        help="many random flights: success rate, errors, conditions of the losses",
         description="Fly the mission many times in the direct engine, each with another payload, "
         "wind, noise, mass and motors.",
         epilog=EXAMPLES,
@@ -56,10 +56,10 @@ def add(commands: argparse._SubParsersAction) -> None:
 
 
 def run(options: argparse.Namespace) -> int:
-    """Fly as asked; returns the exit status."""
+    """Run the command; return the exit status."""
     try:
         if options.flights < 1 or options.jobs < 1 or options.seed < 0:
-            raise ConfigurationError("--flights and --jobs are 1 or more, --seed 0 or more")
+            raise ConfigurationError("--flights and --jobs must be 1 or more, --seed 0 or more")
         profile = load_profile(str(configuration.named("profiles", options.profile)))
         return campaign(options, profile, make_folder(options.out, "campaign"))
     except (ConfigurationError, ProfileError, ResultFolderError, OSError) as error:
@@ -68,7 +68,7 @@ def run(options: argparse.Namespace) -> int:
 
 
 def campaign(options: argparse.Namespace, profile: Profile, out: Path) -> int:
-    """Fly, then write everything; returns the exit status."""
+    """Fly, then write the results; return the exit status."""
     from uam_lab.campaign import campaign_report
     from uam_lab.campaign.flown import Flown
     from uam_lab.campaign.variations import draw, ranges
@@ -77,7 +77,7 @@ def campaign(options: argparse.Namespace, profile: Profile, out: Path) -> int:
     flown = Flown(out, (options.seed, ranges(), profile.sets, profile.bridge()))
     trials = [one.trial for one in draws if one.trial.seed not in flown.results]
     if flown.results:
-        print(f"campaign: {len(flown.results)} flights were flown before, going on", flush=True)
+        print(f"campaign: continuing after {len(flown.results)} earlier flights", flush=True)
     with Counting("campaign", len(draws)) as counting:
 
         def show(done: int, result: TrialResult) -> None:

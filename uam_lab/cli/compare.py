@@ -1,4 +1,4 @@
-"""`uam compare`: the paper's tables and figures, every controller over the same flights."""
+"""`uam compare`: the paper's tables and figures, all controllers over the same flights."""
 
 from __future__ import annotations
 
@@ -23,10 +23,10 @@ EXAMPLES = """\
 examples:
   uam compare                          every controller, payloads 0.1 0.2 0.3 kg, 5 seeds
   uam compare --seeds 10 --jobs 4
-  uam compare --engine ros --rows proposed --seeds 10    through the nodes, one flight at a time
-  uam compare --profile mine=mine.yaml     one more row, of a profile of your own
+  uam compare --engine ros --rows proposed --seeds 10    with the nodes, one flight at a time
+  uam compare --profile mine=mine.yaml     with one more row, for the profile mine.yaml
 
-Left in --out: report.html, tables.md, flights.csv, comparison.json and figures/. The baselines are
+Results in --out: report.html, tables.md, flights.csv, comparison.json, figures/. The baselines are
 reconstructions (docs/law.md). The same command gives the same tables.
 """
 
@@ -58,36 +58,36 @@ def add(commands: argparse._SubParsersAction) -> None:
         metavar="NAME",
         choices=tuple(plan.ROWS),
         default=tuple(plan.ROWS),
-        help=f"what is flown: {', '.join(plan.ROWS)} (default: all)",
+        help=f"rows of the tables: {', '.join(plan.ROWS)} (default: all)",
     )
     option(
         "--profile",
         action="append",
         default=[],
         metavar="LABEL=FILE",
-        help="a further row; may be given again",
+        help="an additional row; may be repeated",
     )
     option(
         "--jobs",
         type=int,
         metavar="N",
-        help=f"flights at a time (default: one per core, {cores()}; with --engine ros 1)",
+        help=f"parallel flights (default: one per core, {cores()}; with --engine ros 1)",
     )
     option("--out", type=Path, metavar="DIR", help="result folder (default results/<time>-compare)")
     parser.set_defaults(run=run)
 
 
 def run(options: argparse.Namespace) -> int:
-    """Compare as asked; returns the exit status."""
+    """Run the command; return the exit status."""
     try:
         jobs = options.jobs
         if jobs is None:
             jobs = 1 if options.engine == "ros" else cores()
         if options.seeds < 1 or jobs < 1:
-            raise ConfigurationError("--seeds and --jobs are 1 or more")
+            raise ConfigurationError("--seeds and --jobs must be 1 or more")
         payloads = tuple(options.payload_mass or plan.PAYLOADS)
         if not all(0.0 <= mass <= 2.0 for mass in payloads):
-            raise ConfigurationError("--payload-mass is 0 to 2 kg")
+            raise ConfigurationError("--payload-mass must be 0 to 2 kg")
         rows = (*plan.entries(options.rows), *map(_further, options.profile))
         out = make_folder(options.out, "compare")
         (out / "flights").mkdir(exist_ok=True)
@@ -113,7 +113,7 @@ def compare(
     jobs: int,
     out: Path,
 ) -> int:
-    """Fly, then write everything; returns the exit status."""
+    """Fly, then write the results; return the exit status."""
     from uam_lab.compare import comparison_report, modularity
 
     trials = plan.trials(rows, payloads, list(seeds), out / "flights")
@@ -126,7 +126,7 @@ def compare(
             counting.show(done, f"{result.label}, {result.payload_mass:g} kg, seed {result.seed}")
 
         results = fly_all(trials, jobs, _work(engine), progress=show)
-        # of the laws alone, which are the same in both engines
+        # direct engine: these flights compare the laws only, which are the same in both engines
         others = fly_all(
             extra, jobs, progress=lambda done, result: show(len(trials) + done, result)
         )
@@ -146,7 +146,7 @@ def compare(
 
 
 def _work(engine: str):
-    """What a process does with a trial. Raises SettingsError where ROS is not installed."""
+    """Return the function that flies a trial. Raises SettingsError if ROS is not installed."""
     if engine == "direct":
         return figures_of
     require_ros()

@@ -1,15 +1,15 @@
-"""How far a long piece of work is: a bar on a terminal, now and then a line elsewhere."""
+"""Progress of a long computation: a bar on a terminal, otherwise a few lines."""
 
 from __future__ import annotations
 
 from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
 
-LINES = 20  # at most so many where the output is not a terminal
+LINES = 20  # largest number of lines if the output is no terminal
 
 
 class Counting:
-    """A context manager; `show(done, text)` as often as wanted."""
+    """Context manager; call `show(done, text)` any number of times."""
 
     def __init__(self, what: str, total: int):
         self._what, self._total = what, total
@@ -34,7 +34,7 @@ class Counting:
         self._bar.__exit__(*exception)
 
     def show(self, done: int, text: str) -> None:
-        """Show that `done` pieces are done, and a word on the newest."""
+        """Show the number of finished items and a text about the newest one."""
         self._bar.update(self._line, completed=done, text=text)
         share = LINES * done // self._total
         if not self._console.is_terminal and share > self._said:

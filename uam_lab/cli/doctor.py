@@ -1,4 +1,4 @@
-"""`uam doctor`: is everything here that a flight needs?"""
+"""`uam doctor`: check the requirements of a flight on this machine."""
 
 from __future__ import annotations
 
@@ -17,11 +17,11 @@ FINE, BROKEN, WRONG_USE = 0, 1, 2
 STYLES = {Verdict.OK: "green", Verdict.WARN: "bold yellow", Verdict.FAIL: "bold red"}
 EXAMPLES = """\
 examples:
-  uam doctor                                    half a minute
+  uam doctor                                    takes half a minute
   uam doctor --autopilot serial:/dev/ttyACM0:921600
-  uam doctor --json > doctor.json               to send along with a question
+  uam doctor --json > doctor.json               for a bug report
 
-Exit status: 0 all OK, or WARN: flights work; 1 at least one FAIL; 2 wrong use.
+Exit status: 0 only OK and WARN: flights work; 1 at least one FAIL; 2 wrong use.
 """
 
 
@@ -29,19 +29,19 @@ def add(commands: argparse._SubParsersAction) -> None:
     """Add the subcommand to the command line."""
     parser = commands.add_parser(
         "doctor",
-        help="what is installed, free and reachable, and what to do where something is missing",
+        help="check installation, ports, rendering and autopilot link, with advice",
         description="Check installation, ROS, ports, rendering, autopilot link and machine.",
         epilog=EXAMPLES,
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
     option = parser.add_argument
-    option("--autopilot", default="", metavar="URL", help=f"look for an autopilot there: {ALLOWED}")
-    option("--json", action="store_true", help="for programs")
+    option("--autopilot", default="", metavar="URL", help=f"check an autopilot there: {ALLOWED}")
+    option("--json", action="store_true", help="print JSON, for programs")
     parser.set_defaults(run=run)
 
 
 def run(options: argparse.Namespace) -> int:
-    """Examine as asked; returns the exit status."""
+    """Run the command; return the exit status."""
     try:
         if options.autopilot:
             parse_url(options.autopilot)
@@ -52,7 +52,7 @@ def run(options: argparse.Namespace) -> int:
 
 
 def _show(url: str, machine_readable: bool) -> int:
-    """Say every finding as soon as it is there, or all of them as JSON; returns the exit status."""
+    """Print each finding at once, or all as JSON; return the exit status."""
     console, found = Console(), []
     last = ""
     for group, finding in examine(url):
@@ -74,7 +74,7 @@ def _show(url: str, machine_readable: bool) -> int:
 
 
 def _print(console: Console, finding: Finding) -> None:
-    """One line of what was found; where it is not OK one of what to do."""
+    """Print one line with the finding and, if it is not OK, one line with advice."""
     line = Text.assemble(
         (f"  {finding.verdict.value:<5}", STYLES[finding.verdict]),
         f"{finding.check:<14}{finding.found}",

@@ -1,4 +1,4 @@
-"""`uam faults`: every fault at every moment of the mission, and how it ends."""
+"""`uam faults`: fly every fault at every moment of the mission and classify the outcome."""
 
 from __future__ import annotations
 
@@ -23,15 +23,15 @@ BROKEN, WRONG_USE = 1, 2
 EXAMPLES = """\
 examples:
   uam faults                                 the matrix of config/campaign/faults.yaml
-  uam faults --list                          what there is, with parameters and ranges
+  uam faults --list                          list all faults, with parameters and ranges
   uam faults --only motor_loss --moment transit
   uam faults --matrix mine.yaml --profile asmc2
   uam faults --matrix processes --engine ros --clock realtime --repeat 3
-  uam fly --fault motor_loss@pick+1:remaining=0.7      a single flight with a report of its own
+  uam fly --fault motor_loss@pick+1:remaining=0.7      one flight with its report
 
-Left in --out: report.html with the matrix in colours, summary.md, flights.csv, faults.json,
-matrix.png. The same seed gives the same flights, but where processes are hindered. Exit status: 0,
-1 where a row of the matrix did not do what the file promises of it, 2 wrong use.
+Results in --out: report.html with the matrix in colours, summary.md, flights.csv, faults.json,
+matrix.png. The same seed gives the same flights, except with process faults. Exit status: 0 all
+promises of the matrix kept, 1 a promise broken, 2 wrong use.
 """
 
 
@@ -39,13 +39,13 @@ def add(commands: argparse._SubParsersAction) -> None:
     """Add the subcommand to the command line."""
     parser = commands.add_parser(
         "faults",
-        help="faults at every moment of the mission: what is survived, and how",
-        description="Fly the mission once for each fault and moment, and say how it ended.",
+        help="faults at every moment of the mission, with their outcomes",
+        description="Fly the mission once for each fault and moment, and classify the outcome.",
         epilog=EXAMPLES,
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
     option = parser.add_argument
-    option("--list", action="store_true", help="say what faults there are, and fly nothing")
+    option("--list", action="store_true", help="list the faults; do not fly")
     option(
         "--matrix",
         default="faults",
@@ -57,14 +57,14 @@ def add(commands: argparse._SubParsersAction) -> None:
         action="append",
         default=[],
         metavar="FAULT",
-        help="of the matrix only this fault; may be given again",
+        help="only this fault of the matrix; may be repeated",
     )
     option(
         "--moment",
         action="append",
         default=[],
         metavar="NAME",
-        help="of the matrix only this moment; may be given again",
+        help="only this moment of the matrix; may be repeated",
     )
     option("--scenario", metavar="NAME|FILE", help="default: that of the matrix")
     option("--profile", default="s500", metavar="NAME|FILE", help="(default %(default)s)")
@@ -80,21 +80,21 @@ def add(commands: argparse._SubParsersAction) -> None:
         "--jobs",
         type=int,
         metavar="N",
-        help=f"flights at once (default: one per core, {cores()}; 1 with --engine ros)",
+        help=f"parallel flights (default: one per core, {cores()}; with --engine ros 1)",
     )
     option(
         "--repeat",
         type=int,
         default=1,
         metavar="N",
-        help="fly each fault and moment so often (default %(default)s)",
+        help="flights per fault and moment (default %(default)s)",
     )
     option("--out", type=Path, metavar="DIR", help="result folder (default results/<time>-faults)")
     parser.set_defaults(run=run)
 
 
 def run(options: argparse.Namespace) -> int:
-    """Fly as asked; returns the exit status."""
+    """Run the command; return the exit status."""
     if options.list:
         print(fault_catalogue.listing())
         return 0
@@ -115,7 +115,7 @@ def run(options: argparse.Namespace) -> int:
 
 
 def campaign(options: argparse.Namespace) -> int:
-    """Check, fly, then write everything; returns the exit status."""
+    """Check, fly, then write the results; return the exit status."""
     from uam_lab.campaign import fault_matrix, fault_report, fault_trial
 
     _check(options)
@@ -147,7 +147,7 @@ def campaign(options: argparse.Namespace) -> int:
 
 def _check(options: argparse.Namespace) -> None:
     if options.seed < 0 or options.repeat < 1 or (options.jobs is not None and options.jobs < 1):
-        raise SettingsError("--jobs and --repeat are 1 or more, --seed 0 or more")
+        raise SettingsError("--jobs and --repeat must be 1 or more, --seed 0 or more")
     for name, value, allowed in (
         ("engine", options.engine, ENGINES),
         ("clock", options.clock, CLOCKS),

@@ -1,4 +1,4 @@
-"""`uam fly`: the main job."""
+"""`uam fly`: fly a scenario and write a result folder."""
 
 from __future__ import annotations
 
@@ -48,13 +48,13 @@ EXAMPLES = """\
 examples:
   uam fly                                    the paper's mission, default profile
   uam fly --scenario hover --seed 7          another scenario, other noise
-  uam fly --scenario path.csv --no-video     a trajectory of your own
+  uam fly --scenario path.csv --no-video     a trajectory from a file
   uam fly --profile mine.yaml --engine direct
   uam fly --autopilot px4 --px4-dir ~/PX4-Autopilot/build/px4_sitl_default
   uam fly --autopilot serial:/dev/ttyACM0:921600 --clock realtime --gcs udp:127.0.0.1:14550
-  uam fly --view --clock realtime            watch it and tune it in a browser
+  uam fly --view --clock realtime            monitor and tune in a browser
   uam fly --clock realtime                   paced by the wall clock, latency measured
-  uam fly --without arm_controller           with an arm controller of yours: examples/
+  uam fly --without arm_controller           with your own arm controller: examples/
   uam fly --payload-mass 0.3 --wind 2 0 0    heavier payload, 2 m/s from the west
   uam fly --fault mocap_dropout@20+3         no motion capture from 20 s on, for 3 s
   uam fly --fault motor_loss@pick+1:motor=2,remaining=0.7
@@ -88,7 +88,7 @@ def add(commands: argparse._SubParsersAction) -> None:
         metavar="NAME|FILE",
         action="append",
         help=f"parameters: {profiles}, or a ROS parameter file, as ros2 param dump writes it; "
-        "given again, the later one counts (default: the controller's)",
+        "may be repeated, a later one overrides (default: the controller's)",
     )
     option(
         "--scenario",
@@ -106,14 +106,14 @@ def add(commands: argparse._SubParsersAction) -> None:
         "--clock",
         default="lockstep",
         metavar="lockstep|realtime",
-        help="simulated time, the same flight for the same seed; or the wall clock "
+        help="simulated time, repeatable for the same seed; or the wall clock "
         "(default %(default)s)",
     )
     option(
         "--autopilot",
         default="builtin",
         metavar="builtin|px4|URL",
-        help="the stand-in; PX4 in software; or one that you started, by its link: "
+        help="the stand-in; PX4 in software; or the link of an autopilot that you started: "
         f"{ALLOWED}; serial: a flight controller in HITL mode (default %(default)s)",
     )
     option(
@@ -125,7 +125,7 @@ def add(commands: argparse._SubParsersAction) -> None:
         "--gcs",
         default="",
         metavar="URL",
-        help="ground station that watches, as udp:127.0.0.1:14550 (default: none)",
+        help="ground station, as udp:127.0.0.1:14550 (default: none)",
     )
     option(
         "--payload-mass",
@@ -158,8 +158,8 @@ def add(commands: argparse._SubParsersAction) -> None:
         action="append",
         default=[],
         metavar="NODE",
-        help=f"leave a node out and wait for yours of that name: {', '.join(REPLACEABLE)}; "
-        f"or leave out what only looks on: {', '.join(ONLOOKERS)}; may be given again",
+        help=f"do not start this node, wait for yours of that name: {', '.join(REPLACEABLE)}; "
+        f"or do not start a display: {', '.join(ONLOOKERS)}; may be repeated",
     )
     option(
         "--view",
@@ -172,8 +172,8 @@ def add(commands: argparse._SubParsersAction) -> None:
         default=[],
         metavar="SPEC|FILE",
         help="inject a fault: NAME@SECONDS[+DURATION] or NAME@PHASE[+AFTER[+DURATION]], then "
-        ":parameter=value,...; or a YAML file of several; may be given again; "
-        "uam faults --list tells what there is",
+        ":parameter=value,...; or a YAML file with several faults; may be repeated; "
+        "uam faults --list shows all faults",
     )
     option(
         "--out",
@@ -186,7 +186,7 @@ def add(commands: argparse._SubParsersAction) -> None:
         type=_number("size", "MB", 1.0),
         default=LOG_LIMIT,
         metavar="MB",
-        help="size at which log.mcap ends; the flight goes on (default %(default)g, hours)",
+        help="size at which log.mcap ends; the flight continues (default %(default)g, hours)",
     )
     option("--no-video", action="store_true", help="leave out the video, which takes longest")
     option(
@@ -194,13 +194,13 @@ def add(commands: argparse._SubParsersAction) -> None:
         type=int,
         metavar="N",
         help=f"ROS domain and ports of this instance, 0..{INSTANCES - 1}, numbered as PX4 does "
-        "(default: the first that is free)",
+        "(default: the first free one)",
     )
     parser.set_defaults(run=run)
 
 
 def _number(name: str, unit: str, low: float = -math.inf):
-    """An argparse type: a finite number not below `low`."""
+    """Return an argparse type: a finite number, at least `low`."""
 
     def read(text: str) -> float:
         try:
@@ -224,7 +224,7 @@ def _seed(text: str) -> int:
 
 
 def run(options: argparse.Namespace) -> int:
-    """Fly as asked; returns the exit status."""
+    """Run the command; return the exit status."""
     try:
         settings = flight_settings.settings(
             scenario=options.scenario,
@@ -262,7 +262,7 @@ def _vehicle_changes(options: argparse.Namespace) -> dict[str, object]:
 
 
 def fly(settings: FlightSettings) -> int:
-    """Fly and report; returns the exit status. Raises USER_ERRORS before anything has flown."""
+    """Fly and report; return the exit status. Raises USER_ERRORS before the flight starts."""
     engine = _engine(settings.engine)
     folder = ResultFolder.create(settings.scenario.name, settings.controller, settings.out)
     landing = settings.scenario.landing
@@ -275,10 +275,10 @@ def fly(settings: FlightSettings) -> int:
             raise
     metrics = conclude(settings, folder, outcome, command_line())
     if metrics is not None:
-        # Who pressed Ctrl-C gets the figures of what was flown, but does not wait for pictures.
-        with reporting(console) as say:
+        # after Ctrl-C the report has figures, but no rendered pictures, which take long
+        with reporting(console) as show:
             report = build_report(
-                folder.path, say, video=settings.video, pictures=not outcome.interrupted
+                folder.path, show, video=settings.video, pictures=not outcome.interrupted
             )
         if report.problem:
             outcome.notes.append(report.problem)
@@ -298,7 +298,7 @@ def fly(settings: FlightSettings) -> int:
 
 
 def _engine(name: str):
-    """The engine's `fly`. Raises SettingsError where ROS is not installed."""
+    """Return the engine's `fly`. Raises SettingsError if ROS is not installed."""
     if name == "direct":
         from uam_lab.flight.direct.engine import fly as engine
 
@@ -310,7 +310,7 @@ def _engine(name: str):
 
 
 def _remove_if_empty(folder: Path) -> None:
-    """Take away a result folder that a refused flight has left empty."""
+    """Remove the empty result folder of a refused flight."""
     for path in (folder / "logs", folder):
         try:
             path.rmdir()

@@ -14,7 +14,7 @@ WRONG_USE, INTERRUPTED = 2, 130
 
 
 class OneLineParser(argparse.ArgumentParser):
-    """Says what is wrong in one line; the whole usage is for --help."""
+    """Parser that reports an error in one line, without the usage."""
 
     def error(self, message: str) -> None:
         """Print the line and exit with status 2."""
@@ -22,7 +22,7 @@ class OneLineParser(argparse.ArgumentParser):
 
 
 def parser() -> argparse.ArgumentParser:
-    """The command line of `uam` with all its subcommands."""
+    """Return the parser of `uam` with all subcommands."""
     top = OneLineParser(
         prog="uam",
         description="Flight control for aerial manipulators, and flights of it in simulation.",
@@ -35,14 +35,14 @@ def parser() -> argparse.ArgumentParser:
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Run the command line; returns the exit status."""
+    """Run the command line; return the exit status."""
     options = parser().parse_args(arguments)
     try:
         return options.run(options)
     except KeyboardInterrupt:
         print(f"uam {options.command}: interrupted", file=sys.stderr)
         return INTERRUPTED
-    except BrokenPipeError:  # the reader of our output has gone, as in `uam fly | head`
+    except BrokenPipeError:  # the reader of the output has ended, as in `uam fly | head`
         return 1
 
 

@@ -1,4 +1,4 @@
-"""`uam profile`: gives another profile to a flight while it flies."""
+"""`uam profile`: switch the profile of a running flight."""
 
 from __future__ import annotations
 
@@ -15,13 +15,13 @@ from uam_sim_bridge.ports import INSTANCES, PortError, domain_of_flight
 CHANGED, REFUSED, WRONG_USE = 0, 1, 2
 EXAMPLES = """\
 examples:
-  uam profile mine.yaml                    the flight that is under way; all nodes take it, or none
-  uam profile s500 --instance 2            where several fly
-  ROS_DOMAIN_ID=5 uam profile mine.yaml    nodes that uam fly did not start
-  ros2 param dump /arm_controller > arm.yaml; uam profile s500 arm.yaml    the later one counts
+  uam profile mine.yaml                    the running flight; all nodes accept it, or none
+  uam profile s500 --instance 2            one of several flights
+  ROS_DOMAIN_ID=5 uam profile mine.yaml    nodes not started by uam fly
+  ros2 param dump /arm_controller > arm.yaml; uam profile s500 arm.yaml    a later file overrides
 
-Adapted gains, filters and the attitude asked for stay as they are; the outputs move by what the new
-gains make of the same errors (docs/tuning_in_flight.md). What changed is recorded in the log.
+Adapted gains, filters and the desired attitude stay unchanged; the outputs change because the new
+gains act on the same errors (docs/tuning_in_flight.md). The log records every change.
 """
 
 
@@ -29,9 +29,8 @@ def add(commands: argparse._SubParsersAction) -> None:
     """Add the subcommand to the command line."""
     parser = commands.add_parser(
         "profile",
-        help="give another profile to a flight while it flies",
-        description="Give a whole profile to the nodes of a running flight: all of them take it, "
-        "or none does.",
+        help="switch the profile of a running flight",
+        description="Switch the profile of a running flight: all nodes apply it, or none.",
         epilog=EXAMPLES,
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
@@ -46,13 +45,13 @@ def add(commands: argparse._SubParsersAction) -> None:
         "--instance",
         type=int,
         metavar="N",
-        help=f"of the flight, 0..{INSTANCES - 1} (default: the one that is under way)",
+        help=f"instance of the flight, 0..{INSTANCES - 1} (default: the running one)",
     )
     parser.set_defaults(run=run)
 
 
 def run(options: argparse.Namespace) -> int:
-    """Switch as asked; returns the exit status."""
+    """Run the command; return the exit status."""
     try:
         require_ros()
         given = [str(configuration.named("profiles", one)) for one in options.profile]
@@ -65,7 +64,7 @@ def run(options: argparse.Namespace) -> int:
 
 
 def switch(profile: Profile, domain: int | None) -> int:
-    """Switch the nodes of a ROS domain, say what changed; returns the exit status."""
+    """Switch the nodes of a ROS domain, print the changes; return the exit status."""
     from uam_lab.flight.ros.profile_switch import ProfileSwitch, SwitchRefused
     from uam_lab.processes.guest import Guest
     from uam_lab.processes.node_environment import transport_environment
@@ -84,9 +83,9 @@ def switch(profile: Profile, domain: int | None) -> int:
             print(f"{node}: {name}: {_text(old)} -> {_text(new)}")
     count = sum(map(len, changed.values()))
     print(
-        f"{profile.name} flies: {count} values changed"
+        f"{profile.name} is active: {count} values changed"
         if count
-        else f"{profile.name} flies already"
+        else f"{profile.name} is already active"
     )
     return CHANGED
 

@@ -1,4 +1,4 @@
-"""`uam report`: figures and report of a recorded flight again, or of several over one another."""
+"""`uam report`: rebuild the report of a recorded flight, or overlay several flights."""
 
 from __future__ import annotations
 
@@ -16,10 +16,10 @@ from uam_lab.results.timeseries import UnreadableFlight
 WRITTEN, WRONG_USE = 0, 2
 EXAMPLES = """\
 examples:
-  uam report results/latest                everything anew from its log.mcap, also of a flight that
-                                           was killed in the middle
-  uam report results/latest --out again    the folder itself stays as it is
-  uam report results/a results/b           both in the same figures
+  uam report results/latest                rebuild everything from its log.mcap, also after a flight
+                                           that was killed
+  uam report results/latest --out again    write to another folder
+  uam report results/a results/b           both flights in the same figures
 """
 
 
@@ -27,9 +27,9 @@ def add(commands: argparse._SubParsersAction) -> None:
     """Add the subcommand to the command line."""
     parser = commands.add_parser(
         "report",
-        help="figures and report again, from the log alone; of several flights together",
+        help="rebuild figures and report from the log alone; overlay several flights",
         description="Rebuild table, metrics, figures and report of a flight from its log.mcap, or "
-        "draw several flights over one another.",
+        "draw several flights in the same figures.",
         epilog=EXAMPLES,
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
@@ -39,16 +39,16 @@ def add(commands: argparse._SubParsersAction) -> None:
         "--out",
         type=Path,
         metavar="DIR",
-        help="where to (default: the folder itself; of several results/<time>-report)",
+        help="result folder (default: the given one; for several flights results/<time>-report)",
     )
-    option("--scenario", metavar="NAME|FILE", help="what was flown, for a log that does not say")
+    option("--scenario", metavar="NAME|FILE", help="the flown scenario, for a log without one")
     option("--no-video", action="store_true", help="leave out the video, which takes longest")
     option("--no-pictures", action="store_true", help="leave out snapshots and video")
     parser.set_defaults(run=run)
 
 
 def run(options: argparse.Namespace) -> int:
-    """Report as asked; returns the exit status."""
+    """Run the command; return the exit status."""
     from uam_lab.recording.mcap_reader import UnreadableLog
     from uam_lab.report.rebuild import NothingToReport
 
@@ -69,7 +69,7 @@ def run(options: argparse.Namespace) -> int:
 
 
 def one(options: argparse.Namespace) -> int:
-    """One flight: everything anew."""
+    """Rebuild the report of one flight; return the exit status."""
     from rich.console import Console
 
     from uam_lab.report.build import build_report
@@ -84,11 +84,11 @@ def one(options: argparse.Namespace) -> int:
     elif options.out is None and (directory / "metrics.json").exists():  # of the direct engine
         metrics = json.loads((directory / "metrics.json").read_text())
     else:
-        raise NothingToReport(f"{directory} has no {LOG} to make a report of")
+        raise NothingToReport(f"{directory} has no {LOG} for a report")
     console = Console()
     pictures = not options.no_pictures
-    with reporting(console) as say:
-        report = build_report(out, say, video=not options.no_video, pictures=pictures)
+    with reporting(console) as show:
+        report = build_report(out, show, video=not options.no_video, pictures=pictures)
     console.print(summary(metrics, out))
     for note in [*_notes(out), report.problem]:
         if note:
@@ -97,7 +97,7 @@ def one(options: argparse.Namespace) -> int:
 
 
 def several(options: argparse.Namespace) -> int:
-    """Several flights over one another."""
+    """Write figures and page with several flights overlaid; return the exit status."""
     from rich.console import Console
 
     from uam_lab.report.figures.panels import DrawnFlight
@@ -111,8 +111,8 @@ def several(options: argparse.Namespace) -> int:
         for name, directory in zip(names, options.directories, strict=True)
     ]
     out = make_folder(options.out, "report")
-    with reporting(Console()) as say:
-        page = build_overlay(flights, out, say)
+    with reporting(Console()) as show:
+        page = build_overlay(flights, out, show)
     print(f"report: {page}")
     return WRITTEN
 

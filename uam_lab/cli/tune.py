@@ -27,13 +27,13 @@ EXAMPLES = """\
 examples:
   uam tune                                   the modular law, 200 evaluations
   uam tune --controller asmc1 --evaluations 100
-  uam tune --out results/tune-mine           goes on with a search that was stopped
+  uam tune --out results/tune-mine           continue a stopped search
   uam tune --space mine.yaml --profile best.yaml
-  uam tune --study arm --storage mysql://user@host/optuna    on several machines at once: the same
-                                             command on each, they share the study
+  uam tune --study arm --storage mysql://user@host/optuna    on several machines with one study:
+                                             the same command on each
 
-A space (config/tuning) says which parameters are searched in which range, which flights judge a
-candidate, and how. Left in --out: best.yaml (for uam fly --profile), search.png, evaluations.csv,
+A space (config/tuning) defines the parameters with their ranges, the flights of an evaluation, and
+the cost. Results in --out: best.yaml (for uam fly --profile), search.png, evaluations.csv,
 study.journal.
 """
 
@@ -53,22 +53,22 @@ def add(commands: argparse._SubParsersAction) -> None:
         "--controller",
         default=catalogue.DEFAULT,
         metavar="NAME",
-        help="which space of config/tuning: "
+        help="space of config/tuning: "
         + ", ".join(configuration.names("tuning"))
         + " (default %(default)s)",
     )
-    option("--space", metavar="FILE", help="a space of your own instead")
+    option("--space", metavar="FILE", help="file with another space")
     option(
         "--profile",
         metavar="NAME|FILE",
-        help="where the search starts (default: what the space says)",
+        help="start of the search (default: the profile of the space)",
     )
     option(
         "--evaluations",
         type=_count,
         default=200,
         metavar="N",
-        help="stop after this many, earlier ones of the study included (default %(default)s)",
+        help="total number of evaluations of the study (default %(default)s)",
     )
     option(
         "--jobs",
@@ -82,30 +82,30 @@ def add(commands: argparse._SubParsersAction) -> None:
         type=int,
         default=1,
         metavar="N",
-        help="of the optimiser; with --jobs 1 the search repeats (default %(default)s)",
+        help="of the optimiser; with --jobs 1 the search is repeatable (default %(default)s)",
     )
     option(
         "--step",
         type=float,
         default=0.1,
         metavar="SHARE",
-        help="how far from the start the search looks at first, of the logarithmic range; "
-        "smaller from a good start (default %(default)s)",
+        help="initial step around the start, as a fraction of the logarithmic range; "
+        "use a smaller one for a good start (default %(default)s)",
     )
     option(
         "--out",
         type=Path,
         metavar="DIR",
-        help="result folder, of a stopped search to go on with it (default "
+        help="result folder; that of a stopped search continues it (default "
         "results/<time>-tune-<controller>)",
     )
     option(
         "--storage",
         metavar="FILE|URL",
-        help="where the study is kept: a journal file, or a database as Optuna names it "
+        help="storage of the study: a journal file, or a database URL of Optuna "
         "(default <out>/study.journal)",
     )
-    option("--study", metavar="NAME", help="its name in the storage (default: the space's)")
+    option("--study", metavar="NAME", help="name in the storage (default: that of the space)")
     parser.set_defaults(run=run)
 
 
@@ -116,7 +116,7 @@ def _count(text: str) -> int:
 
 
 def run(options: argparse.Namespace) -> int:
-    """Search as asked; returns the exit status."""
+    """Run the command; return the exit status."""
     from uam_lab.tuning.space import TuningError, load_space
 
     try:
@@ -138,7 +138,7 @@ def run(options: argparse.Namespace) -> int:
 
 
 def tune(options: argparse.Namespace, space: Space) -> int:
-    """Search, show how far it is, write what was found."""
+    """Search, show the progress, write the results; return the exit status."""
     from uam_lab.tuning import search_results
     from uam_lab.tuning.search import Task, open_study, search
     from uam_lab.tuning.space import TuningError
@@ -165,9 +165,9 @@ def tune(options: argparse.Namespace, space: Space) -> int:
     except KeyboardInterrupt:
         status = INTERRUPTED
         print(
-            "uam tune: interrupted; the same command goes on"
+            "uam tune: interrupted; the same command continues the search"
             if options.out
-            else f"uam tune: interrupted; --out {out} goes on",
+            else f"uam tune: interrupted; --out {out} continues the search",
             file=sys.stderr,
         )
     study = open_study(task)

@@ -1,4 +1,4 @@
-"""`uam view`: the cockpit for nodes that run already, of `uam fly` or on the vehicle."""
+"""`uam view`: the cockpit for running nodes, of `uam fly` or on the vehicle."""
 
 from __future__ import annotations
 
@@ -13,14 +13,14 @@ from uam_sim_bridge.ports import INSTANCES, PortError, domain_of_flight
 WRONG_USE = 2
 EXAMPLES = """\
 examples:
-  uam view                                 the flight that is under way
-  ROS_DOMAIN_ID=5 uam view                 nodes that uam fly did not start, as on the vehicle
-  uam view --host 0.0.0.0                  for browsers on other computers, too: anyone who reaches
-                                           this port can then steer the vehicle
-  uam view --origin http://lab:9000        a page served from elsewhere may connect as well
+  uam view                                 the running flight
+  ROS_DOMAIN_ID=5 uam view                 nodes not started by uam fly, as on the vehicle
+  uam view --host 0.0.0.0                  also for browsers on other computers: everyone with
+                                           access to this port can then command the vehicle
+  uam view --origin http://lab:9000        allow connections of a page from another server
 
-The 3-D scene needs the node `scene`, which uam fly starts: ros2 run uam_sim_bridge scene.
-Ctrl-C ends it; the flight goes on.
+The 3-D scene needs the node `scene`: uam fly starts it, otherwise ros2 run uam_lab scene.
+Ctrl-C ends the cockpit; the flight continues.
 """
 
 
@@ -28,7 +28,7 @@ def add(commands: argparse._SubParsersAction) -> None:
     """Add the subcommand to the command line."""
     parser = commands.add_parser(
         "view",
-        help="the cockpit, a local web page, for nodes that run already",
+        help="the cockpit, a local web page, for running nodes",
         description="Serve the cockpit: the scene, charts, gains and commands in a browser.",
         epilog=EXAMPLES,
         formatter_class=argparse.RawDescriptionHelpFormatter,
@@ -38,27 +38,27 @@ def add(commands: argparse._SubParsersAction) -> None:
         "--instance",
         type=int,
         metavar="N",
-        help=f"of the flight, 0..{INSTANCES - 1} (default: the one that is under way)",
+        help=f"instance of the flight, 0..{INSTANCES - 1} (default: the running one)",
     )
     option(
         "--host",
         default="127.0.0.1",
         metavar="ADDRESS",
-        help="address to listen on (default %(default)s: this computer alone)",
+        help="address to listen on (default %(default)s: this computer only)",
     )
     option(
         "--port",
         type=_port,
         default=8080,
         metavar="PORT",
-        help="the first free one from this on (default %(default)s)",
+        help="first port to try; the next free one is used (default %(default)s)",
     )
     option(
         "--origin",
         action="append",
         default=[],
         metavar="URL",
-        help="of other pages that may connect; may be given again",
+        help="origin of another page that may connect; may be repeated",
     )
     parser.set_defaults(run=run)
 
@@ -70,7 +70,7 @@ def _port(text: str) -> int:
 
 
 def run(options: argparse.Namespace) -> int:
-    """Serve until Ctrl-C; returns the exit status."""
+    """Serve until Ctrl-C; return the exit status."""
     try:
         require_ros()
         domain = domain_of_flight(options.instance)
@@ -80,7 +80,7 @@ def run(options: argparse.Namespace) -> int:
     from uam_lab.nodes import cockpit
     from uam_lab.processes.node_environment import transport_environment
 
-    if domain is not None:  # of uam fly; else the user's own
+    if domain is not None:  # a flight of uam fly; otherwise the user's environment
         os.environ.update(transport_environment(), ROS_DOMAIN_ID=str(domain))
     given = {"host": options.host, "port": options.port, "origins": ",".join(options.origin)}
     texts = [f"{name}:={json.dumps(value)}" for name, value in given.items() if value != ""]

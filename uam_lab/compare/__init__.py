@@ -1,1 +1,1 @@
-"""`uam compare`: the paper's comparison, every controller over the same flights."""
+"""`uam compare`: the paper's comparison, all controllers over the same flights."""

@@ -1,4 +1,4 @@
-"""What a comparison leaves: tables, figures, every flight's figures, one page."""
+"""Results of `uam compare`: tables, figures, every flight, one page."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from uam_lab.results import timeseries
 from uam_lab.results.atomic import replacing, write_rows, write_text
 from uam_lab.results.result_folder import as_json, versions
 
-# The paper's five figures; the rows that they overlay.
+# The paper's five figures; OVERLAID: the rows drawn in them.
 PAPERS_FIGURES = (
     "position_errors",
     "attitude_errors",
@@ -33,14 +33,14 @@ OVERLAID = (plan.ASMC1, plan.ASMC2, plan.PROPOSED)
 
 @dataclass(frozen=True)
 class Written:
-    """text: what to show on the console; page: report.html."""
+    """text: for the console; page: report.html."""
 
     text: str
     page: Path
 
 
 def budgets(rows: Sequence[plan.ComparedController]) -> dict[str, str]:
-    """Where each profile's numbers come from: the comment that begins its file."""
+    """Return the source of each profile's values: the comment at the beginning of its file."""
     found = {}
     for row in rows:
         if not row.profile.file.is_file():
@@ -143,7 +143,7 @@ def _draw(out: Path, trials: Sequence[Trial], results: Sequence[TrialResult]) ->
 
 
 def _rms(found: Sequence[tables.ControllerErrors]) -> Figure:
-    """RMS of every row beside the paper's, per column, on a logarithmic scale."""
+    """Draw the RMS errors of every row beside the paper's, on a logarithmic scale."""
     figure = Figure(figsize=(style.WIDTH, 4.2), layout="constrained")
     axis = figure.subplots()
     width = 0.8 / len(found)
@@ -172,7 +172,7 @@ def _rms(found: Sequence[tables.ControllerErrors]) -> Figure:
 
 
 def _gains(results: Sequence[TrialResult]) -> Figure:
-    """The largest value of each adapted gain of the proposed law, a dot per flight."""
+    """Draw the largest value of each adapted gain of the proposed law, one dot per flight."""
     flights = [r for r in results if r.label == plan.PROPOSED]
     names = [n for n in (flights[0].peaks if flights else {}) if n.rsplit(".", 1)[1][0] in "Kz"]
     figure = Figure(figsize=(style.WIDTH, 3.2), layout="constrained")

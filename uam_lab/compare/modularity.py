@@ -1,9 +1,9 @@
-"""Modularity made visible: one subsystem's gains are changed, the other two laws do not notice.
+"""Check of the modularity: a change of one subsystem's gains changes no other subsystem's law.
 
-Two questions, two answers. What is untouched: the controllers are run again along the recorded
-flight (same states, same references), once with the flying parameters and once with one set
-changed; the outputs and adapted gains of the other two must not differ in a single bit. What it
-does: the changed vehicle flies, and all errors are reported.
+Replay: the controllers run again along a recorded flight (same states and references), with the
+flown parameters and with one parameter set changed. Outputs and adapted gains of the other two
+must be equal bit for bit. Flight: the vehicle also flies with the changed set, and all errors are
+reported.
 """
 
 from __future__ import annotations
@@ -39,12 +39,12 @@ class Untouched:
 
     @property
     def holds(self) -> bool:
-        """Whether the others did exactly what they did before, and the changed one did not."""
+        """Whether only the changed subsystem differs."""
         return all((d > 0.0) == (name == self.changed) for name, d in self.differences.items())
 
 
 def changed(profile: Profile, subsystem: str, factor: float = FACTOR) -> Profile:
-    """The profile with one subsystem's feedback gains multiplied by `factor`."""
+    """Return the profile with one subsystem's feedback gains multiplied by `factor`."""
     sections = copy.deepcopy(profile.sections)
     section = sections[SUBSYSTEMS[subsystem][0]]
     for name in ("lambda_1", "lambda_2"):
@@ -53,7 +53,7 @@ def changed(profile: Profile, subsystem: str, factor: float = FACTOR) -> Profile
 
 
 def trials(profile: Profile, payload_mass: float, seed: int, keep: Path) -> list[Trial]:
-    """The flight as it is (its series goes to `keep`), then one with each subsystem changed."""
+    """Return the unchanged flight (its series goes to `keep`) and one per changed subsystem."""
     return [
         Trial("as it is", profile, payload_mass, seed, keep=keep),
         *(
@@ -64,7 +64,7 @@ def trials(profile: Profile, payload_mass: float, seed: int, keep: Path) -> list
 
 
 def untouched(profile: Profile, series: Series, period: float) -> list[Untouched]:
-    """Replay the flight with each subsystem changed in turn. period: of the control [s]."""
+    """Replay the flight with each subsystem changed in turn; period: of the control tick [s]."""
     plain = _replay(profile, series, period)
     found = []
     for name in SUBSYSTEMS:
@@ -78,7 +78,7 @@ def untouched(profile: Profile, series: Series, period: float) -> list[Untouched
 
 
 def _replay(profile: Profile, series: Series, period: float) -> dict[str, np.ndarray]:
-    """Outputs and adaptation of the three controllers along the recorded states and references."""
+    """Return tau and adapted gains (ticks, n) of each controller along the recorded flight."""
     rows = np.flatnonzero(series.flown)
     states = series.block("estimate.")[rows].reshape(-1, 3, SIZE)
     references = series.block("reference.")[rows].reshape(-1, 3, SIZE)
@@ -86,9 +86,9 @@ def _replay(profile: Profile, series: Series, period: float) -> dict[str, np.nda
     controllers = {name: kind(profile.sets[node]) for name, (node, kind) in SUBSYSTEMS.items()}
     out: dict[str, list[np.ndarray]] = {name: [] for name in controllers}
     for state, reference in zip(states, references, strict=True):
-        asked = np.ascontiguousarray(reference[:, attitude])
+        desired = np.ascontiguousarray(reference[:, attitude])
         for name, controller in controllers.items():
-            inputs = (True,) if name == "position" else (asked, True)
+            inputs = (True,) if name == "position" else (desired, True)
             tau = controller.update(state, reference, *inputs, period)
             out[name].append(np.concatenate([tau, controller.adaptation]))
     return {name: np.array(values) for name, values in out.items()}
@@ -96,31 +96,31 @@ def _replay(profile: Profile, series: Series, period: float) -> dict[str, np.nda
 
 @dataclass(frozen=True)
 class Evidence:
-    """Both answers."""
+    """Results of the replays and of the flights."""
 
     flights: tuple[TrialResult, ...]
     replays: tuple[Untouched, ...]
 
     @classmethod
     def of(cls, profile: Profile, series: Path, flights: Sequence[TrialResult]) -> Evidence:
-        """From the recorded flight `series` and the results of `trials`."""
+        """Return the evidence from the recorded flight `series` and the results of `trials`."""
         flight = timeseries.read(series)
         period = float(np.median(np.diff(flight.time)))
         return cls(tuple(flights), tuple(untouched(profile, flight, period)))
 
     @property
     def claim(self) -> str:
-        """What is found, in a sentence."""
+        """The result as a sentence."""
         if all(replay.holds for replay in self.replays):
             return (
-                "Changing one subsystem's gains leaves the other two laws and their adapted "
-                "gains untouched: not one bit differs along the same flight."
+                "A change of one subsystem's gains changes no output and no adapted gain of the "
+                "other two laws: they are equal bit for bit along the same flight."
             )
         broken = [replay.changed for replay in self.replays if not replay.holds]
-        return f"Changing the gains of {', '.join(broken)} is felt by another subsystem's law."
+        return f"A change of the gains of {', '.join(broken)} changes another subsystem's law."
 
     def tables(self) -> list[tuple[list[str], list[list[str]]]]:
-        """(head, rows) of the two tables."""
+        """Return (head, rows) of the two tables."""
         replays = [
             [
                 replay.changed,
@@ -140,9 +140,9 @@ class Evidence:
         return [
             (
                 [
-                    "gains changed of",
+                    "changed gains of",
                     *(f"largest change of {name}" for name in SUBSYSTEMS),
-                    "others untouched",
+                    "others unchanged",
                 ],
                 replays,
             ),

@@ -1,4 +1,4 @@
-"""Which flights a comparison is made of."""
+"""The flights of a comparison."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ VERBATIM, WITH_WEIGHT = "Table I verbatim", "Table I and the weight"
 PAYLOADS = (0.1, 0.2, 0.3)  # [kg]
 
 
-# The rows by their names on the command line: every other law, the paper's own, its variants.
+# Row names of the command line → labels: baselines, proposed law, variants of the proposed law.
 ROWS = {
     **{name: law.label for name, law in catalogue.LAWS.items() if name != catalogue.DEFAULT},
     "proposed": PROPOSED,
@@ -61,7 +61,7 @@ def entries(names: Sequence[str] = tuple(ROWS)) -> tuple[ComparedController, ...
 
 
 def frozen(profile: Profile) -> Profile:
-    """The same profile with the adapted gains kept at their initial values."""
+    """Return the profile with constant gains: the adapted gains keep their initial values."""
     sections = copy.deepcopy(profile.sections)
     for node in CONTROLLERS:
         sections[node]["adapt"] = False
@@ -69,7 +69,7 @@ def frozen(profile: Profile) -> Profile:
 
 
 def with_weight(profile: Profile, other: Profile) -> Profile:
-    """The same profile with the weight that `other` adds to tau_p, without which nothing flies."""
+    """Return the profile with the gravity feedforward of `other`, without which it cannot lift."""
     name = "gravity_feedforward_mass"
     sections = copy.deepcopy(profile.sections)
     sections[POSITION][name] = other.sections[POSITION][name]
@@ -77,7 +77,7 @@ def with_weight(profile: Profile, other: Profile) -> Profile:
 
 
 def middle(payloads: Sequence[float]) -> float:
-    """The payload of the flights that are shown."""
+    """Return the middle payload [kg], that of the flights in the figures."""
     return payloads[len(payloads) // 2]
 
 
@@ -87,9 +87,9 @@ def trials(
     seeds: Sequence[int],
     folder: Path,
 ) -> list[Trial]:
-    """Every row over every payload and seed. Those that the figures show keep their series.
+    """Return the flights of every row over every payload and seed.
 
-    The figures show the middle payload and the first seed.
+    The flights with the middle payload and the first seed keep their series for the figures.
     """
     shown = middle(payloads), seeds[0]
     return [

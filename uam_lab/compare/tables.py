@@ -1,4 +1,4 @@
-"""From the figures of many flights to the paper's three tables."""
+"""The paper's three tables of RMS errors, from the results of many flights."""
 
 from __future__ import annotations
 
@@ -13,13 +13,13 @@ from uam_lab.compare.plan import ASMC1, ASMC2, PROPOSED
 from uam_lab.report.facts import paper
 
 CONFIDENCE = 0.95
-# Tables II to IV of the paper, in the order of ERRORS: m, m, m, deg ...
+# table:error_p, table:error_q, table:error_alpha of the paper, in the order of ERRORS: m, deg
 PAPER = {
     ASMC1: (0.15, 0.08, 0.31, 5.98, 5.33, 8.26, 2.29, 2.34),
     ASMC2: (0.09, 0.05, 0.22, 4.83, 4.74, 5.04, 1.81, 1.73),
     PROPOSED: tuple(value for group in paper.RMS.values() for value in group),
 }
-AIM = (0.025, 0.010, 0.045, 1.6, 1.4, 1.5, 0.6, 0.6)  # half of the paper's, rounded as law.md does
+AIM = (0.025, 0.010, 0.045, 1.6, 1.4, 1.5, 0.6, 0.6)  # half of the paper's, rounded
 TABLES = (("position", slice(0, 3)), ("attitude", slice(3, 6)), ("arm", slice(6, 8)))
 
 
@@ -27,8 +27,8 @@ TABLES = (("position", slice(0, 3)), ("attitude", slice(3, 6)), ("arm", slice(6,
 class ControllerErrors:
     """One controller. mean, half_width, worst (8,): RMS errors as ERRORS, m and deg.
 
-    mean over all flights; half_width of its confidence interval over seeds, each seed being the
-    mean of its payloads, NaN for one seed; worst: the largest RMS of any flight.
+    mean: over all flights; half_width: of its confidence interval over seeds (of the means over
+    the payloads), NaN for one seed; worst: largest RMS of any flight.
     """
 
     label: str
@@ -42,13 +42,13 @@ class ControllerErrors:
 
     @property
     def shortfall(self) -> str:
-        """How many flights were not completed, "" if all were."""
+        """Text with the number of flights that were not completed, "" without any."""
         short = self.flights - self.completed
         return f"{short} of {self.flights} not completed" if short else ""
 
 
 def rows(results: Sequence[TrialResult]) -> list[ControllerErrors]:
-    """One row per label, in the order in which labels first occur."""
+    """Return one row per label, in the order of first occurrence."""
     return [
         row(label, [r for r in results if r.label == label])
         for label in dict.fromkeys(r.label for r in results)
@@ -56,7 +56,7 @@ def rows(results: Sequence[TrialResult]) -> list[ControllerErrors]:
 
 
 def row(label: str, results: Sequence[TrialResult]) -> ControllerErrors:
-    """The row of these flights; one that ended early counts up to its end."""
+    """Return the row of these flights; a flight that ended early counts up to its end."""
     rms = np.array([result.rms for result in results])
     return ControllerErrors(
         label=label,
@@ -71,7 +71,7 @@ def row(label: str, results: Sequence[TrialResult]) -> ControllerErrors:
 
 
 def half_width(results: Sequence[TrialResult]) -> np.ndarray:
-    """Half the width (8,) of Student's confidence interval of the mean over seeds."""
+    """Return half the width (8,) [m, deg] of Student's confidence interval of the mean."""
     seeds = sorted({result.seed for result in results})
     means = np.array(
         [np.mean([r.rms for r in results if r.seed == seed], axis=0) for seed in seeds]
@@ -84,23 +84,23 @@ def half_width(results: Sequence[TrialResult]) -> np.ndarray:
 
 
 def degradation(other: np.ndarray, proposed: np.ndarray) -> np.ndarray:
-    """The paper's "performance degradation" (other - proposed) / other [%]."""
+    """Return the paper's "performance degradation" (other - proposed) / other (8,) [%]."""
     return 100.0 * (np.asarray(other) - np.asarray(proposed)) / np.asarray(other)
 
 
 def claims(found: Sequence[ControllerErrors]) -> list[str]:
-    """Where the paper's claims hold here and where not, a sentence each."""
+    """Return one sentence per claim of the paper: whether it holds in these flights."""
     by_label = {row.label: row for row in found}
     said = []
     if any(np.isnan(row.half_width).any() for row in found):
-        said.append("One seed only: what follows has no confidence intervals.")
+        said.append("One seed only: there are no confidence intervals.")
     for better, worse in ((PROPOSED, ASMC1), (PROPOSED, ASMC2), (ASMC2, ASMC1)):
         if better in by_label and worse in by_label:
             said.append(_smaller(by_label[better], by_label[worse]))
     if PROPOSED in by_label:
         proposed = by_label[PROPOSED]
         said.append(_limit("the paper's proposed row", proposed, PAPER[PROPOSED]))
-        said.append(_limit("half of it", proposed, AIM))
+        said.append(_limit("half of that row", proposed, AIM))
     for row in found:
         if row.completed < row.flights:
             said.append(f"{row.label}: {row.shortfall}, {row.lost} of them lost ({row.why[0]}).")
@@ -110,7 +110,7 @@ def claims(found: Sequence[ControllerErrors]) -> list[str]:
 
 
 def _smaller(better: ControllerErrors, worse: ControllerErrors) -> str:
-    """In which columns the errors of one are the smaller ones, beyond the confidence intervals."""
+    """Return the columns with smaller errors of `better`, beyond the confidence intervals."""
     apart, near, against = [], [], []
     for i, name in enumerate(ERRORS):
         margin = np.nan_to_num(better.half_width[i]) + np.nan_to_num(worse.half_width[i])
@@ -119,7 +119,7 @@ def _smaller(better: ControllerErrors, worse: ControllerErrors) -> str:
     return (
         f"Smaller errors with {better.label} than with {worse.label}: "
         + (f"holds for {', '.join(apart)}" if apart else "holds in no column")
-        + (f"; cannot be told apart for {', '.join(near)}" if near else "")
+        + (f"; no significant difference for {', '.join(near)}" if near else "")
         + (f"; does not hold for {', '.join(against)}" if against else "")
         + "."
     )
@@ -135,7 +135,7 @@ def _limit(what: str, row: ControllerErrors, limit: Sequence[float]) -> str:
 
 
 def as_markdown(found: Sequence[ControllerErrors]) -> str:
-    """The three tables with the paper's numbers beside ours."""
+    """Return the three tables with the paper's values beside those of the flights."""
     proposed = next((row for row in found if row.label == PROPOSED), None)
     parts = []
     for title, columns in TABLES:
@@ -171,5 +171,5 @@ def _name(row: ControllerErrors) -> str:
 
 
 def cell(mean: float, half: float, digits: int) -> str:
-    """A mean with half the width of its interval, if there is one."""
+    """Return a mean with half the width of its confidence interval, if there is one."""
     return f"{mean:.{digits}f}" + ("" if np.isnan(half) else f" ± {half:.{digits}f}")

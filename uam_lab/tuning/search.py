@@ -1,8 +1,7 @@
-"""The search itself: an Optuna study that any number of processes, and machines, work on.
+"""The search: an Optuna study, evaluated by several processes or machines.
 
-The study lives in the optimiser's own storage: a journal file in the result folder, or whatever
-`--storage` names (a database that several machines reach). Every evaluation is in it, so a search
-that was stopped goes on where it was.
+The study is stored in a journal file in the result folder, or in the database of `--storage`, which
+several machines can use. The storage contains every evaluation, so a stopped search can continue.
 """
 
 from __future__ import annotations
@@ -23,14 +22,14 @@ from uam_lab.campaign.trial import fly
 from uam_lab.tuning.space import Space, TuningError
 
 POLL = 1.0  # [s]
-STEP = 0.1  # of the logarithmic range: how far CMA-ES looks around the start at first
-HOPELESS = 1.5  # times the best cost so far: what one flight alone may exceed it before we give up
+STEP = 0.1  # initial step of CMA-ES around the start, as a fraction of the logarithmic range
+HOPELESS = 1.5  # a candidate is pruned when its cost exceeds this factor times the best cost
 DONE = (TrialState.COMPLETE, TrialState.PRUNED)
 
 
 @dataclass(frozen=True)
 class Task:
-    """What each worker is told."""
+    """Settings of a search, the same for each worker."""
 
     space: Space
     study: str
@@ -41,17 +40,17 @@ class Task:
 
 
 def open_storage(where: str) -> JournalStorage | RDBStorage:
-    """A journal file, or a database URL as sqlite:///file.db or mysql://...; TuningError."""
+    """Open a journal file, or a database by URL, as sqlite:///file.db. Raises TuningError."""
     try:
         if "://" in where:
             return RDBStorage(where, heartbeat_interval=60)
         return JournalStorage(JournalFileBackend(where))
-    except Exception as error:  # whatever the database's driver raises
+    except Exception as error:  # drivers of databases raise different types
         raise TuningError(f"storage {where}: {str(error).splitlines()[0]}") from None
 
 
 def open_study(task: Task) -> optuna.Study:
-    """The study, made with the start values enqueued when it is new."""
+    """Open the study; a new study first evaluates the start values."""
     optuna.logging.set_verbosity(optuna.logging.ERROR)
     warnings.filterwarnings("ignore", category=FutureWarning, module="optuna")
     space = task.space
@@ -71,7 +70,7 @@ def open_study(task: Task) -> optuna.Study:
 
 
 def evaluate(space: Space, trial: optuna.Trial, best: float | None) -> float:
-    """Fly one candidate; the mean cost of its flights. Pruned once it cannot be good any more."""
+    """Fly one candidate; return the mean cost of its flights. A bad candidate is pruned early."""
     values = {
         knob.name: trial.suggest_float(knob.name, knob.low, knob.high, log=True)
         for knob in space.knobs
@@ -84,13 +83,13 @@ def evaluate(space: Space, trial: optuna.Trial, best: float | None) -> float:
         trial.set_user_attr(f"flight {number}", {"cost": costs[-1], "rms": result.rms.tolist()})
         hopeless = best is not None and sum(costs) > HOPELESS * best * len(trials)
         if hopeless and number + 1 < len(trials):
-            # Told to the sampler with what is known: every further flight as bad as those so far.
+            # estimate for the sampler: mean so far, plus 10 % per flight not flown
             return sum(costs) / len(costs) * (1.0 + 0.1 * (len(trials) - len(costs)))
     return sum(costs) / len(costs)
 
 
 def work(task: Task, number: int) -> None:
-    """Evaluate until the study has as many evaluations as asked for; a worker's whole life."""
+    """Evaluate candidates until the study has task.evaluations; main function of a worker."""
     prepare_worker()
     study = open_study(Task(**{**vars(task), "seed": task.seed + number}))
     study.optimize(
@@ -107,11 +106,10 @@ def _best(study: optuna.Study) -> float | None:
 
 
 def search(task: Task, jobs: int, progress: Callable[[int, float | None], None]) -> optuna.Study:
-    """Work on the study with `jobs` processes until it has task.evaluations, or Ctrl-C.
+    """Extend the study with `jobs` processes until it has task.evaluations; return it.
 
-    progress: called about once a second with the evaluations done and the best cost. Raises
-    TuningError when a worker fails, KeyboardInterrupt when the user stops it; the study keeps
-    what was found.
+    progress: called about once per second with the number of evaluations and the best cost. Raises
+    TuningError if a worker fails, KeyboardInterrupt on Ctrl-C; the study keeps its evaluations.
     """
     study = open_study(task)
     context = multiprocessing.get_context("spawn")
@@ -125,7 +123,7 @@ def search(task: Task, jobs: int, progress: Callable[[int, float | None], None])
             time.sleep(POLL)
             failed = [worker for worker in workers if worker.exitcode]
             if failed:
-                raise TuningError("a worker failed; its last lines are above")
+                raise TuningError("a worker failed; see its error message above")
     finally:
         for worker in workers:
             if worker.is_alive():

@@ -1,4 +1,4 @@
-"""What a search leaves: the best profile as a ROS parameter file, every evaluation, a plot."""
+"""Results of a search: the best profile as a ROS parameter file, every evaluation, a plot."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ matplotlib.use("Agg")
 
 
 def write_best(file: Path, space: Space, study: optuna.Study, command: str) -> None:
-    """Write the best profile found, with where it comes from in its head."""
+    """Write the best profile, with its origin as comment at the beginning."""
     best = study.best_trial
     profile = space.profile(best.params, file.stem)
     evaluations = len(study.get_trials(deepcopy=False, states=DONE))
@@ -57,7 +57,7 @@ def write_evaluations(file: Path, space: Space, study: optuna.Study) -> None:
 
 
 def plot(file: Path, space: Space, study: optuna.Study) -> None:
-    """Draw the cost of every evaluation and the best so far, and where each knob went."""
+    """Draw the cost of every evaluation, the best cost so far, and the values of each knob."""
     trials = study.get_trials(deepcopy=False, states=DONE)
     costs = np.array([trial.value for trial in trials])
     columns = 4

@@ -1,4 +1,4 @@
-"""What a search may change, flies and judges by: a file of config/tuning, checked as it is read."""
+"""Search space from a file of config/tuning: parameters with ranges, flights, cost function."""
 
 from __future__ import annotations
 
@@ -13,35 +13,35 @@ from uam_control.profiles.profile import NODES, Profile, load_profile, profile_o
 from uam_control.settings import configuration, yaml_file
 from uam_lab.campaign.trial import ERRORS, Trial, TrialResult
 
-DIGITS = 4  # significant ones of a found value
+DIGITS = 4  # significant digits of a value
 
 
 class TuningError(ValueError):
-    """A search that cannot be made; the text is one line."""
+    """An invalid search space or a failed search; the text is one line."""
 
 
 @dataclass(frozen=True)
 class Knob:
-    """One number of the search: some entries of a parameter, moved together, logarithmically.
+    """One variable of the search: entries of a parameter with one common value, in log scale.
 
-    nodes: those that it is set in, as a rule one.
+    nodes: the nodes whose parameter is set, usually one.
     """
 
     nodes: tuple[str, ...]
     parameter: str
     low: float
     high: float
-    entries: tuple[int, ...] = ()  # () for a parameter that is one number
+    entries: tuple[int, ...] = ()  # () for a scalar parameter
 
     @property
     def name(self) -> str:
-        """As "arm_controller.lambda_1[0]"."""
+        """Name of the variable, as "arm_controller.lambda_1[0]"."""
         where = ",".join(map(str, self.entries))
         node = self.nodes[0] if len(self.nodes) == 1 else "all"
         return f"{node}.{self.parameter}" + (f"[{where}]" if where else "")
 
     def value(self, profile: Profile) -> float:
-        """The value in a profile (its first entry), moved into the range."""
+        """Return the value in a profile (first entry), limited to the range."""
         value = getattr(profile.sets[self.nodes[0]], self.parameter)
         value = value[self.entries[0]] if self.entries else value
         return min(max(float(value), self.low), self.high)
@@ -49,7 +49,7 @@ class Knob:
 
 @dataclass(frozen=True)
 class Cost:
-    """How a flight is judged; see config/tuning/modular.yaml for the formula."""
+    """The cost function; its formula is in config/tuning/modular.yaml."""
 
     aim: tuple[float, ...]
     peak_weight: float
@@ -59,7 +59,7 @@ class Cost:
     lost: float
 
     def of(self, result: TrialResult) -> float:
-        """The cost of a campaign.trial.TrialResult; finite in any case."""
+        """Return the cost of a flight, always finite."""
         if result.cut_short or not all(map(math.isfinite, result.rms)):
             return self.lost * (2.0 - result.flown)
         share = [(value / aim) ** 2 for value, aim in zip(result.rms, self.aim, strict=True)]
@@ -89,7 +89,7 @@ class Space:
     cost: Cost
 
     def profile(self, values: Mapping[str, float], name: str = "candidate") -> Profile:
-        """The start profile with the knobs at `values` (by name). Raises ProfileError."""
+        """Return the start profile with the knobs at `values` (by name). Raises ProfileError."""
         sections = copy.deepcopy(self.start.sections)
         for knob, node in [(k, node) for k in self.knobs for node in k.nodes]:
             value = float(f"{values[knob.name]:.{DIGITS}g}")
@@ -105,7 +105,7 @@ class Space:
         return profile_of(sections, Path(f"{name}.yaml"))
 
     def trials(self, profile: Profile) -> list[Trial]:
-        """The flights that judge a profile."""
+        """Return the flights that evaluate a profile."""
         return [
             Trial(
                 self.name,
@@ -120,14 +120,14 @@ class Space:
 
 
 def load_space(name_or_file: str, start: Profile | None = None) -> Space:
-    """Read a file of config/tuning, or another one. start: instead of the profile that it names.
+    """Read a file of config/tuning, or another one. start: instead of the file's profile.
 
-    Raises TuningError, and what loading the profile raises; one line each.
+    Raises TuningError, ProfileError, ConfigurationError; one line each.
     """
     try:
         file = configuration.named("tuning", name_or_file)
         document = yaml_file.read(file, TuningError)
-        if "judged_as" in document:  # flights and cost of another space: a fair comparison
+        if "judged_as" in document:  # flights and cost of another space, for a fair comparison
             other = configuration.named("tuning", document["judged_as"])
             document = {**yaml_file.read(other, TuningError), **document}
         start = start or load_profile(document["profile"])
@@ -167,7 +167,7 @@ def _knob(entry: dict[str, Any], start: Profile) -> Knob:
 
 
 def _check(knob: Knob, value: Any) -> None:
-    """Refuse a knob that does not fit the parameter's `value`."""
+    """Raise TuningError if the knob does not fit the parameter's `value`."""
     length = len(value) if isinstance(value, tuple) else 0
     if value is None or isinstance(value, str | bool):
         raise TuningError(f"{knob.name}: no such parameter, or not a number")
@@ -175,5 +175,5 @@ def _check(knob: Knob, value: Any) -> None:
         raise TuningError(
             f"{knob.name}: entries 0 to {length - 1} are expected"
             if length
-            else f"{knob.name}: one number, has no entries"
+            else f"{knob.name}: the parameter is one number, entries are not allowed"
         )
