@@ -1,4 +1,4 @@
-"""Everything around the bridge node: plant, estimator, controllers, and the autopilot's objects."""
+"""A test rig around the bridge node: plant, estimator, controllers, and the autopilot's objects."""
 
 import socket
 
@@ -98,7 +98,7 @@ class Rig:
             )
 
     def hear(self):
-        """Let the autopilot take what has arrived; return the messages."""
+        """Pass the received messages to the autopilot and return them."""
         arrived = []
         while True:
             try:
@@ -131,7 +131,7 @@ class Rig:
         body.step(motors)
 
     def fly(self):
-        """Arm, put the vehicle up and let it hover."""
+        """Arm, place the vehicle in the air and let it hover."""
         self.publish(topics.ARMING, Bool(data=True))
         for _ in range(500):
             self.tick()

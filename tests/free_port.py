@@ -1,4 +1,4 @@
-"""A port that nobody uses."""
+"""A free port for a test."""
 
 import socket
 

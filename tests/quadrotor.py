@@ -35,7 +35,7 @@ class Quadrotor:
         self.thrusts = np.zeros(4)
 
     def hover(self):
-        """Let the rotors carry the weight already."""
+        """Set the rotor thrusts for hover."""
         self.thrusts[:] = self.mass * GRAVITY / 4
         return self
 
@@ -56,7 +56,7 @@ class Quadrotor:
         torque = np.array([Y @ self.thrusts, -X @ self.thrusts, REACTION @ self.thrusts])
         acceleration = rotation @ force / self.mass - [0.0, 0.0, GRAVITY]
         if self.position[2] <= 0.0 and (self.velocity[2] < 0.0 or acceleration[2] <= 0.0):
-            stop = -self.velocity / h  # the ground's impulse is felt by the accelerometer
+            stop = -self.velocity / h  # the accelerometer measures the ground's impulse
             self.velocity[:] = self.gyro[:] = 0.0
             self.position[2] = 0.0
             self.accel = rotation.T @ (np.clip(stop, -50.0, 50.0) + [0.0, 0.0, GRAVITY])

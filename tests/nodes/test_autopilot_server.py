@@ -22,7 +22,7 @@ from uam_sim_bridge.mavlink.protocol.wire import Codec, Framer, mavlink2
 from uam_sim_bridge.mavlink.transport.transport import UdpTransport
 
 START_TIMEOUT = 60.0  # s: a first start compiles
-PATIENT = HilParameters(answer_timeout=30.0, silent_timeout=10.0)  # a loaded machine is no failure
+PATIENT = HilParameters(answer_timeout=30.0, silent_timeout=10.0)  # for a loaded machine
 HOVER = MASS * 9.81
 
 
@@ -83,7 +83,7 @@ class Flight:
             self.tick(rates, thrust)
 
     def airborne(self, height=20.0):
-        """Arm on the ground, put the vehicle up there and let it hover."""
+        """Arm on the ground, place the vehicle in the air and let it hover."""
         self.sequence.want(True)
         self.run(3.0)
         assert self.sequence.phase is Phase.FLYING, self.sequence.reasons
@@ -275,7 +275,7 @@ def test_help_has_examples():
 
 
 class FakeAutopilot:
-    """The TCP client's side by hand."""
+    """The TCP client's side, operated by the test."""
 
     def __init__(self, port):
         self.socket = socket.create_connection(("127.0.0.1", port), timeout=10)
@@ -357,11 +357,11 @@ def test_waits_are_bounded_and_shorter_after_silence(pair):
     first = time.monotonic() - begin
     server.exchange(0.008, *BODY)
     assert first >= 0.2 and not server.answered and server.missed == 2
-    assert motors == pytest.approx([0.5] * 4)  # the last commands hold
+    assert motors == pytest.approx([0.5] * 4)  # the last commands remain
     fake.answer(8000, [0.4] * 4, 129)
     server.send(0.012, *BODY)
     server.receive(0.05)
-    assert not server.answered  # an old answer is none
+    assert not server.answered  # an answer to an older tick does not count
     assert server.motors == pytest.approx([0.4] * 4)
 
 

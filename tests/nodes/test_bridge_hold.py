@@ -1,4 +1,4 @@
-"""The bridge node without usable commands in flight: level for a bounded time, then nothing."""
+"""The bridge node without valid commands in flight: bounded level hold, then no stream."""
 
 import math
 import time
@@ -29,22 +29,24 @@ def test_bad_commands_in_flight_hold_level_then_the_failsafe_acts(make_rig):
     assert rig.autopilot.status.mode is Mode.LAND  # COM_OF_LOSS_T after the hold
     assert rig.autopilot.status.armed
     assert "holding level" in rig.node.output
-    # good commands again: the bridge asks for OFFBOARD again
+    # valid commands again: the bridge requests OFFBOARD again
     for _ in range(400):
         rig.tick((0, 0, WEIGHT))
     assert rig.autopilot.status.mode is Mode.OFFBOARD
 
 
 def test_a_mission_in_failsafe_is_left_to_the_autopilot_down_to_the_ground(make_rig, probe):
-    """Level, then no stream, and no wish for OFFBOARD, at any height; idle does not mean thrust
-    0."""
+    """The bridge holds level, then stops the stream and does not request OFFBOARD, at any height.
+
+    Idle commands do not set the thrust to zero.
+    """
     status = probe.publisher(topics.MISSION_STATUS)
     rig = make_rig()
     probe.until_connected("mavlink_bridge", [status], [])
     rig.fly()
-    told = MissionStatus("aborted", 1.0, state="failsafe", cause="tilt").to_message(1)
-    status.publish(told)
-    time.sleep(0.2)  # it is not part of the join; let it arrive
+    message = MissionStatus("aborted", 1.0, state="failsafe", cause="tilt").to_message(1)
+    status.publish(message)
+    time.sleep(0.2)  # no input of the join: wait until it arrives
     for _ in range(100):
         _, thrust = rig.tick()
         assert thrust == pytest.approx(WEIGHT / 41.36, rel=0.02)
@@ -67,12 +69,12 @@ def test_idle_high_up_is_not_thrust_zero(make_rig):
 
 
 def test_states_without_commands_hold_level_then_the_failsafe_acts(make_rig):
-    """A controller is lost: states go on, by whose stamps the bridge counts."""
+    """Without a controller the states continue; the bridge counts time by their stamps."""
     rig = make_rig()
     rig.fly()
     stopped, thrusts, rolls = rig.count, [], []
     tilted = np.zeros((3, 8))
-    tilted[0, 3] = 0.1  # roll [rad], which no command has seen
+    tilted[0, 3] = 0.1  # roll [rad], without a reaction of the controllers
     for _ in range(950):
         rig.publish(topics.STATE, rig.state.fill(rig.count * PERIOD, tilted))
         silent = rig.count - stopped < 24  # stale_after, 0.1 s, after the last command
@@ -95,7 +97,7 @@ def test_states_without_commands_hold_level_then_the_failsafe_acts(make_rig):
 
 
 def test_realtime_watchdog_holds_level_and_then_stops(make_rig):
-    """Ticks stop in flight: level setpoints go on by themselves for release_time, then none."""
+    """Ticks stop in flight: the bridge sends level setpoints for release_time, then none."""
     rig = make_rig("-p", "clock:=realtime", "-p", "stale_after:=2.0", "-p", "release_time:=1.0")
     rig.fly()
     rig.hear()
@@ -115,7 +117,7 @@ def test_realtime_watchdog_holds_level_and_then_stops(make_rig):
 
 
 def test_without_states_it_levels_by_the_motion_capture(make_rig):
-    """The estimator is lost: the last estimate of the attitude is old, the mocap's is not."""
+    """Without the estimator the bridge levels by the attitude of the motion capture."""
     level = ("-p", "hold_gain:=3.0", "-p", "hold_integral:=0.0", "-p", "release_time:=3.0")
     rig = make_rig("-p", "clock:=realtime", "-p", "stale_after:=1.0", *level)
     rig.fly()

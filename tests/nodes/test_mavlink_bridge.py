@@ -42,8 +42,8 @@ def test_alone_it_waits_and_stops(start):
 def test_bad_parameters_are_refused_in_one_line(start, arguments, complaint):
     node = start(MODULE, "--ros-args", *arguments)
     assert node.process.wait(60) == 2
-    said = [line for line in node.output.splitlines() if line.startswith("mavlink_bridge: ")]
-    assert len(said) == 1 and complaint in said[0] and "Traceback" not in node.output
+    errors = [line for line in node.output.splitlines() if line.startswith("mavlink_bridge: ")]
+    assert len(errors) == 1 and complaint in errors[0] and "Traceback" not in node.output
 
 
 def test_from_the_ground_to_hover_and_back(make_rig):
@@ -86,15 +86,17 @@ def test_mapping_parameters_of_the_autopilot_are_compared(make_rig):
     rig.node.until_said("MC_ROLLRATE_P is 0.3 on the autopilot, the bridge assumes 0.15")
 
 
-def test_the_thrust_factor_is_identified_told_and_held_while_the_magnet_is_on(make_rig, probe):
-    """The vehicle hovers with the thrust of its weight; the bridge believes it is lighter."""
+def test_the_thrust_factor_is_identified_published_and_constant_while_the_magnet_is_on(
+    make_rig, probe
+):
+    """The vehicle hovers with the thrust of its weight; the bridge assumes a lower mass."""
     status = probe.publisher(topics.MISSION_STATUS)
-    told = probe.collect(topics.THRUST)
+    factors = probe.collect(topics.THRUST)
     rig = make_rig("-p", "identification_mass:=1.9", "-p", "factor_slew:=0.5")
     probe.until_connected("mavlink_bridge", [status], [topics.THRUST])
 
     def factor():
-        return Serialized(JointState, told[-1]).numbers("position")[0]
+        return Serialized(JointState, factors[-1]).numbers("position")[0]
 
     rig.fly()
     assert factor() == 1.0
@@ -104,7 +106,7 @@ def test_the_thrust_factor_is_identified_told_and_held_while_the_magnet_is_on(ma
     assert thrust * 41.36 == pytest.approx(WEIGHT / factor(), rel=0.01)  # it is applied
     stamp = (rig.count - 1) * PERIOD
     status.publish(MissionStatus("carry", 1.0, magnet=True).to_message(stamp))
-    time.sleep(0.2)  # it is not part of the join; let it arrive
+    time.sleep(0.2)  # no input of the join: wait until it arrives
     for _ in range(30):
         rig.tick((0, 0, WEIGHT))
     held = factor()

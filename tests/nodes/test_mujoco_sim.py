@@ -1,4 +1,4 @@
-"""The plant node alone, and with stand-ins for everybody who answers it."""
+"""The plant node alone, and with stand-ins for all nodes that it waits for."""
 
 import json
 import socket
@@ -23,14 +23,14 @@ def publishers(probe, topic):
     return {info.node_name for info in probe.node.get_publishers_info_by_topic(topic.name)}
 
 
-def test_alone_it_says_who_is_missing_and_stops_cleanly(start):
+def test_alone_it_names_missing_nodes_and_stops_cleanly(start):
     running = start(MODULE, *options())
     running.until_said("waiting for state_estimator to listen to /imu/data")
     assert running.interrupt(times=3) == 0
     assert "Traceback" not in running.output
 
 
-def test_a_bounded_start_names_who_never_came(start, tmp_path):
+def test_a_bounded_start_names_missing_nodes(start, tmp_path):
     statistics = tmp_path / "plant.json"
     running = start(MODULE, *options(start_timeout=1.0, statistics=statistics))
     assert running.process.wait(60) == NOT_READY
@@ -73,7 +73,7 @@ def test_its_topics_are_those_of_the_contract(start, probe):
 
 
 def test_the_list_of_wires_is_that_of_the_running_nodes(start, probe, tmp_path):
-    """All nodes run, idle; what they publish and hear is what `wiring` says, both ways."""
+    """With all nodes idle, their publishers and subscriptions equal those of `wiring`."""
     modules = [
         "uam_control.nodes." + name
         for name in (

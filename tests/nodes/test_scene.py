@@ -1,4 +1,4 @@
-"""The scene over real ROS: what RViz and Foxglove would receive."""
+"""The scene over real ROS: the messages for RViz and Foxglove."""
 
 import numpy as np
 from mcap.records import Schema
@@ -19,7 +19,7 @@ FRAME = 10 * TICK
 
 
 def transforms(messages):
-    """child → (parent, x) of the newest of each, and the stamps of base_link [ns]."""
+    """Return child → (parent, x) of the newest transforms, and the stamps of base_link [ns]."""
     name = "tf2_msgs/msg/TFMessage"
     kind = Schema(id=1, name=name, encoding="ros2msg", data=schema(name).encode())
     decode = DecoderFactory().decoder_for("cdr", kind)
@@ -33,7 +33,7 @@ def transforms(messages):
 
 
 class Rig:
-    """The scene, and the probe in the place of estimator, mission and simulator."""
+    """The scene node; the test replaces estimator, mission and simulator."""
 
     def __init__(self, start, probe, truth=True):
         self.probe, self.stamp = probe, 0
@@ -42,8 +42,8 @@ class Rig:
         self.markers = probe.collect(topics.MARKERS)
         self.errors = probe.collect(topics.TRACKING_ERROR)
         self.robot = probe.collect(topics.ROBOT_DESCRIPTION)
-        wanted = [topics.STATE, topics.REFERENCE] + [topics.TRUTH_PAYLOAD] * truth
-        self.outlets = [probe.publisher(topic) for topic in wanted]
+        inputs = [topics.STATE, topics.REFERENCE] + [topics.TRUTH_PAYLOAD] * truth
+        self.outlets = [probe.publisher(topic) for topic in inputs]
         self.status = probe.publisher(topics.MISSION_STATUS)
         self.writers = TrajectoryWriter(COORDINATES), ReferenceWriter(), PoseWriter()
         self.tell(MissionStatus(phase="waiting"))
@@ -54,21 +54,21 @@ class Rig:
         self.status.publish(status.to_message(self.stamp))
 
     def tick(self, flying=True):
-        """One tick: state at x = 0.1, reference at x = 0.3, payload at x = 0.7."""
+        """Publish a tick: state at x = 0.1, reference at x = 0.3, payload at x = 0.7."""
         self.stamp += TICK
-        state, wanted = np.zeros((3, SIZE)), np.zeros((3, SIZE))
-        state[0, 0], wanted[0, 0], wanted[0, 7] = 0.1, 0.3, 0.5
+        state, desired = np.zeros((3, SIZE)), np.zeros((3, SIZE))
+        state[0, 0], desired[0, 0], desired[0, 7] = 0.1, 0.3, 0.5
         level = np.array([1.0, 0.0, 0.0, 0.0])
         messages = (
             self.writers[0].fill(self.stamp, state),
-            self.writers[1].fill(self.stamp, wanted, flying, 0),
+            self.writers[1].fill(self.stamp, desired, flying, 0),
             self.writers[2].fill(self.stamp, np.array([0.7, 0.0, 0.0]), level),
         )
         for outlet, message in list(zip(self.outlets, messages, strict=False))[::-1]:
             outlet.publish(message)
 
     def fly(self, until, what, **how):
-        """Tick in about real time until `until()`."""
+        """Tick at about real time until `until()` is true."""
 
         def step():
             self.tick(**how)

@@ -1,4 +1,4 @@
-"""Level hold: bounded time, thrust of the flight so far, rates against the tilt."""
+"""Level hold: bounded time, mean thrust of the flight, body rates against the tilt."""
 
 import math
 
@@ -25,7 +25,7 @@ def test_levels_with_the_thrust_flown():
 
 
 def test_a_tilt_that_stays_is_met_by_more_and_more():
-    """The autopilot's rate loop alone gives way to the arm's torque."""
+    """The autopilot's rate loop alone does not compensate the arm's torque."""
     hold, rates = flown(), []
     for k in range(250):
         rates.append(hold.setpoint(4.0 + 0.004 * k, np.array([0.0, -0.1, 0.0]), UNKNOWN)[0][1])
@@ -54,7 +54,7 @@ def test_thrust_acts_against_sinking_within_a_limit():
 
 
 def test_the_last_setpoints_do_not_turn_it():
-    """The autopilot keeps to them until its failsafe."""
+    """The autopilot uses them until its failsafe."""
     hold = flown()
     hold.setpoint(4.0, TILTED, UNKNOWN)
     rates, _ = hold.setpoint(5.94, TILTED, UNKNOWN)
