@@ -250,7 +250,7 @@ def test_wrong_use_is_one_line_and_status_2(arguments, message):
     assert message in err.strip().splitlines()[-1] and "Traceback" not in err
 
 
-def test_taken_udp_port_is_said():
+def test_a_used_udp_port_is_a_one_line_error():
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as s:
         s.bind(("127.0.0.1", 0))
         process = start("--mavlink-port", s.getsockname()[1], "--wait", "0.1")
@@ -376,7 +376,7 @@ def test_hang_up_stops_the_motors(pair):
     assert not server.connected and np.all(server.motors == 0.0) and not server.armed
 
 
-def test_taken_simulator_port_is_said():
+def test_a_used_simulator_port_is_a_one_line_error():
     with socket.socket(socket.AF_INET, socket.SOCK_STREAM) as s:
         s.bind(("127.0.0.1", 0))
         s.listen()
