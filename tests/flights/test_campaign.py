@@ -48,4 +48,4 @@ def test_most_random_flights_are_flown_to_the_end(tmp_path, capsys):
     assert f"continuing after {FLIGHTS - 1} earlier flights" in capsys.readouterr().out
     assert (tmp_path / "flights.csv").read_bytes() == whole
     assert main(["campaign", "--seed", "2", "--out", str(tmp_path)]) == 2
-    assert "choose another --out" in capsys.readouterr().err
+    assert "give another --out" in capsys.readouterr().err

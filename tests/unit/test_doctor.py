@@ -72,7 +72,7 @@ def test_packages_missing_or_old_are_named_with_what_to_do():
     )
     assert found.verdict is FAIL
     assert "missing: no-such-package>=2" in found.found and "also-not" not in found.found
-    assert "wanted >=999" in found.found and "numpy" not in found.found, have
+    assert "required >=999" in found.found and "numpy" not in found.found, have
     assert '"no-such-package>=2" "pyyaml>=999"' in found.advice
     assert installation.packages(["numpy>=1"]).verdict is OK
     assert installation.packages(None).verdict is WARN

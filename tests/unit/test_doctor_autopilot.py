@@ -92,7 +92,7 @@ def test_without_a_version_the_rest_is_said(stand_in):
         return [heartbeat(base_mode=129)] if message.get_type() == "HEARTBEAT" else []
 
     found = autopilot.link(stand_in(answer).url, PATIENCE)
-    assert found.verdict is WARN and "no word about its firmware" in found.found
+    assert found.verdict is WARN and "firmware version not sent" in found.found
     assert "ARMED" in found.found
 
 
@@ -109,7 +109,7 @@ def test_silence_other_messages_and_noise_are_told_apart(stand_in):
     found = autopilot.link(stand_in(lambda _: [text]).url, 2.0)
     assert found.verdict is FAIL and "STATUSTEXT" in found.found
     found = autopilot.link(stand_in(lambda _: [], raw=b"login: ").url, 2.0)
-    assert found.verdict is FAIL and "bytes that are no MAVLink" in found.found
+    assert found.verdict is FAIL and "bytes, but no MAVLink" in found.found
     assert "baud" in found.advice
 
 

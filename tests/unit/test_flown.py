@@ -37,5 +37,5 @@ def test_a_flight_whose_line_was_cut_is_flown_again(tmp_path):
 
 def test_flights_of_something_else_are_not_mixed(tmp_path):
     Flown(tmp_path, "x").add(flight(1))
-    with pytest.raises(ConfigurationError, match="choose another --out"):
+    with pytest.raises(ConfigurationError, match="give another --out"):
         Flown(tmp_path, "y")

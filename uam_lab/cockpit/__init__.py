@@ -1,4 +1,4 @@
-"""The cockpit: a local web page (viser) that shows a flight and steers it, over ROS alone.
+"""The cockpit: a local web page (viser) that shows and commands a flight, over ROS only.
 
-It knows nothing of the plant: what it shows are the topics of nodes that run, on the vehicle too.
+It uses only topics and services of running nodes, so it also works on the vehicle.
 """

@@ -1,4 +1,4 @@
-"""What is plotted, and from which messages."""
+"""The charts of the page, and the messages with their data."""
 
 from __future__ import annotations
 
@@ -25,10 +25,10 @@ ADAPTATION = {
 
 
 class Charts:
-    """Three tabs of charts; `show` takes every message, `draw` sends what changed."""
+    """Three tabs of charts; `show` stores data of a message, `draw` sends new data."""
 
     def __init__(self, gui: viser.GuiApi, panel: viser.PanelHandle, window: float, interval: float):
-        """window [s] of time shown; interval [s] between samples."""
+        """window: shown time [s]; interval: between samples [s]."""
         self._gui, self._window, self._interval = gui, window, interval
         self._adaptation: dict[Topic, StripChart] = {}
         with panel.add_tab("Errors", viser.Icon.CHART_LINE):
@@ -48,7 +48,7 @@ class Charts:
         return StripChart(self._gui, chart, self._window, self._interval)
 
     def show(self, topic: Topic, message: Any) -> None:
-        """Take a message, if it is one that is plotted."""
+        """Store the data of a message if its topic is plotted."""
         if topic is topics.TRACKING_ERROR:
             time, error = _time(message), message.position
             self._position.add(time, [100.0 * value for value in error[0:3]])
@@ -68,7 +68,7 @@ class Charts:
             self._adapted(topic, message)
 
     def _adapted(self, topic: Topic, message: JointState) -> None:
-        """The gains go by the names that their law gives them."""
+        """Plot adapted gains by the names in the message, which come from the law."""
         if topic not in self._adaptation:
             with self._adaptation_tab:
                 title = f"Adapted gains, {ADAPTATION[topic]}"
@@ -76,7 +76,7 @@ class Charts:
         self._adaptation[topic].add(_time(message), list(message.position))
 
     def draw(self) -> None:
-        """Send the page what is new."""
+        """Send new data to the page."""
         fixed = (
             self._position,
             self._attitude,
@@ -92,10 +92,10 @@ class Charts:
 
 
 def _time(message: JointState | JointTrajectory | TwistStamped) -> float:
-    """The stamp [s]."""
+    """Return the stamp [s]."""
     return message.header.stamp.sec + 1e-9 * message.header.stamp.nanosec
 
 
 def _effort(message: JointTrajectory, count: int) -> list[float]:
-    """The first `count` efforts of a trajectory's point; none while nothing is commanded."""
+    """Return the first `count` efforts of a trajectory's point; empty without a command."""
     return list(message.points[0].effort[:count]) if message.points else []

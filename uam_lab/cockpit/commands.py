@@ -1,4 +1,4 @@
-"""The buttons: what can be asked of mission and controllers, through their services."""
+"""Buttons for the services of mission and controllers."""
 
 from __future__ import annotations
 
@@ -16,9 +16,9 @@ Later = Callable[[Callable[[], None]], None]
 
 @dataclass(frozen=True)
 class Button:
-    """A label, and the services called by it. on: what a SetBool gets, None for a Trigger.
+    """A button and its services. on: value of a SetBool request, None for a Trigger.
 
-    ask: a question that is to be answered first, "" for none.
+    ask: question to confirm first, "" for none.
     """
 
     label: str
@@ -36,14 +36,14 @@ def _each(service: str) -> tuple[str, ...]:
 
 BUTTONS = (
     Button("Hold", "PLAYER_PAUSE", ("/mission/hold",), "stop here and stay"),
-    Button("Resume", "PLAYER_PLAY", ("/mission/resume",), "go on with the scenario"),
+    Button("Resume", "PLAYER_PLAY", ("/mission/resume",), "continue the scenario"),
     Button("Land", "ARROW_BAR_TO_DOWN", ("/mission/land",), "land here", colour="orange"),
     Button("Disarm", "POWER", ("/mission/disarm",), "motors off", colour="red",
            ask="Motors off: a vehicle in the air falls. Disarm?"),
     Button("Magnet on", "MAGNET", ("/mission/magnet",), "until the scenario switches it", on=True),
     Button("Magnet off", "MAGNET_OFF", ("/mission/magnet",), "drops the payload", on=False),
     Button("Freeze adaptation", "SNOWFLAKE", _each("freeze_adaptation"),
-           "adapted gains stay as they are", on=True),
+           "adapted gains stay constant", on=True),
     Button("Free adaptation", "SNOWFLAKE_OFF", _each("freeze_adaptation"),
            "adapted gains adapt again", on=False),
     Button("Reset adaptation", "REFRESH", _each("reset_adaptation"),
@@ -52,12 +52,12 @@ BUTTONS = (
 
 
 class CommandButtons:
-    """Puts the buttons on the page. A click is worked on by whoever `later` gives it to."""
+    """The buttons on the page. `later` passes a click to the thread that processes it."""
 
     def __init__(
         self, gui: viser.GuiApi, services: Services, later: Later, said: Callable[[bool, str], None]
     ):
-        """said(whether it was done, what was answered)."""
+        """said: called with success and the text of the answer."""
         self._gui, self._services, self._said = gui, services, said
         self._handles = []
         for button in BUTTONS:
@@ -72,7 +72,7 @@ class CommandButtons:
         self._later = later
 
     def look(self) -> None:
-        """Only what somebody serves can be pressed."""
+        """Enable the buttons whose services are available."""
         for button, handle in self._handles:
             kind = Trigger if button.on is None else SetBool
             there = any(self._services.ready(kind, name) for name in button.services)

@@ -1,4 +1,4 @@
-"""Parameter values as people type them, and how far a slider reaches."""
+"""Parameter values as text, and the ranges of sliders."""
 
 from __future__ import annotations
 
@@ -9,12 +9,12 @@ import numpy as np
 
 from uam_lab.cockpit.remote_parameters import About
 
-REACH = 4.0  # a slider goes to this many times the value at which it was made
+REACH = 4.0  # end of a slider / initial value
 STEPS = 400
 
 
 def text_of(value: Any) -> str:
-    """A value as it is typed."""
+    """Return a value as text."""
     if isinstance(value, list):
         return ", ".join(text_of(one) for one in value)
     if isinstance(value, bool):
@@ -23,7 +23,7 @@ def text_of(value: Any) -> str:
 
 
 def value_of(text: str, like: Any) -> Any:
-    """What `text` says, in the kind of `like`, the present value. Raises ValueError."""
+    """Return the value of `text`, of the type of `like`, the current value. Raises ValueError."""
     if isinstance(like, list):
         return [_number(part) for part in text.replace(";", ",").split(",")]
     if isinstance(like, bool):
@@ -44,7 +44,7 @@ def _number(text: str) -> float:
 
 
 def reach(about: About, value: float) -> tuple[float, float, float]:
-    """(least, largest, step) of a slider that begins at `value`."""
+    """Return (low, high, step) of a slider with the initial value `value`."""
     low, high = bounds(about)
     low = max(low, min(0.0, REACH * value))
     high = min(high, max(REACH * value, 1.0 if value == 0.0 else value / REACH))
@@ -54,7 +54,7 @@ def reach(about: About, value: float) -> tuple[float, float, float]:
 
 
 def bounds(about: About) -> tuple[float, float]:
-    """The range that the node declares, also of each entry of a vector."""
+    """Return the range declared by the node; for a vector that of each entry."""
     if about.low is not None and about.high is not None:
         return about.low, about.high
     words = about.constraints.removeprefix("each ").split()
@@ -65,7 +65,7 @@ def bounds(about: About) -> tuple[float, float]:
 
 
 def axes(about: About, count: int) -> Sequence[str]:
-    """Names of the entries of a vector, as the node tells them, or their numbers."""
-    _, _, told = about.constraints.partition("; ")
-    names = [name.strip() for name in told.split(",") if name.strip()]
+    """Return the names of a vector's entries from its constraints, or their numbers."""
+    _, _, listed = about.constraints.partition("; ")
+    names = [name.strip() for name in listed.split(",") if name.strip()]
     return names if len(names) == count else [str(number) for number in range(count)]

@@ -1,4 +1,4 @@
-"""Fields and sliders for every parameter of a node; they show what flies, refusals as well."""
+"""Fields and sliders for every parameter of a node, with active values and refusals."""
 
 from __future__ import annotations
 
@@ -12,8 +12,8 @@ from uam_lab.cockpit.commands import Later
 from uam_lab.cockpit.entry import axes, reach, text_of, value_of
 from uam_lab.cockpit.remote_parameters import About, RemoteParameters
 
-OPEN = ("lambda_1", "lambda_2")  # what is tuned most: on top, and unfolded
-INTERVAL = 0.15  # [s] of wall time between two changes that a slider asks for
+OPEN = ("lambda_1", "lambda_2")  # parameters at the top, unfolded
+INTERVAL = 0.15  # [s] minimum wall time between two requests of a slider
 Said = Callable[[bool, str], None]
 
 
@@ -26,7 +26,7 @@ class ParameterEntry:
         self._about, self._remote, self._later, self._said = about, remote, later, said
         self._name = about.name
         self._sent = 0.0
-        self._wanted: Any = None  # what sliders want, not asked for yet
+        self._desired: Any = None  # value of the sliders that is not yet requested
         value = remote.values[self._name]
         self._folder = gui.add_folder(self._label(value), expand_by_default=self._name in OPEN)
         self._sliders: list[viser.GuiSliderHandle] = []
@@ -60,7 +60,7 @@ class ParameterEntry:
             self._sliders.append(slider)
 
     def _entered(self, event: viser.GuiEvent) -> None:
-        if event.client is None:  # our own doing
+        if event.client is None:  # changed by this program, not by the user
             return
         text = self._field.value
         self._later(lambda: self._ask_for(text))
@@ -79,19 +79,19 @@ class ParameterEntry:
             return
         values = [slider.value for slider in self._sliders]
         vector = isinstance(self._remote.values[self._name], list)
-        wanted = values if vector else values[0]
+        desired = values if vector else values[0]
 
         def note() -> None:
-            self._wanted = wanted
+            self._desired = desired
 
         self._later(note)
 
     def look(self) -> None:
-        """Ask for what the sliders want, not at each of their steps."""
-        if self._wanted is None or time.monotonic() - self._sent < INTERVAL:
+        """Request the value of the sliders, at most once per INTERVAL."""
+        if self._desired is None or time.monotonic() - self._sent < INTERVAL:
             return
-        wanted, self._wanted = self._wanted, None
-        self._set(wanted)
+        desired, self._desired = self._desired, None
+        self._set(desired)
 
     def _set(self, value: Any) -> None:
         self._sent = time.monotonic()
@@ -112,13 +112,13 @@ class ParameterEntry:
         self.show(self._remote.values[self._name])
 
     def show(self, value: Any) -> None:
-        """Show the value that flies."""
+        """Show the active value."""
         self._remote.values[self._name] = value
         self._folder.label = self._label(value)
         shown = value if isinstance(value, bool) or self._about.choices else text_of(value)
         if self._field.value != shown:
             self._field.value = shown
-        if self._wanted is not None:
+        if self._desired is not None:
             return
         entries = value if isinstance(value, list) else [value]
         for slider, entry in zip(self._sliders, entries, strict=False):
@@ -138,7 +138,7 @@ class NodeGains:
         later: Later,
         said: Said,
     ):
-        """remote: loaded."""
+        """remote: after `load`."""
         self.remote = remote
         self._entries: dict[str, ParameterEntry] = {}
         with tab:
@@ -147,17 +147,17 @@ class NodeGains:
                     self._entries[name] = ParameterEntry(gui, about, remote, later, said)
 
     def look(self) -> None:
-        """Ask for what sliders want."""
+        """Request the values of moved sliders."""
         for entry in self._entries.values():
             entry.look()
 
     def changed(self, values: dict[str, Any]) -> None:
-        """Show what somebody else has changed."""
+        """Show values changed by another client."""
         for name, value in values.items():
             if name in self._entries and value is not None:
                 self._entries[name].show(value)
 
 
 def _escaped(text: str) -> str:
-    """Text as markdown and HTML show it literally."""
+    """Return text escaped for markdown and HTML."""
     return "".join(f"&#{ord(char)};" if char in "<>&*_`[]()#\\" else char for char in text)

@@ -1,4 +1,4 @@
-"""The headline of the page: how the vehicle is, what phase it is in, how large the errors are."""
+"""The headline of the page: state of the vehicle, phase of the mission, tracking errors."""
 
 from __future__ import annotations
 
@@ -10,11 +10,11 @@ from uam_lab.cockpit.vehicle_health import BAD, CAUTION, GOOD, UNKNOWN, Health, 
 
 COLOURS = {GOOD: "#1b8a5a", CAUTION: "#c77700", BAD: "#c62828", UNKNOWN: "#777777"}
 MARKS = {GOOD: "●", CAUTION: "▲", BAD: "■", UNKNOWN: "○"}
-SHOWN = 4  # nodes that are not well
+SHOWN = 4  # largest number of listed nodes with problems
 
 
 def headline(health: Health, limits: Mapping[str, list[float]]) -> str:
-    """The HTML; limits: pairs of config/views/cockpit.yaml by name."""
+    """Return the HTML; limits: pairs (caution, bad) of config/views/cockpit.yaml by name."""
     return "".join(
         (_banner(health), _errors(health, limits), _facts(health, limits), _nodes(health))
     )
@@ -58,8 +58,8 @@ def _errors(health: Health, limits: Mapping[str, list[float]]) -> str:
 def _facts(health: Health, limits: Mapping[str, list[float]]) -> str:
     autopilot, mission = health.autopilot, health.mission
     level = GOOD if autopilot is not None and autopilot.connected else CAUTION
-    said = "not heard" if autopilot is None else autopilot.summary
-    rows = [("autopilot", level, said)]
+    summary = "no message" if autopilot is None else autopilot.summary
+    rows = [("autopilot", level, summary)]
     if autopilot is not None and autopilot.reasons:
         rows.append(("", CAUTION, autopilot.reasons))
     if math.isfinite(health.battery):
@@ -77,7 +77,7 @@ def _facts(health: Health, limits: Mapping[str, list[float]]) -> str:
 def _nodes(health: Health) -> str:
     ailing = health.ailing()
     if not health.nodes:
-        return _table([("nodes", UNKNOWN, "none heard")])
+        return _table([("nodes", UNKNOWN, "no message")])
     if not ailing:
         return _table([("nodes", GOOD, f"all {len(health.nodes)} healthy")])
     rows = [(name, level, what) for name, level, what in ailing[:SHOWN]]

@@ -37,13 +37,13 @@ TUNED = {
     "mission": "Mission",
     "mavlink_bridge": "Bridge",
 }
-LINES = 6  # answers and changes kept on the page
-RETRY = 2.0  # [s] of wall time between two looks for nodes and services
+LINES = 6  # answers and changes shown on the page
+RETRY = 2.0  # [s] wall time between two searches for nodes and services
 LEFT_WIDTH, RIGHT_WIDTH = 330, 400  # [px]
 
 
 class Page:
-    """One page for one ROS domain; `look` is called again and again, by one thread."""
+    """One page for one ROS domain; one thread calls `look` periodically."""
 
     def __init__(
         self, server: viser.ViserServer, watch: Watch, services: Services, options: dict[str, Any]
@@ -79,7 +79,7 @@ class Page:
         self._tabs = {name: self._panel.add_tab(title) for name, title in TUNED.items()}
 
     def look(self) -> None:
-        """Show what is new, and do what was clicked."""
+        """Show new messages and process clicks."""
         while not self._todo.empty():
             self._todo.get()()
         self._services.look()
@@ -99,7 +99,7 @@ class Page:
             self._find_nodes()
 
     def say(self, done: bool, text: str) -> None:
-        """Put a line among the answers; at once before everyone's eyes if it is bad."""
+        """Add a line to the answers; a failure is also shown as a notification."""
         self._lines.appendleft(text)
         self._answers.content = "\n\n".join(self._lines)
         if not done:
@@ -142,7 +142,7 @@ class Page:
             health.track(np.array(message.position))
 
     def _changed(self, change: ParameterChange) -> None:
-        """Somebody asked a node for a change, perhaps this page."""
+        """Show an accepted change of parameters, of any client."""
         if not change.accepted:
             return
         new = {name: values[1] for name, values in change.values.items()}
@@ -155,7 +155,7 @@ class Page:
             self._gains[change.node].changed(new)
 
     def _find_nodes(self) -> None:
-        """Show the parameters of nodes that have come."""
+        """Load the parameters of nodes that have appeared."""
         for name in TUNED:
             if name in self._asked:
                 continue

@@ -1,4 +1,4 @@
-"""Where the page is: address and port."""
+"""Address and port of the page."""
 
 from __future__ import annotations
 
@@ -7,20 +7,20 @@ import socket
 
 LOCAL = "127.0.0.1"
 PORT = 8080
-TRIES = 100  # ports looked at from the one wished for
+TRIES = 100  # number of ports to try, from the given one on
 
 
 class PlaceError(OSError):
-    """The page cannot be served there; the message says why."""
+    """The page cannot be served at this address; the text gives the reason."""
 
 
 def address(host: str, port: int) -> str:
-    """The same, before it is served."""
+    """Return the URL of a page at `host` and `port`."""
     return f"http://{'localhost' if host in (LOCAL, '0.0.0.0') else host}:{port}"
 
 
 def free_port(host: str, port: int) -> int:
-    """The first free port of TRIES from `port` on, any for 0. Raises PlaceError."""
+    """Return the first free port of TRIES from `port` on, any for 0. Raises PlaceError."""
     for number in range(port, min(port + TRIES, 65536)) if port else (0,):
         try:
             with socket.create_server((host, number)) as probe:

@@ -1,4 +1,4 @@
-"""The parameters of another node: what they are, what they are set to, and changes to them."""
+"""The parameters of another node: descriptions, values, and changes."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ from uam_msgs_py.node.node_parameters import plain
 
 @dataclass(frozen=True)
 class About:
-    """What a node says of one parameter. choices: the words allowed, () where it is no word."""
+    """Description of one parameter. choices: the allowed words, () for other types."""
 
     name: str
     description: str
@@ -34,7 +34,7 @@ class About:
 
 
 class RemoteParameters:
-    """Parameters of one node. `known` holds them once `load` has been answered."""
+    """Parameters of one node. `known` contains their descriptions after `load`."""
 
     def __init__(self, services: Services, node: str):
         self.node = node
@@ -51,7 +51,7 @@ class RemoteParameters:
         return self._services.ready(ListParameters, f"/{self.node}/list_parameters")
 
     def load(self, done: Callable[[str], None]) -> None:
-        """Ask for everything; done("") when it is there, or done(why not)."""
+        """Request descriptions and values; then call done(""), or done(reason) on failure."""
 
         def listed(response: ListParameters.Response | None, why: str) -> None:
             if why:
@@ -71,7 +71,7 @@ class RemoteParameters:
         self._call(ListParameters, "list_parameters", ListParameters.Request(), listed)
 
     def refresh(self, done: Callable[[str], None]) -> None:
-        """Ask for the values anew."""
+        """Request the values again; then call done(""), or done(reason) on failure."""
         names = list(self.known)
 
         def got(response: GetParameters.Response | None, why: str) -> None:
@@ -83,7 +83,7 @@ class RemoteParameters:
         self._call(GetParameters, "get_parameters", GetParameters.Request(names=names), got)
 
     def set(self, changes: Mapping[str, Any], done: Callable[[str], None]) -> None:
-        """Ask for changes as a whole; done("") when they count, or done(the reason)."""
+        """Request changes as a whole; then call done(""), or done(reason) if refused."""
 
         def answered(response: SetParametersAtomically.Response | None, why: str) -> None:
             if not why and not response.result.successful:

@@ -1,4 +1,4 @@
-"""Calls of services that do not wait: the answer comes when it comes, or why none did."""
+"""Asynchronous service calls: a callback gets the response, or the reason of a failure."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ Answer = Callable[[Any, str], None]
 
 
 class Services:
-    """Clients of one node, kept once made. `look` hands out answers, in the caller's thread."""
+    """Service clients of one node. `look` calls the callbacks, in the thread of its caller."""
 
     def __init__(self, node: Node):
         self._node = node
@@ -22,26 +22,26 @@ class Services:
         self._open: list[tuple[Any, Any, float, Answer]] = []
 
     def client(self, kind: type, name: str) -> Any:
-        """The client of the service `name`."""
+        """Return the client of the service `name`; create it if necessary."""
         if name not in self._clients:
             self._clients[name] = self._node.create_client(kind, name)
         return self._clients[name]
 
     def ready(self, kind: type, name: str) -> bool:
-        """Whether somebody offers it."""
+        """Return whether a node offers the service."""
         return self.client(kind, name).service_is_ready()
 
     def call(self, kind: type, name: str, request: Any, answer: Answer) -> None:
-        """Call it; answer(response, "") or answer(None, why not) comes later, from `look`."""
+        """Call a service; `look` later calls answer(response, "") or answer(None, reason)."""
         client = self.client(kind, name)
         if not client.service_is_ready():
-            answer(None, f"{name} is not there")
+            answer(None, f"{name}: service not found")
             return
         end = time.monotonic() + PATIENCE
         self._open.append((client, client.call_async(request), end, answer))
 
     def look(self) -> None:
-        """Hand out what has come."""
+        """Call the callbacks of received responses and of expired requests."""
         now = time.monotonic()
         still, self._open = self._open, []
         for client, future, end, answer in still:
@@ -49,6 +49,6 @@ class Services:
                 answer(future.result(), "")
             elif now > end:
                 client.remove_pending_request(future)
-                answer(None, f"{client.srv_name} does not answer")
+                answer(None, f"{client.srv_name}: no response")
             else:
                 self._open.append((client, future, end, answer))

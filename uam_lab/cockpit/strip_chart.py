@@ -1,4 +1,4 @@
-"""Charts whose time runs on: the last seconds of a few series."""
+"""Strip charts: the last seconds of a few series."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ HEIGHT = 150  # [px]
 
 @dataclass(frozen=True)
 class Chart:
-    """title with unit; names of its series; logarithmic: the axis."""
+    """title: with unit; names: of the series; logarithmic: scale of the y axis."""
 
     title: str
     names: tuple[str, ...]
@@ -25,10 +25,10 @@ class Chart:
 
 
 class StripChart:
-    """One chart of the page; `add` samples, `draw` now and then."""
+    """One chart of the page: `add` stores samples, `draw` sends them to the page."""
 
     def __init__(self, gui: viser.GuiApi, chart: Chart, window: float, interval: float):
-        """window [s] shown; interval [s]: least time between two samples that are kept."""
+        """window: shown time [s]; interval: minimum time between two stored samples [s]."""
         self._chart, self._window, self._interval = chart, window, interval
         self._rows: deque[tuple[float, ...]] = deque()
         series = [uplot.Series(label="t [s]")]
@@ -49,7 +49,7 @@ class StripChart:
         self._new = False
 
     def add(self, time: float, values: Sequence[float]) -> None:
-        """Take a sample; what does not fit the chart or is not finite is left out."""
+        """Store a sample (n,) at time [s]; ignore it if its length is wrong or it is not finite."""
         rows = self._rows
         if len(values) != len(self._chart.names) or not np.all(np.isfinite(values)):
             return
@@ -63,7 +63,7 @@ class StripChart:
         self._new = True
 
     def draw(self) -> None:
-        """Send the page what is new."""
+        """Send new samples to the page."""
         if not self._new:
             return
         self._new = False

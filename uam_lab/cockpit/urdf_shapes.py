@@ -1,4 +1,4 @@
-"""What a URDF looks like: the boxes, cylinders and spheres of its links."""
+"""The visual shapes of a URDF: boxes, cylinders and spheres of its links."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ class Shape:
 
 
 def shapes(urdf: str) -> list[Shape]:
-    """The shapes of a URDF text; none for what is no URDF. Meshes are left out."""
+    """Return the shapes of a URDF text without meshes; none for an invalid text."""
     try:
         robot = ElementTree.fromstring(urdf)
         return [shape for link in robot.iter("link") for shape in _of_link(link)]
@@ -64,5 +64,5 @@ def _colour(visual: ElementTree.Element) -> tuple[float, ...]:
 
 
 def _numbers(text: str | None, count: int) -> np.ndarray:
-    """Numbers of an attribute; zeros (count,) where it is missing. Raises ValueError."""
+    """Return the numbers of an attribute; zeros (count,) if it is missing. Raises ValueError."""
     return np.zeros(count) if text is None else np.array(text.split(), dtype=float)

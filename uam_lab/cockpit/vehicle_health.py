@@ -1,4 +1,4 @@
-"""How the vehicle is, from what its nodes say: the facts behind the page's headline."""
+"""State of the vehicle from the status messages of its nodes, for the page's headline."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ ORDER = (UNKNOWN, GOOD, CAUTION, BAD)
 
 @dataclass
 class NodeHealth:
-    """What one node said last of itself; heard: time.monotonic() [s]."""
+    """Last diagnostics of one node; heard: time.monotonic() of the message [s]."""
 
     level: str
     summary: str
@@ -29,7 +29,7 @@ class NodeHealth:
 
 @dataclass
 class Health:
-    """What was last heard; `silent_after` [s] of wall time counts as lost."""
+    """Last received states; a node counts as lost after `silent_after` [s] wall time."""
 
     silent_after: float
     mission: MissionStatus | None = None
@@ -39,23 +39,23 @@ class Health:
     nodes: dict[str, NodeHealth] = field(default_factory=dict)
     saturated: set[str] = field(default_factory=set)
     frozen: set[str] = field(default_factory=set)
-    silence: float | None = None  # [s] of wall time without a word of the control loop
+    silence: float | None = None  # [s] wall time since the last message of the control loop
     errors: tuple[float, float, float] = (math.nan,) * 3  # norms: [m], [rad], [rad]
-    _tracked: bool = False  # whether the errors come often, from /uam/tracking/error
+    _tracked: bool = False  # whether the errors come from /uam/tracking/error
 
     def hear(self, mission: MissionStatus) -> None:
-        """Take the mission's status, twice a second."""
+        """Store the mission's status, which comes twice per second."""
         self.mission = mission
         if not self._tracked:
             self.errors = mission.position_error, mission.attitude_error, mission.arm_error
 
     def track(self, error: np.ndarray) -> None:
-        """Take estimate - reference, chi (8,)."""
+        """Store the tracking error, estimate - reference: chi (8,), m and rad."""
         self._tracked = True
         self.errors = tuple(float(np.linalg.norm(error[p])) for p in (POSITION, ATTITUDE, ARM))
 
     def diagnose(self, message: DiagnosticArray) -> None:
-        """Take a message of /diagnostics."""
+        """Store a message of /diagnostics."""
         for status in message.status:
             level = LEVELS.get(status.level, BAD)
             self.nodes[status.name] = NodeHealth(level, status.message, time.monotonic())
@@ -67,7 +67,7 @@ class Health:
                     change(self.saturated, status.name)
 
     def state(self) -> tuple[str, str, str]:
-        """How the flight is: level, a few words, and why, "" where there is nothing to say."""
+        """Return level, text and reason ("" without one) of the flight's state."""
         mission, silence = self.mission, self.silence
         if mission is None or silence is None:
             return UNKNOWN, "waiting for a flight", ""
@@ -84,7 +84,7 @@ class Health:
         return GOOD, mission.phase, ""
 
     def ailing(self) -> list[tuple[str, str, str]]:
-        """(node, level, what is wrong) of nodes that are not well, worst first."""
+        """Return (node, level, problem) of the nodes with problems, worst first."""
         found = []
         for name, node in self.nodes.items():
             gone = time.monotonic() - node.heard
@@ -96,7 +96,7 @@ class Health:
 
 
 def grade(value: float, caution: float, bad: float) -> str:
-    """The level of a value that is better the smaller; the larger where caution > bad."""
+    """Return the level of a value: large values are bad, or small ones if caution > bad."""
     if not math.isfinite(value):
         return UNKNOWN
     worse = value.__ge__ if caution < bad else value.__le__

@@ -13,14 +13,14 @@ from uam_lab.cockpit.urdf_shapes import Shape, shapes
 from uam_msgs_py.messages.topics import WORLD
 from uam_msgs_py.messages.transforms import Transform
 
-REFERENCE = "reference"  # the frame that the mission asks for
+REFERENCE = "reference"  # frame of the desired pose
 GROUND = 12.0  # [m] edge of the floor shown
 CELL = 0.25  # [m]
 AXES = 0.12  # [m] of the reference frame
 
 
 class VehicleView:
-    """Keeps viser's scene like the last messages. Frames appear when their parents are known."""
+    """Shows the last messages in viser's scene. A frame appears when its parent is known."""
 
     def __init__(self, scene: viser.SceneApi):
         self._scene = scene
@@ -30,13 +30,13 @@ class VehicleView:
         self._shapes: dict[str, list[Shape]] = {}
         self._markers: dict[str, Any] = {}
         self._lines: dict[str, bytes] = {}
-        self.vehicle = np.zeros(3)  # position [m, world] of the frame that hangs on the world first
+        self.vehicle = np.zeros(3)  # position [m, world] of the vehicle's base frame
         scene.add_grid(
             f"/{WORLD}/ground", width=GROUND, height=GROUND, cell_size=CELL, section_size=1.0
         )
 
     def describe(self, message: String) -> None:
-        """std_msgs/String: the URDF."""
+        """Take the URDF of a std_msgs/String."""
         by_link: dict[str, list[Shape]] = {}
         for shape in shapes(message.data):
             by_link.setdefault(shape.link, []).append(shape)
@@ -46,7 +46,7 @@ class VehicleView:
                 self._dress(link)
 
     def transforms(self, transforms: list[Transform]) -> None:
-        """What /tf or /tf_static says."""
+        """Apply transforms of /tf or /tf_static."""
         for transform in transforms:
             self._orphans[transform.child] = transform
         placed = True
@@ -88,7 +88,7 @@ class VehicleView:
                 self._scene.add_icosphere(name, radius=shape.size[0], **look)
 
     def markers(self, message: MarkerArray) -> None:
-        """visualization_msgs/MarkerArray, as far as the stack's scene node uses it."""
+        """Show a visualization_msgs/MarkerArray, with the types used by the scene node."""
         for marker in message.markers:
             name, frame = marker.ns, marker.header.frame_id
             if marker.action == Marker.DELETE:

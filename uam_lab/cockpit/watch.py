@@ -1,4 +1,4 @@
-"""The newest message of each topic that the page shows: taken when looked at, not called back."""
+"""Subscriptions of the page: polled for the newest message of each topic, without callbacks."""
 
 from __future__ import annotations
 
@@ -14,8 +14,8 @@ from uam_msgs_py.messages.topics import Topic
 from uam_msgs_py.node.polling import listen, messages
 
 # Before the first tick of a simulated flight every publisher of the control loop counts its
-# listeners. So that this one never stands in for another it listens to these from the start only,
-# and to the others when the mission has begun.
+# subscribers. The cockpit must not be counted in place of another node, so it subscribes to LATE
+# only after the mission's first status.
 EARLY = (
     topics.MISSION_STATUS,
     topics.AUTOPILOT_STATE,
@@ -38,12 +38,12 @@ LATE = (
     topics.AUTOPILOT_BATTERY,
     topics.CLOCK,
 )
-SERIALIZED = (topics.TF, topics.TF_STATIC)  # where tf2_msgs is not installed there is no other way
+SERIALIZED = (topics.TF, topics.TF_STATIC)  # taken raw: tf2_msgs may not be installed
 WHOLE = (topics.DIAGNOSTICS, topics.CHANGES, topics.TF, topics.TF_STATIC)  # each message counts
 
 
 class Watch:
-    """Looks at the topics through `node`, which nobody spins."""
+    """Polls the topics through `node`, which is not spun."""
 
     def __init__(self, node: Node):
         self._node = node
@@ -58,7 +58,7 @@ class Watch:
         self._subscriptions[topic] = listen(self._node, topic, qos, raw=topic in SERIALIZED)
 
     def look(self, show: Callable[[Topic, Any], None]) -> None:
-        """show(topic, message) for what is new: all of WHOLE, of the others the newest."""
+        """Call show(topic, message) for new messages: all of WHOLE, the newest of the others."""
         for topic, subscription in self._subscriptions.items():
             newest = None
             for message in messages(subscription):
@@ -77,9 +77,9 @@ class Watch:
 
     @property
     def silence(self) -> float | None:
-        """Seconds of wall time since the last message of the control loop; None before the first.
+        """Wall time [s] since the last message of the control loop; None before the first.
 
-        What nodes say of themselves does not count.
+        Topics of WHOLE do not count.
         """
         arrivals = [at for topic, at in self._arrivals.items() if topic not in WHOLE]
         return time.monotonic() - max(arrivals) if arrivals else None

@@ -1,4 +1,4 @@
-"""The page's server: where it listens, and whom it talks to."""
+"""The server of the page: address, port and allowed origins."""
 
 from __future__ import annotations
 
@@ -29,13 +29,13 @@ def serve(host: str, port: int, label: str, origins: Sequence[str] = ()) -> vise
 
 
 def url(server: viser.ViserServer) -> str:
-    """Where a browser on this machine finds the page."""
+    """Return the URL of the page for a browser on this machine."""
     return address(server.get_host(), server.get_port())
 
 
 def _own_origins(host: str, port: int) -> list[str | re.Pattern[str]]:
     names = {"localhost", LOCAL, host}
-    if host not in ("localhost", LOCAL):  # asked to be reached from elsewhere, by its names
+    if host not in ("localhost", LOCAL):  # reachable from other computers, by these names
         names |= {socket.gethostname(), socket.getfqdn()}
         with contextlib.suppress(OSError):
             names |= set(socket.gethostbyname_ex(socket.gethostname())[2])
@@ -44,7 +44,7 @@ def _own_origins(host: str, port: int) -> list[str | re.Pattern[str]]:
 
 @contextlib.contextmanager
 def _origins(allowed: Sequence[str | re.Pattern[str] | None]) -> Iterator[None]:
-    """viser has no option for origins; the library beneath it has."""
+    """Set the allowed origins in websockets, as viser has no option for them."""
     plain = websockets.asyncio.server.serve
     websockets.asyncio.server.serve = functools.partial(plain, origins=list(allowed))
     try:

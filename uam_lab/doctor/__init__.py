@@ -1,5 +1,5 @@
-"""`uam doctor`: is everything here that a flight needs, and what to do where it is not.
+"""`uam doctor`: check the requirements of a flight, with advice for each problem.
 
-One module per group of checks; each has `checks(...)`, which yields findings and raises nothing.
-What may hang or take its process with it (ROS, OpenGL) runs in a child with a time limit.
+One module per group of checks; each has `checks(...)`, which yields findings. Checks that may hang
+or crash (ROS, OpenGL) run in a child process with a time limit.
 """

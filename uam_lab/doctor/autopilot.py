@@ -1,4 +1,4 @@
-"""The autopilot: does one answer at a link, which, and is PX4 in software there to be started."""
+"""Checks of the autopilot: the one at a link, and an installation of PX4 in software."""
 
 from __future__ import annotations
 
@@ -14,36 +14,36 @@ from uam_sim_bridge.mavlink.transport.transport import Transport, open_transport
 from uam_sim_bridge.ports import PortError
 from uam_sim_bridge.px4.px4_installation import VARIABLE, Px4Error, Px4Installation
 
-PATIENCE = 5.0  # [s] for a heartbeat, which comes once a second
+PATIENCE = 5.0  # [s] for a heartbeat (sent once per second)
 VERSION_PATIENCE = 2.0  # [s] for AUTOPILOT_VERSION after it
 BEAT, POLL = 0.5, 0.01  # [s]
-OWN_SYSTEM = 254  # nobody's: a ground station is 255, autopilots count from 1
+OWN_SYSTEM = 254  # system id: unused, a ground station has 255, autopilots count from 1
 RELEASES = ((255, ""), (192, " rc"), (128, " beta"), (64, " alpha"), (0, " dev"))
 
 
 @dataclass
 class Heard:
-    """What came over a link. heartbeat: the first one of an autopilot; system: its sender."""
+    """Messages received over a link. heartbeat: newest of the autopilot; system: its id."""
 
     heartbeat: Message | None = None
     system: int = 0
     version: Message | None = None
     bytes: int = 0
-    others: set[str] = field(default_factory=set)  # types of messages of others
+    others: set[str] = field(default_factory=set)  # message types of other senders
 
 
 def checks(url: str = "") -> Iterator[Finding]:
-    """Findings about PX4 in software and, where `url` is given, the autopilot at that link."""
+    """Yield the findings about PX4 in software and, with `url`, about the autopilot there."""
     yield px4()
     if url:
         yield link(url)
 
 
 def px4(directory: str | None = None) -> Finding:
-    """Whether PX4_SITL_DIR (or `directory`) holds a PX4 that `--autopilot px4` could start."""
+    """Check for a PX4 for `--autopilot px4` in PX4_SITL_DIR or `directory`."""
     given = directory or os.environ.get(VARIABLE, "")
     if not given:
-        return ok("PX4", f"{VARIABLE} is not set, as only --autopilot px4 needs it")
+        return ok("PX4", f"{VARIABLE} is not set; only --autopilot px4 needs it")
     try:
         return ok("PX4", f"{VARIABLE}: {Px4Installation.find(given).directory}")
     except Px4Error as error:
@@ -53,11 +53,11 @@ def px4(directory: str | None = None) -> Finding:
 
 
 def link(url: str, patience: float = PATIENCE) -> Finding:
-    """Who answers at `url` within `patience` [s]."""
+    """Check for an autopilot at `url`, for at most `patience` [s]."""
     try:
         transport = open_transport(url)
     except PortError as error:
-        return fail("autopilot", str(error), "give another URL, or end who has the port or device")
+        return fail("autopilot", str(error), "give another URL, or end the program that uses it")
     try:
         heard = listen(transport, patience)
     finally:
@@ -68,12 +68,12 @@ def link(url: str, patience: float = PATIENCE) -> Finding:
 
 
 def listen(transport: Transport, patience: float) -> Heard:
-    """Beat, wait for an autopilot's heartbeat, then ask for its version."""
+    """Send heartbeats, wait for the heartbeat of an autopilot, then request its version."""
     codec = Codec(OWN_SYSTEM, mavlink2.MAV_COMP_ID_ONBOARD_COMPUTER)
     framer, heard = Framer(codec), Heard()
     end, beat = time.monotonic() + patience, 0.0
     while (now := time.monotonic()) < end and heard.version is None:
-        if now >= beat:  # a UDP peer learns from it where we are
+        if now >= beat:  # a UDP peer gets the address from it
             beat = now + BEAT
             transport.send(codec.encode(_heartbeat()))
             if heard.heartbeat is not None:
@@ -101,7 +101,7 @@ def _take(heard: Heard, message: Message) -> None:
 
 
 def describe(url: str, heard: Heard) -> Finding:
-    """The autopilot that answered."""
+    """Return the finding about the autopilot that answered."""
     beat = heard.heartbeat
     kind = _name("MAV_AUTOPILOT", beat.autopilot)
     armed = "armed" if beat.base_mode & mavlink2.MAV_MODE_FLAG_SAFETY_ARMED else "disarmed"
@@ -110,21 +110,21 @@ def describe(url: str, heard: Heard) -> Finding:
     firmware = (
         f"firmware {version(heard.version.flight_sw_version)}"
         if heard.version
-        else ("no word about its firmware")
+        else ("firmware version not sent")
     )
     found = (
         f"{url}: system {heard.system}, {kind}, {_name('MAV_TYPE', beat.type)}, mode {mode}, "
         f"{armed}, {firmware}"
     )
     if not px4_like:
-        return warn("autopilot", found, "the bridge speaks PX4's modes and parameters: docs/px4.md")
+        return warn("autopilot", found, "the bridge uses PX4's modes and parameters: docs/px4.md")
     if armed == "armed":
         return warn("autopilot", f"{found}: ARMED", "mind the propellers; disarm before a flight")
     return ok("autopilot", found)
 
 
 def version(number: int) -> str:
-    """AUTOPILOT_VERSION.flight_sw_version in words, as "1.16.0" or "1.15.0 beta"."""
+    """Return AUTOPILOT_VERSION.flight_sw_version as text, as "1.16.0" or "1.15.0 beta"."""
     major, minor, patch, kind = number.to_bytes(4, "big")
     release = next(word for least, word in RELEASES if kind >= least)
     return f"{major}.{minor}.{patch}{release}"
@@ -132,19 +132,19 @@ def version(number: int) -> str:
 
 def _silent(url: str, heard: Heard, patience: float) -> Finding:
     if heard.others:
-        found = f"messages ({', '.join(sorted(heard.others)[:4])}), but no autopilot's heartbeat"
-        advice = "the link leads to something else: a camera, a radio, a ground station?"
+        found = f"messages ({', '.join(sorted(heard.others)[:4])}), but no autopilot heartbeat"
+        advice = "check what is connected: a camera, a radio, a ground station?"
     elif heard.bytes:
-        found = f"{heard.bytes} bytes that are no MAVLink"
+        found = f"{heard.bytes} bytes, but no MAVLink"
         advice = "check the baud rate, and that the port is set to MAVLink (MAV_0_CONFIG ...)"
     else:
         found = "nothing"
-        advice = "is it on, is the port the right one, does a firewall or another program take it?"
+        advice = "check power, port number, firewall, and other programs that use the port"
     return fail("autopilot", f"{url}: {found} within {patience:g} s", advice)
 
 
 def _name(table: str, value: int) -> str:
-    """A MAVLink constant in words, as "px4" for MAV_AUTOPILOT 12."""
+    """Return the name of a MAVLink constant, as "px4" for MAV_AUTOPILOT 12."""
     entry = mavlink2.enums[table].get(value)
     text = entry.name if entry is not None else f"{table}_{value}"
     return text.removeprefix(f"{table}_").lower().replace("_", " ")

@@ -1,4 +1,4 @@
-"""Runs a part of a check in a process of its own, for a bounded time."""
+"""Runs a part of a check in a separate process, with a time limit."""
 
 from __future__ import annotations
 
@@ -16,15 +16,15 @@ TOO_LATE = "no end within"
 
 @dataclass(frozen=True)
 class Said:
-    """What a child said: `facts`, its lines of JSON put together; `problem`: why it did not end
-    well, empty if it did."""
+    """Output of a child: `facts`: its lines of JSON, merged; `problem`: reason of a failure, empty
+    without one."""
 
     facts: dict[str, Any]
     problem: str = ""
 
 
 class CheckProcess:
-    """`python -m module arguments...`. A context manager: nothing survives the `with` block."""
+    """`python -m module arguments...`. Context manager: the process ends with the `with` block."""
 
     def __init__(
         self,
@@ -32,7 +32,7 @@ class CheckProcess:
         arguments: Sequence[str] = (),
         environment: Mapping[str, str] | None = None,
     ):
-        """environment: variables on top of this process's own."""
+        """environment: variables in addition to those of this process."""
         self._process = subprocess.Popen(
             [sys.executable, "-m", module, *arguments],
             env={**os.environ, **(environment or {})},
@@ -41,11 +41,11 @@ class CheckProcess:
             stderr=subprocess.STDOUT,
             text=True,
             errors="replace",
-            process_group=0,  # Ctrl-C ends us, and we end it
+            process_group=0,  # Ctrl-C reaches only the parent, which ends the child
         )
 
     def wait(self, seconds: float) -> Said:
-        """What it said when it has ended, or was ended after `seconds`."""
+        """Wait for the end, kill the process after `seconds`; return its output."""
         problem = ""
         try:
             text, _ = self._process.communicate(timeout=seconds)
@@ -74,7 +74,7 @@ class CheckProcess:
 
 
 def _sorted(text: str) -> tuple[dict[str, Any], list[str]]:
-    """The lines that are JSON objects, put together, and the others that are not empty."""
+    """Return the JSON objects among the lines, merged, and the other non-empty lines."""
     facts, others = {}, []
     for line in text.splitlines():
         try:
@@ -89,5 +89,5 @@ def _sorted(text: str) -> tuple[dict[str, Any], list[str]]:
 
 
 def say(**facts: Any) -> None:
-    """In the child: tell `facts`."""
+    """In the child: print `facts` as a line of JSON."""
     print(json.dumps(facts), flush=True)

@@ -1,4 +1,4 @@
-"""Environment variables that change how nodes find each other, often left over from other work."""
+"""Checks of environment variables that change the discovery of nodes."""
 
 from __future__ import annotations
 
@@ -9,11 +9,11 @@ from uam_lab.doctor.finding import Finding, fail, ok, warn
 from uam_lab.processes.node_environment import PROFILES_FILE
 from uam_sim_bridge.ports import LAST_DOMAIN
 
-BY_HAND = "flights have a domain of their own; nodes started by hand"
+BY_HAND = "uam fly sets its own domain; nodes started by hand"
 
 
 def checks(surroundings: Mapping[str, str]) -> Iterator[Finding]:
-    """One finding for each variable that is set; one for all where none is."""
+    """Yield one finding per set variable, or one for all if none is set."""
     found = [
         check(name, surroundings[name])
         for name, check in VARIABLES.items()
@@ -49,8 +49,8 @@ def _profiles(name: str, value: str) -> Finding:
         return fail("environment", f"{name}={value} is no file", f"unset {name}")
     return warn(
         "environment",
-        f"{name}={value} takes the place of config/dds/fastdds.xml: smaller buffers lose messages",
-        f"unset {name}, unless it is meant",
+        f"{name}={value} replaces config/dds/fastdds.xml: smaller buffers lose messages",
+        f"unset {name}, unless it is intended",
     )
 
 
@@ -61,20 +61,20 @@ def _local_only(name: str, value: str) -> Finding:
         "environment",
         f"{name}={value} is deprecated and overrides "
         "ROS_AUTOMATIC_DISCOVERY_RANGE: no other computer is found",
-        f"flights do not mind; for a vehicle: unset {name}",
+        f"no effect on uam fly; for a vehicle: unset {name}",
     )
 
 
 def _range(name: str, value: str) -> Finding:
     if value in ("SUBNET", "LOCALHOST", "SYSTEM_DEFAULT"):
         return ok("environment", f"{name}={value}: {BY_HAND} use it")
-    return warn("environment", f"{name}={value}: {BY_HAND} find nobody", f"unset {name}")
+    return warn("environment", f"{name}={value}: {BY_HAND} find no other node", f"unset {name}")
 
 
 def _server(name: str, value: str) -> Finding:
     return warn(
         "environment",
-        f"{name}={value}: nodes look for each other at that server alone",
+        f"{name}={value}: nodes use only that server for discovery",
         f"unset {name}, or start the server",
     )
 
@@ -82,12 +82,12 @@ def _server(name: str, value: str) -> Finding:
 def _transports(name: str, value: str) -> Finding:
     return warn(
         "environment",
-        f"{name}={value} changes how messages travel",
-        f"unset {name}, unless it is meant",
+        f"{name}={value} changes the transport of messages",
+        f"unset {name}, unless it is intended",
     )
 
 
-# name → what it means to have it set; asked only for those that are
+# name → check of its value, for the variables that are set
 VARIABLES: dict[str, Callable[[str, str], Finding]] = {
     "ROS_DOMAIN_ID": _domain,
     "RMW_IMPLEMENTATION": _middleware,

@@ -1,4 +1,4 @@
-"""What a check has found: a verdict, one line of what is there, one line of what to do."""
+"""Result of a check: a verdict, one line with the finding, one line with advice."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ class Verdict(Enum):
 
 @dataclass(frozen=True)
 class Finding:
-    """One check's result; `advice` is empty where nothing is to be done."""
+    """Result of one check; `advice` is empty if no action is needed."""
 
     check: str
     verdict: Verdict
@@ -25,20 +25,20 @@ class Finding:
 
 
 def ok(check: str, found: str) -> Finding:
-    """All is well."""
+    """Return a finding without a problem."""
     return Finding(check, Verdict.OK, one_line(found))
 
 
 def warn(check: str, found: str, advice: str) -> Finding:
-    """Flights work, but not as well as they might."""
+    """Return a finding with a problem that does not prevent flights."""
     return Finding(check, Verdict.WARN, one_line(found), one_line(advice))
 
 
 def fail(check: str, found: str, advice: str) -> Finding:
-    """Something will not work."""
+    """Return a finding with a problem that prevents some function."""
     return Finding(check, Verdict.FAIL, one_line(found), one_line(advice))
 
 
 def one_line(text: str) -> str:
-    """The text without line breaks, as error messages of others may have them."""
+    """Return the text without line breaks, which messages of libraries may have."""
     return " ".join(text.split())

@@ -1,4 +1,4 @@
-"""Child of the rendering check: one picture of the vehicle, without a screen.
+"""Child process of the rendering check: render one picture of the vehicle, without a screen.
 
 MUJOCO_GL=egl python -m uam_lab.doctor.frame
 """
@@ -15,7 +15,7 @@ FRAMES = 3
 
 
 def main() -> int:
-    """Render, tell with what and how fast; returns the exit status."""
+    """Render; print the renderer and its speed; return the exit status."""
     try:
         import mujoco
 
@@ -36,14 +36,14 @@ def main() -> int:
             device=_device(),
         )
         renderer.close()
-    except Exception as error:  # MuJoCo, PyOpenGL and GLFW each have their own
+    except Exception as error:  # MuJoCo, PyOpenGL and GLFW raise different types
         print(f"{type(error).__name__}: {error}".splitlines()[0])
         return 1
     return 0
 
 
 def _device() -> str:
-    """What OpenGL calls its renderer, empty where it does not tell."""
+    """Return the name of OpenGL's renderer, empty if unknown."""
     try:
         from OpenGL import GL
 

@@ -1,4 +1,4 @@
-"""Which processes hold a port or a lock: the user's own processes, or all of them for root."""
+"""Processes that hold a port or a lock: those of the user, or all of them for root."""
 
 from __future__ import annotations
 
@@ -10,14 +10,14 @@ from uam_lab.processes.process_table import command, node_name
 
 
 def of_port(protocol: str, port: int) -> list[str]:
-    """Processes with a socket at local `port`; protocol: tcp or udp. Empty if that is unknown."""
+    """Return the processes with a socket at local `port`; protocol: tcp or udp. May be empty."""
     sockets = psutil.net_connections(kind=protocol)
     found = {one.pid for one in sockets if one.pid and one.laddr and one.laddr.port == port}
     return [name_of(pid) for pid in sorted(found)]
 
 
 def of_file(path: Path) -> list[str]:
-    """Processes that have the file open."""
+    """Return the processes that have the file open."""
     return [name_of(one.pid) for one in psutil.process_iter() if str(path) in _open_files(one)]
 
 
@@ -29,7 +29,7 @@ def _open_files(process: psutil.Process) -> set[str]:
 
 
 def name_of(pid: int) -> str:
-    """As "mujoco_sim (process 4711)"."""
+    """Return name and pid, as "mujoco_sim (process 4711)"."""
     try:
         process = psutil.Process(pid)
     except psutil.NoSuchProcess:

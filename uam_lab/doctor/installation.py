@@ -1,4 +1,4 @@
-"""Python, packages, configuration, compiled control path."""
+"""Checks of the installation: Python, packages, configuration, compiled control path."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ AGAIN = "make setup, or pip install again"
 
 
 def checks() -> Iterator[Finding]:
-    """Findings about the installation."""
+    """Yield the findings about the installation."""
     yield python(sys.version_info[:3])
     yield packages(_requirements())
     yield config()
@@ -29,40 +29,40 @@ def checks() -> Iterator[Finding]:
 
 
 def python(version: tuple[int, ...]) -> Finding:
-    """Whether the interpreter, of `version`, is new enough."""
+    """Check that the interpreter, of `version`, is new enough."""
     found = f"{platform.python_implementation()} {'.'.join(map(str, version))} at {sys.executable}"
     if version[:2] < PYTHON:
-        wanted = ".".join(map(str, PYTHON))
-        return fail("python", found, f"Python {wanted} or newer is needed: make PYTHON=... setup")
+        least = ".".join(map(str, PYTHON))
+        return fail("python", found, f"Python {least} or newer is needed: make PYTHON=... setup")
     return ok("python", found)
 
 
 def packages(requirements: Iterable[str] | None) -> Finding:
-    """Whether every package is there in a version that is wanted; None: nobody knows which."""
+    """Check the version of every required package; requirements: None if unknown."""
     if requirements is None:
-        return warn("packages", f"{NAME} is not installed: no list of what it needs", AGAIN)
+        return warn("packages", f"{NAME} is not installed: its requirements are unknown", AGAIN)
     missing, wrong, count = [], [], 0
     for line in requirements:
         try:
-            wanted = Requirement(line)
+            required = Requirement(line)
         except InvalidRequirement:
             continue
-        if wanted.marker is not None and not wanted.marker.evaluate({"extra": ""}):
+        if required.marker is not None and not required.marker.evaluate({"extra": ""}):
             continue
         count += 1
         try:
-            version = metadata.version(wanted.name)
+            version = metadata.version(required.name)
         except metadata.PackageNotFoundError:
-            missing.append(f"{wanted.name}{wanted.specifier}")
+            missing.append(f"{required.name}{required.specifier}")
             continue
-        if not wanted.specifier.contains(version, prereleases=True):
-            wrong.append(f"{wanted.name} {version}, wanted {wanted.specifier}")
+        if not required.specifier.contains(version, prereleases=True):
+            wrong.append(f"{required.name} {version}, required {required.specifier}")
     if missing or wrong:
         found = "; ".join([f"missing: {', '.join(missing)}"] * bool(missing) + wrong)
-        lines = [*missing, *(re.sub(r" .*wanted ", "", text) for text in wrong)]
+        lines = [*missing, *(re.sub(r" .*required ", "", text) for text in wrong)]
         quoted = " ".join(f'"{line}"' for line in lines)
         return fail("packages", found, f"{sys.executable} -m pip install {quoted}")
-    return ok("packages", f"{NAME} {metadata.version(NAME)} and the {count} packages it needs")
+    return ok("packages", f"{NAME} {metadata.version(NAME)} and {count} required packages")
 
 
 def _requirements() -> list[str] | None:
@@ -73,7 +73,7 @@ def _requirements() -> list[str] | None:
 
 
 def config() -> Finding:
-    """Whether the files of config/ are found, and the default profile and scenario can be read."""
+    """Check that config/ is found and that the default profile and scenario can be read."""
     from uam_control.mission import ScenarioError, load_scenario
     from uam_control.profiles.profile import ProfileError, load_profile
 
@@ -86,14 +86,14 @@ def config() -> Finding:
 
 
 def control_path() -> Finding:
-    """Whether the control path is compiled already."""
+    """Check that the control path is compiled."""
     from uam_lab.flight.direct.warm_up import compiled_functions, is_cold
 
     if compiled.numba is None:
         return warn(
             "compiled",
             "numba is missing: the control path runs as plain Python",
-            "flights work, slower: pip install numba",
+            "flights work, but slowly: pip install numba",
         )
     count = sum(1 for _ in compiled_functions())
     if count == 0:
@@ -102,6 +102,6 @@ def control_path() -> Finding:
         return warn(
             "compiled",
             "the control path is not compiled yet",
-            "nothing to do: the next flight compiles it once, in a minute or so",
+            "no action needed: the next flight compiles it once, in about a minute",
         )
     return ok("compiled", f"{count} functions of the control path are compiled")

@@ -1,4 +1,4 @@
-"""Which instances (ports and ROS domains of a flight) are free, and who has the others."""
+"""Check of the instances (ports and ROS domains of a flight): which are free or in use."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ SHOWN = 4  # busy ports named in the line
 
 @dataclass(frozen=True)
 class Busy:
-    """An instance that a flight cannot have. who: who holds it, in words; flight: another one."""
+    """An instance in use. who: its user, as text; flight: whether that is another flight."""
 
     instance: int
     who: str
@@ -23,7 +23,7 @@ class Busy:
 
 
 def checks(folder: Path | None = None) -> Iterator[Finding]:
-    """The finding; folder: where flights keep their locks."""
+    """Yield the finding; folder: of the lock files of flights."""
     busy = [found for number in range(INSTANCES) if (found := look(number, folder))]
     free = INSTANCES - len(busy)
     first = next(n for n in range(INSTANCES + 1) if n not in {b.instance for b in busy})
@@ -41,14 +41,14 @@ def checks(folder: Path | None = None) -> Iterator[Finding]:
         yield fail("instances", text, "end flights or the programs named here")
     elif others:
         yield warn(
-            "instances", text, "flights take a free one; end these programs if they are left over"
+            "instances", text, "flights use a free one; end these programs if they are leftovers"
         )
     else:
         yield ok("instances", text)
 
 
 def look(instance: int, folder: Path | None = None) -> Busy | None:
-    """Who has an instance; None: it is free. Takes nothing."""
+    """Return the user of an instance, None if it is free; reserve nothing."""
     lock = lock_file(folder, instance)
     if held(lock):
         return Busy(instance, ", ".join(holders.of_file(lock)) or "a flight", True)

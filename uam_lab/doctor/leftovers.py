@@ -1,4 +1,4 @@
-"""What crashed flights left: locks, processes without their orchestrator."""
+"""Checks for leftovers of crashed flights: locks, and processes without their parent."""
 
 from __future__ import annotations
 
@@ -15,13 +15,13 @@ from uam_sim_bridge.ports import held
 
 
 def checks(folder: Path | None = None) -> Iterator[Finding]:
-    """Findings about leftovers; folder: where flights keep their locks."""
+    """Yield the findings about leftovers; folder: of the lock files of flights."""
     yield locks(folder or Path(tempfile.gettempdir()))
     yield orphans()
 
 
 def locks(folder: Path) -> Finding:
-    """Lock files that nobody holds: harmless, the next flight takes them over."""
+    """Check for lock files without a process: harmless, the next flight uses them."""
     name = re.compile(rf"uam-{os.getuid()}-\d+\.lock")
     ours = (file for file in sorted(folder.glob("uam-*.lock")) if name.fullmatch(file.name))
     left = [file for file in ours if not held(file)]
@@ -30,13 +30,13 @@ def locks(folder: Path) -> Finding:
         return warn(
             "locks",
             f"without a flight: {names} in {folder}",
-            "nothing to do: the next flights use them again and remove them",
+            "no action needed: the next flights use and remove them",
         )
     return ok("locks", f"none left in {folder}")
 
 
 def orphans() -> Finding:
-    """Nodes whose `uam fly` has gone; they end by themselves within seconds, as a rule."""
+    """Check for nodes whose `uam fly` has ended; normally they end within seconds."""
     left = [process.pid for process in process_table.orphans()]
     if left:
         return warn(

@@ -1,4 +1,4 @@
-"""The machine: cores, memory, and whether a process is woken in time for `--clock realtime`."""
+"""Checks of the machine: cores, memory, and timer accuracy for `--clock realtime`."""
 
 from __future__ import annotations
 
@@ -18,40 +18,40 @@ MEMORY = 2.0  # [GiB]
 
 
 def checks() -> Iterator[Finding]:
-    """Findings about the machine."""
+    """Yield the findings about the machine."""
     yield cores(len(os.sched_getaffinity(0)), os.getloadavg()[0])
     yield memory(psutil.virtual_memory().available / 2**30)
     yield timer(oversleep())
 
 
 def cores(count: int, load: float) -> Finding:
-    """count: cores that this process may use; load: of the last minute."""
+    """Check the number of usable cores (count) and the load of the last minute."""
     found = f"{count} core{'s' * (count > 1)}, load {load:.1f}"
     if count < CORES:
         return warn("cores", found, f"real time needs {CORES}: fly --clock lockstep")
     if load > count:
         return warn(
             "cores",
-            f"{found}: others keep it busy",
+            f"{found}: other programs use the processor",
             "real-time flights will miss ticks; lockstep flights take longer",
         )
     return ok("cores", found)
 
 
 def memory(free: float) -> Finding:
-    """Whether a flight and its report fit into the available memory; free [GiB]."""
+    """Check that the available memory is enough for a flight and its report; free [GiB]."""
     found = f"{free:.1f} GiB available"
     if free < MEMORY:
         return warn(
             "memory",
             found,
-            f"a flight with its report wants {MEMORY:g} GiB: --no-video, or end other programs",
+            f"a flight with its report needs {MEMORY:g} GiB: --no-video, or end other programs",
         )
     return ok("memory", found)
 
 
 def oversleep(count: int = SLEEPS, tick: float = TICK) -> np.ndarray:
-    """How much longer than `tick` [s] each of `count` sleeps took [s]."""
+    """Return by how much each of `count` sleeps of `tick` [s] was too long, (count,) [s]."""
     late = np.empty(count)
     for i in range(count):
         begun = time.perf_counter()
@@ -61,7 +61,7 @@ def oversleep(count: int = SLEEPS, tick: float = TICK) -> np.ndarray:
 
 
 def timer(late: np.ndarray) -> Finding:
-    """Whether real time is sensible; late (n,) [s]."""
+    """Check the timer for real-time flights; late (n,) [s]: see `oversleep`."""
     median, most = 1e3 * np.quantile(late, (0.5, 0.99))
     found = (
         f"a {1e3 * TICK:g} ms sleep ends {median:.2f} ms late (median), {most:.2f} ms "
@@ -71,6 +71,6 @@ def timer(late: np.ndarray) -> Finding:
         return warn(
             "timer",
             f"{found}: more than a control period",
-            "--clock realtime will miss ticks here; lockstep does not mind",
+            "--clock realtime will miss ticks here; use --clock lockstep",
         )
-    return ok("timer", f"{found}: real time is sensible")
+    return ok("timer", f"{found}: accurate enough for real time")

@@ -1,4 +1,4 @@
-"""Pictures: an offscreen frame, with which OpenGL and how fast."""
+"""Check of offscreen rendering: one frame, its OpenGL renderer and its speed."""
 
 from __future__ import annotations
 
@@ -15,9 +15,9 @@ SOFTWARE = ("llvmpipe", "softpipe", "swrast")
 
 
 def checks() -> Iterator[Finding]:
-    """The finding: of the first platform that draws, in the order in which reports try them."""
-    problem, wanted = "", os.environ.get("MUJOCO_GL", "")
-    for platform in dict.fromkeys(filter(None, (wanted, PLATFORM))):
+    """Yield the finding for the first platform that renders, in the order of the report."""
+    problem, chosen = "", os.environ.get("MUJOCO_GL", "")
+    for platform in dict.fromkeys(filter(None, (chosen, PLATFORM))):
         with CheckProcess(MODULE, environment={"MUJOCO_GL": platform}) as child:
             said = child.wait(PATIENCE)
         if "frame_s" in said.facts:
@@ -28,7 +28,7 @@ def checks() -> Iterator[Finding]:
         yield warn(
             "rendering",
             problem,
-            "a busy machine, or a driver that hangs: try again, or another MUJOCO_GL",
+            "the machine is busy or the driver hangs: try again, or try another MUJOCO_GL",
         )
         return
     what, _, how = HOW_TO_GET_ONE.partition("; ")
@@ -36,7 +36,7 @@ def checks() -> Iterator[Finding]:
 
 
 def drawn(platform: str, said: Said) -> Finding:
-    """What a frame tells."""
+    """Return the finding about a rendered frame."""
     facts = said.facts
     device = facts["device"] or "unknown renderer"
     kind = ", in software" if any(word in device for word in SOFTWARE) else ""

@@ -1,4 +1,4 @@
-"""ROS: which installation, whether two processes reach each other, room for messages."""
+"""Checks of ROS: installation, messages between two processes, receive buffers."""
 
 from __future__ import annotations
 
@@ -16,18 +16,18 @@ from uam_sim_bridge.ports import PortError, Reservation
 
 MODULE = "uam_lab.doctor.round_trip"
 PATIENCE = 40.0  # [s] for both processes: import, discovery, messages
-WANTED, WANTED_RMW = "jazzy", "rmw_fastrtps_cpp"
-SLOW = 0.05  # [s] a round trip that long: control at 250 Hz in real time is out of the question
+REQUIRED, REQUIRED_RMW = "jazzy", "rmw_fastrtps_cpp"
+SLOW = 0.05  # [s] round trip; above it control at 250 Hz in real time is not possible
 RECEIVE_LIMIT = Path("/proc/sys/net/core/rmem_max")
-ROOM = 4 * 2**20  # [bytes]: what config/dds/fastdds.xml asks for
-INSTALL = "make setup brings the wheels (x86-64); else source /opt/ros/jazzy/setup.bash"
+ROOM = 4 * 2**20  # [bytes]: buffer size in config/dds/fastdds.xml
+INSTALL = "make setup installs the wheels (x86-64); otherwise source /opt/ros/jazzy/setup.bash"
 
 
 def checks(surroundings: Mapping[str, str] = os.environ) -> Iterator[Finding]:
-    """Findings about ROS."""
+    """Yield the findings about ROS."""
     spec = importlib.util.find_spec("rclpy")
     if spec is None or spec.origin is None:
-        yield fail("rclpy", "not installed: --engine direct alone can fly", INSTALL)
+        yield fail("rclpy", "not installed: only --engine direct works", INSTALL)
         return
     yield from environment.checks(surroundings)
     yield room()
@@ -37,11 +37,11 @@ def checks(surroundings: Mapping[str, str] = os.environ) -> Iterator[Finding]:
             yield installation(Path(spec.origin), said, surroundings)
             yield round_trip(said, reservation.ports.domain)
     except PortError as error:
-        yield warn("round trip", f"not tried: {error}", "end another flight and try again")
+        yield warn("round trip", f"not tested: {error}", "end another flight and try again")
 
 
 def measure(domain: int) -> Said:
-    """Let two processes exchange messages in `domain`; what the asking one said."""
+    """Exchange messages between two processes in `domain`; return the output of the asking one."""
     with tempfile.TemporaryDirectory(prefix="uam-doctor-") as logs:
         own = ros_environment(domain, Path(logs))
         with CheckProcess(MODULE, ["answer"], own), CheckProcess(MODULE, ["ask"], own) as asking:
@@ -49,36 +49,36 @@ def measure(domain: int) -> Said:
 
 
 def installation(origin: Path, said: Said, surroundings: Mapping[str, str]) -> Finding:
-    """Which rclpy this is and with which middleware; origin: its file."""
+    """Check version and middleware of rclpy; origin: its file."""
     if "file" not in said.facts:
         return fail("rclpy", f"{origin.parent} cannot be imported: {said.problem}", INSTALL)
     kind, rmw = kind_of(origin), said.facts["rmw"]
     found = f"{kind}, {rmw}, {origin.parent}"
     distribution = surroundings.get("ROS_DISTRO", "")
-    if distribution and distribution != WANTED:
+    if distribution and distribution != REQUIRED:
         return warn(
             "rclpy",
             f"{found}; ROS_DISTRO is {distribution}",
-            f"the stack is made for ROS 2 {WANTED}: source that one",
+            f"the stack requires ROS 2 {REQUIRED}: source that one",
         )
     if distribution and kind == "wheels":
         return warn(
             "rclpy",
-            f"{found}, with an installation sourced beside it ({distribution})",
-            "use one of them: a shell without the sourced one, or a venv without wheels",
+            f"{found}, and another installation is sourced ({distribution})",
+            "use only one: a shell without the sourced one, or a venv without wheels",
         )
-    if rmw != WANTED_RMW:
+    if rmw != REQUIRED_RMW:
         return warn(
             "rclpy",
             found,
-            f"config/dds speaks to {WANTED_RMW} alone: with others watch "
-            "for lost messages in the report",
+            f"config/dds is for {REQUIRED_RMW} only: with another one check "
+            "the report for lost messages",
         )
     return ok("rclpy", found)
 
 
 def kind_of(origin: Path) -> str:
-    """Where an rclpy comes from, by its file."""
+    """Return the kind of an rclpy installation, by its file."""
     parts = origin.parts
     if parts[:3] == ("/", "opt", "ros"):
         return f"apt, ROS 2 {parts[3]}"
@@ -88,12 +88,12 @@ def kind_of(origin: Path) -> str:
 
 
 def round_trip(said: Said, domain: int) -> Finding:
-    """Whether messages came through."""
+    """Return the finding about the exchange of messages."""
     if "median_s" not in said.facts:
         return fail(
             "round trip",
             f"domain {domain}: {said.problem or 'no messages'}",
-            "look at the variables above, then at firewall and container",
+            "check the variables above, then firewall and container",
         )
     median, longest = (1e3 * said.facts[name] for name in ("median_s", "longest_s"))
     found = (
@@ -106,16 +106,16 @@ def round_trip(said: Said, domain: int) -> Finding:
 
 
 def room(file: Path = RECEIVE_LIMIT) -> Finding:
-    """How much of what a process has not taken yet the system keeps for it."""
+    """Check the system's limit of a socket's receive buffer."""
     try:
         limit = int(file.read_text())
     except (OSError, ValueError):
-        return ok("buffers", f"{file} does not tell their limit")
+        return ok("buffers", f"limit unknown: {file} is not readable")
     found = f"net.core.rmem_max is {limit // 1024} KiB"
     if limit < ROOM:
         return warn(
             "buffers",
-            f"{found}: who gets no processor time for some hundredths of a second loses messages",
+            f"{found}: a process without processor time for tens of milliseconds loses messages",
             f"sudo sysctl -w net.core.rmem_max={ROOM}",
         )
     return ok("buffers", found)

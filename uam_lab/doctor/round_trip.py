@@ -1,9 +1,9 @@
-"""Children of the ROS check: one answers, the other asks and measures.
+"""Child processes of the ROS check: one answers, the other sends and measures.
 
     python -m uam_lab.doctor.round_trip answer|ask
 
-They meet on two topics in the domain of their environment. `ask` says, as lines of JSON, which
-rclpy it has, then how long the other took to be found and how long a message there and back.
+They use two topics in the ROS domain of their environment. `ask` prints lines of JSON: file and
+middleware of rclpy, time of the discovery, and time of a message there and back.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ DISCOVERY, ANSWER = 15.0, 2.0  # [s] longest waits
 
 
 def main() -> int:
-    """Answer or ask; returns the exit status."""
+    """Answer or ask; return the exit status."""
     try:
         import rclpy
         from std_msgs.msg import Float64
@@ -46,7 +46,7 @@ def main() -> int:
         return value in heard
 
     begun = time.monotonic()
-    while not until_heard(-1.0, 0.1):  # repeated until both ends have found each other
+    while not until_heard(-1.0, 0.1):  # repeated until the discovery is complete
         there.publish(Float64(data=-1.0))
         if time.monotonic() - begun > DISCOVERY:
             print(f"the two processes did not find each other within {DISCOVERY:g} s")

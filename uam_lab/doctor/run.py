@@ -1,4 +1,4 @@
-"""All groups of checks in their order, and what they add up to."""
+"""Run all groups of checks in order; overall verdict and JSON."""
 
 from __future__ import annotations
 
@@ -13,30 +13,31 @@ GROUPS = ("installation", "ros", "instances", "rendering", "autopilot", "machine
 
 
 def examine(url: str = "") -> Iterator[tuple[str, Finding]]:
-    """Every finding with its group, as soon as it is there; url: link of an autopilot, if any."""
+    """Yield every finding with its group at once; url: link of an autopilot, if any."""
     for group in GROUPS:
         for finding in _guarded(group, (url,) if group == "autopilot" else ()):
             yield group, finding
 
 
 def _guarded(group: str, arguments: tuple[str, ...]) -> Iterator[Finding]:
-    """What a group finds; an error that it did not expect is a finding, too."""
+    """Yield the findings of a group; an unexpected error is also a finding."""
     try:
         checks: Callable[..., Iterable[Finding]]
         checks = import_module(f"uam_lab.doctor.{group}").checks
         yield from checks(*arguments)
     except Exception as error:  # a broken installation may raise anything
-        yield fail(group, f"{type(error).__name__}: {error}", "make setup; if it stays, report it")
+        text = f"{type(error).__name__}: {error}"
+        yield fail(group, text, "make setup; if the error stays, report it")
 
 
 def worst(verdicts: Iterable[Verdict]) -> Verdict:
-    """The worst of the verdicts, OK where there is none."""
+    """Return the worst of the verdicts, OK without any."""
     order = list(Verdict)
     return max(verdicts, key=order.index, default=Verdict.OK)
 
 
 def as_json(found: Iterable[tuple[str, Finding]]) -> str:
-    """All findings as one JSON document."""
+    """Return all findings as one JSON document."""
     found = list(found)
     rows = [
         {
