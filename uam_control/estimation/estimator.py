@@ -174,7 +174,12 @@ def assemble(
     filtered: np.ndarray,
     state: np.ndarray,
 ) -> None:
-    """Filter the accelerations over `period` [s] and gather the state (3, 8)."""
+    """Filter the accelerations over `period` [s] and write the state (3, 6 + n).
+
+    position, velocity, quaternion, rates, acceleration: see `PoseFilter`; joints (2, n): angles
+    [rad] and velocities [rad/s]; cutoffs [Hz]; rates_filter (2, 3), filtered (3,): states of the
+    filters, updated.
+    """
     if period > 0.0:
         derivative_step(rates, angular_cutoff, period, rates_filter, state[2, 3:6])
         low_pass_step(acceleration, linear_cutoff, period, filtered)

@@ -177,7 +177,8 @@ def predict(
 ) -> None:
     """Advance the estimate in place by dt [s]; write position and quaternion into pose (7,).
 
-    gyro, specific_force: see `PoseFilter.predict`; the other arrays: see `PoseFilter`.
+    gyro (3,), specific_force (3,): see `PoseFilter.predict`. position, velocity, quaternion, rates,
+    acceleration, gyro_bias, accelerometer_bias: see `PoseFilter`.
     """
     for i in range(3):
         rates[i] = gyro[i] - gyro_bias[i]
@@ -210,8 +211,9 @@ def correct(
     """Correct the estimate in place with a measured pose and its prediction pose (7,).
 
     Observer gains: 3w, 3w^2, w^3 (triple pole) for position; 2w, w^2 (double pole) for attitude.
-    dt [s]: since the last correction; bandwidths (2,): w of position and attitude [rad/s]; the
-    other arrays: see `PoseFilter`.
+    dt [s]: since the last correction; bandwidths (2,): w of position and attitude [rad/s];
+    measured_position (3,) [m, world]; measured_quaternion (4,) body → world [w x y z]. position,
+    velocity, quaternion, gyro_bias, accelerometer_bias: see `PoseFilter`.
     """
     w = bandwidths[0]
     for i in range(3):

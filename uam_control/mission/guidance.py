@@ -65,7 +65,7 @@ class Segment:
     def __init__(
         self, stamp: float, start: np.ndarray, goal: np.ndarray, lengths: np.ndarray
     ) -> None:
-        """start (3, 8), goal (8,), lengths (8,) [s], from `stamp` [s] on."""
+        """Begin at `stamp` [s]; start (3, 6 + n); goal (6 + n,); lengths (6 + n,): times [s]."""
         self._stamp, self._lengths, self._goal = stamp, lengths, goal.copy()
         p, v, a = start[0], start[1] * lengths, start[2] * lengths**2  # per length
         d = goal - p
@@ -82,7 +82,7 @@ class Segment:
         return self._stamp + float(np.max(self._lengths))
 
     def write(self, stamp: float, reference: np.ndarray) -> None:
-        """Write the reference (3, 8) at `stamp` [s]."""
+        """Write the reference (3, 6 + n) at `stamp` [s]."""
         u = np.clip((stamp - self._stamp) / self._lengths, 0.0, 1.0)
         c = self._powers
         reference[0] = c[0] + u * (c[1] + u * (c[2] + u * (c[3] + u * (c[4] + u * c[5]))))
@@ -98,7 +98,7 @@ class Segment:
 class Guidance:
     """Writes the reference of a flight; the mission calls `stop`, `go_on`, `descend` and `rest`.
 
-    `reference` (3, 8): rewritten by every `write`; `scenario_time` [s]: time on the scenario, held
+    `reference` (3, 6 + n): rewritten by every `write`; `scenario_time` [s]: time on the scenario,
     constant during a hold; `end` [s]: stamp at which a descent reaches the ground, inf without one.
     """
 
@@ -160,7 +160,7 @@ class Guidance:
         """Move the reference to the vehicle's pose and plan the return to the path; call after
         `write` while no controller is active.
 
-        Otherwise the restarted controller would begin with a large error. state: estimate.
+        Otherwise the restarted controller would begin with a large error. state (3, 6 + n).
         """
         path = self.reference[0].copy()
         if self._away is not None:
@@ -195,7 +195,7 @@ class Guidance:
             self._go_on_at = max(self._go_on_at, self._away.end)
 
     def descend(self, stamp: float, state: np.ndarray, ground: float, stow: bool) -> None:
-        """Descend vertically from the vehicle's position to `ground` [m]; state: estimate."""
+        """Descend vertically from the position in state (3, 6 + n) to the height `ground` [m]."""
         p, now = self.parameters, self.reference
         offset = state[0, POSITION] - now[0, POSITION]
         if not np.all(np.isfinite(offset)):  # then descend from the reference

@@ -34,7 +34,7 @@ WAITING, HOLD, LAND, LANDED, ABORTED = "waiting", "hold", "land", "landed", "abo
 class MissionOutput:
     """Output of the mission at one tick.
 
-    reference (3, 8), reused by the next step; flying: position and attitude are controlled;
+    reference (3, 6 + n), reused by the next step; flying: position and attitude are controlled;
     time [s]: since take-off, negative before; arm: desired arming of the autopilot; state, cause:
     of the supervisor; abort_reason: why the scenario was aborted, "" if not.
     """
@@ -96,7 +96,7 @@ class Mission:
     ) -> MissionOutput:
         """Return the output of the next tick, at `stamp` [s]; call it once per tick.
 
-        state: newest estimate (3, 8). armed_since: stamp [s] at which the autopilot reported
+        state (3, 6 + n): newest estimate. armed_since: stamp [s] at which the autopilot reported
         armed, None while disarmed. readings: for the supervisor.
         """
         output, guidance = self.output, self._guidance

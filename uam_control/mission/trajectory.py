@@ -15,7 +15,7 @@ class Trajectory(Protocol):
     """A reference as a function of mission time."""
 
     def write(self, time: float, reference: np.ndarray) -> None:
-        """Write chi_d, chi_d_dot, chi_d_ddot at mission time [s] into reference (3, 8)."""
+        """Write chi_d, chi_d_dot, chi_d_ddot at mission time [s] into reference (3, 6 + n)."""
 
 
 @dataclass(frozen=True)
@@ -32,7 +32,7 @@ class Moves:
     """Minimum-jerk moves from a starting pose; a coordinate holds its value between moves."""
 
     def __init__(self, start: np.ndarray, moves: list[Move]) -> None:
-        """start: chi (8,) at mission time 0; moves of one coordinate must not overlap."""
+        """start: chi (6 + n,) at mission time 0; moves of one coordinate must not overlap."""
         self._start = np.array(start, dtype=float)
         value = dict(zip(COORDINATES, self._start, strict=True))
         rows = []
@@ -50,13 +50,17 @@ class Moves:
         self._rows = np.array(rows, dtype=float).reshape(-1, 5)
 
     def write(self, time: float, reference: np.ndarray) -> None:
-        """See `Trajectory.write`."""
+        """Write the reference (3, 6 + n); see `Trajectory.write`."""
         write_moves(time, self._start, self._rows, reference)
 
 
 @jit
 def write_moves(time: float, start: np.ndarray, rows: np.ndarray, reference: np.ndarray) -> None:
-    """Evaluate the moves; rows (m, 5): coordinate, start, end, from, to; sorted by start."""
+    """Write the reference (3, 6 + n) at mission time [s].
+
+    start (6 + n,): chi at mission time 0; rows (m, 5), sorted by start: index of the coordinate,
+    start [s], end [s], value at start, value at end.
+    """
     reference[:] = 0.0
     reference[0] = start
     for row in rows:
@@ -72,8 +76,8 @@ def write_moves(time: float, start: np.ndarray, rows: np.ndarray, reference: np.
 class Sampled:
     """A sampled trajectory: cubic Hermite interpolation of values and rates, linear acceleration.
 
-    times (m,) [s], increasing; samples (m, 3, 8). Before the first and after the last sample the
-    value is constant.
+    times (m,) [s], increasing; samples (m, 3, 6 + n). Before the first and after the last sample
+    the value is constant.
     """
 
     def __init__(self, times: np.ndarray, samples: np.ndarray) -> None:
@@ -87,16 +91,16 @@ class Sampled:
 
     @property
     def first(self) -> np.ndarray:
-        """chi (8,) of the first sample."""
+        """Return chi (6 + n,) of the first sample."""
         return self._samples[0, 0]
 
     @property
     def last(self) -> np.ndarray:
-        """chi (8,) of the last sample."""
+        """Return chi (6 + n,) of the last sample."""
         return self._samples[-1, 0]
 
     def write(self, time: float, reference: np.ndarray) -> None:
-        """See `Trajectory.write`."""
+        """Write the reference (3, 6 + n); see `Trajectory.write`."""
         times, samples = self._times, self._samples
         reference[:] = 0.0
         if time <= times[0] or time >= times[-1]:
@@ -128,7 +132,7 @@ class Chain:
         self._parts = parts
 
     def write(self, time: float, reference: np.ndarray) -> None:
-        """See `Trajectory.write`."""
+        """Write the reference (3, 6 + n); see `Trajectory.write`."""
         start, part = next((p for p in reversed(self._parts) if time >= p[0]), self._parts[0])
         part.write(time - start, reference)
 

@@ -233,7 +233,11 @@ def read(
     gain_limits: np.ndarray,
     values: np.ndarray,
 ) -> None:
-    """Write the readings (see `Readings`) into values[8:]; NaN (unknown) passes every check."""
+    """Write the readings (see `Readings`) into values[8:]; NaN (unknown) passes every check.
+
+    effort (n,), effort_limits (n,): of the joints [N m]; gains (3,), gain_limits (3,): adapted
+    gains of position, attitude, arm.
+    """
     values[8] = _known(-battery)
     values[9], values[10], values[11] = _known(mocap), _known(still), _known(joints)
     values[12], values[13] = _known(controllers), _known(autopilot)

@@ -28,14 +28,14 @@ TAU_Q = TrajectoryReader(ATTITUDE_NAMES, ["effort"])
 
 
 def read_state(data: bytes) -> tuple[int, np.ndarray]:
-    """Return (stamp [ns], chi, chi_dot, chi_ddot (3, 8)); raises BadMessage."""
+    """Return (stamp [ns], chi, chi_dot, chi_ddot (3, 6 + n)); raises BadMessage."""
     message = trajectory(data)
     return message.stamp, WHOLE.read(message)
 
 
 @dataclass(frozen=True)
 class Reference:
-    """chi_d, chi_d_dot, chi_d_ddot (3, 8); only the arm's columns count while not flying."""
+    """values (3, 6 + n): chi_d, chi_d_dot, chi_d_ddot; if not flying only the arm's columns."""
 
     values: np.ndarray
     flying: bool
@@ -48,7 +48,7 @@ class ReferenceWriter:
         self._whole, self._arm = TrajectoryWriter(ALL), TrajectoryWriter(ARM_NAMES)
 
     def fill(self, stamp: int, reference: np.ndarray, flying: bool, mission_time: int) -> bytes:
-        """Return the message; reference (3, 8), mission_time [ns] (not negative)."""
+        """Return the message; stamp [ns], reference (3, 6 + n), mission_time [ns], at least 0."""
         if flying:
             return self._whole.fill(stamp, reference, mission_time)
         return self._arm.fill(stamp, reference[:, ARM], mission_time)
@@ -86,7 +86,9 @@ class PositionCommandWriter:
     def fill(
         self, stamp: int, reference: np.ndarray, attitude: np.ndarray, tau: np.ndarray
     ) -> bytes:
-        """Return the message; reference (3, 8), attitude (3, 3), tau (3,) [N, world]."""
+        """Return the message; stamp [ns], reference (3, 6 + n), attitude (3, 3): rows q_d, Omega_d,
+        Omega_d_dot; tau (3,) [N, world].
+        """
         for i, row in enumerate(ROWS):
             values = self._writer.values[row]
             values[POSITION] = reference[i, POSITION]

@@ -75,7 +75,10 @@ class FaultyPlant(Plant):
         return samples
 
     def step(self, motor_commands: np.ndarray, arm_effort: np.ndarray, magnet: bool) -> None:
-        """Step as in `Plant.step`, with commands and model changed by the active faults."""
+        """Step as in `Plant.step`, with commands and model changed by the active faults.
+
+        motor_commands (n_rotors,) 0..1; arm_effort (n_joints,) [N m].
+        """
         if self._effects or self._touched:
             commands = PlantCommands(np.array(motor_commands), np.array(arm_effort), bool(magnet))
             self._as_usual()

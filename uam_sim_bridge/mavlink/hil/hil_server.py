@@ -110,7 +110,8 @@ class HilServer:
     ) -> np.ndarray:
         """Send the sensors of a tick, wait for the answer, return `motors` (4,): send and receive.
 
-        Arguments: see `send`. Without a connection, or if the autopilot closes it, they are zero.
+        gyro (3,), accel (3,), position (3,), quaternion (4,): see `send`. Without a connection, or
+        if the autopilot closes it, the motors are zero.
         """
         self.send(time, gyro, accel, position, quaternion)
         return self.receive()
@@ -165,7 +166,11 @@ class HilServer:
         position_deviation: float,
         attitude_deviation: float,
     ) -> None:
-        """Send a mocap pose to the autopilot over this link: see `vision_message`."""
+        """Send a mocap pose to the autopilot over this link.
+
+        stamp [s]; position (3,) [m, ENU]; quaternion (4,) FLU → ENU [w x y z]; standard deviations
+        [m] and [rad].
+        """
         if self._link is not None and not self._send(
             vision_message(stamp, position, quaternion, position_deviation, attitude_deviation)
         ):

@@ -57,7 +57,7 @@ def swap_quaternion(q: np.ndarray) -> np.ndarray:
 
 @jit
 def swap_euler(euler: np.ndarray) -> np.ndarray:
-    """Convert roll, pitch, yaw (3,) [rad] of FLU in ENU to those of FRD in NED, or back.
+    """Convert euler (3,), roll, pitch, yaw [rad] of FLU in ENU, to those of FRD in NED, or back.
 
     ENU yaw is counter-clockwise from east, NED yaw clockwise from north. Returned yaw: [-pi, pi).
     """
