@@ -22,7 +22,8 @@ from uam_sim_bridge.mavlink.offboard.sequence import OffboardSequence, Phase
 from uam_sim_bridge.mavlink.offboard.setpoint import RateThrustMap
 from uam_sim_bridge.mavlink.protocol.modes import Mode
 from uam_sim_bridge.mavlink.transport.udp_transport import UdpTransport
-from uam_sim_bridge.plant import Plant, Vehicle
+from uam_sim_bridge.plant import Vehicle
+from uam_sim_bridge.plant.mujoco_plant import MujocoPlant
 from uam_sim_bridge.ports import Ports
 
 HOST = "127.0.0.1"
@@ -48,7 +49,7 @@ class HoverFlight:
         """always_answers: the stand-in does; PX4 is silent while it boots."""
         vehicle = load_description()
         profile = load_profile(vehicle.profile(DEFAULT))
-        self.plant = Plant(Vehicle.of(vehicle), 0.0, SEED)
+        self.plant = MujocoPlant(Vehicle.of(vehicle), 0.0, SEED)
         self._position = PositionController(profile.sets["position_controller"])
         self._attitude = AttitudeController(profile.sets["attitude_controller"])
         self._arm = ArmController(profile.sets["arm_controller"])

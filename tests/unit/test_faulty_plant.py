@@ -6,9 +6,10 @@ import numpy as np
 import pytest
 
 from uam_control.mission import load_scenario
-from uam_sim_bridge.faults import FAULTS, PLANT, read_schedule
-from uam_sim_bridge.faults.faulty_plant import FaultyPlant
-from uam_sim_bridge.plant import Plant, Vehicle
+from uam_sim_bridge.faults import FAULTS, PLANT, FaultError, Schedule, read_schedule
+from uam_sim_bridge.faults.faulty_plant import FaultyPlant, make_plant
+from uam_sim_bridge.plant import Vehicle
+from uam_sim_bridge.plant.mujoco_plant import MujocoPlant
 
 VEHICLE = Vehicle.load()
 SCENARIO = load_scenario("pick_and_place")
@@ -18,7 +19,7 @@ HOVER = np.full(4, 0.62)
 
 
 def plant_with(text):
-    plant = FaultyPlant(*START, read_schedule([text], SCENARIO, 5))
+    plant = make_plant(*START, read_schedule([text], SCENARIO, 5))
     plant.mission_at(0.0, 0.0)
     return plant
 
@@ -50,7 +51,7 @@ def faulty(name, values=""):
     return run(plant_with(f"{name}@{BEGIN}+{END - BEGIN:g}" + (f":{values}" if values else "")))
 
 
-NOMINAL = run(Plant(*START))
+NOMINAL = run(MujocoPlant(*START))
 
 
 def equal(a, b):
@@ -223,13 +224,13 @@ def test_two_faults_of_one_motor_multiply_and_end_one_by_one():
         SCENARIO,
         1,
     )
-    plant = FaultyPlant(*START, both)
+    plant = make_plant(*START, both)
     plant.mission_at(0.0, 0.0)
     efficiency = {}
     while plant.time < 0.4:
         plant.sense()
         plant.step(HOVER, np.zeros(2), False)
-        efficiency[round(plant.time, 3)] = plant.rotors.efficiency[0]
+        efficiency[round(plant.time, 3)] = plant.inner.rotors.efficiency[0]
     assert [efficiency[t] for t in (0.1, 0.152, 0.252, 0.4)] == [1.0, 0.15, 0.3, 1.0]
 
 
@@ -248,7 +249,7 @@ def test_wind_comes_softly_and_goes():
     while plant.time < 0.4:
         plant.sense()
         plant.step(HOVER, np.zeros(2), False)
-        winds[round(plant.time, 3)] = plant.wind.copy()
+        winds[round(plant.time, 3)] = plant.inner.wind.copy()
     np.testing.assert_allclose(winds[0.1], 0.0)
     np.testing.assert_allclose(winds[0.152], [0.0, 4.0, -0.5], atol=0.3)
     np.testing.assert_allclose(winds[0.296], [0.0, 8.0, -1.0], atol=1e-9)
@@ -257,18 +258,18 @@ def test_wind_comes_softly_and_goes():
 
 def test_gusts_go_on_around_the_wind_that_a_fault_adds():
     gusty = Vehicle.load().changed({"air.gust": 1.0})
-    usual = Plant(gusty, 0.2, 3, (0.3, 0.4))
-    added = FaultyPlant(
+    usual = MujocoPlant(gusty, 0.2, 3, (0.3, 0.4))
+    added = make_plant(
         gusty, 0.2, 3, (0.3, 0.4), read_schedule(["wind_gust@0.1:speed=5,rise=0"], SCENARIO, 1)
     )
     added.mission_at(0.0, 0.0)
     run(usual, 0.4)
     run(added, 0.4)
-    np.testing.assert_allclose(added.wind - usual.wind, [5.0, 0.0, 0.0], atol=1e-9)
+    np.testing.assert_allclose(added.inner.wind - usual.wind, [5.0, 0.0, 0.0], atol=1e-9)
 
 
 def test_nothing_happens_before_the_mission_begins():
-    plant = FaultyPlant(*START, read_schedule(["mocap_dropout@0"], SCENARIO, 1))
+    plant = make_plant(*START, read_schedule(["mocap_dropout@0"], SCENARIO, 1))
     assert len(poses(run(plant, 0.2))) > 10
     plant.mission_at(0.2, 0.0)
     assert poses(run(plant, 0.4)) == []
@@ -282,7 +283,8 @@ def lifted(text, until=1.5):
 
     The magnet is on until 1 s.
     """
-    plant = plant_with(text)
+    faulty = plant_with(text)
+    plant = faulty.inner
     plant._alpha[:] = 0.0
     plant.data.qpos[plant._swing] = 0.0
     base = np.array([0.0, 0.0, 2.0, 1.0, 0.0, 0.0, 0.0])
@@ -292,10 +294,10 @@ def lifted(text, until=1.5):
     while plant.time < until - 1e-9:
         plant._position[:], plant._quaternion[:] = base[:3], base[3:]
         plant._velocity[:] = plant._rates[:] = 0.0
-        plant.sense()
-        plant.step(np.zeros(4), np.zeros(2), plant.time < 1.0)
+        faulty.sense()
+        faulty.step(np.zeros(4), np.zeros(2), plant.time < 1.0)
         rows.append((plant.time, plant.truth()))
-    return plant, rows
+    return faulty, rows
 
 
 def height(rows, time):
@@ -335,3 +337,26 @@ def test_a_payload_swings_but_stays_until_the_magnet_is_off():
     assert tilt(swinging, 0.5, 1.0) > 10.0
     assert height(swinging, 0.99) > height(swinging, 0.1) - 0.02
     assert height(swinging, 1.4) < height(swinging, 0.99) - 0.3
+
+
+ANOTHER = "rigid_body_plant:RigidBodyPlant"
+
+
+def test_faults_of_sensors_and_commands_work_with_the_plant_of_any_engine():
+    frozen = read_schedule([f"mocap_freeze@{BEGIN}+{END - BEGIN:g}"], SCENARIO, 1)
+    plant = make_plant(*START, frozen, ANOTHER)
+    plant.mission_at(0.0, 0.0)
+    found = poses(during(run(plant, motors=np.ones(4))))
+    assert len(found) > 15 and all(equal(pose[1:], found[0][1:]) for pose in found)
+    usual = poses(during(run(make_plant(*START, Schedule(), ANOTHER), motors=np.ones(4))))
+    assert not equal(usual[0][1:], usual[-1][1:])
+
+
+@pytest.mark.parametrize(
+    "name", ["motor_loss", "battery_sag", "servo_jam", "magnet_weak", "payload_swing", "wind_gust"]
+)
+def test_faults_of_the_physics_are_refused_where_the_engine_has_none(name):
+    faults = read_schedule([f"{name}@1"], SCENARIO, 1)
+    with pytest.raises(FaultError, match=f"fault {name}: plant {ANOTHER} has no faults of the"):
+        make_plant(*START, faults, ANOTHER)
+    assert isinstance(make_plant(*START, faults), FaultyPlant)

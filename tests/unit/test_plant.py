@@ -8,9 +8,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from uam_sim_bridge.plant import Plant, Vehicle
+from uam_sim_bridge.plant import Vehicle
 from uam_sim_bridge.plant.actuators import Rotors, Servos
 from uam_sim_bridge.plant.magnet import magnet_constants, pull_fraction
+from uam_sim_bridge.plant.mujoco_plant import MujocoPlant
 from uam_sim_bridge.plant.sensors import Delay, Encoders, Mocap
 
 VEHICLE = Vehicle.load()
@@ -82,7 +83,7 @@ def test_delay_hands_out_what_went_in_some_ticks_ago():
 
 
 def test_sensors_arrive_late_with_the_stamp_of_their_exposure():
-    plant = Plant(VEHICLE, 0.2, seed=3)
+    plant = MujocoPlant(VEHICLE, 0.2, seed=3)
     ages = {"imu": [], "joints": [], "mocap": []}
     for _ in range(100):
         samples = plant.sense()
@@ -99,7 +100,7 @@ def test_sensors_arrive_late_with_the_stamp_of_their_exposure():
 
 def test_same_seed_same_noise_other_seed_other_noise():
     def readings(seed):
-        plant = Plant(VEHICLE, 0.2, seed=seed)
+        plant = MujocoPlant(VEHICLE, 0.2, seed=seed)
         return np.concatenate([np.concatenate(plant.sense().hil[1:]) for _ in range(50)])
 
     np.testing.assert_array_equal(readings(1), readings(1))
@@ -107,7 +108,7 @@ def test_same_seed_same_noise_other_seed_other_noise():
 
 
 def test_noise_has_the_stated_size():
-    plant = Plant(VEHICLE, 0.2, seed=5)
+    plant = MujocoPlant(VEHICLE, 0.2, seed=5)
     gyro = np.array([plant.sense().hil[1] for _ in range(4000)])
     np.testing.assert_allclose(gyro.std(axis=0), NUMBERS["sensors"]["imu"]["gyro_noise"], rtol=0.06)
 
@@ -137,7 +138,7 @@ def test_the_plate_is_where_the_model_has_it():
 
 
 def test_the_magnet_stands_on_the_stand_but_does_not_hold_on_to_it():
-    plant = Plant(VEHICLE, 0.0, seed=1)
+    plant = MujocoPlant(VEHICLE, 0.0, seed=1)
     model, data = plant.model, plant.data
     face, top = (model.geom(name).id for name in ("magnet_face", "stand_top"))
     mujoco.mj_forward(model, data)
@@ -151,8 +152,8 @@ def test_the_magnet_stands_on_the_stand_but_does_not_hold_on_to_it():
 
 
 def test_drag_and_wind_push_the_vehicle():
-    still = Plant(VEHICLE, 0.0, seed=1)
-    windy = Plant(VEHICLE.changed({"air.wind": [3.0, 0.0, 0.0]}), 0.0, seed=1)
+    still = MujocoPlant(VEHICLE, 0.0, seed=1)
+    windy = MujocoPlant(VEHICLE.changed({"air.wind": [3.0, 0.0, 0.0]}), 0.0, seed=1)
     for plant in (still, windy):
         plant.data.qpos[2] = 20.0
         for _ in range(100):

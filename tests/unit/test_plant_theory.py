@@ -7,7 +7,8 @@ import numpy as np
 import pytest
 
 from uam_control.maths.rotations import matrix_from_quaternion
-from uam_sim_bridge.plant import Plant, Vehicle
+from uam_sim_bridge.plant import Vehicle
+from uam_sim_bridge.plant.mujoco_plant import MujocoPlant
 from uam_sim_bridge.plant.urdf import urdf
 
 pinocchio = pytest.importorskip("pinocchio")
@@ -111,7 +112,7 @@ def test_energy_is_kept_without_losses():
 
 def test_hover_thrust_is_the_weight():
     """Level, arm at the pose where its weight is balanced: weight in thrust keeps it in the air."""
-    plant = Plant(VEHICLE, 0.0, seed=1, arm_start=(0.0, 0.0))
+    plant = MujocoPlant(VEHICLE, 0.0, seed=1, arm_start=(0.0, 0.0))
     thrust = 2.2 * 9.81 / 4.0 / ROTOR.thrust_max
     factor = VEHICLE.numbers["rotors"]["curve_factor"]
     command = (-(1 - factor) + np.sqrt((1 - factor) ** 2 + 4 * factor * thrust)) / (2 * factor)
@@ -130,7 +131,7 @@ def test_hover_thrust_is_the_weight():
 
 def test_accelerometer_at_rest_feels_the_ground():
     vehicle = VEHICLE.changed({"sensors.noise_scale": 0.0})
-    plant = Plant(vehicle, 0.2, seed=1)
+    plant = MujocoPlant(vehicle, 0.2, seed=1)
     effort = np.zeros(2)
     for _ in range(500):
         hil = plant.sense().hil

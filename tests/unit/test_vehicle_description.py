@@ -13,6 +13,7 @@ from uam_control.vehicle import VehicleError, load_description
 from uam_control.vehicle.loading import describe
 from uam_sim_bridge.autopilot.params import Parameters
 from uam_sim_bridge.plant import Vehicle
+from uam_sim_bridge.plant.mujoco_plant import MujocoPlant
 
 S500 = load_description()
 
@@ -113,11 +114,10 @@ def test_what_is_missing_is_named(key):
     ],
 )
 def test_what_contradicts_the_mjcf_is_refused_in_one_line(change, said):
-    from uam_sim_bridge.plant import Plant
 
     described = describe(changed(change), S500.file)
     with pytest.raises(VehicleError) as error:
-        Plant(Vehicle.of(described), 0.0, 1)
+        MujocoPlant(Vehicle.of(described), 0.0, 1)
     assert said in str(error.value) and "\n" not in str(error.value)
 
 

@@ -29,6 +29,7 @@ from uam_lab.report.page.console import reporting, summary
 from uam_lab.results.result_folder import ResultFolder, ResultFolderError
 from uam_sim_bridge.faults import FaultError
 from uam_sim_bridge.mavlink.transport.transport import ALLOWED
+from uam_sim_bridge.plant.engines import DEFAULT_PLANT, PLANTS, PlantError
 from uam_sim_bridge.ports import INSTANCES, PortError
 from uam_sim_bridge.px4.px4_installation import Px4Error
 
@@ -42,6 +43,7 @@ USER_ERRORS = (
     Px4Error,
     ResultFolderError,
     FaultError,
+    PlantError,
 )
 
 EXAMPLES = """\
@@ -108,6 +110,12 @@ def add(commands: argparse._SubParsersAction) -> None:
         metavar="lockstep|realtime",
         help="simulated time, repeatable for the same seed; or the wall clock "
         "(default %(default)s)",
+    )
+    option(
+        "--plant",
+        default=DEFAULT_PLANT,
+        metavar="NAME|MODULE:CLASS",
+        help=f"physics engine: {', '.join(PLANTS)}, or a class of your own (default %(default)s)",
     )
     option(
         "--autopilot",
@@ -232,6 +240,7 @@ def run(options: argparse.Namespace) -> int:
             profile=options.profile,
             engine=options.engine,
             clock=options.clock,
+            plant=options.plant,
             autopilot=options.autopilot,
             px4_dir=options.px4_dir,
             gcs=options.gcs,

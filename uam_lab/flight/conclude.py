@@ -26,6 +26,7 @@ def settings_facts(settings: FlightSettings, command: str) -> dict[str, Any]:
         "profile": settings.profile.name,
         "scenario": scenario.name,
         "engine": settings.engine,
+        "plant": settings.plant,
         "clock": settings.clock,
         "autopilot": settings.autopilot,
         "seed": settings.seed,

@@ -13,8 +13,10 @@ from uam_control.profiles.profile import Profile, default_profile, load_profile
 from uam_control.settings import configuration
 from uam_lab.processes.node_environment import without_discovery
 from uam_sim_bridge.faults import Schedule, limits, read_schedule
+from uam_sim_bridge.faults.faulty_plant import check_engine
 from uam_sim_bridge.faults.process_faults import DiscoveryLoss
 from uam_sim_bridge.mavlink.transport.transport import ALLOWED, LinkUrl, parse_url
+from uam_sim_bridge.plant.engines import DEFAULT_PLANT
 from uam_sim_bridge.ports import AUTOPILOT_UDP, INSTANCES
 from uam_sim_bridge.px4.px4_installation import Px4Installation
 
@@ -56,6 +58,7 @@ class FlightSettings:
     gcs: str = ""  # URL of a ground station
     seed: int = 1
     video: bool = True
+    plant: str = DEFAULT_PLANT  # see `plant_class`
     scenario_source: str = ""  # as given by the user: a name or a file
     instance: int | None = None  # of ROS domain and ports; None: the first free one
     vehicle_changes: dict[str, object] = field(default_factory=dict)
@@ -75,6 +78,7 @@ def settings(
     profile: str | Sequence[str] | None = None,
     engine: str = "ros",
     clock: str = "lockstep",
+    plant: str = DEFAULT_PLANT,
     autopilot: str = BUILTIN,
     px4_dir: str | None = None,
     gcs: str = "",
@@ -141,6 +145,7 @@ def settings(
     injected = read_schedule(faults, loaded, seed)
     left_out = tuple(dict.fromkeys(without if view else (*without, COCKPIT)))
     absent = (*left_out, "autopilot") if link is not None else left_out
+    check_engine(injected, plant)
     limits.check(injected, engine, absent, {DiscoveryLoss.NAME: without_discovery()})
     return FlightSettings(
         scenario=loaded,
@@ -156,6 +161,7 @@ def settings(
         gcs=gcs,
         seed=seed,
         video=video,
+        plant=plant,
         scenario_source=scenario,
         instance=_instance_of(link) if instance is None else instance,
         vehicle_changes=dict(vehicle_changes or {}),

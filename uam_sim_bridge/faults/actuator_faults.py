@@ -29,6 +29,7 @@ class ActEffect(Effect):
 class MotorLoss(PlantFault):
     NAME: ClassVar[str] = "motor_loss"
     ABOUT: ClassVar[str] = "a motor gives only a fraction of its thrust, as with a broken propeller"
+    PHYSICS: ClassVar[bool] = True
 
     motor: float = number(1, "motor number, in PX4's order", "1", 1, 4)
     remaining: float = number(0.5, "fraction of the thrust that remains", "1", 0.0, 1.0)
@@ -41,6 +42,7 @@ class MotorLoss(PlantFault):
 class BatterySag(PlantFault):
     NAME: ClassVar[str] = "battery_sag"
     ABOUT: ClassVar[str] = "the battery voltage falls, and with it the thrust of all motors"
+    PHYSICS: ClassVar[bool] = True
 
     remaining: float = number(0.8, "fraction of the thrust that remains", "1", 0.1, 1.0)
     over: float = number(2.0, "time in which the thrust falls", "s", 0.0, 1000.0)
@@ -81,6 +83,7 @@ class ServoWeak(PlantFault):
 class ServoJam(PlantFault):
     NAME: ClassVar[str] = "servo_jam"
     ABOUT: ClassVar[str] = "a joint's gear jams and holds its present angle"
+    PHYSICS: ClassVar[bool] = True
 
     joint: float = number(1, JOINT, "1", 1, 2)
     torque: float = number(20.0, "torque that still moves the joint", "N m", 0.1, 1000.0)
@@ -93,6 +96,7 @@ class ServoJam(PlantFault):
 class MagnetWeak(PlantFault):
     NAME: ClassVar[str] = "magnet_weak"
     ABOUT: ClassVar[str] = "the magnet holds with a fraction of its force, or with none"
+    PHYSICS: ClassVar[bool] = True
 
     remaining: float = number(0.0, "fraction of the force that remains", "1", 0.0, 1.0)
 
@@ -123,17 +127,19 @@ class Remanent(Effect):
 class PayloadSwing(PlantFault):
     NAME: ClassVar[str] = "payload_swing"
     ABOUT: ClassVar[str] = "the payload hangs from one point of the magnet and swings freely"
+    PHYSICS: ClassVar[bool] = True
 
     rate: float = number(5.0, "initial pitch rate of the payload", "rad/s", -20.0, 20.0)
 
     def effect(self, noise: np.random.Generator) -> Effect:
-        return ActEffect(lambda plant, commands: plant.swing_payload(commands, self.rate))
+        return ActEffect(lambda plant, _: plant.swing_payload(self.rate))
 
 
 @dataclass(frozen=True)
 class WindGust(PlantFault):
     NAME: ClassVar[str] = "wind_gust"
     ABOUT: ClassVar[str] = "additional wind that rises smoothly"
+    PHYSICS: ClassVar[bool] = True
 
     speed: float = number(4.0, "horizontal speed", "m/s", 0.0, 40.0)
     towards: float = number(

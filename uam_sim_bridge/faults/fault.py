@@ -46,8 +46,13 @@ class PlantCommands:
 class Disturbable(Protocol):
     """The plant as an effect changes it; each call applies to the next period only."""
 
-    def weaken_rotors(self, parts: np.ndarray) -> None:
-        """Scale the thrust of each rotor by parts (n_rotors,) [1]."""
+    period: float  # [s]
+
+    def weaken_rotor(self, rotor: int, part: float) -> None:
+        """Scale the thrust of rotor `rotor`, counted from 0, by `part` [1]."""
+
+    def weaken_rotors(self, part: float) -> None:
+        """Scale the thrust of all rotors by `part` [1]."""
 
     def brake_joint(self, joint: int, torque: float) -> None:
         """Add dry friction `torque` [N m] to joint `joint`, counted from 0."""
@@ -58,7 +63,7 @@ class Disturbable(Protocol):
     def add_wind(self, wind: np.ndarray) -> None:
         """Add wind (3,) [m/s, ENU]."""
 
-    def swing_payload(self, commands: PlantCommands, rate: float) -> None:
+    def swing_payload(self, rate: float) -> None:
         """Attach the payload by a hinge while the magnet is on; rate [rad/s]: initial rate."""
 
 
@@ -78,9 +83,10 @@ class Effect:
 
 @dataclass(frozen=True)
 class PlantFault(Fault):
-    """A fault of sensors, actuators, payload or wind."""
+    """A fault of sensors, actuators, payload or wind. PHYSICS: it needs `Plant.disturb`."""
 
     PLACE: ClassVar[str] = PLANT
+    PHYSICS: ClassVar[bool] = False
 
     def effect(self, noise: np.random.Generator) -> Effect:
         """Return the effect that begins now; noise: generator of this fault, seeded per flight."""

@@ -1,138 +1,137 @@
-"""The plant with fault injection: changes samples, commands and model at each tick.
+"""A plant with fault injection: changes samples, commands and physics at each tick.
 
-Flights without plant faults use `Plant` itself.
+It works with the plant of any physics engine. Flights without plant faults use that plant itself.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 
-import mujoco
 import numpy as np
 
-from uam_sim_bridge.faults.fault import Effect, PlantCommands
+from uam_sim_bridge.faults.fault import PLANT, Effect, FaultError, PlantCommands
 from uam_sim_bridge.faults.schedule import Schedule
 from uam_sim_bridge.faults.timeline import FaultState, Timeline
-from uam_sim_bridge.plant import Plant, Samples, Vehicle
-from uam_sim_bridge.plant.payload_hinge import PayloadHinge, add_to
-from uam_sim_bridge.plant.vehicle import MAGNET
+from uam_sim_bridge.plant import Disturbance, Plant, Samples, Truth, Vehicle
+from uam_sim_bridge.plant.engines import DEFAULT_PLANT, plant_class
 
-STIFF = 0.9999  # constraint impedance of a friction without creep, see MuJoCo's solimp
+
+def make_plant(
+    vehicle: Vehicle,
+    payload_mass: float,
+    seed: int,
+    arm_start: Sequence[float],
+    faults: Schedule,
+    engine: str = DEFAULT_PLANT,
+) -> Plant:
+    """Return the plant of a flight, with the plant faults of `faults` if there are any.
+
+    engine: see `plant_class`; the others as in `PlantFactory`. Raises PlantError, FaultError.
+    """
+    check_engine(faults, engine)
+    acting = faults.only(PLANT)
+    plant = plant_class(engine)(vehicle, payload_mass, seed, arm_start, bool(_physical(acting)))
+    return FaultyPlant(plant, acting) if acting else plant
+
+
+def check_engine(faults: Schedule, engine: str) -> None:
+    """Raise PlantError for an unknown engine, FaultError for faults that it cannot simulate."""
+    physical = _physical(faults)
+    if not plant_class(engine).DISTURBABLE and physical:
+        raise FaultError(
+            f"fault {physical[0]}: plant {engine} has no faults of the physics, only those of "
+            "sensors and commands"
+        )
+
+
+def _physical(faults: Schedule) -> list[str]:
+    """Names of the faults that change the physics."""
+    return [one.fault.NAME for one in faults.faults if getattr(one.fault, "PHYSICS", False)]
 
 
 class FaultyPlant(Plant):
-    """A Plant with faults that begin and end at mission times; `mission_at` sets the time."""
+    """A plant with faults that begin and end at mission times; `mission_at` sets the time.
 
-    def __init__(
-        self,
-        vehicle: Vehicle,
-        payload_mass: float,
-        seed: int,
-        arm_start: Sequence[float],
-        schedule: Schedule,
-    ) -> None:
-        """See `Plant`; schedule: faults of the plant only."""
-        super().__init__(vehicle, payload_mass, seed, arm_start)
+    `inner`: the plant of the physics engine.
+    """
+
+    def __init__(self, inner: Plant, schedule: Schedule) -> None:
+        """schedule: faults of the plant only."""
+        super().__init__(inner.vehicle)
+        self.inner = inner
         self.timeline = Timeline(schedule)
         self.changed: list[FaultState] = []  # faults that began or ended at this tick
         self._effects: dict[int, Effect] = {}
+        self._disturbance = self._none()
         self._touched = False
         streams = np.random.SeedSequence(schedule.seed, spawn_key=(0xFA,)).spawn(
             len(schedule.faults)
         )
         self._noise = [np.random.default_rng(stream) for stream in streams]
-        model = self.model
-        self._arm_dofs = [model.joint(name).dofadr[0] for name in vehicle.description.joint_names]
-        self._magnet_id = model.actuator(MAGNET).id
-        self._usual = (
-            self.rotors.efficiency.copy(),
-            model.dof_frictionloss[self._arm_dofs].copy(),
-            model.dof_solimp[self._arm_dofs].copy(),
-            self._magnet_gain,
-        )
-        self._added_wind, self._fault_wind = np.zeros(3), np.zeros(3)
-        self._hinge = PayloadHinge(model, self.data)
-        self._swinging = False
-
-    def _compile(self, vehicle: Vehicle, payload_mass: float) -> mujoco.MjModel:
-        return vehicle.compile(payload_mass, add_to)
 
     def mission_at(self, stamp: float, time: float) -> None:
         """See `Timeline.mission_at`."""
         self.timeline.mission_at(stamp, time)
 
     def sense(self) -> Samples:
-        """Return the samples of `Plant.sense`, changed by the active faults."""
+        """Return the samples of the inner plant, changed by the active faults."""
         self.changed = self.timeline.update(self.time)
         for one in self.changed:
             if one.active:
                 self._effects[one.number] = one.fault.effect(self._noise[one.number])
             else:
                 del self._effects[one.number]
-        samples = super().sense()
+        samples = self.inner.sense()
         for effect in self._effects.values():
             effect.sense(samples)
         return samples
 
     def step(self, motor_commands: np.ndarray, arm_effort: np.ndarray, magnet: bool) -> None:
-        """Step as in `Plant.step`, with commands and model changed by the active faults.
+        """Step the inner plant, with commands and physics changed by the active faults.
 
-        motor_commands (n_rotors,) 0..1; arm_effort (n_joints,) [N m].
+        Arguments as in `Plant.step`.
         """
         if self._effects or self._touched:
             commands = PlantCommands(np.array(motor_commands), np.array(arm_effort), bool(magnet))
-            self._as_usual()
+            self._disturbance = self._none()
             for effect in self._effects.values():
                 effect.act(self, commands)
-            self._settle()
+            if self.inner.DISTURBABLE:
+                self.inner.disturb(self._disturbance)
             motor_commands, arm_effort = commands.motors, commands.effort
             magnet = commands.magnet
             self._touched = bool(self._effects)
-        super().step(motor_commands, arm_effort, magnet)
+        self.inner.step(motor_commands, arm_effort, magnet)
+        self.tick = self.inner.tick
+
+    def truth(self) -> Truth:
+        """Return the truth of the inner plant."""
+        return self.inner.truth()
 
     def weaken_rotor(self, rotor: int, part: float) -> None:
         """Scale the thrust of one rotor (0: the first) by `part` [1] for this period."""
-        self.rotors.efficiency[rotor] *= part
+        self._disturbance.rotor_parts[rotor] *= part
 
     def weaken_rotors(self, part: float) -> None:
         """Scale the thrust of all rotors by `part` [1] for this period."""
-        self.rotors.efficiency *= part
+        self._disturbance.rotor_parts *= part
 
     def brake_joint(self, joint: int, torque: float) -> None:
         """Add dry friction `torque` [N m] to a joint (0: the first) for this period."""
-        self.model.dof_frictionloss[self._arm_dofs[joint]] += torque
-        self.model.dof_solimp[self._arm_dofs[joint], 0:2] = STIFF
+        self._disturbance.joint_friction[joint] += torque
 
     def weaken_magnet(self, part: float) -> None:
         """Scale the magnet's holding force by `part` [1] for this period."""
-        self._magnet_gain *= part
+        self._disturbance.magnet_part *= part
 
     def add_wind(self, wind: np.ndarray) -> None:
         """Add wind (3,) [m/s, ENU] for this period."""
-        self._fault_wind += wind
+        self._disturbance.wind += wind
 
-    def swing_payload(self, commands: PlantCommands, rate: float) -> None:
+    def swing_payload(self, rate: float) -> None:
         """Attach the payload by a hinge while the magnet is on; rate [rad/s]: initial rate."""
-        self._swinging = commands.magnet and (self._hinge.closed or self._hinge.close(rate))
-        if self._swinging:
-            commands.magnet = False  # the hinge replaces the magnet's rigid contact
+        self._disturbance.payload_swing = rate
 
-    def _as_usual(self) -> None:
-        """Undo the changes of the last period."""
-        efficiency, friction, softness, gain = self._usual
-        self.rotors.efficiency[:] = efficiency
-        self.model.dof_frictionloss[self._arm_dofs] = friction
-        self.model.dof_solimp[self._arm_dofs] = softness
-        self._magnet_gain = gain
-        self._fault_wind[:] = 0.0
-        self._swinging = False
-
-    def _settle(self) -> None:
-        """Write the magnet's gain, the wind and the hinge's state to the model."""
-        self.model.actuator_gainprm[self._magnet_id, 0] = self._magnet_gain
-        change = self._fault_wind - self._added_wind
-        self.wind += change
-        self._wind_mean += change
-        self._added_wind += change
-        if not self._swinging and self._hinge.closed:
-            self._hinge.open()
+    def _none(self) -> Disturbance:
+        described = self.vehicle.description
+        return Disturbance.none(len(described.rotors), len(described.joints))

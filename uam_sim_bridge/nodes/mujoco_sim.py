@@ -44,7 +44,7 @@ from uam_msgs_py.node.executor import LeanExecutor
 from uam_msgs_py.node.node_parameters import refuse_unknown
 from uam_msgs_py.node.tunable import TunableNode
 from uam_sim_bridge.faults import PLANT, Schedule
-from uam_sim_bridge.faults.faulty_plant import FaultyPlant
+from uam_sim_bridge.faults.faulty_plant import FaultyPlant, make_plant
 from uam_sim_bridge.mavlink.hil.hil_server import HilParameters, HilServer
 from uam_sim_bridge.nodes.fault_topic import FaultTopic
 from uam_sim_bridge.nodes.latencies import Latencies
@@ -80,10 +80,10 @@ class Simulator:
         vehicle = Vehicle.load(options.vehicle).changed(json.loads(options.vehicle_changes))
         start = (vehicle, options.payload_mass, options.seed, tuple(options.arm_start))
         faults = Schedule.from_text(options.faults).only(PLANT)
-        self._faulty = FaultyPlant(*start, faults) if faults else None
-        self.plant = self._faulty or Plant(*start)
+        self.plant = make_plant(*start, faults, options.plant)
+        self._faulty = self.plant if isinstance(self.plant, FaultyPlant) else None
         self._fault_topic = FaultTopic(node) if faults else None
-        _warm_up(Plant(*start))
+        _warm_up(make_plant(*start, Schedule(), options.plant))
         self.sensors, self.truth = Sensors(node), TruthTopics(node)
         self.answers = Answers(node)
         self.connections = Connections(node)
@@ -299,7 +299,8 @@ def _warm_up(spare: Plant) -> None:
     for _ in range(10):
         spare.sense()
         spare.truth()
-        spare.step(np.zeros(len(spare.rotors.speed)), np.zeros(spare.joints), False)
+        rotors = len(spare.vehicle.description.rotors)
+        spare.step(np.zeros(rotors), np.zeros(spare.joints), False)
 
 
 def _listed(waiting: list[str]) -> str:

@@ -10,6 +10,7 @@ from rcl_interfaces.msg import ParameterDescriptor
 from rclpy.node import Node
 
 from uam_control.settings.parameter_set import ParameterError
+from uam_sim_bridge.plant.engines import DEFAULT_PLANT, PLANTS
 
 NOT_READY = 3  # exit status: not everyone came, or found the others
 
@@ -20,6 +21,7 @@ class Options:
 
     vehicle: str = "s500_arm"
     vehicle_changes: str = "{}"
+    plant: str = DEFAULT_PLANT
     payload_mass: float = 0.2
     seed: int = 1
     arm_start: list[float] = field(default_factory=lambda: [0.0, math.pi / 2.0])
@@ -39,6 +41,7 @@ class Options:
 DESCRIPTIONS = {
     "vehicle": "name of a file in config/vehicle",
     "vehicle_changes": 'JSON, dotted entries of that file to replace, as {"air.gust": 1.0}',
+    "plant": "physics engine: " + ", ".join(PLANTS) + ", or a class as module:Class",
     "payload_mass": "mass of the payload [kg], 0 for none",
     "seed": "of all noise",
     "arm_start": "joint angles on the ground [rad]",

@@ -1,21 +1,25 @@
-"""One control tick of the plant: sensors out, motor commands and joint efforts in."""
+"""What the simulator needs of a plant: the interface to a physics engine.
+
+A physics engine is one class, a `Plant`. It is chosen by a name of `engines.PLANTS` or as
+"module:Class": `uam fly --plant`, parameter `plant` of the node mujoco_sim. At each control tick
+the simulator calls
+
+    samples = plant.sense()                    what the sensors deliver
+    truth = plant.truth()                      for the record, and the autopilot's simulator link
+    plant.disturb(disturbance)                 only in a flight with faults of the physics
+    plant.step(motors, effort, magnet)         physics of one control period
+"""
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Protocol
 
-import mujoco
 import numpy as np
 
-from uam_control.coordinates import ALPHA, CHI, CHI_DDOT, CHI_DOT, ROLL, X
-from uam_control.maths.compiled import jit
-from uam_control.maths.rotations import euler_from_quaternion
-from uam_control.vehicle import VehicleError
-from uam_sim_bridge.plant.actuators import Rotors, Servos, rotor_step, servo_step
-from uam_sim_bridge.plant.magnet import magnet_constants, pull_fraction
-from uam_sim_bridge.plant.sensors import Delay, Encoders, Imu, Mocap, Noise, generators
-from uam_sim_bridge.plant.vehicle import BASE, MAGNET, PAYLOAD, SWING, Vehicle
+from uam_sim_bridge.plant.vehicle import Vehicle
 
 
 @dataclass
@@ -47,289 +51,80 @@ class Truth:
     rotor_thrust: np.ndarray
 
 
-class Plant:
-    """The vehicle with arm and magnet, and the payload; see config/vehicle/ for the numbers.
+@dataclass
+class Disturbance:
+    """What faults change in the physics of one period; see `none`.
 
-    At a tick: `sense()`, then `step(...)`, which advances one control period.
+    rotor_parts (rotors,): part of the thrust of each rotor; joint_friction (n,): dry friction added
+    to each joint [N m]; magnet_part: of the holding force; wind (3,): added [m/s, ENU];
+    payload_swing: the payload hangs from one point of the magnet while that is on, beginning with
+    this pitch rate [rad/s]; None: it lies flat on the magnet.
     """
 
-    def __init__(
-        self,
-        vehicle: Vehicle,
-        payload_mass: float,
-        seed: int,
-        arm_start: Sequence[float] = (),
-    ) -> None:
-        """payload_mass [kg], 0 for none; arm_start (n,): joint angles on the ground [rad], empty:
-        stowed as described."""
-        numbers = vehicle.numbers
+    rotor_parts: np.ndarray
+    joint_friction: np.ndarray
+    wind: np.ndarray
+    magnet_part: float = 1.0
+    payload_swing: float | None = None
+
+    @classmethod
+    def none(cls, rotors: int, joints: int) -> Disturbance:
+        """Return the disturbance that changes nothing."""
+        return cls(np.ones(rotors), np.zeros(joints), np.zeros(3))
+
+
+class Plant(ABC):
+    """Vehicle, payload and surroundings.
+
+    `vehicle`: as flown; `period`: of control [s]; `joints`: their number n; `tick`: number of
+    periods stepped. `DISTURBABLE`: whether it has `disturb`; without, faults of the physics are
+    refused, those of sensors and commands are not.
+    """
+
+    DISTURBABLE = True
+
+    def __init__(self, vehicle: Vehicle) -> None:
         self.vehicle = vehicle
-        self.joints = len(vehicle.description.joints)
         self.period: float = vehicle.description.control_period
+        self.joints = len(vehicle.description.joints)
         self.tick = 0
-        self.model = model = self._compile(vehicle, payload_mass)
-        self.data = data = mujoco.MjData(model)
-        self._steps = round(self.period / model.opt.timestep)
-        self._lay_out(payload_mass, arm_start or vehicle.description.stowed)
-
-        scale = numbers["sensors"]["noise_scale"]
-        imu_noise, mocap_noise, gusts = generators(seed, 3)
-        sensors = numbers["sensors"]
-        self._imu = Imu(sensors["imu"], scale, imu_noise)
-        self._mocap = Mocap(sensors["mocap"], scale, mocap_noise)
-        self._encoders = Encoders(sensors["joints"])
-        self._delays = {
-            name: Delay(sensors[name]["latency_ticks"]) for name in ("imu", "mocap", "joints")
-        }
-        self._effort_delay = Delay(numbers["servos"]["command_latency_ticks"])
-        self._effort = np.zeros(self.joints)
-
-        self.rotors = Rotors(numbers["rotors"], model.opt.timestep)
-        self.servos = Servos(numbers["servos"], self.joints)
-        air = numbers["air"]
-        self._drag = np.array(air["drag"], dtype=float)
-        self._wind_mean = np.array(air["wind"], dtype=float)
-        self.wind = self._wind_mean.copy()
-        self._gust_keep = np.exp(-self.period / air["gust_time"])
-        spread = air["gust"] * np.sqrt(1.0 - self._gust_keep**2)
-        self._gust = Noise(gusts, np.full(3, spread)) if air["gust"] else None
-
-        mujoco.mj_forward(model, data)
-        self._specific_force = self._sensed_force.copy()
-
-    def _compile(self, vehicle: Vehicle, payload_mass: float) -> mujoco.MjModel:
-        """The model; payload_mass [kg]."""
-        return vehicle.compile(payload_mass)
-
-    def _lay_out(self, payload_mass: float, arm_start: Sequence[float]) -> None:
-        """Keep views into MuJoCo's arrays and set the starting pose."""
-        data, joint, described = self.data, self.model.joint, self.vehicle.description
-        base_q, base_v = joint(BASE).qposadr[0], joint(BASE).dofadr[0]
-        self._position = data.qpos[base_q : base_q + 3]
-        self._quaternion = data.qpos[base_q + 3 : base_q + 7]
-        self._velocity = data.qvel[base_v : base_v + 3]
-        self._rates = data.qvel[base_v + 3 : base_v + 6]
-        first, names = described.joint_names[0], described.joint_names
-        arm_q, arm_v = joint(first).qposadr[0], joint(first).dofadr[0]
-        self._in_a_row("joint", [joint(name).dofadr[0] for name in names])
-        self._alpha = data.qpos[arm_q : arm_q + self.joints]
-        self._alpha_dot = data.qvel[arm_v : arm_v + self.joints]
-        self._base_acceleration = data.qacc[base_v : base_v + 6]
-        self._alpha_ddot = data.qacc[arm_v : arm_v + self.joints]
-        self._swing = joint(SWING).qposadr[0]
-        payload_q = joint(PAYLOAD).qposadr[0]
-        self._payload_pose = data.qpos[payload_q : payload_q + 7]
-        self._payload_position = self._payload_pose[0:3]
-        sensed = self.model.sensor("specific_force").adr[0]
-        self._sensed_force = data.sensordata[sensed : sensed + 3]
-        self._thrust_control = self._controls(described.rotor_names)
-        self._torque_control = self._controls(names)
-        self._force_on_base = data.xfrc_applied[self.model.body(BASE).id, 0:3]
-        self._magnet_gain = self.model.actuator(MAGNET).gainprm[0]
-        self._magnet_control = self._controls((MAGNET,))
-        self._face = data.site_xpos[self.model.site("magnet_face").id]
-        self._payload_axes = data.xmat[self.model.body(PAYLOAD).id]
-        gap_scale = self.vehicle.numbers["magnet"]["gap_scale"]
-        self._magnet_constants = magnet_constants(self.model, gap_scale)
-        self._alpha[:] = arm_start
-        data.qpos[self._swing] = -sum(arm_start)
-        self._payload_position[0:2] += self.vehicle.numbers["variation"]["payload_offset"]
-        if payload_mass <= 0.0:  # out of the way rather than another model
-            self._payload_position[:] = (5.0, 5.0, 0.02)
-
-    def _controls(self, names: Sequence[str]) -> np.ndarray:
-        """A view (len(names),) of the controls of these actuators."""
-        found = [self.model.actuator(name).id for name in names]
-        self._in_a_row("actuator", found)
-        return self.data.ctrl[found[0] : found[-1] + 1]
-
-    def _in_a_row(self, kind: str, numbers: Sequence[int]) -> None:
-        """Raise VehicleError where the parts are not adjacent and in the description's order."""
-        if list(numbers) != list(range(numbers[0], numbers[0] + len(numbers))):
-            described = self.vehicle.description
-            raise VehicleError(
-                f"{described.model}: each {kind} must follow the one before it in "
-                f"{described.file.name}"
-            )
 
     @property
     def time(self) -> float:
         """Simulation time [s]."""
         return self.tick * self.period
 
+    @abstractmethod
     def sense(self) -> Samples:
         """Expose the sensors at this tick and return what arrives now (call once per tick)."""
-        tick, time = self.tick, self.tick * self.period
-        gyro, force = self._imu.sample(self._rates, self._specific_force)
-        hil = (time, gyro, force)
-        delays = self._delays
-        delays["imu"].put(tick, hil)
-        alpha, alpha_dot = self._encoders.sample(self._alpha, self._alpha_dot)
-        delays["joints"].put(tick, (time, alpha, alpha_dot, self.servos.torque.copy()))
-        if self._mocap.due(time):
-            delays["mocap"].put(tick, (time, *self._mocap.sample(self._position, self._quaternion)))
-        return Samples(
-            delays["imu"].take(tick), delays["joints"].take(tick), delays["mocap"].take(tick), hil
-        )
 
+    @abstractmethod
     def step(self, motor_commands: np.ndarray, arm_effort: np.ndarray, magnet: bool) -> None:
-        """Advance one control period.
+        """Advance one control period, and `tick` by 1.
 
         motor_commands (rotors,) 0..1 in PX4's order, arm_effort (n,) [N m] as sent now (the bus
         delays it), magnet: current on.
         """
-        self._effort_delay.put(self.tick, tuple(map(float, arm_effort)))
-        due = self._effort_delay.take(self.tick)
-        if due is not None:
-            self._effort[:] = due
-        if self._gust is not None:
-            self.wind += (1.0 - self._gust_keep) * (self._wind_mean - self.wind) + self._gust()
-        surroundings(
-            self._drag,
-            self._velocity,
-            self.wind,
-            self._force_on_base,
-            magnet,
-            self._face,
-            self._payload_position,
-            self._payload_axes,
-            self._magnet_constants,
-            self._magnet_control,
-            self._specific_force,
-        )
-        rotors, servos = self.rotors, self.servos
-        for _ in range(self._steps):
-            actuate(
-                motor_commands,
-                rotors.constants,
-                rotors.efficiency,
-                rotors.speed,
-                rotors.thrust,
-                self._effort,
-                self._alpha_dot,
-                servos.constants,
-                servos.torque,
-                self._thrust_control,
-                self._torque_control,
-            )
-            mujoco.mj_step(self.model, self.data)
-            average(self._sensed_force, 1.0 / self._steps, self._specific_force)
-        self.tick += 1
 
-    def write_truth_state(self, state: np.ndarray) -> None:
-        """Write chi, chi_dot, chi_ddot into state (3, 6 + n)."""
-        write_state(
-            self._position,
-            self._quaternion,
-            self._velocity,
-            self._rates,
-            self._alpha,
-            self._alpha_dot,
-            self._base_acceleration,
-            self._alpha_ddot,
-            state,
-        )
-
-    @property
-    def payload_pose(self) -> np.ndarray:
-        """Position [m] and quaternion [w x y z] (7,) of the payload: a view, to be copied."""
-        return self._payload_pose
-
-    @property
-    def magnet_force(self) -> float:
-        """Holding force of the magnet at the present air gap [N]."""
-        return float(self._magnet_control[0] * self._magnet_gain)
-
-    @property
-    def magnet_swing(self) -> float:
-        """Angle of the magnet's pivot [rad], relative to the last link."""
-        return float(self.data.qpos[self._swing])
-
+    @abstractmethod
     def truth(self) -> Truth:
         """Return a copy of everything true at this tick."""
-        state = np.empty((3, ALPHA + self.joints))
-        self.write_truth_state(state)
-        return Truth(
-            state=state,
-            quaternion=self._quaternion.copy(),
-            payload_position=self._payload_position.copy(),
-            payload_quaternion=self._payload_pose[3:7].copy(),
-            magnet_force=self.magnet_force,
-            magnet_swing=self.magnet_swing,
-            rotor_speed=self.rotors.speed.copy(),
-            rotor_thrust=self.rotors.thrust.copy(),
-        )
+
+    def disturb(self, disturbance: Disturbance) -> None:
+        """Let `disturbance` act until the next call."""
+        raise NotImplementedError
 
 
-@jit
-def write_state(
-    position: np.ndarray,
-    quaternion: np.ndarray,
-    velocity: np.ndarray,
-    rates: np.ndarray,
-    alpha: np.ndarray,
-    alpha_dot: np.ndarray,
-    base_acceleration: np.ndarray,
-    alpha_ddot: np.ndarray,
-    state: np.ndarray,
-) -> None:
-    """Gather chi, chi_dot, chi_ddot into state (3, 6 + n)."""
-    euler = euler_from_quaternion(quaternion)
-    for i in range(3):
-        state[CHI, X + i], state[CHI, ROLL + i] = position[i], euler[i]
-        state[CHI_DOT, X + i], state[CHI_DOT, ROLL + i] = velocity[i], rates[i]
-        state[CHI_DDOT, X + i] = base_acceleration[i]
-        state[CHI_DDOT, ROLL + i] = base_acceleration[3 + i]
-    for i in range(len(alpha)):
-        state[CHI, ALPHA + i], state[CHI_DOT, ALPHA + i] = alpha[i], alpha_dot[i]
-        state[CHI_DDOT, ALPHA + i] = alpha_ddot[i]
+class PlantFactory(Protocol):
+    """How a plant is made; the class of a physics engine is one."""
 
-
-@jit
-def surroundings(
-    drag: np.ndarray,
-    velocity: np.ndarray,
-    wind: np.ndarray,
-    force: np.ndarray,
-    magnet: bool,
-    face: np.ndarray,
-    payload: np.ndarray,
-    payload_axes: np.ndarray,
-    gap_constants: np.ndarray,
-    magnet_control: np.ndarray,
-    specific_force: np.ndarray,
-) -> None:
-    """Before a tick: drag -c (v - wind) [N, world] into force (3,), pull of the magnet at its gap.
-
-    Also clears specific_force (3,) for the average over the physics steps of the tick.
-    """
-    for i in range(3):
-        force[i] = drag[i] * (wind[i] - velocity[i])
-        specific_force[i] = 0.0
-    magnet_control[0] = pull_fraction(face, payload, payload_axes, gap_constants) if magnet else 0.0
-
-
-@jit
-def actuate(
-    commands: np.ndarray,
-    rotor_constants: np.ndarray,
-    efficiency: np.ndarray,
-    speed: np.ndarray,
-    thrust: np.ndarray,
-    effort: np.ndarray,
-    joint_rates: np.ndarray,
-    servo_constants: np.ndarray,
-    torque: np.ndarray,
-    thrust_control: np.ndarray,
-    torque_control: np.ndarray,
-) -> None:
-    """Before a physics step: thrusts (rotors,) [N] and joint torques (n,) [N m] to the controls."""
-    rotor_step(commands, rotor_constants, efficiency, speed, thrust, thrust_control)
-    servo_step(effort, joint_rates, servo_constants, torque, torque_control)
-
-
-@jit
-def average(sample: np.ndarray, weight: float, mean: np.ndarray) -> None:
-    """Add weight * sample (3,) to mean (3,)."""
-    for i in range(3):
-        mean[i] += weight * sample[i]
+    def __call__(
+        self,
+        vehicle: Vehicle,
+        payload_mass: float,
+        seed: int,
+        arm_start: Sequence[float] = (),
+        disturbed: bool = False,
+    ) -> Plant:
+        """payload_mass [kg], 0 for none; seed: of all noise; arm_start (n,): joint angles on the
+        ground [rad], empty: stowed as described; disturbed: `disturb` will be called."""

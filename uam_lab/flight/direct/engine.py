@@ -32,6 +32,7 @@ def fly(settings: FlightSettings, folder: ResultFolder, progress: Progress) -> O
         settings.payload_mass,
         settings.seed,
         settings.faults,
+        settings.plant,
     )
     folder.write_parameters({node: vars(values) for node, values in settings.profile.sets.items()})
     begin = time.monotonic()

@@ -24,7 +24,9 @@ from uam_lab.flight.direct.record import Snapshot, record, record_blind, record_
 from uam_lab.results.timeseries import SUBSYSTEMS, FlightTable, gain_columns
 from uam_sim_bridge.faults import Schedule
 from uam_sim_bridge.faults.direct import DirectFaults
-from uam_sim_bridge.plant import Plant, Samples, Vehicle
+from uam_sim_bridge.faults.faulty_plant import make_plant
+from uam_sim_bridge.plant import Samples, Vehicle
+from uam_sim_bridge.plant.engines import DEFAULT_PLANT
 
 GAINS_TICKS = 25  # between two looks at the adapted gains for the supervisor
 LONGEST_WAIT = 20.0  # [s] simulated, for the autopilot to get ready and armed
@@ -44,12 +46,14 @@ class DirectFlight:
         payload_mass: float,
         seed: int,
         faults: Schedule | None = None,
+        plant: str = DEFAULT_PLANT,
     ) -> None:
-        """payload_mass [kg]; faults: those that `faults.limits.check` lets pass."""
+        """payload_mass [kg]; faults: those that `faults.limits.check` lets pass; plant: see
+        `plant_class`."""
         sets = profile.sets
-        self._faults = DirectFaults(faults) if faults else None
         started = (vehicle, payload_mass, seed, scenario.arm_start)
-        self.plant = self._faults.plant(*started) if self._faults else Plant(*started)
+        self.plant = make_plant(*started, faults or Schedule(), plant)
+        self._faults = DirectFaults(faults, self.plant) if faults else None
         self.estimator = StateEstimator(sets["state_estimator"])
         self.mission = Mission(scenario, sets["mission"])
         self.position = PositionController(sets["position_controller"])

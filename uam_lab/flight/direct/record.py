@@ -38,15 +38,14 @@ class Snapshot(NamedTuple):
     @classmethod
     def of(cls, plant: Plant) -> Snapshot:
         """A copy of what is true now."""
-        state = np.empty((3, 8))
-        plant.write_truth_state(state)
+        truth = plant.truth()
         return cls(
             plant.time,
-            state,
-            plant.rotors.thrust.copy(),
-            plant.payload_pose.copy(),
-            plant.magnet_force,
-            plant.magnet_swing,
+            truth.state,
+            truth.rotor_thrust,
+            np.concatenate((truth.payload_position, truth.payload_quaternion)),
+            truth.magnet_force,
+            truth.magnet_swing,
         )
 
 

@@ -32,6 +32,7 @@ def parameters(
     sections[wiring.MISSION]["scenario"] = scenario_source(settings)
     sections[wiring.PLANT] = {
         "vehicle_changes": json.dumps(settings.vehicle_changes),
+        "plant": settings.plant,
         "payload_mass": float(settings.payload_mass),
         "seed": settings.seed,
         "arm_start": list(settings.scenario.arm_start),
