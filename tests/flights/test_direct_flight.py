@@ -106,7 +106,7 @@ def test_the_printed_law_with_table_1_stays_on_the_ground():
     a_flight = fly_until(flight(profile="paper_table1"), 5.0)
     series = a_flight.recording.series()
     assert np.nanmax(series["truth.z"]) < 0.30
-    assert a_flight.position.parameters.safeguards == []
+    assert a_flight.control.position.controller.parameters.safeguards == []
 
 
 def test_the_bridge_flies_what_the_profile_says_of_it():
@@ -114,5 +114,5 @@ def test_the_bridge_flies_what_the_profile_says_of_it():
     section = {"thrust_max": 30.0, "stream_time": 2.0, "local_port": 14999}
     profile = dataclasses.replace(profile, sections={**profile.sections, "mavlink_bridge": section})
     flight = DirectFlight(load_scenario("hover"), profile, Vehicle.load(), 0.0, seed=1)
-    assert flight.bridge.map.parameters.thrust_max == 30.0
-    assert flight.bridge.sequence.parameters.stream_time == 2.0
+    assert flight.control.bridge.map.parameters.thrust_max == 30.0
+    assert flight.sequence.parameters.stream_time == 2.0

@@ -70,7 +70,7 @@ def test_a_flight_without_a_motor_is_lost():
 def test_without_imu_or_link_the_autopilot_brings_it_down_and_the_flight_ends():
     for text in ("imu_dropout@hover+1", "mavlink_cut@hover+1"):
         flight, series, figures = flown(text)
-        assert not flight.bridge.autopilot.commander.armed
+        assert not flight.armed
         assert classify(series, figures) == "failsafe", text
         assert figures["shortfalls"], text
 
@@ -87,7 +87,7 @@ def test_a_frozen_tracker_is_believed_by_nobody():
     flight, series, figures = flown("mocap_freeze@hover+1+6")
     assert classify(series, figures) == "failsafe"
     assert "mocap pose has been the same for 1.10 s" in figures["shortfalls"][0]
-    assert not flight.bridge.autopilot.commander.armed
+    assert not flight.armed
 
 
 def test_the_same_seed_gives_the_same_flight_with_random_faults():

@@ -94,7 +94,7 @@ def test_without_mocap_it_holds_on_the_imu_then_the_autopilot_brings_it_down():
     output = until(made, lambda o: o.done)
     assert states(made)[-2:] == [State.HOLDING, State.FAILSAFE]
     assert output.abort_reason.startswith("mocap pose is 1.") and output.phase == "aborted"
-    assert not made.bridge.autopilot.commander.armed and not output.arm
+    assert not made.armed and not output.arm
     x, y = landed_softly(made)
     assert np.hypot(x, y) < 1.0
 
@@ -102,7 +102,7 @@ def test_without_mocap_it_holds_on_the_imu_then_the_autopilot_brings_it_down():
 def test_motors_that_are_switched_off_by_the_autopilot_end_it():
     made = flight("hover", payload=0.0)
     until(made, lambda o: o.time > 4.0)
-    made.bridge.autopilot.commander.armed = False
+    made.autopilot.autopilot.commander.armed = False
     output = until(made, lambda o: o.done)
     assert output.abort_reason == "the autopilot disarmed in flight"
-    assert not made.bridge.autopilot.commander.armed
+    assert not made.armed

@@ -8,6 +8,7 @@ from uam_control.coordinates import COORDINATES, JOINTS
 from uam_control.estimation import StateEstimator
 from uam_control.mission import Mission, load_scenario
 from uam_control.profiles.profile import load_profile
+from uam_control.stamps import seconds
 from uam_msgs_py.messages import topics
 from uam_msgs_py.messages.control import (
     read_position_command,
@@ -16,7 +17,6 @@ from uam_msgs_py.messages.control import (
     read_torque,
 )
 from uam_msgs_py.messages.convert import ImuWriter, JointStateWriter, PoseWriter, read_effort
-from uam_msgs_py.messages.stamps import seconds
 from uam_msgs_py.messages.status import AutopilotState, MissionStatus
 from uam_msgs_py.messages.trajectories import TrajectoryWriter
 from uam_msgs_py.node.connections import Connections

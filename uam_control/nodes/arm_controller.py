@@ -4,6 +4,7 @@ import numpy as np
 
 from uam_control.control.controllers import ArmController
 from uam_control.nodes.controller_node import ControllerNode
+from uam_control.stages.law_stages import TorqueStage
 from uam_msgs_py.messages import topics
 from uam_msgs_py.messages.control import ARM_NAMES, PositionCommand, Reference, TorqueWriter
 from uam_msgs_py.messages.convert import EffortWriter
@@ -22,6 +23,7 @@ class ArmControllerNode(ControllerNode):
         super().__init__(
             NAME,
             ArmController,
+            TorqueStage,
             [topics.STATE, topics.REFERENCE, topics.POSITION_COMMAND],
             topics.ARM_ADAPTATION,
         )
@@ -33,26 +35,14 @@ class ArmControllerNode(ControllerNode):
     def tick(
         self,
         stamp: int,
-        dt: float,
         state: np.ndarray,
         reference: Reference,
         position: PositionCommand,
     ) -> None:
         flying = reference.flying and position.flying
-        tau = self.controller.update(state, reference.values, position.attitude, flying, dt)
+        tau = self.stage.update(stamp, state, reference.values, position.attitude, flying)
         self._effort.publish(self._effort_writer.fill(tau))
         self._command.publish(self._writer.fill(stamp, tau))
-
-    def evaluate(
-        self,
-        controller: ArmController,
-        dt: float,
-        state: np.ndarray,
-        reference: np.ndarray,
-        attitude: np.ndarray,
-        flying: bool,
-    ) -> np.ndarray:
-        return controller.update(state, reference, attitude, flying, dt)
 
 
 def main() -> int:

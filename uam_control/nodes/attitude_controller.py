@@ -4,6 +4,7 @@ import numpy as np
 
 from uam_control.control.controllers import AttitudeController
 from uam_control.nodes.controller_node import ControllerNode
+from uam_control.stages.law_stages import TorqueStage
 from uam_msgs_py.messages import topics
 from uam_msgs_py.messages.control import ATTITUDE_NAMES, PositionCommand, Reference, TorqueWriter
 from uam_msgs_py.node.base_node import run
@@ -18,6 +19,7 @@ class AttitudeControllerNode(ControllerNode):
         super().__init__(
             NAME,
             AttitudeController,
+            TorqueStage,
             [topics.STATE, topics.REFERENCE, topics.POSITION_COMMAND],
             topics.ATTITUDE_ADAPTATION,
         )
@@ -27,25 +29,13 @@ class AttitudeControllerNode(ControllerNode):
     def tick(
         self,
         stamp: int,
-        dt: float,
         state: np.ndarray,
         reference: Reference,
         position: PositionCommand,
     ) -> None:
         flying = reference.flying and position.flying
-        tau = self.controller.update(state, reference.values, position.attitude, flying, dt)
+        tau = self.stage.update(stamp, state, reference.values, position.attitude, flying)
         self._command.publish(self._writer.fill(stamp, tau) if flying else self._writer.idle(stamp))
-
-    def evaluate(
-        self,
-        controller: AttitudeController,
-        dt: float,
-        state: np.ndarray,
-        reference: np.ndarray,
-        attitude: np.ndarray,
-        flying: bool,
-    ) -> np.ndarray:
-        return controller.update(state, reference, attitude, flying, dt)
 
 
 def main() -> int:

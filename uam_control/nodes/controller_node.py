@@ -10,8 +10,9 @@ from uam_control.control.controllers import Controller
 from uam_control.coordinates import SIZE
 from uam_control.laws import catalogue
 from uam_control.nodes.described import described_vehicle
-from uam_control.nodes.timing import Ticks, Timing
 from uam_control.profiles.profile import default_profile, parameter_set
+from uam_control.stages.law_stages import LawStage, PositionStage
+from uam_control.stages.timing import Timing
 from uam_msgs_py.messages import topics
 from uam_msgs_py.messages.control import read_position_command, read_reference, read_state
 from uam_msgs_py.messages.convert import JointStateWriter
@@ -21,7 +22,6 @@ from uam_msgs_py.node.base_node import UamNode
 from uam_msgs_py.node.joins import StampJoin
 from uam_msgs_py.node.node_parameters import NodeParameters, given
 
-ADAPTATION_PERIOD = 20_000_000  # [ns] between two adaptation messages
 RESET, FREEZE = "reset_adaptation", "freeze_adaptation"  # services
 
 
@@ -35,7 +35,12 @@ class ControllerNode(UamNode):
     }
 
     def __init__(
-        self, name: str, controller: type[Controller], inputs: list[Topic], adaptation: Topic
+        self,
+        name: str,
+        controller: type[Controller],
+        stage: type[LawStage],
+        inputs: list[Topic],
+        adaptation: Topic,
     ):
         """inputs: the topics whose messages `tick` takes, in that order.
 
@@ -50,10 +55,10 @@ class ControllerNode(UamNode):
         derived = self.vehicle.node_parameters().get(name)
         self.parameter_set = NodeParameters(self, kind, axes, defaults, derived)
         timing = NodeParameters(self, Timing, read_only=True).current
-        self._ticks = Ticks(timing)
         self.controller = controller(self.parameter_set.current)
+        self.stage = stage(self.controller, timing)
         self.parameter_set.apply = self.controller.set_parameters
-        self._warm_up(controller(self.parameter_set.current), timing.control_period)
+        self._warm_up(stage(controller(self.parameter_set.current), timing))
         self._adaptation = self.publisher(adaptation)
         self._gains = JointStateWriter(self.controller.names)
         self._join = StampJoin([topic.name for topic in inputs], self._joined)
@@ -70,33 +75,22 @@ class ControllerNode(UamNode):
 
     def _joined(self, stamp: int, *values) -> None:
         begun = time.perf_counter()
-        self.tick(stamp, self._ticks.step(stamp), *values)
-        if stamp // ADAPTATION_PERIOD != self.stamp // ADAPTATION_PERIOD:
+        self.tick(stamp, *values)
+        if self.stage.gains_due:
             self._gains.position[:] = self.controller.adaptation
             self._adaptation.publish(self._gains.stamped(stamp))
         self.done_tick(stamp, begun)
 
-    def tick(self, stamp: int, dt: float, *values) -> None:
-        """Control at `stamp` [ns], dt [s] after the last tick; publish the command."""
+    def tick(self, stamp: int, *values) -> None:
+        """Control at `stamp` [ns] and publish the command."""
         raise NotImplementedError
 
-    def evaluate(
-        self,
-        controller: Controller,
-        dt: float,
-        state: np.ndarray,
-        reference: np.ndarray,
-        attitude: np.ndarray,
-        flying: bool,
-    ) -> np.ndarray:
-        """Return the controller's output; used to compile it before the flight."""
-        raise NotImplementedError
-
-    def _warm_up(self, spare: Controller, dt: float) -> None:
-        """Compile the law on a controller that never flies: the first call takes a second."""
-        nothing = np.zeros((3, SIZE))
+    def _warm_up(self, spare: LawStage) -> None:
+        """Compile the law on a stage that never flies: the first call takes a second."""
+        nothing, attitude = np.zeros((3, SIZE)), np.zeros((3, 3))
+        reference = (nothing,) if isinstance(spare, PositionStage) else (nothing, attitude)
         for flying in (False, True):
-            self.evaluate(spare, dt, nothing, nothing, np.zeros((3, 3)), flying)
+            spare.update(0, nothing, *reference, flying)
 
     def _on_reset(self, request: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
         controller = self.controller

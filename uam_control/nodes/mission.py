@@ -14,14 +14,14 @@ from uam_control.mission import Mission, MissionOutput, MissionParameters, load_
 from uam_control.nodes.described import described_vehicle
 from uam_control.nodes.mission_inputs import MissionInputs
 from uam_control.nodes.mission_services import offer
-from uam_control.nodes.timing import Ticks, Timing
 from uam_control.profiles.profile import default_profile
+from uam_control.stages.mission_stage import MissionStage
+from uam_control.stages.timing import Timing
+from uam_control.stamps import SECOND
 from uam_control.supervision import State
 from uam_msgs_py.messages import topics
 from uam_msgs_py.messages.control import ReferenceWriter, read_state
 from uam_msgs_py.messages.convert import SWITCH
-from uam_msgs_py.messages.layouts import SECOND
-from uam_msgs_py.messages.stamps import seconds
 from uam_msgs_py.messages.status import ERROR, OK, WARN, AutopilotState, MissionStatus
 from uam_msgs_py.node.base_node import UamNode, run
 from uam_msgs_py.node.joins import Backlog
@@ -30,7 +30,6 @@ from uam_msgs_py.node.node_parameters import NodeParameters
 NAME = "mission"
 DEFAULT_SCENARIO = "pick_and_place"
 STATUS_PERIOD = 500_000_000  # [ns]
-TOLD_BY = 200_000_000  # [ns] by which everybody has the status of a tick
 
 
 class MissionNode(UamNode):
@@ -46,18 +45,16 @@ class MissionNode(UamNode):
         derived = vehicle.node_parameters()[NAME]
         axes = vehicle.coordinates[ARM]
         self.parameter_set = NodeParameters(self, MissionParameters, axes, section, derived)
-        self._period = Ticks(NodeParameters(self, Timing, read_only=True).current).period
+        timing = NodeParameters(self, Timing, read_only=True).current
         about = ParameterDescriptor(
             description="name of a scenario, or its file; fixed once the node runs", read_only=True
         )
         scenario = self.declare_parameter("scenario", DEFAULT_SCENARIO, about).value
         self._mission = Mission(load_scenario(scenario), self.parameter_set.current)
+        self._stage = MissionStage(self._mission, timing)
         spare = Mission(self._mission.scenario, self.parameter_set.current)
         warm_up(spare, self.parameter_set.current.takeoff_delay)
         self.parameter_set.apply = self._mission.configure
-        self._armed_since: float | None = None
-        self._ahead = -1  # stamp [ns] of the newest reference
-        self._flown = -TOLD_BY  # stamp [ns] of the newest one that the mission wanted flown
         self._arm: bool | None = None
         self._told: tuple = ()  # what the last status said
         self._errors = (0.0, 0.0, 0.0)
@@ -69,7 +66,7 @@ class MissionNode(UamNode):
         self._arming = self.publisher(topics.ARMING)
         self._status = self.publisher(topics.MISSION_STATUS)
         self._writer = ReferenceWriter()
-        self._inputs = MissionInputs(self, seconds(self._period))
+        MissionInputs(self, self._stage.inputs)
         self.listen(topics.AUTOPILOT_STATE, self._on_autopilot, required=False)
         self.listen(topics.STATE, self._on_state)
         self.triggers = (topics.STATE.name,)
@@ -77,10 +74,8 @@ class MissionNode(UamNode):
 
     def _on_autopilot(self, message: DiagnosticArray) -> None:
         stamp, state = AutopilotState.from_message(message)
-        if state.connected:
-            self._inputs.autopilot(seconds(stamp), state.round_trip)
-        armed = state.armed and state.armed_since is not None
-        self._armed_since = seconds(state.armed_since) if armed else None
+        since = state.armed_since if state.armed else None
+        self._stage.autopilot(stamp, state.connected, since, state.round_trip)
 
     def _on_state(self, data: bytes) -> None:
         self._states.put(read_state(data))
@@ -92,36 +87,24 @@ class MissionNode(UamNode):
             self._tick(stamp, state)
 
     def _tick(self, stamp: int, state: np.ndarray) -> None:
-        begun = time.perf_counter()
-        self._inputs.tick(stamp)
-        if stamp != self._ahead:  # the first tick, or one after a gap
-            self._advance(stamp, state)
-        output = self._mission.output  # as of this tick, from the step one tick ago
+        begun, stage = time.perf_counter(), self._stage
+        if stage.begin(stamp, state):
+            self._publish_reference()
+        output = stage.output
         self._measure(state, output)
-        self._tell(stamp)  # before the magnet: who has the magnet of a tick has its status, too
+        self._tell(stamp)  # before the magnet, so that the status of a tick arrives before it
         self._magnet.publish(SWITCH[bool(output.magnet)])
-        self._advance(stamp + self._period, state)
+        stage.advance(stamp, state)
+        self._publish_reference()
         self.done_tick(stamp, begun)
 
-    def _advance(self, stamp: int, state: np.ndarray) -> None:
-        """Publish the reference of the tick `stamp` [ns]."""
-        readings = self._inputs.readings
-        output = self._mission.step(seconds(stamp), state, self._armed_since, readings)
-        time_of_mission = max(0, round(output.time * SECOND))
-        flying = self._flying(stamp, output)
-        self._reference.publish(self._writer.fill(stamp, output.reference, flying, time_of_mission))
-        self._ahead = stamp
-
-    def _flying(self, stamp: int, output: MissionOutput) -> bool:
-        """Whether the reference is to be flown: in a failsafe, until the bridge knows of it.
-
-        It then ignores commands. Were they idle before its status arrives, they would mean that the
-        vehicle stands on the ground, and low in the air switch its motors off.
-        """
-        if output.flying:
-            self._flown = stamp
-            return True
-        return output.state is State.FAILSAFE and stamp - self._flown < TOLD_BY
+    def _publish_reference(self) -> None:
+        """Publish the newest reference, with the stamp of its tick."""
+        stage, output = self._stage, self._stage.output
+        since_takeoff = max(0, round(output.time * SECOND))
+        self._reference.publish(
+            self._writer.fill(stage.ahead, output.reference, stage.flying, since_takeoff)
+        )
 
     def _measure(self, state: np.ndarray, output: MissionOutput) -> None:
         """Errors of this tick: norms of estimate − reference; zero what is not controlled."""

@@ -4,6 +4,7 @@ import numpy as np
 
 from uam_control.control.controllers import PositionController
 from uam_control.nodes.controller_node import ControllerNode
+from uam_control.stages.law_stages import PositionStage
 from uam_msgs_py.messages import topics
 from uam_msgs_py.messages.control import PositionCommandWriter, Reference
 from uam_msgs_py.node.base_node import run
@@ -18,31 +19,21 @@ class PositionControllerNode(ControllerNode):
         super().__init__(
             NAME,
             PositionController,
+            PositionStage,
             [topics.STATE, topics.REFERENCE],
             topics.POSITION_ADAPTATION,
         )
         self._command = self.publisher(topics.POSITION_COMMAND)
         self._writer = PositionCommandWriter()
 
-    def tick(self, stamp: int, dt: float, state: np.ndarray, reference: Reference) -> None:
-        tau = self.controller.update(state, reference.values, reference.flying, dt)
+    def tick(self, stamp: int, state: np.ndarray, reference: Reference) -> None:
+        tau = self.stage.update(stamp, state, reference.values, reference.flying)
         if reference.flying:
-            attitude = self.controller.attitude_reference
+            attitude = self.stage.attitude_reference
             message = self._writer.fill(stamp, reference.values, attitude, tau)
         else:
             message = self._writer.idle(stamp)
         self._command.publish(message)
-
-    def evaluate(
-        self,
-        controller: PositionController,
-        dt: float,
-        state: np.ndarray,
-        reference: np.ndarray,
-        attitude: np.ndarray,
-        flying: bool,
-    ) -> np.ndarray:
-        return controller.update(state, reference, flying, dt)
 
 
 def main() -> int:

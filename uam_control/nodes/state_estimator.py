@@ -5,13 +5,13 @@ import time
 import numpy as np
 
 from uam_control.coordinates import COORDINATES, JOINTS
-from uam_control.estimation import EstimatorParameters, StateEstimator
+from uam_control.estimation import EstimatorParameters
 from uam_control.laws.catalogue import DEFAULT
 from uam_control.nodes.described import described_vehicle
 from uam_control.profiles.profile import default_profile
+from uam_control.stages.estimator_stage import EstimatorStage
 from uam_msgs_py.messages import topics
 from uam_msgs_py.messages.convert import read_imu, read_joints, read_pose
-from uam_msgs_py.messages.stamps import seconds
 from uam_msgs_py.messages.status import OK, WARN
 from uam_msgs_py.messages.trajectories import TrajectoryWriter
 from uam_msgs_py.node.base_node import UamNode, run
@@ -34,8 +34,8 @@ class StateEstimatorNode(UamNode):
         vehicle = described_vehicle(self)
         section = default_profile(DEFAULT, vehicle).section(NAME)
         self.parameter_set = NodeParameters(self, EstimatorParameters, defaults=section)
-        self._estimator = StateEstimator(self.parameter_set.current)
-        self.parameter_set.apply = self._estimator.set_parameters
+        self._stage = EstimatorStage(self.parameter_set.current)
+        self.parameter_set.apply = self._stage.estimator.set_parameters
         self._warm_up()
         self._state = self.publisher(topics.STATE)
         self._writer = TrajectoryWriter(COORDINATES)
@@ -43,33 +43,28 @@ class StateEstimatorNode(UamNode):
         self._joints = self.listen(topics.JOINTS, self._on_joints)
         self.listen(topics.IMU, self._on_imu)
         self.triggers = (topics.IMU.name,)
-        self._last_imu = -1
         self._refused_before = 0  # poses, at the last report
         self._updates = Backlog()
 
     def _on_mocap(self, data: bytes) -> None:
-        stamp, position, quaternion = read_pose(data)
-        self._estimator.mocap(seconds(stamp), position, quaternion)
+        self._stage.mocap(*read_pose(data))
 
     def _on_joints(self, data: bytes) -> None:
-        stamp, position, velocity = read_joints(data, NAMES)
-        self._estimator.joints(seconds(stamp), position, velocity)
+        self._stage.joints(*read_joints(data, NAMES))
 
     def _on_imu(self, data: bytes) -> None:
         begun = time.perf_counter()
-        stamp, gyro, specific_force = read_imu(data)
-        if stamp <= self._last_imu:
-            self.say(f"IMU stamp {stamp} ns does not follow {self._last_imu} ns; ignored", "imu")
+        stamp, gyro, force = read_imu(data)
+        if stamp <= self._stage.stamp:
+            self.say(f"IMU stamp {stamp} ns does not follow {self._stage.stamp} ns; ignored", "imu")
             return
-        self._last_imu = stamp
         self.take_waiting(self._mocap)
         self.take_waiting(self._joints)
-        estimator = self._estimator
-        estimator.imu(seconds(stamp), gyro, specific_force)
-        if estimator.waiting_for:
+        state = self._stage.imu(stamp, gyro, force)
+        if state is None:
             return
         # for every sample, as the filters count them
-        self._updates.put((stamp, self._writer.fill(stamp, estimator.update()), begun))
+        self._updates.put((stamp, self._writer.fill(stamp, state), begun))
         if not self.deferred:
             self.settle()
 
@@ -79,7 +74,7 @@ class StateEstimatorNode(UamNode):
             self.done_tick(stamp, begun)
 
     def diagnose(self) -> tuple[bytes, str, dict[str, object]]:
-        refused = self._estimator.refused_poses
+        refused = self._stage.estimator.refused_poses
         fresh, self._refused_before = refused - self._refused_before, refused
         values = {"poses refused": refused}
         if fresh:
@@ -88,14 +83,13 @@ class StateEstimatorNode(UamNode):
 
     def _warm_up(self) -> None:
         """Compile the filters on an estimator that never flies."""
-        spare = StateEstimator(self.parameter_set.current)
+        spare = EstimatorStage(self.parameter_set.current)
         rest, level = np.zeros(3), np.array([1.0, 0.0, 0.0, 0.0])
-        for tick in range(3):
-            stamp = 0.004 * tick
+        joints = np.zeros(len(NAMES))
+        for stamp in range(0, 12_000_000, 4_000_000):
             spare.mocap(stamp, rest, level)
-            spare.joints(stamp, np.zeros(2), np.zeros(2))
+            spare.joints(stamp, joints, joints)
             spare.imu(stamp, rest, np.array([0.0, 0.0, 9.81]))
-            spare.update()
 
 
 def main() -> int:

@@ -26,10 +26,11 @@ from rclpy.signals import SignalHandlerOptions
 from rclpy.subscription import Subscription
 
 from uam_control.settings.parameter_set import ParameterError
+from uam_control.stamps import SECOND
 from uam_lab.recording.bounded_log import BoundedLog
 from uam_lab.recording.message_definitions import schema
 from uam_msgs_py.messages import topics
-from uam_msgs_py.messages.layouts import SECOND, stamp_of
+from uam_msgs_py.messages.layouts import stamp_of
 from uam_msgs_py.messages.serialized import type_name
 from uam_msgs_py.messages.status import ERROR, OK, WARN, diagnostic
 from uam_msgs_py.node import connections

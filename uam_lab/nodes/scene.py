@@ -24,12 +24,11 @@ from uam_control.coordinates import ARM, ATTITUDE, COORDINATES, JOINTS, POSITION
 from uam_control.maths.rotations import quaternion_from_euler, wrap_angle
 from uam_control.mission import load_scenario
 from uam_control.settings.parameter_set import ParameterSet, number
+from uam_control.stamps import SECOND, seconds
 from uam_lab.nodes.scene_markers import PAYLOAD, FlownPath, Markers, ReferencePath
 from uam_msgs_py.messages import topics
 from uam_msgs_py.messages.control import Reference, read_reference, read_state
 from uam_msgs_py.messages.convert import JointStateWriter, read_pose
-from uam_msgs_py.messages.layouts import SECOND
-from uam_msgs_py.messages.stamps import seconds
 from uam_msgs_py.messages.status import ERROR, OK, MissionStatus
 from uam_msgs_py.messages.topics import BODY, WORLD
 from uam_msgs_py.messages.transforms import Transform, transforms_message

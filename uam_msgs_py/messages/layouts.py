@@ -16,7 +16,8 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Any
 
-SECOND = 1_000_000_000  # [ns]
+from uam_control.stamps import SECOND
+
 ENCAPSULATION = 4
 STAMP = slice(4, 12)  # std_msgs/Header and rosgraph_msgs/Clock begin with it
 KNOWN_LAYOUTS = 32  # stored per message type

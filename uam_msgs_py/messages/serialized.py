@@ -17,8 +17,8 @@ from sensor_msgs.msg import Imu, JointState
 from std_msgs.msg import Float64MultiArray
 from trajectory_msgs.msg import JointTrajectory
 
+from uam_control.stamps import SECOND
 from uam_msgs_py.messages.layouts import (
-    SECOND,
     STAMP,
     BadMessage,
     Layout,

@@ -1,10 +1,10 @@
-"""Stamps: integer nanoseconds here, builtin_interfaces/Time in messages, seconds in the maths."""
+"""Stamps: integer nanoseconds here, builtin_interfaces/Time in messages."""
 
 from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from uam_msgs_py.messages.layouts import SECOND
+from uam_control.stamps import SECOND
 
 if TYPE_CHECKING:
     from builtin_interfaces.msg import Time
@@ -18,8 +18,3 @@ def set_stamp(stamp: Time, nanoseconds: int) -> None:
 def nanoseconds(stamp: Time) -> int:
     """Return a builtin_interfaces/Time in integer nanoseconds."""
     return stamp.sec * SECOND + stamp.nanosec
-
-
-def seconds(nanoseconds: int) -> float:
-    """Return integer nanoseconds in seconds."""
-    return nanoseconds / SECOND

@@ -6,7 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from uam_msgs_py.messages.layouts import ENCAPSULATION, SECOND, BadMessage, is_little_endian
+from uam_control.stamps import SECOND
+from uam_msgs_py.messages.layouts import ENCAPSULATION, BadMessage, is_little_endian
 
 LITTLE_ENDIAN = b"\0\1\0\0"  # the encapsulation of plain CDR
 NUMBERS = 7  # translation x y z, rotation x y z w

@@ -2,54 +2,46 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 from uam_msgs_py.messages import topics
 from uam_msgs_py.messages.battery_state import battery_message
-from uam_msgs_py.messages.stamps import seconds
 from uam_msgs_py.messages.status import AutopilotState
 from uam_msgs_py.node.base_node import UamNode
 from uam_sim_bridge.mavlink.link.link import OffboardLink
-from uam_sim_bridge.mavlink.offboard.sequence import OffboardSequence
+from uam_sim_bridge.stages.autopilot_report import AutopilotReport
 
-STATE_PERIOD = 200_000_000  # ns between two reports of the autopilot's state
 BATTERY_PERIOD = 1_000_000_000  # ns
 
 
 class AutopilotTopics:
-    """Publishes the state when it changes and five times a second, the battery once a second."""
+    """Publishes the reports of the bridge's stage, the battery once a second, and warnings."""
 
-    def __init__(self, node: UamNode, link: OffboardLink, sequence: OffboardSequence) -> None:
-        self._logger, self._link, self._sequence = node.get_logger(), link, sequence
+    def __init__(self, node: UamNode, link: OffboardLink) -> None:
+        self._logger, self._link = node.get_logger(), link
         self._state = node.publisher(topics.AUTOPILOT_STATE)
         self._battery = node.publisher(topics.AUTOPILOT_BATTERY)
-        self._told: tuple[Any, ...] = ()
-        self._told_at, self._battery_told = -STATE_PERIOD, -BATTERY_PERIOD
+        self._told: AutopilotReport | None = None
+        self._battery_told = -BATTERY_PERIOD
         self._warned: tuple[str, ...] = ()
 
-    def tell(self, stamp: int) -> None:
-        """Publish and log what is due at `stamp` [ns]."""
+    def tell(self, stamp: int, report: AutopilotReport | None) -> None:
+        """Publish and log what is due at `stamp` [ns]; report: None where none is due."""
         self._tell_battery(stamp)
         self._tell_warnings()
-        link, sequence = self._link, self._sequence
-        connected = link.connected(seconds(stamp))
-        what = (connected, link.mode, link.armed, sequence.phase, sequence.reasons)
-        if what == self._told and stamp - self._told_at < STATE_PERIOD:
+        if report is None:
             return
-        if what != self._told:
-            armed = "armed" if link.armed else "disarmed"
-            heard = "" if connected else ", no heartbeat"
-            text = f"{sequence.phase.value}; autopilot {link.mode.name}, {armed}{heard}"
-            self._logger.info("; ".join((text, *sequence.reasons)))
-        self._told, self._told_at = what, stamp
-        since = link.armed_since
+        if report.differs(self._told):
+            armed = "armed" if report.armed else "disarmed"
+            heard = "" if report.connected else ", no heartbeat"
+            text = f"{report.phase.value}; autopilot {report.mode.name}, {armed}{heard}"
+            self._logger.info("; ".join((text, *report.reasons)))
+        self._told = report
         state = AutopilotState(
-            connected,
-            link.mode.name,
-            link.armed,
-            None if since is None else round(since * 1e6) * 1000,
-            "; ".join(sequence.reasons),
-            link.time_sync.quickest,
+            report.connected,
+            report.mode.name,
+            report.armed,
+            report.armed_since,
+            "; ".join(report.reasons),
+            report.round_trip,
         )
         self._state.publish(state.to_message(stamp))
 

@@ -36,13 +36,6 @@ class BridgeParameters(ParameterSet):
     )
     autopilot_system: float = number(1, "MAVLink system id of the autopilot", "1", 1, 255)
     signing_link_id: float = number(0, "number of this link in MAVLink 2 signatures", "1", 0, 255)
-    vision_interval: float = number(0.02, "least time between two vision poses sent", "s", 0.0, 1.0)
-    vision_position_deviation: float = number(
-        0.005, "standard deviation told with a vision pose", "m", 1e-4, 1.0
-    )
-    vision_attitude_deviation: float = number(
-        0.02, "standard deviation told with a vision pose", "rad", 1e-4, 1.0
-    )
     autopilot_parameters: str = choice(
         "warn",
         "where the autopilot's MC_*RATE_P/K or THR_MDL_FAC differ from the mapping: warn, "

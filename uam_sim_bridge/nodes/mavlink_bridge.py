@@ -1,11 +1,10 @@
 """Node: tau_p and tau_q → SET_ATTITUDE_TARGET; OFFBOARD, arming, vision and telemetry over MAVLink.
 
-One tick per stamp at which state, position command and attitude command are there. At a tick: what
-the autopilot sent is read, then go out: heartbeat and requests, the newest mocap pose, the
-setpoint; /uam/setpoint repeats what was sent and acknowledges the tick.
+One tick of `BridgeStage` per stamp at which state, position command and attitude command are there;
+/uam/setpoint repeats what was sent and acknowledges the tick.
 
 Without commands for `stale_after`, by the stamps of the state or, in real time, by the wall clock,
-it sends what `SetpointSource` has for that.
+the stage sends what it has for that.
 """
 
 from __future__ import annotations
@@ -20,10 +19,10 @@ from rclpy.clock import Clock, ClockType
 from rclpy.parameter import Parameter
 from std_msgs.msg import Bool
 
-from uam_control.coordinates import ATTITUDE
-from uam_control.estimation.repeats import Repeats
+from uam_control.coordinates import ATTITUDE, SIZE
 from uam_control.nodes.described import described_vehicle
 from uam_control.settings.parameter_set import ParameterError
+from uam_control.stamps import SECOND, seconds
 from uam_control.supervision import State
 from uam_msgs_py.messages import topics
 from uam_msgs_py.messages.control import (
@@ -34,7 +33,6 @@ from uam_msgs_py.messages.control import (
 )
 from uam_msgs_py.messages.convert import JointStateWriter, SetpointWriter, read_pose
 from uam_msgs_py.messages.layouts import BadMessage, stamp_of
-from uam_msgs_py.messages.stamps import seconds
 from uam_msgs_py.messages.status import OK, WARN, MissionStatus
 from uam_msgs_py.node.base_node import UamNode, run
 from uam_msgs_py.node.joins import StampJoin
@@ -44,14 +42,8 @@ from uam_sim_bridge.mavlink.link.vision import vision_message
 from uam_sim_bridge.mavlink.offboard.hold import HoldParameters
 from uam_sim_bridge.mavlink.offboard.sequence import OffboardParameters, OffboardSequence
 from uam_sim_bridge.mavlink.offboard.setpoint import RateThrustMap, RateThrustParameters
-from uam_sim_bridge.mavlink.offboard.setpoint_source import (
-    IDLE,
-    Setpoint,
-    SetpointSource,
-    Situation,
-)
+from uam_sim_bridge.mavlink.offboard.setpoint_source import IDLE, Setpoint
 from uam_sim_bridge.mavlink.offboard.thrust_identification import (
-    ThrustIdentification,
     ThrustIdentificationParameters,
     steady_force,
 )
@@ -59,6 +51,8 @@ from uam_sim_bridge.mavlink.telemetry.parameter_check import adopted, difference
 from uam_sim_bridge.nodes.autopilot_topics import AutopilotTopics
 from uam_sim_bridge.nodes.bridge_link import BridgeParameters, open_links
 from uam_sim_bridge.nodes.fault_topic import FaultTopic
+from uam_sim_bridge.stages.bridge_stage import BridgeSets, BridgeStage
+from uam_sim_bridge.stages.vision_pacing import VisionParameters
 
 NAME = "mavlink_bridge"
 THRUST_PERIOD = 100_000_000  # ns between two reports of the thrust factor
@@ -85,32 +79,29 @@ class MavlinkBridgeNode(UamNode):
         super().__init__(NAME)
         vehicle = described_vehicle(self)
         derived = vehicle.node_parameters()[NAME]
-        self._map_parameters = NodeParameters(self, RateThrustParameters, derived=derived)
+        mapping = NodeParameters(self, RateThrustParameters, derived=derived)
+        mapping.apply = self._configure
         self._options = NodeParameters(self, BridgeParameters, read_only=True).current
+        vision = NodeParameters(self, VisionParameters, read_only=True).current
         offboard = NodeParameters(self, OffboardParameters, read_only=True).current
         hold = NodeParameters(self, HoldParameters, read_only=True).current
-
-        self.map = RateThrustMap(self._map_parameters.current, vehicle)
-        self._map_parameters.apply = self._configure
         thrust = NodeParameters(self, ThrustIdentificationParameters, derived=derived)
-        self.identification = ThrustIdentification(thrust.current)
-        thrust.apply = self.identification.configure
-        self.sequence = OffboardSequence(offboard)
-        options = self._options
-        self._source = SetpointSource(self.map, hold, options.stale_after + LATENCY, self.say)
-        links = open_links(self, options, self.sequence, self.map.parameters)
+
+        options, sequence = self._options, OffboardSequence(offboard)
+        links = open_links(self, options, sequence, mapping.current)
         self.link, self._station, self._faulty = links.autopilot, links.station, links.faulty
+        sets = BridgeSets(mapping.current, hold, thrust.current, vision)
+        fresh = options.stale_after + LATENCY
+        self.stage = BridgeStage(sets, vehicle, self.link, sequence, fresh, self.say)
+        thrust.apply = self.stage.identification.configure
         self._fault_topic = FaultTopic(self) if self._faulty else None
-        self._pose: tuple[int, np.ndarray, np.ndarray] | None = None
-        self._repeats = Repeats()
-        self._pose_sent = -1.0
         self._adopted: tuple[str, ...] = ()
         self._commanded = 0  # stamp [ns] of the last tick with commands
         self._last_tick = time.monotonic()
         self._warm_up()
 
         self._setpoint = self.publisher(topics.SETPOINT)
-        self._autopilot = AutopilotTopics(self, self.link, self.sequence)
+        self._autopilot = AutopilotTopics(self, self.link)
         self._thrust = self.publisher(topics.THRUST)
         self._writer = SetpointWriter()
         self._factor_writer = JointStateWriter(["factor"])
@@ -129,7 +120,7 @@ class MavlinkBridgeNode(UamNode):
             self.create_timer(WATCH_PERIOD, self._watch, clock=steady)
 
     def _configure(self, parameters: RateThrustParameters) -> None:
-        self.map.configure(parameters)
+        self.stage.map.configure(parameters)
         self.link.set_mapping(parameters)
 
     def destroy_node(self) -> None:
@@ -153,7 +144,7 @@ class MavlinkBridgeNode(UamNode):
 
     def _read_state(self, data: bytes) -> tuple[int, np.ndarray]:
         stamp, state = read_state(data)
-        self._source.note_state(seconds(stamp), state)
+        self.stage.note_state(stamp, state)
         return stamp, state
 
     @staticmethod
@@ -162,51 +153,50 @@ class MavlinkBridgeNode(UamNode):
         return stamp, (torque,)  # None means "idle" here, but "not there" to the join
 
     def _on_arming(self, message: Bool) -> None:
-        self.sequence.want(bool(message.data))
+        self.stage.arm(bool(message.data))
 
     def _on_mission(self, message: DiagnosticArray) -> None:
         stamp, status = MissionStatus.from_message(message)
-        self.identification.switch(seconds(stamp), status.magnet)
-        self.sequence.let_go = status.state == State.FAILSAFE.value
+        self.stage.mission(stamp, status.magnet, status.state == State.FAILSAFE.value)
         if self._faulty is not None:
             self._faulty.mission_at(seconds(stamp), status.time)
 
     def _on_mocap(self, data: bytes) -> None:
-        pose = stamp, position, quaternion = read_pose(data)
-        if self._repeats(position, quaternion) and self.link.armed:
-            return  # neither the autopilot nor the level hold is to believe a frozen tracker
-        self._pose = pose
-        self._source.note_pose(seconds(stamp), quaternion)
+        self.stage.mocap(*read_pose(data))
 
     def _tick(
         self, stamp: int, state: StateOrBad, position: CommandOrBad, torque: TorqueOrBad
     ) -> None:
         begun = time.perf_counter()
-        now = seconds(stamp)
         self._commanded = stamp
         self._last_tick = time.monotonic()
         self.take_waiting(self._arming)
         self.take_waiting(self._mocap)
         self.take_waiting(self._mission)
-        self._update_faults(now)
-        self.link.poll(now)
+        self._hear(stamp)
         self._adopt()
         if state is BAD or position is BAD or torque is BAD:
-            setpoint = self._source.without(now, self._situation)
+            setpoint = self.stage.without(stamp)
         else:
-            setpoint = self._source.commanded(
-                now, state, position.flying, position.tau, *torque, self._situation
-            )
-        self._send(now, setpoint)
-        self._autopilot.tell(stamp)
-        rates, thrust = setpoint or IDLE
-        self._identify(stamp, state, position, thrust)
-        self._setpoint.publish(self._writer.fill(stamp, rates, thrust))
+            setpoint = self.stage.tick(stamp, state, position.flying, position.tau, *torque)
+        self._tell(stamp)
+        if stamp // THRUST_PERIOD != self.stamp // THRUST_PERIOD:
+            self._factor_writer.position[0] = self.stage.factor
+            self._thrust.publish(self._factor_writer.stamped(stamp))
+        self._setpoint.publish(self._writer.fill(stamp, *(setpoint or IDLE)))
         self.done_tick(stamp, begun)
 
-    def _update_faults(self, now: float) -> None:
+    def _hear(self, stamp: int) -> None:
+        """Begin a tick: what the faults left of the autopilot's messages."""
         if self._faulty and self._fault_topic:
-            self._fault_topic.tell(round(now * 1e9), self._faulty.update(now))
+            self._fault_topic.tell(stamp, self._faulty.update(seconds(stamp)))
+        self.stage.hear(stamp)
+
+    def _tell(self, stamp: int) -> None:
+        """End a tick: to the ground station, and what is known of the autopilot to the topics."""
+        if self._station is not None:
+            self._station.forward()
+        self._autopilot.tell(stamp, self.stage.report)
 
     def _adopt(self) -> None:
         """Take the autopilot's parameters over where that is wished; never while it is armed."""
@@ -214,7 +204,8 @@ class MavlinkBridgeNode(UamNode):
         wished = self._options.autopilot_parameters == "adopt"
         if not wished or link.armed or not link.mapping_read:
             return
-        old, changes = self.map.parameters, tuple(differences(self.map.parameters, link.values))
+        old = self.stage.map.parameters
+        changes = tuple(differences(old, link.values))
         if not changes or changes == self._adopted:
             return
         self._adopted = changes
@@ -229,48 +220,6 @@ class MavlinkBridgeNode(UamNode):
         for change in changes:
             self.get_logger().info(f"adopted from the autopilot: {change}")
 
-    def _identify(
-        self, stamp: int, state: StateOrBad, position: CommandOrBad, thrust: float
-    ) -> None:
-        """Compare the thrust sent with the acceleration; the factor counts from the next tick."""
-        if stamp // THRUST_PERIOD != self.stamp // THRUST_PERIOD:
-            self._factor_writer.position[0] = self.map.thrust_factor  # as applied at this tick
-            self._thrust.publish(self._factor_writer.stamped(stamp))
-        if state is BAD or position is BAD:
-            return
-        self.map.thrust_factor = self.identification.update(
-            seconds(stamp),
-            state,
-            thrust,
-            self.map.assumed_thrust(thrust),
-            position.flying and self.link.armed and not self.sequence.let_go,
-        )
-
-    @property
-    def _situation(self) -> Situation:
-        return Situation(self.link.armed, self.link.landed, self.sequence.let_go)
-
-    def _send(self, now: float, setpoint: Setpoint) -> None:
-        """Send the autopilot what is due: heartbeat, requests, vision, setpoint."""
-        link, options = self.link, self._options
-        link.tick(now)
-        if self._pose is not None:
-            exposed, position, quaternion = self._pose
-            exposed = seconds(exposed)
-            if exposed - self._pose_sent >= options.vision_interval - 1e-9:
-                self._pose, self._pose_sent = None, exposed
-                link.send_vision(
-                    exposed,
-                    position,
-                    quaternion,
-                    options.vision_position_deviation,
-                    options.vision_attitude_deviation,
-                )
-        if setpoint is not None and self.sequence.streaming:
-            link.send_setpoint(*setpoint, now)
-        if self._station is not None:
-            self._station.forward()
-
     def settle(self) -> None:
         """Act on complete inputs, and on states for which the commands do not come."""
         super().settle()
@@ -280,9 +229,8 @@ class MavlinkBridgeNode(UamNode):
         if seconds(state - self._commanded) >= self._options.stale_after:
             self._join.skip(state)
             self._last_tick = time.monotonic()
-            setpoint = self._go_without(seconds(state))
-            rates, thrust = setpoint or IDLE
-            self._setpoint.publish(self._writer.fill(state, rates, thrust))
+            setpoint = self._go_without(state)
+            self._setpoint.publish(self._writer.fill(state, *(setpoint or IDLE)))
             self.done_tick(state, time.perf_counter())
 
     def _watch(self) -> None:
@@ -290,19 +238,17 @@ class MavlinkBridgeNode(UamNode):
         silence = time.monotonic() - self._last_tick
         if self.ticks == 0 or silence < self._options.stale_after:
             return
-        self._go_without(seconds(self.stamp) + silence)
+        self._go_without(self.stamp + round(silence * SECOND))
 
-    def _go_without(self, now: float) -> Setpoint:
-        """Do what a tick at `now` [s] does, without commands; return the setpoint sent."""
-        self._update_faults(now)
-        self.link.poll(now)
-        setpoint = self._source.without(now, self._situation)
-        self._send(now, setpoint)
-        self._autopilot.tell(round(now * 1e9))
+    def _go_without(self, stamp: int) -> Setpoint:
+        """Do what a tick at `stamp` [ns] does, without commands; return the setpoint sent."""
+        self._hear(stamp)
+        setpoint = self.stage.without(stamp)
+        self._tell(stamp)
         return setpoint
 
     def diagnose(self) -> tuple[bytes, str, dict[str, object]]:
-        link, sequence = self.link, self.sequence
+        link, sequence = self.link, self.stage.sequence
         notes = (*sequence.reasons, *faults(link), *link.warnings)
         values = {
             "sequence": sequence.phase.value,
@@ -313,10 +259,10 @@ class MavlinkBridgeNode(UamNode):
             "refused": link.refused,
             "link open": link.open,
             "frames dropped": link.dropped,
-            "level hold": self._source.holding,
+            "level hold": self.stage.source.holding,
             "adopted": "; ".join(self._adopted),
             **report(link),
-            "thrust factor [1]": f"{self.map.thrust_factor:.4f}",
+            "thrust factor [1]": f"{self.stage.map.thrust_factor:.4f}",
         }
         summary = "; ".join((sequence.phase.value, *notes))
         return WARN if notes else OK, summary, values
@@ -324,7 +270,7 @@ class MavlinkBridgeNode(UamNode):
     def _warm_up(self) -> None:
         """Compile the maths before the flight: a first call takes a second."""
         spare, zero, level = RateThrustMap(), np.zeros(3), np.array([1.0, 0.0, 0.0, 0.0])
-        state = np.zeros((3, 8))
+        state = np.zeros((3, SIZE))
         spare.map(zero, zero, state[0, ATTITUDE], state[1, ATTITUDE])
         spare.assumed_thrust(0.5)
         steady_force(state, 0.1, 1.0)

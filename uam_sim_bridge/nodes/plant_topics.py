@@ -13,6 +13,7 @@ from rclpy.subscription import Subscription
 from rosgraph_msgs.msg import Clock
 
 from uam_control.coordinates import ARM, COORDINATES
+from uam_control.stamps import nanoseconds
 from uam_msgs_py.messages import topics
 from uam_msgs_py.messages.convert import (
     ImuWriter,
@@ -29,11 +30,6 @@ from uam_sim_bridge.plant import Samples, Truth
 
 JOINTS = list(COORDINATES[ARM])
 ROTORS = [f"rotor_{i}" for i in range(1, 5)]
-
-
-def nanoseconds(time: float) -> int:
-    """Seconds of the maths → stamp; exact, as ticks are whole microseconds."""
-    return round(time * 1e6) * 1000
 
 
 class Outlets:

@@ -60,7 +60,8 @@ def record(
     tau_p: np.ndarray,
     tau_q: np.ndarray,
     tau_alpha: np.ndarray,
-    setpoint: np.ndarray,
+    rates: np.ndarray,
+    command: float,
     gains: tuple[np.ndarray, ...],
     gain_columns: tuple[np.ndarray, ...],
     motors: np.ndarray,
@@ -81,10 +82,11 @@ def record(
             row[_REFERENCE + 8 * i + 3 + j] = attitude_reference[i, j]
         row[_TAU_P + i] = tau_p[i]
         row[_TAU_Q + i] = tau_q[i]
+        row[_SETPOINT + i] = rates[i]
     for i in range(2):
         row[_TAU_ALPHA + i] = tau_alpha[i]
+    row[_SETPOINT + 3] = command
     for i in range(4):
-        row[_SETPOINT + i] = setpoint[i]
         row[_COMMAND + i] = motors[i]
         row[_THRUST + i] = thrust[i]
     for i in range(7):

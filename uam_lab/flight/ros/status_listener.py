@@ -7,10 +7,10 @@ from collections.abc import Mapping
 
 from rclpy.node import Node
 
+from uam_control.stamps import seconds
 from uam_lab.flight.progress import Status
 from uam_lab.processes.guest import Guest
 from uam_msgs_py.messages import topics
-from uam_msgs_py.messages.stamps import seconds
 from uam_msgs_py.messages.status import AutopilotState, MissionStatus
 from uam_msgs_py.node.polling import listen, messages
 

@@ -109,6 +109,11 @@ class OffboardLink:
         """Return the number of frames that the transport did not send."""
         return self._transport.dropped
 
+    @property
+    def round_trip(self) -> float | None:
+        """How long answers take [s], the quickest of the last second; None while not known."""
+        return self.time_sync.quickest
+
     def connected(self, time: float) -> bool:
         """Return whether a heartbeat arrived in the last HEARTBEAT_TIMEOUT before `time` [s]."""
         return time - self._heartbeat_in < HEARTBEAT_TIMEOUT

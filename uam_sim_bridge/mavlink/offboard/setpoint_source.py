@@ -35,12 +35,12 @@ class Situation(NamedTuple):
     let_go: bool
 
 
-def _silent(text: str, key: str | None) -> None:
-    """For who does not want to know."""
+def silent(text: str, key: str | None) -> None:
+    """Say nothing."""
 
 
 class SetpointSource:
-    """Of the bridge's node and of the direct engine; holds the map, and what is known without
+    """Makes the setpoint of a tick; holds the map, and what is known without
     commands."""
 
     def __init__(
@@ -48,7 +48,7 @@ class SetpointSource:
         rate_map: RateThrustMap,
         hold: HoldParameters,
         fresh: float = math.inf,
-        say: Callable[[str, str | None], None] = _silent,
+        say: Callable[[str, str | None], None] = silent,
     ) -> None:
         """fresh [s]: until when an attitude or a velocity is good; say(text, kind): of warnings."""
         self.map = rate_map

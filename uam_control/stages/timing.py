@@ -1,10 +1,11 @@
-"""The control period as the nodes see it: from stamp to stamp."""
+"""The control period as the stages see it: from stamp to stamp."""
+
+from __future__ import annotations
 
 from dataclasses import dataclass
 
 from uam_control.settings.parameter_set import ParameterSet, number
-from uam_msgs_py.messages.layouts import SECOND
-from uam_msgs_py.messages.stamps import seconds
+from uam_control.stamps import SECOND, seconds
 
 
 @dataclass(frozen=True)
@@ -15,10 +16,10 @@ class Timing(ParameterSet):
 
 
 class Ticks:
-    """Turns stamps into time steps."""
+    """Turns stamps into time steps. `period` [ns]: of control ticks."""
 
-    def __init__(self, timing: Timing):
-        self.period = round(timing.control_period * SECOND)  # [ns]
+    def __init__(self, timing: Timing) -> None:
+        self.period = round(timing.control_period * SECOND)
         self._last: int | None = None
 
     def step(self, stamp: int) -> float:

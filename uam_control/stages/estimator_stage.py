@@ -1,0 +1,40 @@
+"""Stage: motion capture + IMU + joints → state."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from uam_control.estimation import EstimatorParameters, StateEstimator
+from uam_control.stamps import seconds
+
+
+class EstimatorStage:
+    """Takes samples as they arrive and returns the state at each IMU sample.
+
+    All stamps in [ns]. The IMU sample begins a tick, so it comes last of what a tick delivers.
+    """
+
+    def __init__(self, parameters: EstimatorParameters) -> None:
+        self.estimator = StateEstimator(parameters)
+        self.stamp = -1  # [ns] of the newest IMU sample
+
+    def mocap(self, stamp: int, position: np.ndarray, quaternion: np.ndarray) -> None:
+        """Take a pose: position (3,) [m, ENU], quaternion (4,) [w x y z] FLU → ENU."""
+        self.estimator.mocap(seconds(stamp), position, quaternion)
+
+    def joints(self, stamp: int, alpha: np.ndarray, alpha_dot: np.ndarray) -> None:
+        """Take joint readings: alpha (n,) [rad], alpha_dot (n,) [rad/s]."""
+        self.estimator.joints(seconds(stamp), alpha, alpha_dot)
+
+    def imu(self, stamp: int, gyro: np.ndarray, force: np.ndarray) -> np.ndarray | None:
+        """Take an IMU sample: gyro (3,) [rad/s], specific force (3,) [m/s^2], FLU.
+
+        Returns the state (3, SIZE), reused by the next call; None while an input has never come.
+        Raises ValueError where the stamp does not follow the last one.
+        """
+        if stamp <= self.stamp:
+            raise ValueError(f"IMU stamp {stamp} ns does not follow {self.stamp} ns")
+        self.stamp = stamp
+        estimator = self.estimator
+        estimator.imu(seconds(stamp), gyro, force)
+        return None if estimator.waiting_for else estimator.update()

@@ -1,0 +1,139 @@
+"""The autopilot stand-in joined to the bridge without messages, as the direct engine has it.
+
+It follows the times of the MAVLink link: what the autopilot does at a tick is known at the next
+one, by the heartbeat that a change brings at once, or by the next regular one where that was lost.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+
+import numpy as np
+
+from uam_sim_bridge.autopilot.core import Autopilot, AutopilotStatus
+from uam_sim_bridge.mavlink.offboard.sequence import (
+    HEARTBEAT_TIMEOUT,
+    OffboardSequence,
+    Request,
+)
+from uam_sim_bridge.mavlink.protocol.frames import swap_body, swap_quaternion, swap_world
+from uam_sim_bridge.mavlink.protocol.modes import (
+    CUSTOM_MODE_ENABLED,
+    MavCmd,
+    MavResult,
+    Mode,
+    Severity,
+)
+
+HEARTBEAT, LANDED = 1.0, 0.2  # [s] between two regular reports, as `telemetry.STREAMS`
+
+
+class JoinedAutopilot:
+    """An `AutopilotPort` to the `Autopilot` in the same process."""
+
+    def __init__(self, autopilot: Autopilot, sequence: OffboardSequence) -> None:
+        """sequence: of the bridge; it takes answers and texts."""
+        self.autopilot, self.sequence = autopilot, sequence
+        self.armed, self.mode, self.landed = False, Mode.UNKNOWN, True
+        self.armed_since: float | None = None
+        self.passes: Callable[[], bool] = lambda: True  # whether a message reaches the autopilot
+        self.receives: Callable[[], bool] = lambda: True  # whether one of the autopilot arrives
+        self._time = 0.0  # [s] of the autopilot's next cycle
+        self._received_at = -math.inf
+        self._told: AutopilotStatus | None = None
+        self._heartbeat_due = self._landed_due = -math.inf  # [s]
+        self._heartbeat = self._landed = False  # sent, and not yet taken
+        self._answers: list[tuple[Request, MavResult]] = []
+
+    @property
+    def round_trip(self) -> float | None:
+        """None: without a link nothing is measured."""
+        return None
+
+    def connected(self, time: float) -> bool:
+        """Whether a heartbeat came within the last seconds before `time` [s]."""
+        return time - self._received_at < HEARTBEAT_TIMEOUT
+
+    def poll(self, time: float) -> None:
+        """Take what the autopilot has sent since the last call."""
+        texts = self.autopilot.commander.texts
+        if self._answers or texts or self._heartbeat or self._landed:
+            self._take(time, self.autopilot.commander.take_texts())
+
+    def _take(self, time: float, texts: list[tuple[Severity, str]]) -> None:
+        answers, self._answers = self._answers, []
+        heartbeat, landed = self._heartbeat, self._landed
+        self._heartbeat = self._landed = False
+        if not self.receives():
+            return
+        for request, result in answers:
+            self.sequence.answer(request, result)
+        for severity, text in texts:
+            self.sequence.text(severity, text)
+        if landed:
+            self.landed = self._told.landed
+        if heartbeat:
+            self._received_at = time
+            armed = self._told.armed
+            if armed and not self.armed:
+                self.armed_since = time
+            elif not armed:
+                self.armed_since = None
+            self.armed, self.mode = armed, self._told.mode
+
+    def tick(self, time: float) -> None:
+        """Send the request of the sequence, if there is one."""
+        connected = self.connected(time)
+        request = self.sequence.update(time, connected, self.armed, self.mode)
+        if request is None or not self.passes():
+            return
+        if request is Request.OFFBOARD:
+            command = MavCmd.DO_SET_MODE, (CUSTOM_MODE_ENABLED, *Mode.OFFBOARD.value)
+        else:
+            command = MavCmd.ARM_DISARM, (float(request is Request.ARM), 0.0)
+        self._answers.append((request, self.autopilot.command(self._time, *command)))
+
+    def send_vision(
+        self,
+        stamp: float,
+        position: np.ndarray,
+        quaternion: np.ndarray,
+        position_deviation: float,
+        attitude_deviation: float,
+    ) -> None:
+        """Send a pose: position (3,) [m, ENU], quaternion (4,) [w x y z] FLU → ENU."""
+        if self.passes():
+            self.autopilot.vision(self._time, swap_world(position), swap_quaternion(quaternion))
+
+    def send_setpoint(self, rates: np.ndarray, thrust: float, time: float) -> None:
+        """Send body rates (3,) [rad/s, FLU] and normalised thrust 0..1."""
+        if self.passes():
+            self.autopilot.setpoint(self._time, swap_body(rates), thrust)
+
+    def begin(self, time: float) -> None:
+        """Begin the autopilot's cycle of `time` [s]: what is sent from now on arrives in it."""
+        self._time = time
+
+    def update(self, time: float, gyro: np.ndarray, force: np.ndarray) -> np.ndarray:
+        """Run the autopilot's cycle of `time` [s] and return its motor commands, 0..1 each.
+
+        gyro (3,) [rad/s] and specific force (3,) [m/s^2], FLU: its own IMU sample.
+        """
+        motors = self.autopilot.update(time, swap_body(gyro), swap_body(force))
+        status = self.autopilot.status
+        if status != self._told:
+            self._told = status
+            self._heartbeat_due = self._landed_due = -math.inf
+        if time >= self._heartbeat_due - 1e-9:
+            self._heartbeat = True
+            self._heartbeat_due = _following(self._heartbeat_due, HEARTBEAT, time)
+        if time >= self._landed_due - 1e-9:
+            self._landed = True
+            self._landed_due = _following(self._landed_due, LANDED, time)
+        return motors
+
+
+def _following(due: float, interval: float, time: float) -> float:
+    """Return when the report after the one of `due` is due [s]; as `Telemetry.due`."""
+    return due + interval if due + interval > time else time + interval

@@ -1,0 +1,155 @@
+"""Stage: tau_p and tau_q → setpoint of the autopilot; vision, OFFBOARD, arming, thrust factor.
+
+At a tick: `hear` takes what the autopilot sent, then `tick` sends heartbeat and requests, the
+newest pose, the setpoint, and compares the thrust with the acceleration. `without` stands in for
+`tick` where no commands come.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import Any, Self
+
+import numpy as np
+
+from uam_control.stamps import seconds
+from uam_control.vehicle import VehicleDescription
+from uam_sim_bridge.mavlink.offboard.hold import HoldParameters
+from uam_sim_bridge.mavlink.offboard.sequence import OffboardSequence
+from uam_sim_bridge.mavlink.offboard.setpoint import RateThrustMap, RateThrustParameters
+from uam_sim_bridge.mavlink.offboard.setpoint_source import (
+    Setpoint,
+    SetpointSource,
+    Situation,
+    silent,
+)
+from uam_sim_bridge.mavlink.offboard.thrust_identification import (
+    ThrustIdentification,
+    ThrustIdentificationParameters,
+)
+from uam_sim_bridge.stages.autopilot_port import AutopilotPort
+from uam_sim_bridge.stages.autopilot_report import AutopilotReport, AutopilotReports
+from uam_sim_bridge.stages.vision_pacing import VisionPacing, VisionParameters
+
+
+@dataclass(frozen=True)
+class BridgeSets:
+    """The parameter sets of the stage."""
+
+    mapping: RateThrustParameters
+    hold: HoldParameters
+    identification: ThrustIdentificationParameters
+    vision: VisionParameters
+
+    @classmethod
+    def of(cls, vehicle: VehicleDescription, section: Mapping[str, Any]) -> Self:
+        """Those of a vehicle, with what a profile's section mavlink_bridge says otherwise."""
+        return cls(
+            RateThrustParameters.of(vehicle, section),
+            HoldParameters.among(section),
+            ThrustIdentificationParameters.of(vehicle, section),
+            VisionParameters.among(section),
+        )
+
+
+class BridgeStage:
+    """The bridge between control laws and autopilot. All stamps in [ns].
+
+    `factor`: thrust factor that the last setpoint was made with; `report`: what is to be told of
+    the autopilot after the last tick, None where nothing is due.
+    """
+
+    def __init__(
+        self,
+        sets: BridgeSets,
+        vehicle: VehicleDescription,
+        autopilot: AutopilotPort,
+        sequence: OffboardSequence,
+        fresh: float = math.inf,
+        say: Callable[[str, str | None], None] = silent,
+    ) -> None:
+        """sequence: the one that `autopilot` was made with; fresh, say: see `SetpointSource`."""
+        self.autopilot, self.sequence = autopilot, sequence
+        self.map = RateThrustMap(sets.mapping, vehicle)
+        self.identification = ThrustIdentification(sets.identification)
+        self.source = SetpointSource(self.map, sets.hold, fresh, say)
+        self._vision = VisionPacing(sets.vision)
+        self._reports = AutopilotReports(autopilot, sequence)
+        self.report: AutopilotReport | None = None
+        self.factor = 1.0
+
+    def mocap(self, stamp: int, position: np.ndarray, quaternion: np.ndarray) -> None:
+        """Take a pose: position (3,) [m, ENU], quaternion (4,) [w x y z] FLU → ENU.
+
+        Neither the autopilot nor the level hold uses a frozen tracker.
+        """
+        if self._vision.take(seconds(stamp), position, quaternion, self.autopilot.armed):
+            self.source.note_pose(seconds(stamp), quaternion)
+
+    def arm(self, arm: bool) -> None:
+        """Take the mission's desired arming state."""
+        self.sequence.want(arm)
+
+    def mission(self, stamp: int, magnet: bool, failsafe: bool) -> None:
+        """Take the mission's status: the magnet, and whether the autopilot's failsafe is to act."""
+        self.identification.switch(seconds(stamp), magnet)
+        self.sequence.let_go = failsafe
+
+    def note_state(self, stamp: int, state: np.ndarray) -> None:
+        """Take an estimate (3, SIZE), also where no tick follows; it is kept, not copied."""
+        self.source.note_state(seconds(stamp), state)
+
+    def hear(self, stamp: int) -> None:
+        """Take what the autopilot has sent."""
+        self.autopilot.poll(seconds(stamp))
+
+    def tick(
+        self,
+        stamp: int,
+        state: np.ndarray,
+        flying: bool,
+        tau_p: np.ndarray,
+        tau_q: np.ndarray | None,
+    ) -> Setpoint:
+        """Send the setpoint of a tick with commands, and return it; None: none was sent.
+
+        state (3, SIZE); flying: whether tau_p (3,) [N, ENU] is to be flown; tau_q (3,) [N m, FLU],
+        None for idle.
+        """
+        now, situation = seconds(stamp), self._situation
+        setpoint = self.source.commanded(now, state, flying, tau_p, tau_q, situation)
+        self._send(now, setpoint)
+        self.report = self._reports.due(stamp)
+        thrust, self.factor = setpoint[1] if setpoint else 0.0, self.map.thrust_factor
+        self.map.thrust_factor = self.identification.update(
+            now,
+            state,
+            thrust,
+            self.map.assumed_thrust(thrust),
+            flying and situation.armed and not situation.let_go,
+        )
+        return setpoint
+
+    def without(self, stamp: int) -> Setpoint:
+        """Send the setpoint of a tick without usable commands, and return it."""
+        now = seconds(stamp)
+        setpoint = self.source.without(now, self._situation)
+        self._send(now, setpoint)
+        self.report = self._reports.due(stamp)
+        self.factor = self.map.thrust_factor
+        return setpoint
+
+    @property
+    def _situation(self) -> Situation:
+        autopilot = self.autopilot
+        return Situation(autopilot.armed, autopilot.landed, self.sequence.let_go)
+
+    def _send(self, now: float, setpoint: Setpoint) -> None:
+        """Send what is due at `now` [s]: heartbeat and requests, vision, setpoint."""
+        autopilot = self.autopilot
+        autopilot.tick(now)
+        self._vision.send(autopilot)
+        if setpoint is not None and self.sequence.streaming:
+            autopilot.send_setpoint(*setpoint, now)

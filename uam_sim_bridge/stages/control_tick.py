@@ -1,0 +1,231 @@
+"""One control tick, from sensor samples to the autopilot's setpoint: the stages in their order.
+
+STAGES at the end of this file is the block diagram. The direct engine calls `ControlTick.tick`. In
+a flight over ROS each stage runs in a node of its own, and the signals are topics.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Self
+
+import numpy as np
+
+from uam_control.control.controllers import ArmController, AttitudeController, PositionController
+from uam_control.coordinates import coordinates
+from uam_control.mission import Mission, Scenario
+from uam_control.settings.parameter_set import ParameterSet
+from uam_control.stages.estimator_stage import EstimatorStage
+from uam_control.stages.law_stages import LawStage, PositionStage, TorqueStage
+from uam_control.stages.mission_stage import MissionStage
+from uam_control.stages.timing import Timing
+from uam_control.stamps import seconds
+from uam_control.supervision import State
+from uam_sim_bridge.mavlink.offboard.setpoint_source import Setpoint
+from uam_sim_bridge.stages.bridge_stage import BridgeStage
+
+Pose = tuple[int, np.ndarray, np.ndarray]  # stamp [ns], position (3,) [m], quaternion [w x y z]
+Joints = tuple[int, np.ndarray, np.ndarray, np.ndarray]  # stamp, angles, speeds, efforts (n,)
+Imu = tuple[int, np.ndarray, np.ndarray]  # stamp, gyro (3,) [rad/s], specific force (3,) [m/s^2]
+
+
+@dataclass
+class Signals:
+    """What runs between the stages at one tick. The next tick writes the same arrays again.
+
+    SIZE stands for 6 + n with an arm of n joints.
+    """
+
+    # estimator
+    state: np.ndarray  # (3, SIZE) chi, chi_dot, chi_ddot, see `coordinates`
+    # mission
+    reference: np.ndarray  # (3, SIZE) chi_d, chi_d_dot, chi_d_ddot
+    # laws
+    tau_alpha: np.ndarray  # (n,) [N m]
+    tau_p: np.ndarray  # (3,) [N, ENU]
+    attitude_reference: np.ndarray  # (3, 3) rows q_d [rad], Omega_d, Omega_d_dot, FLU
+    tau_q: np.ndarray  # (3,) [N m, FLU]
+    # samples that arrived at this tick
+    mocap: Pose | None = None
+    joints: Joints | None = None
+    imu: Imu | None = None
+    stamp: int = -1  # [ns] of the IMU sample; names the tick
+    # mission
+    flying: bool = False  # whether position and attitude are controlled
+    magnet: bool = False
+    time: float = -1.0  # [s] since take-off, negative before
+    phase: str = ""
+    # bridge
+    setpoint: Setpoint = None  # as sent to the autopilot; None: no setpoint was sent
+    thrust_factor: float = 1.0  # that the setpoint was made with
+
+    @classmethod
+    def at_rest(cls, joints: int) -> Self:
+        """Return the signals before the first tick: everything zero."""
+        size = len(coordinates(joints))
+        return cls(
+            state=np.zeros((3, size)),
+            reference=np.zeros((3, size)),
+            tau_alpha=np.zeros(joints),
+            tau_p=np.zeros(3),
+            attitude_reference=np.zeros((3, 3)),
+            tau_q=np.zeros(3),
+        )
+
+
+class ControlTick:
+    """All stages in one process, and the `signals` between them.
+
+    `stages`: STAGES; further ones may be inserted before the first tick.
+    """
+
+    def __init__(
+        self,
+        scenario: Scenario,
+        sets: Mapping[str, ParameterSet],
+        bridge: BridgeStage,
+        timing: Timing,
+    ) -> None:
+        """sets: parameters by the names of the nodes, see `Profile.sets`."""
+        self.signals = Signals.at_rest(len(scenario.arm_start))
+        self.stages = list(STAGES)
+        self.estimator = EstimatorStage(sets["state_estimator"])
+        self.mission = MissionStage(Mission(scenario, sets["mission"]), timing)
+        self.position = PositionStage(PositionController(sets["position_controller"]), timing)
+        self.attitude = TorqueStage(AttitudeController(sets["attitude_controller"]), timing)
+        self.arm = TorqueStage(ArmController(sets["arm_controller"]), timing)
+        self.bridge = bridge
+        self.laws: dict[str, LawStage] = {
+            "position": self.position,
+            "attitude": self.attitude,
+            "arm": self.arm,
+        }
+        self._told: tuple[bool, bool] | None = None  # magnet and failsafe, as the bridge has them
+
+    def tick(
+        self, mocap: Pose | None = None, joints: Joints | None = None, imu: Imu | None = None
+    ) -> bool:
+        """Run one tick on what has arrived; all stamps in [ns].
+
+        Returns False at a blind tick, one without an IMU sample or before every sensor has
+        delivered: the samples are taken, the other signals stay as they were.
+        """
+        signals = self.signals
+        signals.mocap, signals.joints, signals.imu = mocap, joints, imu
+        return all(stage(self) for _, stage in self.stages)
+
+    def insert(self, before: str, name: str, stage: Stage) -> None:
+        """Insert a stage before the one of the name `before`; raises ValueError without it."""
+        names = [name for name, _ in self.stages]
+        self.stages.insert(names.index(before), (name, stage))
+
+
+Stage = Callable[[ControlTick], bool]  # returns whether the tick goes on
+
+
+def listen(tick: ControlTick) -> bool:
+    """mocap, joints → the supervisor's inputs; mocap → the autopilot's estimator."""
+    s, inputs = tick.signals, tick.mission.inputs
+    if s.mocap is not None:
+        stamp, *pose = s.mocap
+        inputs.keep("mocap", inputs.inputs.mocap, (seconds(stamp), *pose))
+        tick.bridge.mocap(*s.mocap)
+    if s.joints is not None:
+        stamp, _, _, effort = s.joints
+        inputs.keep("joints", inputs.inputs.joints, (seconds(stamp), effort))
+    return True
+
+
+def estimate(tick: ControlTick) -> bool:
+    """mocap, joints, imu → state."""
+    s, estimator = tick.signals, tick.estimator
+    if s.mocap is not None:
+        estimator.mocap(*s.mocap)
+    if s.joints is not None:
+        estimator.joints(*s.joints[:3])
+    state = None if s.imu is None else estimator.imu(*s.imu)
+    if state is None:
+        return False
+    s.stamp, s.state = s.imu[0], state
+    return True
+
+
+def fly_mission(tick: ControlTick) -> bool:
+    """state, the autopilot's last report → reference, flying, magnet; arming."""
+    s, mission = tick.signals, tick.mission
+    mission.begin(s.stamp, s.state)
+    output = mission.output
+    s.reference[:] = (
+        output.reference
+    )  # the mission's own array is the next tick's, see `look_ahead`
+    s.flying, s.magnet = mission.flying, output.magnet
+    s.time, s.phase = output.time, output.phase
+    tick.bridge.arm(output.arm)
+    told = output.magnet, output.state is State.FAILSAFE
+    if told != tick._told:
+        tick._told = told
+        tick.bridge.mission(s.stamp, *told)
+    return True
+
+
+def control_position(tick: ControlTick) -> bool:
+    """state, reference → tau_p, attitude reference."""
+    s, stage = tick.signals, tick.position
+    s.tau_p = stage.update(s.stamp, s.state, s.reference, s.flying)
+    s.attitude_reference = stage.attitude_reference
+    return _tell_gains(tick, "position", stage)
+
+
+def control_attitude(tick: ControlTick) -> bool:
+    """state, reference, attitude reference → tau_q."""
+    s, stage = tick.signals, tick.attitude
+    s.tau_q = stage.update(s.stamp, s.state, s.reference, s.attitude_reference, s.flying)
+    return _tell_gains(tick, "attitude", stage)
+
+
+def control_arm(tick: ControlTick) -> bool:
+    """state, reference, attitude reference → tau_alpha."""
+    s, stage = tick.signals, tick.arm
+    s.tau_alpha = stage.update(s.stamp, s.state, s.reference, s.attitude_reference, s.flying)
+    return _tell_gains(tick, "arm", stage)
+
+
+def send_setpoint(tick: ControlTick) -> bool:
+    """state, tau_p, tau_q → setpoint to the autopilot; its report to the mission."""
+    s, bridge = tick.signals, tick.bridge
+    bridge.hear(s.stamp)
+    bridge.note_state(s.stamp, s.state)
+    s.setpoint = bridge.tick(s.stamp, s.state, s.flying, s.tau_p, s.tau_q if s.flying else None)
+    s.thrust_factor, report = bridge.factor, bridge.report
+    if report is not None:
+        tick.mission.autopilot(s.stamp, report.connected, report.armed_since, report.round_trip)
+    return True
+
+
+def look_ahead(tick: ControlTick) -> bool:
+    """state → reference of the next tick."""
+    tick.mission.advance(tick.signals.stamp, tick.signals.state)
+    return True
+
+
+def _tell_gains(tick: ControlTick, subsystem: str, stage: LawStage) -> bool:
+    """Adapted gains → the supervisor's inputs, when they are due."""
+    if stage.gains_due:
+        inputs, law = tick.mission.inputs, stage.controller
+        stamp, gains = tick.signals.stamp, law.adaptation.copy()
+        message = seconds(stamp), subsystem, law.names, gains
+        inputs.keep(subsystem, inputs.inputs.gains, message, stamp)
+    return True
+
+
+STAGES: Sequence[tuple[str, Stage]] = (
+    ("listeners of the sensors", listen),
+    ("estimator", estimate),
+    ("mission", fly_mission),
+    ("position law", control_position),
+    ("attitude law", control_attitude),
+    ("arm law", control_arm),
+    ("bridge", send_setpoint),
+    ("next reference", look_ahead),
+)
