@@ -1,9 +1,9 @@
-"""How much a whole direct flight costs beside its bare physics, in one run on one core.
+"""Measure the computing time of a direct flight relative to its physics, on one core.
 
     .venv/bin/python benchmarks/direct_engine.py [--profile] [--seconds 90]
 
-Alternates a stretch of flight with as many bare `mj_step` of the same model, so that both see the
-same machine. Prints the real-time factor and the ratio; --profile says where the rest goes.
+Alternates a part of the flight with the same number of `mj_step` of the same model, so that both
+run under the same load. Prints the real-time factor and the ratio; --profile lists the functions.
 """
 
 from __future__ import annotations
@@ -26,14 +26,14 @@ STRETCH = 250  # ticks
 
 
 def new_flight() -> DirectFlight:
-    """The paper's mission."""
+    """Return a flight of the paper's mission."""
     return DirectFlight(
         load_scenario("pick_and_place"), load_profile("s500"), Vehicle.load(), 0.2, seed=1
     )
 
 
 def measure() -> tuple[float, float, float]:
-    """Return wall time of a flight, of its bare physics, and simulated time [s]."""
+    """Return wall time of a flight, wall time of its physics, and simulated time [s]."""
     flight, bare = new_flight(), new_flight()
     model, data = bare.plant.model, bare.plant.data
     steps = round(bare.plant.period / model.opt.timestep)
@@ -55,8 +55,8 @@ def measure() -> tuple[float, float, float]:
 def main() -> None:
     """Measure and print."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--profile", action="store_true", help="where the time goes")
-    parser.add_argument("--runs", type=int, default=5, help="the best of so many (default 5)")
+    parser.add_argument("--profile", action="store_true", help="list the slowest functions")
+    parser.add_argument("--runs", type=int, default=5, help="runs; the best counts (default 5)")
     options = parser.parse_args()
     if hasattr(os, "sched_setaffinity"):
         os.sched_setaffinity(0, {min(os.sched_getaffinity(0))})

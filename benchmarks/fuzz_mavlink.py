@@ -4,15 +4,16 @@
 
 Three targets, each with its real parse path: the bridge (OffboardLink, RateThrustMap and thrust
 identification behind a transport in memory), the stand-in autopilot (Server, UdpPort, Companion)
-and the plant's HilServer. All the time it is checked that
+and the plant's HilServer. Checks at every tick:
 
-- nothing is raised,
+- no exception is raised,
 - every setpoint sent is finite, its thrust 0..1, its rates within the limits,
-- the bridge asks to arm only while it is told to,
+- the bridge requests arming only while the mission commands it,
 - every motor command is finite and 0..1, and 0 at the plant while disarmed,
-- what the framers keep is bounded, and so is the memory of the process.
+- the buffers of the framers and the memory of the process are bounded.
 
-Ends with one line; on failure with status 1, and the seed and the latest inputs in a file.
+Prints one line at the end; after a failure the exit status is 1, and a file contains the seed and
+the latest inputs.
 """
 
 from __future__ import annotations
@@ -36,7 +37,7 @@ KEPT_INPUTS = 64  # ticks
 
 
 class Campaign:
-    """The targets, what they are fed, and what came of it."""
+    """The targets, their latest inputs and the counts."""
 
     def __init__(self, seed: int) -> None:
         self.seed, self.counts = seed, Counter()
@@ -111,12 +112,12 @@ class Campaign:
         )
 
     def close(self) -> None:
-        """Give the sockets back."""
+        """Close the sockets."""
         self._targets[-1].close()
 
 
 def resident() -> float:
-    """Resident set of this process [MB]."""
+    """Return the resident set of this process [MB]."""
     gc.collect()
     return psutil.Process().memory_info().rss / 1e6
 
@@ -126,7 +127,7 @@ def run(
 ) -> tuple[Campaign, float]:
     """Feed everything to a new campaign; return it and the growth of the memory [MB].
 
-    Raises what a target raises, with `campaign` as its attribute.
+    Raises the exception of a target, with the attribute `campaign`.
     """
     warm = Campaign(seed + 1_000_000)
     try:
@@ -164,14 +165,14 @@ def main() -> int:
         type=float,
         default=8.0,
         metavar="MB",
-        help="growth of the memory that is allowed (default 8)",
+        help="allowed growth of the memory (default 8)",
     )
     parser.add_argument(
         "--save",
         type=Path,
         default=Path("fuzz_failure.json"),
         metavar="FILE",
-        help="where a failure is written (default %(default)s)",
+        help="file for a failure (default %(default)s)",
     )
     options = parser.parse_args()
     begin = shown = time.monotonic()

@@ -1,11 +1,11 @@
-"""Fly in real time on a machine that is kept busy: what gets worse, in which order.
+"""Measure real-time flights on a machine under load.
 
     .venv/bin/python benchmarks/load.py                        # every condition, some minutes
     .venv/bin/python benchmarks/load.py --only "one core"      # one of them
 
-The same short mission under each condition of loading/conditions.py; every number is also given as
-a multiple of that of the flight without load, in the same run. Leaves load.json and load.md in
---out; the exit status is 1 where a vehicle was lost.
+It flies the same short mission under each condition of loading/conditions.py. The table also gives
+each number relative to the flight without load of the same run. Writes load.json and load.md to
+--out; the exit status is 1 if a vehicle was lost.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ LOST, INTERRUPTED = 1, 130
 
 
 def main() -> int:
-    """Fly, print; returns the exit status."""
+    """Fly and print the table; return the exit status."""
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
@@ -32,7 +32,7 @@ def main() -> int:
         "--only",
         action="append",
         choices=[one.name for one in CONDITIONS],
-        help="besides the flight without load; may be given again",
+        help="condition to fly besides the flight without load; may be repeated",
     )
     option("--out", type=Path, default=Path("results/load"), help="(default %(default)s)")
     options = parser.parse_args()

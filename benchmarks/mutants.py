@@ -1,4 +1,4 @@
-"""Do the unit tests notice errors? Puts small errors into modules, one at a time, and counts.
+"""Mutation test: inserts small errors into modules, one at a time, and runs their unit tests.
 
     .venv/bin/python benchmarks/mutants.py                     # all modules of modules.toml
     .venv/bin/python benchmarks/mutants.py laws/ rotations     # those whose path has such a text

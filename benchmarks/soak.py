@@ -1,13 +1,13 @@
-"""Fly for hours, and see whether memory, file handles, threads and the log stay bounded.
+"""Fly for hours and check that memory, file handles, threads and the log stay bounded.
 
     .venv/bin/python benchmarks/soak.py --minutes 60                          # nodes, real time
-    .venv/bin/python benchmarks/soak.py --minutes 600 --clock lockstep        # as fast as it goes
+    .venv/bin/python benchmarks/soak.py --minutes 600 --clock lockstep        # as fast as possible
     .venv/bin/python benchmarks/soak.py --minutes 600 --engine direct         # missions in a row
 
-With nodes it is one flight, to and fro with the arm swinging; in the direct engine mission after
-mission in one process. Every process is looked at every few seconds. Leaves soak.json and
-soak.png in --out; the exit status is 1 where something has grown.
-After Ctrl-C what was flown until then is judged.
+With nodes it is one flight to and fro with a moving arm; with the direct engine many missions in
+one process. Every process is sampled every few seconds. Writes soak.json and soak.png to --out;
+the exit status is 1 if memory, handles or threads have grown. Ctrl-C ends the flight; the samples
+up to then are evaluated.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ FAILED, INTERRUPTED = 1, 130
 
 
 def main() -> int:
-    """Fly, judge, print; returns the exit status."""
+    """Fly, evaluate, print; return the exit status."""
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )

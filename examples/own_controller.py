@@ -1,10 +1,10 @@
-"""A controller of your own in the place of one of the stack's: here PID for the arm's two joints.
+"""Example of a user's own controller: PID for the arm's two joints replaces arm_controller.
 
-    uam fly --scenario hover --without arm_controller      says which ROS domain it waits in, say 1
+    uam fly --scenario hover --without arm_controller      prints the ROS domain, for instance 1
     ROS_DOMAIN_ID=1 python examples/own_controller.py      in another terminal
 
-It is called as the node it replaces, listens to /uam/state, and publishes one effort for each
-state. /uam/arm/command is for log and report only.
+The node has the name of the replaced node, subscribes to /uam/state, and publishes one effort for
+each state. /uam/arm/command is only for log and report.
 """
 
 import rclpy
@@ -19,7 +19,7 @@ PERIOD, TORQUE_MAX = 0.004, 2.5  # [s], [N m]
 
 
 class OwnArmController(Node):
-    """PID on the joint angles; the integral carries the arm's weight."""
+    """PID on the joint angles; the integral compensates the arm's weight."""
 
     def __init__(self):
         super().__init__("arm_controller")
@@ -36,11 +36,11 @@ class OwnArmController(Node):
     def on_state(self, message):
         tau = [0.0, 0.0]
         if self.reference is not None:
-            for i, ((a, a_dot), (wanted, wanted_dot)) in enumerate(
+            for i, ((a, a_dot), (a_d, a_d_dot)) in enumerate(
                 zip(arm(message), self.reference, strict=True)
             ):
-                self.integral[i] += K_I * PERIOD * (wanted - a)
-                total = K_P * (wanted - a) + K_D * (wanted_dot - a_dot) + self.integral[i]
+                self.integral[i] += K_I * PERIOD * (a_d - a)
+                total = K_P * (a_d - a) + K_D * (a_d_dot - a_dot) + self.integral[i]
                 tau[i] = max(-TORQUE_MAX, min(TORQUE_MAX, total))
         self.effort.publish(Float64MultiArray(data=tau))
         points = [JointTrajectoryPoint(effort=tau)]
@@ -50,7 +50,7 @@ class OwnArmController(Node):
 
 
 def arm(message):
-    """Angle [rad] and rate [rad/s] of both joints of a /uam/state or /uam/reference."""
+    """Return angle [rad] and rate [rad/s] of both joints from /uam/state or /uam/reference."""
     point, rows = message.points[0], [list(message.joint_names).index(j) for j in JOINTS]
     return [(point.positions[row], point.velocities[row]) for row in rows]
 

@@ -1,9 +1,9 @@
-"""A flight's log.mcap with pandas: RMS tracking errors from the messages themselves.
+"""Read a flight's log.mcap with pandas: RMS tracking errors from the messages.
 
     pip install 'uam[examples]'
     python examples/read_log.py results/latest/log.mcap
 
-mcap and mcap_ros2 read the log anywhere, without ROS.
+mcap and mcap_ros2 read the log without ROS.
 """
 
 import sys
@@ -17,7 +17,7 @@ UNITS = {"x": "m", "y": "m", "z": "m"}  # the other coordinates are angles, show
 
 
 def trajectory(log, topic):
-    """The positions on a topic: one row per stamp [ns], one column per coordinate."""
+    """Return the positions [m, rad] of a topic: a row per stamp [ns], a column per coordinate."""
     rows = {}
     with open(log, "rb") as file:
         reader = make_reader(file, decoder_factories=[DecoderFactory()])
@@ -30,13 +30,13 @@ def trajectory(log, topic):
 
 
 def main():
-    """Print the errors of the flight: everything is controlled, position and attitude too."""
+    """Print the errors of the ticks in which position and attitude are controlled."""
     log = sys.argv[1]
-    reference = trajectory(log, "/uam/reference").dropna()  # on the ground the arm's alone
+    reference = trajectory(log, "/uam/reference").dropna()  # on the ground: the arm only
     error = (trajectory(log, "/uam/truth/state") - reference).dropna()
     angles = error.columns.difference(UNITS)
-    # roll, pitch and yaw of the reference are the mission's: yaw counts, the others are asked
-    # for by the position controller
+    # the mission's reference of roll and pitch is not used: the position controller computes the
+    # desired roll and pitch
     error[angles] = np.degrees(error[angles])
     table = pd.DataFrame({"RMS": np.sqrt((error**2).mean()), "largest": error.abs().max()})
     table["unit"] = [UNITS.get(name, "deg") for name in table.index]

@@ -1,4 +1,4 @@
-"""Input of the fuzzer: frames of valid messages with wild fields, mutated; and plain garbage."""
+"""Input of the fuzzer: mutated frames of messages with extreme fields, and random bytes."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from collections import Counter
 from uam_sim_bridge.autopilot.params import DEFINITIONS
 from uam_sim_bridge.mavlink.protocol.wire import mavlink2
 
-# Numbers and words that lead deeper into the handlers than random ones do.
+# Numbers and words that reach more code of the handlers than random ones.
 FLOATS = (
     math.nan,
     math.inf,
@@ -43,7 +43,7 @@ RANGES = {
     "q": (8, True),
     "Q": (8, False),
 }
-SPOKEN = {  # what each target has a handler for
+SPOKEN = {  # messages for which each target has a handler
     "bridge": (
         "HEARTBEAT",
         "COMMAND_ACK",
@@ -71,7 +71,7 @@ KINDS = {kind.msgname: kind for kind in mavlink2.mavlink_map.values()}
 
 
 def number(rng: random.Random) -> float:
-    """A wild number."""
+    """Return an extreme or random number."""
     return (
         rng.choice(FLOATS)
         if rng.random() < 0.5
@@ -80,7 +80,7 @@ def number(rng: random.Random) -> float:
 
 
 class Messages:
-    """Frames of valid messages with wild fields, mutated; in datagrams or chunks of a stream."""
+    """Mutated frames of messages with extreme fields, as datagrams or chunks of a stream."""
 
     def __init__(self, rng: random.Random, target: str, counts: Counter) -> None:
         self._rng, self._counts = rng, counts
@@ -94,7 +94,7 @@ class Messages:
         self._late: list[bytes] = []
 
     def frame(self, checked: bool = True) -> bytes:
-        """Return a whole frame of a message with wild fields."""
+        """Return a complete frame of a message with extreme fields."""
         rng = self._rng
         kind = rng.choice(self._spoken if rng.random() < 0.85 else self._all)
         payload = b"".join(self._field(count, code) for count, code in self._formats[kind])
@@ -143,7 +143,7 @@ class Messages:
         return rng.randbytes(size)
 
     def chunk(self) -> tuple[bytes, int]:
-        """Return a datagram or chunk and the number of messages that it was made of."""
+        """Return a datagram or chunk and the number of its messages."""
         rng = self._rng
         frame = self.frame()
         draw = rng.random()
@@ -172,7 +172,7 @@ class Messages:
 
 
 def garbage(rng: random.Random) -> bytes:
-    """Random bytes of the length of a datagram; some of them full of starts of frames."""
+    """Return random bytes of the length of a datagram; some contain many start bytes of frames."""
     size = rng.choice((rng.randint(1, 60), rng.randint(1, 300), rng.randint(1, 1472), 1472))
     if rng.random() < 0.002:
         size = 65507

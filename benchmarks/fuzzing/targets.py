@@ -1,4 +1,4 @@
-"""What is fuzzed: both ends of the links with their real parse paths, checked after every tick."""
+"""Targets of the fuzzer: both ends of the links with their real parsers, checked at every tick."""
 
 from __future__ import annotations
 
@@ -25,17 +25,17 @@ FLOAT32 = 1.0 + 1e-6  # limits after rounding to the wire's floats
 
 
 class Violation(AssertionError):
-    """Something that must never happen did."""
+    """A required condition is violated."""
 
 
 def require(true: bool, what: str) -> None:
-    """Raise Violation with `what` unless `true`."""
+    """Raise Violation with the text `what` unless `true`."""
     if not true:
         raise Violation(what)
 
 
 class MemoryTransport:
-    """A transport whose datagrams are put in and taken out here."""
+    """A transport in memory."""
 
     stream, connected, dropped = False, True, 0
 
@@ -55,7 +55,7 @@ class MemoryTransport:
 
 
 class Bridge:
-    """The bridge's side of the link, told to fly and to disarm by turns."""
+    """The bridge's side of the link, alternately commanded to fly and to disarm."""
 
     name = "bridge"
 
@@ -71,16 +71,16 @@ class Bridge:
         self._map = RateThrustMap()
         self._link = OffboardLink(self._transport, self._sequence, self._map.parameters)
         self._identification = ThrustIdentification()
-        self._wanted = False
+        self._armed_desired = False
 
     def feed(self, chunks: list[bytes]) -> None:
-        """One tick at which `chunks` have arrived."""
+        """Run one tick with the received `chunks`."""
         self._ticks += 1
         if self._ticks % REBORN == 0:
             self._begin()
         if self._ticks % 400 == 100:
-            self._wanted = not self._wanted
-            self._sequence.want(self._wanted)
+            self._armed_desired = not self._armed_desired
+            self._sequence.want(self._armed_desired)
         now = self._ticks * PERIOD
         if self._ticks % REBORN < REBORN // 2 and self._ticks % 5 == 0:
             chunks = [*chunks, self._codec.encode(self._heartbeat())]
@@ -91,7 +91,7 @@ class Bridge:
         self._check()
 
     def _heartbeat(self):
-        """Of an autopilot in OFFBOARD, armed or not, so that the sequence gets anywhere."""
+        """Return a heartbeat in OFFBOARD, sometimes armed, so that the arming sequence proceeds."""
         armed = 128 if self._rng.random() < 0.1 else 0
         return mavlink2.MAVLink_heartbeat_message(2, 12, 1 | armed, 6 << 16, 4, 3)
 
@@ -133,14 +133,14 @@ class Bridge:
                 require(fine and 0.0 <= m.thrust <= 1.0, f"sent rates {rates} thrust {m.thrust}")
             elif kind == "COMMAND_LONG" and m.command == 400:
                 self._counts["arm requests"] += m.param1 == 1.0
-                require(self._wanted or m.param1 == 0.0, "asked to arm without being told to")
+                require(self._armed_desired or m.param1 == 0.0, "arming requested without command")
         self._transport.sent.clear()
         bounded = len(self._link.values) <= 100 and len(self._sequence.reasons) <= 10
         require(bounded, f"keeps {len(self._link.values)} parameters")
 
 
 class FakeUdp:
-    """The socket of UdpPort: datagrams in, datagrams out, in memory."""
+    """Replaces the socket of UdpPort by lists of datagrams in memory."""
 
     def __init__(self) -> None:
         self.arrived: deque[bytes] = deque()
@@ -197,9 +197,9 @@ class StandIn:
         self._server = Server(self._autopilot, self._simulator, self._udp)
 
     def feed(self, chunks: list[bytes]) -> None:
-        """One tick at which `chunks` have arrived; half of the time the link is in order as well.
+        """Run one tick with the received `chunks`; half of the time the link also works normally.
 
-        Then the vehicle has vision, is armed and gets setpoints, so that what is fuzzed flies.
+        The vehicle then has vision, is armed and gets setpoints, so that the target is in flight.
         """
         self._ticks += 1
         if self._ticks % REBORN == 0:
@@ -272,7 +272,7 @@ class Plant:
         self._ticks = 0
 
     def feed(self, chunks: list[bytes]) -> None:
-        """Ticks at which `chunks` have arrived, one after the other."""
+        """Run ticks, each with one of the received `chunks`."""
         server = self._server
         for data in chunks:
             for k in range(0, len(data), 60000):
@@ -290,6 +290,6 @@ class Plant:
         require(len(server._framer._rest) <= LONGEST_FRAME, "the framer keeps too much")
 
     def close(self) -> None:
-        """Give the sockets back."""
+        """Close the sockets."""
         self._server.close()
         self._far.close()

@@ -1,1 +1,1 @@
-"""What benchmarks/load.py is made of."""
+"""Parts of benchmarks/load.py."""

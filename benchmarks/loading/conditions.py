@@ -1,4 +1,4 @@
-"""What keeps the machine busy: processes beside the flight, and fewer cores for it."""
+"""Load conditions: processes beside the flight, and fewer cores for it."""
 
 from __future__ import annotations
 
@@ -16,15 +16,15 @@ from uam_lab.processes.node_environment import ros_environment
 from uam_sim_bridge.ports import discovery_port, in_use
 
 BLOCK = 8_000_000  # bytes
-BLOCKS = 16  # until the hog begins its file anew
+BLOCKS = 16  # per file, before it is overwritten
 WAIT = 0.2  # [s]
-LISTENERS = 20  # ten times the two that listen to /diagnostics in a flight
+LISTENERS = 20  # ten times the number of subscribers to /diagnostics in a flight
 
 
 @dataclass(frozen=True)
 class Condition:
-    """cores: that the flight may use, None for all. beside: run by so many processes each, in the
-    flight's folder and ROS domain."""
+    """cores: number for the flight, None for all. beside: functions and their numbers of processes,
+    called with the flight's folder and ROS domain."""
 
     name: str
     cores: int | None = None
@@ -32,13 +32,13 @@ class Condition:
 
 
 def hog(folder: Path, domain: int) -> None:
-    """Takes a core, or as much of it as it gets."""
+    """Use a core completely."""
     while True:
         sum(range(100_000))
 
 
 def writer(folder: Path, domain: int) -> None:
-    """Keeps the disk busy: writes, and waits until it is there."""
+    """Load the disk with synchronous writes."""
     block = os.urandom(BLOCK)
     with tempfile.TemporaryFile(dir=folder) as file:
         while True:
@@ -50,7 +50,7 @@ def writer(folder: Path, domain: int) -> None:
 
 
 def listener(folder: Path, domain: int) -> None:
-    """Takes every message of /diagnostics, once the flight is there."""
+    """Receive every message of /diagnostics, after the start of the flight."""
     while not in_use(socket.SOCK_DGRAM, discovery_port(domain)):
         time.sleep(WAIT)
     os.environ.update(ros_environment(domain, folder))
@@ -75,7 +75,7 @@ CONDITIONS = (
 
 @contextmanager
 def under(condition: Condition, folder: Path, domain: int) -> Iterator[None]:
-    """The load, and the cores, while it lasts; both are inherited by what is started inside."""
+    """Context manager with the load and the cores of a condition; child processes inherit both."""
     before = os.sched_getaffinity(0)
     if condition.cores is not None:
         os.sched_setaffinity(0, set(sorted(before)[: condition.cores]))

@@ -1,4 +1,4 @@
-"""One flight under a condition, and what is kept of it."""
+"""One flight under a load condition, and its result."""
 
 from __future__ import annotations
 
@@ -17,15 +17,15 @@ from uam_lab.results.result_folder import in_a_name, new_folder
 from uam_sim_bridge.ports import INSTANCES, ports_of
 
 SCENARIO = "quick_pick"
-INSTANCE = INSTANCES - 1  # whose domain the listeners are to know
+INSTANCE = INSTANCES - 1  # fixed, so that the listeners have its ROS domain
 
 
 @dataclass(frozen=True)
 class Measured:
     """latency [ms]: median and 99th percentile; missed: control ticks, of those with a sample.
 
-    pace: simulated over wall time. position [m]: largest RMS error of an axis. told: why the
-    mission was not completed, or holds.
+    pace: simulated / wall time. position [m]: largest RMS error of an axis. told: causes of holds
+    and landings, and unmet criteria of a completed mission.
     """
 
     condition: str
@@ -54,7 +54,7 @@ def fly(condition: Condition, out: Path) -> Measured:
 
 
 def measured(name: str, folder: Path) -> Measured:
-    """Read what the flight has left."""
+    """Return the result from the files of the flight."""
     plant = json.loads((folder / "logs" / "mujoco_sim.json").read_text())
     recorder = json.loads((folder / "logs" / "recorder.json").read_text())
     metrics = json.loads((folder / "metrics.json").read_text())

@@ -1,4 +1,4 @@
-"""The flights under load as a table."""
+"""Table of the flights under load."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ HEAD = (
 
 
 def markdown(found: Sequence[Measured]) -> str:
-    """One line for each; in brackets: times that of the first."""
+    """Return one line per flight; in brackets: relative to the first."""
     first = found[0]
     lines = [f"| {' | '.join(HEAD)} |", "|---" * len(HEAD) + "|"]
     for one in found:

@@ -1,1 +1,1 @@
-"""What benchmarks/soak.py is made of."""
+"""Parts of benchmarks/soak.py."""

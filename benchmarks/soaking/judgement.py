@@ -1,6 +1,6 @@
-"""Whether something has grown: the most of a soak's last quarter against that of its first half.
+"""Detects growth: the maximum of a soak's last quarter against that of its first half.
 
-The most, because memory that Python collects now and then comes and goes.
+The maximum is used, because Python's garbage collection makes the memory fluctuate.
 """
 
 from __future__ import annotations
@@ -10,12 +10,12 @@ from dataclasses import dataclass
 from soaking.samples import Soak
 
 ALLOWED = 2.0  # [MB] and
-SHARE = 0.03  # [1] of the memory, whichever is more: caches that fill, pages that are touched late
+SHARE = 0.03  # [1] of the memory, whichever is larger: allows for caches and late page faults
 
 
 @dataclass(frozen=True)
 class Verdict:
-    """memory [MB]: the most of the first half, and of the last quarter; the others likewise."""
+    """memory [MB], handles, threads: maximum of the first half, maximum of the last quarter."""
 
     name: str
     memory: tuple[float, float]
@@ -24,14 +24,14 @@ class Verdict:
 
     @property
     def grown(self) -> bool:
-        """Whether it would not go on for ever."""
+        """Whether memory, handles or threads have grown."""
         before, after = self.memory
         more = after - before > max(ALLOWED, SHARE * before)
         return more or self.handles[1] > self.handles[0] or self.threads[1] > self.threads[0]
 
 
 def judge(soak: Soak) -> list[Verdict]:
-    """A verdict of each process that was seen long enough."""
+    """Return a verdict for each process with enough samples."""
     found = []
     for name, samples in soak.usage.items():
         if len(samples) < 8:
@@ -44,7 +44,7 @@ def judge(soak: Soak) -> list[Verdict]:
 
 
 def table(verdicts: list[Verdict]) -> str:
-    """As Markdown."""
+    """Return the verdicts as a Markdown table."""
     lines = [
         "| process | memory [MB], most of the first half → last quarter | handles | threads | |",
         "|---|---|---|---|---|",

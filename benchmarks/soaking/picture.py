@@ -1,4 +1,4 @@
-"""Memory of each process over a soak."""
+"""Picture of the memory of each process over a soak."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What a process uses, over the time of a soak."""
+"""Samples of the memory, handles and threads of processes over a soak."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ import psutil
 
 @dataclass(frozen=True)
 class Usage:
-    """memory [MB]: its own, neither shared nor of files."""
+    """memory [MB]: resident memory without shared pages."""
 
     memory: float
     handles: int
@@ -18,7 +18,7 @@ class Usage:
 
 
 def usage(pid: int) -> Usage | None:
-    """What a process uses now; None where it is gone."""
+    """Return the current usage of a process, None if it has ended."""
     try:
         process = psutil.Process(pid)
         memory = process.memory_info()
@@ -29,10 +29,10 @@ def usage(pid: int) -> Usage | None:
 
 @dataclass
 class Soak:
-    """What was seen. usage: by process, each (time of the soak [s], what it used).
+    """Samples of a soak. usage: by process, each (time of the soak [s], usage).
 
-    unit: of the time, as the picture names it; failed: whether the flight itself went wrong;
-    interrupted: by people, and what is here is what had been seen by then.
+    unit: label of the time axis; failed: whether the flight failed; interrupted: by the user, with
+    the samples up to then.
     """
 
     title: str
@@ -43,11 +43,11 @@ class Soak:
     interrupted: bool = False
 
     def add(self, name: str, time: float, used: Usage) -> None:
-        """Note what a process used at a time [s]."""
+        """Add the usage of a process at a time [s]."""
         self.usage.setdefault(name, []).append((time, used))
 
     def to_mapping(self, verdicts: Sequence[object]) -> dict[str, object]:
-        """As JSON takes it."""
+        """Return a mapping for JSON."""
         seen = {
             name: [(time, used.memory, used.handles, used.threads) for time, used in samples]
             for name, samples in self.usage.items()

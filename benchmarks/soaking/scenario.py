@@ -1,4 +1,4 @@
-"""A scenario as long as is wanted: to and fro, the arm swinging, and home."""
+"""A scenario of any duration: the vehicle flies to and fro and moves its arm."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ REST = 90.0  # [deg] alpha_2 at rest
 
 
 def shuttle(duration: float) -> str:
-    """The YAML of a flight of about `duration` [s]."""
+    """Return the YAML of a scenario of about `duration` [s]."""
     moves = [{"coordinate": "z", "from": 0, "until": 3, "to": 1.0}]
     begin, half = 4.0, CYCLE / 2.0
     cycles = max(1, math.floor((duration - begin - 7.0) / CYCLE))

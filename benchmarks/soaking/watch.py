@@ -1,4 +1,4 @@
-"""Flies, and looks at what the processes use."""
+"""Flies and samples the usage of the processes."""
 
 from __future__ import annotations
 
@@ -21,13 +21,13 @@ from uam_lab.processes.process_table import nodes
 from uam_lab.results.result_folder import new_folder
 from uam_sim_bridge.plant import Vehicle
 
-PERIOD = 10.0  # [s] of wall time between two looks
-SPOKEN = 30  # looks between two lines of progress
+PERIOD = 10.0  # [s] wall time between two samples
+SPOKEN = 30  # samples between two lines of progress
 ORCHESTRATOR = "uam fly"
 
 
 def flight(duration: float, clock: str, log_limit: float, out: Path) -> Soak:
-    """One flight of `duration` [s] with all nodes, log_limit [MB], into `out`/flight."""
+    """Fly once for `duration` [s] with all nodes; log_limit [MB]; results in `out`/flight."""
     scenario = out / "shuttle.yaml"
     scenario.write_text(shuttle(duration))
     said = out / "flight.txt"
@@ -39,7 +39,7 @@ def flight(duration: float, clock: str, log_limit: float, out: Path) -> Soak:
             [sys.executable, *command, "--out", str(folder)],
             stdout=output,
             stderr=output,
-            process_group=0,  # Ctrl-C comes to it from here, once
+            process_group=0,  # Ctrl-C does not reach it; this process sends SIGINT once
         )
     soak = Soak(f"{duration / 60.0:g} minutes through the nodes, {clock}", "wall time")
     while run.poll() is None:
@@ -54,7 +54,7 @@ def flight(duration: float, clock: str, log_limit: float, out: Path) -> Soak:
 
 
 def _look(soak: Soak, run: subprocess.Popen, ended: Path) -> None:
-    """Until the plant has written its statistics, which it does at its end, or the run is over."""
+    """Sample until the plant has written its statistics (at its end) or the run has ended."""
     begin, looks = time.monotonic(), 0
     while run.poll() is None and not ended.exists():
         now = time.monotonic() - begin
@@ -91,12 +91,12 @@ def _conclude(soak: Soak, folder: Path, duration: float) -> None:
         f"{sum(recorder['lost'].values())} messages lost",
     ]
     if plant["clock"] == "realtime":
-        asked = plant["answerable_ticks"]
-        soak.notes.append(f"missed   {plant['missed_ticks']} of {asked} control ticks")
+        total = plant["answerable_ticks"]
+        soak.notes.append(f"missed   {plant['missed_ticks']} of {total} control ticks")
 
 
 def missions(duration: float) -> Soak:
-    """Mission after mission in the direct engine and this process, `duration` [s] in all."""
+    """Fly missions in the direct engine, all in this process, for `duration` [s] in total."""
     scenario, profile = load_scenario("pick_and_place"), load_profile("s500")
     soak, flown, completed, number = Soak("missions in one process", "simulated time"), 0.0, 0, 0
     begin = time.monotonic()

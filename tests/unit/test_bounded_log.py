@@ -24,7 +24,7 @@ def test_it_ends_at_its_size_and_is_complete(tmp_path):
     log = BoundedLog(file, limit=1e-3)
     fill(log, 1000)
     log.close()
-    assert log.ended == "the log has its largest size, 0.001 MB"
+    assert log.ended == "the log reached its size limit, 0.001 MB"
     assert file.stat().st_size < 0.01 * MEGABYTE
     with file.open("rb") as stream:
         summary = make_reader(stream).get_summary()

@@ -1,1 +1,1 @@
-"""Processes of a flight: start, watch, signal, environment."""
+"""Processes of a flight: start, monitoring, signals, environment."""

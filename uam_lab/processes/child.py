@@ -1,12 +1,12 @@
-"""How a node runs inside a flight: forked where its imports are done, ended with the flight.
+"""A node's process in a flight: forked from a process with finished imports.
 
-A node needs seconds to import what it uses, the same for all of them. So they are forked from one
-process that has imported it (multiprocessing's fork server, see `prepare`): a flight starts sooner,
-and a node that was lost in flight is back sooner.
+The imports of a node take seconds and are the same for all nodes. The nodes are therefore forked
+from one process that has imported the modules (multiprocessing's fork server, see `prepare`). This
+shortens the start of a flight and the restart of a lost node.
 
-Each child watches its orchestrator. When that is gone - even by `kill -9`, which no handler sees -
-it is interrupted as by Ctrl-C, and killed if that does not help. Unlike PR_SET_PDEATHSIG this works
-on every system and lets the recorder close its file.
+Each child monitors its orchestrator. When the orchestrator has ended, also by `kill -9`, the child
+sends itself SIGINT, and SIGKILL after GRACE. Unlike PR_SET_PDEATHSIG this works on every system and
+lets the recorder close its file.
 """
 
 from __future__ import annotations
@@ -26,20 +26,20 @@ from pathlib import Path
 
 from setproctitle import setproctitle
 
-GRACE = 5.0  # seconds from the interrupt to the kill, once the orchestrator is gone
-TITLE = "uam-node"  # how the command line of a child begins, for `ps` and `process_table`
+GRACE = 5.0  # [s] from SIGINT to SIGKILL, after the end of the orchestrator
+TITLE = "uam-node"  # first word of a child's command line, for `ps` and `process_table`
 POLL = 0.002  # seconds
-# One thread each: the nodes' matrices are tiny, and pools of threads on few cores only delay each
-# other. Read when the libraries are loaded, hence by the process that forks.
+# One thread per node: the matrices are small, and thread pools on few cores delay each other. The
+# libraries read these variables when they are loaded, so the forking process needs them.
 SINGLE_THREAD = dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "NUMBA_NUM_THREADS"), "1")
 
 _context = multiprocessing.get_context("forkserver")
 
 
 def prepare(modules: Iterable[str]) -> None:
-    """Start the process that forks, and have it import `modules`; returns at once.
+    """Start the forking process, which imports `modules`; return at once.
 
-    Without it the first child starts that process, and every child imports for itself.
+    Without this call the first child starts that process, and each child does its own imports.
     """
     before = {name: os.environ.get(name) for name in SINGLE_THREAD}
     os.environ.update(SINGLE_THREAD)
@@ -55,7 +55,7 @@ def prepare(modules: Iterable[str]) -> None:
 
 
 class Forked:
-    """A running child, with what `subprocess.Popen` calls the same."""
+    """A running child, with some of the methods of `subprocess.Popen`."""
 
     def __init__(
         self,
@@ -65,7 +65,7 @@ class Forked:
         log: Path,
         environment: Mapping[str, str],
     ) -> None:
-        """See `Processes.start`; log: output is appended to it."""
+        """Start the child, see `Processes.start`; log: file to which its output is appended."""
         run = (name, module, tuple(arguments), str(log), dict(environment))
         self._process = _context.Process(target=_run, args=run, name=name)
         self._process.start()
@@ -73,28 +73,28 @@ class Forked:
             time.sleep(POLL)
 
     def _apart(self) -> bool:
-        """Whether Ctrl-C in the terminal does not reach it any more."""
+        """Return whether the child has its own process group, so Ctrl-C does not reach it."""
         try:
             return os.getpgid(self.pid) == self.pid
-        except ProcessLookupError:  # ended; its status is on its way
+        except ProcessLookupError:  # ended; its status follows
             return False
 
     @property
     def pid(self) -> int:
-        """Its process id."""
+        """Process id of the child."""
         return self._process.pid
 
     @property
     def returncode(self) -> int | None:
-        """None while it runs; negative: the signal that ended it."""
+        """Exit status, None while the child runs; negative: the signal that ended it."""
         return self._process.exitcode
 
     def poll(self) -> int | None:
-        """The same."""
+        """Return `returncode`."""
         return self.returncode
 
     def send_signal(self, number: int) -> None:
-        """Send it, unless it has ended."""
+        """Send a signal to the child if it runs."""
         if self.returncode is None:
             os.kill(self.pid, number)
 
@@ -106,9 +106,9 @@ def _run(
     log: str,
     environment: dict[str, str],
 ) -> None:
-    """Be the child: import the module and call its `main()`, which reads sys.argv."""
-    os.setpgid(0, 0)  # Ctrl-C in the terminal is for the orchestrator alone
-    setproctitle(f"{TITLE} {name}")  # before the environment changes, beside which the title lies
+    """Main function of the child: import the module and call its `main()`, which reads sys.argv."""
+    os.setpgid(0, 0)  # Ctrl-C in the terminal reaches only the orchestrator
+    setproctitle(f"{TITLE} {name}")  # before a change of the environment, next to it in memory
     with open(log, "ab", buffering=0) as output:
         for stream in (1, 2):
             os.dup2(output.fileno(), stream)
@@ -122,7 +122,7 @@ def _run(
     sys.argv = [module, *arguments]
     try:
         status = importlib.import_module(module).main()
-    except Exception:  # said here, as multiprocessing adds its own lines
+    except Exception:  # printed here, because multiprocessing would add its own lines
         traceback.print_exc()
         status = 1
     sys.exit(status)

@@ -1,4 +1,4 @@
-"""A node beside a running flight, in a ROS context of its own, that nobody waits for."""
+"""An additional node in the ROS domain of a running flight, with its own ROS context."""
 
 from __future__ import annotations
 
@@ -11,12 +11,12 @@ from rclpy.signals import SignalHandlerOptions
 
 
 class Guest:
-    """`node` in the flight's ROS domain. A context manager; whoever uses it spins it or polls."""
+    """Context manager with `node` in the flight's ROS domain; the caller spins or polls it."""
 
     def __init__(self, name: str, environment: Mapping[str, str], domain: int | None = None):
-        """environment: of the flight's processes, of which ROS reads some variables here too.
+        """environment: of the flight's processes; ROS reads some of its variables here too.
 
-        domain: None for that of the environment.
+        domain: ROS domain, None for that of the environment.
         """
         before = dict(os.environ)
         os.environ.update(environment)
@@ -40,7 +40,7 @@ class Guest:
             os.environ.update(before)
 
     def close(self) -> None:
-        """Leave the flight."""
+        """Destroy the node and its context."""
         self.node.destroy_node()
         rclpy.shutdown(context=self.context)
 

@@ -1,4 +1,4 @@
-"""Ctrl-C during a flight: noted, so that nothing breaks half-way, and acted upon in order."""
+"""Ctrl-C during a flight: only counted, so that the flight can end in order."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 
 
 class Interrupts:
-    """Counts SIGINT, SIGTERM and SIGHUP while the `with` block runs, instead of what they do."""
+    """Context manager that counts SIGINT, SIGTERM and SIGHUP instead of their normal effect."""
 
     def __init__(self):
         self.count = 0
@@ -16,12 +16,12 @@ class Interrupts:
 
     @property
     def raised(self) -> bool:
-        """Whether the flight is to end."""
+        """Whether a signal was received: the flight has to end."""
         return self.count > 0
 
     @property
     def impatient(self) -> bool:
-        """Whether the user asked again: end it at once."""
+        """Whether a second signal was received: the flight has to end at once."""
         return self.count > 1
 
     def _note(self, *_) -> None:

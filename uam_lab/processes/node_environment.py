@@ -1,4 +1,4 @@
-"""The variables by which the processes of a flight find each other, and nobody else does."""
+"""Environment variables of a flight's processes: a private ROS domain on this machine."""
 
 from __future__ import annotations
 
@@ -14,12 +14,12 @@ FAST_DDS = "fastrtps"  # in the names of its middlewares
 
 
 def environment(domain: int, log_folder: Path) -> dict[str, str]:
-    """What the children inherit: a private, local ROS domain and one thread each."""
+    """Return the environment of the children: a private, local ROS domain and one thread each."""
     return {**os.environ, **ros_environment(domain, log_folder), **SINGLE_THREAD}
 
 
 def ros_environment(domain: int, log_folder: Path) -> dict[str, str]:
-    """The variables by which ROS finds its domain, its transports and the place of its logs."""
+    """Return the variables for ROS domain, transports and log folder."""
     return {
         **transport_environment(),
         "ROS_DOMAIN_ID": str(domain),
@@ -29,10 +29,10 @@ def ros_environment(domain: int, log_folder: Path) -> dict[str, str]:
 
 
 def transport_environment() -> dict[str, str]:
-    """The variables that keep ROS on this machine.
+    """Return the variables that restrict ROS to this machine.
 
-    Our transports do so by themselves (config/dds/fastdds.xml). Where the user's own file or
-    another middleware is used, ROS is told to.
+    The transports of config/dds/fastdds.xml do so themselves. With the user's own file or another
+    middleware the discovery range is set to LOCALHOST.
     """
     transports = str(configuration.path("dds/fastdds.xml"))
     chosen = os.environ.get(PROFILES_FILE) or transports
@@ -44,12 +44,12 @@ def transport_environment() -> dict[str, str]:
 
 
 def middleware() -> str:
-    """The middleware that ROS is going to use."""
+    """Return the middleware that ROS will use."""
     return os.environ.get("RMW_IMPLEMENTATION") or f"rmw_{FAST_DDS}_cpp"
 
 
 def without_discovery() -> str:
-    """Why a process's threads of discovery cannot be stopped here; empty where they can be."""
+    """Return why discovery threads cannot be stopped on this machine, "" if they can."""
     if FAST_DDS not in middleware():
-        return f"it knows the threads of Fast DDS, not those of {middleware()}"
+        return f"it supports Fast DDS only, not {middleware()}"
     return thread_stop.refusal()

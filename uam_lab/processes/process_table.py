@@ -1,4 +1,4 @@
-"""The nodes of flights among the processes of this machine, also those that lost their flight."""
+"""Search for nodes of flights among the processes of this machine, orphans included."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ POLL = 0.1  # [s]
 
 
 def command(process: psutil.Process) -> list[str]:
-    """The words of its command line; empty where it is gone or a kernel thread."""
+    """Return the words of a command line; empty for an ended process or a kernel thread."""
     try:
         return " ".join(process.cmdline()).split()
     except psutil.Error:
@@ -22,19 +22,19 @@ def command(process: psutil.Process) -> list[str]:
 
 
 def node_name(process: psutil.Process) -> str:
-    """The name under which a flight started it, "" where it is no node of a flight."""
+    """Return the name of a flight's node, "" for other processes."""
     title, *name = command(process) or [""]
     return " ".join(name) if title == TITLE else ""
 
 
 def nodes(processes: Iterable[psutil.Process]) -> dict[psutil.Process, str]:
-    """Those of `processes` that are nodes of flights, with their names."""
+    """Return the nodes of flights among `processes`, with their names."""
     found = {process: node_name(process) for process in processes}
     return {process: name for process, name in found.items() if name}
 
 
 def orphans() -> list[psutil.Process]:
-    """Nodes whose `uam fly` has gone; they end by themselves within child.GRACE, as a rule."""
+    """Return the nodes whose `uam fly` has ended; normally they end within child.GRACE."""
     return [process for process in nodes(psutil.process_iter()) if _parent(process) == INIT]
 
 
@@ -46,14 +46,14 @@ def _parent(process: psutil.Process) -> int:
 
 
 def await_orphans(say: Callable[[str], None]) -> None:
-    """Wait until the nodes of a flight that was killed have ended, at most a little over GRACE.
+    """Wait until the nodes of a killed flight have ended, at most GRACE + 1 s.
 
-    Nobody holds their instance any more: one that starts could meet them in its ROS domain.
+    Their instance is free again, so a new flight could have the same ROS domain.
     """
     end = time.monotonic() + GRACE + 1.0
     left = orphans()
     if left:
-        say(f"waiting for {len(left)} nodes of a flight that was killed to end")
+        say(f"waiting for the end of {len(left)} nodes of a killed flight")
     while left and time.monotonic() < end:
         time.sleep(POLL)
         left = orphans()

@@ -1,9 +1,8 @@
 """Starts, watches and stops the processes of one flight.
 
-Each child has its own process group, so that Ctrl-C in the terminal reaches the orchestrator alone
-and the children are stopped in order; its output goes to <logs>/<name>.log. It stays in the
-session: schedulers share time between sessions first, whatever the processes' priorities.
-See `child` for how they run.
+Each child has its own process group: Ctrl-C in the terminal reaches only the orchestrator, which
+stops the children in order. The output of a child goes to <logs>/<name>.log. The children stay in
+the session, because schedulers share processor time between sessions first. See also `child`.
 """
 
 import signal
@@ -20,19 +19,19 @@ POLL = 0.02  # seconds
 
 
 class NodeFailed(RuntimeError):
-    """A process of the flight ended by itself; the text says which, why, and its last lines."""
+    """A process of the flight ended by itself; the text contains its name and the reason."""
 
     def __init__(self, name: str, status: int, log: Path):
         self.name, self.status = name, status
         self.last_lines = tail(log)
         own_words = self.last_lines[-1] if self.last_lines else ""
-        why = own_words.removeprefix(f"{name}: ")  # nodes end with one line that begins so
+        why = own_words.removeprefix(f"{name}: ")  # prefix of a node's last line
         said = f": {why}" if why != own_words else ""
         super().__init__(f"{name} {describe(status)}{said}")
 
 
 def describe(status: int) -> str:
-    """What a return code of subprocess means, in words."""
+    """Return a return code of subprocess as text."""
     if status < 0:
         try:
             return f"was killed by {signal.Signals(-status).name}"
@@ -42,7 +41,7 @@ def describe(status: int) -> str:
 
 
 def tail(log: Path, count: int = LAST_LINES) -> list[str]:
-    """The last non-empty lines of a text file; none when it is not there."""
+    """Return the last non-empty lines of a text file; none if it does not exist."""
     try:
         with log.open("rb") as file:
             file.seek(max(0, log.stat().st_size - 16384))
@@ -59,21 +58,21 @@ class NodeProcess:
     name: str
     process: Forked
     log: Path
-    run: Callable[[Sequence[str]], Forked]  # starts it again, with further arguments
-    may_end: bool = False  # its end is expected: it was asked to stop, or ends with the mission
-    optional: bool = False  # the flight goes on without it
-    again: int = 0  # how often it is still started again where it ends by itself
+    run: Callable[[Sequence[str]], Forked]  # restarts it, with additional arguments
+    may_end: bool = False  # its end is expected: after a stop or with the mission
+    optional: bool = False  # the flight continues without it
+    again: int = 0  # remaining number of restarts
 
 
 class Processes:
-    """The children of one flight. A context manager: nothing survives the `with` block."""
+    """The children of one flight. Context manager: all have ended after the `with` block."""
 
     def __init__(self, logs: Path, environment: Mapping[str, str]):
-        """Output goes to `logs`, which must exist; `environment` is the children's whole one."""
+        """logs: existing folder for the output; environment: all variables of the children."""
         self._logs = logs
         self._environment = dict(environment)
         self._children: dict[str, NodeProcess] = {}
-        self.hurry: Callable[[], bool] = lambda: False  # True: the next, harder signal at once
+        self.hurry: Callable[[], bool] = lambda: False  # True: send the next signal at once
 
     def start(
         self,
@@ -86,8 +85,8 @@ class Processes:
     ) -> NodeProcess:
         """Run `module.main()` as the process `name`.
 
-        may_end: it stops by itself when done; optional: its end is no failure of the flight, see
-        `missed`; again: how often `revive` starts it again.
+        may_end: it ends by itself when finished; optional: its end is no failure of the flight, see
+        `missed`; again: number of restarts by `revive`.
         """
         log = self._logs / f"{name}.log"
 
@@ -100,26 +99,26 @@ class Processes:
 
     @property
     def names(self) -> list[str]:
-        """Everything that was started, in that order."""
+        """Names of all started children, in order."""
         return list(self._children)
 
     def pid(self, name: str) -> int:
-        """The process id of a child."""
+        """Return the process id of a child."""
         return self._children[name].process.pid
 
     def let_end(self, name: str) -> None:
-        """Whatever ends this child, it is no failure of the flight; one to be revived will be."""
+        """Treat the end of this child as no failure, unless it has restarts left for `revive`."""
         child = self._children[name]
         child.optional = not child.again
 
     def running(self, name: str) -> bool:
-        """True while the child has not ended."""
+        """Return whether the child runs."""
         return self._children[name].process.poll() is None
 
     def check(self) -> None:
-        """Raise NodeFailed for a child that ended although nobody asked it to.
+        """Raise NodeFailed for a child that ended unexpectedly.
 
-        Of several one that was killed: the others may have ended because of it.
+        Of several it reports a killed one: the others may have ended because of it.
         """
         failed = []
         for child in self._children.values():
@@ -131,7 +130,7 @@ class Processes:
             raise min(failed, key=lambda one: one.status >= 0)
 
     def missed(self) -> list[NodeFailed]:
-        """What became of optional children that ended by themselves, told once for each."""
+        """Return the optional children that ended by themselves, each only once."""
         ended = [c for c in self._children.values() if c.optional and not c.may_end]
         ended = [child for child in ended if child.process.poll() is not None]
         for child in ended:
@@ -139,23 +138,23 @@ class Processes:
         return [NodeFailed(child.name, child.process.returncode, child.log) for child in ended]
 
     def revive(self, further: Callable[[str], Sequence[str]] = lambda _: ()) -> list[NodeFailed]:
-        """Start again what has ended by itself and may be; returns what became of each.
+        """Restart children that ended by themselves and have restarts left; return their failures.
 
-        further: arguments for the process of a name, after those that it was started with.
+        further: returns additional arguments for a child, by its name.
         """
         ended = [c for c in self._children.values() if c.again and not c.may_end]
         ended = [child for child in ended if child.process.poll() is not None]
-        told = [NodeFailed(child.name, child.process.returncode, child.log) for child in ended]
+        failures = [NodeFailed(child.name, child.process.returncode, child.log) for child in ended]
         for child in ended:
             child.again -= 1
             child.process = child.run(further(child.name))
-        return told
+        return failures
 
     def stop(self, names: Iterable[str]) -> list[str]:
-        """Interrupt these children together, wait, then terminate, then kill.
+        """Send SIGINT to these children, after a wait SIGTERM, then SIGKILL.
 
-        Returns the names of those that did not obey the interrupt. Children that have already
-        ended, also by a failure, are left alone.
+        Returns the names of those that did not end after SIGINT. Children that have already ended
+        get no signal.
         """
         chosen = [self._children[name] for name in names if name in self._children]
         disobedient: set[str] = set()

@@ -1,7 +1,7 @@
 """Stops single threads of a child process by ptrace, as a debugger does (Linux, see ptrace(2)).
 
-Signals stop whole processes only. The kernel lets the threads go on when the tracer ends, however
-it ends; a traced process can be killed and interrupted as usual.
+Signals stop whole processes only. The kernel continues the threads when the tracer ends, also after
+a crash. A traced process can be killed and interrupted as usual.
 """
 
 from __future__ import annotations
@@ -23,13 +23,13 @@ _ptrace.restype = ctypes.c_long
 
 
 def refusal() -> str:
-    """Why threads of children cannot be stopped on this machine; empty where they can be."""
+    """Return why threads of children cannot be stopped on this machine, "" if they can."""
     try:
         scope = int(SCOPE.read_text())
     except (OSError, ValueError):  # a kernel without Yama
         return ""
     if scope >= ADMINISTRATOR_ONLY and os.geteuid() != 0:
-        return f"kernel.yama.ptrace_scope is {scope}; it takes 1 or less"
+        return f"kernel.yama.ptrace_scope is {scope}; it must be 1 or less"
     return ""
 
 
@@ -37,9 +37,9 @@ class StoppedThreads:
     """Threads of a process, chosen by their names, stopped until `end`."""
 
     def __init__(self, pid: int, chosen: Callable[[str], bool]):
-        """Stop them. `end` is for the thread that made it, as ptrace has it.
+        """Stop the threads. Only the same thread may call `end` (a rule of ptrace).
 
-        Raises OSError where the kernel refuses.
+        Raises OSError if the kernel refuses.
         """
         self._stopped: list[int] = []
         for task in Path(f"/proc/{pid}/task").iterdir():
@@ -54,13 +54,13 @@ class StoppedThreads:
         os.waitpid(thread, WAIT_ALL)
 
     def look(self) -> None:
-        """Take note of those that have ended: until then their process has not, for its parent."""
+        """Collect ended threads; their process stays a zombie until then."""
         for thread in self._stopped:
             with contextlib.suppress(OSError):
                 os.waitpid(thread, WAIT_ALL | os.WNOHANG)
 
     def end(self) -> None:
-        """Let them go on."""
+        """Let the threads continue."""
         self.look()
         for thread in self._stopped:
             with contextlib.suppress(OSError):  # ended meanwhile

@@ -1,1 +1,1 @@
-"""log.mcap: writing it, and reading a flight back from it."""
+"""log.mcap: write it, and read a flight from it."""

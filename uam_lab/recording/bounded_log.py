@@ -1,7 +1,7 @@
-"""Writes ROS messages, already serialized, to an MCAP file that ends before the disk does.
+"""Writes serialized ROS messages to an MCAP file of limited size.
 
-The log ends at a size, or when nothing more can be written. What was written until then stays, and
-the recorder goes on without it.
+The log ends at its size limit or after a write error. The messages before that stay readable, and
+the recorder continues without the log.
 """
 
 from __future__ import annotations
@@ -19,13 +19,13 @@ MEGABYTE = 1_000_000
 class BoundedLog:
     """One MCAP file with profile `ros2`. Not thread-safe.
 
-    ended: why nothing is written any more, "" while the log is open. counts: messages per topic.
+    ended: reason of the end of the log, "" while it is open. counts: messages per topic.
     """
 
     def __init__(self, file: Path, limit: float) -> None:
         """Create the file, replacing an existing one. limit [MB], 0 for none.
 
-        Raises OSError where the file cannot be created.
+        Raises OSError if the file cannot be created.
         """
         self.ended = ""
         self.counts: Counter[str] = Counter()
@@ -39,7 +39,7 @@ class BoundedLog:
     def add_channel(
         self, topic: str, type_name: str, schema: str, metadata: Mapping[str, str]
     ) -> int:
-        """Announce a topic of `package/msg/Name` with its `ros2msg` schema; returns its id."""
+        """Register a topic of type `package/msg/Name` with its `ros2msg` schema; return its id."""
         if type_name not in self._schemas:
             schema_id = self._writer.register_schema(type_name, "ros2msg", schema.encode())
             self._schemas[type_name] = schema_id
@@ -53,7 +53,7 @@ class BoundedLog:
     def write(
         self, channel: int, log_time: int, publish_time: int, data: bytes, sequence: int
     ) -> None:
-        """Append a CDR message; times in nanoseconds, not negative."""
+        """Append a CDR message; times in nanoseconds, 0 or more."""
         if not self.ended:
             add = self._writer.add_message
             self._try(add, channel, log_time, data, publish_time, sequence)
@@ -65,9 +65,9 @@ class BoundedLog:
             self._try(self._writer.add_metadata, name, dict(values))
 
     def flush(self) -> None:
-        """Bring what was written to the file, so that a killed recorder loses nothing of it.
+        """Write buffered messages to the file, so that they survive a kill of the recorder.
 
-        Ends the log where the file has become too long.
+        Ends the log if the file has reached its size limit.
         """
         if self.ended:
             return
@@ -75,11 +75,11 @@ class BoundedLog:
         if not self.ended and 0 < self._limit <= self._file.tell():
             self.close()
             self.ended = (
-                self.ended or f"the log has its largest size, {self._limit / MEGABYTE:g} MB"
+                self.ended or f"the log reached its size limit, {self._limit / MEGABYTE:g} MB"
             )
 
     def close(self) -> None:
-        """Write the index and end the file. Calling it again does nothing."""
+        """Write the index and close the file. A second call has no effect."""
         if not self.ended and not self._file.closed:
             self._try(self._writer.finish)
             self._try(self._file.close)

@@ -1,4 +1,4 @@
-"""Reads many serialized messages of one topic at once into arrays."""
+"""Decodes all serialized messages of one topic into arrays."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -12,7 +12,7 @@ from uam_msgs_py.messages.layouts import STAMP, Layout, Layouts
 class Block:
     """Messages with one layout: stamps (m,) [ns], names, and each field as (m, n) float64.
 
-    `order` (m,) are their numbers among all messages of the topic; time_from_start is [ns], int64.
+    order (m,): numbers of the messages within the topic; time_from_start: int64 [ns].
     """
 
     order: np.ndarray
@@ -22,9 +22,9 @@ class Block:
 
 
 def read(type_name: str, messages: Sequence[bytes]) -> list[Block]:
-    """Decode all messages of one topic; one block per layout that occurs.
+    """Decode all messages of one topic; return one block per layout.
 
-    Raises KeyError for a type without a layout, BadMessage for what is no such message.
+    Raises KeyError for a type without a layout, BadMessage for an invalid message.
     """
     layouts = Layouts(type_name)
     groups: dict[int, tuple[Layout, list[int]]] = {}
@@ -47,6 +47,6 @@ def _block(layout: Layout, messages: Sequence[bytes], numbers: np.ndarray) -> Bl
 
 
 def _nanoseconds(table: np.ndarray) -> np.ndarray:
-    """(m, 8) bytes of int32 seconds and uint32 nanoseconds → (m,) int64 [ns]."""
+    """Convert int32 seconds and uint32 nanoseconds, bytes (m, 8), to int64 (m,) [ns]."""
     pairs = np.ascontiguousarray(table).view([("sec", "<i4"), ("nanosec", "<u4")])[:, 0]
     return pairs["sec"].astype(np.int64) * 1_000_000_000 + pairs["nanosec"]

@@ -1,4 +1,4 @@
-"""Faults of a flight, read back from its log."""
+"""Faults of a flight, read from its log."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ SECOND = 1e9
 
 
 def records(messages: Iterable[bytes], takeoff: int) -> list[dict[str, Any]]:
-    """What a log tells, see `timeline.record`; takeoff: stamp [ns] of mission time 0."""
+    """Return the faults of a log, see `timeline.record`; takeoff: stamp [ns] of mission time 0."""
     found: dict[tuple[str, int], dict[str, Any]] = {}
     for data in messages:
         stamp, event = FaultEvent.from_message(deserialize_message(data, DiagnosticArray))

@@ -1,11 +1,11 @@
 """Settings of a flight as metadata of its log, so that the log alone describes the flight.
 
-    flight       the entries of info.json that are known beforehand, each as JSON
+    flight       the entries of info.json that exist before the flight, each as JSON
     scenario     name and text of its file
     parameters   the effective parameters, a ROS parameter file
     versions     versions.json
 
-The recorder writes them first, so that a flight killed in the middle has them.
+The recorder writes them first, so that the log of a killed flight also contains them.
 """
 
 from __future__ import annotations
@@ -37,7 +37,7 @@ class LogFacts:
 
 
 def write(file: Path, info: Mapping[str, Any], scenario: str, texts: Mapping[str, str]) -> None:
-    """Write what the recorder is to put into the log; scenario: a name or a file."""
+    """Write the file with the metadata for the recorder; scenario: a name or a file."""
     source = configuration.named("scenarios", scenario)
     records: Records = {
         FLIGHT: {name: json.dumps(value) for name, value in info.items()},
@@ -48,7 +48,7 @@ def write(file: Path, info: Mapping[str, Any], scenario: str, texts: Mapping[str
 
 
 def read(log: Path) -> LogFacts:
-    """Read them back from a log; nothing where it has none. Raises UnreadableLog, OSError."""
+    """Read the metadata of a log; missing parts are empty. Raises UnreadableLog, OSError."""
     records = read_metadata(log)
     info = {name: json.loads(text) for name, text in records.get(FLIGHT, {}).items()}
     return LogFacts(info, _scenario(records.get(SCENARIO)), records.get(TEXTS, {}))

@@ -1,8 +1,8 @@
-"""A flight's log.mcap → the table of its control ticks.
+"""Converts the log.mcap of a flight to the table of its control ticks.
 
-A tick is a stamp of /uam/truth/state at which the mission had a reference; everything else is
-joined to it by stamp. What a tick has no message of its own for (the gains, at 50 Hz; in real time
-a message that was lost) holds the last value, as it did for whoever received it.
+A tick is a stamp of /uam/truth/state for which the mission had a reference. All other topics are
+joined to it by stamp. Without a message of the same stamp (gains come at 50 Hz; in real time
+messages may be lost) a tick has the last value before it, as in the receiving nodes.
 """
 
 from __future__ import annotations
@@ -38,7 +38,7 @@ from uam_msgs_py.messages.parameter_changes import ParameterChange
 from uam_msgs_py.messages.status import MissionStatus
 
 SECOND = 1e9
-SILENCE = 1e9  # [ns] without references, until the mission counts as lost
+SILENCE = 1e9  # [ns] without references after which the mission counts as lost
 STATE_ROWS = ("positions", "velocities", "accelerations")
 TRUTH, STATE, REFERENCE = (t.name for t in (topics.TRUTH_STATE, topics.STATE, topics.REFERENCE))
 POSITION, ATTITUDE, JOINTS = (
@@ -61,14 +61,14 @@ TOPICS = {
 
 
 class StampedRows:
-    """Values of one topic in the order of their stamps: stamps (m,) [ns], rows (m, n)."""
+    """Values of one topic, sorted by stamp: stamps (m,) [ns], rows (m, n)."""
 
     def __init__(self, stamps: np.ndarray, rows: np.ndarray):
         order = np.argsort(stamps, kind="stable")
         self.stamps, self.rows = stamps[order], rows[order]
 
     def at(self, ticks: np.ndarray) -> np.ndarray:
-        """Rows (len(ticks), n) at the stamps `ticks` [ns] or last before; NaN before the first."""
+        """Return the rows (k, n) at the stamps ticks (k,) [ns] or last before them; else NaN."""
         out = np.full((len(ticks), self.rows.shape[1]), np.nan)
         if not len(self.stamps):
             return out
@@ -79,28 +79,28 @@ class StampedRows:
 
 
 class Log:
-    """The topics of a log, decoded when asked for."""
+    """The topics of a log, decoded on request."""
 
     def __init__(self, found: Mapping[str, TopicLog]):
         self._topics = found
 
     def messages(self, topic: str) -> list[bytes]:
-        """Serialized messages of a topic in file order; [] where there are none."""
+        """Return the serialized messages of a topic in file order; may be empty."""
         log = self._topics.get(topic)
         return log.messages if log else []
 
     def wall_seconds(self, topic: str) -> float:
-        """Wall time between the first and the last message of a topic [s]; 0 without."""
+        """Return the wall time between first and last message of a topic [s]; 0 without any."""
         log = self._topics.get(topic)
         return (max(log.published) - min(log.published)) / SECOND if log and log.published else 0.0
 
     def blocks(self, topic: str) -> list[cdr.Block]:
-        """Decoded messages of a topic; [] where there are none."""
+        """Return the decoded messages of a topic; may be empty."""
         log = self._topics.get(topic)
         return cdr.read(log.type_name, log.messages) if log and log.messages else []
 
     def samples(self, topic: str, fields: Sequence[str], width: int) -> StampedRows:
-        """`fields` side by side, `width` numbers each; zeros for messages that are idle (empty)."""
+        """Return `fields` side by side, `width` numbers each; zeros for empty (idle) messages."""
         stamps, rows = [], []
         for block in self.blocks(topic):
             stamps.append(block.stamps)
@@ -110,7 +110,7 @@ class Log:
         return StampedRows(np.concatenate(stamps), np.vstack(rows))
 
     def statuses(self) -> list[tuple[int, MissionStatus]]:
-        """What the mission said of itself, and at which stamp [ns], in order."""
+        """Return stamps [ns] and statuses of the mission, in order."""
         return [
             MissionStatus.from_message(deserialize_message(data, DiagnosticArray))
             for data in self.messages(STATUS)
@@ -125,7 +125,10 @@ def _field(block: cdr.Block, field: str, width: int) -> np.ndarray:
 
 
 class References:
-    """What the mission asked for, and when: rows (m, 24), flying (m,), take-off stamp."""
+    """References of the mission: samples with stamps (m,) [ns] and rows (m, 25), take-off stamp.
+
+    A row contains chi_d, chi_d_dot, chi_d_ddot (24) and whether position and attitude are flown.
+    """
 
     def __init__(self, log: Log):
         stamps, rows, flying = [], [], []
@@ -141,13 +144,13 @@ class References:
             if whole:
                 self.takeoff = int(np.min(block.stamps - block.fields["time_from_start"]))
         if not stamps:
-            raise UnreadableLog("the log has no reference: the mission never began")
+            raise UnreadableLog("the log has no reference: the mission did not start")
         joined = np.hstack([np.vstack(rows), np.vstack(flying)])
         self.samples = StampedRows(np.concatenate(stamps), joined)
         self._hold_after_landing()
 
     def _hold_after_landing(self) -> None:
-        """After the flight nothing is asked of the pose any more; its last reference stays."""
+        """Keep the last reference of the pose after the flight, which has none of its own."""
         rows = self.samples.rows
         flights = np.flatnonzero(rows[:, -1])
         if len(flights):
@@ -157,9 +160,8 @@ class References:
 
 @dataclass(frozen=True)
 class LoggedFlight:
-    """What a log tells: the table, whether the mission ended by itself, why it was given up, what
-    was asked of the parameters, how the states followed each other, which faults there were, how
-    long it took [s of wall time]."""
+    """Content of a log. series: table of the ticks; done: the mission ended; abort_reason: of the
+    mission; parameter_changes, transitions, faults: in order; wall_s: wall time [s]."""
 
     series: Series
     done: bool
@@ -173,9 +175,9 @@ class LoggedFlight:
 def read_flight(
     path: Path, scenario: Scenario, info: Mapping[str, Any] | None = None
 ) -> LoggedFlight:
-    """The flight of `scenario` that is recorded in `path`.
+    """Return the flight of `scenario` recorded in `path`.
 
-    Raises UnreadableLog when the file is no log, or the log of a flight that never began.
+    Raises UnreadableLog if the file is no log or its flight did not start.
     """
     log = Log(read_log(path, TOPICS))
     statuses = log.statuses()
@@ -184,8 +186,8 @@ def read_flight(
     references = References(log)
     truth = log.samples(TRUTH, STATE_ROWS, len(COORDINATES))
     first, last = references.samples.stamps[[0, -1]]
-    # The mission is one tick ahead: its last reference is of a tick that nobody controlled. What
-    # follows its end depends on how fast the plant heard of it.
+    # The mission is one tick ahead: its last reference is for a tick without control. Ticks after
+    # the mission's end depend on the time until the plant receives the end, so they are cut off.
     last = min(last, end + 1) if end is not None else _last_of_all(last, truth.stamps)
     ticks = truth.stamps[(truth.stamps >= first) & (truth.stamps < last)]
     if not len(ticks):
@@ -209,25 +211,27 @@ def read_flight(
         )
     recording.count = len(ticks)
     changes = parameter_changes(log, takeoff)
-    told = transitions(statuses, takeoff)
+    states = transitions(statuses, takeoff)
     wall = log.wall_seconds(TRUTH)
     faults = fault_log.records(log.messages(FAULTS), takeoff)
     series = recording.series(info)
-    return LoggedFlight(series, end is not None, abort_reason, changes, told, faults, wall)
+    return LoggedFlight(series, end is not None, abort_reason, changes, states, faults, wall)
 
 
 def _last_of_all(last: int, truth: np.ndarray) -> int:
-    """Where the table of a flight ends that the mission did not end; stamps [ns].
+    """Return the end [ns] of the table of a flight without an end of the mission.
 
-    last: of the last reference. A mission that fell silent in flight still has a vehicle.
+    last: stamp of the last reference [ns]; truth (m,): stamps of the true state [ns]. If the
+    mission node was lost in flight, the table contains the rest of the flight.
     """
     return int(truth[-1]) + 1 if len(truth) and truth[-1] - last > SILENCE else int(last)
 
 
 def parameter_changes(log: Log, takeoff: int) -> list[dict[str, Any]]:
-    """What was asked of the nodes' parameters, in order; takeoff: stamp [ns] of mission time 0.
+    """Return the requested parameter changes, in order; takeoff: stamp [ns] of mission time 0.
 
-    time_s: mission time after which it counts; node, by, reason, values: `ParameterChange`.
+    time_s: mission time of the last tick with the old values; node, by, reason, values: see
+    `ParameterChange`.
     """
     found = []
     for data in log.messages(CHANGES):
@@ -245,18 +249,18 @@ def parameter_changes(log: Log, takeoff: int) -> list[dict[str, Any]]:
 
 
 def adaptation(log: Log, subsystem: str, ticks: np.ndarray, values: np.ndarray) -> None:
-    """Fill in the gains of a subsystem's law: one block of messages, as a law has one set."""
+    """Fill in the gains of a subsystem's law at ticks (m,) [ns] in the columns of values (m, n)."""
     for block in log.blocks(ADAPTATION[subsystem]):
         gains = StampedRows(block.stamps, block.fields["position"])
         values[:, gain_columns(subsystem, block.names)] = gains.at(ticks)
 
 
 def _commands(log: Log, ticks: np.ndarray, values: np.ndarray) -> None:
-    """Fill in what the controllers commanded, and the attitude that the position law asked for."""
+    """Fill in the commands of the controllers and the desired attitude of the position law."""
     position = log.samples(POSITION, (*STATE_ROWS, "effort"), 6).at(ticks)
-    asked = [COLUMNS[f"reference.{angle}"] for angle in ("roll", "pitch", "yaw")]
+    attitude = [COLUMNS[f"reference.{angle}"] for angle in ("roll", "pitch", "yaw")]
     for row in range(3):
-        columns = [column + row * len(COORDINATES) for column in asked]
+        columns = [column + row * len(COORDINATES) for column in attitude]
         values[:, columns] = position[:, 6 * row + 3 : 6 * row + 6]
     values[:, COLUMNS.block("tau_p.")] = position[:, 18:21]
     values[:, COLUMNS.block("tau_q.")] = log.samples(ATTITUDE, ("effort",), 3).at(ticks)
@@ -268,7 +272,7 @@ def _commands(log: Log, ticks: np.ndarray, values: np.ndarray) -> None:
 
 
 def _truth(log: Log, ticks: np.ndarray, values: np.ndarray) -> None:
-    """Fill in what only the simulator knew."""
+    """Fill in the data that only the simulator has: rotors, payload, magnet."""
     rotors = log.samples(ROTORS, ("position", "effort"), 4).at(ticks)
     for i in range(4):
         values[:, COLUMNS[f"rotor_{i + 1}.command"]] = rotors[:, i]
@@ -283,7 +287,7 @@ def _truth(log: Log, ticks: np.ndarray, values: np.ndarray) -> None:
 def transitions(
     statuses: Sequence[tuple[int, MissionStatus]], takeoff: int
 ) -> list[dict[str, Any]]:
-    """How the states of the supervisor followed each other: see `outcome.transition`."""
+    """Return the supervisor's state changes, see `outcome.transition`."""
     found = []
     for (_, before), (stamp, now) in pairwise(statuses):
         if now.state != before.state:
@@ -299,10 +303,10 @@ def phases(
     scenario: Scenario,
     statuses: Sequence[tuple[int, MissionStatus]],
 ) -> Iterator[str]:
-    """The phase of each tick; ticks (m,) [ns], time (m,) [s], flying (m,): position and attitude
-    are controlled.
+    """Yield the phase of each tick; ticks (m,) [ns], time (m,) [s], flying (m,): position and
+    attitude are controlled.
 
-    The scenario's, unless the mission has left it; then what the mission said last.
+    It is the phase of the scenario; once the mission has left the scenario, that of its status.
     """
     left = any(
         status.state == State.HOLDING.value
@@ -318,8 +322,8 @@ def phases(
     stamps = [stamp for stamp, _ in statuses]
     for number, now in enumerate(time.tolist()):
         if flying[number]:
-            told = bisect_right(stamps, ticks[number]) - 1 if left else -1
-            yield statuses[told][1].phase if told >= 0 else scenario.phase(max(now, 0.0))
+            newest = bisect_right(stamps, ticks[number]) - 1 if left else -1
+            yield statuses[newest][1].phase if newest >= 0 else scenario.phase(max(now, 0.0))
         elif number < takeoff:
             yield WAITING
         else:

@@ -1,4 +1,4 @@
-"""Reads an MCAP log in one pass, also one whose recorder was killed before it wrote the index."""
+"""Reads an MCAP log in one pass, also without an index (after a kill of the recorder)."""
 
 import struct
 from collections.abc import Iterator
@@ -11,7 +11,7 @@ from mcap.stream_reader import StreamReader
 
 
 class UnreadableLog(ValueError):
-    """Not an MCAP file that can be read here; the text is one line."""
+    """The file is no readable MCAP file; the text is one line."""
 
 
 @dataclass
@@ -25,13 +25,13 @@ class TopicLog:
 
 
 def read_log(path: Path, topics: set[str] | None = None) -> dict[str, TopicLog]:
-    """All messages of `topics` (default: every one), by topic.
+    """Return all messages of `topics` (default: all), by topic.
 
-    What follows the last complete record is ignored. Raises UnreadableLog, or OSError.
+    An incomplete last record is ignored. Raises UnreadableLog, OSError.
     """
     found: dict[str, TopicLog] = {}
     types: dict[int, str] = {}  # schema id → type name
-    logs: dict[int, TopicLog] = {}  # channel id → where its messages go
+    logs: dict[int, TopicLog] = {}  # channel id → its topic's messages
     for record in _records(path):
         if isinstance(record, Message):
             log = logs.get(record.channel_id)
@@ -48,13 +48,13 @@ def read_log(path: Path, topics: set[str] | None = None) -> dict[str, TopicLog]:
 
 
 def read_metadata(path: Path) -> dict[str, dict[str, str]]:
-    """The named texts of a log, also of one that was cut off. Raises UnreadableLog, or OSError."""
+    """Return the metadata of a log, also of a truncated one. Raises UnreadableLog, OSError."""
     records = _records(path, emit_chunks=True)
     return {record.name: record.metadata for record in records if isinstance(record, Metadata)}
 
 
 def _records(path: Path, emit_chunks: bool = False) -> Iterator[McapRecord]:
-    """The complete records before the index; emit_chunks: chunks as they are, not unpacked."""
+    """Yield the complete records before the index; emit_chunks: do not unpack chunks."""
     with path.open("rb") as stream:
         try:
             for record in StreamReader(stream, emit_chunks=emit_chunks).records:

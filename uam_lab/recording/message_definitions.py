@@ -1,4 +1,4 @@
-"""The text of ROS message definitions, as MCAP's `ros2msg` schemas want it.
+"""ROS message definitions as `ros2msg` schemas for MCAP.
 
 A schema is the .msg file of the type followed, for each type it depends on, by a line of 80 `=`,
 a line `MSG: package/Name` and that type's .msg file (MCAP specification, appendix "ros2msg").
@@ -26,15 +26,15 @@ class DefinitionMissing(LookupError):
 
 @cache
 def definition(type_name: str) -> str:
-    """The .msg text of `package/msg/Name`."""
+    """Return the .msg text of `package/msg/Name`. Raises DefinitionMissing."""
     package, _, name = type_name.partition("/msg/")
     module = importlib.util.find_spec(package)
     if module is None and package == tf_message.PACKAGE:
         return tf_message.DEFINITION
     if module is None or module.origin is None:
         raise DefinitionMissing(f"message package {package} is not installed")
-    # The same tree holds lib/pythonX.Y/site-packages/<package> and share/<package>, in wheels
-    # and in apt installations alike.
+    # in wheels and apt installations, lib/pythonX.Y/site-packages/<package> and share/<package>
+    # have a common parent folder
     for prefix in Path(module.origin).parents:
         file = prefix / "share" / package / "msg" / f"{name}.msg"
         if file.is_file():
@@ -43,7 +43,7 @@ def definition(type_name: str) -> str:
 
 
 def dependencies(type_name: str) -> list[str]:
-    """The message types that `package/msg/Name` contains, directly, in order of appearance."""
+    """Return the message types of the fields of `package/msg/Name`, in order of appearance."""
     package = type_name.partition("/")[0]
     found: dict[str, None] = {}
     for line in definition(type_name).splitlines():
@@ -57,9 +57,9 @@ def dependencies(type_name: str) -> list[str]:
 
 @cache
 def schema(type_name: str) -> str:
-    """The complete `ros2msg` schema of `package/msg/Name`.
+    """Return the complete `ros2msg` schema of `package/msg/Name`.
 
-    Raises DefinitionMissing when a package that the type needs is not installed.
+    Raises DefinitionMissing if a required package is not installed.
     """
     parts = [definition(type_name)]
     queue, seen = dependencies(type_name), {type_name}

@@ -112,7 +112,7 @@ class _Hindrance:
             self._thread.start()
 
     def look(self) -> None:
-        """Do nothing (a StoppedThreads looks for new threads)."""
+        """Do nothing; the counterpart of `StoppedThreads.look`."""
 
     def end(self) -> None:
         """Let the process continue."""
