@@ -1,0 +1,51 @@
+"""Limits of force and torque against hand-worked numbers."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from uam_control.control.limits import PositionLimits, limit_force, limit_torque
+from uam_control.settings.parameter_set import ParameterError
+
+A = math.atan2(0.6, 0.8)  # tan A = .75
+NO_TILT_LIMIT = 1.5  # its tangent is 14
+
+
+@pytest.mark.parametrize(("tau", "thrust_max", "tilt_max", "expected", "cut"), [
+    ((3.0, 4.0, 10.0), 100.0, A, (3.0, 4.0, 15.0), False),
+    ((3.0, -4.0, -1.0), 100.0, A, (1.8, -2.4, 4.0), True),  # .75*4 = 3 of 5 to the side
+    ((-3.0, 4.0, -1.0), 5.0, NO_TILT_LIMIT, (-1.8, 2.4, 4.0), True),  # sqrt(25 - 16) = 3 of 5
+    ((0.0, 0.0, 95.0), 100.0, A, (0.0, 0.0, 100.0), False),  # up to the limit, not beyond
+    ((3.0, 4.0, 200.0), 100.0, A, (0.0, 0.0, 100.0), True),  # altitude goes first
+    ((0.0, 0.0, 200.0), 100.0, A, (0.0, 0.0, 100.0), True),
+    ((0.0, 0.0, -50.0), 100.0, A, (0.0, 0.0, 2.0), True),
+    ((0.5, 0.0, -3.0), 100.0, A, (0.5, 0.0, 2.0), False),  # 2 N, the least, are asked for
+])  # fmt: skip
+def test_force_by_hand(tau, thrust_max, tilt_max, expected, cut):
+    """With a weight of 5 N and 2 N upwards at least."""
+    limited = np.full(3, 77.0)
+    assert limit_force(np.array(tau), 5.0, 2.0, thrust_max, tilt_max, limited) == cut
+    np.testing.assert_allclose(limited, expected, atol=1e-12)
+
+
+@pytest.mark.parametrize(("tau", "expected", "cut"), [
+    ((0.5, -2.0, 3.0), (0.5, -2.0, 3.0), False),
+    ((5.0, 0.5, 0.5), (1.0, 0.5, 0.5), True),
+    ((0.5, -5.0, 0.5), (0.5, -2.0, 0.5), True),
+    ((0.5, 0.5, -3.5), (0.5, 0.5, -3.0), True),
+])  # fmt: skip
+def test_torque_by_hand(tau, expected, cut):
+    limited = np.full(3, 77.0)
+    assert limit_torque(np.array(tau), np.array([1.0, 2.0, 3.0]), limited) == cut
+    np.testing.assert_array_equal(limited, expected)
+
+
+def test_a_least_thrust_above_the_largest_is_refused():
+    same = replace(PositionLimits(), thrust_min=7.0, thrust_max=7.0)
+    assert same.validated() == same
+    with pytest.raises(ParameterError, match="thrust_min: 7.5 N is above thrust_max, 7 N"):
+        replace(same, thrust_min=7.5).validated()
