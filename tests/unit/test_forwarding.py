@@ -14,8 +14,7 @@ from uam_sim_bridge.mavlink.offboard.setpoint import RateThrustParameters
 from uam_sim_bridge.mavlink.protocol.modes import Mode
 from uam_sim_bridge.mavlink.protocol.signing import Signing
 from uam_sim_bridge.mavlink.protocol.wire import Codec, Framer, mavlink2
-from uam_sim_bridge.mavlink.transport.forwarding import BYTES_PER_TICK, LINE_SHARE, GroundStation
-from uam_sim_bridge.mavlink.transport.pacing import BURST
+from uam_sim_bridge.mavlink.transport.forwarding import GroundStation
 from uam_sim_bridge.ports import PortError
 
 PATIENCE = 30.0  # s
@@ -137,7 +136,7 @@ def test_the_bytes_forwarded_per_tick_are_bounded(make):
     while rig.gcs.forwarded < 200:
         assert time.monotonic() < end
         rig.gcs.forward()
-        assert (rig.gcs.forwarded - before) * size <= BYTES_PER_TICK + size
+        assert (rig.gcs.forwarded - before) * size <= 2048 + size
         before = rig.gcs.forwarded
     assert len(rig.line.sent) == 200
 
@@ -163,7 +162,7 @@ def test_on_a_slow_line_the_station_gets_its_share_and_no_more(make):
         rig.gcs.forward()
     rig.forward_all(10 * ticks)
     size = len(rig.line.sent[0])
-    allowed = LINE_SHARE * SPEED * (rig.now + BURST) + size
+    allowed = 0.2 * SPEED * (rig.now + 0.01) + size
     assert 0.9 * allowed < sum(map(len, rig.line.sent)) <= allowed
     assert rig.gcs.held_back > 0
 

@@ -11,6 +11,7 @@ from hypothesis import strategies as st
 from scipy.linalg import solve_continuous_lyapunov
 
 from uam_control.laws import lyapunov
+from uam_control.laws.law_parameters import structured
 from uam_control.laws.modular import ModularLaw, ModularParameters
 from uam_control.settings.parameter_set import ParameterError
 
@@ -259,6 +260,12 @@ def test_a_matrix_p_that_is_singular_in_double_precision_is_refused():
         law(**SINGULAR, q_velocity=[1e-9])
     p11, p12, p22 = law(**SINGULAR, q_velocity=[1e-5]).parameters.lyapunov_matrix()  # 2.5e-12
     np.testing.assert_allclose([p11[0], p12[0], p22[0]], [2e12, 2e6, 2.0])
+
+
+def test_a_law_reads_one_record():
+    record = structured({"vector": (1.0, 2.0), "number": 3.0})
+    assert record.shape == (1,) and record[0].number == 3.0
+    np.testing.assert_array_equal(record[0].vector, [1.0, 2.0])
 
 
 def test_safeguards_that_are_on_are_named():

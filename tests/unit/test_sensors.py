@@ -51,6 +51,10 @@ def test_imu_adds_bias_and_noise_of_each_axis():
     # the noise 7..12: gyro 14, 16, 18; accelerometer 40, 44, 48
     np.testing.assert_array_equal(gyro, [24.5, 37.0, 49.5])
     np.testing.assert_array_equal(force, [45.0, 51.0, 57.0])
+    # the next row of noise, 13..18: 26, 28, 30 and 64, 68, 72
+    gyro, force = imu.sample(np.zeros(3), np.zeros(3))
+    np.testing.assert_array_equal(gyro, [26.5, 29.0, 31.5])
+    np.testing.assert_array_equal(force, [68.0, 73.0, 78.0])
 
 
 MOCAP = {"rate": 4.0, "position_noise": 0.5, "attitude_noise": 1e-3}
@@ -67,11 +71,13 @@ def test_mocap_adds_noise_to_position_and_a_turn_in_the_body_to_attitude():
     s = math.sin(angle / 2.0) / angle * 1e-3
     expected = [-12.0 * s, -10.0 * s, 8.0 * s, math.cos(angle / 2.0)]
     np.testing.assert_allclose(quaternion, expected, rtol=1e-12)
+    position, _ = mocap.sample(np.zeros(3), np.array([1.0, 0.0, 0.0, 0.0]))
+    np.testing.assert_array_equal(position, [7.0, 8.0, 9.0])  # of the next row
 
 
 def test_mocap_exposes_at_its_rate_and_not_late_by_rounding():
     mocap = Mocap(MOCAP, 1.0, Counting())
-    times = [0.0, 0.0, 0.2, 0.25, 0.3, 0.5 - 1e-8, 0.5 - 5e-10, 0.6, 0.75, 1.0]
+    times = [0.0, 0.0, 0.2, 0.25 - 1e-9, 0.3, 0.5 - 1e-8, 0.5 - 5e-10, 0.6, 0.75, 1.0]
     due = [True, False, False, True, False, False, True, False, True, True]
     assert [mocap.due(time) for time in times] == due
 
@@ -81,7 +87,8 @@ def test_a_delay_hands_out_one_sample_when_it_is_due():
     assert line.take(0) is None
     line.put(0, ("a",))
     line.put(1, ("b",))
-    assert [line.take(tick) for tick in (1, 5, 5, 5)] == [None, ("a",), ("b",), None]
+    got = [line.take(tick) for tick in (1, 2, 2, 5, 5)]  # due at 2 and 3
+    assert got == [None, ("a",), None, ("b",), None]
     line = Delay(0)
     line.put(3, ("c",))
     assert line.take(2) is None and line.take(3) == ("c",)

@@ -8,7 +8,6 @@ import tty
 import pytest
 
 from uam_sim_bridge.mavlink.protocol.wire import Codec, Framer, mavlink2
-from uam_sim_bridge.mavlink.transport.stream_transport import LAST_RETRY
 from uam_sim_bridge.mavlink.transport.tcp_transport import TcpTransport
 from uam_sim_bridge.mavlink.transport.transport import UdpTransport, open_transport
 from uam_sim_bridge.ports import PortError
@@ -166,12 +165,12 @@ def test_tcp_connects_again_after_a_loss_with_growing_intervals(opened):
     gaps = [b - a for a, b in zip(starts, starts[1:], strict=False)]
     assert all(a <= b + 1 / 32 for a, b in zip(gaps, gaps[1:], strict=False))
     assert 8 <= len(starts) <= 14
-    assert max(gaps) == pytest.approx(LAST_RETRY, abs=0.05)
+    assert max(gaps) == pytest.approx(5.0, abs=0.05)
     opened.append(server := listener(port))
-    clock.now += LAST_RETRY
+    clock.now += 5.0
 
     def again():
-        clock.now += LAST_RETRY
+        clock.now += 5.0
         return link.send(b"two")
 
     until(again, "the connection again")
@@ -275,7 +274,7 @@ def test_serial_is_opened_again_after_unplugging(line):
     far, near = os.openpty()
     tty.setraw(near)
     device.symlink_to(os.ttyname(near))
-    clock.now += LAST_RETRY
+    clock.now += 5.0
     assert link.send(b"again") and os.read(far, 10) == b"again"
     os.close(far)
     os.close(near)
