@@ -35,6 +35,23 @@ def test_mixer_of_the_square_quad():
     assert pytest.approx(np.array(expected)) == MIXER
 
 
+def test_mixer_of_a_plus_whose_rotors_are_a_little_off_the_axes():
+    """Two rotors of four make a torque each: sqrt(1/2). Entries below 0.001 are zero."""
+    off = 1e-4
+    px, py = np.array([1.0, -1.0, off, -off]), np.array([off, -off, 1.0, -1.0])
+    found = normalised_mixer(px, py, np.array([0.1, 0.1, -0.1, -0.1]))
+    expected = np.array(
+        [
+            [0.0, HALF, 1.0, 1.0],
+            [0.0, -HALF, 1.0, 1.0],
+            [-HALF, 0.0, -1.0, 1.0],
+            [HALF, 0.0, -1.0, 1.0],
+        ]
+    )
+    assert found == pytest.approx(expected, abs=1e-6)
+    np.testing.assert_array_equal(found == 0.0, expected == 0.0)
+
+
 def test_mixer_does_not_depend_on_the_size():
     assert normalised_mixer(3 * PX, 3 * PY, 0.5 * KM) == pytest.approx(MIXER)
 

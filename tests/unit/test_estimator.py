@@ -62,6 +62,7 @@ def started(**parameters) -> StateEstimator:
 
 def test_it_starts_at_the_first_samples():
     state = started().update()
+    assert state.shape == (3, 8)
     np.testing.assert_array_equal(state[0], [1.0, 2.0, 3.0, 0.0, 0.0, 0.0, 0.3, -0.2])
     np.testing.assert_array_equal(state[1], [0.0] * 6 + [1.0, -2.0])
     np.testing.assert_array_equal(state[2], 0.0)
@@ -73,6 +74,7 @@ def test_imu_samples_count_for_the_time_since_the_last_but_50_ms_at_most(stamp, 
     estimator.imu(stamp, np.array([0.0, 0.0, 2.0]), WEIGHT + [0.0, 0.0, 4.0])
     state = estimator.update()
     np.testing.assert_allclose(state[1, 2], 4.0 * counted)
+    assert state[1, 5] == (2.0 if counted else 0.0)
     np.testing.assert_allclose(state[0, 2], 3.0 + 2.0 * counted**2)
     np.testing.assert_allclose(state[0, 5], 2.0 * counted, atol=1e-15)
     # low-pass of 5 Hz on the acceleration
@@ -92,6 +94,22 @@ def test_joint_readings_count_for_the_time_since_the_last_but_50_ms_at_most(stam
     # omega = 1 on rates that the filter has at 0: dt e^-dt of them
     expected = counted * math.exp(-counted) * np.array([1.0, -2.0])
     np.testing.assert_allclose(state[2, 6:], expected, atol=1e-15)
+
+
+def test_the_first_imu_sample_counts_for_no_time():
+    estimator = StateEstimator(EstimatorParameters())
+    estimator.mocap(0.0, NOTHING, LEVEL)
+    estimator.imu(0.0, np.ones(3), 2.0 * WEIGHT)
+    state = estimator.update()
+    np.testing.assert_array_equal(state, np.zeros((3, 8)))
+
+
+def test_a_jump_is_refused_while_the_estimate_is_trusted():
+    estimator = StateEstimator(EstimatorParameters())
+    for k in range(40):
+        estimator.imu(0.04 * k, NOTHING, WEIGHT)
+        estimator.mocap(0.04 * k, np.array([1e-6 * k + (k > 30), 0.0, 0.0]), LEVEL)
+    assert estimator.refused_poses == 9
 
 
 def test_it_predicts_only_from_a_pose_on():

@@ -75,7 +75,9 @@ def test_correction_gains():
 
 def test_the_nearest_stamp_and_of_two_the_first():
     stamps = np.array([1.0, 2.0, -1.0, 4.0])
-    assert [nearest(stamps, stamp) for stamp in (0.75, 1.75, 9.0, -5.0, 3.0)] == [0, 1, 3, 2, 1]
+    assert [nearest(stamps, stamp) for stamp in (0.75, 1.75, 9.0, -5.0, 3.0, 1.5)] == [
+        0, 1, 3, 2, 1, 0,
+    ]  # fmt: skip
 
 
 def test_what_was_predicted_since_a_stamp_is_shifted():
@@ -96,6 +98,13 @@ def at_rest(stamps, position=NOTHING) -> PoseFilter:
     for stamp in stamps:
         found.predict(stamp, 0.01, NOTHING, WEIGHT)
     return found
+
+
+def test_it_begins_level_and_at_rest():
+    found = PoseFilter(2.0, 3.0, 10.0)
+    np.testing.assert_array_equal(found.quaternion, LEVEL)
+    vectors = found.position, found.velocity, found.rates, found.acceleration, found.gyro_bias
+    np.testing.assert_array_equal([*vectors, found.accelerometer_bias], np.zeros((6, 3)))
 
 
 def test_corrections_count_for_the_time_since_the_last_but_no_less_than_1_and_no_more_than_50_ms():

@@ -78,6 +78,33 @@ def test_slope_of_an_unmatched_thrust_model_scales_the_rates():
     assert at_slope_half[0] == pytest.approx(2.0 * at_slope_1[0])
 
 
+def test_battery_and_thrust_factor_scale_what_full_thrust_is():
+    m = RateThrustMap(RateThrustParameters.of(VEHICLE, {"battery_factor": 0.8}))
+    plain = m.map(HOVER, np.array([0.3, 0.0, 0.0]), ZERO, ZERO)[0].copy()
+    m.thrust_factor = 0.75
+    rates, thrust = m.map(HOVER, np.array([0.3, 0.0, 0.0]), ZERO, ZERO)
+    assert m.thrust_factor == 0.75
+    assert thrust == pytest.approx(2.2 * 9.81 / (4 * 10.34 * 0.6))
+    assert rates == pytest.approx(plain / 0.75)
+    assert m.assumed_thrust(0.5) == pytest.approx(0.5 * 4 * 10.34 * 0.8)  # without the factor
+
+
+@pytest.mark.parametrize("factor", [0.0, -0.5, math.nan, math.inf, -math.inf])
+def test_a_thrust_factor_that_is_not_a_positive_number_is_refused(factor):
+    m = RateThrustMap()
+    m.thrust_factor = 0.75
+    with pytest.raises(ValueError, match="is not a positive number"):
+        m.thrust_factor = factor
+    assert m.thrust_factor == 0.75
+    assert m.map(HOVER, ZERO, ZERO, ZERO)[1] == pytest.approx(2.2 * 9.81 / (4 * 10.34 * 0.75))
+
+
+def test_no_thrust_is_a_setpoint_too():
+    m = RateThrustMap(RateThrustParameters.of(VEHICLE, {"thrust_min": 0.0}))
+    _, thrust = m.map(np.array([0.0, 0.0, -1.0]), ZERO, ZERO, ZERO)
+    assert thrust == 0.0
+
+
 @pytest.mark.parametrize("bad", [math.nan, math.inf, -math.inf])
 @pytest.mark.parametrize("which", range(12))
 def test_what_is_not_finite_is_refused_by_name(which, bad):

@@ -244,7 +244,7 @@ def test_the_map_makes_newtons_newtons(factor, newtons):
     rates, thrust = truth.map(np.array([0.0, 0.0, newtons]), torque, zero, zero)
     assert factor * truth.assumed_thrust(thrust) == pytest.approx(newtons)
     p = truth.parameters
-    gain = np.array(p.rate_p) * np.array(p.rate_k) * p.torque_scale * factor
+    gain = np.array(p.rate_p) * np.array(p.rate_k) * p.torque_scale(load_description()) * factor
     assert gain * rates == pytest.approx(torque)
 
 

@@ -1,0 +1,177 @@
+"""What surrounds the law in a controller, against hand-worked numbers.
+
+The law is ASMC-1 with next to no feedback: tau = Mhat (chi_d_ddot - Lambda e_dot) + Dhat, and
+Dhat' = -Gamma s with s = e_dot + Lambda e. Damping and switching are off.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from uam_control.control.controller_parameters import controller_parameters
+from uam_control.control.controllers import ArmController, AttitudeController, PositionController
+from uam_control.control.limits import PositionLimits, TorqueLimits
+from uam_control.laws.asmc1 import Asmc1Parameters
+from uam_control.laws.modular import ModularParameters
+
+A = math.atan2(0.6, 0.8)  # sine .6, cosine .8
+LAW = {
+    "inertia": 2.0, "slope": 3.0, "damping": 0.0, "switching": 0.0, "boundary": 1.0,
+}  # fmt: skip
+
+
+def parameters(limits, axes, law=Asmc1Parameters, **values):
+    vectors = {name: [value] * axes for name, value in LAW.items()}
+    return controller_parameters(law, limits).from_mapping(vectors | {"gamma": 0.0} | values, axes)
+
+
+def position(**changes):
+    values = {
+        "gravity_feedforward_mass": 2.0, "gravity": 5.0, "thrust_min": 1.0, "thrust_max": 100.0,
+        "tilt_max": 1.4, "attitude_cutoff": 0.5 / math.pi,
+    }  # fmt: skip
+    return PositionController(parameters(PositionLimits, 3, **values | changes))
+
+
+def torque(kind, axes, **changes):
+    return kind(parameters(TorqueLimits, axes, **{"torque_max": [100.0] * axes} | changes))
+
+
+def vehicle():
+    """State, reference and attitude reference, all zero."""
+    return np.zeros((3, 8)), np.zeros((3, 8)), np.zeros((3, 3))
+
+
+def test_force_is_the_law_and_the_weight():
+    controller, (state, reference, _) = position(), vehicle()
+    state[1, :3], reference[2, :3] = (0.5, -0.5, 1.0), (1.0, 2.0, -1.0)
+    tau = controller.update(state, reference, True, 0.004)
+    # 2 (1 - 1.5, 2 + 1.5, -1 - 3), and 2*5 N of weight
+    np.testing.assert_allclose(tau, [-1.0, 7.0, 2.0])
+    assert not controller.saturated
+    np.testing.assert_allclose(controller.errors[:, 0], [0.0, 0.5, 1.0])
+
+
+def test_the_attitude_reference_points_along_the_limited_force_with_the_yaw_of_the_mission():
+    controller, (state, reference, _) = position(thrust_max=10.0), vehicle()
+    reference[:, 5], reference[2, 0] = (0.0, 0.5, 0.25), 4.0
+    state[1, 2] = 10.0 / 15.0  # tau_z is 10 - 2*3*2/3 = 6 N, tau_x 8 N: 10 N in all
+    controller.update(state, reference, True, math.log(2.0))
+    # omega = 1: the pitch goes from 0 to (1 - (1 + ln 2)/2) of atan(8/6), its rate is ln 2/2 of it
+    target, dt = math.atan2(8.0, 6.0), math.log(2.0)
+    pitch, rate = target * (1.0 - 0.5 * (1.0 + dt)), target * 0.5 * dt
+    np.testing.assert_allclose(controller.attitude_reference[0], [0.0, pitch, 0.0], atol=1e-12)
+    expected = [-math.sin(pitch) * 0.5, rate, math.cos(pitch) * 0.5]
+    np.testing.assert_allclose(controller.attitude_reference[1], expected)
+
+
+def test_the_attitude_error_of_xi_is_against_the_reference_of_the_last_tick():
+    law = {"lambda_1": 1.0, "lambda_2": 1.0, "lambda_table": 1.0, "q_position": 1.0}
+    law |= {"q_velocity": 1.0, "inertia": 1.0}
+    values = {name: [value] * 3 for name, value in law.items()}
+    values |= {"k_initial": [1e-9, 1.0, 1e-9, 1e-9], "nu": [1.0] * 4, "attitude_cutoff": 100.0}
+    values |= {"zeta_initial": 1e-9, "adapt": False, "gravity_feedforward_mass": 1.0}
+    kind = controller_parameters(ModularParameters, PositionLimits)
+    controller, (state, reference, _) = PositionController(kind.from_mapping(values, 3)), vehicle()
+    reference[0, 5] = A
+    for expected in (0.0, 0.6):  # e_q is of the level attitude at yaw 0 first, then at yaw A
+        controller.update(state, reference, True, 10.0)
+        rho = controller.adaptation[controller.names.index("rho")]
+        assert rho == pytest.approx(expected, abs=1e-8)  # rho = K1 ||xi||
+
+
+def test_on_the_ground_there_is_no_force_and_the_law_starts_afresh():
+    controller, (state, reference, _) = position(thrust_max=5.0, gamma=1.0), vehicle()
+    state[1, :3], state[0, 5] = 1.0, 0.7
+    controller.update(state, reference, True, 0.1)
+    assert controller.saturated and controller.adaptation[0] == pytest.approx(-0.2)
+    np.testing.assert_array_equal(controller.update(state, reference, False, 0.1), [0.0] * 3)
+    np.testing.assert_array_equal(controller.adaptation, 0.0)
+    assert not controller.saturated
+    np.testing.assert_array_equal(
+        controller.attitude_reference, [[0.0, 0.0, 0.7], [0.0] * 3, [0.0] * 3]
+    )
+
+
+@pytest.mark.parametrize("kind", [AttitudeController, ArmController])
+def test_torque_is_the_law_within_its_limits(kind):
+    axes = 3 if kind is AttitudeController else 2
+    controller, (state, reference, desired) = torque(kind, axes), vehicle()
+    own = slice(3, 6) if kind is AttitudeController else slice(6, 8)
+    state[1, own] = [0.5, -1.0, 0.25][:axes]
+    tau = controller.update(state, reference, desired, True, 0.004)
+    np.testing.assert_allclose(tau, [-3.0, 6.0, -1.5][:axes])
+    assert not controller.saturated
+    controller.set_parameters(replace(controller.parameters, torque_max=(2.0,) * axes))
+    tau = controller.update(state, reference, desired, True, 0.004)
+    np.testing.assert_allclose(tau, [-2.0, 2.0, -1.5][:axes])
+    assert controller.saturated
+
+
+def test_on_the_ground_the_arm_works_and_the_attitude_does_not():
+    state, reference, desired = vehicle()
+    state[1, 3:] = 1.0
+    attitude, arm = torque(AttitudeController, 3, gamma=1.0), torque(ArmController, 2, gamma=1.0)
+    for controller in (attitude, arm):
+        controller.update(state, reference, desired, True, 0.1)
+        assert controller.adaptation[0] == pytest.approx(-0.2)  # -2*1*.1
+    np.testing.assert_array_equal(attitude.update(state, reference, desired, False, 0.1), [0.0] * 3)
+    np.testing.assert_array_equal(attitude.adaptation, 0.0)
+    # -6 of the rate and -.2 of Dhat
+    np.testing.assert_allclose(arm.update(state, reference, desired, False, 0.1), [-6.2, -6.2])
+    np.testing.assert_array_equal(arm.errors[:, :6], 0.0)
+
+
+def test_the_law_is_told_that_the_last_tick_saturated():
+    controller, (state, reference, desired) = (
+        torque(ArmController, 2, gamma=1.0, torque_max=[1.0, 1.0], freeze_when_saturated=True),
+        vehicle(),
+    )
+    assert not controller.saturated
+    state[1, 6:] = 1.0
+    controller.update(state, reference, desired, True, 0.1)  # learns, and saturates
+    assert controller.saturated
+    controller.update(state, reference, desired, True, 0.1)  # keeps what it has
+    np.testing.assert_allclose(controller.adaptation[:2], [-0.2, -0.2])
+    controller.reset_adaptation()
+    np.testing.assert_array_equal(controller.adaptation[:2], 0.0)
+    assert controller.saturated  # nothing else changes
+
+
+def test_the_form_of_the_rate_error_follows_the_parameters():
+    state, reference, desired = vehicle()
+    state[0, 5], desired[1] = A, (1.0, 0.0, 0.0)
+    lee, printed = (
+        torque(AttitudeController, 3),
+        torque(AttitudeController, 3, error_rate_form="printed"),
+    )
+    # R^T R_d Omega_d = (.8, -.6, 0); printed R_d^T R Omega_d = (.8, .6, 0); tau = -6 e_dot, and of
+    # Lee's form no feedforward, as Omega is 0
+    np.testing.assert_allclose(
+        lee.update(state, reference, desired, True, 0.1), [4.8, -3.6, 0.0], atol=1e-12
+    )
+    for _ in range(2):
+        np.testing.assert_allclose(
+            printed.update(state, reference, desired, True, 0.1), [4.8, 3.6, 0.0], atol=1e-12
+        )
+        printed.set_parameters(printed.parameters)
+    printed.set_parameters(lee.parameters)
+    np.testing.assert_allclose(
+        printed.update(state, reference, desired, True, 0.1), [4.8, -3.6, 0.0], atol=1e-12
+    )
+
+
+def test_another_corner_of_the_attitude_filter_from_the_next_tick_on():
+    slow, fast = position(), position()
+    fast.set_parameters(replace(fast.parameters, attitude_cutoff=50.0))
+    state, reference, _ = vehicle()
+    reference[2, 0] = 4.0
+    for controller in (slow, fast):
+        controller.update(state, reference, True, 0.1)
+    # 8 N forward, 10 N up; the fast filter is there after 31 time constants
+    assert fast.attitude_reference[0, 1] == pytest.approx(math.atan2(8.0, 10.0))
+    assert slow.attitude_reference[0, 1] < 0.01
