@@ -29,7 +29,7 @@ from uam_sim_bridge.ports import Ports
 HOST = "127.0.0.1"
 SEED = 1
 VISION_TICKS = 5  # a pose every 20 ms
-POSITION_DEVIATION, ATTITUDE_DEVIATION = 0.005, 0.02  # [m], [rad], as the bridge tells
+POSITION_DEVIATION, ATTITUDE_DEVIATION = 0.005, 0.02  # [m], [rad], as the bridge sends
 LONGEST_WAIT = 90.0  # [s] simulated, for an autopilot that boots
 NEAR_GROUND = 0.05  # [m] above where it stood
 
@@ -75,7 +75,7 @@ class HoverFlight:
 
     @property
     def mode(self) -> Mode:
-        """The autopilot's, as last told."""
+        """Last received state of the autopilot."""
         return self._link.mode
 
     @property
@@ -162,8 +162,8 @@ class HoverFlight:
         setpoint = self._setpoint
         setpoint[:] = 0.0
         if self._flying:
-            wanted, setpoint[3] = self._map.map(tau_p, tau_q, state[0, ATTITUDE], rates)
-            setpoint[:3] = wanted
+            desired, setpoint[3] = self._map.map(tau_p, tau_q, state[0, ATTITUDE], rates)
+            setpoint[:3] = desired
         if replaced is not None:
             setpoint[replaced[0]] = replaced[1]
         if link:

@@ -1,4 +1,4 @@
-"""Random flights around the nominal one, and the short way through `uam compare`."""
+"""`uam campaign` with a few random flights, and a short `uam compare`."""
 
 import csv
 import json

@@ -1,4 +1,4 @@
-"""`uam compare` from the command line, as short as it can be."""
+"""The shortest `uam compare` from the command line."""
 
 import json
 

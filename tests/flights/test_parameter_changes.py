@@ -1,4 +1,4 @@
-"""Five hundred random changes of parameters in one flight: it goes on, and the log has them all."""
+"""500 random parameter changes in one flight: the flight continues, the log has all of them."""
 
 import json
 import math

@@ -1,4 +1,4 @@
-"""Flights that are cut short: the reason is named, what was flown is kept, nothing is left."""
+"""Interrupted flights: the reason is reported, the recording is kept, no process stays."""
 
 import json
 import os

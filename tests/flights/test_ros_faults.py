@@ -1,4 +1,4 @@
-"""Faults in flights of the ROS engine: where the direct engine has them, and told by the log."""
+"""Faults in flights of the ROS engine: as in the direct engine, and recorded in the log."""
 
 import json
 import shutil

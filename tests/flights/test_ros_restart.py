@@ -1,4 +1,4 @@
-"""A controller is killed in flight: it is started again, and the flight goes on or lands.
+"""A controller is killed in flight: it is restarted, and the flight continues or lands.
 
 Slow, and on an idle machine: how long the restart takes is wall time, in lockstep too.
 """

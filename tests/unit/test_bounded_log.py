@@ -1,4 +1,4 @@
-"""A log that ends at a size, or with the disk, and says so."""
+"""A log that ends at its size limit or after a write error, and reports the reason."""
 
 from pathlib import Path
 

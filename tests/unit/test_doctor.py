@@ -1,4 +1,4 @@
-"""uam doctor: verdicts, the whole, and its command line."""
+"""uam doctor: verdicts, all groups of checks, and the command line."""
 
 import json
 import os

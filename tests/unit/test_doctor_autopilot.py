@@ -1,4 +1,4 @@
-"""uam doctor: who answers at a MAVLink link, with stand-ins on real sockets."""
+"""uam doctor: the autopilot at a MAVLink link, simulated with real sockets."""
 
 import socket
 import threading

@@ -1,4 +1,4 @@
-"""uam doctor: instances, who holds them, and what crashed flights left; with ports held here."""
+"""uam doctor: instances, their users, and leftovers of crashed flights; with real ports."""
 
 import os
 import socket

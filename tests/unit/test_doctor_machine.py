@@ -1,4 +1,4 @@
-"""uam doctor: cores, memory, timer, pictures."""
+"""uam doctor: cores, memory, timer, rendering."""
 
 import numpy as np
 import pytest

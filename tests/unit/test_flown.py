@@ -1,4 +1,4 @@
-"""What an interrupted campaign keeps."""
+"""Stored results of an interrupted campaign."""
 
 import numpy as np
 import pytest

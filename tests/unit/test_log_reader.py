@@ -1,4 +1,4 @@
-"""The gains in a log go to the columns that bear their names."""
+"""The gains of a log are stored in the columns of the same names."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""Processes of a flight are killed, stopped and slowed down; none remains stopped."""
+"""Process faults: kill, stop and slow down processes; none stays stopped afterwards."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The law of a flight: from --controller, and the profile must have it."""
+"""The law of a flight: --controller selects it, and the profile must have the same law."""
 
 import pytest
 

@@ -1,4 +1,4 @@
-"""benchmarks/soak.py: what has grown is told from what comes and goes."""
+"""benchmarks/soak.py: growth is distinguished from fluctuation."""
 
 import os
 

@@ -1,4 +1,4 @@
-"""The table of a flight: columns, error, spans, and that a file gives back what was written."""
+"""The table of a flight: columns, errors, spans, writing and reading a file."""
 
 import numpy as np
 import pyarrow.parquet as pq
