@@ -15,7 +15,7 @@ from std_srvs.srv import SetBool, Trigger
 
 from uam_control.coordinates import COORDINATES
 from uam_control.nodes.controller_node import ADAPTATION_PERIOD
-from uam_control.profiles.profile import CONTROLLERS, NODES, load_profile
+from uam_control.profiles.profile import NODES, load_profile, parameter_set
 from uam_control.settings import configuration
 from uam_lab.flight.ros.profile_switch import ProfileSwitch, SwitchRefused
 from uam_lab.processes.guest import Guest
@@ -174,7 +174,7 @@ def test_every_parameter_of_every_node_has_a_description(start, probe, node):
         if isinstance(value, bool | str):
             continue
         assert text.description.endswith("]") and " to " in text.additional_constraints, name
-        axes = CONTROLLERS.get(node, (None, ()))[1]
+        axes = parameter_set(node, {})[1]
         if name in ("inertia", "lambda_1", "torque_max"):
             assert text.additional_constraints.endswith("; " + ", ".join(axes)), name
 
