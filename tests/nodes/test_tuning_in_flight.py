@@ -14,7 +14,6 @@ from rclpy.parameter import Parameter, parameter_value_to_python
 from std_srvs.srv import SetBool, Trigger
 
 from uam_control.coordinates import COORDINATES
-from uam_control.nodes.controller_node import ADAPTATION_PERIOD
 from uam_control.profiles.profile import NODES, load_profile, parameter_set
 from uam_control.settings import configuration
 from uam_lab.flight.ros.profile_switch import ProfileSwitch, SwitchRefused
@@ -26,7 +25,7 @@ from uam_msgs_py.messages.layouts import stamp_of
 from uam_msgs_py.messages.parameter_changes import ParameterChange
 from uam_msgs_py.messages.trajectories import TrajectoryWriter
 
-PERIOD = 4_000_000  # [ns]
+PERIOD, ADAPTATION_PERIOD = 4_000_000, 20_000_000  # [ns]
 POSITION = "position_controller"
 GAINS = ["K0", "K1", "K2", "K3", "zeta"]
 
