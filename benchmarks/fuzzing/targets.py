@@ -16,6 +16,8 @@ from uam_sim_bridge.mavlink.link.link import OffboardLink
 from uam_sim_bridge.mavlink.offboard.sequence import OffboardSequence
 from uam_sim_bridge.mavlink.offboard.setpoint import RateThrustMap, SetpointRefused
 from uam_sim_bridge.mavlink.offboard.thrust_identification import ThrustIdentification
+from uam_sim_bridge.mavlink.protocol.attitude_target import AttitudeTarget
+from uam_sim_bridge.mavlink.protocol.frames import swap_body
 from uam_sim_bridge.mavlink.protocol.wire import Codec, Framer, mavlink2
 
 PERIOD = 0.004  # s
@@ -118,7 +120,7 @@ class Bridge:
         )
         p = self._identification.parameters
         require(p.factor_min <= factor <= p.factor_max, f"thrust factor {factor}")
-        self._link.send_setpoint(rates, thrust, now)
+        self._link.send_setpoint(AttitudeTarget.of_rates(swap_body(rates), thrust), now)
 
     def _check(self) -> None:
         limit = self._map.parameters.rate_limit

@@ -20,6 +20,8 @@ from uam_sim_bridge.mavlink.hil.hil_server import HilParameters, HilServer
 from uam_sim_bridge.mavlink.link.link import OffboardLink
 from uam_sim_bridge.mavlink.offboard.sequence import OffboardSequence, Phase
 from uam_sim_bridge.mavlink.offboard.setpoint import RateThrustMap
+from uam_sim_bridge.mavlink.protocol.attitude_target import AttitudeTarget
+from uam_sim_bridge.mavlink.protocol.frames import swap_body
 from uam_sim_bridge.mavlink.protocol.modes import Mode
 from uam_sim_bridge.mavlink.transport.udp_transport import UdpTransport
 from uam_sim_bridge.plant import Vehicle
@@ -190,7 +192,8 @@ class HoverFlight:
                 now, self._state[0, POSITION], quaternion, POSITION_DEVIATION, ATTITUDE_DEVIATION
             )
         if self._sequence.streaming:
-            link.send_setpoint(self._setpoint[:3], self._setpoint[3], now)
+            rates, thrust = swap_body(self._setpoint[:3]), float(self._setpoint[3])
+            link.send_setpoint(AttitudeTarget.of_rates(rates, thrust), now)
 
     def _note(self) -> None:
         roll, pitch = self._state[0, 3:5]

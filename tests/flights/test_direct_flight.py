@@ -19,7 +19,7 @@ DROP_POINT = [0.789, 0.0]
 def flight(scenario="pick_and_place", profile="s500", payload=0.2, seed=1, **changes):
     return DirectFlight(
         load_scenario(scenario),
-        load_profile(profile),
+        load_profile(*([profile] if isinstance(profile, str) else profile)),
         Vehicle.load().changed(changes),
         payload,
         seed,
@@ -116,3 +116,16 @@ def test_the_bridge_flies_what_the_profile_says_of_it():
     flight = DirectFlight(load_scenario("hover"), profile, Vehicle.load(), 0.0, seed=1)
     assert flight.control.bridge.map.parameters.thrust_max == 30.0
     assert flight.sequence.parameters.stream_time == 2.0
+
+
+def test_attitude_setpoints_complete_the_mission():
+    """The autopilot's attitude loop flies in place of tau_q; the controllers are the same."""
+    a_flight = flight(profile=("s500", "attitude_setpoints"))
+    a_flight.run()
+    result = metrics(a_flight)
+    assert result["mission_completed"], result["shortfalls"]
+    assert result["payload_place_error_m"] < 0.15
+    assert max(result["rms"]["position_m"]) < 0.02 and max(result["rms"]["attitude_deg"]) < 2.0
+    series = a_flight.recording.series()
+    assert np.isnan(series.block("setpoint.rate_")[series.flown]).all()
+    assert series["setpoint.thrust"][series.flown].min() > 0.3

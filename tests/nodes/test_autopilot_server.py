@@ -16,6 +16,8 @@ from uam_sim_bridge.mavlink.hil.hil_server import HilError, HilParameters, HilSe
 from uam_sim_bridge.mavlink.link.link import OffboardLink
 from uam_sim_bridge.mavlink.offboard.sequence import OffboardSequence, Phase
 from uam_sim_bridge.mavlink.offboard.setpoint import RateThrustMap, RateThrustParameters
+from uam_sim_bridge.mavlink.protocol.attitude_target import AttitudeTarget
+from uam_sim_bridge.mavlink.protocol.frames import swap_body
 from uam_sim_bridge.mavlink.protocol.modes import Mode
 from uam_sim_bridge.mavlink.protocol.signing import Signing
 from uam_sim_bridge.mavlink.protocol.wire import Codec, Framer, mavlink2
@@ -73,7 +75,9 @@ class Flight:
         if self.vision and self.ticks % 5 == 0:
             link.send_vision(body.time, body.position, body.quaternion, 0.005, 0.02)
         if self.streaming and self.sequence.streaming:
-            link.send_setpoint(np.array(rates, float), thrust, body.time)
+            link.send_setpoint(
+                AttitudeTarget.of_rates(swap_body(np.array(rates, float)), thrust), body.time
+            )
         motors = self.hil.exchange(body.time, body.gyro, body.accel, body.position, body.quaternion)
         assert self.hil.answered
         body.step(motors)

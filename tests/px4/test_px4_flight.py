@@ -49,6 +49,15 @@ def test_px4_flies_the_mission_about_as_well_as_the_stand_in(fly):
         assert np.all(np.array(found["rms"][group]) <= limit), (group, found["rms"][group], rms)
 
 
+def test_px4_flies_the_mission_with_attitude_setpoints(fly):
+    profiles = ("--profile", "s500", "--profile", "attitude_setpoints")
+    found = metrics(fly("attitude", "--autopilot", "px4", *profiles))
+    assert found["mission_completed"] and found["payload_place_error_m"] < PLACED
+    ours = metrics(fly("stand-in", *profiles))
+    for group, rms in ours["rms"].items():
+        assert np.all(np.array(found["rms"][group]) <= TIMES_THE_STAND_INS * np.array(rms)), group
+
+
 def test_two_flights_with_px4_at_once(fly):
     both = [fly(name, "--autopilot", "px4", "--scenario", "hover") for name in ("one", "other")]
     for flight in both:

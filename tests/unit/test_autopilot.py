@@ -12,6 +12,7 @@ from uam_control.vehicle import load_description
 from uam_sim_bridge.autopilot.core import Autopilot
 from uam_sim_bridge.autopilot.params import Parameters
 from uam_sim_bridge.mavlink.offboard.setpoint import RateThrustMap
+from uam_sim_bridge.mavlink.protocol.attitude_target import AttitudeTarget
 from uam_sim_bridge.mavlink.protocol.frames import swap_body, swap_quaternion, swap_world
 from uam_sim_bridge.mavlink.protocol.modes import FORCE, MavCmd, MavResult, Mode
 
@@ -41,7 +42,8 @@ class Bench:
             attitude = quaternion_multiply(body.quaternion, self.vision_tilt)
             autopilot.vision(body.time, swap_world(body.position), swap_quaternion(attitude))
         if setpoint is not None:
-            autopilot.setpoint(body.time, swap_body(np.array(setpoint[0], float)), setpoint[1])
+            rates = swap_body(np.array(setpoint[0], float))
+            assert not autopilot.target(body.time, AttitudeTarget.of_rates(rates, setpoint[1]))
         motors = autopilot.update(body.time, swap_body(body.gyro), swap_body(body.accel))
         body.step(motors)
         return motors
@@ -197,10 +199,14 @@ def test_setpoints_that_are_not_finite_are_refused():
     bench = airborne()
     before = bench.autopilot._setpoint.copy()
     for bad in (math.nan, math.inf):
-        assert not bench.autopilot.setpoint(bench.time, np.array([bad, 0.0, 0.0]), 0.5)
-        assert not bench.autopilot.setpoint(bench.time, np.zeros(3), bad)
+        for target in (
+            AttitudeTarget.of_rates(np.array([bad, 0.0, 0.0]), 0.5),
+            AttitudeTarget.of_rates(np.zeros(3), bad),
+            AttitudeTarget.of_attitude(np.array([1.0, 0.0, bad, 0.0]), 0.5),
+        ):
+            assert bench.autopilot.target(bench.time, target) == "not finite"
     assert np.all(bench.autopilot._setpoint == before)
-    bench.autopilot.setpoint(bench.time, np.zeros(3), 7.0)
+    bench.autopilot.target(bench.time, AttitudeTarget.of_rates(np.zeros(3), 7.0))
     assert bench.autopilot._setpoint[3] == 1.0
 
 

@@ -10,6 +10,7 @@ from uam_sim_bridge.autopilot.params import Parameters
 from uam_sim_bridge.mavlink.offboard.hold import HoldParameters
 from uam_sim_bridge.mavlink.offboard.sequence import OffboardParameters
 from uam_sim_bridge.mavlink.offboard.setpoint import RateThrustParameters
+from uam_sim_bridge.mavlink.offboard.setpoints.catalogue import SetpointParameters
 from uam_sim_bridge.mavlink.offboard.thrust_identification import ThrustIdentificationParameters
 from uam_sim_bridge.mavlink.telemetry.parameter_check import WATCHED, differences, expected
 
@@ -20,7 +21,13 @@ DERIVED = VEHICLE.node_parameters()["mavlink_bridge"]
 
 @pytest.mark.parametrize(
     "kind",
-    [RateThrustParameters, OffboardParameters, HoldParameters, ThrustIdentificationParameters],
+    [
+        RateThrustParameters,
+        OffboardParameters,
+        HoldParameters,
+        SetpointParameters,
+        ThrustIdentificationParameters,
+    ],
 )
 def test_the_file_holds_the_defaults(kind: type[ParameterSet]):
     given = {name: value for name, value in BRIDGE.items() if name in kind.specs()}

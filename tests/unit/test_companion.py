@@ -168,10 +168,10 @@ def test_vision_reaches_the_estimate(odometry):
     assert ned_yaw == pytest.approx(math.pi / 2 - yaw, abs=1e-3)
 
 
-def test_only_body_rates_are_flown():
+def test_setpoints_with_another_mask_or_not_finite_are_refused():
     rig = Rig()
     rig.setpoint(0.1, 0.2, 0.3, mask=0)
-    assert any("type_mask 0" in clean_text(m.text) for m in rig.heard("STATUSTEXT"))
+    assert any("type_mask 0, allowed: 128" in clean_text(m.text) for m in rig.heard("STATUSTEXT"))
     assert np.all(rig.autopilot._setpoint == 0.0)
     rig.setpoint(math.nan, 0.0, 0.0, thrust=0.5)
     assert np.all(rig.autopilot._setpoint == 0.0)

@@ -11,6 +11,7 @@ from uam_control.vehicle import load_description
 from uam_sim_bridge.mavlink.link.link import OffboardLink
 from uam_sim_bridge.mavlink.offboard.sequence import OffboardSequence, Request
 from uam_sim_bridge.mavlink.offboard.setpoint import RateThrustParameters
+from uam_sim_bridge.mavlink.protocol.attitude_target import AttitudeTarget
 from uam_sim_bridge.mavlink.protocol.modes import Mode
 from uam_sim_bridge.mavlink.protocol.signing import Signing
 from uam_sim_bridge.mavlink.protocol.wire import Codec, Framer, mavlink2
@@ -208,7 +209,7 @@ def test_chunks_of_a_stream_are_joined_by_the_link(make):
         rig.line.arriving = [piece]
         link.poll(1.0)
     assert link.connected(1.0)
-    link.send_setpoint(np.zeros(3), 0.5, 1.0)
+    link.send_setpoint(AttitudeTarget.of_rates(np.zeros(3), 0.5), 1.0)
     assert Framer(Codec(2, 2)).stream(rig.line.sent[-1])[0].get_type() == "SET_ATTITUDE_TARGET"
 
 

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from uam_sim_bridge.mavlink.offboard.hold import UNKNOWN, HoldParameters, LevelHold
+from uam_sim_bridge.mavlink.offboard.setpoints.desired import Desired, level
 
 TILTED = np.array([0.1, -0.2, 1.0])
 LEVEL = np.zeros(3)
@@ -14,12 +15,12 @@ LEVEL = np.zeros(3)
 def flown(thrust=0.52):
     hold = LevelHold(HoldParameters())
     for k in range(1000):
-        hold.good(k * 0.004, thrust)
+        hold.good(k * 0.004, Desired(np.zeros(3), level(0.0), thrust))
     return hold
 
 
 def test_levels_with_the_thrust_flown():
-    rates, thrust = flown().setpoint(4.0, TILTED, UNKNOWN)
+    rates, _, thrust = flown().setpoint(4.0, TILTED, UNKNOWN)
     assert rates == pytest.approx([-0.6, 1.2, 0.0], rel=0.05)
     assert thrust == pytest.approx(0.52)
 
@@ -28,7 +29,7 @@ def test_a_tilt_that_stays_is_met_by_more_and_more():
     """The autopilot's rate loop alone does not compensate the arm's torque."""
     hold, rates = flown(), []
     for k in range(250):
-        rates.append(hold.setpoint(4.0 + 0.004 * k, np.array([0.0, -0.1, 0.0]), UNKNOWN)[0][1])
+        rates.append(hold.setpoint(4.0 + 0.004 * k, np.array([0.0, -0.1, 0.0]), UNKNOWN).rates[1])
     assert np.all(np.diff(rates) > 0.0) and rates[-1] == pytest.approx(0.6 + 0.6, rel=0.02)
 
 
@@ -42,14 +43,14 @@ def test_a_tilt_that_stays_is_met_by_more_and_more():
     ],
 )
 def test_tilts_against_the_velocity(velocity, yaw, signs):
-    rates, _ = flown().setpoint(4.0, np.array([0.0, 0.0, yaw]), np.array(velocity))
+    rates, *_ = flown().setpoint(4.0, np.array([0.0, 0.0, yaw]), np.array(velocity))
     assert rates[:2] == pytest.approx(np.array(signs) * 6.0 * 0.5 / 9.81, rel=0.03, abs=1e-9)
 
 
 def test_thrust_acts_against_sinking_within_a_limit():
-    _, thrust = flown().setpoint(4.0, LEVEL, np.array([0.0, 0.0, -0.5]))
+    thrust = flown().setpoint(4.0, LEVEL, np.array([0.0, 0.0, -0.5])).thrust
     assert thrust == pytest.approx(0.52 * (1.0 + 0.5 / 9.81))
-    _, thrust = flown().setpoint(4.0, LEVEL, np.array([0.0, 0.0, 99.0]))
+    thrust = flown().setpoint(4.0, LEVEL, np.array([0.0, 0.0, 99.0])).thrust
     assert thrust == pytest.approx(0.52 * (1.0 - 1.5 / 9.81))
 
 
@@ -57,9 +58,9 @@ def test_the_last_setpoints_do_not_turn_it():
     """The autopilot uses them until its failsafe."""
     hold = flown()
     hold.setpoint(4.0, TILTED, UNKNOWN)
-    rates, _ = hold.setpoint(5.94, TILTED, UNKNOWN)
+    rates, *_ = hold.setpoint(5.94, TILTED, UNKNOWN)
     assert np.all(rates[:2] != 0.0)
-    rates, _ = hold.setpoint(5.96, TILTED, UNKNOWN)
+    rates, *_ = hold.setpoint(5.96, TILTED, UNKNOWN)
     assert rates == pytest.approx([0.0, 0.0, 0.0])
 
 
@@ -72,8 +73,8 @@ def test_without_hope_it_ends_sooner():
 
 def test_thrust_is_an_average_not_the_last_value():
     hold = flown()
-    hold.good(4.0, 0.9)
-    _, thrust = hold.setpoint(4.004, TILTED, UNKNOWN)
+    hold.good(4.0, Desired(np.zeros(3), level(0.0), 0.9))
+    thrust = hold.setpoint(4.004, TILTED, UNKNOWN).thrust
     assert 0.52 < thrust < 0.53
 
 
@@ -82,7 +83,7 @@ def test_ends_after_its_time_and_starts_anew():
     assert hold.setpoint(4.0, TILTED, UNKNOWN) is not None
     assert hold.setpoint(5.99, TILTED, UNKNOWN) is not None
     assert hold.setpoint(6.01, TILTED, UNKNOWN) is None
-    hold.good(6.1, 0.5)
+    hold.good(6.1, Desired(np.zeros(3), level(0.0), 0.5))
     assert not hold.active
     assert hold.setpoint(6.2, TILTED, UNKNOWN) is not None
 
@@ -96,5 +97,5 @@ def test_nothing_before_a_flight_and_after_it():
 
 
 def test_strange_attitude_gives_bounded_rates():
-    rates, _ = flown().setpoint(4.0, np.array([math.nan, 50.0, math.nan]), np.ones(3))
+    rates, *_ = flown().setpoint(4.0, np.array([math.nan, 50.0, math.nan]), np.ones(3))
     assert rates == pytest.approx([0.0, -2.0, 0.0])

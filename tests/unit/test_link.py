@@ -12,6 +12,7 @@ from uam_sim_bridge.mavlink.link.link import OffboardLink
 from uam_sim_bridge.mavlink.link.link_report import faults, report
 from uam_sim_bridge.mavlink.offboard.sequence import OffboardSequence, Phase
 from uam_sim_bridge.mavlink.offboard.setpoint import RateThrustParameters
+from uam_sim_bridge.mavlink.protocol.attitude_target import AttitudeTarget
 from uam_sim_bridge.mavlink.protocol.modes import MavCmd, MavResult, Mode
 from uam_sim_bridge.mavlink.protocol.wire import Codec, Framer, clean_text, mavlink2
 from uam_sim_bridge.mavlink.telemetry.event_messages import EventMessage
@@ -92,7 +93,7 @@ class Rig:
             link.poll(self.time)
             link.tick(self.time)
             if self.sequence.streaming:
-                link.send_setpoint(np.zeros(3), 0.5, self.time)
+                link.send_setpoint(AttitudeTarget.of_rates(np.zeros(3), 0.5), self.time)
             self.reasons_seen.update(self.sequence.reasons)
             sent, self.memory.to_autopilot = self.memory.to_autopilot, []
             if autopilot:

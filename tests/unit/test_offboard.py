@@ -10,6 +10,7 @@ from uam_sim_bridge.mavlink.offboard.sequence import (
     Phase,
     Request,
 )
+from uam_sim_bridge.mavlink.protocol.attitude_target import AttitudeTarget
 from uam_sim_bridge.mavlink.protocol.modes import MavCmd, MavResult, Mode, Severity
 
 DOWN = np.array([0.0, 0.0, -9.81])
@@ -156,7 +157,7 @@ def test_with_the_stand_in():
             autopilot.vision(t, np.zeros(3), np.array([1.0, 0.0, 0.0, 0.0]))
         status = autopilot.status
         request = s.update(t, True, status.armed, status.mode)
-        autopilot.setpoint(t, np.zeros(3), 0.0)
+        autopilot.target(t, AttitudeTarget.of_rates(np.zeros(3), 0.0))
         if request:
             command, parameters = COMMANDS[request]
             s.answer(request, autopilot.command(t, command, parameters))

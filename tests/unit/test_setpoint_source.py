@@ -9,10 +9,12 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from uam_control.maths.rotations import quaternion_from_euler
+from uam_control.maths.rotations import euler_from_quaternion, quaternion_from_euler
 from uam_sim_bridge.mavlink.offboard.hold import HoldParameters
 from uam_sim_bridge.mavlink.offboard.setpoint import RateThrustMap, RateThrustParameters
 from uam_sim_bridge.mavlink.offboard.setpoint_source import SetpointSource, Situation
+from uam_sim_bridge.mavlink.offboard.setpoints.catalogue import SETPOINTS
+from uam_sim_bridge.mavlink.protocol.frames import swap_quaternion
 
 TICK = 0.004
 FLYING = Situation(armed=True, landed=False, let_go=False)
@@ -28,20 +30,29 @@ def state_at(height: float = 0.0, roll: float = 0.0) -> np.ndarray:
     return state
 
 
-def in_flight(said: list[str] | None = None, fresh: float = math.inf) -> SetpointSource:
+ATTITUDE = np.array([[0.1, -0.2, 0.7], [0.0] * 3, [0.0] * 3])  # desired, in flight
+
+
+def in_flight(
+    said: list[str] | None = None, fresh: float = math.inf, setpoint: str = "rates"
+) -> SetpointSource:
     """One that stood on the ground and hovers at 1 m; its last tick was at 1 s."""
     notes = [] if said is None else said
     source = SetpointSource(
-        RateThrustMap(), HoldParameters(), fresh, lambda text, _: notes.append(text)
+        RateThrustMap(),
+        HoldParameters(),
+        SETPOINTS[setpoint],
+        fresh,
+        lambda text, _: notes.append(text),
     )
     state = state_at()
     source.note_state(0.0, state)
-    assert source.commanded(0.0, state, False, WEIGHT, None, STANDING)[1] == 0.0
+    assert source.commanded(0.0, state, False, WEIGHT, None, ATTITUDE, STANDING).thrust == 0.0
     state = state_at(1.0)
     for k in range(1, 251):
         source.note_state(TICK * k, state)
-        _, thrust = source.commanded(TICK * k, state, True, WEIGHT, REST, FLYING)
-    assert thrust > 0.3 and not source.holding
+        sent = source.commanded(TICK * k, state, True, WEIGHT, REST, ATTITUDE, FLYING)
+    assert sent.thrust > 0.3 and not source.holding
     return source
 
 
@@ -64,16 +75,16 @@ def test_what_is_not_good_in_flight_is_a_level_hold_and_then_nothing(
     for k in range(round((held + 0.5) / TICK)):
         now = 1.0 + TICK * (k + 1)
         source.note_state(now, state)
-        setpoint = source.commanded(now, state, flying, tau_p, tau_q, situation)
+        setpoint = source.commanded(now, state, flying, tau_p, tau_q, ATTITUDE, situation)
         if TICK * k < held - 0.1:
-            assert setpoint[0][0] < -0.5 and setpoint[1] > 0.3
+            assert setpoint.body_rates[0] < -0.5 and setpoint.thrust > 0.3
     assert setpoint is None and source.holding
 
 
 def test_it_says_why():
     said = []
     source = in_flight(said)
-    source.commanded(1.004, state_at(1.0), True, WEIGHT * math.nan, REST, FLYING)
+    source.commanded(1.004, state_at(1.0), True, WEIGHT * math.nan, REST, ATTITUDE, FLYING)
     source.without(9.0, FLYING)
     assert said == [
         "setpoint refused: tau_p.x is not finite",
@@ -85,16 +96,16 @@ def test_it_says_why():
 def test_on_the_ground_everything_is_idle():
     source = SetpointSource(RateThrustMap(), HoldParameters())
     for situation in (STANDING, FLYING._replace(landed=True), STANDING._replace(let_go=True)):
-        rates, thrust = source.without(1.0, situation)
-        assert thrust == 0.0 and not rates.any()
+        setpoint = source.without(1.0, situation)
+        assert setpoint.thrust == 0.0 and not setpoint.body_rates.any()
 
 
 def test_an_old_estimate_gives_way_to_what_the_motion_capture_saw_and_then_to_none():
     source = in_flight(fresh=0.15)
     source.note_pose(1.1, quaternion_from_euler(np.array([0.0, 0.2, 0.0])))
-    rates, _ = source.without(1.2, FLYING)
+    rates = source.without(1.2, FLYING).body_rates
     assert rates[1] == pytest.approx(-1.2, rel=0.05) and rates[0] == 0.0
-    rates, _ = source.without(1.3, FLYING)
+    rates = source.without(1.3, FLYING).body_rates
     assert rates[0] == 0.0 and abs(rates[1]) < 0.3  # what the integral has gathered
 
 
@@ -112,15 +123,69 @@ def ticks(draw):
 
 
 @pytest.mark.filterwarnings("ignore:invalid value")  # of infinite velocities
-@given(st.lists(ticks(), min_size=1, max_size=30), st.floats(0.001, 1.0))
-def test_whatever_comes_rates_and_thrust_are_finite_and_within_their_limits(sequence, step):
-    source, limit = in_flight(), np.array(RateThrustParameters.rate_limit)
+@given(
+    st.lists(ticks(), min_size=1, max_size=30),
+    st.floats(0.001, 1.0),
+    st.sampled_from(list(SETPOINTS)),
+)
+def test_whatever_comes_setpoints_are_finite_and_within_their_limits(sequence, step, kind):
+    source, limit = in_flight(setpoint=kind), np.array(RateThrustParameters.rate_limit)
     for k, (told, state, commands, situation) in enumerate(sequence):
         now = 1.0 + step * (k + 1)
         if told:
             source.note_state(now, state)
-            setpoint = source.commanded(now, state, *commands, situation)
+            setpoint = source.commanded(now, state, *commands, ATTITUDE, situation)
         else:
             setpoint = source.without(now, situation)
         if setpoint is not None:
-            assert np.all(np.abs(setpoint[0]) <= limit) and 0.0 <= setpoint[1] <= 1.0
+            assert np.all(np.abs(setpoint.rates) <= limit) and 0.0 <= setpoint.thrust <= 1.0
+            assert not setpoint.refused()
+
+
+def desired(target) -> np.ndarray:
+    """Roll, pitch, yaw [rad, FLU in ENU] of an attitude setpoint."""
+    assert target.type_mask == 7 and np.isnan(target.body_rates).all()
+    return euler_from_quaternion(swap_quaternion(target.quaternion))
+
+
+def test_attitude_setpoints_are_the_position_laws_attitude_with_the_same_thrust():
+    state = state_at(1.0)
+    rates, attitude = in_flight(), in_flight(setpoint="attitude")
+    sent = attitude.commanded(1.004, state, True, WEIGHT, REST, ATTITUDE, FLYING)
+    assert desired(sent) == pytest.approx([0.1, -0.2, 0.7], abs=1e-12)
+    other = rates.commanded(1.004, state, True, WEIGHT, REST, ATTITUDE, FLYING)
+    assert other.type_mask == 128 and sent.thrust == other.thrust
+
+
+def test_an_attitude_that_is_not_finite_is_refused_where_it_is_sent():
+    said = []
+    source = in_flight(said, setpoint="attitude")
+    bad = ATTITUDE * math.nan
+    held = source.commanded(1.004, state_at(1.0), True, WEIGHT, REST, bad, FLYING)
+    assert said[0] == "setpoint refused: not finite" and source.holding
+    assert desired(held) == pytest.approx([0.0, 0.0, 0.7], abs=1e-12)
+    assert (
+        not in_flight().commanded(1.004, state_at(1.0), True, WEIGHT, REST, bad, FLYING).refused()
+    )
+
+
+def test_the_level_hold_of_attitude_setpoints_tilts_against_the_velocity():
+    source = in_flight(setpoint="attitude")
+    state = state_at(1.0, roll=0.3)
+    state[1, 0], state[0, 5] = 0.5, math.pi / 2.0  # eastward, looking north: to its right
+    source.note_state(1.004, state)
+    held = source.without(1.004, FLYING)
+    # 0.5 m/s^2 to the left is a roll of -0.5/g; the yaw is that of the last good command
+    assert desired(held) == pytest.approx([-0.5 / 9.81, 0.0, 0.7], abs=1e-3)
+    last = source.without(1.004 + HoldParameters().hold_time - 0.01, FLYING)
+    assert desired(last) == pytest.approx([0.0, 0.0, 0.7], abs=1e-12)
+
+
+def test_idle_attitude_setpoints_are_level_with_the_yaw_of_the_vehicle():
+    source = SetpointSource(RateThrustMap(), HoldParameters(), SETPOINTS["attitude"])
+    assert desired(source.without(0.0, STANDING)) == pytest.approx([0.0, 0.0, 0.0], abs=1e-12)
+    state = state_at(roll=0.1)
+    state[0, 5] = -1.2
+    source.note_state(0.0, state)
+    sent = source.without(0.0, STANDING)
+    assert desired(sent) == pytest.approx([0.0, 0.0, -1.2], abs=1e-12) and sent.thrust == 0.0

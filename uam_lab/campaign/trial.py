@@ -115,7 +115,7 @@ def result(
         why="; ".join(figures["shortfalls"]),
         place_error=figures["payload_place_error_m"],
         restless=(
-            _change(series.block("setpoint.rate_")[flown]),
+            _change(_rates(series)[flown]),
             _change(series.block("tau_alpha.")[flown]),
         ),
         peaks=_peaks(series, flown),
@@ -125,6 +125,13 @@ def result(
 def _row(groups: dict[str, list[float | None]]) -> np.ndarray:
     values = [value for key, _, _ in metrics.GROUPS for value in groups[key]]
     return np.array([np.nan if value is None else value for value in values])
+
+
+def _rates(series: Series) -> np.ndarray:
+    """Body rates (ticks, 3) [rad/s] that were sent; those of the vehicle where none were."""
+    sent = series.block("setpoint.rate_")
+    own = np.column_stack([series[f"truth.{axis}_dot"] for axis in ("roll", "pitch", "yaw")])
+    return own if np.isnan(sent).all() else sent
 
 
 def _change(values: np.ndarray) -> float:

@@ -12,10 +12,10 @@ from uam_control.settings.parameter_set import ParameterError
 from uam_sim_bridge.autopilot.core import Autopilot
 from uam_sim_bridge.autopilot.params import DEFINITIONS
 from uam_sim_bridge.autopilot.telemetry import Telemetry
+from uam_sim_bridge.mavlink.protocol.attitude_target import AttitudeTarget
 from uam_sim_bridge.mavlink.protocol.modes import MavCmd, MavResult, Severity
 from uam_sim_bridge.mavlink.protocol.wire import Message, clean_text, mavlink2, text_chunks
 
-ATTITUDE_IGNORED = 128  # the only type_mask of SET_ATTITUDE_TARGET that is flown
 _PARAMETERS_PER_TICK = 10
 _REAL, _INTEGER = mavlink2.MAV_PARAM_TYPE_REAL32, mavlink2.MAV_PARAM_TYPE_INT32
 _POSE_FRAMES = (mavlink2.MAV_FRAME_LOCAL_NED, mavlink2.MAV_FRAME_LOCAL_FRD)
@@ -70,12 +70,9 @@ class Companion:
             self._autopilot.commander.texts.append((Severity.WARNING, text))
 
     def _attitude_target(self, time: float, m: Message) -> None:
-        if m.type_mask != ATTITUDE_IGNORED:
-            self._say_once(f"setpoint refused: type_mask {m.type_mask}, only 128 (body rates)")
-            return
-        rates = (m.body_roll_rate, m.body_pitch_rate, m.body_yaw_rate)
-        if not self._autopilot.setpoint(time, rates, m.thrust):
-            self._say_once("setpoint refused: not finite")
+        refused = self._autopilot.target(time, AttitudeTarget.from_message(m))
+        if refused:
+            self._say_once(f"setpoint refused: {refused}")
 
     def _vision_position(self, time: float, m: Message) -> None:
         euler = np.array([m.roll, m.pitch, m.yaw])
@@ -168,10 +165,11 @@ def warm_up() -> None:
     autopilot = Autopilot()
     companion = Companion(autopilot)
     zero, down, level = np.zeros(3), np.array([0.0, 0.0, -9.81]), np.array([1.0, 0.0, 0.0, 0.0])
+    targets = AttitudeTarget.of_rates(zero, 0.5), AttitudeTarget.of_attitude(level, 0.5)
     for k in range(300):
         time = 0.004 * k
         autopilot.vision(time, zero, level)
-        autopilot.setpoint(time, zero, 0.5)
+        autopilot.target(time, targets[k % 2])
         companion.tick(time)
         if k == 200:
             autopilot.command(time, MavCmd.DO_SET_MODE, (1.0, 6.0, 0.0))

@@ -2,7 +2,8 @@
 
 `server` wraps it in MAVLink; the direct engine calls it as it is. Everything is FRD and NED, time
 is that of the sensor samples, in seconds. One `update` is one cycle of PX4's rate loop: gyro
-filter, rate PID, allocation, thrust model; around it commander, land detector and estimator.
+filter, rate PID, allocation, thrust model; around it attitude loop, commander, land detector and
+estimator.
 """
 
 from __future__ import annotations
@@ -15,6 +16,8 @@ import numpy as np
 from uam_control.maths.compiled import jit
 from uam_control.vehicle import load_description
 from uam_sim_bridge.autopilot.allocation import allocate, unallocated_torque
+from uam_sim_bridge.autopilot.attitude_control import attitude_gains, attitude_rates
+from uam_sim_bridge.autopilot.autopilot_estimator import ATTITUDE as ESTIMATED_ATTITUDE
 from uam_sim_bridge.autopilot.autopilot_estimator import Estimator
 from uam_sim_bridge.autopilot.commander import Commander
 from uam_sim_bridge.autopilot.descent import Descent
@@ -22,7 +25,6 @@ from uam_sim_bridge.autopilot.landing import LandDetector
 from uam_sim_bridge.autopilot.params import Parameters
 from uam_sim_bridge.autopilot.rate_control import (
     INTEGRAL,
-    RATES,
     TORQUE,
     UNALLOCATED,
     filter_coefficients,
@@ -30,8 +32,14 @@ from uam_sim_bridge.autopilot.rate_control import (
     rate_torque,
     reset_filters,
 )
+from uam_sim_bridge.autopilot.rate_control import RATES as FILTERED
 from uam_sim_bridge.mavlink.offboard.rotor_geometry import normalised_mixer
 from uam_sim_bridge.mavlink.offboard.thrust_curve import inverse_curve
+from uam_sim_bridge.mavlink.protocol.attitude_target import (
+    ATTITUDE_AND_YAW_RATE,
+    RATES,
+    AttitudeTarget,
+)
 from uam_sim_bridge.mavlink.protocol.modes import (
     CUSTOM_MODE_ENABLED,
     FORCE,
@@ -116,7 +124,9 @@ class Autopilot:
         self.commander = Commander(self.parameters)
         self.landing = LandDetector(self.parameters)
         self._descent = Descent(self.parameters)
-        self._setpoint = np.zeros(4)
+        self._setpoint = np.zeros(4)  # body rates [rad/s, FRD], thrust
+        self._desired: np.ndarray | None = None  # attitude FRD → NED, None: body rates are flown
+        self._yaw_rate = 0.0  # [rad/s] about the world's z axis, down
         self._memory = np.zeros((7, 3))
         self._time: float | None = None
         self._sample_rate = sample_rate
@@ -137,24 +147,25 @@ class Autopilot:
         self._sample_rate = sample_rate
         self._configure()
 
-    def setpoint(self, time: float, rates: np.ndarray, thrust: float) -> bool:
-        """Take a body-rate setpoint (3,) [rad/s, FRD] and a normalised thrust; False: refused.
+    def target(self, time: float, target: AttitudeTarget) -> str:
+        """Take a setpoint of body rates or of an attitude; return why it was refused, "" if taken.
 
         What is not finite is refused; the thrust is clamped to 0..1.
         """
-        if not (
-            math.isfinite(thrust)
-            and math.isfinite(rates[0])
-            and math.isfinite(rates[1])
-            and math.isfinite(rates[2])
-        ):
-            return False
-        self._setpoint[0] = rates[0]
-        self._setpoint[1] = rates[1]
-        self._setpoint[2] = rates[2]
-        self._setpoint[3] = min(1.0, max(0.0, thrust))
+        refused = target.refused()
+        if refused:
+            return refused
+        setpoint, rates = self._setpoint, target.rates
+        setpoint[0] = rates[0]
+        setpoint[1] = rates[1]
+        setpoint[2] = rates[2]
+        setpoint[3] = min(1.0, max(0.0, target.thrust))
+        self._desired = None
+        if target.type_mask != RATES:
+            self._desired = target.quaternion / np.linalg.norm(target.quaternion)
+            self._yaw_rate = rates[2] if target.type_mask == ATTITUDE_AND_YAW_RATE else 0.0
         self.commander.setpoint(time)
-        return True
+        return ""
 
     def vision(self, time: float, position: np.ndarray, quaternion: np.ndarray) -> bool:
         """Take an external pose (NED [m], FRD → NED [w x y z]); False: refused as nonsense."""
@@ -206,6 +217,11 @@ class Autopilot:
             setpoint = self._descent.update(self.estimator.estimate, dt)
         else:
             self._descent.reset()
+            if self._desired is not None:
+                attitude = self.estimator.estimate[ESTIMATED_ATTITUDE]
+                attitude_rates(
+                    attitude, self._desired, self._yaw_rate, self._attitude_gains, setpoint
+                )
         control_tick(
             gyro,
             dt,
@@ -228,7 +244,7 @@ class Autopilot:
                 True,
                 descending,
                 float(setpoint[3]),
-                (float(memory[RATES, 0]), float(memory[RATES, 1])),
+                (float(memory[FILTERED, 0]), float(memory[FILTERED, 1])),
                 velocity,
             )
         else:
@@ -244,7 +260,7 @@ class Autopilot:
     @property
     def rates(self) -> np.ndarray:
         """Filtered body rates (3,) FRD [rad/s]."""
-        return self._memory[RATES]
+        return self._memory[FILTERED]
 
     def _configure(self) -> None:
         p = self.parameters
@@ -264,5 +280,6 @@ class Autopilot:
             self._sample_rate, p["IMU_GYRO_CUTOFF"], p["IMU_DGYRO_CUTOFF"], p["MC_YAW_TQ_CUTOFF"]
         )
         self._model_factor = p["THR_MDL_FAC"]
+        self._attitude_gains = attitude_gains(p)
         self.landing.configure(p)
         self._descent.configure(p)

@@ -17,6 +17,7 @@ from uam_sim_bridge.mavlink.offboard.sequence import (
     OffboardSequence,
     Request,
 )
+from uam_sim_bridge.mavlink.protocol.attitude_target import AttitudeTarget
 from uam_sim_bridge.mavlink.protocol.frames import swap_body, swap_quaternion, swap_world
 from uam_sim_bridge.mavlink.protocol.modes import (
     CUSTOM_MODE_ENABLED,
@@ -106,10 +107,10 @@ class JoinedAutopilot:
         if self.passes():
             self.autopilot.vision(self._time, swap_world(position), swap_quaternion(quaternion))
 
-    def send_setpoint(self, rates: np.ndarray, thrust: float, time: float) -> None:
-        """Send body rates (3,) [rad/s, FLU] and normalised thrust 0..1."""
+    def send_setpoint(self, target: AttitudeTarget, time: float) -> None:
+        """Send the setpoint of the tick `time` [s]."""
         if self.passes():
-            self.autopilot.setpoint(self._time, swap_body(rates), thrust)
+            self.autopilot.target(self._time, target)
 
     def begin(self, time: float) -> None:
         """Begin the autopilot's cycle of `time` [s]: what is sent from now on arrives in it."""

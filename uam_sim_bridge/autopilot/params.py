@@ -23,6 +23,15 @@ class Definition:
     integer: bool = False
 
 
+def _attitude(axis: str, text: str, p: float, high: float, limit: float) -> dict[str, Definition]:
+    return {
+        f"MC_{axis}_P": Definition(p, 0.0, high, "1/s", f"{text} P of the attitude loop"),
+        f"MC_{axis}RATE_MAX": Definition(
+            limit, 0.0, 1800.0, "deg/s", f"largest {text} rate of the attitude loop"
+        ),
+    }
+
+
 def _axis(rate: str, limit: str, axis: str, p: float, i: float, d: float) -> dict[str, Definition]:
     return {
         f"MC_{rate}_P": Definition(p, 0.0, 2.0, "1/(rad/s)", f"{axis} rate P"),
@@ -43,8 +52,10 @@ DEFINITIONS: dict[str, Definition] = {
     **_axis("PITCHRATE", "PR", "pitch", 0.15, 0.2, 0.003),
     **_axis("YAWRATE", "YR", "yaw", 0.2, 0.1, 0.0),
     "MC_YAW_TQ_CUTOFF": Definition(2.0, 0.0, 10.0, "Hz", "low pass on the yaw torque; 0 off"),
-    "MC_ROLL_P": Definition(6.5, 0.0, 12.0, "1/s", "roll P of the failsafe's attitude loop"),
-    "MC_PITCH_P": Definition(6.5, 0.0, 12.0, "1/s", "pitch P of the failsafe's attitude loop"),
+    **_attitude("ROLL", "roll", 6.5, 12.0, 220.0),
+    **_attitude("PITCH", "pitch", 6.5, 12.0, 220.0),
+    **_attitude("YAW", "yaw", 2.8, 5.0, 200.0),
+    "MC_YAW_WEIGHT": Definition(0.4, 0.0, 1.0, "1", "share of yaw in the attitude loop"),
     "IMU_GYRO_CUTOFF": Definition(40.0, 0.0, 1000.0, "Hz", "low pass on the gyro; 0 off"),
     "IMU_DGYRO_CUTOFF": Definition(20.0, 0.0, 1000.0, "Hz", "low pass on its derivative; 0 off"),
     "THR_MDL_FAC": Definition(0.0, 0.0, 1.0, "1", "thrust model factor"),

@@ -42,7 +42,9 @@ from uam_sim_bridge.mavlink.link.vision import vision_message
 from uam_sim_bridge.mavlink.offboard.hold import HoldParameters
 from uam_sim_bridge.mavlink.offboard.sequence import OffboardParameters, OffboardSequence
 from uam_sim_bridge.mavlink.offboard.setpoint import RateThrustMap, RateThrustParameters
-from uam_sim_bridge.mavlink.offboard.setpoint_source import IDLE, Setpoint
+from uam_sim_bridge.mavlink.offboard.setpoint_source import Setpoint, sent
+from uam_sim_bridge.mavlink.offboard.setpoints.catalogue import SETPOINTS, SetpointParameters
+from uam_sim_bridge.mavlink.offboard.setpoints.desired import Desired
 from uam_sim_bridge.mavlink.offboard.thrust_identification import (
     ThrustIdentificationParameters,
     steady_force,
@@ -85,12 +87,13 @@ class MavlinkBridgeNode(UamNode):
         vision = NodeParameters(self, VisionParameters, read_only=True).current
         offboard = NodeParameters(self, OffboardParameters, read_only=True).current
         hold = NodeParameters(self, HoldParameters, read_only=True).current
+        setpoint = NodeParameters(self, SetpointParameters, read_only=True).current
         thrust = NodeParameters(self, ThrustIdentificationParameters, derived=derived)
 
         options, sequence = self._options, OffboardSequence(offboard)
         links = open_links(self, options, sequence, mapping.current)
         self.link, self._station, self._faulty = links.autopilot, links.station, links.faulty
-        sets = BridgeSets(mapping.current, hold, thrust.current, vision)
+        sets = BridgeSets(mapping.current, hold, thrust.current, vision, setpoint)
         fresh = options.stale_after + LATENCY
         self.stage = BridgeStage(sets, vehicle, self.link, sequence, fresh, self.say)
         thrust.apply = self.stage.identification.configure
@@ -178,12 +181,14 @@ class MavlinkBridgeNode(UamNode):
         if state is BAD or position is BAD or torque is BAD:
             setpoint = self.stage.without(stamp)
         else:
-            setpoint = self.stage.tick(stamp, state, position.flying, position.tau, *torque)
+            setpoint = self.stage.tick(
+                stamp, state, position.flying, position.tau, *torque, position.attitude
+            )
         self._tell(stamp)
         if stamp // THRUST_PERIOD != self.stamp // THRUST_PERIOD:
             self._factor_writer.position[0] = self.stage.factor
             self._thrust.publish(self._factor_writer.stamped(stamp))
-        self._setpoint.publish(self._writer.fill(stamp, *(setpoint or IDLE)))
+        self._setpoint.publish(self._writer.fill(stamp, *sent(setpoint)))
         self.done_tick(stamp, begun)
 
     def _hear(self, stamp: int) -> None:
@@ -230,7 +235,7 @@ class MavlinkBridgeNode(UamNode):
             self._join.skip(state)
             self._last_tick = time.monotonic()
             setpoint = self._go_without(state)
-            self._setpoint.publish(self._writer.fill(state, *(setpoint or IDLE)))
+            self._setpoint.publish(self._writer.fill(state, *sent(setpoint)))
             self.done_tick(state, time.perf_counter())
 
     def _watch(self) -> None:
@@ -273,6 +278,8 @@ class MavlinkBridgeNode(UamNode):
         state = np.zeros((3, SIZE))
         spare.map(zero, zero, state[0, ATTITUDE], state[1, ATTITUDE])
         spare.assumed_thrust(0.5)
+        for setpoint in SETPOINTS.values():
+            setpoint(Desired(zero, np.zeros((3, 3)), 0.5))
         steady_force(state, 0.1, 1.0)
         vision_message(0.0, zero, level, 1.0, 1.0)
 

@@ -12,6 +12,7 @@ from typing import Protocol
 
 import numpy as np
 
+from uam_sim_bridge.mavlink.protocol.attitude_target import AttitudeTarget
 from uam_sim_bridge.mavlink.protocol.modes import Mode
 
 
@@ -58,6 +59,6 @@ class AutopilotPort(Protocol):
         """
         ...
 
-    def send_setpoint(self, rates: np.ndarray, thrust: float, time: float) -> None:
-        """Send body rates (3,) [rad/s, FLU] and normalised thrust 0..1."""
+    def send_setpoint(self, target: AttitudeTarget, time: float) -> None:
+        """Send the setpoint of the tick `time` [s]."""
         ...

@@ -25,6 +25,7 @@ from uam_sim_bridge.mavlink.offboard.setpoint_source import (
     Situation,
     silent,
 )
+from uam_sim_bridge.mavlink.offboard.setpoints.catalogue import SetpointParameters
 from uam_sim_bridge.mavlink.offboard.thrust_identification import (
     ThrustIdentification,
     ThrustIdentificationParameters,
@@ -42,6 +43,7 @@ class BridgeSets:
     hold: HoldParameters
     identification: ThrustIdentificationParameters
     vision: VisionParameters
+    setpoint: SetpointParameters
 
     @classmethod
     def of(cls, vehicle: VehicleDescription, section: Mapping[str, Any]) -> Self:
@@ -51,6 +53,7 @@ class BridgeSets:
             HoldParameters.among(section),
             ThrustIdentificationParameters.of(vehicle, section),
             VisionParameters.among(section),
+            SetpointParameters.among(section),
         )
 
 
@@ -74,7 +77,7 @@ class BridgeStage:
         self.autopilot, self.sequence = autopilot, sequence
         self.map = RateThrustMap(sets.mapping, vehicle)
         self.identification = ThrustIdentification(sets.identification)
-        self.source = SetpointSource(self.map, sets.hold, fresh, say)
+        self.source = SetpointSource(self.map, sets.hold, sets.setpoint.type, fresh, say)
         self._vision = VisionPacing(sets.vision)
         self._reports = AutopilotReports(autopilot, sequence)
         self.report: AutopilotReport | None = None
@@ -112,17 +115,18 @@ class BridgeStage:
         flying: bool,
         tau_p: np.ndarray,
         tau_q: np.ndarray | None,
+        attitude: np.ndarray,
     ) -> Setpoint:
         """Send the setpoint of a tick with commands, and return it; None: none was sent.
 
         state (3, SIZE); flying: whether tau_p (3,) [N, ENU] is to be flown; tau_q (3,) [N m, FLU],
-        None for idle.
+        None for idle; attitude (3, 3): of the position law, see `Desired`.
         """
         now, situation = seconds(stamp), self._situation
-        setpoint = self.source.commanded(now, state, flying, tau_p, tau_q, situation)
+        setpoint = self.source.commanded(now, state, flying, tau_p, tau_q, attitude, situation)
         self._send(now, setpoint)
         self.report = self._reports.due(stamp)
-        thrust, self.factor = setpoint[1] if setpoint else 0.0, self.map.thrust_factor
+        thrust, self.factor = setpoint.thrust if setpoint else 0.0, self.map.thrust_factor
         self.map.thrust_factor = self.identification.update(
             now,
             state,
@@ -152,4 +156,4 @@ class BridgeStage:
         autopilot.tick(now)
         self._vision.send(autopilot)
         if setpoint is not None and self.sequence.streaming:
-            autopilot.send_setpoint(*setpoint, now)
+            autopilot.send_setpoint(setpoint, now)

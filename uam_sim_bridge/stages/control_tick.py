@@ -192,11 +192,12 @@ def control_arm(tick: ControlTick) -> bool:
 
 
 def send_setpoint(tick: ControlTick) -> bool:
-    """state, tau_p, tau_q → setpoint to the autopilot; its report to the mission."""
+    """state, laws → setpoint to the autopilot; the autopilot's report to the mission."""
     s, bridge = tick.signals, tick.bridge
     bridge.hear(s.stamp)
     bridge.note_state(s.stamp, s.state)
-    s.setpoint = bridge.tick(s.stamp, s.state, s.flying, s.tau_p, s.tau_q if s.flying else None)
+    tau_q = s.tau_q if s.flying else None
+    s.setpoint = bridge.tick(s.stamp, s.state, s.flying, s.tau_p, tau_q, s.attitude_reference)
     s.thrust_factor, report = bridge.factor, bridge.report
     if report is not None:
         tick.mission.autopilot(s.stamp, report.connected, report.armed_since, report.round_trip)

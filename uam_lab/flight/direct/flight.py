@@ -26,7 +26,7 @@ from uam_sim_bridge.faults import Schedule
 from uam_sim_bridge.faults.direct import DirectFaults
 from uam_sim_bridge.faults.faulty_plant import make_plant
 from uam_sim_bridge.mavlink.offboard.sequence import OffboardParameters, OffboardSequence
-from uam_sim_bridge.mavlink.offboard.setpoint_source import IDLE
+from uam_sim_bridge.mavlink.offboard.setpoint_source import sent
 from uam_sim_bridge.plant import Samples, Vehicle
 from uam_sim_bridge.plant.engines import DEFAULT_PLANT
 from uam_sim_bridge.stages.bridge_stage import BridgeSets, BridgeStage
@@ -147,7 +147,7 @@ class DirectFlight:
         """Write a tick's row."""
         truth = self._truth_at(seconds(signals.stamp))
         row = self.recording.next_row(signals.phase)
-        rates, thrust = signals.setpoint or IDLE
+        rates, thrust = sent(signals.setpoint)
         record(
             row,
             signals.time,

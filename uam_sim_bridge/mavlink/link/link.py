@@ -13,7 +13,7 @@ import numpy as np
 from uam_sim_bridge.mavlink.link.vision import vision_message
 from uam_sim_bridge.mavlink.offboard.sequence import HEARTBEAT_TIMEOUT, OffboardSequence, Request
 from uam_sim_bridge.mavlink.offboard.setpoint import RateThrustParameters
-from uam_sim_bridge.mavlink.protocol.frames import swap_body
+from uam_sim_bridge.mavlink.protocol.attitude_target import AttitudeTarget
 from uam_sim_bridge.mavlink.protocol.modes import CUSTOM_MODE_ENABLED, MavCmd, MavResult, Mode
 from uam_sim_bridge.mavlink.protocol.signing import Signing
 from uam_sim_bridge.mavlink.protocol.wire import Codec, Framer, Message, TextAssembler, mavlink2
@@ -28,8 +28,6 @@ from uam_sim_bridge.mavlink.transport.transport import Transport
 
 HEARTBEAT_PERIOD = 1.0  # s
 EXPLAIN_PERIOD = 3.0  # s between two requests for the failed arming checks
-_NO_ATTITUDE = [1.0, 0.0, 0.0, 0.0]
-ATTITUDE_IGNORED = 128  # type_mask of SET_ATTITUDE_TARGET: only body rates and thrust
 
 
 class OffboardLink:
@@ -154,30 +152,14 @@ class OffboardLink:
         if request is not None:
             self._request(request)
 
-    def send_setpoint(self, rates: np.ndarray, thrust: float, time: float) -> None:
+    def send_setpoint(self, target: AttitudeTarget, time: float) -> None:
         """Send the setpoint of the tick `time` [s]: SET_ATTITUDE_TARGET.
 
-        rates (3,): body rates [rad/s, FLU]; thrust: normalised, 0..1. Raises ValueError if a value
-        is not finite or thrust is out of range.
+        Raises ValueError if a value is not finite or thrust is out of range.
         """
-        roll, pitch, yaw = swap_body(rates).tolist()
-        if not math.isfinite(roll + pitch + yaw + thrust) or not 0.0 <= thrust <= 1.0:
-            raise ValueError(
-                f"setpoint: rates {rates}, thrust {thrust}; finite rates and thrust 0..1 allowed"
-            )
-        self._send(
-            mavlink2.MAVLink_set_attitude_target_message(
-                round(time * 1e3) & 0xFFFFFFFF,
-                self._target,
-                mavlink2.MAV_COMP_ID_AUTOPILOT1,
-                ATTITUDE_IGNORED,
-                _NO_ATTITUDE,
-                roll,
-                pitch,
-                yaw,
-                thrust,
-            )
-        )
+        if target.refused() or not 0.0 <= target.thrust <= 1.0:
+            raise ValueError(f"setpoint {target}; finite values and thrust 0..1 allowed")
+        self._send(target.message(time, self._target))
 
     def send_vision(
         self,

@@ -11,6 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from uam_control.settings.parameter_set import ParameterSet, number
+from uam_sim_bridge.mavlink.offboard.setpoints.desired import Desired
 from uam_sim_bridge.mavlink.offboard.thrust_identification import GRAVITY
 
 _LAST = 0.05  # s, before the end: the autopilot keeps to the last setpoint until its failsafe
@@ -59,7 +60,7 @@ class HoldParameters(ParameterSet):
 
 
 class LevelHold:
-    """Level setpoints with the thrust of the flight so far; `rates` (3,) is reused.
+    """Level setpoints with the thrust of the flight so far; the arrays are reused.
 
     The autopilot's rate loop alone gives way to the arm's torque, hence the integral; and an arm
     that swings on pushes the vehicle, hence the tilt and thrust against its velocity.
@@ -68,6 +69,7 @@ class LevelHold:
     def __init__(self, parameters: HoldParameters) -> None:
         self.parameters = parameters
         self.rates = np.zeros(3)
+        self._desired = np.zeros((3, 3))  # see `Desired.attitude`
         self._integral = np.zeros(2)  # rad/s
         self._thrust: float | None = None
         self._time = -math.inf
@@ -78,9 +80,10 @@ class LevelHold:
         """Whether the last tick was one without a good command."""
         return self._since is not None
 
-    def good(self, time: float, thrust: float) -> None:
-        """Note a good command at `time` [s] with its normalised thrust."""
+    def good(self, time: float, desired: Desired) -> None:
+        """Note a good command at `time` [s]: its thrust and its yaw."""
         self._since = None
+        self._desired[0, 2], thrust = desired.attitude[0, 2], desired.thrust
         dt = time - self._time
         self._time = time
         if self._thrust is None or not 0.0 < dt < _THRUST_TIME:
@@ -94,8 +97,8 @@ class LevelHold:
 
     def setpoint(
         self, time: float, attitude: np.ndarray, velocity: np.ndarray, hopeless: bool = False
-    ) -> tuple[np.ndarray, float] | None:
-        """Return body rates (3,) [rad/s, FLU] and thrust, or None when the stream is to stop.
+    ) -> Desired | None:
+        """Return body rates, attitude and thrust, or None when the stream is to stop.
 
         attitude (3,): roll, pitch, yaw [rad], FLU in ENU; no rates about an axis of which it is not
         finite. velocity (3,): [m/s], ENU; nothing is done against what is not finite of it.
@@ -111,13 +114,16 @@ class LevelHold:
         dt, self._time = max(0.0, time - self._time), time
         if remaining < 0.0:
             return None
+        desired = self._desired[0]
         if remaining <= _LAST:
-            self.rates[:] = 0.0
-            return self.rates, self._thrust
+            self.rates[:] = desired[:2] = 0.0
+            return Desired(self.rates, self._desired, self._thrust)
         forward, left, up = self._braking(velocity, attitude[2])
-        self._turn(0, attitude[0] + left / GRAVITY, dt)
-        self._turn(1, attitude[1] - forward / GRAVITY, dt)
-        return self.rates, min(1.0, self._thrust * (1.0 + up / GRAVITY))
+        desired[0], desired[1] = -left / GRAVITY, forward / GRAVITY
+        self._turn(0, attitude[0] - desired[0], dt)
+        self._turn(1, attitude[1] - desired[1], dt)
+        thrust = min(1.0, self._thrust * (1.0 + up / GRAVITY))
+        return Desired(self.rates, self._desired, thrust)
 
     def _turn(self, axis: int, tilt: float, dt: float) -> None:
         """Set the rate against what the angle is off by [rad]."""

@@ -2,8 +2,8 @@
 
 | commands | sent |
 |---|---|
-| good | body rates and thrust from the map |
-| idle (not flying) | rates 0, thrust 0: the stream goes on, the vehicle stays on the ground |
+| good | the setpoint type's part of body rates, attitude and thrust |
+| idle (not flying) | rates 0, level, thrust 0: the stream goes on, the vehicle stays there |
 | not finite, malformed or none, on the ground | as idle |
 | the same in flight; the mission in failsafe; idle high above the start | level hold for \
 `hold_time`, `release_time` where nothing is to be expected, then nothing: the autopilot's \
@@ -22,9 +22,19 @@ from uam_control.coordinates import ATTITUDE, POSITION
 from uam_control.maths.rotations import euler_from_quaternion
 from uam_sim_bridge.mavlink.offboard.hold import UNKNOWN, HoldParameters, LevelHold
 from uam_sim_bridge.mavlink.offboard.setpoint import RateThrustMap, SetpointRefused
+from uam_sim_bridge.mavlink.offboard.setpoints.desired import Desired, SetpointType, level
+from uam_sim_bridge.mavlink.offboard.setpoints.rates import rates_setpoint
+from uam_sim_bridge.mavlink.protocol.attitude_target import STILL, AttitudeTarget
 
-Setpoint = tuple[np.ndarray, float] | None  # body rates (3,) [rad/s, FLU], thrust 0..1; None: none
-IDLE = (np.zeros(3), 0.0)
+Setpoint = AttitudeTarget | None  # None: no setpoint is sent
+
+
+def sent(setpoint: Setpoint) -> tuple[np.ndarray, float]:
+    """Return body rates (3,) [rad/s, FLU] and thrust of a setpoint, as it is recorded.
+
+    The rates are NaN where others than body rates were sent, both are zero where nothing was.
+    """
+    return (STILL, 0.0) if setpoint is None else (setpoint.body_rates, setpoint.thrust)
 
 
 class Situation(NamedTuple):
@@ -47,11 +57,14 @@ class SetpointSource:
         self,
         rate_map: RateThrustMap,
         hold: HoldParameters,
+        setpoint: SetpointType = rates_setpoint,
         fresh: float = math.inf,
         say: Callable[[str, str | None], None] = silent,
     ) -> None:
-        """fresh [s]: until when an attitude or a velocity is good; say(text, kind): of warnings."""
+        """setpoint: the type that is sent; fresh [s]: until when an attitude or a velocity is good;
+        say(text, kind): of warnings."""
         self.map = rate_map
+        self._type = setpoint
         self._hold = LevelHold(hold)
         self._margin = hold.ground_margin
         self._fresh_for = fresh
@@ -82,12 +95,13 @@ class SetpointSource:
         flying: bool,
         tau_p: np.ndarray,
         tau_q: np.ndarray | None,
+        attitude: np.ndarray,
         situation: Situation,
     ) -> Setpoint:
         """Return the setpoint of a tick with commands.
 
-        now [s]; state (3, 8); flying: whether tau_p (3,) [N] is meant; tau_q (3,) [N m], None for
-        idle.
+        now [s]; state (3, 8); flying: whether tau_p (3,) [N, ENU] is meant; tau_q (3,) [N m, FLU],
+        None for idle; attitude (3, 3): see `Desired`.
         """
         if situation.let_go:
             return self.without(now, situation)
@@ -97,24 +111,34 @@ class SetpointSource:
             except SetpointRefused as error:
                 self._say(f"setpoint refused: {error}", None)
             else:
-                self._hold.good(now, thrust)
-                return rates, thrust
+                desired = Desired(rates, attitude, thrust)
+                setpoint = self._type(desired)
+                refused = setpoint.refused()
+                if not refused:
+                    self._hold.good(now, desired)
+                    return setpoint
+                self._say(f"setpoint refused: {refused}", None)
         elif not flying and tau_q is None and not self._high(situation.armed):
             self._hold.reset()
-            return IDLE
+            return self._idle
         return self.without(now, situation)
 
     def without(self, now: float, situation: Situation) -> Setpoint:
         """Return the setpoint at `now` [s] where there are no commands to be used."""
         armed, landed, let_go = situation
         if not armed or (landed and not self._high(armed)):
-            return IDLE
+            return self._idle
         hopeless = let_go or not self._fresh(self._estimated[0], now)
         velocity = UNKNOWN if hopeless else self._velocity
-        setpoint = self._hold.setpoint(now, self._attitude(now), velocity, hopeless)
-        doing = "holding level" if setpoint else "stream stopped, the failsafe acts"
+        desired = self._hold.setpoint(now, self._attitude(now), velocity, hopeless)
+        doing = "holding level" if desired else "stream stopped, the failsafe acts"
         self._say(f"no usable commands in flight: {doing}", "hold")
-        return setpoint
+        return None if desired is None else self._type(desired)
+
+    @property
+    def _idle(self) -> AttitudeTarget:
+        yaw = self._estimated[1][2]
+        return self._type(Desired(np.zeros(3), level(yaw if math.isfinite(yaw) else 0.0), 0.0))
 
     def _high(self, armed: bool) -> bool:
         """Whether the vehicle is armed and well above the place where it stood disarmed."""

@@ -1,0 +1,1 @@
+"""Setpoint types: what of a desired motion goes to the autopilot."""

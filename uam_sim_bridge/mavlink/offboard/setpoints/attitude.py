@@ -1,0 +1,14 @@
+"""Attitude and thrust: the autopilot's own attitude loop flies, tau_q is not used."""
+
+from __future__ import annotations
+
+from uam_control.maths.rotations import quaternion_from_euler
+from uam_sim_bridge.mavlink.offboard.setpoints.desired import Desired
+from uam_sim_bridge.mavlink.protocol.attitude_target import AttitudeTarget
+from uam_sim_bridge.mavlink.protocol.frames import swap_quaternion
+
+
+def attitude_setpoint(desired: Desired) -> AttitudeTarget:
+    """Return the attitude and the thrust of `desired`; the body rates are ignored."""
+    quaternion = swap_quaternion(quaternion_from_euler(desired.attitude[0]))
+    return AttitudeTarget.of_attitude(quaternion, desired.thrust)

@@ -1,0 +1,31 @@
+"""Every setpoint type by its name. A new one is a file beside this one and a line in SETPOINTS."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from uam_control.settings.parameter_set import ParameterSet, choice
+from uam_sim_bridge.mavlink.offboard.setpoints.attitude import attitude_setpoint
+from uam_sim_bridge.mavlink.offboard.setpoints.desired import SetpointType
+from uam_sim_bridge.mavlink.offboard.setpoints.rates import rates_setpoint
+
+SETPOINTS: dict[str, SetpointType] = {
+    "rates": rates_setpoint,
+    "attitude": attitude_setpoint,
+}
+
+
+@dataclass(frozen=True)
+class SetpointParameters(ParameterSet):
+    """Which setpoints the autopilot gets."""
+
+    setpoint: str = choice(
+        "rates",
+        "rates: body rates and thrust; attitude: attitude and thrust, tau_q is not used",
+        tuple(SETPOINTS),
+    )
+
+    @property
+    def type(self) -> SetpointType:
+        """The function that makes them."""
+        return SETPOINTS[self.setpoint]

@@ -1,0 +1,34 @@
+"""What is desired at a tick, of which a setpoint type sends a part."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import NamedTuple
+
+import numpy as np
+
+from uam_sim_bridge.mavlink.protocol.attitude_target import AttitudeTarget
+
+
+class Desired(NamedTuple):
+    """The desired motion, from the control laws or from the level hold.
+
+    rates (3,): body rates that make tau_q in the autopilot's rate loop [rad/s, FLU]; attitude
+    (3, 3): rows q_d = roll, pitch, yaw [rad, FLU in ENU], Omega_d [rad/s], Omega_d_dot [rad/s^2],
+    both in the desired body frame (FLU); thrust: 0..1.
+    """
+
+    rates: np.ndarray
+    attitude: np.ndarray
+    thrust: float
+
+
+# A setpoint type returns the part of the desired motion that is sent, in the autopilot's frames.
+SetpointType = Callable[[Desired], AttitudeTarget]
+
+
+def level(yaw: float) -> np.ndarray:
+    """Return `Desired.attitude` of a level vehicle at rest with this yaw [rad]."""
+    attitude = np.zeros((3, 3))
+    attitude[0, 2] = yaw
+    return attitude

@@ -1,0 +1,12 @@
+"""Body rates and thrust: tau_q acts through the autopilot's rate loop."""
+
+from __future__ import annotations
+
+from uam_sim_bridge.mavlink.offboard.setpoints.desired import Desired
+from uam_sim_bridge.mavlink.protocol.attitude_target import AttitudeTarget
+from uam_sim_bridge.mavlink.protocol.frames import swap_body
+
+
+def rates_setpoint(desired: Desired) -> AttitudeTarget:
+    """Return the body rates and the thrust of `desired`; the attitude is ignored."""
+    return AttitudeTarget.of_rates(swap_body(desired.rates), desired.thrust)

@@ -1,0 +1,87 @@
+"""What SET_ATTITUDE_TARGET carries, and which of its type masks are flown.
+
+| type_mask | ignored | flown |
+|---|---|---|
+| 128 | attitude | body rates and thrust |
+| 7 | body rates | attitude and thrust |
+| 3 | roll rate, pitch rate | attitude and thrust, with a yaw rate on top |
+
+Source: MAVLink, ATTITUDE_TARGET_TYPEMASK; PX4 v1.16, MavlinkReceiver, handling of
+SET_ATTITUDE_TARGET.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from uam_sim_bridge.mavlink.protocol.frames import swap_body
+from uam_sim_bridge.mavlink.protocol.wire import Message, mavlink2
+
+RATES, ATTITUDE, ATTITUDE_AND_YAW_RATE = 128, 7, 3  # type masks
+FLOWN = "128 (body rates), 7 (attitude), 3 (attitude and yaw rate)"
+UPRIGHT = np.array([1.0, 0.0, 0.0, 0.0])
+STILL = np.zeros(3)
+NO_RATES = np.full(3, math.nan)
+
+
+class AttitudeTarget(NamedTuple):
+    """One setpoint for the autopilot, in its frames.
+
+    quaternion (4,): desired attitude FRD → NED [w x y z]; rates (3,): body rates [rad/s, FRD], for
+    ATTITUDE_AND_YAW_RATE the last is the rate about the world's vertical axis, positive downwards;
+    thrust: 0..1.
+    """
+
+    type_mask: int
+    quaternion: np.ndarray
+    rates: np.ndarray
+    thrust: float
+
+    @classmethod
+    def of_rates(cls, rates: np.ndarray, thrust: float) -> AttitudeTarget:
+        """Return the setpoint of body rates (3,) [rad/s, FRD] and thrust 0..1."""
+        return cls(RATES, UPRIGHT, rates, thrust)
+
+    @classmethod
+    def of_attitude(cls, quaternion: np.ndarray, thrust: float) -> AttitudeTarget:
+        """Return the setpoint of an attitude (4,) FRD → NED [w x y z] and thrust 0..1."""
+        return cls(ATTITUDE, quaternion, STILL, thrust)
+
+    @classmethod
+    def from_message(cls, m: Message) -> AttitudeTarget:
+        """Return the content of a SET_ATTITUDE_TARGET."""
+        rates = np.array([m.body_roll_rate, m.body_pitch_rate, m.body_yaw_rate])
+        return cls(m.type_mask, np.array(m.q, dtype=float), rates, m.thrust)
+
+    def message(self, time: float, system: int) -> Message:
+        """Return it as a message to the autopilot of the system id `system`; time [s]."""
+        return mavlink2.MAVLink_set_attitude_target_message(
+            round(time * 1e3) & 0xFFFFFFFF,
+            system,
+            mavlink2.MAV_COMP_ID_AUTOPILOT1,
+            self.type_mask,
+            self.quaternion.tolist(),
+            *self.rates.tolist(),
+            self.thrust,
+        )
+
+    @property
+    def body_rates(self) -> np.ndarray:
+        """Body rates (3,) [rad/s, FLU]; NaN where it has none."""
+        return swap_body(self.rates) if self.type_mask == RATES else NO_RATES
+
+    def refused(self) -> str:
+        """Return why no autopilot should fly it: the mask, or what is not finite; "" if nothing."""
+        if self.type_mask not in (RATES, ATTITUDE, ATTITUDE_AND_YAW_RATE):
+            return f"type_mask {self.type_mask}, allowed: {FLOWN}"
+        total = self.thrust + self.rates[0] + self.rates[1] + self.rates[2]
+        if self.type_mask != RATES:
+            q = self.quaternion
+            squared = q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3]
+            if squared == 0.0:
+                return "the attitude is no quaternion"
+            total += squared
+        return "" if math.isfinite(total) else "not finite"
