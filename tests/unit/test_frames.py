@@ -33,6 +33,8 @@ def test_known_vectors():
         ((0.0, 0.0, math.pi / 2), (0.0, 0.0, 0.0)),  # nose north
         ((0.1, 0.2, 0.0), (0.1, -0.2, math.pi / 2)),  # right side down; nose down is -pitch in FRD
         ((0.0, 0.0, math.pi), (0.0, 0.0, -math.pi / 2)),  # nose west
+        ((0.0, 0.0, -3.0), (0.0, 0.0, 3.0 - 1.5 * math.pi)),  # pi/2 + 3 is beyond pi
+        ((0.0, 0.0, -9.0), (0.0, 0.0, 9.0 - 3.5 * math.pi)),
     ],
 )
 def test_known_euler(enu, ned):

@@ -77,6 +77,16 @@ def test_slope_is_the_derivative(motor, model, command):
     assert thrust_slope(command, FULL, 1.0, motor, model) == pytest.approx(difference, rel=1e-4)
 
 
+def test_slope_by_hand():
+    # u = .4: s = .25*.16 + .75*.4 = .34; motor .5 + 2*.5*.4 = .9, model .75 + 2*.25*.4 = .95
+    assert thrust_slope(0.34, 40.0, 0.5, 0.5, 0.25) == pytest.approx(40.0 * 0.5 * 0.9 / 0.95)
+    # a slope of 0 counts as 0.001
+    assert thrust_slope(0.0, 40.0, 0.5, 1.0, 0.0) == pytest.approx(0.02)
+    assert thrust_slope(0.0, 40.0, 0.5, 0.0, 1.0) == pytest.approx(20_000.0)
+
+
 def test_outside_is_clamped():
+    assert [curve(0.3, u) for u in (-1.0, 2.0)] == [0.0, 1.0]
+    assert [inverse_curve(0.3, y) for y in (-1.0, 2.0)] == [0.0, 1.0]
     assert command_of_thrust(-5.0, FULL, 1.0, 0.3, 0.3) == 0.0
     assert command_of_thrust(100.0, FULL, 1.0, 0.3, 0.3) == pytest.approx(1.0)
