@@ -34,9 +34,14 @@ def main() -> int:
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
     parser.add_argument("modules", nargs="*", help="texts that paths must have (default: all)")
+    parser.add_argument("--list", action="store_true", help="print the listed survivors only")
     parser.add_argument("-j", type=int, default=2, help="processes (default %(default)s)")
     options = parser.parse_args()
     data = tomllib.loads((DATA / "modules.toml").read_text())
+    listed = tomllib.loads((DATA / "survivors.toml").read_text())
+    if options.list:
+        print(table.survivors_table(listed))
+        return 0
     modules = {
         path: tests
         for path, tests in data["modules"].items()
@@ -61,7 +66,6 @@ def main() -> int:
         jobs = ((one, path, one.source, tests, allowed[path]) for one in found[path])
         survivors[path] = [one for one, status, _ in judge.run(jobs, options.j) if status == 0]
         print(f"{path}: {len(survivors[path])} of {len(found[path])} left", file=sys.stderr)
-    listed = tomllib.loads((DATA / "survivors.toml").read_text())
     result = table.Result(found, survivors, listed, data["least_percent"])
     print(result.markdown())
     for line in result.complaints():

@@ -53,6 +53,16 @@ class Result:
         return sorted(self.survivors.get(path, []), key=lambda mutant: mutant.number)
 
 
+def survivors_table(listed: dict[str, list[dict[str, str]]]) -> str:
+    """The listed survivors, for the docs."""
+    lines = ["| module | line | as | why it survives |", "|---|---|---|---|"]
+    for path, entries in listed.items():
+        for one in entries:
+            cells = (f"`{one[name]}`".replace("|", "\\|") for name in ("line", "becomes"))
+            lines.append(f"| {' | '.join((path, *cells, one['reason']))} |")
+    return "\n".join(lines)
+
+
 def _row(name: str, total: int, left: int) -> str:
     percent = 100.0 * (total - left) / total if total else 100.0
     return f"| {name} | {total} | {total - left} | {left} | {percent:.1f} % |"
