@@ -65,7 +65,7 @@ def test_messages_that_do_not_come_fail():
     [
         ({}, "rmw_fastrtps_cpp", OK, "wheels"),
         ({"ROS_DISTRO": "humble"}, "rmw_fastrtps_cpp", WARN, "humble"),
-        ({"ROS_DISTRO": "jazzy"}, "rmw_fastrtps_cpp", WARN, "sourced beside it"),
+        ({"ROS_DISTRO": "jazzy"}, "rmw_fastrtps_cpp", WARN, "another installation is sourced"),
         ({}, "rmw_cyclonedds_cpp", WARN, "rmw_cyclonedds_cpp"),
     ],
 )

@@ -35,7 +35,7 @@ def test_with_the_users_own_middleware_ros_keeps_it_on_this_machine(
 
 def test_threads_of_another_middleware_are_not_known(monkeypatch):
     monkeypatch.setenv("RMW_IMPLEMENTATION", "rmw_cyclonedds_cpp")
-    assert "not those of rmw_cyclonedds_cpp" in node_environment.without_discovery()
+    assert "supports Fast DDS only, not rmw_cyclonedds_cpp" in node_environment.without_discovery()
     monkeypatch.delenv("RMW_IMPLEMENTATION")
     monkeypatch.setattr(node_environment.thread_stop, "refusal", lambda: "")
     assert node_environment.without_discovery() == ""
