@@ -11,7 +11,7 @@ import numpy as np
 
 from uam_control.control.limits import PositionLimits, TorqueLimits, limit_force, limit_torque
 from uam_control.control.thrust_direction import AttitudeReference
-from uam_control.coordinates import ARM, ATTITUDE, POSITION, SIZE
+from uam_control.coordinates import ALPHA, ARM, ATTITUDE, POSITION
 from uam_control.laws import catalogue
 from uam_control.laws.errors import tracking_errors
 from uam_control.laws.law_parameters import LawParameters
@@ -31,8 +31,7 @@ class Controller:
         self.names = self.law.names
         self.adaptation = self.law.adaptation[: len(self.names)]
         self.saturated = False
-        self._errors = np.zeros((3, SIZE))
-        self._own = tuple(self._errors[:, self.columns])
+        self._allocate((3, ALPHA))
         self._norms = np.zeros(3)
         self._printed = parameters.error_rate_form == "printed"
 
@@ -56,9 +55,14 @@ class Controller:
         """Put the adapted gains back to their initial values, in flight; nothing else changes."""
         self.law.reset_adaptation()
 
+    def _allocate(self, shape: tuple[int, int]) -> None:
+        """Make room for the errors of a state of this shape."""
+        self._errors = np.zeros(shape)
+        self._own = tuple(self._errors[:, self.columns])
+
     @property
     def errors(self) -> np.ndarray:
-        """Rows e, e_dot, chi_d_ddot (3, 8) of the last tick."""
+        """Rows e, e_dot, chi_d_ddot (3, 6 + n) of the last tick."""
         return self._errors
 
     def _law_output(
@@ -69,6 +73,8 @@ class Controller:
         flying: bool,
         dt: float,
     ) -> np.ndarray:
+        if state.shape != self._errors.shape:
+            self._allocate(state.shape)
         tracking_errors(
             state, reference, attitude_reference, flying, self._printed, self._errors, self._norms
         )
@@ -104,7 +110,7 @@ class PositionController(Controller):
     ) -> np.ndarray:
         """Return tau_p (3,) [N, world]; zero, and the law at its start, while not flying.
 
-        state, reference: (3, 8), see `coordinates`. ||xi|| uses the attitude asked for in the last
+        state, reference: (3, 6 + n), see `coordinates`. ||xi|| uses the attitude asked for in the last
         tick, as this tick's is only known afterwards. The array is reused by the next call.
         """
         if not flying:

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from uam_control.coordinates import ARM
+from uam_control.coordinates import ALPHA, ARM, CHI, CHI_DDOT, CHI_DOT, ROLL, X
 from uam_control.estimation.filters import derivative_step, joint_step, low_pass_step
 from uam_control.estimation.pose_filter import PoseFilter
 from uam_control.maths.compiled import jit
@@ -58,15 +58,16 @@ class StateEstimator:
     at the stamp of the newest IMU sample.
     """
 
-    def __init__(self, parameters: EstimatorParameters) -> None:
+    def __init__(self, parameters: EstimatorParameters, joints: int) -> None:
+        """joints: how many the arm has."""
         self.parameters = parameters
         self._pose = PoseFilter(
             parameters.position_bandwidth, parameters.attitude_bandwidth, parameters.pose_gate
         )
-        self._state = np.zeros((3, 8))
-        self._joints = np.zeros((2, 2))
+        self._state = np.zeros((3, ALPHA + joints))
+        self._joints = np.zeros((2, joints))
         self._rates_filter = np.zeros((2, 3))
-        self._joints_filter = np.zeros((2, 2))
+        self._joints_filter = np.zeros((2, joints))
         self._acceleration = np.zeros(3)
         self._imu_stamp: float | None = None
         self._joint_stamp: float | None = None
@@ -136,11 +137,11 @@ class StateEstimator:
             p.joint_acceleration_cutoff,
             dt,
             self._joints_filter,
-            self._state[2, ARM],
+            self._state[CHI_DDOT, ARM],
         )
 
     def update(self) -> np.ndarray:
-        """Return the state (3, 8) at the newest IMU stamp; the array is reused by the next call."""
+        """Return the state (3, 6 + n) at the newest IMU stamp; the array is reused by the next call."""
         p, pose, state = self.parameters, self._pose, self._state
         assemble(
             pose.position,
@@ -181,12 +182,12 @@ def assemble(
     filters, updated.
     """
     if period > 0.0:
-        derivative_step(rates, angular_cutoff, period, rates_filter, state[2, 3:6])
+        derivative_step(rates, angular_cutoff, period, rates_filter, state[CHI_DDOT, ROLL:ALPHA])
         low_pass_step(acceleration, linear_cutoff, period, filtered)
     euler = euler_from_quaternion(quaternion)
     for i in range(3):
-        state[0, i], state[0, 3 + i] = position[i], euler[i]
-        state[1, i], state[1, 3 + i] = velocity[i], rates[i]
-        state[2, i] = filtered[i]
+        state[CHI, X + i], state[CHI, ROLL + i] = position[i], euler[i]
+        state[CHI_DOT, X + i], state[CHI_DOT, ROLL + i] = velocity[i], rates[i]
+        state[CHI_DDOT, X + i] = filtered[i]
     for i in range(joints.shape[1]):
-        state[0, 6 + i], state[1, 6 + i] = joints[0, i], joints[1, i]
+        state[CHI, ALPHA + i], state[CHI_DOT, ALPHA + i] = joints[0, i], joints[1, i]

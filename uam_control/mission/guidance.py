@@ -11,7 +11,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from uam_control.coordinates import ARM, POSITION, SIZE, YAW
+from uam_control.coordinates import ARM, POSITION, YAW
 from uam_control.maths.rotations import wrap_angle
 from uam_control.mission.scenario import SINK
 from uam_control.mission.trajectory import Trajectory
@@ -117,7 +117,7 @@ class Guidance:
         self._trajectory, self._stowed = trajectory, np.array(stowed, dtype=float)
         self._clock = PathClock(stamp)
         self._rate, self._slope = 1.0, 0.0  # of the clock
-        self._path = np.zeros((3, SIZE))
+        self._path = np.zeros_like(reference)
         self._arm: Segment | None = None  # in place of the path's, while holding
         self._away: Segment | None = None  # offset from the path, after a drift
         self._go_on_at = math.inf  # stamp [s] at which the arm is back and the path continues
@@ -166,7 +166,7 @@ class Guidance:
         if self._away is not None:
             self._away.write(stamp, self._path)
             path[: ARM.start] -= self._path[0, : ARM.start]
-        offset = np.zeros((3, SIZE))
+        offset = np.zeros_like(self.reference)
         offset[0, POSITION] = state[0, POSITION] - path[POSITION]
         offset[0, YAW] = wrap_angle(state[0, YAW] - path[YAW])
         if not np.all(np.isfinite(offset)):
@@ -174,7 +174,7 @@ class Guidance:
         self.reference[0, : ARM.start] = path[: ARM.start] + offset[0, : ARM.start]
         p, way = self.parameters, float(np.linalg.norm(offset[0, POSITION]))
         length = max(p.stop_time, _PEAK * way / p.travel_speed)
-        self._away = Segment(stamp, offset, np.zeros(SIZE), np.full(SIZE, length))
+        self._away = Segment(stamp, offset, np.zeros_like(path), np.full_like(path, length))
 
     def stop(self, stamp: float, stow: bool) -> None:
         """Slow down to a stop on the path from `stamp` [s] on; stow: move the arm to `stowed`."""
@@ -219,7 +219,7 @@ class Guidance:
         p, now = self.parameters, self.reference
         speed = float(np.linalg.norm(now[1, POSITION]))
         length = max(p.stop_time, 2.0 * _RAMP * speed / p.stop_acceleration)
-        goal, lengths = now[0] + now[1] * length / 2, np.full(SIZE, length)
+        goal, lengths = now[0] + now[1] * length / 2, np.full_like(now[0], length)
         if stow:
             goal[ARM] = self._stowed
             lengths[ARM] = self._arm_length(self._stowed)
@@ -228,7 +228,7 @@ class Guidance:
     def _arm_segment(self, stamp: float, angles: np.ndarray) -> Segment:
         goal = self.reference[0].copy()
         goal[ARM] = angles
-        return Segment(stamp, self.reference, goal, np.full(SIZE, self._arm_length(angles)))
+        return Segment(stamp, self.reference, goal, np.full_like(goal, self._arm_length(angles)))
 
     def _arm_length(self, angles: np.ndarray) -> float:
         """Return the time [s] for the arm to reach `angles` [rad] within stow_rate."""

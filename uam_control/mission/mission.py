@@ -56,7 +56,7 @@ class Mission:
 
     def __init__(self, scenario: Scenario, parameters: MissionParameters) -> None:
         self.scenario = scenario
-        self.output = MissionOutput(empty_reference())
+        self.output = MissionOutput(empty_reference(len(scenario.arm_start)))
         self.output.reference[0, ARM] = scenario.arm_start
         self._supervisor = Supervisor(parameters)
         self._parameters = parameters

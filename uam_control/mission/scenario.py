@@ -10,14 +10,12 @@ from typing import Any
 
 import numpy as np
 
-from uam_control.coordinates import ARM, COORDINATES
+from uam_control.coordinates import ARM, CHI, CHI_DDOT, CHI_DOT, POSITION, YAW, arm_coordinates, coordinates
 from uam_control.mission.trajectory import Chain, Move, Moves, Sampled, Trajectory
 from uam_control.settings import configuration, yaml_file
+from uam_control.vehicle import VehicleDescription, load_description
 
-ANGLES = COORDINATES[3:]
 CSV_REQUIRED = ("t", "px", "py", "pz", "yaw", "vx", "vy", "vz", "ax", "ay", "az", "dyaw")
-CSV_OPTIONAL = ("alpha_1", "alpha_2")
-JOINT_LIMIT = math.radians(110.0)
 
 
 class ScenarioError(ValueError):
@@ -42,7 +40,7 @@ class Scenario:
 
     name: str
     description: str
-    arm_start: tuple[float, float]
+    arm_start: tuple[float, ...]
     phases: tuple[tuple[float, str], ...]
     landing: Landing
     moves: tuple[Move, ...] = ()
@@ -62,7 +60,7 @@ class Scenario:
             return Moves(start, [*self.moves, down])
         climb = [
             Move(name, 0.0, self.samples_start, value)
-            for name, value in zip(COORDINATES, self.samples.first, strict=True)
+            for name, value in zip(coordinates(len(self.arm_start)), self.samples.first, strict=True)
         ]
         return Chain(
             [
@@ -89,30 +87,33 @@ class Scenario:
 SINK = 0.03  # m, depth of the landing reference below the ground, for a firm contact
 
 
-def load_scenario(name_or_file: str) -> Scenario:
-    """Return a scenario by its name in config/scenarios, or of a .yaml or .csv file.
+def load_scenario(name_or_file: str, vehicle: VehicleDescription | None = None) -> Scenario:
+    """Return a scenario by name, or from a .yaml or .csv file; raises ScenarioError.
 
-    Raises ScenarioError.
+    vehicle: that it is for, None for the default one.
     """
+    vehicle = vehicle or load_description()
     file = Path(name_or_file)
     if file.suffix not in (".yaml", ".csv"):
         try:
-            file = configuration.path(f"scenarios/{name_or_file}.yaml")
+            file = configuration.named("scenarios", name_or_file)
         except configuration.ConfigurationError as error:
             raise ScenarioError(str(error)) from None
     try:
-        return from_csv(file) if file.suffix == ".csv" else from_yaml(file)
+        return from_csv(file, vehicle) if file.suffix == ".csv" else from_yaml(file, vehicle)
     except OSError as error:
         raise ScenarioError(f"{file}: {error.strerror}") from None
 
 
-def from_yaml(file: Path) -> Scenario:
-    """Return the scenario of a YAML file; form: config/scenarios/pick_and_place.yaml."""
+def from_yaml(file: Path, vehicle: VehicleDescription) -> Scenario:
+    """Read a scenario file; see config/scenarios/pick_and_place.yaml for the form.
+
+    Without arm_start the arm begins stowed.
+    """
     document = yaml_file.read(file, ScenarioError)
     if not isinstance(document, dict):
         raise ScenarioError(f"{file}: a mapping expected, see scenarios/pick_and_place.yaml")
-    reader = Reader(str(file))
-    arm = reader.mapping(document, "arm_start")
+    reader = Reader(str(file), vehicle)
     landing = reader.mapping(document, "landing")
     moves = [reader.move(entry, i) for i, entry in enumerate(document.get("moves") or [])]
     reader.no_overlap(moves)
@@ -129,10 +130,7 @@ def from_yaml(file: Path) -> Scenario:
     return Scenario(
         name=file.stem,
         description=str(document.get("description", "")),
-        arm_start=(
-            math.radians(reader.number(arm, "alpha_1_deg", "arm_start")),
-            math.radians(reader.number(arm, "alpha_2_deg", "arm_start")),
-        ),
+        arm_start=reader.arm_start(document),
         phases=phases,
         landing=Landing(
             reader.number(landing, "at", "landing"), reader.number(landing, "duration", "landing")
@@ -152,8 +150,36 @@ def from_yaml(file: Path) -> Scenario:
 class Reader:
     """Reads entries of a scenario file; its errors name file and entry."""
 
-    def __init__(self, where: str) -> None:
-        self.where = where
+    def __init__(self, where: str, vehicle: VehicleDescription) -> None:
+        self.where, self.vehicle = where, vehicle
+        self.joints = dict(zip(arm_coordinates(len(vehicle.joints)), vehicle.joints, strict=True))
+
+    def arm_start(self, document: dict) -> tuple[float, ...]:
+        """Return the joint angles [rad] on the ground: `arm_start`, or stowed."""
+        if "arm_start" not in document:
+            return self.vehicle.stowed
+        arm = self.mapping(document, "arm_start")
+        expected = [f"{name}_deg" for name in self.joints]
+        strange = [name for name in arm if name not in expected]
+        if strange:
+            raise ScenarioError(
+                f"{self.where}: 'arm_start.{strange[0]}': {self.vehicle.name} has: "
+                + ", ".join(expected)
+            )
+        return tuple(
+            self.angle(name, self.number(arm, f"{name}_deg", "arm_start"), f"arm_start.{name}_deg")
+            for name in self.joints
+        )
+
+    def angle(self, coordinate: str, degrees: float, owner: str) -> float:
+        """Return an angle [rad]; a joint's must be within its range."""
+        angle, joint = math.radians(degrees), self.joints.get(coordinate)
+        if joint is not None and not joint.low <= angle <= joint.high:
+            raise ScenarioError(
+                f"{self.where}: '{owner}' is {degrees:g}, {self.vehicle.name} allows "
+                f"{math.degrees(joint.low):g} to {math.degrees(joint.high):g}"
+            )
+        return angle
 
     def mapping(self, document: dict, key: str) -> dict:
         """Return a required mapping."""
@@ -193,18 +219,20 @@ class Reader:
         """Return an entry of `moves`; angles are in degrees; roll and pitch are not allowed."""
         owner = f"moves[{index}]"
         coordinate = entry.get("coordinate") if isinstance(entry, dict) else None
-        allowed = [c for c in COORDINATES if c not in ("roll", "pitch")]
+        allowed = [c for c in self.vehicle.coordinates if c not in ("roll", "pitch")]
         if coordinate not in allowed:
             raise ScenarioError(
                 f"{self.where}: '{owner}.coordinate' is {coordinate!r}, "
                 f"allowed: {', '.join(allowed)}"
             )
-        angle = coordinate in ANGLES
+        angle = coordinate not in ("x", "y", "z")
         target = self.number(entry, "to_deg" if angle else "to", owner)
         start, end = self.number(entry, "from", owner), self.number(entry, "until", owner)
         if end <= start:
             raise ScenarioError(f"{self.where}: '{owner}' ends at {end} s, before it begins")
-        return Move(coordinate, start, end, math.radians(target) if angle else target)
+        if angle:
+            target = self.angle(coordinate, target, f"{owner}.to_deg")
+        return Move(coordinate, start, end, target)
 
     def no_overlap(self, moves: list[Move]) -> None:
         """Raise ScenarioError if two moves of one coordinate overlap in time."""
@@ -218,8 +246,10 @@ class Reader:
             last[move.coordinate] = move
 
 
-def from_csv(file: Path, takeoff: float = 3.0, landing: float = 5.0) -> Scenario:
-    """Return the scenario of a CSV trajectory: columns CSV_REQUIRED and CSV_OPTIONAL (SI, ENU).
+def from_csv(
+    file: Path, vehicle: VehicleDescription, takeoff: float = 3.0, landing: float = 5.0
+) -> Scenario:
+    """Read a trajectory with the columns of CSV_REQUIRED (SI, ENU) and optionally alpha_1..n.
 
     A take-off of `takeoff` [s] to the first point precedes it, a landing of `landing` [s] below the
     last point follows. Raises ScenarioError with line and column.
@@ -234,17 +264,15 @@ def from_csv(file: Path, takeoff: float = 3.0, landing: float = 5.0) -> Scenario
                 f"{file} line 1: column {', '.join(missing)} is missing; needed: "
                 f"{','.join(CSV_REQUIRED)}"
             )
-        optional = [name for name in CSV_OPTIONAL if name in columns]
-        if len(optional) == 1:
-            raise ScenarioError(
-                f"{file} line 1: {optional[0]} without its twin; the arm has two "
-                "joints: alpha_1,alpha_2"
-            )
-        unknown = [c for c in columns if c.startswith("alpha") and c not in CSV_OPTIONAL]
-        if unknown:
-            raise ScenarioError(
-                f"{file} line 1: column {unknown[0]}: the arm has two joints: alpha_1,alpha_2"
-            )
+        joints = arm_coordinates(len(vehicle.joints))
+        optional = [name for name in joints if name in columns]
+        needed = f"{vehicle.name} has: {','.join(joints)}"
+        if optional and len(optional) < len(joints):
+            lacking = next(name for name in joints if name not in columns)
+            raise ScenarioError(f"{file} line 1: {optional[0]} without {lacking}; {needed}")
+        strange = [c for c in columns if c.startswith("alpha") and c not in joints]
+        if strange:
+            raise ScenarioError(f"{file} line 1: column {strange[0]}; {needed}")
         table = np.array(
             [
                 _csv_row(file, line, row, (*CSV_REQUIRED, *optional))
@@ -261,20 +289,18 @@ def from_csv(file: Path, takeoff: float = 3.0, landing: float = 5.0) -> Scenario
     if np.any(table[:, 3] <= 0.0):
         line = int(np.argmax(table[:, 3] <= 0.0)) + 2
         raise ScenarioError(f"{file} line {line} column pz: below the ground")
-    samples = np.zeros((len(table), 3, 8))
+    samples = np.zeros((len(table), 3, len(vehicle.coordinates)))
     for row, first in enumerate((1, 5, 8)):
-        samples[:, row, 0:3] = table[:, first : first + 3]
-    samples[:, 0, 5] = table[:, 4]
-    samples[:, 1, 5] = table[:, 11]
-    samples[:, 2, 5] = np.gradient(table[:, 11], times)
-    arm_start = (0.0, math.pi / 2.0)
-    samples[:, 0, ARM] = arm_start
+        samples[:, row, POSITION] = table[:, first : first + 3]
+    samples[:, CHI, YAW] = table[:, 4]
+    samples[:, CHI_DOT, YAW] = table[:, 11]
+    samples[:, CHI_DDOT, YAW] = np.gradient(table[:, 11], times)
+    arm_start = vehicle.stowed
+    samples[:, CHI, ARM] = arm_start
     if optional:
-        samples[:, 0, ARM] = table[:, 12:14]
-        if np.any(np.abs(table[:, 12:14]) > JOINT_LIMIT):
-            line = int(np.argmax(np.any(np.abs(table[:, 12:14]) > JOINT_LIMIT, axis=1))) + 2
-            raise ScenarioError(f"{file} line {line}: joint angle beyond ±{JOINT_LIMIT:.2f} rad")
-        for row in (1, 2):
+        samples[:, CHI, ARM] = table[:, len(CSV_REQUIRED) :]
+        _check_angles(file, samples[:, CHI, ARM], vehicle)
+        for row in (CHI_DOT, CHI_DDOT):
             samples[:, row, ARM] = np.gradient(samples[:, row - 1, ARM], times, axis=0)
     end = takeoff + float(times[-1] - times[0])
     return Scenario(
@@ -286,6 +312,19 @@ def from_csv(file: Path, takeoff: float = 3.0, landing: float = 5.0) -> Scenario
         samples=Sampled(times - times[0], samples),
         samples_start=takeoff,
     )
+
+
+def _check_angles(file: Path, angles: np.ndarray, vehicle: VehicleDescription) -> None:
+    """Raise ScenarioError for the first of angles (rows, n) [rad] out of its joint's range."""
+    low = np.array([joint.low for joint in vehicle.joints])
+    high = np.array([joint.high for joint in vehicle.joints])
+    beyond = np.argwhere((angles < low) | (angles > high))
+    if len(beyond):
+        row, i = beyond[0]
+        raise ScenarioError(
+            f"{file} line {row + 2} column alpha_{i + 1}: joint angle beyond its range, "
+            f"{low[i]:.2f} to {high[i]:.2f} rad"
+        )
 
 
 def _csv_row(file: Path, line: int, row: dict, names: tuple[str, ...]) -> list[float]:

@@ -7,7 +7,7 @@ from typing import Protocol
 
 import numpy as np
 
-from uam_control.coordinates import COORDINATES, SIZE
+from uam_control.coordinates import ALPHA, coordinates
 from uam_control.maths.compiled import jit
 
 
@@ -34,12 +34,13 @@ class Moves:
     def __init__(self, start: np.ndarray, moves: list[Move]) -> None:
         """start: chi (6 + n,) at mission time 0; moves of one coordinate must not overlap."""
         self._start = np.array(start, dtype=float)
-        value = dict(zip(COORDINATES, self._start, strict=True))
+        names = coordinates(len(self._start) - ALPHA)
+        value = dict(zip(names, self._start, strict=True))
         rows = []
         for move in sorted(moves, key=lambda m: m.start):
             rows.append(
                 (
-                    COORDINATES.index(move.coordinate),
+                    names.index(move.coordinate),
                     move.start,
                     move.end,
                     value[move.coordinate],
@@ -137,6 +138,6 @@ class Chain:
         part.write(time - start, reference)
 
 
-def empty_reference() -> np.ndarray:
-    """Return a reference (3, 8) of zeros."""
-    return np.zeros((3, SIZE))
+def empty_reference(joints: int) -> np.ndarray:
+    """Return a reference (3, 6 + joints) of zeros."""
+    return np.zeros((3, ALPHA + joints))

@@ -15,7 +15,7 @@ from __future__ import annotations
 import json
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
-from functools import cached_property
+from functools import cache, cached_property
 from pathlib import Path
 from typing import Any
 
@@ -23,14 +23,13 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 
-from uam_control.coordinates import COORDINATES as NAMES
-from uam_control.coordinates import POSITION, SIZE
+from uam_control.coordinates import ALPHA, POSITION, ROLL, coordinates
 from uam_control.laws import catalogue
 from uam_control.maths.rotations import wrap_angle
+from uam_control.vehicle import VehicleDescription
 from uam_lab.results.atomic import replacing
 
-UNITS = {name: "m" if name in NAMES[POSITION] else "rad" for name in NAMES}
-ANGLES = slice(3, 8)
+ANGLES = slice(ROLL, None)  # of chi
 SUBSYSTEMS = ("position", "attitude", "arm")
 AXES = 3  # the largest number of axes of a subsystem
 # Phases of the mission node on the ground; the scenario names those in flight.
@@ -39,25 +38,27 @@ PHASE_COLUMN = "phase"
 METADATA_KEY = b"uam"
 
 
-def _declare() -> dict[str, str]:
+def _declare(joints: int, rotors: int) -> dict[str, str]:
     """Return all numeric columns in file order: name → unit."""
+    names = coordinates(joints)
+    units = {name: "m" if name in names[POSITION] else "rad" for name in names}
     columns = {"time": "s"}
     for group in ("truth", "estimate", "reference"):
         for suffix, per in (("", ""), ("_dot", "/s"), ("_ddot", "/s^2")):
-            columns |= {f"{group}.{c}{suffix}": unit + per for c, unit in UNITS.items()}
-    columns |= {f"error.{c}": unit for c, unit in UNITS.items()}
+            columns |= {f"{group}.{c}{suffix}": unit + per for c, unit in units.items()}
+    columns |= {f"error.{c}": unit for c, unit in units.items()}
     columns |= {f"tau_p.{axis}": "N" for axis in "xyz"}
     columns |= {f"tau_q.{axis}": "N m" for axis in ("roll", "pitch", "yaw")}
-    columns |= {f"tau_alpha.{joint}": "N m" for joint in "12"}
+    columns |= {f"tau_alpha.{joint}": "N m" for joint in range(1, joints + 1)}
     columns |= {f"setpoint.rate_{axis}": "rad/s" for axis in "xyz"} | {"setpoint.thrust": "1"}
     columns |= {"thrust.factor": "1"}  # true / assumed, identified and applied
     # The gains of every law, NaN for those that did not fly. Their units differ with subsystem and
     # power of ||xi||; rho and zeta are those of tau before the multiplication by Mbar, so a unit
     # per column would mislead.
-    gains = catalogue.gain_names(AXES)
+    gains = catalogue.gain_names(max(AXES, joints))
     columns |= {f"adaptation.{s}.{gain}": "1" for s in SUBSYSTEMS for gain in gains}
-    columns |= {f"rotor_{i}.command": "1" for i in range(1, 5)}
-    columns |= {f"rotor_{i}.thrust": "N" for i in range(1, 5)}
+    columns |= {f"rotor_{i}.command": "1" for i in range(1, rotors + 1)}
+    columns |= {f"rotor_{i}.thrust": "N" for i in range(1, rotors + 1)}
     columns |= {f"payload.{axis}": "m" for axis in "xyz"}
     columns |= {f"payload.q{axis}": "1" for axis in "wxyz"}
     columns |= {"magnet.on": "1", "magnet.force": "N", "magnet.swing": "rad"}
@@ -71,6 +72,22 @@ class Columns:
         self.units = dict(units)
         self.names = tuple(units)
         self._number = {name: i for i, name in enumerate(self.names)}
+
+    @cached_property
+    def size(self) -> int:
+        """Number of entries of chi."""
+        errors = self.block("error.")
+        return errors.stop - errors.start
+
+    @property
+    def joints(self) -> int:
+        """Number of joints of the arm."""
+        return self.size - ALPHA
+
+    @cached_property
+    def rotors(self) -> int:
+        """Number of rotors."""
+        return sum(name.startswith("rotor_") and name.endswith(".thrust") for name in self.names)
 
     def __len__(self) -> int:
         return len(self.names)
@@ -96,12 +113,23 @@ class Columns:
         return f"{name} [{self.units[name]}]"
 
 
-COLUMNS = Columns(_declare())
+@cache
+def columns(joints: int, rotors: int) -> Columns:
+    """Return the columns of a vehicle with so many joints and rotors."""
+    return Columns(_declare(joints, rotors))
 
 
-def gain_columns(subsystem: str, names: Iterable[str]) -> np.ndarray:
-    """Return the column numbers (n,) of a subsystem's gains `names`."""
-    return np.array([COLUMNS[f"adaptation.{subsystem}.{name}"] for name in names], dtype=int)
+def columns_of(vehicle: VehicleDescription) -> Columns:
+    """Return the columns of a vehicle."""
+    return columns(len(vehicle.joints), len(vehicle.rotors))
+
+
+COLUMNS = columns(2, 4)
+
+
+def gain_columns(subsystem: str, names: Iterable[str], found: Columns = COLUMNS) -> np.ndarray:
+    """Return the column numbers (n,) of a subsystem's gains `names` among the columns `found`."""
+    return np.array([found[f"adaptation.{subsystem}.{name}"] for name in names], dtype=int)
 
 
 class UnreadableFlight(ValueError):
@@ -111,8 +139,9 @@ class UnreadableFlight(ValueError):
 class FlightTable:
     """Preallocated table for recording a flight; unwritten entries are NaN."""
 
-    def __init__(self, capacity: int):
-        self.values = np.full((capacity, len(COLUMNS)), np.nan)
+    def __init__(self, capacity: int, columns: Columns = COLUMNS):
+        self.columns = columns
+        self.values = np.full((capacity, len(columns)), np.nan)
         self.phases = np.zeros(capacity, dtype=np.int8)
         self.phase_names: dict[str, int] = {}
         self.count = 0
@@ -128,14 +157,14 @@ class FlightTable:
 
     def series(self, info: Mapping[str, Any] | None = None) -> Series:
         """Return the recorded rows, with error columns and countdown computed."""
-        values = self.values[: self.count]
-        count_down(values[:, COLUMNS["time"]])
-        truth, reference = (values[:, COLUMNS.block(group)] for group in ("truth.", "reference."))
-        error = truth[:, :SIZE] - reference[:, :SIZE]
+        values, columns = self.values[: self.count], self.columns
+        count_down(values[:, columns["time"]])
+        truth, reference = (values[:, columns.block(group)] for group in ("truth.", "reference."))
+        error = truth[:, : columns.size] - reference[:, : columns.size]
         error[:, ANGLES] = wrap_angle(error[:, ANGLES])
-        values[:, COLUMNS.block("error.")] = error
+        values[:, columns.block("error.")] = error
         names = tuple(self.phase_names)
-        return Series(values, self.phases[: self.count], names, dict(info or {}))
+        return Series(values, self.phases[: self.count], names, dict(info or {}), columns)
 
 
 def count_down(time: np.ndarray) -> None:
@@ -156,17 +185,18 @@ class Series:
     phases: np.ndarray
     phase_names: tuple[str, ...]
     info: dict[str, Any] = field(default_factory=dict)
+    columns: Columns = COLUMNS
 
     def __getitem__(self, name: str) -> np.ndarray:
         """Column (ticks,) by its name without unit."""
-        return self.values[:, COLUMNS[name]]
+        return self.values[:, self.columns[name]]
 
     def __len__(self) -> int:
         return len(self.values)
 
     def block(self, prefix: str) -> np.ndarray:
         """Columns (ticks, n) whose names start with `prefix`."""
-        return self.values[:, COLUMNS.block(prefix)]
+        return self.values[:, self.columns.block(prefix)]
 
     @cached_property
     def time(self) -> np.ndarray:
@@ -220,7 +250,7 @@ class Series:
             pa.array(self.phases, pa.int8()), pa.array(self.phase_names, pa.string())
         )
         arrays = [pa.array(np.ascontiguousarray(column)) for column in self.values.T]
-        labels = [COLUMNS.label(name) for name in COLUMNS.names]
+        labels = [self.columns.label(name) for name in self.columns.names]
         table = pa.table([arrays[0], phase, *arrays[1:]], [labels[0], PHASE_COLUMN, *labels[1:]])
         return table.replace_schema_metadata(
             {METADATA_KEY: json.dumps(self.info, sort_keys=True, default=str).encode()}
@@ -242,22 +272,30 @@ def read(path: Path) -> Series:
     except (OSError, pa.ArrowException) as error:
         reason = str(error).splitlines()[0]
         raise UnreadableFlight(f"{path}: not a readable flight ({reason})") from None
-    missing = _missing(table.column_names)
+    found = _layout(table.column_names)
+    missing = _missing(table.column_names, found)
     if missing:
         more = f" and {len(missing) - 1} more" if len(missing) > 1 else ""
         raise UnreadableFlight(f"{path}: column {missing[0]!r}{more} missing")
-    values = np.column_stack([table[COLUMNS.label(name)].to_numpy() for name in COLUMNS.names])
+    values = np.column_stack([table[found.label(name)].to_numpy() for name in found.names])
     phase = table[PHASE_COLUMN].combine_chunks().dictionary_encode()
     if isinstance(phase, pa.ChunkedArray):
         phase = phase.combine_chunks()
     codes = phase.indices.to_numpy().astype(np.int8)
     names = tuple(phase.dictionary.to_pylist())
     info = json.loads((table.schema.metadata or {}).get(METADATA_KEY, b"{}"))
-    return Series(values, codes, names, info)
+    return Series(values, codes, names, info, found)
 
 
-def _missing(present: Iterable[str]) -> list[str]:
+def _layout(present: Iterable[str]) -> Columns:
+    """Return the columns of a file whose columns are called `present`."""
+    joints = sum(label.startswith("error.alpha_") for label in present)
+    rotors = sum(label.startswith("rotor_") and ".thrust" in label for label in present)
+    return columns(joints, rotors)
+
+
+def _missing(present: Iterable[str], columns: Columns) -> list[str]:
     """Return the labels of the required columns that are not in `present`."""
     present = set(present)
-    required = [COLUMNS.label(name) for name in COLUMNS.names] + [PHASE_COLUMN]
+    required = [columns.label(name) for name in columns.names] + [PHASE_COLUMN]
     return [label for label in required if label not in present]

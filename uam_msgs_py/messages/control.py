@@ -5,10 +5,19 @@ position and attitude commands are idle messages, with a stamp but without value
 """
 
 from dataclasses import dataclass
+from functools import cache
 
 import numpy as np
 
-from uam_control.coordinates import ARM, ATTITUDE, COORDINATES, JOINTS, POSITION, SIZE
+from uam_control.coordinates import (
+    ALPHA,
+    ARM,
+    ATTITUDE,
+    BASE_COORDINATES,
+    POSITION,
+    arm_coordinates,
+    coordinates,
+)
 from uam_msgs_py.messages.layouts import BadMessage
 from uam_msgs_py.messages.trajectories import (
     IdleWriter,
@@ -17,20 +26,30 @@ from uam_msgs_py.messages.trajectories import (
     trajectory,
 )
 
-ALL = list(COORDINATES)
-ARM_NAMES = list(JOINTS)
-POSE_NAMES = list(COORDINATES[:6])
-ATTITUDE_NAMES = list(COORDINATES[ATTITUDE])
+POSE_NAMES = list(BASE_COORDINATES)
+ATTITUDE_NAMES = list(BASE_COORDINATES[ATTITUDE])
+ALONE = list(arm_coordinates(1))  # how the names begin where the arm is alone
 ROWS = TrajectoryWriter.ROWS[:3]
-WHOLE, ARM_ALONE = TrajectoryReader(ALL), TrajectoryReader(ARM_NAMES)
 POSE = TrajectoryReader(POSE_NAMES, TrajectoryWriter.ROWS)
 TAU_Q = TrajectoryReader(ATTITUDE_NAMES, ["effort"])
+
+
+@cache
+def whole(joints: int) -> TrajectoryReader:
+    """Return the reader of all coordinates of a vehicle with so many joints."""
+    return TrajectoryReader(coordinates(joints))
+
+
+@cache
+def arm_alone(joints: int) -> TrajectoryReader:
+    """Return the reader of the coordinates of an arm with so many joints."""
+    return TrajectoryReader(arm_coordinates(joints))
 
 
 def read_state(data: bytes) -> tuple[int, np.ndarray]:
     """Return (stamp [ns], chi, chi_dot, chi_ddot (3, 6 + n)); raises BadMessage."""
     message = trajectory(data)
-    return message.stamp, WHOLE.read(message)
+    return message.stamp, whole(len(message.layout.names) - ALPHA).read(message)
 
 
 @dataclass(frozen=True)
@@ -44,8 +63,10 @@ class Reference:
 class ReferenceWriter:
     """Writes references of all coordinates or, on the ground, of the arm only."""
 
-    def __init__(self):
-        self._whole, self._arm = TrajectoryWriter(ALL), TrajectoryWriter(ARM_NAMES)
+    def __init__(self, joints: int):
+        """joints: how many the arm has."""
+        self._whole = TrajectoryWriter(coordinates(joints))
+        self._arm = TrajectoryWriter(arm_coordinates(joints))
 
     def fill(self, stamp: int, reference: np.ndarray, flying: bool, mission_time: int) -> bytes:
         """Return the message; stamp [ns], reference (3, 6 + n), mission_time [ns], at least 0."""
@@ -57,10 +78,11 @@ class ReferenceWriter:
 def read_reference(data: bytes) -> tuple[int, Reference]:
     """Return (stamp [ns], reference); raises BadMessage."""
     message = trajectory(data)
-    if message.layout.names != ARM_NAMES:
-        return message.stamp, Reference(WHOLE.read(message), True)
-    values = np.zeros((3, SIZE))
-    values[:, ARM] = ARM_ALONE.read(message)
+    names = message.layout.names
+    if names[:1] != ALONE:
+        return message.stamp, Reference(whole(len(names) - ALPHA).read(message), True)
+    values = np.zeros((3, ALPHA + len(names)))
+    values[:, ARM] = arm_alone(len(names)).read(message)
     return message.stamp, Reference(values, False)
 
 
