@@ -32,8 +32,3 @@ def arm_coordinates(joints: int) -> tuple[str, ...]:
 def coordinates(joints: int) -> tuple[str, ...]:
     """Names of the entries of chi for an arm of `joints` joints."""
     return (*BASE_COORDINATES, *arm_coordinates(joints))
-
-
-COORDINATES = coordinates(2)
-SIZE = len(COORDINATES)
-JOINTS = COORDINATES[ARM]

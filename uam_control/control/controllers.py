@@ -110,8 +110,8 @@ class PositionController(Controller):
     ) -> np.ndarray:
         """Return tau_p (3,) [N, world]; zero, and the law at its start, while not flying.
 
-        state, reference: (3, 6 + n), see `coordinates`. ||xi|| uses the attitude asked for in the last
-        tick, as this tick's is only known afterwards. The array is reused by the next call.
+        state, reference: (3, 6 + n), see `coordinates`. ||xi|| uses the desired attitude of the
+        last tick, as this tick's is only known afterwards. The array is reused by the next call.
         """
         if not flying:
             self._idle()

@@ -141,7 +141,7 @@ class StateEstimator:
         )
 
     def update(self) -> np.ndarray:
-        """Return the state (3, 6 + n) at the newest IMU stamp; the array is reused by the next call."""
+        """Return the state (3, 6 + n) at the newest IMU stamp; the next call reuses the array."""
         p, pose, state = self.parameters, self._pose, self._state
         assemble(
             pose.position,

@@ -11,7 +11,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from uam_control.coordinates import ARM, POSITION, YAW
+from uam_control.coordinates import ALPHA, ARM, POSITION, YAW
 from uam_control.maths.rotations import wrap_angle
 from uam_control.mission.scenario import SINK
 from uam_control.mission.trajectory import Trajectory
@@ -152,7 +152,7 @@ class Guidance:
             self.reference[:, ARM] = self._path[:, ARM]
         if self._away is not None:
             self._away.write(stamp, self._path)
-            self.reference[:, : ARM.start] += self._path[:, : ARM.start]
+            self.reference[:, :ALPHA] += self._path[:, :ALPHA]
             if stamp >= self._away.end:
                 self._away = None
 
@@ -165,13 +165,13 @@ class Guidance:
         path = self.reference[0].copy()
         if self._away is not None:
             self._away.write(stamp, self._path)
-            path[: ARM.start] -= self._path[0, : ARM.start]
+            path[:ALPHA] -= self._path[0, :ALPHA]
         offset = np.zeros_like(self.reference)
         offset[0, POSITION] = state[0, POSITION] - path[POSITION]
         offset[0, YAW] = wrap_angle(state[0, YAW] - path[YAW])
         if not np.all(np.isfinite(offset)):
             return
-        self.reference[0, : ARM.start] = path[: ARM.start] + offset[0, : ARM.start]
+        self.reference[0, :ALPHA] = path[:ALPHA] + offset[0, :ALPHA]
         p, way = self.parameters, float(np.linalg.norm(offset[0, POSITION]))
         length = max(p.stop_time, _PEAK * way / p.travel_speed)
         self._away = Segment(stamp, offset, np.zeros_like(path), np.full_like(path, length))

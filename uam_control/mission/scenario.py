@@ -10,7 +10,16 @@ from typing import Any
 
 import numpy as np
 
-from uam_control.coordinates import ARM, CHI, CHI_DDOT, CHI_DOT, POSITION, YAW, arm_coordinates, coordinates
+from uam_control.coordinates import (
+    ARM,
+    CHI,
+    CHI_DDOT,
+    CHI_DOT,
+    POSITION,
+    YAW,
+    arm_coordinates,
+    coordinates,
+)
 from uam_control.mission.trajectory import Chain, Move, Moves, Sampled, Trajectory
 from uam_control.settings import configuration, yaml_file
 from uam_control.vehicle import VehicleDescription, load_description
@@ -60,7 +69,9 @@ class Scenario:
             return Moves(start, [*self.moves, down])
         climb = [
             Move(name, 0.0, self.samples_start, value)
-            for name, value in zip(coordinates(len(self.arm_start)), self.samples.first, strict=True)
+            for name, value in zip(
+                coordinates(len(self.arm_start)), self.samples.first, strict=True
+            )
         ]
         return Chain(
             [

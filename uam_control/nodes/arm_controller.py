@@ -3,10 +3,11 @@
 import numpy as np
 
 from uam_control.control.controllers import ArmController
+from uam_control.coordinates import ARM
 from uam_control.nodes.controller_node import ControllerNode
 from uam_control.stages.law_stages import TorqueStage
 from uam_msgs_py.messages import topics
-from uam_msgs_py.messages.control import ARM_NAMES, PositionCommand, Reference, TorqueWriter
+from uam_msgs_py.messages.control import PositionCommand, Reference, TorqueWriter
 from uam_msgs_py.messages.convert import EffortWriter
 from uam_msgs_py.node.base_node import run
 
@@ -27,10 +28,11 @@ class ArmControllerNode(ControllerNode):
             [topics.STATE, topics.REFERENCE, topics.POSITION_COMMAND],
             topics.ARM_ADAPTATION,
         )
+        names = list(self.vehicle.coordinates[ARM])
         self._effort = self.publisher(topics.ARM_EFFORT)
         self._command = self.publisher(topics.ARM_COMMAND)
-        self._effort_writer = EffortWriter(len(ARM_NAMES))
-        self._writer = TorqueWriter(ARM_NAMES)
+        self._effort_writer = EffortWriter(len(names))
+        self._writer = TorqueWriter(names)
 
     def tick(
         self,

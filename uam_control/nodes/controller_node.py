@@ -7,7 +7,6 @@ from rclpy.parameter import Parameter
 from std_srvs.srv import SetBool, Trigger
 
 from uam_control.control.controllers import Controller
-from uam_control.coordinates import SIZE
 from uam_control.laws import catalogue
 from uam_control.nodes.described import described_vehicle
 from uam_control.profiles.profile import default_profile, parameter_set
@@ -87,7 +86,7 @@ class ControllerNode(UamNode):
 
     def _warm_up(self, spare: LawStage) -> None:
         """Compile the law on a stage that never flies: the first call takes a second."""
-        nothing, attitude = np.zeros((3, SIZE)), np.zeros((3, 3))
+        nothing, attitude = np.zeros((3, len(self.vehicle.coordinates))), np.zeros((3, 3))
         reference = (nothing,) if isinstance(spare, PositionStage) else (nothing, attitude)
         for flying in (False, True):
             spare.update(0, nothing, *reference, flying)

@@ -7,7 +7,7 @@ from diagnostic_msgs.msg import DiagnosticArray
 from rcl_interfaces.msg import ParameterDescriptor
 from std_msgs.msg import Bool
 
-from uam_control.coordinates import ARM, ATTITUDE, POSITION, SIZE
+from uam_control.coordinates import ARM, ATTITUDE, POSITION
 from uam_control.laws.catalogue import DEFAULT
 from uam_control.maths.rotations import wrap_angle
 from uam_control.mission import Mission, MissionOutput, MissionParameters, load_scenario
@@ -50,7 +50,7 @@ class MissionNode(UamNode):
             description="name of a scenario, or its file; fixed once the node runs", read_only=True
         )
         scenario = self.declare_parameter("scenario", DEFAULT_SCENARIO, about).value
-        self._mission = Mission(load_scenario(scenario), self.parameter_set.current)
+        self._mission = Mission(load_scenario(scenario, vehicle), self.parameter_set.current)
         self._stage = MissionStage(self._mission, timing)
         spare = Mission(self._mission.scenario, self.parameter_set.current)
         warm_up(spare, self.parameter_set.current.takeoff_delay)
@@ -65,8 +65,8 @@ class MissionNode(UamNode):
         self._magnet = self.publisher(topics.MAGNET)
         self._arming = self.publisher(topics.ARMING)
         self._status = self.publisher(topics.MISSION_STATUS)
-        self._writer = ReferenceWriter()
-        MissionInputs(self, self._stage.inputs)
+        self._writer = ReferenceWriter(len(vehicle.joints))
+        MissionInputs(self, self._stage.inputs, vehicle.joint_names)
         self.listen(topics.AUTOPILOT_STATE, self._on_autopilot, required=False)
         self.listen(topics.STATE, self._on_state)
         self.triggers = (topics.STATE.name,)
@@ -169,7 +169,7 @@ class MissionNode(UamNode):
 
 def warm_up(spare: Mission, takeoff: float) -> None:
     """Compile what is called in flight, on a mission that never flies; takeoff [s]: its delay."""
-    state = np.zeros((3, SIZE))
+    state = np.zeros_like(spare.output.reference)
     for stamp in (0.0, takeoff, takeoff + 0.004):
         spare.step(stamp, state, 0.0)
 

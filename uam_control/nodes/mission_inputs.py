@@ -3,13 +3,12 @@
 Messages stay serialized until `SupervisorInputs` looks at them.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from functools import partial
 from typing import Any
 
 from sensor_msgs.msg import BatteryState, Temperature
 
-from uam_control.coordinates import JOINTS
 from uam_control.stages.supervisor_inputs import SupervisorInputs
 from uam_control.stamps import seconds
 from uam_msgs_py.messages import topics
@@ -23,13 +22,14 @@ GAINS = (
     (topics.ATTITUDE_ADAPTATION, "attitude"),
     (topics.ARM_ADAPTATION, "arm"),
 )
-NAMES = list(JOINTS)
 
 
 class MissionInputs:
     """Listens through a node, for the supervisor's inputs of the mission's stage."""
 
-    def __init__(self, node: UamNode, supervisor: SupervisorInputs):
+    def __init__(self, node: UamNode, supervisor: SupervisorInputs, joints: Sequence[str]):
+        """joints: their names."""
+        self._names = list(joints)
         self._node = node
         self._supervisor, self._inputs = supervisor, supervisor.inputs
         self._keep(topics.MOCAP, self._on_mocap)
@@ -66,11 +66,11 @@ class MissionInputs:
 
     def _on_joints(self, data: bytes) -> None:
         stamp, names, effort = read_values(data, "effort")
-        if names != NAMES:
+        if names != self._names:
             try:
-                effort = effort[[names.index(name) for name in NAMES]]
+                effort = effort[[names.index(name) for name in self._names]]
             except ValueError:
-                check_names(names, NAMES)
+                check_names(names, self._names)
         self._inputs.joints(seconds(stamp), effort)
 
     def _on_battery(self, message: BatteryState) -> None:
@@ -78,8 +78,8 @@ class MissionInputs:
 
     def _on_temperature(self, message: Temperature) -> None:
         joint = message.header.frame_id
-        if joint not in NAMES:
-            raise BadMessage(f"frame_id {joint!r} is no joint; there are: {', '.join(NAMES)}")
+        if joint not in self._names:
+            raise BadMessage(f"frame_id {joint!r} is no joint; there are: {', '.join(self._names)}")
         self._inputs.temperature(joint, message.temperature)
 
     def _on_gains(self, subsystem: str, data: bytes) -> None:

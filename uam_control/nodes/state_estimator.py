@@ -4,7 +4,6 @@ import time
 
 import numpy as np
 
-from uam_control.coordinates import COORDINATES, JOINTS
 from uam_control.estimation import EstimatorParameters
 from uam_control.laws.catalogue import DEFAULT
 from uam_control.nodes.described import described_vehicle
@@ -19,7 +18,6 @@ from uam_msgs_py.node.joins import Backlog
 from uam_msgs_py.node.node_parameters import NodeParameters
 
 NAME = "state_estimator"
-NAMES = list(JOINTS)
 
 
 class StateEstimatorNode(UamNode):
@@ -32,13 +30,14 @@ class StateEstimatorNode(UamNode):
     def __init__(self):
         super().__init__(NAME)
         vehicle = described_vehicle(self)
+        self._names = list(vehicle.joint_names)
         section = default_profile(DEFAULT, vehicle).section(NAME)
         self.parameter_set = NodeParameters(self, EstimatorParameters, defaults=section)
-        self._stage = EstimatorStage(self.parameter_set.current)
+        self._stage = EstimatorStage(self.parameter_set.current, len(self._names))
         self.parameter_set.apply = self._stage.estimator.set_parameters
         self._warm_up()
         self._state = self.publisher(topics.STATE)
-        self._writer = TrajectoryWriter(COORDINATES)
+        self._writer = TrajectoryWriter(vehicle.coordinates)
         self._mocap = self.listen(topics.MOCAP, self._on_mocap)
         self._joints = self.listen(topics.JOINTS, self._on_joints)
         self.listen(topics.IMU, self._on_imu)
@@ -50,7 +49,7 @@ class StateEstimatorNode(UamNode):
         self._stage.mocap(*read_pose(data))
 
     def _on_joints(self, data: bytes) -> None:
-        self._stage.joints(*read_joints(data, NAMES))
+        self._stage.joints(*read_joints(data, self._names))
 
     def _on_imu(self, data: bytes) -> None:
         begun = time.perf_counter()
@@ -83,9 +82,9 @@ class StateEstimatorNode(UamNode):
 
     def _warm_up(self) -> None:
         """Compile the filters on an estimator that never flies."""
-        spare = EstimatorStage(self.parameter_set.current)
+        spare = EstimatorStage(self.parameter_set.current, len(self._names))
         rest, level = np.zeros(3), np.array([1.0, 0.0, 0.0, 0.0])
-        joints = np.zeros(len(NAMES))
+        joints = np.zeros(len(self._names))
         for stamp in range(0, 12_000_000, 4_000_000):
             spare.mocap(stamp, rest, level)
             spare.joints(stamp, joints, joints)

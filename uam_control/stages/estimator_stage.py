@@ -14,8 +14,9 @@ class EstimatorStage:
     All stamps in [ns]. The IMU sample begins a tick, so it comes last of what a tick delivers.
     """
 
-    def __init__(self, parameters: EstimatorParameters) -> None:
-        self.estimator = StateEstimator(parameters)
+    def __init__(self, parameters: EstimatorParameters, joints: int) -> None:
+        """joints: how many the arm has."""
+        self.estimator = StateEstimator(parameters, joints)
         self.stamp = -1  # [ns] of the newest IMU sample
 
     def mocap(self, stamp: int, position: np.ndarray, quaternion: np.ndarray) -> None:

@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 
 from uam_control.coordinates import coordinates
+from uam_control.settings import configuration
 
 AXES = ("ROLL", "PITCH", "YAW")  # of PX4's rate loop, MC_*RATE_P
 ANGLE_STEP = 0.05  # [rad] the supervisor's limits are the joint's ranges rounded down to it
@@ -103,6 +104,12 @@ class VehicleDescription:
     autopilot: str
     autopilot_gains: dict[str, float]
     numbers: dict[str, Any]
+
+    @property
+    def source(self) -> str:
+        """What `load_description` is given for it: its name in config/vehicle, or its file."""
+        own = self.file.parent == configuration.root() / "vehicle"
+        return self.name if own else str(self.file.resolve())
 
     def profile(self, law: str) -> str:
         """Return the profile that it flies a control law with, "" where the description names

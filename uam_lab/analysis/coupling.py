@@ -18,7 +18,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from uam_control.coordinates import SIZE
+from uam_control.coordinates import ALPHA
 from uam_lab.analysis.dynamics import Dynamics
 from uam_lab.analysis.supply import COLUMNS_OF, NODE_OF, Supply
 
@@ -50,7 +50,7 @@ def along(dynamics: Dynamics, acceleration: np.ndarray, supply: Supply, sets: di
 
 def nominal_inertia(sets: dict) -> np.ndarray:
     """Return the diagonal of Mbar (8,) [kg (p), kg m^2 (q, alpha)]."""
-    inertia = np.empty(SIZE)
+    inertia = np.empty(ALPHA + len(sets[NODE_OF["arm"]].inertia))
     for name, columns in COLUMNS_OF.items():
         inertia[columns] = sets[NODE_OF[name]].inertia
     return inertia

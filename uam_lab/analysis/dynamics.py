@@ -21,14 +21,11 @@ from dataclasses import dataclass
 import mujoco
 import numpy as np
 
-from uam_control.coordinates import SIZE
+from uam_control.coordinates import ALPHA, ATTITUDE, POSITION
 from uam_lab.analysis import ticks
 from uam_lab.results.timeseries import Series
 from uam_sim_bridge.plant import Vehicle
 from uam_sim_bridge.plant.vehicle import MAGNET, PAYLOAD
-
-TREE = SIZE + 1  # dof of base, arm and pivot: the first of the model
-PIVOT = SIZE
 
 
 @dataclass(frozen=True)
@@ -68,6 +65,7 @@ class Body:
                 )
 
         # the free payload is a tree of its own, which is not evaluated
+        self.size = len(vehicle.description.coordinates)  # base and arm; the pivot follows them
         self.model = model = vehicle.compile(0.0, hold_payload)
         flags = mujoco.mjtDisableBit
         model.opt.disableflags |= flags.mjDSBL_CONSTRAINT | flags.mjDSBL_CONTACT
@@ -79,14 +77,14 @@ class Body:
     def place(self, chi: np.ndarray, swing: float) -> None:
         """Set the pose: chi (8,) [m, world; rad, Euler angles; rad, joints], pivot angle [rad]."""
         qpos = self.data.qpos
-        qpos[0:3] = chi[0:3]
-        half = 0.5 * chi[3:6]
+        qpos[0:3] = chi[POSITION]
+        half = 0.5 * chi[ATTITUDE]
         (cr, cp, cy), (sr, sp, sy) = np.cos(half), np.sin(half)
         qpos[3] = cr * cp * cy + sr * sp * sy
         qpos[4] = sr * cp * cy - cr * sp * sy
         qpos[5] = cr * sp * cy + sr * cp * sy
         qpos[6] = cr * cp * sy - sr * sp * cy
-        qpos[7:9], qpos[9] = chi[6:8], swing
+        qpos[7 : self.size + 1], qpos[self.size + 1] = chi[ALPHA:], swing
 
     def evaluate(
         self,
@@ -103,30 +101,30 @@ class Body:
         chi, chi_dot (8,): SI units, position in the world, body rates in FLU. swing (3,): angle
         [rad], rate, acceleration of the pivot. Units of the results: see `Dynamics`.
         """
-        model, data = self.model, self.data
+        model, data, size = self.model, self.data, self.size
         self.place(chi, swing[0])
         data.qvel[:] = 0.0
         mujoco.mj_forward(model, data)
-        gravity[:] = data.qfrc_bias[:SIZE]
-        for i in range(TREE):
+        gravity[:] = data.qfrc_bias[:size]
+        for i in range(size + 1):
             self._unit[i] = 1.0
             mujoco.mj_mulM(model, data, self._column, self._unit)
             self._unit[i] = 0.0
-            if i < SIZE:
-                mass[:, i] = self._column[:SIZE]
-        data.qvel[:SIZE] = chi_dot
+            if i < size:
+                mass[:, i] = self._column[:size]
+        data.qvel[:size] = chi_dot
         mujoco.mj_fwdVelocity(model, data)
-        coriolis[:] = data.qfrc_bias[:SIZE] - gravity
-        pivot[:] = self._column[:SIZE] * swing[2] - data.qfrc_bias[:SIZE]
-        data.qvel[PIVOT] = swing[1]
+        coriolis[:] = data.qfrc_bias[:size] - gravity
+        pivot[:] = self._column[:size] * swing[2] - data.qfrc_bias[:size]
+        data.qvel[size] = swing[1]
         mujoco.mj_fwdVelocity(model, data)
-        pivot += data.qfrc_bias[:SIZE]
+        pivot += data.qfrc_bias[:size]
 
 
 def along(series: Series, rows: np.ndarray, vehicle: Vehicle, payload_mass: float) -> Dynamics:
     """Return the true dynamics at `rows` (m,) of a flight; payload_mass in kg."""
-    count = len(rows)
-    truth = series.block("truth.").reshape(-1, 3, SIZE)[rows]
+    count, size = len(rows), series.columns.size
+    truth = series.block("truth.").reshape(-1, 3, size)[rows]
     swing = pivot_motion(series)[rows]
     held = ticks.carrying(series)[rows] if payload_mass else np.zeros(count, dtype=bool)
     bare = Body(vehicle)
@@ -134,7 +132,7 @@ def along(series: Series, rows: np.ndarray, vehicle: Vehicle, payload_mass: floa
     if held.any():
         loaded = Body(vehicle, payload_mass, hold(series, rows[held], bare))
     found = Dynamics(
-        np.empty((count, SIZE, SIZE)), *(np.empty((count, SIZE)) for _ in range(3)), held
+        np.empty((count, size, size)), *(np.empty((count, size)) for _ in range(3)), held
     )
     for k in range(count):
         (loaded if held[k] else bare).evaluate(
@@ -158,7 +156,7 @@ def hold(series: Series, rows: np.ndarray, body: Body) -> np.ndarray:
     magnet = body.data.body("magnet")
     found = []
     for row in rows[:: max(1, len(rows) // 20)]:
-        body.place(truth[row, :SIZE], swing[row])
+        body.place(truth[row, : series.columns.size], swing[row])
         mujoco.mj_kinematics(body.model, body.data)
         found.append(magnet.xmat.reshape(3, 3).T @ (place[row] - magnet.xpos))
     return np.median(found, axis=0)

@@ -6,6 +6,7 @@ from pathlib import Path
 
 from uam_control.laws.modular import ModularLaw
 from uam_control.profiles.profile import load_profile
+from uam_control.vehicle import DEFAULT_VEHICLE, load_description
 from uam_lab.analysis.stability import Stability, analyse
 from uam_lab.results.timeseries import Series
 from uam_sim_bridge.plant import Vehicle
@@ -21,6 +22,7 @@ def analyse_folder(directory: Path, series: Series) -> Stability | None:
     info = series.info
     if info.get("controller", LAW) != LAW:
         return None
-    sets = load_profile(str(directory / "parameters.yaml")).sets
-    vehicle = Vehicle.load().changed(info.get("vehicle_changes") or {})
+    described = load_description(info.get("vehicle") or DEFAULT_VEHICLE)
+    sets = load_profile(str(directory / "parameters.yaml"), vehicle=described).sets
+    vehicle = Vehicle.of(described).changed(info.get("vehicle_changes") or {})
     return analyse(series, sets, vehicle, info.get("payload_mass_kg") or 0.0)

@@ -8,7 +8,6 @@ from typing import Any
 
 import numpy as np
 
-from uam_control.coordinates import SIZE
 from uam_control.laws.modular import ModularParameters
 from uam_lab.analysis import (
     assumptions,
@@ -164,7 +163,7 @@ def analyse(
     )
     true = dynamics.along(series, rows, vehicle, payload_mass)
     terms = supply.along(series, rows, estimate, sets, dynamics.Body(vehicle))
-    acceleration = series.block("truth.")[rows, 2 * SIZE :]
+    acceleration = series.block("truth.")[rows, 2 * series.columns.size :]
     forces = coupling.along(true, acceleration, terms, sets)
     regressors = constants.regressor(truth)
     subsystems, ceilings, seen = {}, {}, {}

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from uam_control.coordinates import ARM, ATTITUDE, POSITION, SIZE
+from uam_control.coordinates import ARM, ATTITUDE, POSITION
 from uam_control.maths.rotations import matrix_from_euler
 from uam_lab.analysis.dynamics import Body
 from uam_lab.analysis.tracking import Tracking
@@ -37,7 +37,7 @@ def along(series: Series, rows: np.ndarray, estimate: Tracking, sets: dict, body
 
     estimate: errors of the estimated state, the input of the law. sets: parameter sets by node.
     """
-    shape = (len(rows), SIZE)
+    shape = (len(rows), series.columns.size)
     feedforward, feedback, adaptive, weight = (np.zeros(shape) for _ in range(4))
     for name, columns in COLUMNS_OF.items():
         p = sets[NODE_OF[name]].record()[0]

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from uam_control.coordinates import ATTITUDE, SIZE
+from uam_control.coordinates import ATTITUDE
 from uam_control.laws.errors import tracking_errors
 from uam_lab.results.timeseries import Series
 
@@ -29,9 +29,10 @@ def along(series: Series, rows: np.ndarray, source: str, printed: bool) -> Track
 
     printed: use e_q_dot as in eq. (15). The desired attitude is that of the same tick.
     """
-    states = np.ascontiguousarray(series.block(f"{source}.")[rows]).reshape(-1, 3, SIZE)
-    references = np.ascontiguousarray(series.block("reference.")[rows]).reshape(-1, 3, SIZE)
-    errors = np.zeros((len(rows), 3, SIZE))
+    size = series.columns.size
+    states = np.ascontiguousarray(series.block(f"{source}.")[rows]).reshape(-1, 3, size)
+    references = np.ascontiguousarray(series.block("reference.")[rows]).reshape(-1, 3, size)
+    errors = np.zeros((len(rows), 3, size))
     norms = np.zeros((len(rows), 3))
     for k in range(len(rows)):
         attitude = np.ascontiguousarray(references[k, :, ATTITUDE])

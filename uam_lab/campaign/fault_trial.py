@@ -8,6 +8,7 @@ from typing import Any
 
 from uam_control.mission import load_scenario
 from uam_control.profiles.profile import Profile
+from uam_control.vehicle import load_description
 from uam_lab.campaign import quiet
 from uam_lab.campaign.fault_matrix import Cell
 from uam_lab.campaign.fault_outcome import COMPLETED, LOST, classify, down_after
@@ -80,6 +81,7 @@ def _ros(trial: FaultTrial) -> FaultResult:
     settings = FlightSettings(
         scenario=load_scenario(trial.scenario),
         profile=trial.profile,
+        vehicle=load_description(),
         clock=trial.clock,
         payload_mass=trial.payload_mass,
         seed=trial.seed,

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from uam_control.mission import load_scenario
+from uam_control.vehicle import load_description
 from uam_lab.campaign import quiet
 from uam_lab.campaign import trial as direct
 from uam_lab.campaign.trial import Trial, TrialResult
@@ -19,6 +20,7 @@ def fly(trial: Trial) -> TrialResult:
     settings = FlightSettings(
         scenario=scenario,
         profile=trial.profile,
+        vehicle=load_description(),
         payload_mass=trial.payload_mass,
         seed=trial.seed,
         scenario_source=trial.scenario,

@@ -11,6 +11,7 @@ import yaml
 
 from uam_control.profiles.profile import Profile
 from uam_control.settings.configuration import path
+from uam_control.vehicle import load_description
 from uam_lab.campaign.trial import Trial
 
 
@@ -47,7 +48,7 @@ def _one(
 ) -> Draw:
     drawn = {name: float(random.uniform(low, high)) for name, (low, high) in allowed.items()}
     direction = random.uniform(0.0, 2.0 * np.pi)
-    efficiency = random.uniform(*allowed["efficiency"], size=4)
+    efficiency = random.uniform(*allowed["efficiency"], size=len(load_description().rotors))
     offset = random.uniform(0.0, 2.0 * np.pi)
     speed, away = drawn["wind"], drawn["payload_offset"]
     drawn["efficiency"] = float(efficiency.min())

@@ -14,6 +14,7 @@ from uam_control.mission import ScenarioError
 from uam_control.profiles.profile import ProfileError
 from uam_control.settings import configuration
 from uam_control.settings.configuration import ConfigurationError
+from uam_control.vehicle import DEFAULT_VEHICLE, VehicleError
 from uam_lab.flight import settings as flight_settings
 from uam_lab.flight.conclude import command_line, conclude
 from uam_lab.flight.progress import Progress
@@ -44,6 +45,7 @@ USER_ERRORS = (
     ResultFolderError,
     FaultError,
     PlantError,
+    VehicleError,
 )
 
 EXAMPLES = """\
@@ -77,6 +79,7 @@ def add(commands: argparse._SubParsersAction) -> None:
     )
     scenarios = ", ".join(configuration.names("scenarios"))
     profiles = ", ".join(configuration.names("profiles"))
+    vehicles = ", ".join(configuration.names("vehicle", (".yaml",)))
     option = parser.add_argument
     option(
         "--controller",
@@ -91,6 +94,12 @@ def add(commands: argparse._SubParsersAction) -> None:
         action="append",
         help=f"parameters: {profiles}, or a ROS parameter file, as ros2 param dump writes it; "
         "may be repeated, a later one overrides (default: the controller's)",
+    )
+    option(
+        "--vehicle",
+        default=DEFAULT_VEHICLE,
+        metavar="NAME|FILE",
+        help=f"{vehicles}, or the description of one: docs/your_vehicle.md (default %(default)s)",
     )
     option(
         "--scenario",
@@ -238,6 +247,7 @@ def run(options: argparse.Namespace) -> int:
             scenario=options.scenario,
             controller=options.controller,
             profile=options.profile,
+            vehicle=options.vehicle,
             engine=options.engine,
             clock=options.clock,
             plant=options.plant,

@@ -6,7 +6,7 @@ import math
 import queue
 import time
 from collections import deque
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
@@ -46,9 +46,14 @@ class Page:
     """One page for one ROS domain; one thread calls `look` periodically."""
 
     def __init__(
-        self, server: viser.ViserServer, watch: Watch, services: Services, options: dict[str, Any]
+        self,
+        server: viser.ViserServer,
+        watch: Watch,
+        services: Services,
+        options: dict[str, Any],
+        joints: Sequence[str],
     ):
-        """options: config/views/cockpit.yaml."""
+        """options: config/views/cockpit.yaml; joints: names of the arm's coordinates."""
         self._server, self._options = server, options
         self._todo: queue.SimpleQueue[Callable[[], None]] = queue.SimpleQueue()
         self._watch, self._services = watch, services
@@ -73,7 +78,9 @@ class Page:
         gui.main_panel.dock_left()
         gui.main_panel.set_width(LEFT_WIDTH)
         self._panel = gui.add_panel()
-        self._charts = Charts(gui, self._panel, options["window"], options["sample_interval"])
+        self._charts = Charts(
+            gui, self._panel, options["window"], options["sample_interval"], joints
+        )
         self._panel.dock_right()
         self._panel.set_width(RIGHT_WIDTH)
         self._tabs = {name: self._panel.add_tab(title) for name, title in TUNED.items()}

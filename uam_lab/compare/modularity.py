@@ -16,7 +16,7 @@ from pathlib import Path
 import numpy as np
 
 from uam_control.control.controllers import ArmController, AttitudeController, PositionController
-from uam_control.coordinates import COORDINATES, SIZE
+from uam_control.coordinates import ATTITUDE
 from uam_control.profiles.profile import Profile, profile_of
 from uam_lab.campaign.trial import ERRORS, Trial, TrialResult
 from uam_lab.results import timeseries
@@ -80,9 +80,9 @@ def untouched(profile: Profile, series: Series, period: float) -> list[Untouched
 def _replay(profile: Profile, series: Series, period: float) -> dict[str, np.ndarray]:
     """Return tau and adapted gains (ticks, n) of each controller along the recorded flight."""
     rows = np.flatnonzero(series.flown)
-    states = series.block("estimate.")[rows].reshape(-1, 3, SIZE)
-    references = series.block("reference.")[rows].reshape(-1, 3, SIZE)
-    attitude = slice(COORDINATES.index("roll"), COORDINATES.index("yaw") + 1)
+    states = series.block("estimate.")[rows].reshape(-1, 3, series.columns.size)
+    references = series.block("reference.")[rows].reshape(-1, 3, series.columns.size)
+    attitude = ATTITUDE
     controllers = {name: kind(profile.sets[node]) for name, (node, kind) in SUBSYSTEMS.items()}
     out: dict[str, list[np.ndarray]] = {name: [] for name in controllers}
     for state, reference in zip(states, references, strict=True):

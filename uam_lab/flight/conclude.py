@@ -31,6 +31,7 @@ def settings_facts(settings: FlightSettings, command: str) -> dict[str, Any]:
         "autopilot": settings.autopilot,
         "seed": settings.seed,
         "payload_mass_kg": settings.payload_mass,
+        "vehicle": settings.vehicle.source,
         "vehicle_changes": settings.vehicle_changes,
         "drop_point": list(scenario.drop_point) if scenario.drop_point else None,
         "snapshots": [list(snapshot) for snapshot in scenario.snapshots],

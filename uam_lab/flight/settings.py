@@ -11,6 +11,7 @@ from uam_control.laws import catalogue
 from uam_control.mission import Scenario, load_scenario
 from uam_control.profiles.profile import Profile, default_profile, load_profile
 from uam_control.settings import configuration
+from uam_control.vehicle import DEFAULT_VEHICLE, VehicleDescription, load_description
 from uam_lab.processes.node_environment import without_discovery
 from uam_sim_bridge.faults import Schedule, limits, read_schedule
 from uam_sim_bridge.faults.faulty_plant import check_engine
@@ -47,6 +48,7 @@ class FlightSettings:
 
     scenario: Scenario
     profile: Profile
+    vehicle: VehicleDescription
     payload_mass: float
     out: Path | None = None
     controller: str = catalogue.DEFAULT
@@ -76,6 +78,7 @@ def settings(
     scenario: str = "pick_and_place",
     controller: str = catalogue.DEFAULT,
     profile: str | Sequence[str] | None = None,
+    vehicle: str = DEFAULT_VEHICLE,
     engine: str = "ros",
     clock: str = "lockstep",
     plant: str = DEFAULT_PLANT,
@@ -126,12 +129,15 @@ def settings(
         raise SettingsError("--gcs must be udp:HOST:PORT and needs --engine ros")
     if not 0 <= seed < 2**31:
         raise SettingsError(f"seed {seed} is outside 0..{2**31 - 1}")
-    loaded = load_scenario(str(configuration.named("scenarios", scenario)))
+    described = load_description(vehicle)
+    loaded = load_scenario(str(configuration.named("scenarios", scenario)), described)
     given = [profile] if isinstance(profile, str) else profile
     flown = (
-        load_profile(*(str(configuration.named("profiles", one)) for one in given))
+        load_profile(
+            *(str(configuration.named("profiles", one)) for one in given), vehicle=described
+        )
         if given
-        else default_profile(controller)
+        else default_profile(controller, described)
     )
     for node, law in flown.laws().items():
         if law != controller:
@@ -146,10 +152,11 @@ def settings(
     left_out = tuple(dict.fromkeys(without if view else (*without, COCKPIT)))
     absent = (*left_out, "autopilot") if link is not None else left_out
     check_engine(injected, plant)
-    limits.check(injected, engine, absent, {DiscoveryLoss.NAME: without_discovery()})
+    limits.check(injected, engine, absent, {DiscoveryLoss.NAME: without_discovery()}, described)
     return FlightSettings(
         scenario=loaded,
         profile=flown,
+        vehicle=described,
         payload_mass=mass,
         out=None if out is None else Path(out),
         controller=controller,

@@ -11,6 +11,8 @@ from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 from rclpy.signals import SignalHandlerOptions
 
+from uam_control.coordinates import ARM
+from uam_control.nodes.described import described_vehicle
 from uam_control.settings import configuration
 from uam_control.settings.parameter_set import ParameterError
 from uam_lab.cockpit import web
@@ -35,6 +37,7 @@ def main() -> int:
     origins = [one for one in node.declare_parameter("origins", "").value.split(",") if one]
     options = yaml.safe_load(configuration.path(OPTIONS).read_text())
     try:
+        vehicle = described_vehicle(node)
         refuse_unknown(node)
         server = web.serve(host, port, "uam", origins)
     except (ParameterError, PlaceError) as error:
@@ -44,7 +47,7 @@ def main() -> int:
     executor.add_node(node)
     # not spun: an executor would take the messages that the page polls
     watcher = Node(f"{NAME}_watch", start_parameter_services=False, enable_rosout=False)
-    page = Page(server, Watch(watcher), Services(node), options)
+    page = Page(server, Watch(watcher), Services(node), options, vehicle.coordinates[ARM])
     period = options["scene_period"]
     while not stop.raised:
         end = time.monotonic() + period

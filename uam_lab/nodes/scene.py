@@ -20,9 +20,10 @@ import numpy as np
 from diagnostic_msgs.msg import DiagnosticArray
 from std_msgs.msg import String
 
-from uam_control.coordinates import ARM, ATTITUDE, COORDINATES, JOINTS, POSITION
+from uam_control.coordinates import ALPHA, ARM, ATTITUDE, POSITION
 from uam_control.maths.rotations import quaternion_from_euler, wrap_angle
 from uam_control.mission import load_scenario
+from uam_control.nodes.described import described_vehicle
 from uam_control.settings.parameter_set import ParameterSet, number
 from uam_control.stamps import SECOND, seconds
 from uam_lab.nodes.scene_markers import PAYLOAD, FlownPath, Markers, ReferencePath
@@ -41,7 +42,7 @@ from uam_sim_bridge.plant.vehicle import SWING
 
 NAME = "scene"
 REFERENCE = "reference"  # frame of the desired pose
-DEFAULT_SCENARIO, DEFAULT_VEHICLE = "pick_and_place", "s500_arm"
+DEFAULT_SCENARIO = "pick_and_place"
 REFERENCES = 8  # stored until the state of the same tick arrives: they come one tick earlier
 
 
@@ -64,8 +65,10 @@ class SceneNode(UamNode):
         self._frame_period = round(SECOND / options.frame_rate)
         self._marker_period = round(SECOND / options.marker_rate)
         scenario = self.declare_parameter("scenario", DEFAULT_SCENARIO).value
-        vehicle = Vehicle.load(self.declare_parameter("vehicle", DEFAULT_VEHICLE).value)
-        self._scenario, model = load_scenario(scenario), vehicle.compile(0.0)
+        described = described_vehicle(self)
+        vehicle = Vehicle.of(described)
+        self._joint_names = described.joint_names
+        self._scenario, model = load_scenario(scenario, described), vehicle.compile(0.0)
         hung = frames(model)
         self._fixed = [frame for frame in hung if not frame.joint]
         self._moving = [frame for frame in hung if frame.joint]
@@ -86,7 +89,7 @@ class SceneNode(UamNode):
         self._tf = self.publisher(topics.TF)
         self._markers = self.publisher(topics.MARKERS)
         self._error = self.publisher(topics.TRACKING_ERROR)
-        self._error_writer = JointStateWriter(COORDINATES)
+        self._error_writer = JointStateWriter(described.coordinates)
         self._describe(urdf(vehicle))
         self.listen(topics.MISSION_STATUS, self._on_status)
         # other topics are polled when a status arrives or after `wake_up`
@@ -149,7 +152,7 @@ class SceneNode(UamNode):
         error = state[:2] - reference.values[:2]
         error[0, 3:] = wrap_angle(error[0, 3:])
         if not reference.flying:
-            error[:, : ARM.start] = 0.0
+            error[:, :ALPHA] = 0.0
         writer = self._error_writer
         writer.position[:], writer.velocity[:] = error
         self._error.publish(writer.stamped(stamp))
@@ -159,7 +162,7 @@ class SceneNode(UamNode):
     ) -> list[Transform]:
         """Return the moving transforms at `stamp` [ns] for chi (8,) and the desired chi_d (8,)."""
         turned = quaternion_from_euler(chi[ATTITUDE])
-        angles = dict(zip(JOINTS, chi[ARM], strict=True))
+        angles = dict(zip(self._joint_names, chi[ARM], strict=True))
         angles[SWING] = hanging(chi[ATTITUDE][1], chi[ARM])
         found = [Transform(stamp, WORLD, BODY, chi[POSITION], turned)]
         found += [

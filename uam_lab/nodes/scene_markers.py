@@ -12,6 +12,7 @@ from geometry_msgs.msg import Point
 from std_msgs.msg import ColorRGBA
 from visualization_msgs.msg import Marker, MarkerArray
 
+from uam_control.coordinates import ALPHA
 from uam_control.mission import Scenario
 from uam_control.mission.trajectory import empty_reference
 from uam_msgs_py.messages.stamps import set_stamp
@@ -33,11 +34,11 @@ class ReferencePath:
     """The path of a scenario, sampled once."""
 
     def __init__(self, scenario: Scenario, start: np.ndarray):
-        """start: chi (8,) at take-off, SI units."""
+        """start: chi (6 + n,) at take-off, SI units."""
         landing = scenario.landing
         self._times = np.arange(0.0, landing.at + landing.duration + PATH_STEP, PATH_STEP)
         self._points = np.empty((len(self._times), 3))
-        trajectory, reference = scenario.trajectory(start), empty_reference()
+        trajectory, reference = scenario.trajectory(start), empty_reference(len(start) - ALPHA)
         for time, point in zip(self._times, self._points, strict=True):
             trajectory.write(float(time), reference)
             point[:] = reference[0, :3]

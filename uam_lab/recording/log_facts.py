@@ -19,6 +19,7 @@ from typing import Any
 
 from uam_control.mission import Scenario, load_scenario
 from uam_control.settings import configuration
+from uam_control.vehicle import DEFAULT_VEHICLE, load_description
 from uam_lab.recording.mcap_reader import read_metadata
 from uam_lab.results.atomic import write_text
 from uam_lab.results.result_folder import as_json
@@ -51,13 +52,15 @@ def read(log: Path) -> LogFacts:
     """Read the metadata of a log; missing parts are empty. Raises UnreadableLog, OSError."""
     records = read_metadata(log)
     info = {name: json.loads(text) for name, text in records.get(FLIGHT, {}).items()}
-    return LogFacts(info, _scenario(records.get(SCENARIO)), records.get(TEXTS, {}))
+    return LogFacts(
+        info, _scenario(records.get(SCENARIO), info.get("vehicle")), records.get(TEXTS, {})
+    )
 
 
-def _scenario(record: Mapping[str, str] | None) -> Scenario | None:
+def _scenario(record: Mapping[str, str] | None, vehicle: str | None) -> Scenario | None:
     if not record:
         return None
     with tempfile.TemporaryDirectory() as folder:
         file = Path(folder) / Path(record["name"]).name
         file.write_text(record["text"])
-        return load_scenario(str(file))
+        return load_scenario(str(file), load_description(vehicle or DEFAULT_VEHICLE))

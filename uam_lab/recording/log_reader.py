@@ -18,7 +18,8 @@ import numpy as np
 from diagnostic_msgs.msg import DiagnosticArray
 from rclpy.serialization import deserialize_message
 
-from uam_control.coordinates import ARM, COORDINATES
+from uam_control.coordinates import ALPHA, ARM
+from uam_control.coordinates import ATTITUDE as ANGLES
 from uam_control.mission import Scenario
 from uam_control.mission.mission import ABORTED, LANDED, WAITING
 from uam_control.supervision import State
@@ -29,9 +30,13 @@ from uam_lab.results.outcome import transition
 from uam_lab.results.timeseries import (
     COLUMNS,
     SUBSYSTEMS,
+    Columns,
     FlightTable,
     Series,
     gain_columns,
+)
+from uam_lab.results.timeseries import (
+    columns as columns_for,
 )
 from uam_msgs_py.messages import topics
 from uam_msgs_py.messages.parameter_changes import ParameterChange
@@ -89,6 +94,10 @@ class Log:
         log = self._topics.get(topic)
         return log.messages if log else []
 
+    def width(self, topic: str) -> int:
+        """Number of names in the messages of a topic; 0 without messages."""
+        return next((len(block.names) for block in self.blocks(topic)), 0)
+
     def wall_seconds(self, topic: str) -> float:
         """Return the wall time between first and last message of a topic [s]; 0 without any."""
         log = self._topics.get(topic)
@@ -125,17 +134,18 @@ def _field(block: cdr.Block, field: str, width: int) -> np.ndarray:
 
 
 class References:
-    """References of the mission: samples with stamps (m,) [ns] and rows (m, 25), take-off stamp.
+    """References of the mission: stamps (m,) [ns] and rows (m, 3 size + 1), take-off stamp.
 
-    A row contains chi_d, chi_d_dot, chi_d_ddot (24) and whether position and attitude are flown.
+    A row contains chi_d, chi_d_dot, chi_d_ddot and whether position and attitude are flown.
     """
 
-    def __init__(self, log: Log):
+    def __init__(self, log: Log, size: int):
+        """size: number of entries of chi."""
         stamps, rows, flying = [], [], []
         self.takeoff: int | None = None  # stamp [ns] of mission time 0
         for block in log.blocks(REFERENCE):
-            whole = len(block.names) == len(COORDINATES)
-            values = np.zeros((len(block.stamps), 3, len(COORDINATES)))
+            whole = len(block.names) == size
+            values = np.zeros((len(block.stamps), 3, size))
             for i, row in enumerate(STATE_ROWS):
                 values[:, i, slice(None) if whole else ARM] = block.fields[row]
             stamps.append(block.stamps)
@@ -147,14 +157,14 @@ class References:
             raise UnreadableLog("the log has no reference: the mission did not start")
         joined = np.hstack([np.vstack(rows), np.vstack(flying)])
         self.samples = StampedRows(np.concatenate(stamps), joined)
-        self._hold_after_landing()
+        self._hold_after_landing(size)
 
-    def _hold_after_landing(self) -> None:
+    def _hold_after_landing(self, size: int) -> None:
         """Keep the last reference of the pose after the flight, which has none of its own."""
         rows = self.samples.rows
         flights = np.flatnonzero(rows[:, -1])
         if len(flights):
-            pose = [c for c in range(3 * len(COORDINATES)) if c % len(COORDINATES) < ARM.start]
+            pose = [c for c in range(3 * size) if c % size < ALPHA]
             rows[flights[-1] + 1 :, pose] = rows[flights[-1], pose]
 
 
@@ -183,8 +193,9 @@ def read_flight(
     statuses = log.statuses()
     end = next((stamp for stamp, status in statuses if status.done), None)
     abort_reason = statuses[-1][1].abort_reason if statuses else ""
-    references = References(log)
-    truth = log.samples(TRUTH, STATE_ROWS, len(COORDINATES))
+    columns = columns_for(log.width(TRUTH) - ALPHA, log.width(ROTORS))
+    references = References(log, columns.size)
+    truth = log.samples(TRUTH, STATE_ROWS, columns.size)
     first, last = references.samples.stamps[[0, -1]]
     # The mission is one tick ahead: its last reference is for a tick without control. Ticks after
     # the mission's end depend on the time until the plant receives the end, so they are cut off.
@@ -192,19 +203,19 @@ def read_flight(
     ticks = truth.stamps[(truth.stamps >= first) & (truth.stamps < last)]
     if not len(ticks):
         raise UnreadableLog(f"{path} has no control tick")
-    recording = FlightTable(len(ticks))
+    recording = FlightTable(len(ticks), columns)
     values = recording.values
     takeoff = references.takeoff if references.takeoff is not None else int(last)
-    time = values[:, COLUMNS["time"]] = (ticks - takeoff) / SECOND
-    values[:, COLUMNS.block("truth.")] = truth.at(ticks)
-    values[:, COLUMNS.block("estimate.")] = log.samples(STATE, STATE_ROWS, 8).at(ticks)
+    time = values[:, columns["time"]] = (ticks - takeoff) / SECOND
+    values[:, columns.block("truth.")] = truth.at(ticks)
+    values[:, columns.block("estimate.")] = log.samples(STATE, STATE_ROWS, columns.size).at(ticks)
     reference = references.samples.at(ticks)
     flying = reference[:, -1] > 0.5
-    values[:, COLUMNS.block("reference.")] = reference[:, :-1]
-    _commands(log, ticks, values)
+    values[:, columns.block("reference.")] = reference[:, :-1]
+    _commands(log, ticks, recording)
     for subsystem in SUBSYSTEMS:
-        adaptation(log, subsystem, ticks, values)
-    _truth(log, ticks, values)
+        adaptation(log, subsystem, ticks, values, columns)
+    _truth(log, ticks, recording)
     for number, name in enumerate(phases(ticks, time, flying, scenario, statuses)):
         recording.phases[number] = recording.phase_names.setdefault(
             name, len(recording.phase_names)
@@ -248,40 +259,47 @@ def parameter_changes(log: Log, takeoff: int) -> list[dict[str, Any]]:
     return sorted(found, key=lambda entry: entry["time_s"])
 
 
-def adaptation(log: Log, subsystem: str, ticks: np.ndarray, values: np.ndarray) -> None:
+def adaptation(
+    log: Log, subsystem: str, ticks: np.ndarray, values: np.ndarray, columns: Columns = COLUMNS
+) -> None:
     """Fill in the gains of a subsystem's law at ticks (m,) [ns] in the columns of values (m, n)."""
     for block in log.blocks(ADAPTATION[subsystem]):
         gains = StampedRows(block.stamps, block.fields["position"])
-        values[:, gain_columns(subsystem, block.names)] = gains.at(ticks)
+        values[:, gain_columns(subsystem, block.names, columns)] = gains.at(ticks)
 
 
-def _commands(log: Log, ticks: np.ndarray, values: np.ndarray) -> None:
+def _commands(log: Log, ticks: np.ndarray, table: FlightTable) -> None:
     """Fill in the commands of the controllers and the desired attitude of the position law."""
-    position = log.samples(POSITION, (*STATE_ROWS, "effort"), 6).at(ticks)
-    attitude = [COLUMNS[f"reference.{angle}"] for angle in ("roll", "pitch", "yaw")]
+    values, columns = table.values, table.columns
+    position = log.samples(POSITION, (*STATE_ROWS, "effort"), ALPHA).at(ticks)
+    attitude = [columns[f"reference.{angle}"] for angle in ("roll", "pitch", "yaw")]
     for row in range(3):
-        columns = [column + row * len(COORDINATES) for column in attitude]
-        values[:, columns] = position[:, 6 * row + 3 : 6 * row + 6]
-    values[:, COLUMNS.block("tau_p.")] = position[:, 18:21]
-    values[:, COLUMNS.block("tau_q.")] = log.samples(ATTITUDE, ("effort",), 3).at(ticks)
-    values[:, COLUMNS.block("tau_alpha.")] = log.samples(JOINTS, ("effort",), 2).at(ticks)
+        angles = [column + row * columns.size for column in attitude]
+        values[:, angles] = position[:, ALPHA * row :][:, ANGLES]
+    values[:, columns.block("tau_p.")] = position[:, 18:21]
+    values[:, columns.block("tau_q.")] = log.samples(ATTITUDE, ("effort",), 3).at(ticks)
+    values[:, columns.block("tau_alpha.")] = log.samples(JOINTS, ("effort",), columns.joints).at(
+        ticks
+    )
     setpoint = log.samples(SETPOINT, ("angular", "linear"), 3).at(ticks)
-    values[:, COLUMNS.block("setpoint.")] = setpoint[:, [0, 1, 2, 5]]
+    values[:, columns.block("setpoint.")] = setpoint[:, [0, 1, 2, 5]]
     factor = log.samples(THRUST, ("position",), 1).at(ticks)
-    values[:, COLUMNS["thrust.factor"]] = factor[:, 0]
+    values[:, columns["thrust.factor"]] = factor[:, 0]
 
 
-def _truth(log: Log, ticks: np.ndarray, values: np.ndarray) -> None:
+def _truth(log: Log, ticks: np.ndarray, table: FlightTable) -> None:
     """Fill in the data that only the simulator has: rotors, payload, magnet."""
-    rotors = log.samples(ROTORS, ("position", "effort"), 4).at(ticks)
-    for i in range(4):
-        values[:, COLUMNS[f"rotor_{i + 1}.command"]] = rotors[:, i]
-        values[:, COLUMNS[f"rotor_{i + 1}.thrust"]] = rotors[:, 4 + i]
+    values, columns = table.values, table.columns
+    count = columns.rotors
+    rotors = log.samples(ROTORS, ("position", "effort"), count).at(ticks)
+    for i in range(count):
+        values[:, columns[f"rotor_{i + 1}.command"]] = rotors[:, i]
+        values[:, columns[f"rotor_{i + 1}.thrust"]] = rotors[:, count + i]
     position = log.samples(PAYLOAD, ("position",), 3).at(ticks)
     x, y, z, w = log.samples(PAYLOAD, ("orientation",), 4).at(ticks).T
-    values[:, COLUMNS.block("payload.")] = np.column_stack([position, w, x, y, z])
+    values[:, columns.block("payload.")] = np.column_stack([position, w, x, y, z])
     magnet = log.samples(MAGNET, ("position", "effort"), 2).at(ticks)
-    values[:, COLUMNS.block("magnet.")] = magnet[:, [0, 2, 1]]
+    values[:, columns.block("magnet.")] = magnet[:, [0, 2, 1]]
 
 
 def transitions(

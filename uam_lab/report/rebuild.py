@@ -9,6 +9,7 @@ from typing import Any
 
 from uam_control.mission import Scenario, load_scenario
 from uam_control.settings import configuration
+from uam_control.vehicle import DEFAULT_VEHICLE, load_description
 from uam_lab.flight.conclude import complete
 from uam_lab.recording import log_facts
 from uam_lab.recording.log_reader import read_flight
@@ -87,7 +88,8 @@ def _scenario(
     """Return the flown scenario: from the user, else from the log, else from info.json."""
     name = asked or (None if facts.scenario else known.get("scenario"))
     if name is not None:
-        return load_scenario(str(configuration.named("scenarios", name)))
+        vehicle = load_description(known.get("vehicle") or DEFAULT_VEHICLE)
+        return load_scenario(str(configuration.named("scenarios", name)), vehicle)
     if facts.scenario is None:
         raise NothingToReport(f"{directory / LOG} contains no scenario: give --scenario")
     return facts.scenario

@@ -23,6 +23,7 @@ GROUPS = (
 )
 PASSED_ON = (
     "controller",
+    "vehicle",
     "profile",
     "scenario",
     "engine",

@@ -31,7 +31,7 @@ class MotorLoss(PlantFault):
     ABOUT: ClassVar[str] = "a motor gives only a fraction of its thrust, as with a broken propeller"
     PHYSICS: ClassVar[bool] = True
 
-    motor: float = number(1, "motor number, in PX4's order", "1", 1, 4)
+    motor: float = number(1, "motor number, in PX4's order", "1", 1, 12)
     remaining: float = number(0.5, "fraction of the thrust that remains", "1", 0.0, 1.0)
 
     def effect(self, noise: np.random.Generator) -> Effect:
@@ -69,7 +69,7 @@ class ServoWeak(PlantFault):
     NAME: ClassVar[str] = "servo_weak"
     ABOUT: ClassVar[str] = "a servo gives only a fraction of the commanded torque"
 
-    joint: float = number(1, JOINT, "1", 1, 2)
+    joint: float = number(1, JOINT, "1", 1, 7)
     remaining: float = number(0.0, "fraction of the torque that remains", "1", 0.0, 1.0)
 
     def effect(self, noise: np.random.Generator) -> Effect:
@@ -85,7 +85,7 @@ class ServoJam(PlantFault):
     ABOUT: ClassVar[str] = "a joint's gear jams and holds its present angle"
     PHYSICS: ClassVar[bool] = True
 
-    joint: float = number(1, JOINT, "1", 1, 2)
+    joint: float = number(1, JOINT, "1", 1, 7)
     torque: float = number(20.0, "torque that still moves the joint", "N m", 0.1, 1000.0)
 
     def effect(self, noise: np.random.Generator) -> Effect:

@@ -106,7 +106,7 @@ class EncoderStuck(PlantFault):
     NAME: ClassVar[str] = "encoder_stuck"
     ABOUT: ClassVar[str] = "a joint's encoder repeats its angle and reports zero velocity"
 
-    joint: float = number(1, "joint number", "1", 1, 2)
+    joint: float = number(1, "joint number", "1", 1, 7)
 
     def effect(self, noise: np.random.Generator) -> Effect:
         return Stuck(int(self.joint) - 1)

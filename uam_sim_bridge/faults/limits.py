@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping
+from collections.abc import Collection, Mapping, Sequence
 
+from uam_control.vehicle import VehicleDescription, load_description
 from uam_sim_bridge.faults.fault import PROCESS, Fault, FaultError
 from uam_sim_bridge.faults.link_faults import LinkFault, MavlinkDelay
 from uam_sim_bridge.faults.process_faults import ProcessFault
@@ -15,6 +16,7 @@ def check(
     engine: str,
     absent: Collection[str] = (),
     refused: Mapping[str, str] | None = None,
+    vehicle: VehicleDescription | None = None,
 ) -> None:
     """Raise FaultError for the first fault that is not possible in this flight.
 
@@ -23,6 +25,11 @@ def check(
     """
     for one in schedule.faults:
         fault = one.fault
+        for what, parts in parts_of(vehicle or load_description()).items():
+            if getattr(fault, what, 1) > len(parts):
+                raise FaultError(
+                    f"{fault.NAME}: {what} {getattr(fault, what):g}: the vehicle has {len(parts)}"
+                )
         why = needs_nodes(fault) if engine == "direct" else ""
         if why:
             raise FaultError(f"{fault.NAME}: {why}: needs --engine ros")
@@ -30,6 +37,11 @@ def check(
             raise FaultError(f"{fault.NAME}: not on this machine: {why}")
         if isinstance(fault, ProcessFault) and fault.node in absent:
             raise FaultError(f"{fault.NAME}: this flight does not start {fault.node}")
+
+
+def parts_of(vehicle: VehicleDescription) -> dict[str, Sequence[object]]:
+    """Return what the parameters of faults count, by the parameter's name."""
+    return {"motor": vehicle.rotors, "joint": vehicle.joints}
 
 
 def needs_nodes(fault: Fault) -> str:

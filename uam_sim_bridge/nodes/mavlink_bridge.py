@@ -19,7 +19,7 @@ from rclpy.clock import Clock, ClockType
 from rclpy.parameter import Parameter
 from std_msgs.msg import Bool
 
-from uam_control.coordinates import ATTITUDE, SIZE
+from uam_control.coordinates import ATTITUDE
 from uam_control.nodes.described import described_vehicle
 from uam_control.settings.parameter_set import ParameterError
 from uam_control.stamps import SECOND, seconds
@@ -79,7 +79,7 @@ class MavlinkBridgeNode(UamNode):
 
     def __init__(self) -> None:
         super().__init__(NAME)
-        vehicle = described_vehicle(self)
+        vehicle = self._vehicle = described_vehicle(self)
         derived = vehicle.node_parameters()[NAME]
         mapping = NodeParameters(self, RateThrustParameters, derived=derived)
         mapping.apply = self._configure
@@ -275,7 +275,7 @@ class MavlinkBridgeNode(UamNode):
     def _warm_up(self) -> None:
         """Compile the maths before the flight: a first call takes a second."""
         spare, zero, level = RateThrustMap(), np.zeros(3), np.array([1.0, 0.0, 0.0, 0.0])
-        state = np.zeros((3, SIZE))
+        state = np.zeros((3, len(self._vehicle.coordinates)))
         spare.map(zero, zero, state[0, ATTITUDE], state[1, ATTITUDE])
         spare.assumed_thrust(0.5)
         for setpoint in SETPOINTS.values():

@@ -78,18 +78,19 @@ class Simulator:
     def __init__(self, node: TunableNode, options: Options, stop: StopSignal):
         self.node, self.options, self._stop = node, options, stop
         vehicle = Vehicle.load(options.vehicle).changed(json.loads(options.vehicle_changes))
+        described = vehicle.description
         start = (vehicle, options.payload_mass, options.seed, tuple(options.arm_start))
         faults = Schedule.from_text(options.faults).only(PLANT)
         self.plant = make_plant(*start, faults, options.plant)
         self._faulty = self.plant if isinstance(self.plant, FaultyPlant) else None
         self._fault_topic = FaultTopic(node) if faults else None
         _warm_up(make_plant(*start, Schedule(), options.plant))
-        self.sensors, self.truth = Sensors(node), TruthTopics(node)
-        self.answers = Answers(node)
+        self.sensors, self.truth = Sensors(node, described), TruthTopics(node, described)
+        self.answers = Answers(node, described)
         self.connections = Connections(node)
         self.executor = LeanExecutor(node, [topics.SETPOINT.name], lambda: self._setpoint_is_there)
         patience = options.answer_timeout
-        rotors = len(vehicle.description.rotors)
+        rotors = len(described.rotors)
         waits = HilParameters(answer_timeout=patience)
         if options.autopilot_always_answers:
             waits = HilParameters(answer_timeout=patience, silent_timeout=patience)

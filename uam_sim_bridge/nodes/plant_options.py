@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from array import array
 from dataclasses import asdict, dataclass, field, replace
 
@@ -10,6 +9,7 @@ from rcl_interfaces.msg import ParameterDescriptor
 from rclpy.node import Node
 
 from uam_control.settings.parameter_set import ParameterError
+from uam_control.vehicle import DEFAULT_VEHICLE
 from uam_sim_bridge.plant.engines import DEFAULT_PLANT, PLANTS
 
 NOT_READY = 3  # exit status: not everyone came, or found the others
@@ -19,12 +19,12 @@ NOT_READY = 3  # exit status: not everyone came, or found the others
 class Options:
     """The node's parameters."""
 
-    vehicle: str = "s500_arm"
+    vehicle: str = DEFAULT_VEHICLE
     vehicle_changes: str = "{}"
     plant: str = DEFAULT_PLANT
     payload_mass: float = 0.2
     seed: int = 1
-    arm_start: list[float] = field(default_factory=lambda: [0.0, math.pi / 2.0])
+    arm_start: list[float] = field(default_factory=list)
     clock: str = "lockstep"
     hil_port: int = 4560
     autopilot_always_answers: bool = True
@@ -44,7 +44,7 @@ DESCRIPTIONS = {
     "plant": "physics engine: " + ", ".join(PLANTS) + ", or a class as module:Class",
     "payload_mass": "mass of the payload [kg], 0 for none",
     "seed": "of all noise",
-    "arm_start": "joint angles on the ground [rad]",
+    "arm_start": "joint angles on the ground [rad], empty = stowed as described",
     "clock": "lockstep or realtime",
     "hil_port": "TCP port at which the autopilot connects",
     "autopilot_always_answers": "the stand-in does; PX4 is silent while it boots",
@@ -63,7 +63,9 @@ def declare(node: Node) -> Options:
     """Declare the parameters and return their values. Raises ParameterError for a bad one."""
     values = {}
     for name, default in asdict(Options()).items():
-        text = ParameterDescriptor(description=DESCRIPTIONS[name], read_only=True)
+        text = ParameterDescriptor(
+            description=DESCRIPTIONS[name], read_only=True, dynamic_typing=default == []
+        )
         values[name] = node.declare_parameter(name, default, text).value
     options = Options(**values)
     if options.clock not in ("lockstep", "realtime"):

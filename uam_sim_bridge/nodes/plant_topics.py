@@ -12,8 +12,8 @@ from rclpy.publisher import Publisher
 from rclpy.subscription import Subscription
 from rosgraph_msgs.msg import Clock
 
-from uam_control.coordinates import ARM, COORDINATES
 from uam_control.stamps import nanoseconds
+from uam_control.vehicle import VehicleDescription
 from uam_msgs_py.messages import topics
 from uam_msgs_py.messages.convert import (
     ImuWriter,
@@ -27,9 +27,6 @@ from uam_msgs_py.messages.serialized import Template
 from uam_msgs_py.messages.status import MissionStatus
 from uam_msgs_py.messages.trajectories import TrajectoryWriter
 from uam_sim_bridge.plant import Samples, Truth
-
-JOINTS = list(COORDINATES[ARM])
-ROTORS = [f"rotor_{i}" for i in range(1, 5)]
 
 
 class Outlets:
@@ -48,12 +45,12 @@ class Outlets:
 class Sensors(Outlets):
     """Publishes /clock and what the sensors deliver."""
 
-    def __init__(self, node: Node):
+    def __init__(self, node: Node, vehicle: VehicleDescription):
         super().__init__(node, (topics.CLOCK, topics.IMU, topics.JOINTS, topics.MOCAP))
         self._clock, self._imu, self._joints, self._mocap = self.outlets.values()
         self._clock_writer = Template(Clock())
         self._imu_writer, self._mocap_writer = ImuWriter(), PoseWriter()
-        self._joint_writer = JointStateWriter(JOINTS)
+        self._joint_writer = JointStateWriter(vehicle.joint_names)
 
     def clock(self, stamp: int) -> None:
         """Publish simulation time [ns]."""
@@ -83,13 +80,13 @@ class Sensors(Outlets):
 class TruthTopics(Outlets):
     """Publishes what only a simulator knows; no controller subscribes to it."""
 
-    def __init__(self, node: Node):
+    def __init__(self, node: Node, vehicle: VehicleDescription):
         truth = (topics.TRUTH_STATE, topics.TRUTH_PAYLOAD, topics.TRUTH_ROTORS, topics.TRUTH_MAGNET)
         super().__init__(node, truth)
         self._state, self._payload, self._rotors, self._magnet = self.outlets.values()
-        self._state_writer = TrajectoryWriter(COORDINATES)
+        self._state_writer = TrajectoryWriter(vehicle.coordinates)
         self._payload_writer = PoseWriter()
-        self._rotor_writer = JointStateWriter(ROTORS)
+        self._rotor_writer = JointStateWriter(vehicle.rotor_names)
         self._magnet_writer = JointStateWriter(["magnet", "swing"])
 
     def publish(self, stamp: int, truth: Truth, motors: np.ndarray, magnet: bool) -> None:
@@ -126,8 +123,9 @@ class Answers:
     to take out.
     """
 
-    def __init__(self, node: Node):
-        self.effort = np.zeros(2)
+    def __init__(self, node: Node, vehicle: VehicleDescription):
+        self._names = list(vehicle.joint_names)
+        self.effort = np.zeros(len(self._names))
         self.magnet = False
         self.mission, self.mission_stamp = MissionStatus(), 0  # [ns]
         self.setpoints: dict[int, int] = {}
@@ -173,7 +171,7 @@ class Answers:
             self.setpoints[self._setpoint_stamp] = info["source_timestamp"]
 
     def _on_effort(self, data: bytes, info: dict | None = None) -> None:
-        self.effort = read_effort(data, JOINTS)
+        self.effort = read_effort(data, self._names)
         self._arrived.add("effort")
         self.arrivals[topics.ARM_EFFORT.name] = time.monotonic()
 

@@ -90,7 +90,7 @@ class ControlTick:
         """sets: parameters by the names of the nodes, see `Profile.sets`."""
         self.signals = Signals.at_rest(len(scenario.arm_start))
         self.stages = list(STAGES)
-        self.estimator = EstimatorStage(sets["state_estimator"])
+        self.estimator = EstimatorStage(sets["state_estimator"], len(scenario.arm_start))
         self.mission = MissionStage(Mission(scenario, sets["mission"]), timing)
         self.position = PositionStage(PositionController(sets["position_controller"]), timing)
         self.attitude = TorqueStage(AttitudeController(sets["attitude_controller"]), timing)

@@ -6,7 +6,7 @@ import time
 
 import numpy as np
 
-from uam_control.coordinates import ARM, ATTITUDE, POSITION, SIZE
+from uam_control.coordinates import ARM, ATTITUDE, POSITION
 from uam_control.maths.rotations import wrap_angle
 from uam_lab.flight.direct.flight import DirectFlight
 from uam_lab.flight.direct.warm_up import is_cold, warm_up
@@ -15,7 +15,6 @@ from uam_lab.flight.settings import FlightSettings
 from uam_lab.processes.interrupts import Interrupts
 from uam_lab.results.outcome import Outcome, transitions
 from uam_lab.results.result_folder import ResultFolder
-from uam_lab.results.timeseries import COLUMNS
 from uam_sim_bridge.plant import Vehicle
 
 
@@ -24,7 +23,7 @@ def fly(settings: FlightSettings, folder: ResultFolder, progress: Progress) -> O
     if is_cold():
         progress.message("compiling the control path (once)")
         warm_up()
-    vehicle = Vehicle.load().changed(settings.vehicle_changes)
+    vehicle = Vehicle.of(settings.vehicle).changed(settings.vehicle_changes)
     flight = DirectFlight(
         settings.scenario,
         settings.profile,
@@ -65,7 +64,9 @@ def _report(flight: DirectFlight, begin: float, progress: Progress, stop: Interr
     if not recording.count:
         return
     row, output = recording.values[recording.count - 1], flight.mission.output
-    error = row[COLUMNS.block("estimate.")][:SIZE] - row[COLUMNS.block("reference.")][:SIZE]
+    columns = recording.columns
+    size = columns.size
+    error = row[columns.block("estimate.")][:size] - row[columns.block("reference.")][:size]
     error[ATTITUDE.start :] = wrap_angle(error[ATTITUDE.start :])
     norms = [float(np.linalg.norm(error[part])) for part in (POSITION, ATTITUDE, ARM)]
     wall = time.monotonic() - begin

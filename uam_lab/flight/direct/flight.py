@@ -17,8 +17,8 @@ from uam_control.mission.time_limit import DISARMED, Settled, time_limit
 from uam_control.profiles.profile import Profile
 from uam_control.stages.timing import Timing
 from uam_control.stamps import nanoseconds, seconds
-from uam_lab.flight.direct.record import Snapshot, record, record_blind, record_switches
-from uam_lab.results.timeseries import SUBSYSTEMS, FlightTable, gain_columns
+from uam_lab.flight.direct.record import Places, Snapshot, record, record_blind, record_switches
+from uam_lab.results.timeseries import SUBSYSTEMS, FlightTable, columns_of, gain_columns
 from uam_sim_bridge.autopilot.core import Autopilot
 from uam_sim_bridge.autopilot.joined import JoinedAutopilot
 from uam_sim_bridge.autopilot.params import Parameters
@@ -73,13 +73,14 @@ class DirectFlight:
         self._lag = 0  # ticks from an IMU sample to its arrival
         self._truths: deque[Snapshot] = deque()  # of ticks whose IMU sample is on its way
         self._complete = False  # every kind of sensor has delivered
-        laws = self.control.laws
+        laws, columns = self.control.laws, columns_of(described)
+        self._places = Places.of(columns)
         self._gains = tuple(laws[name].controller.adaptation for name in SUBSYSTEMS)
         self._gain_columns = tuple(
-            gain_columns(name, laws[name].controller.names) for name in SUBSYSTEMS
+            gain_columns(name, laws[name].controller.names, columns) for name in SUBSYSTEMS
         )
         length = scenario.landing.at + scenario.landing.duration + 12.0
-        self.recording = FlightTable(int(length / self.plant.period))
+        self.recording = FlightTable(int(length / self.plant.period), columns)
 
     def run(self, progress: Callable[[float, str], None] | None = None) -> FlightTable:
         """Fly until the mission is done; progress(mission time [s], phase) once a second."""
@@ -165,8 +166,9 @@ class DirectFlight:
             motors,
             truth.thrust,
             truth.payload_pose,
+            self._places,
         )
-        record_switches(row, signals.magnet, truth, signals.thrust_factor)
+        record_switches(row, signals.magnet, truth, signals.thrust_factor, self._places)
         self._lag = len(self._truths)
 
     def _record_blind(self, motors: np.ndarray) -> None:
@@ -177,7 +179,7 @@ class DirectFlight:
             row = self.recording.next_row(self.mission.output.phase)
             row[:] = self.recording.values[last]
             row[0] += self.plant.period
-            record_blind(row, truth, motors)
+            record_blind(row, truth, motors, self._places)
 
     def _update_faults(self, control: ControlTick) -> bool:
         """Stage: tell plant and link the mission's time; where there are faults."""

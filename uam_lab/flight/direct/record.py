@@ -6,23 +6,40 @@ from typing import NamedTuple
 
 import numpy as np
 
+from uam_control.coordinates import ROLL
 from uam_control.maths.compiled import jit
-from uam_lab.results.timeseries import COLUMNS
+from uam_lab.results.timeseries import Columns
 from uam_sim_bridge.plant import Plant
 
-# where each group of columns begins; constants of the compiled `record`
-_TRUTH = COLUMNS.block("truth.").start
-_ESTIMATE = COLUMNS.block("estimate.").start
-_REFERENCE = COLUMNS.block("reference.").start
-_TAU_P = COLUMNS["tau_p.x"]
-_TAU_Q = COLUMNS["tau_q.roll"]
-_TAU_ALPHA = COLUMNS["tau_alpha.1"]
-_SETPOINT = COLUMNS["setpoint.rate_x"]
-_FACTOR = COLUMNS["thrust.factor"]
-_COMMAND = COLUMNS["rotor_1.command"]
-_THRUST = COLUMNS["rotor_1.thrust"]
-_PAYLOAD = COLUMNS.block("payload.").start
-_MAGNET = COLUMNS["magnet.on"]
+
+class Places(NamedTuple):
+    """Where each group of columns begins."""
+
+    truth: int
+    estimate: int
+    reference: int
+    tau_p: int
+    tau_q: int
+    tau_alpha: int
+    setpoint: int
+    factor: int
+    command: int
+    thrust: int
+    payload: int
+    magnet: int
+
+    @classmethod
+    def of(cls, columns: Columns) -> Places:
+        """Return those of a recording with these columns."""
+        groups = ("truth.", "estimate.", "reference.", "tau_p.", "tau_q.", "tau_alpha.")
+        return cls(
+            *(columns.block(group).start for group in (*groups, "setpoint.")),
+            columns["thrust.factor"],
+            columns["rotor_1.command"],
+            columns["rotor_1.thrust"],
+            columns.block("payload.").start,
+            columns["magnet.on"],
+        )
 
 
 class Snapshot(NamedTuple):
@@ -67,45 +84,52 @@ def record(
     motors: np.ndarray,
     thrust: np.ndarray,
     payload_pose: np.ndarray,
+    at: Places,
 ) -> None:
     """Copy one tick into its row of the recording; roll and pitch reference are what tau_p asks.
 
     gains, gain_columns: three arrays each, the published gains and where they go.
     """
     row[0] = time
+    size = truth.shape[1]
     for i in range(3):
-        for j in range(8):
-            row[_TRUTH + 8 * i + j] = truth[i, j]
-            row[_ESTIMATE + 8 * i + j] = state[i, j]
-            row[_REFERENCE + 8 * i + j] = reference[i, j]
+        for j in range(size):
+            row[at.truth + size * i + j] = truth[i, j]
+            row[at.estimate + size * i + j] = state[i, j]
+            row[at.reference + size * i + j] = reference[i, j]
         for j in range(3):
-            row[_REFERENCE + 8 * i + 3 + j] = attitude_reference[i, j]
-        row[_TAU_P + i] = tau_p[i]
-        row[_TAU_Q + i] = tau_q[i]
-        row[_SETPOINT + i] = rates[i]
-    for i in range(2):
-        row[_TAU_ALPHA + i] = tau_alpha[i]
-    row[_SETPOINT + 3] = command
-    for i in range(4):
-        row[_COMMAND + i] = motors[i]
-        row[_THRUST + i] = thrust[i]
-    for i in range(7):
-        row[_PAYLOAD + i] = payload_pose[i]
+            row[at.reference + size * i + ROLL + j] = attitude_reference[i, j]
+        row[at.tau_p + i] = tau_p[i]
+        row[at.tau_q + i] = tau_q[i]
+        row[at.setpoint + i] = rates[i]
+    for i in range(len(tau_alpha)):
+        row[at.tau_alpha + i] = tau_alpha[i]
+    row[at.setpoint + 3] = command
+    for i in range(len(motors)):
+        row[at.command + i] = motors[i]
+        row[at.thrust + i] = thrust[i]
+    for i in range(len(payload_pose)):
+        row[at.payload + i] = payload_pose[i]
     for subsystem in range(3):
         columns, values = gain_columns[subsystem], gains[subsystem]
         for i in range(len(columns)):
             row[columns[i]] = values[i]
 
 
-def record_switches(row: np.ndarray, magnet: bool, truth: Snapshot, factor: float) -> None:
-    """The rest of a tick: the magnet as commanded and as it is, the thrust factor."""
-    row[_MAGNET], row[_MAGNET + 1 : _MAGNET + 3] = magnet, (truth.magnet_force, truth.magnet_swing)
-    row[_FACTOR] = factor
+def record_switches(
+    row: np.ndarray, magnet: bool, truth: Snapshot, factor: float, at: Places
+) -> None:
+    """Write the rest of a tick: the magnet as commanded and as it is, the thrust factor."""
+    row[at.magnet] = magnet
+    row[at.magnet + 1 : at.magnet + 3] = truth.magnet_force, truth.magnet_swing
+    row[at.factor] = factor
 
 
-def record_blind(row: np.ndarray, truth: Snapshot, motors: np.ndarray) -> None:
-    """A tick without an IMU sample into a copy of the row before: truth and motors (4,) go on."""
-    row[_TRUTH : _TRUTH + truth.state.size] = truth.state.ravel()
-    row[_COMMAND : _COMMAND + 4], row[_THRUST : _THRUST + 4] = motors, truth.thrust
-    row[_PAYLOAD : _PAYLOAD + 7] = truth.payload_pose
-    row[_MAGNET + 1 : _MAGNET + 3] = truth.magnet_force, truth.magnet_swing
+def record_blind(row: np.ndarray, truth: Snapshot, motors: np.ndarray, at: Places) -> None:
+    """A tick without an IMU sample into a copy of the row before: truth and motors go on."""
+    rotors = len(motors)
+    row[at.truth : at.truth + truth.state.size] = truth.state.ravel()
+    row[at.command : at.command + rotors] = motors
+    row[at.thrust : at.thrust + rotors] = truth.thrust
+    row[at.payload : at.payload + 7] = truth.payload_pose
+    row[at.magnet + 1 : at.magnet + 3] = truth.magnet_force, truth.magnet_swing

@@ -18,6 +18,11 @@ from uam_sim_bridge.faults import LINK, PLANT
 from uam_sim_bridge.ports import Ports
 
 FACTS = "facts.json"
+# nodes that load the description of the vehicle
+DESCRIBED = {
+    *(wiring.ESTIMATOR, wiring.MISSION, wiring.POSITION, wiring.ATTITUDE, wiring.ARM),
+    *(wiring.PLANT, wiring.BRIDGE, wiring.SCENE, wiring.COCKPIT),
+}
 PX4_LINGER = 4.0  # [s] simulated, after the mission, in which PX4 disarms and closes its log
 START_TIMEOUT = 20.0  # [s] without progress until every node is connected to the others
 OWN_START_TIMEOUT = 600.0  # [s] the same if the user starts a node by hand
@@ -68,6 +73,8 @@ def parameters(
         "facts": str(folder.path / "logs" / FACTS),
         "size_limit": settings.log_limit,
     }
+    for node in DESCRIBED & sections.keys():
+        sections[node]["vehicle"] = settings.vehicle.source
     return sections
 
 

@@ -47,12 +47,13 @@ def autopilot(
     """Return module and arguments of the autopilot's process; "" if the user starts it."""
     instance = ["--instance", str(ports.instance)]
     patience = ["--wait", str(AUTOPILOT_WAIT)]
+    vehicle = ["--vehicle", settings.vehicle.source]
     if in_the_loop(settings):
         return HITL_ROUTER, [settings.autopilot, *instance, *patience]
     if settings.px4 is not None:
         log = folder.path / PX4_LOG
         own = ["--px4-dir", str(settings.px4.directory), "--log", str(log.absolute())]
-        return SITL, [*instance, *own]
+        return SITL, [*instance, *own, *vehicle]
     if users_autopilot(settings):
         return "", []
-    return STAND_IN, [*instance, *patience]
+    return STAND_IN, [*instance, *patience, *vehicle]

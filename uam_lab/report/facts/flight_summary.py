@@ -24,8 +24,8 @@ class ErrorRow:
 
     @property
     def better(self) -> bool | None:
-        """Return whether the RMS is at most the paper's, None without an RMS."""
-        return None if self.rms is None else self.rms <= self.paper
+        """Return whether the RMS is at most the paper's, None without an RMS or a published one."""
+        return None if self.rms is None or self.paper is None else self.rms <= self.paper
 
     def shown(self, value: float | None) -> str:
         """Return `value` with the unit and the digits of this row."""
@@ -38,11 +38,11 @@ class ErrorRow:
 def error_rows(metrics: Mapping[str, Any]) -> list[ErrorRow]:
     """Return one row per coordinate."""
     rows = []
-    for group, heading, unit, digits, names in paper.TABLES:
+    for group, heading, unit, digits, names in paper.tables(len(metrics["rms"]["arm_deg"])):
         columns = zip(
             names,
             metrics["rms"][group],
-            paper.RMS[group],
+            paper.published(group, len(names)),
             metrics["max"][group],
             strict=True,
         )

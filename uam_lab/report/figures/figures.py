@@ -48,9 +48,14 @@ def arm_errors(flights: Sequence[DrawnFlight]) -> Figure:
     """Draw the joint error over time, as in the paper's plot5."""
     drawn = [
         Panel(f"{label} error [°]", f"error.alpha_{joint}", DEGREES)
-        for label, joint in (("α₁", 1), ("α₂", 2))
+        for joint, label in enumerate(paper.joint_labels(_joints(flights)), start=1)
     ]
     return _errors("Arm tracking error", flights, drawn, "arm_deg", "°", 2)
+
+
+def _joints(flights: Sequence[DrawnFlight]) -> int:
+    """Return the number of joints that all of the flights have."""
+    return min(flight.series.columns.joints for flight in flights)
 
 
 def vehicle_inputs(flights: Sequence[DrawnFlight]) -> Figure:
@@ -65,7 +70,10 @@ def vehicle_inputs(flights: Sequence[DrawnFlight]) -> Figure:
 
 def arm_inputs(flights: Sequence[DrawnFlight]) -> Figure:
     """Draw tau_alpha over time, as in the paper's plot7."""
-    drawn = [Panel(f"$\\tau_{{\\alpha {joint}}}$ [N m]", f"tau_alpha.{joint}") for joint in "12"]
+    drawn = [
+        Panel(f"$\\tau_{{\\alpha {joint}}}$ [N m]", f"tau_alpha.{joint}")
+        for joint in range(1, _joints(flights) + 1)
+    ]
     return panels.stack("Arm control inputs", flights, drawn)[0]
 
 
@@ -165,6 +173,11 @@ def _adaptation_of(
             )
 
 
+def _compared(published: float | None, unit: str) -> str:
+    """Return the paper's figure, "" where it has none."""
+    return "" if published is None else f"paper {published:g} {unit}".replace(" °", "°")
+
+
 def _errors(
     title: str,
     flights: Sequence[DrawnFlight],
@@ -178,11 +191,11 @@ def _errors(
     figure, axes = panels.stack(title, flights, drawn, right=0.875 if single else panels.RIGHT)
     if single:
         own = metrics.errors(flights[0].series)[group]
-        for axis, value, published in zip(axes, own, paper.RMS[group], strict=True):
+        for axis, value, published in zip(axes, own, paper.published(group, len(own)), strict=True):
             for text, height, size, colour in (
                 ("RMS", 0.74, 7.5, style.MUTED),
                 (f"{value:.{digits}f} {unit}".replace(" °", "°"), 0.58, 10.5, style.INK),
-                (f"paper {published:g} {unit}".replace(" °", "°"), 0.42, 7.5, style.MUTED),
+                (_compared(published, unit), 0.42, 7.5, style.MUTED),
             ):
                 axis.text(
                     1.02,

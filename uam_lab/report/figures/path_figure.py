@@ -116,7 +116,7 @@ def _poses(axis: Axes, poses: Poses, start: float, end: float) -> None:
 def _pose(axis: Axes, poses: Poses, opacity: float, order: int) -> None:
     fade = {"alpha": opacity, "zorder": order, "solid_capstyle": "round"}
     feet = np.array([poses.data.geom(f"foot_{i}").xpos for i in (1, 2)])
-    rotors = np.array([poses.site(f"rotor_{i}") for i in (2, 1)])
+    rotors = np.array([poses.site(name) for name in poses.outermost_rotors])
     base = poses.body("base")
     axis.plot(rotors[:, 0], rotors[:, 2], color=style.INK, linewidth=2.6, **fade)
     for rotor in rotors:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
@@ -11,6 +12,7 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.ticker import LogLocator, MaxNLocator, NullLocator
 
+from uam_control.coordinates import ALPHA
 from uam_lab.report.figures import panels, style
 from uam_lab.report.figures.panels import DrawnFlight
 from uam_lab.results.timeseries import SUBSYSTEMS
@@ -60,7 +62,9 @@ def coupling(flights: Sequence[DrawnFlight]) -> Figure | None:
     found = _only(flights)
     if found is None:
         return None
-    figure, axes = panels.grid("Coupling force and its compensation", 4, 2, 1.45)
+    figure, axes = panels.grid(
+        "Coupling force and its compensation", 4, math.ceil(found.supply.tau.shape[1] / 4), 1.45
+    )
     figure.subplots_adjust(wspace=0.26)  # small torques have long labels
     supply = found.supply
     drawn = (
@@ -69,11 +73,16 @@ def coupling(flights: Sequence[DrawnFlight]) -> Figure | None:
         (supply.adaptive, ADAPTIVE, 1.2),
         (found.coupling.plant, COUPLING, 1.2),
     )
-    labels = [f"{axis} [N]" for axis in "xyz"] + ["$\\alpha_1$ [N m]"]
-    labels += [f"{name} [N m]" for name in ("roll φ", "pitch θ", "yaw ψ")] + ["$\\alpha_2$ [N m]"]
-    for axis, label, column in zip(axes.T.flat, labels, (0, 1, 2, 6, 3, 4, 5, 7), strict=True):
+    labels = [f"{axis} [N]" for axis in "xyz"]
+    labels += [f"{name} [N m]" for name in ("roll φ", "pitch θ", "yaw ψ")]
+    order = [*range(ALPHA)]
+    for joint in range(found.supply.tau.shape[1] - ALPHA):  # to the right of x, y, z and angles
+        at = min(4 * joint + 3, len(order))
+        labels.insert(at, f"$\\alpha_{joint + 1}$ [N m]")
+        order.insert(at, ALPHA + joint)
+    for axis, label, column in zip(axes.T.flat, labels, order, strict=False):
         for values, colour, width in drawn:
-            if colour == ACTUATORS and column >= 6:
+            if colour == ACTUATORS and column >= ALPHA:
                 continue  # the servos' torque is not recorded
             mean = moving_mean(found.time, values[:, column])
             axis.plot(*panels.thin(found.time, mean), color=colour, linewidth=width)

@@ -17,11 +17,12 @@ def build_overlay(
     flights: Sequence[DrawnFlight], out: Path, progress: Callable[[str], None] = lambda text: None
 ) -> Path:
     """Write figures/ and report.html to `out`; return the page."""
+    joints = max(flight.series.columns.joints for flight in flights)
     drawn = figures.draw(flights, out / "figures", progress)
     progress("page")
     text = html.template("uam_lab.report.page", "overlay.html.j2").render(
         labels=[flight.label for flight in flights],
-        tables=[_table(flights, *table) for table in paper.TABLES],
+        tables=[_table(flights, *table) for table in paper.tables(joints)],
         figures=[
             (name, figures.FIGURES[name][1], html.embedded(out / "figures" / f"{name}.png"))
             for name in drawn
