@@ -66,9 +66,9 @@ class HoverFlight:
         self._link = OffboardLink(
             self._transport, self._sequence, self._map.parameters, self.system
         )
-        self._reference = empty_reference()
+        self._reference = empty_reference(len(vehicle.joints))
         self._reference[CHI, ARM] = vehicle.stowed
-        self._state = np.zeros((3, 8))
+        self._state = np.zeros_like(self._reference)
         self._setpoint = np.zeros(4)
         self._flying = False
         self._standing = 0.0  # height [m] before take-off

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from uam_control.control.controllers import ArmController, AttitudeController, PositionController
-from uam_control.coordinates import COORDINATES, JOINTS
+from uam_control.coordinates import arm_coordinates, coordinates
 from uam_control.estimation import StateEstimator
 from uam_control.mission import Mission, load_scenario
 from uam_control.profiles.profile import load_profile
@@ -20,6 +20,9 @@ from uam_msgs_py.messages.convert import ImuWriter, JointStateWriter, PoseWriter
 from uam_msgs_py.messages.status import AutopilotState, MissionStatus
 from uam_msgs_py.messages.trajectories import TrajectoryWriter
 from uam_msgs_py.node.connections import Connections
+
+COORDINATES = coordinates(2)
+JOINTS = arm_coordinates(2)
 
 PERIOD = 4_000_000  # [ns]
 ARMED_AT = 40 * PERIOD  # take-off follows 0.5 s later
@@ -53,7 +56,7 @@ def samples():
 def expected():
     """Return the maths' results for `samples`: state, tau_p, tau_q (None: idle), tau_alpha."""
     sets = load_profile("s500").sets
-    estimator = StateEstimator(sets["state_estimator"])
+    estimator = StateEstimator(sets["state_estimator"], 2)
     mission = Mission(load_scenario("pick_and_place"), sets["mission"])
     position = PositionController(sets["position_controller"])
     attitude = AttitudeController(sets["attitude_controller"])

@@ -6,11 +6,15 @@ import numpy as np
 import pytest
 from free_port import free_port
 
-from uam_control.coordinates import COORDINATES, JOINTS, SIZE
+from uam_control.coordinates import arm_coordinates, coordinates
 from uam_msgs_py.messages import topics
 from uam_msgs_py.messages.convert import ImuWriter, JointStateWriter, PoseWriter
 from uam_msgs_py.messages.status import OK, STALE, WARN
 from uam_msgs_py.messages.trajectories import TrajectoryWriter
+
+COORDINATES = coordinates(2)
+SIZE = len(COORDINATES)
+JOINTS = arm_coordinates(2)
 
 NODES = {
     "uam_control.nodes.position_controller": "/uam/state",

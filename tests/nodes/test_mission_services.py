@@ -7,11 +7,13 @@ from sensor_msgs.msg import BatteryState, Temperature
 from std_msgs.msg import Header
 from std_srvs.srv import SetBool, Trigger
 
-from uam_control.coordinates import COORDINATES
+from uam_control.coordinates import coordinates
 from uam_msgs_py.messages import topics
 from uam_msgs_py.messages.control import read_reference
 from uam_msgs_py.messages.status import AutopilotState, MissionStatus
 from uam_msgs_py.messages.trajectories import TrajectoryWriter
+
+COORDINATES = coordinates(2)
 
 PERIOD = 4_000_000  # [ns]
 

@@ -4,7 +4,7 @@ import numpy as np
 from mcap.records import Schema
 from mcap_ros2.decoder import DecoderFactory
 
-from uam_control.coordinates import COORDINATES, SIZE
+from uam_control.coordinates import coordinates
 from uam_lab.recording.message_definitions import schema
 from uam_msgs_py.messages import topics
 from uam_msgs_py.messages.control import ReferenceWriter
@@ -12,6 +12,9 @@ from uam_msgs_py.messages.convert import PoseWriter, read_joints
 from uam_msgs_py.messages.status import MissionStatus
 from uam_msgs_py.messages.trajectories import TrajectoryWriter
 from uam_msgs_py.node.connections import Connections
+
+COORDINATES = coordinates(2)
+SIZE = len(COORDINATES)
 
 MODULE = "uam_lab.nodes.scene"
 TICK = 4_000_000  # [ns]
@@ -45,7 +48,7 @@ class Rig:
         inputs = [topics.STATE, topics.REFERENCE] + [topics.TRUTH_PAYLOAD] * truth
         self.outlets = [probe.publisher(topic) for topic in inputs]
         self.status = probe.publisher(topics.MISSION_STATUS)
-        self.writers = TrajectoryWriter(COORDINATES), ReferenceWriter(), PoseWriter()
+        self.writers = TrajectoryWriter(COORDINATES), ReferenceWriter(2), PoseWriter()
         self.tell(MissionStatus(phase="waiting"))
         probe.until(lambda: self.robot and self.still, "URDF and fixed frames")
         probe.until_connected("scene", self.outlets, [topics.TF, topics.TRACKING_ERROR])

@@ -13,7 +13,7 @@ from rcl_interfaces.srv import (
 from rclpy.parameter import Parameter, parameter_value_to_python
 from std_srvs.srv import SetBool, Trigger
 
-from uam_control.coordinates import COORDINATES
+from uam_control.coordinates import coordinates
 from uam_control.profiles.profile import NODES, load_profile, parameter_set
 from uam_control.settings import configuration
 from uam_lab.flight.ros.profile_switch import ProfileSwitch, SwitchRefused
@@ -25,6 +25,7 @@ from uam_msgs_py.messages.layouts import stamp_of
 from uam_msgs_py.messages.parameter_changes import ParameterChange
 from uam_msgs_py.messages.trajectories import TrajectoryWriter
 
+COORDINATES = coordinates(2)
 PERIOD, ADAPTATION_PERIOD = 4_000_000, 20_000_000  # [ns]
 POSITION = "position_controller"
 GAINS = ["K0", "K1", "K2", "K3", "zeta"]
@@ -72,7 +73,7 @@ class Flying:
         self.gains = probe.collect(topics.POSITION_ADAPTATION)
         self.changes = changes_of(probe)
         self.stamp = 0
-        self._state, self._reference = TrajectoryWriter(COORDINATES), ReferenceWriter()
+        self._state, self._reference = TrajectoryWriter(COORDINATES), ReferenceWriter(2)
         probe.until_connected(
             POSITION,
             [self.state, self.reference],

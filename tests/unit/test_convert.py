@@ -14,9 +14,8 @@ from sensor_msgs.msg import Imu, JointState
 from std_msgs.msg import Bool, Float64MultiArray
 from trajectory_msgs.msg import JointTrajectory
 
-from uam_control.coordinates import COORDINATES, JOINTS
+from uam_control.coordinates import arm_coordinates, coordinates
 from uam_msgs_py.messages.control import (
-    ARM_NAMES,
     ATTITUDE_NAMES,
     PositionCommandWriter,
     ReferenceWriter,
@@ -43,6 +42,9 @@ from uam_msgs_py.messages.layouts import KNOWN_LAYOUTS, BadMessage, stamp_of
 from uam_msgs_py.messages.serialized import LAYOUTS
 from uam_msgs_py.messages.stamps import set_stamp
 from uam_msgs_py.messages.trajectories import TrajectoryWriter
+
+COORDINATES = coordinates(2)
+JOINTS = arm_coordinates(2)
 
 FINITE = st.floats(-1e100, 1e100)
 STATES = arrays(float, (3, 8), elements=FINITE)
@@ -183,7 +185,7 @@ def test_bad_states_are_refused(change, complaint):
 
 @given(STATES, st.booleans())
 def test_reference_contains_only_controlled_coordinates(values, flying):
-    data = ReferenceWriter().fill(4, values, flying, 1_500_000_000)
+    data = ReferenceWriter(2).fill(4, values, flying, 1_500_000_000)
     message = deserialize_message(data, JointTrajectory)
     assert message.joint_names == list(COORDINATES if flying else JOINTS)
     assert message.points[0].time_from_start.sec == 1
@@ -218,7 +220,7 @@ def test_torque_round_trip_and_refusal():
     stamp, torque = read_torque(message)
     assert stamp == 3 and list(torque) == [0.5, -0.25, 0.125]
     with pytest.raises(BadMessage, match="expected roll, pitch, yaw"):
-        read_torque(TorqueWriter(ARM_NAMES).fill(3, np.array([0.5, -0.25])))
+        read_torque(TorqueWriter(list(JOINTS)).fill(3, np.array([0.5, -0.25])))
 
 
 def test_effort_and_setpoint():

@@ -45,7 +45,7 @@ def feed(estimator, until, gyro_bias=0.0, force_bias=0.0, latency=3, frozen=np.i
 @pytest.mark.parametrize("latency", [1, 3, 10, 20, 50])
 def test_follows_a_motion_despite_late_motion_capture_and_biases(latency):
     """Without correction of the stored predictions it oscillates from about 40 ms on."""
-    estimator = StateEstimator(EstimatorParameters())
+    estimator = StateEstimator(EstimatorParameters(), 2)
     t, state = feed(estimator, 12.0, gyro_bias=0.01, force_bias=0.1, latency=latency)
     p, v, a, euler, rates = motion(t)
     np.testing.assert_allclose(state[0, :3], p, atol=2e-3)
@@ -60,7 +60,7 @@ def test_follows_a_motion_despite_late_motion_capture_and_biases(latency):
 
 def test_a_frozen_motion_capture_is_ignored():
     """The estimate continues with the IMU; the repeated pose is 1.4 m away at the end."""
-    estimator = StateEstimator(EstimatorParameters())
+    estimator = StateEstimator(EstimatorParameters(), 2)
     t, state = feed(estimator, 12.0, gyro_bias=0.01, force_bias=0.1, frozen=10.0)
     p, v, *_ = motion(t)
     np.testing.assert_allclose(state[0, :3], p, atol=0.1)
@@ -75,7 +75,7 @@ def test_repeats_are_exact():
 
 
 def test_names_of_missing_inputs():
-    estimator = StateEstimator(EstimatorParameters())
+    estimator = StateEstimator(EstimatorParameters(), 2)
     assert estimator.waiting_for == ["imu", "mocap", "joints"]
     estimator.imu(0.0, np.zeros(3), np.array([0, 0, 9.81]))
     estimator.joints(0.0, np.zeros(2), np.zeros(2))
@@ -86,7 +86,7 @@ def test_names_of_missing_inputs():
 
 
 def test_gravity_is_not_an_acceleration():
-    estimator = StateEstimator(EstimatorParameters())
+    estimator = StateEstimator(EstimatorParameters(), 2)
     for k in range(500):
         if k % 2 == 0:
             estimator.mocap(k * DT, np.zeros(3), np.array([1.0, 0, 0, 0]))

@@ -53,7 +53,7 @@ def test_accelerations_are_filtered_over_the_period():
 
 def started(**parameters) -> StateEstimator:
     """An estimator that was shown a vehicle at rest at 0 s."""
-    estimator = StateEstimator(EstimatorParameters(**parameters))
+    estimator = StateEstimator(EstimatorParameters(**parameters), 2)
     estimator.imu(0.0, NOTHING, WEIGHT)
     estimator.mocap(0.0, np.array([1.0, 2.0, 3.0]), LEVEL)
     estimator.joints(0.0, np.array([0.3, -0.2]), np.array([1.0, -2.0]))
@@ -113,7 +113,7 @@ def test_a_jump_is_refused_while_the_estimate_is_trusted():
 
 
 def test_it_predicts_only_from_a_pose_on():
-    estimator = StateEstimator(EstimatorParameters())
+    estimator = StateEstimator(EstimatorParameters(), 2)
     for stamp in (0.0, 0.01):
         estimator.imu(stamp, NOTHING, 2.0 * WEIGHT)
     assert not estimator.update()[1].any()
@@ -125,7 +125,7 @@ def test_it_predicts_only_from_a_pose_on():
 
 @pytest.mark.parametrize(("gap", "refused"), [(0.05, 1), (0.06, 0)])
 def test_an_imu_gap_of_more_than_50_ms_ends_the_trust_in_the_estimate(gap, refused):
-    estimator = StateEstimator(EstimatorParameters())
+    estimator = StateEstimator(EstimatorParameters(), 2)
     for k in range(-40, 1):  # 1.6 s until 0 s, exactly
         estimator.imu(0.04 * k, NOTHING, WEIGHT)
         estimator.mocap(0.04 * k, 1e-6 * np.array([k, 0.0, 0.0]), LEVEL)
@@ -145,7 +145,7 @@ def test_new_parameters_are_those_of_the_next_sample():
     # the first pose that is compared with a prediction: 50 ms; 3*2*.05, 3*4*.05, 2*3*.05*1.2
     np.testing.assert_allclose(state[0, :6], [1.3, 2.0, 3.0, 0.36, 0.0, 0.0], atol=1e-12)
     np.testing.assert_allclose(state[1, :3], [0.6, 0.0, 0.0])
-    far = StateEstimator(EstimatorParameters())
+    far = StateEstimator(EstimatorParameters(), 2)
     far.set_parameters(EstimatorParameters(pose_gate=7.0))
     for k in range(40):
         far.imu(0.04 * k, NOTHING, WEIGHT)

@@ -119,7 +119,7 @@ def test_csv_is_flown_between_take_off_and_landing(tmp_path):
                 "header": ",".join(CSV_REQUIRED) + ",alpha_1",
                 "rows": [ROW.format(t=0) + ",0", ROW.format(t=1) + ",0"],
             },
-            "without its twin",
+            "without alpha_",
         ),
         (
             {

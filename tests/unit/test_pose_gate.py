@@ -104,7 +104,7 @@ def hover(jump: np.ndarray, seconds: float) -> tuple[StateEstimator, float]:
 
     Returns the estimator and its largest position error [m] until a second after the jump.
     """
-    estimator, worst = StateEstimator(EstimatorParameters()), 0.0
+    estimator, worst = StateEstimator(EstimatorParameters(), 2), 0.0
     for k in range(round((2.5 + seconds) / TICK)):
         t = TICK * k
         if k % 2 == 0:
