@@ -8,10 +8,12 @@ import numpy as np
 import pytest
 import yaml
 
+from uam_control.settings import configuration
 from uam_control.settings.configuration import ConfigurationError
 from uam_control.vehicle import VehicleError, load_description
 from uam_control.vehicle.loading import describe
 from uam_sim_bridge.autopilot.params import Parameters
+from uam_sim_bridge.mavlink.offboard.rotor_geometry import normalised_mixer
 from uam_sim_bridge.plant import Vehicle
 from uam_sim_bridge.plant.mujoco_plant import MujocoPlant
 
@@ -146,3 +148,29 @@ def test_unknown_vehicles_are_refused():
         load_description("none.yaml")
     with pytest.raises(VehicleError, match="not valid YAML|a mapping expected"):
         load_description(str(Path(__file__)))
+
+
+def test_no_python_file_names_a_vehicle_but_the_default():
+    root = Path(__file__).resolve().parents[2]
+    names = [name for name in configuration.names("vehicle", (".yaml",)) if name != S500.name]
+    assert {"hexa_arm", "s500_arm3"} <= set(names)
+    for package in ("uam_control", "uam_msgs_py", "uam_sim_bridge", "uam_lab"):
+        for file in (root / package).rglob("*.py"):
+            text = file.read_text()
+            assert not [name for name in names if name in text], file
+            assert S500.name not in text or file.name == "loading.py", file
+
+
+def test_the_allocation_of_a_hexacopter():
+    # PX4's hexarotor x: right cw, left ccw, front-left cw, back-right ccw, front-right ccw, ...
+    px, py, km = load_description("hexa_arm").geometry()
+    angles = np.degrees(np.arctan2(py, px))
+    np.testing.assert_allclose(angles, [90, -90, -30, 150, 30, -150], atol=0.1)
+    np.testing.assert_allclose(np.hypot(px, py), 0.275, rtol=1e-3)
+    np.testing.assert_array_equal(np.sign(km), [-1, 1, -1, 1, 1, -1])
+    # roll and pitch are scaled alike: columns of norm sqrt(6/2) and sqrt(4/2) before the larger one
+    mixer = normalised_mixer(px, py, km)
+    np.testing.assert_allclose(mixer[:, 3], 1.0)
+    np.testing.assert_allclose(np.abs(mixer[:, 2]), 1.0)
+    np.testing.assert_allclose(mixer[:, 0], -py / 0.275 * mixer[1, 0], atol=1e-3)
+    np.testing.assert_allclose(mixer[:, 1], px / 0.2382 * mixer[2, 1], atol=1e-3)

@@ -19,7 +19,7 @@ class ErrorRow:
     unit: str
     digits: int
     rms: float | None
-    paper: float
+    paper: float | None
     largest: float | None
 
     @property
