@@ -97,7 +97,7 @@ def test_joint_readings_count_for_the_time_since_the_last_but_50_ms_at_most(stam
 
 
 def test_the_first_imu_sample_counts_for_no_time():
-    estimator = StateEstimator(EstimatorParameters())
+    estimator = StateEstimator(EstimatorParameters(), 2)
     estimator.mocap(0.0, NOTHING, LEVEL)
     estimator.imu(0.0, np.ones(3), 2.0 * WEIGHT)
     state = estimator.update()
@@ -105,7 +105,7 @@ def test_the_first_imu_sample_counts_for_no_time():
 
 
 def test_a_jump_is_refused_while_the_estimate_is_trusted():
-    estimator = StateEstimator(EstimatorParameters())
+    estimator = StateEstimator(EstimatorParameters(), 2)
     for k in range(40):
         estimator.imu(0.04 * k, NOTHING, WEIGHT)
         estimator.mocap(0.04 * k, np.array([1e-6 * k + (k > 30), 0.0, 0.0]), LEVEL)

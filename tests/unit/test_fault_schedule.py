@@ -123,7 +123,7 @@ REFUSED = {
     "mocap_dropout@20:": "NAME@SECONDS[+DURATION] or",
     "mocap_dropout@20:speed=3": "speed: unknown parameter; there are: none",
     "motor_loss@20:motor=2.5": "motor: 2.5 is not a whole number",
-    "motor_loss@20:motor=5": "motor: 5.0 is outside 1 to 4",
+    "motor_loss@20:motor=13": "motor: 13.0 is outside 1 to 12",
     "motor_loss@20:motor": "'motor' is not one parameter=value",
     "motor_loss@20:motor=1,motor=2": "'motor=2' is not one parameter=value",
     "motor_loss@20:at=3": "'at=3' is not one parameter=value",

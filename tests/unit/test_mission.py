@@ -126,7 +126,7 @@ def test_csv_is_flown_between_take_off_and_landing(tmp_path):
                 "header": ",".join(CSV_REQUIRED) + ",alpha_1,alpha_2,alpha_3",
                 "rows": [ROW.format(t=0) + ",0,0,0", ROW.format(t=1) + ",0,0,0"],
             },
-            "two joints",
+            "s500_arm has: alpha_1,alpha_2",
         ),
     ],
 )
@@ -140,7 +140,15 @@ def test_bad_csv_is_refused_naming_line_and_column(tmp_path, changes, reason):
     [
         ("moves: [", "line 1.* not valid YAML"),
         ("- a list", "a mapping expected"),
-        ("landing: {at: 5, duration: 3}", "'arm_start' is missing"),
+        ("arm_start: {alpha_1_deg: 0, alpha_2_deg: 0}", "'landing' is missing"),
+        (
+            "arm_start: {alpha_1_deg: 0, alpha_2_deg: 0, alpha_3_deg: 0}",
+            "'arm_start.alpha_3_deg': s500_arm has: alpha_1_deg, alpha_2_deg",
+        ),
+        (
+            "arm_start: {alpha_1_deg: 0, alpha_2_deg: 130}",
+            "'arm_start.alpha_2_deg' is 130, s500_arm allows -120 to 120",
+        ),
         (
             "arm_start: {alpha_1_deg: 0, alpha_2_deg: x}\nlanding: {at: 5, duration: 3}",
             "arm_start.alpha_2_deg' is 'x'",

@@ -8,11 +8,13 @@ import numpy as np
 import pytest
 import yaml
 
+from uam_control.mission import load_scenario
 from uam_control.settings import configuration
 from uam_control.settings.configuration import ConfigurationError
 from uam_control.vehicle import VehicleError, load_description
 from uam_control.vehicle.loading import describe
 from uam_sim_bridge.autopilot.params import Parameters
+from uam_sim_bridge.faults import FaultError, limits, read_schedule
 from uam_sim_bridge.mavlink.offboard.rotor_geometry import normalised_mixer
 from uam_sim_bridge.plant import Vehicle
 from uam_sim_bridge.plant.mujoco_plant import MujocoPlant
@@ -174,3 +176,22 @@ def test_the_allocation_of_a_hexacopter():
     np.testing.assert_allclose(np.abs(mixer[:, 2]), 1.0)
     np.testing.assert_allclose(mixer[:, 0], -py / 0.275 * mixer[1, 0], atol=1e-3)
     np.testing.assert_allclose(mixer[:, 1], px / 0.2382 * mixer[2, 1], atol=1e-3)
+
+
+@pytest.mark.parametrize(
+    ("name", "fault", "said"),
+    [
+        (S500.name, "motor_loss@1:motor=5", "motor_loss: motor 5: the vehicle has 4"),
+        (S500.name, "servo_jam@1:joint=3", "servo_jam: joint 3: the vehicle has 2"),
+        ("hexa_arm", "motor_loss@1:motor=5", ""),
+        ("s500_arm3", "encoder_stuck@1:joint=3", ""),
+    ],
+)
+def test_faults_count_the_parts_of_the_vehicle(name, fault, said):
+    described = load_description(name)
+    schedule = read_schedule([fault], load_scenario("hover", described), 1)
+    if not said:
+        limits.check(schedule, "direct", vehicle=described)
+        return
+    with pytest.raises(FaultError, match=said):
+        limits.check(schedule, "direct", vehicle=described)

@@ -125,6 +125,7 @@ def from_yaml(file: Path, vehicle: VehicleDescription) -> Scenario:
     if not isinstance(document, dict):
         raise ScenarioError(f"{file}: a mapping expected, see scenarios/pick_and_place.yaml")
     reader = Reader(str(file), vehicle)
+    arm_start = reader.arm_start(document)
     landing = reader.mapping(document, "landing")
     moves = [reader.move(entry, i) for i, entry in enumerate(document.get("moves") or [])]
     reader.no_overlap(moves)
@@ -141,7 +142,7 @@ def from_yaml(file: Path, vehicle: VehicleDescription) -> Scenario:
     return Scenario(
         name=file.stem,
         description=str(document.get("description", "")),
-        arm_start=reader.arm_start(document),
+        arm_start=arm_start,
         phases=phases,
         landing=Landing(
             reader.number(landing, "at", "landing"), reader.number(landing, "duration", "landing")
