@@ -22,7 +22,7 @@ os.environ["OPENBLAS_NUM_THREADS"] = "1"
 os.environ["PYTEST_DISABLE_PLUGIN_AUTOLOAD"] = "1"
 
 from mutating import judge, table
-from mutating.mutants import Mutant, mutants
+from mutating.mutants import mutants
 
 DATA = Path(__file__).parent / "mutating"
 LEAST_TIME, TIMES = 10.0, 10.0  # a mutant may need 10 s, or ten times what the module needs
@@ -59,18 +59,25 @@ def main() -> int:
             sys.exit(f"mutants: the tests of {path} fail without a mutant (status {status})")
         allowed[path] = max(LEAST_TIME, TIMES * spent)
 
-    found: dict[str, list[Mutant]] = {}
-    survivors: dict[str, list[Mutant]] = {}
+    print(table.HEADER)
+    judged: list[table.Judged] = []
+    failed = False
     for path, tests in modules.items():
-        found[path] = list(mutants(sources[path], data["operators"]))
-        jobs = ((one, path, one.source, tests, allowed[path]) for one in found[path])
-        survivors[path] = [one for one, status, _ in judge.run(jobs, options.j) if status == 0]
-        print(f"{path}: {len(survivors[path])} of {len(found[path])} left", file=sys.stderr)
-    result = table.Result(found, survivors, listed, data["least_percent"])
-    print(result.markdown())
-    for line in result.complaints():
-        print(line, file=sys.stderr)
-    return 1 if result.complaints() else 0
+        found = list(mutants(sources[path], data["operators"]))
+        jobs = ((one, path, one.source, tests, allowed[path]) for one in found)
+        left = [one for one, status, _ in judge.run(jobs, options.j) if status == 0]
+        judged.append(table.Judged(path, len(found), left, listed.get(path, [])))
+        print(judged[-1].row(), flush=True)
+        failed |= complain(judged[-1].complaints())
+    print(table.total_row(judged))
+    return 1 if complain(table.too_few(judged, data["least_percent"])) or failed else 0
+
+
+def complain(lines: list[str]) -> bool:
+    """Print the lines to stderr; return whether there are any."""
+    for line in lines:
+        print(line, file=sys.stderr, flush=True)
+    return bool(lines)
 
 
 if __name__ == "__main__":

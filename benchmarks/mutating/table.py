@@ -8,49 +8,55 @@ from dataclasses import dataclass
 from mutating.mutants import Mutant
 
 
+HEADER = "| module | mutants | killed | survived | killed |\n|---|---|---|---|---|"
+
+
 @dataclass(frozen=True)
-class Result:
-    """Mutants and survivors by path; listed: survivors with a reason, see survivors.toml."""
+class Judged:
+    """A module's number of mutants, and those that survived; listed: see survivors.toml."""
 
-    found: dict[str, list[Mutant]]
-    survivors: dict[str, list[Mutant]]
-    listed: dict[str, list[dict[str, str]]]
-    least_percent: float
+    path: str
+    mutants: int
+    survivors: list[Mutant]
+    listed: list[dict[str, str]]
 
-    def markdown(self) -> str:
-        """A row per module, and the sum."""
-        rows = [(path, len(all_of), len(self._left(path))) for path, all_of in self.found.items()]
-        lines = ["| module | mutants | killed | survived | killed |", "|---|---|---|---|---|"]
-        lines += [_row(f"`{path}`", total, left) for path, total, left in rows]
-        total, left = (sum(row[i] for row in rows) for i in (1, 2))
-        lines.append(_row("**all**", total, left))
-        return "\n".join(lines)
+    def row(self) -> str:
+        """The module's row of the table."""
+        return _row(f"`{self.path}`", self.mutants, len(self.survivors))
 
     def complaints(self) -> list[str]:
-        """Survivors that are not listed, listed ones that do not survive, too few killed."""
+        """Survivors that are not listed, and listed ones that do not survive."""
+        known = Counter((one["line"], one["becomes"]) for one in self.listed)
         lines = []
-        for path in self.found:
-            known = Counter((one["line"], one["becomes"]) for one in self.listed.get(path, []))
-            for mutant in self._left(path):
-                if known[mutant.key]:
-                    known[mutant.key] -= 1
-                    continue
-                lines.append(
-                    f"{path}:{mutant.number}: survives: {mutant.line!r} as {mutant.becomes!r} "
-                    f"({mutant.operator})"
-                )
-            lines += [
-                f"{path}: listed, but does not survive: {line!r} as {becomes!r}"
-                for line, becomes in known.elements()
-            ]
-        total = sum(map(len, self.found.values()))
-        killed = total - sum(len(self._left(path)) for path in self.found)
-        if killed < self.least_percent / 100.0 * total:
-            lines.append(f"{killed} of {total} killed, {self.least_percent:g} % is the least")
-        return lines
+        for mutant in sorted(self.survivors, key=lambda one: one.number):
+            if known[mutant.key]:
+                known[mutant.key] -= 1
+                continue
+            lines.append(
+                f"{self.path}:{mutant.number}: survives: {mutant.line!r} as {mutant.becomes!r} "
+                f"({mutant.operator})"
+            )
+        return lines + [
+            f"{self.path}: listed, but does not survive: {line!r} as {becomes!r}"
+            for line, becomes in known.elements()
+        ]
 
-    def _left(self, path: str) -> list[Mutant]:
-        return sorted(self.survivors.get(path, []), key=lambda mutant: mutant.number)
+
+def total_row(judged: list[Judged]) -> str:
+    """The last row: all modules together."""
+    return _row("**all**", *_sums(judged))
+
+
+def too_few(judged: list[Judged], least_percent: float) -> list[str]:
+    """A complaint where fewer than `least_percent` of the mutants were killed."""
+    total, left = _sums(judged)
+    if total - left >= least_percent / 100.0 * total:
+        return []
+    return [f"{total - left} of {total} killed, {least_percent:g} % is the least"]
+
+
+def _sums(judged: list[Judged]) -> tuple[int, int]:
+    return sum(one.mutants for one in judged), sum(len(one.survivors) for one in judged)
 
 
 def survivors_table(listed: dict[str, list[dict[str, str]]]) -> str:
