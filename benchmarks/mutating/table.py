@@ -7,7 +7,6 @@ from dataclasses import dataclass
 
 from mutating.mutants import Mutant
 
-
 HEADER = "| module | mutants | killed | survived | killed |\n|---|---|---|---|---|"
 
 
