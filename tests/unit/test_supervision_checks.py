@@ -35,6 +35,8 @@ def test_quantities_of_a_state():
     # error (2, -2, 1); tilt: cos A cos B = .48; 1 m below the top, 3 m to the nearest wall
     expected = [0.0, 3.0, math.acos(0.48), 4.0, 2.5, -1.0, 0.5, -math.inf]
     np.testing.assert_allclose(values, expected)
+    state[0, 3:5] = math.pi - A, 0.0  # upside down
+    assert measured(state)[2] == pytest.approx(math.pi - A)
 
 
 @pytest.mark.parametrize(("position", "outside"), [
