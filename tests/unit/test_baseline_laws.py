@@ -71,6 +71,11 @@ def test_asmc1_outside_the_boundary_layer_and_with_sign_by_hand():
     assert update(asmc1(switching_form="sign"), 0.0, 0.0) == 0.0
 
 
+def test_only_the_disturbance_is_drawn_with_its_sign():
+    assert [group.signed for group in Asmc1Law.gain_groups(2)] == [True, False]
+    assert not any(group.signed for group in Asmc2Law.gain_groups(2))
+
+
 def test_asmc1_axes_are_apart_and_frozen_ones_still_act():
     values = {"inertia": [2.0, 1.0], "slope": [3.0, 1.0], "damping": [5.0, 2.0]}
     values |= {"switching": [4.0, 1.0], "boundary": [0.5, 2.0]}
