@@ -42,11 +42,11 @@ class Quadrotor:
     def step(self, motors, dt=0.004, substeps=4):
         """Advance by dt with motor commands (4,) 0..1."""
         u = np.clip(motors, 0.0, 1.0)
-        wanted = FULL * (0.3 * u * u + 0.7 * u)
+        desired = FULL * (0.3 * u * u + 0.7 * u)
         h = dt / substeps
         for _ in range(substeps):
-            lag = np.where(wanted > self.thrusts, 0.0125, 0.025)
-            self.thrusts += (wanted - self.thrusts) * h / (lag + h)
+            lag = np.where(desired > self.thrusts, 0.0125, 0.025)
+            self.thrusts += (desired - self.thrusts) * h / (lag + h)
             self._move(h)
         self.time += dt
 

@@ -51,7 +51,7 @@ def plotjuggler() -> set[str]:
 
 
 def rviz() -> tuple[dict[str, str], set[str], set[str]]:
-    """Topics with the durability asked for, frames, and marker namespaces of the configuration."""
+    """Topics with the required durability, frames, and marker namespaces of the configuration."""
     manager = yaml.safe_load((VIEWS / "flight.rviz").read_text())["Visualization Manager"]
     topics, frames, namespaces = {}, {manager["Global Options"]["Fixed Frame"]}, set()
     for display in manager["Displays"]:

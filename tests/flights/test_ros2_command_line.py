@@ -68,8 +68,8 @@ def ros2(flight, monkeypatch):
 
 
 def test_nodes_parameters_and_services(flight, ros2, tmp_path):
-    wanted = {f"/{name}" for name in (*NODES, BRIDGE, PLANT, RECORDER, SCENE)}
-    flight.until(lambda: wanted <= set(ros2("node", "list").split()), "all nodes to be listed")
+    expected = {f"/{name}" for name in (*NODES, BRIDGE, PLANT, RECORDER, SCENE)}
+    flight.until(lambda: expected <= set(ros2("node", "list").split()), "all nodes to be listed")
 
     for node in CONTROLLERS:
         known = load_profile("s500").section(node)

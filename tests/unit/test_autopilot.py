@@ -161,11 +161,11 @@ def test_hover_thrust_carries_the_weight():
 @pytest.mark.parametrize(("axis", "size"), [(0, 1.0), (1, 1.0), (2, 0.5)])
 def test_rate_steps_are_followed(axis, size):
     bench = airborne()
-    wanted = np.zeros(3)
-    wanted[axis] = size
+    desired = np.zeros(3)
+    desired[axis] = size
     rates = []
     for _ in range(125 if axis < 2 else 500):
-        bench.tick((wanted, HOVER))
+        bench.tick((desired, HOVER))
         rates.append(bench.body.gyro.copy())
     rates = np.array(rates)
     half = np.argmax(rates[:, axis] > 0.5 * size) * 0.004

@@ -1,4 +1,4 @@
-"""Errors on SO(3), limits, the attitude that tau_p asks for, and the modularity of the three."""
+"""Errors on SO(3), limits, the desired attitude, and the modularity of the three."""
 
 from __future__ import annotations
 

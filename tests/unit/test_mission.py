@@ -351,13 +351,13 @@ HAPPENINGS = st.tuples(
 @given(st.lists(HAPPENINGS, max_size=12))
 def test_a_reference_is_finite_and_never_jumps_for_any_events(happenings):
     flight = Flight("pick_and_place", armed_at=0.0)
-    wanted, before = True, None
+    arming, before = True, None
     for ticks, row, column, value, command, magnet, well in happenings:
         for _ in range(ticks):
             output = flight.step()
             assert np.all(np.isfinite(output.reference)) and np.isfinite(output.time)
-            assert wanted or not output.arm
-            wanted = output.arm
+            assert arming or not output.arm
+            arming = output.arm
             if before is not None and output.flying:
                 assert np.max(np.abs(output.reference[0] - before)) < 0.02
             before = output.reference[0].copy() if output.flying else None

@@ -235,7 +235,7 @@ def test_what_is_not_finite_leaves_it_unchanged(where, bad):
 
 @given(st.floats(0.5, 1.3), st.floats(5.0, 30.0))
 def test_the_map_makes_newtons_newtons(factor, newtons):
-    """Thrust and torque of the true motors come out as asked for, whatever the factor."""
+    """Thrust and torque of the true motors are the desired ones for every factor."""
     truth, zero = RateThrustMap(), np.zeros(3)
     truth.thrust_factor = factor
     if newtons > 0.99 * FULL * factor:

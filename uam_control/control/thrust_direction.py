@@ -15,7 +15,7 @@ from uam_control.maths.compiled import jit
 
 
 class AttitudeReference:
-    """Filtered roll and pitch that tau_p asks for, yaw from the mission.
+    """Desired roll and pitch, filtered, from tau_p; desired yaw from the mission.
 
     `value` (3, 3): rows q_d = roll, pitch, yaw [rad], Omega_d [rad/s], Omega_d_dot [rad/s^2], the
     latter two in the desired body frame (FLU).
@@ -53,21 +53,21 @@ def attitude_reference_step(
     yaw, yaw_rate, yaw_acceleration = reference[0, 5], reference[1, 5], reference[2, 5]
     cy, sy = math.cos(yaw), math.sin(yaw)
     norm = math.sqrt(tau_p[0] ** 2 + tau_p[1] ** 2 + tau_p[2] ** 2)
-    wanted_roll = math.asin(max(-1.0, min(1.0, (sy * tau_p[0] - cy * tau_p[1]) / norm)))
-    wanted_pitch = math.atan2(cy * tau_p[0] + sy * tau_p[1], tau_p[2])
+    desired_roll = math.asin(max(-1.0, min(1.0, (sy * tau_p[0] - cy * tau_p[1]) / norm)))
+    desired_pitch = math.atan2(cy * tau_p[0] + sy * tau_p[1], tau_p[2])
 
     omega = 2.0 * math.pi * cutoff
     accelerations = np.empty(2)
     for axis in range(2):
-        wanted = wanted_roll if axis == 0 else wanted_pitch
+        desired = desired_roll if axis == 0 else desired_pitch
         angle, rate = filtered[axis, 0], filtered[axis, 1]
         # exact step of the critically damped filter towards a constant input
         decay = math.exp(-omega * dt)
-        offset = angle - wanted
+        offset = angle - desired
         slope = rate + omega * offset
-        filtered[axis, 0] = wanted + decay * (offset + slope * dt)
+        filtered[axis, 0] = desired + decay * (offset + slope * dt)
         filtered[axis, 1] = decay * (rate - omega * slope * dt)
-        accelerations[axis] = -omega * omega * (filtered[axis, 0] - wanted) - (
+        accelerations[axis] = -omega * omega * (filtered[axis, 0] - desired) - (
             2.0 * omega * filtered[axis, 1]
         )
 

@@ -1,4 +1,4 @@
-"""Services of the mission node: what may be asked for in flight.
+"""Services of the mission node: the commands that are accepted in flight.
 
 | service | type | does |
 |---|---|---|
@@ -30,7 +30,7 @@ def offer(node: Node, mission: Mission) -> None:
         what: str, response: Trigger.Response | SetBool.Response, result: tuple[bool, str]
     ) -> Trigger.Response | SetBool.Response:
         response.success, response.message = result
-        node.get_logger().info(f"asked for {what}: {response.message}")
+        node.get_logger().info(f"command {what}: {response.message}")
         return response
 
     def on_command(

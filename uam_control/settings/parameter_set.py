@@ -144,8 +144,8 @@ def _number(name: str, value: Any, spec: Bound, axes: int) -> float | tuple[floa
     numbers = numbers.astype(float)
     shape = () if spec.length is None else (spec.length or axes,)
     if numbers.shape != shape:
-        wanted = "one number" if spec.length is None else f"a list of {shape[0]} numbers"
-        raise ParameterError(f"{name}: {wanted} expected, got {value!r}; each {allowed}")
+        required = "one number" if spec.length is None else f"a list of {shape[0]} numbers"
+        raise ParameterError(f"{name}: {required} expected, got {value!r}; each {allowed}")
     if not np.all((numbers >= spec.low) & (numbers <= spec.high)):  # refuses NaN too
         raise ParameterError(f"{name}: {value!r} is outside {allowed}")
     return float(numbers) if spec.length is None else tuple(numbers.tolist())

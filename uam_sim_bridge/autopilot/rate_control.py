@@ -101,8 +101,8 @@ def rate_torque(
 ) -> None:
     """Advance TORQUE and INTEGRAL of `memory`.
 
-    setpoint (>= 3,): wanted body rates FRD [rad/s] first; gains (5, 3): rows P, I, D (times K), FF,
-    LIMIT; landed: the integral is frozen.
+    setpoint (>= 3,): desired body rates FRD [rad/s] first; gains (5, 3): rows P, I, D (times K),
+    FF, LIMIT; landed: the integral is frozen.
     """
     for axis in range(3):
         error = setpoint[axis] - memory[RATES, axis]

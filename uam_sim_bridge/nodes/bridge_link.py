@@ -49,7 +49,7 @@ class BridgeParameters(ParameterSet):
 
 @dataclass(frozen=True)
 class Links:
-    """What was opened; station, faulty: None where none is asked for."""
+    """What was opened; station, faulty: None if not configured."""
 
     autopilot: OffboardLink
     station: GroundStation | None

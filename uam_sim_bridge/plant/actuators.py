@@ -49,9 +49,9 @@ def rotor_step(
     gain_up, gain_down = constants[3], constants[4]
     for i in range(len(commands)):
         u = min(max(commands[i], 0.0), 1.0)
-        wanted = math.sqrt(thrust_max * (factor * u * u + (1.0 - factor) * u) / coefficient)
-        gain = gain_up if wanted > speed[i] else gain_down
-        speed[i] += gain * (wanted - speed[i])
+        desired = math.sqrt(thrust_max * (factor * u * u + (1.0 - factor) * u) / coefficient)
+        gain = gain_up if desired > speed[i] else gain_down
+        speed[i] += gain * (desired - speed[i])
         thrust[i] = efficiency[i] * coefficient * speed[i] * speed[i]
         output[i] = thrust[i]
 
@@ -90,8 +90,8 @@ def servo_step(
     """Torque = command in whole current units, within stall (1 - speed / no-load speed)."""
     stall, no_load, unit = constants[0], constants[1], constants[2]
     for i in range(len(effort)):
-        wanted = unit * np.round(effort[i] / unit)
+        desired = unit * np.round(effort[i] / unit)
         forward = max(0.0, min(1.0, 1.0 - velocity[i] / no_load)) * stall
         backward = max(0.0, min(1.0, 1.0 + velocity[i] / no_load)) * stall
-        torque[i] = min(max(wanted, -backward), forward)
+        torque[i] = min(max(desired, -backward), forward)
         output[i] = torque[i]

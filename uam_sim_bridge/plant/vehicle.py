@@ -93,14 +93,14 @@ class Vehicle:
         """Raise VehicleError for what the plant finds by name and the MJCF does not have."""
         described = self.description
         joints = {joint.name for joint in spec.joints}
-        for kind, wanted, there in (
+        for kind, required, there in (
             ("body", (BASE, PAYLOAD, MAGNET), {body.name for body in spec.bodies}),
             ("joint", (BASE, PAYLOAD, SWING, *described.joint_names), joints),
             ("site", ("imu", "magnet_face"), {site.name for site in spec.sites}),
             ("geom", (PAYLOAD, "payload_plate", "magnet_face"), {g.name for g in spec.geoms}),
             ("sensor", ("specific_force", "body_rates"), {s.name for s in spec.sensors}),
         ):
-            missing = [name for name in wanted if name not in there]
+            missing = [name for name in required if name not in there]
             if missing:
                 raise VehicleError(f"{described.model}: no {kind} '{missing[0]}'")
         strange = sorted(joints - {BASE, PAYLOAD, SWING, *described.joint_names})

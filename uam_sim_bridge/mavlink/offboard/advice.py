@@ -69,7 +69,7 @@ ADVICE: tuple[tuple[str, str], ...] = (
     (r"safety configuration", "the vehicle is configured not to arm: COM_ARMABLE"),
     (r"arm auth", "the arming authority said no: COM_ARM_AUTH_REQ"),
     (r"calibrating", "wait until the calibration is done"),
-    (r"no valid mission", "COM_ARM_MIS_REQ asks for a mission: set it 0"),
+    (r"no valid mission", "COM_ARM_MIS_REQ requires a mission: set it 0"),
     # what the autopilot did by itself
     (r"left offboard for (land|return|hold)",
      "a failsafe: see the text beside it, COM_OF_LOSS_T, COM_OBL_RC_ACT and the link"),

@@ -55,7 +55,7 @@ class OffboardParameters(ParameterSet):
     """Times and patience of the sequence."""
 
     stream_time: float = number(
-        1.0, "stream of setpoints before OFFBOARD is asked for", "s", 0.0, 30.0
+        1.0, "time of streaming setpoints before the first request for OFFBOARD", "s", 0.0, 30.0
     )
     retry_interval: float = number(0.5, "time between two requests", "s", 0.05, 10.0)
     attempts: float = number(40.0, "requests without success before giving up", "1", 1.0, 10000.0)
@@ -68,8 +68,8 @@ class OffboardSequence:
     """The state machine.
 
     `phase`; `armed_stamp` [s] or None: when armed was first seen in this flight; `reasons`: what
-    the autopilot said against the last requests and what to do about it, newest last; `let_go`: set
-    from outside where the autopilot's own failsafe is wanted, then OFFBOARD is not asked for again.
+    the autopilot answered to refused requests, with advice, newest last; `let_go`: set by the owner
+    when the autopilot is to run its own failsafe; the sequence then requests OFFBOARD no more.
     """
 
     def __init__(self, parameters: OffboardParameters | None = None) -> None:
@@ -131,8 +131,7 @@ class OffboardSequence:
     def rebooted(self, time: float) -> None:
         """Note at `time` [s] that the autopilot has restarted.
 
-        On the ground it is asked for everything again, after a new stream; in flight that is the
-        end of it.
+        On the ground the sequence starts again with a new stream. In flight it fails.
         """
         if self._in_flight:  # FAILED, where a heartbeat said "disarmed" first
             self._reason("the autopilot rebooted in flight")

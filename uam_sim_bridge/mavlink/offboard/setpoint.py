@@ -167,9 +167,9 @@ def rate_thrust_map(
     thrust = min(p[_COMMAND_MAX], thrust)
     slope = thrust_slope(thrust, p[_FULL], p[_BATTERY], p[_MOTOR], p[_MODEL]) / p[_FULL]
     for i in range(3):
-        wanted = body_rates[i] + tau_q[i] / (p[_GAIN + i] * slope)
+        desired = body_rates[i] + tau_q[i] / (p[_GAIN + i] * slope)
         limit = p[_LIMIT + i]
-        rates[i] = min(limit, max(-limit, wanted))
+        rates[i] = min(limit, max(-limit, desired))
     return thrust
 
 
