@@ -44,7 +44,8 @@ def command_of_thrust(
     """Return the normalised thrust s in 0..1 that makes `newtons`.
 
     newtons: desired collective thrust; full_thrust [N]: the collective at u = 1 with a full
-    battery; battery: fraction of it that is left (1: full); motor_factor: f; model_factor: THR_MDL_FAC.
+    battery; battery: fraction of it that is left (1: full); motor_factor: f; model_factor:
+    THR_MDL_FAC.
     """
     u = inverse_curve(motor_factor, newtons / (full_thrust * battery))
     return curve(model_factor, u)
