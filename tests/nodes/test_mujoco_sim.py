@@ -42,7 +42,7 @@ def test_a_bounded_start_names_missing_nodes(start, tmp_path):
 def test_wrong_parameters_are_refused_in_one_line(start):
     for arguments, said in (
         (options(clock="sundial"), "clock: 'sundial' is not lockstep or realtime"),
-        (options(vehicle="glider"), "no vehicle/glider.yaml in the configuration"),
+        (options(vehicle="glider"), "unknown vehicle 'glider'; there are: hexa_arm, s500_arm"),
         (options(gravity="9.81"), "gravity: unknown"),
         (options(faults="'{}'"), 'faults: {"seed": N, "faults": [...]} expected, as JSON'),
     ):

@@ -11,6 +11,7 @@ from uam_lab.results.timeseries import COLUMNS, FlightTable
 
 INFO = {
     "controller": "modular",
+    "vehicle": "s500_arm",
     "profile": "s500",
     "scenario": "pick_and_place",
     "engine": "direct",
