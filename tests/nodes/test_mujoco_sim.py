@@ -43,6 +43,7 @@ def test_wrong_parameters_are_refused_in_one_line(start):
     for arguments, said in (
         (options(clock="sundial"), "clock: 'sundial' is not lockstep or realtime"),
         (options(vehicle="glider"), "unknown vehicle 'glider'; there are: hexa_arm, s500_arm"),
+        (options(plant="bullet"), "unknown plant 'bullet'; there are: mujoco, or a class as"),
         (options(gravity="9.81"), "gravity: unknown"),
         (options(faults="'{}'"), 'faults: {"seed": N, "faults": [...]} expected, as JSON'),
     ):

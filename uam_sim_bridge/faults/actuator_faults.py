@@ -165,3 +165,15 @@ class Gust(Effect):
         risen = 1.0 if self._since >= self._rise else self._since / self._rise
         plant.add_wind(0.5 * (1.0 - math.cos(math.pi * risen)) * self._full)
         self._since += plant.period
+
+
+FAULTS = (
+    ServoWeak,
+    ServoJam,
+    MagnetWeak,
+    MagnetStuck,
+    PayloadSwing,
+    MotorLoss,
+    BatterySag,
+    WindGust,
+)

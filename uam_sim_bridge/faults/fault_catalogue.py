@@ -14,34 +14,8 @@ from uam_sim_bridge.faults.fault import Fault, FaultError
 
 FAULTS: dict[str, type[Fault]] = {
     kind.NAME: kind
-    for kind in (
-        mocap_faults.MocapDropout,
-        mocap_faults.MocapFreeze,
-        mocap_faults.MocapJump,
-        mocap_faults.MocapSwap,
-        mocap_faults.MocapLatency,
-        mocap_faults.MocapOutliers,
-        mocap_faults.ClockJump,
-        imu_faults.ImuBias,
-        imu_faults.ImuSaturation,
-        imu_faults.ImuDropout,
-        imu_faults.EncoderStuck,
-        actuator_faults.ServoWeak,
-        actuator_faults.ServoJam,
-        actuator_faults.MagnetWeak,
-        actuator_faults.MagnetStuck,
-        actuator_faults.PayloadSwing,
-        actuator_faults.MotorLoss,
-        actuator_faults.BatterySag,
-        actuator_faults.WindGust,
-        link_faults.MavlinkCut,
-        link_faults.MavlinkDelay,
-        link_faults.MavlinkCorruption,
-        process_faults.NodeKill,
-        process_faults.NodeStall,
-        process_faults.NodeSlow,
-        process_faults.DiscoveryLoss,
-    )
+    for module in (mocap_faults, imu_faults, actuator_faults, link_faults, process_faults)
+    for kind in module.FAULTS
 }
 WHOLE = ("joint", "motor")  # parameters that must be whole numbers
 

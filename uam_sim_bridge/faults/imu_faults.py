@@ -128,3 +128,6 @@ class Stuck(Effect):
         alpha, alpha_dot = alpha.copy(), alpha_dot.copy()
         alpha[self._joint], alpha_dot[self._joint] = self._angle, 0.0
         samples.joints = stamp, alpha, alpha_dot, torque
+
+
+FAULTS = (ImuBias, ImuSaturation, ImuDropout, EncoderStuck)

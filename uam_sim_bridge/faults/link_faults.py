@@ -50,3 +50,6 @@ class MavlinkCorruption(LinkFault):
     ABOUT: ClassVar[str] = "some packets have one wrong byte, and the receiver discards them"
 
     share: float = number(0.2, "fraction of wrong packets", "1", 0.0, 1.0)
+
+
+FAULTS = (MavlinkCut, MavlinkDelay, MavlinkCorruption)

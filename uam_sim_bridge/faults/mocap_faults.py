@@ -149,3 +149,14 @@ class ClockJump(PlantFault):
 
     def effect(self, noise: np.random.Generator) -> Effect:
         return PoseEffect(lambda stamp, *pose: (max(0.0, stamp + self.step), *pose))
+
+
+FAULTS = (
+    MocapDropout,
+    MocapFreeze,
+    MocapJump,
+    MocapSwap,
+    MocapLatency,
+    MocapOutliers,
+    ClockJump,
+)

@@ -63,3 +63,6 @@ class NodeSlow(ProcessFault):
 
     stopped: float = number(0.5, "fraction of the cycle in which it is stopped", "1", 0.0, 0.95)
     cycle: float = number(0.02, "length of a cycle", "s", 0.005, 1.0)
+
+
+FAULTS = (NodeKill, NodeStall, NodeSlow, DiscoveryLoss)

@@ -21,7 +21,7 @@ class SetpointParameters(ParameterSet):
 
     setpoint: str = choice(
         "rates",
-        "rates: body rates and thrust; attitude: attitude and thrust, tau_q is not used",
+        "what is sent with the thrust; only rates act as tau_q",
         tuple(SETPOINTS),
     )
 
