@@ -1,7 +1,8 @@
 """Another physics engine: one class in numpy, to show what the simulator needs of a plant.
 
 A rigid quadrotor with the vehicle's mass; each joint of the arm turns by itself, without weight and
-without an effect on the body. No payload, no noise, no latency.
+without an effect on the body. No payload, no latency; noise on the motion capture's position alone,
+as a pose that repeats counts as a frozen tracker.
 """
 
 from __future__ import annotations
@@ -13,7 +14,7 @@ from uam_control.maths.rotations import euler_from_quaternion, matrix_from_quate
 from uam_sim_bridge.plant import Plant, Samples, Truth
 
 JOINT_INERTIA, JOINT_DAMPING = 0.02, 0.05  # [kg m^2], [N m s/rad]
-MOCAP_TICKS = 2
+MOCAP_TICKS, MOCAP_NOISE = 2, 1e-4  # [m]
 
 
 class RigidBodyPlant(Plant):
@@ -26,13 +27,14 @@ class RigidBodyPlant(Plant):
         self.body = Quadrotor(mass=vehicle.description.mass)
         self.alpha = np.array(arm_start or vehicle.description.stowed, dtype=float)
         self.alpha_dot, self.effort = np.zeros(self.joints), np.zeros(self.joints)
-        self.motors = np.zeros(len(vehicle.description.rotors))
+        self.noise = np.random.default_rng(seed)
 
     def sense(self):
         now, body = self.time, self.body
         imu = (now, body.gyro.copy(), body.accel.copy())
         joints = (now, self.alpha.copy(), self.alpha_dot.copy(), self.effort.copy())
-        mocap = (now, body.position.copy(), body.quaternion.copy())
+        position = body.position + self.noise.normal(0.0, MOCAP_NOISE, 3)
+        mocap = (now, position, body.quaternion.copy())
         return Samples(imu, joints, None if self.tick % MOCAP_TICKS else mocap, imu)
 
     def step(self, motor_commands, arm_effort, magnet):
