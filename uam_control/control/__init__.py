@@ -1,1 +1,1 @@
-"""The three controllers, and the attitude that points the thrust."""
+"""The three controllers, their limits, and the desired attitude that follows from tau_p."""

@@ -1,4 +1,4 @@
-"""The parameter set of a controller: those of its law and those of its limits in one."""
+"""The parameter set of a controller: the parameters of its law and of its limits."""
 
 from __future__ import annotations
 
@@ -14,12 +14,12 @@ from uam_control.settings.parameter_set import ParameterSet
 def controller_parameters(
     law: type[LawParameters], limits: type[ParameterSet]
 ) -> type[LawParameters]:
-    """Return the set with the parameters of `law` and of `limits`; of the same two, the same."""
+    """Return the class with the parameters of `law` and `limits`; one class for each pair."""
 
     def reduce(self: LawParameters) -> tuple[Any, ...]:
         return _restored, (law, limits, vars(self))
 
-    # pickle looks up a class by its name, which a class made here does not have
+    # pickle finds a class by its name in a module; this class has none there
     name = f"{law.__name__}And{limits.__name__}"
     return make_dataclass(
         name, [], bases=(law, limits), namespace={"__reduce__": reduce}, frozen=True

@@ -1,8 +1,8 @@
-"""The three controllers: what the position, attitude and arm nodes run, and the direct engine too.
+"""The position, attitude and arm controllers, shared by the ROS nodes and the direct engine.
 
-Each holds one law with its own parameters and adapted gains, and sees the rest of the vehicle only
-through ||xi||, ||chi_ddot|| and ||chi_dot||. Which law flies follows from the type of the
-parameters; errors, limits and weight are the same for all. Nothing here knows ROS.
+Each controller has one law with its own parameters and adapted gains. From the rest of the vehicle
+it uses only ||xi||, ||chi_ddot|| and ||chi_dot||. The parameter `law` selects the law; errors,
+limits and weight are the same for all laws. No code here uses ROS.
 """
 
 from __future__ import annotations
@@ -19,9 +19,10 @@ from uam_control.settings.parameter_set import ParameterError
 
 
 class Controller:
-    """What the three have in common: errors of the whole vehicle, one law, its saturation.
+    """Base of the three controllers: errors of the whole vehicle, one law, its saturation.
 
-    `adaptation` (len(names),) are the law's published gains, called `names`.
+    `adaptation` (len(names),): the law's published gains; `names`: their names.
+    `saturated`: whether a limit changed the output of the last tick.
     """
 
     columns: slice
@@ -37,13 +38,13 @@ class Controller:
 
     @property
     def parameters(self) -> LawParameters:
-        """The set that flies now."""
+        """The parameters in use."""
         return self.law.parameters
 
     def set_parameters(self, parameters: LawParameters) -> None:
-        """Fly `parameters` (validated) from the next tick on; adapted gains are kept.
+        """Use `parameters` (validated) from the next tick on; the adapted gains stay.
 
-        Raises ParameterError for those of another law.
+        Raises ParameterError if they are the parameters of another law.
         """
         flying = self.law.parameters.law
         if parameters.law != flying:
@@ -52,17 +53,17 @@ class Controller:
         self._printed = parameters.error_rate_form == "printed"
 
     def reset_adaptation(self) -> None:
-        """Put the adapted gains back to their initial values, in flight; nothing else changes."""
+        """Set the adapted gains to their initial values in flight; nothing else changes."""
         self.law.reset_adaptation()
 
     def _allocate(self, shape: tuple[int, int]) -> None:
-        """Make room for the errors of a state of this shape."""
+        """Allocate the errors for a state of this shape."""
         self._errors = np.zeros(shape)
         self._own = tuple(self._errors[:, self.columns])
 
     @property
     def errors(self) -> np.ndarray:
-        """Rows e, e_dot, chi_d_ddot (3, 6 + n) of the last tick."""
+        """Rows e, e_dot, chi_d_ddot (3, 6 + n) of the last tick; see `tracking_errors`."""
         return self._errors
 
     def _law_output(
@@ -86,7 +87,7 @@ class Controller:
 
 
 class PositionController(Controller):
-    """tau_p, equation (ct1), and the attitude that points the thrust along it."""
+    """tau_p, eq. (8), ct1, and the desired attitude, which points the thrust along tau_p."""
 
     columns = POSITION
 
@@ -96,22 +97,22 @@ class PositionController(Controller):
         self._tau = np.zeros(3)
 
     def set_parameters(self, parameters: PositionLimits) -> None:
-        """See `Controller.set_parameters`; also moves the corner of the attitude filter."""
+        """See `Controller.set_parameters`; also sets the corner of the attitude filter."""
         super().set_parameters(parameters)
         self._attitude.cutoff = parameters.attitude_cutoff
 
     @property
     def attitude_reference(self) -> np.ndarray:
-        """Rows q_d (roll, pitch, yaw), Omega_d, Omega_d_dot (3, 3); see `thrust_direction`."""
+        """Rows q_d [rad], Omega_d, Omega_d_dot (3, 3); see `AttitudeReference.value`."""
         return self._attitude.value
 
     def update(
         self, state: np.ndarray, reference: np.ndarray, flying: bool, dt: float
     ) -> np.ndarray:
-        """Return tau_p (3,) [N, world]; zero, and the law at its start, while not flying.
+        """Return tau_p (3,) [N, ENU]; while not flying, return zero and reset the law.
 
-        state, reference: (3, 6 + n), see `coordinates`. ||xi|| uses the desired attitude of the
-        last tick, as this tick's is only known afterwards. The array is reused by the next call.
+        state, reference: (3, 6 + n), see `coordinates`; dt [s]. ||xi|| uses the desired attitude of
+        the last tick, because that of this tick follows from tau_p. The next call reuses the array.
         """
         if not flying:
             self._idle()
@@ -133,7 +134,7 @@ class PositionController(Controller):
 
 
 class TorqueController(Controller):
-    """tau_q or tau_alpha: the law's output within the torque limits."""
+    """Base for tau_q and tau_alpha: the law's output within the torque limits."""
 
     def __init__(self, parameters: TorqueLimits) -> None:
         super().__init__(parameters)
@@ -159,7 +160,7 @@ class TorqueController(Controller):
 
 
 class AttitudeController(TorqueController):
-    """tau_q, equation (ct2)."""
+    """tau_q, eq. (18), ct2."""
 
     columns = ATTITUDE
 
@@ -171,9 +172,10 @@ class AttitudeController(TorqueController):
         flying: bool,
         dt: float,
     ) -> np.ndarray:
-        """Return tau_q (3,) [N m, FLU]; zero, and the law at its start, while not flying.
+        """Return tau_q (3,) [N m, FLU]; while not flying, return zero and reset the law.
 
-        attitude_reference: (3, 3) from the position controller, same tick.
+        state, reference: (3, 6 + n), see `coordinates`; attitude_reference: (3, 3) of the position
+        controller, same tick, see `AttitudeReference.value`; dt [s].
         """
         if not flying:
             self._idle()
@@ -183,7 +185,7 @@ class AttitudeController(TorqueController):
 
 
 class ArmController(TorqueController):
-    """tau_alpha, equation (ct3); on duty on the ground as well."""
+    """tau_alpha, eq. (25), ct3; it also runs on the ground."""
 
     columns = ARM
 
@@ -195,5 +197,8 @@ class ArmController(TorqueController):
         flying: bool,
         dt: float,
     ) -> np.ndarray:
-        """Return tau_alpha (n,) [N m]."""
+        """Return tau_alpha (n,) [N m], one torque per joint.
+
+        Arguments as in `AttitudeController.update`.
+        """
         return self._torque(state, reference, attitude_reference, flying, dt)

@@ -1,4 +1,4 @@
-"""Limits of the three controllers, the same for every law: their parameters and their maths."""
+"""Limits of the three controllers, the same for every law: parameters and maths."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from uam_control.settings.parameter_set import TINY, ParameterError, ParameterSe
 
 @dataclass(frozen=True)
 class PositionLimits(ParameterSet):
-    """What surrounds the position law: weight, limits of tau_p, filter of the desired attitude."""
+    """Weight, limits of tau_p and filter of the desired attitude."""
 
     gravity_feedforward_mass: float = number(
         0.0, "mass whose weight is added to tau_p, 0 = the printed law", "kg", 0.0, 50.0
@@ -49,9 +49,10 @@ def limit_force(
     tilt_max: float,
     limited: np.ndarray,
 ) -> bool:
-    """Write tau + weight e3 within the limits to limited (3,); return whether anything was cut.
+    """Write tau + weight e3 within the limits to limited (3,); return whether a limit acted.
 
-    The vertical part goes first: altitude is kept while the horizontal part is reduced.
+    tau: (3,) of eq. (8a), tau_p [N, ENU]; weight, thrust_min, thrust_max [N]; tilt_max [rad].
+    The vertical part has priority: the vehicle keeps its altitude, the horizontal part is reduced.
     """
     upward = tau[2] + weight
     limited[2] = min(max(upward, thrust_min), thrust_max)
@@ -68,7 +69,10 @@ def limit_force(
 
 @jit
 def limit_torque(tau: np.ndarray, torque_max: np.ndarray, limited: np.ndarray) -> bool:
-    """Write tau within ±torque_max to limited (n,); return whether anything was cut."""
+    """Write tau within ±torque_max to limited (n,); return whether a limit acted.
+
+    tau, torque_max: (n,) [N m]; tau of eq. (18a), tau_q (FLU), or (25a), tau_alpha (per joint).
+    """
     cut = False
     for i in range(len(tau)):
         limited[i] = min(max(tau[i], -torque_max[i]), torque_max[i])

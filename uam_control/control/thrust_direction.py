@@ -1,8 +1,8 @@
-"""The attitude that points the thrust along tau_p, smoothed so that it has rates to follow.
+"""The desired attitude, which points the thrust along tau_p, and its filter.
 
-tau_p = R_B^W [0 0 u_1] fixes roll and pitch for a given yaw (the paper's equation for tau_p). Its
-raw value carries the noise of the position loop; a critically damped second-order filter gives
-q_d, and with it Omega_d and Omega_d_dot, without differentiating noise.
+tau_p = R_B^W U, U = [0 0 u_1], eq. (4a), pos, determines roll and pitch for a given yaw. The raw
+angles contain the noise of the position loop. A critically damped second-order filter gives q_d,
+Omega_d and Omega_d_dot without differentiating the noise.
 """
 
 from __future__ import annotations
@@ -15,10 +15,10 @@ from uam_control.maths.compiled import jit
 
 
 class AttitudeReference:
-    """Desired roll and pitch, filtered, from tau_p; desired yaw from the mission.
+    """Desired attitude: filtered roll and pitch from tau_p, yaw from the mission.
 
-    `value` (3, 3): rows q_d = roll, pitch, yaw [rad], Omega_d [rad/s], Omega_d_dot [rad/s^2], the
-    latter two in the desired body frame (FLU).
+    `value` (3, 3): rows q_d = roll, pitch, yaw [rad], Omega_d [rad/s], Omega_d_dot [rad/s^2]; the
+    last two rows are in the desired body frame (FLU).
     """
 
     def __init__(self, cutoff: float) -> None:
@@ -28,14 +28,16 @@ class AttitudeReference:
         self._filter = np.zeros((2, 2))  # rows roll, pitch: angle, rate
 
     def reset(self, yaw: float) -> None:
-        """Start level at `yaw` [rad]."""
+        """Set the desired attitude to level at `yaw` [rad], with zero rates."""
         self._filter[:] = 0.0
         self.value[:] = 0.0
         self.value[0, 2] = yaw
 
     def update(self, tau_p: np.ndarray, reference: np.ndarray, dt: float) -> np.ndarray:
-        """Advance by dt with tau_p (3,) [N, world, z > 0]; yaw and its rates from reference (3,
-        8)."""
+        """Advance by dt [s] and return `value` (3, 3).
+
+        tau_p: (3,) [N, ENU], z > 0; reference: (3, 6 + n), gives yaw and its derivatives.
+        """
         attitude_reference_step(tau_p, reference, self.cutoff, dt, self._filter, self.value)
         return self.value
 
@@ -49,9 +51,14 @@ def attitude_reference_step(
     filtered: np.ndarray,
     value: np.ndarray,
 ) -> None:
-    """Advance the filter and write q_d, Omega_d, Omega_d_dot into value (3, 3)."""
+    """Advance the filter and write q_d, Omega_d, Omega_d_dot into value (3, 3).
+
+    tau_p, reference, dt: as in `AttitudeReference.update`; cutoff [Hz]; filtered: (2, 2), rows
+    roll, pitch: angle [rad], rate [rad/s].
+    """
     yaw, yaw_rate, yaw_acceleration = reference[0, 5], reference[1, 5], reference[2, 5]
     cy, sy = math.cos(yaw), math.sin(yaw)
+    # eq. (4a), pos, solved for roll and pitch: the third column of eq. (3), rot_matrix, along tau_p
     norm = math.sqrt(tau_p[0] ** 2 + tau_p[1] ** 2 + tau_p[2] ** 2)
     desired_roll = math.asin(max(-1.0, min(1.0, (sy * tau_p[0] - cy * tau_p[1]) / norm)))
     desired_pitch = math.atan2(cy * tau_p[0] + sy * tau_p[1], tau_p[2])
@@ -61,7 +68,7 @@ def attitude_reference_step(
     for axis in range(2):
         desired = desired_roll if axis == 0 else desired_pitch
         angle, rate = filtered[axis, 0], filtered[axis, 1]
-        # exact step of the critically damped filter towards a constant input
+        # exact step of the critically damped filter for a constant input
         decay = math.exp(-omega * dt)
         offset = angle - desired
         slope = rate + omega * offset

@@ -1,14 +1,15 @@
-"""ASMC-1, a RECONSTRUCTION after Kim et al. 2013 and 2016, whose exact law could not be had.
+"""ASMC-1, a RECONSTRUCTION after Kim et al. 2013 and 2016; their exact law was not available.
 
-Adaptive sliding mode in the manner of passivity-based control, with an estimate Dhat of a slowly
-varying disturbance that knows nothing of the state:
+Adaptive sliding mode in the form of passivity-based control. Dhat estimates a slowly varying
+disturbance and does not depend on the state:
 
     s = e_dot + Lambda e,   chi_r_dot = chi_d_dot - Lambda e
     tau = Mhat chi_r_ddot + Ghat + Dhat - A s - K sat(s / phi),   Dhat_dot = -Gamma s
 
-with diagonal Mhat, A = a Mhat, K = k Mhat and Gamma = gamma Mhat. Ghat of the law itself is 0: the
-weight is added to tau_p for every law alike (`gravity_feedforward_mass`), and for the arm law.md
-gives no law a gravity term. For the attitude e and e_dot are the errors on SO(3).
+with diagonal Mhat, A = a Mhat, K = k Mhat and Gamma = gamma Mhat. The law's own Ghat is 0: the
+position controller adds the weight to tau_p for every law (`gravity_feedforward_mass`), and no law
+compensates the weight of the arm. For the attitude, e and e_dot are the errors on SO(3), eq. (14)
+and (15). These equations are not in the paper.
 """
 
 from __future__ import annotations
@@ -26,7 +27,7 @@ from uam_control.settings.parameter_set import HUGE, TINY, choice, number, switc
 
 @dataclass(frozen=True)
 class Asmc1Parameters(LawParameters):
-    """One entry per axis; gamma is one number, by design the same in all three subsystems."""
+    """One entry per axis. gamma is one number, the same in all three subsystems."""
 
     law: str = choice("asmc1", "the law that flies, fixed", ("asmc1",), fixed=True)
     inertia: tuple = vector((), "Mhat, diagonal mass matrix", "kg or kg m^2", TINY, 1e3)
@@ -76,9 +77,10 @@ def asmc1_step(
     adaptation: np.ndarray,
     tau: np.ndarray,
 ) -> None:
-    """One tick of ASMC-1: writes tau (n,) and advances adaptation (n + 1,) in place.
+    """Compute one tick of ASMC-1: write tau (n,) and advance adaptation (n + 1,) in place.
 
-    Dhat does not act on its own derivative: over a tick of constant s the sum is exact.
+    Arguments: units and frames as in `Law.update`; record: of `Asmc1Parameters.record`.
+    The derivative of Dhat does not contain Dhat: the sum is exact for s constant over the tick.
     """
     p = record[0]
     n = len(tau)
@@ -107,7 +109,7 @@ def asmc1_step(
 
 
 class Asmc1Law(Law):
-    """`adaptation` (n + 1,): Dhat per axis and ||s||."""
+    """ASMC-1. `adaptation` (n + 1,): Dhat per axis [N or N m], ||s|| [m/s or rad/s]."""
 
     kind = Asmc1Parameters
     label = "ASMC-1 (reconstructed)"
@@ -124,5 +126,5 @@ class Asmc1Law(Law):
         )
 
     def reset_adaptation(self) -> None:
-        """Forget the disturbance."""
+        """Set Dhat to zero."""
         self.adaptation[:-1] = 0.0

@@ -1,6 +1,7 @@
-"""ASMC-2, a RECONSTRUCTION after Liang et al. 2023, whose exact law could not be had.
+"""ASMC-2, a RECONSTRUCTION after Liang et al. 2023; its exact law was not available.
 
-Prescribed performance and adaptive sliding mode: no bound is known beforehand, the mass matrix is.
+Prescribed performance and adaptive sliding mode. The law needs the mass matrix, but no bound of
+the disturbance:
 
     rho_i = (rho_i0 - rho_iinf) exp(-l_i t) + rho_iinf, eta = e / rho,
     epsilon = 0.5 ln((1 + eta) / (1 - eta)),            R = diag(1 / (rho (1 - eta^2)))
@@ -9,11 +10,12 @@ Prescribed performance and adaptive sliding mode: no bound is known beforehand, 
           - k_s R^-1 s - (theta^T Y) w / (||w|| + varpi)],      Y = [1, ||chi_dot||, ||chi_dot||^2]
     theta_dot = gamma (||w|| Y - sigma theta)
 
-t runs from the reset of the law: take-off, for the arm the start of its duty on the ground. |eta|
-is clamped at 0.98 wherever it occurs, e being then 0.98 rho, and each clamped axis and tick is
-counted. Mhat is diagonal. Ghat of the law itself is 0: the weight is added to tau_p for every law
-alike (`gravity_feedforward_mass`), and for the arm law.md gives no law a gravity term. For the
-attitude e and e_dot are the errors on SO(3).
+t starts at the reset of the law: at take-off; for the arm, when its controller starts on the
+ground. |eta| is clamped at 0.98 in every term (e then counts as 0.98 rho). The law counts the
+clamped axes of all ticks. Mhat is diagonal. The law's own Ghat is 0: the position controller adds
+the weight to tau_p for every law (`gravity_feedforward_mass`), and no law compensates the weight
+of the arm. For the attitude, e and e_dot are the errors on SO(3), eq. (14) and (15). These
+equations are not in the paper.
 """
 
 from __future__ import annotations
@@ -34,7 +36,7 @@ W_NORM, ETA, CLAMPS, TIME = 3, 4, 5, 6
 
 @dataclass(frozen=True)
 class Asmc2Parameters(LawParameters):
-    """One entry per axis, or theta_0..theta_2; gamma is by design the same in all subsystems."""
+    """One entry per axis, or theta_0..theta_2. gamma is the same in all three subsystems."""
 
     law: str = choice("asmc2", "the law that flies, fixed", ("asmc2",), fixed=True)
     inertia: tuple = vector((), "Mhat, diagonal mass matrix", "kg or kg m^2", TINY, 1e3)
@@ -88,7 +90,10 @@ def asmc2_step(
     adaptation: np.ndarray,
     tau: np.ndarray,
 ) -> None:
-    """One tick of ASMC-2: writes tau (n,) and advances adaptation (7,) in place."""
+    """Compute one tick of ASMC-2: write tau (n,) and advance adaptation (7,) in place.
+
+    Arguments: units and frames as in `Law.update`; record: of `Asmc2Parameters.record`.
+    """
     p = record[0]
     n = len(tau)
     time = adaptation[TIME]
@@ -138,9 +143,10 @@ def asmc2_step(
 def adapt(
     p: np.record, w_norm: float, rate: float, saturated: bool, dt: float, adaptation: np.ndarray
 ) -> None:
-    """Advance theta by dt, exactly for inputs that are constant over the tick.
+    """Advance theta, adaptation[:3] of (7,), by dt [s]; exact for inputs constant over the tick.
 
     theta' = gamma (u - sigma theta) is linear in theta, so theta >= 0 holds for every dt.
+    rate: ||chi_dot||; w_norm: ||w||.
     """
     keep = math.exp(-p.gamma * p.sigma * dt)
     regressor = 1.0
@@ -153,7 +159,7 @@ def adapt(
 
 
 class Asmc2Law(Law):
-    """`adaptation` (7,): theta_0..theta_2, ||w||, largest |eta|, number of clamps, time [s]."""
+    """ASMC-2. `adaptation` (7,): theta_0..theta_2, ||w||, largest |eta|, clamp count, time [s]."""
 
     kind = Asmc2Parameters
     label = "ASMC-2 (reconstructed)"
@@ -173,9 +179,9 @@ class Asmc2Law(Law):
 
     @property
     def clamps(self) -> int:
-        """How often |eta| was clamped since the reset, axes counted singly."""
+        """Number of clamped values of |eta| since the reset, summed over the axes."""
         return int(self.adaptation[CLAMPS])
 
     def reset_adaptation(self) -> None:
-        """Put theta back to its initial value; the time since the start of the law goes on."""
+        """Set theta to its initial value; the time since the start of the law continues."""
         self.adaptation[:3] = self.parameters.theta_initial

@@ -1,4 +1,4 @@
-"""Every law by its name. A new law is a file beside this one and its class in `LAWS`."""
+"""All laws by name. A new law is a file in this folder and an entry in `LAWS`."""
 
 from __future__ import annotations
 
@@ -20,14 +20,14 @@ DEFAULT = ModularLaw.kind.law
 
 
 def law(name: str) -> type[Law]:
-    """Return the law of that name; raises ParameterError."""
+    """Return the class of the law `name`; raises ParameterError for an unknown name."""
     if name not in tuple(LAWS):
         raise ParameterError(f"law: '{name}' is not one of {', '.join(LAWS)}")
     return LAWS[name]
 
 
 def label(name: str) -> str:
-    """Return the label of a law in tables and figures; of an unknown law its name."""
+    """Return the label of a law in tables and figures; for an unknown law, its name."""
     return LAWS[name].label if name in LAWS else name
 
 

@@ -1,8 +1,8 @@
-"""Tracking errors of the paper: e, e_dot, and ||xi|| of the whole vehicle.
+"""Tracking errors of the paper: e, e_dot and ||xi|| of the whole vehicle, eq. (5), err.
 
-Attitude uses the error on SO(3), e_q = 1/2 (R_d^T R - R^T R_d)^vee, and one of two forms of its
-rate: `lee` (default) Omega - R^T R_d Omega_d, or `printed` q_dot - R_d^T R q_d_dot, the paper's
-equation.
+The attitude uses the error on SO(3), eq. (14), e_q (no label in the source):
+e_q = 1/2 (R_d^T R - R^T R_d)^vee. Its rate has two forms: `lee` (default), Omega - R^T R_d Omega_d,
+or `printed`, eq. (15), rate of e_q (no label): q_dot - R_d^T R q_d_dot.
 """
 
 from __future__ import annotations
@@ -32,15 +32,15 @@ def tracking_errors(
     errors: np.ndarray,
     norms: np.ndarray,
 ) -> None:
-    """Write e, e_dot and the acceleration feedforward into errors (3, 8), norms into norms (3,).
+    """Write eq. (5), err, and the acceleration feedforward into errors (3, 6 + n), norms (3,).
 
-    state, reference: (3, 8) as in `coordinates`; attitude_reference: (3, 3) rows q_d (Euler) [rad],
-    Omega_d [rad/s], Omega_d_dot [rad/s^2] in the desired body frame. Rows of `errors`: e, e_dot,
-    chi_d_ddot. While not flying only the arm has errors; the rest is zero. norms: ||xi||,
-    ||chi_ddot||,
-    ||chi_dot||.
+    state, reference: (3, 6 + n), units and frames as in `coordinates`. attitude_reference: (3, 3),
+    rows q_d (Euler) [rad], Omega_d [rad/s], Omega_d_dot [rad/s^2] in the desired body frame.
+    printed: eq. (15) instead of the `lee` form. errors: rows e, e_dot, chi_d_ddot; while not
+    flying, only the arm has errors and the rest is zero. norms: ||xi||, ||chi_ddot||, ||chi_dot||.
     """
     errors[:] = 0.0
+    # eq. (5), err: e = chi - chi_d
     for i in range(6, state.shape[1]):
         errors[0, i] = state[0, i] - reference[0, i]
         errors[1, i] = state[1, i] - reference[1, i]
@@ -51,6 +51,7 @@ def tracking_errors(
             errors[1, i] = state[1, i] - reference[1, i]
             errors[2, i] = reference[2, i]
         attitude_errors(state, attitude_reference, printed, errors)
+    # eq. (5), err: ||xi||, xi = [e, e_dot]
     xi = acceleration = rate = 0.0
     for i in range(state.shape[1]):
         xi += errors[0, i] ** 2 + errors[1, i] ** 2
@@ -65,22 +66,28 @@ def tracking_errors(
 def attitude_errors(
     state: np.ndarray, attitude_reference: np.ndarray, printed: bool, errors: np.ndarray
 ) -> None:
-    """Write e_q, e_q_dot and the attitude feedforward into columns 3:6 of errors (3, 8)."""
+    """Write e_q, its rate and the attitude feedforward into columns 3:6 of errors (3, 6 + n).
+
+    Eq. (14), e_q, and eq. (15), rate of e_q. Arguments as in `tracking_errors`; the results are
+    in the body frame (FLU) [1, rad/s, rad/s^2].
+    """
     actual = matrix_from_euler(state[0, 3:6])
     desired = matrix_from_euler(attitude_reference[0])
     relative = relative_rotation(desired, actual)  # R_d^T R
+    # eq. (14), e_q
     errors[0, 3] = 0.5 * (relative[2, 1] - relative[1, 2])
     errors[0, 4] = 0.5 * (relative[0, 2] - relative[2, 0])
     errors[0, 5] = 0.5 * (relative[1, 0] - relative[0, 1])
     rate = state[1, 3:6]
     rate_d = attitude_reference[1]
     acceleration_d = attitude_reference[2]
-    if printed:
+    if printed:  # eq. (15), rate of e_q: q_dot - R_d^T R q_d_dot
         turned = rotate(relative, rate_d)
         for i in range(3):
             errors[1, 3 + i] = rate[i] - turned[i]
             errors[2, 3 + i] = acceleration_d[i]
         return
+    # in place of eq. (15), the `lee` form: Omega - R^T R_d Omega_d
     turned = rotate_back(relative, rate_d)  # R^T R_d Omega_d
     feedforward = rotate_back(relative, acceleration_d)
     for i in range(3):

@@ -1,4 +1,4 @@
-"""What every law is to its controller: parameters, adapted gains, one compiled step."""
+"""Base class of the laws: parameters, adapted gains, one compiled step per tick."""
 
 from __future__ import annotations
 
@@ -12,11 +12,11 @@ from uam_control.laws.law_parameters import LawParameters
 
 @dataclass(frozen=True)
 class GainGroup:
-    """Published gains that share a row of the figure of the adaptation.
+    """Published gains that share a row in the figure of the adaptation.
 
-    label: of the row; "" for gains that have no row. names: of the gains, hence of the recorded
-    columns. symbol: of several gains, to which the last character of a name is the index. Both in
-    matplotlib's mathtext. signed: drawn on a linear scale instead of a logarithmic one.
+    label: of the row; "" for gains without a row. names: of the gains and of the recorded columns.
+    symbol: for a row of several gains; the last character of a name is its index. label and symbol
+    are matplotlib mathtext. signed: drawn on a linear scale instead of a logarithmic one.
     """
 
     label: str
@@ -26,20 +26,20 @@ class GainGroup:
 
 
 class Law:
-    """One subsystem's law and its adapted gains.
+    """The law of one subsystem and its adapted gains.
 
     A law is a subclass with these attributes and `gain_groups`, listed in `catalogue.LAWS`:
 
-    | attribute | is |
+    | attribute | meaning |
     |---|---|
-    | `kind` | its parameters; the default of their `law` is the name of the law |
+    | `kind` | class of its parameters; the default of their `law` is the name of the law |
     | `label` | its name in tables and figures |
-    | `profile` | the profile in config/profiles that it flies with; "" see `default_profile` |
-    | `memory` | count of values in `adaptation` after the published gains |
-    | `step` | the compiled function of one tick; `update` says what its arguments are |
+    | `profile` | its profile in config/profiles; "": see `default_profile` |
+    | `memory` | number of values in `adaptation` after the published gains |
+    | `step` | the compiled function of one tick; arguments as in `update` |
 
-    `names` are those of the published gains, the first values of `adaptation`. `frozen`: the
-    adapted gains stay as they are (parameter `adapt`).
+    `names`: of the published gains, which are the first values of `adaptation`, a float64 array
+    (len(names) + memory,). `frozen`: the adapted gains do not change (parameter `adapt`).
     """
 
     kind: type[LawParameters]
@@ -58,7 +58,7 @@ class Law:
 
     @classmethod
     def gain_groups(cls, axes: int) -> tuple[GainGroup, ...]:
-        """Return the published gains of a subsystem with `axes` axes, in order of `adaptation`."""
+        """Return the published gains of a subsystem with `axes` axes, ordered as `adaptation`."""
         raise NotImplementedError
 
     @classmethod
@@ -67,18 +67,18 @@ class Law:
         return tuple(name for group in cls.gain_groups(axes) for name in group.names)
 
     def set_parameters(self, parameters: LawParameters) -> None:
-        """Fly `parameters` (validated) from the next tick on; the adapted gains are kept."""
+        """Use `parameters` (validated) from the next tick on; the adapted gains stay."""
         self.parameters = parameters
         self.frozen = not parameters.adapt
         self._record = parameters.record()
 
     def reset(self) -> None:
-        """Start afresh: adapted gains at their initial values, nothing remembered."""
+        """Set the adapted gains to their initial values, and filters and time to zero."""
         self.adaptation[:] = 0.0
         self.reset_adaptation()
 
     def reset_adaptation(self) -> None:
-        """Put the adapted gains back to their initial values; filters and time go on."""
+        """Set the adapted gains to their initial values; filters and time continue."""
         raise NotImplementedError
 
     def update(
@@ -90,12 +90,13 @@ class Law:
         saturated: bool,
         dt: float,
     ) -> np.ndarray:
-        """Return tau_j (n,) and advance the adapted gains by dt [s].
+        """Return tau_j (n,) [N or N m] and advance the adapted gains by dt [s].
 
-        e, e_dot, acceleration_d: (n,), the subsystem's tracking error, its rate and chi_j_d_ddot.
-        norms (3,): ||xi||, ||chi_ddot||, ||chi_dot|| of the whole vehicle.
+        e, e_dot, acceleration_d: (n,), the subsystem's tracking error [m or rad], its rate and
+        chi_j_d_ddot; world frame (ENU) for the position, body frame (FLU) for the attitude, per
+        joint for the arm. norms (3,): ||xi||, ||chi_ddot||, ||chi_dot|| of the whole vehicle.
         saturated: the actuator was at its limit in the last tick.
-        The returned array is reused by the next call.
+        The next call reuses the returned array.
         """
         type(self).step(
             self._record,

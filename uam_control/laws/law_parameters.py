@@ -1,4 +1,4 @@
-"""Parameters that all laws have, and the form in which a compiled law reads its own."""
+"""Parameters that all laws have, and the structured array that a compiled law reads."""
 
 from __future__ import annotations
 
@@ -10,12 +10,12 @@ import numpy as np
 from uam_control.laws.errors import ERROR_RATE_FORMS
 from uam_control.settings.parameter_set import Bound, ParameterSet, Switch, choice, switch
 
-SAFEGUARD = "safeguard"  # how the description of a parameter begins that the law does not have
+SAFEGUARD = "safeguard"  # first word of the description of a parameter that the source lacks
 
 
 @dataclass(frozen=True)
 class LawParameters(ParameterSet):
-    """What every law has; vectors have one entry per axis (3, or one per joint of the arm)."""
+    """Parameters of every law; vectors have one entry per axis (3, or one per joint of the arm)."""
 
     law: str = choice("", "the law that flies, fixed once the node runs", (), fixed=True)
     adapt: bool = switch(
@@ -27,7 +27,7 @@ class LawParameters(ParameterSet):
 
     @property
     def safeguards(self) -> list[str]:
-        """Names of the safeguards that are on; no law's source has any (docs/law.md)."""
+        """Names of the safeguards that are on; the printed laws have none (docs/law.md)."""
         return [
             name
             for name, spec in self.specs().items()
@@ -37,14 +37,14 @@ class LawParameters(ParameterSet):
         ]
 
     def record(self) -> np.ndarray:
-        """Return the one-element structured array that the compiled law reads."""
+        """Return the structured array (1,) that the compiled law reads."""
         raise NotImplementedError
 
 
 def structured(values: dict[str, Any]) -> np.ndarray:
-    """Return `values`, numbers and vectors, as a one-element structured float64 array.
+    """Return `values`, numbers and vectors, as a structured float64 array (1,).
 
-    Its element is a np.record: compiled or not, its fields are attributes.
+    Its element is a np.record: its fields are attributes in compiled and in plain Python code.
     """
     fields = [(name, np.float64, np.shape(value)) for name, value in values.items()]
     record = np.zeros(1, np.dtype((np.record, fields)))
@@ -54,5 +54,5 @@ def structured(values: dict[str, Any]) -> np.ndarray:
 
 
 def ceiling(values: tuple) -> np.ndarray:
-    """Return the largest values allowed, where 0 means that there is none."""
+    """Return the largest allowed values (n,), with infinity in place of 0 (no limit)."""
     return np.where(np.array(values) > 0.0, values, np.inf)

@@ -1,7 +1,8 @@
-"""The Lyapunov equation A^T P + P A = -Q of one subsystem, solved in closed form.
+"""Closed-form solution of the Lyapunov equation A^T P + P A = -Q of one subsystem.
 
-With diagonal lambda_1, lambda_2 and Q the 2n x 2n equation falls apart into n equations of size
-two, A = [[0, 1], [-lambda_1, -lambda_2]], Q = diag(q_position, q_velocity).
+The equation stands in the text after eq. (7), err_variable_p; (17), err_variable_q; (24),
+err_variable_alpha. With diagonal lambda_1, lambda_2 and Q it splits into n equations of size two,
+A = [[0, 1], [-lambda_1, -lambda_2]], Q = diag(q_position, q_velocity).
 """
 
 from __future__ import annotations
@@ -14,8 +15,8 @@ def solve(
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Return (p11, p12, p22), each (n,): P = [[diag p11, diag p12], [diag p12, diag p22]] > 0.
 
-    All arguments have shape (n,) and are positive. r = B^T P xi = p12 e + p22 e_dot (the paper's
-    definition of r_p, r_q, r_alpha).
+    All arguments have shape (n,) and are positive: lambda_1 [1/s^2], lambda_2 [1/s], the two halves
+    of Q's diagonal [1]. r of eq. (7), (17), (24) is B^T P xi = p12 e + p22 e_dot.
     """
     p12 = q_position / (2.0 * lambda_1)
     p22 = (q_velocity + 2.0 * p12) / (2.0 * lambda_2)

@@ -1,11 +1,20 @@
 """The modular adaptive law of the paper (Section III), one class for all three subsystems.
 
-    tau_j  = Mbar_j (-Lambda_j xi_j - dtau_j + chi_j_d_ddot)
-    dtau_j = rho_j r_j / max(||r_j||, varpi_j),          r_j = B^T P_j xi_j
-    rho_j  = K0 + K1 ||xi|| + K2 ||xi||^2 + K3 ||chi_ddot|| + zeta_j
+Printed equation numbers and labels of the paper, for position, attitude and arm:
 
-with the adaptive laws for K0..K3 and zeta_j. xi and chi_ddot are those of the whole vehicle, r_j
-the subsystem's own: that is how couplings enter while the three parameter sets stay independent.
+    r_j    = B^T P_j xi_j
+             (7) err_variable_p, (17) err_variable_q, (24) err_variable_alpha
+    tau_j  = Mbar_j (-Lambda_j xi_j - dtau_j + chi_j_d_ddot)
+             (8a) tau_p, (18a) tau_q, (25a) tau_alpha
+    dtau_j = rho_j r_j / max(||r_j||, varpi_j)
+             (8b) del_p, (18b) rho_q, (25b) rho_alpha
+    rho_j  = K0 + K1 ||xi|| + K2 ||xi||^2 + K3 ||chi_ddot|| + zeta_j
+             (12) rho_p, (21) and (28) without label
+    K0..K3 and zeta_j adapted in `adapt`
+             (13) adaptive_law_p, (22) adaptive_law_q, (29) adaptive_law_alpha
+
+xi and chi_ddot are those of the whole vehicle; r_j is the subsystem's own. The norms carry the
+couplings between the subsystems, so the three parameter sets stay independent.
 """
 
 from __future__ import annotations
@@ -34,7 +43,7 @@ ZETA, RHO, R_NORM, ACCELERATION = 4, 5, 6, 7
 
 @dataclass(frozen=True)
 class ModularParameters(LawParameters):
-    """The paper's Table I and the safeguards; one entry per axis, or K0..K3."""
+    """Design parameters (Table I of the paper) and safeguards; one entry per axis, or K0..K3."""
 
     law: str = choice("modular", "the law that flies, fixed", ("modular",), fixed=True)
     inertia: tuple = vector((), "Mbar, its diagonal", "kg or kg m^2", TINY, 1e3)
@@ -69,7 +78,7 @@ class ModularParameters(LawParameters):
     )
 
     def check_together(self) -> None:
-        """Also refuse gains whose Lyapunov matrix P is not positive definite as computed."""
+        """Raise ParameterError also where the computed matrix P is not positive definite."""
         super().check_together()
         p11, p12, p22 = self.lyapunov_matrix()
         if not np.all((1.0 - 1e-12) * p11 * p22 > p12 * p12):
@@ -79,7 +88,7 @@ class ModularParameters(LawParameters):
             )
 
     def lyapunov_matrix(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Return p11, p12, p22, each (n,), see `lyapunov.solve`."""
+        """Return p11, p12, p22, each (n,); see `lyapunov.solve`."""
         given = (self.lambda_1, self.lambda_2, self.q_position, self.q_velocity)
         return lyapunov.solve(*map(np.array, given))
 
@@ -120,10 +129,11 @@ def law_step(
     adaptation: np.ndarray,
     tau: np.ndarray,
 ) -> None:
-    """One tick of the law: writes tau (n,) and advances adaptation (8,) in place.
+    """Compute one tick of the law: write tau (n,) and advance adaptation (8,) in place.
 
-    Equations (ct1), (del_p), (rho_p) and (adaptive_law_p) of the paper and their twins for q,
-    alpha.
+    Arguments: units and frames as in `Law.update`; record: of `ModularParameters.record`.
+    Equations (7), (8), (12), (13) for the position; (17), (18), (21), (22) for the attitude;
+    (24), (25), (28), (29) for the arm.
     """
     p = record[0]
     n = len(tau)
@@ -135,12 +145,14 @@ def law_step(
         acceleration = keep * adaptation[ACCELERATION] + (1.0 - keep) * acceleration
     adaptation[ACCELERATION] = acceleration
 
+    # eq. (7), err_variable_p; (17), err_variable_q; (24), err_variable_alpha: ||r_j||
     r_squared = 0.0
     for i in range(n):
         r_i = p.p12[i] * e[i] + p.p22[i] * e_dot[i]
         r_squared += r_i * r_i
     r_norm = math.sqrt(r_squared)
 
+    # eq. (12), rho_p; (21); (28): rho_j, and rho_j without zeta_j
     bound = (
         adaptation[0]
         + adaptation[1] * xi_norm
@@ -148,7 +160,9 @@ def law_step(
         + adaptation[3] * acceleration
     )
     rho = bound + adaptation[ZETA]
+    # eq. (8b), del_p; (18b), rho_q; (25b), rho_alpha: dtau_j = scale r_j
     scale = rho / max(r_norm, p.varpi)
+    # eq. (8a), tau_p; (18a), tau_q; (25a), tau_alpha
     for i in range(n):
         r_i = p.p12[i] * e[i] + p.p22[i] * e_dot[i]
         feedback = p.gain_e[i] * e[i] + p.gain_e_dot[i] * e_dot[i]
@@ -172,11 +186,15 @@ def adapt(
     dt: float,
     adaptation: np.ndarray,
 ) -> None:
-    """Advance K0..K3 and zeta by dt, exactly for inputs that are constant over the tick.
+    """Advance K0..K3 and zeta by dt [s] in place; exact for inputs constant over the tick.
 
-    Each law is linear in its own gain, K' = u - nu K, so K(dt) = K e^(-nu dt) + (1 - e^(-nu dt))
-    u/nu stays positive for every dt, as the Appendix proves in continuous time.
+    Eq. (13), adaptive_law_p; (22), adaptive_law_q; (29), adaptive_law_alpha. Each law is linear in
+    its own gain, K' = u - nu K. Therefore K(dt) = K e^(-nu dt) + (1 - e^(-nu dt)) u / nu, which
+    stays positive for every dt. The Appendix proves the same in continuous time.
+
+    bound: rho_j without zeta_j; acceleration: ||chi_ddot||; adaptation: (8,), see `ModularLaw`.
     """
+    # eq. (13a), (22a), (29a): K0..K2; (13b), (22b), (29b): K3
     regressor = 1.0
     for i in range(4):
         if i == 3:
@@ -185,9 +203,10 @@ def adapt(
         gain = keep * adaptation[i] + (1.0 - keep) * r_norm * regressor / p.nu[i]
         if p.freeze_when_saturated > 0.0 and saturated:
             gain = min(gain, adaptation[i])
-        # the floor only keeps a decayed gain from underflowing to zero
+        # the floor prevents that a decayed gain underflows to zero
         adaptation[i] = max(min(gain, p.k_ceiling[i]), 1e-12)
         regressor *= xi_norm
+    # eq. (13c), (22c), (29c): zeta_j, constant for ||r_j|| >= varpi_j
     if r_norm < p.varpi:
         rate = 1.0 + bound * r_norm
         keep = math.exp(-rate * dt)
@@ -195,7 +214,7 @@ def adapt(
 
 
 class ModularLaw(Law):
-    """`adaptation` (8,): K0..K3, zeta, rho, ||r||, and the filtered ||chi_ddot|| that K3 sees."""
+    """Modular law. `adaptation` (8,): K0..K3, zeta, rho, ||r||, filtered ||chi_ddot||."""
 
     kind = ModularParameters
     label = "modular"
@@ -214,6 +233,6 @@ class ModularLaw(Law):
         )
 
     def reset_adaptation(self) -> None:
-        """Put K0..K3 and zeta back to their initial values."""
+        """Set K0..K3 and zeta to their initial values, eq. (13d), zeta1; (22d); (29d)."""
         self.adaptation[:4] = self.parameters.k_initial
         self.adaptation[ZETA] = self.parameters.zeta_initial
