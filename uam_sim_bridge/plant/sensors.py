@@ -9,9 +9,7 @@ import numpy as np
 from uam_control.maths.compiled import jit
 from uam_control.maths.rotations import quaternion_from_rotation_vector, quaternion_multiply
 
-BLOCK = (
-    2048  # samples of noise drawn at a time: one call to the generator is dear, its numbers cheap
-)
+BLOCK = 2048  # noise samples drawn per call of the generator; the sequence is the same for any
 
 
 class Noise:
