@@ -17,7 +17,7 @@ from uam_control.control.controllers import (
 )
 from uam_control.control.limits import limit_force
 from uam_control.control.thrust_direction import AttitudeReference
-from uam_control.laws.catalogue import LAWS
+from uam_control.laws.catalogue import LAWS, label
 from uam_control.laws.errors import attitude_errors
 from uam_control.maths.rotations import matrix_from_euler
 from uam_control.profiles.profile import ProfileError, default_profile, load_profile
@@ -167,6 +167,12 @@ def test_gravity_feedforward_carries_the_weight_and_zero_is_the_printed_law():
     printed = PositionController(load_profile("paper_table1").sets["position_controller"])
     state[0, 2] = -1.0  # a metre too low: far from lifting 21.6 N
     assert printed.update(state, reference, True, DT)[2] < 8.0
+
+
+def test_laws_have_labels_and_an_unknown_one_its_name():
+    names = ("modular", "asmc1", "asmc2", "pid")
+    expected = ["modular", "ASMC-1 (reconstructed)", "ASMC-2 (reconstructed)", "pid"]
+    assert [label(name) for name in names] == expected
 
 
 @pytest.mark.parametrize("law", LAWS)

@@ -48,6 +48,7 @@ def vehicle():
 
 def test_force_is_the_law_and_the_weight():
     controller, (state, reference, _) = position(), vehicle()
+    np.testing.assert_array_equal(controller.errors, np.zeros((3, 6)))
     state[1, :3], reference[2, :3] = (0.5, -0.5, 1.0), (1.0, 2.0, -1.0)
     tau = controller.update(state, reference, True, 0.004)
     # 2 (1 - 1.5, 2 + 1.5, -1 - 3), and 2*5 N of weight
