@@ -82,5 +82,6 @@ def _mutant(source: str, mutated: str, number: int, operator: str) -> Mutant:
 
 
 def _tidy(line: str) -> str:
-    """One line without the spaces that cosmic-ray puts before a number."""
-    return re.sub(r"(?<=[\[(:]) (?=-?\d)", "", re.sub(r"\s+", " ", line.strip()))
+    """The line without its comment, and without the spaces that cosmic-ray puts before a number."""
+    line = re.sub(r"\s+", " ", line.strip().partition("  # ")[0])
+    return re.sub(r"(?<=[\[(:]) (?=-?\d)|(?<=[(:,] -) (?=\d)|(?<=[(:]-) (?=\d)", "", line)
