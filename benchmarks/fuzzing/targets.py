@@ -82,7 +82,7 @@ class Bridge:
             self._begin()
         if self._ticks % 400 == 100:
             self._armed_desired = not self._armed_desired
-            self._sequence.want(self._armed_desired)
+            self._sequence.set_desired(self._armed_desired)
         now = self._ticks * PERIOD
         if self._ticks % REBORN < REBORN // 2 and self._ticks % 5 == 0:
             chunks = [*chunks, self._codec.encode(self._heartbeat())]

@@ -107,7 +107,7 @@ class HoverFlight:
 
     def take_off(self, height: float = 1.5, speed: float = 0.5, settle: float = 3.0) -> None:
         """Arm, climb to `height` [m] at `speed` [m/s], hover for `settle` [s]. Raises NotFlown."""
-        self._sequence.want(True)
+        self._sequence.set_desired(True)
         while self._sequence.phase is not Phase.FLYING:
             self.tick()
             if self.plant.time > LONGEST_WAIT or self._sequence.phase is Phase.FAILED:

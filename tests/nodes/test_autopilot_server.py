@@ -88,7 +88,7 @@ class Flight:
 
     def airborne(self, height=20.0):
         """Arm on the ground, place the vehicle in the air and let it hover."""
-        self.sequence.want(True)
+        self.sequence.set_desired(True)
         self.run(3.0)
         assert self.sequence.phase is Phase.FLYING, self.sequence.reasons
         self.body.position[2] = height
@@ -147,7 +147,7 @@ def test_same_flight_twice_is_the_same_to_the_bit():
 
 def test_arming_is_refused_in_words(flight):
     flight.vision = False
-    flight.sequence.want(True)
+    flight.sequence.set_desired(True)
     flight.run(2.5)
     assert flight.sequence.phase is Phase.ARMING and not flight.hil.armed
     assert any("vision" in reason for reason in flight.heard)
@@ -158,7 +158,7 @@ def test_arming_is_refused_in_words(flight):
 
 def test_offboard_is_refused_without_a_stream(flight):
     flight.streaming = False
-    flight.sequence.want(True)
+    flight.sequence.set_desired(True)
     flight.run(2.5)
     assert flight.sequence.phase is Phase.OFFBOARD and not flight.hil.armed
     assert any("no offboard signal" in reason for reason in flight.heard)

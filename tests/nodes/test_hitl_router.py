@@ -120,7 +120,7 @@ class Bench:
 
     def arm(self):
         self.until(lambda: self.answered > 20, "answers")
-        self.sequence.want(True)
+        self.sequence.set_desired(True)
         self.until(lambda: self.sequence.phase is Phase.FLYING, "armed and in OFFBOARD")
         self.until(lambda: self.hil.armed and self.hil.motors.max() > 0.1, "turning motors", 0.3)
 

@@ -111,7 +111,7 @@ class Rig:
         self.send(*self.companion.tick(self.uptime))
 
     def fly(self):
-        self.sequence.want(True)
+        self.sequence.set_desired(True)
         self.run(2.0)
         assert self.sequence.phase is Phase.FLYING, self.sequence.reasons
         self.received.clear()
@@ -233,7 +233,7 @@ def test_reboot_on_the_ground_repeats_all_requests(rig):
     intervals = [c for c, _ in rig.commands() if c == MavCmd.SET_MESSAGE_INTERVAL]
     assert len(intervals) == len(RATES) - len(ONLY_COUNTED)
     assert rig.link.mapping_read and rig.link.time_sync.offset == pytest.approx(-8.0, abs=0.01)
-    rig.sequence.want(True)
+    rig.sequence.set_desired(True)
     rig.run(2.0)
     assert rig.sequence.phase is Phase.FLYING and rig.link.reboots == 1
 
@@ -304,7 +304,7 @@ def test_integer_parameters_are_read_by_type(rig):
 
 def test_the_link_requests_the_reasons_of_a_refused_arming(rig):
     rig.vision = False
-    rig.sequence.want(True)
+    rig.sequence.set_desired(True)
     rig.run(3.0)
     sent = [c for c, _ in rig.commands()]
     assert sent.count(MavCmd.RUN_PREARM_CHECKS) == 1 < sent.count(MavCmd.ARM_DISARM)
@@ -320,7 +320,7 @@ def test_the_link_requests_the_reasons_of_a_refused_arming(rig):
 
 
 def test_answers_to_other_components_are_ignored(rig):
-    rig.sequence.want(True)
+    rig.sequence.set_desired(True)
     rig.run(0.02)
     rig.send(
         mavlink2.MAVLink_command_ack_message(

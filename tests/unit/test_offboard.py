@@ -33,7 +33,7 @@ def run(sequence, seconds, start, connected=True, armed=False, mode=Mode.HOLD):
 
 def flying():
     s = OffboardSequence()
-    s.want(True)
+    s.set_desired(True)
     run(s, 1.1, 0.0)
     run(s, 0.1, 1.1, mode=Mode.OFFBOARD)
     run(s, 0.1, 1.2, armed=True, mode=Mode.OFFBOARD)
@@ -43,7 +43,7 @@ def flying():
 
 def test_order_and_times():
     s = OffboardSequence()
-    s.want(True)
+    s.set_desired(True)
     assert run(s, 1.0, 0.0, connected=False) == []
     assert s.phase is Phase.WAITING and not s.streaming
     asked = run(s, 1.8, 1.0)
@@ -55,7 +55,7 @@ def test_order_and_times():
     assert s.phase is Phase.FLYING and s.armed_stamp == pytest.approx(2.9)
 
 
-def test_streams_but_asks_nothing_until_wanted():
+def test_streams_but_requests_nothing_until_desired():
     s = OffboardSequence()
     assert run(s, 5.0, 0.0) == []
     assert s.streaming and s.phase is Phase.STREAMING
@@ -63,7 +63,7 @@ def test_streams_but_asks_nothing_until_wanted():
 
 def test_gives_up_with_the_reasons():
     s = OffboardSequence(OffboardParameters(attempts=3))
-    s.want(True)
+    s.set_desired(True)
     run(s, 1.1, 0.0)
     s.answer(Request.OFFBOARD, MavResult.TEMPORARILY_REJECTED)
     s.text(Severity.CRITICAL, "no offboard signal")
@@ -74,8 +74,8 @@ def test_gives_up_with_the_reasons():
     assert "OFFBOARD refused (temporarily rejected)" in said
     assert "no offboard signal" in said and "chatter" not in said
     assert "no success after 3 requests" in s.reasons[-1]
-    s.want(False)
-    s.want(True)
+    s.set_desired(False)
+    s.set_desired(True)
     assert run(s, 0.1, 6.1) and s.phase is Phase.OFFBOARD
 
 
@@ -98,7 +98,7 @@ def test_unexpected_disarm_is_a_failure():
 
 def test_disarm():
     s = flying()
-    s.want(False)
+    s.set_desired(False)
     assert run(s, 0.1, 2.0, armed=True, mode=Mode.OFFBOARD) == [(2.0, Request.DISARM)]
     s.answer(Request.DISARM, MavResult.TEMPORARILY_REJECTED)
     run(s, 0.1, 3.0, armed=False, mode=Mode.OFFBOARD)
@@ -118,8 +118,8 @@ def test_a_failure_outlasts_the_loss_of_the_link():
     assert s.phase is Phase.FAILED
     run(s, 5.0, 2.1, connected=False)
     assert run(s, 30.0, 7.1) == [] and s.phase is Phase.FAILED and s.streaming
-    s.want(False)
-    s.want(True)
+    s.set_desired(False)
+    s.set_desired(True)
     assert run(s, 0.1, 37.1, mode=Mode.OFFBOARD) == [(37.1, Request.ARM)]
 
 
@@ -134,7 +134,7 @@ def test_reboot_in_flight_is_the_end():
 
 def test_reboot_on_the_ground_starts_over_with_a_new_stream():
     s = OffboardSequence()
-    s.want(True)
+    s.set_desired(True)
     run(s, 1.2, 0.0)
     run(s, 0.3, 1.2, mode=Mode.OFFBOARD)
     assert s.phase is Phase.ARMING
@@ -149,7 +149,7 @@ def test_reboot_on_the_ground_starts_over_with_a_new_stream():
 def test_with_the_stand_in():
     """Vision comes late: arming is refused in words, then succeeds; auto-disarm ends it."""
     autopilot, s = Autopilot(), OffboardSequence()
-    s.want(True)
+    s.set_desired(True)
     heard = set()
     for k in range(2500):
         t = k * 0.004
@@ -175,5 +175,5 @@ def test_an_autopilot_that_is_to_help_itself_is_not_asked_for_offboard_again():
     s.let_go = True
     assert run(s, 5.0, 2.0, armed=True, mode=Mode.LAND) == []
     assert run(s, 5.0, 7.0, armed=False, mode=Mode.HOLD) == []  # nor to arm, once it has landed
-    s.want(False)
+    s.set_desired(False)
     assert run(s, 5.0, 12.0, armed=False, mode=Mode.HOLD) == []

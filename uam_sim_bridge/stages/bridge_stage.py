@@ -93,7 +93,7 @@ class BridgeStage:
 
     def arm(self, arm: bool) -> None:
         """Take the mission's desired arming state."""
-        self.sequence.want(arm)
+        self.sequence.set_desired(arm)
 
     def mission(self, stamp: int, magnet: bool, failsafe: bool) -> None:
         """Take the mission's status: the magnet, and whether the autopilot's failsafe is to act."""

@@ -1,1 +1,1 @@
-"""From tau_p, tau_q to a setpoint; OFFBOARD, arming, level hold."""
+"""tau_p and tau_q → setpoint; OFFBOARD, arming, level hold."""

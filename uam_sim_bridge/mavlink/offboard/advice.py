@@ -1,8 +1,8 @@
-"""From what PX4 says against us to one line of what to do about it.
+"""One line of advice for each reason why PX4 v1.16 refuses to arm or to fly OFFBOARD.
 
-The patterns are PX4 v1.16's texts, of STATUSTEXT ("Preflight Fail: ...") and of events alike, the
-results of COMMAND_ACK as the offboard sequence words them, and modes PX4 went to by itself. The
-first pattern found anywhere in a text counts, so the narrower ones stand first.
+The patterns match the texts of STATUSTEXT ("Preflight Fail: ...") and of events, the results of
+COMMAND_ACK as worded by `OffboardSequence`, and mode changes that PX4 made by itself. The first
+matching pattern counts, so narrow patterns come before wide ones.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ ADVICE: tuple[tuple[str, str], ...] = (
     (r"no valid position estimate|horizontal position unstable|position estimate has low accuracy",
      "check mocap, EKF2_EV_CTRL (11: position, height, yaw) and EKF2_EV_DELAY"),
     (r"height estimate not stable|no valid altitude estimate",
-     "set EKF2_HGT_REF to vision (3) and check the height that mocap tells"),
+     "set EKF2_HGT_REF to vision (3) and check the height that mocap reports"),
     (r"heading estimate not stable|vision tilt differs",
      "vision and IMU disagree: check the mocap body's axes (x forward, z up) and EKF2_EV_CTRL"),
     (r"(horizontal|vertical) velocity unstable",
@@ -41,14 +41,14 @@ ADVICE: tuple[tuple[str, str], ...] = (
      "setpoints must stream faster than 2 Hz: check the link's rate and COM_OF_LOSS_T"),
     (r"no manual control|manual control loss|needs radio control|\brc\b.*lost",
      "switch to OFFBOARD before arming; without a radio set COM_RCL_EXCEPT's bit for OFFBOARD"),
-    (r"pilot took over", "a stick moved: see COM_RC_OVERRIDE; ask for OFFBOARD again when clear"),
+    (r"pilot took over", "a stick moved: see COM_RC_OVERRIDE; request OFFBOARD again when clear"),
     (r"mode not suitable for arming|switch to manual mode|mode .* is not available",
-     "ask for OFFBOARD first, then arm"),
+     "request OFFBOARD first, then arm"),
     (r"switching to .* not (available|possible)",
      "the mode's requirements fail: see the reasons beside it"),
     (r"connection to (the )?(gcs|ground)|gcs connection loss|data ?link",
      "connect a ground station or set NAV_DLL_ACT 0"),
-    (r"connection to mission computer lost", "PX4 misses our heartbeats: check the link"),
+    (r"connection to mission computer lost", "PX4 receives no heartbeat: check the link"),
     (r"kill (switch )?engaged|rtl switch engaged", "release the switch on the radio"),
     (r"safety button", "press the safety button or set CBRK_IO_SAFETY"),
     (r"throttle", "put the throttle stick down"),
@@ -67,31 +67,31 @@ ADVICE: tuple[tuple[str, str], ...] = (
      "COM_ARM_HFLT_CHK"),
     (r"cpu|ram usage", "lower message rates or logging; COM_CPU_MAX"),
     (r"safety configuration", "the vehicle is configured not to arm: COM_ARMABLE"),
-    (r"arm auth", "the arming authority said no: COM_ARM_AUTH_REQ"),
+    (r"arm auth", "the arming authority refused: COM_ARM_AUTH_REQ"),
     (r"calibrating", "wait until the calibration is done"),
     (r"no valid mission", "COM_ARM_MIS_REQ requires a mission: set it 0"),
-    # what the autopilot did by itself
+    # actions of the autopilot by itself
     (r"left offboard for (land|return|hold)",
      "a failsafe: see the text beside it, COM_OF_LOSS_T, COM_OBL_RC_ACT and the link"),
     (r"left offboard for", "the pilot or a ground station changed the mode"),
     (r"autopilot disarmed in flight", "kill switch, failure detector or a wrong land detection"),
     (r"autopilot rebooted", "check its power supply; arm again by hand after the landing"),
     (r"failsafe activated|autopilot disengaged", "see the reason beside it"),
-    # what COMMAND_ACK says, and what only sums up
+    # results of COMMAND_ACK, and summaries of other texts
     (r"resolve system health failures",
      "the failed checks are the reasons beside it; none: `commander check` in PX4's shell"),
     (r"disarming (denied|refused)|not landed",
-     "the land detector does not see the ground: lower the thrust, LNDMC_*"),
+     "the land detector does not detect the ground: lower the thrust, LNDMC_*"),
     (r"arming refused \(temporarily", "an arming check failed: see the reasons beside it"),
     (r"refused \((denied|unsupported|failed)",
-     "the autopilot does not know this request: check firmware and autopilot_system"),
+     "the autopilot does not support this request: check firmware and autopilot_system"),
 )  # fmt: skip
 
 _COMPILED = tuple((re.compile(pattern, re.IGNORECASE), what) for pattern, what in ADVICE)
 
 
 def advice(text: str) -> str | None:
-    """Return what to do about `text`, None where we know nothing."""
+    """Return the advice for `text`; None if no pattern matches."""
     for pattern, what in _COMPILED:
         if pattern.search(text):
             return what
@@ -99,6 +99,6 @@ def advice(text: str) -> str | None:
 
 
 def with_advice(text: str) -> str:
-    """Return `text` with its advice behind it, once."""
+    """Return `text` followed by its advice; unchanged if it has advice already."""
     what = None if SEPARATOR in text else advice(text)
     return text if what is None else f"{text}{SEPARATOR}{what}"

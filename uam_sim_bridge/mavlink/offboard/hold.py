@@ -1,6 +1,6 @@
-"""What the autopilot gets while no good command is there: level for a bounded time, then nothing.
+"""Level hold: setpoints for a bounded time while the bridge has no valid command.
 
-Nothing means that the stream stops, and the autopilot's own failsafe (COM_OF_LOSS_T) takes over.
+Then the stream of setpoints stops, and the autopilot's own failsafe (COM_OF_LOSS_T) acts.
 """
 
 from __future__ import annotations
@@ -14,8 +14,8 @@ from uam_control.settings.parameter_set import ParameterSet, number
 from uam_sim_bridge.mavlink.offboard.setpoints.desired import Desired
 from uam_sim_bridge.mavlink.offboard.thrust_identification import GRAVITY
 
-_LAST = 0.05  # s, before the end: the autopilot keeps to the last setpoint until its failsafe
-UNKNOWN = np.full(3, math.nan)  # an attitude or a velocity
+_LAST = 0.05  # s before the end, rates 0: the autopilot holds the last setpoint until its failsafe
+UNKNOWN = np.full(3, math.nan)  # unknown attitude [rad] or velocity [m/s]
 _THRUST_TIME = 0.5  # s, over which the thrust of normal flight is averaged
 
 
@@ -60,10 +60,10 @@ class HoldParameters(ParameterSet):
 
 
 class LevelHold:
-    """Level setpoints with the thrust of the flight so far; the arrays are reused.
+    """Makes level setpoints with the mean thrust of the flight so far; the arrays are reused.
 
-    The autopilot's rate loop alone gives way to the arm's torque, hence the integral; and an arm
-    that swings on pushes the vehicle, hence the tilt and thrust against its velocity.
+    Under the autopilot's rate loop alone the arm's torque would tilt the vehicle: the integral acts
+    against it. A swinging arm pushes the vehicle: tilt and thrust act against the velocity.
     """
 
     def __init__(self, parameters: HoldParameters) -> None:
@@ -77,11 +77,11 @@ class LevelHold:
 
     @property
     def active(self) -> bool:
-        """Whether the last tick was one without a good command."""
+        """Whether the last tick had no valid command."""
         return self._since is not None
 
     def good(self, time: float, desired: Desired) -> None:
-        """Note a good command at `time` [s]: its thrust and its yaw."""
+        """Store thrust and yaw of a valid command at `time` [s]."""
         self._since = None
         self._desired[0, 2], thrust = desired.attitude[0, 2], desired.thrust
         dt = time - self._time
@@ -92,17 +92,17 @@ class LevelHold:
             self._thrust += dt / _THRUST_TIME * (thrust - self._thrust)
 
     def reset(self) -> None:
-        """Forget the flight: the vehicle is on the ground."""
+        """Clear the mean thrust; call it while the vehicle is on the ground."""
         self._thrust = self._since = None
 
     def setpoint(
         self, time: float, attitude: np.ndarray, velocity: np.ndarray, hopeless: bool = False
     ) -> Desired | None:
-        """Return body rates, attitude and thrust, or None when the stream is to stop.
+        """Return body rates, attitude and thrust at `time` [s]; None: the stream must stop.
 
-        attitude (3,): roll, pitch, yaw [rad], FLU in ENU; no rates about an axis of which it is not
-        finite. velocity (3,): [m/s], ENU; nothing is done against what is not finite of it.
-        hopeless: no commands are to be expected.
+        attitude (3,): roll, pitch, yaw [rad], FLU in ENU; an axis that is not finite gets rate 0.
+        velocity (3,): [m/s], ENU; a component that is not finite is not braked. hopeless: no
+        commands are expected, so `release_time` applies instead of `hold_time`.
         """
         if self._thrust is None:
             return None
@@ -126,7 +126,7 @@ class LevelHold:
         return Desired(self.rates, self._desired, thrust)
 
     def _turn(self, axis: int, tilt: float, dt: float) -> None:
-        """Set the rate against what the angle is off by [rad]."""
+        """Set the body rate about `axis` against the angle error `tilt` [rad]."""
         parameters = self.parameters
         limit = parameters.hold_rate_limit
         if not math.isfinite(tilt):

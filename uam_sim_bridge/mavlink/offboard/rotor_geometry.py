@@ -1,9 +1,9 @@
-"""Rotor geometry -> torques and thrust, normalised as PX4's control allocator does it.
+"""Rotor geometry → torques and thrust, normalised as in PX4's control allocator.
 
-The mixer is the pseudo-inverse of the rotors' effectiveness, its columns scaled so that the size of
-the vehicle and of the rotors drops out (PX4: pseudo-inverse with normalised roll, pitch, yaw):
-roll and pitch by the same factor, such that the columns have the norm sqrt(n/2) for n rotors; yaw
-such that its largest entry is 1; thrust such that all entries are 1.
+The mixer is the pseudo-inverse of the rotors' effectiveness. Its columns are scaled, which makes it
+independent of the size of vehicle and rotors (PX4: pseudo-inverse, normalised roll, pitch, yaw):
+roll and pitch by the same factor to the norm sqrt(n/2) for n rotors; yaw to a largest entry of 1;
+thrust to a mean entry of 1.
 """
 
 from __future__ import annotations
@@ -27,7 +27,8 @@ def effectiveness(px: np.ndarray, py: np.ndarray, moment_ratio: np.ndarray) -> n
 def normalised_mixer(px: np.ndarray, py: np.ndarray, moment_ratio: np.ndarray) -> np.ndarray:
     """Return (n, 4): motor thrust 0..1 per unit of normalised roll, pitch, yaw, thrust.
 
-    Raises ValueError where the rotors cannot make the four of them independently.
+    px, py, moment_ratio (n,): see `effectiveness`. Raises ValueError where the rotors cannot make
+    roll, pitch, yaw and thrust independently.
     """
     matrix = effectiveness(px, py, moment_ratio)
     if np.linalg.matrix_rank(matrix) < 4:
@@ -47,7 +48,8 @@ def torque_scale(
 ) -> np.ndarray:
     """Return (3,) [N m]: the torque about each axis for a normalised torque of 1.
 
-    rotor_thrust [N]: thrust of one rotor at motor thrust 1.
+    px, py, moment_ratio (n,): see `effectiveness`; rotor_thrust [N]: thrust of one rotor at motor
+    thrust 1.
     """
     matrix = effectiveness(px, py, moment_ratio)
     return rotor_thrust * np.diag(matrix @ normalised_mixer(px, py, moment_ratio))[:3].copy()

@@ -1,18 +1,19 @@
-"""From "fly" to an armed vehicle in OFFBOARD, and back: a state machine on simulation time.
+"""State machine that arms the vehicle in OFFBOARD and disarms it, on simulation time.
 
-It neither sends nor receives: `update` takes what is known of the autopilot and returns what to
-ask it for. The bridge and the direct engine use the same object.
+It sends and receives no messages: `update` takes the autopilot's state and returns the request to
+send. The bridge and the direct engine use the same class.
 
     WAITING    no heartbeat yet
-    STREAMING  setpoints go out (the autopilot demands a stream before the switch)
-    OFFBOARD   asking for the mode
-    ARMING     asking to arm
-    FLYING     armed, in OFFBOARD; asks again when the autopilot leaves the mode
-               (also without heartbeats: the stream must go on)
-    DISARMING  asking to disarm
+    STREAMING  setpoints are sent (the autopilot requires a stream before OFFBOARD)
+    OFFBOARD   the mode is requested
+    ARMING     arming is requested
+    FLYING     armed, in OFFBOARD; the mode is requested again when the autopilot leaves it
+               (the phase stays without heartbeats: the stream must go on)
+    DISARMING  disarming is requested
     DISARMED   done
-    FAILED     an attempt too many, disarmed or rebooted in flight; `reasons` says why, and only a
-               new wish (`want`) starts again: nothing is armed in the air by itself
+    FAILED     too many attempts, disarmed or rebooted in flight; `reasons` says why. Only a new
+               desired state (`set_desired`) starts again: the vehicle is never armed again in the
+               air by itself
 """
 
 from __future__ import annotations
@@ -25,16 +26,16 @@ from uam_control.settings.parameter_set import ParameterSet, number
 from uam_sim_bridge.mavlink.offboard.advice import with_advice
 from uam_sim_bridge.mavlink.protocol.modes import MavResult, Mode, Severity, result_word
 
-HEARTBEAT_TIMEOUT = 3.0  # s without one: not connected
+HEARTBEAT_TIMEOUT = 3.0  # s without a heartbeat: not connected
 _KEPT_REASONS = 5
 
 
 class Phase(Enum):
-    """Where the sequence stands; the value is for people."""
+    """Phase of the sequence; the value is the text for logs."""
 
     WAITING = "waiting for the autopilot"
     STREAMING = "streaming setpoints"
-    OFFBOARD = "asking for OFFBOARD"
+    OFFBOARD = "requesting OFFBOARD"
     ARMING = "arming"
     FLYING = "flying"
     DISARMING = "disarming"
@@ -43,7 +44,7 @@ class Phase(Enum):
 
 
 class Request(Enum):
-    """What to ask the autopilot for; the value is for people."""
+    """A request to the autopilot; the value is the text for logs."""
 
     OFFBOARD = "OFFBOARD"
     ARM = "arming"
@@ -52,7 +53,7 @@ class Request(Enum):
 
 @dataclass(frozen=True)
 class OffboardParameters(ParameterSet):
-    """Times and patience of the sequence."""
+    """Times and numbers of attempts of the sequence."""
 
     stream_time: float = number(
         1.0, "time of streaming setpoints before the first request for OFFBOARD", "s", 0.0, 30.0
@@ -67,9 +68,9 @@ class OffboardParameters(ParameterSet):
 class OffboardSequence:
     """The state machine.
 
-    `phase`; `armed_stamp` [s] or None: when armed was first seen in this flight; `reasons`: what
-    the autopilot answered to refused requests, with advice, newest last; `let_go`: set by the owner
-    when the autopilot is to run its own failsafe; the sequence then requests OFFBOARD no more.
+    `phase`; `armed_stamp` [s]: first time at which this flight was armed, None before; `reasons`:
+    the autopilot's answers to refused requests, with advice, newest last; `let_go`: set by the
+    owner when the autopilot must run its own failsafe; OFFBOARD is then requested no more.
     """
 
     def __init__(self, parameters: OffboardParameters | None = None) -> None:
@@ -78,31 +79,31 @@ class OffboardSequence:
         self.armed_stamp: float | None = None
         self.reasons: tuple[str, ...] = ()
         self.let_go = False
-        self._wanted = False
+        self._desired = False  # armed
         self._stream_start = math.inf
         self._asked = -math.inf
         self._attempts = 0
-        self._in_flight = False  # from FLYING until disarmed as wished, or a new wish
+        self._in_flight = False  # from FLYING until disarmed on request, or a new desired state
 
     @property
     def streaming(self) -> bool:
-        """Whether setpoints are to be sent: always, once an autopilot is there."""
+        """Whether setpoints must be sent: always after the first heartbeat."""
         return self.phase is not Phase.WAITING
 
-    def want(self, armed: bool) -> None:
-        """Take the pilot's wish: True fly, False disarm. A new wish forgets earlier failures."""
-        if armed == self._wanted:
+    def set_desired(self, armed: bool) -> None:
+        """Set the desired state: True fly, False disarm. A change clears earlier failures."""
+        if armed == self._desired:
             return
-        self._wanted = armed
+        self._desired = armed
         self.reasons = ()
         self._attempts, self._asked = 0, -math.inf
         if self.phase in (Phase.FAILED, Phase.DISARMED):
             self.phase, self._in_flight = Phase.STREAMING, False
 
     def update(self, time: float, connected: bool, armed: bool, mode: Mode) -> Request | None:
-        """Advance to `time` [s] and return what to ask for now, if anything.
+        """Advance to `time` [s] and return the request to send now, None for none.
 
-        connected: a heartbeat came recently; armed, mode: the autopilot's latest word.
+        connected: the last heartbeat is recent; armed, mode: as last reported by the autopilot.
         """
         if not connected:
             if self.phase not in (Phase.FLYING, Phase.FAILED):
@@ -111,7 +112,7 @@ class OffboardSequence:
         if self.phase is Phase.WAITING:
             self.phase = Phase.STREAMING
             self._stream_start = time
-        if not self._wanted:
+        if not self._desired:
             return self._stay_disarmed(time, armed)
         if self.phase is Phase.FLYING:
             return self._keep_flying(time, armed, mode)
@@ -129,11 +130,11 @@ class OffboardSequence:
         return None
 
     def rebooted(self, time: float) -> None:
-        """Note at `time` [s] that the autopilot has restarted.
+        """Handle a restart of the autopilot at `time` [s].
 
         On the ground the sequence starts again with a new stream. In flight it fails.
         """
-        if self._in_flight:  # FAILED, where a heartbeat said "disarmed" first
+        if self._in_flight:  # the phase is FAILED if a heartbeat reported "disarmed" before
             self._reason("the autopilot rebooted in flight")
             self.phase = Phase.FAILED
         elif self.phase in (Phase.STREAMING, Phase.OFFBOARD, Phase.ARMING):
@@ -141,15 +142,15 @@ class OffboardSequence:
             self.phase, self._stream_start = Phase.STREAMING, time
 
     def answer(self, request: Request, result: int) -> None:
-        """Take a COMMAND_ACK's result for a request; a refusal becomes a reason."""
+        """Handle the result of COMMAND_ACK for a request; a refusal becomes a reason."""
         if result == MavResult.ACCEPTED:
             return
         self._reason(f"{request.value} refused ({result_word(result)})")
 
     def text(self, severity: int, text: str) -> None:
-        """Take a STATUSTEXT; warnings and worse become reasons."""
+        """Handle a STATUSTEXT; warnings and worse become reasons."""
         if severity <= Severity.WARNING:
-            self._reason(text.strip())  # PX4 ends a text with a tab where an event says the same
+            self._reason(text.strip())  # PX4 ends a text with a tab if an event has the same text
 
     def _reason(self, text: str) -> None:
         text = with_advice(text)

@@ -1,7 +1,7 @@
 """tau_p [N] and tau_q [N m] → body-rate setpoint [rad/s] and normalised thrust.
 
-Thrust. The collective is what tau_p asks along the body's thrust axis, u1 = tau_p · (R e3), clamped
-to [thrust_min, thrust_max] and turned into 0..1 by the inverse of the thrust curve.
+Thrust. The collective is the part of tau_p along the body's thrust axis, u1 = tau_p · (R e3). It is
+clamped to [thrust_min, thrust_max] and mapped to 0..1 by the inverse of the thrust curve.
 
 Rates. PX4's rate loop makes the torque
 
@@ -11,20 +11,19 @@ with S the torque [N m] of a normalised torque of 1 (torque_scale). Sending
 
     omega_sp = omega + tau_q / (S K P)
 
-makes the proportional path equal to tau_q. What the loop does beyond is welcome: its integral acts
-as integral action on tau_q (K I / (K P) of it per second) and takes up constant torques such as the
-arm's weight; its D acts as rate damping.
+makes the proportional path equal to tau_q. The other paths help: the integral acts as integral
+action on tau_q (K I / (K P) of it per second) and compensates constant torques such as the arm's
+weight; D acts as rate damping.
 
-Both stand on the thrust of the motors: full thrust × battery × `thrust_factor`, the last one
-identified in flight (thrust_identification.py). Where it is wrong, u1 and tau_q are off by the same
-factor.
+Both use the thrust of the motors: full thrust × battery × `thrust_factor`, which is identified in
+flight (thrust_identification.py). An error of this product scales u1 and tau_q by the same factor.
 
-Assumptions: omega is the rate that the loop sees (its gyro filter is ignored); K P, the thrust
+Assumptions: omega is the rate that the loop uses (its gyro filter is ignored); K P, the thrust
 curve and the rotor geometry here are those of the autopilot (the bridge reads and compares them);
-the motors do not saturate. Where the autopilot's thrust model differs from the motors' curve, S is
+the motors do not saturate. If the autopilot's thrust model differs from the motors' curve, S is
 scaled by the local slope of the composed curve.
 
-Body vectors are FLU. The map is the same in FRD, as signs cancel.
+Body vectors are FLU. The map is the same in FRD: the signs cancel.
 """
 
 from __future__ import annotations
@@ -66,9 +65,9 @@ class SetpointRefused(ValueError):
 
 @dataclass(frozen=True)
 class RateThrustParameters(ParameterSet):
-    """What the map needs to know of vehicle and autopilot.
+    """Numbers of vehicle and autopilot that the map uses.
 
-    What is NaN or empty follows from the vehicle: `of`.
+    Values that are NaN or empty by default come from the vehicle's description: `of`.
     """
 
     rotor_thrust_max: float = number(
@@ -108,15 +107,15 @@ class RateThrustParameters(ParameterSet):
 
     @classmethod
     def of(cls, vehicle: VehicleDescription, values: Mapping[str, Any] | None = None) -> Self:
-        """Return the validated set of a vehicle, with those of `values` that belong to it."""
+        """Return the validated set of a vehicle, with those of `values` that belong to the set."""
         return cls.among(vehicle.node_parameters()["mavlink_bridge"] | dict(values or {}))
 
     def torque_scale(self, vehicle: VehicleDescription) -> np.ndarray:
-        """Torque (3,) [N m] of a normalised torque of 1 about roll, pitch, yaw (PX4 allocation)."""
+        """Return the torque (3,) [N m, FLU] of a normalised torque of 1 about roll, pitch, yaw."""
         return torque_scale(*vehicle.geometry(), self.rotor_thrust_max)
 
     def flat(self, vehicle: VehicleDescription) -> np.ndarray:
-        """Return the array that the compiled map reads."""
+        """Return the parameters (13,) of `rate_thrust_map`, SI units."""
         p = np.empty(_LENGTH)
         p[_FULL] = len(vehicle.rotors) * self.rotor_thrust_max
         p[_BATTERY] = self.battery_factor
@@ -140,9 +139,11 @@ def rate_thrust_map(
     p: np.ndarray,
     rates: np.ndarray,
 ) -> float:
-    """Write the body-rate setpoint into rates (3,) and return the normalised thrust.
+    """Write the body-rate setpoint [rad/s, FLU] into rates (3,); return the normalised thrust.
 
-    Returns -1 - i, touching nothing, where INPUTS[i] is not finite.
+    tau_p (3,) [N, ENU], tau_q (3,) [N m, FLU], attitude (3,) roll, pitch, yaw [rad, FLU in ENU],
+    body_rates (3,) [rad/s, FLU], p (13,): `RateThrustParameters.flat`. Returns -1 - i and leaves
+    `rates` unchanged if INPUTS[i] is not finite.
     """
     for i in range(3):
         if not math.isfinite(tau_p[i]):
@@ -153,7 +154,7 @@ def rate_thrust_map(
             return -7.0 - i
         if not math.isfinite(body_rates[i]):
             return -10.0 - i
-    # third column of R_B^W: the thrust axis in the world
+    # third column of R_B^W: the thrust axis in the world frame
     cr, sr = math.cos(attitude[0]), math.sin(attitude[0])
     cp, sp = math.cos(attitude[1]), math.sin(attitude[1])
     cy, sy = math.cos(attitude[2]), math.sin(attitude[2])
@@ -174,10 +175,10 @@ def rate_thrust_map(
 
 
 class RateThrustMap:
-    """The map above with its parameters; one instance per flight.
+    """`rate_thrust_map` with its parameters; one instance per flight.
 
-    `rates` (3,) is reused by every call: copy it to keep it. `thrust_factor`: true thrust / thrust
-    of the parameters' curve, 1 until something else is set.
+    `rates` (3,) [rad/s, FLU] is reused by every call: copy it to keep it. `thrust_factor`: true
+    thrust / thrust of the parameters' curve, 1 at first.
     """
 
     def __init__(
@@ -192,7 +193,7 @@ class RateThrustMap:
         self.configure(parameters or RateThrustParameters.of(self._vehicle))
 
     def configure(self, parameters: RateThrustParameters) -> None:
-        """Take new parameters, whole or not at all; raises ParameterError naming the wrong one."""
+        """Apply new parameters; a ParameterError names the bad one and changes nothing."""
         checked = parameters.validated()
         self._flat = checked.flat(self._vehicle)
         self.parameters = checked
@@ -205,7 +206,7 @@ class RateThrustMap:
 
     @thrust_factor.setter
     def thrust_factor(self, factor: float) -> None:
-        """Raises ValueError, the old factor staying, where it is not a positive number."""
+        """Set the factor; raises ValueError, without a change, if it is not a positive number."""
         if not (math.isfinite(factor) and factor > 0.0):
             raise ValueError(f"thrust factor {factor} is not a positive number")
         self._factor = factor
@@ -216,8 +217,8 @@ class RateThrustMap:
     ) -> tuple[np.ndarray, float]:
         """Return the body-rate setpoint (3,) [rad/s, FLU] and the normalised thrust 0..1.
 
-        tau_p (3,) [N, world ENU], tau_q (3,) [N m, FLU], attitude (3,) roll, pitch, yaw [rad],
-        body_rates (3,) [rad/s, FLU]; float64. Raises SetpointRefused where one is not finite.
+        tau_p (3,) [N, ENU], tau_q (3,) [N m, FLU], attitude (3,) roll, pitch, yaw [rad, FLU in
+        ENU], body_rates (3,) [rad/s, FLU]; float64. Raises SetpointRefused if one is not finite.
         """
         thrust = rate_thrust_map(tau_p, tau_q, attitude, body_rates, self._flat, self.rates)
         if thrust < 0.0:
@@ -225,7 +226,7 @@ class RateThrustMap:
         return self.rates, thrust
 
     def assumed_thrust(self, command: float) -> float:
-        """Return the collective [N] of a normalised thrust by the curve, without the factor."""
+        """Return the collective [N] of a normalised thrust by the curve without `thrust_factor`."""
         p = self._flat
         return thrust_of_command(
             command, p[_FULL], self.parameters.battery_factor, p[_MOTOR], p[_MODEL]

@@ -1,12 +1,12 @@
-"""What goes out at a tick: the map's setpoint, idle, the level hold's, or nothing.
+"""The setpoint of a tick: from the map, idle, from the level hold, or none.
 
 | commands | sent |
 |---|---|
-| good | the setpoint type's part of body rates, attitude and thrust |
-| idle (not flying) | rates 0, level, thrust 0: the stream goes on, the vehicle stays there |
+| valid | the setpoint type's part of body rates, attitude and thrust |
+| idle (not flying) | rates 0, level, thrust 0: the stream goes on, the vehicle stays landed |
 | not finite, malformed or none, on the ground | as idle |
 | the same in flight; the mission in failsafe; idle high above the start | level hold for \
-`hold_time`, `release_time` where nothing is to be expected, then nothing: the autopilot's \
+`hold_time` (`release_time` if no commands are expected), then no setpoint: the autopilot's \
 failsafe acts |
 """
 
@@ -30,15 +30,15 @@ Setpoint = AttitudeTarget | None  # None: no setpoint is sent
 
 
 def sent(setpoint: Setpoint) -> tuple[np.ndarray, float]:
-    """Return body rates (3,) [rad/s, FLU] and thrust of a setpoint, as it is recorded.
+    """Return body rates (3,) [rad/s, FLU] and thrust 0..1 of a setpoint for the recording.
 
-    The rates are NaN where others than body rates were sent, both are zero where nothing was.
+    The rates are NaN for a setpoint without body rates. Without a setpoint both are zero.
     """
     return (STILL, 0.0) if setpoint is None else (setpoint.body_rates, setpoint.thrust)
 
 
 class Situation(NamedTuple):
-    """What the autopilot says, and let_go: the mission wants its failsafe."""
+    """State of the autopilot; let_go: the mission requires the autopilot's failsafe."""
 
     armed: bool
     landed: bool
@@ -46,12 +46,11 @@ class Situation(NamedTuple):
 
 
 def silent(text: str, key: str | None) -> None:
-    """Say nothing."""
+    """Discard the warning."""
 
 
 class SetpointSource:
-    """Makes the setpoint of a tick; holds the map, and what is known without
-    commands."""
+    """Makes the setpoint of a tick from commands, or from the latest state without commands."""
 
     def __init__(
         self,
@@ -61,8 +60,8 @@ class SetpointSource:
         fresh: float = math.inf,
         say: Callable[[str, str | None], None] = silent,
     ) -> None:
-        """setpoint: the type that is sent; fresh [s]: until when an attitude or a velocity is good;
-        say(text, kind): of warnings."""
+        """setpoint: the type that is sent; fresh [s]: age up to which an attitude or a velocity is
+        used; say(text, kind): called for each warning."""
         self.map = rate_map
         self._type = setpoint
         self._hold = LevelHold(hold)
@@ -76,16 +75,16 @@ class SetpointSource:
 
     @property
     def holding(self) -> bool:
-        """Whether the last tick was one of the level hold."""
+        """Whether the setpoint of the last tick came from the level hold."""
         return self._hold.active
 
     def note_state(self, stamp: float, state: np.ndarray) -> None:
-        """Note an estimate (3, 8) of `stamp` [s]; the array is kept, not copied."""
+        """Store the estimate (3, 6 + n), see uam_control.coordinates, of `stamp` [s] uncopied."""
         self._estimated, self._velocity = (stamp, state[0, ATTITUDE]), state[1, POSITION]
         self._height = float(state[0, 2])
 
     def note_pose(self, stamp: float, quaternion: np.ndarray) -> None:
-        """Note an attitude [w x y z] that the motion capture saw at `stamp` [s]."""
+        """Store the attitude (4,) [w x y z], FLU → ENU, of a mocap pose of `stamp` [s]."""
         self._seen = stamp, euler_from_quaternion(quaternion)
 
     def commanded(
@@ -100,8 +99,8 @@ class SetpointSource:
     ) -> Setpoint:
         """Return the setpoint of a tick with commands.
 
-        now [s]; state (3, 8); flying: whether tau_p (3,) [N, ENU] is meant; tau_q (3,) [N m, FLU],
-        None for idle; attitude (3, 3): see `Desired`.
+        now [s]; state (3, 6 + n); flying: whether tau_p (3,) [N, ENU] is valid; tau_q (3,)
+        [N m, FLU], None for idle; attitude (3, 3): see `Desired`.
         """
         if situation.let_go:
             return self.without(now, situation)
@@ -124,7 +123,7 @@ class SetpointSource:
         return self.without(now, situation)
 
     def without(self, now: float, situation: Situation) -> Setpoint:
-        """Return the setpoint at `now` [s] where there are no commands to be used."""
+        """Return the setpoint at `now` [s] without valid commands."""
         armed, landed, let_go = situation
         if not armed or (landed and not self._high(armed)):
             return self._idle
@@ -141,13 +140,14 @@ class SetpointSource:
         return self._type(Desired(np.zeros(3), level(yaw if math.isfinite(yaw) else 0.0), 0.0))
 
     def _high(self, armed: bool) -> bool:
-        """Whether the vehicle is armed and well above the place where it stood disarmed."""
+        """Whether the vehicle is armed and more than `ground_margin` above its last disarmed
+        height."""
         if self._ground is None or not armed:
             self._ground = self._height
         return self._height - self._ground > self._margin
 
     def _attitude(self, now: float) -> np.ndarray:
-        """Roll, pitch, yaw [rad]: the estimate, the mocap's where that is old; NaN without both."""
+        """Return roll, pitch, yaw (3,) [rad]: the estimate, else mocap's if fresh, else NaN."""
         known = (self._estimated, self._seen)
         return next((angles for stamp, angles in known if self._fresh(stamp, now)), UNKNOWN)
 

@@ -1,14 +1,14 @@
-"""Newtons ↔ the normalised thrust of SET_ATTITUDE_TARGET.
+"""Thrust [N] ↔ normalised thrust of SET_ATTITUDE_TARGET.
 
-Three curves stand between a thrust command s in 0..1 and the thrust of a rotor:
+Three curves lead from a thrust command s in 0..1 to the thrust T of a rotor:
 
-    u      = solution of  m u^2 + (1 - m) u = s      what the autopilot does (PX4: THR_MDL_FAC = m)
-    T/Tmax = f u^2 + (1 - f) u                       the motor and its propeller (factor f)
-    Tmax   = Tmax_full * battery                     what the battery leaves of the full thrust
+    u      = solution of  m u^2 + (1 - m) u = s      autopilot (PX4: THR_MDL_FAC = m)
+    T/Tmax = f u^2 + (1 - f) u                       motor and propeller (factor f)
+    Tmax   = Tmax_full * battery                     full thrust at the present battery voltage
 
-with u the motor command in 0..1. The bridge inverts the composition, so that newtons are newtons
-for any pair (f, m). For f = m the first two cancel and s = T / (Tmax_full * battery). f = 0 is a
-motor with thrust proportional to its command, f = 1 one with thrust proportional to its square.
+with u the motor command in 0..1. The bridge inverts the composition, so that T is correct for any
+pair (f, m). For f = m the first two cancel and s = T / (Tmax_full * battery). For f = 0 the thrust
+is proportional to the motor command, for f = 1 to its square.
 
 All curves are strictly increasing on 0..1, so the inverse exists; inputs outside are clamped.
 """
@@ -29,7 +29,7 @@ def curve(factor: float, u: float) -> float:
 
 @jit
 def inverse_curve(factor: float, relative_thrust: float) -> float:
-    """Return the u in 0..1 with curve(factor, u) = relative_thrust (clamped to 0..1)."""
+    """Return u in 0..1 with curve(factor, u) = relative_thrust (clamped to 0..1)."""
     y = min(1.0, max(0.0, relative_thrust))
     b = 1.0 - factor
     # the root written without subtraction stays exact down to factor = 0
@@ -41,11 +41,10 @@ def inverse_curve(factor: float, relative_thrust: float) -> float:
 def command_of_thrust(
     newtons: float, full_thrust: float, battery: float, motor_factor: float, model_factor: float
 ) -> float:
-    """Return the normalised thrust s in 0..1 that makes `newtons`.
+    """Return the normalised thrust s in 0..1 for a collective of `newtons` [N].
 
-    newtons: desired collective thrust; full_thrust [N]: the collective at u = 1 with a full
-    battery; battery: fraction of it that is left (1: full); motor_factor: f; model_factor:
-    THR_MDL_FAC.
+    full_thrust [N]: collective at u = 1 with a full battery; battery: present full thrust as a
+    fraction of it; motor_factor: f; model_factor: m, THR_MDL_FAC.
     """
     u = inverse_curve(motor_factor, newtons / (full_thrust * battery))
     return curve(model_factor, u)
@@ -55,7 +54,7 @@ def command_of_thrust(
 def thrust_of_command(
     command: float, full_thrust: float, battery: float, motor_factor: float, model_factor: float
 ) -> float:
-    """Return the collective [N] that the normalised thrust `command` makes: the forward map."""
+    """Return the collective [N] of the normalised thrust `command`: the forward map."""
     u = inverse_curve(model_factor, command)
     return full_thrust * battery * curve(motor_factor, u)
 

@@ -1,27 +1,26 @@
-"""What the motors really give: true thrust / thrust that the curve says, identified in flight.
+"""Thrust factor, true thrust / thrust by the curve, identified in flight.
 
-So newtons stay newtons on a vehicle whose motors, propellers or battery are not those of the
-parameters. In steady flight Newton's law along the body's thrust axis,
+It corrects the thrust of a vehicle whose motors, propellers or battery differ from the parameters.
+In steady flight Newton's law along the body's thrust axis gives
 
     measured = m (p_ddot + g e3) · R e3 / thrust of the command by the curve
 
-needs what the bridge has anyway: attitude and acceleration of /uam/state, the thrust sent, and the
-mass. The command goes through the lag of the motors and of the acceleration's filter first, so that
-both sides of the quotient belong to the same instant. The factor follows it as first-order low pass
-within bounds and a slew limit: with a short time constant at first, then with one as long as has
-been measured (which makes it a mean), in the end with a long one, much slower than the position
-law.
+from attitude and acceleration of /uam/state, the thrust sent, and the mass. The command first
+passes a lag equal to that of motors and acceleration filter, so that numerator and denominator
+belong to the same time. The factor follows `measured` as a first-order low pass with bounds and a
+slew limit. The time constant is short at first, then equal to the time measured so far (a mean),
+and finally long, so that the factor is much slower than the position law.
 
-| while | the factor |
+| condition | factor |
 |---|---|
-| on the ground, near it, tilted, accelerating, thrust near its ends, numbers missing | is held |
-| `identification_settling` after any of these | is held |
-| the magnet is on, as nobody knows the payload's mass | is held |
-| after it, until the quotient is back where it was: then nothing hangs on the vehicle | is held |
-| `thrust_identification` freeze | is held |
-| `thrust_identification` off | goes back to 1 |
+| on the ground, near it, tilted, accelerating, thrust near 0 or 1, values not finite | held |
+| for `identification_settling` after any of these | held |
+| magnet on (the mass of the payload is unknown) | held |
+| magnet off, until `measured` is back at its earlier value: no payload hangs any more | held |
+| `thrust_identification` freeze | held |
+| `thrust_identification` off | returns to 1 |
 
-A held factor is still applied. The landed vehicle keeps it: battery and motors are the same.
+A held factor is still applied. After a landing it is kept: battery and motors are the same.
 """
 
 from __future__ import annotations
@@ -39,19 +38,19 @@ from uam_control.settings.parameter_set import ParameterSet, choice, number
 from uam_control.vehicle import VehicleDescription, load_description
 
 GRAVITY = 9.81  # m/s^2
-USABLE = (0.1, 0.9)  # normalised thrust: beyond, torques take their share of it (allocation)
-LONGEST_GAP = 0.1  # s between two ticks; longer ones begin anew
-SETTLED = 3.0  # times `identification_start`: learnt so long, it can tell whether something hangs
-# The word of the magnet comes from another process. It counts from a stamp on by which it has
-# arrived everywhere, so that a lockstep flight is the same every time.
+USABLE = (0.1, 0.9)  # normalised thrust: outside, the allocation reduces it in favour of torques
+LONGEST_GAP = 0.1  # s between two ticks; after a longer gap the lag filter starts again
+SETTLED = 3.0  # [times `identification_start`] of learning, after which a payload can be detected
+# The magnet's state comes from another process. It counts only after this delay, at which it has
+# arrived in every process: so a lockstep flight is reproducible.
 MAGNET_DELAY = 0.01  # s
 
 
 @dataclass(frozen=True)
 class ThrustIdentificationParameters(ParameterSet):
-    """When to trust a comparison of thrust and acceleration, and how fast to follow it.
+    """Conditions for a measurement of thrust, and time constants of the factor.
 
-    The mass follows from the vehicle: `of`.
+    The mass comes from the vehicle's description: `of`.
     """
 
     thrust_identification: str = choice(
@@ -107,11 +106,11 @@ class ThrustIdentificationParameters(ParameterSet):
 
     @classmethod
     def of(cls, vehicle: VehicleDescription, values: Mapping[str, Any] | None = None) -> Self:
-        """Return the validated set of a vehicle, with those of `values` that belong to it."""
+        """Return the validated set of a vehicle, with those of `values` that belong to the set."""
         return cls.among(vehicle.node_parameters()["mavlink_bridge"] | dict(values or {}))
 
     def validated(self, axes: int = 0) -> Self:
-        """As of every set; YAML's `on` and `off` arrive as true and false and are taken as well."""
+        """See `ParameterSet.validated`; accepts YAML's `on` and `off`, read as true and false."""
         said = self.thrust_identification
         if isinstance(said, bool):
             return replace(self, thrust_identification="on" if said else "off").validated(axes)
@@ -120,10 +119,11 @@ class ThrustIdentificationParameters(ParameterSet):
 
 @jit
 def steady_force(state: np.ndarray, tilt_max: float, acceleration_max: float) -> float:
-    """Return the specific force [m/s^2] along the thrust axis of state (3, 8), 0 if not steady.
+    """Return the specific force [m/s^2] along the thrust axis, 0 if the flight is not steady.
 
-    0 as well where a number is not finite: a comparison with NaN is false, and math.cos of an
-    infinite angle raises an error in plain Python, while compiled it is NaN.
+    state (3, 6 + n): see uam_control.coordinates; tilt_max [rad]; acceleration_max [m/s^2]. Returns
+    0 also if a value is not finite. The angles are checked first: math.cos of an infinite angle
+    raises an error in plain Python, while compiled it is NaN.
     """
     ax, ay, az = state[2, 0], state[2, 1], state[2, 2]
     if not ax * ax + ay * ay + az * az <= acceleration_max * acceleration_max:
@@ -140,10 +140,10 @@ def steady_force(state: np.ndarray, tilt_max: float, acceleration_max: float) ->
 
 
 class ThrustIdentification:
-    """The estimate and when it may move.
+    """Estimate of the thrust factor, and the conditions under which it changes.
 
-    `factor`: true / assumed thrust, to be applied; always within its bounds. `learning`: whether
-    the last tick moved it by a measurement.
+    `factor`: true / assumed thrust, always within its bounds. `learning`: whether a measurement
+    changed it in the last tick.
     """
 
     def __init__(self, parameters: ThrustIdentificationParameters | None = None) -> None:
@@ -151,38 +151,39 @@ class ThrustIdentification:
         self.learning = False
         self._time = -math.inf
         self._assumed = 0.0  # N, lagged as the motors
-        self._ground: float | None = None  # m, where it stood
+        self._ground: float | None = None  # m, height of the vehicle on the ground
         self._learnt = 0.0  # s of learning so far
-        self._unsteady = -math.inf  # s, when the flight was not steady last
+        self._unsteady = -math.inf  # s, last time at which the flight was not steady
         self._switches: deque[tuple[float, bool]] = deque()
         self._magnet = False
-        self._released: float | None = None  # s, magnet off and not yet judged
-        self._recent = math.nan  # measurement since the release, followed fast
-        self._before: float | None = None  # factor that was settled when the magnet went on
+        self._released: float | None = None  # s, magnet off; None once no payload hangs
+        self._recent = math.nan  # measurement since the release, fast low pass
+        self._before: float | None = None  # settled factor before the magnet went on
         self.configure(parameters or ThrustIdentificationParameters.of(load_description()))
 
     def configure(self, parameters: ThrustIdentificationParameters) -> None:
-        """Take new parameters, whole or not at all; raises ParameterError naming the wrong one."""
+        """Apply new parameters; a ParameterError names the bad one and changes nothing."""
         p = self.parameters = parameters.validated()
         self.factor = min(p.factor_max, max(p.factor_min, self.factor))
 
     def switch(self, time: float, on: bool) -> None:
-        """Take the word of the magnet at `time` [s]; it counts a little later, see MAGNET_DELAY."""
+        """Store the magnet's state at `time` [s]; it counts MAGNET_DELAY later."""
         if not math.isfinite(time):
             return
-        if self._switches and time < self._switches[-1][0]:  # a clock that began anew
+        if self._switches and time < self._switches[-1][0]:  # the clock was restarted
             self._switches.clear()
         self._switches.append((time, bool(on)))
-        while len(self._switches) > 100:  # nobody takes them: keep the latest
+        while len(self._switches) > 100:  # without calls of `update`: keep the latest
             self._switches.popleft()
 
     def update(
         self, time: float, state: np.ndarray, command: float, assumed: float, flying: bool
     ) -> float:
-        """Take one tick and return `factor`.
+        """Advance by one tick and return `factor`.
 
-        time [s]; state (3, 8); command: normalised thrust sent at this tick; assumed [N]: the
-        collective that it makes by the curve, without the factor; flying: armed and controlled.
+        time [s]; state (3, 6 + n): see uam_control.coordinates; command: normalised thrust sent at
+        this tick; assumed [N]: its collective by the curve, without the factor; flying: armed and
+        controlled.
         """
         self.learning = False
         if not math.isfinite(time + assumed + command):
@@ -209,12 +210,12 @@ class ThrustIdentification:
         return self.factor
 
     def _compare(self, time: float, dt: float, state: np.ndarray, command: float) -> None:
-        """Measure, where the flight is steady, and follow the measurement."""
+        """Measure the factor in steady flight and follow the measurement."""
         p = self.parameters
         force = steady_force(state, p.identification_tilt, p.identification_acceleration)
         if force == 0.0 or self._assumed <= 0.0 or not USABLE[0] <= command <= USABLE[1]:
             self._unsteady = time
-        # A vehicle that sways passes through rest, and its motors clip: rest has to last.
+        # A swaying vehicle is at rest for moments, and its motors saturate: rest must last.
         if time - self._unsteady <= p.identification_settling:
             return
         measured = p.identification_mass * force / self._assumed
@@ -229,14 +230,14 @@ class ThrustIdentification:
             self._move(gain * (measured - self.factor), dt)
 
     def _hanging(self, time: float, dt: float, measured: float) -> bool:
-        """Whether something may still hang on the magnet that is off."""
+        """Whether a payload may still hang on the magnet that is off."""
         p = self.parameters
         if math.isnan(self._recent):
             self._recent = measured
         self._recent += min(1.0, 2.0 * dt / p.identification_release) * (measured - self._recent)
         if time - self._released < p.identification_release:
             return True
-        if self._before is None:  # never known without payload: only landing tells
+        if self._before is None:  # the factor without payload is unknown: wait for the landing
             return True
         mass = p.identification_mass
         if self._recent < self._before * mass / (mass + p.hanging_mass):
@@ -249,7 +250,7 @@ class ThrustIdentification:
             on = self._switches.popleft()[1]
             if on and not self._magnet:
                 settled = self._learnt >= SETTLED * self.parameters.identification_start
-                # a payload that never came off leaves what was known before it
+                # if the last payload never came off, `_before` keeps its value
                 if self._released is None:
                     self._before = self.factor if settled else None
             elif self._magnet and not on:

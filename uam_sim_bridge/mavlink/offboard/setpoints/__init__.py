@@ -1,1 +1,1 @@
-"""Setpoint types: what of a desired motion goes to the autopilot."""
+"""Setpoint types: each sends another part of the desired motion to the autopilot."""

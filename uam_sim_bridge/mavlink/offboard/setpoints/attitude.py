@@ -1,4 +1,4 @@
-"""Attitude and thrust: the autopilot's own attitude loop flies, tau_q is not used."""
+"""Attitude and thrust: the autopilot's own attitude loop controls, tau_q is not used."""
 
 from __future__ import annotations
 
@@ -9,6 +9,6 @@ from uam_sim_bridge.mavlink.protocol.frames import swap_quaternion
 
 
 def attitude_setpoint(desired: Desired) -> AttitudeTarget:
-    """Return the attitude and the thrust of `desired`; the body rates are ignored."""
+    """Return attitude (FRD → NED) and thrust of `desired`; the body rates are ignored."""
     quaternion = swap_quaternion(quaternion_from_euler(desired.attitude[0]))
     return AttitudeTarget.of_attitude(quaternion, desired.thrust)

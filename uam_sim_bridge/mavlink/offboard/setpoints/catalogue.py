@@ -17,7 +17,7 @@ SETPOINTS: dict[str, SetpointType] = {
 
 @dataclass(frozen=True)
 class SetpointParameters(ParameterSet):
-    """Which setpoints the autopilot gets."""
+    """Type of the setpoints that the bridge sends."""
 
     setpoint: str = choice(
         "rates",
@@ -27,5 +27,5 @@ class SetpointParameters(ParameterSet):
 
     @property
     def type(self) -> SetpointType:
-        """The function that makes them."""
+        """The function that makes the setpoints."""
         return SETPOINTS[self.setpoint]

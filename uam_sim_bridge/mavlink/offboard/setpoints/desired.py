@@ -1,4 +1,4 @@
-"""What is desired at a tick, of which a setpoint type sends a part."""
+"""The desired motion at a tick; a setpoint type sends a part of it."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ SetpointType = Callable[[Desired], AttitudeTarget]
 
 
 def level(yaw: float) -> np.ndarray:
-    """Return `Desired.attitude` of a level vehicle at rest with this yaw [rad]."""
+    """Return `Desired.attitude` (3, 3) of a level vehicle at rest with `yaw` [rad]."""
     attitude = np.zeros((3, 3))
     attitude[0, 2] = yaw
     return attitude

@@ -8,5 +8,5 @@ from uam_sim_bridge.mavlink.protocol.frames import swap_body
 
 
 def rates_setpoint(desired: Desired) -> AttitudeTarget:
-    """Return the body rates and the thrust of `desired`; the attitude is ignored."""
+    """Return body rates (FRD) and thrust of `desired`; the attitude is ignored."""
     return AttitudeTarget.of_rates(swap_body(desired.rates), desired.thrust)
