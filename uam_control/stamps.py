@@ -1,4 +1,4 @@
-"""Stamps are integer nanoseconds [ns]; the maths takes seconds [s]."""
+"""Conversion between stamps, integer nanoseconds [ns], and times of the maths, seconds [s]."""
 
 from __future__ import annotations
 
@@ -7,10 +7,10 @@ _MICROSECOND = 1_000  # [ns]
 
 
 def seconds(stamp: int) -> float:
-    """Return the seconds [s] of a stamp [ns]."""
+    """Return a stamp [ns] in seconds [s]."""
     return stamp / SECOND
 
 
 def nanoseconds(time: float) -> int:
-    """Return the stamp [ns] of a time [s], to the microsecond: sample times are whole ones."""
+    """Return the stamp [ns] of a time [s], rounded to a microsecond, the unit of sample times."""
     return round(time * 1e6) * _MICROSECOND

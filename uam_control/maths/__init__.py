@@ -1,1 +1,1 @@
-"""Rotations, and the compilation of small fixed-size maths."""
+"""Rotations, and the compilation of small fixed-size functions."""

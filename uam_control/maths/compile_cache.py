@@ -1,10 +1,10 @@
-"""Machine code of the compiled functions on disk, so that processes that start together and are
-killed at any moment never load another function's code, or code of an older source.
+"""Machine code of the compiled functions on disk, safe for processes that start at the same time.
 
-numba's own cache is not made for that. It numbers its files through an index that every process
-reads and writes back, so two that compile at the same time may use one number; and it knows only
-the file of a function, not those of the functions and constants compiled into it. Here a file is
-named by everything that its content follows from.
+A process must never load the code of another function or of an older source, even if processes
+are killed while they write. numba's own cache does not guarantee this. It numbers its files in an
+index that every process reads and writes, so two processes that compile at the same time can use
+one number. It also checks only the file of a function, not the files of the functions and
+constants that are compiled into it. Here the file name contains a digest of all these inputs.
 """
 
 from __future__ import annotations
@@ -23,11 +23,11 @@ from numba.core.dispatcher import Dispatcher
 
 
 def _mangled(record: types.Record) -> tuple[str, tuple[str, ...]]:
-    """What a record type puts into the names of machine code: its layout.
+    """Return the part of a machine code name that stands for a record type: its layout.
 
-    numba puts a number of the process there. The laws of two nodes, each compiled in its process,
-    then have one name for two layouts, and who loads both (the direct engine) runs one law with
-    the code of the other, without a word.
+    numba uses a counter of the process instead. Two laws that two processes compile then have one
+    name for two layouts. The direct engine loads both and would run one law with the code of the
+    other, without an error.
     """
     return "Record", (hashlib.sha256(str(record).encode()).hexdigest()[:16],)
 
@@ -44,7 +44,7 @@ class CompileCache(FunctionCache):
 
     @property
     def filled(self) -> bool:
-        """Whether it holds machine code of the present sources, for any signature."""
+        """Whether the cache contains machine code of the present sources, for any signature."""
         return self._cache_file.filled
 
 
@@ -54,7 +54,8 @@ class _Files(IndexDataCacheFile):
     def __init__(self, folder: str, base: str, function: Callable):
         super().__init__(folder, base, None)
         self._base, self._function = base, function
-        _content(Path(function.__code__.co_filename))  # now, not at the first call, after an edit
+        # read the source now: at the first call it may already be edited
+        _content(Path(function.__code__.co_filename))
 
     def _name(self, key: Any) -> str:
         signature = hashlib.sha256(repr((numba.__version__, key)).encode()).hexdigest()
@@ -67,14 +68,14 @@ class _Files(IndexDataCacheFile):
         return any(Path(self._cache_path).glob(pattern))
 
     def load(self, key: Any) -> Any:
-        """Return what was saved for `key`; None if there is nothing, or nothing readable."""
+        """Return the data saved for `key`; None if no readable file exists."""
         try:
             return self._load_data(self._name(key))
         except OSError:
             return None
 
     def save(self, key: Any, data: Any) -> None:
-        """Save `data` for `key` and remove what older sources left."""
+        """Save `data` for `key` and remove the files of older sources."""
         name = self._name(key)
         self._save_data(name, data)
         current = name.rsplit(".", 2)[0]
@@ -84,7 +85,7 @@ class _Files(IndexDataCacheFile):
 
 
 def _sources(function: Callable) -> str:
-    """Return a digest of all that is compiled into `function`: files and constants."""
+    """Return a digest of the source files and constants that are compiled into `function`."""
     files, constants = set(), set()
     for part in _parts(function, set()):
         if isinstance(part, Path):
@@ -99,12 +100,12 @@ def _sources(function: Callable) -> str:
 
 @cache
 def _content(file: Path) -> bytes:
-    """A digest of a source file as it was when this process had imported it."""
+    """Return a digest of a source file as it was when this process imported it."""
     return hashlib.sha256(file.read_bytes()).digest()
 
 
 def _parts(function: Callable, seen: set[Callable]) -> Iterator[Path | str]:
-    """Yield the files of `function` and of what it calls, and each global constant they name."""
+    """Yield the files of `function` and of the functions it calls, and the constants they use."""
     seen.add(function)
     yield Path(function.__code__.co_filename)
     names = function.__code__.co_names

@@ -1,12 +1,11 @@
-"""Compilation of the small fixed-size maths in the control loop.
+"""Compilation of the small fixed-size functions of the control loop.
 
-NumPy spends about a microsecond per call on arrays of three; a control law makes hundreds of such
-calls per tick. Compiled once (and kept on disk, see `compile_cache`), the same code runs ten to a
-hundred times faster, which matters for campaigns of thousands of flights and on a companion
-computer.
+NumPy needs about a microsecond per call for arrays of three; a control law makes hundreds of such
+calls per tick. Compiled code (kept on disk, see `compile_cache`) is ten to a hundred times faster.
+Campaigns of thousands of flights and a companion computer need this.
 
-The code stays plain Python: without numba, or with NUMBA_DISABLE_JIT=1 in the environment (for
-debuggers and coverage), every function runs as written and gives the same numbers up to rounding.
+The code stays plain Python. Without numba, or with NUMBA_DISABLE_JIT=1 in the environment (for
+debuggers and coverage), every function runs in Python and gives the same numbers up to rounding.
 """
 
 from collections.abc import Callable
@@ -23,7 +22,7 @@ F = TypeVar("F", bound=Callable)
 
 
 def jit(function: F) -> F:
-    """Compile `function` on its first call, if numba is there; otherwise return it unchanged."""
+    """Return `function`, compiled on its first call; without numba, return it unchanged."""
     if numba is None:
         return function
     compiled = numba.njit(function)

@@ -1,6 +1,7 @@
-"""Rotations: Z-Y-X Euler angles, matrices and quaternions [w x y z], all body → world.
+"""Rotations: Z-Y-X Euler angles, matrices and quaternions [w x y z].
 
-The paper's R_B^W (its equation for the rotation matrix) is `matrix_from_euler`.
+All rotate from the body frame (FLU) to the world frame (ENU), unless a docstring says otherwise.
+The paper's R_B^W, eq. (3), rot_matrix, is `matrix_from_euler`.
 """
 
 from __future__ import annotations
@@ -14,7 +15,7 @@ from uam_control.maths.compiled import jit
 
 @jit
 def matrix_from_euler(euler: np.ndarray) -> np.ndarray:
-    """Return R_B^W (3, 3) of roll, pitch, yaw [rad] in `euler` (3,)."""
+    """Return R_B^W (3, 3), eq. (3), rot_matrix, of roll, pitch, yaw [rad] in `euler` (3,)."""
     cr, sr = math.cos(euler[0]), math.sin(euler[0])
     cp, sp = math.cos(euler[1]), math.sin(euler[1])
     cy, sy = math.cos(euler[2]), math.sin(euler[2])
@@ -33,7 +34,7 @@ def matrix_from_euler(euler: np.ndarray) -> np.ndarray:
 
 @jit
 def rotate(matrix: np.ndarray, v: np.ndarray) -> np.ndarray:
-    """Return matrix (3, 3) times v (3,)."""
+    """Return matrix (3, 3) times v (3,), of any unit; for R_B^W: body → world."""
     out = np.empty(3)
     for i in range(3):
         out[i] = matrix[i, 0] * v[0] + matrix[i, 1] * v[1] + matrix[i, 2] * v[2]
@@ -42,7 +43,7 @@ def rotate(matrix: np.ndarray, v: np.ndarray) -> np.ndarray:
 
 @jit
 def rotate_back(matrix: np.ndarray, v: np.ndarray) -> np.ndarray:
-    """Return the transpose of matrix (3, 3) times v (3,)."""
+    """Return the transpose of matrix (3, 3) times v (3,), of any unit; for R_B^W: world → body."""
     out = np.empty(3)
     for i in range(3):
         out[i] = matrix[0, i] * v[0] + matrix[1, i] * v[1] + matrix[2, i] * v[2]
@@ -51,7 +52,7 @@ def rotate_back(matrix: np.ndarray, v: np.ndarray) -> np.ndarray:
 
 @jit
 def relative_rotation(a: np.ndarray, b: np.ndarray) -> np.ndarray:
-    """Return a^T b of two rotation matrices (3, 3)."""
+    """Return a^T b (3, 3) of two rotation matrices (3, 3): the rotation frame b → frame a."""
     out = np.empty((3, 3))
     for i in range(3):
         for j in range(3):
@@ -61,7 +62,7 @@ def relative_rotation(a: np.ndarray, b: np.ndarray) -> np.ndarray:
 
 @jit
 def matrix_from_quaternion(q: np.ndarray) -> np.ndarray:
-    """Return R (3, 3) of the unit quaternion q = [w x y z]."""
+    """Return R (3, 3) of the unit quaternion q (4,) = [w x y z]."""
     w, x, y, z = q[0], q[1], q[2], q[3]
     matrix = np.empty((3, 3))
     matrix[0, 0] = 1.0 - 2.0 * (y * y + z * z)
@@ -78,7 +79,7 @@ def matrix_from_quaternion(q: np.ndarray) -> np.ndarray:
 
 @jit
 def euler_from_quaternion(q: np.ndarray) -> np.ndarray:
-    """Return roll, pitch, yaw [rad] (3,) of the unit quaternion q = [w x y z]; |pitch| <= pi/2."""
+    """Return roll, pitch, yaw (3,) [rad] of the unit quaternion q (4,); |pitch| <= pi/2."""
     w, x, y, z = q[0], q[1], q[2], q[3]
     euler = np.empty(3)
     euler[0] = math.atan2(2.0 * (w * x + y * z), 1.0 - 2.0 * (x * x + y * y))
@@ -89,7 +90,7 @@ def euler_from_quaternion(q: np.ndarray) -> np.ndarray:
 
 @jit
 def quaternion_from_euler(euler: np.ndarray) -> np.ndarray:
-    """Return the unit quaternion [w x y z] of roll, pitch, yaw [rad]; w >= 0."""
+    """Return the unit quaternion (4,) [w x y z] of roll, pitch, yaw (3,) [rad]; w >= 0."""
     cr, sr = math.cos(euler[0] / 2.0), math.sin(euler[0] / 2.0)
     cp, sp = math.cos(euler[1] / 2.0), math.sin(euler[1] / 2.0)
     cy, sy = math.cos(euler[2] / 2.0), math.sin(euler[2] / 2.0)
@@ -105,7 +106,7 @@ def quaternion_from_euler(euler: np.ndarray) -> np.ndarray:
 
 @jit
 def quaternion_multiply(a: np.ndarray, b: np.ndarray) -> np.ndarray:
-    """Return the Hamilton product a ⊗ b of two quaternions [w x y z]."""
+    """Return the Hamilton product a ⊗ b (4,) of two quaternions (4,) [w x y z]: b first, then a."""
     q = np.empty(4)
     q[0] = a[0] * b[0] - a[1] * b[1] - a[2] * b[2] - a[3] * b[3]
     q[1] = a[0] * b[1] + a[1] * b[0] + a[2] * b[3] - a[3] * b[2]
@@ -116,10 +117,13 @@ def quaternion_multiply(a: np.ndarray, b: np.ndarray) -> np.ndarray:
 
 @jit
 def quaternion_from_rotation_vector(v: np.ndarray) -> np.ndarray:
-    """Return the unit quaternion of the rotation vector v (3,) [rad] (exponential map)."""
+    """Return the unit quaternion (4,) of the rotation vector v (3,) [rad] (exponential map).
+
+    The rotation goes from the rotated to the original frame; v is the same in both.
+    """
     angle = math.sqrt(v[0] * v[0] + v[1] * v[1] + v[2] * v[2])
     q = np.empty(4)
-    # sin(a/2)/a, by its series where a is too small to divide by
+    # sin(a/2)/a; for small a its series, to avoid the division
     scale = 0.5 - angle * angle / 48.0 if angle < 1e-4 else math.sin(angle / 2.0) / angle
     q[0] = math.cos(angle / 2.0)
     q[1] = scale * v[0]
@@ -132,7 +136,8 @@ def quaternion_from_rotation_vector(v: np.ndarray) -> np.ndarray:
 def rotation_error(reference: np.ndarray, actual: np.ndarray) -> np.ndarray:
     """Return the rotation vector (3,) [rad] from `actual` to `reference`, in the actual body frame.
 
-    Both are unit quaternions [w x y z]; exact for small angles, monotone up to pi.
+    Both are unit quaternions (4,) [w x y z]. The length is 2 sin(angle/2): equal to the angle for
+    small angles, and monotone up to pi.
     """
     inverse = np.empty(4)
     inverse[0] = actual[0]
@@ -145,5 +150,5 @@ def rotation_error(reference: np.ndarray, actual: np.ndarray) -> np.ndarray:
 
 
 def wrap_angle(angle: float | np.ndarray) -> float | np.ndarray:
-    """Return `angle` [rad] (number or array) wrapped to [-pi, pi)."""
+    """Return `angle` [rad] (number or array of any shape) wrapped to [-pi, pi)."""
     return (np.asarray(angle) + math.pi) % (2.0 * math.pi) - math.pi

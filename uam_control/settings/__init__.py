@@ -1,1 +1,1 @@
-"""Parameter sets, YAML files and the place of config/."""
+"""Parameter sets, YAML files and the location of config/."""

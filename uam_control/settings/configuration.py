@@ -1,6 +1,6 @@
-"""Finds the files of config/ in every kind of installation.
+"""Search for the files of config/ in every kind of installation.
 
-| installation | config/ is |
+| installation | location of config/ |
 |---|---|
 | checkout, `pip install -e .`, `colcon build --symlink-install` | config/ beside the packages |
 | wheel, `colcon build` | share/uam/config under the installation prefix |
@@ -13,14 +13,14 @@ SUFFIXES = (".yaml", ".xml", ".csv")
 
 
 class ConfigurationError(ValueError):
-    """A configuration file does not exist or is not what it should be; the text is one line."""
+    """A configuration file does not exist or is not valid; the text is one line."""
 
 
 @cache
 def root() -> Path:
-    """The directory that holds profiles/, scenarios/, vehicle/ ...
+    """Return the directory that contains profiles/, scenarios/, vehicle/ ...
 
-    Raises ConfigurationError when the installation has none.
+    Raises ConfigurationError if the installation has none.
     """
     package = Path(__file__).resolve().parents[1]
     checkout = package.parent
@@ -36,9 +36,9 @@ def root() -> Path:
 
 
 def path(relative: str) -> Path:
-    """The file or directory `relative` of config/, as "profiles/s500.yaml".
+    """Return the file or directory `relative` of config/, for example "profiles/s500.yaml".
 
-    Raises ConfigurationError listing what exists when there is no such file.
+    Raises ConfigurationError, with the list of existing files, if it does not exist.
     """
     found = root() / relative
     if found.exists():
@@ -56,11 +56,11 @@ def path(relative: str) -> Path:
 
 
 def named(folder: str, name: str, suffixes: tuple[str, ...] = SUFFIXES) -> Path:
-    """What the user calls `name`: a file of his own, or one of config/<folder> without its suffix.
+    """Return the file `name`, or the file of config/<folder> with this name without its suffix.
 
     `named("profiles", "s500")` and `named("profiles", "./mine.yaml")` both work. A name with a
-    directory or a known suffix is a file. suffixes: of the files that count. Raises
-    ConfigurationError otherwise, listing the names.
+    directory or a known suffix is a file. suffixes: of the accepted files in config/<folder>.
+    Raises ConfigurationError, with the list of names, if there is no such file.
     """
     given = Path(name).expanduser()
     if given.is_file():
@@ -77,5 +77,5 @@ def named(folder: str, name: str, suffixes: tuple[str, ...] = SUFFIXES) -> Path:
 
 
 def names(folder: str, suffixes: tuple[str, ...] = SUFFIXES) -> list[str]:
-    """The names that `named` knows in config/<folder>, sorted."""
+    """Return the names that `named` accepts for config/<folder>, sorted."""
     return sorted(p.stem for p in (root() / folder).glob("*") if p.suffix in suffixes)

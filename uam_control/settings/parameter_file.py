@@ -1,12 +1,12 @@
-"""ROS parameter files, as written by hand, by `ros2 param dump`, and by a flight.
+"""ROS parameter files, written by hand, by `ros2 param dump` or by a flight.
 
     /position_controller:
       ros__parameters:
         inertia: [2.2, 2.2, 2.2]
         ...
 
-What ROS gives every node (and a dump therefore has) is left out; files of several nodes may simply
-be joined into one.
+The reader leaves out the parameters that ROS declares in every node; a dump contains them. Files
+of several nodes can be concatenated.
 """
 
 from __future__ import annotations
@@ -16,17 +16,16 @@ from typing import Any
 
 from uam_control.settings import yaml_file
 
-# what rclpy declares in every node by itself
+# parameters that rclpy declares in every node
 ROS_OWN = ("use_sim_time", "start_type_description_service", "qos_overrides")
 
 
 class ProfileError(ValueError):
-    """A profile that cannot fly; the message is one line: file, node, parameter, what is
-    allowed."""
+    """A profile that is not valid; one-line message: file, node, parameter, allowed range."""
 
 
 def read_sections(file: Path) -> dict[str, dict[str, Any]]:
-    """Return the sections of a ROS parameter file, node → parameters; raises ProfileError."""
+    """Return the sections of a ROS parameter file: node → parameters. Raises ProfileError."""
     document = yaml_file.read(file, ProfileError)
     if not isinstance(document, dict):
         raise ProfileError(f"{file}: a ROS parameter file expected: <node>: ros__parameters: ...")

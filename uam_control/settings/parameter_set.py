@@ -1,8 +1,7 @@
-"""Parameter sets as frozen dataclasses whose fields say meaning, unit and range.
+"""Parameter sets: frozen dataclasses whose fields contain meaning, unit and range.
 
-A set is checked as a whole by `validated`: what passes may fly, what does not is refused with the
-name of the value, what was wrong and what is allowed. The ROS nodes declare their parameters from
-the same fields.
+`validated` checks a set as a whole. The error of a refused set contains the name of the parameter,
+its value and the allowed range. The ROS nodes declare their parameters from the same fields.
 """
 
 from __future__ import annotations
@@ -18,14 +17,14 @@ HUGE = 1e6
 
 
 class ParameterError(ValueError):
-    """A parameter set that must not be used; the message says which value and what is allowed."""
+    """A parameter set that is not valid; the message has the parameter and the allowed range."""
 
 
 @dataclass(frozen=True)
 class Bound:
-    """Meaning and range of a parameter; `length` None for one number, else how many numbers.
+    """Meaning, unit and range of a numeric parameter.
 
-    A length of 0 means one number per axis of the subsystem.
+    length: None for one number, else the number of entries; 0: one entry per axis of the subsystem.
     """
 
     description: str
@@ -37,7 +36,7 @@ class Bound:
 
 @dataclass(frozen=True)
 class Choice:
-    """Meaning of a parameter that is one of several words; `fixed` once its node runs."""
+    """Meaning of a parameter that is one of several words; `fixed`: read-only in a running node."""
 
     description: str
     choices: tuple[str, ...]
@@ -61,14 +60,14 @@ def vector(
 ) -> Any:
     """Declare a field of `length` numbers (0: one per axis), each within [low, high].
 
-    A default of one number per axis has one entry, which every axis gets; () is no default.
+    A per-axis default has one entry, used for every axis; () means that there is no default.
     """
     spec = Bound(description, unit, low, high, length)
     return field(default=default, metadata={"spec": spec})
 
 
 def choice(default: str, description: str, choices: tuple[str, ...], fixed: bool = False) -> Any:
-    """Declare a field that is one of `choices`; `fixed` once the node runs."""
+    """Declare a field that is one of `choices`; `fixed`: read-only in a running node."""
     return field(default=default, metadata={"spec": Choice(description, choices, fixed)})
 
 
@@ -83,12 +82,12 @@ class ParameterSet:
 
     @classmethod
     def specs(cls) -> dict[str, Bound | Choice | Switch]:
-        """Return what each parameter means, in order."""
+        """Return name → meaning, unit and range of each parameter, in order."""
         return {item.name: item.metadata["spec"] for item in fields(cls)}
 
     @classmethod
     def from_mapping(cls, values: dict[str, Any], axes: int = 0) -> Self:
-        """Return a validated set; raise ParameterError on unknown names or bad values."""
+        """Return a validated set; raise ParameterError for unknown names or invalid values."""
         known = cls.specs()
         for name in values:
             if name not in known:
@@ -96,8 +95,7 @@ class ParameterSet:
         return cls(**values).validated(axes)
 
     def to_mapping(self) -> dict[str, Any]:
-        """Return what `from_mapping` reads, as YAML has it; empty lists stand for defaults and stay
-        out."""
+        """Return the set as a mapping for YAML and `from_mapping`, without empty lists."""
         return {
             name: list(value) if isinstance(value, tuple) else value
             for name, value in asdict(self).items()
@@ -106,20 +104,20 @@ class ParameterSet:
 
     @classmethod
     def among(cls, values: Mapping[str, Any]) -> Self:
-        """Return a validated set of those `values` that belong to it; others may be there."""
+        """Return a validated set of those `values` that belong to it; ignore the others."""
         return cls.from_mapping({k: v for k, v in values.items() if k in cls.specs()})
 
     def validated(self, axes: int = 0) -> Self:
-        """Return this set with clean floats and tuples; raise ParameterError on the first fault.
+        """Return this set with floats and tuples of floats; raise ParameterError if one is invalid.
 
-        axes: how many numbers a per-axis vector has.
+        axes: number of entries of a per-axis vector.
         """
         clean = {}
         for name, spec in self.specs().items():
             value = getattr(self, name)
             if isinstance(spec, Bound):
                 if spec.length == 0 and value is getattr(type(self), name):
-                    value = axes * value  # the default, the same for every axis
+                    value = axes * value  # the default, repeated for every axis
                 clean[name] = _number(name, value, spec, axes)
             elif isinstance(spec, Choice) and value not in spec.choices:
                 raise ParameterError(f"{name}: '{value}' is not one of {', '.join(spec.choices)}")
@@ -130,7 +128,7 @@ class ParameterSet:
         return checked
 
     def check_together(self) -> None:
-        """Raise ParameterError where values that are good by themselves do not go together."""
+        """Raise ParameterError if valid values contradict each other."""
 
 
 def _number(name: str, value: Any, spec: Bound, axes: int) -> float | tuple[float, ...]:
@@ -139,7 +137,7 @@ def _number(name: str, value: Any, spec: Bound, axes: int) -> float | tuple[floa
         numbers = np.asarray(value)
     except ValueError:  # lists of different lengths
         numbers = np.array(None)
-    if numbers.dtype.kind not in "iuf":  # neither true nor "1" is a number
+    if numbers.dtype.kind not in "iuf":  # refuses true and "1" too
         raise ParameterError(f"{name}: {value!r} is not numeric; allowed: {allowed}")
     numbers = numbers.astype(float)
     shape = () if spec.length is None else (spec.length or axes,)

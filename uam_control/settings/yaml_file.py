@@ -1,4 +1,4 @@
-"""YAML files: numbers as ROS reads them, and what is wrong with a file in one line."""
+"""Reader of YAML files: numbers as in ROS, and one-line errors."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ import yaml
 
 
 class _Loader(yaml.SafeLoader):
-    """Reads 1e-4 as the number that it is to ROS; YAML 1.1 wants 1.0e-4."""
+    """Loader that reads 1e-4 as a number, as ROS does; YAML 1.1 requires 1.0e-4."""
 
 
 _Loader.add_implicit_resolver(
@@ -21,7 +21,7 @@ _Loader.add_implicit_resolver(
 
 
 def read(file: Path, error: type[ValueError]) -> Any:
-    """What the file holds; raises `error` with one line: file, place, what is wrong."""
+    """Return the content of the file; raise `error` with one line: file, place, error."""
     try:
         return yaml.load(file.read_text(), _Loader)  # noqa: S506 (a SafeLoader)
     except OSError as reason:
