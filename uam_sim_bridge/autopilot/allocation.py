@@ -1,8 +1,8 @@
-"""Normalised torques and thrust → the thrusts of the motors, as PX4's control allocator does it.
+"""Normalised torques and thrust → motor thrusts, as in PX4's control allocator.
 
-The mixer is that of `rotor_geometry.normalised_mixer`. Saturation is removed in the
-order of importance (PX4: sequential desaturation, MC_AIRMODE = 0): collective down, then roll and
-pitch, then yaw with a margin, then collective down again.
+The mixer is `rotor_geometry.normalised_mixer`. Saturation is removed in this order (PX4: sequential
+desaturation, MC_AIRMODE = 0): collective down, then roll and pitch, then yaw with a margin, then
+collective down again.
 
 Motor order and signs are those of PX4's CA_ROTORn; torques FRD.
 """
@@ -22,7 +22,7 @@ WEAK = 0.2  # mixer entries below this do not desaturate (PX4)
 def _desaturate(
     motors: np.ndarray, mixer: np.ndarray, axis: int, upper: float, down_only: bool
 ) -> None:
-    """Move `motors` along one mixer column so that the sum of both saturations gets smallest."""
+    """Move motors (n,) along one mixer column to remove saturation, or balance it at both ends."""
     for attempt in range(2):
         low = 0.0
         high = 0.0
@@ -41,7 +41,7 @@ def _desaturate(
         if attempt == 0 and down_only and gain > 0.0:
             return
         if attempt == 1:
-            gain *= 0.5  # the second pass settles half of what the first one left
+            gain *= 0.5  # the second pass removes half of the remaining saturation
         for i in range(motors.shape[0]):
             motors[i] += gain * mixer[i, axis]
 
@@ -50,7 +50,8 @@ def _desaturate(
 def allocate(torque: np.ndarray, thrust: float, mixer: np.ndarray, motors: np.ndarray) -> None:
     """Write the motor thrusts 0..1 into `motors` (n,).
 
-    torque (3,): normalised, FRD; thrust: normalised collective, up; mixer: `normalised_mixer`.
+    torque (3,): normalised, FRD; thrust: normalised collective, up; mixer (n, 4):
+    `normalised_mixer`.
     """
     count = motors.shape[0]
     for i in range(count):
@@ -72,10 +73,10 @@ def allocate(torque: np.ndarray, thrust: float, mixer: np.ndarray, motors: np.nd
 def unallocated_torque(
     torque: np.ndarray, motors: np.ndarray, inverse_mixer: np.ndarray, out: np.ndarray
 ) -> None:
-    """Write into out (3,) the part of `torque` that `motors` do not make (normalised).
+    """Write into out (3,) the part of torque (3,) that motors (n,) do not make; normalised, FRD.
 
-    inverse_mixer (4, n): pseudo-inverse of the normalised mixer. All three are zero where the sum
-    of squares is below 1e-6, as in PX4's allocator status.
+    inverse_mixer (4, n): pseudo-inverse of the normalised mixer. All three are zero if the sum of
+    squares is below 1e-6, as in PX4's allocator status.
     """
     total = 0.0
     for axis in range(3):

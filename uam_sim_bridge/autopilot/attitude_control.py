@@ -1,14 +1,14 @@
 """The attitude loop, with PX4's structure (v1.16, AttitudeControl): attitude → body rates.
 
-Roll and pitch come first. The reduced attitude q_red turns the vehicle's z axis into the desired
-one on the shortest way, with no rotation about z. What is left to the desired attitude is a yaw
-angle, which is multiplied by MC_YAW_WEIGHT:
+Roll and pitch have priority. The reduced attitude q_red turns the vehicle's z axis into the desired
+one by the shortest rotation, without rotation about z. The remaining rotation to the desired
+attitude is a yaw angle, which is multiplied by MC_YAW_WEIGHT:
 
     q_d = q_red q_yaw,   q_mix = q_red (q_yaw scaled),   q_e = q^-1 q_mix
     rates = P 2 Im(q_e) + yaw rate along the world's z axis, limited per axis
 
-P holds MC_ROLL_P, MC_PITCH_P, and MC_YAW_P / MC_YAW_WEIGHT, so that the weight changes the share of
-large angles and not the gain.
+P contains MC_ROLL_P, MC_PITCH_P, and MC_YAW_P / MC_YAW_WEIGHT, so that the weight changes the share
+of large yaw angles and not the gain.
 """
 
 from __future__ import annotations
@@ -50,8 +50,8 @@ def attitude_rates(
 ) -> None:
     """Write the body-rate setpoint [rad/s, FRD] into rates (>= 3,).
 
-    attitude, desired (4,): FRD → NED [w x y z], unit norm; yaw_rate: about the world's z axis, down
-    [rad/s].
+    attitude, desired (4,): FRD → NED [w x y z], unit norm; yaw_rate [rad/s]: about the world's z
+    axis, down; gains (7,): `attitude_gains`.
     """
     turn = _shortest(_z_axis(attitude), _z_axis(desired))
     if abs(turn[1]) > _OPPOSITE or abs(turn[2]) > _OPPOSITE:
@@ -101,7 +101,7 @@ def _shortest(a: np.ndarray, b: np.ndarray) -> np.ndarray:
     q[2] = a[2] * b[0] - a[0] * b[2]
     q[3] = a[0] * b[1] - a[1] * b[0]
     if q[1] * q[1] + q[2] * q[2] + q[3] * q[3] < _PARALLEL * _PARALLEL and q[0] < 1.0:
-        # a half turn, about any axis across a: the one across a's smallest component
+        # a half turn about an axis perpendicular to a: here a x (unit vector of its smallest entry)
         smallest = np.zeros(3)
         smallest[np.argmin(np.abs(a))] = 1.0
         q[0] = 0.0

@@ -1,9 +1,9 @@
 """Attitude, velocity and position for arming checks, telemetry and the failsafe descent.
 
-A complementary filter stands in for PX4's EKF2: it integrates gyro and accelerometer and is pulled
-towards the vision pose; without vision, roll and pitch are pulled towards the measured gravity and
-position and velocity drift. It is good for a level descent, not for precise flight: the control
-laws have their own estimator.
+A complementary filter replaces PX4's EKF2. It integrates gyro and accelerometer and is corrected
+by the vision pose. Without vision, roll and pitch are corrected by the measured gravity, while
+position and velocity drift. It serves a level descent, not precise flight: the control laws have
+their own estimator.
 """
 
 from __future__ import annotations
@@ -27,19 +27,19 @@ GRAVITY = 9.80665  # m/s^2, as PX4
 ATTITUDE, POSITION, VELOCITY = slice(0, 4), slice(4, 7), slice(7, 10)
 
 VISION_TIMEOUT = 0.5  # s
-ALIGN_SAMPLES = 5  # vision poses before the estimate counts as valid
+ALIGN_SAMPLES = 5  # vision poses until the estimate is valid
 MAX_TILT_DIFFERENCE = math.radians(10.0)  # between vision and measured gravity, at rest
 
-_LEVEL_GAIN = 0.2  # 1/s, pull of gravity on roll and pitch
-_VISION_ATTITUDE = 5.0  # 1/s, pull of vision on attitude
-_VISION_POSITION = 20.0  # 1/s, on position
-_VISION_VELOCITY = 100.0  # 1/s^2, of the position difference on velocity: two poles at -10 1/s
-_VISION_BIAS = 50.0  # 1/s^3, of it on the acceleration's bias: a third pole at -0.5 1/s
-_BIAS_WINDOW = 0.02  # m, a larger difference is a jump of vision and says nothing about the bias
+_LEVEL_GAIN = 0.2  # 1/s, gravity → roll and pitch
+_VISION_ATTITUDE = 5.0  # 1/s, vision → attitude
+_VISION_POSITION = 20.0  # 1/s, vision → position
+_VISION_VELOCITY = 100.0  # 1/s^2, position difference → velocity: two poles at -10 1/s
+_VISION_BIAS = 50.0  # 1/s^3, position difference → bias: a third pole at -0.5 1/s
+_BIAS_WINDOW = 0.02  # m, a larger difference is a jump of vision and does not change the bias
 _BIAS_MAX = 0.4  # m/s^2
-_LONGEST_PULL = 0.04  # s, the longest interval that one pose makes up for
-_FORCE_TIME = 0.2  # s, of the average of the specific force
-_VELOCITY_KEPT = 5.0  # s without vision, after which the integrated velocity is worth nothing
+_LONGEST_PULL = 0.04  # s, longest interval used for the correction by one pose
+_FORCE_TIME = 0.2  # s, time constant of the mean specific force
+_VELOCITY_KEPT = 5.0  # s without vision, after which the next pose resets the velocity to 0
 
 
 @jit
@@ -52,18 +52,18 @@ def predict(
     bias: np.ndarray,
     mean_force: np.ndarray,
 ) -> None:
-    """Advance `estimate` by dt with gyro (3,) [rad/s] and specific force (3,) [m/s^2], FRD.
+    """Advance estimate (10,) by dt [s] with gyro (3,) [rad/s] and specific force (3,) [m/s^2], FRD.
 
-    bias (3,): of the acceleration, NED [m/s^2], learnt from vision: without it a descent that has
-    lost vision would drift upwards or fall. mean_force (3,): slow average of the specific force,
-    for the check before arming.
+    bias (3,): of the acceleration, NED [m/s^2], estimated from vision; without it a descent without
+    vision would climb or fall. mean_force (3,) [m/s^2, FRD]: low-pass filtered specific force for
+    the check before arming.
     """
     for i in range(3):
         mean_force[i] += min(1.0, dt / _FORCE_TIME) * (accel[i] - mean_force[i])
     matrix = matrix_from_quaternion(estimate[0:4])
     force = rotate(matrix, accel)
     turn = np.empty(3)
-    # where gravity should be seen in the body, against where it is: -accel at rest
+    # expected direction of gravity in the body against the measured one: -accel at rest
     pull = 0.0
     norm = math.sqrt(accel[0] ** 2 + accel[1] ** 2 + accel[2] ** 2)
     if abs(norm - GRAVITY) < 1.0 and not aided:
@@ -90,9 +90,9 @@ def correct(
     estimate: np.ndarray,
     bias: np.ndarray,
 ) -> None:
-    """Pull `estimate` towards a vision pose (NED; FRD → NED), `interval` [s] after the last one.
+    """Correct estimate (10,) by a vision pose, `interval` [s] after the last one.
 
-    bias (3,): see `predict`.
+    position (3,) [m, NED]; quaternion (4,) [w x y z], FRD → NED; bias (3,): see `predict`.
     """
     interval = min(interval, _LONGEST_PULL)
     error = rotation_error(quaternion, estimate[0:4])
@@ -111,7 +111,7 @@ def correct(
 
 
 class Estimator:
-    """The filter with its bookkeeping of vision; NED and FRD throughout.
+    """The filter with the state of its vision input; NED and FRD throughout.
 
     `estimate` (10,): attitude quaternion, position [m], velocity [m/s].
     """
@@ -126,15 +126,18 @@ class Estimator:
         self._bias = np.zeros(3)
 
     def aided(self, time: float) -> bool:
-        """Whether vision is fresh."""
+        """Whether the last vision pose is younger than VISION_TIMEOUT at `time` [s]."""
         return time - self._vision_time < VISION_TIMEOUT
 
     def predict(self, time: float, gyro: np.ndarray, accel: np.ndarray, dt: float) -> None:
-        """Advance by one sensor sample."""
+        """Advance by one sample: gyro (3,) [rad/s], accel (3,) [m/s^2], FRD; dt [s]."""
         predict(gyro, accel, dt, self.aided(time), self.estimate, self._bias, self._force)
 
     def vision(self, time: float, position: np.ndarray, quaternion: np.ndarray) -> None:
-        """Take a pose (3,), (4,) arriving at `time`; the first after a gap sets the estimate."""
+        """Correct by a pose that arrives at `time` [s]; the first after a gap sets the estimate.
+
+        position (3,) [m, NED]; quaternion (4,) [w x y z], FRD → NED.
+        """
         gap = time - self._vision_time
         self._vision_time = time
         self._vision_down = matrix_from_quaternion(quaternion)[2].copy()
@@ -149,7 +152,7 @@ class Estimator:
         correct(position, quaternion, gap, self.estimate, self._bias)
 
     def faults(self, time: float) -> list[str]:
-        """Return why the estimate is no basis for arming, in PX4's words; empty when it is one."""
+        """Return the reasons against arming in PX4's wording; empty if the estimate is valid."""
         if not self.aided(time):
             return ["Preflight Fail: no valid vision pose (external vision missing)"]
         if self._vision_count < ALIGN_SAMPLES:

@@ -2,13 +2,13 @@
 
 | event | rule |
 |---|---|
-| OFFBOARD asked | needs a stream of setpoints faster than 2 Hz for half a second |
+| OFFBOARD requested | needs a stream of setpoints faster than 2 Hz for half a second |
 | arming | needs a valid estimate from vision, and in OFFBOARD the stream |
 | disarming | only when landed, unless forced |
-| in OFFBOARD no setpoint for COM_OF_LOSS_T | armed: failsafe Descend; it stays until OFFBOARD is \
-asked again; disarmed: nothing, but arming is refused |
+| in OFFBOARD no setpoint for COM_OF_LOSS_T | armed: failsafe Descend until OFFBOARD is requested \
+again; disarmed: arming is refused |
 | landed for COM_DISARM_LAND after a flight | disarm |
-| not taken off COM_DISARM_PRFLT after arming | disarm |
+| no take-off for COM_DISARM_PRFLT after arming | disarm |
 """
 
 from __future__ import annotations
@@ -18,12 +18,12 @@ import math
 from uam_sim_bridge.autopilot.params import Parameters
 from uam_sim_bridge.mavlink.protocol.modes import MavResult, Mode, Severity
 
-STREAM_GAP = 0.5  # s: slower than 2 Hz is no stream
-STREAM_TIME = 0.5  # s for which it must have lasted
+STREAM_GAP = 0.5  # s, longest interval between two setpoints of a stream (2 Hz)
+STREAM_TIME = 0.5  # s, shortest duration of a stream before OFFBOARD
 
 
 class Commander:
-    """The state machine. `texts` collects (severity, text) for STATUSTEXT until they are taken."""
+    """The state machine. `texts`: (severity, text) of each STATUSTEXT not yet taken."""
 
     def __init__(self, parameters: Parameters) -> None:
         self._parameters = parameters
@@ -38,13 +38,13 @@ class Commander:
         self._landed_at: float | None = None
 
     def setpoint(self, time: float) -> None:
-        """Note that a valid setpoint arrived."""
+        """Register a valid setpoint that arrived at `time` [s]."""
         if time - self._stream_last > STREAM_GAP:
             self._stream_start = time
         self._stream_last = time
 
     def streaming(self, time: float) -> bool:
-        """Whether the stream allows OFFBOARD to be entered."""
+        """Whether the stream of setpoints allows OFFBOARD."""
         fresh = time - self._stream_last <= STREAM_GAP
         return fresh and self._stream_last - self._stream_start >= STREAM_TIME
 
@@ -65,7 +65,7 @@ class Commander:
         return MavResult.ACCEPTED
 
     def request_arm(self, time: float, faults: list[str]) -> MavResult:
-        """Handle a request to arm; `faults` of the estimator refuse it."""
+        """Handle a request to arm; it is refused if the estimator reports `faults`."""
         if self.armed:
             return MavResult.ACCEPTED
         reasons = list(faults)
@@ -96,7 +96,7 @@ class Commander:
         return MavResult.ACCEPTED
 
     def update(self, time: float, landed: bool) -> None:
-        """Apply the rules that act by themselves; call once per tick."""
+        """Apply the rules for timeouts: failsafe and automatic disarming; call once per tick."""
         if not self.armed:
             return
         parameters = self._parameters

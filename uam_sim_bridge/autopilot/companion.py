@@ -1,4 +1,4 @@
-"""The autopilot's side of the link to a companion computer: bytes in, messages out, no sockets."""
+"""The autopilot's side of the link to a companion computer: messages in and out, no sockets."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ _POSE_FRAMES = (mavlink2.MAV_FRAME_LOCAL_NED, mavlink2.MAV_FRAME_LOCAL_FRD)
 
 
 class Companion:
-    """Handles what a companion computer sends; `out` collects the answers for the transport."""
+    """Handles the messages of a companion computer; `out`: answers not yet sent."""
 
     def __init__(self, autopilot: Autopilot) -> None:
         self._autopilot = autopilot
@@ -46,14 +46,14 @@ class Companion:
         }
 
     def handle(self, time: float, message: Message) -> None:
-        """Take one valid message that arrived at `time` [s]; others than ours are ignored."""
+        """Handle a message that arrived at `time` [s]; other types and targets are ignored."""
         handler = self._handlers.get(message.get_type())
         if handler is None or getattr(message, "target_system", 0) not in (0, self._system):
             return
         handler(time, message)
 
     def tick(self, time: float) -> list[Message]:
-        """Return everything to be sent at `time`: answers, texts, parameters, telemetry."""
+        """Return the messages to send at `time` [s]: answers, texts, parameters, telemetry."""
         for severity, text in self._autopilot.commander.take_texts():
             self._texts += 1
             self.out += text_chunks(severity, text, self._texts)
@@ -161,7 +161,7 @@ class Companion:
 
 
 def warm_up() -> None:
-    """Compile everything that a flight will call, so that no tick waits for the compiler."""
+    """Compile the functions of a flight, so that no tick waits for the compiler."""
     autopilot = Autopilot()
     companion = Companion(autopilot)
     zero, down, level = np.zeros(3), np.array([0.0, 0.0, -9.81]), np.array([1.0, 0.0, 0.0, 0.0])

@@ -1,9 +1,8 @@
-"""The autopilot stand-in as a pure object: sensor sample in, motor commands out, no sockets.
+"""The autopilot stand-in without sockets: sensor sample in, motor commands out.
 
-`server` wraps it in MAVLink; the direct engine calls it as it is. Everything is FRD and NED, time
-is that of the sensor samples, in seconds. One `update` is one cycle of PX4's rate loop: gyro
-filter, rate PID, allocation, thrust model; around it attitude loop, commander, land detector and
-estimator.
+`server` adds MAVLink; the direct engine calls it directly. All vectors are FRD and NED; time [s] is
+that of the sensor samples. One `update` is one cycle of PX4's rate loop (gyro filter, rate PID,
+allocation, thrust model) with attitude loop, commander, land detector and estimator.
 """
 
 from __future__ import annotations
@@ -54,7 +53,7 @@ SHORTEST_STEP, LONGEST_STEP = 0.000125, 0.02  # s, bounds of the time step (PX4)
 
 @dataclass(frozen=True)
 class AutopilotStatus:
-    """What a companion computer knows of the autopilot."""
+    """State of the autopilot as reported to a companion computer."""
 
     armed: bool
     mode: Mode
@@ -77,7 +76,12 @@ def control_tick(
     memory: np.ndarray,
     motors: np.ndarray,
 ) -> None:
-    """One cycle of the rate loop: gyro (3,) and setpoint (4,) → motors (rotors,), FRD."""
+    """Run one cycle of the rate loop and write motors (rotors,), 0..1.
+
+    gyro (3,) [rad/s, FRD]; dt [s]; setpoint (4,): body rates [rad/s, FRD], thrust; model_factor:
+    THR_MDL_FAC; filters (7,), gains (5, 3), memory (7, 3): see `rate_control`; mixer (rotors, 4)
+    and its pseudo-inverse, inverse (4, rotors).
+    """
     filter_gyro(gyro, dt, filters, memory)
     if not armed:
         for axis in range(3):
@@ -97,7 +101,10 @@ def control_tick(
 
 @jit
 def magnitude_of_usable(position: np.ndarray, quaternion: np.ndarray) -> float:
-    """Return the norm of the quaternion (4,) of an external pose, 0 where the pose is nonsense."""
+    """Return the norm of the quaternion of an external pose; 0 if the pose is not usable.
+
+    position (3,) [m, NED]; quaternion (4,) [w x y z].
+    """
     for i in range(3):
         if not abs(position[i]) < FARTHEST_VISION:  # true for NaN
             return 0.0
@@ -111,13 +118,12 @@ def magnitude_of_usable(position: np.ndarray, quaternion: np.ndarray) -> float:
 class Autopilot:
     """PX4-class autopilot.
 
-    `motors` (rotors,): commands 0..1 in PX4's order, zero while disarmed; rewritten by every
-    `update`.
+    `motors` (rotors,): commands 0..1 in PX4's order, zero while disarmed; each `update` overwrites
+    them.
     """
 
     def __init__(self, parameters: Parameters | None = None, sample_rate: float = 250.0) -> None:
-        """parameters: None for the default vehicle's; sample_rate [Hz]: how often `update` will be
-        called."""
+        """parameters: None for those of the default vehicle; sample_rate [Hz]: of `update`."""
         self.parameters = parameters or Parameters.of(load_description())
         self.motors = np.zeros(int(self.parameters["CA_ROTOR_COUNT"]))
         self.estimator = Estimator()
@@ -133,7 +139,7 @@ class Autopilot:
         self._configure()
 
     def set_parameter(self, name: str, value: float) -> None:
-        """Change one parameter in flight; raises ParameterError, the old value staying."""
+        """Change one parameter in flight; raises ParameterError, without a change, if refused."""
         old = self.parameters[name] if name in self.parameters.names else 0.0
         self.parameters.set(name, value)
         try:
@@ -148,9 +154,9 @@ class Autopilot:
         self._configure()
 
     def target(self, time: float, target: AttitudeTarget) -> str:
-        """Take a setpoint of body rates or of an attitude; return why it was refused, "" if taken.
+        """Set the setpoint of body rates or attitude; return the reason of a refusal, else "".
 
-        What is not finite is refused; the thrust is clamped to 0..1.
+        A setpoint that is not finite is refused; the thrust is clamped to 0..1.
         """
         refused = target.refused()
         if refused:
@@ -168,7 +174,10 @@ class Autopilot:
         return ""
 
     def vision(self, time: float, position: np.ndarray, quaternion: np.ndarray) -> bool:
-        """Take an external pose (NED [m], FRD → NED [w x y z]); False: refused as nonsense."""
+        """Handle an external pose; False: refused as not usable.
+
+        position (3,) [m, NED]; quaternion (4,) [w x y z], FRD → NED.
+        """
         norm = magnitude_of_usable(position, quaternion)
         if not norm:
             return False
@@ -201,7 +210,7 @@ class Autopilot:
     def update(self, time: float, gyro: np.ndarray, accel: np.ndarray) -> np.ndarray:
         """Advance to `time` [s] and return `motors`.
 
-        gyro (3,) [rad/s] and specific force accel (3,) [m/s^2] FRD, float64 (at rest z = -9.81).
+        gyro (3,) [rad/s] and specific force accel (3,) [m/s^2], FRD, float64 (at rest z = -9.81).
         """
         if self._time is None:
             self._time = time - 1.0 / self._sample_rate
@@ -253,7 +262,7 @@ class Autopilot:
 
     @property
     def status(self) -> AutopilotStatus:
-        """The state as HEARTBEAT and EXTENDED_SYS_STATE tell it."""
+        """The state that HEARTBEAT and EXTENDED_SYS_STATE report."""
         c = self.commander
         return AutopilotStatus(c.armed, c.mode, self.landing.landed, c.failsafe)
 

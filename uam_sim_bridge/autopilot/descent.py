@@ -11,7 +11,7 @@ from uam_control.maths.rotations import euler_from_quaternion
 from uam_sim_bridge.autopilot.autopilot_estimator import ATTITUDE, GRAVITY
 from uam_sim_bridge.autopilot.params import Parameters
 
-_MIN_COSINE = 0.5  # of the tilt, when thrust makes up for it
+_MIN_COSINE = 0.5  # smallest cosine of the tilt for which the thrust is corrected
 
 
 @jit
@@ -23,10 +23,11 @@ def descend(
     gains: np.ndarray,
     setpoint: np.ndarray,
 ) -> float:
-    """Write body rates (3,) FRD [rad/s] and thrust into setpoint (4,); return the new integral.
+    """Write body rates [rad/s, FRD] and thrust into setpoint (4,); return the new integral.
 
-    euler (3,) FRD in NED; sink_rate [m/s] down; integral: acceleration [m/s^2] down; gains (8,):
-    roll P, pitch P, sink speed, P, I, hover thrust, least and largest thrust.
+    euler (3,): roll, pitch, yaw [rad], FRD in NED; sink_rate [m/s] down; integral: acceleration
+    [m/s^2] down; dt [s]; gains (8,): roll P, pitch P, sink speed, P, I, hover thrust, smallest and
+    largest thrust.
     """
     setpoint[0] = -gains[0] * euler[0]
     setpoint[1] = -gains[1] * euler[1]
@@ -41,7 +42,7 @@ def descend(
 
 
 class Descent:
-    """The descent with its integral; `reset` at every start."""
+    """The descent with its integral; call `reset` at each start of a descent."""
 
     def __init__(self, parameters: Parameters) -> None:
         self.setpoint = np.zeros(4)
@@ -64,11 +65,14 @@ class Descent:
         )
 
     def reset(self) -> None:
-        """Forget the integral."""
+        """Set the integral to 0."""
         self._integral = 0.0
 
     def update(self, estimate: np.ndarray, dt: float) -> np.ndarray:
-        """Return the setpoint (4,) for the estimate (10,) of `Estimator`."""
+        """Return the setpoint (4,): body rates [rad/s, FRD], thrust.
+
+        estimate (10,): of `Estimator`; dt [s].
+        """
         euler = euler_from_quaternion(estimate[ATTITUDE])
         self._integral = descend(euler, estimate[9], self._integral, dt, self._gains, self.setpoint)
         return self.setpoint

@@ -1,7 +1,7 @@
-"""The autopilot stand-in joined to the bridge without messages, as the direct engine has it.
+"""The autopilot stand-in joined to the bridge without messages, for the direct engine.
 
-It follows the times of the MAVLink link: what the autopilot does at a tick is known at the next
-one, by the heartbeat that a change brings at once, or by the next regular one where that was lost.
+It has the timing of the MAVLink link: the bridge receives a change of the autopilot's state one
+tick later, by the heartbeat sent at once, or by the next regular one if that is lost.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ class JoinedAutopilot:
     """An `AutopilotPort` to the `Autopilot` in the same process."""
 
     def __init__(self, autopilot: Autopilot, sequence: OffboardSequence) -> None:
-        """sequence: of the bridge; it takes answers and texts."""
+        """sequence: of the bridge; it receives answers and texts."""
         self.autopilot, self.sequence = autopilot, sequence
         self.armed, self.mode, self.landed = False, Mode.UNKNOWN, True
         self.armed_since: float | None = None
@@ -44,20 +44,20 @@ class JoinedAutopilot:
         self._received_at = -math.inf
         self._told: AutopilotStatus | None = None
         self._heartbeat_due = self._landed_due = -math.inf  # [s]
-        self._heartbeat = self._landed = False  # sent, and not yet taken
+        self._heartbeat = self._landed = False  # sent, not yet received
         self._answers: list[tuple[Request, MavResult]] = []
 
     @property
     def round_trip(self) -> float | None:
-        """None: without a link nothing is measured."""
+        """None: without a link there is no round trip."""
         return None
 
     def connected(self, time: float) -> bool:
-        """Whether a heartbeat came within the last seconds before `time` [s]."""
+        """Whether the last heartbeat is younger than HEARTBEAT_TIMEOUT at `time` [s]."""
         return time - self._received_at < HEARTBEAT_TIMEOUT
 
     def poll(self, time: float) -> None:
-        """Take what the autopilot has sent since the last call."""
+        """Receive the autopilot's messages since the last call."""
         texts = self.autopilot.commander.texts
         if self._answers or texts or self._heartbeat or self._landed:
             self._take(time, self.autopilot.commander.take_texts())
@@ -103,7 +103,7 @@ class JoinedAutopilot:
         position_deviation: float,
         attitude_deviation: float,
     ) -> None:
-        """Send a pose: position (3,) [m, ENU], quaternion (4,) [w x y z] FLU → ENU."""
+        """Send a pose: position (3,) [m, ENU], quaternion (4,) [w x y z], FLU → ENU."""
         if self.passes():
             self.autopilot.vision(self._time, swap_world(position), swap_quaternion(quaternion))
 
@@ -113,13 +113,13 @@ class JoinedAutopilot:
             self.autopilot.target(self._time, target)
 
     def begin(self, time: float) -> None:
-        """Begin the autopilot's cycle of `time` [s]: what is sent from now on arrives in it."""
+        """Begin the autopilot's cycle of `time` [s]; later messages arrive in this cycle."""
         self._time = time
 
     def update(self, time: float, gyro: np.ndarray, force: np.ndarray) -> np.ndarray:
-        """Run the autopilot's cycle of `time` [s] and return its motor commands, 0..1 each.
+        """Run the autopilot's cycle of `time` [s] and return its motor commands (rotors,), 0..1.
 
-        gyro (3,) [rad/s] and specific force (3,) [m/s^2], FLU: its own IMU sample.
+        gyro (3,) [rad/s] and specific force (3,) [m/s^2], FLU: sample of the autopilot's IMU.
         """
         motors = self.autopilot.update(time, swap_body(gyro), swap_body(force))
         status = self.autopilot.status
@@ -136,5 +136,5 @@ class JoinedAutopilot:
 
 
 def _following(due: float, interval: float, time: float) -> float:
-    """Return when the report after the one of `due` is due [s]; as `Telemetry.due`."""
+    """Return the time [s] of the report after the one due at `due`; as in `Telemetry.due`."""
     return due + interval if due + interval > time else time + interval

@@ -1,7 +1,7 @@
-"""Whether the vehicle stands on the ground: PX4's multicopter land detector, three stages in a row.
+"""Land detector of a multicopter, with PX4's three stages.
 
-Ground contact: little thrust, no motion. Maybe landed: hardly any thrust, no rotation. Landed:
-both for a while. Each stage needs a third of LNDMC_TRIG_TIME; any counter-evidence resets at once.
+Ground contact: low thrust, no motion. Maybe landed: minimal thrust, no rotation. Landed: both for
+some time. Each stage takes a third of LNDMC_TRIG_TIME; a violated condition resets it at once.
 """
 
 from __future__ import annotations
@@ -10,9 +10,9 @@ import math
 
 from uam_sim_bridge.autopilot.params import Parameters
 
-_LOW_THRUST = 0.3  # share of the way from least to hover thrust (PX4)
+_LOW_THRUST = 0.3  # fraction of the range from smallest to hover thrust (PX4)
 _NO_THRUST = 0.1
-_WIDER = 2.5  # of the motion thresholds once maybe landed (PX4)
+_WIDER = 2.5  # factor on the motion thresholds while maybe landed (PX4)
 
 
 class LandDetector:
@@ -45,10 +45,11 @@ class LandDetector:
         rates: tuple[float, float],
         velocity: tuple[float, float, float] | None,
     ) -> None:
-        """Take this tick's thrust command, roll and pitch rate [rad/s], velocity NED [m/s].
+        """Update the stages with this tick's thrust command, roll and pitch rate [rad/s] and
+        velocity [m/s, NED].
 
-        velocity: None where it is only integrated, without vision; it then drifts, and little
-        thrust has to do. A descent that would have drifted on would else take off again.
+        velocity: None without vision. The integrated velocity drifts, and a drifting descent would
+        never count as landed: low thrust alone then means ground contact.
         """
         if not armed:
             self.landed = self.maybe_landed = self._contact = True

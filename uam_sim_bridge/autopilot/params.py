@@ -13,7 +13,7 @@ from uam_control.vehicle import VehicleDescription
 
 @dataclass(frozen=True)
 class Definition:
-    """Default, range and unit of one parameter; `integer` says how MAVLink carries it."""
+    """Default, range and unit of one parameter; `integer`: sent as INT32 over MAVLink."""
 
     default: float
     low: float
@@ -69,7 +69,7 @@ DEFINITIONS: dict[str, Definition] = {
     "COM_OF_LOSS_T": Definition(1.0, 0.0, 60.0, "s", "time without setpoints before failsafe"),
     "COM_DISARM_LAND": Definition(2.0, -1.0, 20.0, "s", "disarm after landing; <= 0 never"),
     "COM_DISARM_PRFLT": Definition(10.0, -1.0, 200.0, "s", "disarm without take-off; <= 0 never"),
-    "LNDMC_TRIG_TIME": Definition(1.0, 0.1, 10.0, "s", "time until landed is believed"),
+    "LNDMC_TRIG_TIME": Definition(1.0, 0.1, 10.0, "s", "time until landed is reported"),
     "LNDMC_Z_VEL_MAX": Definition(0.25, 0.0, 10.0, "m/s", "vertical speed when landed"),
     "LNDMC_XY_VEL_MAX": Definition(1.5, 0.0, 10.0, "m/s", "horizontal speed when landed"),
     "LNDMC_ROT_MAX": Definition(20.0, 0.0, 1000.0, "deg/s", "rotation when landed"),
@@ -99,10 +99,10 @@ class Parameters:
 
     @classmethod
     def of(cls, vehicle: VehicleDescription, file: Path | str | None = None) -> Parameters:
-        """The parameters of a vehicle, and those of a YAML file with lines `NAME: value`.
+        """Return the parameters of a vehicle, overridden by a YAML file of lines `NAME: value`.
 
-        Raises ParameterError, one line with the file's name; also where the file has another rotor
-        geometry (CA_*) than the vehicle.
+        Raises ParameterError in one line with the file's name, also if the rotor geometry (CA_*) of
+        the file differs from the vehicle's.
         """
         derived = vehicle.autopilot_parameters()
         if file is None:
@@ -125,7 +125,7 @@ class Parameters:
         return self._values[name]
 
     def set(self, name: str, value: float) -> None:
-        """Set one value; raises ParameterError saying what is allowed, the old value staying."""
+        """Set one value; raises ParameterError with the allowed range, without a change."""
         definition = DEFINITIONS.get(name)
         if definition is None:
             raise ParameterError(f"unknown autopilot parameter {name}")
@@ -143,7 +143,7 @@ class Parameters:
         return [self._values[name] for name in names]
 
     def rotors(self) -> tuple[list[float], list[float], list[float]]:
-        """Return px, py, km (CA_ROTOR_COUNT,) of the rotors."""
+        """Return px, py, km, each of length CA_ROTOR_COUNT [m]: see `effectiveness`."""
         rotors = range(int(self["CA_ROTOR_COUNT"]))
         px, py, km = (
             self.vector(*(f"CA_ROTOR{i}_{what}" for i in rotors)) for what in ("PX", "PY", "KM")

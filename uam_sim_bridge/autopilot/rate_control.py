@@ -5,8 +5,8 @@
     torque = K (P error + D (-angular acceleration)) + FF setpoint + integral, normalised, FRD
     yaw torque → low pass (1st order, MC_YAW_TQ_CUTOFF)
 
-The integral stops growing into an axis whose torque the motors could not make, shrinks its gain
-for errors towards 400 deg/s, is limited, frozen while landed and zero while disarmed.
+The integral does not grow in the direction of a torque that the motors do not make. Its gain
+decreases to 0 at an error of 400 deg/s. It is limited, held while landed and zero while disarmed.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ import numpy as np
 
 from uam_control.maths.compiled import jit
 
-# rows of `memory` (7, 3), the loop's whole state
+# rows of `memory` (7, 3), the state of the loop
 DELAY_1, DELAY_2, RATES, ACCELERATION, INTEGRAL, TORQUE, UNALLOCATED = range(7)
 # rows of `gains` (5, 3)
 P, I, D, FF, LIMIT = range(5)  # noqa: E741
@@ -67,7 +67,10 @@ def alpha(sample_rate: float, cutoff: float) -> float:
 
 @jit
 def filter_gyro(gyro: np.ndarray, dt: float, filters: np.ndarray, memory: np.ndarray) -> None:
-    """Advance the rows DELAY, RATES, ACCELERATION of `memory` by one gyro sample (3,) [rad/s]."""
+    """Advance DELAY_1, DELAY_2, RATES, ACCELERATION of memory (7, 3) by one sample.
+
+    gyro (3,) [rad/s, FRD]; dt [s]; filters (7,): `filter_coefficients`.
+    """
     for axis in range(3):
         d1 = memory[DELAY_1, axis]
         d2 = memory[DELAY_2, axis]
@@ -83,7 +86,7 @@ def filter_gyro(gyro: np.ndarray, dt: float, filters: np.ndarray, memory: np.nda
 
 
 def reset_filters(gyro: np.ndarray, filters: np.ndarray, memory: np.ndarray) -> None:
-    """Start the filters at rest with the value gyro (3,)."""
+    """Set the filters' state in memory (7, 3) to a constant gyro (3,) [rad/s, FRD]."""
     gain = 1.0 + filters[A1] + filters[A2]
     memory[DELAY_1] = memory[DELAY_2] = np.asarray(gyro) / gain
     memory[RATES] = gyro
@@ -99,10 +102,10 @@ def rate_torque(
     landed: bool,
     memory: np.ndarray,
 ) -> None:
-    """Advance TORQUE and INTEGRAL of `memory`.
+    """Advance TORQUE and INTEGRAL of memory (7, 3): normalised torques, FRD.
 
-    setpoint (>= 3,): desired body rates FRD [rad/s] first; gains (5, 3): rows P, I, D (times K),
-    FF, LIMIT; landed: the integral is frozen.
+    setpoint (>= 3,): desired body rates [rad/s, FRD] first; dt [s]; filters (7,); gains (5, 3):
+    rows P, I, D (times K), FF, LIMIT; landed: the integral is held.
     """
     for axis in range(3):
         error = setpoint[axis] - memory[RATES, axis]

@@ -1,6 +1,6 @@
-"""The stand-in's end of a serial line that carries everything, as at a flight controller in HITL.
+"""The stand-in's end of a serial line for all messages, as on a flight controller in HITL mode.
 
-It takes the places of both the simulator's socket and the companion's UDP port in `Server`.
+It replaces both the simulator's socket and the companion's UDP port in `Server`.
 """
 
 from __future__ import annotations
@@ -13,16 +13,16 @@ from uam_sim_bridge.mavlink.transport.transport import open_transport
 
 
 class SerialLine:
-    """One line; its loss ends the server, as the end of the simulator's connection does."""
+    """One serial line; its loss ends the server, like a closed connection to the simulator."""
 
     def __init__(self, place: str, codec: Codec) -> None:
-        """place: DEVICE:BAUD. Raises PortError in one line where it cannot be opened."""
+        """place: DEVICE:BAUD. Raises PortError in one line if it cannot be opened."""
         self._transport: SerialTransport = open_transport(f"serial:{place}")
         self._codec = codec
         self._chunks: list[bytes] = []
 
     def recv(self, size: int) -> bytes:
-        """Wait for bytes and return them; b"" once the line is lost. `size` is the socket's."""
+        """Wait for bytes and return them; b"" if the line is lost. `size`: not used, see socket."""
         while not self._chunks:
             if self._transport.losses or not self._transport.connected:
                 return b""
@@ -31,11 +31,11 @@ class SerialLine:
         return self._chunks.pop(0)
 
     def sendall(self, frame: bytes) -> None:
-        """Send a frame; one that a full line does not take is lost, as at a flight controller."""
+        """Send a frame; it is lost if the line's buffer is full, as on a flight controller."""
         self._transport.send(frame)
 
     def receive(self) -> list[Message]:
-        """Return nothing: messages of the companion come in the stream."""
+        """Return no messages: those of the companion arrive through `recv`."""
         return []
 
     def send(self, messages: list[Message]) -> None:
@@ -44,5 +44,5 @@ class SerialLine:
             self.sendall(self._codec.encode(message))
 
     def close(self) -> None:
-        """Give the device back."""
+        """Close the device."""
         self._transport.close()

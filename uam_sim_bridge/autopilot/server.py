@@ -1,11 +1,12 @@
 """Executable `autopilot`: the stand-in on the sockets of a PX4 SITL instance.
 
-TCP client of the simulator (HIL_SENSOR in, HIL_ACTUATOR_CONTROLS out), UDP towards the companion
-computer. All time is the simulator's. Before a HIL_SENSOR is handled, everything that has arrived
-over UDP is; what is to be told goes out before the answer. So a lockstep flight is deterministic.
+TCP client of the simulator (HIL_SENSOR in, HIL_ACTUATOR_CONTROLS out), UDP to the companion
+computer. All time is the simulator's. At each HIL_SENSOR the server first handles the messages
+received over UDP, and sends its own messages before HIL_ACTUATOR_CONTROLS. So a lockstep flight is
+deterministic.
 
-With --serial, one line carries both, as at a flight controller in HITL mode; see
-`uam_sim_bridge.mavlink.hil.router` for its other end.
+With --serial, one line carries both, as on a flight controller in HITL mode; its other end is
+`uam_sim_bridge.mavlink.hil.router`.
 """
 
 from __future__ import annotations
@@ -33,10 +34,10 @@ from uam_sim_bridge.mavlink.protocol.wire import Codec, Framer, Message, mavlink
 
 _GYRO_AND_ACCELEROMETER = 0x3F  # HIL_SENSOR.fields_updated
 _LOCKSTEP = 1  # HIL_ACTUATOR_CONTROLS.flags
-_CUSTOM_MODE, _ARMED = 1, 128  # its mode
-_LATEST = 2**53  # µs: MAVLink's nanoseconds end a little later
-CONTROLS = 16  # of HIL_ACTUATOR_CONTROLS
-_RATE_SAMPLES = 8  # intervals from which the rate of HIL_SENSOR is measured
+_CUSTOM_MODE, _ARMED = 1, 128  # HIL_ACTUATOR_CONTROLS.mode
+_LATEST = 2**53  # µs, latest time: its nanoseconds still fit MAVLink's 64 bits
+CONTROLS = 16  # number of values of HIL_ACTUATOR_CONTROLS.controls
+_RATE_SAMPLES = 8  # number of intervals that measure the rate of HIL_SENSOR
 
 
 class Server:
@@ -48,7 +49,7 @@ class Server:
         simulator: socket.socket | SerialLine,
         udp: UdpPort | SerialLine,
     ) -> None:
-        """simulator, udp: where HIL messages and those of the companion come from; may be one."""
+        """simulator: source of HIL messages; udp: link to the companion; both may be one line."""
         p = autopilot.parameters
         self._codec = Codec(int(p["MAV_SYS_ID"]), int(p["MAV_COMP_ID"]))
         self._framer = Framer(self._codec)
@@ -98,7 +99,7 @@ class Server:
         try:
             self._simulator.sendall(self._codec.encode(answer))
         except ConnectionError:
-            pass  # the next recv says that the link is closed
+            pass  # the next recv detects the closed link
 
     def _measure_rate(self, microseconds: int) -> None:
         if self._microseconds < 0 or len(self._intervals) >= _RATE_SAMPLES:
@@ -109,7 +110,7 @@ class Server:
 
 
 def parser() -> argparse.ArgumentParser:
-    """The command line."""
+    """Return the parser of the command line."""
     p = argparse.ArgumentParser(
         prog="autopilot",
         formatter_class=argparse.RawDescriptionHelpFormatter,
@@ -128,17 +129,17 @@ def parser() -> argparse.ArgumentParser:
         metavar="NAME|FILE",
         help="description, as in config/vehicle/ (default %(default)s)",
     )
-    p.add_argument("--params", metavar="FILE", help="parameters beside the vehicle's; they count")
+    p.add_argument("--params", metavar="FILE", help="parameters that override the vehicle's")
     p.add_argument(
         "--serial",
         metavar="DEVICE:BAUD",
-        help="everything over this line instead of TCP and UDP, as in HITL",
+        help="use this line instead of TCP and UDP, as in HITL",
     )
     p.add_argument(
         "--signing-key",
         default="",
         metavar="KEY",
-        help="sign on UDP and refuse what is not: 64 hex digits, or a file of them",
+        help="sign messages on UDP and refuse unsigned ones: 64 hex digits, or a file of them",
     )
     return p
 
@@ -151,9 +152,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
     udp = link = None
     try:
         if options.serial and options.signing_key:
-            raise ValueError("--signing-key is for UDP, the line of --serial is not signed")
+            raise ValueError("--signing-key is for UDP: omit it with --serial, which is not signed")
         autopilot = Autopilot(Parameters.of(load_description(options.vehicle), options.params))
-        # as PX4 SITL does; the highest instances do not fit MAVLink's one byte
+        # as PX4 SITL; the highest instances exceed MAVLink's one byte
         autopilot.set_parameter("MAV_SYS_ID", min(options.instance + 1, 250))
         codec = Codec(
             int(autopilot.parameters["MAV_SYS_ID"]),

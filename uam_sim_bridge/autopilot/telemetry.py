@@ -1,4 +1,4 @@
-"""What the autopilot tells: message streams at their intervals, on sensor time."""
+"""Telemetry of the autopilot: message streams at their intervals, on sensor time."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ _NO_COVARIANCE = [_NAN] * 21
 _LANDED, _IN_AIR, _LANDING = 1, 2, 4  # MAV_LANDED_STATE
 _STANDBY, _ACTIVE, _CRITICAL = 3, 4, 5  # MAV_STATE
 _GYRO, _ACCELEROMETER, _VISION = 1, 2, 128  # MAV_SYS_STATUS_SENSOR
-_NO_VOLTAGE, _NO_TEMPERATURE = 65535, 32767  # what MAVLink defines as unknown
+_NO_VOLTAGE, _NO_TEMPERATURE = 65535, 32767  # MAVLink's values for "unknown"
 _AIDED = (
     mavlink2.ESTIMATOR_VELOCITY_HORIZ
     | mavlink2.ESTIMATOR_VELOCITY_VERT
@@ -57,13 +57,13 @@ def extended_sys_state(autopilot: Autopilot, time: float) -> Message:
 
 
 def attitude_quaternion(autopilot: Autopilot, time: float) -> Message:
-    """ATTITUDE_QUATERNION, FRD → NED."""
+    """ATTITUDE_QUATERNION: quaternion FRD → NED, body rates FRD [rad/s]."""
     q, rates = autopilot.estimator.estimate[0:4].tolist(), autopilot.rates.tolist()
     return mavlink2.MAVLink_attitude_quaternion_message(_milliseconds(time), *q, *rates)
 
 
 def odometry(autopilot: Autopilot, time: float) -> Message:
-    """ODOMETRY: pose in local NED, velocity in body FRD."""
+    """ODOMETRY: pose [m] in local NED, velocity [m/s] and rates [rad/s] in body FRD."""
     estimate = autopilot.estimator.estimate
     velocity = rotate_back(matrix_from_quaternion(estimate[0:4]), estimate[7:10])
     return mavlink2.MAVLink_odometry_message(
@@ -80,7 +80,7 @@ def odometry(autopilot: Autopilot, time: float) -> Message:
 
 
 def battery_status(autopilot: Autopilot, time: float) -> Message:
-    """BATTERY_STATUS: no battery is simulated, every field says "unknown"."""
+    """BATTERY_STATUS: no battery is simulated, every field is "unknown"."""
     return mavlink2.MAVLink_battery_status_message(
         0,
         mavlink2.MAV_BATTERY_FUNCTION_ALL,
@@ -133,7 +133,7 @@ class Telemetry:
         self._told = autopilot.status
 
     def set_interval(self, number: int, microseconds: float) -> bool:
-        """Handle SET_MESSAGE_INTERVAL: -1 off, 0 default; False where there is no such stream."""
+        """Handle SET_MESSAGE_INTERVAL: -1 off, 0 default; False if the stream does not exist."""
         if number not in STREAMS or not math.isfinite(microseconds):
             return False
         if microseconds < 0.0:
@@ -146,11 +146,11 @@ class Telemetry:
         return True
 
     def build(self, number: int, time: float) -> Message | None:
-        """Return one message of a stream, None where there is no such stream."""
+        """Return one message of a stream, None if the stream does not exist."""
         return STREAMS[number][0](self._autopilot, time) if number in STREAMS else None
 
     def due(self, time: float) -> list[Message]:
-        """Return the messages due at `time` [s]; a change of state brings its HEARTBEAT at once."""
+        """Return the messages due at `time` [s]; a change of state makes HEARTBEAT due at once."""
         if self._told != self._autopilot.status:
             self._told = self._autopilot.status
             self._due[mavlink2.MAVLINK_MSG_ID_HEARTBEAT] = -math.inf
