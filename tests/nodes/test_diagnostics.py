@@ -115,5 +115,5 @@ def test_an_estimator_reports_rejected_poses(start, probe):
     assert found.values["poses refused"] == "0"
     jump = 1.0
     probe.until(fed, "a warning")
-    assert "poses of late jumped away from the estimate" in found.status.message
+    assert "new poses refused: too far from the estimate" in found.status.message
     assert int(found.values["poses refused"]) > 0

@@ -1,1 +1,1 @@
-"""The ROS nodes: thin shells around the maths."""
+"""The ROS nodes; each connects one stage of the control tick to topics, parameters and services."""

@@ -1,4 +1,4 @@
-"""Node: arm law. state + reference + the attitude asked by the position law → joint efforts."""
+"""Node: arm law. state + reference + desired attitude of the position law → joint efforts."""
 
 import numpy as np
 
@@ -17,7 +17,7 @@ NAME = "arm_controller"
 class ArmControllerNode(ControllerNode):
     """Publishes joint efforts, one message per state, on the ground as well.
 
-    The attitude reference enters through ||xi||, the norm of the whole vehicle's errors.
+    The attitude reference is part of ||xi||, the norm of the errors of the whole vehicle.
     """
 
     def __init__(self):

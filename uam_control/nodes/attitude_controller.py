@@ -1,4 +1,4 @@
-"""Node: attitude law. state + reference + the attitude asked by the position law → tau_q."""
+"""Node: attitude law. state + reference + desired attitude of the position law → tau_q."""
 
 import numpy as np
 

@@ -1,4 +1,4 @@
-"""What the three controller nodes share: the joined inputs, the parameters, the adaptation."""
+"""Base of the three controller nodes: joined inputs, parameters, adapted gains, services."""
 
 import time
 
@@ -25,7 +25,7 @@ RESET, FREEZE = "reset_adaptation", "freeze_adaptation"  # services
 
 
 class ControllerNode(UamNode):
-    """One adaptive law: runs once per stamp, when all its inputs of that stamp are there."""
+    """Node with one adaptive law; it runs once per stamp, after the last input of the stamp."""
 
     READERS = {
         topics.STATE.name: read_state,
@@ -43,13 +43,13 @@ class ControllerNode(UamNode):
     ):
         """inputs: the topics whose messages `tick` takes, in that order.
 
-        The reference comes a tick ahead, so of the others the last one completes the tick.
+        The reference arrives a tick ahead. The last topic besides it therefore completes the tick.
         """
         super().__init__(name)
         law = given(self).get("law", catalogue.DEFAULT)
         self.vehicle = described_vehicle(self)
         kind, axes = parameter_set(name, {"law": law}, self.vehicle)
-        # for what no parameter file says
+        # for parameters that no parameter file gives
         defaults = default_profile(law, self.vehicle).section(name)
         derived = self.vehicle.node_parameters().get(name)
         self.parameter_set = NodeParameters(self, kind, axes, defaults, derived)
@@ -81,11 +81,11 @@ class ControllerNode(UamNode):
         self.done_tick(stamp, begun)
 
     def tick(self, stamp: int, *values) -> None:
-        """Control at `stamp` [ns] and publish the command."""
+        """Run the law for `stamp` [ns] and publish the command; values: one per input topic."""
         raise NotImplementedError
 
     def _warm_up(self, spare: LawStage) -> None:
-        """Compile the law on a stage that never flies: the first call takes a second."""
+        """Compile the law with a spare stage, because the first call takes a second."""
         nothing, attitude = np.zeros((3, len(self.vehicle.coordinates))), np.zeros((3, 3))
         reference = (nothing,) if isinstance(spare, PositionStage) else (nothing, attitude)
         for flying in (False, True):
@@ -103,7 +103,7 @@ class ControllerNode(UamNode):
         return response
 
     def _on_freeze(self, request: SetBool.Request, response: SetBool.Response) -> SetBool.Response:
-        """The parameter `adapt` by another name, so that the two cannot disagree."""
+        """Set the parameter `adapt`, so that service and parameter always agree."""
         result = self.change_parameters([Parameter("adapt", value=not request.data)], FREEZE)
         frozen = "frozen at" if request.data else "free, from"
         response.success = result.successful

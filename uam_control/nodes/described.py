@@ -1,4 +1,4 @@
-"""The read-only parameter `vehicle` of a node: which description it flies by."""
+"""The read-only parameter `vehicle` of a node: the name or file of the vehicle description."""
 
 from rcl_interfaces.msg import ParameterDescriptor
 from rclpy.node import Node
@@ -16,7 +16,7 @@ PARAMETER = "vehicle"
 
 
 def described_vehicle(node: Node) -> VehicleDescription:
-    """Declare the parameter and return what it names. Raises ParameterError."""
+    """Declare the parameter and return the description it names. Raises ParameterError."""
     about = ParameterDescriptor(
         description="name of a file in config/vehicle, or a file; fixed once the node runs",
         read_only=True,

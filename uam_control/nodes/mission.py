@@ -1,4 +1,4 @@
-"""Node: flies a scenario. state + autopilot → reference, magnet, arming."""
+"""Node: mission. state + autopilot → reference, magnet, arming."""
 
 import time
 
@@ -33,9 +33,10 @@ STATUS_PERIOD = 500_000_000  # [ns]
 
 
 class MissionNode(UamNode):
-    """For each state: the reference of the next tick, and the magnet of this one.
+    """For each state, publishes the reference of the next tick and the magnet of this tick.
 
-    The reference goes out one tick ahead, so that it waits for the state and not the state for it.
+    The reference goes out one tick ahead: when a state arrives, the controllers already have the
+    reference of its tick.
     """
 
     def __init__(self):
@@ -56,7 +57,7 @@ class MissionNode(UamNode):
         warm_up(spare, self.parameter_set.current.takeoff_delay)
         self.parameter_set.apply = self._mission.configure
         self._arm: bool | None = None
-        self._told: tuple = ()  # what the last status said
+        self._told: tuple = ()  # content of the last status
         self._errors = (0.0, 0.0, 0.0)
         self._due = 0  # stamp [ns] of the next status
         self._states = Backlog()
@@ -107,14 +108,17 @@ class MissionNode(UamNode):
         )
 
     def _measure(self, state: np.ndarray, output: MissionOutput) -> None:
-        """Errors of this tick: norms of estimate − reference; zero what is not controlled."""
+        """Compute the errors of this tick: norms of estimate − reference; 0 if not controlled.
+
+        state: (3, 6 + n), see `coordinates`; errors of position [m], attitude and arm [rad].
+        """
         error = state[0] - output.reference[0]
         error[3:] = wrap_angle(error[3:])
         norms = [float(np.linalg.norm(error[part])) for part in (POSITION, ATTITUDE, ARM)]
         self._errors = tuple(norms) if output.flying else (0.0, 0.0, norms[2])
 
     def _tell(self, stamp: int) -> None:
-        """Arming when it changes; the status when it changes and twice a second."""
+        """Publish arming when it changes, and the status when it changes and twice a second."""
         output = self._mission.output
         if output.arm != self._arm:
             self._arm = output.arm
@@ -129,7 +133,7 @@ class MissionNode(UamNode):
 
     @property
     def status(self) -> MissionStatus:
-        """Where the mission is now."""
+        """Phase, errors and state of the mission at the newest tick."""
         output = self._mission.output
         return MissionStatus(
             output.phase,
@@ -146,7 +150,7 @@ class MissionNode(UamNode):
         output = self._mission.output
         text = f"{output.phase} at {output.time:.3f} s; {output.state.value}: {output.cause}"
         text += ", done" if output.done else ""
-        # in two lines, as rclpy wants one severity for each
+        # two calls: rclpy requires one severity per line of code
         if output.abort_reason or output.state is State.HOLDING:
             self.get_logger().warning(text)
         else:
@@ -168,7 +172,7 @@ class MissionNode(UamNode):
 
 
 def warm_up(spare: Mission, takeoff: float) -> None:
-    """Compile what is called in flight, on a mission that never flies; takeoff [s]: its delay."""
+    """Compile the functions of a flight with a spare mission; takeoff [s]: its take-off delay."""
     state = np.zeros_like(spare.output.reference)
     for stamp in (0.0, takeoff, takeoff + 0.004):
         spare.step(stamp, state, 0.0)

@@ -1,6 +1,6 @@
-"""What the mission node hears besides state and autopilot, for the supervisor's limits.
+"""Subscriptions of the mission node for the supervisor's limits.
 
-Messages stay serialized until `SupervisorInputs` looks at them.
+Messages stay serialized until `SupervisorInputs` reads them.
 """
 
 from collections.abc import Callable, Sequence
@@ -25,7 +25,7 @@ GAINS = (
 
 
 class MissionInputs:
-    """Listens through a node, for the supervisor's inputs of the mission's stage."""
+    """Subscriptions that feed the supervisor's inputs of the mission's stage."""
 
     def __init__(self, node: UamNode, supervisor: SupervisorInputs, joints: Sequence[str]):
         """joints: their names."""
@@ -45,7 +45,7 @@ class MissionInputs:
         read: Callable[[Any], None],
         answers: Callable[[Any], int] = lambda message: -1,
     ) -> None:
-        """Keep the newest message of a topic for the next look; see `SupervisorInputs.keep`."""
+        """Keep the newest message of a topic until it is read; see `SupervisorInputs.keep`."""
         name = topic.name
 
         def guarded(message: Any) -> None:
@@ -61,7 +61,7 @@ class MissionInputs:
         self._node.listen(topic, handle, required=False)
 
     def _on_mocap(self, data: bytes) -> None:
-        stamp, *pose = read_pose(data)  # one that the estimator cannot use does not count
+        stamp, *pose = read_pose(data)  # refuses a pose that the estimator cannot use
         self._inputs.mocap(seconds(stamp), *pose)
 
     def _on_joints(self, data: bytes) -> None:

@@ -2,13 +2,13 @@
 
 | service | type | does |
 |---|---|---|
-| `~/hold` | std_srvs/Trigger | stops on the path and waits there |
-| `~/resume` | std_srvs/Trigger | goes on from there |
-| `~/land` | std_srvs/Trigger | goes straight down and disarms |
+| `~/hold` | std_srvs/Trigger | stop on the path and hold the position |
+| `~/resume` | std_srvs/Trigger | continue on the path after a hold |
+| `~/land` | std_srvs/Trigger | descend vertically and disarm |
 | `~/disarm` | std_srvs/Trigger | motors off: on the ground, or in failsafe |
 | `~/magnet` | std_srvs/SetBool | on or off until the scenario switches it next |
 
-An answer says what will be done at the next tick, or why it is refused.
+The response contains the action of the next tick, or the reason why the command is refused.
 """
 
 from functools import partial
@@ -24,7 +24,7 @@ MAGNET = "magnet"
 
 
 def offer(node: Node, mission: Mission) -> None:
-    """Have `node` offer the services, for `mission`; they are served between two ticks."""
+    """Create the services of `mission` in `node`; they run between two ticks."""
 
     def answer(
         what: str, response: Trigger.Response | SetBool.Response, result: tuple[bool, str]

@@ -1,4 +1,4 @@
-"""Node: position law. state + reference → tau_p and the attitude that points the thrust so."""
+"""Node: position law. state + reference → tau_p and the desired attitude for this thrust."""
 
 import numpy as np
 

@@ -21,10 +21,10 @@ NAME = "state_estimator"
 
 
 class StateEstimatorNode(UamNode):
-    """Publishes /uam/state with the stamp of the IMU sample that it belongs to.
+    """Publishes /uam/state with the stamp of its IMU sample.
 
-    The IMU sample is what makes a tick. A sensor hub (the simulator is one) publishes it last, so
-    that everything else of the tick has arrived by then and a repeated flight sees the same.
+    The IMU sample starts a tick. The sensor hub (here the simulator) publishes it last. All other
+    samples of the tick have then arrived, and a repeated flight uses the same samples.
     """
 
     def __init__(self):
@@ -42,7 +42,7 @@ class StateEstimatorNode(UamNode):
         self._joints = self.listen(topics.JOINTS, self._on_joints)
         self.listen(topics.IMU, self._on_imu)
         self.triggers = (topics.IMU.name,)
-        self._refused_before = 0  # poses, at the last report
+        self._refused_before = 0  # number of refused poses at the last report
         self._updates = Backlog()
 
     def _on_mocap(self, data: bytes) -> None:
@@ -62,7 +62,7 @@ class StateEstimatorNode(UamNode):
         state = self._stage.imu(stamp, gyro, force)
         if state is None:
             return
-        # for every sample, as the filters count them
+        # one output per sample: the filters need every sample
         self._updates.put((stamp, self._writer.fill(stamp, state), begun))
         if not self.deferred:
             self.settle()
@@ -77,11 +77,11 @@ class StateEstimatorNode(UamNode):
         fresh, self._refused_before = refused - self._refused_before, refused
         values = {"poses refused": refused}
         if fresh:
-            return WARN, f"{fresh} poses of late jumped away from the estimate", values
+            return WARN, f"{fresh} new poses refused: too far from the estimate", values
         return OK, "running", values
 
     def _warm_up(self) -> None:
-        """Compile the filters on an estimator that never flies."""
+        """Compile the filters with a spare estimator."""
         spare = EstimatorStage(self.parameter_set.current, len(self._names))
         rest, level = np.zeros(3), np.array([1.0, 0.0, 0.0, 0.0])
         joints = np.zeros(len(self._names))

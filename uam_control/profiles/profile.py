@@ -1,12 +1,12 @@
-"""Profiles: ROS parameter files that hold the parameters of every node of a flight.
+"""Profiles: ROS parameter files with the parameters of every node of a flight.
 
     position_controller:
       ros__parameters:
         inertia: [2.2, 2.2, 2.2]
         ...
 
-A profile is read whole and checked whole; the same sets go to the nodes and to the direct engine.
-What `ros2 param dump` wrote of the nodes of a flight is a profile, too.
+A profile is read and checked as a whole; the nodes and the direct engine use the same sets. The
+output of `ros2 param dump` for the nodes of a flight is a profile, too.
 """
 
 from __future__ import annotations
@@ -40,7 +40,7 @@ BRIDGE_LINKS = (
     *("clock", "local_port", "autopilot_port", "autopilot_host", "autopilot_system"),
     *("autopilot", "gcs", "vehicle"),
 )
-# Parameters that a node has but a profile has not: they belong to a flight.
+# Parameters of a node that are not in a profile: they belong to one flight.
 FLIGHT_OWN = {
     **dict.fromkeys(CONTROLLERS, ("control_period", "vehicle")),
     "state_estimator": ("vehicle",),
@@ -50,7 +50,7 @@ FLIGHT_OWN = {
 
 @dataclass(frozen=True)
 class Profile:
-    """The parameter sets of a flight, by node, and where they came from."""
+    """The parameter sets of a flight, by node, and their source: name, file, raw sections."""
 
     name: str
     file: Path
@@ -58,12 +58,11 @@ class Profile:
     sections: dict[str, dict[str, Any]]
 
     def section(self, node: str) -> dict[str, Any]:
-        """Return the raw parameters of a node, {} where the profile has none."""
+        """Return the raw parameters of a node; {} if the profile has none."""
         return self.sections.get(node, {})
 
     def bridge(self) -> dict[str, Any]:
-        """Return what it says of the bridge, without the links of the flight that it was dumped
-        from: a flight has its own."""
+        """Return the raw parameters of the bridge, without links: every flight has its own."""
         values = self.section(BRIDGE)
         key_is_hidden = values.get("signing_key") == "set"
         aside = (*BRIDGE_LINKS, "signing_key") if key_is_hidden else BRIDGE_LINKS
@@ -77,11 +76,10 @@ class Profile:
 def parameter_set(
     node: str, values: Mapping[str, Any], vehicle: VehicleDescription | None = None
 ) -> tuple[type[ParameterSet], tuple[str, ...]]:
-    """Return the kind of parameters of a node and the names of its axes; a controller's follow
-    from its law.
+    """Return the class of a node's parameters and the names of its axes.
 
-    The axes of the mission are the joints. values: the node's section, whose `law` counts;
-    vehicle: None for the default one. Raises ParameterError for an unknown law.
+    `law` in values, the node's section, selects the class of a controller. The axes of the mission
+    are the joints. vehicle: None for the default one. Raises ParameterError for an unknown law.
     """
     vehicle = vehicle or load_description()
     if node in OTHERS:
@@ -94,8 +92,8 @@ def parameter_set(
 def load_profile(*names_or_files: str, vehicle: VehicleDescription | None = None) -> Profile:
     """Return a profile by name (config/profiles) or from a .yaml file; raises ProfileError.
 
-    Of several what comes later counts, parameter by parameter; what none of them has and follows
-    from the vehicle (None: the default one) is taken from there.
+    With several profiles, a later one replaces single parameters of the earlier ones. Parameters
+    that no profile has come from the vehicle (None: the default one), where they follow from it.
     """
     sections: dict[str, dict[str, Any]] = {}
     files = [_file(given) for given in names_or_files]
@@ -107,12 +105,12 @@ def load_profile(*names_or_files: str, vehicle: VehicleDescription | None = None
 
 
 def default_profile(law: str, vehicle: VehicleDescription | None = None) -> Profile:
-    """Return the profile that `law` flies with when the user names none; raises ProfileError.
+    """Return the profile of `law` for flights without a named profile; raises ProfileError.
 
     vehicle: None for the default one; its description may name a profile for the law.
 
-    A law without a profile of its own takes the default law's values of the parameters that both
-    have (same name, meaning, unit and range); the others have their defaults.
+    A law without its own profile uses the default law's values for the parameters that both laws
+    have (same name, meaning, unit and range), and defaults for the others.
     """
     vehicle = vehicle or load_description()
     own = vehicle.profile(law) or catalogue.law(law).profile
@@ -140,9 +138,9 @@ def _file(name_or_file: str) -> Path:
 def profile_of(
     sections: dict[str, dict[str, Any]], file: Path, vehicle: VehicleDescription | None = None
 ) -> Profile:
-    """Return the checked profile of the raw `sections`, which are those of `file` or belong there.
+    """Return the checked profile of the raw `sections`; raises ProfileError.
 
-    vehicle: see `load_profile`. Raises ProfileError.
+    file: named in the profile and in errors; vehicle: see `load_profile`.
     """
     sets, vehicle = {}, vehicle or load_description()
     derived = vehicle.node_parameters()

@@ -1,4 +1,4 @@
-"""A vehicle in numbers: rotors, joints, mass, gravity. Everything that repeats one derives it here.
+"""A vehicle in numbers: rotors, joints, mass, gravity, and the values derived from them.
 
 Frames: FLU body frame (x forward, y left, z up). PX4's parameters are FRD (y right).
 """
@@ -16,7 +16,7 @@ from uam_control.coordinates import coordinates
 from uam_control.settings import configuration
 
 AXES = ("ROLL", "PITCH", "YAW")  # of PX4's rate loop, MC_*RATE_P
-ANGLE_STEP = 0.05  # [rad] the supervisor's limits are the joint's ranges rounded down to it
+ANGLE_STEP = 0.05  # [rad] the supervisor's limits: joint ranges, rounded down to this step
 
 
 @dataclass(frozen=True)
@@ -33,7 +33,7 @@ class Rotor:
 
 @dataclass(frozen=True)
 class RotorModel:
-    """What all rotors have in common.
+    """Parameters common to all rotors.
 
     thrust_coefficient [N s^2/rad^2]; speed_max [rad/s]; curve_factor f [1] in
     T/Tmax = f u^2 + (1 - f) u for motor command u (PX4: THR_MDL_FAC); moment_ratio: reaction torque
@@ -56,7 +56,7 @@ class RotorModel:
 
 @dataclass(frozen=True)
 class Servo:
-    """What all joint servos have in common.
+    """Parameters common to all joint servos.
 
     stall_torque [N m]; no_load_speed [rad/s]; effort_limit: measured torque at which the supervisor
     holds [N m].
@@ -82,12 +82,12 @@ class Joint:
 
 @dataclass(frozen=True)
 class VehicleDescription:
-    """What the file config/vehicle/NAME.yaml says of a vehicle.
+    """The content of the file config/vehicle/NAME.yaml.
 
     file: that file; model: its MJCF file. mass: with arm, without payload [kg]; gravity [m/s^2];
     control_period [s]. profiles: parameter files by control law, see `profile`; autopilot:
-    the file of config/autopilot with the autopilot's gains; autopilot_gains: what it holds, by
-    PX4's names. numbers: the whole file, with what only the plant reads.
+    the file of config/autopilot with the autopilot's gains; autopilot_gains: its content, by
+    PX4's names. numbers: the whole file, including the values that only the plant reads.
     """
 
     name: str
@@ -107,13 +107,12 @@ class VehicleDescription:
 
     @property
     def source(self) -> str:
-        """What `load_description` is given for it: its name in config/vehicle, or its file."""
+        """The argument of `load_description` for this vehicle: name in config/vehicle, or file."""
         own = self.file.parent == configuration.root() / "vehicle"
         return self.name if own else str(self.file.resolve())
 
     def profile(self, law: str) -> str:
-        """Return the profile that it flies a control law with, "" where the description names
-        none."""
+        """Return the profile for a control law; "" if the description names none."""
         return self.profiles.get(law, "")
 
     @property
@@ -148,14 +147,16 @@ class VehicleDescription:
         return round(self.mass * self.gravity / (len(self.rotors) * self.rotor.thrust_max), 2)
 
     def geometry(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """px, py, km (n,) [m] of the rotors as PX4 has them: forward, right, moment per thrust
-        (> 0: counter-clockwise)."""
+        """Return px, py, km, each (rotors,) [m], in PX4's convention and motor order.
+
+        px forward, py right (FRD); km: moment per thrust, > 0 for counter-clockwise.
+        """
         positions = np.array([rotor.position for rotor in self.rotors])
         turns = np.array([1.0 if rotor.counter_clockwise else -1.0 for rotor in self.rotors])
         return positions[:, 0].copy(), -positions[:, 1], turns * self.rotor.moment_ratio
 
     def autopilot_parameters(self) -> dict[str, float]:
-        """The autopilot's gains and what follows from the vehicle, by PX4's names."""
+        """Return the autopilot's gains and the values derived from the vehicle, by PX4's names."""
         values: dict[str, float] = self.autopilot_gains | {
             "CA_ROTOR_COUNT": len(self.rotors),
             "THR_MDL_FAC": self.rotor.curve_factor,
@@ -170,7 +171,7 @@ class VehicleDescription:
         return values
 
     def node_parameters(self) -> dict[str, dict[str, Any]]:
-        """Parameters of the nodes that follow from the vehicle, where a profile has no other."""
+        """Return the node parameters derived from the vehicle; a profile can replace them."""
         return {
             "position_controller": {
                 "gravity": self.gravity,

@@ -1,4 +1,4 @@
-"""Reads the description of a vehicle and refuses what cannot be one, in one line."""
+"""Reader of vehicle descriptions; an invalid description gives a one-line error."""
 
 from __future__ import annotations
 
@@ -18,17 +18,18 @@ from uam_control.vehicle.description import (
 
 DEFAULT_VEHICLE = "s500_arm"
 DIRECTIONS = ("ccw", "cw")
-LEAST_RANGE = 0.1  # [rad] to either side of 0, about which the supervisor's limits are
+LEAST_RANGE = 0.1  # [rad] to either side of 0, because the supervisor's limits are symmetric
 
 
 class VehicleError(ValueError):
-    """A description that contradicts itself or its MJCF, or is not complete; one line."""
+    """An incomplete description, or one that contradicts itself or its MJCF; one-line message."""
 
 
 def load_description(name_or_file: str | Path = DEFAULT_VEHICLE) -> VehicleDescription:
-    """Return the vehicle config/vehicle/NAME.yaml, or the one of a file.
+    """Return the vehicle of config/vehicle/NAME.yaml, or of a file.
 
-    Raises VehicleError, and ConfigurationError for a name or file that does not exist.
+    Raises VehicleError for an invalid file, ConfigurationError for a name or file that does not
+    exist.
     """
     file = configuration.named("vehicle", str(name_or_file), suffixes=(".yaml",))
     document = yaml_file.read(file, VehicleError)
@@ -38,7 +39,7 @@ def load_description(name_or_file: str | Path = DEFAULT_VEHICLE) -> VehicleDescr
 
 
 def describe(document: dict[str, Any], file: Path) -> VehicleDescription:
-    """Return the checked description of what `file` says. Raises VehicleError."""
+    """Return the checked description in `document`, the content of `file`. Raises VehicleError."""
     top = Section(document, f"{file}:")
     model = file.parent / top.text("model")
     if not model.is_file():
@@ -72,16 +73,16 @@ def describe(document: dict[str, Any], file: Path) -> VehicleDescription:
 
 
 def _autopilot_gains(top: Section) -> dict[str, float]:
-    """What the file of config/autopilot holds; the geometry of the rotors is not its business."""
+    """Return the content of the file in config/autopilot; it must not repeat the rotor geometry."""
     file = configuration.named("autopilot", top.text("autopilot"))
     values = yaml_file.read(file, VehicleError)
     if not isinstance(values, dict):
         raise VehicleError(f"{file}: 'NAME: value' lines expected")
     for name in values:
         if str(name).startswith("CA_") or name in ("THR_MDL_FAC", "MPC_THR_HOVER"):
-            raise VehicleError(f"{file}: {name} follows from {top.where} it must not be here")
+            raise VehicleError(f"{file}: remove {name}: it is derived from {top.where[:-1]}")
     gains = Section(values, f"{file}:")
-    for axis in AXES:  # the bridge maps torques with them
+    for axis in AXES:  # the torque mapping of the bridge uses them
         gains.positive(f"MC_{axis}RATE_P")
     return values
 
@@ -149,20 +150,20 @@ def _check_servo(servo: Servo, section: Section) -> None:
 
 
 class Section:
-    """A mapping of the file that says precisely what is wrong with an entry."""
+    """A mapping of the file; its methods check one entry and raise VehicleError with its place."""
 
     def __init__(self, values: dict[str, Any], where: str) -> None:
         self.values, self.where = values, where
 
     def section(self, key: str) -> Section:
-        """A mapping."""
+        """Return the entry `key`, a mapping."""
         value = self._entry(key)
         if not isinstance(value, dict) or not value:
             raise VehicleError(f"{self._name(key)}: a mapping expected, got {value!r}")
         return Section(value, self._name(key))
 
     def entries(self, key: str) -> list[Section]:
-        """A list of mappings, at least one."""
+        """Return the entry `key`, a list of one mapping or more."""
         value = self._entry(key)
         if not isinstance(value, list) or not value:
             raise VehicleError(f"{self._name(key)}: a list of mappings expected, got {value!r}")
@@ -174,25 +175,25 @@ class Section:
         return found
 
     def text(self, key: str) -> str:
-        """A word."""
+        """Return the entry `key`, a text that is not empty."""
         value = self._entry(key)
         if not isinstance(value, str) or not value:
             raise VehicleError(f"{self._name(key)}: a name expected, got {value!r}")
         return value
 
     def number(self, key: str) -> float:
-        """A finite number."""
+        """Return the entry `key`, a finite number."""
         return self._checked(key, self._entry(key))
 
     def positive(self, key: str) -> float:
-        """A finite number above 0."""
+        """Return the entry `key`, a finite number above 0."""
         value = self.number(key)
         if value <= 0.0:
             raise VehicleError(f"{self._name(key)}: {value:g} is not above 0")
         return value
 
     def numbers(self, key: str, count: int) -> tuple[float, ...]:
-        """A list of `count` finite numbers."""
+        """Return the entry `key`, a list of `count` finite numbers."""
         value = self._entry(key)
         if not isinstance(value, list) or len(value) != count:
             raise VehicleError(f"{self._name(key)}: a list of {count} numbers expected: {value!r}")
