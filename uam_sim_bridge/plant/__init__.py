@@ -1,4 +1,4 @@
-"""The vehicle and its surroundings, with sensors and actuators as the real ones behave."""
+"""Simulated vehicle and surroundings, with models of sensors and actuators."""
 
 from uam_sim_bridge.plant.plant import Disturbance, Plant, Samples, Truth
 from uam_sim_bridge.plant.vehicle import Vehicle

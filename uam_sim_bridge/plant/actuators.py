@@ -1,4 +1,4 @@
-"""Motors and servos between a command and a force: curves, lags and limits."""
+"""Motors and servos: curves, lags and limits between command and force."""
 
 from __future__ import annotations
 
@@ -31,7 +31,8 @@ class Rotors:
         self.thrust = np.zeros(len(self.efficiency))
 
     def step(self, commands: np.ndarray, output: np.ndarray) -> None:
-        """Advance one physics step; thrust [N] goes to `thrust` and to output (rotors,)."""
+        """Advance one physics step with commands (rotors,) 0..1; write thrust [N] to output
+        (rotors,)."""
         rotor_step(commands, self.constants, self.efficiency, self.speed, self.thrust, output)
 
 
@@ -44,7 +45,11 @@ def rotor_step(
     thrust: np.ndarray,
     output: np.ndarray,
 ) -> None:
-    """First-order speed lag with separate rates up and down; T = c speed^2."""
+    """Advance rotors by one step: first-order speed lag, different up and down; T = c speed^2.
+
+    commands (rotors,) 0..1; constants (5,): of `Rotors`; efficiency (rotors,): factor on thrust;
+    speed (rotors,) [rad/s], thrust and output (rotors,) [N] are overwritten.
+    """
     coefficient, thrust_max, factor = constants[0], constants[1], constants[2]
     gain_up, gain_down = constants[3], constants[4]
     for i in range(len(commands)):
@@ -59,8 +64,7 @@ def rotor_step(
 class Servos:
     """Dynamixel XM430-W210 in current control: quantised current, torque-speed limit.
 
-    `torque` (n,) [N m] is what the gear delivers before friction; friction and reflected inertia
-    are in the MJCF.
+    `torque` (n,) [N m]: of the gear before friction. The MJCF has friction and reflected inertia.
     """
 
     def __init__(self, numbers: dict, joints: int) -> None:
@@ -75,7 +79,7 @@ class Servos:
         self.torque = np.zeros(joints)
 
     def step(self, effort: np.ndarray, velocity: np.ndarray, output: np.ndarray) -> None:
-        """Apply the commanded effort (n,) [N m] at joint velocity (n,) [rad/s] to output (n,)."""
+        """Write the torque (n,) [N m] for effort (n,) [N m] at velocity (n,) [rad/s] to output."""
         servo_step(effort, velocity, self.constants, self.torque, output)
 
 
@@ -87,7 +91,11 @@ def servo_step(
     torque: np.ndarray,
     output: np.ndarray,
 ) -> None:
-    """Torque = command in whole current units, within stall (1 - speed / no-load speed)."""
+    """Write torque and output (n,) [N m]: effort in whole current units, within the speed limit.
+
+    effort (n,) [N m]; velocity (n,) [rad/s]; constants (3,): stall torque [N m], no-load speed
+    [rad/s], torque of one current unit [N m]. Limit: stall torque (1 - speed / no-load speed).
+    """
     stall, no_load, unit = constants[0], constants[1], constants[2]
     for i in range(len(effort)):
         desired = unit * np.round(effort[i] / unit)

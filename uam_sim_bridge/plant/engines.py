@@ -1,4 +1,4 @@
-"""The physics engines by name. A new one is a class and a line here, or "module:Class"."""
+"""The physics engines by name. A new engine is a class and a line here, or "module:Class"."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ DEFAULT_PLANT = "mujoco"
 
 
 class PlantError(ValueError):
-    """A plant that does not exist; the text is one line."""
+    """The plant does not exist; the text is one line."""
 
 
 def plant_class(name: str) -> type[Plant]:

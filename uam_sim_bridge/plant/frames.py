@@ -1,4 +1,4 @@
-"""The vehicle's frames, from the compiled MJCF as the URDF: arm, magnet, and what they hold."""
+"""Frames of the vehicle's bodies (arm, magnet, payload plate), from the same MJCF as the URDF."""
 
 from __future__ import annotations
 
@@ -14,10 +14,10 @@ from uam_sim_bridge.plant.vehicle import BASE
 
 @dataclass(frozen=True)
 class Frame:
-    """A body in the frame of the body that carries it; named as its link in the URDF.
+    """Pose of a body in the frame of its parent; `name`: of its link in the URDF.
 
-    position (3,) [m]; quaternion [w x y z], body → parent, at joint angle 0; axis (3,) of the
-    hinge; joint: its name, "" where the body is fixed.
+    position (3,) [m]; quaternion (4,) [w x y z], body → parent, at joint angle 0; axis (3,): unit
+    vector of the hinge; joint: its name, "" for a fixed body.
     """
 
     name: str
@@ -28,7 +28,7 @@ class Frame:
     joint: str = ""
 
     def turned(self, angle: float) -> np.ndarray:
-        """The quaternion [w x y z] at a joint angle [rad]."""
+        """Return the quaternion (4,) [w x y z], body → parent, at a joint angle [rad]."""
         turn = quaternion_from_rotation_vector(self.axis * angle)
         return quaternion_multiply(self.quaternion, turn)
 
@@ -42,7 +42,7 @@ class Box:
 
 
 def frames(model: mujoco.MjModel) -> list[Frame]:
-    """The frames that hang on the vehicle's base, parents first."""
+    """Return the frames carried by the vehicle's base, parents first."""
     root = model.body(BASE).id
     return [_frame(model, body, root) for body in carried(model)]
 
@@ -61,14 +61,14 @@ def _frame(model: mujoco.MjModel, body: int, root: int) -> Frame:
 
 
 def box(model: mujoco.MjModel, name: str) -> Box:
-    """The geom `name`, which is a box."""
+    """Return the box of the geom `name`; the geom must be a box."""
     geom = model.geom(name)
     return Box(geom.pos.copy(), 2.0 * geom.size)
 
 
 def hanging(pitch: float, alpha: np.ndarray) -> float:
-    """Angle of the magnet's pivot [rad] at which its face is level, as its weight makes it.
+    """Return the angle of the magnet's pivot [rad] at rest: its weight makes its face level.
 
-    pitch [rad] of the vehicle; alpha (n,) [rad]. Joints turn the other way than pitch.
+    pitch [rad] of the vehicle; alpha (n,) [rad], positive in the opposite direction of pitch.
     """
     return float(pitch - alpha.sum())

@@ -1,7 +1,7 @@
-"""The electromagnet: finite holding force, falling off with the air gap.
+"""The electromagnet: finite holding force that decreases with the air gap.
 
-MuJoCo's adhesion actuator pulls along the normals of the contacts between magnet and payload; what
-it holds, and whether, comes out of contact and friction. Here only its strength is set.
+MuJoCo's adhesion actuator pulls along the normals of the contacts between magnet and payload;
+contact and friction decide whether the payload is held. This module sets only the strength.
 """
 
 from __future__ import annotations
@@ -15,10 +15,10 @@ from uam_control.maths.compiled import jit
 
 
 def magnet_constants(model: mujoco.MjModel, gap_scale: float) -> np.ndarray:
-    """What `pull_fraction` needs of the model (4,): height, reach, thickness, gap_scale, all [m].
+    """Return the constants (4,) of `pull_fraction`: height, reach, thickness, gap_scale, all [m].
 
-    Where the payload's steel plate is in its own frame: its upper side, how far from its middle
-    some of the magnet's face is still above it, and how thick it is.
+    The first three describe the steel plate in the payload's frame: height of its upper side,
+    largest horizontal distance at which the magnet's face still overlaps it, and thickness.
     """
     plate, face = model.geom("payload_plate").size, model.geom("magnet_face").size
     return np.array([model.geom("payload").size[2], plate[0] + face[0], 2 * plate[2], gap_scale])
@@ -30,9 +30,9 @@ def pull_fraction(
 ) -> float:
     """Return the fraction 0..1 of the holding force at the present air gap to the steel plate.
 
-    face (3,): centre of the magnet's face; payload (3,), payload_axes (9,): centre and rotation
-    matrix, row by row, of the payload; constants (4,): of `magnet_constants`. Reluctance of an air
-    gap: F = F0 / (1 + gap / gap_scale)^2.
+    face (3,) [m, world]: centre of the magnet's face; payload (3,) [m, world], payload_axes (9,):
+    centre and rotation matrix (payload → world, row by row) of the payload; constants (4,): of
+    `magnet_constants`. Reluctance of an air gap: F = F0 / (1 + gap / gap_scale)^2.
     """
     height, reach, thickness, gap_scale = constants
     gap_squared = 0.0

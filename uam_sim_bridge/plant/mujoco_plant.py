@@ -18,11 +18,11 @@ from uam_sim_bridge.plant.plant import Disturbance, Plant, Samples, Truth
 from uam_sim_bridge.plant.sensors import Delay, Encoders, Imu, Mocap, Noise, generators
 from uam_sim_bridge.plant.vehicle import BASE, MAGNET, PAYLOAD, SWING, Vehicle
 
-STIFF = 0.9999  # constraint impedance of a friction without creep, see MuJoCo's solimp
+STIFF = 0.9999  # constraint impedance for friction without creep, see MuJoCo's solimp
 
 
 class MujocoPlant(Plant):
-    """The vehicle with arm and magnet, and the payload; see config/vehicle/ for the numbers."""
+    """Vehicle with arm, magnet and payload in MuJoCo; the numbers are in config/vehicle/."""
 
     def __init__(
         self,
@@ -76,7 +76,7 @@ class MujocoPlant(Plant):
         )
 
     def _lay_out(self, payload_mass: float, arm_start: Sequence[float]) -> None:
-        """Keep views into MuJoCo's arrays and set the starting pose."""
+        """Store views into MuJoCo's arrays and set the initial pose."""
         data, joint, described = self.data, self.model.joint, self.vehicle.description
         base_q, base_v = joint(BASE).qposadr[0], joint(BASE).dofadr[0]
         self._position = data.qpos[base_q : base_q + 3]
@@ -108,17 +108,17 @@ class MujocoPlant(Plant):
         self._alpha[:] = arm_start
         data.qpos[self._swing] = -sum(arm_start)
         self._payload_position[0:2] += self.vehicle.numbers["variation"]["payload_offset"]
-        if payload_mass <= 0.0:  # out of the way rather than another model
+        if payload_mass <= 0.0:  # moved far away: the model stays the same
             self._payload_position[:] = (5.0, 5.0, 0.02)
 
     def _controls(self, names: Sequence[str]) -> np.ndarray:
-        """A view (len(names),) of the controls of these actuators."""
+        """Return a view (len(names),) of the controls of these actuators."""
         found = [self.model.actuator(name).id for name in names]
         self._in_a_row("actuator", found)
         return self.data.ctrl[found[0] : found[-1] + 1]
 
     def _in_a_row(self, kind: str, numbers: Sequence[int]) -> None:
-        """Raise VehicleError where the parts are not adjacent and in the description's order."""
+        """Raise VehicleError if the parts are not adjacent or not in the description's order."""
         if list(numbers) != list(range(numbers[0], numbers[0] + len(numbers))):
             described = self.vehicle.description
             raise VehicleError(
@@ -200,7 +200,10 @@ class MujocoPlant(Plant):
         self._swing_rate = disturbance.payload_swing
 
     def _held_by_magnet(self, magnet: bool) -> bool:
-        """Close or open the hinge; whether the magnet acts. The hinge replaces its contact."""
+        """Close or open the hinge; return whether the magnet acts.
+
+        The closed hinge replaces the contact of magnet and payload.
+        """
         hinge, rate = self._hinge, self._swing_rate
         if rate is not None and magnet and (hinge.closed or hinge.close(rate)):
             return False
@@ -246,7 +249,12 @@ def write_state(
     alpha_ddot: np.ndarray,
     state: np.ndarray,
 ) -> None:
-    """Gather chi, chi_dot, chi_ddot into state (3, 6 + n)."""
+    """Write chi, chi_dot, chi_ddot into state (3, 6 + n), see uam_control.coordinates.
+
+    position, velocity (3,) [m, m/s, ENU]; quaternion (4,) [w x y z], FLU → ENU; rates (3,) [rad/s,
+    FLU]; alpha, alpha_dot, alpha_ddot (n,) [rad, rad/s, rad/s^2]; base_acceleration (6,): linear
+    [m/s^2, ENU] and angular [rad/s^2, FLU].
+    """
     euler = euler_from_quaternion(quaternion)
     for i in range(3):
         state[CHI, X + i], state[CHI, ROLL + i] = position[i], euler[i]
@@ -272,9 +280,11 @@ def surroundings(
     magnet_control: np.ndarray,
     specific_force: np.ndarray,
 ) -> None:
-    """Before a tick: drag -c (v - wind) [N, world] into force (3,), pull of the magnet at its gap.
+    """Write the loads of the next tick: drag -c (v - wind) into force (3,), pull of the magnet.
 
-    Also clears specific_force (3,) for the average over the physics steps of the tick.
+    drag (3,) [N s/m], velocity, wind (3,) [m/s], force (3,) [N], all ENU; face, payload,
+    payload_axes, gap_constants: see `pull_fraction`; magnet_control (1,): 0..1. Sets specific_force
+    (3,) to 0 for the mean over the physics steps of the tick.
     """
     for i in range(3):
         force[i] = drag[i] * (wind[i] - velocity[i])
@@ -296,13 +306,16 @@ def actuate(
     thrust_control: np.ndarray,
     torque_control: np.ndarray,
 ) -> None:
-    """Before a physics step: thrusts (rotors,) [N] and joint torques (n,) [N m] to the controls."""
+    """Write thrusts (rotors,) [N] and joint torques (n,) [N m] of the next physics step.
+
+    The arguments are those of `rotor_step` and `servo_step`.
+    """
     rotor_step(commands, rotor_constants, efficiency, speed, thrust, thrust_control)
     servo_step(effort, joint_rates, servo_constants, torque, torque_control)
 
 
 @jit
 def average(sample: np.ndarray, weight: float, mean: np.ndarray) -> None:
-    """Add weight * sample (3,) to mean (3,)."""
+    """Add weight * sample (3,) to mean (3,); both in the same unit and frame."""
     for i in range(3):
         mean[i] += weight * sample[i]

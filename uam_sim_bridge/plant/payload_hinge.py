@@ -1,7 +1,7 @@
 """A joint between magnet and payload that can be closed and opened in flight.
 
-MuJoCo knows joints between free bodies as constraints that are part of the model. This one is a
-ball at the middle of the payload's plate; while it is closed, magnet and payload do not collide.
+In MuJoCo a joint between free bodies is an equality constraint of the model. This one is a ball
+joint at the middle of the payload's plate. While it is closed, magnet and payload do not collide.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ REACH = 0.002  # [m] largest gap at which the payload sits on the magnet
 
 
 def add_to(spec: mujoco.MjSpec) -> None:
-    """Give the model the joint, open."""
+    """Add the open joint to the model."""
     spec.add_equality(
         name=NAME,
         type=mujoco.mjtEq.mjEQ_CONNECT,
@@ -29,7 +29,7 @@ class PayloadHinge:
     """The joint in a model and its data."""
 
     def __init__(self, model: mujoco.MjModel, data: mujoco.MjData) -> None:
-        """The model must have been given the joint, see `add_to`."""
+        """model: with the joint that `add_to` adds."""
         self._model, self._data = model, data
         self._equality = model.equality(NAME).id
         self._magnet, self._payload = model.body("magnet").id, model.body("payload").id
@@ -43,14 +43,14 @@ class PayloadHinge:
 
     @property
     def closed(self) -> bool:
-        """Whether the payload hangs on it."""
+        """Whether the joint is closed: the payload hangs on the magnet."""
         return bool(self._data.eq_active[self._equality])
 
     def close(self, rate: float) -> bool:
-        """Hang the payload on it, turning at `rate` [rad/s] about its y axis; False where it is
-        not at the magnet.
+        """Close the joint; return False if the payload is not at the magnet.
 
-        It hangs from where the middle of the magnet's face is now.
+        The payload hangs from the present position of the middle of the magnet's face. rate
+        [rad/s]: added rotation of the payload about its y axis.
         """
         model, data = self._model, self._data
         face = data.site_xpos[self._face]
@@ -69,10 +69,10 @@ class PayloadHinge:
         return True
 
     def open(self) -> None:
-        """Let the payload go."""
+        """Open the joint: the payload is released."""
         self._model.geom_contype[self._geom], self._model.geom_conaffinity[self._geom] = self._bits
         self._data.eq_active[self._equality] = False
 
     def _in_body(self, body: int, point: np.ndarray) -> np.ndarray:
-        """A point of the world in a body's own coordinates."""
+        """Return a point (3,) [m, world] in the frame of a body (3,) [m]."""
         return self._data.xmat[body].reshape(3, 3).T @ (point - self._data.xpos[body])

@@ -1,11 +1,11 @@
-"""What the simulator needs of a plant: the interface to a physics engine.
+"""The interface between the simulator and a physics engine.
 
-A physics engine is one class, a `Plant`. It is chosen by a name of `engines.PLANTS` or as
+A physics engine is one class, a `Plant`. It is selected by a name of `engines.PLANTS` or as
 "module:Class": `uam fly --plant`, parameter `plant` of the node mujoco_sim. At each control tick
 the simulator calls
 
-    samples = plant.sense()                    what the sensors deliver
-    truth = plant.truth()                      for the record, and the autopilot's simulator link
+    samples = plant.sense()                    samples of the sensors
+    truth = plant.truth()                      for the recording and the autopilot's simulator link
     plant.disturb(disturbance)                 only in a flight with faults of the physics
     plant.step(motors, effort, magnet)         physics of one control period
 """
@@ -24,11 +24,12 @@ from uam_sim_bridge.plant.vehicle import Vehicle
 
 @dataclass
 class Samples:
-    """What arrives at one tick; each entry None or a tuple that begins with its stamp [s].
+    """Sensor samples that arrive at one tick; each is None or a tuple with its stamp [s] first.
 
-    imu: (stamp, gyro (3,) [rad/s], specific force (3,) [m/s^2]), FLU, as the companion computer
-    gets it. joints: (stamp, alpha (n,), alpha_dot (n,), torque (n,)). mocap: (stamp, position (3,),
-    quaternion [w x y z]). hil: as imu, undelayed, for the autopilot's own sensors.
+    imu: (stamp, gyro (3,) [rad/s], specific force (3,) [m/s^2]), FLU, of the companion computer.
+    joints: (stamp, alpha (n,) [rad], alpha_dot (n,) [rad/s], torque (n,) [N m]). mocap: (stamp,
+    position (3,) [m, ENU], quaternion (4,) [w x y z], FLU → ENU). hil: as imu, without delay, for
+    the autopilot's own sensors.
     """
 
     imu: tuple | None
@@ -39,7 +40,12 @@ class Samples:
 
 @dataclass
 class Truth:
-    """What no controller sees. state (3, 6 + n) as in uam_control.coordinates; the rest SI."""
+    """True values, hidden from the controllers; SI, ENU.
+
+    state (3, 6 + n): as in uam_control.coordinates; quaternion, payload_quaternion (4,) [w x y z],
+    FLU → ENU; payload_position (3,) [m]; magnet_force [N]; magnet_swing [rad]; rotor_speed
+    (rotors,) [rad/s]; rotor_thrust (rotors,) [N].
+    """
 
     state: np.ndarray
     quaternion: np.ndarray
@@ -53,12 +59,12 @@ class Truth:
 
 @dataclass
 class Disturbance:
-    """What faults change in the physics of one period; see `none`.
+    """Changes of the physics by faults during one period; see `none`.
 
-    rotor_parts (rotors,): part of the thrust of each rotor; joint_friction (n,): dry friction added
-    to each joint [N m]; magnet_part: of the holding force; wind (3,): added [m/s, ENU];
-    payload_swing: the payload hangs from one point of the magnet while that is on, beginning with
-    this pitch rate [rad/s]; None: it lies flat on the magnet.
+    rotor_parts (rotors,): factor on the thrust of each rotor; joint_friction (n,) [N m]: dry
+    friction added to each joint; magnet_part: factor on the holding force; wind (3,) [m/s, ENU]:
+    added; payload_swing [rad/s]: initial pitch rate of a payload that hangs from one point of the
+    magnet while the magnet is on; None: the payload lies flat on the magnet.
     """
 
     rotor_parts: np.ndarray
@@ -76,9 +82,9 @@ class Disturbance:
 class Plant(ABC):
     """Vehicle, payload and surroundings.
 
-    `vehicle`: as flown; `period`: of control [s]; `joints`: their number n; `tick`: number of
-    periods stepped. `DISTURBABLE`: whether it has `disturb`; without, faults of the physics are
-    refused, those of sensors and commands are not.
+    `vehicle`: as flown; `period` [s]: of control; `joints`: their number n; `tick`: number of
+    periods stepped. `DISTURBABLE`: whether the class implements `disturb`; if not, faults of the
+    physics are refused, faults of sensors and commands are accepted.
     """
 
     DISTURBABLE = True
@@ -96,27 +102,27 @@ class Plant(ABC):
 
     @abstractmethod
     def sense(self) -> Samples:
-        """Expose the sensors at this tick and return what arrives now (call once per tick)."""
+        """Sample the sensors and return the samples that arrive now; call it once per tick."""
 
     @abstractmethod
     def step(self, motor_commands: np.ndarray, arm_effort: np.ndarray, magnet: bool) -> None:
         """Advance one control period, and `tick` by 1.
 
-        motor_commands (rotors,) 0..1 in PX4's order, arm_effort (n,) [N m] as sent now (the bus
-        delays it), magnet: current on.
+        motor_commands (rotors,): 0..1 in PX4's order; arm_effort (n,) [N m]: sent now, delayed by
+        the bus; magnet: current on.
         """
 
     @abstractmethod
     def truth(self) -> Truth:
-        """Return a copy of everything true at this tick."""
+        """Return a copy of the true values at this tick."""
 
     def disturb(self, disturbance: Disturbance) -> None:
-        """Let `disturbance` act until the next call."""
+        """Apply `disturbance` until the next call."""
         raise NotImplementedError
 
 
 class PlantFactory(Protocol):
-    """How a plant is made; the class of a physics engine is one."""
+    """Signature that makes a plant; the class of a physics engine has it."""
 
     def __call__(
         self,
@@ -126,5 +132,5 @@ class PlantFactory(Protocol):
         arm_start: Sequence[float] = (),
         disturbed: bool = False,
     ) -> Plant:
-        """payload_mass [kg], 0 for none; seed: of all noise; arm_start (n,): joint angles on the
-        ground [rad], empty: stowed as described; disturbed: `disturb` will be called."""
+        """payload_mass [kg], 0 for none; seed: of all noise; arm_start (n,) [rad]: joint angles on
+        the ground, empty: stowed as described; disturbed: `disturb` will be called."""

@@ -1,4 +1,4 @@
-"""Sensors as the real ones deliver: rate, noise, bias, quantisation and latency, all seeded."""
+"""Sensor models: rate, noise, bias, quantisation and latency; the noise is seeded."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ BLOCK = 2048  # noise samples drawn per call of the generator; the sequence is t
 
 
 class Noise:
-    """White noise (width,) per call with given standard deviations, drawn in blocks."""
+    """White noise with given standard deviations (width,), drawn in blocks; (width,) per call."""
 
     def __init__(self, generator: np.random.Generator, deviations: np.ndarray) -> None:
         self._generator = generator
@@ -30,7 +30,7 @@ class Noise:
 
 
 class Delay:
-    """A line that hands out what was put in a fixed number of ticks ago."""
+    """Delay line of a fixed number of ticks."""
 
     def __init__(self, ticks: int) -> None:
         self._ticks = ticks
@@ -48,7 +48,7 @@ class Delay:
 
 
 def generators(seed: int, count: int) -> list[np.random.Generator]:
-    """Return independent generators, one per noise source, from one seed."""
+    """Return `count` independent generators, one per noise source, from one seed."""
     return [np.random.default_rng(s) for s in np.random.SeedSequence(seed).spawn(count)]
 
 
@@ -65,7 +65,10 @@ class Imu:
     def sample(
         self, rates: np.ndarray, specific_force: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray]:
-        """Return (gyro (3,) [rad/s], accelerometer (3,) [m/s^2]) with noise and bias."""
+        """Return gyro (3,) [rad/s] and accelerometer (3,) [m/s^2], FLU, with noise and bias.
+
+        rates (3,) [rad/s], specific_force (3,) [m/s^2]: true values, FLU.
+        """
         return disturbed(rates, specific_force, self._noise(), self.bias)
 
 
@@ -80,14 +83,14 @@ class Mocap:
         self._noise = Noise(generator, scale * np.array(deviations))
 
     def due(self, time: float) -> bool:
-        """Return whether an exposure falls on this tick."""
+        """Return whether mocap takes a pose at `time` [s]; call it once per tick."""
         if time + 1e-9 < self._next:
             return False
         self._next += self._period
         return True
 
     def sample(self, position: np.ndarray, quaternion: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Return (position (3,) [m], quaternion [w x y z]) with noise."""
+        """Return position (3,) [m, ENU] and quaternion (4,) [w x y z], FLU → ENU, with noise."""
         noise = self._noise()
         turn = quaternion_from_rotation_vector(noise[3:])
         return position + noise[:3], quaternion_multiply(quaternion, turn)
@@ -102,7 +105,7 @@ class Encoders:
         self._velocity = numbers["velocity_unit"]
 
     def sample(self, angle: np.ndarray, velocity: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Return (alpha (n,) [rad], alpha_dot (n,) [rad/s]) in whole counts."""
+        """Return alpha (n,) [rad] and alpha_dot (n,) [rad/s] in whole counts."""
         return quantised(angle, self._count), quantised(velocity, self._velocity)
 
 
@@ -110,7 +113,7 @@ class Encoders:
 def disturbed(
     rates: np.ndarray, specific_force: np.ndarray, noise: np.ndarray, bias: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Return rates and specific force (3,) each with noise and bias (6,) added."""
+    """Return rates (3,) [rad/s] and specific force (3,) [m/s^2], FLU, plus noise and bias (6,)."""
     gyro, accelerometer = np.empty(3), np.empty(3)
     for i in range(3):
         gyro[i] = rates[i] + noise[i] + bias[i]
@@ -120,7 +123,7 @@ def disturbed(
 
 @jit
 def quantised(values: np.ndarray, unit: float) -> np.ndarray:
-    """Return values (n,) in whole units."""
+    """Return values (n,) rounded to multiples of `unit`, in the same unit."""
     out = np.empty(len(values))
     for i in range(len(values)):
         out[i] = unit * np.round(values[i] / unit)

@@ -1,4 +1,4 @@
-"""URDF of the vehicle, generated from the compiled MJCF: one source for masses, axes and shapes."""
+"""URDF of the vehicle, generated from the compiled MJCF, the source of masses, axes and shapes."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ import numpy as np
 from uam_control.vehicle import Servo
 from uam_sim_bridge.plant.vehicle import BASE, Vehicle
 
-BASE_LINK = "base_link"  # the base, as REP-105 has it
+BASE_LINK = "base_link"  # REP-105's name of the base
 SHAPES = {
     mujoco.mjtGeom.mjGEOM_BOX: lambda s: ("box", {"size": _text(2.0 * s)}),
     mujoco.mjtGeom.mjGEOM_SPHERE: lambda s: ("sphere", {"radius": _text(s[:1])}),
@@ -18,7 +18,7 @@ SHAPES = {
         "cylinder",
         {"radius": _text(s[:1]), "length": _text(2.0 * s[1:2])},
     ),
-    # URDF knows no capsule: a cylinder as long as the whole capsule
+    # URDF has no capsule: a cylinder of the capsule's whole length
     mujoco.mjtGeom.mjGEOM_CAPSULE: lambda s: (
         "cylinder",
         {"radius": _text(s[:1]), "length": _text(2.0 * (s[1:2] + s[:1]))},
@@ -46,7 +46,7 @@ def urdf(vehicle: Vehicle, root_name: str = BASE_LINK) -> str:
 
 
 def carried(model: mujoco.MjModel) -> list[int]:
-    """The bodies that hang on the vehicle's base, parents first, without mere contacts."""
+    """Return the bodies carried by the vehicle's base, parents first, without massless ones."""
     root = model.body(BASE).id
     return [
         body
@@ -130,7 +130,7 @@ def _matrix(quaternion: np.ndarray) -> np.ndarray:
 
 
 def _euler(matrix: np.ndarray) -> np.ndarray:
-    """Fixed-axis roll, pitch, yaw, as URDF's rpy."""
+    """Return fixed-axis roll, pitch, yaw (3,) [rad], URDF's rpy, of a rotation matrix (3, 3)."""
     return np.array(
         [
             np.arctan2(matrix[2, 1], matrix[2, 2]),

@@ -1,4 +1,4 @@
-"""The plant's vehicle: the description's numbers and the MuJoCo model made of its MJCF and them.
+"""The plant's vehicle: numbers of the description, and the MuJoCo model made of MJCF and numbers.
 
 The MJCF holds bodies, their masses and shapes, and the sites of the sensors. Rotors, actuators,
 ranges of the joints and gravity are added from the description.
@@ -24,15 +24,15 @@ from uam_control.vehicle import (
 )
 
 BASE, PAYLOAD, MAGNET = "base", "payload", "magnet"  # bodies of the MJCF
-SWING = "magnet_swing"  # the joint of the magnet's pivot, which nothing measures
+SWING = "magnet_swing"  # the joint of the magnet's pivot, without a sensor
 MASS_TOLERANCE = 1e-3  # relative
 
 
 @dataclass
 class Vehicle:
-    """A description and the numbers of its file, some of which a flight may change.
+    """A description and the numbers of its file; a flight may change some numbers.
 
-    The controllers fly by the description, the plant by the numbers.
+    The controllers use the description, the plant uses the numbers.
     """
 
     description: VehicleDescription
@@ -45,7 +45,7 @@ class Vehicle:
 
     @classmethod
     def of(cls, description: VehicleDescription) -> Vehicle:
-        """The vehicle as described."""
+        """Return the vehicle as described."""
         return cls(description, description.numbers)
 
     def changed(self, changes: dict[str, object]) -> Vehicle:
@@ -66,7 +66,7 @@ class Vehicle:
     ) -> mujoco.MjModel:
         """Return the MuJoCo model with a payload of payload_mass [kg] (0: far away, massless).
 
-        extend: adds to the model what only some flights need. Raises VehicleError where the MJCF
+        extend: adds parts to the model that only some flights need. Raises VehicleError if the MJCF
         contradicts the description.
         """
         described = self.description
@@ -84,13 +84,13 @@ class Vehicle:
         if extend is not None:
             extend(spec)
         model = spec.compile()
-        if extend is None:  # what only some flights need may weigh something
+        if extend is None:  # added parts may have a mass
             self._check_model(model)
         self._vary(model)
         return model
 
     def _check_parts(self, spec: mujoco.MjSpec) -> None:
-        """Raise VehicleError for what the plant finds by name and the MJCF does not have."""
+        """Raise VehicleError if a part that the plant finds by name is not in the MJCF."""
         described = self.description
         joints = {joint.name for joint in spec.joints}
         for kind, required, there in (
@@ -116,7 +116,7 @@ class Vehicle:
             )
 
     def _add_rotors(self, spec: mujoco.MjSpec) -> None:
-        """Give the base a site and a propeller for each rotor."""
+        """Add a site and a propeller to the base for each rotor."""
         base, look = spec.body(BASE), spec.find_default("rotor")
         described = self.description
         for rotor in described.rotors:
@@ -126,7 +126,7 @@ class Vehicle:
             propeller.size[0] = described.rotor.radius
 
     def _limit(self, spec: mujoco.MjSpec, joint: Joint) -> None:
-        """Give a joint its range; the MJCF may state the same one, but no other."""
+        """Set the range of a joint; raise VehicleError if the MJCF has another range."""
         element = spec.joint(joint.name)
         scale = 180.0 / math.pi if spec.compiler.degree else 1.0
         limits = [round(scale * limit, 9) for limit in (joint.low, joint.high)]
@@ -139,14 +139,14 @@ class Vehicle:
         element.range = limits
 
     def _add_actuators(self, spec: mujoco.MjSpec) -> None:
-        """Thrust [N] of each rotor, torque [N m] of each joint, pull of the magnet 0..1."""
+        """Add actuators: thrust [N] per rotor, torque [N m] per joint, magnet pull 0..1."""
         described = self.description
         for rotor in described.rotors:
             motor = spec.add_actuator(
                 name=rotor.name, target=rotor.name, trntype=mujoco.mjtTrn.mjTRN_SITE
             )
             motor.set_to_motor()
-            # the air turns the base against the propeller: clockwise for a ccw one, -z
+            # the reaction torque on the base is opposite to the rotation: -z for counter-clockwise
             turn = -1.0 if rotor.counter_clockwise else 1.0
             motor.gear = (0.0, 0.0, 1.0, 0.0, 0.0, turn * described.rotor.moment_ratio)
         for name in described.joint_names:
@@ -158,7 +158,7 @@ class Vehicle:
         magnet.set_to_adhesion(self.numbers["magnet"]["holding_force"])
 
     def _check_model(self, model: mujoco.MjModel) -> None:
-        """Raise VehicleError where mass or time step contradict the description."""
+        """Raise VehicleError if mass or time step contradict the description."""
         described = self.description
         mass = float(model.body_subtreemass[model.body(BASE).id])
         if not math.isclose(mass, described.mass, rel_tol=MASS_TOLERANCE):
@@ -174,7 +174,7 @@ class Vehicle:
             )
 
     def _vary(self, model: mujoco.MjModel) -> None:
-        """Give vehicle and arm the masses of `variation`."""
+        """Scale masses and inertias of vehicle and arm by `variation`."""
         variation = self.numbers["variation"]
         if variation["mass"] == 1.0 and variation["inertia"] == 1.0:
             return
