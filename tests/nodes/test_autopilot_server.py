@@ -301,7 +301,7 @@ class FakeAutopilot:
 
 @pytest.fixture
 def pair():
-    server = HilServer(0, parameters=HilParameters(answer_timeout=0.2, silent_timeout=0.01))
+    server = HilServer(0, 4, parameters=HilParameters(answer_timeout=0.2, silent_timeout=0.01))
     fake = FakeAutopilot(server._listener.getsockname()[1])
     assert server.accept(5.0)
     yield server, fake
@@ -386,5 +386,5 @@ def test_a_used_simulator_port_is_a_one_line_error():
         s.listen()
         port = s.getsockname()[1]
         with pytest.raises(HilError, match=f"TCP port {port} .*in use") as error:
-            HilServer(port)
+            HilServer(port, 4)
         assert "\n" not in str(error.value)

@@ -71,7 +71,7 @@ class Bench:
         self.cable = Cable()
         tcp, self.udp = free_port(socket.SOCK_STREAM), free_port(socket.SOCK_DGRAM)
         local = free_port(socket.SOCK_DGRAM)
-        self.hil = HilServer(tcp, parameters=hil)
+        self.hil = HilServer(tcp, 4, parameters=hil)
         self.autopilot = start(AUTOPILOT, "--serial", f"{self.cable.ends[1]}:921600")
         self.autopilot.until_said("on the serial line")
         self.router = start(
