@@ -1,1 +1,1 @@
-"""The stages of a control tick: plain objects that the nodes and the direct engine share."""
+"""The stages of a control tick: plain objects, shared by the nodes and the direct engine."""

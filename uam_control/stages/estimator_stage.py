@@ -11,16 +11,16 @@ from uam_control.stamps import seconds
 class EstimatorStage:
     """Takes samples as they arrive and returns the state at each IMU sample.
 
-    All stamps in [ns]. The IMU sample begins a tick, so it comes last of what a tick delivers.
+    All stamps are in [ns]. The IMU sample starts a tick; the other samples of the tick come before.
     """
 
     def __init__(self, parameters: EstimatorParameters, joints: int) -> None:
-        """joints: how many the arm has."""
+        """joints: number of joints of the arm."""
         self.estimator = StateEstimator(parameters, joints)
         self.stamp = -1  # [ns] of the newest IMU sample
 
     def mocap(self, stamp: int, position: np.ndarray, quaternion: np.ndarray) -> None:
-        """Take a pose: position (3,) [m, ENU], quaternion (4,) [w x y z] FLU → ENU."""
+        """Take a pose: position (3,) [m, ENU], unit quaternion (4,) [w x y z], FLU → ENU."""
         self.estimator.mocap(seconds(stamp), position, quaternion)
 
     def joints(self, stamp: int, alpha: np.ndarray, alpha_dot: np.ndarray) -> None:
@@ -30,8 +30,9 @@ class EstimatorStage:
     def imu(self, stamp: int, gyro: np.ndarray, force: np.ndarray) -> np.ndarray | None:
         """Take an IMU sample: gyro (3,) [rad/s], specific force (3,) [m/s^2], FLU.
 
-        Returns the state (3, SIZE), reused by the next call; None while an input has never come.
-        Raises ValueError where the stamp does not follow the last one.
+        Returns the state (3, 6 + n), see `coordinates`; the next call reuses the array. Returns
+        None until every input has arrived once. Raises ValueError if the stamp is not after the
+        last one.
         """
         if stamp <= self.stamp:
             raise ValueError(f"IMU stamp {stamp} ns does not follow {self.stamp} ns")

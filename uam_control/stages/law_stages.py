@@ -1,4 +1,4 @@
-"""Stages: the three adaptive laws, and when their adapted gains are told."""
+"""Stages: the three adaptive laws, and the ticks at which their gains are published."""
 
 from __future__ import annotations
 
@@ -12,14 +12,14 @@ from uam_control.control.controllers import (
 )
 from uam_control.stages.timing import Ticks, Timing
 
-GAINS_PERIOD = 20_000_000  # [ns] between two reports of the adapted gains
+GAINS_PERIOD = 20_000_000  # [ns] between two publications of the adapted gains
 
 
 class LawStage:
     """One controller and its time steps.
 
-    `gains_due`: whether the adapted gains of the last tick are to be told, to the log and to the
-    supervisor. Stamps in [ns].
+    `gains_due`: whether to publish the adapted gains of the last tick, for the recording and the
+    supervisor. Stamps are in [ns].
     """
 
     def __init__(self, controller: Controller, timing: Timing) -> None:
@@ -29,31 +29,34 @@ class LawStage:
         self._stamp = 0
 
     def _step(self, stamp: int) -> float:
-        """Begin the tick `stamp` and return its time step [s]."""
+        """Start the tick `stamp` and return its time step [s]."""
         self.gains_due = stamp // GAINS_PERIOD != self._stamp // GAINS_PERIOD
         self._stamp = stamp
         return self._ticks.step(stamp)
 
 
 class PositionStage(LawStage):
-    """state + reference → tau_p and the attitude that points the thrust along it."""
+    """state + reference → tau_p, eq. (8a), and the desired attitude."""
 
     controller: PositionController
 
     def update(
         self, stamp: int, state: np.ndarray, reference: np.ndarray, flying: bool
     ) -> np.ndarray:
-        """Return tau_p (3,) [N, ENU], zero while not flying; state, reference: (3, SIZE)."""
+        """Return tau_p (3,) [N, ENU]; zero while not flying.
+
+        state, reference: (3, 6 + n), see `coordinates`.
+        """
         return self.controller.update(state, reference, flying, self._step(stamp))
 
     @property
     def attitude_reference(self) -> np.ndarray:
-        """Rows q_d (roll, pitch, yaw), Omega_d, Omega_d_dot (3, 3) of the last tick."""
+        """Rows q_d [rad], Omega_d, Omega_d_dot (3, 3) of the last tick; see `AttitudeReference`."""
         return self.controller.attitude_reference
 
 
 class TorqueStage(LawStage):
-    """state + reference + attitude reference → tau_q or tau_alpha."""
+    """state + reference + attitude reference → tau_q, eq. (18a), or tau_alpha, eq. (25a)."""
 
     controller: AttitudeController | ArmController
 
@@ -67,7 +70,8 @@ class TorqueStage(LawStage):
     ) -> np.ndarray:
         """Return tau_q (3,) [N m, FLU] or tau_alpha (n,) [N m].
 
-        state, reference: (3, SIZE); attitude_reference (3, 3): of the position law, same tick.
+        state, reference: (3, 6 + n), see `coordinates`; attitude_reference: (3, 3) of the position
+        law, same tick, see `AttitudeReference`.
         """
         return self.controller.update(
             state, reference, attitude_reference, flying, self._step(stamp)

@@ -1,5 +1,4 @@
-"""Stage: scenario and supervisor. state + autopilot + supervisor's inputs → reference, magnet,
-arming."""
+"""Stage: mission and supervisor. state + autopilot + limits' inputs → reference, magnet, arming."""
 
 from __future__ import annotations
 
@@ -14,14 +13,14 @@ from uam_control.stages.timing import Ticks, Timing
 from uam_control.stamps import seconds
 from uam_control.supervision import Readings, State
 
-TOLD_BY = 200_000_000  # [ns] after which every stage has the status of a tick
+TOLD_BY = 200_000_000  # [ns] after which the status of a tick has arrived at every stage
 
 
 class MissionStage:
-    """Makes the reference one tick ahead, so that it waits for the state and not the state for it.
+    """Computes the reference one tick ahead, so that it is ready when the state arrives.
 
-    `output`: what holds at the tick between `begin` and `advance`; `flying`: whether the reference
-    of that tick is to be flown; `ahead` [ns]: the tick of the newest reference.
+    Between `begin` and `advance`, `output` is the mission's output at this tick, and `flying` is
+    whether the controllers fly its reference. `ahead` [ns]: the tick of the newest reference.
     """
 
     def __init__(self, mission: Mission, timing: Timing) -> None:
@@ -37,24 +36,24 @@ class MissionStage:
 
     @property
     def output(self) -> MissionOutput:
-        """What the mission has decided; see `MissionOutput`."""
+        """The newest output of the mission; see `MissionOutput`."""
         return self.mission.output
 
     def autopilot(
         self, stamp: int, connected: bool, armed_since: int | None, round_trip: float | None
     ) -> None:
-        """Take the bridge's report of the tick `stamp` [ns]; it counts from the next tick on.
+        """Take the bridge's report of the tick `stamp` [ns]; it is used from the next tick on.
 
-        armed_since [ns]: the tick at which the autopilot was first known armed, None while it is
-        not; round_trip [s]: how long its answers take, None where not known.
+        armed_since [ns]: the first tick at which the autopilot was reported armed, None while it is
+        not armed; round_trip [s]: response time of the autopilot, None if not measured.
         """
         trip = math.nan if round_trip is None else round_trip
         self._told.append((stamp, connected, armed_since, trip))
 
     def begin(self, stamp: int, state: np.ndarray) -> bool:
-        """Begin the tick `stamp` [ns] with its state (3, SIZE).
+        """Start the tick `stamp` [ns] with its state (3, 6 + n), see `coordinates`.
 
-        Returns whether its reference had to be made now, at the first tick or after a gap.
+        Returns whether the reference of this tick was computed now: at the first tick, after a gap.
         """
         while self._told and self._told[0][0] < stamp:
             told, connected, since, round_trip = self._told.popleft()
@@ -68,7 +67,10 @@ class MissionStage:
         return True
 
     def advance(self, stamp: int, state: np.ndarray) -> None:
-        """Make the reference of the tick after `stamp` [ns], with what `begin` was told."""
+        """Compute the reference of the tick after `stamp` [ns], with the inputs of `begin`.
+
+        state: (3, 6 + n) of the tick `stamp`.
+        """
         self._step(stamp + self.period, state)
 
     def _step(self, stamp: int, state: np.ndarray) -> None:
@@ -77,10 +79,10 @@ class MissionStage:
         self.ahead = stamp
 
     def _is_flown(self, stamp: int, output: MissionOutput) -> bool:
-        """Whether the reference is to be flown: in a failsafe, until the bridge is told of it.
+        """Whether the controllers fly the reference; in failsafe, until the bridge has the status.
 
-        The bridge ignores commands then. Idle commands that come before it is told would mean that
-        the vehicle stands on the ground, and low in the air they would switch its motors off.
+        In a failsafe the bridge ignores commands. Idle commands mean that the vehicle is on the
+        ground. If they arrived before the status, they would switch off the motors at low height.
         """
         if output.flying:
             self._flown = stamp

@@ -1,7 +1,8 @@
-"""Stage: what the supervisor is told besides state and reference, looked at 50 times a second.
+"""Stage: inputs of the supervisor besides state and reference, read 50 times a second.
 
-Messages come more often than the limits need them. The newest of each kind is kept as it came and
-read at a look. Ages go by stamps, so that the delay of a message does not matter.
+Messages arrive more often than the limits need them. This stage keeps the newest message of each
+kind and reads it at the next reading. Ages are differences of stamps, so the delay of a message
+has no effect.
 """
 
 from __future__ import annotations
@@ -11,29 +12,29 @@ from collections.abc import Callable
 from uam_control.stamps import seconds
 from uam_control.supervision import Inputs, Readings
 
-LOOK_PERIOD = 20_000_000  # [ns] of stamps between two looks
+LOOK_PERIOD = 20_000_000  # [ns] of stamps between two readings
 
 
 class SupervisorInputs:
-    """Keeps messages until the next look; `readings`: as of the last tick, see `Readings`."""
+    """Keeps messages until the next reading; `readings`: of the last tick, see `Readings`."""
 
     def __init__(self, control_period: float) -> None:
-        """control_period [s]: of ticks."""
+        """control_period [s]: time between two ticks."""
         self.inputs = Inputs(control_period)
         self.readings = Readings()
         self._kept: dict[str, tuple[Callable[..., None], tuple, int]] = {}
         self._looked = -LOOK_PERIOD
 
     def keep(self, name: str, read: Callable[..., None], message: tuple, answers: int = -1) -> None:
-        """Keep the newest message of `name`; the next look calls read(*message).
+        """Keep the newest message of `name`; the next reading calls read(*message).
 
-        answers [ns]: the tick that the message answers. It counts from the tick after that one on,
-        because another process may or may not be as fast as the look of that tick.
+        answers [ns]: the tick of which the message is a result. It is used from the next tick on:
+        the message of another process may arrive before or after the reading of the same tick.
         """
         self._kept[name] = read, message, answers
 
     def tick(self, stamp: int) -> Readings:
-        """Return what is known at the tick `stamp` [ns]; the object is reused."""
+        """Return the readings at the tick `stamp` [ns]; the next call reuses the object."""
         if stamp - self._looked >= LOOK_PERIOD or stamp < self._looked:
             self._looked = stamp
             kept, self._kept = self._kept, {}

@@ -1,4 +1,4 @@
-"""The control period as the stages see it: from stamp to stamp."""
+"""The control period, and time steps from stamp to stamp."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from uam_control.stamps import SECOND, seconds
 
 @dataclass(frozen=True)
 class Timing(ParameterSet):
-    """When control ticks come."""
+    """Parameters of the control ticks."""
 
     control_period: float = number(0.004, "time between two control ticks", "s", 1e-4, 0.1)
 
@@ -25,8 +25,8 @@ class Ticks:
     def step(self, stamp: int) -> float:
         """Return the time since the last tick [s].
 
-        One control period at the first tick, and after a gap of more than ten or a step back in
-        time: nothing may be integrated over what was not seen.
+        Returns one control period at the first tick, after a gap of more than ten periods and after
+        a step back in time: the laws must not integrate over a time without samples.
         """
         gap = self.period if self._last is None else stamp - self._last
         self._last = stamp
