@@ -81,7 +81,10 @@ class ControllerNode(UamNode):
         self.done_tick(stamp, begun)
 
     def tick(self, stamp: int, *values) -> None:
-        """Run the law for `stamp` [ns] and publish the command; values: one per input topic."""
+        """Run the law for `stamp` [ns] and publish the command.
+
+        values: one per input topic; arrays as in the `update` of the stage.
+        """
         raise NotImplementedError
 
     def _warm_up(self, spare: LawStage) -> None:
