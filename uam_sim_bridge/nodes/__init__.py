@@ -1,1 +1,1 @@
-"""ROS 2 nodes of the simulation: plant, MAVLink bridge, recorder."""
+"""ROS 2 nodes of the simulation: plant and MAVLink bridge."""

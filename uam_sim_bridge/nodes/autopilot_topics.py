@@ -1,4 +1,4 @@
-"""What the bridge tells of the autopilot: /uam/autopilot/state, /uam/autopilot/battery, the log."""
+"""Reports of the autopilot: /uam/autopilot/state, /uam/autopilot/battery, log lines."""
 
 from __future__ import annotations
 
@@ -19,22 +19,22 @@ class AutopilotTopics:
         self._logger, self._link = node.get_logger(), link
         self._state = node.publisher(topics.AUTOPILOT_STATE)
         self._battery = node.publisher(topics.AUTOPILOT_BATTERY)
-        self._told: AutopilotReport | None = None
-        self._battery_told = -BATTERY_PERIOD
+        self._last: AutopilotReport | None = None
+        self._battery_stamp = -BATTERY_PERIOD
         self._warned: tuple[str, ...] = ()
 
-    def tell(self, stamp: int, report: AutopilotReport | None) -> None:
-        """Publish and log what is due at `stamp` [ns]; report: None where none is due."""
-        self._tell_battery(stamp)
-        self._tell_warnings()
+    def publish(self, stamp: int, report: AutopilotReport | None) -> None:
+        """Publish and log at `stamp` [ns]; report: None if none is due."""
+        self._publish_battery(stamp)
+        self._log_warnings()
         if report is None:
             return
-        if report.differs(self._told):
+        if report.differs(self._last):
             armed = "armed" if report.armed else "disarmed"
-            heard = "" if report.connected else ", no heartbeat"
-            text = f"{report.phase.value}; autopilot {report.mode.name}, {armed}{heard}"
+            lost = "" if report.connected else ", no heartbeat"
+            text = f"{report.phase.value}; autopilot {report.mode.name}, {armed}{lost}"
             self._logger.info("; ".join((text, *report.reasons)))
-        self._told = report
+        self._last = report
         state = AutopilotState(
             report.connected,
             report.mode.name,
@@ -45,13 +45,13 @@ class AutopilotTopics:
         )
         self._state.publish(state.to_message(stamp))
 
-    def _tell_battery(self, stamp: int) -> None:
+    def _publish_battery(self, stamp: int) -> None:
         battery = self._link.vitals.battery
-        if battery is not None and stamp - self._battery_told >= BATTERY_PERIOD:
-            self._battery_told = stamp
+        if battery is not None and stamp - self._battery_stamp >= BATTERY_PERIOD:
+            self._battery_stamp = stamp
             self._battery.publish(battery_message(stamp, battery))
 
-    def _tell_warnings(self) -> None:
+    def _log_warnings(self) -> None:
         warnings = self._link.warnings
         for warning in warnings:
             if warning not in self._warned:

@@ -1,4 +1,4 @@
-"""The bridge's links: to the autopilot, and to a ground station that watches."""
+"""The bridge's links: to the autopilot, and to a ground station."""
 
 from __future__ import annotations
 
@@ -23,11 +23,11 @@ from uam_sim_bridge.ports import PortError
 
 @dataclass(frozen=True)
 class BridgeParameters(ParameterSet):
-    """Ports and rates of the bridge; fixed once the node runs."""
+    """Ports and times of the bridge; they cannot change while the node runs."""
 
     clock: str = choice(
         "lockstep",
-        "lockstep: ticks alone; realtime: a watchdog on wall time as well",
+        "lockstep: only ticks; realtime: also a watchdog on wall time",
         ("lockstep", "realtime"),
     )
     local_port: float = number(14540, "own UDP port (14540 + instance)", "1", 1, 65535)
@@ -43,13 +43,13 @@ class BridgeParameters(ParameterSet):
         ("warn", "adopt"),
     )
     stale_after: float = number(
-        0.1, "time without a command, after which they count as lost", "s", 0.01, 5.0
+        0.1, "time without a command after which commands count as lost", "s", 0.01, 5.0
     )
 
 
 @dataclass(frozen=True)
 class Links:
-    """What was opened; station, faulty: None if not configured."""
+    """The open links; station, faulty: None if not configured."""
 
     autopilot: OffboardLink
     station: GroundStation | None
@@ -62,13 +62,13 @@ def open_links(
     sequence: OffboardSequence,
     mapping: RateThrustParameters,
 ) -> Links:
-    """Declare the parameters that name links, and open them.
+    """Declare the parameters of the links, and open the links.
 
     Raises PortError, FaultError in one line.
     """
     system = int(options.autopilot_system)
     about = ParameterDescriptor(
-        description="address of the autopilot's UDP port, where `autopilot` names no link",
+        description="host of the autopilot's UDP port, used if `autopilot` is empty",
         read_only=True,
     )
     host = node.declare_parameter("autopilot_host", "127.0.0.1", about).value
@@ -78,19 +78,18 @@ def open_links(
         "link to the autopilot, in place of the UDP port: "
         "udp:HOST:PORT[:LOCAL_PORT], tcp:HOST:PORT or serial:DEVICE:BAUD",
     )
-    watching = _text(node, "gcs", "ground station that watches: udp:HOST:PORT[:LOCAL_PORT]")
+    watching = _text(node, "gcs", "link to a ground station: udp:HOST:PORT[:LOCAL_PORT]")
     key = _text(
         node,
         "signing_key",
-        "MAVLink 2 signing: 64 hex digits, or a file that holds them; read as 'set' from outside",
+        "MAVLink 2 signing: 64 hex digits, or a file with them; shown as 'set'",
         secret=True,
     )
     signing = Signing.from_text(key, int(options.signing_link_id))
     planned = _text(
         node,
         "faults",
-        "JSON, faults of the MAVLink connection and when they come, see docs/faults.md; "
-        "empty = none",
+        "JSON, faults of the MAVLink connection with their times, see docs/faults.md; empty = none",
     )
     faults = Schedule.from_text(planned).only(LINK)
     transport: Transport
@@ -109,9 +108,9 @@ def open_links(
 
 
 def _text(node: TunableNode, name: str, description: str, secret: bool = False) -> str:
-    """Declare a read-only text, '' by default, and return it; a secret one is not shown.
+    """Declare a read-only text parameter, '' by default, and return it; a secret is not shown.
 
-    Raises PortError where something else is given, such as a key that reads as a number.
+    Raises PortError if the value is not a text, for example a key that YAML reads as a number.
     """
     value = given(node).get(name, "")
     if not isinstance(value, str):

@@ -12,14 +12,14 @@ from uam_sim_bridge.faults.timeline import FaultState
 
 
 class FaultTopic:
-    """Publishes what came and went."""
+    """Publishes the beginning and end of faults."""
 
     def __init__(self, node: Node):
         topic = topics.FAULTS
         self._publisher = node.create_publisher(topic.type, topic.name, topic.qos)
 
-    def tell(self, stamp: int, changed: Iterable[FaultState]) -> None:
-        """Publish the events of the moment `stamp` [ns]."""
+    def publish(self, stamp: int, changed: Iterable[FaultState]) -> None:
+        """Publish the events at `stamp` [ns]."""
         for one in changed:
             fault = one.fault
             event = FaultEvent(fault.NAME, fault.PLACE, one.number, one.active, fault.values)

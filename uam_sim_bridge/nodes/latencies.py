@@ -1,4 +1,4 @@
-"""How long setpoints take from the IMU sample that they answer, in real time."""
+"""Latency from an IMU sample to its setpoint, in real time."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ DEADLINE_TICKS = 3  # [control periods] 12 ms, about a rotor's time constant
 
 
 class Latencies:
-    """Notes when samples were published and when their setpoints were sent, in `statistics`."""
+    """Measures the time from each sample to its setpoint; the results go to `statistics`."""
 
     def __init__(self, statistics: Statistics, period: float):
         """period: of the control ticks [s]."""
@@ -16,7 +16,7 @@ class Latencies:
         self._unanswered: dict[int, int] = {}  # stamp [ns] → wall time of publication [ns]
 
     def tick(self, stamp: int | None, published: int, setpoints: dict[int, int]) -> None:
-        """Note a tick's sample, None for none, and the setpoints that have arrived.
+        """Register a tick's sample, None for none, and the setpoints that have arrived.
 
         published: wall time [ns]; setpoints: stamp of the sample answered [ns] → wall time [ns].
         """
@@ -34,7 +34,7 @@ class Latencies:
             numbers.missed_ticks += latency > DEADLINE_TICKS * self._period
 
     def conclude(self, now: int) -> None:
-        """Count as missed what was never answered and not on its way any more at `now` [ns]."""
+        """Count unanswered samples as missed if their deadline is over at `now` [ns]."""
         underway = DEADLINE_TICKS * self._period * 1e9
         never = sum(now - sent > underway for sent in self._unanswered.values())
         self._statistics.late_ticks += never

@@ -1,10 +1,10 @@
 """Node: tau_p and tau_q → SET_ATTITUDE_TARGET; OFFBOARD, arming, vision and telemetry over MAVLink.
 
-One tick of `BridgeStage` per stamp at which state, position command and attitude command are there;
-/uam/setpoint repeats what was sent and acknowledges the tick.
+The node runs one tick of `BridgeStage` for each stamp with state, position command and attitude
+command. /uam/setpoint repeats the setpoint that was sent and acknowledges the tick.
 
-Without commands for `stale_after`, by the stamps of the state or, in real time, by the wall clock,
-the stage sends what it has for that.
+After `stale_after` without commands (by the stamps of the state, in real time also by the wall
+clock) the node runs `BridgeStage.without`.
 """
 
 from __future__ import annotations
@@ -58,12 +58,12 @@ from uam_sim_bridge.stages.vision_pacing import VisionParameters
 
 NAME = "mavlink_bridge"
 THRUST_PERIOD = 100_000_000  # ns between two reports of the thrust factor
-LATENCY = 0.05  # s, by which a pose is older than what it is waited for
-WATCH_PERIOD = 0.02  # s between two looks of the real-time watchdog, and its setpoints
+LATENCY = 0.05  # s, latency of sensors: a state or pose may be `stale_after` + LATENCY old
+WATCH_PERIOD = 0.02  # s, period of the real-time watchdog and of its setpoints
 
 
 class Unusable(Enum):
-    """Stands for a message that must not be used."""
+    """Placeholder for an invalid message."""
 
     BAD = 0
 
@@ -133,7 +133,7 @@ class MavlinkBridgeNode(UamNode):
         super().destroy_node()
 
     def _feed(self, topic: topics.Topic, read: Callable[[bytes], tuple[int, object]]) -> None:
-        """Join a topic; a message that must not be used still counts for its stamp."""
+        """Join a topic; an invalid message still counts for its stamp, as BAD."""
 
         def handle(data: bytes) -> None:
             try:
@@ -153,7 +153,7 @@ class MavlinkBridgeNode(UamNode):
     @staticmethod
     def _read_attitude_command(data: bytes) -> tuple[int, tuple[np.ndarray | None]]:
         stamp, torque = read_torque(data)
-        return stamp, (torque,)  # None means "idle" here, but "not there" to the join
+        return stamp, (torque,)  # in a tuple: a torque None is "idle", for the join "missing"
 
     def _on_arming(self, message: Bool) -> None:
         self.stage.arm(bool(message.data))
@@ -176,7 +176,7 @@ class MavlinkBridgeNode(UamNode):
         self.take_waiting(self._arming)
         self.take_waiting(self._mocap)
         self.take_waiting(self._mission)
-        self._hear(stamp)
+        self._begin_tick(stamp)
         self._adopt()
         if state is BAD or position is BAD or torque is BAD:
             setpoint = self.stage.without(stamp)
@@ -184,30 +184,30 @@ class MavlinkBridgeNode(UamNode):
             setpoint = self.stage.tick(
                 stamp, state, position.flying, position.tau, *torque, position.attitude
             )
-        self._tell(stamp)
+        self._end_tick(stamp)
         if stamp // THRUST_PERIOD != self.stamp // THRUST_PERIOD:
             self._factor_writer.position[0] = self.stage.factor
             self._thrust.publish(self._factor_writer.stamped(stamp))
         self._setpoint.publish(self._writer.fill(stamp, *sent(setpoint)))
         self.done_tick(stamp, begun)
 
-    def _hear(self, stamp: int) -> None:
-        """Begin a tick: what the faults left of the autopilot's messages."""
+    def _begin_tick(self, stamp: int) -> None:
+        """Begin a tick: update the faults of the link and receive the autopilot's messages."""
         if self._faulty and self._fault_topic:
-            self._fault_topic.tell(stamp, self._faulty.update(seconds(stamp)))
+            self._fault_topic.publish(stamp, self._faulty.update(seconds(stamp)))
         self.stage.hear(stamp)
 
-    def _tell(self, stamp: int) -> None:
-        """End a tick: to the ground station, and what is known of the autopilot to the topics."""
+    def _end_tick(self, stamp: int) -> None:
+        """End a tick: forward to the ground station, publish the autopilot's state."""
         if self._station is not None:
             self._station.forward()
-        self._autopilot.tell(stamp, self.stage.report)
+        self._autopilot.publish(stamp, self.stage.report)
 
     def _adopt(self) -> None:
-        """Take the autopilot's parameters over where that is wished; never while it is armed."""
+        """Adopt the autopilot's parameters if `autopilot_parameters` is adopt; not while armed."""
         link = self.link
-        wished = self._options.autopilot_parameters == "adopt"
-        if not wished or link.armed or not link.mapping_read:
+        adopting = self._options.autopilot_parameters == "adopt"
+        if not adopting or link.armed or not link.mapping_read:
             return
         old = self.stage.map.parameters
         changes = tuple(differences(old, link.values))
@@ -226,7 +226,7 @@ class MavlinkBridgeNode(UamNode):
             self.get_logger().info(f"adopted from the autopilot: {change}")
 
     def settle(self) -> None:
-        """Act on complete inputs, and on states for which the commands do not come."""
+        """Run ticks with complete inputs, and ticks without commands after `stale_after`."""
         super().settle()
         state = self._join.last_seen[topics.STATE.name]
         if self.ticks == 0 or state is None or state <= self.stamp:
@@ -239,17 +239,17 @@ class MavlinkBridgeNode(UamNode):
             self.done_tick(state, time.perf_counter())
 
     def _watch(self) -> None:
-        """In real time: act when states stop coming."""
+        """Run ticks without commands in real time when states stop arriving."""
         silence = time.monotonic() - self._last_tick
         if self.ticks == 0 or silence < self._options.stale_after:
             return
         self._go_without(self.stamp + round(silence * SECOND))
 
     def _go_without(self, stamp: int) -> Setpoint:
-        """Do what a tick at `stamp` [ns] does, without commands; return the setpoint sent."""
-        self._hear(stamp)
+        """Run a tick at `stamp` [ns] without commands; return the setpoint sent."""
+        self._begin_tick(stamp)
         setpoint = self.stage.without(stamp)
-        self._tell(stamp)
+        self._end_tick(stamp)
         return setpoint
 
     def diagnose(self) -> tuple[bytes, str, dict[str, object]]:
@@ -273,7 +273,7 @@ class MavlinkBridgeNode(UamNode):
         return WARN if notes else OK, summary, values
 
     def _warm_up(self) -> None:
-        """Compile the maths before the flight: a first call takes a second."""
+        """Compile the functions of a tick before the flight: a first call takes a second."""
         spare, zero, level = RateThrustMap(), np.zeros(3), np.array([1.0, 0.0, 0.0, 0.0])
         state = np.zeros((3, len(self._vehicle.coordinates)))
         spare.map(zero, zero, state[0, ATTITUDE], state[1, ATTITUDE])
@@ -285,7 +285,7 @@ class MavlinkBridgeNode(UamNode):
 
 
 def _plain(value: float | tuple[float, ...]) -> float | list[float]:
-    """Return the value as ROS parameters take it."""
+    """Return the value in a type that ROS parameters accept."""
     return list(value) if isinstance(value, tuple) else value
 
 

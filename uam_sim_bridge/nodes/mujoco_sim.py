@@ -1,23 +1,21 @@
 """The plant as a ROS node: physics in place of vehicle, motion capture, IMU and Dynamixels.
 
-Towards ROS it publishes sensors and truth and takes joint efforts and the magnet's switch; towards
-the autopilot it is a simulator that speaks MAVLink over TCP. Two clocks:
+For ROS it publishes sensors and truth, and subscribes to joint efforts and the magnet's switch. For
+the autopilot it is a simulator with MAVLink over TCP. Two clocks:
 
 lockstep  At every control tick the plant waits for the setpoint that the bridge sent for this
           tick's IMU sample, for joint efforts and magnet, and for the autopilot's motor commands.
-          It also waits for a recorder that has fallen far behind, so that nothing is lost.
-          Every wait is bounded in wall time; when one ends, the node says who did not answer.
-          Where a lost node is being started again, ticks go on at the pace of the wall clock
-          without its answers, until all have come in time for a while: the flight is lost or saved
-          as in real time.
-realtime  Ticks begin at absolute deadlines of the wall clock, `control period` apart; after a stall
-          of the machine they follow each other at most CATCH_UP times as fast. What has not arrived
-          by the next deadline is missing, and what was commanded last holds. A control tick counts
-          as missed when its setpoint was never sent, or some control periods after its IMU sample
-          (`latencies.py`). The latency of a tick is the time between these two publications;
-          beyond one control period it counts as late.
-          The bridge publishes /uam/setpoint when it has sent the setpoint to the autopilot, which
-          therefore has it by then.
+          It also waits for a recorder that is far behind, so that no message is lost.
+          Every wait has a limit in wall time; then the node reports which node did not answer.
+          While a lost node is restarted, ticks run at the pace of the wall clock without its
+          answers, until all answers have been in time for IN_TIME ticks (`restart.py`).
+realtime  Ticks begin at absolute deadlines of the wall clock, one control period apart; after a
+          stall of the machine they run at most CATCH_UP times as fast. Without an answer by the
+          next deadline the last command holds. The latency of a tick is the time from the
+          publication of its IMU sample to that of its setpoint. Beyond one control period the tick
+          counts as late. Beyond some periods, or without a setpoint, it counts as missed
+          (`latencies.py`).
+          The bridge publishes /uam/setpoint after it has sent the setpoint to the autopilot.
 """
 
 from __future__ import annotations
@@ -56,20 +54,20 @@ from uam_sim_bridge.patience import Patience
 from uam_sim_bridge.plant import Plant, Samples, Truth, Vehicle
 
 NAME = "mujoco_sim"
-REPORT_INTERVAL = 5.0  # [s] between two lines that say who is waited for
-CATCH_UP = 1.25  # [1] times real time, after a stall of the machine, which had no time to spare
-FOREIGN_WAIT = 1.0  # [s] for a foreign node to find us as well: it does not say when it has
-LAST_WAIT = 3.0  # [s] for a recorder that has not seen the last tick, and may have lost it
-RECORDER_LAG = 2.0  # [s] it tells once a second how far it is, and keeps four times as much
-SERVICE_TICKS = 25  # in real time the parameter services are looked after every so many ticks
+REPORT_INTERVAL = 5.0  # [s] between two log lines with the missing nodes
+CATCH_UP = 1.25  # [1] largest real-time factor after a stall of the machine
+FOREIGN_WAIT = 1.0  # [s] for discovery by foreign nodes, which do not report their connections
+LAST_WAIT = 3.0  # [s] longest wait for the recorder after the last tick
+RECORDER_LAG = 2.0  # [s] the recorder reports its progress each second; its queue is 4 times longer
+SERVICE_TICKS = 25  # [ticks] between two calls of the parameter services in real time
 
 
 class PlantStopped(RuntimeError):
-    """The flight cannot go on; the text is one line and says who did not answer."""
+    """The flight cannot go on; the text is one line and names the node that did not answer."""
 
 
 class NotReady(PlantStopped):
-    """Not everyone came, or found the others."""
+    """Not every node has started, or not all are connected."""
 
 
 class Simulator:
@@ -98,8 +96,8 @@ class Simulator:
         self.statistics = Statistics(options.clock)
         self.health = PlantHealth(node, self.answers, self.statistics)
         self._foreign = tuple(filter(None, options.foreign.split(",")))
-        self._setpoint_is_there = False  # as a rule it is the last answer to arrive
-        self._complete = False  # every kind of sensor has delivered
+        self._setpoint_is_there = False  # usually the last answer to arrive
+        self._complete = False  # every kind of sensor has delivered a sample
         self._stamp: int | None = None  # of this tick's IMU sample [ns]
         self._published = 0  # wall time [ns] of its publication
         self._restart = Restart(options.answer_timeout)
@@ -107,8 +105,8 @@ class Simulator:
         self._begun_at = 0.0  # and simulation time [s]
         self._latencies = Latencies(self.statistics, self.plant.period)
 
-    def wait_for_everyone(self) -> None:
-        """Return when all nodes are connected to each other and the autopilot to us."""
+    def wait_for_nodes(self) -> None:
+        """Return when all nodes are connected to each other, and the autopilot to this node."""
         limit = self.options.start_timeout
         patience, missed = Patience(limit or math.inf), []
         reported, last = -math.inf, []
@@ -119,7 +117,7 @@ class Simulator:
                 break
             self.health.waiting(_listed(waiting))
             now = time.monotonic()
-            if waiting != missed:  # a slow machine gets on, too
+            if waiting != missed:  # progress: a slow machine gets the time again
                 patience, missed = Patience(limit or math.inf), waiting
             if patience.over:
                 raise NotReady(f"no progress for {limit:g} s, waiting for {_listed(waiting)}")
@@ -129,13 +127,13 @@ class Simulator:
         settled = time.monotonic() + (FOREIGN_WAIT if self._foreign else 0.0)
         while time.monotonic() < settled and not self._stop.raised:
             self.executor.spin_once(0.05)
-        print(f"{NAME}: everyone is there", flush=True)
+        print(f"{NAME}: all nodes are connected", flush=True)
 
     def _waiting_for(self) -> list[str]:
         recorded, foreign = self.options.recorded, self._foreign
         wires = wiring.with_foreign(self.node, foreign)
         waiting = wiring.missing(self.node, recorded, wires)
-        if not waiting:  # the ends exist; have they found each other?
+        if not waiting:  # all publishers and subscriptions exist: are they connected?
             plant = of(self.sensors.outlets | self.truth.outlets, self.answers.inlets)
             waiting = list(wiring.unconnected(self.connections, plant, recorded, wires, foreign))
         if not self.hil.accept(0.0):
@@ -143,11 +141,11 @@ class Simulator:
         return waiting
 
     def run(self) -> None:
-        """Fly until the mission is done, the time limit, or SIGINT."""
+        """Run ticks until the mission is done, the time limit, or SIGINT."""
         realtime = self.options.clock == "realtime"
         limit, end = self.options.time_limit or math.inf, math.inf
         gc.collect()
-        gc.freeze()  # what exists now stays; later collections need not look at it
+        gc.freeze()  # existing objects stay: later collections skip them
         begin, settled = time.monotonic(), Settled()
         while not self._stop.raised:
             begun = time.perf_counter()
@@ -162,8 +160,8 @@ class Simulator:
                 self._send_hil(samples, truth)
                 self._receive_hil()
             if self._faulty:
-                told = self.answers
-                self._faulty.mission_at(told.mission_stamp * 1e-9, told.mission.time)
+                answers = self.answers
+                self._faulty.mission_at(answers.mission_stamp * 1e-9, answers.mission.time)
             self.plant.step(self.hil.motors, self.answers.effort, self.answers.magnet)
             self.health.done_tick(begun, self.plant.time)
             if self.answers.mission.done and not self.statistics.ended_by:
@@ -180,45 +178,45 @@ class Simulator:
         else:
             self.statistics.ended_by = "interrupt"
         self.statistics.wall_s = time.monotonic() - begin
-        self._recorder_has_caught_up(0.0, LAST_WAIT)  # what we have published goes when we go
+        self._recorder_has_caught_up(0.0, LAST_WAIT)  # unread messages are lost when the node ends
 
     def _deadline(self, begin: float) -> float:
         """Wall time [s] at which the next tick of a flight begun at `begin` begins.
 
-        After a stall ticks come faster, but not in a burst that nobody could follow.
+        After a stall ticks run faster, but not in a burst: the other nodes could not follow.
         """
         on_time = begin + (self.plant.tick + 1) * self.plant.period
         return max(on_time, self._begun + self.plant.period / CATCH_UP)
 
     def _begin_tick(self) -> tuple[Samples, Truth]:
-        """Publish what is due at this tick."""
+        """Publish the samples and the truth of this tick, and return them."""
         plant = self.plant
         self._begun, self._begun_at = time.monotonic(), plant.time
         now = self.node.stamp = nanoseconds(plant.time)
         self.answers.begin()
         samples, truth = plant.sense(), plant.truth()
         if self._faulty and self._faulty.changed:
-            self._fault_topic.tell(now, self._faulty.changed)
+            self._fault_topic.publish(now, self._faulty.changed)
         self.sensors.clock(now)
-        # Sensors with latency deliver nothing at first. The estimator cannot begin before all have,
-        # and which of the early samples it would have seen by then is chance: they are not sent.
+        # Sensors with latency deliver no sample at first, and the estimator needs all sensors.
+        # Earlier samples are not sent: how many of them it would receive is not reproducible.
         self._complete = self._complete or None not in (samples.imu, samples.joints, samples.mocap)
         self._published = time.time_ns()
         self._stamp = self.sensors.publish(samples) if self._complete else None
-        # Nobody waits for the truth: it goes out while the estimator works.
+        # No node waits for the truth: it is published while the estimator works.
         self.truth.publish(now, truth, self.hil.motors, self.answers.magnet)
         return samples, truth
 
     def _send_hil(self, samples: Samples, truth: Truth) -> None:
-        """Give the autopilot its sensors."""
+        """Send the autopilot its sensor samples."""
         now, gyro, force = samples.hil
         self.hil.send(now, gyro, force, truth.state[0, POSITION], truth.quaternion)
 
     def _receive_hil(self, timeout: float | None = None) -> None:
-        """Take the autopilot's motor commands; timeout [s], None: see HilServer.receive."""
+        """Receive the autopilot's motor commands; timeout [s], None: see HilServer.receive."""
         self.hil.receive(timeout)
         if not self.hil.connected:
-            raise PlantStopped(f"the autopilot hung up at t = {self.plant.time:.3f} s")
+            raise PlantStopped(f"the autopilot closed the link at t = {self.plant.time:.3f} s")
         required = self.options.autopilot_always_answers and timeout is None
         if required and not self.hil.answered:
             raise PlantStopped(
@@ -247,7 +245,7 @@ class Simulator:
         self._restart.tick(complete=not missing)
 
     def _recorder_has_caught_up(self, lag: float, patience: float) -> bool:
-        """Wait until it is not more than `lag` [s] behind what was published; False: it stays so.
+        """Wait until the recorder is at most `lag` [s] behind; return False after `patience`.
 
         patience: longest wait [s of wall time].
         """
@@ -269,7 +267,7 @@ class Simulator:
 
     def _wait_until(self, deadline: float) -> None:
         if self.plant.tick % SERVICE_TICKS == 0:
-            self.answers.take()  # first, so that none of them goes the way without a time
+            self.answers.take()  # before the executor, which would discard their source time
             self.executor.spin_once(0.0)
         left = deadline - time.monotonic()
         if left > 0.0:
@@ -277,12 +275,12 @@ class Simulator:
         self.answers.take()
 
     def _measure(self) -> None:
-        """Note what became of this tick, and of those whose setpoints have arrived."""
+        """Measure the latency of this tick, and of ticks whose setpoints have arrived."""
         self._latencies.tick(self._stamp, self._published, self.answers.setpoints)
         self.answers.setpoints.clear()
 
     def report(self) -> Statistics:
-        """The statistics so far; ticks never answered count, except those still on their way."""
+        """Return the statistics so far; unanswered ticks count once their deadline is over."""
         numbers = self.statistics
         numbers.ticks, numbers.simulated_s = self.plant.tick, self.plant.time
         self._latencies.conclude(self._published)
@@ -290,13 +288,13 @@ class Simulator:
         return numbers
 
     def close(self) -> None:
-        """End the link to the autopilot."""
+        """Close the link to the autopilot."""
         self.hil.close()
         self.executor.shutdown()
 
 
 def _warm_up(spare: Plant) -> None:
-    """Compile what a tick calls, on a plant that is thrown away: a first call takes long."""
+    """Compile the functions of a tick with a spare plant: a first call takes long."""
     for _ in range(10):
         spare.sense()
         spare.truth()
@@ -305,7 +303,7 @@ def _warm_up(spare: Plant) -> None:
 
 
 def _listed(waiting: list[str]) -> str:
-    """The first few of many, and how many more."""
+    """Return the first four as a text, with the number of the others."""
     shown = "; ".join(waiting[:4])
     return shown if len(waiting) <= 4 else f"{shown}; and {len(waiting) - 4} more"
 
@@ -329,7 +327,7 @@ def main() -> int:
         except (ValueError, KeyError, OSError) as error:
             return refuse(NAME, error)
         try:
-            simulator.wait_for_everyone()
+            simulator.wait_for_nodes()
             simulator.run()
         except PlantStopped as error:
             print(f"{NAME}: {error}", file=sys.stderr, flush=True)

@@ -15,10 +15,10 @@ from uam_sim_bridge.nodes.plant_topics import Answers, nanoseconds
 
 
 class PlantHealth:
-    """Says how fast the simulation runs, how long a tick takes, and how old the answers are.
+    """Reports the speed of the simulation, the duration of a tick, and the age of the answers.
 
-    A tick is everything from its sensors to the next state: in lockstep the answers of all nodes,
-    in real time the control period and what it was overrun by.
+    A tick lasts from its sensor samples to the next state: in lockstep until the answers of all
+    nodes, in real time for the control period and its overrun.
     """
 
     def __init__(self, node: Node, answers: Answers, statistics: Statistics):
@@ -30,13 +30,13 @@ class PlantHealth:
         self._missed = 0
         self._last = (time.monotonic(), 0.0)  # wall and simulated time of the last report [s]
 
-    def waiting(self, for_whom: str) -> None:
-        """Before the first tick."""
+    def waiting(self, missing: str) -> None:
+        """Publish before the first tick; missing: the nodes and links that the plant waits for."""
         if self._due():
-            self._publish(0.0, STALE, f"waiting for {for_whom}")
+            self._publish(0.0, STALE, f"waiting for {missing}")
 
     def done_tick(self, begun: float, simulated: float) -> None:
-        """A tick that began at time.perf_counter() `begun` [s] led to `simulated` time [s]."""
+        """Register a tick from time.perf_counter() `begun` [s] on, up to `simulated` time [s]."""
         self._loop.add(begun)
         self._ticks += 1
         if not self._due():

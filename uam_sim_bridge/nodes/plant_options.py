@@ -1,4 +1,4 @@
-"""What the plant node can be told, and what it reports at its end."""
+"""Parameters of the plant node, and the statistics that it writes at its end."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from uam_control.settings.parameter_set import ParameterError
 from uam_control.vehicle import DEFAULT_VEHICLE
 from uam_sim_bridge.plant.engines import DEFAULT_PLANT, PLANTS
 
-NOT_READY = 3  # exit status: not everyone came, or found the others
+NOT_READY = 3  # exit status: not every node has started, or not all are connected
 
 
 @dataclass(frozen=True)
@@ -47,11 +47,11 @@ DESCRIPTIONS = {
     "arm_start": "joint angles on the ground [rad], empty = stowed as described",
     "clock": "lockstep or realtime",
     "hil_port": "TCP port at which the autopilot connects",
-    "autopilot_always_answers": "the stand-in does; PX4 is silent while it boots",
-    "linger": "how long it goes on after the mission, for an autopilot that has to finish [s]",
+    "autopilot_always_answers": "true for the stand-in; false for PX4, which is silent at boot",
+    "linger": "time after the mission, in which the autopilot can land and disarm [s]",
     "recorded": "wait for the recorder as well",
     "foreign": "names of nodes that are not the stack's own, with commas between them",
-    "faults": "JSON, faults of the plant and when they come, see docs/faults.md; empty = none",
+    "faults": "JSON, faults of the plant with their times, see docs/faults.md; empty = none",
     "start_timeout": "longest wait for the other nodes [s] without progress, 0 = for ever",
     "answer_timeout": "longest wait for the answers to a tick [s of wall time]",
     "time_limit": "simulation time at which the flight ends in any case [s], 0 = never",
@@ -75,20 +75,20 @@ def declare(node: Node) -> Options:
 
 @dataclass
 class Statistics:
-    """What the node reports at the end."""
+    """Statistics of the flight, written at the end."""
 
     clock: str
     ticks: int = 0
     simulated_s: float = 0.0
     wall_s: float = 0.0
-    answerable_ticks: int = 0  # realtime: ticks with an IMU sample, which hence want a setpoint
+    answerable_ticks: int = 0  # realtime: ticks with an IMU sample, which require a setpoint
     missed_ticks: int = 0
     late_ticks: int = 0
     late_motor_commands: int = 0
-    latency_s: array[float] = field(default_factory=lambda: array("f"))  # small: for hours
+    latency_s: array[float] = field(default_factory=lambda: array("f"))  # 4 bytes: long flights
     ended_by: str = ""
 
     def to_mapping(self) -> dict[str, object]:
-        """As JSON takes it; latencies to the microsecond."""
+        """Return the values for JSON; latencies rounded to the microsecond."""
         latencies = [round(value, 6) for value in self.latency_s]
         return asdict(replace(self, latency_s=array("f"))) | {"latency_s": latencies}

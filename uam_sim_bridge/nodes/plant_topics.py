@@ -30,7 +30,7 @@ from uam_sim_bridge.plant import Samples, Truth
 
 
 class Outlets:
-    """Publishers by topic, without events, each of which would be waited for again and again."""
+    """Publishers by topic, without event callbacks, which would slow each wait of the executor."""
 
     def __init__(self, node: Node, chosen: tuple[topics.Topic, ...]):
         events = PublisherEventCallbacks(use_default_callbacks=False)
@@ -43,7 +43,7 @@ class Outlets:
 
 
 class Sensors(Outlets):
-    """Publishes /clock and what the sensors deliver."""
+    """Publishes /clock and the sensor samples."""
 
     def __init__(self, node: Node, vehicle: VehicleDescription):
         super().__init__(node, (topics.CLOCK, topics.IMU, topics.JOINTS, topics.MOCAP))
@@ -57,9 +57,9 @@ class Sensors(Outlets):
         self._clock.publish(self._clock_writer.stamped(stamp))
 
     def publish(self, samples: Samples) -> int | None:
-        """Publish what arrived at this tick; returns the IMU's stamp [ns], if it was among it.
+        """Publish the samples of this tick; return the stamp [ns] of the IMU's, None without one.
 
-        The IMU goes last: it is what the estimator's tick begins with.
+        The IMU's is published last: it starts the estimator's tick.
         """
         if samples.mocap is not None:
             time, position, quaternion = samples.mocap
@@ -78,7 +78,7 @@ class Sensors(Outlets):
 
 
 class TruthTopics(Outlets):
-    """Publishes what only a simulator knows; no controller subscribes to it."""
+    """Publishes the true values of the simulation; no controller subscribes to them."""
 
     def __init__(self, node: Node, vehicle: VehicleDescription):
         truth = (topics.TRUTH_STATE, topics.TRUTH_PAYLOAD, topics.TRUTH_ROTORS, topics.TRUTH_MAGNET)
@@ -90,7 +90,10 @@ class TruthTopics(Outlets):
         self._magnet_writer = JointStateWriter(["magnet", "swing"])
 
     def publish(self, stamp: int, truth: Truth, motors: np.ndarray, magnet: bool) -> None:
-        """Publish the truth at this tick [ns]; motors (4,) and magnet as last commanded."""
+        """Publish the truth at `stamp` [ns].
+
+        motors (rotors,): last commands 0..1; magnet: last command.
+        """
         self._state.publish(self._state_writer.fill(stamp, truth.state))
         self._payload.publish(
             self._payload_writer.fill(stamp, truth.payload_position, truth.payload_quaternion)
@@ -105,7 +108,7 @@ class TruthTopics(Outlets):
         self._magnet.publish(writer.stamped(stamp))
 
 
-# Which node to look at first when an answer is missing: the answers' common way leads through it.
+# The node named when answers are missing: the last one that all of them depend on.
 SUSPECTS = {
     frozenset({"setpoint", "effort", "magnet"}): "state_estimator",
     frozenset({"setpoint", "effort"}): "position_controller or mission",
@@ -116,11 +119,11 @@ SUSPECTS = {
 
 
 class Answers:
-    """What the nodes answer to a tick: setpoint sent, joint efforts, magnet; and the mission's end.
+    """Answers of the nodes to a tick: setpoint sent, joint efforts, magnet; state of the mission.
 
-    `effort` (2,) [N m] and `magnet` hold until the next message. `setpoints`: stamp [ns] → wall
-    time [ns] at which the bridge published it; kept only by `take`, for whoever measures latency
-    to take out.
+    `effort` (n,) [N m] and `magnet` hold until the next message. `setpoints`: stamp [ns] → wall
+    time [ns] of the bridge's publication; filled only by `take`, cleared after the measurement of
+    the latency.
     """
 
     def __init__(self, node: Node, vehicle: VehicleDescription):
@@ -149,16 +152,16 @@ class Answers:
         }
 
     def begin(self) -> None:
-        """Forget what has arrived, at the beginning of a tick."""
+        """Begin a tick: clear the set of received answers."""
         self._arrived.clear()
 
     def missing(self, stamp: int) -> frozenset[str]:
-        """Answers that the tick of `stamp` [ns] still lacks."""
+        """Return the missing answers to the tick of `stamp` [ns]."""
         lacking = {"effort", "magnet"} - self._arrived
         return frozenset(lacking | {"setpoint"} if self._setpoint_stamp < stamp else lacking)
 
     def take(self) -> None:
-        """Take every message that is there, without waiting."""
+        """Take every message in the queues, without waiting."""
         for subscription in self.inlets.values():
             take = subscription.handle.take_message
             while (taken := take(subscription.msg_type, subscription.raw)) is not None:

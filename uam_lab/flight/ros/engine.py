@@ -155,7 +155,7 @@ def _process_faults(
     def announce(one: FaultState) -> None:
         stage = f"begins at {one.begin:.2f} s" if one.active else f"ends at {one.end:.2f} s"
         progress.message(f"fault {one.fault.NAME} of {one.fault.values['node']} {stage}")
-        topic.tell(listener.stamp, [one])
+        topic.publish(listener.stamp, [one])
 
     return ProcessFaults(children, schedule, announce)
 
