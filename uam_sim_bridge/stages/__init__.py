@@ -1,1 +1,1 @@
-"""The stages of a control tick that talk to the autopilot, and the whole tick."""
+"""The stages of a control tick on the autopilot's side, and the whole tick."""

@@ -1,4 +1,4 @@
-"""What the bridge needs of an autopilot, whatever is between them.
+"""The interface between the bridge and an autopilot.
 
 | port | used by |
 |---|---|
@@ -17,10 +17,10 @@ from uam_sim_bridge.mavlink.protocol.modes import Mode
 
 
 class AutopilotPort(Protocol):
-    """The autopilot's newest report, and the way to it.
+    """The autopilot's latest reported state, and the messages to it.
 
-    All times are those of control ticks [s]. What is sent at a tick is answered at the next one,
-    at the earliest.
+    All times are those of control ticks [s]. The answer to a message arrives one tick later at the
+    earliest.
     """
 
     armed: bool
@@ -29,20 +29,20 @@ class AutopilotPort(Protocol):
     armed_since: float | None  # [s] tick at which it was first known armed; None while it is not
 
     def connected(self, time: float) -> bool:
-        """Whether a heartbeat came within the last seconds."""
+        """Whether the last heartbeat is younger than HEARTBEAT_TIMEOUT at `time` [s]."""
         ...
 
     @property
     def round_trip(self) -> float | None:
-        """How long its answers take [s], the quickest of late; None where not known."""
+        """Shortest round trip [s] of the latest messages; None if unknown."""
         ...
 
     def poll(self, time: float) -> None:
-        """Take everything that has arrived, at the tick `time` [s]."""
+        """Receive the messages that have arrived by the tick `time` [s]."""
         ...
 
     def tick(self, time: float) -> None:
-        """Send what is due besides vision and setpoint: heartbeat and the sequence's requests."""
+        """Send the heartbeat and the sequence's requests that are due at `time` [s]."""
         ...
 
     def send_vision(
@@ -53,7 +53,7 @@ class AutopilotPort(Protocol):
         position_deviation: float,
         attitude_deviation: float,
     ) -> None:
-        """Send a pose exposed at `stamp` [s]: position (3,) [m, ENU], FLU → ENU [w x y z].
+        """Send a pose of `stamp` [s]: position (3,) [m, ENU], quaternion (4,) [w x y z], FLU → ENU.
 
         Deviations: standard deviations [m], [rad].
         """

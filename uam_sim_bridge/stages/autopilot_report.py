@@ -1,4 +1,4 @@
-"""What the bridge tells of the autopilot, and when: on a change and five times a second."""
+"""The bridge's report of the autopilot: due on a change and five times a second."""
 
 from __future__ import annotations
 
@@ -13,10 +13,10 @@ REPORT_PERIOD = 200_000_000  # [ns]
 
 
 class AutopilotReport(NamedTuple):
-    """The autopilot as known at a tick.
+    """The autopilot's state as received by a tick.
 
-    armed_since [ns]: tick at which it was first known armed, None while it is not; reasons: why it
-    is not armed or has left OFFBOARD; round_trip [s]: None where not known.
+    armed_since [ns]: first tick with an armed autopilot, None while disarmed; reasons: against
+    arming, or for leaving OFFBOARD; round_trip [s]: None if unknown.
     """
 
     connected: bool
@@ -28,12 +28,12 @@ class AutopilotReport(NamedTuple):
     round_trip: float | None = None
 
     def differs(self, other: AutopilotReport | None) -> bool:
-        """Whether more than numbers differ from `other`."""
+        """Whether a field other than `armed_since` and `round_trip` differs from `other`."""
         return other is None or self[:5] != other[:5]
 
 
 class AutopilotReports:
-    """Says when a report is due. `last`: the newest report that was due."""
+    """Makes the reports when they are due. `last`: the newest one."""
 
     def __init__(self, autopilot: AutopilotPort, sequence: OffboardSequence) -> None:
         self._autopilot, self._sequence = autopilot, sequence

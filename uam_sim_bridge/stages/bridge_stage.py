@@ -47,7 +47,7 @@ class BridgeSets:
 
     @classmethod
     def of(cls, vehicle: VehicleDescription, section: Mapping[str, Any]) -> Self:
-        """Those of a vehicle, with what a profile's section mavlink_bridge says otherwise."""
+        """Return the sets of a vehicle, overridden by a profile's section mavlink_bridge."""
         return cls(
             RateThrustParameters.of(vehicle, section),
             HoldParameters.among(section),
@@ -60,8 +60,8 @@ class BridgeSets:
 class BridgeStage:
     """The bridge between control laws and autopilot. All stamps in [ns].
 
-    `factor`: thrust factor that the last setpoint was made with; `report`: what is to be told of
-    the autopilot after the last tick, None where nothing is due.
+    `factor`: thrust factor used for the last setpoint; `report`: the report of the autopilot due
+    after the last tick, None if none is due.
     """
 
     def __init__(
@@ -73,7 +73,7 @@ class BridgeStage:
         fresh: float = math.inf,
         say: Callable[[str, str | None], None] = silent,
     ) -> None:
-        """sequence: the one that `autopilot` was made with; fresh, say: see `SetpointSource`."""
+        """sequence: the one of `autopilot`; fresh, say: see `SetpointSource`."""
         self.autopilot, self.sequence = autopilot, sequence
         self.map = RateThrustMap(sets.mapping, vehicle)
         self.identification = ThrustIdentification(sets.identification)
@@ -84,9 +84,9 @@ class BridgeStage:
         self.factor = 1.0
 
     def mocap(self, stamp: int, position: np.ndarray, quaternion: np.ndarray) -> None:
-        """Take a pose: position (3,) [m, ENU], quaternion (4,) [w x y z] FLU → ENU.
+        """Handle a pose: position (3,) [m, ENU], quaternion (4,) [w x y z], FLU → ENU.
 
-        Neither the autopilot nor the level hold uses a frozen tracker.
+        In flight the poses of a frozen tracker are discarded.
         """
         if self._vision.take(seconds(stamp), position, quaternion, self.autopilot.armed):
             self.source.note_pose(seconds(stamp), quaternion)
@@ -119,8 +119,8 @@ class BridgeStage:
     ) -> Setpoint:
         """Send the setpoint of a tick with commands, and return it; None: none was sent.
 
-        state (3, SIZE); flying: whether tau_p (3,) [N, ENU] is to be flown; tau_q (3,) [N m, FLU],
-        None for idle; attitude (3, 3): of the position law, see `Desired`.
+        state (3, 6 + n); flying: whether tau_p (3,) [N, ENU] is valid; tau_q (3,) [N m, FLU], None
+        for idle; attitude (3, 3): of the position law, see `Desired`.
         """
         now, situation = seconds(stamp), self._situation
         setpoint = self.source.commanded(now, state, flying, tau_p, tau_q, attitude, situation)
@@ -137,7 +137,7 @@ class BridgeStage:
         return setpoint
 
     def without(self, stamp: int) -> Setpoint:
-        """Send the setpoint of a tick without usable commands, and return it."""
+        """Send the setpoint of a tick without valid commands, and return it."""
         now = seconds(stamp)
         setpoint = self.source.without(now, self._situation)
         self._send(now, setpoint)
@@ -151,7 +151,7 @@ class BridgeStage:
         return Situation(autopilot.armed, autopilot.landed, self.sequence.let_go)
 
     def _send(self, now: float, setpoint: Setpoint) -> None:
-        """Send what is due at `now` [s]: heartbeat and requests, vision, setpoint."""
+        """Send the messages due at `now` [s]: heartbeat and requests, vision, setpoint."""
         autopilot = self.autopilot
         autopilot.tick(now)
         self._vision.send(autopilot)

@@ -1,4 +1,4 @@
-"""One control tick, from sensor samples to the autopilot's setpoint: the stages in their order.
+"""One control tick, from sensor samples to the autopilot's setpoint: all stages in order.
 
 STAGES at the end of this file is the block diagram. The direct engine calls `ControlTick.tick`. In
 a flight over ROS each stage runs in a node of its own, and the signals are topics.
@@ -32,9 +32,9 @@ Imu = tuple[int, np.ndarray, np.ndarray]  # stamp, gyro (3,) [rad/s], specific f
 
 @dataclass
 class Signals:
-    """What runs between the stages at one tick. The next tick writes the same arrays again.
+    """The signals between the stages at one tick. The next tick overwrites the same arrays.
 
-    SIZE stands for 6 + n with an arm of n joints.
+    SIZE is 6 + n for an arm of n joints.
     """
 
     # estimator
@@ -58,7 +58,7 @@ class Signals:
     phase: str = ""
     # bridge
     setpoint: Setpoint = None  # as sent to the autopilot; None: no setpoint was sent
-    thrust_factor: float = 1.0  # that the setpoint was made with
+    thrust_factor: float = 1.0  # used for the setpoint
 
     @classmethod
     def at_rest(cls, joints: int) -> Self:
@@ -106,17 +106,17 @@ class ControlTick:
     def tick(
         self, mocap: Pose | None = None, joints: Joints | None = None, imu: Imu | None = None
     ) -> bool:
-        """Run one tick on what has arrived; all stamps in [ns].
+        """Run one tick with the samples that have arrived; all stamps in [ns].
 
-        Returns False at a blind tick, one without an IMU sample or before every sensor has
-        delivered: the samples are taken, the other signals stay as they were.
+        Returns False without an IMU sample, or before every sensor has delivered one: the samples
+        are stored, the other signals do not change.
         """
         signals = self.signals
         signals.mocap, signals.joints, signals.imu = mocap, joints, imu
         return all(stage(self) for _, stage in self.stages)
 
     def insert(self, before: str, name: str, stage: Stage) -> None:
-        """Insert a stage before the one of the name `before`; raises ValueError without it."""
+        """Insert a stage before the stage `before`; raises ValueError if it does not exist."""
         names = [name for name, _ in self.stages]
         self.stages.insert(names.index(before), (name, stage))
 

@@ -1,4 +1,4 @@
-"""Which poses of the motion capture go to the autopilot's estimator, and how often."""
+"""Selection and rate of the mocap poses sent to the autopilot's estimator."""
 
 from __future__ import annotations
 
@@ -17,18 +17,17 @@ class VisionParameters(ParameterSet):
 
     vision_interval: float = number(0.02, "least time between two vision poses sent", "s", 0.0, 1.0)
     vision_position_deviation: float = number(
-        0.005, "standard deviation told with a vision pose", "m", 1e-4, 1.0
+        0.005, "standard deviation sent with a vision pose", "m", 1e-4, 1.0
     )
     vision_attitude_deviation: float = number(
-        0.02, "standard deviation told with a vision pose", "rad", 1e-4, 1.0
+        0.02, "standard deviation sent with a vision pose", "rad", 1e-4, 1.0
     )
 
 
 class VisionPacing:
-    """Keeps the newest pose and sends it when the interval has passed.
+    """Stores the newest pose and sends it when the interval has passed.
 
-    An EKF gains nothing from more than 50 poses a second (30 to 50 Hz is what PX4 recommends), and
-    a slow serial line has no room for them.
+    PX4 recommends 30 to 50 Hz: a higher rate does not improve its EKF and loads a serial line.
     """
 
     def __init__(self, parameters: VisionParameters) -> None:
@@ -40,9 +39,10 @@ class VisionPacing:
     def take(
         self, exposed: float, position: np.ndarray, quaternion: np.ndarray, armed: bool
     ) -> bool:
-        """Take a pose exposed at `exposed` [s]; whether it is used.
+        """Store a pose of `exposed` [s]; return whether it is used.
 
-        In flight (`armed`) a pose that repeats the one before is not: the tracker is frozen.
+        position (3,) [m, ENU]; quaternion (4,) [w x y z], FLU → ENU. In flight (`armed`) a pose
+        equal to the one before is discarded: the tracker is frozen.
         """
         if self._repeats(position, quaternion) and armed:
             return False
