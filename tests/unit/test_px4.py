@@ -114,7 +114,7 @@ def test_nothing_is_left_but_the_logs(build, tmp_path, signum):
         ]
     )[0]
     seen = (folder / "seen").read_text()
-    assert "PX4_PARAM_THR_MDL_FAC=0.3" in seen and "MC_ROLL_P" not in seen
+    assert "PX4_PARAM_THR_MDL_FAC=0.3" in seen and "PX4_PARAM_MC_ROLL_P=99" not in seen
     assert f"arguments -i 7 -d {build / 'etc'}" in _until(output.read_text)
     px4 = psutil.Process(process.pid).children()
     process.send_signal(signum)
