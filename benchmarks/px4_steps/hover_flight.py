@@ -153,14 +153,15 @@ class HoverFlight:
         plant, state, dt = self.plant, self._state, self.plant.period
         samples = plant.sense()
         now = plant.time
-        plant.write_truth_state(state)
+        truth = plant.truth()
+        state[:] = truth.state
         rates = state[1, ATTITUDE].copy()
-        quaternion = plant.truth().quaternion
+        quaternion = truth.quaternion
         self._link.poll(now)
         tau_p = self._position.update(state, self._reference, self._flying, dt)
-        asked = self._position.attitude_reference
-        tau_q = self._attitude.update(state, self._reference, asked, self._flying, dt)
-        effort = self._arm.update(state, self._reference, asked, self._flying, dt)
+        desired = self._position.attitude_reference
+        tau_q = self._attitude.update(state, self._reference, desired, self._flying, dt)
+        effort = self._arm.update(state, self._reference, desired, self._flying, dt)
         setpoint = self._setpoint
         setpoint[:] = 0.0
         if self._flying:

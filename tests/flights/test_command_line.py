@@ -43,8 +43,12 @@ TRAJECTORIES = [
     (f"{CSV_HEAD}\n{ROW.format(t=0)}\n", "at least two rows", ""),
     (f"{CSV_HEAD}\n{ROW.format(t=0)}\n{ROW.format(t='nan')}\n", "line 3 column t", "finite"),
     (f"{CSV_HEAD}\n{ROW.format(t=1)}\n{ROW.format(t=0.5)}\n", "line 3 column t", "increase"),
-    (f"{CSV_HEAD},alpha_1\n{ROW.format(t=0)},0\n", "line 1: alpha_1", "two joints"),
-    (f"{CSV_HEAD},alpha_1,alpha_2,alpha_3\n", "column alpha_3", "two joints"),
+    (
+        f"{CSV_HEAD},alpha_1\n{ROW.format(t=0)},0\n",
+        "line 1: alpha_1",
+        "s500_arm has: alpha_1",
+    ),
+    (f"{CSV_HEAD},alpha_1,alpha_2,alpha_3\n", "column alpha_3", "s500_arm has: alpha_1"),
 ]
 PROFILES = [
     ("position_controller: [1, 2\n", "line 2 column 1: not valid YAML", ""),

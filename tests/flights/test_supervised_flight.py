@@ -17,7 +17,7 @@ from uam_sim_bridge.plant import Vehicle
 
 def flight(scenario="pick_and_place", payload=0.2, **mission):
     profile = load_profile("s500")
-    changed = dataclasses.replace(profile.sets["mission"], **mission).validated()
+    changed = dataclasses.replace(profile.sets["mission"], **mission).validated(axes=2)
     profile = dataclasses.replace(profile, sets=profile.sets | {"mission": changed})
     return DirectFlight(load_scenario(scenario), profile, Vehicle.load(), payload, seed=1)
 

@@ -72,7 +72,7 @@ def with_weight(profile: Profile, other: Profile) -> Profile:
     """Return the profile with the gravity feedforward of `other`, without which it cannot lift."""
     name = "gravity_feedforward_mass"
     sections = copy.deepcopy(profile.sections)
-    sections[POSITION][name] = other.sections[POSITION][name]
+    sections[POSITION][name] = getattr(other.sets[POSITION], name)
     return profile_of(sections, Path(f"{profile.name}_weight.yaml"))
 
 
