@@ -52,6 +52,11 @@ class JoinedAutopilot:
         """None: without a link there is no round trip."""
         return None
 
+    @property
+    def motors(self) -> np.ndarray:
+        """Motor commands (n,) 0..1 of the last cycle; rewritten by the next one."""
+        return self.autopilot.motors
+
     def connected(self, time: float) -> bool:
         """Whether the last heartbeat is younger than HEARTBEAT_TIMEOUT at `time` [s]."""
         return time - self._received_at < HEARTBEAT_TIMEOUT

@@ -13,7 +13,7 @@ from typing import Self
 import numpy as np
 
 from uam_control.control.controllers import ArmController, AttitudeController, PositionController
-from uam_control.coordinates import coordinates
+from uam_control.coordinates import ARM, coordinates
 from uam_control.mission import Mission, Scenario
 from uam_control.settings.parameter_set import ParameterSet
 from uam_control.stages.estimator_stage import EstimatorStage
@@ -96,6 +96,7 @@ class ControlTick:
         self.attitude = TorqueStage(AttitudeController(sets["attitude_controller"]), timing)
         self.arm = TorqueStage(ArmController(sets["arm_controller"]), timing)
         self.bridge = bridge
+        self.level = np.zeros((3, 3))  # attitude reference while there is none
         self.laws: dict[str, LawStage] = {
             "position": self.position,
             "attitude": self.attitude,
@@ -156,9 +157,9 @@ def fly_mission(tick: ControlTick) -> bool:
     s, mission = tick.signals, tick.mission
     mission.begin(s.stamp, s.state)
     output = mission.output
-    s.reference[:] = (
-        output.reference
-    )  # the mission's own array is the next tick's, see `look_ahead`
+    # a copy, as `look_ahead` writes the next one; on the ground only the arm has a reference
+    commanded = slice(None) if mission.flying else ARM
+    s.reference[:, commanded] = output.reference[:, commanded]
     s.flying, s.magnet = mission.flying, output.magnet
     s.time, s.phase = output.time, output.phase
     tick.bridge.arm(output.arm)
@@ -173,7 +174,7 @@ def control_position(tick: ControlTick) -> bool:
     """state, reference → tau_p, attitude reference."""
     s, stage = tick.signals, tick.position
     s.tau_p = stage.update(s.stamp, s.state, s.reference, s.flying)
-    s.attitude_reference = stage.attitude_reference
+    s.attitude_reference = stage.attitude_reference if s.flying else tick.level
     return _tell_gains(tick, "position", stage)
 
 

@@ -10,8 +10,6 @@ from collections import deque
 from collections.abc import Callable
 from typing import Any
 
-import numpy as np
-
 from uam_control.mission import Mission, Scenario
 from uam_control.mission.time_limit import DISARMED, Settled, time_limit
 from uam_control.profiles.profile import Profile
@@ -121,16 +119,16 @@ class DirectFlight:
     def tick(self) -> None:
         """One control period of the whole vehicle."""
         plant, control, autopilot = self.plant, self.control, self.autopilot
+        signals = control.signals
         now, samples = plant.time, plant.sense()
-        self._truths.append(Snapshot.of(plant))
+        self._truths.append(Snapshot.of(plant, autopilot.motors, signals.magnet))
         autopilot.begin(now)
         seen = control.tick(*self._delivered(samples))
         motors = autopilot.update(*samples.hil)
-        signals = control.signals
-        if not seen:
-            self._record_blind(motors)
+        if seen:
+            self._record(signals)
         else:
-            self._record(signals, motors)
+            self._record_blind()
         plant.step(motors, signals.tau_alpha, signals.magnet)
 
     def _delivered(self, samples: Samples) -> tuple[Pose | None, Joints | None, Imu | None]:
@@ -144,7 +142,7 @@ class DirectFlight:
             return None, None, None
         return _stamped(mocap), _stamped(joints), _stamped(imu)
 
-    def _record(self, signals: Signals, motors: np.ndarray) -> None:
+    def _record(self, signals: Signals) -> None:
         """Write a tick's row."""
         truth = self._truth_at(seconds(signals.stamp))
         row = self.recording.next_row(signals.phase)
@@ -163,23 +161,23 @@ class DirectFlight:
             thrust,
             self._gains,
             self._gain_columns,
-            motors,
+            truth.motors,
             truth.thrust,
             truth.payload_pose,
             self._places,
         )
-        record_switches(row, signals.magnet, truth, signals.thrust_factor, self._places)
+        record_switches(row, truth, signals.thrust_factor, self._places)
         self._lag = len(self._truths)
 
-    def _record_blind(self, motors: np.ndarray) -> None:
-        """Write the row of a tick without an IMU sample: truth and motors go on."""
+    def _record_blind(self) -> None:
+        """Write the row of a tick without an IMU sample: the truth goes on."""
         if self.recording.count and len(self._truths) > self._lag:
             truth = self._truths.popleft()
             last = self.recording.count - 1
             row = self.recording.next_row(self.mission.output.phase)
             row[:] = self.recording.values[last]
             row[0] += self.plant.period
-            record_blind(row, truth, motors, self._places)
+            record_blind(row, truth, self._places)
 
     def _update_faults(self, control: ControlTick) -> bool:
         """Stage: tell plant and link the mission's time; where there are faults."""

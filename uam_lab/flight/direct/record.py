@@ -43,7 +43,10 @@ class Places(NamedTuple):
 
 
 class Snapshot(NamedTuple):
-    """The truth of one tick, at plant time [s]; see `plant.Truth`."""
+    """The truth of one tick, at plant time [s]; see `plant.Truth`.
+
+    motors (n,), magnet: the commands in force then, which are those of the tick before.
+    """
 
     time: float
     state: np.ndarray
@@ -51,10 +54,12 @@ class Snapshot(NamedTuple):
     payload_pose: np.ndarray
     magnet_force: float
     magnet_swing: float
+    motors: np.ndarray
+    magnet: bool
 
     @classmethod
-    def of(cls, plant: Plant) -> Snapshot:
-        """A copy of what is true now."""
+    def of(cls, plant: Plant, motors: np.ndarray, magnet: bool) -> Snapshot:
+        """A copy of what is true now; motors, magnet: as commanded at the last tick."""
         truth = plant.truth()
         return cls(
             plant.time,
@@ -63,6 +68,8 @@ class Snapshot(NamedTuple):
             np.concatenate((truth.payload_position, truth.payload_quaternion)),
             truth.magnet_force,
             truth.magnet_swing,
+            motors.copy(),
+            magnet,
         )
 
 
@@ -116,20 +123,17 @@ def record(
             row[columns[i]] = values[i]
 
 
-def record_switches(
-    row: np.ndarray, magnet: bool, truth: Snapshot, factor: float, at: Places
-) -> None:
-    """Write the rest of a tick: the magnet as commanded and as it is, the thrust factor."""
-    row[at.magnet] = magnet
-    row[at.magnet + 1 : at.magnet + 3] = truth.magnet_force, truth.magnet_swing
+def record_switches(row: np.ndarray, truth: Snapshot, factor: float, at: Places) -> None:
+    """Write the rest of a tick: the magnet's command, force and swing; the thrust factor."""
+    row[at.magnet : at.magnet + 3] = truth.magnet, truth.magnet_force, truth.magnet_swing
     row[at.factor] = factor
 
 
-def record_blind(row: np.ndarray, truth: Snapshot, motors: np.ndarray, at: Places) -> None:
-    """A tick without an IMU sample into a copy of the row before: truth and motors go on."""
-    rotors = len(motors)
+def record_blind(row: np.ndarray, truth: Snapshot, at: Places) -> None:
+    """Write a tick without an IMU sample into a copy of the row before: the truth goes on."""
+    rotors = len(truth.motors)
     row[at.truth : at.truth + truth.state.size] = truth.state.ravel()
-    row[at.command : at.command + rotors] = motors
+    row[at.command : at.command + rotors] = truth.motors
     row[at.thrust : at.thrust + rotors] = truth.thrust
     row[at.payload : at.payload + 7] = truth.payload_pose
-    row[at.magnet + 1 : at.magnet + 3] = truth.magnet_force, truth.magnet_swing
+    row[at.magnet : at.magnet + 3] = truth.magnet, truth.magnet_force, truth.magnet_swing
