@@ -8,6 +8,7 @@ newest pose, the setpoint, and compares the thrust with the acceleration. `witho
 from __future__ import annotations
 
 import math
+from collections import deque
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any, Self
@@ -33,6 +34,10 @@ from uam_sim_bridge.mavlink.offboard.thrust_identification import (
 from uam_sim_bridge.stages.autopilot_port import AutopilotPort
 from uam_sim_bridge.stages.autopilot_report import AutopilotReport, AutopilotReports
 from uam_sim_bridge.stages.vision_pacing import VisionPacing, VisionParameters
+
+# The mission's status comes from another process. It counts from a stamp on by which it has arrived
+# everywhere, so that a lockstep flight is the same every time.
+STATUS_DELAY = 10_000_000  # [ns]
 
 
 @dataclass(frozen=True)
@@ -80,6 +85,7 @@ class BridgeStage:
         self.source = SetpointSource(self.map, sets.hold, sets.setpoint.type, fresh, say)
         self._vision = VisionPacing(sets.vision)
         self._reports = AutopilotReports(autopilot, sequence)
+        self._failsafe: deque[tuple[int, bool]] = deque()
         self.report: AutopilotReport | None = None
         self.factor = 1.0
 
@@ -96,17 +102,24 @@ class BridgeStage:
         self.sequence.set_desired(arm)
 
     def mission(self, stamp: int, magnet: bool, failsafe: bool) -> None:
-        """Take the mission's status: the magnet, and whether the autopilot's failsafe is to act."""
+        """Take the mission's status: the magnet, and whether the autopilot's failsafe is to act.
+
+        Both count a little later, see STATUS_DELAY.
+        """
         self.identification.switch(seconds(stamp), magnet)
-        self.sequence.let_go = failsafe
+        if self._failsafe and stamp < self._failsafe[-1][0]:  # a clock that began anew
+            self._failsafe.clear()
+        self._failsafe.append((stamp, failsafe))
 
     def note_state(self, stamp: int, state: np.ndarray) -> None:
         """Take an estimate (3, SIZE), also where no tick follows; it is kept, not copied."""
         self.source.note_state(seconds(stamp), state)
 
     def hear(self, stamp: int) -> None:
-        """Take what the autopilot has sent."""
+        """Take what the autopilot has sent, and the mission's status that counts by now."""
         self.autopilot.poll(seconds(stamp))
+        while self._failsafe and self._failsafe[0][0] <= stamp - STATUS_DELAY:
+            self.sequence.let_go = self._failsafe.popleft()[1]
 
     def tick(
         self,
