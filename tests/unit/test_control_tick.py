@@ -1,0 +1,198 @@
+"""One control tick: the order of its stages, ticks without samples, gaps, and who tells whom."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from uam_control.coordinates import ARM
+from uam_control.mission import load_scenario
+from uam_control.profiles.profile import load_profile
+from uam_control.stages.timing import Timing
+from uam_control.vehicle import load_description
+from uam_sim_bridge.mavlink.offboard.sequence import OffboardSequence, Request
+from uam_sim_bridge.mavlink.protocol.modes import Mode
+from uam_sim_bridge.stages.bridge_stage import BridgeSets, BridgeStage
+from uam_sim_bridge.stages.control_tick import STAGES, ControlTick
+
+PERIOD = 4_000_000  # [ns]
+LEVEL = np.array([1.0, 0.0, 0.0, 0.0])
+REST, WEIGHT = np.zeros(3), np.array([0.0, 0.0, 9.81])
+LOW = np.array([0.0, 0.0, 0.2])
+
+
+class Port:
+    """An autopilot that does at once what it is asked for, and keeps what it was sent."""
+
+    def __init__(self, sequence):
+        self.sequence = sequence
+        self.armed, self.mode, self.landed, self.armed_since = False, Mode.HOLD, True, None
+        self.round_trip = 0.01
+        self.poses, self.setpoints = [], []
+
+    def connected(self, time):
+        return True
+
+    def poll(self, time):
+        pass
+
+    def tick(self, time):
+        request = self.sequence.update(time, True, self.armed, self.mode)
+        if request is Request.OFFBOARD:
+            self.mode = Mode.OFFBOARD
+        elif request is not None:
+            self.armed = request is Request.ARM
+            self.armed_since = time if self.armed else None
+
+    def send_vision(self, stamp, position, quaternion, *deviations):
+        self.poses.append(stamp)
+
+    def send_setpoint(self, setpoint, time):
+        self.setpoints.append((time, setpoint))
+
+
+class Rig:
+    """A control tick on a vehicle that stands still."""
+
+    def __init__(self):
+        vehicle = load_description()
+        sequence = OffboardSequence()
+        self.port = Port(sequence)
+        bridge = BridgeStage(BridgeSets.of(vehicle, {}), vehicle, self.port, sequence)
+        sets = load_profile("s500").sets
+        self.control = ControlTick(load_scenario("hover"), sets, bridge, Timing())
+        self.signals = self.control.signals
+        self.stamp = 0
+        start = self.control.mission.mission.scenario.arm_start
+        self.angles = np.array(start)
+
+    def tick(self, mocap=True, joints=True, imu=True, noise=1e-6):
+        """One tick; every pose differs a little, as a tracker's do."""
+        stamp, moved = self.stamp, LOW + noise * self.stamp / PERIOD
+        zero = np.zeros(len(self.angles))
+        self.stamp += PERIOD
+        return self.control.tick(
+            (stamp, moved, LEVEL) if mocap else None,
+            (stamp, self.angles, zero, zero) if joints else None,
+            (stamp, REST, WEIGHT) if imu else None,
+        )
+
+    def run(self, seconds, **samples):
+        for _ in range(round(seconds / 0.004)):
+            self.tick(**samples)
+
+
+def test_the_stages_are_those_of_the_block_diagram():
+    assert [name for name, _ in STAGES] == [
+        "listeners of the sensors",
+        "estimator",
+        "mission",
+        "position law",
+        "attitude law",
+        "arm law",
+        "bridge",
+        "next reference",
+    ]
+
+
+def test_a_further_stage_comes_before_the_one_named():
+    rig, seen = Rig(), []
+    rig.control.insert("bridge", "probe", lambda tick: not seen.append(tick.signals.stamp))
+    assert [name for name, _ in rig.control.stages][5:8] == ["arm law", "probe", "bridge"]
+    assert len(STAGES) == 8
+    rig.tick()
+    assert seen == [0]
+    with pytest.raises(ValueError, match="nothing"):
+        rig.control.insert("nothing", "probe", lambda tick: True)
+
+
+def test_ticks_before_every_sensor_has_delivered_are_blind():
+    rig = Rig()
+    assert not rig.tick(joints=False)
+    assert not rig.tick(mocap=False, joints=False)
+    assert rig.signals.stamp == -1 and rig.port.setpoints == []
+    assert rig.tick()
+    assert rig.signals.stamp == 2 * PERIOD
+
+
+def test_a_blind_tick_leaves_the_signals_and_takes_the_samples():
+    rig = Rig()
+    rig.tick()
+    kept = rig.signals.state.copy(), rig.signals.stamp, len(rig.port.setpoints)
+    assert not rig.tick(imu=False)
+    assert np.array_equal(rig.signals.state, kept[0])
+    assert (rig.signals.stamp, len(rig.port.setpoints)) == kept[1:]
+    rig.run(0.02)
+    assert rig.control.mission.inputs.readings.mocap_age < 0.02
+
+
+def test_after_a_gap_the_reference_is_that_of_the_tick():
+    rig = Rig()
+    rig.run(2.5)
+    mission = rig.control.mission
+    assert rig.signals.flying and mission.ahead == rig.stamp
+    for _ in range(5):
+        rig.tick(imu=False)
+    assert rig.tick()
+    takeoff = mission.ahead - PERIOD - round(rig.signals.time * 1e9)
+    assert rig.signals.stamp == rig.stamp - PERIOD
+    assert takeoff == pytest.approx(mission.mission.changes[0].stamp * 1e9, abs=1e3)
+    assert mission.inputs.readings.missed_ticks == 5.0
+
+
+def test_on_the_ground_only_the_arm_has_a_reference_and_torques():
+    rig = Rig()
+    start = rig.angles
+    rig.angles = start + 0.01
+    rig.tick()
+    s = rig.signals
+    assert not s.flying and s.setpoint.thrust == 0.0
+    assert np.array_equal(s.reference[0, ARM], start)
+    assert not s.reference[:, : ARM.start].any() and not s.attitude_reference.any()
+    assert not s.tau_p.any() and not s.tau_q.any() and s.tau_alpha.any()
+
+
+def test_it_takes_off_by_the_autopilots_report_of_the_tick_before():
+    rig = Rig()
+    while not rig.port.armed:
+        rig.tick()
+    armed = rig.signals.stamp
+    assert rig.port.armed_since == armed * 1e-9
+    delay = rig.control.mission.mission._parameters.takeoff_delay
+    while not rig.signals.flying:
+        rig.tick()
+    assert rig.signals.stamp * 1e-9 == pytest.approx(armed * 1e-9 + max(delay, 0.008), abs=1e-9)
+    assert rig.signals.tau_p[2] > 0.0 and rig.signals.setpoint.thrust > 0.0
+
+
+def test_poses_go_to_the_autopilot_at_most_every_20_ms():
+    rig = Rig()
+    rig.run(1.0)
+    assert np.diff(rig.port.poses) == pytest.approx(np.full(49, 0.02))
+
+
+def test_a_frozen_tracker_is_sent_until_armed_and_not_in_flight():
+    rig = Rig()
+    rig.run(0.2, noise=0.0)
+    assert len(rig.port.poses) == 10
+    rig.port.armed = True
+    rig.run(0.2, noise=0.0)
+    assert len(rig.port.poses) == 10
+
+
+def test_the_supervisor_sees_gains_sensors_and_the_link():
+    rig = Rig()
+    rig.run(0.1)
+    readings = rig.control.mission.inputs.readings
+    assert readings.round_trip == 0.01 and readings.autopilot_age < 0.21
+    assert readings.controller_age <= 0.04 and readings.joint_age <= 0.02
+    assert readings.gains[2] == pytest.approx(max_gain(rig), rel=0.5)
+    assert not math.isnan(readings.mocap_age)
+
+
+def max_gain(rig):
+    law = rig.control.laws["arm"].controller
+    watched = [i for i, name in enumerate(law.names) if name.startswith(("K", "zeta"))]
+    return np.abs(law.adaptation[watched]).max()

@@ -1,0 +1,147 @@
+"""The stages of a control tick by themselves."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from uam_control.estimation import EstimatorParameters
+from uam_control.mission import Mission, load_scenario
+from uam_control.profiles.profile import load_profile
+from uam_control.stages.estimator_stage import EstimatorStage
+from uam_control.stages.mission_stage import MissionStage
+from uam_control.stages.supervisor_inputs import SupervisorInputs
+from uam_control.stages.timing import Ticks, Timing
+from uam_control.stamps import nanoseconds, seconds
+from uam_sim_bridge.autopilot.core import Autopilot
+from uam_sim_bridge.autopilot.joined import JoinedAutopilot
+from uam_sim_bridge.mavlink.offboard.sequence import OffboardSequence, Phase
+from uam_sim_bridge.mavlink.protocol.attitude_target import AttitudeTarget
+from uam_sim_bridge.mavlink.protocol.modes import Mode
+
+MS = 1_000_000  # [ns]
+PERIOD = 4 * MS
+LEVEL = np.array([1.0, 0.0, 0.0, 0.0])
+REST, WEIGHT = np.zeros(3), np.array([0.0, 0.0, 9.81])
+
+
+def test_stamps_are_whole_microseconds_and_exact_seconds():
+    assert nanoseconds(3 * 0.004) == 12_000_000  # 3 * 0.004 is not 0.012
+    assert seconds(12_000_000) == 0.012
+
+
+def test_time_steps_are_one_period_after_a_long_gap_or_a_step_back():
+    ticks = Ticks(Timing())
+    steps = [ticks.step(stamp * MS) for stamp in (100, 104, 112, 152, 196, 100, 104)]
+    assert steps == [0.004, 0.004, 0.008, 0.04, 0.004, 0.004, 0.004]
+
+
+def test_the_estimator_refuses_a_stamp_that_does_not_follow():
+    stage = EstimatorStage(EstimatorParameters(), joints=2)
+    assert stage.imu(0, REST, WEIGHT) is None  # no pose and no joints yet
+    stage.mocap(0, REST, LEVEL)
+    stage.joints(0, np.zeros(2), np.zeros(2))
+    assert stage.imu(PERIOD, REST, WEIGHT).shape == (3, 8)
+    with pytest.raises(ValueError, match="IMU stamp 4000000 ns does not follow 4000000 ns"):
+        stage.imu(PERIOD, REST, WEIGHT)
+
+
+def test_the_newest_message_is_read_every_20_ms():
+    inputs, read = SupervisorInputs(0.004), []
+    for stamp in range(0, 48 * MS, PERIOD):
+        inputs.keep("mocap", read.append, (stamp // MS,))
+        inputs.tick(stamp)
+    assert read == [0, 20, 40]
+
+
+def test_an_answer_to_a_tick_counts_from_the_next_tick_on():
+    inputs, read = SupervisorInputs(0.004), []
+    inputs.tick(0)
+    inputs.keep("gains", read.append, ("of 20 ms",), answers=20 * MS)
+    inputs.tick(20 * MS)
+    assert read == []
+    inputs.tick(40 * MS)
+    assert read == ["of 20 ms"]
+
+
+def mission_stage():
+    parameters = load_profile("s500").sets["mission"]
+    return MissionStage(Mission(load_scenario("hover"), parameters), Timing())
+
+
+def test_the_mission_makes_the_reference_of_the_next_tick():
+    stage, state = mission_stage(), np.zeros((3, 8))
+    assert stage.begin(0, state)  # the first one has to be made
+    stage.advance(0, state)
+    assert stage.ahead == PERIOD
+    assert not stage.begin(PERIOD, state)
+    stage.advance(PERIOD, state)
+    assert stage.begin(5 * PERIOD, state)  # after a gap as well
+    assert stage.ahead == 5 * PERIOD
+
+
+def test_a_report_of_the_autopilot_counts_from_the_next_tick_on():
+    stage, state = mission_stage(), np.zeros((3, 8))
+    stage.autopilot(0, True, 0, 0.01)
+    stage.begin(0, state)
+    assert np.isnan(stage.inputs.readings.autopilot_age)
+    stage.begin(PERIOD, state)
+    assert stage.inputs.readings.autopilot_age == 0.004
+    assert stage.inputs.readings.round_trip == 0.01
+
+
+class Joined:
+    """A joined autopilot at rest, tick by tick, poses coming in."""
+
+    def __init__(self):
+        self.sequence = OffboardSequence()
+        self.port = JoinedAutopilot(Autopilot(), self.sequence)
+        self.sequence.set_desired(True)
+        self.ticks = 0
+
+    def run(self, seconds):
+        for _ in range(round(seconds / 0.004)):
+            time, port = 0.004 * self.ticks, self.port
+            port.begin(time)
+            port.poll(time)
+            port.tick(time)
+            if self.ticks % 5 == 0:
+                port.send_vision(time, 1e-6 * self.ticks * np.ones(3), LEVEL, 0.01, 0.01)
+            port.send_setpoint(AttitudeTarget.of_rates(REST, 0.0), time)
+            port.update(time, REST, WEIGHT)
+            self.ticks += 1
+
+
+def test_what_the_joined_autopilot_does_is_known_a_tick_later():
+    rig = Joined()
+    while not rig.port.autopilot.commander.armed:
+        rig.run(0.004)
+    assert not rig.port.armed and rig.sequence.phase is Phase.ARMING
+    rig.run(0.004)
+    assert rig.port.armed and rig.port.mode is Mode.OFFBOARD
+    assert rig.port.armed_since == pytest.approx(0.004 * (rig.ticks - 1))
+    assert rig.sequence.phase is Phase.FLYING
+
+
+def test_heartbeats_that_are_lost_are_missed_after_3_s_and_a_change_is_told_by_the_next():
+    rig = Joined()
+    rig.run(2.0)
+    assert rig.port.connected(2.0) and rig.port.armed
+    rig.port.receives = lambda: False
+    rig.port.autopilot.commander.armed = False
+    rig.run(1.9)
+    assert rig.port.armed and rig.port.connected(0.004 * rig.ticks)
+    rig.run(1.2)
+    assert not rig.port.connected(0.004 * rig.ticks)
+    rig.port.receives = lambda: True
+    rig.run(1.1)
+    assert not rig.port.armed and rig.port.connected(0.004 * rig.ticks)
+
+
+def test_nothing_passes_a_cut():
+    rig = Joined()
+    rig.port.passes = lambda: False
+    rig.run(2.5)
+    autopilot = rig.port.autopilot
+    assert not autopilot.commander.streaming(2.5) and not autopilot.commander.armed
+    assert rig.sequence.phase is Phase.OFFBOARD
