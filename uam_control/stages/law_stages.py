@@ -26,12 +26,13 @@ class LawStage:
         self.controller = controller
         self.gains_due = False
         self._ticks = Ticks(timing)
-        self._stamp = 0
+        self._period = 0  # number of the gains' period that the last tick was in
 
     def _step(self, stamp: int) -> float:
         """Start the tick `stamp` and return its time step [s]."""
-        self.gains_due = stamp // GAINS_PERIOD != self._stamp // GAINS_PERIOD
-        self._stamp = stamp
+        period = stamp // GAINS_PERIOD
+        self.gains_due = period != self._period
+        self._period = period
         return self._ticks.step(stamp)
 
 

@@ -9,6 +9,8 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
+import numpy as np
+
 from uam_control.stamps import seconds
 from uam_control.supervision import Inputs, Readings
 
@@ -32,6 +34,16 @@ class SupervisorInputs:
         the message of another process may arrive before or after the reading of the same tick.
         """
         self._kept[name] = read, message, answers
+
+    def mocap(self, stamp: int, position: np.ndarray, quaternion: np.ndarray) -> None:
+        """Read a pose of `stamp` [ns]: position (3,) [m, ENU], quaternion (4,) [w x y z]."""
+        self.inputs.mocap(seconds(stamp), position, quaternion)
+
+    def joints(
+        self, stamp: int, alpha: np.ndarray, alpha_dot: np.ndarray, effort: np.ndarray
+    ) -> None:
+        """Read the joints at `stamp` [ns]; of alpha, alpha_dot, effort (n,) only effort [N m]."""
+        self.inputs.joints(seconds(stamp), effort)
 
     def tick(self, stamp: int) -> Readings:
         """Return the readings at the tick `stamp` [ns]; the next call reuses the object."""

@@ -20,6 +20,7 @@ class Ticks:
 
     def __init__(self, timing: Timing) -> None:
         self.period = round(timing.control_period * SECOND)
+        self._step = seconds(self.period)
         self._last: int | None = None
 
     def step(self, stamp: int) -> float:
@@ -28,6 +29,7 @@ class Ticks:
         Returns one control period at the first tick, after a gap of more than ten periods and after
         a step back in time: the laws must not integrate over a time without samples.
         """
-        gap = self.period if self._last is None else stamp - self._last
-        self._last = stamp
-        return seconds(gap if 0 < gap <= 10 * self.period else self.period)
+        last, self._last = self._last, stamp
+        if last is None or not 0 < stamp - last <= 10 * self.period:
+            return self._step
+        return seconds(stamp - last)

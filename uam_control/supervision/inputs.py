@@ -71,8 +71,10 @@ class Inputs:
         key = tuple(names)
         if key not in self._watched:
             self._watched[key] = [i for i, n in enumerate(names) if n.startswith(WATCHED)]
-        watched = self._watched[key]
-        largest = float(np.max(np.abs(values[watched]))) if watched else math.nan
+        gains = values.tolist()
+        watched = [abs(gains[i]) for i in self._watched[key]]
+        known = watched and not math.isnan(sum(watched))
+        largest = max(watched) if known else math.nan
         self._readings.gains[SUBSYSTEMS.index(subsystem)] = largest
         self._controllers[subsystem] = stamp
 

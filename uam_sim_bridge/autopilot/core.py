@@ -8,7 +8,7 @@ allocation, thrust model) with attitude loop, commander, land detector and estim
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -51,8 +51,7 @@ FARTHEST_VISION = 1e5  # m
 SHORTEST_STEP, LONGEST_STEP = 0.000125, 0.02  # s, bounds of the time step (PX4)
 
 
-@dataclass(frozen=True)
-class AutopilotStatus:
+class AutopilotStatus(NamedTuple):
     """State of the autopilot as reported to a companion computer."""
 
     armed: bool

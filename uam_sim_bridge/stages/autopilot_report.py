@@ -38,6 +38,7 @@ class AutopilotReports:
     def __init__(self, autopilot: AutopilotPort, sequence: OffboardSequence) -> None:
         self._autopilot, self._sequence = autopilot, sequence
         self._due = -1  # [ns]
+        self._reported: tuple | None = None  # what a change of brings a report
         self.last: AutopilotReport | None = None
 
     def due(self, stamp: int) -> AutopilotReport | None:
@@ -45,10 +46,10 @@ class AutopilotReports:
         autopilot, sequence = self._autopilot, self._sequence
         connected = autopilot.connected(seconds(stamp))
         what = (connected, autopilot.mode, autopilot.armed, sequence.phase, sequence.reasons)
-        if self.last is not None and self.last[:5] == what and stamp < self._due:
+        if what == self._reported and stamp < self._due:
             return None
         since = autopilot.armed_since
-        self._due = stamp + REPORT_PERIOD
+        self._due, self._reported = stamp + REPORT_PERIOD, what
         self.last = AutopilotReport(
             *what, None if since is None else nanoseconds(since), autopilot.round_trip
         )

@@ -114,7 +114,10 @@ class ControlTick:
         """
         signals = self.signals
         signals.mocap, signals.joints, signals.imu = mocap, joints, imu
-        return all(stage(self) for _, stage in self.stages)
+        for _, stage in self.stages:
+            if not stage(self):
+                return False
+        return True
 
     def insert(self, before: str, name: str, stage: Stage) -> None:
         """Insert a stage before the stage `before`; raises ValueError if it does not exist."""
@@ -129,12 +132,10 @@ def listen(tick: ControlTick) -> bool:
     """mocap, joints → the supervisor's inputs; mocap → the autopilot's estimator."""
     s, inputs = tick.signals, tick.mission.inputs
     if s.mocap is not None:
-        stamp, *pose = s.mocap
-        inputs.keep("mocap", inputs.inputs.mocap, (seconds(stamp), *pose))
+        inputs.keep("mocap", inputs.mocap, s.mocap)
         tick.bridge.mocap(*s.mocap)
     if s.joints is not None:
-        stamp, _, _, effort = s.joints
-        inputs.keep("joints", inputs.inputs.joints, (seconds(stamp), effort))
+        inputs.keep("joints", inputs.joints, s.joints)
     return True
 
 
@@ -158,8 +159,10 @@ def fly_mission(tick: ControlTick) -> bool:
     mission.begin(s.stamp, s.state)
     output = mission.output
     # a copy, as `look_ahead` writes the next one; on the ground only the arm has a reference
-    commanded = slice(None) if mission.flying else ARM
-    s.reference[:, commanded] = output.reference[:, commanded]
+    if mission.flying:
+        s.reference[:] = output.reference
+    else:
+        s.reference[:, ARM] = output.reference[:, ARM]
     s.flying, s.magnet = mission.flying, output.magnet
     s.time, s.phase = output.time, output.phase
     tick.bridge.arm(output.arm)
