@@ -5,9 +5,10 @@ from collections.abc import Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from mcap.exceptions import EndOfFile, InvalidMagic
+from mcap.exceptions import EndOfFile
 from mcap.records import Channel, DataEnd, McapRecord, Message, Metadata, Schema
-from mcap.stream_reader import StreamReader
+from mcap.stream_reader import MAGIC_SIZE, StreamReader
+from mcap.writer import MCAP0_MAGIC
 
 
 class UnreadableLog(ValueError):
@@ -56,12 +57,13 @@ def read_metadata(path: Path) -> dict[str, dict[str, str]]:
 def _records(path: Path, emit_chunks: bool = False) -> Iterator[McapRecord]:
     """Yield the complete records before the index; emit_chunks: do not unpack chunks."""
     with path.open("rb") as stream:
+        if stream.read(MAGIC_SIZE) != MCAP0_MAGIC:  # a shorter file, too
+            raise UnreadableLog(f"{path} is not an MCAP file")
+        stream.seek(0)
         try:
             for record in StreamReader(stream, emit_chunks=emit_chunks).records:
                 if isinstance(record, DataEnd):
                     return
                 yield record
-        except InvalidMagic:
-            raise UnreadableLog(f"{path} is not an MCAP file") from None
         except (EndOfFile, struct.error):  # the log was cut off here
             return
