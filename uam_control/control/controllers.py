@@ -146,7 +146,7 @@ class TorqueController(Controller):
         super().set_parameters(parameters)
         self._torque_max = np.array(parameters.torque_max)
 
-    def _torque(
+    def update(
         self,
         state: np.ndarray,
         reference: np.ndarray,
@@ -154,6 +154,11 @@ class TorqueController(Controller):
         flying: bool,
         dt: float,
     ) -> np.ndarray:
+        """Return the torque (n,) [N m], one per axis of the subsystem.
+
+        state, reference: (3, 6 + n), see `coordinates`; attitude_reference: (3, 3) of the position
+        controller, same tick, see `AttitudeReference.value`; dt [s].
+        """
         tau = self._law_output(state, reference, attitude_reference, flying, dt)
         self.saturated = limit_torque(tau, self._torque_max, self._tau)
         return self._tau
@@ -174,31 +179,16 @@ class AttitudeController(TorqueController):
     ) -> np.ndarray:
         """Return tau_q (3,) [N m, FLU]; while not flying, return zero and reset the law.
 
-        state, reference: (3, 6 + n), see `coordinates`; attitude_reference: (3, 3) of the position
-        controller, same tick, see `AttitudeReference.value`; dt [s].
+        Arguments as in `TorqueController.update`.
         """
         if not flying:
             self._idle()
             self._tau[:] = 0.0
             return self._tau
-        return self._torque(state, reference, attitude_reference, True, dt)
+        return super().update(state, reference, attitude_reference, True, dt)
 
 
 class ArmController(TorqueController):
-    """tau_alpha, eq. (25), ct3; it also runs on the ground."""
+    """tau_alpha (n,) [N m], eq. (25), ct3, one torque per joint; it also runs on the ground."""
 
     columns = ARM
-
-    def update(
-        self,
-        state: np.ndarray,
-        reference: np.ndarray,
-        attitude_reference: np.ndarray,
-        flying: bool,
-        dt: float,
-    ) -> np.ndarray:
-        """Return tau_alpha (n,) [N m], one torque per joint.
-
-        Arguments as in `AttitudeController.update`.
-        """
-        return self._torque(state, reference, attitude_reference, flying, dt)
