@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from uam_control.laws.law import GainGroup, Law
+from uam_control.laws.law import GainGroup, Law, LawInputs
 from uam_control.laws.law_parameters import LawParameters, structured
 from uam_control.maths.compiled import jit
 from uam_control.settings.parameter_set import HUGE, TINY, choice, vector
@@ -26,26 +26,17 @@ class PidParameters(LawParameters):
     kappa: tuple = vector((0.5,), "kappa, gain on the integral of e", "1/s^3", 0.0, HUGE)
 
     def record(self) -> np.ndarray:
-        """See `LawParameters.record`."""
         names = ("inertia", "lambda_1", "lambda_2", "kappa")
         return structured({name: getattr(self, name) for name in names})
 
 
 @jit
 def pid_step(
-    record: np.ndarray,
-    e: np.ndarray,
-    e_dot: np.ndarray,
-    acceleration_d: np.ndarray,
-    norms: np.ndarray,
-    saturated: bool,
-    frozen: bool,
-    dt: float,
-    adaptation: np.ndarray,
-    tau: np.ndarray,
+    record: np.ndarray, inputs: LawInputs, adaptation: np.ndarray, tau: np.ndarray
 ) -> None:
     """One tick of PID: writes tau (n,) and advances adaptation (n,), the integral of e."""
     p = record[0]
+    e, e_dot, acceleration_d, norms, saturated, frozen, dt = inputs
     for i in range(len(tau)):
         feedback = p.lambda_1[i] * e[i] + p.lambda_2[i] * e_dot[i] + p.kappa[i] * adaptation[i]
         tau[i] = p.inertia[i] * (acceleration_d[i] - feedback)
@@ -62,7 +53,6 @@ class PidLaw(Law):
 
     @classmethod
     def gain_groups(cls, axes: int) -> tuple[GainGroup, ...]:
-        """See `Law.gain_groups`."""
         names = tuple(f"Z{i}" for i in range(1, axes + 1))
         return (GainGroup("$\\int e$", names, "z", signed=True),)
 

@@ -136,6 +136,8 @@ class PositionController(Controller):
 class TorqueController(Controller):
     """Base for tau_q and tau_alpha: the law's output within the torque limits."""
 
+    on_ground = False  # whether the law also runs while not flying
+
     def __init__(self, parameters: TorqueLimits) -> None:
         super().__init__(parameters)
         self._tau = np.zeros(len(parameters.torque_max))
@@ -156,39 +158,27 @@ class TorqueController(Controller):
     ) -> np.ndarray:
         """Return the torque (n,) [N m], one per axis of the subsystem.
 
-        state, reference: (3, 6 + n), see `coordinates`; attitude_reference: (3, 3) of the position
+        While not flying, return zero and reset the law, unless it runs `on_ground`. state,
+        reference: (3, 6 + n), see `coordinates`; attitude_reference: (3, 3) of the position
         controller, same tick, see `AttitudeReference.value`; dt [s].
         """
+        if not (flying or self.on_ground):
+            self._idle()
+            self._tau[:] = 0.0
+            return self._tau
         tau = self._law_output(state, reference, attitude_reference, flying, dt)
         self.saturated = limit_torque(tau, self._torque_max, self._tau)
         return self._tau
 
 
 class AttitudeController(TorqueController):
-    """tau_q, eq. (18), ct2."""
+    """tau_q (3,) [N m, FLU], eq. (18), ct2."""
 
     columns = ATTITUDE
-
-    def update(
-        self,
-        state: np.ndarray,
-        reference: np.ndarray,
-        attitude_reference: np.ndarray,
-        flying: bool,
-        dt: float,
-    ) -> np.ndarray:
-        """Return tau_q (3,) [N m, FLU]; while not flying, return zero and reset the law.
-
-        Arguments as in `TorqueController.update`.
-        """
-        if not flying:
-            self._idle()
-            self._tau[:] = 0.0
-            return self._tau
-        return super().update(state, reference, attitude_reference, True, dt)
 
 
 class ArmController(TorqueController):
     """tau_alpha (n,) [N m], eq. (25), ct3, one torque per joint; it also runs on the ground."""
 
     columns = ARM
+    on_ground = True

@@ -19,7 +19,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from uam_control.laws.law import GainGroup, Law
+from uam_control.laws.law import GainGroup, Law, LawInputs
 from uam_control.laws.law_parameters import LawParameters, structured
 from uam_control.maths.compiled import jit
 from uam_control.settings.parameter_set import HUGE, TINY, choice, number, switch, vector
@@ -47,7 +47,6 @@ class Asmc1Parameters(LawParameters):
     )
 
     def record(self) -> np.ndarray:
-        """See `LawParameters.record`."""
         inertia = np.array(self.inertia)
         return structured(
             {
@@ -66,23 +65,15 @@ class Asmc1Parameters(LawParameters):
 
 @jit
 def asmc1_step(
-    record: np.ndarray,
-    e: np.ndarray,
-    e_dot: np.ndarray,
-    acceleration_d: np.ndarray,
-    norms: np.ndarray,
-    saturated: bool,
-    frozen: bool,
-    dt: float,
-    adaptation: np.ndarray,
-    tau: np.ndarray,
+    record: np.ndarray, inputs: LawInputs, adaptation: np.ndarray, tau: np.ndarray
 ) -> None:
     """Compute one tick of ASMC-1: write tau (n,) and advance adaptation (n + 1,) in place.
 
-    Arguments: units and frames as in `Law.update`; record: of `Asmc1Parameters.record`.
+    inputs: see `LawInputs`; record: of `Asmc1Parameters.record`.
     The derivative of Dhat does not contain Dhat: the sum is exact for s constant over the tick.
     """
     p = record[0]
+    e, e_dot, acceleration_d, norms, saturated, frozen, dt = inputs
     n = len(tau)
     squared = 0.0
     for i in range(n):
@@ -118,7 +109,6 @@ class Asmc1Law(Law):
 
     @classmethod
     def gain_groups(cls, axes: int) -> tuple[GainGroup, ...]:
-        """See `Law.gain_groups`."""
         disturbance = tuple(f"D{i}" for i in range(1, axes + 1))
         return (
             GainGroup("$\\hat D$", disturbance, "D", signed=True),

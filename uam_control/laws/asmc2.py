@@ -25,7 +25,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from uam_control.laws.law import GainGroup, Law
+from uam_control.laws.law import GainGroup, Law, LawInputs
 from uam_control.laws.law_parameters import LawParameters, ceiling, structured
 from uam_control.maths.compiled import jit
 from uam_control.settings.parameter_set import HUGE, TINY, choice, number, switch, vector
@@ -59,7 +59,6 @@ class Asmc2Parameters(LawParameters):
     )
 
     def record(self) -> np.ndarray:
-        """See `LawParameters.record`."""
         return structured(
             {
                 "inertia": self.inertia,
@@ -79,22 +78,14 @@ class Asmc2Parameters(LawParameters):
 
 @jit
 def asmc2_step(
-    record: np.ndarray,
-    e: np.ndarray,
-    e_dot: np.ndarray,
-    acceleration_d: np.ndarray,
-    norms: np.ndarray,
-    saturated: bool,
-    frozen: bool,
-    dt: float,
-    adaptation: np.ndarray,
-    tau: np.ndarray,
+    record: np.ndarray, inputs: LawInputs, adaptation: np.ndarray, tau: np.ndarray
 ) -> None:
     """Compute one tick of ASMC-2: write tau (n,) and advance adaptation (7,) in place.
 
-    Arguments: units and frames as in `Law.update`; record: of `Asmc2Parameters.record`.
+    inputs: see `LawInputs`; record: of `Asmc2Parameters.record`.
     """
     p = record[0]
+    e, e_dot, acceleration_d, norms, saturated, frozen, dt = inputs
     n = len(tau)
     time = adaptation[TIME]
     adaptation[TIME] = time + dt
@@ -169,7 +160,6 @@ class Asmc2Law(Law):
 
     @classmethod
     def gain_groups(cls, axes: int) -> tuple[GainGroup, ...]:
-        """See `Law.gain_groups`."""
         return (
             GainGroup("$\\theta_0 \\ldots \\theta_2$", ("theta0", "theta1", "theta2"), "\\theta"),
             GainGroup("‖w‖", ("w_norm",)),

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -25,6 +26,18 @@ class GainGroup:
     signed: bool = False
 
 
+class LawInputs(NamedTuple):
+    """Inputs of a law at one tick: those of `Law.update`, and whether the gains are frozen."""
+
+    e: np.ndarray
+    e_dot: np.ndarray
+    acceleration_d: np.ndarray
+    norms: np.ndarray
+    saturated: bool
+    frozen: bool
+    dt: float
+
+
 class Law:
     """The law of one subsystem and its adapted gains.
 
@@ -36,7 +49,7 @@ class Law:
     | `label` | its name in tables and figures |
     | `profile` | its profile in config/profiles; "": see `default_profile` |
     | `memory` | number of values in `adaptation` after the published gains |
-    | `step` | the compiled function of one tick; arguments as in `update` |
+    | `step` | the compiled function of one tick: step(record, inputs, adaptation, tau) |
 
     `names`: of the published gains, which are the first values of `adaptation`, a float64 array
     (len(names) + memory,). `frozen`: the adapted gains do not change (parameter `adapt`).
@@ -98,16 +111,6 @@ class Law:
         saturated: the actuator was at its limit in the last tick.
         The next call reuses the returned array.
         """
-        type(self).step(
-            self._record,
-            e,
-            e_dot,
-            acceleration_d,
-            norms,
-            saturated,
-            self.frozen,
-            dt,
-            self.adaptation,
-            self._tau,
-        )
+        inputs = LawInputs(e, e_dot, acceleration_d, norms, saturated, self.frozen, dt)
+        type(self).step(self._record, inputs, self.adaptation, self._tau)
         return self._tau

@@ -25,7 +25,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from uam_control.laws import lyapunov
-from uam_control.laws.law import GainGroup, Law
+from uam_control.laws.law import GainGroup, Law, LawInputs
 from uam_control.laws.law_parameters import LawParameters, ceiling, structured
 from uam_control.maths.compiled import jit
 from uam_control.settings.parameter_set import (
@@ -93,7 +93,6 @@ class ModularParameters(LawParameters):
         return lyapunov.solve(*map(np.array, given))
 
     def record(self) -> np.ndarray:
-        """See `LawParameters.record`."""
         p11, p12, p22 = self.lyapunov_matrix()
         theory = self.lambda_form == "theory"
         table = np.array(self.lambda_table)
@@ -118,24 +117,16 @@ class ModularParameters(LawParameters):
 
 @jit
 def law_step(
-    record: np.ndarray,
-    e: np.ndarray,
-    e_dot: np.ndarray,
-    acceleration_d: np.ndarray,
-    norms: np.ndarray,
-    saturated: bool,
-    frozen: bool,
-    dt: float,
-    adaptation: np.ndarray,
-    tau: np.ndarray,
+    record: np.ndarray, inputs: LawInputs, adaptation: np.ndarray, tau: np.ndarray
 ) -> None:
     """Compute one tick of the law: write tau (n,) and advance adaptation (8,) in place.
 
-    Arguments: units and frames as in `Law.update`; record: of `ModularParameters.record`.
+    inputs: see `LawInputs`; record: of `ModularParameters.record`.
     Equations (7), (8), (12), (13) for the position; (17), (18), (21), (22) for the attitude;
     (24), (25), (28), (29) for the arm.
     """
     p = record[0]
+    e, e_dot, acceleration_d, norms, saturated, frozen, dt = inputs
     n = len(tau)
 
     xi_norm = norms[0]
@@ -224,7 +215,6 @@ class ModularLaw(Law):
 
     @classmethod
     def gain_groups(cls, axes: int) -> tuple[GainGroup, ...]:
-        """See `Law.gain_groups`."""
         return (
             GainGroup("$K_0 \\ldots K_3$", ("K0", "K1", "K2", "K3"), "K"),
             GainGroup("ζ", ("zeta",)),

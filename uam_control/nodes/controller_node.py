@@ -1,6 +1,8 @@
 """Base of the three controller nodes: joined inputs, parameters, adapted gains, services."""
 
 import time
+from collections.abc import Callable
+from functools import partial
 
 import numpy as np
 from rclpy.parameter import Parameter
@@ -10,10 +12,17 @@ from uam_control.control.controllers import Controller
 from uam_control.laws import catalogue
 from uam_control.nodes.described import described_vehicle
 from uam_control.profiles.profile import default_profile, parameter_set
-from uam_control.stages.law_stages import LawStage, PositionStage
+from uam_control.stages.law_stages import LawStage
 from uam_control.stages.timing import Timing
 from uam_msgs_py.messages import topics
-from uam_msgs_py.messages.control import read_position_command, read_reference, read_state
+from uam_msgs_py.messages.control import (
+    NO_COMMAND,
+    PositionCommand,
+    Reference,
+    read_position_command,
+    read_reference,
+    read_state,
+)
 from uam_msgs_py.messages.convert import JointStateWriter
 from uam_msgs_py.messages.parameter_changes import ParameterChange
 from uam_msgs_py.messages.topics import Topic
@@ -33,18 +42,8 @@ class ControllerNode(UamNode):
         topics.POSITION_COMMAND.name: read_position_command,
     }
 
-    def __init__(
-        self,
-        name: str,
-        controller: type[Controller],
-        stage: type[LawStage],
-        inputs: list[Topic],
-        adaptation: Topic,
-    ):
-        """inputs: the topics whose messages `tick` takes, in that order.
-
-        The reference arrives a tick ahead. The last topic besides it therefore completes the tick.
-        """
+    def __init__(self, name: str, controller: type[Controller], adaptation: Topic, last: Topic):
+        """last: the topic whose message completes a tick; the reference arrives a tick ahead."""
         super().__init__(name)
         law = given(self).get("law", catalogue.DEFAULT)
         self.vehicle = described_vehicle(self)
@@ -55,44 +54,48 @@ class ControllerNode(UamNode):
         self.parameter_set = NodeParameters(self, kind, axes, defaults, derived)
         timing = NodeParameters(self, Timing, read_only=True).current
         self.controller = controller(self.parameter_set.current)
-        self.stage = stage(self.controller, timing)
+        self.stage = LawStage(self.controller, timing)
         self.parameter_set.apply = self.controller.set_parameters
-        self._warm_up(stage(controller(self.parameter_set.current), timing))
+        attitude = () if last is topics.STATE else (NO_COMMAND.attitude,)
+        nothing = np.zeros((3, len(self.vehicle.coordinates)))
+        spare = LawStage(controller(self.parameter_set.current), timing)
+        for flying in (False, True):  # compiles the law: the first call takes a second
+            spare.update(0, nothing, nothing, *attitude, flying)
         self._adaptation = self.publisher(adaptation)
         self._gains = JointStateWriter(self.controller.names)
+        inputs = [topics.STATE, topics.REFERENCE]
+        inputs += [] if last in inputs else [last]
         self._join = StampJoin([topic.name for topic in inputs], self._joined)
         self.joins.append(self._join)
-        self.triggers = ([t for t in inputs if t is not topics.REFERENCE][-1].name,)
+        self.triggers = (last.name,)
         for topic in inputs:
-            self._feed(topic)
+            self.listen(topic, partial(self._add, topic.name, self.READERS[topic.name]))
         self.create_service(Trigger, f"~/{RESET}", self._on_reset)
         self.create_service(SetBool, f"~/{FREEZE}", self._on_freeze)
 
-    def _feed(self, topic: Topic) -> None:
-        add, name, read = self._join.add, topic.name, self.READERS[topic.name]
-        self.listen(topic, lambda data: add(name, *read(data)))
+    def _add(self, name: str, read: Callable[[bytes], tuple], data: bytes) -> None:
+        self._join.add(name, *read(data))
 
-    def _joined(self, stamp: int, *values) -> None:
+    def _joined(
+        self,
+        stamp: int,
+        state: np.ndarray,
+        reference: Reference,
+        position: PositionCommand | None = None,
+    ) -> None:
         begun = time.perf_counter()
-        self.tick(stamp, *values)
+        flying = reference.flying and (position is None or position.flying)
+        attitude = () if position is None else (position.attitude,)
+        tau = self.stage.update(stamp, state, reference.values, *attitude, flying)
+        self.send(stamp, tau, reference, flying)
         if self.stage.gains_due:
             self._gains.position[:] = self.controller.adaptation
             self._adaptation.publish(self._gains.stamped(stamp))
         self.done_tick(stamp, begun)
 
-    def tick(self, stamp: int, *values) -> None:
-        """Run the law for `stamp` [ns] and publish the command.
-
-        values: one per input topic; arrays as in the `update` of the stage.
-        """
+    def send(self, stamp: int, tau: np.ndarray, reference: Reference, flying: bool) -> None:
+        """Publish the command of the tick `stamp` [ns]; tau: see `update` of the controller."""
         raise NotImplementedError
-
-    def _warm_up(self, spare: LawStage) -> None:
-        """Compile the law with a spare stage, because the first call takes a second."""
-        nothing, attitude = np.zeros((3, len(self.vehicle.coordinates))), np.zeros((3, 3))
-        reference = (nothing,) if isinstance(spare, PositionStage) else (nothing, attitude)
-        for flying in (False, True):
-            spare.update(0, nothing, *reference, flying)
 
     def _on_reset(self, request: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
         controller = self.controller

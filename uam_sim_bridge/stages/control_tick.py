@@ -17,7 +17,7 @@ from uam_control.coordinates import ARM, coordinates
 from uam_control.mission import Mission, Scenario
 from uam_control.settings.parameter_set import ParameterSet
 from uam_control.stages.estimator_stage import EstimatorStage
-from uam_control.stages.law_stages import LawStage, PositionStage, TorqueStage
+from uam_control.stages.law_stages import LawStage
 from uam_control.stages.mission_stage import MissionStage
 from uam_control.stages.timing import Timing
 from uam_control.stamps import seconds
@@ -92,9 +92,9 @@ class ControlTick:
         self.stages = list(STAGES)
         self.estimator = EstimatorStage(sets["state_estimator"], len(scenario.arm_start))
         self.mission = MissionStage(Mission(scenario, sets["mission"]), timing)
-        self.position = PositionStage(PositionController(sets["position_controller"]), timing)
-        self.attitude = TorqueStage(AttitudeController(sets["attitude_controller"]), timing)
-        self.arm = TorqueStage(ArmController(sets["arm_controller"]), timing)
+        self.position = LawStage(PositionController(sets["position_controller"]), timing)
+        self.attitude = LawStage(AttitudeController(sets["attitude_controller"]), timing)
+        self.arm = LawStage(ArmController(sets["arm_controller"]), timing)
         self.bridge = bridge
         self.level = np.zeros((3, 3))  # attitude reference while there is none
         self.laws: dict[str, LawStage] = {
@@ -177,22 +177,22 @@ def control_position(tick: ControlTick) -> bool:
     """state, reference → tau_p, attitude reference."""
     s, stage = tick.signals, tick.position
     s.tau_p = stage.update(s.stamp, s.state, s.reference, s.flying)
-    s.attitude_reference = stage.attitude_reference if s.flying else tick.level
-    return _tell_gains(tick, "position", stage)
+    s.attitude_reference = stage.controller.attitude_reference if s.flying else tick.level
+    return _keep_gains(tick, "position", stage)
 
 
 def control_attitude(tick: ControlTick) -> bool:
     """state, reference, attitude reference → tau_q."""
     s, stage = tick.signals, tick.attitude
     s.tau_q = stage.update(s.stamp, s.state, s.reference, s.attitude_reference, s.flying)
-    return _tell_gains(tick, "attitude", stage)
+    return _keep_gains(tick, "attitude", stage)
 
 
 def control_arm(tick: ControlTick) -> bool:
     """state, reference, attitude reference → tau_alpha."""
     s, stage = tick.signals, tick.arm
     s.tau_alpha = stage.update(s.stamp, s.state, s.reference, s.attitude_reference, s.flying)
-    return _tell_gains(tick, "arm", stage)
+    return _keep_gains(tick, "arm", stage)
 
 
 def send_setpoint(tick: ControlTick) -> bool:
@@ -214,7 +214,7 @@ def look_ahead(tick: ControlTick) -> bool:
     return True
 
 
-def _tell_gains(tick: ControlTick, subsystem: str, stage: LawStage) -> bool:
+def _keep_gains(tick: ControlTick, subsystem: str, stage: LawStage) -> bool:
     """Adapted gains → the supervisor's inputs, when they are due."""
     if stage.gains_due:
         inputs, law = tick.mission.inputs, stage.controller
