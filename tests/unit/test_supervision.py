@@ -80,7 +80,7 @@ def test_every_check_has_a_value():
     values, seen, two, three = np.full(len(CHECKS), np.nan), observation(), np.ones(2), np.ones(3)
     measure(seen.state, seen.reference, three, 0.0, 0.0, np.zeros((2, 3)), two, values)
     assert np.isnan(values).sum() == 11
-    read(1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, two, two, three, three, values)
+    read(Readings(), two, three, values)
     assert not np.isnan(values).any()
     checks = Checks(S500)
     assert checks.update(0.0, seen, True) is None

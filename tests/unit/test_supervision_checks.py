@@ -85,20 +85,20 @@ def test_of_a_state_that_is_not_finite_nothing_else_is_said(where, bad):
 
 def test_readings_have_their_places():
     values = np.full(19, 77.0)
-    effort, gains = np.array([1.0, -6.0, 2.0]), np.array([3.0, math.nan, 1.0])
-    read(
-        0.5, 9.0, 10.0, 11.0, 12.0, 13.0, 14.0, 15.0, 16.0,
-        effort, np.array([2.0, 4.0, 8.0]), gains, np.array([2.0, 1.0, 0.25]), values,
+    readings = Readings(
+        battery=0.5, mocap_age=9.0, mocap_still=10.0, joint_age=11.0, controller_age=12.0,
+        autopilot_age=13.0, round_trip=14.0, missed_ticks=15.0, temperature=16.0,
+        joint_effort=np.array([1.0, -6.0, 2.0]), gains=np.array([3.0, math.nan, 1.0]),
     )  # fmt: skip
+    read(readings, np.array([2.0, 4.0, 8.0]), np.array([2.0, 1.0, 0.25]), values)
     np.testing.assert_array_equal(values[:8], 77.0)
     # effort: 6/4; gains: 1/.25, the unknown one left out
     np.testing.assert_array_equal(values[8:], [-0.5, 9, 10, 11, 12, 13, 14, 15, 16, 1.5, 4.0])
 
 
 def test_what_is_unknown_is_below_every_limit():
-    values, unknown = np.zeros(19), [math.nan] * 9
-    nothing, three = np.zeros(0), np.full(3, math.nan)
-    read(*unknown, nothing, np.ones(2), three, np.ones(3), values)
+    values = np.zeros(19)
+    read(Readings(), np.ones(2), np.ones(3), values)
     np.testing.assert_array_equal(values[8:], -math.inf)
 
 

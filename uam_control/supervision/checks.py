@@ -13,7 +13,7 @@ import numpy as np
 from uam_control.coordinates import ALPHA, CHI, CHI_DOT, PITCH, ROLL, X, Z
 from uam_control.maths.compiled import jit
 from uam_control.supervision.monitor import Level, Monitor
-from uam_control.supervision.observation import Observation
+from uam_control.supervision.observation import Observation, Readings
 from uam_control.supervision.supervision_parameters import SupervisionParameters
 
 NONE = math.inf
@@ -26,7 +26,7 @@ class Check(NamedTuple):
 
     hold, land, failsafe: name of a parameter, or a number. in_flight: checked only while airborne.
     sign: -1 if a smaller value is worse. failsafe_after: name of the parameter with the time beyond
-    the limit before failsafe.
+    the limit before failsafe. reading: the value's name in `Readings`.
     """
 
     name: str
@@ -37,6 +37,7 @@ class Check(NamedTuple):
     in_flight: bool = False
     sign: int = 1
     failsafe_after: str = "failsafe_after"
+    reading: str = ""
 
 
 # in the order of the values of `measure` and `read`
@@ -57,25 +58,28 @@ CHECKS = (
     Check("motion capture", "{name} is {value:.2f} m off the estimate, {limit:g} m allowed",
           "mocap_distance_hold", failsafe="mocap_distance_hold", in_flight=True,
           failsafe_after="mocap_age_failsafe"),
-    Check("battery", "{name} {value:.2f} full, below {limit:g}", land="battery_land", sign=-1),
+    Check("battery", "{name} {value:.2f} full, below {limit:g}", land="battery_land", sign=-1,
+          reading="battery"),
     Check("mocap", "{name} pose is {value:.2f} s old, {limit:g} s allowed", "mocap_age_hold",
-          failsafe="mocap_age_failsafe"),
+          failsafe="mocap_age_failsafe", reading="mocap_age"),
     Check("mocap pose", "{name} has been the same for {value:.2f} s, {limit:g} s allowed",
-          "mocap_age_hold", failsafe="mocap_age_failsafe", in_flight=True),
-    Check("joint angles", "{name} are {value:.2f} s old, {limit:g} s allowed", "joint_age_hold"),
+          "mocap_age_hold", failsafe="mocap_age_failsafe", in_flight=True, reading="mocap_still"),
+    Check("joint angles", "{name} are {value:.2f} s old, {limit:g} s allowed", "joint_age_hold",
+          reading="joint_age"),
     Check(CONTROLLERS, "a controller's gains are {value:.2f} s old, {limit:g} s allowed",
-          "controller_age_hold"),
+          "controller_age_hold", reading="controller_age"),
     Check("autopilot", "no message of the {name} for {value:.2f} s, {limit:g} s allowed",
-          land="autopilot_age_land"),
+          land="autopilot_age_land", reading="autopilot_age"),
     Check("autopilot's link", "{name} takes {value:.3f} s there and back, {limit:g} s allowed",
-          land="round_trip_land", failsafe="round_trip_failsafe"),
+          land="round_trip_land", failsafe="round_trip_failsafe", reading="round_trip"),
     Check("control ticks", "{value:.0f} {name} missed within a second, {limit:g} allowed",
-          "missed_ticks_hold", failsafe="missed_ticks_failsafe"),
+          "missed_ticks_hold", failsafe="missed_ticks_failsafe", reading="missed_ticks"),
     Check("servo temperature", "{name} {value:.0f} deg C exceeds {limit:g} deg C",
-          "temperature_hold", "temperature_land"),
+          "temperature_hold", "temperature_land", reading="temperature"),
     Check("joint torque", "{name} at {value:.2f} of its limit", 1.0),
     Check("adapted gain", "{name} at {value:.2f} of its limit", 1.0),
 )  # fmt: skip
+_READ = [(i, check.sign, check.reading) for i, check in enumerate(CHECKS) if check.reading]
 
 
 class ExceededLimit(NamedTuple):
@@ -133,22 +137,7 @@ class Checks:
             self._joints,
             values,
         )
-        read(
-            readings.battery,
-            readings.mocap_age,
-            readings.mocap_still,
-            readings.joint_age,
-            readings.controller_age,
-            readings.autopilot_age,
-            readings.round_trip,
-            readings.missed_ticks,
-            readings.temperature,
-            readings.joint_effort,
-            self._efforts,
-            readings.gains,
-            self._gains,
-            values,
-        )
+        read(readings, self._efforts, self._gains, values)
         if self.quiet and _below(values, self._calm):
             return None
         p, worst = self._parameters, None
@@ -213,42 +202,21 @@ def measure(
     values[4] = state[CHI, Z] - ground
     values[5] = outside
     values[6] = _largest(state[CHI, ALPHA:], joints)
-    values[7] = _known(math.sqrt(apart))
+    values[7] = -math.inf if math.isnan(apart) else math.sqrt(apart)
 
 
-@jit
 def read(
-    battery: float,
-    mocap: float,
-    still: float,
-    joints: float,
-    controllers: float,
-    autopilot: float,
-    round_trip: float,
-    missed: float,
-    temperature: float,
-    effort: np.ndarray,
-    effort_limits: np.ndarray,
-    gains: np.ndarray,
-    gain_limits: np.ndarray,
-    values: np.ndarray,
+    readings: Readings, effort_limits: np.ndarray, gain_limits: np.ndarray, values: np.ndarray
 ) -> None:
-    """Write the readings (see `Readings`) into values[8:]; NaN (unknown) passes every check.
+    """Write the readings into values[8:]; NaN (unknown) passes every check.
 
-    effort (n,), effort_limits (n,): of the joints [N m]; gains (3,), gain_limits (3,): adapted
-    gains of position, attitude, arm.
+    effort_limits (n,): of the joints [N m]; gain_limits (3,): of position, attitude, arm.
     """
-    values[8] = _known(-battery)
-    values[9], values[10], values[11] = _known(mocap), _known(still), _known(joints)
-    values[12], values[13] = _known(controllers), _known(autopilot)
-    values[14], values[15], values[16] = _known(round_trip), _known(missed), _known(temperature)
-    values[17] = _largest(effort, effort_limits)
-    values[18] = _largest(gains, gain_limits)
-
-
-@jit
-def _known(value: float) -> float:
-    return -math.inf if math.isnan(value) else value
+    for i, sign, name in _READ:
+        value = getattr(readings, name)
+        values[i] = -math.inf if math.isnan(value) else sign * value
+    values[17] = _largest(readings.joint_effort, effort_limits)
+    values[18] = _largest(readings.gains, gain_limits)
 
 
 @jit

@@ -3,6 +3,9 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import partial
+from itertools import pairwise
+from typing import Any
 
 from uam_control.settings.parameter_set import (
     ParameterError,
@@ -13,6 +16,13 @@ from uam_control.settings.parameter_set import (
     vector,
 )
 
+
+def _limit(reaction: str, default: float, what: str, unit: str, low: float, high: float) -> Any:
+    """Declare a limit [unit] within [low, high]: value of `what` that starts the reaction."""
+    return number(default, f"{what} that starts {reaction}", unit, low, high)
+
+
+_hold, _land, _failsafe = (partial(_limit, it) for it in ("a hold", "a landing", "the failsafe"))
 _BOX = "corner of the geofence, world frame: "
 _MAGNET = ("keep", "release")
 _ARM = ("stay", "stow")
@@ -22,74 +32,45 @@ _ARM = ("stay", "stow")
 class SupervisionLimits(ParameterSet):
     """Limits. Their endings name the reaction: _hold, _land, _failsafe (the autopilot descends)."""
 
-    position_error_hold: float = number(1.0, "position error that starts a hold", "m", 0.05, 100.0)
-    position_error_land: float = number(
-        1.5, "position error that starts a landing", "m", 0.05, 100.0
-    )
-    position_error_failsafe: float = number(
-        3.0, "position error that starts the failsafe", "m", 0.05, 100.0
-    )
-    tilt_hold: float = number(0.8, "tilt that starts a hold", "rad", 0.05, 3.2)
-    tilt_failsafe: float = number(1.05, "tilt that starts the failsafe", "rad", 0.05, 3.2)
-    body_rate_hold: float = number(
-        8.0, "body rate about any axis that starts a hold", "rad/s", 0.1, 100.0
-    )
-    body_rate_failsafe: float = number(
-        15.0, "body rate about any axis that starts the failsafe", "rad/s", 0.1, 100.0
-    )
-    altitude_hold: float = number(5.0, "height above take-off that starts a hold", "m", 0.1, 1000.0)
+    position_error_hold: float = _hold(1.0, "position error", "m", 0.05, 100.0)
+    position_error_land: float = _land(1.5, "position error", "m", 0.05, 100.0)
+    position_error_failsafe: float = _failsafe(3.0, "position error", "m", 0.05, 100.0)
+    tilt_hold: float = _hold(0.8, "tilt", "rad", 0.05, 3.2)
+    tilt_failsafe: float = _failsafe(1.05, "tilt", "rad", 0.05, 3.2)
+    body_rate_hold: float = _hold(8.0, "body rate about any axis", "rad/s", 0.1, 100.0)
+    body_rate_failsafe: float = _failsafe(15.0, "body rate about any axis", "rad/s", 0.1, 100.0)
+    altitude_hold: float = _hold(5.0, "height above take-off", "m", 0.1, 1000.0)
     geofence_low: tuple = vector((-5.0, -5.0, -1.0), _BOX + "smallest x, y, z", "m", -1e4, 1e4, 3)
     geofence_high: tuple = vector((5.0, 5.0, 6.0), _BOX + "largest x, y, z", "m", -1e4, 1e4, 3)
-    geofence_land: float = number(
-        0.1, "distance outside the geofence that starts a landing", "m", 0.0, 100.0
-    )
-    geofence_failsafe: float = number(
-        2.0, "distance outside the geofence that starts the failsafe", "m", 0.0, 1000.0
-    )
+    geofence_land: float = _land(0.1, "distance outside the geofence", "m", 0.0, 100.0)
+    geofence_failsafe: float = _failsafe(2.0, "distance outside the geofence", "m", 0.0, 1000.0)
     joint_angle_hold: tuple = vector(
         (), "joint angle, to either side, that starts a hold", "rad", 0.01, 6.3
     )
     joint_effort_hold: tuple = vector(
         (), "measured joint torque that starts a hold", "N m", 0.01, 100.0
     )
-    temperature_hold: float = number(
-        70.0, "servo temperature that starts a hold (a Dynamixel X switches off at 80)", "deg C",
-        0.0, 150.0,
-    )  # fmt: skip
-    temperature_land: float = number(
-        75.0, "servo temperature that starts a landing", "deg C", 0.0, 150.0
+    # a Dynamixel X switches off at 80 deg C
+    temperature_hold: float = _hold(70.0, "servo temperature", "deg C", 0.0, 150.0)
+    temperature_land: float = _land(75.0, "servo temperature", "deg C", 0.0, 150.0)
+    battery_land: float = _land(0.15, "state of charge", "1", 0.0, 1.0)
+    mocap_age_hold: float = _hold(0.25, "age of the mocap pose", "s", 0.02, 10.0)
+    mocap_age_failsafe: float = _failsafe(1.0, "age of the mocap pose", "s", 0.02, 60.0)
+    mocap_distance_hold: float = _hold(
+        0.15, "distance of the mocap pose from the estimate", "m", 0.05, 1000.0
     )
-    battery_land: float = number(0.15, "state of charge that starts a landing", "1", 0.0, 1.0)
-    mocap_age_hold: float = number(
-        0.25, "age of the mocap pose that starts a hold", "s", 0.02, 10.0
+    joint_age_hold: float = _hold(0.25, "age of the joint angles", "s", 0.02, 10.0)
+    controller_age_hold: float = _hold(0.25, "age of a controller's newest gains", "s", 0.05, 10.0)
+    autopilot_age_land: float = _land(
+        0.75, "time without a message of autopilot or bridge", "s", 0.3, 60.0
     )
-    mocap_age_failsafe: float = number(
-        1.0, "age of the mocap pose that starts the failsafe", "s", 0.02, 60.0
+    round_trip_land: float = _land(0.03, "round trip of the autopilot's link", "s", 0.005, 10.0)
+    round_trip_failsafe: float = _failsafe(
+        0.05, "round trip of the autopilot's link", "s", 0.005, 10.0
     )
-    mocap_distance_hold: float = number(
-        0.15, "distance of the mocap pose from the estimate that starts a hold", "m", 0.05, 1000.0
-    )
-    joint_age_hold: float = number(
-        0.25, "age of the joint angles that starts a hold", "s", 0.02, 10.0
-    )
-    controller_age_hold: float = number(
-        0.25, "age of a controller's newest gains that starts a hold", "s", 0.05, 10.0
-    )
-    autopilot_age_land: float = number(
-        0.75, "time without a message of autopilot or bridge that starts a landing", "s", 0.3,
-        60.0,
-    )  # fmt: skip
-    round_trip_land: float = number(
-        0.03, "round trip of the autopilot's link that starts a landing", "s", 0.005, 10.0
-    )
-    round_trip_failsafe: float = number(
-        0.05, "round trip of the autopilot's link that starts the failsafe", "s", 0.005, 10.0
-    )
-    missed_ticks_hold: float = number(
-        125.0, "control ticks missed within a second that start a hold", "1", 1.0, 1e4
-    )
-    missed_ticks_failsafe: float = number(
-        250.0, "control ticks missed within a second that start the failsafe", "1", 1.0, 1e4
+    missed_ticks_hold: float = _hold(125.0, "control ticks missed within a second", "1", 1.0, 1e4)
+    missed_ticks_failsafe: float = _failsafe(
+        250.0, "control ticks missed within a second", "1", 1.0, 1e4
     )
     gain_hold: tuple = vector(
         (100.0, 100.0, 1000.0),
@@ -103,17 +84,10 @@ class SupervisionLimits(ParameterSet):
         Raises ParameterError; see `ParameterSet.check_together`.
         """
         super().check_together()
-        for order in (
-            ("position_error_hold", "position_error_land", "position_error_failsafe"),
-            ("tilt_hold", "tilt_failsafe"),
-            ("body_rate_hold", "body_rate_failsafe"),
-            ("geofence_land", "geofence_failsafe"),
-            ("mocap_age_hold", "mocap_age_failsafe"),
-            ("missed_ticks_hold", "missed_ticks_failsafe"),
-            ("temperature_hold", "temperature_land"),
-            ("round_trip_land", "round_trip_failsafe"),
-        ):
-            for less, more in zip(order, order[1:], strict=False):
+        known = self.specs()
+        for stem in dict.fromkeys(name.rpartition("_")[0] for name in known):
+            order = [stem + end for end in ("_hold", "_land", "_failsafe") if stem + end in known]
+            for less, more in pairwise(order):
                 low, high = getattr(self, less), getattr(self, more)
                 if not low < high:
                     raise ParameterError(f"{less}: {low:g} is not below {more}, {high:g}")
