@@ -6,11 +6,6 @@ SECOND = 1_000_000_000  # [ns]
 _MICROSECOND = 1_000  # [ns]
 
 
-def seconds(stamp: int) -> float:
-    """Return a stamp [ns] in seconds [s]."""
-    return stamp / SECOND
-
-
 def nanoseconds(time: float) -> int:
     """Return the stamp [ns] of a time [s], rounded to a microsecond, the unit of sample times."""
     return round(time * 1e6) * _MICROSECOND

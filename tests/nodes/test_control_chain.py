@@ -8,7 +8,7 @@ from uam_control.coordinates import arm_coordinates, coordinates
 from uam_control.estimation import StateEstimator
 from uam_control.mission import Mission, load_scenario
 from uam_control.profiles.profile import load_profile
-from uam_control.stamps import seconds
+from uam_control.stamps import SECOND
 from uam_msgs_py.messages import topics
 from uam_msgs_py.messages.control import (
     read_position_command,
@@ -61,9 +61,9 @@ def expected():
     position = PositionController(sets["position_controller"])
     attitude = AttitudeController(sets["attitude_controller"])
     arm = ArmController(sets["arm_controller"])
-    dt = seconds(PERIOD)
+    dt = PERIOD / SECOND
     for stamp, imu, pose, joints in samples():
-        time = seconds(stamp)
+        time = stamp / SECOND
         if pose is not None:
             estimator.mocap(time, *pose)
         estimator.joints(time, *joints)
@@ -76,8 +76,8 @@ def expected():
         tau_q = attitude.update(state, output.reference, desired, flying, dt).copy()
         tau_alpha = arm.update(state, output.reference, desired, flying, dt).copy()
         yield state.copy(), tau_p if flying else None, tau_q if flying else None, tau_alpha
-        armed = seconds(ARMED_AT) if stamp >= ARMED_AT else None
-        mission.step(seconds(stamp + PERIOD), state, armed)
+        armed = ARMED_AT / SECOND if stamp >= ARMED_AT else None
+        mission.step((stamp + PERIOD) / SECOND, state, armed)
 
 
 class Plant:

@@ -84,14 +84,16 @@ def test_mocap_exposes_at_its_rate_and_not_late_by_rounding():
 
 def test_a_delay_hands_out_one_sample_when_it_is_due():
     line = Delay(2)
-    assert line.take(0) is None
-    line.put(0, ("a",))
-    line.put(1, ("b",))
-    got = [line.take(tick) for tick in (1, 2, 2, 5, 5)]  # due at 2 and 3
-    assert got == [None, ("a",), None, ("b",), None]
-    line = Delay(0)
-    line.put(3, ("c",))
-    assert line.take(2) is None and line.take(3) == ("c",)
+    given = [(0, ("a",)), (1, ("b",)), (2, None), (2, None), (5, None), (5, None)]
+    assert [line(tick, sample) for tick, sample in given] == [
+        None,
+        None,
+        ("a",),  # due at 2
+        None,
+        ("b",),  # due at 3
+        None,
+    ]
+    assert Delay(0)(3, ("c",)) == ("c",)
 
 
 @pytest.mark.parametrize("sign", [1.0, -1.0])

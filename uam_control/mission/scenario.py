@@ -88,11 +88,17 @@ class Scenario:
 
     def phase(self, time: float) -> str:
         """Return the name of the phase at mission time `time` [s] >= 0."""
-        return next(name for start, name in reversed(self.phases) if time >= start)
+        for start, name in reversed(self.phases):
+            if time >= start:
+                return name
+        raise ValueError(f"no phase at {time} s")
 
     def magnet_on(self, time: float) -> bool:
         """Return the desired state of the magnet at mission time `time` [s]."""
-        return next((on for at, on in reversed(self.magnet) if time >= at), False)
+        for at, on in reversed(self.magnet):
+            if time >= at:
+                return on
+        return False
 
 
 SINK = 0.03  # m, depth of the landing reference below the ground, for a firm contact

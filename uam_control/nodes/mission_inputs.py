@@ -10,7 +10,7 @@ from typing import Any
 from sensor_msgs.msg import BatteryState, Temperature
 
 from uam_control.stages.supervisor_inputs import SupervisorInputs
-from uam_control.stamps import seconds
+from uam_control.stamps import SECOND
 from uam_msgs_py.messages import topics
 from uam_msgs_py.messages.convert import read_pose, read_values
 from uam_msgs_py.messages.layouts import BadMessage, stamp_of
@@ -62,7 +62,7 @@ class MissionInputs:
 
     def _on_mocap(self, data: bytes) -> None:
         stamp, *pose = read_pose(data)  # refuses a pose that the estimator cannot use
-        self._inputs.mocap(seconds(stamp), *pose)
+        self._inputs.mocap(stamp / SECOND, *pose)
 
     def _on_joints(self, data: bytes) -> None:
         stamp, names, effort = read_values(data, "effort")
@@ -71,7 +71,7 @@ class MissionInputs:
                 effort = effort[[names.index(name) for name in self._names]]
             except ValueError:
                 check_names(names, self._names)
-        self._inputs.joints(seconds(stamp), effort)
+        self._inputs.joints(stamp / SECOND, effort)
 
     def _on_battery(self, message: BatteryState) -> None:
         self._inputs.battery(message.percentage)
@@ -84,4 +84,4 @@ class MissionInputs:
 
     def _on_gains(self, subsystem: str, data: bytes) -> None:
         stamp, names, values = read_values(data, "position")
-        self._inputs.gains(seconds(stamp), subsystem, names, values)
+        self._inputs.gains(stamp / SECOND, subsystem, names, values)

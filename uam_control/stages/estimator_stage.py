@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from uam_control.estimation import EstimatorParameters, StateEstimator
-from uam_control.stamps import seconds
+from uam_control.stamps import SECOND
 
 
 class EstimatorStage:
@@ -18,14 +18,15 @@ class EstimatorStage:
         """joints: number of joints of the arm."""
         self.estimator = StateEstimator(parameters, joints)
         self.stamp = -1  # [ns] of the newest IMU sample
+        self._waiting = True  # for the first sample of an input
 
     def mocap(self, stamp: int, position: np.ndarray, quaternion: np.ndarray) -> None:
         """Take a pose: position (3,) [m, ENU], unit quaternion (4,) [w x y z], FLU → ENU."""
-        self.estimator.mocap(seconds(stamp), position, quaternion)
+        self.estimator.mocap(stamp / SECOND, position, quaternion)
 
     def joints(self, stamp: int, alpha: np.ndarray, alpha_dot: np.ndarray) -> None:
         """Take joint readings: alpha (n,) [rad], alpha_dot (n,) [rad/s]."""
-        self.estimator.joints(seconds(stamp), alpha, alpha_dot)
+        self.estimator.joints(stamp / SECOND, alpha, alpha_dot)
 
     def imu(self, stamp: int, gyro: np.ndarray, force: np.ndarray) -> np.ndarray | None:
         """Take an IMU sample: gyro (3,) [rad/s], specific force (3,) [m/s^2], FLU.
@@ -38,5 +39,6 @@ class EstimatorStage:
             raise ValueError(f"IMU stamp {stamp} ns does not follow {self.stamp} ns")
         self.stamp = stamp
         estimator = self.estimator
-        estimator.imu(seconds(stamp), gyro, force)
-        return None if estimator.waiting_for else estimator.update()
+        estimator.imu(stamp / SECOND, gyro, force)
+        self._waiting = self._waiting and bool(estimator.waiting_for)
+        return None if self._waiting else estimator.update()

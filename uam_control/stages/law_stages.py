@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from uam_control.control.controllers import Controller
-from uam_control.stages.timing import Ticks, Timing
+from uam_control.stages.timing import Timing
+from uam_control.stamps import SECOND
 
 GAINS_PERIOD = 20_000_000  # [ns] between two publications of the adapted gains
 
@@ -20,15 +21,19 @@ class LawStage:
     def __init__(self, controller: Controller, timing: Timing) -> None:
         self.controller = controller
         self.gains_due = False
-        self._ticks = Ticks(timing)
-        self._period = 0  # number of the gains' period that the last tick was in
+        self._period = timing.period  # [ns]
+        self._last: int | None = None  # [ns] last tick
 
     def update(self, stamp: int, *inputs: np.ndarray | bool) -> np.ndarray:
         """Return tau of the controller at the tick `stamp` [ns].
 
-        inputs: those of the controller's `update`, without dt.
+        inputs: those of the controller's `update`, without dt. dt is the time since the last tick;
+        one control period at the first tick, after a gap of more than ten periods and after a step
+        back in time: the laws must not integrate over a time without samples.
         """
-        period = stamp // GAINS_PERIOD
-        self.gains_due = period != self._period
-        self._period = period
-        return self.controller.update(*inputs, self._ticks.step(stamp))
+        last, self._last = self._last, stamp
+        self.gains_due = stamp // GAINS_PERIOD != (last or 0) // GAINS_PERIOD
+        step = self._period if last is None else stamp - last
+        if not 0 < step <= 10 * self._period:
+            step = self._period
+        return self.controller.update(*inputs, step / SECOND)

@@ -7,10 +7,10 @@ from collections import deque
 
 import numpy as np
 
-from uam_control.mission import Mission, MissionOutput
+from uam_control.mission import Mission
 from uam_control.stages.supervisor_inputs import SupervisorInputs
-from uam_control.stages.timing import Ticks, Timing
-from uam_control.stamps import seconds
+from uam_control.stages.timing import Timing
+from uam_control.stamps import SECOND
 from uam_control.supervision import Readings, State
 
 TOLD_BY = 200_000_000  # [ns] after which the status of a tick has arrived at every stage
@@ -19,25 +19,21 @@ TOLD_BY = 200_000_000  # [ns] after which the status of a tick has arrived at ev
 class MissionStage:
     """Computes the reference one tick ahead, so that it is ready when the state arrives.
 
-    Between `begin` and `advance`, `output` is the mission's output at this tick, and `flying` is
+    Between `begin` and `advance`, `output` is the mission's output at this tick, see
+    `MissionOutput`, and `flying` is
     whether the controllers fly its reference. `ahead` [ns]: the tick of the newest reference.
     """
 
     def __init__(self, mission: Mission, timing: Timing) -> None:
-        self.mission = mission
-        self.period = Ticks(timing).period
-        self.inputs = SupervisorInputs(seconds(self.period))
+        self.mission, self.output = mission, mission.output
+        self.period = timing.period
+        self.inputs = SupervisorInputs(self.period / SECOND)
         self.flying = False
         self.ahead = -1
         self._armed_since: float | None = None
         self._told: deque[tuple[int, bool, int | None, float]] = deque()
         self._readings = Readings()
         self._flown = -TOLD_BY  # [ns] newest reference that the mission has flown
-
-    @property
-    def output(self) -> MissionOutput:
-        """The newest output of the mission; see `MissionOutput`."""
-        return self.mission.output
 
     def autopilot(
         self, stamp: int, connected: bool, armed_since: int | None, round_trip: float | None
@@ -57,13 +53,13 @@ class MissionStage:
         """
         while self._told and self._told[0][0] < stamp:
             told, connected, since, round_trip = self._told.popleft()
-            self._armed_since = None if since is None else seconds(since)
+            self._armed_since = None if since is None else since / SECOND
             if connected:
-                self.inputs.inputs.autopilot(seconds(told), round_trip)
+                self.inputs.inputs.autopilot(told / SECOND, round_trip)
         self._readings = self.inputs.tick(stamp)
         if stamp == self.ahead:
             return False
-        self._step(stamp, state)
+        self.advance(stamp - self.period, state)
         return True
 
     def advance(self, stamp: int, state: np.ndarray) -> None:
@@ -71,20 +67,11 @@ class MissionStage:
 
         state: (3, 6 + n) of the tick `stamp`.
         """
-        self._step(stamp + self.period, state)
-
-    def _step(self, stamp: int, state: np.ndarray) -> None:
-        output = self.mission.step(seconds(stamp), state, self._armed_since, self._readings)
-        self.flying = self._is_flown(stamp, output)
-        self.ahead = stamp
-
-    def _is_flown(self, stamp: int, output: MissionOutput) -> bool:
-        """Whether the controllers fly the reference; in failsafe, until the bridge has the status.
-
-        In a failsafe the bridge ignores commands. Idle commands mean that the vehicle is on the
-        ground. If they arrived before the status, they would switch off the motors at low height.
-        """
+        ahead = self.ahead = stamp + self.period
+        output = self.mission.step(ahead / SECOND, state, self._armed_since, self._readings)
         if output.flying:
-            self._flown = stamp
-            return True
-        return output.state is State.FAILSAFE and stamp - self._flown < TOLD_BY
+            self._flown = ahead
+        # In a failsafe the bridge ignores commands. Idle commands mean that the vehicle is on the
+        # ground. If they arrived before the status, they would switch off the motors at low height.
+        failing = output.state is State.FAILSAFE and ahead - self._flown < TOLD_BY
+        self.flying = output.flying or failing

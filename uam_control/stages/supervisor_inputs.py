@@ -11,7 +11,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from uam_control.stamps import seconds
+from uam_control.stamps import SECOND
 from uam_control.supervision import Inputs, Readings
 
 LOOK_PERIOD = 20_000_000  # [ns] of stamps between two readings
@@ -37,13 +37,13 @@ class SupervisorInputs:
 
     def mocap(self, stamp: int, position: np.ndarray, quaternion: np.ndarray) -> None:
         """Read a pose of `stamp` [ns]: position (3,) [m, ENU], quaternion (4,) [w x y z]."""
-        self.inputs.mocap(seconds(stamp), position, quaternion)
+        self.inputs.mocap(stamp / SECOND, position, quaternion)
 
     def joints(
         self, stamp: int, alpha: np.ndarray, alpha_dot: np.ndarray, effort: np.ndarray
     ) -> None:
         """Read the joints at `stamp` [ns]; of alpha, alpha_dot, effort (n,) only effort [N m]."""
-        self.inputs.joints(seconds(stamp), effort)
+        self.inputs.joints(stamp / SECOND, effort)
 
     def tick(self, stamp: int) -> Readings:
         """Return the readings at the tick `stamp` [ns]; the next call reuses the object."""
@@ -55,5 +55,5 @@ class SupervisorInputs:
                     self._kept[name] = read, message, answers
                 else:
                     read(*message)
-        self.readings = self.inputs.at(seconds(stamp))
+        self.readings = self.inputs.at(stamp / SECOND)
         return self.readings

@@ -28,6 +28,7 @@ class Inputs:
         self._moved = math.nan  # stamp [s] of the first pose like the newest
         self._repeats = Repeats()
         self._temperatures: dict[str, float] = {}
+        self._oldest = self._oldest_of_pose = math.nan  # [s] stamps of gains
         self._controllers: dict[str, float] = {}  # stamps of the newest gains [s]
         self._last: float | None = None
         self._gaps: deque[tuple[float, int]] = deque()  # stamp [s], ticks missed before it
@@ -71,12 +72,13 @@ class Inputs:
         key = tuple(names)
         if key not in self._watched:
             self._watched[key] = [i for i, n in enumerate(names) if n.startswith(WATCHED)]
-        gains = values.tolist()
-        watched = [abs(gains[i]) for i in self._watched[key]]
-        known = watched and not math.isnan(sum(watched))
-        largest = max(watched) if known else math.nan
+        watched = values[self._watched[key]]
+        largest = float(np.maximum.reduce(np.abs(watched))) if len(watched) else math.nan
         self._readings.gains[SUBSYSTEMS.index(subsystem)] = largest
         self._controllers[subsystem] = stamp
+        self._oldest = min(self._controllers.values())
+        pose = [at for name, at in self._controllers.items() if name in POSE]
+        self._oldest_of_pose = min(pose, default=math.nan)
 
     def at(self, stamp: float) -> Readings:
         """Return the readings at the tick `stamp` [s]; the next call reuses the object."""
@@ -88,13 +90,11 @@ class Inputs:
         self._last = stamp
         while gaps and stamp - gaps[0][0] > 1.0:
             gaps.popleft()
-        readings.missed_ticks = float(sum(missed for _, missed in gaps))
+        readings.missed_ticks = float(sum(missed for _, missed in gaps)) if gaps else 0.0
         readings.mocap_age = stamp - self._mocap
         readings.mocap_still = stamp - self._moved
         readings.joint_age = stamp - self._joints
         readings.autopilot_age = stamp - self._autopilot
-        if self._controllers:
-            readings.controller_age = stamp - min(self._controllers.values())
-            of_pose = [at for subsystem, at in self._controllers.items() if subsystem in POSE]
-            readings.pose_controller_age = stamp - min(of_pose, default=math.nan)
+        readings.controller_age = stamp - self._oldest
+        readings.pose_controller_age = stamp - self._oldest_of_pose
         return readings

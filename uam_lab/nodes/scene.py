@@ -25,7 +25,7 @@ from uam_control.maths.rotations import quaternion_from_euler, wrap_angle
 from uam_control.mission import load_scenario
 from uam_control.nodes.described import described_vehicle
 from uam_control.settings.parameter_set import ParameterSet, number
-from uam_control.stamps import SECOND, seconds
+from uam_control.stamps import SECOND
 from uam_lab.nodes.scene_markers import PAYLOAD, FlownPath, Markers, ReferencePath
 from uam_msgs_py.messages import topics
 from uam_msgs_py.messages.control import Reference, read_reference, read_state
@@ -193,7 +193,7 @@ class SceneNode(UamNode):
         if now == self._shown and stamp < self._markers_due:
             return
         self._shown, self._markers_due = now, stamp + self._marker_period
-        mission_time = status.time + seconds(stamp - at)
+        mission_time = status.time + (stamp - at) / SECOND
         ahead = self._path.ahead(0.0 if status.time < 0.0 else mission_time)
         if status.done or status.abort_reason:
             ahead = ahead[:0]

@@ -129,9 +129,14 @@ class Estimator:
         """Whether the last vision pose is younger than VISION_TIMEOUT at `time` [s]."""
         return time - self._vision_time < VISION_TIMEOUT
 
-    def predict(self, time: float, gyro: np.ndarray, accel: np.ndarray, dt: float) -> None:
-        """Advance by one sample: gyro (3,) [rad/s], accel (3,) [m/s^2], FRD; dt [s]."""
-        predict(gyro, accel, dt, self.aided(time), self.estimate, self._bias, self._force)
+    def predict(self, time: float, gyro: np.ndarray, accel: np.ndarray, dt: float) -> bool:
+        """Advance by one sample and return `aided`.
+
+        gyro (3,) [rad/s], accel (3,) [m/s^2], FRD; dt [s].
+        """
+        aided = self.aided(time)
+        predict(gyro, accel, dt, aided, self.estimate, self._bias, self._force)
+        return aided
 
     def vision(self, time: float, position: np.ndarray, quaternion: np.ndarray) -> None:
         """Correct by a pose that arrives at `time` [s]; the first after a gap sets the estimate.

@@ -217,7 +217,7 @@ class Autopilot:
         dt = min(LONGEST_STEP, max(SHORTEST_STEP, time - self._time))
         self._time = time
         commander, landing = self.commander, self.landing
-        self.estimator.predict(time, gyro, accel, dt)
+        aided = self.estimator.predict(time, gyro, accel, dt)
         commander.update(time, landing.landed)
         setpoint = self._setpoint
         descending = commander.armed and commander.mode is not Mode.OFFBOARD
@@ -245,8 +245,8 @@ class Autopilot:
             self.motors,
         )
         if commander.armed:
-            memory, estimator = self._memory, self.estimator
-            velocity = tuple(estimator.estimate[7:10].tolist()) if estimator.aided(time) else None
+            memory = self._memory
+            velocity = tuple(self.estimator.estimate[7:10].tolist()) if aided else None
             landing.update(
                 time,
                 True,

@@ -31,16 +31,21 @@ HEARTBEAT, LANDED = 1.0, 0.2  # [s] between two regular reports, as `telemetry.S
 
 
 class JoinedAutopilot:
-    """An `AutopilotPort` to the `Autopilot` in the same process."""
+    """An `AutopilotPort` to the `Autopilot` in the same process.
+
+    `motors` (n,): commands 0..1 of the last cycle; rewritten by the next one. `time` [s]: of the
+    autopilot's next cycle, in which messages arrive; set by the owner at each tick.
+    """
 
     def __init__(self, autopilot: Autopilot, sequence: OffboardSequence) -> None:
         """sequence: of the bridge; it receives answers and texts."""
         self.autopilot, self.sequence = autopilot, sequence
+        self.motors = autopilot.motors
         self.armed, self.mode, self.landed = False, Mode.UNKNOWN, True
         self.armed_since: float | None = None
         self.passes: Callable[[], bool] = lambda: True  # whether a message reaches the autopilot
         self.receives: Callable[[], bool] = lambda: True  # whether one of the autopilot arrives
-        self._time = 0.0  # [s] of the autopilot's next cycle
+        self.time = 0.0
         self._received_at = -math.inf
         self._told: AutopilotStatus | None = None
         self._heartbeat_due = self._landed_due = -math.inf  # [s]
@@ -51,11 +56,6 @@ class JoinedAutopilot:
     def round_trip(self) -> float | None:
         """None: without a link there is no round trip."""
         return None
-
-    @property
-    def motors(self) -> np.ndarray:
-        """Motor commands (n,) 0..1 of the last cycle; rewritten by the next one."""
-        return self.autopilot.motors
 
     def connected(self, time: float) -> bool:
         """Whether the last heartbeat is younger than HEARTBEAT_TIMEOUT at `time` [s]."""
@@ -98,7 +98,7 @@ class JoinedAutopilot:
             command = MavCmd.DO_SET_MODE, (CUSTOM_MODE_ENABLED, *Mode.OFFBOARD.value)
         else:
             command = MavCmd.ARM_DISARM, (float(request is Request.ARM), 0.0)
-        self._answers.append((request, self.autopilot.command(self._time, *command)))
+        self._answers.append((request, self.autopilot.command(self.time, *command)))
 
     def send_vision(
         self,
@@ -110,16 +110,12 @@ class JoinedAutopilot:
     ) -> None:
         """Send a pose: position (3,) [m, ENU], quaternion (4,) [w x y z], FLU → ENU."""
         if self.passes():
-            self.autopilot.vision(self._time, swap_world(position), swap_quaternion(quaternion))
+            self.autopilot.vision(self.time, swap_world(position), swap_quaternion(quaternion))
 
     def send_setpoint(self, target: AttitudeTarget, time: float) -> None:
         """Send the setpoint of the tick `time` [s]."""
         if self.passes():
-            self.autopilot.target(self._time, target)
-
-    def begin(self, time: float) -> None:
-        """Begin the autopilot's cycle of `time` [s]; later messages arrive in this cycle."""
-        self._time = time
+            self.autopilot.target(self.time, target)
 
     def update(self, time: float, gyro: np.ndarray, force: np.ndarray) -> np.ndarray:
         """Run the autopilot's cycle of `time` [s] and return its motor commands (rotors,), 0..1.

@@ -22,7 +22,7 @@ class LandDetector:
         self.landed = True
         self.maybe_landed = True
         self._contact = True
-        self._since = [-math.inf, -math.inf, -math.inf]
+        self._since = [-math.inf, -math.inf, -math.inf]  # [s] begin of the evidence of each stage
         self.configure(parameters)
 
     def configure(self, parameters: Parameters) -> None:
@@ -52,7 +52,7 @@ class LandDetector:
         never count as landed: low thrust alone then means ground contact.
         """
         if not armed:
-            self.landed = self.maybe_landed = self._contact = True
+            self._contact = self.maybe_landed = self.landed = True
             return
         wider = _WIDER if self.maybe_landed else 1.0
         contact = thrust <= self._low and (
@@ -60,18 +60,16 @@ class LandDetector:
             or abs(velocity[2]) <= wider * self._vertical
             and math.hypot(velocity[0], velocity[1]) <= self._horizontal
         )
-        self._contact = self._stage(0, time, contact, self._contact)
         still = math.hypot(*rates) <= wider * self._rotation
         none = thrust <= (self._none_descending if descending else self._none)
-        self.maybe_landed = self._stage(
-            1, time, self._contact and still and none, self.maybe_landed
-        )
-        self.landed = self._stage(2, time, self.maybe_landed, self.landed)
-
-    def _stage(self, stage: int, time: float, evidence: bool, now: bool) -> bool:
-        if not evidence:
-            self._since[stage] = math.inf
-            return False
-        if self._since[stage] > time:
-            self._since[stage] = time
-        return now or time - self._since[stage] >= self._stage_time
+        since, reached = self._since, [self._contact, self.maybe_landed, self.landed]
+        evidence = True
+        for stage, condition in enumerate((contact, still and none, True)):
+            if evidence and condition:
+                if since[stage] > time:
+                    since[stage] = time
+                evidence = reached[stage] or time - since[stage] >= self._stage_time
+            else:
+                since[stage], evidence = math.inf, False
+            reached[stage] = evidence
+        self._contact, self.maybe_landed, self.landed = reached

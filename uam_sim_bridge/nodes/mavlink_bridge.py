@@ -22,7 +22,7 @@ from std_msgs.msg import Bool
 from uam_control.coordinates import ATTITUDE
 from uam_control.nodes.described import described_vehicle
 from uam_control.settings.parameter_set import ParameterError
-from uam_control.stamps import SECOND, seconds
+from uam_control.stamps import SECOND
 from uam_control.supervision import State
 from uam_msgs_py.messages import topics
 from uam_msgs_py.messages.control import (
@@ -162,7 +162,7 @@ class MavlinkBridgeNode(UamNode):
         stamp, status = MissionStatus.from_message(message)
         self.stage.mission(stamp, status.magnet, status.state == State.FAILSAFE.value)
         if self._faulty is not None:
-            self._faulty.mission_at(seconds(stamp), status.time)
+            self._faulty.mission_at(stamp / SECOND, status.time)
 
     def _on_mocap(self, data: bytes) -> None:
         self.stage.mocap(*read_pose(data))
@@ -194,7 +194,7 @@ class MavlinkBridgeNode(UamNode):
     def _begin_tick(self, stamp: int) -> None:
         """Begin a tick: update the faults of the link and receive the autopilot's messages."""
         if self._faulty and self._fault_topic:
-            self._fault_topic.publish(stamp, self._faulty.update(seconds(stamp)))
+            self._fault_topic.publish(stamp, self._faulty.update(stamp / SECOND))
         self.stage.hear(stamp)
 
     def _end_tick(self, stamp: int) -> None:
@@ -231,7 +231,7 @@ class MavlinkBridgeNode(UamNode):
         state = self._join.last_seen[topics.STATE.name]
         if self.ticks == 0 or state is None or state <= self.stamp:
             return
-        if seconds(state - self._commanded) >= self._options.stale_after:
+        if (state - self._commanded) / SECOND >= self._options.stale_after:
             self._join.skip(state)
             self._last_tick = time.monotonic()
             setpoint = self._go_without(state)

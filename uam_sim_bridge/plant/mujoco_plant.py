@@ -46,9 +46,9 @@ class MujocoPlant(Plant):
         self._imu = Imu(sensors["imu"], scale, imu_noise)
         self._mocap = Mocap(sensors["mocap"], scale, mocap_noise)
         self._encoders = Encoders(sensors["joints"])
-        self._delays = {
-            name: Delay(sensors[name]["latency_ticks"]) for name in ("imu", "mocap", "joints")
-        }
+        self._imu_delay, self._mocap_delay, self._joints_delay = (
+            Delay(sensors[name]["latency_ticks"]) for name in ("imu", "mocap", "joints")
+        )
         self._effort_delay = Delay(numbers["servos"]["command_latency_ticks"])
         self._effort = np.zeros(self.joints)
 
@@ -131,22 +131,22 @@ class MujocoPlant(Plant):
         tick, time = self.tick, self.tick * self.period
         gyro, force = self._imu.sample(self._rates, self._specific_force)
         hil = (time, gyro, force)
-        delays = self._delays
-        delays["imu"].put(tick, hil)
-        alpha, alpha_dot = self._encoders.sample(self._alpha, self._alpha_dot)
-        delays["joints"].put(tick, (time, alpha, alpha_dot, self.servos.torque.copy()))
+        joints = (time, *self._encoders.sample(self._alpha, self._alpha_dot))
+        mocap = None
         if self._mocap.due(time):
-            delays["mocap"].put(tick, (time, *self._mocap.sample(self._position, self._quaternion)))
+            mocap = (time, *self._mocap.sample(self._position, self._quaternion))
         return Samples(
-            delays["imu"].take(tick), delays["joints"].take(tick), delays["mocap"].take(tick), hil
+            self._imu_delay(tick, hil),
+            self._joints_delay(tick, (*joints, self.servos.torque.copy())),
+            self._mocap_delay(tick, mocap),
+            hil,
         )
 
     def step(self, motor_commands: np.ndarray, arm_effort: np.ndarray, magnet: bool) -> None:
         """See `Plant.step`."""
         if self._hinge is not None:
             magnet = self._held_by_magnet(magnet)
-        self._effort_delay.put(self.tick, tuple(map(float, arm_effort)))
-        due = self._effort_delay.take(self.tick)
+        due = self._effort_delay(self.tick, tuple(map(float, arm_effort)))
         if due is not None:
             self._effort[:] = due
         if self._gust is not None:
@@ -225,11 +225,12 @@ class MujocoPlant(Plant):
             self._alpha_ddot,
             state,
         )
+        payload = self._payload_pose.copy()
         return Truth(
             state=state,
             quaternion=self._quaternion.copy(),
-            payload_position=self._payload_position.copy(),
-            payload_quaternion=self._payload_pose[3:7].copy(),
+            payload_position=payload[:3],
+            payload_quaternion=payload[3:],
             magnet_force=float(self._magnet_control[0] * self._magnet_gain),
             magnet_swing=float(self.data.qpos[self._swing]),
             rotor_speed=self.rotors.speed.copy(),

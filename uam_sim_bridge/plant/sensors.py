@@ -36,12 +36,10 @@ class Delay:
         self._ticks = ticks
         self._queue: deque = deque()
 
-    def put(self, tick: int, sample: tuple) -> None:
-        """Store a sample taken at `tick`."""
-        self._queue.append((tick + self._ticks, sample))
-
-    def take(self, tick: int) -> tuple | None:
-        """Return the sample due by `tick`, or None."""
+    def __call__(self, tick: int, sample: tuple | None) -> tuple | None:
+        """Store the sample taken at `tick`, if any; return the sample due by then, or None."""
+        if sample is not None:
+            self._queue.append((tick + self._ticks, sample))
         if self._queue and self._queue[0][0] <= tick:
             return self._queue.popleft()[1]
         return None
@@ -106,7 +104,7 @@ class Encoders:
 
     def sample(self, angle: np.ndarray, velocity: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Return alpha (n,) [rad] and alpha_dot (n,) [rad/s] in whole counts."""
-        return quantised(angle, self._count), quantised(velocity, self._velocity)
+        return quantised(angle, self._count, velocity, self._velocity)
 
 
 @jit
@@ -122,9 +120,12 @@ def disturbed(
 
 
 @jit
-def quantised(values: np.ndarray, unit: float) -> np.ndarray:
-    """Return values (n,) rounded to multiples of `unit`, in the same unit."""
-    out = np.empty(len(values))
-    for i in range(len(values)):
-        out[i] = unit * np.round(values[i] / unit)
-    return out
+def quantised(
+    angle: np.ndarray, count: float, velocity: np.ndarray, unit: float
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return angle (n,) in whole counts, both [rad], and velocity (n,) in whole units [rad/s]."""
+    angles, velocities = np.empty(len(angle)), np.empty(len(angle))
+    for i in range(len(angle)):
+        angles[i] = count * np.round(angle[i] / count)
+        velocities[i] = unit * np.round(velocity[i] / unit)
+    return angles, velocities

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from uam_control.stamps import nanoseconds, seconds
+from uam_control.stamps import SECOND, nanoseconds
 from uam_sim_bridge.mavlink.offboard.sequence import OffboardSequence, Phase
 from uam_sim_bridge.mavlink.protocol.modes import Mode
 from uam_sim_bridge.stages.autopilot_port import AutopilotPort
@@ -44,7 +44,7 @@ class AutopilotReports:
     def due(self, stamp: int) -> AutopilotReport | None:
         """Return the report that is due at the tick `stamp` [ns], None for none."""
         autopilot, sequence = self._autopilot, self._sequence
-        connected = autopilot.connected(seconds(stamp))
+        connected = autopilot.connected(stamp / SECOND)
         what = (connected, autopilot.mode, autopilot.armed, sequence.phase, sequence.reasons)
         if what == self._reported and stamp < self._due:
             return None

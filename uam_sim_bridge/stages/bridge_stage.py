@@ -15,7 +15,7 @@ from typing import Any, Self
 
 import numpy as np
 
-from uam_control.stamps import seconds
+from uam_control.stamps import SECOND
 from uam_control.vehicle import VehicleDescription
 from uam_sim_bridge.mavlink.offboard.hold import HoldParameters
 from uam_sim_bridge.mavlink.offboard.sequence import OffboardSequence
@@ -86,6 +86,7 @@ class BridgeStage:
         self._vision = VisionPacing(sets.vision)
         self._reports = AutopilotReports(autopilot, sequence)
         self._failsafe: deque[tuple[int, bool]] = deque()
+        self._situation = Situation(armed=False, landed=True, let_go=False)
         self.report: AutopilotReport | None = None
         self.factor = 1.0
 
@@ -94,8 +95,8 @@ class BridgeStage:
 
         In flight the poses of a frozen tracker are discarded.
         """
-        if self._vision.take(seconds(stamp), position, quaternion, self.autopilot.armed):
-            self.source.note_pose(seconds(stamp), quaternion)
+        if self._vision.take(stamp / SECOND, position, quaternion, self.autopilot.armed):
+            self.source.note_pose(stamp / SECOND, quaternion)
 
     def arm(self, arm: bool) -> None:
         """Take the mission's desired arming state."""
@@ -106,20 +107,23 @@ class BridgeStage:
 
         Both count a little later, see STATUS_DELAY.
         """
-        self.identification.switch(seconds(stamp), magnet)
+        self.identification.switch(stamp / SECOND, magnet)
         if self._failsafe and stamp < self._failsafe[-1][0]:  # a clock that began anew
             self._failsafe.clear()
         self._failsafe.append((stamp, failsafe))
 
     def note_state(self, stamp: int, state: np.ndarray) -> None:
         """Take an estimate (3, SIZE), also where no tick follows; it is kept, not copied."""
-        self.source.note_state(seconds(stamp), state)
+        self.source.note_state(stamp / SECOND, state)
 
     def hear(self, stamp: int) -> None:
         """Take what the autopilot has sent, and the mission's status that counts by now."""
-        self.autopilot.poll(seconds(stamp))
+        self.autopilot.poll(stamp / SECOND)
         while self._failsafe and self._failsafe[0][0] <= stamp - STATUS_DELAY:
             self.sequence.let_go = self._failsafe.popleft()[1]
+        situation = self.autopilot.armed, self.autopilot.landed, self.sequence.let_go
+        if situation != self._situation:
+            self._situation = Situation(*situation)
 
     def tick(
         self,
@@ -135,7 +139,7 @@ class BridgeStage:
         state (3, 6 + n); flying: whether tau_p (3,) [N, ENU] is valid; tau_q (3,) [N m, FLU], None
         for idle; attitude (3, 3): of the position law, see `Desired`.
         """
-        now, situation = seconds(stamp), self._situation
+        now, situation = stamp / SECOND, self._situation
         setpoint = self.source.commanded(now, state, flying, tau_p, tau_q, attitude, situation)
         self._send(now, setpoint)
         self.report = self._reports.due(stamp)
@@ -151,17 +155,12 @@ class BridgeStage:
 
     def without(self, stamp: int) -> Setpoint:
         """Send the setpoint of a tick without valid commands, and return it."""
-        now = seconds(stamp)
+        now = stamp / SECOND
         setpoint = self.source.without(now, self._situation)
         self._send(now, setpoint)
         self.report = self._reports.due(stamp)
         self.factor = self.map.thrust_factor
         return setpoint
-
-    @property
-    def _situation(self) -> Situation:
-        autopilot = self.autopilot
-        return Situation(autopilot.armed, autopilot.landed, self.sequence.let_go)
 
     def _send(self, now: float, setpoint: Setpoint) -> None:
         """Send the messages due at `now` [s]: heartbeat and requests, vision, setpoint."""

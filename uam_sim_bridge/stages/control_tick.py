@@ -20,7 +20,7 @@ from uam_control.stages.estimator_stage import EstimatorStage
 from uam_control.stages.law_stages import LawStage
 from uam_control.stages.mission_stage import MissionStage
 from uam_control.stages.timing import Timing
-from uam_control.stamps import seconds
+from uam_control.stamps import SECOND
 from uam_control.supervision import State
 from uam_sim_bridge.mavlink.offboard.setpoint_source import Setpoint
 from uam_sim_bridge.stages.bridge_stage import BridgeStage
@@ -102,7 +102,7 @@ class ControlTick:
             "attitude": self.attitude,
             "arm": self.arm,
         }
-        self._told: tuple[bool, bool] | None = None  # magnet and failsafe, as the bridge has them
+        self._told: tuple | None = None  # arm, magnet and failsafe, as the bridge has them
 
     def tick(
         self, mocap: Pose | None = None, joints: Joints | None = None, imu: Imu | None = None
@@ -165,11 +165,11 @@ def fly_mission(tick: ControlTick) -> bool:
         s.reference[:, ARM] = output.reference[:, ARM]
     s.flying, s.magnet = mission.flying, output.magnet
     s.time, s.phase = output.time, output.phase
-    tick.bridge.arm(output.arm)
-    told = output.magnet, output.state is State.FAILSAFE
+    told = output.arm, output.magnet, output.state is State.FAILSAFE
     if told != tick._told:
         tick._told = told
-        tick.bridge.mission(s.stamp, *told)
+        tick.bridge.arm(output.arm)
+        tick.bridge.mission(s.stamp, *told[1:])
     return True
 
 
@@ -178,21 +178,27 @@ def control_position(tick: ControlTick) -> bool:
     s, stage = tick.signals, tick.position
     s.tau_p = stage.update(s.stamp, s.state, s.reference, s.flying)
     s.attitude_reference = stage.controller.attitude_reference if s.flying else tick.level
-    return _keep_gains(tick, "position", stage)
+    if stage.gains_due:
+        _keep_gains(tick, "position", stage)
+    return True
 
 
 def control_attitude(tick: ControlTick) -> bool:
     """state, reference, attitude reference → tau_q."""
     s, stage = tick.signals, tick.attitude
     s.tau_q = stage.update(s.stamp, s.state, s.reference, s.attitude_reference, s.flying)
-    return _keep_gains(tick, "attitude", stage)
+    if stage.gains_due:
+        _keep_gains(tick, "attitude", stage)
+    return True
 
 
 def control_arm(tick: ControlTick) -> bool:
     """state, reference, attitude reference → tau_alpha."""
     s, stage = tick.signals, tick.arm
     s.tau_alpha = stage.update(s.stamp, s.state, s.reference, s.attitude_reference, s.flying)
-    return _keep_gains(tick, "arm", stage)
+    if stage.gains_due:
+        _keep_gains(tick, "arm", stage)
+    return True
 
 
 def send_setpoint(tick: ControlTick) -> bool:
@@ -214,14 +220,12 @@ def look_ahead(tick: ControlTick) -> bool:
     return True
 
 
-def _keep_gains(tick: ControlTick, subsystem: str, stage: LawStage) -> bool:
-    """Adapted gains → the supervisor's inputs, when they are due."""
-    if stage.gains_due:
-        inputs, law = tick.mission.inputs, stage.controller
-        stamp, gains = tick.signals.stamp, law.adaptation.copy()
-        message = seconds(stamp), subsystem, law.names, gains
-        inputs.keep(subsystem, inputs.inputs.gains, message, stamp)
-    return True
+def _keep_gains(tick: ControlTick, subsystem: str, stage: LawStage) -> None:
+    """Adapted gains → the supervisor's inputs."""
+    inputs, law = tick.mission.inputs, stage.controller
+    stamp, gains = tick.signals.stamp, law.adaptation.copy()
+    message = stamp / SECOND, subsystem, law.names, gains
+    inputs.keep(subsystem, inputs.inputs.gains, message, stamp)
 
 
 STAGES: Sequence[tuple[str, Stage]] = (

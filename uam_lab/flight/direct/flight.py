@@ -14,7 +14,7 @@ from uam_control.mission import Mission, Scenario
 from uam_control.mission.time_limit import DISARMED, Settled, time_limit
 from uam_control.profiles.profile import Profile
 from uam_control.stages.timing import Timing
-from uam_control.stamps import nanoseconds, seconds
+from uam_control.stamps import SECOND, nanoseconds
 from uam_lab.flight.direct.record import Places, Snapshot, record, record_blind, record_switches
 from uam_lab.results.timeseries import SUBSYSTEMS, FlightTable, columns_of, gain_columns
 from uam_sim_bridge.autopilot.core import Autopilot
@@ -121,8 +121,9 @@ class DirectFlight:
         plant, control, autopilot = self.plant, self.control, self.autopilot
         signals = control.signals
         now, samples = plant.time, plant.sense()
-        self._truths.append(Snapshot.of(plant, autopilot.motors, signals.magnet))
-        autopilot.begin(now)
+        shot = Snapshot(now, plant.truth(), autopilot.motors.copy(), signals.magnet)
+        self._truths.append(shot)
+        autopilot.time = now
         seen = control.tick(*self._delivered(samples))
         motors = autopilot.update(*samples.hil)
         if seen:
@@ -140,11 +141,19 @@ class DirectFlight:
         self._complete = self._complete or None not in (mocap, joints, imu)
         if not self._complete:
             return None, None, None
-        return _stamped(mocap), _stamped(joints), _stamped(imu)
+        return (
+            mocap and (nanoseconds(mocap[0]), *mocap[1:]),
+            joints and (nanoseconds(joints[0]), *joints[1:]),
+            imu and (nanoseconds(imu[0]), *imu[1:]),
+        )
 
     def _record(self, signals: Signals) -> None:
         """Write a tick's row."""
-        truth = self._truth_at(seconds(signals.stamp))
+        truths, stamp = self._truths, signals.stamp / SECOND
+        while truths[0].time < stamp - 1e-9:
+            truths.popleft()
+        shot = truths.popleft()  # when the IMU sample was taken
+        truth = shot.truth
         row = self.recording.next_row(signals.phase)
         rates, thrust = sent(signals.setpoint)
         record(
@@ -161,38 +170,27 @@ class DirectFlight:
             thrust,
             self._gains,
             self._gain_columns,
-            truth.motors,
-            truth.thrust,
-            truth.payload_pose,
+            shot.motors,
+            truth.rotor_thrust,
+            truth.payload_position,
+            truth.payload_quaternion,
             self._places,
         )
-        record_switches(row, truth, signals.thrust_factor, self._places)
+        record_switches(row, shot, signals.thrust_factor, self._places)
         self._lag = len(self._truths)
 
     def _record_blind(self) -> None:
         """Write the row of a tick without an IMU sample: the truth goes on."""
         if self.recording.count and len(self._truths) > self._lag:
-            truth = self._truths.popleft()
+            shot = self._truths.popleft()
             last = self.recording.count - 1
             row = self.recording.next_row(self.mission.output.phase)
             row[:] = self.recording.values[last]
             row[0] += self.plant.period
-            record_blind(row, truth, self._places)
+            record_blind(row, shot, self._places)
 
     def _update_faults(self, control: ControlTick) -> bool:
         """Stage: tell plant and link the mission's time; where there are faults."""
         signals = control.signals
-        self._faults.update(seconds(signals.stamp), signals.time)
+        self._faults.update(signals.stamp / SECOND, signals.time)
         return True
-
-    def _truth_at(self, stamp: float) -> Snapshot:
-        """What was true when the IMU sample of `stamp` [s] was taken."""
-        truths = self._truths
-        while truths[0].time < stamp - 1e-9:
-            truths.popleft()
-        return truths.popleft()
-
-
-def _stamped(sample: tuple | None) -> tuple | None:
-    """Return a sample with its time [s] as a stamp [ns]."""
-    return None if sample is None else (nanoseconds(sample[0]), *sample[1:])

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
@@ -9,7 +10,7 @@ import numpy as np
 from uam_control.coordinates import ROLL
 from uam_control.maths.compiled import jit
 from uam_lab.results.timeseries import Columns
-from uam_sim_bridge.plant import Plant
+from uam_sim_bridge.plant import Truth
 
 
 class Places(NamedTuple):
@@ -42,35 +43,17 @@ class Places(NamedTuple):
         )
 
 
-class Snapshot(NamedTuple):
-    """The truth of one tick, at plant time [s]; see `plant.Truth`.
+@dataclass(slots=True)
+class Snapshot:
+    """The truth of one tick, at plant time [s].
 
     motors (n,), magnet: the commands in force then, which are those of the tick before.
     """
 
     time: float
-    state: np.ndarray
-    thrust: np.ndarray
-    payload_pose: np.ndarray
-    magnet_force: float
-    magnet_swing: float
+    truth: Truth
     motors: np.ndarray
     magnet: bool
-
-    @classmethod
-    def of(cls, plant: Plant, motors: np.ndarray, magnet: bool) -> Snapshot:
-        """A copy of what is true now; motors, magnet: as commanded at the last tick."""
-        truth = plant.truth()
-        return cls(
-            plant.time,
-            truth.state,
-            truth.rotor_thrust,
-            np.concatenate((truth.payload_position, truth.payload_quaternion)),
-            truth.magnet_force,
-            truth.magnet_swing,
-            motors.copy(),
-            magnet,
-        )
 
 
 @jit
@@ -90,7 +73,8 @@ def record(
     gain_columns: tuple[np.ndarray, ...],
     motors: np.ndarray,
     thrust: np.ndarray,
-    payload_pose: np.ndarray,
+    payload_position: np.ndarray,
+    payload_quaternion: np.ndarray,
     at: Places,
 ) -> None:
     """Copy one tick into its row of the recording; roll and pitch reference are what tau_p asks.
@@ -115,25 +99,29 @@ def record(
     for i in range(len(motors)):
         row[at.command + i] = motors[i]
         row[at.thrust + i] = thrust[i]
-    for i in range(len(payload_pose)):
-        row[at.payload + i] = payload_pose[i]
+    for i in range(3):
+        row[at.payload + i] = payload_position[i]
+    for i in range(4):
+        row[at.payload + 3 + i] = payload_quaternion[i]
     for subsystem in range(3):
         columns, values = gain_columns[subsystem], gains[subsystem]
         for i in range(len(columns)):
             row[columns[i]] = values[i]
 
 
-def record_switches(row: np.ndarray, truth: Snapshot, factor: float, at: Places) -> None:
+def record_switches(row: np.ndarray, shot: Snapshot, factor: float, at: Places) -> None:
     """Write the rest of a tick: the magnet's command, force and swing; the thrust factor."""
-    row[at.magnet : at.magnet + 3] = truth.magnet, truth.magnet_force, truth.magnet_swing
+    truth = shot.truth
+    row[at.magnet : at.magnet + 3] = shot.magnet, truth.magnet_force, truth.magnet_swing
     row[at.factor] = factor
 
 
-def record_blind(row: np.ndarray, truth: Snapshot, at: Places) -> None:
+def record_blind(row: np.ndarray, shot: Snapshot, at: Places) -> None:
     """Write a tick without an IMU sample into a copy of the row before: the truth goes on."""
-    rotors = len(truth.motors)
+    truth, rotors = shot.truth, len(shot.motors)
     row[at.truth : at.truth + truth.state.size] = truth.state.ravel()
-    row[at.command : at.command + rotors] = truth.motors
-    row[at.thrust : at.thrust + rotors] = truth.thrust
-    row[at.payload : at.payload + 7] = truth.payload_pose
-    row[at.magnet : at.magnet + 3] = truth.magnet, truth.magnet_force, truth.magnet_swing
+    row[at.command : at.command + rotors] = shot.motors
+    row[at.thrust : at.thrust + rotors] = truth.rotor_thrust
+    row[at.payload : at.payload + 3] = truth.payload_position
+    row[at.payload + 3 : at.payload + 7] = truth.payload_quaternion
+    row[at.magnet : at.magnet + 3] = shot.magnet, truth.magnet_force, truth.magnet_swing

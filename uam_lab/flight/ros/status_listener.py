@@ -7,7 +7,7 @@ from collections.abc import Mapping
 
 from rclpy.node import Node
 
-from uam_control.stamps import seconds
+from uam_control.stamps import SECOND
 from uam_lab.flight.progress import Status
 from uam_lab.processes.guest import Guest
 from uam_msgs_py.messages import topics
@@ -52,7 +52,7 @@ class StatusListener:
             position_error=mission.position_error,
             attitude_error=mission.attitude_error,
             arm_error=mission.arm_error,
-            real_time_factor=self._real_time_factor(seconds(stamp)),
+            real_time_factor=self._real_time_factor(stamp / SECOND),
             autopilot=self._autopilot_text,
         )
 

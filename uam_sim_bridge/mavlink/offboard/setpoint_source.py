@@ -68,7 +68,8 @@ class SetpointSource:
         self._margin = hold.ground_margin
         self._fresh_for = fresh
         self._say = say
-        self._estimated = self._seen = (-math.inf, UNKNOWN)  # stamp [s], roll, pitch, yaw
+        self._estimated = -math.inf, UNKNOWN  # stamp [s]; roll, pitch, yaw
+        self._seen = -math.inf, UNKNOWN  # stamp [s]; quaternion
         self._velocity = UNKNOWN
         self._height = 0.0
         self._ground: float | None = None  # height [m] at which the vehicle stood
@@ -85,7 +86,7 @@ class SetpointSource:
 
     def note_pose(self, stamp: float, quaternion: np.ndarray) -> None:
         """Store the attitude (4,) [w x y z], FLU → ENU, of a mocap pose of `stamp` [s]."""
-        self._seen = stamp, euler_from_quaternion(quaternion)
+        self._seen = stamp, quaternion
 
     def commanded(
         self,
@@ -148,8 +149,9 @@ class SetpointSource:
 
     def _attitude(self, now: float) -> np.ndarray:
         """Return roll, pitch, yaw (3,) [rad]: the estimate, else mocap's if fresh, else NaN."""
-        known = (self._estimated, self._seen)
-        return next((angles for stamp, angles in known if self._fresh(stamp, now)), UNKNOWN)
+        if self._fresh(self._estimated[0], now):
+            return self._estimated[1]
+        return euler_from_quaternion(self._seen[1]) if self._fresh(self._seen[0], now) else UNKNOWN
 
     def _fresh(self, stamp: float, now: float) -> bool:
         return now - stamp < self._fresh_for

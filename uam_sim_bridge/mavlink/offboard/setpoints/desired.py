@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import NamedTuple
+from dataclasses import dataclass
 
 import numpy as np
 
 from uam_sim_bridge.mavlink.protocol.attitude_target import AttitudeTarget
 
 
-class Desired(NamedTuple):
+@dataclass(slots=True)
+class Desired:
     """The desired motion, from the control laws or from the level hold.
 
     rates (3,): body rates that make tau_q in the autopilot's rate loop [rad/s, FLU]; attitude
