@@ -16,6 +16,7 @@ import json
 
 import numpy as np
 import pytest
+from default_columns import COLUMNS
 
 from uam_control.coordinates import BASE_COORDINATES
 from uam_control.mission import load_scenario
@@ -23,7 +24,7 @@ from uam_control.profiles.profile import load_profile
 from uam_lab.flight.direct.flight import DirectFlight
 from uam_lab.results import timeseries
 from uam_lab.results.outcome import transitions
-from uam_lab.results.timeseries import COLUMNS, SUBSYSTEMS
+from uam_lab.results.timeseries import SUBSYSTEMS
 from uam_sim_bridge.faults import read_schedule
 from uam_sim_bridge.plant import Vehicle
 

@@ -4,6 +4,7 @@ import json
 
 import numpy as np
 import pytest
+from default_columns import COLUMNS
 from mcap.reader import make_reader
 from mcap_ros2.decoder import DecoderFactory
 
@@ -76,9 +77,9 @@ def test_every_tick_is_in_the_table(two_flights):
     assert names == ["waiting", "take-off", "hover", "land", "landed"]
     flown = series.values[series.flown]
     names = ModularLaw.gain_names(3)
-    own = [gain_columns(subsystem, names) for subsystem in timeseries.SUBSYSTEMS]
+    own = [gain_columns(subsystem, names, COLUMNS) for subsystem in timeseries.SUBSYSTEMS]
     others = np.ones(flown.shape[1], dtype=bool)
-    others[timeseries.COLUMNS.block("adaptation.")] = False
+    others[COLUMNS.block("adaptation.")] = False
     others[np.concatenate(own)] = True
     assert not np.isnan(flown[:, others]).any(), "a number on every tick, but for other laws' gains"
     assert np.isnan(flown[:, ~others]).all()

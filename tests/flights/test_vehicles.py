@@ -10,6 +10,7 @@ import json
 
 import numpy as np
 import pytest
+import yaml
 from whole_flight import SHORT, Flight
 
 from uam_control.laws.modular import ModularLaw
@@ -17,6 +18,7 @@ from uam_control.mission import load_scenario
 from uam_control.profiles.profile import default_profile
 from uam_control.supervision import State
 from uam_control.vehicle import load_description
+from uam_lab.cli.main import main
 from uam_lab.flight.direct.flight import DirectFlight
 from uam_lab.results import timeseries
 from uam_lab.results.metrics import compute
@@ -102,3 +104,73 @@ def test_it_flies_through_the_nodes(name, tmp_path):
     assert series.columns.rotors == len(described.rotors)
     rotors = [f"rotor_{i}.thrust" for i in range(1, series.columns.rotors + 1)]
     assert min(series[rotor].max() for rotor in rotors) > 1.0
+
+
+def test_a_campaign_flies_the_joints_of_the_vehicle(tmp_path, capsys):
+    command = ["campaign", "--vehicle", "s500_arm3", "--scenario", "hover", "--flights", "1"]
+    assert main([*command, "--out", str(tmp_path)]) == 0
+    assert capsys.readouterr().out.count("| alpha_3 |") == 1
+    found = json.loads((tmp_path / "campaign.json").read_text())
+    assert found["vehicle"] == "s500_arm3" and found["outcomes"]["completed"] == 1
+    assert found["columns"] == list(load_description("s500_arm3").coordinates)
+    assert len(found["rms_percentiles"]["50"]) == 9
+    assert main([*command, "--seed", "2", "--out", str(tmp_path)]) == 2, "other flights"
+
+
+def test_a_comparison_flies_the_joints_of_the_vehicle(tmp_path):
+    command = ["compare", "--vehicle", "s500_arm3", "--scenario", "hover", "--rows", "proposed"]
+    one = ["--seeds", "1", "--payload-mass", "0"]
+    assert main([*command, *one, "--out", str(tmp_path)]) == 0
+    found = json.loads((tmp_path / "comparison.json").read_text())
+    assert (found["vehicle"], found["scenario"]) == ("s500_arm3", "hover")
+    assert len(found["rows"]["proposed"]["mean"]) == len(found["columns"]) == 9
+    assert found["profiles"] == {"proposed": "s500_arm3.yaml"}
+    assert "Vehicle s500_arm3, scenario hover" in (tmp_path / "report.html").read_text()
+
+
+def test_a_fault_matrix_reaches_the_sixth_rotor(tmp_path, capsys):
+    fault = {"fault": "motor_loss", "motor": 6, "remaining": 0.7}
+    matrix = {"scenario": "hover", "moments": {"air": {"at": 5}}, "faults": [fault]}
+    file, out = tmp_path / "matrix.yaml", tmp_path / "out"
+    file.write_text(yaml.safe_dump(matrix))
+    assert main(["faults", "--matrix", str(file), "--out", str(out)]) == 2
+    assert "motor 6: the vehicle has 4" in capsys.readouterr().err and not out.exists()
+    assert main(["faults", "--matrix", str(file), "--vehicle", "hexa_arm", "--out", str(out)]) == 0
+    found = json.loads((out / "faults.json").read_text())
+    assert found["vehicle"] == "hexa_arm"
+    assert [flight["outcome"] for flight in found["flights"]] == ["completed", "completed"]
+
+
+def test_a_search_starts_from_the_profile_of_the_vehicle(tmp_path, capsys):
+    space = {
+        "controller": "modular",
+        "flights": [{"payload_mass": 0.0, "seed": 3, "scenario": "hover"}],
+        "cost": {
+            "aim": [1.0] * 9,
+            "peak_weight": 0.3,
+            "restless_weight": 0.1,
+            "restless_allowed": [1.0, 1.0],
+            "not_completed": 3.0,
+            "lost": 100.0,
+        },
+        "knobs": [
+            {
+                "node": "arm_controller",
+                "parameter": "lambda_1",
+                "entries": [2],
+                "low": 100.0,
+                "high": 5000.0,
+            }
+        ],
+    }
+    file, out = tmp_path / "space.yaml", tmp_path / "out"
+    file.write_text(yaml.safe_dump(space))
+    command = ["tune", "--space", str(file), "--jobs", "1", "--evaluations", "1"]
+    assert main([*command, "--out", str(out)]) == 2
+    assert "entries 0 to 1 are expected" in capsys.readouterr().err
+    assert main([*command, "--vehicle", "s500_arm3", "--out", str(out)]) == 0
+    best = (out / "best.yaml").read_text()
+    assert "from profile s500_arm3." in best and "Vehicle: s500_arm3." in best
+    start = default_profile("modular", load_description("s500_arm3"))
+    flown = yaml.safe_load(best)["arm_controller"]["ros__parameters"]["lambda_1"]
+    assert flown == pytest.approx(start.sets["arm_controller"].lambda_1, rel=1e-3)

@@ -5,6 +5,7 @@ from dataclasses import asdict
 
 import numpy as np
 import pytest
+from default_columns import COLUMNS
 from whole_flight import SHORT
 
 from uam_control.laws.modular import ModularLaw
@@ -13,7 +14,7 @@ from uam_control.profiles.profile import load_profile
 from uam_lab.flight.direct.flight import DirectFlight
 from uam_lab.results import metrics
 from uam_lab.results.result_folder import ResultFolder
-from uam_lab.results.timeseries import COLUMNS, FlightTable, gain_columns
+from uam_lab.results.timeseries import FlightTable, gain_columns
 from uam_sim_bridge.plant import Vehicle
 
 PERIOD = 0.04  # ten times the control period: enough for a picture
@@ -29,7 +30,7 @@ def made_up_flight(seed=1, scale=1.0, info=None):
     start = np.zeros(8)
     start[2], start[6:] = 0.285, scenario.arm_start
     trajectory = scenario.trajectory(start)
-    recording = FlightTable(len(times))
+    recording = FlightTable(len(times), COLUMNS)
     reference = np.zeros((3, 8))
     phase_of_error = noise.uniform(0, 6, 8)
     amplitude = scale * np.array([0.02, 0.01, 0.015, 0.02, 0.015, 0.01, 0.01, 0.012])
@@ -58,7 +59,9 @@ def made_up_flight(seed=1, scale=1.0, info=None):
         for subsystem in ("position", "attitude", "arm"):
             gains = np.abs(1.0 + np.sin(0.1 * time + np.arange(7)))
             row[COLUMNS.block(f"adaptation.{subsystem}.")] = np.nan
-            row[gain_columns(subsystem, ModularLaw.gain_names(3))] = gains if flying else 0.0
+            row[gain_columns(subsystem, ModularLaw.gain_names(3), COLUMNS)] = (
+                gains if flying else 0.0
+            )
         for i in range(1, 5):
             row[COLUMNS[f"rotor_{i}.command"]] = 0.6 * flying
             row[COLUMNS[f"rotor_{i}.thrust"]] = 5.4 * flying

@@ -7,6 +7,7 @@ import re
 
 import numpy as np
 import pytest
+from default_columns import COLUMNS
 
 from uam_control.settings import configuration
 from uam_lab.campaign import fault_matrix, fault_report
@@ -18,7 +19,6 @@ from uam_lab.report.figures.figures import draw
 from uam_lab.report.figures.panels import DrawnFlight
 from uam_lab.report.page import flight_page
 from uam_lab.results import metrics
-from uam_lab.results.timeseries import COLUMNS
 from uam_sim_bridge.faults import FAULTS, FaultError
 
 MATRIX = configuration.path("campaign/faults.yaml")
@@ -169,6 +169,7 @@ def test_a_bad_matrix_is_refused_in_one_line(tmp_path, text, said):
         (["--matrix", "no"], "unknown campaign 'no'; there are: faults"),
         (["--engine", "fast"], "unknown engine 'fast'"),
         (["--clock", "realtime"], "the direct engine has no clock"),
+        (["--vehicle", "none"], "unknown vehicle 'none'; there are: hexa_arm"),
         (["--jobs", "0"], "--jobs and --repeat must be 1 or more"),
         (["--repeat", "0"], "--jobs and --repeat must be 1 or more"),
     ],
@@ -248,8 +249,9 @@ def test_the_report_of_a_campaign(tmp_path):
             matrix.cells(1), ["completed", "held", "lost", "lost"], strict=True
         )
     ]
-    summary, written = fault_report.write(tmp_path, matrix, results, "uam faults")
-    assert summary.startswith("3 flights with a fault: 1 held, 2 lost. Without a fault: completed.")
+    summary, written = fault_report.write(tmp_path, matrix, results, "s500_arm", "uam faults")
+    assert summary.startswith("s500_arm, pick_and_place: 3 flights with a fault: 1 held, 2 lost. ")
+    assert "Without a fault: completed." in summary
     assert "| servo_jam (joint 1) | held 0.20 m |" in summary
     html = written.read_text()
     assert "why, not &lt;so&gt;" in html and "node_kill" not in html

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from default_columns import COLUMNS
 from PIL import Image
 
 from uam_control.profiles.profile import load_profile
@@ -9,7 +10,7 @@ from uam_lab.analysis.stability import analyse
 from uam_lab.report.figures import figures, panels
 from uam_lab.report.figures.panels import DrawnFlight
 from uam_lab.results import metrics
-from uam_lab.results.timeseries import COLUMNS, Series, gain_columns
+from uam_lab.results.timeseries import Series, gain_columns
 from uam_sim_bridge.plant import Vehicle
 
 
@@ -28,7 +29,9 @@ def without_magnet(flight):
     values = flight.values.copy()
     values[:, COLUMNS.block("magnet.")] = 0.0
     values[:, COLUMNS.block("payload.")] = np.nan
-    return Series(values, flight.phases, flight.phase_names, {"payload_mass_kg": 0.0})
+    return Series(
+        values, flight.phases, flight.phase_names, {"payload_mass_kg": 0.0}, flight.columns
+    )
 
 
 def test_thinning_keeps_every_peak():
@@ -111,15 +114,22 @@ def test_a_flight_without_payload_has_no_payload_figure_and_one_path(flight, tmp
 def test_a_law_without_adaptation_has_no_adaptation_figure(flight):
     values = flight.values.copy()
     values[:, COLUMNS.block("adaptation.")] = np.nan
-    series = Series(values, flight.phases, flight.phase_names, flight.info)
+    series = Series(values, flight.phases, flight.phase_names, flight.info, flight.columns)
     assert figures.adaptation([DrawnFlight("other", series)]) is None
 
 
 def test_each_law_has_its_own_rows_in_the_adaptation_figure(flight):
     values = flight.values.copy()
     values[:, COLUMNS.block("adaptation.")] = np.nan
-    values[:, gain_columns("position", ("D1", "D2", "D3", "s_norm"))] = [-0.1, 0.2, 0.3, 0.4]
-    other = DrawnFlight("ASMC-1", Series(values, flight.phases, flight.phase_names, flight.info))
+    values[:, gain_columns("position", ("D1", "D2", "D3", "s_norm"), COLUMNS)] = [
+        -0.1,
+        0.2,
+        0.3,
+        0.4,
+    ]
+    other = DrawnFlight(
+        "ASMC-1", Series(values, flight.phases, flight.phase_names, flight.info, flight.columns)
+    )
     rows = ["$\\hat D$", "‖s‖"]
     alone = figures.adaptation([other])
     assert [axis.get_ylabel() for axis in alone.axes[::3]] == rows
@@ -131,6 +141,8 @@ def test_each_law_has_its_own_rows_in_the_adaptation_figure(flight):
 
 def test_a_flight_that_never_took_off_is_drawn_too(flight, tmp_path):
     rows = flight.time < -0.5
-    series = Series(flight.values[rows], flight.phases[rows], flight.phase_names, flight.info)
+    series = Series(
+        flight.values[rows], flight.phases[rows], flight.phase_names, flight.info, flight.columns
+    )
     names = ["position_errors", "path", "adaptation"]
     assert figures.draw([DrawnFlight("modular", series)], tmp_path, names=names)[:2] == names[:2]

@@ -5,12 +5,14 @@ import pytest
 
 pytest.importorskip("rclpy")
 
+from default_columns import COLUMNS
+
 from uam_control.laws.catalogue import LAWS
 from uam_control.mission import load_scenario
 from uam_control.profiles.profile import default_profile
 from uam_lab.recording import log_reader
 from uam_lab.recording.mcap_reader import TopicLog
-from uam_lab.results.timeseries import COLUMNS, gain_columns
+from uam_lab.results.timeseries import gain_columns
 from uam_msgs_py.messages.convert import JointStateWriter
 from uam_msgs_py.messages.status import MissionStatus
 
@@ -27,8 +29,8 @@ def test_the_gains_of_every_law_are_read_by_name(law):
     log = log_reader.Log({topic: TopicLog("sensor_msgs/msg/JointState", [], messages)})
     values = np.full((3, len(COLUMNS)), np.nan)
     ticks = np.array([16_000_000, 36_000_000, 40_000_000])
-    log_reader.adaptation(log, "arm", ticks, values)
-    columns = gain_columns("arm", names)
+    log_reader.adaptation(log, "arm", ticks, values, COLUMNS)
+    columns = gain_columns("arm", names, COLUMNS)
     assert np.isnan(values[0]).all()  # nothing was said yet
     np.testing.assert_array_equal(values[1, columns], 10.0 + np.arange(len(names)))
     np.testing.assert_array_equal(values[2, columns], 20.0 + np.arange(len(names)))

@@ -5,9 +5,10 @@ import math
 
 import numpy as np
 import pytest
+from default_columns import COLUMNS
 
 from uam_lab.results import metrics
-from uam_lab.results.timeseries import COLUMNS, FlightTable
+from uam_lab.results.timeseries import FlightTable
 
 INFO = {
     "controller": "modular",
@@ -30,7 +31,7 @@ def flight(phases=None, payload=True):
 
     The payload is raised by 0.3 m while the magnet is on and ends 0.05 m from (0.8, 0).
     """
-    made = FlightTable(10)
+    made = FlightTable(10, COLUMNS)
     for k in range(10):
         name = "waiting" if k < 2 else "hover" if k < 8 else "landed"
         row = made.next_row(phases[k] if phases else name)

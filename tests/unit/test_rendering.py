@@ -19,7 +19,9 @@ def cut(series, end):
     """Return the flight up to mission time `end` [s], with one snapshot."""
     rows = series.time < end
     info = series.info | {"snapshots": [[0.5 * end, "(a) take-off"], [80.0, "never reached"]]}
-    return Series(series.values[rows], series.phases[rows], series.phase_names, info)
+    return Series(
+        series.values[rows], series.phases[rows], series.phase_names, info, series.columns
+    )
 
 
 def test_a_pose_reproduces_the_recorded_positions(flight):
@@ -38,7 +40,7 @@ def test_a_pose_reproduces_the_recorded_positions(flight):
 
 def test_without_payload_its_body_is_out_of_sight(flight):
     info = flight.info | {"payload_mass_kg": 0.0}
-    poses = Poses(Series(flight.values, flight.phases, flight.phase_names, info))
+    poses = Poses(Series(flight.values, flight.phases, flight.phase_names, info, flight.columns))
     poses.put(flight.row_at(50.0))
     assert np.linalg.norm(poses.body("payload")) > 20.0
 
@@ -47,7 +49,7 @@ def test_snapshots_are_those_of_the_scenario_up_to_the_end_of_the_flight(flight)
     times = flight_video.snapshot_times(flight)
     assert [caption[:3] for _, caption in times] == ["(a)", "(b)", "(c)", "(d)", "(e)", "(f)"]
     assert flight_video.snapshot_times(cut(flight, 3.0)) == [(1.5, "(a) take-off")]
-    plain = Series(flight.values, flight.phases, flight.phase_names, {})
+    plain = Series(flight.values, flight.phases, flight.phase_names, {}, flight.columns)
     spread = flight_video.snapshot_times(plain)
     assert len(spread) == 6
     assert spread[0][1] == "(a) approach"

@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from default_columns import COLUMNS
 
 from uam_control.laws.modular import ModularLaw, ModularParameters
 from uam_control.profiles.profile import load_profile
@@ -12,7 +13,7 @@ from uam_lab.analysis.folder import analyse_folder
 from uam_lab.analysis.lyapunov_bound import ComparisonSystem
 from uam_lab.analysis.tracking import Tracking
 from uam_lab.report.figures import figures, panels
-from uam_lab.results.timeseries import COLUMNS, Series
+from uam_lab.results.timeseries import Series
 from uam_sim_bridge.plant import Vehicle
 
 LAW = ModularParameters(
@@ -197,11 +198,15 @@ def test_no_analysis_of_other_laws_and_of_a_vehicle_on_the_ground(short_direct_f
     series, sets = short_direct_flight, load_profile("s500").sets
     values = series.values.copy()
     values[:, COLUMNS.block("adaptation.")] = np.nan
-    other = Series(values, series.phases, series.phase_names, {"controller": "asmc1"})
+    other = Series(
+        values, series.phases, series.phase_names, {"controller": "asmc1"}, series.columns
+    )
     assert analyse_folder(tmp_path, other) is None
     assert stability.analyse(other, sets, Vehicle.load(), 0.2) is None
     rows = series.time < 0.2
-    grounded = Series(series.values[rows], series.phases[rows], series.phase_names, series.info)
+    grounded = Series(
+        series.values[rows], series.phases[rows], series.phase_names, series.info, series.columns
+    )
     assert stability.analyse(grounded, sets, Vehicle.load(), 0.2) is None
-    empty = Series(series.values[:0], series.phases[:0], series.phase_names, {})
+    empty = Series(series.values[:0], series.phases[:0], series.phase_names, {}, series.columns)
     assert len(ticks.in_the_air(empty)) == 0

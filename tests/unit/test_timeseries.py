@@ -3,14 +3,15 @@
 import numpy as np
 import pyarrow.parquet as pq
 import pytest
+from default_columns import COLUMNS
 
 from uam_lab.results import timeseries
-from uam_lab.results.timeseries import COLUMNS, FlightTable, UnreadableFlight
+from uam_lab.results.timeseries import FlightTable, UnreadableFlight
 
 
 def recording(phases, dt=0.5, start=-1.0):
     """A recording with one row per phase name and every number zero."""
-    made = FlightTable(2)
+    made = FlightTable(2, COLUMNS)
     for k, phase in enumerate(phases):
         row = made.next_row(phase)
         row[:] = 0.0

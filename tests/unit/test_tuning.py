@@ -35,7 +35,7 @@ FLIGHT = TrialResult(
     peaks={},
 )
 SPACE = {
-    "profile": "s500",
+    "controller": "modular",
     "flights": [{"payload_mass": 0.0, "seed": 3, "scenario": "hover"}],
     "cost": {
         "aim": [0.025, 0.01, 0.045, 1.6, 1.4, 1.5, 0.6, 0.6],

@@ -50,10 +50,14 @@ FLIGHT_OWN = {
 
 @dataclass(frozen=True)
 class Profile:
-    """The parameter sets of a flight, by node, and their source: name, file, raw sections."""
+    """The parameter sets of a flight, by node, and their source: name, file, raw sections.
+
+    vehicle: the one whose derived values and number of joints the sets have.
+    """
 
     name: str
     file: Path
+    vehicle: VehicleDescription
     sets: dict[str, ParameterSet]
     sections: dict[str, dict[str, Any]]
 
@@ -153,4 +157,4 @@ def profile_of(
             sets[node] = kind.from_mapping(values, len(axes))
         except ParameterError as error:
             raise ProfileError(f"{file}: {node}: {error}") from None
-    return Profile(file.stem, file, sets, sections)
+    return Profile(file.stem, file, vehicle, sets, sections)

@@ -24,7 +24,9 @@ def in_the_air(series: Series, frequency: float = FREQUENCY) -> np.ndarray:
         return np.zeros(0, dtype=int)
     flown = series.flown & (series["truth.z"] > series["truth.z"][0] + CLEARANCE)
     names = ModularLaw.gain_names(AXES)
-    gains = np.hstack([series.values[:, gain_columns(s, names)] for s in SUBSYSTEMS])
+    gains = np.hstack(
+        [series.values[:, gain_columns(s, names, series.columns)] for s in SUBSYSTEMS]
+    )
     complete = np.logical_and.reduce(
         [np.isfinite(block).all(axis=1) for block in (*map(series.block, NEEDED), gains)]
     )

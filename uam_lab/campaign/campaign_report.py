@@ -8,8 +8,9 @@ from pathlib import Path
 import numpy as np
 from matplotlib.figure import Figure
 
+from uam_control.coordinates import BASE_COORDINATES, POSITION
 from uam_lab.campaign.fault_outcome import COMPLETED, OUTCOMES, counts
-from uam_lab.campaign.trial import ERRORS, TrialResult
+from uam_lab.campaign.trial import TrialResult
 from uam_lab.campaign.variations import Draw, common
 from uam_lab.report.figures import style
 from uam_lab.results.atomic import replacing, write_rows, write_text
@@ -18,36 +19,52 @@ from uam_lab.results.result_folder import as_json, versions
 PERCENTILES = (50, 90, 99)
 
 
-def write(out: Path, draws: Sequence[Draw], results: Sequence[TrialResult], command: str) -> str:
-    """Write flights.csv, campaign.json, campaign.png and summary.md; return the summary."""
+def write(
+    out: Path,
+    draws: Sequence[Draw],
+    results: Sequence[TrialResult],
+    vehicle: str,
+    command: str,
+) -> str:
+    """Write flights.csv, campaign.json, campaign.png and summary.md; return the summary.
+
+    vehicle: its name.
+    """
     failed = [not result.completed for result in results]
     rms = np.array([result.rms for result in results])
     _flights(out / "flights.csv", draws, results)
-    summary = _summary(draws, results, failed, rms, command)
+    summary = _summary(draws, results, failed, rms, vehicle, command)
     write_text(out / "summary.md", summary)
     write_text(
         out / "campaign.json",
         as_json(
             {
                 "command": command,
+                "vehicle": vehicle,
                 "versions": versions(),
                 "flights": len(results),
                 "outcomes": counts(r.outcome for r in results),
                 "rms_percentiles": {str(p): np.percentile(rms, p, axis=0) for p in PERCENTILES},
-                "columns": ERRORS,
+                "columns": results[0].coordinates,
                 "failures_have_in_common": common(draws, failed),
             }
         ),
     )
     with style.styled(), replacing(out / "campaign.png") as temporary:
-        _figure(draws, results, failed, rms).savefig(
+        _figure(draws, results, vehicle, rms).savefig(
             temporary, format="png", dpi=style.PIXELS_PER_INCH
         )
     return summary
 
 
 def _flights(file: Path, draws: Sequence[Draw], results: Sequence[TrialResult]) -> None:
-    head = ["flight", *draws[0].values, *(f"rms {n}" for n in ERRORS), "outcome", "why"]
+    head = [
+        "flight",
+        *draws[0].values,
+        *(f"rms {n}" for n in results[0].coordinates),
+        "outcome",
+        "why",
+    ]
     write_rows(
         file,
         head,
@@ -69,13 +86,14 @@ def _summary(
     results: Sequence[TrialResult],
     failed: Sequence[bool],
     rms: np.ndarray,
+    vehicle: str,
     command: str,
 ) -> str:
     count, bad = len(results), sum(failed)
     others = {o: n for o, n in counts(r.outcome for r in results).items() if n and o != COMPLETED}
     listed = ", ".join(f"{number} {outcome}" for outcome, number in others.items())
     lines = [
-        f"{count - bad} of {count} flights completed the mission "
+        f"{vehicle}: {count - bad} of {count} flights completed the mission "
         f"({100.0 * (count - bad) / count:.1f} %); {listed or 'none lost'}.",
         "",
         *(f"- {outcome}: {OUTCOMES[outcome]}" for outcome in others),
@@ -83,8 +101,8 @@ def _summary(
         "| RMS error | " + " | ".join(f"{p} % of flights below" for p in PERCENTILES) + " |",
         "|---|" + "---|" * len(PERCENTILES),
     ]
-    for i, name in enumerate(ERRORS):
-        unit, digits = ("m", 3) if i < 3 else ("deg", 2)
+    for i, name in enumerate(results[0].coordinates):
+        unit, digits = ("m", 3) if name in BASE_COORDINATES[POSITION] else ("deg", 2)
         cells = [f"{np.percentile(rms[:, i], p):.{digits}f} {unit}" for p in PERCENTILES]
         lines.append(f"| {name} | " + " | ".join(cells) + " |")
     shared = common(draws, failed)
@@ -118,25 +136,27 @@ def _kind(why: str) -> str:
 
 
 def _figure(
-    draws: Sequence[Draw], results: Sequence[TrialResult], failed: Sequence[bool], rms: np.ndarray
+    draws: Sequence[Draw], results: Sequence[TrialResult], vehicle: str, rms: np.ndarray
 ) -> Figure:
     """Draw the distribution of each RMS error and, below, each variation, completed or not."""
+    failed = np.array([not result.completed for result in results])
     figure = Figure(figsize=(style.WIDTH, 5.6), layout="constrained")
     top, bottom = figure.subfigures(2, 1, height_ratios=(1.0, 1.2))
     axis = top.subplots()
     axis.violinplot(np.log10(rms), showmedians=True, widths=0.85)
     ticks = range(int(np.floor(np.log10(rms.min()))), int(np.ceil(np.log10(rms.max()))) + 1)
     axis.set(
-        xticks=range(1, len(ERRORS) + 1),
-        xticklabels=ERRORS,
+        xticks=range(1, rms.shape[1] + 1),
+        xticklabels=results[0].coordinates,
         ylabel="RMS error [m, deg]",
         yticks=list(ticks),
         yticklabels=[f"{10.0**k:g}" for k in ticks],
     )
-    axis.set_title(f"{len(results)} random flights, {sum(failed)} not completed", loc="left")
+    axis.set_title(
+        f"{vehicle}: {len(results)} random flights, {failed.sum()} not completed", loc="left"
+    )
     names = list(draws[0].values)
-    failed = np.array(failed)
-    error = np.linalg.norm(rms[:, :3], axis=1)
+    error = np.linalg.norm(rms[:, POSITION], axis=1)
     for name, small in zip(names, bottom.subplots(2, -(-len(names) // 2)).flat, strict=False):
         values = np.array([draw.values[name] for draw in draws])
         small.plot(values[~failed], error[~failed], ".", color=style.FLIGHTS[0], markersize=2)

@@ -9,6 +9,7 @@ from typing import Any, NamedTuple
 
 from uam_control.mission import Scenario, load_scenario
 from uam_control.settings import yaml_file
+from uam_control.vehicle import VehicleDescription
 from uam_lab.campaign import promise
 from uam_lab.campaign.promise import Promise
 from uam_sim_bridge.faults import FAULTS, Fault, FaultError, Schedule
@@ -74,15 +75,16 @@ def read(
     only: Collection[str] = (),
     moments: Sequence[str] = (),
     scenario: str | None = None,
+    vehicle: VehicleDescription | None = None,
 ) -> Matrix:
     """Read a matrix for an engine. Raises FaultError, ConfigurationError, ScenarioError.
 
     only: names of faults, () for all; moments: names of columns, () for all; scenario: instead of
-    the file's.
+    the file's; vehicle: None for the default one.
     """
     document = _document(file)
     name = scenario or str(document["scenario"])
-    times = _moments(document["moments"], load_scenario(name), str(file))
+    times = _moments(document["moments"], load_scenario(name, vehicle), str(file))
     entries = listed(document["faults"], str(file))
     rows = [_checked(dict(entry), str(file)) for entry in entries]
     for given, known in ((only, FAULTS), (moments, times)):

@@ -48,9 +48,12 @@ HEAD = (
 
 
 def write(
-    out: Path, matrix: Matrix, results: Sequence[FaultResult], command: str
+    out: Path, matrix: Matrix, results: Sequence[FaultResult], vehicle: str, command: str
 ) -> tuple[str, Path]:
-    """Write flights.csv, faults.json, summary.md, matrix.png, report.html; return summary, page."""
+    """Write flights.csv, faults.json, summary.md, matrix.png, report.html; return summary, page.
+
+    vehicle: its name.
+    """
     write_rows(
         out / "flights.csv",
         HEAD,
@@ -73,18 +76,19 @@ def write(
         as_json(
             {
                 "command": command,
+                "vehicle": vehicle,
                 "versions": versions(),
                 "matrix": asdict(matrix),
                 "flights": [vars(result) for result in results],
             }
         ),
     )
-    summary = markdown(matrix, results, command)
+    summary = markdown(matrix, results, vehicle, command)
     write_text(out / "summary.md", summary)
     with style.styled(), replacing(out / "matrix.png") as temporary:
         picture(matrix, results).savefig(temporary, format="png", dpi=style.PIXELS_PER_INCH)
     page = out / "report.html"
-    write_text(page, _page(out, matrix, results, command))
+    write_text(page, _page(out, matrix, results, vehicle, command))
     return summary, page
 
 
@@ -141,11 +145,11 @@ def sentence(results: Sequence[FaultResult]) -> str:
     )
 
 
-def markdown(matrix: Matrix, results: Sequence[FaultResult], command: str) -> str:
+def markdown(matrix: Matrix, results: Sequence[FaultResult], vehicle: str, command: str) -> str:
     """Return the matrix as a Markdown table: outcome and largest position error."""
     cells = grouped(results)
     lines = [
-        sentence(results),
+        f"{vehicle}, {matrix.scenario}: {sentence(results)}",
         "",
         f"| fault | {' | '.join(matrix.moments)} |",
         "|---|" + "---|" * len(matrix.moments),
@@ -202,10 +206,13 @@ def _shown(value: float) -> str:
     return "" if math.isnan(value) else f"{value:.4g}"
 
 
-def _page(out: Path, matrix: Matrix, results: Sequence[FaultResult], command: str) -> str:
+def _page(
+    out: Path, matrix: Matrix, results: Sequence[FaultResult], vehicle: str, command: str
+) -> str:
     return html.template("uam_lab.campaign", "faults.html.j2").render(
         sentence=sentence(results),
         matrix=matrix,
+        vehicle=vehicle,
         outcomes=OUTCOMES,
         colours=COLOURS,
         picture=html.embedded(out / "matrix.png"),

@@ -6,9 +6,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
-from uam_control.mission import load_scenario
+from uam_control.mission import Scenario, load_scenario
 from uam_control.profiles.profile import Profile
-from uam_control.vehicle import load_description
 from uam_lab.campaign import quiet
 from uam_lab.campaign.fault_matrix import Cell
 from uam_lab.campaign.fault_outcome import COMPLETED, LOST, classify, down_after
@@ -23,7 +22,7 @@ from uam_sim_bridge.plant import Vehicle
 
 @dataclass(frozen=True)
 class FaultTrial:
-    """One flight. scenario: name or file; payload_mass [kg]."""
+    """One flight of the profile's vehicle. scenario: name or file; payload_mass [kg]."""
 
     cell: Cell
     scenario: str
@@ -32,6 +31,10 @@ class FaultTrial:
     seed: int
     engine: str = "direct"
     clock: str = "lockstep"
+
+    def load_scenario(self) -> Scenario:
+        """Return the scenario, for the vehicle. Raises ScenarioError."""
+        return load_scenario(self.scenario, self.profile.vehicle)
 
 
 @dataclass(frozen=True)
@@ -61,11 +64,10 @@ def fly(trial: FaultTrial) -> FaultResult:
 
 
 def _direct(trial: FaultTrial) -> FaultResult:
-    scenario = load_scenario(trial.scenario)
     flight = DirectFlight(
-        scenario,
+        trial.load_scenario(),
         trial.profile,
-        Vehicle.load(),
+        Vehicle.of(trial.profile.vehicle),
         trial.payload_mass,
         trial.seed,
         trial.cell.schedule,
@@ -79,9 +81,9 @@ def _direct(trial: FaultTrial) -> FaultResult:
 def _ros(trial: FaultTrial) -> FaultResult:
     hindered = {one.fault.values["node"] for one in trial.cell.schedule.only(PROCESS).faults}
     settings = FlightSettings(
-        scenario=load_scenario(trial.scenario),
+        scenario=trial.load_scenario(),
         profile=trial.profile,
-        vehicle=load_description(),
+        vehicle=trial.profile.vehicle,
         clock=trial.clock,
         payload_mass=trial.payload_mass,
         seed=trial.seed,
@@ -109,7 +111,7 @@ def _result(
         "payload_mass_kg": trial.payload_mass,
         "abort_reason": reason,
         "faults": happened,
-        "drop_point": load_scenario(trial.scenario).drop_point,
+        "drop_point": trial.load_scenario().drop_point,
         "transitions": changes,
     }
     figures = metrics.compute(series, info)

@@ -35,7 +35,8 @@ class Flown:
         first, *lines = self._file.read_text().splitlines() or [""]
         if first != json.dumps(mark):
             raise ConfigurationError(
-                f"{out} contains flights with another profile, seed or range: give another --out"
+                f"{out} contains flights with another vehicle, scenario, profile, seed or range: "
+                "give another --out"
             )
         for line in lines:
             try:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from uam_control.mission import load_scenario
-from uam_control.vehicle import load_description
 from uam_lab.campaign import quiet
 from uam_lab.campaign import trial as direct
 from uam_lab.campaign.trial import Trial, TrialResult
@@ -16,11 +15,12 @@ class TrialFailed(RuntimeError):
 
 def fly(trial: Trial) -> TrialResult:
     """Fly a trial. Raises TrialFailed."""
-    scenario = load_scenario(trial.scenario)
+    vehicle = trial.profile.vehicle
+    scenario = load_scenario(trial.scenario, vehicle)
     settings = FlightSettings(
         scenario=scenario,
         profile=trial.profile,
-        vehicle=load_description(),
+        vehicle=vehicle,
         payload_mass=trial.payload_mass,
         seed=trial.seed,
         scenario_source=trial.scenario,

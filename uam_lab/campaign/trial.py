@@ -8,22 +8,23 @@ from typing import Any
 
 import numpy as np
 
+from uam_control.coordinates import ALPHA, coordinates
 from uam_control.mission import Scenario, load_scenario
 from uam_control.profiles.profile import Profile
 from uam_lab.campaign.fault_outcome import COMPLETED, LOST, classify
 from uam_lab.flight.direct.flight import DirectFlight
 from uam_lab.results import metrics
 from uam_lab.results.outcome import transitions
-from uam_lab.results.timeseries import COLUMNS, Series
+from uam_lab.results.timeseries import Series
 from uam_sim_bridge.plant import Vehicle
-
-# The eight columns of the paper's tables of RMS errors, in the paper's order.
-ERRORS = ("x", "y", "z", "roll", "pitch", "yaw", "alpha_1", "alpha_2")
 
 
 @dataclass(frozen=True)
 class Trial:
-    """One flight. label: its row in the tables; keep: file for its time series, if any."""
+    """One flight of the profile's vehicle.
+
+    label: its row in the tables; keep: file for its time series, if any.
+    """
 
     label: str
     profile: Profile
@@ -36,7 +37,8 @@ class Trial:
 
 @dataclass(frozen=True)
 class TrialResult:
-    """Result of a flight. rms, largest (8,): ERRORS in m and deg, NaN without a take-off.
+    """Result of a flight. rms, largest (6 + n,): errors of the `coordinates`, in m and
+    deg, NaN without a take-off.
 
     flown: flown time / planned time; cut_short: not landed by the mission. outcome: one of
     `fault_outcome.OUTCOMES`; why: unmet criteria of a completed mission. restless: RMS change from
@@ -58,6 +60,11 @@ class TrialResult:
     peaks: dict[str, float]
 
     @property
+    def coordinates(self) -> tuple[str, ...]:
+        """Names of the entries of rms and largest."""
+        return coordinates(len(self.rms) - ALPHA)
+
+    @property
     def completed(self) -> bool:
         """Whether the mission was completed."""
         return self.outcome == COMPLETED
@@ -70,8 +77,9 @@ class TrialResult:
 
 def fly(trial: Trial) -> tuple[TrialResult, Series]:
     """Fly a trial. Raises ConfigurationError, ScenarioError."""
-    scenario = load_scenario(trial.scenario)
-    vehicle = Vehicle.load().changed(trial.vehicle_changes)
+    described = trial.profile.vehicle
+    scenario = load_scenario(trial.scenario, described)
+    vehicle = Vehicle.of(described).changed(trial.vehicle_changes)
     flight = DirectFlight(scenario, trial.profile, vehicle, trial.payload_mass, trial.seed)
     flight.run()
     series = flight.recording.series({"controller": trial.label})
@@ -140,10 +148,10 @@ def _change(values: np.ndarray) -> float:
 
 
 def _peaks(series: Series, flown: np.ndarray) -> dict[str, float]:
-    where = COLUMNS.block("adaptation.")
+    where = series.columns.block("adaptation.")
     values = np.abs(series.values[flown, where])
     return {
         name.removeprefix("adaptation."): float(np.nanmax(column))
-        for name, column in zip(COLUMNS.names[where], values.T, strict=True)
+        for name, column in zip(series.columns.names[where], values.T, strict=True)
         if not np.isnan(column).all()
     }

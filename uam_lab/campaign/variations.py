@@ -11,7 +11,6 @@ import yaml
 
 from uam_control.profiles.profile import Profile
 from uam_control.settings.configuration import path
-from uam_control.vehicle import load_description
 from uam_lab.campaign.trial import Trial
 
 
@@ -30,25 +29,30 @@ def ranges(file: Path | None = None) -> dict[str, tuple[float, float]]:
 
 
 def draw(
-    profile: Profile, count: int, seed: int, allowed: dict[str, tuple[float, float]] | None = None
+    profile: Profile,
+    count: int,
+    seed: int,
+    allowed: dict[str, tuple[float, float]] | None = None,
+    scenario: str = "pick_and_place",
 ) -> list[Draw]:
     """Return `count` random flights. Flight i depends on the seed and i, not on `count`."""
     allowed = allowed or ranges()
     return [
-        _one(profile, np.random.default_rng([seed, i]), seed * 100_000 + i, allowed)
+        _one(profile, scenario, np.random.default_rng([seed, i]), seed * 100_000 + i, allowed)
         for i in range(count)
     ]
 
 
 def _one(
     profile: Profile,
+    scenario: str,
     random: np.random.Generator,
     seed: int,
     allowed: dict[str, tuple[float, float]],
 ) -> Draw:
     drawn = {name: float(random.uniform(low, high)) for name, (low, high) in allowed.items()}
     direction = random.uniform(0.0, 2.0 * np.pi)
-    efficiency = random.uniform(*allowed["efficiency"], size=len(load_description().rotors))
+    efficiency = random.uniform(*allowed["efficiency"], size=len(profile.vehicle.rotors))
     offset = random.uniform(0.0, 2.0 * np.pi)
     speed, away = drawn["wind"], drawn["payload_offset"]
     drawn["efficiency"] = float(efficiency.min())
@@ -61,7 +65,7 @@ def _one(
         "variation.payload_offset": [float(away * np.cos(offset)), float(away * np.sin(offset))],
         "rotors.efficiency": efficiency.tolist(),
     }
-    trial = Trial("random", profile, drawn["payload"], seed, vehicle_changes=changes)
+    trial = Trial("random", profile, drawn["payload"], seed, scenario, vehicle_changes=changes)
     return Draw(drawn, trial)
 
 

@@ -7,12 +7,14 @@ import shlex
 import sys
 from pathlib import Path
 
-from uam_control.profiles.profile import Profile, ProfileError, load_profile
-from uam_control.settings import configuration
+from uam_control.mission import ScenarioError, load_scenario
+from uam_control.profiles.profile import Profile, ProfileError
 from uam_control.settings.configuration import ConfigurationError
+from uam_control.vehicle import VehicleError, load_description
 from uam_lab.campaign.pool import cores, fly_all
 from uam_lab.campaign.trial import TrialResult
 from uam_lab.cli.counting import Counting
+from uam_lab.cli.vehicle_options import add_profile, add_scenario, add_vehicle, given_profile
 from uam_lab.results.result_folder import ResultFolderError, make_folder
 
 WRONG_USE = 2
@@ -20,6 +22,7 @@ EXAMPLES = """\
 examples:
   uam campaign                             1,000 flights of the flying profile
   uam campaign --flights 100 --profile asmc2
+  uam campaign --flights 100 --vehicle mine.yaml
   uam campaign --out robust                stop with Ctrl-C; the same command continues
 
 Mass and position of the payload, wind, gusts, sensor noise, masses, inertias and motors are drawn
@@ -40,7 +43,9 @@ def add(commands: argparse._SubParsersAction) -> None:
     )
     option = parser.add_argument
     option("--flights", type=int, default=1000, metavar="N", help="(default %(default)s)")
-    option("--profile", default="s500", metavar="NAME|FILE", help="(default %(default)s)")
+    add_vehicle(parser)
+    add_scenario(parser)
+    add_profile(parser)
     option("--seed", type=int, default=1, metavar="N", help="of the draw (default %(default)s)")
     option(
         "--jobs",
@@ -60,9 +65,18 @@ def run(options: argparse.Namespace) -> int:
     try:
         if options.flights < 1 or options.jobs < 1 or options.seed < 0:
             raise ConfigurationError("--flights and --jobs must be 1 or more, --seed 0 or more")
-        profile = load_profile(str(configuration.named("profiles", options.profile)))
+        vehicle = load_description(options.vehicle)
+        load_scenario(options.scenario, vehicle)  # an invalid one is refused before any flight
+        profile = given_profile(options.profile, vehicle)
         return campaign(options, profile, make_folder(options.out, "campaign"))
-    except (ConfigurationError, ProfileError, ResultFolderError, OSError) as error:
+    except (
+        ConfigurationError,
+        ProfileError,
+        ScenarioError,
+        VehicleError,
+        ResultFolderError,
+        OSError,
+    ) as error:
         print(f"uam campaign: {error}", file=sys.stderr)
         return WRONG_USE
 
@@ -73,8 +87,10 @@ def campaign(options: argparse.Namespace, profile: Profile, out: Path) -> int:
     from uam_lab.campaign.flown import Flown
     from uam_lab.campaign.variations import draw, ranges
 
-    draws = draw(profile, options.flights, options.seed)
-    flown = Flown(out, (options.seed, ranges(), profile.sets, profile.bridge()))
+    draws = draw(profile, options.flights, options.seed, scenario=options.scenario)
+    vehicle = profile.vehicle
+    settings = (options.seed, ranges(), profile.sets, profile.bridge())
+    flown = Flown(out, (*settings, vehicle.numbers, options.scenario))
     trials = [one.trial for one in draws if one.trial.seed not in flown.results]
     if flown.results:
         print(f"campaign: continuing after {len(flown.results)} earlier flights", flush=True)
@@ -87,6 +103,7 @@ def campaign(options: argparse.Namespace, profile: Profile, out: Path) -> int:
 
         fly_all(trials, options.jobs, progress=show)
     results = [flown.results[one.trial.seed] for one in draws]
-    print(campaign_report.write(out, draws, results, shlex.join(["uam", *sys.argv[1:]])))
+    command = shlex.join(["uam", *sys.argv[1:]])
+    print(campaign_report.write(out, draws, results, vehicle.name, command))
     print(f"results  {out}")
     return 0

@@ -8,12 +8,16 @@ import sys
 from collections.abc import Sequence
 from pathlib import Path
 
-from uam_control.profiles.profile import ProfileError, load_profile
+from uam_control.laws import catalogue
+from uam_control.mission import ScenarioError, load_scenario
+from uam_control.profiles.profile import ProfileError, default_profile, load_profile
 from uam_control.settings import configuration
 from uam_control.settings.configuration import ConfigurationError
+from uam_control.vehicle import VehicleDescription, VehicleError, load_description
 from uam_lab.campaign.pool import cores, figures_of, fly_all
 from uam_lab.campaign.trial import TrialResult
 from uam_lab.cli.counting import Counting
+from uam_lab.cli.vehicle_options import add_scenario, add_vehicle
 from uam_lab.compare import plan
 from uam_lab.flight.settings import ENGINES, SettingsError, require_ros
 from uam_lab.results.result_folder import ResultFolderError, make_folder
@@ -25,6 +29,7 @@ examples:
   uam compare --seeds 10 --jobs 4
   uam compare --engine ros --rows proposed --seeds 10    with the nodes, one flight at a time
   uam compare --profile mine=mine.yaml     with one more row, for the profile mine.yaml
+  uam compare --vehicle mine.yaml --scenario hover --rows proposed frozen
 
 Results in --out: report.html, tables.md, flights.csv, comparison.json, figures/. The baselines are
 reconstructions (docs/law.md). The same command gives the same tables.
@@ -41,6 +46,8 @@ def add(commands: argparse._SubParsersAction) -> None:
         epilog=EXAMPLES,
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
+    add_vehicle(parser)
+    add_scenario(parser)
     option = parser.add_argument
     option("--seeds", type=int, default=5, metavar="N", help="seeds 1..N (default %(default)s)")
     option(
@@ -88,27 +95,41 @@ def run(options: argparse.Namespace) -> int:
         payloads = tuple(options.payload_mass or plan.PAYLOADS)
         if not all(0.0 <= mass <= 2.0 for mass in payloads):
             raise ConfigurationError("--payload-mass must be 0 to 2 kg")
-        rows = (*plan.entries(options.rows), *map(_further, options.profile))
+        vehicle = load_description(options.vehicle)
+        load_scenario(options.scenario, vehicle)  # an invalid one is refused before any flight
+        rows = (
+            *plan.entries(options.rows, vehicle),
+            *(_further(text, vehicle) for text in options.profile),
+        )
         out = make_folder(options.out, "compare")
         (out / "flights").mkdir(exist_ok=True)
         seeds = range(1, options.seeds + 1)
-        return compare(rows, payloads, seeds, options.engine, jobs, out)
-    except (ConfigurationError, ProfileError, ResultFolderError, SettingsError, OSError) as error:
+        flights = plan.Flights(vehicle, options.scenario, payloads, tuple(seeds))
+        return compare(rows, flights, options.engine, jobs, out)
+    except (
+        ConfigurationError,
+        ProfileError,
+        ResultFolderError,
+        ScenarioError,
+        SettingsError,
+        VehicleError,
+        OSError,
+    ) as error:
         print(f"uam compare: {error}", file=sys.stderr)
         return WRONG_USE
 
 
-def _further(text: str):
+def _further(text: str, vehicle: VehicleDescription) -> plan.ComparedController:
     label, _, file = text.partition("=")
     if not label or not file:
         raise ConfigurationError(f"--profile {text}: LABEL=FILE is expected")
-    return plan.ComparedController(label, load_profile(str(configuration.named("profiles", file))))
+    profile = load_profile(str(configuration.named("profiles", file)), vehicle=vehicle)
+    return plan.ComparedController(label, profile)
 
 
 def compare(
     rows: Sequence[plan.ComparedController],
-    payloads: Sequence[float],
-    seeds: Sequence[int],
+    flights: plan.Flights,
     engine: str,
     jobs: int,
     out: Path,
@@ -116,10 +137,10 @@ def compare(
     """Fly, then write the results; return the exit status."""
     from uam_lab.compare import comparison_report, modularity
 
-    trials = plan.trials(rows, payloads, list(seeds), out / "flights")
-    proposed = load_profile("s500")
+    trials = plan.trials(rows, flights, out / "flights")
+    proposed = default_profile(catalogue.DEFAULT, flights.vehicle)
     kept = out / "flights" / "modularity.parquet"
-    extra = modularity.trials(proposed, plan.middle(payloads), seeds[0], kept)
+    extra = modularity.trials(proposed, flights, kept)
     with Counting("compare", len(trials) + len(extra)) as counting:
 
         def show(done: int, result: TrialResult) -> None:
@@ -134,14 +155,16 @@ def compare(
     facts = {
         "command": shlex.join(["uam", *sys.argv[1:]]),
         "engine": engine,
-        "payloads_kg": list(payloads),
-        "seeds": list(seeds),
+        "vehicle": flights.vehicle.name,
+        "scenario": flights.scenario,
+        "payloads_kg": list(flights.payloads),
+        "seeds": list(flights.seeds),
         "profiles": {row.label: row.profile.file.name for row in rows},
         "budgets": comparison_report.budgets(rows),
     }
     written = comparison_report.write(out, trials, results, modular, facts)
     print(written.text)
-    print(f"results  {out}\nreport   {written.page}")
+    print(f"vehicle  {flights.vehicle.name}\nresults  {out}\nreport   {written.page}")
     return 0
 
 

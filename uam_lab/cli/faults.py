@@ -8,15 +8,17 @@ import sys
 from pathlib import Path
 
 from uam_control.mission import ScenarioError, load_scenario
-from uam_control.profiles.profile import ProfileError, load_profile
+from uam_control.profiles.profile import ProfileError
 from uam_control.settings import configuration
 from uam_control.settings.configuration import ConfigurationError
+from uam_control.vehicle import VehicleError, load_description
 from uam_lab.campaign.pool import cores, fly_all
 from uam_lab.cli.counting import Counting
+from uam_lab.cli.vehicle_options import add_profile, add_vehicle, given_profile
 from uam_lab.flight import settings as flight_settings
 from uam_lab.flight.settings import CLOCKS, ENGINES, SettingsError
 from uam_lab.results.result_folder import ResultFolderError, make_folder
-from uam_sim_bridge.faults import FaultError, fault_catalogue
+from uam_sim_bridge.faults import FaultError, fault_catalogue, limits
 from uam_sim_bridge.ports import PortError
 
 BROKEN, WRONG_USE = 1, 2
@@ -26,6 +28,7 @@ examples:
   uam faults --list                          list all faults, with parameters and ranges
   uam faults --only motor_loss --moment transit
   uam faults --matrix mine.yaml --profile asmc2
+  uam faults --only motor_loss --vehicle mine.yaml
   uam faults --matrix processes --engine ros --clock realtime --repeat 3
   uam fly --fault motor_loss@pick+1:remaining=0.7      one flight with its report
 
@@ -67,7 +70,8 @@ def add(commands: argparse._SubParsersAction) -> None:
         help="only this moment of the matrix; may be repeated",
     )
     option("--scenario", metavar="NAME|FILE", help="default: that of the matrix")
-    option("--profile", default="s500", metavar="NAME|FILE", help="(default %(default)s)")
+    add_vehicle(parser)
+    add_profile(parser)
     option("--engine", default="direct", metavar="ros|direct", help="(default %(default)s)")
     option(
         "--clock",
@@ -104,6 +108,7 @@ def run(options: argparse.Namespace) -> int:
         ConfigurationError,
         ProfileError,
         ScenarioError,
+        VehicleError,
         FaultError,
         SettingsError,
         PortError,
@@ -119,15 +124,20 @@ def campaign(options: argparse.Namespace) -> int:
     from uam_lab.campaign import fault_matrix, fault_report, fault_trial
 
     _check(options)
-    profile = load_profile(str(configuration.named("profiles", options.profile)))
+    vehicle = load_description(options.vehicle)
+    profile = given_profile(options.profile, vehicle)
     file = configuration.named("campaign", options.matrix)
-    matrix = fault_matrix.read(file, options.engine, options.only, options.moment, options.scenario)
-    mass = load_scenario(matrix.scenario).payload_mass
+    given = (options.engine, options.only, options.moment, options.scenario)
+    matrix = fault_matrix.read(file, *given, vehicle)
+    mass = load_scenario(matrix.scenario, vehicle).payload_mass
+    cells = matrix.cells(options.seed, options.repeat)
+    for cell in cells:
+        limits.check(cell.schedule, options.engine, vehicle=vehicle)
     trials = [
         fault_trial.FaultTrial(
             cell, matrix.scenario, profile, mass, options.seed, options.engine, options.clock
         )
-        for cell in matrix.cells(options.seed, options.repeat)
+        for cell in cells
     ]
     out = make_folder(options.out, "faults")
     jobs = options.jobs or (1 if options.engine == "ros" else cores())
@@ -139,7 +149,7 @@ def campaign(options: argparse.Namespace) -> int:
 
         results = fly_all(trials, jobs, fault_trial.fly, show)
     command = shlex.join(["uam", *sys.argv[1:]])
-    summary, page = fault_report.write(out, matrix, results, command)
+    summary, page = fault_report.write(out, matrix, results, vehicle.name, command)
     print(summary)
     print(f"report   {page}")
     return BROKEN if any(result.kept is False for result in results) else 0

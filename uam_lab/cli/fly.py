@@ -14,7 +14,8 @@ from uam_control.mission import ScenarioError
 from uam_control.profiles.profile import ProfileError
 from uam_control.settings import configuration
 from uam_control.settings.configuration import ConfigurationError
-from uam_control.vehicle import DEFAULT_VEHICLE, VehicleError
+from uam_control.vehicle import VehicleError
+from uam_lab.cli.vehicle_options import add_scenario, add_vehicle
 from uam_lab.flight import settings as flight_settings
 from uam_lab.flight.conclude import command_line, conclude
 from uam_lab.flight.progress import Progress
@@ -77,9 +78,7 @@ def add(commands: argparse._SubParsersAction) -> None:
         epilog=EXAMPLES,
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
-    scenarios = ", ".join(configuration.names("scenarios"))
     profiles = ", ".join(configuration.names("profiles"))
-    vehicles = ", ".join(configuration.names("vehicle", (".yaml",)))
     option = parser.add_argument
     option(
         "--controller",
@@ -95,18 +94,8 @@ def add(commands: argparse._SubParsersAction) -> None:
         help=f"parameters: {profiles}, or a ROS parameter file, as ros2 param dump writes it; "
         "may be repeated, a later one overrides (default: the controller's)",
     )
-    option(
-        "--vehicle",
-        default=DEFAULT_VEHICLE,
-        metavar="NAME|FILE",
-        help=f"{vehicles}, or the description of one: docs/your_vehicle.md (default %(default)s)",
-    )
-    option(
-        "--scenario",
-        default="pick_and_place",
-        metavar="NAME|FILE",
-        help=f"{scenarios}, or a .yaml or .csv file (default %(default)s)",
-    )
+    add_vehicle(parser)
+    add_scenario(parser)
     option(
         "--engine",
         default="ros",

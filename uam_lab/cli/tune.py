@@ -11,11 +11,13 @@ from typing import TYPE_CHECKING
 
 from uam_control.laws import catalogue
 from uam_control.mission import ScenarioError
-from uam_control.profiles.profile import ProfileError, load_profile
+from uam_control.profiles.profile import ProfileError
 from uam_control.settings import configuration
 from uam_control.settings.configuration import ConfigurationError
+from uam_control.vehicle import VehicleError, load_description
 from uam_lab.campaign.pool import cores
 from uam_lab.cli.counting import Counting
+from uam_lab.cli.vehicle_options import add_vehicle, given_profile
 from uam_lab.flight.direct.warm_up import is_cold, warm_up
 from uam_lab.results.result_folder import ResultFolderError, make_folder
 
@@ -29,6 +31,7 @@ examples:
   uam tune --controller asmc1 --evaluations 100
   uam tune --out results/tune-mine           continue a stopped search
   uam tune --space mine.yaml --profile best.yaml
+  uam tune --vehicle mine.yaml
   uam tune --study arm --storage mysql://user@host/optuna    on several machines with one study:
                                              the same command on each
 
@@ -58,10 +61,11 @@ def add(commands: argparse._SubParsersAction) -> None:
         + " (default %(default)s)",
     )
     option("--space", metavar="FILE", help="file with another space")
+    add_vehicle(parser)
     option(
         "--profile",
         metavar="NAME|FILE",
-        help="start of the search (default: the profile of the space)",
+        help="start of the search (default: the vehicle's profile for the controller)",
     )
     option(
         "--evaluations",
@@ -120,16 +124,16 @@ def run(options: argparse.Namespace) -> int:
     from uam_lab.tuning.space import TuningError, load_space
 
     try:
-        start = None
-        if options.profile:
-            start = load_profile(str(configuration.named("profiles", options.profile)))
-        space = load_space(options.space or options.controller, start)
+        vehicle = load_description(options.vehicle)
+        start = given_profile(options.profile, vehicle) if options.profile else None
+        space = load_space(options.space or options.controller, start, vehicle)
         return tune(options, space)
     except (
         TuningError,
         ProfileError,
         ScenarioError,
         ConfigurationError,
+        VehicleError,
         ResultFolderError,
         OSError,
     ) as error:

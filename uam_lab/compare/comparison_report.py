@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from matplotlib.figure import Figure
 
-from uam_lab.campaign.trial import ERRORS, Trial, TrialResult
+from uam_lab.campaign.trial import Trial, TrialResult
 from uam_lab.compare import plan, tables
 from uam_lab.compare.modularity import Evidence
 from uam_lab.report.figures import figures, style
@@ -83,7 +83,13 @@ def write(
     write_text(
         out / "comparison.json",
         as_json(
-            {"columns": ERRORS, **facts, "versions": versions(), "rows": numbers, "claims": claims}
+            {
+                "columns": found[0].coordinates,
+                **facts,
+                "versions": versions(),
+                "rows": numbers,
+                "claims": claims,
+            }
         ),
     )
     write_text(
@@ -91,7 +97,8 @@ def write(
         markdown
         + "\n"
         + "\n".join(f"- {claim}" for claim in claims)
-        + f"\n\nMade by `{facts['command']}`; ± is the {tables.CONFIDENCE:.0%} confidence "
+        + f"\n\nVehicle {facts['vehicle']}, scenario {facts['scenario']}. Made by "
+        f"`{facts['command']}`; ± is the {tables.CONFIDENCE:.0%} confidence "
         "interval over seeds.\n",
     )
     drawn = _draw(out, trials, results)
@@ -105,7 +112,7 @@ def _flights(file: Path, results: Sequence[TrialResult]) -> None:
         "controller",
         "payload_kg",
         "seed",
-        *(f"rms {n}" for n in ERRORS),
+        *(f"rms {n}" for n in results[0].coordinates),
         "outcome",
         "place_error_m",
         "why",
@@ -147,7 +154,8 @@ def _rms(found: Sequence[tables.ControllerErrors]) -> Figure:
     figure = Figure(figsize=(style.WIDTH, 4.2), layout="constrained")
     axis = figure.subplots()
     width = 0.8 / len(found)
-    at = np.arange(len(ERRORS))
+    names = found[0].coordinates
+    at = np.arange(len(names))
     for number, row in enumerate(found):
         colour = style.FLIGHTS[number % len(style.FLIGHTS)]
         x = at + (number - 0.5 * (len(found) - 1)) * width
@@ -163,9 +171,10 @@ def _rms(found: Sequence[tables.ControllerErrors]) -> Figure:
             error_kw={"linewidth": 0.7},
         )
         if row.label in tables.PAPER:
-            axis.plot(x, tables.PAPER[row.label], "_", color=style.INK, markersize=9)
+            published = tables.PAPER[row.label]
+            axis.plot(x[: len(published)], published, "_", color=style.INK, markersize=9)
     axis.plot([], [], "_", color=style.INK, label="the paper's")
-    axis.set(yscale="log", xticks=at, xticklabels=ERRORS, ylabel="RMS error [m, deg]")
+    axis.set(yscale="log", xticks=at, xticklabels=names, ylabel="RMS error [m, deg]")
     axis.set_title("RMS errors over all flights", loc="left")
     axis.legend(ncols=3, loc="upper left", bbox_to_anchor=(0.0, -0.08))
     return figure
@@ -217,7 +226,7 @@ def _page(
         {
             "title": title,
             "unit": "m" if title == "position" else "deg",
-            "names": ERRORS[columns],
+            "names": found[0].coordinates[columns],
             "rows": [_html_row(row, found, columns, title) for row in found],
         }
         for title, columns in tables.TABLES
@@ -241,16 +250,16 @@ def _html_row(
 ) -> dict:
     digits = 4 if title == "position" else 3
     proposed = next((other for other in found if other.label == plan.PROPOSED), None)
-    papers = tables.PAPER.get(row.label)
+    papers = tables.papers(row)
     cells = []
-    for i in range(*columns.indices(len(ERRORS))):
+    for i in range(*columns.indices(len(row.mean))):
         worse = ""
         if proposed is not None and row is not proposed:
             worse = f"{tables.degradation(row.mean, proposed.mean)[i]:.0f} %"
         cells.append(
             {
                 "ours": tables.cell(row.mean[i], row.half_width[i], digits),
-                "paper": f"{papers[i]:g}" if papers else "",
+                "paper": papers[i],
                 "worse": worse,
             }
         )

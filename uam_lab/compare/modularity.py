@@ -18,7 +18,8 @@ import numpy as np
 from uam_control.control.controllers import ArmController, AttitudeController, PositionController
 from uam_control.coordinates import ATTITUDE
 from uam_control.profiles.profile import Profile, profile_of
-from uam_lab.campaign.trial import ERRORS, Trial, TrialResult
+from uam_lab.campaign.trial import Trial, TrialResult
+from uam_lab.compare.plan import Flights
 from uam_lab.results import timeseries
 from uam_lab.results.timeseries import Series
 
@@ -49,15 +50,16 @@ def changed(profile: Profile, subsystem: str, factor: float = FACTOR) -> Profile
     section = sections[SUBSYSTEMS[subsystem][0]]
     for name in ("lambda_1", "lambda_2"):
         section[name] = [factor * value for value in section[name]]
-    return profile_of(sections, Path(f"{profile.name}_{subsystem}.yaml"))
+    return profile_of(sections, Path(f"{profile.name}_{subsystem}.yaml"), profile.vehicle)
 
 
-def trials(profile: Profile, payload_mass: float, seed: int, keep: Path) -> list[Trial]:
+def trials(profile: Profile, flights: Flights, keep: Path) -> list[Trial]:
     """Return the unchanged flight (its series goes to `keep`) and one per changed subsystem."""
+    shown = (*flights.shown, flights.scenario)
     return [
-        Trial("as it is", profile, payload_mass, seed, keep=keep),
+        Trial("as it is", profile, *shown, keep=keep),
         *(
-            Trial(f"{name} gains x {FACTOR:g}", changed(profile, name), payload_mass, seed)
+            Trial(f"{name} gains x {FACTOR:g}", changed(profile, name), *shown)
             for name in SUBSYSTEMS
         ),
     ]
@@ -146,5 +148,5 @@ class Evidence:
                 ],
                 replays,
             ),
-            (["RMS error [m, deg]", *ERRORS, "completed"], flights),
+            (["RMS error [m, deg]", *self.flights[0].coordinates, "completed"], flights),
         ]

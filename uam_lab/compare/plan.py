@@ -15,6 +15,7 @@ from uam_control.profiles.profile import (
     load_profile,
     profile_of,
 )
+from uam_control.vehicle import VehicleDescription
 from uam_lab.campaign.trial import Trial
 
 POSITION = "position_controller"
@@ -23,6 +24,7 @@ ASMC1, ASMC2 = catalogue.label("asmc1"), catalogue.label("asmc2")
 FROZEN = "proposed, adaptation frozen"
 VERBATIM, WITH_WEIGHT = "Table I verbatim", "Table I and the weight"
 PAYLOADS = (0.1, 0.2, 0.3)  # [kg]
+TABLE1 = "paper_table1"  # profile
 
 
 # Row names of the command line → labels: baselines, proposed law, variants of the proposed law.
@@ -43,18 +45,38 @@ class ComparedController:
     profile: Profile
 
 
-def entries(names: Sequence[str] = tuple(ROWS)) -> tuple[ComparedController, ...]:
-    """Return the rows of these `names`, keys of ROWS."""
-    proposed, verbatim = default_profile(catalogue.DEFAULT), load_profile("paper_table1")
-    profiles = {
-        "proposed": proposed,
-        "frozen": frozen(proposed),
-        "table1": verbatim,
-        "table1_weight": with_weight(verbatim, proposed),
+@dataclass(frozen=True)
+class Flights:
+    """The flights of every row: each payload [kg] with each seed."""
+
+    vehicle: VehicleDescription
+    scenario: str
+    payloads: tuple[float, ...]
+    seeds: tuple[int, ...]
+
+    @property
+    def shown(self) -> tuple[float, int]:
+        """Payload [kg] and seed of the flights in the figures: the middle and the first one."""
+        return self.payloads[len(self.payloads) // 2], self.seeds[0]
+
+
+def entries(
+    names: Sequence[str] = tuple(ROWS), vehicle: VehicleDescription | None = None
+) -> tuple[ComparedController, ...]:
+    """Return the rows of these `names`, keys of ROWS; vehicle: None for the default one.
+
+    Raises ProfileError for a profile that does not fit the vehicle.
+    """
+    proposed = default_profile(catalogue.DEFAULT, vehicle)
+    variants = {
+        "proposed": lambda: proposed,
+        "frozen": lambda: frozen(proposed),
+        "table1": lambda: load_profile(TABLE1, vehicle=vehicle),
+        "table1_weight": lambda: with_weight(load_profile(TABLE1, vehicle=vehicle), proposed),
     }
     return tuple(
         ComparedController(
-            ROWS[name], profiles[name] if name in profiles else default_profile(name)
+            ROWS[name], variants[name]() if name in variants else default_profile(name, vehicle)
         )
         for name in names
     )
@@ -65,7 +87,7 @@ def frozen(profile: Profile) -> Profile:
     sections = copy.deepcopy(profile.sections)
     for node in CONTROLLERS:
         sections[node]["adapt"] = False
-    return profile_of(sections, Path(f"{profile.name}_frozen.yaml"))
+    return profile_of(sections, Path(f"{profile.name}_frozen.yaml"), profile.vehicle)
 
 
 def with_weight(profile: Profile, other: Profile) -> Profile:
@@ -73,34 +95,21 @@ def with_weight(profile: Profile, other: Profile) -> Profile:
     name = "gravity_feedforward_mass"
     sections = copy.deepcopy(profile.sections)
     sections[POSITION][name] = getattr(other.sets[POSITION], name)
-    return profile_of(sections, Path(f"{profile.name}_weight.yaml"))
+    return profile_of(sections, Path(f"{profile.name}_weight.yaml"), profile.vehicle)
 
 
-def middle(payloads: Sequence[float]) -> float:
-    """Return the middle payload [kg], that of the flights in the figures."""
-    return payloads[len(payloads) // 2]
-
-
-def trials(
-    rows: Sequence[ComparedController],
-    payloads: Sequence[float],
-    seeds: Sequence[int],
-    folder: Path,
-) -> list[Trial]:
-    """Return the flights of every row over every payload and seed.
-
-    The flights with the middle payload and the first seed keep their series for the figures.
-    """
-    shown = middle(payloads), seeds[0]
+def trials(rows: Sequence[ComparedController], flights: Flights, folder: Path) -> list[Trial]:
+    """Return the flights of every row; those of the figures keep their series in `folder`."""
     return [
         Trial(
             row.label,
             row.profile,
             mass,
             seed,
-            keep=folder / f"{number}.parquet" if (mass, seed) == shown else None,
+            flights.scenario,
+            keep=folder / f"{number}.parquet" if (mass, seed) == flights.shown else None,
         )
         for number, row in enumerate(rows)
-        for mass in payloads
-        for seed in seeds
+        for mass in flights.payloads
+        for seed in flights.seeds
     ]

@@ -8,24 +8,25 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.stats import t as student
 
-from uam_lab.campaign.trial import ERRORS, TrialResult
+from uam_control.coordinates import ALPHA, ARM, ATTITUDE, POSITION, coordinates
+from uam_lab.campaign.trial import TrialResult
 from uam_lab.compare.plan import ASMC1, ASMC2, PROPOSED
 from uam_lab.report.facts import paper
 
 CONFIDENCE = 0.95
-# table:error_p, table:error_q, table:error_alpha of the paper, in the order of ERRORS: m, deg
+# table:error_p, table:error_q, table:error_alpha of the paper; order of the coordinates: m, deg
 PAPER = {
     ASMC1: (0.15, 0.08, 0.31, 5.98, 5.33, 8.26, 2.29, 2.34),
     ASMC2: (0.09, 0.05, 0.22, 4.83, 4.74, 5.04, 1.81, 1.73),
     PROPOSED: tuple(value for group in paper.RMS.values() for value in group),
 }
 AIM = (0.025, 0.010, 0.045, 1.6, 1.4, 1.5, 0.6, 0.6)  # half of the paper's, rounded
-TABLES = (("position", slice(0, 3)), ("attitude", slice(3, 6)), ("arm", slice(6, 8)))
+TABLES = (("position", POSITION), ("attitude", ATTITUDE), ("arm", ARM))
 
 
 @dataclass(frozen=True)
 class ControllerErrors:
-    """One controller. mean, half_width, worst (8,): RMS errors as ERRORS, m and deg.
+    """One controller. mean, half_width, worst (6 + n,): RMS errors, m and deg.
 
     mean: over all flights; half_width: of its confidence interval over seeds (of the means over
     the payloads), NaN for one seed; worst: largest RMS of any flight.
@@ -39,6 +40,11 @@ class ControllerErrors:
     half_width: np.ndarray
     worst: np.ndarray
     why: tuple[str, ...]
+
+    @property
+    def coordinates(self) -> tuple[str, ...]:
+        """Names of the entries of mean, half_width and worst."""
+        return coordinates(len(self.mean) - ALPHA)
 
     @property
     def shortfall(self) -> str:
@@ -71,20 +77,20 @@ def row(label: str, results: Sequence[TrialResult]) -> ControllerErrors:
 
 
 def half_width(results: Sequence[TrialResult]) -> np.ndarray:
-    """Return half the width (8,) [m, deg] of Student's confidence interval of the mean."""
+    """Return half the width (6 + n,) [m, deg] of Student's confidence interval of the mean."""
     seeds = sorted({result.seed for result in results})
     means = np.array(
         [np.mean([r.rms for r in results if r.seed == seed], axis=0) for seed in seeds]
     )
     count = len(seeds)
     if count < 2:
-        return np.full(len(ERRORS), np.nan)
+        return np.full(means.shape[1], np.nan)
     quantile = student.ppf(0.5 + 0.5 * CONFIDENCE, count - 1)
     return quantile * means.std(axis=0, ddof=1) / np.sqrt(count)
 
 
 def degradation(other: np.ndarray, proposed: np.ndarray) -> np.ndarray:
-    """Return the paper's "performance degradation" (other - proposed) / other (8,) [%]."""
+    """Return the paper's "performance degradation" (other - proposed) / other (6 + n,) [%]."""
     return 100.0 * (np.asarray(other) - np.asarray(proposed)) / np.asarray(other)
 
 
@@ -112,7 +118,7 @@ def claims(found: Sequence[ControllerErrors]) -> list[str]:
 def _smaller(better: ControllerErrors, worse: ControllerErrors) -> str:
     """Return the columns with smaller errors of `better`, beyond the confidence intervals."""
     apart, near, against = [], [], []
-    for i, name in enumerate(ERRORS):
+    for i, name in enumerate(better.coordinates):
         margin = np.nan_to_num(better.half_width[i]) + np.nan_to_num(worse.half_width[i])
         gap = worse.mean[i] - better.mean[i]
         (apart if gap > margin else against if gap < -margin else near).append(name)
@@ -126,7 +132,9 @@ def _smaller(better: ControllerErrors, worse: ControllerErrors) -> str:
 
 
 def _limit(what: str, row: ControllerErrors, limit: Sequence[float]) -> str:
-    missed = [name for i, name in enumerate(ERRORS) if not row.worst[i] <= limit[i]]
+    # an arm may have more joints than the paper's, for which there is no limit
+    judged = zip(row.coordinates, row.worst, limit, strict=False)
+    missed = [name for name, worst, most in judged if not worst <= most]
     return (
         f"Worst RMS of any {row.label} flight against {what}: "
         + ("met in every column" if not missed else f"missed in {', '.join(missed)}")
@@ -139,7 +147,7 @@ def as_markdown(found: Sequence[ControllerErrors]) -> str:
     proposed = next((row for row in found if row.label == PROPOSED), None)
     parts = []
     for title, columns in TABLES:
-        names, unit = ERRORS[columns], "m" if title == "position" else "deg"
+        names, unit = found[0].coordinates[columns], "m" if title == "position" else "deg"
         head = [
             f"RMS {title} error [{unit}]",
             *names,
@@ -153,8 +161,7 @@ def as_markdown(found: Sequence[ControllerErrors]) -> str:
                 cell(m, w, digits)
                 for m, w in zip(row.mean[columns], row.half_width[columns], strict=True)
             ]
-            papers = PAPER.get(row.label)
-            cells += [f"{x:g}" for x in papers[columns]] if papers else ["" for _ in names]
+            cells += papers(row)[columns]
             worse = proposed is not None and row.label != PROPOSED
             cells += (
                 [f"{x:.0f}" for x in degradation(row.mean, proposed.mean)[columns]]
@@ -164,6 +171,12 @@ def as_markdown(found: Sequence[ControllerErrors]) -> str:
             lines.append("| " + " | ".join([_name(row), *cells]) + " |")
         parts.append("\n".join(lines))
     return "\n\n".join(parts) + "\n"
+
+
+def papers(row: ControllerErrors) -> list[str]:
+    """Return the paper's values (6 + n,) as text, "" for those that the paper does not have."""
+    known = [f"{x:g}" for x in PAPER.get(row.label, ())]
+    return known + [""] * (len(row.mean) - len(known))
 
 
 def _name(row: ControllerErrors) -> str:

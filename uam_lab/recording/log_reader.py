@@ -28,7 +28,6 @@ from uam_lab.recording import fault_records as fault_log
 from uam_lab.recording.mcap_reader import TopicLog, UnreadableLog, read_log
 from uam_lab.results.outcome import transition
 from uam_lab.results.timeseries import (
-    COLUMNS,
     SUBSYSTEMS,
     Columns,
     FlightTable,
@@ -260,7 +259,7 @@ def parameter_changes(log: Log, takeoff: int) -> list[dict[str, Any]]:
 
 
 def adaptation(
-    log: Log, subsystem: str, ticks: np.ndarray, values: np.ndarray, columns: Columns = COLUMNS
+    log: Log, subsystem: str, ticks: np.ndarray, values: np.ndarray, columns: Columns
 ) -> None:
     """Fill in the gains of a subsystem's law at ticks (m,) [ns] in the columns of values (m, n)."""
     for block in log.blocks(ADAPTATION[subsystem]):

@@ -3,9 +3,9 @@
 Both engines write the same table. Metrics, figures and pictures read it by column name. In flight,
 an engine fills a preallocated float64 array by column number:
 
-    recording = FlightTable(ticks)
-    TRUTH = COLUMNS.block("truth.")
-    recording.values[k, TRUTH] = state.ravel()          # state (3, 8): chi, chi_dot, chi_ddot
+    recording = FlightTable(ticks, columns_of(vehicle))
+    truth = recording.columns.block("truth.")
+    recording.values[k, truth] = state.ravel()          # state (3, 6 + n): chi, chi_dot, chi_ddot
 
 In the file a column is called "name [unit]"; in the code it is called by its name alone.
 """
@@ -14,7 +14,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import cache, cached_property
 from pathlib import Path
 from typing import Any
@@ -124,10 +124,7 @@ def columns_of(vehicle: VehicleDescription) -> Columns:
     return columns(len(vehicle.joints), len(vehicle.rotors))
 
 
-COLUMNS = columns(2, 4)
-
-
-def gain_columns(subsystem: str, names: Iterable[str], found: Columns = COLUMNS) -> np.ndarray:
+def gain_columns(subsystem: str, names: Iterable[str], found: Columns) -> np.ndarray:
     """Return the column numbers (n,) of a subsystem's gains `names` among the columns `found`."""
     return np.array([found[f"adaptation.{subsystem}.{name}"] for name in names], dtype=int)
 
@@ -139,7 +136,7 @@ class UnreadableFlight(ValueError):
 class FlightTable:
     """Preallocated table for recording a flight; unwritten entries are NaN."""
 
-    def __init__(self, capacity: int, columns: Columns = COLUMNS):
+    def __init__(self, capacity: int, columns: Columns):
         self.columns = columns
         self.values = np.full((capacity, len(columns)), np.nan)
         self.phases = np.zeros(capacity, dtype=np.int8)
@@ -184,8 +181,8 @@ class Series:
     values: np.ndarray
     phases: np.ndarray
     phase_names: tuple[str, ...]
-    info: dict[str, Any] = field(default_factory=dict)
-    columns: Columns = COLUMNS
+    info: dict[str, Any]
+    columns: Columns
 
     def __getitem__(self, name: str) -> np.ndarray:
         """Column (ticks,) by its name without unit."""

@@ -27,6 +27,7 @@ def write_best(file: Path, space: Space, study: optuna.Study, command: str) -> N
         f"Found by: {command}",
         f"Study {study.study_name}: evaluation {best.number} of {evaluations}, cost "
         f"{best.value:.4g} (start {study.trials[0].value:.4g}), from profile {space.start.name}.",
+        f"Vehicle: {space.start.vehicle.name}.",
         "Flights of an evaluation: "
         + "; ".join(
             f"{flight['payload_mass']:g} kg seed {flight['seed']}"
@@ -72,8 +73,8 @@ def plot(file: Path, space: Space, study: optuna.Study) -> None:
         axis.step(numbers, best_so_far, where="post", color=style.INK, label="best so far")
         axis.set(yscale="log", xlabel="evaluation", ylabel="cost")
         axis.set_title(
-            f"Search {study.study_name}: {len(costs)} evaluations, best "
-            f"{costs.min():.3g}, start {costs[0]:.3g}",
+            f"Search {study.study_name}, {space.start.vehicle.name}: {len(costs)} evaluations, "
+            f"best {costs.min():.3g}, start {costs[0]:.3g}",
             loc="left",
         )
         axis.legend(loc="upper right")

@@ -9,9 +9,11 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from uam_control.profiles.profile import NODES, Profile, load_profile, profile_of
+from uam_control.laws import catalogue
+from uam_control.profiles.profile import NODES, Profile, default_profile, profile_of
 from uam_control.settings import configuration, yaml_file
-from uam_lab.campaign.trial import ERRORS, Trial, TrialResult
+from uam_control.vehicle import VehicleDescription
+from uam_lab.campaign.trial import Trial, TrialResult
 
 DIGITS = 4  # significant digits of a value
 
@@ -102,7 +104,7 @@ class Space:
             for entry in knob.entries:
                 vector[entry] = value
             section[knob.parameter] = vector
-        return profile_of(sections, Path(f"{name}.yaml"))
+        return profile_of(sections, Path(f"{name}.yaml"), self.start.vehicle)
 
     def trials(self, profile: Profile) -> list[Trial]:
         """Return the flights that evaluate a profile."""
@@ -119,9 +121,12 @@ class Space:
         ]
 
 
-def load_space(name_or_file: str, start: Profile | None = None) -> Space:
-    """Read a file of config/tuning, or another one. start: instead of the file's profile.
+def load_space(
+    name_or_file: str, start: Profile | None = None, vehicle: VehicleDescription | None = None
+) -> Space:
+    """Read a file of config/tuning, or another one.
 
+    start: None for the vehicle's profile of the file's law; vehicle: None for the default one.
     Raises TuningError, ProfileError, ConfigurationError; one line each.
     """
     try:
@@ -130,7 +135,12 @@ def load_space(name_or_file: str, start: Profile | None = None) -> Space:
         if "judged_as" in document:  # flights and cost of another space, for a fair comparison
             other = configuration.named("tuning", document["judged_as"])
             document = {**yaml_file.read(other, TuningError), **document}
-        start = start or load_profile(document["profile"])
+        if document["controller"] not in catalogue.LAWS:
+            raise TuningError(
+                f"{file}: unknown controller '{document['controller']}'; "
+                f"there are: {', '.join(catalogue.LAWS)}"
+            )
+        start = start or default_profile(document["controller"], vehicle)
         knobs = tuple(_knob(entry, start) for entry in document["knobs"])
         cost = {
             key: tuple(map(float, value)) if isinstance(value, list) else float(value)
@@ -143,10 +153,11 @@ def load_space(name_or_file: str, start: Profile | None = None) -> Space:
         space = Space(file.stem, start, knobs, flights, Cost(**cost))
     except (KeyError, TypeError) as error:
         raise TuningError(f"{name_or_file}: {error.args[0]} is missing or not allowed") from None
-    if len(space.cost.aim) != len(ERRORS):
+    names = start.vehicle.coordinates
+    if len(space.cost.aim) != len(names):
         raise TuningError(
-            f"{file}: cost.aim has {len(space.cost.aim)} numbers, {len(ERRORS)} are "
-            f"expected: {', '.join(ERRORS)}"
+            f"{file}: cost.aim has {len(space.cost.aim)} numbers, {len(names)} are "
+            f"expected: {', '.join(names)}"
         )
     if not flights or not knobs:
         raise TuningError(f"{file}: at least one flight and one knob are expected")

@@ -1,0 +1,6 @@
+"""Columns of the recording of the default vehicle."""
+
+from uam_control.vehicle import load_description
+from uam_lab.results.timeseries import columns_of
+
+COLUMNS = columns_of(load_description())
