@@ -6,6 +6,7 @@ The monitors run only if a value is near or beyond a limit, or was so recently.
 from __future__ import annotations
 
 import math
+from operator import attrgetter
 from typing import NamedTuple
 
 import numpy as np
@@ -79,7 +80,9 @@ CHECKS = (
     Check("joint torque", "{name} at {value:.2f} of its limit", 1.0),
     Check("adapted gain", "{name} at {value:.2f} of its limit", 1.0),
 )  # fmt: skip
-_READ = [(i, check.sign, check.reading) for i, check in enumerate(CHECKS) if check.reading]
+_ROWS = [i for i, check in enumerate(CHECKS) if check.reading]
+_SIGNS = np.array([CHECKS[i].sign for i in _ROWS])
+_readings = attrgetter(*(CHECKS[i].reading for i in _ROWS))
 
 
 class ExceededLimit(NamedTuple):
@@ -212,9 +215,9 @@ def read(
 
     effort_limits (n,): of the joints [N m]; gain_limits (3,): of position, attitude, arm.
     """
-    for i, sign, name in _READ:
-        value = getattr(readings, name)
-        values[i] = -math.inf if math.isnan(value) else sign * value
+    known = np.array(_readings(readings)) * _SIGNS
+    known[np.isnan(known)] = -math.inf
+    values[_ROWS] = known
     values[17] = _largest(readings.joint_effort, effort_limits)
     values[18] = _largest(readings.gains, gain_limits)
 
