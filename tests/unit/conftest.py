@@ -12,7 +12,7 @@ from uam_control.laws.modular import ModularLaw
 from uam_control.mission import load_scenario
 from uam_control.profiles.profile import load_profile
 from uam_lab.flight.direct.flight import DirectFlight
-from uam_lab.results import metrics
+from uam_lab.results import metrics, result_folder
 from uam_lab.results.result_folder import ResultFolder
 from uam_lab.results.timeseries import FlightTable, gain_columns
 from uam_sim_bridge.plant import Vehicle
@@ -102,10 +102,10 @@ def magnet_face(chi):
 def write_folder(directory, series):
     """What a flight leaves in its result folder before the report is made."""
     folder = ResultFolder.create("pick_and_place", "modular", out=directory)
-    folder.write_series(series)
-    folder.write_info(series.info)
-    folder.write_metrics(metrics.compute(series, series.info))
-    folder.write_versions()
+    series.write(folder.timeseries)
+    result_folder.write_json(folder.info, series.info)
+    result_folder.write_json(folder.metrics, metrics.compute(series, series.info))
+    result_folder.write_json(folder.versions, result_folder.versions())
     profile = load_profile("s500")
     folder.write_parameters({node: asdict(values) for node, values in profile.sets.items()})
     return folder.path

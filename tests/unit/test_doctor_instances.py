@@ -5,8 +5,9 @@ import socket
 
 import pytest
 
-from uam_lab.doctor import holders, instances, leftovers
+from uam_lab.doctor import instances, leftovers
 from uam_lab.doctor.finding import Verdict
+from uam_lab.processes import process_table
 from uam_sim_bridge.ports import INSTANCES, Reservation
 
 OK, WARN, FAIL = Verdict
@@ -65,6 +66,6 @@ def test_locks_without_a_flight_are_named_and_others_left_alone(tmp_path):
 
 
 def test_a_process_is_called_by_its_program():
-    assert holders.name_of(os.getpid()).endswith(f"(process {os.getpid()})")
+    assert process_table.name_of(os.getpid()).endswith(f"(process {os.getpid()})")
     nobody = 2**22 + 1
-    assert holders.name_of(nobody) == f"a program (process {nobody})"
+    assert process_table.name_of(nobody) == f"a program (process {nobody})"

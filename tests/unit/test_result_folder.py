@@ -45,7 +45,7 @@ def test_a_folder_of_the_users_choice_is_used_unless_it_holds_a_flight(here):
     assert folder.path == here / "a/b"
     assert not (here / "results").exists()
     ResultFolder.create("hover", "modular", out=here / "a/b")
-    folder.write_metrics({"seed": 1})
+    result_folder.write_json(folder.metrics, {"seed": 1})
     with pytest.raises(ResultFolderError, match="already contains a flight"):
         ResultFolder.create("hover", "modular", out=here / "a/b")
     assert json.loads(folder.metrics.read_text()) == {"seed": 1}
@@ -74,7 +74,9 @@ def test_a_folder_without_permission_is_refused(here):
 
 def test_files_are_whole_plain_and_readable(here):
     folder = ResultFolder.create("hover", "modular", out=here / "f")
-    folder.write_metrics({"rms": {"position_m": np.array([0.1, np.nan])}, "ok": np.bool_(True)})
+    result_folder.write_json(
+        folder.metrics, {"rms": {"position_m": np.array([0.1, np.nan])}, "ok": np.bool_(True)}
+    )
     assert json.loads(folder.metrics.read_text()) == {
         "rms": {"position_m": [0.1, None]},
         "ok": True,
@@ -83,7 +85,7 @@ def test_files_are_whole_plain_and_readable(here):
     assert yaml.safe_load(folder.parameters.read_text()) == {
         "arm_controller": {"ros__parameters": {"nu": [1.0, 2.0], "lambda_form": "theory"}}
     }
-    folder.write_versions()
+    result_folder.write_json(folder.versions, result_folder.versions())
     versions = json.loads(folder.versions.read_text())
     assert versions["packages"]["numpy"] == np.__version__
     assert sorted(p.name for p in folder.path.iterdir()) == [
@@ -95,7 +97,7 @@ def test_files_are_whole_plain_and_readable(here):
 
 def test_an_interrupted_write_leaves_the_old_file(here):
     folder = ResultFolder.create("hover", "modular", out=here / "f")
-    folder.write_metrics({"seed": 1})
+    result_folder.write_json(folder.metrics, {"seed": 1})
     with pytest.raises(RuntimeError), result_folder.replacing(folder.metrics) as temporary:
         temporary.write_text("{")
         raise RuntimeError

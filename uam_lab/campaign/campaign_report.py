@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections import Counter
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -13,8 +14,9 @@ from uam_lab.campaign.fault_outcome import COMPLETED, OUTCOMES, counts
 from uam_lab.campaign.trial import TrialResult
 from uam_lab.campaign.variations import Draw, common
 from uam_lab.report.figures import style
-from uam_lab.results.atomic import replacing, write_rows, write_text
-from uam_lab.results.result_folder import as_json, versions
+from uam_lab.results.atomic import write_rows, write_text
+from uam_lab.results.result_folder import versions, write_json
+from uam_lab.results.templates import markdown_table
 
 PERCENTILES = (50, 90, 99)
 
@@ -32,101 +34,66 @@ def write(
     """
     failed = [not result.completed for result in results]
     rms = np.array([result.rms for result in results])
-    _flights(out / "flights.csv", draws, results)
-    summary = _summary(draws, results, failed, rms, vehicle, command)
-    write_text(out / "summary.md", summary)
-    write_text(
-        out / "campaign.json",
-        as_json(
-            {
-                "command": command,
-                "vehicle": vehicle,
-                "versions": versions(),
-                "flights": len(results),
-                "outcomes": counts(r.outcome for r in results),
-                "rms_percentiles": {str(p): np.percentile(rms, p, axis=0) for p in PERCENTILES},
-                "columns": results[0].coordinates,
-                "failures_have_in_common": common(draws, failed),
-            }
-        ),
-    )
-    with style.styled(), replacing(out / "campaign.png") as temporary:
-        _figure(draws, results, vehicle, rms).savefig(
-            temporary, format="png", dpi=style.PIXELS_PER_INCH
-        )
-    return summary
-
-
-def _flights(file: Path, draws: Sequence[Draw], results: Sequence[TrialResult]) -> None:
-    head = [
-        "flight",
-        *draws[0].values,
-        *(f"rms {n}" for n in results[0].coordinates),
-        "outcome",
-        "why",
-    ]
+    shared, names = common(draws, failed), results[0].coordinates
     write_rows(
-        file,
-        head,
+        out / "flights.csv",
+        ["flight", *draws[0].values, *(f"rms {n}" for n in names), "outcome", "why"],
         (
-            [
-                i,
-                *(f"{x:.4g}" for x in draw.values.values()),
-                *(f"{x:.4g}" for x in r.rms),
-                r.outcome,
-                r.why,
-            ]
+            [i, *(f"{x:.4g}" for x in (*draw.values.values(), *r.rms)), r.outcome, r.why]
             for i, (draw, r) in enumerate(zip(draws, results, strict=True))
         ),
     )
+    outcomes = counts(r.outcome for r in results)
+    numbers = {
+        "command": command,
+        "vehicle": vehicle,
+        "versions": versions(),
+        "flights": len(results),
+        "outcomes": outcomes,
+        "rms_percentiles": {str(p): np.percentile(rms, p, axis=0) for p in PERCENTILES},
+        "columns": names,
+        "failures_have_in_common": shared,
+    }
+    write_json(out / "campaign.json", numbers)
+    summary = "\n\n".join(
+        [*_summary(results, outcomes, shared, rms, vehicle), f"Made by `{command}`.\n"]
+    )
+    write_text(out / "summary.md", summary)
+    with style.styled():
+        style.save(_figure(draws, results, vehicle, rms), out / "campaign.png")
+    return summary
 
 
 def _summary(
-    draws: Sequence[Draw],
     results: Sequence[TrialResult],
-    failed: Sequence[bool],
+    outcomes: Mapping[str, int],
+    shared: Sequence[tuple[str, float, float, float]],
     rms: np.ndarray,
     vehicle: str,
-    command: str,
-) -> str:
-    count, bad = len(results), sum(failed)
-    others = {o: n for o, n in counts(r.outcome for r in results).items() if n and o != COMPLETED}
+) -> Iterator[str]:
+    """Yield the paragraphs; shared: see `common`."""
+    count, done = len(results), outcomes[COMPLETED]
+    others = {o: n for o, n in outcomes.items() if n and o != COMPLETED}
     listed = ", ".join(f"{number} {outcome}" for outcome, number in others.items())
-    lines = [
-        f"{vehicle}: {count - bad} of {count} flights completed the mission "
-        f"({100.0 * (count - bad) / count:.1f} %); {listed or 'none lost'}.",
-        "",
-        *(f"- {outcome}: {OUTCOMES[outcome]}" for outcome in others),
-        "",
-        "| RMS error | " + " | ".join(f"{p} % of flights below" for p in PERCENTILES) + " |",
-        "|---|" + "---|" * len(PERCENTILES),
-    ]
+    yield (
+        f"{vehicle}: {done} of {count} flights completed the mission "
+        f"({100.0 * done / count:.1f} %); {listed or 'none lost'}."
+    )
+    if others:
+        yield "\n".join(f"- {outcome}: {OUTCOMES[outcome]}" for outcome in others)
+    errors = []
     for i, name in enumerate(results[0].coordinates):
         unit, digits = ("m", 3) if name in BASE_COORDINATES[POSITION] else ("deg", 2)
-        cells = [f"{np.percentile(rms[:, i], p):.{digits}f} {unit}" for p in PERCENTILES]
-        lines.append(f"| {name} | " + " | ".join(cells) + " |")
-    shared = common(draws, failed)
-    if shared:
-        head = ("", "their mean", "mean of the others", "distance [standard deviations]")
-        lines += [
-            "",
-            "Conditions of the flights that were not completed, the largest distance first:",
-            "",
-            f"| {' | '.join(head)} |",
-            "|---|---|---|---|",
-        ]
-        lines += [f"| {n} | {a:.3g} | {b:.3g} | {d:+.2f} |" for n, a, b, d in shared]
-        reasons = sorted({_kind(r.why) for r in results if not r.completed})
-        lines += [
-            "",
-            "Reasons: "
-            + "; ".join(
-                f"{kind}: {sum(_kind(r.why) == kind for r in results if not r.completed)}"
-                for kind in reasons
-            )
-            + ".",
-        ]
-    return "\n".join([*lines, "", f"Made by `{command}`."]) + "\n"
+        figures = np.percentile(rms[:, i], PERCENTILES)
+        errors.append([name, *(f"{value:.{digits}f} {unit}" for value in figures)])
+    yield markdown_table(["RMS error", *(f"{p} % of flights below" for p in PERCENTILES)], errors)
+    if not shared:
+        return
+    yield "Conditions of the flights that were not completed, the largest distance first:"
+    head = ("", "their mean", "mean of the others", "distance [standard deviations]")
+    yield markdown_table(head, ([n, f"{a:.3g}", f"{b:.3g}", f"{d:+.2f}"] for n, a, b, d in shared))
+    kinds = Counter(_kind(r.why) for r in results if not r.completed)
+    yield "Reasons: " + "; ".join(f"{kind}: {kinds[kind]}" for kind in sorted(kinds)) + "."
 
 
 def _kind(why: str) -> str:

@@ -22,9 +22,9 @@ from uam_lab.campaign.fault_outcome import (
 )
 from uam_lab.campaign.fault_trial import FaultResult
 from uam_lab.report.figures import style
-from uam_lab.report.page import html
-from uam_lab.results.atomic import replacing, write_rows, write_text
-from uam_lab.results.result_folder import as_json, versions
+from uam_lab.results import templates
+from uam_lab.results.atomic import write_rows, write_text
+from uam_lab.results.result_folder import versions, write_json
 
 COLOURS = {
     COMPLETED: "#5aa469",
@@ -71,24 +71,27 @@ def write(
             for r in results
         ),
     )
-    write_text(
-        out / "faults.json",
-        as_json(
-            {
-                "command": command,
-                "vehicle": vehicle,
-                "versions": versions(),
-                "matrix": asdict(matrix),
-                "flights": [vars(result) for result in results],
-            }
-        ),
-    )
+    facts = {"command": command, "vehicle": vehicle, "versions": versions()}
+    facts |= {"matrix": asdict(matrix), "flights": [vars(result) for result in results]}
+    write_json(out / "faults.json", facts)
     summary = markdown(matrix, results, vehicle, command)
     write_text(out / "summary.md", summary)
-    with style.styled(), replacing(out / "matrix.png") as temporary:
-        picture(matrix, results).savefig(temporary, format="png", dpi=style.PIXELS_PER_INCH)
+    with style.styled():
+        style.save(picture(matrix, results), out / "matrix.png")
     page = out / "report.html"
-    write_text(page, _page(out, matrix, results, vehicle, command))
+    text = templates.render(
+        "uam_lab.campaign",
+        "faults.html.j2",
+        sentence=sentence(results),
+        matrix=matrix,
+        vehicle=vehicle,
+        outcomes=OUTCOMES,
+        colours=COLOURS,
+        picture=templates.embedded(out / "matrix.png"),
+        command=command,
+        rows=[(r, [_shown(worst(r, key)) for key in HEAD[3:6]]) for r in results],
+    )
+    write_text(page, text)
     return summary, page
 
 
@@ -148,25 +151,21 @@ def sentence(results: Sequence[FaultResult]) -> str:
 def markdown(matrix: Matrix, results: Sequence[FaultResult], vehicle: str, command: str) -> str:
     """Return the matrix as a Markdown table: outcome and largest position error."""
     cells = grouped(results)
-    lines = [
+    table = templates.markdown_table(
+        ["fault", *matrix.moments],
+        ([row, *(str(cells[row, moment]) for moment in matrix.moments)] for row in matrix.rows),
+    )
+    outcomes = "; ".join(f"{name}: {about}" for name, about in OUTCOMES.items())
+    parts = [
         f"{vehicle}, {matrix.scenario}: {sentence(results)}",
-        "",
-        f"| fault | {' | '.join(matrix.moments)} |",
-        "|---|" + "---|" * len(matrix.moments),
-    ]
-    for row in matrix.rows:
-        shown = [str(cells[row, moment]) for moment in matrix.moments]
-        lines.append(f"| {row} | {' | '.join(shown)} |")
-    lines += [
-        "",
+        table,
         "In each cell: the outcome (the worst of several flights), the longest time from the fault "
         "to touchdown if the mission was not completed, and the largest position error. "
-        + "; ".join(f"{name}: {about}" for name, about in OUTCOMES.items())
-        + ".",
+        f"{outcomes}.",
     ]
     if matrix.left_out:
-        lines += ["", f"Only with --engine ros: {'; '.join(matrix.left_out)}."]
-    return "\n".join([*lines, "", f"Made by `{command}`."]) + "\n"
+        parts.append(f"Only with --engine ros: {'; '.join(matrix.left_out)}.")
+    return "\n\n".join([*parts, f"Made by `{command}`."]) + "\n"
 
 
 def picture(matrix: Matrix, results: Sequence[FaultResult]) -> Figure:
@@ -181,15 +180,8 @@ def picture(matrix: Matrix, results: Sequence[FaultResult]) -> Figure:
     )
     for i, row in enumerate(rows):
         for j, column in enumerate(columns):
-            axis.text(
-                j,
-                i,
-                str(cells[row, column]),
-                ha="center",
-                va="center",
-                fontsize=7.5,
-                color=style.INK,
-            )
+            text = str(cells[row, column])
+            axis.text(j, i, text, ha="center", va="center", fontsize=7.5, color=style.INK)
     axis.set_xticks(range(len(columns)), columns)
     axis.set_yticks(range(len(rows)), rows)
     axis.tick_params(length=0, labeltop=True, labelbottom=False)
@@ -204,18 +196,3 @@ def picture(matrix: Matrix, results: Sequence[FaultResult]) -> Figure:
 
 def _shown(value: float) -> str:
     return "" if math.isnan(value) else f"{value:.4g}"
-
-
-def _page(
-    out: Path, matrix: Matrix, results: Sequence[FaultResult], vehicle: str, command: str
-) -> str:
-    return html.template("uam_lab.campaign", "faults.html.j2").render(
-        sentence=sentence(results),
-        matrix=matrix,
-        vehicle=vehicle,
-        outcomes=OUTCOMES,
-        colours=COLOURS,
-        picture=html.embedded(out / "matrix.png"),
-        command=command,
-        rows=[(r, [_shown(worst(r, key)) for key in HEAD[3:6]]) for r in results],
-    )

@@ -10,7 +10,7 @@ import threading
 from collections.abc import Callable, Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
 
-from uam_lab.campaign.trial import Trial, TrialResult, fly
+from uam_lab.campaign.trial import Trial, TrialResult, measure
 from uam_lab.flight.direct.warm_up import is_cold, warm_up
 from uam_lab.processes.child import SINGLE_THREAD
 
@@ -23,17 +23,16 @@ def cores() -> int:
 def fly_all(
     trials: Sequence[Trial],
     jobs: int,
-    work: Callable[[Trial], TrialResult] | None = None,
+    work: Callable[[Trial], TrialResult] = measure,
     progress: Callable[[int, TrialResult], None] = lambda done, result: None,
 ) -> list[TrialResult]:
     """Fly every trial; return the results in the order of the trials.
 
-    work: importable function from trial to result (default: `figures_of`). progress: called with
-    the number of finished flights and the newest result.
+    work: importable function from trial to result. progress: called with the number of finished
+    flights and the newest result.
     """
     if is_cold():
         warm_up()
-    work = work or figures_of
     results: list[TrialResult | None] = [None] * len(trials)
     others = multiprocessing.active_children()
     with _executor(jobs) as executor:
@@ -50,11 +49,6 @@ def fly_all(
                     worker.terminate()
             raise
     return results
-
-
-def figures_of(trial: Trial) -> TrialResult:
-    """Fly a trial; discard the time series."""
-    return fly(trial)[0]
 
 
 def _executor(jobs: int) -> ProcessPoolExecutor:

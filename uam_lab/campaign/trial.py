@@ -1,22 +1,33 @@
-"""One flight of a campaign, and its result."""
+"""One flight of a campaign, in either engine, and its result."""
 
 from __future__ import annotations
 
+import os
+import tempfile
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+from rich.console import Console
 
 from uam_control.coordinates import ALPHA, coordinates
 from uam_control.mission import Scenario, load_scenario
 from uam_control.profiles.profile import Profile
 from uam_lab.campaign.fault_outcome import COMPLETED, LOST, classify
 from uam_lab.flight.direct.flight import DirectFlight
+from uam_lab.flight.progress import Progress
+from uam_lab.flight.settings import ONLOOKERS, FlightSettings
 from uam_lab.results import metrics
-from uam_lab.results.outcome import transitions
+from uam_lab.results.outcome import Outcome, transitions
+from uam_lab.results.result_folder import ResultFolder
 from uam_lab.results.timeseries import Series
+from uam_sim_bridge.faults import PROCESS, Schedule
 from uam_sim_bridge.plant import Vehicle
+
+
+class TrialFailed(RuntimeError):
+    """The flight ended with a failure; the text is one line."""
 
 
 @dataclass(frozen=True)
@@ -30,9 +41,16 @@ class Trial:
     profile: Profile
     payload_mass: float  # [kg]
     seed: int
-    scenario: str = "pick_and_place"
+    scenario: str = "pick_and_place"  # name or file
     vehicle_changes: dict[str, object] = field(default_factory=dict)
     keep: Path | None = None
+    faults: Schedule = Schedule()
+    engine: str = "direct"
+    clock: str = "lockstep"
+
+    def load_scenario(self) -> Scenario:
+        """Return the scenario, for the vehicle. Raises ScenarioError."""
+        return load_scenario(self.scenario, self.profile.vehicle)
 
 
 @dataclass(frozen=True)
@@ -75,57 +93,93 @@ class TrialResult:
         return self.outcome == LOST
 
 
-def fly(trial: Trial) -> tuple[TrialResult, Series]:
-    """Fly a trial. Raises ConfigurationError, ScenarioError."""
-    described = trial.profile.vehicle
-    scenario = load_scenario(trial.scenario, described)
-    vehicle = Vehicle.of(described).changed(trial.vehicle_changes)
-    flight = DirectFlight(scenario, trial.profile, vehicle, trial.payload_mass, trial.seed)
+def fly(trial: Trial) -> Outcome:
+    """Fly a trial, without log and output. Raises ConfigurationError, ScenarioError."""
+    scenario = trial.load_scenario()
+    if trial.engine == "ros":
+        return _fly_nodes(trial, scenario)
+    vehicle = Vehicle.of(trial.profile.vehicle).changed(trial.vehicle_changes)
+    flight = DirectFlight(
+        scenario, trial.profile, vehicle, trial.payload_mass, trial.seed, trial.faults
+    )
     flight.run()
-    series = flight.recording.series({"controller": trial.label})
-    reason, changes = flight.mission.output.abort_reason, transitions(flight.mission.changes)
-    return result(trial, scenario, series, reason, changes), series
+    return Outcome(
+        series=flight.recording.series({"controller": trial.label}),
+        abort_reason=flight.mission.output.abort_reason,
+        failure=flight.ended_by,
+        transitions=transitions(flight.mission.changes),
+        faults=flight.fault_records,
+    )
 
 
-def result(
-    trial: Trial,
-    scenario: Scenario,
-    series: Series,
-    abort_reason: str,
-    changes: list[dict[str, Any]],
-) -> TrialResult:
-    """Return the result of a flight; write its series to `trial.keep` if given.
+def _fly_nodes(trial: Trial, scenario: Scenario) -> Outcome:
+    """Fly a trial with nodes, topics and MAVLink, as `uam fly` does."""
+    from uam_lab.flight.ros import engine
 
-    changes: the supervisor's transitions, see `results.outcome.transitions`.
+    needed = {one.fault.values["node"] for one in trial.faults.only(PROCESS).faults}
+    settings = FlightSettings(
+        scenario=scenario,
+        profile=trial.profile,
+        vehicle=trial.profile.vehicle,
+        clock=trial.clock,
+        payload_mass=trial.payload_mass,
+        seed=trial.seed,
+        scenario_source=trial.scenario,
+        vehicle_changes=trial.vehicle_changes,
+        without=tuple(name for name in ONLOOKERS if name not in needed),
+        faults=trial.faults,
+    )
+    with (
+        tempfile.TemporaryDirectory(prefix="uam-flight-") as folder,
+        open(os.devnull, "w") as nowhere,
+        Progress(Console(file=nowhere)) as progress,
+    ):
+        outcome = engine.fly(settings, ResultFolder(Path(folder)), progress)
+    if outcome.series is not None:
+        outcome.series.info["controller"] = trial.label
+    return outcome
+
+
+def figures_of(trial: Trial, outcome: Outcome, abort_reason: str) -> dict[str, Any]:
+    """Return the content of metrics.json for a flight with a recorded series."""
+    info = {
+        "payload_mass_kg": trial.payload_mass,
+        "drop_point": trial.load_scenario().drop_point,
+        "abort_reason": abort_reason,
+        "transitions": outcome.transitions,
+        "faults": outcome.faults,
+    }
+    return metrics.compute(outcome.series, info)
+
+
+def measure(trial: Trial) -> TrialResult:
+    """Fly a trial; return its result and write its series to `trial.keep` if given.
+
+    Raises TrialFailed if a flight with the nodes failed.
     """
+    outcome = fly(trial)
+    series = outcome.series
+    if series is None or (trial.engine == "ros" and outcome.partial):
+        raise TrialFailed(
+            f"{trial.label}, {trial.payload_mass:g} kg, seed {trial.seed}: "
+            f"{outcome.reason or 'nothing was recorded'}"
+        )
     if trial.keep is not None:
         series.write(trial.keep)
-    figures = metrics.compute(
-        series,
-        {
-            "payload_mass_kg": trial.payload_mass,
-            "drop_point": scenario.drop_point,
-            "abort_reason": abort_reason,
-            "transitions": changes,
-        },
-    )
-    flown = series.flown
-    planned = scenario.landing.at + scenario.landing.duration
+    figures = figures_of(trial, outcome, outcome.abort_reason)
+    flown, landing = series.flown, trial.load_scenario().landing
     return TrialResult(
         label=trial.label,
         payload_mass=trial.payload_mass,
         seed=trial.seed,
         rms=_row(figures["rms"]),
         largest=_row(figures["max"]),
-        flown=min(1.0, figures["duration_s"] / planned),
+        flown=min(1.0, figures["duration_s"] / (landing.at + landing.duration)),
         cut_short=not bool(series.in_phase("landed").any()),
         outcome=classify(series, figures),
         why="; ".join(figures["shortfalls"]),
         place_error=figures["payload_place_error_m"],
-        restless=(
-            _change(_rates(series)[flown]),
-            _change(series.block("tau_alpha.")[flown]),
-        ),
+        restless=(_change(_rates(series)[flown]), _change(series.block("tau_alpha.")[flown])),
         peaks=_peaks(series, flown),
     )
 

@@ -3,17 +3,16 @@
 from __future__ import annotations
 
 import argparse
-import sys
 
 from rich.console import Console
 from rich.text import Text
 
+from uam_lab.cli.command import Command
 from uam_lab.doctor.finding import Finding, Verdict
 from uam_lab.doctor.run import as_json, examine, worst
 from uam_sim_bridge.mavlink.transport.transport import ALLOWED, parse_url
-from uam_sim_bridge.ports import PortError
 
-FINE, BROKEN, WRONG_USE = 0, 1, 2
+FINE, BROKEN = 0, 1
 STYLES = {Verdict.OK: "green", Verdict.WARN: "bold yellow", Verdict.FAIL: "bold red"}
 EXAMPLES = """\
 examples:
@@ -27,28 +26,23 @@ Exit status: 0 only OK and WARN: flights work; 1 at least one FAIL; 2 wrong use.
 
 def add(commands: argparse._SubParsersAction) -> None:
     """Add the subcommand to the command line."""
-    parser = commands.add_parser(
+    command = Command(
+        commands,
         "doctor",
-        help="check installation, ports, rendering and autopilot link, with advice",
-        description="Check installation, ROS, ports, rendering, autopilot link and machine.",
-        epilog=EXAMPLES,
-        formatter_class=argparse.RawDescriptionHelpFormatter,
+        run,
+        "check installation, ports, rendering and autopilot link, with advice",
+        "Check installation, ROS, ports, rendering, autopilot link and machine.",
+        EXAMPLES,
     )
-    option = parser.add_argument
-    option("--autopilot", default="", metavar="URL", help=f"check an autopilot there: {ALLOWED}")
-    option("--json", action="store_true", help="print JSON, for programs")
-    parser.set_defaults(run=run)
+    command.option("--autopilot", "URL", f"check an autopilot there: {ALLOWED}", "")
+    command.switch("--json", "print JSON, for programs")
 
 
 def run(options: argparse.Namespace) -> int:
     """Run the command; return the exit status."""
-    try:
-        if options.autopilot:
-            parse_url(options.autopilot)
-        return _show(options.autopilot, options.json)
-    except PortError as error:
-        print(f"uam doctor: {error}", file=sys.stderr)
-        return WRONG_USE
+    if options.autopilot:
+        parse_url(options.autopilot)
+    return _show(options.autopilot, options.json)
 
 
 def _show(url: str, machine_readable: bool) -> int:

@@ -3,52 +3,28 @@
 from __future__ import annotations
 
 import argparse
-import math
 import sys
+from collections.abc import Callable
 from pathlib import Path
 
 from rich.console import Console
 
 from uam_control.laws import catalogue
-from uam_control.mission import ScenarioError
-from uam_control.profiles.profile import ProfileError
 from uam_control.settings import configuration
-from uam_control.settings.configuration import ConfigurationError
-from uam_control.vehicle import VehicleError
-from uam_lab.cli.vehicle_options import add_scenario, add_vehicle
+from uam_lab.cli.command import INTERRUPTED, USER_ERRORS, Command, number
 from uam_lab.flight import settings as flight_settings
 from uam_lab.flight.conclude import command_line, conclude
 from uam_lab.flight.progress import Progress
-from uam_lab.flight.settings import (
-    LOG_LIMIT,
-    ONLOOKERS,
-    REPLACEABLE,
-    FlightSettings,
-    SettingsError,
-)
+from uam_lab.flight.settings import LOG_LIMIT, ONLOOKERS, REPLACEABLE, FlightSettings
 from uam_lab.report.build import build_report
 from uam_lab.report.page.console import reporting, summary
-from uam_lab.results.result_folder import ResultFolder, ResultFolderError
-from uam_sim_bridge.faults import FaultError
+from uam_lab.results.outcome import Outcome
+from uam_lab.results.result_folder import ResultFolder
 from uam_sim_bridge.mavlink.transport.transport import ALLOWED
-from uam_sim_bridge.plant.engines import DEFAULT_PLANT, PLANTS, PlantError
-from uam_sim_bridge.ports import INSTANCES, PortError
-from uam_sim_bridge.px4.px4_installation import Px4Error
+from uam_sim_bridge.plant.engines import DEFAULT_PLANT, PLANTS
+from uam_sim_bridge.ports import INSTANCES
 
-COMPLETED, NOT_COMPLETED, WRONG_USE, INTERRUPTED = 0, 1, 2, 130
-USER_ERRORS = (
-    SettingsError,
-    ScenarioError,
-    ProfileError,
-    ConfigurationError,
-    PortError,
-    Px4Error,
-    ResultFolderError,
-    FaultError,
-    PlantError,
-    VehicleError,
-)
-
+COMPLETED, NOT_COMPLETED = 0, 1
 EXAMPLES = """\
 examples:
   uam fly                                    the paper's mission, default profile
@@ -71,202 +47,86 @@ move, alpha_1,alpha_2. Exit status: 0 mission completed, 1 flown but not complet
 
 def add(commands: argparse._SubParsersAction) -> None:
     """Add the subcommand to the command line."""
-    parser = commands.add_parser(
+    command = Command(
+        commands,
         "fly",
-        help="fly a scenario and write a result folder",
-        description="Start every node, fly a scenario, write a result folder.",
-        epilog=EXAMPLES,
-        formatter_class=argparse.RawDescriptionHelpFormatter,
+        run,
+        "fly a scenario and write a result folder",
+        "Start every node, fly a scenario, write a result folder.",
+        EXAMPLES,
     )
-    profiles = ", ".join(configuration.names("profiles"))
-    option = parser.add_argument
-    option(
-        "--controller",
-        default=catalogue.DEFAULT,
-        metavar="NAME",
-        help="; ".join(f"{name}: {law.label}" for name, law in catalogue.LAWS.items())
-        + " (default %(default)s)",
+    option = command.option
+    text = "; ".join(f"{name}: {law.label}" for name, law in catalogue.LAWS.items())
+    option("--controller", "NAME", text, catalogue.DEFAULT)
+    text = (
+        f"parameters: {', '.join(configuration.names('profiles'))}, or a ROS parameter file, as "
+        "ros2 param dump writes it; may be repeated, a later one overrides (default: the "
+        "controller's)"
     )
-    option(
-        "--profile",
-        metavar="NAME|FILE",
-        action="append",
-        help=f"parameters: {profiles}, or a ROS parameter file, as ros2 param dump writes it; "
-        "may be repeated, a later one overrides (default: the controller's)",
+    option("--profile", "NAME|FILE", text, action="append")
+    command.vehicle()
+    command.scenario()
+    option("--engine", "ros|direct", "nodes and sockets, or one loop without them", "ros")
+    text = "simulated time, repeatable for the same seed; or the wall clock"
+    option("--clock", "lockstep|realtime", text, "lockstep")
+    text = f"physics engine: {', '.join(PLANTS)}, or a class of your own"
+    option("--plant", "NAME|MODULE:CLASS", text, DEFAULT_PLANT)
+    text = (
+        "the stand-in; PX4 in software; or the link of an autopilot that you started: "
+        f"{ALLOWED}; serial: a flight controller in HITL mode"
     )
-    add_vehicle(parser)
-    add_scenario(parser)
-    option(
-        "--engine",
-        default="ros",
-        metavar="ros|direct",
-        help="nodes and sockets, or one loop without them (default %(default)s)",
-    )
-    option(
-        "--clock",
-        default="lockstep",
-        metavar="lockstep|realtime",
-        help="simulated time, repeatable for the same seed; or the wall clock "
-        "(default %(default)s)",
-    )
-    option(
-        "--plant",
-        default=DEFAULT_PLANT,
-        metavar="NAME|MODULE:CLASS",
-        help=f"physics engine: {', '.join(PLANTS)}, or a class of your own (default %(default)s)",
-    )
-    option(
-        "--autopilot",
-        default="builtin",
-        metavar="builtin|px4|URL",
-        help="the stand-in; PX4 in software; or the link of an autopilot that you started: "
-        f"{ALLOWED}; serial: a flight controller in HITL mode (default %(default)s)",
-    )
-    option(
-        "--px4-dir",
-        metavar="DIR",
-        help="PX4's build directory, with bin/px4 and etc/ (default: $PX4_SITL_DIR)",
-    )
-    option(
-        "--gcs",
-        default="",
-        metavar="URL",
-        help="ground station, as udp:127.0.0.1:14550 (default: none)",
-    )
-    option(
-        "--payload-mass",
-        type=_number("mass", "kg", 0.0),
-        metavar="KG",
-        help="default: the scenario's",
-    )
-    option(
-        "--wind",
-        type=_number("wind", "m/s"),
-        nargs=3,
-        metavar=("X", "Y", "Z"),
-        help="mean wind [m/s, ENU] (default: calm)",
-    )
-    option(
-        "--gust",
-        type=_number("gust", "m/s", 0.0),
-        metavar="M/S",
-        help="standard deviation of the gusts per axis (default: none)",
-    )
-    option(
-        "--noise",
-        type=_number("noise", "", 0.0),
-        metavar="FACTOR",
-        help="multiplies noise and bias of the sensors (default 1)",
-    )
-    option("--seed", type=_seed, default=1, metavar="N", help="of all noise (default %(default)s)")
-    option(
+    option("--autopilot", "builtin|px4|URL", text, "builtin")
+    text = "PX4's build directory, with bin/px4 and etc/ (default: $PX4_SITL_DIR)"
+    option("--px4-dir", "DIR", text)
+    option("--gcs", "URL", "ground station, as udp:127.0.0.1:14550 (default: none)", "")
+    mass = number("mass", "kg", 0.0)
+    option("--payload-mass", "KG", "default: the scenario's", type=mass)
+    wind = number("wind", "m/s")
+    option("--wind", ("X", "Y", "Z"), "mean wind [m/s, ENU] (default: calm)", type=wind, nargs=3)
+    text = "standard deviation of the gusts per axis (default: none)"
+    option("--gust", "M/S", text, type=number("gust", "m/s", 0.0))
+    text = "multiplies noise and bias of the sensors (default 1)"
+    option("--noise", "FACTOR", text, type=number("noise", "", 0.0))
+    command.seed("of all noise")
+    command.repeated(
         "--without",
-        action="append",
-        default=[],
-        metavar="NODE",
-        help=f"do not start this node, wait for yours of that name: {', '.join(REPLACEABLE)}; "
-        f"or do not start a display: {', '.join(ONLOOKERS)}; may be repeated",
+        "NODE",
+        f"do not start this node, wait for yours of that name: {', '.join(REPLACEABLE)}; "
+        f"or do not start a display: {', '.join(ONLOOKERS)}",
     )
-    option(
-        "--view",
-        action="store_true",
-        help="serve the cockpit, a local web page: the scene, charts, gains, commands",
+    command.switch(
+        "--view", "serve the cockpit, a local web page: the scene, charts, gains, commands"
     )
-    option(
+    command.repeated(
         "--fault",
-        action="append",
-        default=[],
-        metavar="SPEC|FILE",
-        help="inject a fault: NAME@SECONDS[+DURATION] or NAME@PHASE[+AFTER[+DURATION]], then "
-        ":parameter=value,...; or a YAML file with several faults; may be repeated; "
-        "uam faults --list shows all faults",
+        "SPEC|FILE",
+        "inject a fault: NAME@SECONDS[+DURATION] or NAME@PHASE[+AFTER[+DURATION]], then "
+        ":parameter=value,...; or a YAML file with several faults; uam faults --list shows all",
+        dest="faults",
     )
-    option(
-        "--out",
-        type=Path,
-        metavar="DIR",
-        help="result folder (default results/<time>-<scenario>-<controller>)",
+    command.out("<scenario>-<controller>")
+    text = "size at which log.mcap ends, after hours; the flight continues"
+    option("--log-limit", "MB", text, LOG_LIMIT, type=number("size", "MB", 1.0))
+    command.switch(
+        "--no-video", "leave out the video, which takes longest", "store_false", dest="video"
     )
-    option(
-        "--log-limit",
-        type=_number("size", "MB", 1.0),
-        default=LOG_LIMIT,
-        metavar="MB",
-        help="size at which log.mcap ends; the flight continues (default %(default)g, hours)",
+    text = (
+        f"ROS domain and ports of this instance, 0..{INSTANCES - 1}, numbered as PX4 does "
+        "(default: the first free one)"
     )
-    option("--no-video", action="store_true", help="leave out the video, which takes longest")
-    option(
-        "--instance",
-        type=int,
-        metavar="N",
-        help=f"ROS domain and ports of this instance, 0..{INSTANCES - 1}, numbered as PX4 does "
-        "(default: the first free one)",
-    )
-    parser.set_defaults(run=run)
-
-
-def _number(name: str, unit: str, low: float = -math.inf):
-    """Return an argparse type: a finite number, at least `low`."""
-
-    def read(text: str) -> float:
-        try:
-            value = float(text)
-        except ValueError:
-            value = math.nan
-        if not math.isfinite(value) or value < low:
-            least = f", at least {low:g}" if low > -math.inf else ""
-            raise argparse.ArgumentTypeError(
-                f"'{text}' is not a {name}: a number{f' in {unit}' if unit else ''}{least}"
-            )
-        return value
-
-    return read
-
-
-def _seed(text: str) -> int:
-    if not text.isdecimal():
-        raise argparse.ArgumentTypeError(f"'{text}' is not a seed: a whole number, 0 or more")
-    return int(text)
+    option("--instance", "N", text, type=int)
 
 
 def run(options: argparse.Namespace) -> int:
     """Run the command; return the exit status."""
-    try:
-        settings = flight_settings.settings(
-            scenario=options.scenario,
-            controller=options.controller,
-            profile=options.profile,
-            vehicle=options.vehicle,
-            engine=options.engine,
-            clock=options.clock,
-            plant=options.plant,
-            autopilot=options.autopilot,
-            px4_dir=options.px4_dir,
-            gcs=options.gcs,
-            payload_mass=options.payload_mass,
-            seed=options.seed,
-            out=options.out,
-            video=not options.no_video,
-            vehicle_changes=_vehicle_changes(options),
-            instance=options.instance,
-            without=options.without,
-            log_limit=options.log_limit,
-            view=options.view,
-            faults=options.fault,
-        )
-        return fly(settings)
-    except USER_ERRORS as error:
-        print(f"uam fly: {error}", file=sys.stderr)
-        return WRONG_USE
-
-
-def _vehicle_changes(options: argparse.Namespace) -> dict[str, object]:
+    given = {name: value for name, value in vars(options).items() if name not in ("command", "run")}
     changes = {
-        "air.wind": options.wind,
-        "air.gust": options.gust,
-        "sensors.noise_scale": options.noise,
+        "air.wind": given.pop("wind"),
+        "air.gust": given.pop("gust"),
+        "sensors.noise_scale": given.pop("noise"),
     }
-    return {name: value for name, value in changes.items() if value is not None}
+    changes = {name: value for name, value in changes.items() if value is not None}
+    return fly(flight_settings.settings(**given, vehicle_changes=changes))
 
 
 def fly(settings: FlightSettings) -> int:
@@ -305,7 +165,7 @@ def fly(settings: FlightSettings) -> int:
     return COMPLETED if completed else NOT_COMPLETED
 
 
-def _engine(name: str):
+def _engine(name: str) -> Callable[..., Outcome]:
     """Return the engine's `fly`. Raises SettingsError if ROS is not installed."""
     if name == "direct":
         from uam_lab.flight.direct.engine import fly as engine

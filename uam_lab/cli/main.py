@@ -7,10 +7,10 @@ import sys
 from collections.abc import Sequence
 
 from uam_lab.cli import campaign, compare, doctor, faults, fly, profile, report, tune, view
+from uam_lab.cli.command import INTERRUPTED, USER_ERRORS, WRONG_USE
 
 # each has add(subparsers), which sets `run`: arguments → exit status
 COMMANDS = (fly, view, profile, report, compare, tune, campaign, faults, doctor)
-WRONG_USE, INTERRUPTED = 2, 130
 
 
 class OneLineParser(argparse.ArgumentParser):
@@ -44,6 +44,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
         return INTERRUPTED
     except BrokenPipeError:  # the reader of the output has ended, as in `uam fly | head`
         return 1
+    except (*USER_ERRORS, OSError) as error:
+        print(f"uam {options.command}: {error}", file=sys.stderr)
+        return WRONG_USE
 
 
 if __name__ == "__main__":

@@ -6,13 +6,13 @@ import argparse
 import sys
 from typing import Any
 
-from uam_control.profiles.profile import Profile, ProfileError, load_profile
+from uam_control.profiles.profile import Profile, load_profile
 from uam_control.settings import configuration
-from uam_control.settings.configuration import ConfigurationError
-from uam_lab.flight.settings import SettingsError, require_ros
-from uam_sim_bridge.ports import INSTANCES, PortError, domain_of_flight
+from uam_lab.cli.command import Command
+from uam_lab.flight.settings import require_ros
+from uam_sim_bridge.ports import domain_of_flight
 
-CHANGED, REFUSED, WRONG_USE = 0, 1, 2
+CHANGED, REFUSED = 0, 1
 EXAMPLES = """\
 examples:
   uam profile mine.yaml                    the running flight; all nodes accept it, or none
@@ -27,40 +27,24 @@ gains act on the same errors (docs/tuning_in_flight.md). The log records every c
 
 def add(commands: argparse._SubParsersAction) -> None:
     """Add the subcommand to the command line."""
-    parser = commands.add_parser(
+    command = Command(
+        commands,
         "profile",
-        help="switch the profile of a running flight",
-        description="Switch the profile of a running flight: all nodes apply it, or none.",
-        epilog=EXAMPLES,
-        formatter_class=argparse.RawDescriptionHelpFormatter,
+        run,
+        "switch the profile of a running flight",
+        "Switch the profile of a running flight: all nodes apply it, or none.",
+        EXAMPLES,
     )
-    option = parser.add_argument
-    option(
-        "profile",
-        nargs="+",
-        metavar="NAME|FILE",
-        help=f"{', '.join(configuration.names('profiles'))}, or a ROS parameter file",
-    )
-    option(
-        "--instance",
-        type=int,
-        metavar="N",
-        help=f"instance of the flight, 0..{INSTANCES - 1} (default: the running one)",
-    )
-    parser.set_defaults(run=run)
+    text = f"{', '.join(configuration.names('profiles'))}, or a ROS parameter file"
+    command.option("profile", "NAME|FILE", text, nargs="+")
+    command.instance()
 
 
 def run(options: argparse.Namespace) -> int:
     """Run the command; return the exit status."""
-    try:
-        require_ros()
-        given = [str(configuration.named("profiles", one)) for one in options.profile]
-        profile = load_profile(*given)
-        domain = domain_of_flight(options.instance)
-    except (ConfigurationError, ProfileError, PortError, SettingsError) as error:
-        print(f"uam profile: {error}", file=sys.stderr)
-        return WRONG_USE
-    return switch(profile, domain)
+    require_ros()
+    given = [str(configuration.named("profiles", one)) for one in options.profile]
+    return switch(load_profile(*given), domain_of_flight(options.instance))
 
 
 def switch(profile: Profile, domain: int | None) -> int:

@@ -4,16 +4,15 @@ from __future__ import annotations
 
 import argparse
 import json
-import sys
 from pathlib import Path
 
-from uam_control.mission import ScenarioError
-from uam_control.settings.configuration import ConfigurationError
-from uam_lab.flight.settings import SettingsError, require_ros
-from uam_lab.results.result_folder import ResultFolderError, make_folder
-from uam_lab.results.timeseries import UnreadableFlight
+from rich.console import Console
 
-WRITTEN, WRONG_USE = 0, 2
+from uam_lab.cli.command import Command
+from uam_lab.flight.settings import require_ros
+from uam_lab.results.result_folder import ResultFolderError, make_folder
+
+WRITTEN = 0
 EXAMPLES = """\
 examples:
   uam report results/latest                rebuild everything from its log.mcap, also after a flight
@@ -25,56 +24,33 @@ examples:
 
 def add(commands: argparse._SubParsersAction) -> None:
     """Add the subcommand to the command line."""
-    parser = commands.add_parser(
+    command = Command(
+        commands,
         "report",
-        help="rebuild figures and report from the log alone; overlay several flights",
-        description="Rebuild table, metrics, figures and report of a flight from its log.mcap, or "
+        run,
+        "rebuild figures and report from the log alone; overlay several flights",
+        "Rebuild table, metrics, figures and report of a flight from its log.mcap, or "
         "draw several flights in the same figures.",
-        epilog=EXAMPLES,
-        formatter_class=argparse.RawDescriptionHelpFormatter,
+        EXAMPLES,
     )
-    option = parser.add_argument
-    option("directories", nargs="+", type=Path, metavar="DIR", help="result folder of a flight")
-    option(
-        "--out",
-        type=Path,
-        metavar="DIR",
-        help="result folder (default: the given one; for several flights results/<time>-report)",
-    )
-    option("--scenario", metavar="NAME|FILE", help="the flown scenario, for a log without one")
-    option("--no-video", action="store_true", help="leave out the video, which takes longest")
-    option("--no-pictures", action="store_true", help="leave out snapshots and video")
-    parser.set_defaults(run=run)
+    command.option("directories", "DIR", "result folder of a flight", nargs="+", type=Path)
+    text = "result folder (default: the given one; for several flights results/<time>-report)"
+    command.option("--out", "DIR", text, type=Path)
+    command.option("--scenario", "NAME|FILE", "the flown scenario, for a log without one")
+    command.switch("--no-video", "leave out the video, which takes longest")
+    command.switch("--no-pictures", "leave out snapshots and video")
 
 
 def run(options: argparse.Namespace) -> int:
     """Run the command; return the exit status."""
-    from uam_lab.recording.mcap_reader import UnreadableLog
-    from uam_lab.report.rebuild import NothingToReport
-
-    try:
-        return several(options) if len(options.directories) > 1 else one(options)
-    except (
-        NothingToReport,
-        UnreadableLog,
-        UnreadableFlight,
-        SettingsError,
-        ScenarioError,
-        ConfigurationError,
-        ResultFolderError,
-        OSError,
-    ) as error:
-        print(f"uam report: {error}", file=sys.stderr)
-        return WRONG_USE
+    return several(options) if len(options.directories) > 1 else one(options)
 
 
 def one(options: argparse.Namespace) -> int:
     """Rebuild the report of one flight; return the exit status."""
-    from rich.console import Console
-
     from uam_lab.report.build import build_report
     from uam_lab.report.page.console import reporting, summary
-    from uam_lab.report.rebuild import LOG, NothingToReport, rebuild
+    from uam_lab.report.rebuild import LOG, rebuild
 
     (directory,) = options.directories
     out = options.out or directory
@@ -84,7 +60,7 @@ def one(options: argparse.Namespace) -> int:
     elif options.out is None and (directory / "metrics.json").exists():  # of the direct engine
         metrics = json.loads((directory / "metrics.json").read_text())
     else:
-        raise NothingToReport(f"{directory} has no {LOG} for a report")
+        raise ResultFolderError(f"{directory} has no {LOG} for a report")
     console = Console()
     pictures = not options.no_pictures
     with reporting(console) as show:
@@ -98,8 +74,6 @@ def one(options: argparse.Namespace) -> int:
 
 def several(options: argparse.Namespace) -> int:
     """Write figures and page with several flights overlaid; return the exit status."""
-    from rich.console import Console
-
     from uam_lab.report.figures.panels import DrawnFlight
     from uam_lab.report.page.console import reporting
     from uam_lab.report.page.overlay import build_overlay, labelled

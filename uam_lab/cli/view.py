@@ -7,10 +7,10 @@ import json
 import os
 import sys
 
-from uam_lab.flight.settings import SettingsError, require_ros
-from uam_sim_bridge.ports import INSTANCES, PortError, domain_of_flight
+from uam_lab.cli.command import Command
+from uam_lab.flight.settings import require_ros
+from uam_sim_bridge.ports import domain_of_flight
 
-WRONG_USE = 2
 EXAMPLES = """\
 examples:
   uam view                                 the running flight
@@ -26,41 +26,21 @@ Ctrl-C ends the cockpit; the flight continues.
 
 def add(commands: argparse._SubParsersAction) -> None:
     """Add the subcommand to the command line."""
-    parser = commands.add_parser(
+    command = Command(
+        commands,
         "view",
-        help="the cockpit, a local web page, for running nodes",
-        description="Serve the cockpit: the scene, charts, gains and commands in a browser.",
-        epilog=EXAMPLES,
-        formatter_class=argparse.RawDescriptionHelpFormatter,
+        run,
+        "the cockpit, a local web page, for running nodes",
+        "Serve the cockpit: the scene, charts, gains and commands in a browser.",
+        EXAMPLES,
     )
-    option = parser.add_argument
-    option(
-        "--instance",
-        type=int,
-        metavar="N",
-        help=f"instance of the flight, 0..{INSTANCES - 1} (default: the running one)",
+    command.instance()
+    command.option(
+        "--host", "ADDRESS", "address to listen on; the default is this computer only", "127.0.0.1"
     )
-    option(
-        "--host",
-        default="127.0.0.1",
-        metavar="ADDRESS",
-        help="address to listen on (default %(default)s: this computer only)",
-    )
-    option(
-        "--port",
-        type=_port,
-        default=8080,
-        metavar="PORT",
-        help="first port to try; the next free one is used (default %(default)s)",
-    )
-    option(
-        "--origin",
-        action="append",
-        default=[],
-        metavar="URL",
-        help="origin of another page that may connect; may be repeated",
-    )
-    parser.set_defaults(run=run)
+    text = "first port to try; the next free one is used"
+    command.option("--port", "PORT", text, 8080, type=_port)
+    command.repeated("--origin", "URL", "origin of another page that may connect")
 
 
 def _port(text: str) -> int:
@@ -71,12 +51,8 @@ def _port(text: str) -> int:
 
 def run(options: argparse.Namespace) -> int:
     """Serve until Ctrl-C; return the exit status."""
-    try:
-        require_ros()
-        domain = domain_of_flight(options.instance)
-    except (PortError, SettingsError) as error:
-        print(f"uam view: {error}", file=sys.stderr)
-        return WRONG_USE
+    require_ros()
+    domain = domain_of_flight(options.instance)
     from uam_lab.nodes import cockpit
     from uam_lab.processes.node_environment import transport_environment
 

@@ -15,10 +15,9 @@ from uam_lab.compare import plan, tables
 from uam_lab.compare.modularity import Evidence
 from uam_lab.report.figures import figures, style
 from uam_lab.report.figures.panels import DrawnFlight
-from uam_lab.report.page import html
-from uam_lab.results import timeseries
-from uam_lab.results.atomic import replacing, write_rows, write_text
-from uam_lab.results.result_folder import as_json, versions
+from uam_lab.results import templates, timeseries
+from uam_lab.results.atomic import write_rows, write_text
+from uam_lab.results.result_folder import versions, write_json
 
 # The paper's five figures; OVERLAID: the rows drawn in them.
 PAPERS_FIGURES = (
@@ -28,6 +27,7 @@ PAPERS_FIGURES = (
     "vehicle_inputs",
     "arm_inputs",
 )
+HEAD = ("controller", "payload_kg", "seed", "outcome", "place_error_m", "why")
 OVERLAID = (plan.ASMC1, plan.ASMC2, plan.PROPOSED)
 
 
@@ -67,30 +67,29 @@ def write(
     claims = [*tables.claims(found), modular.claim]
     markdown = tables.as_markdown(found)
     for table in modular.tables():
-        markdown += "\n" + _markdown(*table)
-    _flights(out / "flights.csv", results)
+        markdown += f"\n{templates.markdown_table(*table)}\n"
+    write_rows(
+        out / "flights.csv",
+        [*HEAD[:3], *(f"rms {n}" for n in found[0].coordinates), *HEAD[3:]],
+        (
+            [
+                *(r.label, r.payload_mass, r.seed),
+                *(f"{x:.6g}" for x in r.rms),
+                *(r.outcome, "" if r.place_error is None else f"{r.place_error:.4f}", r.why),
+            ]
+            for r in results
+        ),
+    )
     numbers = {
         row.label: {
-            "flights": row.flights,
-            "completed": row.completed,
-            "lost": row.lost,
-            "mean": row.mean,
-            "half_width": row.half_width,
-            "worst": row.worst,
+            name: value for name, value in vars(row).items() if name not in ("label", "why")
         }
         for row in found
     }
-    write_text(
+    write_json(
         out / "comparison.json",
-        as_json(
-            {
-                "columns": found[0].coordinates,
-                **facts,
-                "versions": versions(),
-                "rows": numbers,
-                "claims": claims,
-            }
-        ),
+        {"columns": found[0].coordinates, **facts, "versions": versions()}
+        | {"rows": numbers, "claims": claims},
     )
     write_text(
         out / "tables.md",
@@ -101,50 +100,41 @@ def write(
         f"`{facts['command']}`; ± is the {tables.CONFIDENCE:.0%} confidence "
         "interval over seeds.\n",
     )
-    drawn = _draw(out, trials, results)
     page = out / "report.html"
-    write_text(page, _page(found, claims, modular, drawn, out, facts))
+    pictures = [
+        (name, templates.embedded(out / "figures" / f"{name}.png"))
+        for name in _draw(out, trials, results, found)
+    ]
+    text = templates.render(
+        "uam_lab.compare",
+        "report.html.j2",
+        tables=tables.error_tables(found),
+        claims=claims,
+        modularity=modular.tables(),
+        pictures=pictures,
+        facts=facts,
+        confidence=tables.CONFIDENCE,
+        shown=OVERLAID,
+    )
+    write_text(page, text)
     return Written(markdown + "\n" + "\n".join(claims) + "\n", page)
 
 
-def _flights(file: Path, results: Sequence[TrialResult]) -> None:
-    head = [
-        "controller",
-        "payload_kg",
-        "seed",
-        *(f"rms {n}" for n in results[0].coordinates),
-        "outcome",
-        "place_error_m",
-        "why",
-    ]
-    write_rows(
-        file,
-        head,
-        (
-            [
-                r.label,
-                r.payload_mass,
-                r.seed,
-                *(f"{x:.6g}" for x in r.rms),
-                r.outcome,
-                "" if r.place_error is None else f"{r.place_error:.4f}",
-                r.why,
-            ]
-            for r in results
-        ),
-    )
-
-
-def _draw(out: Path, trials: Sequence[Trial], results: Sequence[TrialResult]) -> list[str]:
+def _draw(
+    out: Path,
+    trials: Sequence[Trial],
+    results: Sequence[TrialResult],
+    found: Sequence[tables.ControllerErrors],
+) -> list[str]:
+    """Write the figures; return their names."""
     kept = {trial.label: trial.keep for trial in trials if trial.keep is not None}
     flights = [
         DrawnFlight(label, timeseries.read(kept[label])) for label in OVERLAID if label in kept
     ]
     drawn = figures.draw(flights, out / "figures", names=PAPERS_FIGURES)
     with style.styled():
-        for name, figure in (("rms", _rms(tables.rows(results))), ("gains", _gains(results))):
-            with replacing(out / "figures" / f"{name}.png") as temporary:
-                figure.savefig(temporary, format="png", dpi=style.PIXELS_PER_INCH)
+        for name, figure in (("rms", _rms(found)), ("gains", _gains(results))):
+            style.save(figure, out / "figures" / f"{name}.png")
             drawn.append(name)
     return drawn
 
@@ -157,7 +147,7 @@ def _rms(found: Sequence[tables.ControllerErrors]) -> Figure:
     names = found[0].coordinates
     at = np.arange(len(names))
     for number, row in enumerate(found):
-        colour = style.FLIGHTS[number % len(style.FLIGHTS)]
+        colour = style.flight_colour(number)
         x = at + (number - 0.5 * (len(found) - 1)) * width
         error = np.nan_to_num(row.half_width)
         axis.bar(
@@ -195,7 +185,7 @@ def _gains(results: Sequence[TrialResult]) -> Figure:
                 [i + 0.2 * (number - 1)] * len(values),
                 values,
                 ".",
-                color=style.FLIGHTS[number % len(style.FLIGHTS)],
+                color=style.flight_colour(number),
                 label=f"{mass:g} kg" if i == 0 else None,
             )
     axis.set(yscale="log", xticks=range(len(names)), ylabel="largest value in a flight")
@@ -206,61 +196,3 @@ def _gains(results: Sequence[TrialResult]) -> Figure:
     if names:
         axis.legend(ncols=3)
     return figure
-
-
-def _markdown(head: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
-    lines = [head, ["---"] * len(head), *rows]
-    return "".join(f"| {' | '.join(cells)} |\n" for cells in lines)
-
-
-def _page(
-    found: Sequence[tables.ControllerErrors],
-    claims: Sequence[str],
-    modular: Evidence,
-    drawn: Sequence[str],
-    out: Path,
-    facts: Mapping[str, Any],
-) -> str:
-    pictures = [(name, html.embedded(out / "figures" / f"{name}.png")) for name in drawn]
-    shown = [
-        {
-            "title": title,
-            "unit": "m" if title == "position" else "deg",
-            "names": found[0].coordinates[columns],
-            "rows": [_html_row(row, found, columns, title) for row in found],
-        }
-        for title, columns in tables.TABLES
-    ]
-    return html.template("uam_lab.compare", "report.html.j2").render(
-        tables=shown,
-        claims=claims,
-        modularity=modular.tables(),
-        pictures=pictures,
-        facts=facts,
-        confidence=tables.CONFIDENCE,
-        shown=OVERLAID,
-    )
-
-
-def _html_row(
-    row: tables.ControllerErrors,
-    found: Sequence[tables.ControllerErrors],
-    columns: slice,
-    title: str,
-) -> dict:
-    digits = 4 if title == "position" else 3
-    proposed = next((other for other in found if other.label == plan.PROPOSED), None)
-    papers = tables.papers(row)
-    cells = []
-    for i in range(*columns.indices(len(row.mean))):
-        worse = ""
-        if proposed is not None and row is not proposed:
-            worse = f"{tables.degradation(row.mean, proposed.mean)[i]:.0f} %"
-        cells.append(
-            {
-                "ours": tables.cell(row.mean[i], row.half_width[i], digits),
-                "paper": papers[i],
-                "worse": worse,
-            }
-        )
-    return {"label": row.label, "shortfall": row.shortfall, "cells": cells}

@@ -53,6 +53,7 @@ class Flights:
     scenario: str
     payloads: tuple[float, ...]
     seeds: tuple[int, ...]
+    engine: str = "direct"
 
     @property
     def shown(self) -> tuple[float, int]:
@@ -108,6 +109,7 @@ def trials(rows: Sequence[ComparedController], flights: Flights, folder: Path) -
             seed,
             flights.scenario,
             keep=folder / f"{number}.parquet" if (mass, seed) == flights.shown else None,
+            engine=flights.engine,
         )
         for number, row in enumerate(rows)
         for mass in flights.payloads

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from scipy.stats import t as student
@@ -12,6 +13,7 @@ from uam_control.coordinates import ALPHA, ARM, ATTITUDE, POSITION, coordinates
 from uam_lab.campaign.trial import TrialResult
 from uam_lab.compare.plan import ASMC1, ASMC2, PROPOSED
 from uam_lab.report.facts import paper
+from uam_lab.results.templates import markdown_table
 
 CONFIDENCE = 0.95
 # table:error_p, table:error_q, table:error_alpha of the paper; order of the coordinates: m, deg
@@ -142,34 +144,38 @@ def _limit(what: str, row: ControllerErrors, limit: Sequence[float]) -> str:
     )
 
 
+def error_tables(found: Sequence[ControllerErrors]) -> list[dict[str, Any]]:
+    """Return the three tables: the cells of each row as here, in the paper, and degradation [%]."""
+    proposed = next((row for row in found if row.label == PROPOSED), None)
+    tables = []
+    for title, columns in TABLES:
+        unit, digits = ("m", 4) if title == "position" else ("deg", 3)
+        rows, names = [], found[0].coordinates[columns]
+        for row in found:
+            worse = [""] * len(names)
+            if proposed is not None and row is not proposed:
+                worse = [f"{x:.0f}" for x in degradation(row.mean, proposed.mean)[columns]]
+            values = zip(row.mean[columns], row.half_width[columns], strict=True)
+            here = [cell(mean, half, digits) for mean, half in values]
+            published = papers(row)[columns]
+            rows.append({"row": row, "here": here, "paper": published, "degradation": worse})
+        tables.append({"title": title, "unit": unit, "names": names, "rows": rows})
+    return tables
+
+
 def as_markdown(found: Sequence[ControllerErrors]) -> str:
     """Return the three tables with the paper's values beside those of the flights."""
-    proposed = next((row for row in found if row.label == PROPOSED), None)
     parts = []
-    for title, columns in TABLES:
-        names, unit = found[0].coordinates[columns], "m" if title == "position" else "deg"
-        head = [
-            f"RMS {title} error [{unit}]",
-            *names,
-            *(f"paper {name}" for name in names),
-            *(f"degradation {name} [%]" for name in names),
+    for table in error_tables(found):
+        names = table["names"]
+        head = [f"RMS {table['title']} error [{table['unit']}]", *names]
+        head += [f"paper {name}" for name in names]
+        head += [f"degradation {name} [%]" for name in names]
+        rows = [
+            [_name(one["row"]), *one["here"], *one["paper"], *one["degradation"]]
+            for one in table["rows"]
         ]
-        lines = ["| " + " | ".join(head) + " |", "|" + "---|" * len(head)]
-        for row in found:
-            digits = 4 if unit == "m" else 3
-            cells = [
-                cell(m, w, digits)
-                for m, w in zip(row.mean[columns], row.half_width[columns], strict=True)
-            ]
-            cells += papers(row)[columns]
-            worse = proposed is not None and row.label != PROPOSED
-            cells += (
-                [f"{x:.0f}" for x in degradation(row.mean, proposed.mean)[columns]]
-                if worse
-                else ["" for _ in names]
-            )
-            lines.append("| " + " | ".join([_name(row), *cells]) + " |")
-        parts.append("\n".join(lines))
+        parts.append(markdown_table(head, rows))
     return "\n\n".join(parts) + "\n"
 
 

@@ -107,14 +107,10 @@ def describe(url: str, heard: Heard) -> Finding:
     armed = "armed" if beat.base_mode & mavlink2.MAV_MODE_FLAG_SAFETY_ARMED else "disarmed"
     px4_like = beat.autopilot == mavlink2.MAV_AUTOPILOT_PX4
     mode = Mode.from_custom_mode(beat.custom_mode).name if px4_like else f"{beat.custom_mode}"
-    firmware = (
-        f"firmware {version(heard.version.flight_sw_version)}"
-        if heard.version
-        else ("firmware version not sent")
-    )
+    number = version(heard.version.flight_sw_version) if heard.version else "version not sent"
     found = (
         f"{url}: system {heard.system}, {kind}, {_name('MAV_TYPE', beat.type)}, mode {mode}, "
-        f"{armed}, {firmware}"
+        f"{armed}, firmware {number}"
     )
     if not px4_like:
         return warn("autopilot", found, "the bridge uses PX4's modes and parameters: docs/px4.md")
@@ -154,24 +150,12 @@ def _heartbeat() -> Message:
     return mavlink2.MAVLink_heartbeat_message(
         mavlink2.MAV_TYPE_ONBOARD_CONTROLLER,
         mavlink2.MAV_AUTOPILOT_INVALID,
-        0,
-        0,
-        mavlink2.MAV_STATE_ACTIVE,
-        3,
+        *(0, 0, mavlink2.MAV_STATE_ACTIVE, 3),
     )
 
 
 def _request(system: int) -> Message:
+    version, component = mavlink2.MAVLINK_MSG_ID_AUTOPILOT_VERSION, mavlink2.MAV_COMP_ID_AUTOPILOT1
     return mavlink2.MAVLink_command_long_message(
-        system,
-        mavlink2.MAV_COMP_ID_AUTOPILOT1,
-        MavCmd.REQUEST_MESSAGE,
-        0,
-        mavlink2.MAVLINK_MSG_ID_AUTOPILOT_VERSION,
-        0,
-        0,
-        0,
-        0,
-        0,
-        0,
+        system, component, MavCmd.REQUEST_MESSAGE, 0, version, *[0] * 6
     )

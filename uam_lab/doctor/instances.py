@@ -6,8 +6,8 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
-from uam_lab.doctor import holders
 from uam_lab.doctor.finding import Finding, fail, ok, warn
+from uam_lab.processes import process_table
 from uam_sim_bridge.ports import INSTANCES, busy_port, held, lock_file, ports_of
 
 SHOWN = 4  # busy ports named in the line
@@ -51,9 +51,10 @@ def look(instance: int, folder: Path | None = None) -> Busy | None:
     """Return the user of an instance, None if it is free; reserve nothing."""
     lock = lock_file(folder, instance)
     if held(lock):
-        return Busy(instance, ", ".join(holders.of_file(lock)) or "a flight", True)
+        return Busy(instance, ", ".join(process_table.users_of_file(lock)) or "a flight", True)
     port = busy_port(ports_of(instance))
     if port is None:
         return None
-    who = ", ".join(holders.of_port(port.protocol.lower(), port.number)) or "an unknown program"
+    users = process_table.users_of_port(port.protocol.lower(), port.number)
+    who = ", ".join(users) or "an unknown program"
     return Busy(instance, f"{port}, held by {who}", False)

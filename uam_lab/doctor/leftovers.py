@@ -8,7 +8,6 @@ import tempfile
 from collections.abc import Iterator
 from pathlib import Path
 
-from uam_lab.doctor import holders
 from uam_lab.doctor.finding import Finding, ok, warn
 from uam_lab.processes import process_table
 from uam_sim_bridge.ports import held
@@ -41,7 +40,7 @@ def orphans() -> Finding:
     if left:
         return warn(
             "processes",
-            ", ".join(map(holders.name_of, left)) + " without a flight",
+            ", ".join(map(process_table.name_of, left)) + " without a flight",
             f"kill {' '.join(map(str, left))}",
         )
     return ok("processes", "no node without its flight")

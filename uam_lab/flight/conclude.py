@@ -10,7 +10,7 @@ from typing import Any
 from uam_lab.flight.settings import FlightSettings
 from uam_lab.results import metrics
 from uam_lab.results.outcome import Outcome
-from uam_lab.results.result_folder import ResultFolder
+from uam_lab.results.result_folder import ResultFolder, versions, write_json
 
 
 def command_line() -> str:
@@ -44,7 +44,7 @@ def conclude(
     settings: FlightSettings, folder: ResultFolder, outcome: Outcome, command: str
 ) -> dict[str, Any] | None:
     """Write metrics, table and facts; return the metrics, None if nothing was recorded."""
-    folder.write_versions()
+    write_json(folder.versions, versions())
     return complete(folder, settings_facts(settings, command), outcome)
 
 
@@ -65,11 +65,11 @@ def complete(
         "transitions": outcome.transitions,
         "faults": outcome.faults,
     }
-    folder.write_info(info)
+    write_json(folder.info, info)
     if outcome.series is None:
         return None
     outcome.series.info.update(info)
-    folder.write_series(outcome.series)
+    outcome.series.write(folder.timeseries)
     figures = metrics.compute(outcome.series, info, outcome.latency_s)
-    folder.write_metrics(figures)
+    write_json(folder.metrics, figures)
     return figures

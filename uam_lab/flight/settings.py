@@ -105,8 +105,7 @@ def settings(
     _choice("controller", controller, catalogue.LAWS)
     _choice("engine", engine, ENGINES)
     _choice("clock", clock, CLOCKS)
-    if engine == "direct" and clock == "realtime":
-        raise SettingsError("the direct engine has no clock: --clock realtime needs --engine ros")
+    check_clock(engine, clock)
     if engine == "direct" and autopilot != BUILTIN:
         raise SettingsError(
             "the direct engine has only the built-in autopilot: "
@@ -176,6 +175,12 @@ def settings(
         faults=injected,
         log_limit=log_limit,
     )
+
+
+def check_clock(engine: str, clock: str) -> None:
+    """Raise SettingsError for a clock that the engine does not have."""
+    if engine == "direct" and clock == "realtime":
+        raise SettingsError("the direct engine has no clock: --clock realtime needs --engine ros")
 
 
 def require_ros() -> None:

@@ -21,8 +21,7 @@ from uam_control.mission import Scenario, load_scenario
 from uam_control.settings import configuration
 from uam_control.vehicle import DEFAULT_VEHICLE, load_description
 from uam_lab.recording.mcap_reader import read_metadata
-from uam_lab.results.atomic import write_text
-from uam_lab.results.result_folder import as_json
+from uam_lab.results.result_folder import write_json
 
 FLIGHT, SCENARIO, TEXTS = "flight", "scenario", "files"
 Records = dict[str, dict[str, str]]
@@ -45,7 +44,7 @@ def write(file: Path, info: Mapping[str, Any], scenario: str, texts: Mapping[str
         SCENARIO: {"name": source.name, "text": source.read_text()},
         TEXTS: dict(texts),
     }
-    write_text(file, as_json(records))
+    write_json(file, records)
 
 
 def read(log: Path) -> LogFacts:

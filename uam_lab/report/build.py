@@ -23,8 +23,7 @@ from uam_lab.report.figures.panels import DrawnFlight
 from uam_lab.report.page import flight_page
 from uam_lab.report.video import flight_video
 from uam_lab.results import timeseries
-from uam_lab.results.atomic import write_text
-from uam_lab.results.result_folder import as_json
+from uam_lab.results.result_folder import write_json
 
 
 @dataclass(frozen=True)
@@ -66,5 +65,5 @@ def stability_of(directory: Path, series: timeseries.Series) -> Stability | None
     except ProfileError:  # the page reports the missing parameters
         return None
     if found is not None:
-        write_text(directory / "stability.json", as_json(found.summary()))
+        write_json(directory / "stability.json", found.summary())
     return found

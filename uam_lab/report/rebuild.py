@@ -16,7 +16,7 @@ from uam_lab.recording.log_reader import read_flight
 from uam_lab.results import timeseries
 from uam_lab.results.atomic import write_text
 from uam_lab.results.outcome import Outcome
-from uam_lab.results.result_folder import ResultFolder
+from uam_lab.results.result_folder import ResultFolder, ResultFolderError
 
 LOG, TABLE = "log.mcap", "timeseries.parquet"
 CUT_OFF = "the log ends before the mission was over"
@@ -24,20 +24,16 @@ FILES = ("parameters.yaml", "versions.json")
 PARTIAL = "partial: "
 
 
-class NothingToReport(ValueError):
-    """The folder has no flight, or the log does not contain its scenario; one line."""
-
-
 def rebuild(directory: Path, out: Path, scenario: str | None = None) -> dict[str, Any]:
     """Write table, metrics and facts of the flight logged in `directory` to the folder `out`.
 
     scenario: name or file, for a log without one. Returns the metrics. Facts that are not in the
     log (wall time, reason of the end) are read from `directory` if they are there. Raises
-    NothingToReport, UnreadableLog, OSError.
+    ResultFolderError, UnreadableLog, OSError.
     """
     log = directory / LOG
     if not log.exists():
-        raise NothingToReport(f"{directory} has no {LOG}")
+        raise ResultFolderError(f"{directory} has no {LOG}")
     facts = log_facts.read(log)
     before = _json(directory / "info.json")
     known = facts.info or before
@@ -67,13 +63,13 @@ def rebuild(directory: Path, out: Path, scenario: str | None = None) -> dict[str
 def series_of(directory: Path) -> timeseries.Series:
     """Return the flight in a result folder from its table, else from its log; write nothing.
 
-    Raises NothingToReport, UnreadableLog, UnreadableFlight, OSError.
+    Raises ResultFolderError, UnreadableLog, UnreadableFlight, OSError.
     """
     if (directory / TABLE).exists():
         return timeseries.read(directory / TABLE)
     log = directory / LOG
     if not log.exists():
-        raise NothingToReport(f"{directory} has neither {TABLE} nor {LOG}")
+        raise ResultFolderError(f"{directory} has neither {TABLE} nor {LOG}")
     facts = log_facts.read(log)
     known = facts.info or _json(directory / "info.json")
     flight = read_flight(log, _scenario(directory, facts, known, None), known)
@@ -91,7 +87,7 @@ def _scenario(
         vehicle = load_description(known.get("vehicle") or DEFAULT_VEHICLE)
         return load_scenario(str(configuration.named("scenarios", name)), vehicle)
     if facts.scenario is None:
-        raise NothingToReport(f"{directory / LOG} contains no scenario: give --scenario")
+        raise ResultFolderError(f"{directory / LOG} contains no scenario: give --scenario")
     return facts.scenario
 
 

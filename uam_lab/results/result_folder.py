@@ -16,7 +16,6 @@ from typing import Any
 
 import yaml
 
-from uam_lab.results import timeseries
 from uam_lab.results.atomic import replacing, write_text
 from uam_lab.results.metrics import plain
 
@@ -52,8 +51,6 @@ class ResultFolder:
         self.versions = path / "versions.json"
         self.info = path / "info.json"
         self.log = path / "log.mcap"
-        self.figures = path / "figures"
-        self.report = path / "report.html"
 
     @classmethod
     def create(
@@ -88,21 +85,10 @@ class ResultFolder:
         document = {node: {"ros__parameters": plain(values)} for node, values in parameters.items()}
         write_text(self.parameters, yaml.safe_dump(document, sort_keys=False))
 
-    def write_metrics(self, metrics: Mapping[str, Any]) -> None:
-        """Write metrics.json; the same metrics give the same bytes."""
-        write_text(self.metrics, as_json(metrics))
 
-    def write_versions(self) -> None:
-        """Write versions.json, see `versions`."""
-        write_text(self.versions, as_json(versions()))
-
-    def write_info(self, info: Mapping[str, Any]) -> None:
-        """Write info.json: facts for the report that are not in the series."""
-        write_text(self.info, as_json(info))
-
-    def write_series(self, series: timeseries.Series) -> None:
-        """Write timeseries.parquet."""
-        series.write(self.timeseries)
+def write_json(path: Path, value: Any) -> None:
+    """Write a JSON file; the same value gives the same bytes."""
+    write_text(path, as_json(value))
 
 
 def as_json(value: Any) -> str:

@@ -18,7 +18,7 @@ from optuna.storages.journal import JournalFileBackend
 from optuna.trial import TrialState
 
 from uam_lab.campaign.pool import prepare_worker
-from uam_lab.campaign.trial import fly
+from uam_lab.campaign.trial import measure
 from uam_lab.tuning.space import Space, TuningError
 
 POLL = 1.0  # [s]
@@ -78,7 +78,7 @@ def evaluate(space: Space, trial: optuna.Trial, best: float | None) -> float:
     costs: list[float] = []
     trials = space.trials(space.profile(values))
     for number, flight in enumerate(trials):
-        result = fly(flight)[0]
+        result = measure(flight)
         costs.append(space.cost.of(result))
         trial.set_user_attr(f"flight {number}", {"cost": costs[-1], "rms": result.rms.tolist()})
         hopeless = best is not None and sum(costs) > HOPELESS * best * len(trials)

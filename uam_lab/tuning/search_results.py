@@ -11,7 +11,7 @@ import yaml
 from matplotlib.figure import Figure
 
 from uam_lab.report.figures import style
-from uam_lab.results.atomic import replacing, write_rows, write_text
+from uam_lab.results.atomic import write_rows, write_text
 from uam_lab.tuning.search import DONE
 from uam_lab.tuning.space import Space
 
@@ -85,5 +85,4 @@ def plot(file: Path, space: Space, study: optuna.Study) -> None:
             small.set(xscale="log", yscale="log", xlim=(knob.low, knob.high))
             small.set_title(knob.name.replace("_controller", ""), fontsize=6.5, loc="left")
             small.tick_params(labelsize=5.5, which="both")
-        with replacing(file) as temporary:
-            figure.savefig(temporary, format="png", dpi=style.PIXELS_PER_INCH)
+        style.save(figure, file)

@@ -14,6 +14,7 @@ from uam_lab.report.figures import style
 
 APART = 0.02  # of the time axis; closer letters share one place
 SHADE = 0.16  # opacity
+LETTER = {"fontsize": 7.0, "fontweight": "bold", "color": style.FAULT}
 
 
 @dataclass(frozen=True)
@@ -57,23 +58,14 @@ def shade(axes: np.ndarray, info: Mapping[str, Any], start: float, end: float) -
             axis.axvline(begin, color=style.FAULT, linewidth=0.8, zorder=2.3)
     for axis in axes[0]:
         for at, letters in _together(shown, start, APART * (end - start)):
-            axis.annotate(
-                letters,
-                (at, 0.0),
-                xycoords=("data", "axes fraction"),
-                xytext=(2, 2),
-                textcoords="offset points",
-                fontsize=7.0,
-                fontweight="bold",
-                color=style.FAULT,
-            )
+            style.note(axis, letters, (at, 0.0), (2, 2), **LETTER)
 
 
 def handles(info: Mapping[str, Any]) -> list[Line2D]:
     """Return the legend entry of the faults, if there are any."""
     if not rows(info):
         return []
-    return [Line2D([], [], color=style.FAULT, linewidth=6, alpha=2.0 * SHADE, label="fault")]
+    return [style.key("fault", style.FAULT, 6.0, alpha=2.0 * SHADE)]
 
 
 def _together(shown: Sequence[FaultMark], start: float, apart: float) -> list[tuple[float, str]]:

@@ -11,7 +11,6 @@ from pathlib import Path
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from matplotlib.lines import Line2D
 from matplotlib.ticker import NullFormatter
 
 from uam_control.laws import catalogue
@@ -22,7 +21,6 @@ from uam_lab.report.figures.panels import DrawnFlight, Panel
 from uam_lab.report.figures.path_figure import path_figure
 from uam_lab.report.figures.stability_figures import coupling, lyapunov
 from uam_lab.results import metrics
-from uam_lab.results.atomic import replacing
 from uam_lab.results.timeseries import AXES, SUBSYSTEMS
 
 DEGREES = 180.0 / np.pi
@@ -111,14 +109,8 @@ def adaptation(flights: Sequence[DrawnFlight]) -> Figure | None:
         for number, flight in enumerate(flights):
             for axis, group in zip(axes[:, column], shown, strict=True):
                 _adaptation_of(axis, flight, subsystem, group, number, len(flights))
-        axes[0, column].annotate(
-            subsystem,
-            (0.0, 1.0),
-            xycoords="axes fraction",
-            xytext=(0, 14),
-            textcoords="offset points",
-            fontweight="bold",
-        )
+        top = {"xycoords": "axes fraction", "fontweight": "bold"}
+        style.note(axes[0, column], subsystem, (0.0, 1.0), (0, 14), **top)
     for row, group in zip(axes, shown, strict=True):
         row[0].set_ylabel(group.label)
         if len(group.names) > 1:
@@ -138,9 +130,7 @@ def _gain_legend(axis: Axes, group: GainGroup, above: float) -> None:
     """Add the legend of a row of gains; in the first row it is above the phase names."""
     lines = zip(style.GAINS, group.names, strict=False)
     axis.legend(
-        handles=[
-            Line2D([], [], color=c, label=f"${group.symbol}_{name[-1]}$") for c, name in lines
-        ],
+        handles=[style.key(f"${group.symbol}_{name[-1]}$", c, 1.1) for c, name in lines],
         loc="lower right",
         bbox_to_anchor=(1.02, above),
         ncols=len(group.names),
@@ -167,7 +157,7 @@ def _adaptation_of(
             several = len(group.names) > 1  # then the colour marks the gain, the dash the flight
             axis.plot(
                 *panels.thin(series.time[shown], values[shown], 400),
-                color=style.GAINS[i] if several else style.FLIGHTS[number % len(style.FLIGHTS)],
+                color=style.GAINS[i] if several else style.flight_colour(number),
                 linestyle=("-", "--", ":", "-.")[number % 4] if several and flights > 1 else "-",
                 linewidth=1.0,
             )
@@ -259,7 +249,6 @@ def draw(
             if figure is None:
                 continue
             for suffix, metadata in ((".png", None), (".svg", {"Date": None})):
-                with replacing(directory / (name + suffix)) as temporary:
-                    figure.savefig(temporary, dpi=style.PIXELS_PER_INCH, metadata=metadata)
+                style.save(figure, directory / (name + suffix), metadata=metadata)
             written.append(name)
     return written

@@ -26,6 +26,9 @@ CHANGES = (
     (True, style.CHANGE, "-", "parameters changed"),
     (False, style.REFUSED, ":", "change refused"),
 )
+PHASE = {"ha": "center", "va": "bottom", "fontsize": 7.5, "color": style.MUTED}
+CHANGE = {"va": "top", "fontsize": 6.5, "color": style.CHANGE}
+MAGNET_DASHES = (0, (4, 2.5))
 MARGIN_S = 1.0  # shown before take-off and after touchdown
 
 
@@ -121,7 +124,7 @@ def lines(axis: Axes, flights: Sequence[DrawnFlight], panel: Panel) -> None:
         width = 1.1 if number == 0 else 0.9
         axis.plot(
             *thin(series.time[shown], series[panel.column][shown] * panel.factor),
-            color=style.FLIGHTS[number % len(style.FLIGHTS)],
+            color=style.flight_colour(number),
             linewidth=width,
             zorder=3 + len(flights) - number,
         )
@@ -146,7 +149,7 @@ def finish(
     for axis in axes.flat:
         bands(axis, first, end)
         for time, colour, _ in events(first):
-            axis.axvline(time, color=colour, linewidth=0.9, linestyle=(0, (4, 2.5)), zorder=2.5)
+            axis.axvline(time, color=colour, linewidth=0.9, linestyle=MAGNET_DASHES, zorder=2.5)
     mark_changes(axes, first, start, end)
     fault_marks.shade(axes, first.info, start, end)
     for axis in axes[0]:
@@ -176,17 +179,7 @@ def phase_names(figure: Figure, axis: Axes, series: Series, start: float, end: f
         middle, half = 0.5 * (begin + until), 0.5 * per_character * len(name)
         if name in ON_GROUND or middle - half < reached or middle + half > end + 3 * half:
             continue
-        axis.annotate(
-            name,
-            (middle, 1.0),
-            xycoords=("data", "axes fraction"),
-            xytext=(0, 3),
-            textcoords="offset points",
-            ha="center",
-            va="bottom",
-            fontsize=7.5,
-            color=style.MUTED,
-        )
+        style.note(axis, name, (middle, 1.0), (0, 3), **PHASE)
         reached = middle + half + per_character
 
 
@@ -208,16 +201,7 @@ def mark_changes(axes: np.ndarray, series: Series, start: float, end: float) -> 
             )
     for axis in axes[0]:
         for time, text in change_rows.labels(shown, apart=0.02 * (end - start)):
-            axis.annotate(
-                text,
-                (time, 1.0),
-                xycoords=("data", "axes fraction"),
-                xytext=(2, -2),
-                textcoords="offset points",
-                va="top",
-                fontsize=6.5,
-                color=style.CHANGE,
-            )
+            style.note(axis, text, (time, 1.0), (2, -2), **CHANGE)
 
 
 def events(series: Series) -> list[tuple[float, str, str]]:
@@ -233,23 +217,22 @@ def legend(
     figure: Figure, flights: Sequence[DrawnFlight], marked: Sequence[tuple[float, str, str]]
 ) -> None:
     """Add the legend of flights and events in the upper right corner."""
-    handles = [
-        Line2D([], [], color=style.FLIGHTS[n % len(style.FLIGHTS)], label=flight.label)
-        for n, flight in enumerate(flights)
-    ]
+    handles = flight_keys(flights)
     named = dict.fromkeys((name, colour) for _, colour, name in marked)
-    handles += [
-        Line2D([], [], color=colour, linewidth=0.9, linestyle=(0, (4, 2.5)), label=name)
-        for name, colour in named
-    ]
+    handles += [style.key(name, colour, 0.9, MAGNET_DASHES) for name, colour in named]
     results = {row.accepted for row in change_rows.rows(flights[0].series.info)}
     handles += [
-        Line2D([], [], color=colour, linewidth=0.8, linestyle=dashes, label=name)
+        style.key(name, colour, 0.8, dashes)
         for accepted, colour, dashes, name in CHANGES
         if accepted in results
     ]
     handles += fault_marks.handles(flights[0].series.info)
     corner_legend(figure, handles)
+
+
+def flight_keys(flights: Sequence[DrawnFlight]) -> list[Line2D]:
+    """Return the entries of the legend for the flights."""
+    return [style.key(f.label, style.flight_colour(n), 1.1) for n, f in enumerate(flights)]
 
 
 def corner_legend(figure: Figure, handles: Sequence[Line2D]) -> None:

@@ -8,15 +8,15 @@ import mujoco
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from matplotlib.lines import Line2D
 from matplotlib.patches import Rectangle
 
 from uam_lab.report.figures import style
-from uam_lab.report.figures.panels import DrawnFlight, corner_legend
+from uam_lab.report.figures.panels import DrawnFlight, corner_legend, flight_keys
 from uam_lab.report.figures.poses import Poses
 from uam_lab.results.timeseries import Series
 
 POSES = 5
+DASHES = (0, (3, 2))  # of the reference
 TALLEST, ABOVE, BELOW = 4.5, 0.62, 0.45  # [in] of a panel, above it, below it
 MOVING = [0, 2, 6, 7]  # x, z and the joints among the coordinates
 REACH = 0.35  # [m] shown around the path, for rotors and arm
@@ -49,7 +49,8 @@ def path_figure(flights: Sequence[DrawnFlight]) -> Figure:
         axis.set_xlabel("x [m]")
         axis.set(xlim=across, ylim=up, aspect="equal")
     axes[0].set_ylabel("z [m]")
-    _legend(figure, flights)
+    reference = style.key("reference", style.REFERENCE, 1.1, DASHES)
+    corner_legend(figure, [reference, *flight_keys(flights)])
     return figure
 
 
@@ -88,13 +89,13 @@ def _path(axis: Axes, series: Series, start: float, end: float, number: int) -> 
             series["reference.z"][rows],
             color=style.REFERENCE,
             linewidth=1.2,
-            linestyle=(0, (3, 2)),
+            linestyle=DASHES,
             zorder=6,
         )
     axis.plot(
         series["truth.x"][rows],
         series["truth.z"][rows],
-        color=style.FLIGHTS[number % len(style.FLIGHTS)],
+        color=style.flight_colour(number),
         linewidth=1.2,
         zorder=7,
     )
@@ -172,14 +173,3 @@ def _boxed(axis: Axes, poses: Poses, geom: str, colour: str, opacity: float, ord
             zorder=order,
         )
     )
-
-
-def _legend(figure: Figure, flights: Sequence[DrawnFlight]) -> None:
-    handles = [
-        Line2D([], [], color=style.REFERENCE, linestyle=(0, (3, 2)), label="reference"),
-        *(
-            Line2D([], [], color=style.FLIGHTS[n % len(style.FLIGHTS)], label=flight.label)
-            for n, flight in enumerate(flights)
-        ),
-    ]
-    corner_legend(figure, handles)

@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from matplotlib.lines import Line2D
 from matplotlib.ticker import LogLocator, MaxNLocator, NullLocator
 
 from uam_control.coordinates import ALPHA
@@ -46,12 +45,12 @@ def lyapunov(flights: Sequence[DrawnFlight]) -> Figure | None:
         _bounded(axis, found.time, subsystem.parts.total, subsystem.comparison)
         axis.set_ylabel(f"$V_{{{SYMBOLS[name]}}}$")
     handles = [
-        _key("$V$", style.INK, 1.5),
-        _key("tracking", style.GAINS[1]),
-        _key("gains", style.GAINS[2]),
-        _key("$\\zeta$", style.GAINS[3]),
-        _key("bound by $\\dot V\\leq-\\varrho V+\\gamma$", style.DROP, 1.0, ENVELOPE),
-        _key("ultimate bound", style.DROP, 1.0, BOUND),
+        style.key("$V$", style.INK, 1.5),
+        style.key("tracking", style.GAINS[1]),
+        style.key("gains", style.GAINS[2]),
+        style.key("$\\zeta$", style.GAINS[3]),
+        style.key("bound by $\\dot V\\leq-\\varrho V+\\gamma$", style.DROP, 1.0, ENVELOPE),
+        style.key("ultimate bound", style.DROP, 1.0, BOUND),
     ]
     panels.finish(figure, axes, flights, handles)
     return figure
@@ -90,10 +89,10 @@ def coupling(flights: Sequence[DrawnFlight]) -> Figure | None:
         axis.yaxis.set_major_locator(MaxNLocator(nbins=4, min_n_ticks=3))
         axis.margins(y=0.12)
     handles = [
-        _key("true coupling", COUPLING, 1.4),
-        _key("adaptive term", ADAPTIVE, 1.4),
-        _key("feedback Λξ", FEEDBACK),
-        _key("actuators − τ", ACTUATORS),
+        style.key("true coupling", COUPLING, 1.4),
+        style.key("adaptive term", ADAPTIVE, 1.4),
+        style.key("feedback Λξ", FEEDBACK),
+        style.key("actuators − τ", ACTUATORS),
     ]
     panels.finish(figure, axes, flights, handles)
     return figure
@@ -128,9 +127,3 @@ def _bounded(axis: Axes, time: np.ndarray, value: np.ndarray, comparison: Compar
     axis.set_yscale("log")
     axis.yaxis.set_major_locator(LogLocator(numticks=5))
     axis.yaxis.set_minor_locator(NullLocator())
-
-
-def _key(
-    label: str, colour: str, width: float = 1.0, dash: str | tuple[int, tuple[float, ...]] = "-"
-) -> Line2D:
-    return Line2D([], [], color=colour, linewidth=width, linestyle=dash, label=label)

@@ -1,10 +1,17 @@
-"""Colours and fonts of all figures."""
+"""Colours and fonts of all figures; writing of a figure, entries of a legend, small notes."""
 
 from __future__ import annotations
 
 from contextlib import AbstractContextManager
+from pathlib import Path
+from typing import Any
 
 import matplotlib as mpl
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+
+from uam_lab.results.atomic import replacing
 
 INK = "#22303c"
 MUTED = "#74808b"
@@ -20,6 +27,7 @@ REFUSED = "#b3412a"
 FAULT = "#c9302c"
 PAYLOAD = "#2a8a57"
 REFERENCE = "#9aa5af"
+Dashes = str | tuple[int, tuple[float, ...]]
 
 WIDTH = 9.6  # [in] of a figure; shown at about 960 pixels
 PIXELS_PER_INCH = 160
@@ -59,3 +67,27 @@ SETTINGS = {
 def styled() -> AbstractContextManager[None]:
     """Return the context in which figures are drawn and saved."""
     return mpl.rc_context(SETTINGS)
+
+
+def flight_colour(number: int) -> str:
+    """Return the colour of a flight by its number in the figure."""
+    return FLIGHTS[number % len(FLIGHTS)]
+
+
+def save(figure: Figure, path: Path, **how: Any) -> None:
+    """Write a figure atomically; how: see `Figure.savefig`."""
+    with replacing(path) as temporary:
+        figure.savefig(temporary, dpi=PIXELS_PER_INCH, **how)
+
+
+def key(label: str, colour: str, width: float = 1.0, dashes: Dashes = "-", **how: Any) -> Line2D:
+    """Return an entry of a legend."""
+    return Line2D([], [], color=colour, linewidth=width, linestyle=dashes, label=label, **how)
+
+
+def note(
+    axis: Axes, text: str, at: tuple[float, float], shift: tuple[float, float], **how: Any
+) -> None:
+    """Write a text at (x of the data, height of the panel), shifted by points."""
+    how = {"xycoords": ("data", "axes fraction"), **how}
+    axis.annotate(text, at, xytext=shift, textcoords="offset points", **how)

@@ -12,8 +12,8 @@ from uam_lab.report.facts import change_rows, flight_summary, stability_rows
 from uam_lab.report.facts import parameter_table as parameters
 from uam_lab.report.figures import fault_marks
 from uam_lab.report.figures.figures import FIGURES
-from uam_lab.report.page import html
 from uam_lab.report.video.flight_video import Rendered, existing
+from uam_lab.results import templates
 from uam_lab.results.atomic import write_text
 
 PAPER_SCENARIO = "pick_and_place"
@@ -42,7 +42,9 @@ def write_page(directory: Path, rendered: Rendered | None = None) -> Path:
         comparison, no_parameters = parameters.compare(directory / "parameters.yaml"), ""
     except parameters.ProfileError as error:
         comparison, no_parameters = None, str(error)
-    text = html.template("uam_lab.report.page", "page.html.j2").render(
+    text = templates.render(
+        "uam_lab.report.page",
+        "page.html.j2",
         metrics=metrics,
         info={"notes": [], "vehicle_changes": {}} | info,
         verdict=flight_summary.verdict(metrics),
@@ -93,7 +95,7 @@ def _stability(file: Path) -> dict[str, Any] | None:
 
 def _embedded(file: Path | None) -> str | None:
     """Return the file as a data URI, None without a file."""
-    return None if file is None else html.embedded(file)
+    return None if file is None else templates.embedded(file)
 
 
 def _json(file: Path) -> Mapping[str, Any]:

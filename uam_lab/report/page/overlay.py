@@ -8,8 +8,7 @@ from pathlib import Path
 from uam_lab.report.facts import paper
 from uam_lab.report.figures import figures
 from uam_lab.report.figures.panels import DrawnFlight
-from uam_lab.report.page import html
-from uam_lab.results import metrics
+from uam_lab.results import metrics, templates
 from uam_lab.results.atomic import write_text
 
 
@@ -20,11 +19,13 @@ def build_overlay(
     joints = max(flight.series.columns.joints for flight in flights)
     drawn = figures.draw(flights, out / "figures", progress)
     progress("page")
-    text = html.template("uam_lab.report.page", "overlay.html.j2").render(
+    text = templates.render(
+        "uam_lab.report.page",
+        "overlay.html.j2",
         labels=[flight.label for flight in flights],
         tables=[_table(flights, *table) for table in paper.tables(joints)],
         figures=[
-            (name, figures.FIGURES[name][1], html.embedded(out / "figures" / f"{name}.png"))
+            (name, figures.FIGURES[name][1], templates.embedded(out / "figures" / f"{name}.png"))
             for name in drawn
         ],
     )

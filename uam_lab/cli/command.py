@@ -1,0 +1,167 @@
+"""What the commands share: parser, types of options, errors of the user."""
+
+from __future__ import annotations
+
+import argparse
+import math
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+from uam_control.laws import catalogue
+from uam_control.mission import ScenarioError
+from uam_control.profiles.profile import Profile, ProfileError, default_profile, load_profile
+from uam_control.settings import configuration
+from uam_control.settings.configuration import ConfigurationError
+from uam_control.vehicle import DEFAULT_VEHICLE, VehicleDescription, VehicleError
+from uam_lab.campaign.pool import cores
+from uam_lab.campaign.trial import TrialFailed
+from uam_lab.flight.settings import SettingsError
+from uam_lab.recording.mcap_reader import UnreadableLog
+from uam_lab.results.result_folder import ResultFolderError
+from uam_lab.results.timeseries import UnreadableFlight
+from uam_lab.tuning.space import TuningError
+from uam_sim_bridge.faults import FaultError
+from uam_sim_bridge.plant.engines import PlantError
+from uam_sim_bridge.ports import INSTANCES, PortError
+from uam_sim_bridge.px4.px4_installation import Px4Error
+
+WRONG_USE, INTERRUPTED = 2, 130  # exit status
+# the text of each is one line for the user
+USER_ERRORS = (
+    *(ConfigurationError, ProfileError, ScenarioError, VehicleError, SettingsError, PortError),
+    *(Px4Error, FaultError, PlantError, TuningError, TrialFailed),
+    *(ResultFolderError, UnreadableFlight, UnreadableLog),
+)
+
+
+class Command:
+    """The parser of a subcommand; its methods add options, with the default in the help."""
+
+    def __init__(
+        self,
+        commands: argparse._SubParsersAction,
+        name: str,
+        run: Callable[[argparse.Namespace], int],
+        summary: str,
+        description: str,
+        examples: str,
+    ) -> None:
+        """run: called with the parsed options, returns the exit status."""
+        self._name = name
+        parser = commands.add_parser(
+            name,
+            help=summary,
+            description=description,
+            epilog=examples,
+            formatter_class=argparse.RawDescriptionHelpFormatter,
+        )
+        parser.set_defaults(run=run)
+        self._add = parser.add_argument
+
+    def option(
+        self, flag: str, metavar: str | tuple[str, ...], text: str, default: Any = None, **how: Any
+    ) -> None:
+        """Add an option with a value."""
+        if default not in (None, ""):
+            text = f"{text} (default %(default)s)".strip()
+        self._add(flag, metavar=metavar, help=text, default=default, **how)
+
+    def repeated(self, flag: str, metavar: str, text: str, **how: Any) -> None:
+        """Add an option that may be given several times; its value is a list."""
+        text = f"{text}; may be repeated"
+        self._add(flag, metavar=metavar, help=text, action="append", default=[], **how)
+
+    def switch(self, flag: str, text: str, action: str = "store_true", **how: Any) -> None:
+        """Add an option without a value."""
+        self._add(flag, help=text, action=action, **how)
+
+    def choice(self, flag: str, choices: tuple[str, ...], default: str, text: str) -> None:
+        """Add an option whose value is one of `choices`."""
+        self.option(flag, "|".join(choices), text, default, choices=choices)
+
+    def vehicle(self) -> None:
+        """Add --vehicle."""
+        vehicles = ", ".join(configuration.names("vehicle", (".yaml",)))
+        text = f"{vehicles}, or the description of one: docs/your_vehicle.md"
+        self.option("--vehicle", "NAME|FILE", text, DEFAULT_VEHICLE)
+
+    def scenario(self) -> None:
+        """Add --scenario."""
+        text = f"{', '.join(configuration.names('scenarios'))}, or a .yaml or .csv file"
+        self.option("--scenario", "NAME|FILE", text, "pick_and_place")
+
+    def profile(self) -> None:
+        """Add --profile, for `given_profile`."""
+        self.option("--profile", "NAME|FILE", "(default: the vehicle's)")
+
+    def seed(self, what: str) -> None:
+        """Add --seed."""
+        self.option("--seed", "N", what, 1, type=seed)
+
+    def jobs(self, with_ros: bool = False) -> None:
+        """Add --jobs; with_ros: the command has --engine, see `jobs_of`."""
+        more = "; with --engine ros 1" if with_ros else ""
+        text = f"parallel processes (default: one per core, {cores()}{more})"
+        self.option("--jobs", "N", text, type=count)
+
+    def out(self, folder: str = "") -> None:
+        """Add --out; folder: name of the default folder without the time."""
+        text = f"result folder (default results/<time>-{folder or self._name})"
+        self.option("--out", "DIR", text, type=Path)
+
+    def instance(self) -> None:
+        """Add --instance, of a running flight."""
+        text = f"instance of the flight, 0..{INSTANCES - 1} (default: the running one)"
+        self.option("--instance", "N", text, type=int)
+
+
+def given_profile(name_or_file: str | None, vehicle: VehicleDescription) -> Profile:
+    """Return the profile of --profile; None: the vehicle's for the default law.
+
+    Raises ConfigurationError, ProfileError.
+    """
+    if name_or_file is None:
+        return default_profile(catalogue.DEFAULT, vehicle)
+    return load_profile(str(configuration.named("profiles", name_or_file)), vehicle=vehicle)
+
+
+def jobs_of(options: argparse.Namespace) -> int:
+    """Return the number of parallel processes: --jobs, else 1 with the ROS engine, else cores."""
+    return options.jobs or (1 if getattr(options, "engine", "") == "ros" else cores())
+
+
+def count(text: str) -> int:
+    """Return the whole number in `text`, 1 or more. A type for argparse, as the next two."""
+    if not text.isdecimal() or int(text) < 1:
+        raise argparse.ArgumentTypeError(f"'{text}' is not a number of 1 or more")
+    return int(text)
+
+
+def seed(text: str) -> int:
+    """Return the seed in `text`."""
+    if not text.isdecimal():
+        raise argparse.ArgumentTypeError(f"'{text}' is not a seed: a whole number, 0 or more")
+    return int(text)
+
+
+def number(
+    name: str, unit: str, low: float = -math.inf, high: float = math.inf
+) -> Callable[[str], float]:
+    """Return a type for argparse: a finite number from `low` to `high`."""
+
+    def read(text: str) -> float:
+        try:
+            value = float(text)
+        except ValueError:
+            value = math.nan
+        if not math.isfinite(value) or not low <= value <= high:
+            limits = [f", at least {low:g}"] * (low > -math.inf)
+            limits += [f", at most {high:g}"] * (high < math.inf)
+            of = f" in {unit}" if unit else ""
+            raise argparse.ArgumentTypeError(
+                f"'{text}' is not a {name}: a number{of}{''.join(limits)}"
+            )
+        return value
+
+    return read

@@ -1,0 +1,35 @@
+"""HTML pages from templates, pictures as data URIs, Markdown tables."""
+
+from __future__ import annotations
+
+import base64
+from collections.abc import Iterable, Sequence
+from pathlib import Path
+from typing import Any
+
+import jinja2
+
+MEDIA = {".png": "image/png", ".mp4": "video/mp4"}
+
+
+def render(package: str, name: str, **values: Any) -> str:
+    """Return the page of a template from the folder of `package`; a missing value is an error."""
+    environment = jinja2.Environment(
+        loader=jinja2.PackageLoader(package, "."),
+        autoescape=True,
+        trim_blocks=True,
+        lstrip_blocks=True,
+        undefined=jinja2.StrictUndefined,
+    )
+    return environment.get_template(name).render(values)
+
+
+def embedded(file: Path) -> str:
+    """Return a picture or a video as a data URI."""
+    return f"data:{MEDIA[file.suffix]};base64,{base64.b64encode(file.read_bytes()).decode()}"
+
+
+def markdown_table(head: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
+    """Return a Markdown table, without a newline at its end."""
+    lines = [f"| {' | '.join(cells)} |" for cells in (head, *rows)]
+    return "\n".join([lines[0], "|" + "---|" * len(head), *lines[1:]])
