@@ -33,11 +33,14 @@ def is_little_endian(data: bytes) -> bool:
     return data[1:2] == b"\x01"
 
 
-def stamp_of(data: bytes) -> int:
-    """Return the stamp [ns] of a serialized message with header; raises BadMessage if too short."""
-    if len(data) < STAMP.stop:
+def stamp_of(data: bytes, where: slice = STAMP) -> int:
+    """Return a stamp [ns] of a serialized message, by default that of its header.
+
+    Raises BadMessage if the message is too short.
+    """
+    if len(data) < where.stop:
         raise BadMessage(f"{len(data)} bytes, too short for a header")
-    seconds, nanoseconds = _STAMP[is_little_endian(data)].unpack_from(data, STAMP.start)
+    seconds, nanoseconds = _STAMP[is_little_endian(data)].unpack_from(data, where.start)
     return seconds * SECOND + nanoseconds
 
 
@@ -101,10 +104,6 @@ class Cursor:
         self.fixed.append((where.start, where.stop))
         return self.data[where].rstrip(b"\0").decode(errors="replace")
 
-    def strings(self) -> list[str]:
-        """Read a sequence of strings."""
-        return [self.string() for _ in range(self.count())]
-
     def doubles(self, name: str, length: int | None = None) -> None:
         """Store the position of `length` float64; None: of a sequence."""
         if length is None:
@@ -112,67 +111,48 @@ class Cursor:
         if length:
             self.layout.fields[name] = self.forward(8 * length, align=8)
 
+    def stamp(self) -> slice:
+        """Skip a stamp or duration; return the slice of its bytes."""
+        return self.forward(8, align=4)
+
     def header(self) -> None:
         """Read a std_msgs/Header."""
-        self.forward(8, align=4)
+        self.stamp()
         self.layout.frame = self.string()
 
+    def names(self) -> None:
+        """Read a sequence of strings, the names of the joints."""
+        self.layout.names = [self.string() for _ in range(self.count())]
 
-def _joint_trajectory(cursor: Cursor) -> None:
-    cursor.header()
-    layout = cursor.layout
-    layout.names, layout.points = cursor.strings(), cursor.count()
-    if layout.points:
-        for name in ("positions", "velocities", "accelerations", "effort"):
-            cursor.doubles(name)
-        layout.duration = cursor.forward(8, align=4)
+    def first_point(self) -> None:
+        """Read the number of points of a trajectory, and the first point."""
+        self.layout.points = self.count()
+        if self.layout.points:
+            for name in ("positions", "velocities", "accelerations", "effort"):
+                self.doubles(name)
+            self.layout.duration = self.stamp()
 
-
-def _joint_state(cursor: Cursor) -> None:
-    cursor.header()
-    cursor.layout.names = cursor.strings()
-    for name in ("position", "velocity", "effort"):
-        cursor.doubles(name)
-
-
-def _pose_stamped(cursor: Cursor) -> None:
-    cursor.header()
-    cursor.doubles("position", 3)
-    cursor.doubles("orientation", 4)  # x y z w
+    def no_dimensions(self) -> None:
+        """Read the layout of an array; raises BadMessage for one with dimensions."""
+        if self.count():
+            raise BadMessage("a layout with dimensions; a plain array is expected")
+        self.count()  # data_offset
 
 
-def _twist_stamped(cursor: Cursor) -> None:
-    cursor.header()
-    cursor.doubles("linear", 3)
-    cursor.doubles("angular", 3)
-
-
-def _imu(cursor: Cursor) -> None:
-    cursor.header()
-    for name, length in (("orientation", 4), ("angular_velocity", 3), ("linear_acceleration", 3)):
-        cursor.doubles(name, length)
-        cursor.doubles(name + "_covariance", 9)
-
-
-def _multi_array(cursor: Cursor) -> None:
-    if cursor.count():
-        raise BadMessage("a layout with dimensions; a plain array is expected")
-    cursor.count()  # data_offset
-    cursor.doubles("data")
-
-
-def _clock(cursor: Cursor) -> None:
-    cursor.forward(8, align=4)
-
-
-WALKS: dict[str, Callable[[Cursor], None]] = {
-    "trajectory_msgs/msg/JointTrajectory": _joint_trajectory,
-    "sensor_msgs/msg/JointState": _joint_state,
-    "sensor_msgs/msg/Imu": _imu,
-    "geometry_msgs/msg/PoseStamped": _pose_stamped,
-    "geometry_msgs/msg/TwistStamped": _twist_stamped,
-    "std_msgs/msg/Float64MultiArray": _multi_array,
-    "rosgraph_msgs/msg/Clock": _clock,
+# Content of each type: a step of the cursor, or a field of float64: its name, or (name, length).
+CONTENT: dict[str, tuple[Callable[[Cursor], None] | str | tuple[str, int], ...]] = {
+    "trajectory_msgs/msg/JointTrajectory": (Cursor.header, Cursor.names, Cursor.first_point),
+    "sensor_msgs/msg/JointState": (Cursor.header, Cursor.names, "position", "velocity", "effort"),
+    "sensor_msgs/msg/Imu": (
+        Cursor.header,
+        *(("orientation", 4), ("orientation_covariance", 9)),
+        *(("angular_velocity", 3), ("angular_velocity_covariance", 9)),
+        *(("linear_acceleration", 3), ("linear_acceleration_covariance", 9)),
+    ),
+    "geometry_msgs/msg/PoseStamped": (Cursor.header, ("position", 3), ("orientation", 4)),
+    "geometry_msgs/msg/TwistStamped": (Cursor.header, ("linear", 3), ("angular", 3)),
+    "std_msgs/msg/Float64MultiArray": (Cursor.no_dimensions, "data"),
+    "rosgraph_msgs/msg/Clock": (Cursor.stamp,),
 }
 
 
@@ -180,8 +160,8 @@ class Layouts:
     """The layouts of the received messages of one type."""
 
     def __init__(self, type_name: str):
-        """type_name: one of WALKS; raises KeyError for another."""
-        self._walk = WALKS[type_name]
+        """type_name: one of CONTENT; raises KeyError for another."""
+        self._content = CONTENT[type_name]
         self._known: dict[int, list[Layout]] = {}
         self._count = 0
 
@@ -196,7 +176,11 @@ class Layouts:
         if not is_little_endian(data):
             raise BadMessage("not little-endian")
         cursor = Cursor(data)
-        self._walk(cursor)
+        for part in self._content:
+            if callable(part):
+                part(cursor)
+            else:
+                cursor.doubles(*((part,) if isinstance(part, str) else part))
         layout = cursor.layout
         layout.fix(data, cursor.fixed)
         if self._count >= KNOWN_LAYOUTS:  # a sender with ever new names: bound the memory

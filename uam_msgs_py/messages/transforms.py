@@ -7,7 +7,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from uam_control.stamps import SECOND
-from uam_msgs_py.messages.layouts import ENCAPSULATION, BadMessage, is_little_endian
+from uam_msgs_py.messages.layouts import (
+    ENCAPSULATION,
+    BadMessage,
+    Cursor,
+    is_little_endian,
+    stamp_of,
+)
 
 LITTLE_ENDIAN = b"\0\1\0\0"  # the encapsulation of plain CDR
 NUMBERS = 7  # translation x y z, rotation x y z w
@@ -47,35 +53,15 @@ def read_transforms(data: bytes) -> list[Transform]:
     """Return the transforms of a serialized TFMessage; raises BadMessage for other data."""
     if not is_little_endian(data):
         raise BadMessage("transforms in the byte order of another machine")
-    reader = _Reader(data)
-    try:
-        return [reader.transform() for _ in range(*reader.take("<I", 4))]
-    except (struct.error, UnicodeDecodeError):
-        raise BadMessage("not a list of transforms") from None
+    cursor = Cursor(data)
+    return [_transform(cursor) for _ in range(cursor.count())]
 
 
-class _Reader:
-    def __init__(self, data: bytes):
-        self._data, self._at = data, ENCAPSULATION
-
-    def take(self, form: str, alignment: int) -> tuple:
-        """Return the next values; form: format of `struct`."""
-        self._at += -(self._at - ENCAPSULATION) % alignment
-        found = struct.unpack_from(form, self._data, self._at)
-        self._at += struct.calcsize(form)
-        return found
-
-    def text(self) -> str:
-        (length,) = self.take("<I", 4)
-        (text,) = self.take(f"{length}s", 1)
-        return text.rstrip(b"\0").decode()
-
-    def transform(self) -> Transform:
-        seconds, nanoseconds = self.take("<iI", 4)
-        parent, child = self.text(), self.text()
-        *position, x, y, z, w = self.take(f"<{NUMBERS}d", 8)
-        stamp = seconds * SECOND + nanoseconds
-        return Transform(stamp, parent, child, np.array(position), np.array([w, x, y, z]))
+def _transform(cursor: Cursor) -> Transform:
+    stamp = stamp_of(cursor.data, cursor.stamp())
+    parent, child = cursor.string(), cursor.string()
+    numbers = np.frombuffer(cursor.data[cursor.forward(8 * NUMBERS, align=8)], "<f8")
+    return Transform(stamp, parent, child, numbers[:3], np.roll(numbers[3:], 1))
 
 
 def _align(data: bytearray, size: int) -> None:
