@@ -14,7 +14,7 @@ def test_a_shipped_file_is_found():
 def test_unknown_names_list_what_there_is():
     with pytest.raises(ConfigurationError, match=r"no profiles/s5000.yaml .*s500.yaml"):
         configuration.path("profiles/s5000.yaml")
-    with pytest.raises(ConfigurationError, match="has the folders: .*profiles"):
+    with pytest.raises(ConfigurationError, match="config/ has: .*profiles"):
         configuration.path("no_such_folder/s500.yaml")
     with pytest.raises(ConfigurationError, match="unknown profile 's5000'; there are: .*s500"):
         configuration.named("profiles", "s5000")

@@ -12,11 +12,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from uam_control.control.controller_parameters import controller_parameters
 from uam_control.control.controllers import ArmController, AttitudeController, PositionController
 from uam_control.control.limits import PositionLimits, TorqueLimits
 from uam_control.laws.asmc1 import Asmc1Parameters
 from uam_control.laws.modular import ModularParameters
+from uam_control.profiles.profile import controller_parameters
 
 A = math.atan2(0.6, 0.8)  # sine .6, cosine .8
 LAW = {

@@ -1,14 +1,4 @@
 """Missions: scenarios, smooth references, and the sequence of a flight from waiting to landed."""
 
-from uam_control.mission.mission import Mission, MissionOutput
-from uam_control.mission.mission_parameters import MissionParameters
+from uam_control.mission.mission import Mission, MissionOutput, MissionParameters
 from uam_control.mission.scenario import Scenario, ScenarioError, load_scenario
-
-__all__ = [
-    "Mission",
-    "MissionOutput",
-    "MissionParameters",
-    "Scenario",
-    "ScenarioError",
-    "load_scenario",
-]

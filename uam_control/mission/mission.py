@@ -11,9 +11,9 @@ import numpy as np
 
 from uam_control.coordinates import ARM
 from uam_control.mission.guidance import Guidance
-from uam_control.mission.mission_parameters import MissionParameters
 from uam_control.mission.scenario import Scenario
 from uam_control.mission.trajectory import empty_reference
+from uam_control.settings.parameter_set import number
 from uam_control.supervision import (
     Decision,
     Event,
@@ -23,11 +23,28 @@ from uam_control.supervision import (
     Readings,
     State,
     StateTransition,
+    SupervisionParameters,
     Supervisor,
 )
 
 # phases in addition to those of a scenario
 WAITING, HOLD, LAND, LANDED, ABORTED = "waiting", "hold", "land", "landed", "aborted"
+
+
+@dataclass(frozen=True)
+class MissionParameters(SupervisionParameters):
+    """Times and limits of take-off and touchdown, and the parameters of the supervisor."""
+
+    takeoff_delay: float = number(0.5, "time from armed to take-off", "s", 0.0, 60.0)
+    touchdown_height: float = number(0.05, "height that counts as on the ground", "m", 0.0, 0.5)
+    touchdown_speed: float = number(0.10, "vertical speed that counts as at rest", "m/s", 0.0, 1.0)
+    touchdown_time: float = number(
+        0.3, "time on the ground and at rest before touchdown is detected", "s", 0.0, 5.0
+    )
+    touchdown_timeout: float = number(8.0, "longest wait for touchdown", "s", 0.0, 60.0)
+    settle_time: float = number(
+        1.5, "time from touchdown to the end of the mission", "s", 0.0, 60.0
+    )
 
 
 @dataclass

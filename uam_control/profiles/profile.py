@@ -12,15 +12,16 @@ output of `ros2 param dump` for the nodes of a flight is a profile, too.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, make_dataclass, replace
+from functools import cache
 from pathlib import Path
 from typing import Any
 
-from uam_control.control.controller_parameters import controller_parameters
 from uam_control.control.limits import PositionLimits, TorqueLimits
 from uam_control.coordinates import ARM, ATTITUDE, POSITION
 from uam_control.estimation import EstimatorParameters
 from uam_control.laws import catalogue
+from uam_control.laws.law_parameters import LawParameters
 from uam_control.mission import MissionParameters
 from uam_control.settings import configuration
 from uam_control.settings.parameter_file import ProfileError, read_sections
@@ -75,6 +76,28 @@ class Profile:
     def laws(self) -> dict[str, str]:
         """Return controller → law."""
         return {node: self.sets[node].law for node in CONTROLLERS}
+
+
+@cache
+def controller_parameters(
+    law: type[LawParameters], limits: type[ParameterSet]
+) -> type[LawParameters]:
+    """Return the class with the parameters of `law` and `limits`; one class for each pair."""
+
+    def reduce(self: LawParameters) -> tuple[Any, ...]:
+        return _restored, (law, limits, vars(self))
+
+    # pickle finds a class by its name in a module; this class has none there
+    name = f"{law.__name__}And{limits.__name__}"
+    return make_dataclass(
+        name, [], bases=(law, limits), namespace={"__reduce__": reduce}, frozen=True
+    )
+
+
+def _restored(
+    law: type[LawParameters], limits: type[ParameterSet], values: dict[str, Any]
+) -> LawParameters:
+    return controller_parameters(law, limits)(**values)
 
 
 def parameter_set(

@@ -43,16 +43,9 @@ def path(relative: str) -> Path:
     found = root() / relative
     if found.exists():
         return found
-    folder = found.parent
-    if not folder.is_dir():
-        raise ConfigurationError(
-            f"no {relative} in the configuration, which has the folders: "
-            + ", ".join(sorted(p.name for p in root().iterdir() if p.is_dir()))
-        )
-    raise ConfigurationError(
-        f"no {relative} in the configuration; {folder.relative_to(root())}/ has: "
-        + (", ".join(sorted(p.name for p in folder.iterdir())) or "nothing")
-    )
+    folder = found.parent if found.parent.is_dir() else root()
+    existing = ", ".join(sorted(p.name for p in folder.iterdir())) or "nothing"
+    raise ConfigurationError(f"no {relative} in the configuration; {folder.name}/ has: {existing}")
 
 
 def named(folder: str, name: str, suffixes: tuple[str, ...] = SUFFIXES) -> Path:

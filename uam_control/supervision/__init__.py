@@ -5,18 +5,3 @@ from uam_control.supervision.observation import Observation, OperatorCommand, Re
 from uam_control.supervision.states import ORDINARY, Event, State
 from uam_control.supervision.supervision_parameters import SupervisionParameters
 from uam_control.supervision.supervisor import Decision, Guide, StateTransition, Supervisor
-
-__all__ = [
-    "ORDINARY",
-    "StateTransition",
-    "OperatorCommand",
-    "Decision",
-    "Event",
-    "Guide",
-    "Inputs",
-    "Observation",
-    "Readings",
-    "State",
-    "SupervisionParameters",
-    "Supervisor",
-]

@@ -20,7 +20,7 @@ from uam_control.coordinates import (
 )
 from uam_msgs_py.messages.layouts import BadMessage
 from uam_msgs_py.messages.trajectories import (
-    IdleWriter,
+    CommandWriter,
     TrajectoryReader,
     TrajectoryWriter,
     trajectory,
@@ -98,12 +98,11 @@ class PositionCommand:
 NO_COMMAND = PositionCommand(np.zeros(3), np.zeros((3, 3)), False)
 
 
-class PositionCommandWriter:
+class PositionCommandWriter(CommandWriter):
     """Writes the position controller's command: desired pose, its derivatives, and tau_p."""
 
     def __init__(self):
-        self._writer = TrajectoryWriter(POSE_NAMES, TrajectoryWriter.ROWS)
-        self._idle = IdleWriter()
+        super().__init__(POSE_NAMES, TrajectoryWriter.ROWS)
 
     def fill(
         self, stamp: int, reference: np.ndarray, attitude: np.ndarray, tau: np.ndarray
@@ -112,15 +111,11 @@ class PositionCommandWriter:
         Omega_d_dot; tau (3,) [N, world].
         """
         for i, row in enumerate(ROWS):
-            values = self._writer.values[row]
+            values = self.values[row]
             values[POSITION] = reference[i, POSITION]
             values[ATTITUDE] = attitude[i]
-        self._writer.values["effort"][POSITION] = tau
-        return self._writer.stamped(stamp)
-
-    def idle(self, stamp: int) -> bytes:
-        """Return the empty message of this stamp [ns]."""
-        return self._idle.stamped(stamp)
+        self.values["effort"][POSITION] = tau
+        return self.stamped(stamp)
 
 
 def read_position_command(data: bytes) -> tuple[int, PositionCommand]:
@@ -136,21 +131,16 @@ def read_position_command(data: bytes) -> tuple[int, PositionCommand]:
     return message.stamp, PositionCommand(values[3, POSITION], attitude, True)
 
 
-class TorqueWriter:
+class TorqueWriter(CommandWriter):
     """Writes tau_q or tau_alpha as the effort of a trajectory point."""
 
     def __init__(self, names: list[str]):
-        self._writer = TrajectoryWriter(names, ["effort"])
-        self._idle = IdleWriter()
+        super().__init__(names, ["effort"])
 
     def fill(self, stamp: int, tau: np.ndarray) -> bytes:
         """Return the message; tau (n,) [N m]."""
-        self._writer.values["effort"][:] = tau
-        return self._writer.stamped(stamp)
-
-    def idle(self, stamp: int) -> bytes:
-        """Return the empty message of this stamp [ns]."""
-        return self._idle.stamped(stamp)
+        self.values["effort"][:] = tau
+        return self.stamped(stamp)
 
 
 def read_torque(data: bytes) -> tuple[int, np.ndarray | None]:

@@ -76,9 +76,8 @@ class ImuWriter(Template):
 
     def __init__(self):
         message = Imu()
-        message.header.frame_id = BODY
         message.orientation_covariance[0] = -1.0
-        super().__init__(message)
+        super().__init__(message, BODY)
         self._gyro = self.values["angular_velocity"]
         self._force = self.values["linear_acceleration"]
 
@@ -98,9 +97,7 @@ class PoseWriter(Template):
     """Writes a PoseStamped in the world frame."""
 
     def __init__(self):
-        message = PoseStamped()
-        message.header.frame_id = WORLD
-        super().__init__(message)
+        super().__init__(PoseStamped(), WORLD)
         self._position, self._orientation = self.values["position"], self.values["orientation"]
 
     def fill(self, stamp: int, position: np.ndarray, quaternion: np.ndarray) -> bytes:
@@ -153,9 +150,7 @@ class SetpointWriter(Template):
     """Writes the TwistStamped with the setpoint that was sent to the autopilot."""
 
     def __init__(self):
-        message = TwistStamped()
-        message.header.frame_id = BODY
-        super().__init__(message)
+        super().__init__(TwistStamped(), BODY)
         self._rates, self._linear = self.values["angular"], self.values["linear"]
 
     def fill(self, stamp: int, rates: np.ndarray, thrust: float) -> bytes:

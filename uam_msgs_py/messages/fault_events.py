@@ -7,8 +7,7 @@ from typing import Any
 from diagnostic_msgs.msg import DiagnosticArray
 
 from uam_msgs_py.messages.layouts import BadMessage
-from uam_msgs_py.messages.stamps import nanoseconds
-from uam_msgs_py.messages.status import OK, WARN, diagnostic
+from uam_msgs_py.messages.status import OK, WARN, diagnostic, only_status
 
 BEGUN, OVER = "begun", "over"
 NUMBER = "number"
@@ -39,13 +38,10 @@ class FaultEvent:
     def from_message(cls, message: DiagnosticArray) -> "tuple[int, FaultEvent]":
         """Return (stamp [ns], event); raises BadMessage for something else."""
         try:
-            (status,) = message.status
-            texts = {pair.key: pair.value for pair in status.values}
+            stamp, status, texts = only_status(message)
             number, place = int(texts.pop(NUMBER)), texts.pop("place")
             parameters = {name: json.loads(text) for name, text in texts.items()}
             active = {BEGUN: True, OVER: False}[status.message]
         except (KeyError, ValueError):
             raise BadMessage("not a fault") from None
-        return nanoseconds(message.header.stamp), cls(
-            status.name, place, number, active, parameters
-        )
+        return stamp, cls(status.name, place, number, active, parameters)

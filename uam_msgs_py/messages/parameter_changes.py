@@ -8,8 +8,7 @@ from typing import Any
 from diagnostic_msgs.msg import DiagnosticArray
 
 from uam_msgs_py.messages.layouts import BadMessage
-from uam_msgs_py.messages.stamps import nanoseconds
-from uam_msgs_py.messages.status import OK, WARN, diagnostic
+from uam_msgs_py.messages.status import OK, WARN, diagnostic, only_status
 
 ACCEPTED = "accepted"
 REFUSED = "refused: "
@@ -47,14 +46,13 @@ class ParameterChange:
     def from_message(cls, message: DiagnosticArray) -> "tuple[int, ParameterChange]":
         """Return (stamp [ns], change); raises BadMessage for something else."""
         try:
-            (status,) = message.status
-            texts = {pair.key: pair.value for pair in status.values}
+            stamp, status, texts = only_status(message)
             by = texts.pop(BY)
             values = {name: _pair(text) for name, text in texts.items()}
         except (KeyError, ValueError):
             raise BadMessage("not a change of parameters") from None
         reason = "" if status.message == ACCEPTED else status.message.removeprefix(REFUSED)
-        return nanoseconds(message.header.stamp), cls(status.name, by, values, reason)
+        return stamp, cls(status.name, by, values, reason)
 
 
 def _json(value: Any) -> str:

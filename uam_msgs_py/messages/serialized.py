@@ -8,6 +8,7 @@ nanoseconds.
 from __future__ import annotations
 
 import math
+from typing import Any
 
 import numpy as np
 from geometry_msgs.msg import PoseStamped, TwistStamped
@@ -45,17 +46,13 @@ def stays_serialized(message_type: type) -> bool:
 class Template:
     """A serialized message to publish; `values`: field name → writable view (n,) of its numbers."""
 
-    def __init__(
-        self,
-        message: JointTrajectory
-        | JointState
-        | Imu
-        | PoseStamped
-        | TwistStamped
-        | Float64MultiArray
-        | Clock,
-    ):
-        """message: of a type in LAYOUTS, with all names and with arrays of the final lengths."""
+    def __init__(self, message: Any, frame: str = ""):
+        """message: of a type in LAYOUTS, with all names and with arrays of the final lengths.
+
+        frame: of its header; "" for the message's own.
+        """
+        if frame:
+            message.header.frame_id = frame
         data = serialize_message(message)
         layout = LAYOUTS[type(message)].of(data)
         # CDR aligns numbers from the end of the encapsulation: align this byte in memory

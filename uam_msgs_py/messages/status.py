@@ -35,6 +35,13 @@ def diagnostic(
     return array
 
 
+def only_status(message: DiagnosticArray) -> tuple[int, DiagnosticStatus, dict[str, str]]:
+    """Return (stamp [ns], status, key → text) of a message with one status, else ValueError."""
+    (status,) = message.status
+    texts = {pair.key: pair.value for pair in status.values}
+    return nanoseconds(message.header.stamp), status, texts
+
+
 class _Status:
     """Conversion of a dataclass to and from the key-value pairs of one status."""
 

@@ -10,7 +10,7 @@ The C structures are those of ROS 2 Jazzy, whose binary interface is frozen.
 """
 
 import ctypes
-from ctypes import POINTER, c_bool, c_char_p, c_size_t, c_uint8, c_uint32, c_uint64, c_void_p
+from ctypes import POINTER, c_char_p, c_size_t, c_uint8, c_uint64, c_void_p
 
 from geometry_msgs.msg import TransformStamped
 from visualization_msgs.msg import MarkerArray
@@ -19,7 +19,7 @@ PACKAGE, NAME, FIELD = "tf2_msgs", "TFMessage", "transforms"
 DEFINITION = "geometry_msgs/TransformStamped[] transforms\n"
 # sha256 of the type's description; publishers and subscribers compare it
 HASH = bytes.fromhex("e369d0f05a23ae52508854b66f6aa0437f3449d652e8cbf22d5abe85d020f087")
-FASTRTPS, INTROSPECTION = b"rosidl_typesupport_fastrtps_c", b"rosidl_typesupport_introspection_c"
+FASTRTPS = b"rosidl_typesupport_fastrtps_c"  # of the only middleware among the wheels
 NESTED_SEQUENCE = 145  # type_description_interfaces/msg/FieldType: unbounded sequence of messages
 
 
@@ -95,39 +95,6 @@ class _Callbacks(ctypes.Structure):
     ]
 
 
-class _Member(ctypes.Structure):
-    """rosidl_typesupport_introspection_c__MessageMember."""
-
-    _fields_ = [
-        ("name", c_char_p),
-        ("type_id", c_uint8),
-        ("string_bound", c_size_t),
-        ("members", c_void_p),
-        ("is_key", c_bool),
-        ("is_array", c_bool),
-        ("array_size", c_size_t),
-        ("is_bounded", c_bool),
-        ("offset", c_uint32),
-        ("default", c_void_p),
-        ("functions", c_void_p * 6),
-    ]
-
-
-class _Members(ctypes.Structure):
-    """rosidl_typesupport_introspection_c__MessageMembers."""
-
-    _fields_ = [
-        ("namespace", c_char_p),
-        ("name", c_char_p),
-        ("count", c_uint32),
-        ("size", c_size_t),
-        ("has_key", c_bool),
-        ("members", POINTER(_Member)),
-        ("init", c_void_p),
-        ("fini", c_void_p),
-    ]
-
-
 _capsule_name = ctypes.pythonapi.PyCapsule_GetName
 _capsule_name.restype, _capsule_name.argtypes = c_char_p, [ctypes.py_object]
 _capsule_pointer = ctypes.pythonapi.PyCapsule_GetPointer
@@ -148,14 +115,6 @@ def _support_of(message_type: type) -> _Support:
     return _Support.from_address(_capsule_pointer(capsule, _capsule_name(capsule)))
 
 
-def _found(support: _Support, identifier: bytes) -> _Support:
-    """Return the type support for `identifier`; raises ImportError if there is none."""
-    address = support.find(ctypes.byref(support), identifier)
-    if not address:
-        raise ImportError(f"no {identifier.decode()} to make {PACKAGE} from")
-    return _Support.from_address(address)
-
-
 def _getter(held: ctypes.Structure):
     """Return a C function that returns the address of `held`."""
     address = ctypes.addressof(held)
@@ -171,26 +130,16 @@ class _Assembled:
         self._hash = _Hash(1, (c_uint8 * 32)(*HASH))
         self._sources = _Sequence()
         self._getters = [_getter(held) for held in (self._hash, self._description, self._sources)]
-        fast = _found(array, FASTRTPS)
+        address = array.find(ctypes.byref(array), FASTRTPS)
+        if not address:
+            raise ImportError(f"no {FASTRTPS.decode()} to make {PACKAGE} from")
         self._callbacks = _Callbacks()
-        ctypes.pointer(self._callbacks)[0] = _Callbacks.from_address(fast.data)
+        fast = _Callbacks.from_address(_Support.from_address(address).data)
+        ctypes.pointer(self._callbacks)[0] = fast
         self._callbacks.namespace, self._callbacks.name = b"tf2_msgs::msg", NAME.encode()
-
-        known = _found(array, INTROSPECTION)
-        self._members = _Members()
-        ctypes.pointer(self._members)[0] = _Members.from_address(known.data)
-        self._member = _Member()
-        ctypes.pointer(self._member)[0] = self._members.members[0]
-        self._member.name = FIELD.encode()
-        self._member.members = ctypes.addressof(_found(element, INTROSPECTION))
-        self._members.namespace, self._members.name = b"tf2_msgs__msg", NAME.encode()
-        self._members.members = ctypes.pointer(self._member)
-
         self._find = _FIND(self._support)
-        self._supports = {
-            identifier: _Support(identifier, ctypes.addressof(data), self._find, *self._getters)
-            for identifier, data in ((FASTRTPS, self._callbacks), (INTROSPECTION, self._members))
-        }
+        callbacks = ctypes.addressof(self._callbacks)
+        self._fast = _Support(FASTRTPS, callbacks, self._find, *self._getters)
         self._handle = _Support(b"rosidl_typesupport_c", None, self._find, *self._getters)
         self._capsule_name = _capsule_name(_capsule_of(TransformStamped))
         self.capsule = _capsule(ctypes.addressof(self._handle), self._capsule_name, None)
@@ -210,8 +159,7 @@ class _Assembled:
         self._description = _Description(own, _Sequence.of(self._referenced))
 
     def _support(self, _: ctypes._Pointer, identifier: bytes) -> int | None:
-        support = self._supports.get(identifier)
-        return None if support is None else ctypes.addressof(support)
+        return ctypes.addressof(self._fast) if identifier == FASTRTPS else None
 
 
 class _Metaclass(type):

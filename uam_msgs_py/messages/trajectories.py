@@ -25,9 +25,7 @@ class TrajectoryWriter(Template):
     def __init__(self, names: Sequence[str], rows: Sequence[str] = ROWS[:3]):
         """names: of the n joints; rows: used rows, a subset of ROWS."""
         point = JointTrajectoryPoint(**{row: [0.0] * len(names) for row in rows})
-        message = JointTrajectory(joint_names=list(names), points=[point])
-        message.header.frame_id = WORLD
-        super().__init__(message)
+        super().__init__(JointTrajectory(joint_names=list(names), points=[point]), WORLD)
 
     def fill(self, stamp: int, state: np.ndarray, time_from_start: int = 0) -> bytes:
         """Return the message with state (3, n): positions, velocities, accelerations."""
@@ -38,13 +36,16 @@ class TrajectoryWriter(Template):
         return self.stamped(stamp, time_from_start)
 
 
-class IdleWriter(Template):
-    """Writes a JointTrajectory without names and points: no command at its stamp."""
+class CommandWriter(TrajectoryWriter):
+    """Writes a command, or no command: a JointTrajectory without names and points."""
 
-    def __init__(self):
-        message = JointTrajectory()
-        message.header.frame_id = WORLD
-        super().__init__(message)
+    def __init__(self, names: Sequence[str], rows: Sequence[str]):
+        super().__init__(names, rows)
+        self._idle = Template(JointTrajectory(), WORLD)
+
+    def idle(self, stamp: int) -> bytes:
+        """Return the message without a command at this stamp [ns]."""
+        return self._idle.stamped(stamp)
 
 
 def trajectory(data: bytes) -> Serialized:

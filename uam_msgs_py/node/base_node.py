@@ -20,7 +20,7 @@ from uam_msgs_py.messages.layouts import BadMessage
 from uam_msgs_py.messages.serialized import stays_serialized
 from uam_msgs_py.messages.status import ERROR, OK, STALE, WARN, diagnostic
 from uam_msgs_py.messages.topics import Topic
-from uam_msgs_py.node import connections
+from uam_msgs_py.node import connections, polling
 from uam_msgs_py.node.executor import spin
 from uam_msgs_py.node.health import LoopTime, ages
 from uam_msgs_py.node.joins import StampJoin
@@ -28,7 +28,7 @@ from uam_msgs_py.node.node_parameters import refuse_unknown
 from uam_msgs_py.node.tunable import TunableNode
 
 DIAGNOSTICS_PERIOD = 1.0  # s
-SAY_PERIOD = 2.0  # s, shortest time between two log lines of the same kind
+LOG_PERIOD = 2.0  # s, shortest time between two log lines of the same kind
 
 
 class UamNode(TunableNode):
@@ -46,7 +46,7 @@ class UamNode(TunableNode):
         self._required: dict[str, int] = {}
         self._counts: dict[str, int] = {}
         self._arrivals: dict[str, float] = {}  # time.monotonic() of each input's newest message
-        self._said: dict[str, float] = {}
+        self._logged: dict[str, float] = {}
         self._outlets: dict[str, Publisher] = {}
         self._inlets: dict[str, Subscription] = {}
         self.joins: list[StampJoin] = []
@@ -56,10 +56,10 @@ class UamNode(TunableNode):
         self._loop = LoopTime()
         self._at_last_report = (0, 0.0)
         self._dropped_before = 0
-        self._waiting: list[str] = []
+        self._waiting: list[str] = []  # required inputs without a message in the last LOG_PERIOD
         self._diagnostics = self.publisher(topics.DIAGNOSTICS)
         steady = Clock(clock_type=ClockType.STEADY_TIME)
-        self.create_timer(SAY_PERIOD, self._look_for_inputs, clock=steady)
+        self.create_timer(LOG_PERIOD, self._check_inputs, clock=steady)
         self.create_timer(DIAGNOSTICS_PERIOD, self._report, clock=steady)
 
     def publisher(self, topic: Topic) -> Publisher:
@@ -106,9 +106,8 @@ class UamNode(TunableNode):
         topics in another order. A node that acts on the last message of a tick calls this first for
         its other inputs.
         """
-        kind, raw = subscription.msg_type, subscription.raw
-        while (taken := subscription.handle.take_message(kind, raw)) is not None:
-            subscription.callback(taken[0])
+        for message in polling.messages(subscription):
+            subscription.callback(message)
 
     def defer(self) -> None:
         """From now on act in `settle`, after all received messages are delivered."""
@@ -126,10 +125,10 @@ class UamNode(TunableNode):
             join.settle()
 
     def say(self, text: str, key: str | None = None) -> None:
-        """Log a warning, at most once per SAY_PERIOD for each `key` (default: the text)."""
+        """Log a warning, at most once per LOG_PERIOD for each `key` (default: the text)."""
         now = time.monotonic()
-        if now - self._said.get(key or text, -SAY_PERIOD) >= SAY_PERIOD:
-            self._said[key or text] = now
+        if now - self._logged.get(key or text, -LOG_PERIOD) >= LOG_PERIOD:
+            self._logged[key or text] = now
             self.get_logger().warning(text)
 
     def done_tick(self, stamp: int, begun: float) -> None:
@@ -138,12 +137,7 @@ class UamNode(TunableNode):
         self.ticks += 1
         self._loop.add(begun)
 
-    @property
-    def waiting_for(self) -> list[str]:
-        """Return the required inputs without a message in the last SAY_PERIOD."""
-        return self._waiting
-
-    def _look_for_inputs(self) -> None:
+    def _check_inputs(self) -> None:
         self._waiting = [
             name for name, before in self._required.items() if self._counts[name] == before
         ]
@@ -163,15 +157,13 @@ class UamNode(TunableNode):
         done = self.ticks - ticks
         dropped = sum(join.dropped for join in self.joins)
         self._at_last_report = (self.ticks, now)
-        if self.waiting_for and level < ERROR:
-            level, summary = STALE, "waiting for " + ", ".join(self.waiting_for)
+        if self._waiting and level < ERROR:
+            level, summary = STALE, "waiting for " + ", ".join(self._waiting)
         elif self.refused and level == OK:
             level, summary = WARN, f"{self.refused} messages refused"
         elif dropped > self._dropped_before and level == OK:
-            level, summary = (
-                WARN,
-                f"{dropped - self._dropped_before} ticks dropped since last report",
-            )
+            newly = dropped - self._dropped_before
+            level, summary = WARN, f"{newly} ticks dropped since last report"
         self._dropped_before = dropped
         common = {
             "ticks": self.ticks,

@@ -55,7 +55,6 @@ class StampJoin:
         self._last = -1
         self._backlog = Backlog()
         self.deferred = False
-        self.fired = 0
         self._dropped = 0
         self.last_seen: dict[str, int | None] = dict.fromkeys(inputs)
 
@@ -90,7 +89,6 @@ class StampJoin:
     def settle(self) -> None:
         """Fire the complete ticks of the backlog."""
         for stamp, values in self._backlog.take():
-            self.fired += 1
             self._fire(stamp, *values)
 
     def skip(self, stamp: int) -> None:
@@ -106,8 +104,3 @@ class StampJoin:
     def incomplete_after(self, name: str) -> bool:
         """Return whether the newest tick of input `name` still lacks other inputs."""
         return self.last_seen.get(name) in self._open
-
-    @property
-    def waiting_for(self) -> list[str]:
-        """Return the inputs without any value so far."""
-        return [name for name, stamp in self.last_seen.items() if stamp is None]

@@ -2,11 +2,16 @@
 
 from __future__ import annotations
 
+import math
+
+from sensor_msgs.msg import BatteryState
+
 from uam_msgs_py.messages import topics
-from uam_msgs_py.messages.battery_state import battery_message
+from uam_msgs_py.messages.stamps import set_stamp
 from uam_msgs_py.messages.status import AutopilotState
 from uam_msgs_py.node.base_node import UamNode
 from uam_sim_bridge.mavlink.link.link import OffboardLink
+from uam_sim_bridge.mavlink.telemetry.battery import Battery
 from uam_sim_bridge.stages.autopilot_report import AutopilotReport
 
 BATTERY_PERIOD = 1_000_000_000  # ns
@@ -57,3 +62,20 @@ class AutopilotTopics:
             if warning not in self._warned:
                 self._logger.warning(warning)
         self._warned = warnings
+
+
+def battery_message(stamp: int, battery: Battery) -> BatteryState:
+    """Return the message; stamp [ns]. NaN: unknown; `present` is False for an unknown voltage."""
+    message = BatteryState(
+        voltage=battery.voltage,
+        temperature=battery.temperature,
+        current=-battery.current,  # ROS: negative when discharging
+        charge=math.nan,
+        capacity=math.nan,
+        design_capacity=math.nan,
+        percentage=battery.left,
+        present=math.isfinite(battery.voltage),
+        cell_voltage=list(battery.cells),
+    )
+    set_stamp(message.header.stamp, stamp)
+    return message
