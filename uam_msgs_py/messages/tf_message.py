@@ -19,50 +19,34 @@ PACKAGE, NAME, FIELD = "tf2_msgs", "TFMessage", "transforms"
 DEFINITION = "geometry_msgs/TransformStamped[] transforms\n"
 # sha256 of the type's description; publishers and subscribers compare it
 HASH = bytes.fromhex("e369d0f05a23ae52508854b66f6aa0437f3449d652e8cbf22d5abe85d020f087")
-FASTRTPS = b"rosidl_typesupport_fastrtps_c"  # of the only middleware among the wheels
+FASTRTPS, INTROSPECTION = b"rosidl_typesupport_fastrtps_c", b"rosidl_typesupport_introspection_c"
 NESTED_SEQUENCE = 145  # type_description_interfaces/msg/FieldType: unbounded sequence of messages
 
 
-class _Hash(ctypes.Structure):
-    _fields_ = [("version", c_uint8), ("value", c_uint8 * 32)]
+def _structure(**fields: type) -> type[ctypes.Structure]:
+    """Return the class of a C structure with these fields, in order."""
+    return type("_Structure", (ctypes.Structure,), {"_fields_": list(fields.items())})
 
 
-class _String(ctypes.Structure):
-    _fields_ = [("data", c_char_p), ("size", c_size_t), ("capacity", c_size_t)]
-
-    @classmethod
-    def of(cls, text: str) -> "_String":
-        data = text.encode()
-        return cls(data, len(data), len(data) + 1)
-
-
-class _Sequence(ctypes.Structure):
-    _fields_ = [("data", c_void_p), ("size", c_size_t), ("capacity", c_size_t)]
-
-    @classmethod
-    def of(cls, array: ctypes.Array) -> "_Sequence":
-        return cls(ctypes.addressof(array), len(array), len(array))
-
-
-class _FieldType(ctypes.Structure):
-    _fields_ = [
-        ("type_id", c_uint8),
-        ("capacity", c_uint64),
-        ("string_capacity", c_uint64),
-        ("nested_type_name", _String),
-    ]
-
-
-class _Field(ctypes.Structure):
-    _fields_ = [("name", _String), ("type", _FieldType), ("default_value", _String)]
-
-
-class _IndividualDescription(ctypes.Structure):
-    _fields_ = [("type_name", _String), ("fields", _Sequence)]
-
-
-class _Description(ctypes.Structure):
-    _fields_ = [("own", _IndividualDescription), ("referenced", _Sequence)]
+# Fields that are only copied have one name together.
+_Hash = _structure(version=c_uint8, value=c_uint8 * 32)
+_String = _structure(data=c_char_p, size=c_size_t, capacity=c_size_t)
+_Sequence = _structure(data=c_void_p, size=c_size_t, capacity=c_size_t)
+_FieldType = _structure(type_id=c_uint8, capacities=c_uint64 * 2, nested_type_name=_String)
+_Field = _structure(name=_String, type=_FieldType, default_value=_String)
+_IndividualDescription = _structure(type_name=_String, fields=_Sequence)
+_Description = _structure(own=_IndividualDescription, referenced=_Sequence)
+# message_type_support_callbacks_t of rosidl_typesupport_fastrtps
+_Callbacks = _structure(namespace=c_char_p, name=c_char_p, functions=c_void_p * 5)
+# MessageMember and MessageMembers of rosidl_typesupport_introspection_c
+_Member = _structure(name=c_char_p, type=c_uint64 * 2, members=c_void_p, rest=c_uint64 * 10)
+_Members = _structure(
+    namespace=c_char_p,
+    name=c_char_p,
+    sizes=c_uint64 * 3,
+    members=POINTER(_Member),
+    functions=c_void_p * 2,
+)
 
 
 class _Support(ctypes.Structure):
@@ -72,27 +56,23 @@ class _Support(ctypes.Structure):
 _FIND = ctypes.CFUNCTYPE(c_void_p, POINTER(_Support), c_char_p)
 _GET = ctypes.CFUNCTYPE(c_void_p, POINTER(_Support))
 _Support._fields_ = [
-    ("identifier", c_char_p),
-    ("data", c_void_p),
-    ("find", _FIND),
-    ("hash", _GET),
-    ("description", _GET),
-    ("sources", _GET),
+    *(("identifier", c_char_p), ("data", c_void_p), ("find", _FIND)),
+    *(("hash", _GET), ("description", _GET), ("sources", _GET)),
 ]
 
 
-class _Callbacks(ctypes.Structure):
-    """message_type_support_callbacks_t of rosidl_typesupport_fastrtps."""
+def _string(text: str) -> ctypes.Structure:
+    data = text.encode()
+    return _String(data, len(data), len(data) + 1)
 
-    _fields_ = [
-        ("namespace", c_char_p),
-        ("name", c_char_p),
-        ("serialize", c_void_p),
-        ("deserialize", c_void_p),
-        ("serialized_size", c_void_p),
-        ("max_serialized_size", c_void_p),
-        ("key_callbacks", c_void_p),
-    ]
+
+def _sequence(array: ctypes.Array) -> ctypes.Structure:
+    return _Sequence(ctypes.addressof(array), len(array), len(array))
+
+
+def _copy(kind: type[ctypes.Structure], address: int) -> ctypes.Structure:
+    """Return a copy of the C structure at `address`."""
+    return kind.from_buffer_copy(ctypes.string_at(address, ctypes.sizeof(kind)))
 
 
 _capsule_name = ctypes.pythonapi.PyCapsule_GetName
@@ -115,6 +95,14 @@ def _support_of(message_type: type) -> _Support:
     return _Support.from_address(_capsule_pointer(capsule, _capsule_name(capsule)))
 
 
+def _found(support: _Support, identifier: bytes) -> _Support:
+    """Return the type support for `identifier`; raises ImportError if there is none."""
+    address = support.find(ctypes.byref(support), identifier)
+    if not address:
+        raise ImportError(f"no {identifier.decode()} to make {PACKAGE} from")
+    return _Support.from_address(address)
+
+
 def _getter(held: ctypes.Structure):
     """Return a C function that returns the address of `held`."""
     address = ctypes.addressof(held)
@@ -130,16 +118,21 @@ class _Assembled:
         self._hash = _Hash(1, (c_uint8 * 32)(*HASH))
         self._sources = _Sequence()
         self._getters = [_getter(held) for held in (self._hash, self._description, self._sources)]
-        address = array.find(ctypes.byref(array), FASTRTPS)
-        if not address:
-            raise ImportError(f"no {FASTRTPS.decode()} to make {PACKAGE} from")
-        self._callbacks = _Callbacks()
-        fast = _Callbacks.from_address(_Support.from_address(address).data)
-        ctypes.pointer(self._callbacks)[0] = fast
+        self._callbacks = _copy(_Callbacks, _found(array, FASTRTPS).data)
         self._callbacks.namespace, self._callbacks.name = b"tf2_msgs::msg", NAME.encode()
+
+        self._members = _copy(_Members, _found(array, INTROSPECTION).data)
+        self._member = _copy(_Member, ctypes.addressof(self._members.members[0]))
+        self._member.name = FIELD.encode()
+        self._member.members = ctypes.addressof(_found(element, INTROSPECTION))
+        self._members.namespace, self._members.name = b"tf2_msgs__msg", NAME.encode()
+        self._members.members = ctypes.pointer(self._member)
+
         self._find = _FIND(self._support)
-        callbacks = ctypes.addressof(self._callbacks)
-        self._fast = _Support(FASTRTPS, callbacks, self._find, *self._getters)
+        self._supports = {
+            identifier: _Support(identifier, ctypes.addressof(data), self._find, *self._getters)
+            for identifier, data in ((FASTRTPS, self._callbacks), (INTROSPECTION, self._members))
+        }
         self._handle = _Support(b"rosidl_typesupport_c", None, self._find, *self._getters)
         self._capsule_name = _capsule_name(_capsule_of(TransformStamped))
         self.capsule = _capsule(ctypes.addressof(self._handle), self._capsule_name, None)
@@ -151,15 +144,14 @@ class _Assembled:
         )
         parts = sorted([*known, element.own], key=lambda part: part.type_name.data)
         self._referenced = (_IndividualDescription * len(parts))(*parts)
-        kind = _FieldType(NESTED_SEQUENCE, 0, 0, _String.of("geometry_msgs/msg/TransformStamped"))
-        self._fields = (_Field * 1)(_Field(_String.of(FIELD), kind, _String.of("")))
-        own = _IndividualDescription(
-            _String.of(f"{PACKAGE}/msg/{NAME}"), _Sequence.of(self._fields)
-        )
-        self._description = _Description(own, _Sequence.of(self._referenced))
+        kind = _FieldType(NESTED_SEQUENCE, (0, 0), _string("geometry_msgs/msg/TransformStamped"))
+        self._fields = (_Field * 1)(_Field(_string(FIELD), kind, _string("")))
+        own = _IndividualDescription(_string(f"{PACKAGE}/msg/{NAME}"), _sequence(self._fields))
+        self._description = _Description(own, _sequence(self._referenced))
 
     def _support(self, _: ctypes._Pointer, identifier: bytes) -> int | None:
-        return ctypes.addressof(self._fast) if identifier == FASTRTPS else None
+        support = self._supports.get(identifier)
+        return None if support is None else ctypes.addressof(support)
 
 
 class _Metaclass(type):
