@@ -69,8 +69,8 @@ class Rig:
         )
         self.state, self.pose = TrajectoryWriter(NAMES), PoseWriter()
         self.position, self.torque = PositionCommandWriter(), TorqueWriter(ATTITUDE_NAMES)
-        hears = (topics.SETPOINT, topics.AUTOPILOT_STATE)
-        probe.until_connected("mavlink_bridge", self.out.values(), hears)
+        received = (topics.SETPOINT, topics.AUTOPILOT_STATE)
+        probe.until_connected("mavlink_bridge", self.out.values(), received)
 
     def publish(self, topic, message):
         self.out[topic.name].publish(message)

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from uam_control.laws.law import GainGroup, Law, LawInputs
-from uam_control.laws.law_parameters import LawParameters, structured
+from uam_control.laws.law_parameters import LawParameters
 from uam_control.maths.compiled import jit
 from uam_control.settings.parameter_set import HUGE, TINY, choice, vector
 
@@ -24,10 +24,6 @@ class PidParameters(LawParameters):
     lambda_1: tuple = vector((), "lambda_1, gain on e", "1/s^2", TINY, HUGE)
     lambda_2: tuple = vector((), "lambda_2, gain on e_dot", "1/s", TINY, HUGE)
     kappa: tuple = vector((0.5,), "kappa, gain on the integral of e", "1/s^3", 0.0, HUGE)
-
-    def record(self) -> np.ndarray:
-        names = ("inertia", "lambda_1", "lambda_2", "kappa")
-        return structured({name: getattr(self, name) for name in names})
 
 
 @jit

@@ -16,7 +16,7 @@ from rclpy.node import Node
 
 from uam_lab.processes.node_environment import ros_environment
 from uam_msgs_py.messages.serialized import stays_serialized
-from uam_msgs_py.node.connections import Connections
+from uam_msgs_py.node.connections import READERS, WRITERS, Connections
 from uam_sim_bridge.ports import Reservation
 
 PATIENCE = 60.0  # s, time limit of a wait
@@ -63,8 +63,8 @@ class Probe:
         """Return a publisher of `topic`."""
         return self.node.create_publisher(topic.type, topic.name, topic.qos)
 
-    def until_connected(self, node: str, publishers=(), hears=()) -> None:
-        """Wait until `node` is connected to `publishers` and subscriptions `hears` of the test.
+    def until_connected(self, node: str, publishers=(), receives=()) -> None:
+        """Wait until `node` is connected to `publishers` and topics `receives` of the test.
 
         Both ends must be connected: a best-effort subscriber loses earlier messages.
         """
@@ -72,11 +72,12 @@ class Probe:
         self.until(
             lambda: (
                 all(
-                    p.get_subscription_count() and said.writers(node, p.topic_name)
+                    p.get_subscription_count() and said.count(node, WRITERS, p.topic_name)
                     for p in publishers
                 )
                 and all(
-                    said.readers(node, topic.name) and self.has_writers(topic) for topic in hears
+                    said.count(node, READERS, topic.name) and self.has_writers(topic)
+                    for topic in receives
                 )
             ),
             f"{node} to be connected",

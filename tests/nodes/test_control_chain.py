@@ -19,7 +19,7 @@ from uam_msgs_py.messages.control import (
 from uam_msgs_py.messages.convert import ImuWriter, JointStateWriter, PoseWriter, read_effort
 from uam_msgs_py.messages.status import AutopilotState, MissionStatus
 from uam_msgs_py.messages.trajectories import TrajectoryWriter
-from uam_msgs_py.node.connections import Connections
+from uam_msgs_py.node.connections import READERS, WRITERS, Connections
 
 COORDINATES = coordinates(2)
 JOINTS = arm_coordinates(2)
@@ -129,8 +129,15 @@ class Plant:
         }
         self.probe.until(
             lambda: (
-                all(reported.readers(*end) >= count for end, count in readers.items())
-                and all(reported.writers(node, t.name) for node, own in inputs.items() for t in own)
+                all(
+                    reported.count(end[0], READERS, end[1]) >= count
+                    for end, count in readers.items()
+                )
+                and all(
+                    reported.count(node, WRITERS, t.name)
+                    for node, own in inputs.items()
+                    for t in own
+                )
                 and all(p.get_subscription_count() for p in (self.imu, self.joints, self.mocap))
                 and all(self.probe.has_writers(topic) for topic in self.heard)
             ),

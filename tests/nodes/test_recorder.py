@@ -15,7 +15,7 @@ from uam_lab.recording.mcap_reader import read_log
 from uam_msgs_py.messages import topics
 from uam_msgs_py.messages.convert import SetpointWriter
 from uam_msgs_py.messages.stamps import set_stamp
-from uam_msgs_py.node.connections import Connections
+from uam_msgs_py.node.connections import WRITERS, Connections
 
 MODULE = "uam_lab.nodes.recorder"
 TICK = 4_000_000
@@ -36,7 +36,7 @@ def connected(probe, *publishers):
     said = Connections(probe.node)
     probe.until(
         lambda: all(
-            p.get_subscription_count() and said.writers("recorder", p.topic_name)
+            p.get_subscription_count() and said.count("recorder", WRITERS, p.topic_name)
             for p in publishers
         ),
         "the recorder listens",

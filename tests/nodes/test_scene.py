@@ -11,7 +11,7 @@ from uam_msgs_py.messages.control import ReferenceWriter
 from uam_msgs_py.messages.convert import PoseWriter, read_joints
 from uam_msgs_py.messages.status import MissionStatus
 from uam_msgs_py.messages.trajectories import TrajectoryWriter
-from uam_msgs_py.node.connections import Connections
+from uam_msgs_py.node.connections import READERS, Connections
 
 COORDINATES = coordinates(2)
 SIZE = len(COORDINATES)
@@ -115,7 +115,7 @@ def test_alone_it_waits_for_the_mission_and_listens_to_nothing_else(start, probe
     node.until_said("waiting for /uam/mission/status")
     said = Connections(probe.node)
     state = probe.publisher(topics.STATE)
-    probe.until(lambda: said.readers("scene", topics.DIAGNOSTICS.name), "diagnostics")
+    probe.until(lambda: said.count("scene", READERS, topics.DIAGNOSTICS.name), "diagnostics")
     listeners = probe.node.get_subscriptions_info_by_topic(topics.STATE.name)
     assert listeners == [] and state.get_subscription_count() == 0
     assert node.interrupt(times=3) == 0

@@ -16,11 +16,12 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
 from uam_control.laws.law import GainGroup, Law, LawInputs
-from uam_control.laws.law_parameters import LawParameters, structured
+from uam_control.laws.law_parameters import LawParameters
 from uam_control.maths.compiled import jit
 from uam_control.settings.parameter_set import HUGE, TINY, choice, number, switch, vector
 
@@ -46,21 +47,15 @@ class Asmc1Parameters(LawParameters):
         False, "safeguard: |Dhat| does not grow while the actuator saturates"
     )
 
-    def record(self) -> np.ndarray:
+    def derived(self) -> dict[str, Any]:
         inertia = np.array(self.inertia)
-        return structured(
-            {
-                "inertia": self.inertia,
-                "slope": self.slope,
-                "damping": inertia * self.damping,
-                "switching": inertia * self.switching,
-                "boundary": self.boundary,
-                "sign": float(self.switching_form == "sign"),
-                "gamma": inertia * self.gamma,
-                "ceiling": self.disturbance_ceiling or np.inf,
-                "freeze_when_saturated": float(self.freeze_when_saturated),
-            }
-        )
+        return {
+            "damping": inertia * self.damping,
+            "switching": inertia * self.switching,
+            "sign": self.switching_form == "sign",
+            "gamma": inertia * self.gamma,
+            "ceiling": self.disturbance_ceiling or np.inf,
+        }
 
 
 @jit
@@ -69,7 +64,7 @@ def asmc1_step(
 ) -> None:
     """Compute one tick of ASMC-1: write tau (n,) and advance adaptation (n + 1,) in place.
 
-    inputs: see `LawInputs`; record: of `Asmc1Parameters.record`.
+    inputs: see `LawInputs`; record: of `LawParameters.record`.
     The derivative of Dhat does not contain Dhat: the sum is exact for s constant over the tick.
     """
     p = record[0]

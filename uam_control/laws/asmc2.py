@@ -22,11 +22,12 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
 from uam_control.laws.law import GainGroup, Law, LawInputs
-from uam_control.laws.law_parameters import LawParameters, ceiling, structured
+from uam_control.laws.law_parameters import LawParameters, ceiling
 from uam_control.maths.compiled import jit
 from uam_control.settings.parameter_set import HUGE, TINY, choice, number, switch, vector
 
@@ -58,22 +59,8 @@ class Asmc2Parameters(LawParameters):
         False, "safeguard: theta does not grow while the actuator saturates"
     )
 
-    def record(self) -> np.ndarray:
-        return structured(
-            {
-                "inertia": self.inertia,
-                "rho_initial": self.rho_initial,
-                "rho_final": self.rho_final,
-                "rho_rate": self.rho_rate,
-                "kappa": self.kappa,
-                "surface_gain": self.surface_gain,
-                "gamma": self.gamma,
-                "sigma": self.sigma,
-                "varpi": self.varpi,
-                "theta_ceiling": ceiling(self.theta_ceiling),
-                "freeze_when_saturated": float(self.freeze_when_saturated),
-            }
-        )
+    def derived(self) -> dict[str, Any]:
+        return {"theta_ceiling": ceiling(self.theta_ceiling)}
 
 
 @jit
@@ -82,7 +69,7 @@ def asmc2_step(
 ) -> None:
     """Compute one tick of ASMC-2: write tau (n,) and advance adaptation (7,) in place.
 
-    inputs: see `LawInputs`; record: of `Asmc2Parameters.record`.
+    inputs: see `LawInputs`; record: of `LawParameters.record`.
     """
     p = record[0]
     e, e_dot, acceleration_d, norms, saturated, frozen, dt = inputs

@@ -37,8 +37,16 @@ class LawParameters(ParameterSet):
         ]
 
     def record(self) -> np.ndarray:
-        """Return the structured array (1,) that the compiled law reads."""
-        raise NotImplementedError
+        """Return the structured array (1,) that the compiled law reads.
+
+        It has each number, vector and switch by its name, and the values of `derived`.
+        """
+        numeric = [name for name, spec in self.specs().items() if isinstance(spec, Bound | Switch)]
+        return structured({name: getattr(self, name) for name in numeric} | self.derived())
+
+    def derived(self) -> dict[str, Any]:
+        """Return values for `record` that the law computes from its parameters, by name."""
+        return {}
 
 
 def structured(values: dict[str, Any]) -> np.ndarray:

@@ -21,12 +21,13 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
 from uam_control.laws import lyapunov
 from uam_control.laws.law import GainGroup, Law, LawInputs
-from uam_control.laws.law_parameters import LawParameters, ceiling, structured
+from uam_control.laws.law_parameters import LawParameters, ceiling
 from uam_control.maths.compiled import jit
 from uam_control.settings.parameter_set import (
     HUGE,
@@ -92,27 +93,19 @@ class ModularParameters(LawParameters):
         given = (self.lambda_1, self.lambda_2, self.q_position, self.q_velocity)
         return lyapunov.solve(*map(np.array, given))
 
-    def record(self) -> np.ndarray:
+    def derived(self) -> dict[str, Any]:
         p11, p12, p22 = self.lyapunov_matrix()
         theory = self.lambda_form == "theory"
         table = np.array(self.lambda_table)
-        return structured(
-            {
-                "inertia": self.inertia,
-                "gain_e": self.lambda_1 if theory else 2.0 * table,
-                "gain_e_dot": self.lambda_2 if theory else table,
-                "p11": p11,
-                "p12": p12,
-                "p22": p22,
-                "nu": self.nu,
-                "k_ceiling": ceiling(self.k_ceiling),
-                "epsilon": self.epsilon,
-                "varpi": self.varpi,
-                "acceleration_limit": self.acceleration_limit or np.inf,
-                "acceleration_cutoff": self.acceleration_cutoff,
-                "freeze_when_saturated": float(self.freeze_when_saturated),
-            }
-        )
+        return {
+            "gain_e": self.lambda_1 if theory else 2.0 * table,
+            "gain_e_dot": self.lambda_2 if theory else table,
+            "p11": p11,
+            "p12": p12,
+            "p22": p22,
+            "k_ceiling": ceiling(self.k_ceiling),
+            "acceleration_limit": self.acceleration_limit or np.inf,
+        }
 
 
 @jit
@@ -121,7 +114,7 @@ def law_step(
 ) -> None:
     """Compute one tick of the law: write tau (n,) and advance adaptation (8,) in place.
 
-    inputs: see `LawInputs`; record: of `ModularParameters.record`.
+    inputs: see `LawInputs`; record: of `LawParameters.record`.
     Equations (7), (8), (12), (13) for the position; (17), (18), (21), (22) for the attitude;
     (24), (25), (28), (29) for the arm.
     """

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from functools import cache
 
 import numpy as np
+from trajectory_msgs.msg import JointTrajectory
 
 from uam_control.coordinates import (
     ALPHA,
@@ -19,11 +20,11 @@ from uam_control.coordinates import (
     coordinates,
 )
 from uam_msgs_py.messages.layouts import BadMessage
+from uam_msgs_py.messages.serialized import Serialized
 from uam_msgs_py.messages.trajectories import (
     CommandWriter,
     TrajectoryReader,
     TrajectoryWriter,
-    trajectory,
 )
 
 POSE_NAMES = list(BASE_COORDINATES)
@@ -48,7 +49,7 @@ def arm_alone(joints: int) -> TrajectoryReader:
 
 def read_state(data: bytes) -> tuple[int, np.ndarray]:
     """Return (stamp [ns], chi, chi_dot, chi_ddot (3, 6 + n)); raises BadMessage."""
-    message = trajectory(data)
+    message = Serialized(JointTrajectory, data)
     return message.stamp, whole(len(message.layout.names) - ALPHA).read(message)
 
 
@@ -77,7 +78,7 @@ class ReferenceWriter:
 
 def read_reference(data: bytes) -> tuple[int, Reference]:
     """Return (stamp [ns], reference); raises BadMessage."""
-    message = trajectory(data)
+    message = Serialized(JointTrajectory, data)
     names = message.layout.names
     if names[:1] != ALONE:
         return message.stamp, Reference(whole(len(names) - ALPHA).read(message), True)
@@ -120,7 +121,7 @@ class PositionCommandWriter(CommandWriter):
 
 def read_position_command(data: bytes) -> tuple[int, PositionCommand]:
     """Return (stamp [ns], command); raises BadMessage."""
-    message = trajectory(data)
+    message = Serialized(JointTrajectory, data)
     if not message.layout.names:
         if message.layout.points:
             raise BadMessage("points without joint names")
@@ -145,7 +146,7 @@ class TorqueWriter(CommandWriter):
 
 def read_torque(data: bytes) -> tuple[int, np.ndarray | None]:
     """Return (stamp [ns], tau_q (3,) [N m, FLU], or None while idle); raises BadMessage."""
-    message = trajectory(data)
+    message = Serialized(JointTrajectory, data)
     if not message.layout.names and not message.layout.points:
         return message.stamp, None
     return message.stamp, TAU_Q.read(message)[0]

@@ -48,11 +48,6 @@ class CommandWriter(TrajectoryWriter):
         return self._idle.stamped(stamp)
 
 
-def trajectory(data: bytes) -> Serialized:
-    """Return a received JointTrajectory; raises BadMessage."""
-    return Serialized(JointTrajectory, data)
-
-
 class TrajectoryReader:
     """Reads `rows` of trajectories of the joints `names`.
 

@@ -39,17 +39,10 @@ class Connections:
         for status in message.status:
             self._values[status.name] = {pair.key: pair.value for pair in status.values}
 
-    def readers(self, node: str, topic: str) -> int:
-        """Return the number of subscriptions connected to the publisher of `topic` in `node`."""
-        return self._count(node, READERS + topic)
-
-    def writers(self, node: str, topic: str) -> int:
-        """Return the number of publishers connected to the subscription of `topic` in `node`."""
-        return self._count(node, WRITERS + topic)
+    def count(self, node: str, kind: str, topic: str) -> int:
+        """Return the number of READERS or WRITERS (kind) of `topic` that `node` is connected to."""
+        return int(self._values.get(node, {}).get(kind + topic, 0))
 
     def recorded_until(self) -> float:
         """Return the simulation time [s] up to which the recorder has reported a complete log."""
         return float(self._values.get(RECORDER, {}).get(RECORDED_UNTIL, 0.0))
-
-    def _count(self, node: str, key: str) -> int:
-        return int(self._values.get(node, {}).get(key, 0))

@@ -18,10 +18,7 @@ from uam_msgs_py.node.connections import READERS, WRITERS, Connections
 ESTIMATOR, MISSION = "state_estimator", "mission"
 POSITION, ATTITUDE, ARM = "position_controller", "attitude_controller", "arm_controller"
 BRIDGE, PLANT, RECORDER = "mavlink_bridge", "mujoco_sim", "recorder"
-SCENE, COCKPIT = (
-    "scene",
-    "cockpit",
-)  # observers; the flight does not wait for them: in none of WIRES
+SCENE, COCKPIT = "scene", "cockpit"  # observers, in none of WIRES: a flight starts without them
 
 
 @dataclass(frozen=True)
@@ -120,10 +117,7 @@ def unconnected(
     """
 
     def count(node: str, kind: str, topic: str) -> int:
-        if node == PLANT:
-            return plant.get(kind + topic, 0)
-        read = reported.readers if kind == READERS else reported.writers
-        return read(node, topic)
+        return plant.get(kind + topic, 0) if node == PLANT else reported.count(node, kind, topic)
 
     for wire in wires:
         name, required = wire.topic.name, wire.listeners(recorded)
