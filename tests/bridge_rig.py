@@ -97,7 +97,7 @@ class Rig:
                 self.torque.fill(stamp, np.array(tau_q or (0, 0, 0), float)),
             )
 
-    def hear(self):
+    def receive(self):
         """Pass the received messages to the autopilot and return them."""
         arrived = []
         while True:
@@ -123,7 +123,7 @@ class Rig:
         return rates, thrust
 
     def autopilot_tick(self):
-        self.hear()
+        self.receive()
         body = self.body
         motors = self.autopilot.update(body.time, swap_body(body.gyro), swap_body(body.accel))
         for message in self.companion.tick(body.time):

@@ -24,7 +24,7 @@ INSTANCE = INSTANCES - 1  # fixed, so that the listeners have its ROS domain
 class Measured:
     """latency [ms]: median and 99th percentile; missed: control ticks, of those with a sample.
 
-    pace: simulated / wall time. position [m]: largest RMS error of an axis. told: causes of holds
+    pace: simulated / wall time. position [m]: largest RMS error of an axis. causes: causes of holds
     and landings, and unmet criteria of a completed mission.
     """
 
@@ -37,7 +37,7 @@ class Measured:
     pace: float
     position: float
     lost_messages: int
-    told: str
+    causes: str
 
 
 def fly(condition: Condition, out: Path) -> Measured:
@@ -47,9 +47,9 @@ def fly(condition: Condition, out: Path) -> Measured:
     command += ["--clock", "realtime", "--no-video", "--instance", str(INSTANCE)]
     with (
         under(condition, out, ports_of(INSTANCE).domain),
-        (out / f"{folder.name}.txt").open("w") as said,
+        (out / f"{folder.name}.txt").open("w") as output,
     ):
-        subprocess.run([*command, "--out", str(folder)], stdout=said, stderr=said, check=False)
+        subprocess.run([*command, "--out", str(folder)], stdout=output, stderr=output, check=False)
     return measured(condition.name, folder)
 
 
@@ -71,5 +71,5 @@ def measured(name: str, folder: Path) -> Measured:
         pace=plant["simulated_s"] / plant["wall_s"],
         position=max(metrics["rms"]["position_m"]),
         lost_messages=sum(recorder["lost"].values()),
-        told="; ".join([*unplanned, *metrics["shortfalls"]]),
+        causes="; ".join([*unplanned, *metrics["shortfalls"]]),
     )

@@ -14,7 +14,7 @@ HEAD = (
     "pace",
     "RMS position [m]",
     "messages lost",
-    "told",
+    "causes",
 )
 
 
@@ -33,7 +33,7 @@ def markdown(found: Sequence[Measured]) -> str:
             f"{one.pace:.3f}",
             f"{one.position:.3f} ({_times(one.position, first.position)})",
             str(one.lost_messages),
-            one.told,
+            one.causes,
         )
         lines.append(f"| {' | '.join(cells)} |")
     return "\n".join(lines)

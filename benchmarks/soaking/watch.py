@@ -30,11 +30,11 @@ def flight(duration: float, clock: str, log_limit: float, out: Path) -> Soak:
     """Fly once for `duration` [s] with all nodes; log_limit [MB]; results in `out`/flight."""
     scenario = out / "shuttle.yaml"
     scenario.write_text(shuttle(duration))
-    said = out / "flight.txt"
+    log = out / "flight.txt"
     command = ["-m", "uam_lab.cli.main", "fly", "--scenario", str(scenario)]
     command += ["--clock", clock, "--no-video", "--log-limit", str(log_limit)]
     folder = new_folder(out, "flight")
-    with said.open("w") as output:
+    with log.open("w") as output:
         run = subprocess.Popen(
             [sys.executable, *command, "--out", str(folder)],
             stdout=output,

@@ -78,10 +78,12 @@ def refused(capsys, *arguments):
     return err
 
 
-@pytest.mark.parametrize(("options", "said", "allowed"), OPTIONS, ids=lambda value: str(value)[:30])
-def test_a_wrong_option_is_named(capsys, tmp_path, options, said, allowed):
+@pytest.mark.parametrize(
+    ("options", "message", "allowed"), OPTIONS, ids=lambda value: str(value)[:30]
+)
+def test_a_wrong_option_is_named(capsys, tmp_path, options, message, allowed):
     line = refused(capsys, *options)
-    assert said in line and allowed in line
+    assert message in line and allowed in line
     assert not any(tmp_path.iterdir())
 
 

@@ -45,27 +45,27 @@ def test_a_comparison_is_written_and_repeats(tmp_path, capsys):
 
 
 @pytest.mark.parametrize(
-    "options, said",
+    "options, message",
     [
         (["--seeds", "0"], "1 or more"),
         (["--payload-mass", "3"], "at most 2"),
         (["--profile", "mine"], "LABEL=FILE"),
     ],
 )
-def test_wrong_use_is_refused_in_one_line(options, said, tmp_path, capsys):
+def test_wrong_use_is_refused_in_one_line(options, message, tmp_path, capsys):
     try:
         status = main(["compare", "--out", str(tmp_path), *options])
     except SystemExit as stop:  # argparse
         status = stop.code
     assert status == 2
     error = capsys.readouterr().err
-    assert said in error and error.count("\n") == 1
+    assert message in error and error.count("\n") == 1
 
 
 @pytest.mark.slow
 def test_a_trial_through_the_nodes_is_the_trial_of_the_direct_engine():
     (proposed,) = plan.entries(["proposed"])
-    asked = trial.Trial(proposed.label, proposed.profile, 0.0, 1, scenario="hover")
-    through_ros, direct = trial.measure(replace(asked, engine="ros")), trial.measure(asked)
+    requested = trial.Trial(proposed.label, proposed.profile, 0.0, 1, scenario="hover")
+    through_ros, direct = trial.measure(replace(requested, engine="ros")), trial.measure(requested)
     assert through_ros.completed and direct.completed
     assert through_ros.rms == pytest.approx(direct.rms, rel=1e-3)

@@ -113,15 +113,15 @@ def test_a_matrix_from_the_command_line(tmp_path, capsys):
     )
     out = tmp_path / "out"
     assert main(["faults", "--matrix", str(file), "--jobs", "2", "--out", str(out)]) == 0
-    said = capsys.readouterr().out
-    assert "4 flights with a fault: 2 completed" in said and "Only with --engine ros" in said
-    told = json.loads((out / "faults.json").read_text())["flights"]
-    assert [(f["fault"], f["moment"]) for f in told][:3] == [
+    message = capsys.readouterr().out
+    assert "4 flights with a fault: 2 completed" in message and "Only with --engine ros" in message
+    reported = json.loads((out / "faults.json").read_text())["flights"]
+    assert [(f["fault"], f["moment"]) for f in reported][:3] == [
         ("no fault", ""),
         ("mocap_dropout 0.2 s", "up"),
         ("mocap_dropout 0.2 s", "down"),
     ]
-    assert told[0]["outcome"] == "completed" and told[3]["outcome"] == "lost"
+    assert reported[0]["outcome"] == "completed" and reported[3]["outcome"] == "lost"
     assert {p.name for p in out.iterdir()} == {
         "faults.json",
         "flights.csv",
@@ -159,8 +159,8 @@ def test_ctrl_c_ends_the_matrix_at_once_and_leaves_no_process(tmp_path):
             assert line, "it ended before it was interrupted"
         begin = time.monotonic()
         os.killpg(running.pid, signal.SIGINT)  # as a terminal does: to the workers, too
-        said = running.communicate(timeout=60)[0]
-        assert running.returncode == 130 and said.splitlines()[-1] == "uam faults: interrupted"
+        message = running.communicate(timeout=60)[0]
+        assert running.returncode == 130 and message.splitlines()[-1] == "uam faults: interrupted"
         assert time.monotonic() - begin < 20.0
     finally:
         running.kill()
@@ -181,12 +181,12 @@ def _group_is_there(group: int) -> bool:
 
 def test_a_fault_that_cannot_be_flown_is_refused_in_one_line(tmp_path, capsys, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    for text, said in (
+    for text, message in (
         ("node_kill@3", "needs --engine ros"),
         ("mocap@3", "unknown fault 'mocap'"),
         ("mocap_dropout@pick", "no phase 'pick' in the scenario, which has: take-"),
     ):
         assert main(["fly", "--engine", "direct", "--scenario", "hover", "--fault", text]) == 2
         err = capsys.readouterr().err
-        assert said in err and err.count("\n") == 1
+        assert message in err and err.count("\n") == 1
     assert not any(tmp_path.iterdir())

@@ -18,7 +18,7 @@ def alone(tmp_path_factory):
 def test_a_busy_machine_costs_latency_before_anything_else(alone, tmp_path, name):
     """In real time, hence on a machine that has the time for a flight without load."""
     busy = fly_under(NAMED[name], tmp_path)
-    assert alone.outcome == busy.outcome == "completed", busy.told
+    assert alone.outcome == busy.outcome == "completed", busy.causes
     assert busy.latency_p50 > alone.latency_p50
     assert busy.lost_messages == alone.lost_messages == 0
     assert busy.position < 1.5 * alone.position

@@ -69,12 +69,12 @@ class Tuner:
         }
         self._clock = listen(self.node, topics.CLOCK, raw=True)
         self._now = 0
-        self.told = []  # (stamp [ns], change)
+        self.reported = []  # (stamp [ns], change)
         topic = topics.CHANGES
         self._changes = self.node.create_subscription(
             topic.type,
             topic.name,
-            lambda m: self.told.append(ParameterChange.from_message(m)),
+            lambda m: self.reported.append(ParameterChange.from_message(m)),
             topic.qos,
         )
 
@@ -133,7 +133,7 @@ def test_five_hundred_changes_in_a_flight(fly):
         )
         flight.until_phase("take-off")
         answers = tuner.ask(requests, going_on)
-        told = list(tuner.told)
+        reported = list(tuner.reported)
     assert flight.wait() == 0, flight.said + flight.complained
 
     expected = Counter()
@@ -147,9 +147,9 @@ def test_five_hundred_changes_in_a_flight(fly):
     found = Counter((one["node"], *one["values"], one["accepted"], one["reason"]) for one in logged)
     assert found == expected
     for node in NODES:  # in the order in which they were asked, with what was asked
-        asked = [r for r in requests if r[0] == node]
+        requested = [r for r in requests if r[0] == node]
         listed = [one for one in logged if one["node"] == node]
-        for (_, name, value), one in zip(asked, listed, strict=True):
+        for (_, name, value), one in zip(requested, listed, strict=True):
             new = one["values"][name][1]
             assert new == value or not one["accepted"]
 
@@ -162,7 +162,9 @@ def test_five_hundred_changes_in_a_flight(fly):
     sent = {node: [a[0] for r, a in zip(requests, answers, strict=True) if r[0] == node]
             for node in NODES}  # fmt: skip
     late = [
-        (stamp - sent[change.node].pop(0)) / SECOND for stamp, change in told if sent[change.node]
+        (stamp - sent[change.node].pop(0)) / SECOND
+        for stamp, change in reported
+        if sent[change.node]
     ]
     # The nodes look at least every 0.02 s; how long a request is under way is up to the machine.
     figures = [round(float(np.percentile(late, part)), 3) for part in (50, 90, 99, 100)]

@@ -71,6 +71,6 @@ def test_a_folder_without_flight_is_refused_in_one_line(tmp_path, capsys):
     (tmp_path / "log.mcap").write_bytes(b"no log")
     assert main.main(["report", str(tmp_path)]) == 2
     shutil.rmtree(tmp_path)
-    said = capsys.readouterr().err.splitlines()
-    assert said[0].endswith("has no log.mcap for a report")
-    assert said[1].endswith("is not an MCAP file")
+    message = capsys.readouterr().err.splitlines()
+    assert message[0].endswith("has no log.mcap for a report")
+    assert message[1].endswith("is not an MCAP file")

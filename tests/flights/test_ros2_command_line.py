@@ -74,8 +74,8 @@ def test_nodes_parameters_and_services(flight, ros2, tmp_path):
     for node in CONTROLLERS:
         known = load_profile("s500").section(node)
         assert set(known) <= set(ros2("param", "list", f"/{node}").split())
-        told = ros2("param", "describe", f"/{node}", "lambda_1")
-        assert "gain on e" in told and "1/s^2" in told, told
+        reported = ros2("param", "describe", f"/{node}", "lambda_1")
+        assert "gain on e" in reported and "1/s^2" in reported, reported
         said = ros2("param", "set", f"/{node}", "varpi", "0.3")
         assert "successful" in said, said
         said = ros2("param", "set", f"/{node}", "varpi", "-1.0")

@@ -58,8 +58,8 @@ def test_flights_side_by_side_use_different_domains_and_ports(two_flights):
 
 
 def test_the_direct_engine_flies_the_same(two_flights, short_scenario):
-    asked = settings(scenario=str(short_scenario), seed=3)
-    direct = DirectFlight(asked.scenario, asked.profile, Vehicle.load(), 0.0, seed=3)
+    requested = settings(scenario=str(short_scenario), seed=3)
+    direct = DirectFlight(requested.scenario, requested.profile, Vehicle.load(), 0.0, seed=3)
     expected = errors(direct.run().series())
     found = metrics(two_flights[0])["rms"]
     # What is left is the single precision of MAVLink's setpoints and motor commands, which contact

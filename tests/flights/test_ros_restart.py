@@ -59,8 +59,8 @@ def test_a_controller_that_is_back_has_what_was_changed_in_flight(fly):
 
         executor = SingleThreadedExecutor(context=guest.context)
         executor.add_node(guest.node)
-        asked = [Parameter("tilt_max", value=0.3).to_parameter_msg()]
-        (result,) = called(SetParameters, "set_parameters", parameters=asked).results
+        requested = [Parameter("tilt_max", value=0.3).to_parameter_msg()]
+        (result,) = called(SetParameters, "set_parameters", parameters=requested).results
         assert result.successful, result.reason
         flight.until(lambda: "; restarted" in flight.said, "the restart")
         (kept,) = called(GetParameters, "get_parameters", names=["tilt_max"]).values

@@ -38,7 +38,7 @@ class Probe:
         self.node = Node("probe", context=context)
         self._executor = SingleThreadedExecutor(context=context)
         self._executor.add_node(self.node)
-        self._said = Connections(self.node)
+        self._connections = Connections(self.node)
 
     def until(self, condition: Callable[[], object], what: str) -> None:
         """Spin until `condition()`; fail after PATIENCE with `what` in the error."""
@@ -68,15 +68,15 @@ class Probe:
 
         Both ends must be connected: a best-effort subscriber loses earlier messages.
         """
-        said = self._said
+        reported = self._connections
         self.until(
             lambda: (
                 all(
-                    p.get_subscription_count() and said.count(node, WRITERS, p.topic_name)
+                    p.get_subscription_count() and reported.count(node, WRITERS, p.topic_name)
                     for p in publishers
                 )
                 and all(
-                    said.count(node, READERS, topic.name) and self.has_writers(topic)
+                    reported.count(node, READERS, topic.name) and self.has_writers(topic)
                     for topic in receives
                 )
             ),
@@ -128,12 +128,12 @@ class Running:
         """Return the output so far."""
         return self.log.read_text()
 
-    def until_said(self, text: str) -> None:
+    def until_logged(self, text: str) -> None:
         """Wait until the node has printed `text`."""
         deadline = time.monotonic() + PATIENCE
         while text not in self.output:
             assert self.process.poll() is None, f"ended before saying {text!r}:\n{self.output}"
-            assert time.monotonic() < deadline, f"never said {text!r}:\n{self.output}"
+            assert time.monotonic() < deadline, f"no output {text!r}:\n{self.output}"
             time.sleep(0.05)
 
     def interrupt(self, times: int = 1, number: int = signal.SIGINT) -> int:

@@ -62,7 +62,7 @@ class Flight:
         )
         self.body = Quadrotor()
         self.streaming = self.vision = True
-        self.heard = []
+        self.received = []
         self.ticks = 0
         assert self.hil.accept(START_TIMEOUT)
 
@@ -71,7 +71,7 @@ class Flight:
         self.ticks += 1
         link.poll(body.time)
         link.tick(body.time)
-        self.heard += self.sequence.reasons
+        self.received += self.sequence.reasons
         if self.vision and self.ticks % 5 == 0:
             link.send_vision(body.time, body.position, body.quaternion, 0.005, 0.02)
         if self.streaming and self.sequence.streaming:
@@ -150,7 +150,7 @@ def test_arming_is_refused_in_words(flight):
     flight.sequence.set_desired(True)
     flight.run(2.5)
     assert flight.sequence.phase is Phase.ARMING and not flight.hil.armed
-    assert any("vision" in reason for reason in flight.heard)
+    assert any("vision" in reason for reason in flight.received)
     flight.vision = True
     flight.run(1.0)
     assert flight.sequence.phase is Phase.FLYING
@@ -161,7 +161,7 @@ def test_offboard_is_refused_without_a_stream(flight):
     flight.sequence.set_desired(True)
     flight.run(2.5)
     assert flight.sequence.phase is Phase.OFFBOARD and not flight.hil.armed
-    assert any("no offboard signal" in reason for reason in flight.heard)
+    assert any("no offboard signal" in reason for reason in flight.received)
 
 
 def test_loss_of_the_stream_and_recovery(flight):

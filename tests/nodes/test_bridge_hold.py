@@ -100,19 +100,19 @@ def test_realtime_watchdog_holds_level_and_then_stops(make_rig):
     """Ticks stop in flight: the bridge sends level setpoints for release_time, then none."""
     rig = make_rig("-p", "clock:=realtime", "-p", "stale_after:=2.0", "-p", "release_time:=1.0")
     rig.fly()
-    rig.hear()
+    rig.receive()
     rig.received.clear()
 
     def stream():
-        rig.hear()
+        rig.receive()
         return [m for m in rig.received if m.get_type() == "SET_ATTITUDE_TARGET"]
 
     rig.probe.until(lambda: len(stream()) >= 5, "setpoints of the watchdog")
     assert stream()[-1].thrust == pytest.approx(WEIGHT / 41.36, rel=0.05)
-    rig.node.until_said("stream stopped")
-    rig.hear()
+    rig.node.until_logged("stream stopped")
+    rig.receive()
     rig.received.clear()
-    rig.probe.until(lambda: (rig.hear(), "HEARTBEAT" in rig.kinds())[1], "a heartbeat")
+    rig.probe.until(lambda: (rig.receive(), "HEARTBEAT" in rig.kinds())[1], "a heartbeat")
     assert stream() == []
 
 
@@ -122,13 +122,13 @@ def test_without_states_it_levels_by_the_motion_capture(make_rig):
     rig = make_rig("-p", "clock:=realtime", "-p", "stale_after:=1.0", *level)
     rig.fly()
     pose, tilted = PoseWriter(), quaternion_from_euler(np.array([0.1, 0.0, 0.0]))
-    rig.hear()
+    rig.receive()
     rig.received.clear()
 
     def rolled():
         now = rig.count * PERIOD + round((time.monotonic() - begin) * 1e9)
         rig.publish(topics.MOCAP, pose.fill(now, np.full(3, 1e-12 * now), tilted))
-        rig.hear()
+        rig.receive()
         sent = [m for m in rig.received if m.get_type() == "SET_ATTITUDE_TARGET"]
         return any(m.body_roll_rate == pytest.approx(-0.3, abs=1e-3) for m in sent)
 

@@ -112,7 +112,7 @@ def test_with_signing_only_signed_messages_are_accepted(make_rig, tmp_path):
     file = tmp_path / "key"
     file.write_text(key + "\n")
     rig = make_rig("-p", f"signing_key:={file}", "-p", "signing_link_id:=4")
-    heard = rig.probe.collect(topics.DIAGNOSTICS)
+    arrived = rig.probe.collect(topics.DIAGNOSTICS)
     signing = Signing.from_text(key)
     unsigned = rig.codec
     rig.codec = Codec(1, 1, signing)
@@ -124,7 +124,7 @@ def test_with_signing_only_signed_messages_are_accepted(make_rig, tmp_path):
         rig.tick((0, 0, WEIGHT))
 
     def refused():
-        mine = [m for m in heard if m.status[0].name == "mavlink_bridge"]
+        mine = [m for m in arrived if m.status[0].name == "mavlink_bridge"]
         return mine and int(values(mine)["refused"]) > 0
 
     rig.probe.until(refused, "refusals under /diagnostics")

@@ -99,7 +99,7 @@ class Plant:
         self.status = probe.collect(topics.MISSION_STATUS)
         self.arming = probe.collect(topics.ARMING)
         self.adaptation = probe.collect(topics.ATTITUDE_ADAPTATION)
-        self.heard = (
+        self.received = (
             *(topics.STATE, topics.REFERENCE, topics.POSITION_COMMAND, topics.ATTITUDE_COMMAND),
             *(topics.ARM_EFFORT, topics.MAGNET),
         )
@@ -139,7 +139,7 @@ class Plant:
                     for t in own
                 )
                 and all(p.get_subscription_count() for p in (self.imu, self.joints, self.mocap))
-                and all(self.probe.has_writers(topic) for topic in self.heard)
+                and all(self.probe.has_writers(topic) for topic in self.received)
             ),
             "connections",
         )
@@ -203,7 +203,7 @@ def test_a_state_with_nan_is_refused_and_the_next_one_used(start, probe):
     state = np.zeros((3, 8))
     state[1, 2] = np.nan
     states.publish(writer.fill(PERIOD, state))
-    mission.until_said("/uam/state: refused: velocities of z is nan")
+    mission.until_logged("/uam/state: refused: velocities of z is nan")
     stamp = PERIOD
 
     def answered():

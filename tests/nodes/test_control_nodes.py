@@ -21,14 +21,14 @@ INPUTS = {
 @pytest.mark.parametrize("name", INPUTS)
 def test_alone_it_waits_and_stops(start, name):
     node = start(f"uam_control.nodes.{name}")
-    node.until_said("waiting for " + ", ".join(INPUTS[name]))
+    node.until_logged("waiting for " + ", ".join(INPUTS[name]))
     assert node.interrupt(times=3) == 0
     assert "Traceback" not in node.output
 
 
 def test_it_stops_on_sigterm(start):
     node = start("uam_control.nodes.state_estimator")
-    node.until_said("waiting for")
+    node.until_logged("waiting for")
     assert node.interrupt(number=signal.SIGTERM) == 0
 
 
@@ -60,8 +60,8 @@ def test_diagnostics_name_missing_inputs(start, probe):
 def test_bad_parameters_are_refused_in_one_line(start, name, arguments, complaint):
     node = start(f"uam_control.nodes.{name}", "--ros-args", *arguments)
     assert node.process.wait(60) == 2
-    said = [line for line in node.output.splitlines() if line.startswith(f"{name}: ")]
-    assert len(said) == 1 and complaint in said[0]
+    lines = [line for line in node.output.splitlines() if line.startswith(f"{name}: ")]
+    assert len(lines) == 1 and complaint in lines[0]
     assert "Traceback" not in node.output
 
 

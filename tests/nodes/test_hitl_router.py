@@ -73,7 +73,7 @@ class Bench:
         local = free_port(socket.SOCK_DGRAM)
         self.hil = HilServer(tcp, 4, parameters=hil)
         self.autopilot = start(AUTOPILOT, "--serial", f"{self.cable.ends[1]}:921600")
-        self.autopilot.until_said("on the serial line")
+        self.autopilot.until_logged("on the serial line")
         self.router = start(
             ROUTER,
             f"serial:{self.cable.ends[0]}:921600",
@@ -94,7 +94,7 @@ class Bench:
         self.body = Quadrotor()
         self.ticks = self.answered = 0
         assert self.hil.accept(PATIENCE), self.router.output
-        self.router.until_said("connected to the simulator")
+        self.router.until_logged("connected to the simulator")
 
     def tick(self, thrust=0.0):
         body, link = self.body, self.link
@@ -172,7 +172,7 @@ def test_a_cut_line_stops_the_motors_and_both_ends_report_it(bench):
     b = bench()
     b.arm()
     b.cable.cut()
-    b.router.until_said("lost: motor commands are zero")
+    b.router.until_logged("lost: motor commands are zero")
     b.until(lambda: not b.hil.armed, "motors at rest")
     assert np.all(b.hil.motors == 0.0) and b.hil.connected
     assert b.autopilot.process.wait(PATIENCE) == 0
@@ -319,11 +319,11 @@ def test_a_full_line_gives_a_warning_and_sensors_go_first(wires):
 def test_the_router_continues_after_reconnection(wires):
     w = wires()
     w.unplug()
-    w.router.until_said("lost: motor commands are zero")
+    w.router.until_logged("lost: motor commands are zero")
     answer = Framer(Codec(9, 9)).stream(w.plant.recv(500))[0]
     assert answer.mode == 0 and set(answer.controls) == {0.0}
     w.plug()
-    w.router.until_said("flight controller is open")
+    w.router.until_logged("flight controller is open")
     w.plant.sendall(w.codec.encode(sensor(8_000)))
     w.until(lambda: [m for m in w.read() if m.get_type() == "HIL_SENSOR"])
     assert w.router.interrupt(times=3) == 0 and "Traceback" not in w.router.output

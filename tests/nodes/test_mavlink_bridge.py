@@ -19,7 +19,7 @@ from uam_sim_bridge.mavlink.protocol.wire import mavlink2
 
 def test_alone_it_waits_and_stops(start):
     node = start(MODULE, "--ros-args", "-p", f"local_port:={free_port(socket.SOCK_DGRAM)}")
-    node.until_said(
+    node.until_logged(
         "waiting for /vrpn_mocap/uam/pose, /uam/state, /uam/position/command, /uam/attitude/command"
     )
     assert node.interrupt(times=3) == 0
@@ -83,7 +83,7 @@ def test_mapping_parameters_of_the_autopilot_are_compared(make_rig):
     rig.autopilot.set_parameter("MC_ROLLRATE_P", 0.3)
     for _ in range(100):
         rig.tick()
-    rig.node.until_said("MC_ROLLRATE_P is 0.3 on the autopilot, the bridge assumes 0.15")
+    rig.node.until_logged("MC_ROLLRATE_P is 0.3 on the autopilot, the bridge assumes 0.15")
 
 
 def test_the_thrust_factor_is_identified_published_and_constant_while_the_magnet_is_on(
@@ -120,7 +120,7 @@ def test_mapping_parameters_of_the_autopilot_are_adopted(make_rig):
     rig.autopilot.set_parameter("THR_MDL_FAC", 0.3)
     rig.autopilot.set_parameter("MC_ROLLRATE_P", 0.3)
     rig.fly()
-    rig.node.until_said("adopted from the autopilot: MC_ROLLRATE_P is 0.3")
+    rig.node.until_logged("adopted from the autopilot: MC_ROLLRATE_P is 0.3")
     rates, _ = rig.tick((0, 0, WEIGHT), (0.1, 0.0, 0.0))
     assert rates == pytest.approx([0.1 / (5.00105 * 0.3), 0, 0], rel=1e-3, abs=1e-9)
     # never in flight
@@ -130,7 +130,7 @@ def test_mapping_parameters_of_the_autopilot_are_adopted(make_rig):
     )
     for _ in range(20):
         rig.tick((0, 0, WEIGHT))
-    rig.node.until_said("MC_PITCHRATE_P is 0.3 on the autopilot, the bridge assumes 0.15")
+    rig.node.until_logged("MC_PITCHRATE_P is 0.3 on the autopilot, the bridge assumes 0.15")
     gyro = rig.body.gyro.copy()
     rates, _ = rig.tick((0, 0, WEIGHT), (0.0, 0.1, 0.0))
     assert rates[1] - gyro[1] == pytest.approx(0.1 / (5.00105 * 0.15), rel=1e-3)

@@ -28,7 +28,7 @@ class Vehicle:
         self.battery = probe.publisher(topics.AUTOPILOT_BATTERY)
         self.references = probe.collect(topics.REFERENCE)
         self.magnet = probe.collect(topics.MAGNET)
-        self.told = probe.collect(topics.MISSION_STATUS)
+        self.reported = probe.collect(topics.MISSION_STATUS)
         self.writer = TrajectoryWriter(COORDINATES)
         self.state = np.zeros((3, 8))
         self.state[0, 2], self.state[0, 7] = 0.28, np.pi / 2
@@ -70,7 +70,7 @@ class Vehicle:
 
     @property
     def status(self) -> MissionStatus:
-        return MissionStatus.from_message(self.told[-1])[1]
+        return MissionStatus.from_message(self.reported[-1])[1]
 
     def ask(self, name, on=None):
         kind = Trigger if on is None else SetBool
@@ -126,22 +126,22 @@ def test_a_hot_servo_holds_and_an_unknown_joint_is_refused(vehicle, probe):
 
 
 def test_an_empty_battery_lands_with_the_cause_in_the_diagnostics(vehicle, probe):
-    said = []
+    received = []
     probe.node.create_subscription(
-        DiagnosticArray, topics.DIAGNOSTICS.name, said.append, topics.DIAGNOSTICS.qos
+        DiagnosticArray, topics.DIAGNOSTICS.name, received.append, topics.DIAGNOSTICS.qos
     )
     take_off(vehicle)
     vehicle.battery.publish(BatteryState(percentage=0.1))
     vehicle.until_state("landing")
     assert vehicle.status.cause == "battery 0.10 full, below 0.15"
 
-    def told():
+    def reported():
         vehicle.fly(1)
-        found = [s for m in said for s in m.status if s.name == "mission"]
+        found = [s for m in received for s in m.status if s.name == "mission"]
         values = {pair.key: pair.value for pair in found[-1].values} if found else {}
         return values.get("state") == "landing" and "battery" in values["cause"]
 
-    probe.until(told, "diagnostics of the landing")
+    probe.until(reported, "diagnostics of the landing")
 
 
 def test_a_failsafe_is_published_before_its_idle_reference(vehicle):
@@ -150,8 +150,8 @@ def test_a_failsafe_is_published_before_its_idle_reference(vehicle):
     for _ in range(150):
         vehicle.state[0, 3] = 1.2  # rad, beyond tilt_failsafe
         vehicle.fly(1)
-    told = [MissionStatus.from_message(message) for message in vehicle.told]
-    failed = min(stamp for stamp, status in told if status.state == "failsafe")
+    reported = [MissionStatus.from_message(message) for message in vehicle.reported]
+    failed = min(stamp for stamp, status in reported if status.state == "failsafe")
     references = [read_reference(data) for data in vehicle.references]
     later = [(stamp, one.flying) for stamp, one in references if stamp >= failed]
     assert [flying for _, flying in later[:40]] == [True] * 40

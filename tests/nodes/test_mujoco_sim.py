@@ -25,7 +25,7 @@ def publishers(probe, topic):
 
 def test_alone_it_names_missing_nodes_and_stops_cleanly(start):
     running = start(MODULE, *options())
-    running.until_said("waiting for state_estimator to listen to /imu/data")
+    running.until_logged("waiting for state_estimator to listen to /imu/data")
     assert running.interrupt(times=3) == 0
     assert "Traceback" not in running.output
 
@@ -40,7 +40,7 @@ def test_a_bounded_start_names_missing_nodes(start, tmp_path):
 
 
 def test_wrong_parameters_are_refused_in_one_line(start):
-    for arguments, said in (
+    for arguments, message in (
         (options(clock="sundial"), "clock: 'sundial' is not lockstep or realtime"),
         (options(vehicle="glider"), "unknown vehicle 'glider'; there are: hexa_arm, s500_arm"),
         (options(plant="bullet"), "unknown plant 'bullet'; there are: mujoco, or a class as"),
@@ -49,7 +49,7 @@ def test_wrong_parameters_are_refused_in_one_line(start):
     ):
         running = start(MODULE, *arguments)
         assert running.process.wait(60) == 2
-        assert said in running.output and running.output.count("\n") == 1, running.output
+        assert message in running.output and running.output.count("\n") == 1, running.output
 
 
 def test_a_port_in_use_is_refused_in_one_line(start):
@@ -65,7 +65,7 @@ def test_a_port_in_use_is_refused_in_one_line(start):
 
 def test_its_topics_are_those_of_the_contract(start, probe):
     running = start(MODULE, *options())
-    running.until_said("waiting for")
+    running.until_logged("waiting for")
     for topic in (topics.IMU, topics.JOINTS, topics.MOCAP, topics.TRUTH_STATE):
         probe.until(lambda topic=topic: "mujoco_sim" in publishers(probe, topic), topic.name)
         (info,) = probe.node.get_publishers_info_by_topic(topic.name)

@@ -27,16 +27,16 @@ def recorder(start, tmp_path, probe):
     """Start a recorder; return (process, file, statistics file)."""
     file, statistics = tmp_path / "log.mcap", tmp_path / "recorder.json"
     running = start(MODULE, "--ros-args", "-p", f"file:={file}", "-p", f"statistics:={statistics}")
-    running.until_said("recorder: ")
+    running.until_logged("recorder: ")
     return running, file, statistics
 
 
 def connected(probe, *publishers):
     """Wait until both ends are connected."""
-    said = Connections(probe.node)
+    connections = Connections(probe.node)
     probe.until(
         lambda: all(
-            p.get_subscription_count() and said.count("recorder", WRITERS, p.topic_name)
+            p.get_subscription_count() and connections.count("recorder", WRITERS, p.topic_name)
             for p in publishers
         ),
         "the recorder listens",
@@ -130,11 +130,11 @@ def test_a_killed_recorder_leaves_what_was_flushed(recorder, probe):
 
 
 def test_a_full_disk_is_announced_and_ends_the_log_alone(start, probe):
-    heard = probe.collect(topics.DIAGNOSTICS)
+    received = probe.collect(topics.DIAGNOSTICS)
     running = start(MODULE, "--ros-args", "-p", "file:=/dev/full")
-    running.until_said("the log cannot be written: No space left on device; recorded until 0 s")
-    said = "the log cannot be written: No space left on device"
-    probe.until(lambda: any(m.status[0].message == said for m in heard), "it is announced")
+    running.until_logged("the log cannot be written: No space left on device; recorded until 0 s")
+    shown_text = "the log cannot be written: No space left on device"
+    probe.until(lambda: any(m.status[0].message == shown_text for m in received), "it is announced")
     assert running.interrupt() == 0
     assert "Traceback" not in running.output
 

@@ -112,10 +112,10 @@ def test_on_hardware_there_is_no_truth(start, probe):
 
 def test_alone_it_waits_for_the_mission_and_listens_to_nothing_else(start, probe):
     node = start(MODULE)
-    node.until_said("waiting for /uam/mission/status")
-    said = Connections(probe.node)
+    node.until_logged("waiting for /uam/mission/status")
+    connections = Connections(probe.node)
     state = probe.publisher(topics.STATE)
-    probe.until(lambda: said.count("scene", READERS, topics.DIAGNOSTICS.name), "diagnostics")
+    probe.until(lambda: connections.count("scene", READERS, topics.DIAGNOSTICS.name), "diagnostics")
     listeners = probe.node.get_subscriptions_info_by_topic(topics.STATE.name)
     assert listeners == [] and state.get_subscription_count() == 0
     assert node.interrupt(times=3) == 0
@@ -125,5 +125,5 @@ def test_what_it_cannot_load_is_refused_in_one_line(start):
     for name, value in (("scenario", "nowhere"), ("vehicle", "glider"), ("frame_rate", "1e3")):
         node = start(MODULE, "--ros-args", "-p", f"{name}:={value}")
         assert node.process.wait(60) == 2, node.output
-        said = [line for line in node.output.splitlines() if line.startswith("scene: ")]
-        assert len(said) == 1 and "Traceback" not in node.output
+        shown_text = [line for line in node.output.splitlines() if line.startswith("scene: ")]
+        assert len(shown_text) == 1 and "Traceback" not in node.output

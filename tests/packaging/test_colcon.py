@@ -51,7 +51,7 @@ def test_code_and_configuration_are_those_of_the_workspace(workspace):
     assert (Path(config) / "profiles" / "s500.yaml").is_file()
 
 
-def test_the_dependencies_are_told_for_the_doctor(workspace):
+def test_the_dependencies_are_reported_for_the_doctor(workspace):
     program = "from importlib import metadata; print(*metadata.requires('uam'), sep='\\n')"
     said = workspace.python(program).splitlines()
     assert {re.split("[<>=]", line)[0] for line in said} == {

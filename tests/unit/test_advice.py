@@ -68,7 +68,7 @@ def test_every_pattern_is_reachable():
         re.sub(r"{\d[^}]*}", "1", text).replace("{cause}", "generic")
         for text, _ in (*CHECKS.values(), *OTHERS.values())
     ]
-    said = (
+    message = (
         [text for text, _ in TEXTS]
         + events
         + [
@@ -80,7 +80,7 @@ def test_every_pattern_is_reachable():
             "Missing FMU SD Card",
         ]
     )
-    used = {advice(text) for text in said}
+    used = {advice(text) for text in message}
     assert [pattern for pattern, what in ADVICE if what not in used] == []
 
 

@@ -62,7 +62,7 @@ def test_any_trajectory_is_decoded(names, lengths, frame, data):
             assert field not in block.fields
 
 
-def test_layouts_that_alternate_are_told_apart():
+def test_layouts_that_alternate_are_distinguished():
     arm = ["alpha_1", "alpha_2"]
     eight = ["x", "y", "z", "roll", "pitch", "yaw", *arm]
     messages = [

@@ -59,10 +59,10 @@ def test_a_slider_stays_within_the_range_and_holds_the_value(low, width, share):
 
 
 def test_the_range_of_a_vectors_entries_is_that_of_its_node():
-    told = about("each 1e-09 to 1e+06 1/s^2; x, y, z")
-    assert bounds(told) == (1e-9, 1e6)
-    assert list(axes(told, 3)) == ["x", "y", "z"]
-    assert list(axes(told, 2)) == ["0", "1"]
+    reported = about("each 1e-09 to 1e+06 1/s^2; x, y, z")
+    assert bounds(reported) == (1e-9, 1e6)
+    assert list(axes(reported, 3)) == ["x", "y", "z"]
+    assert list(axes(reported, 2)) == ["0", "1"]
     assert bounds(about("")) == (-math.inf, math.inf)
 
 
@@ -76,7 +76,7 @@ def test_grades():
     assert [grade(v, 0.3, 0.15) for v in (0.9, 0.3, 0.1)] == [GOOD, CAUTION, BAD]
 
 
-def told(name: str, level: bytes, summary: str, **values) -> DiagnosticArray:
+def reported(name: str, level: bytes, summary: str, **values) -> DiagnosticArray:
     return diagnostic(0, name, level, summary, values)
 
 
@@ -86,17 +86,17 @@ def test_the_headline_says_how_it_is():
     health.silence = 0.1
     health.hear(MissionStatus("approach", 12.0, 0.004, 0.1, 0.3))
     health.autopilot = AutopilotState(True, "OFFBOARD", True, 0, "")
-    health.diagnose(told("arm_controller", OK, "running", saturated=True))
+    health.diagnose(reported("arm_controller", OK, "running", saturated=True))
     page = headline(health, LIMITS)
     assert health.state() == (GOOD, "approach", "")
     for part in ("APPROACH", "T +12.0 s", ">0.4<", "OFFBOARD, armed", "all 1 healthy", "saturated"):
         assert part in page, part
-    health.diagnose(told("arm_controller", ERROR, "<b>no</b> joints", saturated=False))
+    health.diagnose(reported("arm_controller", ERROR, "<b>no</b> joints", saturated=False))
     page = headline(health, LIMITS)
     assert "&lt;b&gt;no&lt;/b&gt; joints" in page
     assert "<b>no" not in page
     assert "saturated" not in page
-    for status, said in (
+    for status, message in (
         (
             MissionStatus("hold", state="holding", cause="by command"),
             (CAUTION, "holding", "by command"),
@@ -111,9 +111,9 @@ def test_the_headline_says_how_it_is():
         ),
     ):
         health.hear(status)
-        assert health.state() == said
-        assert said[1].upper() in headline(health, LIMITS)
-        assert said[2] in headline(health, LIMITS)
+        assert health.state() == message
+        assert message[1].upper() in headline(health, LIMITS)
+        assert message[2] in headline(health, LIMITS)
     health.silence = 7.0
     health.hear(MissionStatus("approach", 12.0))
     assert health.state() == (BAD, "no signal for 7 s", "")
@@ -132,9 +132,9 @@ def test_errors_come_from_tracking_once_it_is_there():
     assert health.errors == pytest.approx((0.5, 0.1, 0.2))
 
 
-def test_a_node_that_says_nothing_more_is_told():
+def test_a_node_that_says_nothing_more_is_reported():
     health = Health(silent_after=0.0)
-    health.diagnose(told("mission", OK, "running"))
+    health.diagnose(reported("mission", OK, "running"))
     ((name, level, words),) = health.ailing()
     assert (name, level) == ("mission", BAD)
     assert words.startswith("silent")

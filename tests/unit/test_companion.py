@@ -35,22 +35,22 @@ class Rig:
 
     def tick(self, ticks=1):
         """Advance; return what the autopilot sent, as it arrives."""
-        heard = []
+        received = []
         for _ in range(ticks):
             self.autopilot.update(self.time, np.zeros(3), DOWN)
             for message in self.companion.tick(self.time):
-                heard += Framer(self._ours).datagram(self._theirs.encode(message))
+                received += Framer(self._ours).datagram(self._theirs.encode(message))
             self.time += 0.004
-        return heard
+        return received
 
-    def heard(self, kind, ticks=1):
+    def received(self, kind, ticks=1):
         return [m for m in self.tick(ticks) if m.get_type() == kind]
 
     def command(self, command, *parameters):
         self.send(
             mavlink2.MAVLink_command_long_message(1, 1, command, 0, *(*parameters, *[0.0] * 7)[:7])
         )
-        return self.heard("COMMAND_ACK")[0].result
+        return self.received("COMMAND_ACK")[0].result
 
     def setpoint(self, *rates, thrust=0.0, mask=128):
         self.send(
@@ -61,7 +61,7 @@ class Rig:
 
 
 def test_heartbeat_is_a_px4_quadrotor_at_1_hz():
-    beats = Rig().heard("HEARTBEAT", 1000)
+    beats = Rig().received("HEARTBEAT", 1000)
     assert len(beats) == 4
     assert beats[0].autopilot == mavlink2.MAV_AUTOPILOT_PX4
     assert beats[0].type == mavlink2.MAV_TYPE_QUADROTOR
@@ -72,13 +72,13 @@ def test_heartbeat_is_a_px4_quadrotor_at_1_hz():
 def test_message_intervals():
     rig = Rig()
     number = mavlink2.MAVLINK_MSG_ID_ATTITUDE_QUATERNION
-    assert len(rig.heard("ATTITUDE_QUATERNION", 250)) == 50
+    assert len(rig.received("ATTITUDE_QUATERNION", 250)) == 50
     assert rig.command(MavCmd.SET_MESSAGE_INTERVAL, number, 4000.0) == MavResult.ACCEPTED
-    assert len(rig.heard("ATTITUDE_QUATERNION", 250)) == 250
+    assert len(rig.received("ATTITUDE_QUATERNION", 250)) == 250
     assert rig.command(MavCmd.SET_MESSAGE_INTERVAL, number, -1.0) == MavResult.ACCEPTED
-    assert rig.heard("ATTITUDE_QUATERNION", 250) == []
+    assert rig.received("ATTITUDE_QUATERNION", 250) == []
     assert rig.command(MavCmd.SET_MESSAGE_INTERVAL, number, 0.0) == MavResult.ACCEPTED
-    assert len(rig.heard("ATTITUDE_QUATERNION", 250)) == 50
+    assert len(rig.received("ATTITUDE_QUATERNION", 250)) == 50
     for bad in ((9999.0, 1000.0), (math.nan, 1000.0), (float(number), math.nan)):
         assert rig.command(MavCmd.SET_MESSAGE_INTERVAL, *bad) == MavResult.DENIED
 
@@ -99,27 +99,27 @@ def test_request_message():
 def test_parameters_read_list_set():
     rig = Rig()
     rig.send(mavlink2.MAVLink_param_request_read_message(1, 1, b"MC_ROLLRATE_P", -1))
-    (value,) = rig.heard("PARAM_VALUE")
+    (value,) = rig.received("PARAM_VALUE")
     assert clean_text(value.param_id) == "MC_ROLLRATE_P"
     assert value.param_value == pytest.approx(0.15)
     rig.send(mavlink2.MAVLink_param_request_list_message(1, 1))
-    listed = rig.heard("PARAM_VALUE", 50)
+    listed = rig.received("PARAM_VALUE", 50)
     assert len(listed) == listed[0].param_count == len(rig.autopilot.parameters.names)
     assert [v.param_index for v in listed] == list(range(len(listed)))
     rig.send(mavlink2.MAVLink_param_set_message(1, 1, b"MC_ROLLRATE_P", 0.2, 9))
-    assert rig.heard("PARAM_VALUE")[0].param_value == pytest.approx(0.2)
+    assert rig.received("PARAM_VALUE")[0].param_value == pytest.approx(0.2)
     rig.send(mavlink2.MAVLink_param_set_message(1, 1, b"MC_ROLLRATE_P", -3.0, 9))
     answer = rig.tick()
     assert [m.param_value for m in answer if m.get_type() == "PARAM_VALUE"] == [pytest.approx(0.2)]
     assert any("out of range" in clean_text(m.text) for m in answer if m.get_type() == "STATUSTEXT")
     rig.send(mavlink2.MAVLink_param_request_read_message(1, 1, b"NOT_THERE", -1))
-    assert rig.heard("PARAM_VALUE") == []
+    assert rig.received("PARAM_VALUE") == []
 
 
 def test_integer_parameters_travel_as_bytes():
     rig = Rig()
     rig.send(mavlink2.MAVLink_param_request_read_message(1, 1, b"MAV_SYS_ID", -1))
-    (value,) = rig.heard("PARAM_VALUE")
+    (value,) = rig.received("PARAM_VALUE")
     assert value.param_type == mavlink2.MAV_PARAM_TYPE_INT32
     assert struct.unpack("<i", struct.pack("<f", value.param_value))[0] == 1
 
@@ -128,7 +128,7 @@ def test_timesync_is_answered_in_sensor_time():
     rig = Rig()
     rig.tick(250)
     rig.send(mavlink2.MAVLink_timesync_message(0, 123456789))
-    answers = [m for m in rig.heard("TIMESYNC") if m.tc1]
+    answers = [m for m in rig.received("TIMESYNC") if m.tc1]
     assert [(m.tc1, m.ts1) for m in answers] == [(1_000_000_000, 123456789)]
 
 
@@ -162,7 +162,7 @@ def test_vision_reaches_the_estimate(odometry):
             1, 1, MavCmd.REQUEST_MESSAGE, 0, mavlink2.MAVLINK_MSG_ID_ODOMETRY, 0, 0, 0, 0, 0, 0
         )
     )
-    found = rig.heard("ODOMETRY")[0]
+    found = rig.received("ODOMETRY")[0]
     assert (found.x, found.y, found.z) == pytest.approx((2.0, 1.0, -3.0), abs=1e-3)
     ned_yaw = 2 * math.atan2(found.q[3], found.q[0])
     assert ned_yaw == pytest.approx(math.pi / 2 - yaw, abs=1e-3)
@@ -171,7 +171,9 @@ def test_vision_reaches_the_estimate(odometry):
 def test_setpoints_with_another_mask_or_not_finite_are_refused():
     rig = Rig()
     rig.setpoint(0.1, 0.2, 0.3, mask=0)
-    assert any("type_mask 0, allowed: 128" in clean_text(m.text) for m in rig.heard("STATUSTEXT"))
+    assert any(
+        "type_mask 0, allowed: 128" in clean_text(m.text) for m in rig.received("STATUSTEXT")
+    )
     assert np.all(rig.autopilot._setpoint == 0.0)
     rig.setpoint(math.nan, 0.0, 0.0, thrust=0.5)
     assert np.all(rig.autopilot._setpoint == 0.0)

@@ -87,8 +87,8 @@ def results(*running: subprocess.Popen) -> list[tuple[float, int]]:
     for one in running:
         one.stdin.write("\n")
         one.stdin.flush()
-    said = [one.communicate(timeout=120.0)[0].split() for one in running]
-    return [(float(total), int(hits)) for total, hits in said]
+    message = [one.communicate(timeout=120.0)[0].split() for one in running]
+    return [(float(total), int(hits)) for total, hits in message]
 
 
 def result(running: subprocess.Popen) -> tuple[float, int]:
@@ -128,7 +128,7 @@ def test_a_process_killed_while_it_wrote_leaves_nothing_that_is_loaded(tmp_path)
     assert result(begin(tmp_path)) == (15.0, 0)
 
 
-def test_records_of_two_layouts_compiled_apart_are_told_apart(tmp_path):
+def test_records_of_two_layouts_compiled_apart_are_distinguished(tmp_path):
     """As the nodes compile the laws, each its own, and the direct engine loads them all."""
     (tmp_path / "record.py").write_text(RECORD)
 
@@ -146,8 +146,8 @@ def test_records_of_two_layouts_compiled_apart_are_told_apart(tmp_path):
 
 
 def test_what_is_compiled_is_known_until_an_edit(tmp_path):
-    told = "from caller import total; print(total._cache.filled)"
-    code = f"import sys; sys.path.insert(0, {str(tmp_path)!r}); {told}"
+    reported = "from caller import total; print(total._cache.filled)"
+    code = f"import sys; sys.path.insert(0, {str(tmp_path)!r}); {reported}"
 
     def filled() -> str:
         return subprocess.run(

@@ -1,4 +1,4 @@
-"""One control tick: the order of its stages, ticks without samples, gaps, and who tells whom."""
+"""One control tick: order of its stages, ticks without samples, gaps, reports between stages."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ LOW = np.array([0.0, 0.0, 0.2])
 
 
 class Port:
-    """An autopilot that does at once what it is asked for, and keeps what it was sent."""
+    """An autopilot that applies each command at once and stores the setpoints."""
 
     def __init__(self, sequence):
         self.sequence = sequence

@@ -127,7 +127,7 @@ def test_on_the_ground_the_arm_works_and_the_attitude_does_not():
     np.testing.assert_array_equal(arm.errors[:, :6], 0.0)
 
 
-def test_the_law_is_told_that_the_last_tick_saturated():
+def test_the_law_is_reported_that_the_last_tick_saturated():
     controller, (state, reference, desired) = (
         torque(ArmController, 2, gamma=1.0, torque_max=[1.0, 1.0], freeze_when_saturated=True),
         vehicle(),

@@ -89,19 +89,19 @@ def test_a_child_that_hangs_is_ended_in_time(tmp_path):
     path = os.pathsep.join([str(tmp_path), *sys.path])
     begun = time.monotonic()
     with CheckProcess("hangs", environment={"PYTHONPATH": path}) as child:
-        said = child.wait(3.0)
-    assert said.problem.startswith(TOO_LATE) and time.monotonic() - begun < 30.0
-    if "pid" in said.facts:
+        message = child.wait(3.0)
+    assert message.problem.startswith(TOO_LATE) and time.monotonic() - begun < 30.0
+    if "pid" in message.facts:
         with pytest.raises(ProcessLookupError):
-            os.kill(said.facts["pid"], 0)
+            os.kill(message.facts["pid"], 0)
 
 
 def test_a_child_says_facts_and_why_it_failed(tmp_path):
     (tmp_path / "fails.py").write_text("print('{\"a\": 1}')\nraise SystemExit('no libEGL')\n")
     path = os.pathsep.join([str(tmp_path), *sys.path])
     with CheckProcess("fails", environment={"PYTHONPATH": path}) as child:
-        said = child.wait(60.0)
-    assert said.facts == {"a": 1} and said.problem == "no libEGL"
+        message = child.wait(60.0)
+    assert message.facts == {"a": 1} and message.problem == "no libEGL"
 
 
 def test_an_interrupt_is_one_line(tmp_path):

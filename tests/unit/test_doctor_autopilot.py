@@ -102,7 +102,7 @@ def test_another_autopilot_is_a_warning(stand_in):
     assert found.verdict is WARN and "ardupilotmega" in found.found
 
 
-def test_silence_other_messages_and_noise_are_told_apart(stand_in):
+def test_silence_other_messages_and_noise_are_distinguished(stand_in):
     found = autopilot.link(stand_in(lambda _: []).url, 0.3)
     assert found.verdict is FAIL and "nothing within 0.3 s" in found.found
     text = mavlink2.MAVLink_statustext_message(6, b"camera")

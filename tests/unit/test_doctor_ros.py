@@ -43,10 +43,10 @@ def test_without_any_of_them_there_is_one_finding():
 def test_two_processes_really_meet():
     rclpy = pytest.importorskip("rclpy")
     with Reservation() as reservation:
-        said = ros.measure(reservation.ports.domain)
-        found = ros.round_trip(said, reservation.ports.domain)
+        message = ros.measure(reservation.ports.domain)
+        found = ros.round_trip(message, reservation.ports.domain)
     assert found.verdict is not FAIL, found
-    assert said.facts["file"] == rclpy.__file__ and said.facts["median_s"] > 0.0
+    assert message.facts["file"] == rclpy.__file__ and message.facts["median_s"] > 0.0
     assert f"domain {reservation.ports.domain}" in found.found
 
 
@@ -72,12 +72,12 @@ def test_messages_that_do_not_come_fail():
 def test_which_installation_it_is(tmp_path, surroundings, rmw, verdict, word):
     site = tmp_path / "site-packages"
     (site / "ros_jazzy_rclpy-7.1.6.dist-info").mkdir(parents=True)
-    said = Said({"file": "x", "rmw": rmw})
-    found = ros.installation(site / "rclpy" / "__init__.py", said, surroundings)
+    message = Said({"file": "x", "rmw": rmw})
+    found = ros.installation(site / "rclpy" / "__init__.py", message, surroundings)
     assert found.verdict is verdict and word in found.found
 
 
-def test_apt_and_workspaces_are_told_apart(tmp_path):
+def test_apt_and_workspaces_are_distinguished(tmp_path):
     from pathlib import Path
 
     apt = Path("/opt/ros/jazzy/lib/python3.12/site-packages/rclpy/__init__.py")
@@ -85,12 +85,12 @@ def test_apt_and_workspaces_are_told_apart(tmp_path):
     assert ros.kind_of(tmp_path / "rclpy" / "__init__.py") == "a workspace"
 
 
-def test_small_receive_buffers_are_told_with_the_remedy(tmp_path):
+def test_small_receive_buffers_are_reported_with_the_remedy(tmp_path):
     limit = tmp_path / "rmem_max"
     assert ros.room(limit).verdict is OK, "no such file: not Linux"
     limit.write_text("212992\n")
     assert ros.room(limit).verdict is WARN and "rmem_max=4194304" in ros.room(limit).advice
     limit.write_text("4194304\n")
     assert ros.room(limit).verdict is OK
-    asked = configuration.path("dds/fastdds.xml").read_text()
-    assert f"<receiveBufferSize>{ros.ROOM}</receiveBufferSize>" in asked
+    requested = configuration.path("dds/fastdds.xml").read_text()
+    assert f"<receiveBufferSize>{ros.ROOM}</receiveBufferSize>" in requested

@@ -38,10 +38,10 @@ def test_an_event_is_read_back_from_its_message_and_a_log():
     first = FaultEvent("motor_loss", "plant", 0, True, {"motor": 2.0, "remaining": 0.7})
     other = FaultEvent("mavlink_cut", "MAVLink", 0, True, {"direction": "both"})
     over = FaultEvent("motor_loss", "plant", 0, False, {"motor": 2.0, "remaining": 0.7})
-    told = [(3_000_000_000, other), (2_000_000_000, first), (5_500_000_000, over)]
-    for stamp, event in told:
+    reported = [(3_000_000_000, other), (2_000_000_000, first), (5_500_000_000, over)]
+    for stamp, event in reported:
         assert FaultEvent.from_message(event.to_message(stamp)) == (stamp, event)
-    logged = [serialize_message(event.to_message(stamp)) for stamp, event in told]
+    logged = [serialize_message(event.to_message(stamp)) for stamp, event in reported]
     assert fault_log.records(logged, 1_000_000_000) == [
         record(1.0, 4.5, motor=2.0, remaining=0.7),
         record(2.0, None, "mavlink_cut", direction="both"),
@@ -134,7 +134,7 @@ def test_the_matrix_of_the_configuration_has_every_fault_and_moment():
 
 
 @pytest.mark.parametrize(
-    ("text", "said"),
+    ("text", "message"),
     [
         ("scenario: hover", "a mapping of scenario, moments, faults expected"),
         ("{scenario: hover, moments: {a: 3}, faults: []}", "moments: names with"),
@@ -154,15 +154,15 @@ def test_the_matrix_of_the_configuration_has_every_fault_and_moment():
         ),
     ],
 )
-def test_a_bad_matrix_is_refused_in_one_line(tmp_path, text, said):
+def test_a_bad_matrix_is_refused_in_one_line(tmp_path, text, message):
     file = tmp_path / "mine.yaml"
     file.write_text(text)
-    with pytest.raises(FaultError, match=f"mine.yaml: .*{said}"):
+    with pytest.raises(FaultError, match=f"mine.yaml: .*{message}"):
         fault_matrix.read(file, "direct")
 
 
 @pytest.mark.parametrize(
-    ("options", "said"),
+    ("options", "message"),
     [
         (["--only", "wind"], "unknown fault 'wind'; there are: mocap_dropout"),
         (["--moment", "tea"], "unknown moment 'tea'; there are: take-off"),
@@ -174,7 +174,7 @@ def test_a_bad_matrix_is_refused_in_one_line(tmp_path, text, said):
         (["--repeat", "0"], "--repeat: '0' is not a number of 1 or more"),
     ],
 )
-def test_wrong_use_is_one_line(capsys, monkeypatch, tmp_path, options, said):
+def test_wrong_use_is_one_line(capsys, monkeypatch, tmp_path, options, message):
     monkeypatch.chdir(tmp_path)
     try:
         status = main(["faults", *options])
@@ -182,7 +182,7 @@ def test_wrong_use_is_one_line(capsys, monkeypatch, tmp_path, options, said):
         status = stop.code
     assert status == 2
     out, err = capsys.readouterr()
-    assert said in err and err.count("\n") == 1 and not out
+    assert message in err and err.count("\n") == 1 and not out
     assert not any(tmp_path.iterdir())
 
 
@@ -202,7 +202,7 @@ def test_what_is_promised_of_a_row_is_read_and_judged(tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("promise", "said"),
+    ("promise", "message"),
     [
         ("landed", "{outcome: ..., within: seconds} expected"),
         ("{outcome: [[held]]}", "unknown outcome '['held']'; there are: completed"),
@@ -211,13 +211,13 @@ def test_what_is_promised_of_a_row_is_read_and_judged(tmp_path):
         ("{outcome: held, by: 3}", "{outcome: ..., within: seconds} expected"),
     ],
 )
-def test_a_bad_promise_is_refused_in_one_line(tmp_path, promise, said):
+def test_a_bad_promise_is_refused_in_one_line(tmp_path, promise, message):
     file = tmp_path / "mine.yaml"
     file.write_text(
         "{scenario: hover, moments: {a: {at: 3}}, "
         f"faults: [{{fault: servo_jam, promise: {promise}}}]}}"
     )
-    with pytest.raises(FaultError, match=f"mine.yaml: promise: .*{re.escape(said)}"):
+    with pytest.raises(FaultError, match=f"mine.yaml: promise: .*{re.escape(message)}"):
         fault_matrix.read(file, "direct")
 
 

@@ -50,7 +50,7 @@ def test_the_thrust_factor_holds_between_its_messages():
 SECOND = 1_000_000_000
 
 
-def told(*entries):
+def statuses_of(*entries):
     """(stamp [s], MissionStatus) from (stamp, phase, state, cause, abort_reason)."""
     return [
         (round(at * SECOND), MissionStatus(phase, state=state, cause=cause, abort_reason=reason))
@@ -66,19 +66,35 @@ def phases(statuses, seconds, flying):
 
 
 def test_phases_are_the_scenarios_unless_the_mission_left_it():
-    planned = told((9, "waiting", "grounded", "", ""), (10, "take-off", "taking off", "armed", ""),
-                   (24, "landed", "disarmed", "touchdown", ""))  # fmt: skip
+    planned = statuses_of(
+        (9, "waiting", "grounded", "", ""),
+        (10, "take-off", "taking off", "armed", ""),
+        (24, "landed", "disarmed", "touchdown", ""),
+    )
     seconds, flying = [9, 10, 14, 20, 25], [False, True, True, True, False]
     expected = ["waiting", "take-off", "hover", "land", "landed"]
     assert phases(planned, seconds, flying) == expected
-    held = told((9, "waiting", "grounded", "", ""), (10, "take-off", "taking off", "armed", ""),
-                (13, "hover", "flying", "airborne", ""), (15, "hold", "holding", "asked", ""),
-                (19.5, "land", "landing", "battery", "battery"),
-                (24, "landed", "disarmed", "touchdown", "battery"))  # fmt: skip
+    held = statuses_of(
+        (9, "waiting", "grounded", "", ""),
+        (10, "take-off", "taking off", "armed", ""),
+        (13, "hover", "flying", "airborne", ""),
+        (15, "hold", "holding", "requested", ""),
+        (19.5, "land", "landing", "battery", "battery"),
+        (24, "landed", "disarmed", "touchdown", "battery"),
+    )
     assert phases(held, [9, 10, 14, 16, 20, 25], [False, *[True] * 4, False]) == [
-        "waiting", "take-off", "hover", "hold", "land", "landed"]  # fmt: skip
-    lost = told((9, "waiting", "grounded", "", ""), (10, "take-off", "taking off", "armed", ""),
-                (15, "aborted", "failsafe", "tilt", "tilt"))  # fmt: skip
+        "waiting",
+        "take-off",
+        "hover",
+        "hold",
+        "land",
+        "landed",
+    ]
+    lost = statuses_of(
+        (9, "waiting", "grounded", "", ""),
+        (10, "take-off", "taking off", "armed", ""),
+        (15, "aborted", "failsafe", "tilt", "tilt"),
+    )
     assert phases(lost, [14, 16], [True, False]) == ["hover", "aborted"]
 
 
@@ -89,10 +105,13 @@ def test_a_vehicle_whose_mission_fell_silent_is_in_the_table_to_its_end():
     assert log_reader._last_of_all(2_000_000_000, truth[:0]) == 2_000_000_000
 
 
-def test_transitions_are_told_with_mission_time_and_cause():
-    statuses = told((9, "waiting", "grounded", "", ""), (10, "take-off", "taking off", "armed", ""),
-                    (10.5, "take-off", "taking off", "armed", ""),
-                    (12.25, "hold", "holding", "tilt", ""))  # fmt: skip
+def test_transitions_are_reported_with_mission_time_and_cause():
+    statuses = statuses_of(
+        (9, "waiting", "grounded", "", ""),
+        (10, "take-off", "taking off", "armed", ""),
+        (10.5, "take-off", "taking off", "armed", ""),
+        (12.25, "hold", "holding", "tilt", ""),
+    )
     assert log_reader.transitions(statuses, 10 * SECOND) == [
         {"time_s": 0.0, "from": "grounded", "to": "taking off", "cause": "armed"},
         {"time_s": 2.25, "from": "taking off", "to": "holding", "cause": "tilt"},

@@ -60,8 +60,8 @@ def test_the_public_reader_decodes_what_was_written(tmp_path):
         assert [message.log_time for _, _, message in times] == [3 * SECOND, 4 * SECOND]
     for k, (kind, channel, message, content) in enumerate(decoded):
         assert (kind.name, kind.encoding, channel.topic) == (TRAJECTORY, "ros2msg", "/uam/state")
-        told = (message.log_time, message.publish_time, message.sequence)
-        assert told == (k * SECOND, k * SECOND + 7, k)
+        reported = (message.log_time, message.publish_time, message.sequence)
+        assert reported == (k * SECOND, k * SECOND + 7, k)
         assert content.header.stamp.sec == k and content.header.frame_id == "world"
         assert list(content.joint_names) == ["x", "y"]
         assert list(content.points[0].positions) == [0.1 * k, 2.0]

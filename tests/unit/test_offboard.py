@@ -23,12 +23,12 @@ COMMANDS = {
 
 def run(sequence, seconds, start, connected=True, armed=False, mode=Mode.HOLD):
     """Tick with constant answers; return the requests with their times."""
-    asked = []
+    requested = []
     for k in range(round(seconds / 0.004)):
         request = sequence.update(start + k * 0.004, connected, armed, mode)
         if request:
-            asked.append((round(start + k * 0.004, 3), request))
-    return asked
+            requested.append((round(start + k * 0.004, 3), request))
+    return requested
 
 
 def flying():
@@ -46,11 +46,11 @@ def test_order_and_times():
     s.set_desired(True)
     assert run(s, 1.0, 0.0, connected=False) == []
     assert s.phase is Phase.WAITING and not s.streaming
-    asked = run(s, 1.8, 1.0)
-    assert asked == [(2.0, Request.OFFBOARD), (2.5, Request.OFFBOARD)]
+    requested = run(s, 1.8, 1.0)
+    assert requested == [(2.0, Request.OFFBOARD), (2.5, Request.OFFBOARD)]
     assert s.streaming
-    asked = run(s, 0.1, 2.8, mode=Mode.OFFBOARD)
-    assert asked == [(2.8, Request.ARM)]
+    requested = run(s, 0.1, 2.8, mode=Mode.OFFBOARD)
+    assert requested == [(2.8, Request.ARM)]
     run(s, 0.1, 2.9, armed=True, mode=Mode.OFFBOARD)
     assert s.phase is Phase.FLYING and s.armed_stamp == pytest.approx(2.9)
 
@@ -68,11 +68,11 @@ def test_gives_up_with_the_reasons():
     s.answer(Request.OFFBOARD, MavResult.TEMPORARILY_REJECTED)
     s.text(Severity.CRITICAL, "no offboard signal")
     s.text(Severity.INFO, "chatter")
-    asked = run(s, 5.0, 1.1)
-    assert len(asked) == 2 and s.phase is Phase.FAILED
-    said = "; ".join(s.reasons)
-    assert "OFFBOARD refused (temporarily rejected)" in said
-    assert "no offboard signal" in said and "chatter" not in said
+    requested = run(s, 5.0, 1.1)
+    assert len(requested) == 2 and s.phase is Phase.FAILED
+    message = "; ".join(s.reasons)
+    assert "OFFBOARD refused (temporarily rejected)" in message
+    assert "no offboard signal" in message and "chatter" not in message
     assert "no success after 3 requests" in s.reasons[-1]
     s.set_desired(False)
     s.set_desired(True)
@@ -81,8 +81,8 @@ def test_gives_up_with_the_reasons():
 
 def test_lost_mode_is_asked_for_again_boundedly():
     s = flying()
-    asked = run(s, 1.2, 2.0, armed=True, mode=Mode.LAND)
-    assert [request for _, request in asked] == [Request.OFFBOARD] * 3
+    requested = run(s, 1.2, 2.0, armed=True, mode=Mode.LAND)
+    assert [request for _, request in requested] == [Request.OFFBOARD] * 3
     assert "left OFFBOARD for LAND" in s.reasons[-1]
     run(s, 0.1, 3.2, armed=True, mode=Mode.OFFBOARD)
     assert s.phase is Phase.FLYING
@@ -150,7 +150,7 @@ def test_with_the_stand_in():
     """Vision comes late: arming is refused in words, then succeeds; auto-disarm ends it."""
     autopilot, s = Autopilot(), OffboardSequence()
     s.set_desired(True)
-    heard = set()
+    received = set()
     for k in range(2500):
         t = k * 0.004
         if t > 3.0:
@@ -163,10 +163,10 @@ def test_with_the_stand_in():
             s.answer(request, autopilot.command(t, command, parameters))
         for severity, text in autopilot.commander.take_texts():
             s.text(severity, text)
-        heard.update(s.reasons)
+        received.update(s.reasons)
         autopilot.update(t, np.zeros(3), DOWN)
     assert s.phase is Phase.FLYING and 3.0 < s.armed_stamp < 4.0
-    assert any("vision" in reason for reason in heard)
+    assert any("vision" in reason for reason in received)
     assert s.reasons == ()
 
 

@@ -1,4 +1,4 @@
-"""Motors, servos, sensors, magnet and payload behave as their data sheets say."""
+"""Motors, servos, sensors, magnet and payload follow their data sheets."""
 
 from __future__ import annotations
 

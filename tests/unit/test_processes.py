@@ -149,7 +149,7 @@ def test_a_kill_from_outside_is_a_failure_that_names_the_signal(children):
         children.check()
 
 
-def test_the_end_of_an_optional_child_is_told_once_and_no_failure(children):
+def test_the_end_of_an_optional_child_is_reported_once_and_no_failure(children):
     children.start("scene", "sleeper", optional=True)
     children.start("other", "sleeper", optional=True)
     ready(children, "scene")

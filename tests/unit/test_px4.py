@@ -69,7 +69,7 @@ def test_px4_flies_with_the_stand_ins_rate_loop_and_mocap_alone():
 
 
 @pytest.mark.parametrize(
-    "text, said",
+    "text, message",
     [
         ("[1, 2]", "NAME: value"),
         ("mc_roll_p: 1.0", "no PX4 parameter name"),
@@ -79,10 +79,10 @@ def test_px4_flies_with_the_stand_ins_rate_loop_and_mocap_alone():
         ("A_NAME_THAT_IS_TOO_LONG: 1", "no PX4 parameter name"),
     ],
 )
-def test_bad_parameters_are_refused(text, said, tmp_path):
+def test_bad_parameters_are_refused(text, message, tmp_path):
     file = tmp_path / "mine.yaml"
     file.write_text(text)
-    with pytest.raises(Px4Error, match=said):
+    with pytest.raises(Px4Error, match=message):
         parameters.load(load_description(), [file])
 
 

@@ -34,10 +34,10 @@ ATTITUDE = np.array([[0.1, -0.2, 0.7], [0.0] * 3, [0.0] * 3])  # desired, in fli
 
 
 def in_flight(
-    said: list[str] | None = None, fresh: float = math.inf, setpoint: str = "rates"
+    message: list[str] | None = None, fresh: float = math.inf, setpoint: str = "rates"
 ) -> SetpointSource:
     """One that stood on the ground and hovers at 1 m; its last tick was at 1 s."""
-    notes = [] if said is None else said
+    notes = [] if message is None else message
     source = SetpointSource(
         RateThrustMap(),
         HoldParameters(),
@@ -82,11 +82,11 @@ def test_what_is_not_good_in_flight_is_a_level_hold_and_then_nothing(
 
 
 def test_it_says_why():
-    said = []
-    source = in_flight(said)
+    message = []
+    source = in_flight(message)
     source.commanded(1.004, state_at(1.0), True, WEIGHT * math.nan, REST, ATTITUDE, FLYING)
     source.without(9.0, FLYING)
-    assert said == [
+    assert message == [
         "setpoint refused: tau_p.x is not finite",
         "no usable commands in flight: holding level",
         "no usable commands in flight: stream stopped, the failsafe acts",
@@ -130,9 +130,9 @@ def ticks(draw):
 )
 def test_whatever_comes_setpoints_are_finite_and_within_their_limits(sequence, step, kind):
     source, limit = in_flight(setpoint=kind), np.array(RateThrustParameters.rate_limit)
-    for k, (told, state, commands, situation) in enumerate(sequence):
+    for k, (reported, state, commands, situation) in enumerate(sequence):
         now = 1.0 + step * (k + 1)
-        if told:
+        if reported:
             source.note_state(now, state)
             setpoint = source.commanded(now, state, *commands, ATTITUDE, situation)
         else:
@@ -158,11 +158,11 @@ def test_attitude_setpoints_are_the_position_laws_attitude_with_the_same_thrust(
 
 
 def test_an_attitude_that_is_not_finite_is_refused_where_it_is_sent():
-    said = []
-    source = in_flight(said, setpoint="attitude")
+    message = []
+    source = in_flight(message, setpoint="attitude")
     bad = ATTITUDE * math.nan
     held = source.commanded(1.004, state_at(1.0), True, WEIGHT, REST, bad, FLYING)
-    assert said[0] == "setpoint refused: not finite" and source.holding
+    assert message[0] == "setpoint refused: not finite" and source.holding
     assert desired(held) == pytest.approx([0.0, 0.0, 0.7], abs=1e-12)
     assert (
         not in_flight().commanded(1.004, state_at(1.0), True, WEIGHT, REST, bad, FLYING).refused()

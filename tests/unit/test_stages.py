@@ -126,7 +126,7 @@ def test_what_the_joined_autopilot_does_is_known_a_tick_later():
     assert rig.sequence.phase is Phase.FLYING
 
 
-def test_heartbeats_that_are_lost_are_missed_after_3_s_and_a_change_is_told_by_the_next():
+def test_heartbeats_that_are_lost_are_missed_after_3_s_and_a_change_is_reported_by_the_next():
     rig = Joined()
     rig.run(2.0)
     assert rig.port.connected(2.0) and rig.port.armed

@@ -1,4 +1,4 @@
-"""The thrust factor: it converges, keeps to its bounds, and is held where nothing can be told."""
+"""The thrust factor: it converges, keeps to its bounds, and is held without information."""
 
 import math
 from dataclasses import replace

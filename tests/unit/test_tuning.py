@@ -140,5 +140,5 @@ def test_a_search_finds_goes_on_and_leaves_a_profile_that_loads(tmp_path, capsys
 def test_wrong_use_is_one_line(tmp_path, capsys, monkeypatch, arguments, complaint):
     monkeypatch.chdir(tmp_path)
     assert main(["tune", *arguments]) == 2
-    said = capsys.readouterr().err
-    assert said.startswith("uam tune: ") and complaint in said and said.count("\n") == 1
+    message = capsys.readouterr().err
+    assert message.startswith("uam tune: ") and complaint in message and message.count("\n") == 1

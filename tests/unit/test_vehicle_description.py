@@ -71,7 +71,7 @@ def test_what_the_model_is_made_of():
 
 
 @pytest.mark.parametrize(
-    ("change", "said"),
+    ("change", "message"),
     [
         ((("model",), "none.xml"), "none.xml does not exist"),
         ((("mass",), -1.0), "s500_arm.yaml: mass: -1 is not above 0"),
@@ -90,10 +90,10 @@ def test_what_the_model_is_made_of():
         ((("joints",), 2), "joints: a list of mappings expected, got 2"),
     ],
 )
-def test_what_cannot_be_a_vehicle_is_refused_in_one_line(change, said):
+def test_what_cannot_be_a_vehicle_is_refused_in_one_line(change, message):
     with pytest.raises(VehicleError) as error:
         describe(changed(change), S500.file)
-    assert said in str(error.value) and "\n" not in str(error.value)
+    assert message in str(error.value) and "\n" not in str(error.value)
 
 
 @pytest.mark.parametrize("key", ["model", "mass", "rotors", "joints", "servos", "autopilot"])
@@ -105,7 +105,7 @@ def test_what_is_missing_is_named(key):
 
 
 @pytest.mark.parametrize(
-    ("change", "said"),
+    ("change", "message"),
     [
         ((("mass",), 2.3), "the bodies weigh 2.2 kg in all, s500_arm.yaml has mass: 2.3"),
         ((("control_period",), 0.005), "timestep 0.002 s does not divide control_period"),
@@ -117,12 +117,12 @@ def test_what_is_missing_is_named(key):
         ((("joints",), S500.numbers["joints"][::-1]), "each joint must follow the one before it"),
     ],
 )
-def test_what_contradicts_the_mjcf_is_refused_in_one_line(change, said):
+def test_what_contradicts_the_mjcf_is_refused_in_one_line(change, message):
 
     described = describe(changed(change), S500.file)
     with pytest.raises(VehicleError) as error:
         MujocoPlant(Vehicle.of(described), 0.0, 1)
-    assert said in str(error.value) and "\n" not in str(error.value)
+    assert message in str(error.value) and "\n" not in str(error.value)
 
 
 def test_a_range_of_the_mjcf_may_repeat_but_not_contradict(tmp_path):
@@ -179,7 +179,7 @@ def test_the_allocation_of_a_hexacopter():
 
 
 @pytest.mark.parametrize(
-    ("name", "fault", "said"),
+    ("name", "fault", "message"),
     [
         (S500.name, "motor_loss@1:motor=5", "motor_loss: motor 5: the vehicle has 4"),
         (S500.name, "servo_jam@1:joint=3", "servo_jam: joint 3: the vehicle has 2"),
@@ -187,11 +187,11 @@ def test_the_allocation_of_a_hexacopter():
         ("s500_arm3", "encoder_stuck@1:joint=3", ""),
     ],
 )
-def test_faults_count_the_parts_of_the_vehicle(name, fault, said):
+def test_faults_count_the_parts_of_the_vehicle(name, fault, message):
     described = load_description(name)
     schedule = read_schedule([fault], load_scenario("hover", described), 1)
-    if not said:
+    if not message:
         limits.check(schedule, "direct", vehicle=described)
         return
-    with pytest.raises(FaultError, match=said):
+    with pytest.raises(FaultError, match=message):
         limits.check(schedule, "direct", vehicle=described)

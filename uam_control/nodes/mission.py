@@ -57,7 +57,7 @@ class MissionNode(UamNode):
         warm_up(spare, self.parameter_set.current.takeoff_delay)
         self.parameter_set.apply = self._mission.configure
         self._arm: bool | None = None
-        self._told: tuple = ()  # content of the last status
+        self._published: tuple = ()  # content of the last status
         self._errors = (0.0, 0.0, 0.0)
         self._due = 0  # stamp [ns] of the next status
         self._states = Backlog()
@@ -93,7 +93,9 @@ class MissionNode(UamNode):
             self._publish_reference()
         output = stage.output
         self._measure(state, output)
-        self._tell(stamp)  # before the magnet, so that the status of a tick arrives before it
+        self._publish_status(
+            stamp
+        )  # before the magnet, so that the status of a tick arrives before it
         self._magnet.publish(SWITCH[bool(output.magnet)])
         stage.advance(stamp, state)
         self._publish_reference()
@@ -117,18 +119,18 @@ class MissionNode(UamNode):
         norms = [float(np.linalg.norm(error[part])) for part in (POSITION, ATTITUDE, ARM)]
         self._errors = tuple(norms) if output.flying else (0.0, 0.0, norms[2])
 
-    def _tell(self, stamp: int) -> None:
+    def _publish_status(self, stamp: int) -> None:
         """Publish arming when it changes, and the status when it changes and twice a second."""
         output = self._mission.output
         if output.arm != self._arm:
             self._arm = output.arm
             self._arming.publish(Bool(data=bool(output.arm)))
         now = (output.phase, output.done, output.state, output.cause, bool(output.magnet))
-        if now == self._told and stamp < self._due:
+        if now == self._published and stamp < self._due:
             return
-        if now[:4] != self._told[:4]:
+        if now[:4] != self._published[:4]:
             self._log()
-        self._told, self._due = now, stamp + STATUS_PERIOD
+        self._published, self._due = now, stamp + STATUS_PERIOD
         self._status.publish(self.status.to_message(stamp))
 
     @property

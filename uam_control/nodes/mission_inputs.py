@@ -53,7 +53,7 @@ class MissionInputs:
                 read(message)
             except BadMessage as error:
                 self._node.refused += 1
-                self._node.say(f"{name}: refused: {error}", key=name)
+                self._node.warn(f"{name}: refused: {error}", key=name)
 
         def handle(message: Any) -> None:
             self._supervisor.keep(name, guarded, (message,), answers(message))

@@ -55,7 +55,9 @@ class StateEstimatorNode(UamNode):
         begun = time.perf_counter()
         stamp, gyro, force = read_imu(data)
         if stamp <= self._stage.stamp:
-            self.say(f"IMU stamp {stamp} ns does not follow {self._stage.stamp} ns; ignored", "imu")
+            self.warn(
+                f"IMU stamp {stamp} ns does not follow {self._stage.stamp} ns; ignored", "imu"
+            )
             return
         self.take_waiting(self._mocap)
         self.take_waiting(self._joints)

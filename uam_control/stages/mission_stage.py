@@ -13,7 +13,7 @@ from uam_control.stages.timing import Timing
 from uam_control.stamps import SECOND
 from uam_control.supervision import Readings, State
 
-TOLD_BY = 200_000_000  # [ns] after which the status of a tick has arrived at every stage
+REPORT_DELAY = 200_000_000  # [ns] after which the status of a tick has arrived at every stage
 
 
 class MissionStage:
@@ -31,9 +31,9 @@ class MissionStage:
         self.flying = False
         self.ahead = -1
         self._armed_since: float | None = None
-        self._told: deque[tuple[int, bool, int | None, float]] = deque()
+        self._reports: deque[tuple[int, bool, int | None, float]] = deque()
         self._readings = Readings()
-        self._flown = -TOLD_BY  # [ns] newest reference that the mission has flown
+        self._flown = -REPORT_DELAY  # [ns] newest reference that the mission has flown
 
     def autopilot(
         self, stamp: int, connected: bool, armed_since: int | None, round_trip: float | None
@@ -44,18 +44,18 @@ class MissionStage:
         not armed; round_trip [s]: response time of the autopilot, None if not measured.
         """
         trip = math.nan if round_trip is None else round_trip
-        self._told.append((stamp, connected, armed_since, trip))
+        self._reports.append((stamp, connected, armed_since, trip))
 
     def begin(self, stamp: int, state: np.ndarray) -> bool:
         """Start the tick `stamp` [ns] with its state (3, 6 + n), see `coordinates`.
 
         Returns whether the reference of this tick was computed now: at the first tick, after a gap.
         """
-        while self._told and self._told[0][0] < stamp:
-            told, connected, since, round_trip = self._told.popleft()
+        while self._reports and self._reports[0][0] < stamp:
+            reported, connected, since, round_trip = self._reports.popleft()
             self._armed_since = None if since is None else since / SECOND
             if connected:
-                self.inputs.inputs.autopilot(told / SECOND, round_trip)
+                self.inputs.inputs.autopilot(reported / SECOND, round_trip)
         self._readings = self.inputs.tick(stamp)
         if stamp == self.ahead:
             return False
@@ -73,5 +73,5 @@ class MissionStage:
             self._flown = ahead
         # In a failsafe the bridge ignores commands. Idle commands mean that the vehicle is on the
         # ground. If they arrived before the status, they would switch off the motors at low height.
-        failing = output.state is State.FAILSAFE and ahead - self._flown < TOLD_BY
+        failing = output.state is State.FAILSAFE and ahead - self._flown < REPORT_DELAY
         self.flying = output.flying or failing

@@ -14,7 +14,7 @@ import numpy as np
 from uam_control.stamps import SECOND
 from uam_control.supervision import Inputs, Readings
 
-LOOK_PERIOD = 20_000_000  # [ns] of stamps between two readings
+READ_PERIOD = 20_000_000  # [ns] of stamps between two readings
 
 
 class SupervisorInputs:
@@ -25,7 +25,7 @@ class SupervisorInputs:
         self.inputs = Inputs(control_period)
         self.readings = Readings()
         self._kept: dict[str, tuple[Callable[..., None], tuple, int]] = {}
-        self._looked = -LOOK_PERIOD
+        self._read_at = -READ_PERIOD
 
     def keep(self, name: str, read: Callable[..., None], message: tuple, answers: int = -1) -> None:
         """Keep the newest message of `name`; the next reading calls read(*message).
@@ -47,8 +47,8 @@ class SupervisorInputs:
 
     def tick(self, stamp: int) -> Readings:
         """Return the readings at the tick `stamp` [ns]; the next call reuses the object."""
-        if stamp - self._looked >= LOOK_PERIOD or stamp < self._looked:
-            self._looked = stamp
+        if stamp - self._read_at >= READ_PERIOD or stamp < self._read_at:
+            self._read_at = stamp
             kept, self._kept = self._kept, {}
             for name, (read, message, answers) in kept.items():
                 if answers >= stamp:

@@ -94,7 +94,7 @@ ATTITUDE_ADAPTATION = Topic("/uam/attitude/adaptation", JointState, RELIABLE, "a
 ARM_ADAPTATION = Topic("/uam/arm/adaptation", JointState, RELIABLE, "as for position")
 
 # States of mission and autopilot
-ARMING = Topic("/uam/arming", Bool, LATCHED, "desired: autopilot armed and in OFFBOARD")
+ARMING = Topic("/uam/arming", Bool, LATCHED, "desired: armed and in OFFBOARD; Bool: no stamp")
 AUTOPILOT_STATE = Topic(
     "/uam/autopilot/state",
     DiagnosticArray,

@@ -89,7 +89,7 @@ class UamNode(TunableNode):
                 handle(message)
             except BadMessage as error:
                 self.refused += 1
-                self.say(f"{name}: refused: {error}", key=name)
+                self.warn(f"{name}: refused: {error}", key=name)
                 return
             counts[name] += 1
             arrivals[name] = time.monotonic()
@@ -124,7 +124,7 @@ class UamNode(TunableNode):
         for join in self.joins:
             join.settle()
 
-    def say(self, text: str, key: str | None = None) -> None:
+    def warn(self, text: str, key: str | None = None) -> None:
         """Log a warning, at most once per LOG_PERIOD for each `key` (default: the text)."""
         now = time.monotonic()
         if now - self._logged.get(key or text, -LOG_PERIOD) >= LOG_PERIOD:
