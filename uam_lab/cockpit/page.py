@@ -123,7 +123,7 @@ class Page:
         try:
             self._take(topic, message)
         except BadMessage as error:
-            self.warn(False, f"{topic.name}: {error}")
+            self.say(False, f"{topic.name}: {error}")
 
     def _take(self, topic: Topic, message: Any) -> None:
         health = self._health
@@ -154,7 +154,7 @@ class Page:
             return
         new = {name: values[1] for name, values in change.values.items()}
         for name, value in new.items():
-            self.warn(True, f"{change.node}: {name} = {value}")
+            self.say(True, f"{change.node}: {name} = {value}")
         if "adapt" in new:
             mark = self._health.frozen.discard if new["adapt"] else self._health.frozen.add
             mark(change.node)
