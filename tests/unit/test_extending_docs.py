@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 from uam_sim_bridge.faults import imu_faults
+from uam_sim_bridge.faults.fault import Occurrence
 from uam_sim_bridge.mavlink.offboard.setpoints.desired import Desired, level
 from uam_sim_bridge.plant import Samples
 
@@ -23,7 +24,7 @@ def test_the_fault_scales_the_gyroscope():
     fault = names["ImuScale"].from_mapping({"factor": 1.5, "unit": "companion"})
     imu = (0.0, np.array([0.1, -0.2, 0.3]), np.array([0.0, 0.0, 9.81]))
     samples = Samples(imu, None, None, imu)
-    fault.effect(np.random.default_rng(1)).sense(samples)
+    fault.sense(samples, Occurrence(np.random.default_rng(1)))
     assert samples.imu[1] == pytest.approx([0.15, -0.3, 0.45])
     assert samples.hil is imu and samples.imu[2] is imu[2]
 

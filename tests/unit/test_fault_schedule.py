@@ -23,7 +23,7 @@ from uam_sim_bridge.faults import (
     FaultError,
     Schedule,
     fault_catalogue,
-    limits,
+    feasibility,
     read_schedule,
 )
 from uam_sim_bridge.faults.schedule import KEYS, TimedFault, parse_spec
@@ -177,14 +177,14 @@ def test_faults_of_file_option_and_scenario_are_joined(tmp_path):
 def test_faults_that_the_direct_engine_refuses(text, why):
     found = read_schedule([text], SCENARIO, 1)
     with pytest.raises(FaultError, match=why):
-        limits.check(found, "direct")
-    limits.check(found, "ros")
+        feasibility.check(found, "direct")
+    feasibility.check(found, "ros")
 
 
 def test_a_process_that_is_not_started_cannot_be_killed():
     found = read_schedule(["node_stall@20+1:node=scene"], SCENARIO, 1)
     with pytest.raises(FaultError, match="node_stall: this flight does not start scene"):
-        limits.check(found, "ros", ("scene",))
+        feasibility.check(found, "ros", ("scene",))
 
 
 def test_a_fault_that_the_machine_does_not_allow_is_refused_with_the_reason(monkeypatch, tmp_path):
@@ -199,9 +199,9 @@ def test_a_fault_that_the_machine_does_not_allow_is_refused_with_the_reason(monk
         assert bool(why) == refused
         if refused:
             with pytest.raises(FaultError, match=f"not on this machine: .*scope is {there}"):
-                limits.check(found, "ros", (), {"discovery_loss": why})
+                feasibility.check(found, "ros", (), {"discovery_loss": why})
         else:
-            limits.check(found, "ros", (), {"discovery_loss": why})
+            feasibility.check(found, "ros", (), {"discovery_loss": why})
 
 
 @given(times, times, st.floats(0.0, 50.0))

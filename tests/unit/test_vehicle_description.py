@@ -14,7 +14,7 @@ from uam_control.settings.configuration import ConfigurationError
 from uam_control.vehicle import VehicleError, load_description
 from uam_control.vehicle.loading import describe
 from uam_sim_bridge.autopilot.params import Parameters
-from uam_sim_bridge.faults import FaultError, limits, read_schedule
+from uam_sim_bridge.faults import FaultError, feasibility, read_schedule
 from uam_sim_bridge.mavlink.offboard.rotor_geometry import normalised_mixer
 from uam_sim_bridge.plant import Vehicle
 from uam_sim_bridge.plant.mujoco_plant import MujocoPlant
@@ -191,7 +191,7 @@ def test_faults_count_the_parts_of_the_vehicle(name, fault, message):
     described = load_description(name)
     schedule = read_schedule([fault], load_scenario("hover", described), 1)
     if not message:
-        limits.check(schedule, "direct", vehicle=described)
+        feasibility.check(schedule, "direct", vehicle=described)
         return
     with pytest.raises(FaultError, match=message):
-        limits.check(schedule, "direct", vehicle=described)
+        feasibility.check(schedule, "direct", vehicle=described)

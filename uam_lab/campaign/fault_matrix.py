@@ -13,7 +13,7 @@ from uam_control.vehicle import VehicleDescription
 from uam_lab.campaign import promise
 from uam_lab.campaign.promise import Promise
 from uam_sim_bridge.faults import FAULTS, Fault, FaultError, Schedule
-from uam_sim_bridge.faults.limits import needs_nodes
+from uam_sim_bridge.faults.feasibility import needs_nodes
 from uam_sim_bridge.faults.schedule import beginnings, listed, timed
 
 NOMINAL = "no fault"

@@ -14,7 +14,7 @@ from uam_lab.cli.counting import Counting
 from uam_lab.flight.conclude import command_line
 from uam_lab.flight.settings import CLOCKS, ENGINES, check_clock, require_ros
 from uam_lab.results.result_folder import make_folder
-from uam_sim_bridge.faults import fault_catalogue, limits
+from uam_sim_bridge.faults import fault_catalogue, feasibility
 
 BROKEN = 1
 EXAMPLES = """\
@@ -77,7 +77,7 @@ def run(options: argparse.Namespace) -> int:
     mass = load_scenario(matrix.scenario, vehicle).payload_mass
     cells = matrix.cells(options.seed, options.repeat)
     for cell in cells:
-        limits.check(cell.schedule, options.engine, vehicle=vehicle)
+        feasibility.check(cell.schedule, options.engine, vehicle=vehicle)
     trials = [
         fault_trial.FaultTrial(
             cell,

@@ -13,7 +13,7 @@ from uam_control.profiles.profile import Profile, default_profile, load_profile
 from uam_control.settings import configuration
 from uam_control.vehicle import DEFAULT_VEHICLE, VehicleDescription, load_description
 from uam_lab.processes.node_environment import without_discovery
-from uam_sim_bridge.faults import Schedule, limits, read_schedule
+from uam_sim_bridge.faults import Schedule, feasibility, read_schedule
 from uam_sim_bridge.faults.faulty_plant import check_engine
 from uam_sim_bridge.faults.process_faults import DiscoveryLoss
 from uam_sim_bridge.mavlink.transport.transport import ALLOWED, LinkUrl, parse_url
@@ -151,7 +151,9 @@ def settings(
     left_out = tuple(dict.fromkeys(without if view else (*without, COCKPIT)))
     absent = (*left_out, "autopilot") if link is not None else left_out
     check_engine(injected, plant)
-    limits.check(injected, engine, absent, {DiscoveryLoss.NAME: without_discovery()}, described)
+    feasibility.check(
+        injected, engine, absent, {DiscoveryLoss.NAME: without_discovery()}, described
+    )
     return FlightSettings(
         scenario=loaded,
         profile=flown,

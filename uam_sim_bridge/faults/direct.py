@@ -1,22 +1,54 @@
-"""Fault injection in the direct engine."""
+"""Fault injection in the direct engine, which skips the messages that a fault of the link loses."""
 
 from __future__ import annotations
 
 from typing import Any
 
-from uam_sim_bridge.faults.direct_link import DirectLink
+import numpy as np
+
 from uam_sim_bridge.faults.fault import LINK
 from uam_sim_bridge.faults.faulty_plant import FaultyPlant
+from uam_sim_bridge.faults.link_faults import LinkFault, MavlinkCorruption, MavlinkCut
 from uam_sim_bridge.faults.schedule import Schedule
 from uam_sim_bridge.faults.timeline import Timeline
 from uam_sim_bridge.plant import Plant
+
+
+class DirectLink:
+    """Decides for each message whether it arrives.
+
+    It covers cuts, and corruption of messages to the autopilot; `feasibility.needs_nodes` lists the
+    faults that the direct engine refuses.
+    """
+
+    def __init__(self, schedule: Schedule) -> None:
+        """schedule: faults of the link only."""
+        self.timeline = Timeline(schedule)
+        self._noise = np.random.default_rng(np.random.SeedSequence(schedule.seed, spawn_key=(1,)))
+
+    def receives(self) -> bool:
+        """Return whether messages from the autopilot arrive."""
+        return not any(fault.inwards and isinstance(fault, MavlinkCut) for fault in self._active)
+
+    def passes(self) -> bool:
+        """Return whether the next message to the autopilot arrives uncorrupted."""
+        return not any(self._loses(fault) for fault in self._active)
+
+    def _loses(self, fault: LinkFault) -> bool:
+        if isinstance(fault, MavlinkCorruption):
+            return self._noise.random() < fault.share
+        return isinstance(fault, MavlinkCut)
+
+    @property
+    def _active(self) -> list[LinkFault]:
+        return [one.fault for one in self.timeline.all if one.active]
 
 
 class DirectFaults:
     """Creates the link with its faults and passes plant and link the mission time."""
 
     def __init__(self, schedule: Schedule, plant: Plant) -> None:
-        """schedule: checked by `limits.check`; plant: made with it."""
+        """schedule: checked by `feasibility.check`; plant: made with it."""
         self.link = DirectLink(schedule.only(LINK))
         self._timelines: list[Timeline] = [self.link.timeline]
         if isinstance(plant, FaultyPlant):

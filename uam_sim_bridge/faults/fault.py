@@ -1,14 +1,19 @@
-"""Base classes of faults: parameter sets with a name, a description and the place of action."""
+"""Base classes of faults: parameter sets with a name, a description and the place of action.
+
+A fault is a subclass of the base of its kind. Its fields are its parameters, its docstring is the
+description for the user, and its name is that of the class: `MotorLoss` is `motor_loss`.
+"""
 
 from __future__ import annotations
 
+import re
 from dataclasses import asdict, dataclass
-from typing import Any, ClassVar, Protocol
+from typing import Any, ClassVar, dataclass_transform
 
 import numpy as np
 
-from uam_control.settings.parameter_set import ParameterSet
-from uam_sim_bridge.plant import Samples
+from uam_control.settings.parameter_set import ParameterSet, choice, number
+from uam_sim_bridge.plant import Disturbance, Samples
 
 PLANT, LINK, PROCESS = "plant", "MAVLink", "process"
 
@@ -17,13 +22,19 @@ class FaultError(ValueError):
     """A fault that cannot be injected; the text is one line: what is wrong, what is allowed."""
 
 
-@dataclass(frozen=True)
+@dataclass_transform(frozen_default=True, field_specifiers=(number, choice))
 class Fault(ParameterSet):
-    """Base of all faults. NAME: for the user; ABOUT: its effect; PLACE: PLANT, LINK or PROCESS."""
+    """Base of all faults. NAME, ABOUT: for the user; PLACE: PLANT, LINK or PROCESS."""
 
-    NAME: ClassVar[str] = ""
-    ABOUT: ClassVar[str] = ""
+    NAME: ClassVar[str]
+    ABOUT: ClassVar[str]
     PLACE: ClassVar[str] = ""
+
+    def __init_subclass__(cls) -> None:
+        cls.NAME = re.sub(r"(?<=[a-z])(?=[A-Z])", "_", cls.__name__).lower()
+        about = " ".join((cls.__doc__ or "").split()).rstrip(".")
+        cls.ABOUT = about[:1].lower() + about[1:]
+        dataclass(frozen=True)(cls)
 
     @property
     def values(self) -> dict[str, Any]:
@@ -35,7 +46,7 @@ class Fault(ParameterSet):
 class PlantCommands:
     """Commands of a period: motors (n_rotors,) 0..1, effort (n_joints,) [N m], magnet on or off.
 
-    The arrays are copies; an effect may change them.
+    The arrays are copies; a fault may change them.
     """
 
     motors: np.ndarray
@@ -43,51 +54,31 @@ class PlantCommands:
     magnet: bool
 
 
-class Disturbable(Protocol):
-    """The plant as an effect changes it; each call applies to the next period only."""
+@dataclass
+class Occurrence:
+    """A fault of the plant between its begin and its end.
 
-    period: float  # [s]
-
-    def weaken_rotor(self, rotor: int, part: float) -> None:
-        """Scale the thrust of rotor `rotor`, counted from 0, by `part` [1]."""
-
-    def weaken_rotors(self, part: float) -> None:
-        """Scale the thrust of all rotors by `part` [1]."""
-
-    def brake_joint(self, joint: int, torque: float) -> None:
-        """Add dry friction `torque` [N m] to joint `joint`, counted from 0."""
-
-    def weaken_magnet(self, part: float) -> None:
-        """Scale the magnet's holding force by `part` [1]."""
-
-    def add_wind(self, wind: np.ndarray) -> None:
-        """Add wind (3,) [m/s, ENU]."""
-
-    def swing_payload(self, rate: float) -> None:
-        """Attach the payload by a hinge while the magnet is on; rate [rad/s]: initial rate."""
-
-
-class Effect:
-    """Effect of a plant fault at each tick between its begin and end.
-
-    The plant undoes the changes of `act` before the next tick. Effects therefore add up, and the
-    end of a fault needs no code.
+    noise: generator of this fault, seeded per flight; since [s]: time since the begin; memory: what
+    the fault keeps from tick to tick, None at the begin.
     """
 
-    def sense(self, samples: Samples) -> None:
-        """Change the samples of this tick. Replace the arrays, do not write into them."""
-
-    def act(self, plant: Disturbable, commands: PlantCommands) -> None:
-        """Change plant and commands for the next period."""
+    noise: np.random.Generator
+    since: float = 0.0
+    memory: Any = None
 
 
-@dataclass(frozen=True)
 class PlantFault(Fault):
-    """A fault of sensors, actuators, payload or wind. PHYSICS: it needs `Plant.disturb`."""
+    """A fault of sensors, actuators, payload or wind. PHYSICS: it needs `Plant.disturb`.
+
+    Samples, commands and disturbance are made anew at each tick. Faults therefore add up, and the
+    end of a fault needs no code.
+    """
 
     PLACE: ClassVar[str] = PLANT
     PHYSICS: ClassVar[bool] = False
 
-    def effect(self, noise: np.random.Generator) -> Effect:
-        """Return the effect that begins now; noise: generator of this fault, seeded per flight."""
-        raise NotImplementedError
+    def sense(self, samples: Samples, now: Occurrence) -> None:
+        """Change the samples of this tick. Replace the arrays, do not write into them."""
+
+    def act(self, commands: PlantCommands, physics: Disturbance, now: Occurrence) -> None:
+        """Change commands and physics of the next period."""

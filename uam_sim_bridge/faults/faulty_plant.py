@@ -9,7 +9,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from uam_sim_bridge.faults.fault import PLANT, Effect, FaultError, PlantCommands
+from uam_sim_bridge.faults.fault import PLANT, FaultError, Occurrence, PlantCommands, PlantFault
 from uam_sim_bridge.faults.schedule import Schedule
 from uam_sim_bridge.faults.timeline import FaultState, Timeline
 from uam_sim_bridge.plant import Disturbance, Plant, Samples, Truth, Vehicle
@@ -61,8 +61,7 @@ class FaultyPlant(Plant):
         self.inner = inner
         self.timeline = Timeline(schedule)
         self.changed: list[FaultState] = []  # faults that began or ended at this tick
-        self._effects: dict[int, Effect] = {}
-        self._disturbance = self._none()
+        self._active: dict[int, tuple[PlantFault, Occurrence]] = {}
         self._touched = False
         streams = np.random.SeedSequence(schedule.seed, spawn_key=(0xFA,)).spawn(
             len(schedule.faults)
@@ -78,12 +77,12 @@ class FaultyPlant(Plant):
         self.changed = self.timeline.update(self.time)
         for one in self.changed:
             if one.active:
-                self._effects[one.number] = one.fault.effect(self._noise[one.number])
+                self._active[one.number] = one.fault, Occurrence(self._noise[one.number])
             else:
-                del self._effects[one.number]
+                del self._active[one.number]
         samples = self.inner.sense()
-        for effect in self._effects.values():
-            effect.sense(samples)
+        for fault, now in self._active.values():
+            fault.sense(samples, now)
         return samples
 
     def step(self, motor_commands: np.ndarray, arm_effort: np.ndarray, magnet: bool) -> None:
@@ -91,47 +90,21 @@ class FaultyPlant(Plant):
 
         Arguments as in `Plant.step`.
         """
-        if self._effects or self._touched:
+        if self._active or self._touched:
             commands = PlantCommands(np.array(motor_commands), np.array(arm_effort), bool(magnet))
-            self._disturbance = self._none()
-            for effect in self._effects.values():
-                effect.act(self, commands)
+            described = self.vehicle.description
+            physics = Disturbance.none(len(described.rotors), len(described.joints))
+            for fault, now in self._active.values():
+                fault.act(commands, physics, now)
+                now.since += self.period
             if self.inner.DISTURBABLE:
-                self.inner.disturb(self._disturbance)
+                self.inner.disturb(physics)
             motor_commands, arm_effort = commands.motors, commands.effort
             magnet = commands.magnet
-            self._touched = bool(self._effects)
+            self._touched = bool(self._active)
         self.inner.step(motor_commands, arm_effort, magnet)
         self.tick = self.inner.tick
 
     def truth(self) -> Truth:
         """Return the truth of the inner plant."""
         return self.inner.truth()
-
-    def weaken_rotor(self, rotor: int, part: float) -> None:
-        """Scale the thrust of one rotor (0: the first) by `part` [1] for this period."""
-        self._disturbance.rotor_parts[rotor] *= part
-
-    def weaken_rotors(self, part: float) -> None:
-        """Scale the thrust of all rotors by `part` [1] for this period."""
-        self._disturbance.rotor_parts *= part
-
-    def brake_joint(self, joint: int, torque: float) -> None:
-        """Add dry friction `torque` [N m] to a joint (0: the first) for this period."""
-        self._disturbance.joint_friction[joint] += torque
-
-    def weaken_magnet(self, part: float) -> None:
-        """Scale the magnet's holding force by `part` [1] for this period."""
-        self._disturbance.magnet_part *= part
-
-    def add_wind(self, wind: np.ndarray) -> None:
-        """Add wind (3,) [m/s, ENU] for this period."""
-        self._disturbance.wind += wind
-
-    def swing_payload(self, rate: float) -> None:
-        """Attach the payload by a hinge while the magnet is on; rate [rad/s]: initial rate."""
-        self._disturbance.payload_swing = rate
-
-    def _none(self) -> Disturbance:
-        described = self.vehicle.description
-        return Disturbance.none(len(described.rotors), len(described.joints))

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import ClassVar
 
 from uam_control.settings.parameter_set import choice, number
@@ -11,7 +10,6 @@ from uam_sim_bridge.faults.fault import LINK, Fault
 BOTH, TO, FROM = "both", "to_autopilot", "from_autopilot"
 
 
-@dataclass(frozen=True)
 class LinkFault(Fault):
     """A fault of the bridge's transport."""
 
@@ -30,24 +28,18 @@ class LinkFault(Fault):
         return self.direction != TO
 
 
-@dataclass(frozen=True)
 class MavlinkCut(LinkFault):
-    NAME: ClassVar[str] = "mavlink_cut"
-    ABOUT: ClassVar[str] = "no message arrives"
+    """No message arrives."""
 
 
-@dataclass(frozen=True)
 class MavlinkDelay(LinkFault):
-    NAME: ClassVar[str] = "mavlink_delay"
-    ABOUT: ClassVar[str] = "every message arrives later"
+    """Every message arrives later."""
 
     delay: float = number(0.05, "added delay", "s", 0.0, 10.0)
 
 
-@dataclass(frozen=True)
 class MavlinkCorruption(LinkFault):
-    NAME: ClassVar[str] = "mavlink_corruption"
-    ABOUT: ClassVar[str] = "some packets have one wrong byte, and the receiver discards them"
+    """Some packets have one wrong byte, and the receiver discards them."""
 
     share: float = number(0.2, "fraction of wrong packets", "1", 0.0, 1.0)
 

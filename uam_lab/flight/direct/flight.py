@@ -49,7 +49,7 @@ class DirectFlight:
         faults: Schedule | None = None,
         plant: str = DEFAULT_PLANT,
     ) -> None:
-        """payload_mass [kg]; faults: those that `faults.limits.check` lets pass; plant: see
+        """payload_mass [kg]; faults: those that `faults.feasibility.check` lets pass; plant: see
         `plant_class`."""
         sets = profile.sets
         started = (vehicle, payload_mass, seed, scenario.arm_start)
