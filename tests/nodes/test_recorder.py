@@ -14,7 +14,7 @@ from std_msgs.msg import Bool
 from uam_lab.recording.mcap_reader import read_log
 from uam_msgs_py.messages import topics
 from uam_msgs_py.messages.convert import SetpointWriter
-from uam_msgs_py.messages.stamps import set_stamp
+from uam_msgs_py.messages.ros_time import set_stamp
 from uam_msgs_py.node.connections import WRITERS, Connections
 
 MODULE = "uam_lab.nodes.recorder"

@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from uam_control.control.limits import PositionLimits, limit_force, limit_torque
+from uam_control.control.output_limits import PositionLimits, limit_force, limit_torque
 from uam_control.settings.parameter_set import ParameterError
 
 A = math.atan2(0.6, 0.8)  # tan A = .75

@@ -15,7 +15,7 @@ from uam_control.control.controllers import (
     AttitudeController,
     PositionController,
 )
-from uam_control.control.limits import limit_force
+from uam_control.control.output_limits import limit_force
 from uam_control.control.thrust_direction import AttitudeReference
 from uam_control.laws.catalogue import LAWS, label
 from uam_control.laws.errors import attitude_errors

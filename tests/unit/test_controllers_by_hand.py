@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 from uam_control.control.controllers import ArmController, AttitudeController, PositionController
-from uam_control.control.limits import PositionLimits, TorqueLimits
+from uam_control.control.output_limits import PositionLimits, TorqueLimits
 from uam_control.laws.asmc1 import Asmc1Parameters
 from uam_control.laws.modular import ModularParameters
 from uam_control.profiles.profile import controller_parameters

@@ -39,8 +39,8 @@ from uam_msgs_py.messages.convert import (
     read_switch,
 )
 from uam_msgs_py.messages.layouts import KNOWN_LAYOUTS, BadMessage, stamp_of
+from uam_msgs_py.messages.ros_time import set_stamp
 from uam_msgs_py.messages.serialized import LAYOUTS
-from uam_msgs_py.messages.stamps import set_stamp
 from uam_msgs_py.messages.trajectories import TrajectoryWriter
 
 COORDINATES = coordinates(2)

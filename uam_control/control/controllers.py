@@ -9,7 +9,12 @@ from __future__ import annotations
 
 import numpy as np
 
-from uam_control.control.limits import PositionLimits, TorqueLimits, limit_force, limit_torque
+from uam_control.control.output_limits import (
+    PositionLimits,
+    TorqueLimits,
+    limit_force,
+    limit_torque,
+)
 from uam_control.control.thrust_direction import AttitudeReference
 from uam_control.coordinates import ALPHA, ARM, ATTITUDE, POSITION
 from uam_control.laws import catalogue

@@ -17,7 +17,7 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
-from uam_control.control.limits import PositionLimits, TorqueLimits
+from uam_control.control.output_limits import PositionLimits, TorqueLimits
 from uam_control.coordinates import ARM, ATTITUDE, POSITION
 from uam_control.estimation import EstimatorParameters
 from uam_control.laws import catalogue

@@ -15,7 +15,7 @@ from visualization_msgs.msg import Marker, MarkerArray
 from uam_control.coordinates import ALPHA
 from uam_control.mission import Scenario
 from uam_control.mission.trajectory import empty_reference
-from uam_msgs_py.messages.stamps import set_stamp
+from uam_msgs_py.messages.ros_time import set_stamp
 from uam_msgs_py.messages.status import MissionStatus
 from uam_msgs_py.messages.topics import BODY, WORLD
 from uam_sim_bridge.plant.frames import Box

@@ -21,7 +21,7 @@ from rclpy.serialization import deserialize_message
 from uam_control.coordinates import ALPHA, ARM
 from uam_control.coordinates import ATTITUDE as ANGLES
 from uam_control.mission import Scenario
-from uam_control.mission.mission import ABORTED, LANDED, WAITING
+from uam_control.mission.flight_sequence import ABORTED, LANDED, WAITING
 from uam_control.supervision import State
 from uam_lab.recording import cdr
 from uam_lab.recording import fault_records as fault_log

@@ -6,7 +6,7 @@ from typing import ClassVar, Self
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 
 from uam_msgs_py.messages.layouts import BadMessage
-from uam_msgs_py.messages.stamps import nanoseconds, set_stamp
+from uam_msgs_py.messages.ros_time import nanoseconds, set_stamp
 
 OK, WARN, ERROR, STALE = (
     DiagnosticStatus.OK,

@@ -7,7 +7,7 @@ import math
 from sensor_msgs.msg import BatteryState
 
 from uam_msgs_py.messages import topics
-from uam_msgs_py.messages.stamps import set_stamp
+from uam_msgs_py.messages.ros_time import set_stamp
 from uam_msgs_py.messages.status import AutopilotState
 from uam_msgs_py.node.base_node import UamNode
 from uam_sim_bridge.mavlink.link.link import OffboardLink
