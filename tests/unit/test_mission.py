@@ -140,29 +140,37 @@ def test_bad_csv_is_refused_naming_line_and_column(tmp_path, changes, reason):
     [
         ("moves: [", "line 1.* not valid YAML"),
         ("- a list", "a mapping expected"),
-        ("arm_start: {alpha_1_deg: 0, alpha_2_deg: 0}", "'landing' is missing"),
+        ("arm_start: {alpha_1_deg: 0, alpha_2_deg: 0}", "landing is missing"),
         (
             "arm_start: {alpha_1_deg: 0, alpha_2_deg: 0, alpha_3_deg: 0}",
-            "'arm_start.alpha_3_deg': s500_arm has: alpha_1_deg, alpha_2_deg",
+            "arm_start.alpha_3_deg: no joint; s500_arm has: alpha_1_deg, alpha_2_deg",
         ),
         (
             "arm_start: {alpha_1_deg: 0, alpha_2_deg: 130}",
-            "'arm_start.alpha_2_deg' is 130, s500_arm allows -120 to 120",
+            "arm_start.alpha_2_deg: 130; s500_arm allows -120 to 120",
         ),
         (
             "arm_start: {alpha_1_deg: 0, alpha_2_deg: x}\nlanding: {at: 5, duration: 3}",
-            "arm_start.alpha_2_deg' is 'x'",
+            "arm_start.alpha_2_deg: a number expected, got 'x'",
         ),
         (
             "arm_start: {alpha_1_deg: 0, alpha_2_deg: 0}\nlanding: {at: 5, duration: 3}\n"
             "moves: [{coordinate: roll, from: 0, until: 1, to: 1}]",
-            "coordinate' is 'roll', allowed",
+            "coordinate: 'roll', allowed",
         ),
         (
             "arm_start: {alpha_1_deg: 0, alpha_2_deg: 0}\nlanding: {at: 5, duration: 3}\n"
             "moves: [{coordinate: x, from: 0, until: 2, to: 1},"
             " {coordinate: x, from: 1, until: 3, to: 0}]",
             "two moves of x overlap at 1",
+        ),
+        (
+            "landing: {at: 5, duration: 3}\npayload: {mass: 0.2, drop_point: [x, 0]}",
+            "payload.drop_point: a number expected, got 'x'",
+        ),
+        (
+            "landing: {at: 5, duration: 3}\nmagnet: [{at: 1, energised: 1}]",
+            r"magnet\[0\].energised: true or false expected, got 1",
         ),
     ],
 )

@@ -6,7 +6,6 @@ import csv
 import math
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -21,7 +20,8 @@ from uam_control.coordinates import (
     coordinates,
 )
 from uam_control.mission.trajectory import Chain, Move, Moves, Sampled, Trajectory
-from uam_control.settings import configuration, yaml_file
+from uam_control.settings import configuration
+from uam_control.settings.section import Section, read_section
 from uam_control.vehicle import VehicleDescription, load_description
 
 CSV_REQUIRED = ("t", "px", "py", "pz", "yaw", "vx", "vy", "vz", "ax", "ay", "az", "dyaw")
@@ -127,141 +127,87 @@ def from_yaml(file: Path, vehicle: VehicleDescription) -> Scenario:
 
     Without arm_start the arm begins stowed.
     """
-    document = yaml_file.read(file, ScenarioError)
-    if not isinstance(document, dict):
-        raise ScenarioError(f"{file}: a mapping expected, see scenarios/pick_and_place.yaml")
-    reader = Reader(str(file), vehicle)
-    arm_start = reader.arm_start(document)
-    landing = reader.mapping(document, "landing")
-    moves = [reader.move(entry, i) for i, entry in enumerate(document.get("moves") or [])]
-    reader.no_overlap(moves)
-    phases = tuple(
-        (reader.number(p, "from", "phases"), str(p.get("name", "")))
-        for p in document.get("phases") or [{"from": 0.0, "name": "flight"}]
-    )
-    magnet = tuple(
-        (reader.number(m, "at", "magnet"), reader.switch(m, "energised", "magnet"))
-        for m in document.get("magnet") or []
-    )
-    payload = document.get("payload") or {}
-    drop = payload.get("drop_point")
+    top = read_section(file, ScenarioError)
+    arm_start = _arm_start(top, vehicle)
+    landing = top.section("landing")
+    phases = [(p.number("from"), p.values.get("name", "")) for p in top.entries("phases", True)]
+    payload = top.section("payload") if top.values.get("payload") else None
+    faults = top.values.get("faults") or []
+    if not isinstance(faults, list):
+        raise ScenarioError(f"{file}: 'faults' is not a list")
     return Scenario(
         name=file.stem,
-        description=str(document.get("description", "")),
+        description=str(top.values.get("description", "")),
         arm_start=arm_start,
-        phases=phases,
-        landing=Landing(
-            reader.number(landing, "at", "landing"), reader.number(landing, "duration", "landing")
+        phases=tuple((start, str(name)) for start, name in phases or [(0.0, "flight")]),
+        landing=Landing(landing.number("at"), landing.number("duration")),
+        moves=_moves(top, vehicle),
+        magnet=tuple((m.number("at"), m.switch("energised")) for m in top.entries("magnet", True)),
+        payload_mass=payload.number("mass") if payload else 0.0,
+        drop_point=(
+            payload.numbers("drop_point", 2) if payload and "drop_point" in payload.values else None
         ),
-        moves=tuple(moves),
-        magnet=magnet,
-        payload_mass=reader.number(payload, "mass", "payload") if payload else 0.0,
-        drop_point=(float(drop[0]), float(drop[1])) if drop else None,
         snapshots=tuple(
-            (reader.number(s, "at", "snapshots"), str(s.get("caption", "")))
-            for s in document.get("snapshots") or []
+            (s.number("at"), str(s.values.get("caption", "")))
+            for s in top.entries("snapshots", True)
         ),
-        faults=reader.entries(document, "faults"),
+        faults=tuple(faults),
     )
 
 
-class Reader:
-    """Reads entries of a scenario file; its errors name file and entry."""
+def _arm_start(top: Section, vehicle: VehicleDescription) -> tuple[float, ...]:
+    """Return the joint angles [rad] on the ground: `arm_start`, or stowed."""
+    if "arm_start" not in top.values:
+        return vehicle.stowed
+    arm, joints = top.section("arm_start"), arm_coordinates(len(vehicle.joints))
+    expected = [f"{name}_deg" for name in joints]
+    for name in arm.values:
+        if name not in expected:
+            has = f"{vehicle.name} has: {', '.join(expected)}"
+            raise ScenarioError(f"{arm.where}.{name}: no joint; {has}")
+    return tuple(_angle(arm, f"{name}_deg", name, vehicle) for name in joints)
 
-    def __init__(self, where: str, vehicle: VehicleDescription) -> None:
-        self.where, self.vehicle = where, vehicle
-        self.joints = dict(zip(arm_coordinates(len(vehicle.joints)), vehicle.joints, strict=True))
 
-    def arm_start(self, document: dict) -> tuple[float, ...]:
-        """Return the joint angles [rad] on the ground: `arm_start`, or stowed."""
-        if "arm_start" not in document:
-            return self.vehicle.stowed
-        arm = self.mapping(document, "arm_start")
-        expected = [f"{name}_deg" for name in self.joints]
-        strange = [name for name in arm if name not in expected]
-        if strange:
-            raise ScenarioError(
-                f"{self.where}: 'arm_start.{strange[0]}': {self.vehicle.name} has: "
-                + ", ".join(expected)
-            )
-        return tuple(
-            self.angle(name, self.number(arm, f"{name}_deg", "arm_start"), f"arm_start.{name}_deg")
-            for name in self.joints
+def _angle(entry: Section, key: str, coordinate: str, vehicle: VehicleDescription) -> float:
+    """Return an angle [rad]; a joint's must be within its range."""
+    angle = math.radians(entry.number(key))
+    joints = dict(zip(arm_coordinates(len(vehicle.joints)), vehicle.joints, strict=True))
+    joint = joints.get(coordinate)
+    if joint is not None and not joint.low <= angle <= joint.high:
+        raise ScenarioError(
+            f"{entry.where}.{key}: {entry.values[key]:g}; {vehicle.name} allows "
+            f"{math.degrees(joint.low):g} to {math.degrees(joint.high):g}"
         )
+    return angle
 
-    def angle(self, coordinate: str, degrees: float, owner: str) -> float:
-        """Return an angle [rad]; a joint's must be within its range."""
-        angle, joint = math.radians(degrees), self.joints.get(coordinate)
-        if joint is not None and not joint.low <= angle <= joint.high:
+
+def _moves(top: Section, vehicle: VehicleDescription) -> tuple[Move, ...]:
+    """Return `moves`; angles are in degrees. Moves of one coordinate must not overlap in time."""
+    moves = tuple(_move(entry, vehicle) for entry in top.entries("moves", True))
+    last: dict[str, Move] = {}
+    for move in sorted(moves, key=lambda m: m.start):
+        before = last.get(move.coordinate)
+        if before and before.end > move.start:
             raise ScenarioError(
-                f"{self.where}: '{owner}' is {degrees:g}, {self.vehicle.name} allows "
-                f"{math.degrees(joint.low):g} to {math.degrees(joint.high):g}"
+                f"{top.where} two moves of {move.coordinate} overlap at {move.start} s"
             )
-        return angle
+        last[move.coordinate] = move
+    return moves
 
-    def mapping(self, document: dict, key: str) -> dict:
-        """Return a required mapping."""
-        value = document.get(key)
-        if not isinstance(value, dict):
-            raise ScenarioError(f"{self.where}: '{key}' is missing or not a mapping")
-        return value
 
-    def entries(self, document: dict, key: str) -> tuple[object, ...]:
-        """Return an optional list."""
-        value = document.get(key) or []
-        if not isinstance(value, list):
-            raise ScenarioError(f"{self.where}: '{key}' is not a list")
-        return tuple(value)
-
-    def number(self, entry: Any, key: str, owner: str) -> float:
-        """Return a required finite number."""
-        value = entry.get(key) if isinstance(entry, dict) else None
-        if (
-            isinstance(value, bool)
-            or not isinstance(value, int | float)
-            or not math.isfinite(value)
-        ):
-            raise ScenarioError(f"{self.where}: '{owner}.{key}' is {value!r}, a number expected")
-        return float(value)
-
-    def switch(self, entry: Any, key: str, owner: str) -> bool:
-        """Return a required true or false."""
-        value = entry.get(key) if isinstance(entry, dict) else None
-        if not isinstance(value, bool):
-            raise ScenarioError(
-                f"{self.where}: '{owner}.{key}' is {value!r}, true or false expected"
-            )
-        return value
-
-    def move(self, entry: Any, index: int) -> Move:
-        """Return an entry of `moves`; angles are in degrees; roll and pitch are not allowed."""
-        owner = f"moves[{index}]"
-        coordinate = entry.get("coordinate") if isinstance(entry, dict) else None
-        allowed = [c for c in self.vehicle.coordinates if c not in ("roll", "pitch")]
-        if coordinate not in allowed:
-            raise ScenarioError(
-                f"{self.where}: '{owner}.coordinate' is {coordinate!r}, "
-                f"allowed: {', '.join(allowed)}"
-            )
-        angle = coordinate not in ("x", "y", "z")
-        target = self.number(entry, "to_deg" if angle else "to", owner)
-        start, end = self.number(entry, "from", owner), self.number(entry, "until", owner)
-        if end <= start:
-            raise ScenarioError(f"{self.where}: '{owner}' ends at {end} s, before it begins")
-        if angle:
-            target = self.angle(coordinate, target, f"{owner}.to_deg")
-        return Move(coordinate, start, end, target)
-
-    def no_overlap(self, moves: list[Move]) -> None:
-        """Raise ScenarioError if two moves of one coordinate overlap in time."""
-        last: dict[str, Move] = {}
-        for move in sorted(moves, key=lambda m: m.start):
-            before = last.get(move.coordinate)
-            if before and before.end > move.start:
-                raise ScenarioError(
-                    f"{self.where}: two moves of {move.coordinate} overlap at {move.start} s"
-                )
-            last[move.coordinate] = move
+def _move(entry: Section, vehicle: VehicleDescription) -> Move:
+    coordinate = entry.text("coordinate")
+    allowed = [c for c in vehicle.coordinates if c not in ("roll", "pitch")]
+    if coordinate not in allowed:
+        raise ScenarioError(
+            f"{entry.where}.coordinate: {coordinate!r}, allowed: {', '.join(allowed)}"
+        )
+    length = coordinate in ("x", "y", "z")
+    target = entry.number("to") if length else _angle(entry, "to_deg", coordinate, vehicle)
+    start, end = entry.number("from"), entry.number("until")
+    if end <= start:
+        raise ScenarioError(f"{entry.where}: ends at {end} s, before it begins")
+    return Move(coordinate, start, end, target)
 
 
 def from_csv(

@@ -6,7 +6,8 @@ import math
 from pathlib import Path
 from typing import Any
 
-from uam_control.settings import configuration, yaml_file
+from uam_control.settings import configuration
+from uam_control.settings.section import Section, read_section
 from uam_control.vehicle.description import (
     AXES,
     Joint,
@@ -32,15 +33,12 @@ def load_description(name_or_file: str | Path = DEFAULT_VEHICLE) -> VehicleDescr
     exist.
     """
     file = configuration.named("vehicle", str(name_or_file), suffixes=(".yaml",))
-    document = yaml_file.read(file, VehicleError)
-    if not isinstance(document, dict):
-        raise VehicleError(f"{file}: a mapping expected, see vehicle/{DEFAULT_VEHICLE}.yaml")
-    return describe(document, file)
+    return describe(read_section(file, VehicleError).values, file)
 
 
 def describe(document: dict[str, Any], file: Path) -> VehicleDescription:
     """Return the checked description in `document`, the content of `file`. Raises VehicleError."""
-    top = Section(document, f"{file}:")
+    top = Section(document, f"{file}:", VehicleError)
     model = file.parent / top.text("model")
     if not model.is_file():
         raise VehicleError(f"{file}: model: {model} does not exist")
@@ -55,11 +53,7 @@ def describe(document: dict[str, Any], file: Path) -> VehicleDescription:
         control_period=top.positive("control_period"),
         rotor=_rotor_model(rotor),
         rotors=tuple(_rotor(entry) for entry in rotor.entries("layout")),
-        servo=Servo(
-            servo.positive("stall_torque"),
-            servo.positive("no_load_speed"),
-            servo.positive("effort_limit"),
-        ),
+        servo=Servo(*map(servo.positive, ("stall_torque", "no_load_speed", "effort_limit"))),
         joints=tuple(_joint(entry) for entry in top.entries("joints")),
         profiles={law: profiles.text(law) for law in profiles.values},
         autopilot=top.text("autopilot"),
@@ -75,16 +69,13 @@ def describe(document: dict[str, Any], file: Path) -> VehicleDescription:
 def _autopilot_gains(top: Section) -> dict[str, float]:
     """Return the content of the file in config/autopilot; it must not repeat the rotor geometry."""
     file = configuration.named("autopilot", top.text("autopilot"))
-    values = yaml_file.read(file, VehicleError)
-    if not isinstance(values, dict):
-        raise VehicleError(f"{file}: 'NAME: value' lines expected")
-    for name in values:
+    gains = read_section(file, VehicleError)
+    for name in gains.values:
         if str(name).startswith("CA_") or name in ("THR_MDL_FAC", "MPC_THR_HOVER"):
             raise VehicleError(f"{file}: remove {name}: it is derived from {top.where[:-1]}")
-    gains = Section(values, f"{file}:")
     for axis in AXES:  # the torque mapping of the bridge uses them
         gains.positive(f"MC_{axis}RATE_P")
-    return values
+    return gains.values
 
 
 def _rotor_model(rotor: Section) -> RotorModel:
@@ -147,69 +138,3 @@ def _check_servo(servo: Servo, section: Section) -> None:
             f"{section.where}.effort_limit: {servo.effort_limit:g} N m is above stall_torque, "
             f"{servo.stall_torque:g} N m"
         )
-
-
-class Section:
-    """A mapping of the file; its methods check one entry and raise VehicleError with its place."""
-
-    def __init__(self, values: dict[str, Any], where: str) -> None:
-        self.values, self.where = values, where
-
-    def section(self, key: str) -> Section:
-        """Return the entry `key`, a mapping."""
-        value = self._entry(key)
-        if not isinstance(value, dict) or not value:
-            raise VehicleError(f"{self._name(key)}: a mapping expected, got {value!r}")
-        return Section(value, self._name(key))
-
-    def entries(self, key: str) -> list[Section]:
-        """Return the entry `key`, a list of one mapping or more."""
-        value = self._entry(key)
-        if not isinstance(value, list) or not value:
-            raise VehicleError(f"{self._name(key)}: a list of mappings expected, got {value!r}")
-        found = []
-        for i, entry in enumerate(value):
-            if not isinstance(entry, dict):
-                raise VehicleError(f"{self._name(key)}[{i}]: a mapping expected, got {entry!r}")
-            found.append(Section(entry, f"{self._name(key)}[{i}]"))
-        return found
-
-    def text(self, key: str) -> str:
-        """Return the entry `key`, a text that is not empty."""
-        value = self._entry(key)
-        if not isinstance(value, str) or not value:
-            raise VehicleError(f"{self._name(key)}: a name expected, got {value!r}")
-        return value
-
-    def number(self, key: str) -> float:
-        """Return the entry `key`, a finite number."""
-        return self._checked(key, self._entry(key))
-
-    def positive(self, key: str) -> float:
-        """Return the entry `key`, a finite number above 0."""
-        value = self.number(key)
-        if value <= 0.0:
-            raise VehicleError(f"{self._name(key)}: {value:g} is not above 0")
-        return value
-
-    def numbers(self, key: str, count: int) -> tuple[float, ...]:
-        """Return the entry `key`, a list of `count` finite numbers."""
-        value = self._entry(key)
-        if not isinstance(value, list) or len(value) != count:
-            raise VehicleError(f"{self._name(key)}: a list of {count} numbers expected: {value!r}")
-        return tuple(self._checked(key, item) for item in value)
-
-    def _entry(self, key: str) -> Any:
-        if key not in self.values:
-            raise VehicleError(f"{self._name(key)} is missing")
-        return self.values[key]
-
-    def _checked(self, key: str, value: Any) -> float:
-        if isinstance(value, bool) or not isinstance(value, int | float):
-            raise VehicleError(f"{self._name(key)}: a number expected, got {value!r}")
-        if not math.isfinite(value):
-            raise VehicleError(f"{self._name(key)}: {value!r} is not finite")
-        return float(value)
-
-    def _name(self, key: str) -> str:
-        return f"{self.where}{' ' if self.where.endswith(':') else '.'}{key}"

@@ -1,0 +1,92 @@
+"""Checked access to the entries of a YAML file; each error names file and entry in one line."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+from typing import Any
+
+from uam_control.settings import yaml_file
+
+
+def read_section(file: Path, error: type[ValueError]) -> Section:
+    """Return the content of a YAML file, a mapping; raise `error` if it is none."""
+    values = yaml_file.read(file, error)
+    if not isinstance(values, dict):
+        raise error(f"{file}: a mapping expected: 'name: value' lines")
+    return Section(values, f"{file}:", error)
+
+
+class Section:
+    """A mapping of a file; its methods check one entry and raise `error` with its place."""
+
+    def __init__(self, values: dict[str, Any], where: str, error: type[ValueError]) -> None:
+        self.values, self.where, self._error = values, where, error
+
+    def section(self, key: str) -> Section:
+        """Return the entry `key`, a mapping."""
+        value = self._entry(key)
+        if not isinstance(value, dict) or not value:
+            raise self._error(f"{self._name(key)}: a mapping expected, got {value!r}")
+        return Section(value, self._name(key), self._error)
+
+    def entries(self, key: str, optional: bool = False) -> list[Section]:
+        """Return the entry `key`, a list of one mapping or more; optional: [] if it is missing."""
+        if optional and not self.values.get(key):
+            return []
+        value = self._entry(key)
+        if not isinstance(value, list) or not value:
+            raise self._error(f"{self._name(key)}: a list of mappings expected, got {value!r}")
+        found = []
+        for i, entry in enumerate(value):
+            if not isinstance(entry, dict):
+                raise self._error(f"{self._name(key)}[{i}]: a mapping expected, got {entry!r}")
+            found.append(Section(entry, f"{self._name(key)}[{i}]", self._error))
+        return found
+
+    def text(self, key: str) -> str:
+        """Return the entry `key`, a text that is not empty."""
+        value = self._entry(key)
+        if not isinstance(value, str) or not value:
+            raise self._error(f"{self._name(key)}: a name expected, got {value!r}")
+        return value
+
+    def switch(self, key: str) -> bool:
+        """Return the entry `key`, true or false."""
+        value = self._entry(key)
+        if not isinstance(value, bool):
+            raise self._error(f"{self._name(key)}: true or false expected, got {value!r}")
+        return value
+
+    def number(self, key: str) -> float:
+        """Return the entry `key`, a finite number."""
+        return self._checked(key, self._entry(key))
+
+    def positive(self, key: str) -> float:
+        """Return the entry `key`, a finite number above 0."""
+        value = self.number(key)
+        if value <= 0.0:
+            raise self._error(f"{self._name(key)}: {value:g} is not above 0")
+        return value
+
+    def numbers(self, key: str, count: int) -> tuple[float, ...]:
+        """Return the entry `key`, a list of `count` finite numbers."""
+        value = self._entry(key)
+        if not isinstance(value, list) or len(value) != count:
+            raise self._error(f"{self._name(key)}: a list of {count} numbers expected: {value!r}")
+        return tuple(self._checked(key, item) for item in value)
+
+    def _entry(self, key: str) -> Any:
+        if key not in self.values:
+            raise self._error(f"{self._name(key)} is missing")
+        return self.values[key]
+
+    def _checked(self, key: str, value: Any) -> float:
+        if isinstance(value, bool) or not isinstance(value, int | float):
+            raise self._error(f"{self._name(key)}: a number expected, got {value!r}")
+        if not math.isfinite(value):
+            raise self._error(f"{self._name(key)}: {value!r} is not finite")
+        return float(value)
+
+    def _name(self, key: str) -> str:
+        return f"{self.where}{' ' if self.where.endswith(':') else '.'}{key}"
