@@ -1,4 +1,4 @@
-"""A law as somebody else may add one: a single file, and its class in `catalogue.LAWS`.
+"""Example of an added law: a single file, and its class in `catalogue.LAWS`.
 
 tau = Mbar (chi_d_ddot - lambda_1 e - lambda_2 e_dot - kappa z),   z_dot = e
 """

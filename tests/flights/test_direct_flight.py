@@ -109,7 +109,7 @@ def test_the_printed_law_with_table_1_stays_on_the_ground():
     assert a_flight.control.position.controller.parameters.safeguards == []
 
 
-def test_the_bridge_flies_what_the_profile_says_of_it():
+def test_the_bridge_uses_its_section_of_the_profile():
     profile = load_profile("s500")
     section = {"thrust_max": 30.0, "stream_time": 2.0, "local_port": 14999}
     profile = dataclasses.replace(profile, sections={**profile.sections, "mavlink_bridge": section})

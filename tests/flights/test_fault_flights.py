@@ -86,7 +86,7 @@ def test_late_poses_do_no_harm():
         assert max(figures["max"]["position_m"]) < 0.1
 
 
-def test_a_frozen_tracker_is_believed_by_nobody():
+def test_a_frozen_tracker_is_rejected():
     """Neither by the estimator nor by the autopilot, whose descent would use it."""
     flight, series, figures = flown("mocap_freeze@hover+1+6")
     assert classify(series, figures) == "failsafe"

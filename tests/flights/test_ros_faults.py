@@ -40,7 +40,7 @@ def test_without_the_autopilots_voice_it_lands_by_itself(fly):
 
 
 @pytest.mark.slow
-def test_faults_come_when_they_should_and_the_log_knows_them(fly, short_scenario, tmp_path):
+def test_faults_begin_on_time_and_are_in_the_log(fly, short_scenario, tmp_path):
     options = [word for text in (*IN_BOTH, *IN_NODES) for word in ("--fault", text)]
     flight = fly("--scenario", str(short_scenario), *options)
     assert flight.wait() == 0, flight.said + flight.complained
@@ -73,7 +73,7 @@ def test_faults_come_when_they_should_and_the_log_knows_them(fly, short_scenario
 
 
 @pytest.mark.slow
-def test_a_controller_that_is_unheard_of_is_waited_for_and_comes_back(fly):
+def test_a_flight_waits_for_a_silent_controller(fly):
     """In real time, hence on an idle machine; the lease is 20 s."""
     loss = "discovery_loss@approach+0+24:node=arm_controller"
     flight = fly("--scenario", "pick_and_place", "--clock", "realtime", "--fault", loss)

@@ -32,7 +32,7 @@ def test_a_short_gap_of_the_stream_is_nothing(hovering):
     assert hovering.modes_seen == {Mode.OFFBOARD} and hovering.height > 1.0
 
 
-def test_a_long_gap_ends_in_the_failsafe_and_the_mode_is_asked_for_again(hovering):
+def test_a_long_gap_ends_in_the_failsafe_and_the_mode_is_requested_again(hovering):
     hovering.mute(2.0)
     assert hovering.mode is not Mode.OFFBOARD
     hovering.hover(3.0)

@@ -243,7 +243,7 @@ def test_descent_without_vision_stays_level():
     assert -2.5 < bench.body.velocity[2] < 0.0
 
 
-def test_offboard_comes_back_only_when_asked():
+def test_offboard_returns_only_on_request():
     bench = airborne()
     bench.run(1.5)
     bench.run(1.0, ((0, 0, 0), HOVER))

@@ -80,7 +80,7 @@ def reported(name: str, level: bytes, summary: str, **values) -> DiagnosticArray
     return diagnostic(0, name, level, summary, values)
 
 
-def test_the_headline_says_how_it_is():
+def test_the_headline_shows_the_state():
     health = Health(silent_after=3.0)
     assert "WAITING FOR A FLIGHT" in headline(health, LIMITS)
     health.silence = 0.1
@@ -132,7 +132,7 @@ def test_errors_come_from_tracking_once_it_is_there():
     assert health.errors == pytest.approx((0.5, 0.1, 0.2))
 
 
-def test_a_node_that_says_nothing_more_is_reported():
+def test_a_node_without_diagnostics_is_reported():
     health = Health(silent_after=0.0)
     health.diagnose(reported("mission", OK, "running"))
     ((name, level, words),) = health.ailing()

@@ -46,7 +46,7 @@ def test_degradation_is_the_papers():
     assert paper[3] == pytest.approx(47.99, abs=0.01)
 
 
-def test_claims_say_where_they_hold_and_where_not():
+def test_claims_list_the_cases_where_they_hold_and_where_not():
     flights = [flight(ASMC1, s, 3.0 + 0.01 * s) for s in (1, 2, 3)]
     flights += [flight(ASMC2, s, 0.02 + 0.001 * s) for s in (1, 3)]
     flights += [flight(ASMC2, 2, 0.022, outcome="lost")]

@@ -176,7 +176,7 @@ def test_laws_have_labels_and_an_unknown_one_its_name():
 
 
 @pytest.mark.parametrize("law", LAWS)
-def test_a_profile_says_which_law_flies(law):
+def test_a_profile_selects_the_law(law):
     assert set(load_profile(LAWS[law].profile).laws().values()) == {law}
     for controller, axes in zip(trio(LAWS[law].profile), (3, 3, 2), strict=True):
         assert type(controller.law) is LAWS[law]

@@ -96,7 +96,7 @@ def test_a_child_that_hangs_is_ended_in_time(tmp_path):
             os.kill(message.facts["pid"], 0)
 
 
-def test_a_child_says_facts_and_why_it_failed(tmp_path):
+def test_a_child_reports_facts_and_the_cause_of_its_failure(tmp_path):
     (tmp_path / "fails.py").write_text("print('{\"a\": 1}')\nraise SystemExit('no libEGL')\n")
     path = os.pathsep.join([str(tmp_path), *sys.path])
     with CheckProcess("fails", environment={"PYTHONPATH": path}) as child:

@@ -134,7 +134,7 @@ def test_an_abort_is_the_reason_and_ends_the_flight():
     assert result["landing_error_m"] is None
 
 
-def test_without_a_payload_nothing_is_asked_of_it():
+def test_without_a_payload_no_place_error_is_required():
     info = INFO | {"payload_mass_kg": 0.0, "drop_point": None}
     result = metrics.compute(flight(payload=False).series(), info)
     assert result["mission_completed"] is True

@@ -8,7 +8,6 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from uam_control.mission import Mission, MissionParameters, ScenarioError, load_scenario
-from uam_control.mission.scenario import CSV_REQUIRED
 from uam_control.mission.trajectory import Move, Moves, Sampled
 from uam_control.supervision import OperatorCommand, State
 
@@ -81,6 +80,7 @@ def test_sampled_trajectory_meets_its_samples():
     assert value(sampled, 99.0)[0, 0] == samples[-1, 0, 0] and not value(sampled, 99.0)[1:].any()
 
 
+CSV_REQUIRED = "t,px,py,pz,yaw,vx,vy,vz,ax,ay,az,dyaw".split(",")
 ROW = "{t},0,0,1,0,0,0,0,0,0,0,0"
 
 

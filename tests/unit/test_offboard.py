@@ -79,7 +79,7 @@ def test_gives_up_with_the_reasons():
     assert run(s, 0.1, 6.1) and s.phase is Phase.OFFBOARD
 
 
-def test_lost_mode_is_asked_for_again_boundedly():
+def test_a_lost_mode_is_requested_again_a_bounded_number_of_times():
     s = flying()
     requested = run(s, 1.2, 2.0, armed=True, mode=Mode.LAND)
     assert [request for _, request in requested] == [Request.OFFBOARD] * 3
@@ -170,7 +170,7 @@ def test_with_the_stand_in():
     assert s.reasons == ()
 
 
-def test_an_autopilot_that_is_to_help_itself_is_not_asked_for_offboard_again():
+def test_offboard_is_not_requested_again_in_the_autopilots_failsafe():
     s = flying()
     s.let_go = True
     assert run(s, 5.0, 2.0, armed=True, mode=Mode.LAND) == []

@@ -112,7 +112,7 @@ def test_who_is_started_again_may_get_further_arguments(children):
     wait_for(lambda: "told first and a" in processes.tail(children._logs / "a.log"))
 
 
-def test_who_was_asked_to_stop_is_not_started_again(children):
+def test_a_stopped_child_is_not_started_again(children):
     children.start("a", "sleeper", again=1)
     ready(children, "a")
     children.stop(["a"])
@@ -159,7 +159,7 @@ def test_the_end_of_an_optional_child_is_reported_once_and_no_failure(children):
     children.check()
     assert [str(failure) for failure in children.missed()] == ["scene was killed by SIGKILL"]
     children.stop(["other"])
-    assert children.missed() == [], "told once; and who was asked to stop is not missed"
+    assert children.missed() == [], "reported once; a stopped child is not missed"
 
 
 def test_a_terminal_interrupt_does_not_reach_the_children(children):

@@ -134,7 +134,7 @@ def markers(status, payload=True, ahead=None, scenario="pick_and_place"):
     return {marker.ns: marker for marker in made.markers}
 
 
-def test_markers_tell_phase_magnet_payload_and_drop_point():
+def test_markers_show_phase_magnet_payload_and_drop_point():
     found = markers(MissionStatus(phase="pick", magnet=True))
     assert found["phase"].text == "pick" and found["phase"].header.frame_id == "base_link"
     assert found["magnet"].header.frame_id == "magnet" and found["magnet"].frame_locked

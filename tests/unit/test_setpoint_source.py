@@ -81,7 +81,7 @@ def test_what_is_not_good_in_flight_is_a_level_hold_and_then_nothing(
     assert setpoint is None and source.holding
 
 
-def test_it_says_why():
+def test_the_reason_is_logged():
     message = []
     source = in_flight(message)
     source.commanded(1.004, state_at(1.0), True, WEIGHT * math.nan, REST, ATTITUDE, FLYING)

@@ -18,7 +18,7 @@ def test_a_first_order_lag_has_its_time_constant_no_overshoot_and_ends_at_the_st
     assert found.overshoot == 0.0 and found.final == pytest.approx(1.0, abs=1e-3)
 
 
-def test_a_second_order_lag_overshoots_by_what_its_damping_says():
+def test_a_second_order_lag_overshoots_by_its_damping():
     damping, frequency = 0.5, 20.0
     damped = frequency * np.sqrt(1.0 - damping**2)
     t = np.maximum(TIME, 0.0)

@@ -167,7 +167,7 @@ def test_a_payload_is_not_taken_for_weak_motors():
     assert hover.fly(20.0) == pytest.approx(0.85, abs=0.01)
 
 
-def test_after_a_pick_before_anything_was_learnt_only_landing_tells():
+def test_after_a_pick_before_identification_only_landing_frees_the_factor():
     hover = Hover()
     hover.fly(5.0, magnet=True)
     held = hover.factor
