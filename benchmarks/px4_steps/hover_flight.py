@@ -23,6 +23,7 @@ from uam_sim_bridge.mavlink.offboard.setpoint import RateThrustMap
 from uam_sim_bridge.mavlink.protocol.attitude_target import AttitudeTarget
 from uam_sim_bridge.mavlink.protocol.frames import swap_body
 from uam_sim_bridge.mavlink.protocol.modes import Mode
+from uam_sim_bridge.mavlink.protocol.vision import VisionPose
 from uam_sim_bridge.mavlink.transport.udp_transport import UdpTransport
 from uam_sim_bridge.plant import Vehicle
 from uam_sim_bridge.plant.mujoco_plant import MujocoPlant
@@ -171,9 +172,8 @@ class HoverFlight:
             setpoint[replaced[0]] = replaced[1]
         if link:
             self._send(now, quaternion, vision)
-        motors = self._hil.exchange(
-            now, samples.hil[1], samples.hil[2], state[0, POSITION], quaternion
-        )
+        self._hil.send(now, samples.hil[1], samples.hil[2], state[0, POSITION], quaternion)
+        motors = self._hil.receive()
         if not self._hil.connected:
             raise NotFlown(f"the autopilot hung up at t = {now:.3f} s")
         plant.step(motors, effort, False)
@@ -190,7 +190,13 @@ class HoverFlight:
         link.tick(now)
         if vision and self.plant.tick % VISION_TICKS == 0:
             link.send_vision(
-                now, self._state[0, POSITION], quaternion, POSITION_DEVIATION, ATTITUDE_DEVIATION
+                VisionPose(
+                    now,
+                    self._state[0, POSITION],
+                    quaternion,
+                    POSITION_DEVIATION,
+                    ATTITUDE_DEVIATION,
+                )
             )
         if self._sequence.streaming:
             rates, thrust = swap_body(self._setpoint[:3]), float(self._setpoint[3])

@@ -20,6 +20,7 @@ from uam_sim_bridge.mavlink.protocol.attitude_target import AttitudeTarget
 from uam_sim_bridge.mavlink.protocol.frames import swap_body
 from uam_sim_bridge.mavlink.protocol.modes import Mode
 from uam_sim_bridge.mavlink.protocol.signing import Signing
+from uam_sim_bridge.mavlink.protocol.vision import VisionPose
 from uam_sim_bridge.mavlink.protocol.wire import Codec, Framer, mavlink2
 from uam_sim_bridge.mavlink.transport.transport import UdpTransport
 
@@ -73,12 +74,13 @@ class Flight:
         link.tick(body.time)
         self.received += self.sequence.reasons
         if self.vision and self.ticks % 5 == 0:
-            link.send_vision(body.time, body.position, body.quaternion, 0.005, 0.02)
+            link.send_vision(VisionPose(body.time, body.position, body.quaternion, 0.005, 0.02))
         if self.streaming and self.sequence.streaming:
             link.send_setpoint(
                 AttitudeTarget.of_rates(swap_body(np.array(rates, float)), thrust), body.time
             )
-        motors = self.hil.exchange(body.time, body.gyro, body.accel, body.position, body.quaternion)
+        self.hil.send(body.time, body.gyro, body.accel, body.position, body.quaternion)
+        motors = self.hil.receive()
         assert self.hil.answered
         body.step(motors)
 
@@ -357,9 +359,11 @@ def test_waits_are_bounded_and_shorter_after_silence(pair):
     fake.answer(0, [0.5] * 4, 129)
     server.receive(1.0)
     begin = time.monotonic()
-    motors = server.exchange(0.004, *BODY)
+    server.send(0.004, *BODY)
+    motors = server.receive()
     first = time.monotonic() - begin
-    server.exchange(0.008, *BODY)
+    server.send(0.008, *BODY)
+    server.receive()
     assert first >= 0.2 and not server.answered and server.missed == 2
     assert motors == pytest.approx([0.5] * 4)  # the last commands remain
     fake.answer(8000, [0.4] * 4, 129)
@@ -376,7 +380,8 @@ def test_hang_up_stops_the_motors(pair):
     server.receive(1.0)
     fake.socket.close()
     for k in range(3):
-        server.exchange(0.004 * (k + 1), *BODY)
+        server.send(0.004 * (k + 1), *BODY)
+        server.receive()
     assert not server.connected and np.all(server.motors == 0.0) and not server.armed
 
 

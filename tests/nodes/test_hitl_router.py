@@ -21,6 +21,7 @@ from uam_sim_bridge.mavlink.offboard.sequence import OffboardSequence, Phase
 from uam_sim_bridge.mavlink.offboard.setpoint import RateThrustParameters
 from uam_sim_bridge.mavlink.protocol.attitude_target import AttitudeTarget
 from uam_sim_bridge.mavlink.protocol.modes import Mode
+from uam_sim_bridge.mavlink.protocol.vision import VisionPose
 from uam_sim_bridge.mavlink.protocol.wire import Codec, Framer, mavlink2
 from uam_sim_bridge.mavlink.transport.transport import UdpTransport
 
@@ -102,10 +103,11 @@ class Bench:
         link.poll(body.time)
         link.tick(body.time)
         if self.ticks % 5 == 0:
-            link.send_vision(body.time, body.position, body.quaternion, 0.005, 0.02)
+            link.send_vision(VisionPose(body.time, body.position, body.quaternion, 0.005, 0.02))
         if self.sequence.streaming:
             link.send_setpoint(AttitudeTarget.of_rates(np.zeros(3), thrust), body.time)
-        motors = self.hil.exchange(body.time, body.gyro, body.accel, body.position, body.quaternion)
+        self.hil.send(body.time, body.gyro, body.accel, body.position, body.quaternion)
+        motors = self.hil.receive()
         self.answered += self.hil.answered
         body.step(motors)
 

@@ -10,9 +10,9 @@ from pymavlink.dialects.v20 import common as mavlink2
 
 from uam_sim_bridge.autopilot.companion import Companion
 from uam_sim_bridge.autopilot.core import Autopilot
-from uam_sim_bridge.mavlink.link.vision import covariance, vision_message
 from uam_sim_bridge.mavlink.protocol.frames import swap_quaternion, swap_world
 from uam_sim_bridge.mavlink.protocol.modes import MavCmd, MavResult, Mode
+from uam_sim_bridge.mavlink.protocol.vision import VisionPose, covariance
 from uam_sim_bridge.mavlink.protocol.wire import Codec, Framer, clean_text
 
 DOWN = np.array([0.0, 0.0, -9.81])
@@ -133,7 +133,7 @@ def test_timesync_is_answered_in_sensor_time():
 
 
 def odometry_message(stamp, position, quaternion):
-    """ODOMETRY of a pose at rest, as another bridge may send it instead of vision_message."""
+    """ODOMETRY of a pose at rest, which another bridge may send."""
     return mavlink2.MAVLink_odometry_message(
         round(stamp * 1e6),
         mavlink2.MAV_FRAME_LOCAL_NED,
@@ -155,7 +155,7 @@ def test_vision_reaches_the_estimate(odometry):
         if odometry:
             rig.send(odometry_message(rig.time, position, q))
         else:
-            rig.send(vision_message(rig.time, position, q, 0.01, 0.01))
+            rig.send(VisionPose(rig.time, position, q, 0.01, 0.01).message())
         rig.tick()
     rig.send(
         mavlink2.MAVLink_command_long_message(
@@ -201,7 +201,7 @@ def test_mutated_messages_never_change_flight_into_nonsense():
         mavlink2.MAVLink_set_mode_message(1, 1, 0x60000),
         mavlink2.MAVLink_param_set_message(1, 1, b"MC_ROLLRATE_P", 0.2, 9),
         mavlink2.MAVLink_param_request_read_message(1, 1, b"THR_MDL_FAC", -1),
-        vision_message(0.0, np.zeros(3), LEVEL, 0.01, 0.01),
+        VisionPose(0.0, np.zeros(3), LEVEL, 0.01, 0.01).message(),
         odometry_message(0.0, np.zeros(3), LEVEL),
         mavlink2.MAVLink_timesync_message(0, 1),
     ]

@@ -46,8 +46,8 @@ class Port:
             self.armed = request is Request.ARM
             self.armed_since = time if self.armed else None
 
-    def send_vision(self, stamp, position, quaternion, *deviations):
-        self.poses.append(stamp)
+    def send_vision(self, pose):
+        self.poses.append(pose.stamp)
 
     def send_setpoint(self, setpoint, time):
         self.setpoints.append((time, setpoint))

@@ -7,7 +7,6 @@ import pytest
 from uam_sim_bridge.mavlink.protocol.modes import Severity
 from uam_sim_bridge.mavlink.protocol.wire import Codec, Framer
 from uam_sim_bridge.mavlink.telemetry.event_messages import (
-    CurrentEventSequenceMessage,
     EventMessage,
 )
 from uam_sim_bridge.mavlink.telemetry.events import (
@@ -129,9 +128,3 @@ def test_others():
     assert severity == CRITICAL and "0x01abcdef" in text
     assert px4.send(0x01ABCDEF, CRITICAL, again=True) is None
     assert px4.send("commander_rc_override", INFO)[0] == Severity.WARNING
-
-
-def test_current_sequence_is_read():
-    codec, framer = Codec(1, 1), Framer(Codec(1, 191))
-    (m,) = framer.datagram(codec.encode(CurrentEventSequenceMessage(65534, 1)))
-    assert (m.get_type(), m.sequence, m.flags) == ("CURRENT_EVENT_SEQUENCE", 65534, 1)

@@ -21,6 +21,7 @@ from uam_sim_bridge.autopilot.joined import JoinedAutopilot
 from uam_sim_bridge.mavlink.offboard.sequence import OffboardSequence, Phase
 from uam_sim_bridge.mavlink.protocol.attitude_target import AttitudeTarget
 from uam_sim_bridge.mavlink.protocol.modes import Mode
+from uam_sim_bridge.mavlink.protocol.vision import VisionPose
 
 MS = 1_000_000  # [ns]
 PERIOD = 4 * MS
@@ -109,7 +110,8 @@ class Joined:
             port.poll(time)
             port.tick(time)
             if self.ticks % 5 == 0:
-                port.send_vision(time, 1e-6 * self.ticks * np.ones(3), LEVEL, 0.01, 0.01)
+                position = 1e-6 * self.ticks * np.ones(3)
+                port.send_vision(VisionPose(time, position, LEVEL, 0.01, 0.01))
             port.send_setpoint(AttitudeTarget.of_rates(REST, 0.0), time)
             port.update(time, REST, WEIGHT)
             self.ticks += 1

@@ -59,7 +59,7 @@ def test_random_delays_and_losses():
     run(sync, 30.0, 20.0, offset=-7.0, delay=lambda n: n.exponential(0.02), back=0.002, lost=0.3)
     # the error of one answer is at most half the round trip, about 50 ms here
     assert sync.offset == pytest.approx(-7.0, abs=0.008)
-    assert 0.01 < sync.round_trip < 0.06 and sync.resets == 0
+    assert 0.01 < sync.round_trip < 0.06
 
 
 def test_a_reboot_resets_at_once_and_only_once():
@@ -67,7 +67,7 @@ def test_a_reboot_resets_at_once_and_only_once():
     run(sync, 5.0, 0.0, offset=500.0, delay=0.004)
     jumps = run(sync, 5.0, 5.0, offset=-4.0, delay=0.004)
     assert len(jumps) == 1 and jumps[0] < 5.6  # three requests
-    assert sync.resets == 1 and sync.offset == pytest.approx(-4.0, abs=0.003)
+    assert sync.offset == pytest.approx(-4.0, abs=0.003)
 
 
 def test_a_single_outlier_is_ignored():
@@ -76,14 +76,13 @@ def test_a_single_outlier_is_ignored():
     ts1 = sync.request(2.0)
     assert not sync.answer(2.004, ts1 + 10**12, ts1)
     run(sync, 1.0, 2.2, offset=1.0, delay=0.0)
-    assert sync.resets == 0 and sync.offset == pytest.approx(1.0, abs=0.003)
+    assert sync.offset == pytest.approx(1.0, abs=0.003)
 
 
 def test_a_slow_answer_is_no_jump():
     sync = TimeSync()
     run(sync, 2.0, 0.0, offset=1.0, delay=0.0)
     assert run(sync, 3.0, 2.0, offset=1.0, delay=0.6, back=0.0) == []
-    assert sync.resets == 0
 
 
 def test_answers_to_others_are_ignored():

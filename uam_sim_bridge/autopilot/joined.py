@@ -26,6 +26,7 @@ from uam_sim_bridge.mavlink.protocol.modes import (
     Mode,
     Severity,
 )
+from uam_sim_bridge.mavlink.protocol.vision import VisionPose
 
 HEARTBEAT, LANDED = 1.0, 0.2  # [s] between two regular reports, as `telemetry.STREAMS`
 
@@ -100,17 +101,11 @@ class JoinedAutopilot:
             command = MavCmd.ARM_DISARM, (float(request is Request.ARM), 0.0)
         self._answers.append((request, self.autopilot.command(self.time, *command)))
 
-    def send_vision(
-        self,
-        stamp: float,
-        position: np.ndarray,
-        quaternion: np.ndarray,
-        position_deviation: float,
-        attitude_deviation: float,
-    ) -> None:
-        """Send a pose: position (3,) [m, ENU], quaternion (4,) [w x y z], FLU → ENU."""
+    def send_vision(self, pose: VisionPose) -> None:
+        """Send a mocap pose."""
         if self.passes():
-            self.autopilot.vision(self.time, swap_world(position), swap_quaternion(quaternion))
+            position, quaternion = swap_world(pose.position), swap_quaternion(pose.quaternion)
+            self.autopilot.vision(self.time, position, quaternion)
 
     def send_setpoint(self, target: AttitudeTarget, time: float) -> None:
         """Send the setpoint of the tick `time` [s]."""

@@ -38,7 +38,6 @@ from uam_msgs_py.node.base_node import UamNode, run
 from uam_msgs_py.node.joins import StampJoin
 from uam_msgs_py.node.node_parameters import NodeParameters
 from uam_sim_bridge.mavlink.link.link_report import faults, report
-from uam_sim_bridge.mavlink.link.vision import vision_message
 from uam_sim_bridge.mavlink.offboard.hold import HoldParameters
 from uam_sim_bridge.mavlink.offboard.sequence import OffboardParameters, OffboardSequence
 from uam_sim_bridge.mavlink.offboard.setpoint import RateThrustMap, RateThrustParameters
@@ -49,6 +48,7 @@ from uam_sim_bridge.mavlink.offboard.thrust_identification import (
     ThrustIdentificationParameters,
     steady_force,
 )
+from uam_sim_bridge.mavlink.protocol.vision import VisionPose
 from uam_sim_bridge.mavlink.telemetry.parameter_check import adopted, differences
 from uam_sim_bridge.nodes.autopilot_topics import AutopilotTopics
 from uam_sim_bridge.nodes.bridge_link import BridgeParameters, open_links
@@ -264,6 +264,7 @@ class MavlinkBridgeNode(UamNode):
             "refused": link.refused,
             "link open": link.open,
             "frames dropped": link.dropped,
+            "ground station held back": self._station.held_back if self._station else None,
             "level hold": self.stage.source.holding,
             "adopted": "; ".join(self._adopted),
             **report(link),
@@ -281,7 +282,7 @@ class MavlinkBridgeNode(UamNode):
         for setpoint in SETPOINTS.values():
             setpoint(Desired(zero, np.zeros((3, 3)), 0.5))
         steady_force(state, 0.1, 1.0)
-        vision_message(0.0, zero, level, 1.0, 1.0)
+        VisionPose(0.0, zero, level, 1.0, 1.0).message()
 
 
 def _plain(value: float | tuple[float, ...]) -> float | list[float]:

@@ -10,10 +10,9 @@ from __future__ import annotations
 
 from typing import Protocol
 
-import numpy as np
-
 from uam_sim_bridge.mavlink.protocol.attitude_target import AttitudeTarget
 from uam_sim_bridge.mavlink.protocol.modes import Mode
+from uam_sim_bridge.mavlink.protocol.vision import VisionPose
 
 
 class AutopilotPort(Protocol):
@@ -45,18 +44,8 @@ class AutopilotPort(Protocol):
         """Send the heartbeat and the sequence's requests that are due at `time` [s]."""
         ...
 
-    def send_vision(
-        self,
-        stamp: float,
-        position: np.ndarray,
-        quaternion: np.ndarray,
-        position_deviation: float,
-        attitude_deviation: float,
-    ) -> None:
-        """Send a pose of `stamp` [s]: position (3,) [m, ENU], quaternion (4,) [w x y z], FLU → ENU.
-
-        Deviations: standard deviations [m], [rad].
-        """
+    def send_vision(self, pose: VisionPose) -> None:
+        """Send a mocap pose."""
         ...
 
     def send_setpoint(self, target: AttitudeTarget, time: float) -> None:

@@ -8,6 +8,7 @@ import numpy as np
 
 from uam_control.estimation.repeats import Repeats
 from uam_control.settings.parameter_set import ParameterSet, number
+from uam_sim_bridge.mavlink.protocol.vision import VisionPose
 from uam_sim_bridge.stages.autopilot_port import AutopilotPort
 
 
@@ -57,10 +58,5 @@ class VisionPacing:
         exposed, position, quaternion = self._pose
         if exposed - self._sent >= p.vision_interval - 1e-9:
             self._pose, self._sent = None, exposed
-            autopilot.send_vision(
-                exposed,
-                position,
-                quaternion,
-                p.vision_position_deviation,
-                p.vision_attitude_deviation,
-            )
+            deviations = p.vision_position_deviation, p.vision_attitude_deviation
+            autopilot.send_vision(VisionPose(exposed, position, quaternion, *deviations))

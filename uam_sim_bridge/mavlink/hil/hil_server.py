@@ -15,9 +15,8 @@ import numpy as np
 
 from uam_control.settings.parameter_set import ParameterSet, number
 from uam_sim_bridge.mavlink.hil.hil_sensors import TEMPERATURE, SlowSensors
-from uam_sim_bridge.mavlink.link.vision import vision_message
 from uam_sim_bridge.mavlink.protocol.frames import swap_body, swap_quaternion
-from uam_sim_bridge.mavlink.protocol.wire import Codec, Framer, Message, mavlink2
+from uam_sim_bridge.mavlink.protocol.wire import Codec, Framer, mavlink2
 from uam_sim_bridge.patience import SLICE, Patience
 from uam_sim_bridge.ports import PortError
 
@@ -100,22 +99,6 @@ class HilServer:
             self._link.setblocking(False)
         return self.connected
 
-    def exchange(
-        self,
-        time: float,
-        gyro: np.ndarray,
-        accel: np.ndarray,
-        position: np.ndarray,
-        quaternion: np.ndarray,
-    ) -> np.ndarray:
-        """Send the sensors of a tick, wait for the answer, return `motors` (4,): send and receive.
-
-        gyro (3,), accel (3,), position (3,), quaternion (4,): see `send`. Without a connection, or
-        if the autopilot closes it, the motors are zero.
-        """
-        self.send(time, gyro, accel, position, quaternion)
-        return self.receive()
-
     def send(
         self,
         time: float,
@@ -131,14 +114,36 @@ class HilServer:
         """
         if self._link is None:
             return
-        self._stamp = round(time * 1e6)
-        if not self._send(self._sensor(time, gyro, accel, position, quaternion)):
+        self._stamp, fields = round(time * 1e6), _IMU
+        if time + 1e-9 >= self._slow_due:
+            self._slow_due = time + _SLOW_PERIOD
+            fields |= _MAG | _BARO
+            self._mag = self._slow.magnetometer(swap_quaternion(quaternion))
+            self._baro = self._slow.barometer(float(position[2]))
+        message = mavlink2.MAVLink_hil_sensor_message(
+            self._stamp,
+            *swap_body(accel).tolist(),
+            *swap_body(gyro).tolist(),
+            *self._mag,
+            self._baro[0],
+            0.0,
+            self._baro[1],
+            TEMPERATURE,
+            fields,
+            0,
+        )
+        try:
+            self._link.settimeout(self.parameters.answer_timeout)
+            self._link.sendall(self._codec.encode(message))
+            self._link.setblocking(False)
+        except (ConnectionError, TimeoutError):
             self._stop()
 
     def receive(self, timeout: float | None = None) -> np.ndarray:
-        """Wait for the answer to the last `send`; return `motors` (4,), also without an answer.
+        """Wait for the answer to the last `send`; return `motors` (n,), also without an answer.
 
-        timeout: wall time [s]; None for `answer_timeout` or `silent_timeout` (module docstring).
+        Without a connection, or if the autopilot closes it, the motors are zero. timeout: wall time
+        [s]; None for `answer_timeout` or `silent_timeout` (module docstring).
         """
         if self._link is None:
             return self.motors
@@ -158,64 +163,10 @@ class HilServer:
         self.missed += self._ever and not self.answered
         return self.motors
 
-    def send_vision(
-        self,
-        stamp: float,
-        position: np.ndarray,
-        quaternion: np.ndarray,
-        position_deviation: float,
-        attitude_deviation: float,
-    ) -> None:
-        """Send a mocap pose to the autopilot over this link.
-
-        stamp [s]; position (3,) [m, ENU]; quaternion (4,) FLU → ENU [w x y z]; standard deviations
-        [m] and [rad].
-        """
-        if self._link is not None and not self._send(
-            vision_message(stamp, position, quaternion, position_deviation, attitude_deviation)
-        ):
-            self._stop()
-
     def close(self) -> None:
         """Close the connection and release the port."""
         self._stop()
         self._listener.close()
-
-    def _sensor(
-        self,
-        time: float,
-        gyro: np.ndarray,
-        accel: np.ndarray,
-        position: np.ndarray,
-        quaternion: np.ndarray,
-    ) -> Message:
-        fields = _IMU
-        if time + 1e-9 >= self._slow_due:
-            self._slow_due = time + _SLOW_PERIOD
-            fields |= _MAG | _BARO
-            self._mag = self._slow.magnetometer(swap_quaternion(quaternion))
-            self._baro = self._slow.barometer(float(position[2]))
-        return mavlink2.MAVLink_hil_sensor_message(
-            self._stamp,
-            *swap_body(accel).tolist(),
-            *swap_body(gyro).tolist(),
-            *self._mag,
-            self._baro[0],
-            0.0,
-            self._baro[1],
-            TEMPERATURE,
-            fields,
-            0,
-        )
-
-    def _send(self, message: Message) -> bool:
-        try:
-            self._link.settimeout(self.parameters.answer_timeout)
-            self._link.sendall(self._codec.encode(message))
-            self._link.setblocking(False)
-        except (ConnectionError, TimeoutError):
-            return False
-        return True
 
     def _receive(self) -> bool:
         try:

@@ -8,14 +8,12 @@ from __future__ import annotations
 
 import math
 
-import numpy as np
-
-from uam_sim_bridge.mavlink.link.vision import vision_message
 from uam_sim_bridge.mavlink.offboard.sequence import HEARTBEAT_TIMEOUT, OffboardSequence, Request
 from uam_sim_bridge.mavlink.offboard.setpoint import RateThrustParameters
 from uam_sim_bridge.mavlink.protocol.attitude_target import AttitudeTarget
 from uam_sim_bridge.mavlink.protocol.modes import CUSTOM_MODE_ENABLED, MavCmd, MavResult, Mode
 from uam_sim_bridge.mavlink.protocol.signing import Signing
+from uam_sim_bridge.mavlink.protocol.vision import VisionPose
 from uam_sim_bridge.mavlink.protocol.wire import Codec, Framer, Message, TextAssembler, mavlink2
 from uam_sim_bridge.mavlink.telemetry.events import EventReader
 from uam_sim_bridge.mavlink.telemetry.link_statistics import LinkStatistics
@@ -161,21 +159,9 @@ class OffboardLink:
             raise ValueError(f"setpoint {target}; finite values and thrust 0..1 allowed")
         self._send(target.message(time, self._target))
 
-    def send_vision(
-        self,
-        stamp: float,
-        position: np.ndarray,
-        quaternion: np.ndarray,
-        position_deviation: float,
-        attitude_deviation: float,
-    ) -> None:
-        """Send a mocap pose: stamp [s], position (3,) [m, ENU], quaternion (4,) FLU → ENU, wxyz.
-
-        Standard deviations [m] and [rad].
-        """
-        self._send(
-            vision_message(stamp, position, quaternion, position_deviation, attitude_deviation)
-        )
+    def send_vision(self, pose: VisionPose) -> None:
+        """Send a mocap pose."""
+        self._send(pose.message())
 
     def close(self) -> None:
         """Close the transport."""

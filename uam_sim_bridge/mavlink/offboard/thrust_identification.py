@@ -142,13 +142,11 @@ def steady_force(state: np.ndarray, tilt_max: float, acceleration_max: float) ->
 class ThrustIdentification:
     """Estimate of the thrust factor, and the conditions under which it changes.
 
-    `factor`: true / assumed thrust, always within its bounds. `learning`: whether a measurement
-    changed it in the last tick.
+    `factor`: true / assumed thrust, always within its bounds.
     """
 
     def __init__(self, parameters: ThrustIdentificationParameters | None = None) -> None:
         self.factor = 1.0
-        self.learning = False
         self._time = -math.inf
         self._assumed = 0.0  # N, lagged as the motors
         self._ground: float | None = None  # m, height of the vehicle on the ground
@@ -185,7 +183,6 @@ class ThrustIdentification:
         this tick; assumed [N]: its collective by the curve, without the factor; flying: armed and
         controlled.
         """
-        self.learning = False
         if not math.isfinite(time + assumed + command):
             return self.factor
         dt, self._time = time - self._time, time
@@ -223,7 +220,6 @@ class ThrustIdentification:
         if self._released is not None and self._hanging(time, dt, measured):
             return
         if p.thrust_identification == "on":
-            self.learning = True
             self._learnt += dt
             span = min(p.identification_time, max(p.identification_start, self._learnt))
             gain = 1.0 - math.exp(-dt / span)

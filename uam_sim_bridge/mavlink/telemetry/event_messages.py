@@ -1,7 +1,7 @@
-"""The messages EVENT and CURRENT_EVENT_SEQUENCE, added to pymavlink's dialect on import.
+"""The message EVENT, added to pymavlink's dialect on import.
 
-MAVLink marks both as work in progress, so pymavlink omits them. PX4 sends them: it reports most
-failed arming checks only as EVENT.
+MAVLink marks it as work in progress, so pymavlink omits it. PX4 reports most failed arming checks
+only as EVENT.
 """
 
 from __future__ import annotations
@@ -84,37 +84,4 @@ class EventMessage(mavlink2.MAVLink_message):
         return self._pack(mav, self.crc_extra, payload, force_mavlink1=force_mavlink1)
 
 
-class CurrentEventSequenceMessage(mavlink2.MAVLink_message):
-    """CURRENT_EVENT_SEQUENCE: the number of the newest event."""
-
-    id = 411
-    msgname = "CURRENT_EVENT_SEQUENCE"
-    fieldnames = ordered_fieldnames = ["sequence", "flags"]
-    fieldtypes = ["uint16_t", "uint8_t"]
-    fielddisplays_by_name: dict[str, str] = {}
-    fieldenums_by_name: dict[str, str] = {}
-    fieldunits_by_name: dict[str, str] = {}
-    native_format = bytearray(b"<HB")
-    orders = [0, 1]
-    lengths = [1, 1]
-    array_lengths = [0, 0]
-    crc_extra = 106
-    unpacker = struct.Struct("<HB")
-    instance_field = None
-    instance_offset = -1
-
-    def __init__(self, sequence: int, flags: int):
-        super().__init__(CurrentEventSequenceMessage.id, CurrentEventSequenceMessage.msgname)
-        self._fieldnames = CurrentEventSequenceMessage.fieldnames
-        self._instance_field, self._instance_offset = None, -1
-        self.sequence = sequence
-        self.flags = flags
-
-    def pack(self, mav: mavlink2.MAVLink, force_mavlink1: bool = False) -> bytes:
-        """Return the frame."""
-        payload = self.unpacker.pack(self.sequence, self.flags)
-        return self._pack(mav, self.crc_extra, payload, force_mavlink1=force_mavlink1)
-
-
-for _kind in (EventMessage, CurrentEventSequenceMessage):
-    mavlink2.mavlink_map.setdefault(_kind.id, _kind)
+mavlink2.mavlink_map.setdefault(EventMessage.id, EventMessage)

@@ -25,11 +25,10 @@ class TimeSync:
     """Creates the TIMESYNC requests and estimates the offset from the answers.
 
     `offset` [s] or None: autopilot's clock − companion's clock; `round_trip` [s] or None:
-    smoothed; `resets`: number of jumps of the autopilot's clock.
+    smoothed.
     """
 
     def __init__(self) -> None:
-        self.resets = 0
         self._requested: deque[int] = deque(maxlen=_OUTSTANDING)
         self._last = -math.inf
         self.restart()
@@ -78,7 +77,6 @@ class TimeSync:
             if self._jumps < JUMPS_TO_RESET:
                 return False
             self.restart()
-            self.resets += 1
             self._take(offset, round_trip)
             return True
         self._jumps = 0
