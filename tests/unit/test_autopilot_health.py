@@ -8,14 +8,15 @@ import pytest
 from uam_sim_bridge.autopilot.core import Autopilot
 from uam_sim_bridge.autopilot.telemetry import battery_status, estimator_status, sys_status
 from uam_sim_bridge.mavlink.protocol.wire import mavlink2
-from uam_sim_bridge.mavlink.telemetry.autopilot_health import (
+from uam_sim_bridge.mavlink.telemetry.vitals import (
     ESTIMATOR_FLAGS,
     SENSORS,
     estimate_faults,
+    from_battery_status,
+    from_sys_status,
     names,
     unhealthy,
 )
-from uam_sim_bridge.mavlink.telemetry.battery import from_battery_status, from_sys_status
 
 LEVEL = np.array([1.0, 0.0, 0.0, 0.0])
 

@@ -22,12 +22,12 @@ import numpy as np
 
 from uam_control.settings.configuration import ConfigurationError
 from uam_control.settings.parameter_set import ParameterError
-from uam_control.vehicle import DEFAULT_VEHICLE, load_description
+from uam_control.vehicle import load_description
 from uam_sim_bridge.autopilot.companion import Companion, warm_up
 from uam_sim_bridge.autopilot.core import Autopilot
 from uam_sim_bridge.autopilot.params import Parameters
 from uam_sim_bridge.autopilot.serial_line import SerialLine
-from uam_sim_bridge.mavlink.hil.sitl_options import add_port_options, fill_ports
+from uam_sim_bridge.mavlink.hil.sitl_options import add_port_options, add_vehicle, fill_ports
 from uam_sim_bridge.mavlink.hil.sitl_ports import UdpPort, connect
 from uam_sim_bridge.mavlink.protocol.signing import Signing
 from uam_sim_bridge.mavlink.protocol.wire import Codec, Framer, Message, mavlink2
@@ -123,12 +123,7 @@ def parser() -> argparse.ArgumentParser:
         "  autopilot --serial /dev/ttyUSB0:921600  at the far end of hitl_router's line\n",
     )
     add_port_options(p)
-    p.add_argument(
-        "--vehicle",
-        default=DEFAULT_VEHICLE,
-        metavar="NAME|FILE",
-        help="description, as in config/vehicle/ (default %(default)s)",
-    )
+    add_vehicle(p)
     p.add_argument("--params", metavar="FILE", help="parameters that override the vehicle's")
     p.add_argument(
         "--serial",

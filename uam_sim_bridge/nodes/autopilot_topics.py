@@ -11,7 +11,7 @@ from uam_msgs_py.messages.ros_time import set_stamp
 from uam_msgs_py.messages.status import AutopilotState
 from uam_msgs_py.node.base_node import UamNode
 from uam_sim_bridge.mavlink.link.link import OffboardLink
-from uam_sim_bridge.mavlink.telemetry.battery import Battery
+from uam_sim_bridge.mavlink.telemetry.vitals import Battery
 from uam_sim_bridge.stages.autopilot_report import AutopilotReport
 
 BATTERY_PERIOD = 1_000_000_000  # ns

@@ -20,8 +20,8 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from uam_control.settings.configuration import ConfigurationError
-from uam_control.vehicle import DEFAULT_VEHICLE, VehicleError, load_description
-from uam_sim_bridge.mavlink.hil.sitl_options import instance
+from uam_control.vehicle import VehicleError, load_description
+from uam_sim_bridge.mavlink.hil.sitl_options import add_instance, add_vehicle
 from uam_sim_bridge.px4 import px4_parameters as parameters
 from uam_sim_bridge.px4.px4_installation import REQUIRED, Px4Error, Px4Installation
 
@@ -106,21 +106,9 @@ def parser() -> argparse.ArgumentParser:
         "  px4_sitl --instance 2 --log flight.ulg\n"
         "  px4_sitl --params mine.yaml       NAME: value lines, PX4's names\n",
     )
-    p.add_argument(
-        "-i",
-        "--instance",
-        type=instance,
-        default=0,
-        metavar="N",
-        help="PX4 instance number, added to the ports (default %(default)s)",
-    )
+    add_instance(p)
     p.add_argument("--px4-dir", metavar="DIR", help=REQUIRED)
-    p.add_argument(
-        "--vehicle",
-        default=DEFAULT_VEHICLE,
-        metavar="NAME|FILE",
-        help="description, as in config/vehicle/ (default %(default)s)",
-    )
+    add_vehicle(p)
     p.add_argument(
         "--params",
         metavar="FILE",

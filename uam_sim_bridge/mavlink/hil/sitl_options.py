@@ -6,6 +6,7 @@ import argparse
 import math
 from collections.abc import Callable
 
+from uam_control.vehicle import DEFAULT_VEHICLE
 from uam_sim_bridge.mavlink.hil.sitl_ports import HOST
 from uam_sim_bridge.ports import AUTOPILOT_UDP, OFFBOARD_UDP, SIMULATOR_TCP
 
@@ -39,16 +40,31 @@ def number(what: str, low: float, high: float) -> Callable[[str], float]:
     return read
 
 
-def add_port_options(p: argparse.ArgumentParser) -> None:
-    """Add the options of simulator and companion ports to a command line."""
+def add_instance(p: argparse.ArgumentParser) -> None:
+    """Add the option of the instance number to a command line."""
     p.add_argument(
         "-i",
         "--instance",
         type=instance,
         default=0,
         metavar="N",
-        help="PX4 instance number, added to the default ports",
+        help="PX4 instance number, added to the default ports (default %(default)s)",
     )
+
+
+def add_vehicle(p: argparse.ArgumentParser) -> None:
+    """Add the option of the vehicle to a command line."""
+    p.add_argument(
+        "--vehicle",
+        default=DEFAULT_VEHICLE,
+        metavar="NAME|FILE",
+        help="description, as in config/vehicle/ (default %(default)s)",
+    )
+
+
+def add_port_options(p: argparse.ArgumentParser) -> None:
+    """Add the options of instance, simulator and companion ports to a command line."""
+    add_instance(p)
     p.add_argument(
         "--sim-host", default=HOST, metavar="HOST", help="simulator (default %(default)s)"
     )

@@ -17,10 +17,9 @@ from uam_sim_bridge.mavlink.protocol.vision import VisionPose
 from uam_sim_bridge.mavlink.protocol.wire import Codec, Framer, Message, TextAssembler, mavlink2
 from uam_sim_bridge.mavlink.telemetry.events import EventReader
 from uam_sim_bridge.mavlink.telemetry.link_statistics import LinkStatistics
-from uam_sim_bridge.mavlink.telemetry.parameter_watch import ParameterWatch
-from uam_sim_bridge.mavlink.telemetry.reboot import RebootDetector
+from uam_sim_bridge.mavlink.telemetry.parameter_check import ParameterWatch
 from uam_sim_bridge.mavlink.telemetry.streams import StreamCheck
-from uam_sim_bridge.mavlink.telemetry.time_sync import TimeSync, nanoseconds
+from uam_sim_bridge.mavlink.telemetry.time_sync import RebootDetector, TimeSync, nanoseconds
 from uam_sim_bridge.mavlink.telemetry.vitals import Vitals
 from uam_sim_bridge.mavlink.transport.transport import Transport
 

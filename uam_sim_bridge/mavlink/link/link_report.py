@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from uam_sim_bridge.mavlink.link.link import OffboardLink
-from uam_sim_bridge.mavlink.telemetry.autopilot_health import (
+from uam_sim_bridge.mavlink.telemetry.vitals import (
     ESTIMATOR_FLAGS,
     estimate_faults,
     names,

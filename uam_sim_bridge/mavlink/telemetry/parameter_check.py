@@ -1,4 +1,4 @@
-"""Compares the autopilot's parameters with the bridge's mapping, or adopts them into the mapping.
+"""Requests the autopilot's parameters, compares them with the bridge's mapping, or adopts them.
 
 PX4 sends an integer parameter as four bytes in the float field of PARAM_VALUE; param_type gives
 the type.
@@ -12,7 +12,7 @@ from collections.abc import Iterable, Iterator
 from dataclasses import replace
 
 from uam_sim_bridge.mavlink.offboard.setpoint import RateThrustParameters
-from uam_sim_bridge.mavlink.protocol.wire import Message, mavlink2
+from uam_sim_bridge.mavlink.protocol.wire import Message, clean_text, mavlink2
 
 _AXES = ("ROLLRATE", "PITCHRATE", "YAWRATE")
 # parameters read from the autopilot; those that the mapping does not use are only recorded
@@ -21,6 +21,7 @@ WATCHED = (
     "THR_MDL_FAC", "MPC_THR_HOVER", "COM_OF_LOSS_T",
 )  # fmt: skip
 _TOLERANCE = 1e-4  # relative: MAVLink carries 32-bit numbers
+RETRY, ATTEMPTS = 0.5, 10  # s between requests, number of requests
 HICCUP = 0.5  # s, longest normal gap in the setpoint stream (busy computer or link)
 _INTEGERS = {
     mavlink2.MAV_PARAM_TYPE_UINT8: "<Bxxx", mavlink2.MAV_PARAM_TYPE_INT8: "<bxxx",
@@ -98,3 +99,64 @@ def unanswered(names: Iterable[str], attempts: int) -> Iterator[str]:
     """Yield one line for each parameter that the autopilot has not sent."""
     for name in names:
         yield f"{name}: no answer from the autopilot to {attempts} requests"
+
+
+class ParameterWatch:
+    """`values`: received parameters (of WATCHED) by name; `warnings`: one line per problem."""
+
+    def __init__(self, mapping: RateThrustParameters) -> None:
+        self.values: dict[str, float] = {}
+        self.warnings: tuple[str, ...] = ()
+        self._mapping = mapping
+        self.restart()
+
+    def restart(self) -> None:
+        """Discard all values and request them again."""
+        self.values.clear()
+        self._requested, self._attempts = -math.inf, 0
+        self._compare()
+
+    def set_mapping(self, mapping: RateThrustParameters) -> None:
+        """Compare with this mapping from now on."""
+        self._mapping = mapping
+        self._compare()
+
+    @property
+    def mapping_read(self) -> bool:
+        """Return whether every parameter that the mapping assumes has been received."""
+        return all(name in self.values for name in expected(self._mapping))
+
+    def take(self, message: Message) -> None:
+        """Store the value of a PARAM_VALUE; parameters outside WATCHED are ignored."""
+        name = clean_text(message.param_id)
+        if name in WATCHED:
+            self.values[name] = value_of(message)
+            self._compare()
+
+    def due(self, time: float) -> list[str]:
+        """Return the names to request at the tick `time` [s].
+
+        After ATTEMPTS requests the list is empty and `warnings` names the missing parameters.
+        """
+        if time - self._requested < RETRY or self._attempts > ATTEMPTS:
+            return []
+        missing = self._missing
+        if not missing:
+            return []
+        self._requested = time
+        self._attempts += 1
+        if self._attempts > ATTEMPTS:  # RETRY has passed since the last request
+            self._compare()
+            return []
+        return missing
+
+    @property
+    def _missing(self) -> list[str]:
+        return [name for name in WATCHED if name not in self.values]
+
+    def _compare(self) -> None:
+        self.warnings = (
+            *differences(self._mapping, self.values),
+            *stream_loss(self.values),
+            *unanswered(self._missing if self._attempts > ATTEMPTS else [], ATTEMPTS),
+        )

@@ -1,4 +1,4 @@
-"""Clock offset and round trip of the autopilot from TIMESYNC, the companion's side.
+"""Clock offset, round trip and restarts of the autopilot, from TIMESYNC; the companion's side.
 
 A request carries the companion's time; the answer repeats it and adds the autopilot's time. The
 autopilot is assumed to read its clock at the middle of the round trip, so the error is at most half
@@ -19,6 +19,8 @@ _RECENT = 25  # answers, window of the shortest round trip for the weights
 _SLOWEST_GAIN = 0.05  # lowest gain of the averages
 _SHORTEST = 1e-3  # s, lower bound of a round trip in the weights
 _NEWEST = 5  # answers of one second
+BACKWARDS = 1.0  # s: a smaller step back may be messages out of order
+_WRAP = 2**32 * 1e-3  # s, period of a 32-bit time in milliseconds: 49.7 days
 
 
 class TimeSync:
@@ -99,3 +101,21 @@ class TimeSync:
 def nanoseconds(time: float) -> int:
     """Return `time` [s] in TIMESYNC's unit [ns], at least 1: tc1 = 0 marks a request."""
     return max(1, round(time * 1e9))
+
+
+class RebootDetector:
+    """Compares successive times since boot of ATTITUDE_QUATERNION and TIMESYNC."""
+
+    def __init__(self) -> None:
+        self._latest: float | None = None
+
+    def time_since_boot(self, time: float) -> bool:
+        """Return True if `time` [s since boot] shows a restart."""
+        latest = self._latest
+        if latest is None or time > latest:
+            self._latest = time
+            return False
+        if latest - time < BACKWARDS:
+            return False
+        self._latest = time
+        return latest - time < _WRAP - 60.0

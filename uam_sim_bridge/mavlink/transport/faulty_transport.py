@@ -9,10 +9,10 @@ import numpy as np
 from uam_sim_bridge.faults import Schedule
 from uam_sim_bridge.faults.link_faults import LinkFault, MavlinkCorruption, MavlinkCut, MavlinkDelay
 from uam_sim_bridge.faults.timeline import FaultState, Timeline
-from uam_sim_bridge.mavlink.transport.transport import Transport
+from uam_sim_bridge.mavlink.transport.transport import Transport, WrappedTransport
 
 
-class FaultyTransport:
+class FaultyTransport(WrappedTransport):
     """Wraps a transport; loses, delays and corrupts packets at the times of a schedule.
 
     It has no clock: `mission_at` and `update` pass the time. `send` returns True also for a packet
@@ -21,24 +21,12 @@ class FaultyTransport:
 
     def __init__(self, inner: Transport, schedule: Schedule) -> None:
         """inner: wrapped transport, closed together with this one; schedule: link faults only."""
-        self._inner = inner
+        super().__init__(inner)
         self._timeline = Timeline(schedule)
         self._noise = np.random.default_rng(np.random.SeedSequence(schedule.seed, spawn_key=(1,)))
         self._now = 0.0
         self._outgoing: deque[tuple[float, bytes]] = deque()
         self._incoming: deque[tuple[float, bytes]] = deque()
-        self.stream = inner.stream
-        self.bytes_per_second = inner.bytes_per_second
-
-    @property
-    def connected(self) -> bool:
-        """Return whether the link is open."""
-        return self._inner.connected
-
-    @property
-    def dropped(self) -> int:
-        """Return the number of frames that the wrapped transport did not send."""
-        return self._inner.dropped
 
     def mission_at(self, stamp: float, time: float) -> None:
         """See `Timeline.mission_at`."""
@@ -49,7 +37,7 @@ class FaultyTransport:
         self._now = max(self._now, stamp)
         changed = self._timeline.update(stamp)
         for data in self._due(self._outgoing):
-            self._inner.send(data)
+            self.inner.send(data)
         return changed
 
     def send(self, data: bytes) -> bool:
@@ -61,25 +49,17 @@ class FaultyTransport:
         if late or self._outgoing:
             self._outgoing.append((self._now + late, altered))
             return True
-        return self._inner.send(altered)
+        return self.inner.send(altered)
 
     def receive(self) -> list[bytes]:
         """Return the packets received from the autopilot; active faults apply."""
         faults = [f for f in self._active if f.inwards]
-        for data in self._inner.receive():
+        for data in self.inner.receive():
             altered = self._altered(data, faults)
             if altered is not None:
                 late, altered = altered
                 self._incoming.append((self._now + late, altered))
         return self._due(self._incoming)
-
-    def fileno(self) -> int:
-        """Return the descriptor of the link."""
-        return self._inner.fileno()
-
-    def close(self) -> None:
-        """Close the link."""
-        self._inner.close()
 
     @property
     def _active(self) -> list[LinkFault]:

@@ -13,7 +13,7 @@ from collections.abc import Callable
 
 from uam_sim_bridge.mavlink.protocol.wire import Codec, Framer
 from uam_sim_bridge.mavlink.transport.pacing import Pacer
-from uam_sim_bridge.mavlink.transport.transport import Transport, open_transport
+from uam_sim_bridge.mavlink.transport.transport import Transport, WrappedTransport, open_transport
 from uam_sim_bridge.ports import PortError
 
 BYTES_PER_TICK = 2048  # limit of bytes read from the station per tick
@@ -21,7 +21,7 @@ DATAGRAM = 1400  # bytes, largest datagram to the station: below the usual netwo
 LINE_SHARE = 0.2  # of the line's rate; the rest is for setpoints
 
 
-class GroundStation:
+class GroundStation(WrappedTransport):
     """Transport with forwarding; `forwarded`, `held_back`: messages from the station, counted."""
 
     def __init__(
@@ -37,32 +37,16 @@ class GroundStation:
         """
         if not url.startswith("udp:"):
             raise PortError(f"ground station {url!r}: udp:HOST:PORT[:LOCAL_PORT] expected")
+        super().__init__(autopilot)
         self._station = open_transport(url, BYTES_PER_TICK)
-        self._autopilot = autopilot
         self._framer = Framer(codec)
         self._pacer = Pacer(autopilot.bytes_per_second, LINE_SHARE)
         self._clock = clock
-        self.stream = autopilot.stream
-        self.bytes_per_second = autopilot.bytes_per_second
         self.forwarded = self.held_back = 0
-
-    @property
-    def connected(self) -> bool:
-        """Return whether the autopilot's link is open."""
-        return self._autopilot.connected
-
-    @property
-    def dropped(self) -> int:
-        """Return the number of frames that could not be sent to the autopilot."""
-        return self._autopilot.dropped
-
-    def send(self, data: bytes) -> bool:
-        """Send to the autopilot."""
-        return self._autopilot.send(data)
 
     def receive(self) -> list[bytes]:
         """Return the bytes received from the autopilot; forward them to the station."""
-        chunks = self._autopilot.receive()
+        chunks = self.inner.receive()
         for chunk in chunks:
             for at in range(0, len(chunk), DATAGRAM):
                 self._station.send(chunk[at : at + DATAGRAM])
@@ -73,17 +57,13 @@ class GroundStation:
         for data in self._station.receive():
             for message in self._framer.datagram(data):
                 frame = bytes(message.get_msgbuf())
-                if self._pacer.may_send(self._clock()) and self._autopilot.send(frame):
+                if self._pacer.may_send(self._clock()) and self.inner.send(frame):
                     self._pacer.sent(len(frame))
                     self.forwarded += 1
                 else:
                     self.held_back += 1
 
-    def fileno(self) -> int:
-        """Return the descriptor of the autopilot's link."""
-        return self._autopilot.fileno()
-
     def close(self) -> None:
         """Close both links."""
-        self._autopilot.close()
+        super().close()
         self._station.close()
