@@ -11,10 +11,10 @@ from whole_flight import assert_nothing_left, wait_until_gone
 
 from uam_lab.doctor.finding import Verdict
 from uam_lab.doctor.ros import room
+from uam_lab.flight.flight_settings import settings
 from uam_lab.flight.progress import Progress
 from uam_lab.flight.ros import engine as ros_engine
 from uam_lab.flight.ros import node_arguments as ros_parameters
-from uam_lab.flight.settings import settings
 from uam_lab.results import timeseries
 from uam_lab.results.result_folder import ResultFolder
 from uam_sim_bridge.ports import Reservation

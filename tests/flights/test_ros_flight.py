@@ -12,7 +12,7 @@ from uam_control.laws.modular import ModularLaw
 from uam_control.mission import load_scenario
 from uam_control.profiles.profile import load_profile
 from uam_lab.flight.direct.flight import DirectFlight
-from uam_lab.flight.settings import settings
+from uam_lab.flight.flight_settings import settings
 from uam_lab.recording.log_reader import read_flight
 from uam_lab.results import timeseries
 from uam_lab.results.metrics import errors

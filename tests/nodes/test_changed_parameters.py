@@ -4,7 +4,7 @@ import rclpy
 from rclpy.node import Node
 from rclpy.parameter import Parameter
 
-from uam_lab.flight.ros.changed_parameters import ChangedParameters
+from uam_lab.flight.ros.restarts import ChangedParameters
 from uam_msgs_py.messages.parameter_changes import ParameterChange
 
 

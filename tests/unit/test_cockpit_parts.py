@@ -9,7 +9,7 @@ from diagnostic_msgs.msg import DiagnosticArray
 from hypothesis import given
 from hypothesis import strategies as st
 
-from uam_lab.cockpit import place
+from uam_lab.cockpit import page_address
 from uam_lab.cockpit.entry import axes, bounds, reach, text_of, value_of
 from uam_lab.cockpit.headline import headline
 from uam_lab.cockpit.remote_parameters import About
@@ -84,7 +84,7 @@ def test_the_headline_shows_the_state():
     health = Health(silent_after=3.0)
     assert "WAITING FOR A FLIGHT" in headline(health, LIMITS)
     health.silence = 0.1
-    health.hear(MissionStatus("approach", 12.0, 0.004, 0.1, 0.3))
+    health.set_mission(MissionStatus("approach", 12.0, 0.004, 0.1, 0.3))
     health.autopilot = AutopilotState(True, "OFFBOARD", True, 0, "")
     health.diagnose(reported("arm_controller", OK, "running", saturated=True))
     page = headline(health, LIMITS)
@@ -110,25 +110,25 @@ def test_the_headline_shows_the_state():
             (BAD, "failsafe", "tilt"),
         ),
     ):
-        health.hear(status)
+        health.set_mission(status)
         assert health.state() == message
         assert message[1].upper() in headline(health, LIMITS)
         assert message[2] in headline(health, LIMITS)
     health.silence = 7.0
-    health.hear(MissionStatus("approach", 12.0))
+    health.set_mission(MissionStatus("approach", 12.0))
     assert health.state() == (BAD, "no signal for 7 s", "")
-    health.hear(MissionStatus("landed", 90.0, done=True))
+    health.set_mission(MissionStatus("landed", 90.0, done=True))
     assert health.state() == (GOOD, "flight over", "")
-    health.hear(MissionStatus("aborted", 90.0, abort_reason="tilt 90 deg", done=True))
+    health.set_mission(MissionStatus("aborted", 90.0, abort_reason="tilt 90 deg", done=True))
     assert health.state() == (BAD, "flight over", "tilt 90 deg")
 
 
 def test_errors_come_from_tracking_once_it_is_there():
     health = Health(silent_after=3.0)
-    health.hear(MissionStatus("approach", 1.0, 0.5, 0.5, 0.5))
+    health.set_mission(MissionStatus("approach", 1.0, 0.5, 0.5, 0.5))
     assert health.errors == (0.5, 0.5, 0.5)
     health.track(np.array([0.3, 0.4, 0.0, 0.1, 0.0, 0.0, 0.0, 0.2]))
-    health.hear(MissionStatus("approach", 1.5, 0.9, 0.9, 0.9))
+    health.set_mission(MissionStatus("approach", 1.5, 0.9, 0.9, 0.9))
     assert health.errors == pytest.approx((0.5, 0.1, 0.2))
 
 
@@ -185,8 +185,8 @@ def test_what_is_no_list_of_transforms_is_refused_or_read(data):
 
 
 def test_the_next_port_is_taken_where_one_is_in_use():
-    with socket.create_server((place.LOCAL, 0)) as taken:
+    with socket.create_server((page_address.LOCAL, 0)) as taken:
         port = taken.getsockname()[1]
-        assert place.free_port(place.LOCAL, port) > port
-    with pytest.raises(place.PlaceError, match="cannot serve on 203.0.113.7"):
-        place.free_port("203.0.113.7", 8080)
+        assert page_address.free_port(page_address.LOCAL, port) > port
+    with pytest.raises(page_address.AddressError, match="cannot serve on 203.0.113.7"):
+        page_address.free_port("203.0.113.7", 8080)

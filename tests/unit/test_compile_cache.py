@@ -9,7 +9,7 @@ import numba
 import pytest
 
 from uam_lab.flight.direct import warm_up
-from uam_lab.flight.ros import nodes as ros_nodes
+from uam_lab.flight.ros import node_arguments as ros_nodes
 
 pytestmark = pytest.mark.skipif(
     numba.config.DISABLE_JIT, reason="NUMBA_DISABLE_JIT: nothing is compiled"

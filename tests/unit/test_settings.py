@@ -2,7 +2,7 @@
 
 import pytest
 
-from uam_lab.flight.settings import SettingsError, settings
+from uam_lab.flight.flight_settings import SettingsError, settings
 
 
 @pytest.mark.parametrize(

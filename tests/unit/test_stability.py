@@ -9,8 +9,8 @@ from default_columns import COLUMNS
 from uam_control.laws.modular import ModularLaw, ModularParameters
 from uam_control.profiles.profile import load_profile
 from uam_lab.analysis import constants, lyapunov_bound, stability, ticks
-from uam_lab.analysis.folder import analyse_folder
 from uam_lab.analysis.lyapunov_bound import ComparisonSystem
+from uam_lab.analysis.stability import analyse_folder
 from uam_lab.analysis.tracking import Tracking
 from uam_lab.report.figures import figures, panels
 from uam_lab.results.timeseries import Series

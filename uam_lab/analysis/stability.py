@@ -4,11 +4,14 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from uam_control.laws.modular import ModularParameters
+from uam_control.laws.modular import ModularLaw, ModularParameters
+from uam_control.profiles.profile import load_profile
+from uam_control.vehicle import DEFAULT_VEHICLE, load_description
 from uam_lab.analysis import (
     assumptions,
     constants,
@@ -22,6 +25,8 @@ from uam_lab.analysis import (
 from uam_lab.analysis.supply import COLUMNS_OF, NODE_OF
 from uam_lab.results.timeseries import SUBSYSTEMS, Series
 from uam_sim_bridge.plant import Vehicle
+
+LAW = ModularLaw.kind.law
 
 
 @dataclass(frozen=True)
@@ -217,3 +222,17 @@ def _subsystem(
         error=np.linalg.norm(xi, axis=1),
         error_bound=lyapunov_bound.error_bound(record, largest),
     )
+
+
+def analyse_folder(directory: Path, series: Series) -> Stability | None:
+    """Return the analysis, or None for another law or for a flight with too few airborne ticks.
+
+    Raises ProfileError if parameters.yaml is missing or is no profile of the modular law.
+    """
+    info = series.info
+    if info.get("controller", LAW) != LAW:
+        return None
+    described = load_description(info.get("vehicle") or DEFAULT_VEHICLE)
+    sets = load_profile(str(directory / "parameters.yaml"), vehicle=described).sets
+    vehicle = Vehicle.of(described).changed(info.get("vehicle_changes") or {})
+    return analyse(series, sets, vehicle, info.get("payload_mass_kg") or 0.0)

@@ -10,8 +10,7 @@ from typing import Any, NamedTuple
 from uam_control.mission import Scenario, load_scenario
 from uam_control.settings import yaml_file
 from uam_control.vehicle import VehicleDescription
-from uam_lab.campaign import promise
-from uam_lab.campaign.promise import Promise
+from uam_lab.campaign.fault_outcome import Promise, read_promise
 from uam_sim_bridge.faults import FAULTS, Fault, FaultError, Schedule
 from uam_sim_bridge.faults.feasibility import needs_nodes
 from uam_sim_bridge.faults.schedule import beginnings, listed, timed
@@ -135,4 +134,4 @@ def _checked(entry: dict[str, Any], where: str) -> _Row:
             raise FaultError(f"{where}: {key}: not allowed here, the moments give the time")
     promised = entry.pop("promise", None)
     fault = timed({**entry, "at": 0.0}, {}, where).fault
-    return _Row(entry, fault, None if promised is None else promise.read(promised, where))
+    return _Row(entry, fault, None if promised is None else read_promise(promised, where))

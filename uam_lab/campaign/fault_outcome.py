@@ -1,7 +1,8 @@
-"""Outcome of a flight with a fault, one of five classes."""
+"""Outcome of a flight with a fault, one of five classes, and the promise of a matrix about it."""
 
 from __future__ import annotations
 
+import math
 from collections import Counter
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
@@ -11,6 +12,7 @@ import numpy as np
 
 from uam_control.supervision import State
 from uam_lab.results.timeseries import Series
+from uam_sim_bridge.faults import FaultError
 
 COMPLETED, HELD, LANDED, FAILSAFE, LOST = "completed", "held", "landed", "failsafe", "lost"
 OUTCOMES = {
@@ -100,3 +102,37 @@ def _down_early(series: Series, limits: OutcomeLimits) -> bool:
     been_up = np.maximum.accumulate(height) > limits.near_ground
     down = been_up & (height < limits.height) & series.flown
     return bool(down.any()) and bool(desired[np.argmax(down)] > limits.near_ground)
+
+
+@dataclass(frozen=True)
+class Promise:
+    """outcomes: the allowed ones of OUTCOMES; within [s]: longest time from the fault to the final
+    touchdown, if the mission is not completed."""
+
+    outcomes: tuple[str, ...]
+    within: float = math.inf
+
+    def kept(self, outcome: str, down_after: float | None) -> bool:
+        """Return whether a flight kept the promise; down_after [s]: None without touchdown."""
+        soon = down_after is None or down_after <= self.within
+        return outcome in self.outcomes and soon
+
+
+def read_promise(given: Any, where: str) -> Promise:
+    """Read an entry `promise` of a matrix: {outcome: one or a list, within: seconds}.
+
+    Raises FaultError.
+    """
+    if not isinstance(given, Mapping) or not {"outcome"} <= set(given) <= {"outcome", "within"}:
+        raise FaultError(f"{where}: promise: {{outcome: ..., within: seconds}} expected")
+    named = given["outcome"]
+    outcomes = tuple(named) if isinstance(named, list) else (named,)
+    for one in outcomes:
+        if not isinstance(one, str) or one not in OUTCOMES:
+            raise FaultError(
+                f"{where}: promise: unknown outcome '{one}'; there are: {', '.join(OUTCOMES)}"
+            )
+    within = given.get("within", math.inf)
+    if isinstance(within, bool) or not isinstance(within, int | float) or not within > 0.0:
+        raise FaultError(f"{where}: promise: within: {within!r} is not a time above 0 s")
+    return Promise(outcomes, float(within))

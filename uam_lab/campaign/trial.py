@@ -16,8 +16,8 @@ from uam_control.mission import Scenario, load_scenario
 from uam_control.profiles.profile import Profile
 from uam_lab.campaign.fault_outcome import COMPLETED, LOST, classify
 from uam_lab.flight.direct.flight import DirectFlight
+from uam_lab.flight.flight_settings import ONLOOKERS, FlightSettings
 from uam_lab.flight.progress import Progress
-from uam_lab.flight.settings import ONLOOKERS, FlightSettings
 from uam_lab.results import metrics
 from uam_lab.results.outcome import Outcome, transitions
 from uam_lab.results.result_folder import ResultFolder

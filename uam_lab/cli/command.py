@@ -16,7 +16,7 @@ from uam_control.settings.configuration import ConfigurationError
 from uam_control.vehicle import DEFAULT_VEHICLE, VehicleDescription, VehicleError
 from uam_lab.campaign.pool import cores
 from uam_lab.campaign.trial import TrialFailed
-from uam_lab.flight.settings import SettingsError
+from uam_lab.flight.flight_settings import SettingsError
 from uam_lab.recording.mcap_reader import UnreadableLog
 from uam_lab.results.result_folder import ResultFolderError
 from uam_lab.results.timeseries import UnreadableFlight

@@ -12,7 +12,7 @@ from uam_lab.campaign.trial import Trial
 from uam_lab.cli.command import Command, count, given_profile, jobs_of
 from uam_lab.cli.counting import Counting
 from uam_lab.flight.conclude import command_line
-from uam_lab.flight.settings import CLOCKS, ENGINES, check_clock, require_ros
+from uam_lab.flight.flight_settings import CLOCKS, ENGINES, check_clock, require_ros
 from uam_lab.results.result_folder import make_folder
 from uam_sim_bridge.faults import fault_catalogue, feasibility
 

@@ -12,10 +12,10 @@ from rich.console import Console
 from uam_control.laws import catalogue
 from uam_control.settings import configuration
 from uam_lab.cli.command import INTERRUPTED, USER_ERRORS, Command, number
-from uam_lab.flight import settings as flight_settings
+from uam_lab.flight import flight_settings
 from uam_lab.flight.conclude import command_line, conclude
+from uam_lab.flight.flight_settings import LOG_LIMIT, ONLOOKERS, REPLACEABLE, FlightSettings
 from uam_lab.flight.progress import Progress
-from uam_lab.flight.settings import LOG_LIMIT, ONLOOKERS, REPLACEABLE, FlightSettings
 from uam_lab.report.build import build_report
 from uam_lab.report.page.console import reporting, summary
 from uam_lab.results.outcome import Outcome

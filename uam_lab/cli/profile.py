@@ -9,7 +9,7 @@ from typing import Any
 from uam_control.profiles.profile import Profile, load_profile
 from uam_control.settings import configuration
 from uam_lab.cli.command import Command
-from uam_lab.flight.settings import require_ros
+from uam_lab.flight.flight_settings import require_ros
 from uam_sim_bridge.ports import domain_of_flight
 
 CHANGED, REFUSED = 0, 1

@@ -9,7 +9,7 @@ from pathlib import Path
 from rich.console import Console
 
 from uam_lab.cli.command import Command
-from uam_lab.flight.settings import require_ros
+from uam_lab.flight.flight_settings import require_ros
 from uam_lab.results.result_folder import ResultFolderError, make_folder
 
 WRITTEN = 0

@@ -8,7 +8,7 @@ import os
 import sys
 
 from uam_lab.cli.command import Command
-from uam_lab.flight.settings import require_ros
+from uam_lab.flight.flight_settings import require_ros
 from uam_sim_bridge.ports import domain_of_flight
 
 EXAMPLES = """\

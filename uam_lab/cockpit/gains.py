@@ -8,7 +8,7 @@ from typing import Any
 
 import viser
 
-from uam_lab.cockpit.commands import Later
+from uam_lab.cockpit.buttons import Later
 from uam_lab.cockpit.entry import axes, reach, text_of, value_of
 from uam_lab.cockpit.remote_parameters import About, RemoteParameters
 

@@ -12,8 +12,8 @@ from typing import Any
 import numpy as np
 import viser
 
+from uam_lab.cockpit.buttons import CommandButtons
 from uam_lab.cockpit.charts import Charts
-from uam_lab.cockpit.commands import CommandButtons
 from uam_lab.cockpit.gains import NodeGains
 from uam_lab.cockpit.headline import headline
 from uam_lab.cockpit.remote_parameters import RemoteParameters
@@ -99,7 +99,7 @@ class Page:
         if now >= self._due["charts"]:
             self._due["charts"] = now + self._options["chart_period"]
             self._charts.draw()
-            self._tell()
+            self._update_headline()
         if now >= self._due["nodes"]:
             self._due["nodes"] = now + RETRY
             self._commands.look()
@@ -113,7 +113,7 @@ class Page:
             for client in self._server.get_clients().values():
                 client.add_notification("Refused", text, auto_close_seconds=8.0, color="red")
 
-    def _tell(self) -> None:
+    def _update_headline(self) -> None:
         self._health.silence = self._watch.silence
         shown = headline(self._health, self._options)
         if shown != self._shown:
@@ -128,7 +128,7 @@ class Page:
     def _take(self, topic: Topic, message: Any) -> None:
         health = self._health
         if topic is topics.MISSION_STATUS:
-            health.hear(MissionStatus.from_message(message)[1])
+            health.set_mission(MissionStatus.from_message(message)[1])
         elif topic is topics.AUTOPILOT_STATE:
             health.autopilot = AutopilotState.from_message(message)[1]
         elif topic is topics.CHANGES:

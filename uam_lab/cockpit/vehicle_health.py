@@ -43,7 +43,7 @@ class Health:
     errors: tuple[float, float, float] = (math.nan,) * 3  # norms: [m], [rad], [rad]
     _tracked: bool = False  # whether the errors come from /uam/tracking/error
 
-    def hear(self, mission: MissionStatus) -> None:
+    def set_mission(self, mission: MissionStatus) -> None:
         """Store the mission's status, which comes twice per second."""
         self.mission = mission
         if not self._tracked:

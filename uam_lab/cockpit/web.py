@@ -12,14 +12,14 @@ from collections.abc import Iterator, Sequence
 import viser
 import websockets.asyncio.server
 
-from uam_lab.cockpit.place import LOCAL, address, free_port
+from uam_lab.cockpit.page_address import LOCAL, address, free_port
 
 
 def serve(host: str, port: int, label: str, origins: Sequence[str] = ()) -> viser.ViserServer:
     """Serve on `host`, at the first free port from `port` on, 0 for any.
 
     Pages of other origins may not connect: only those of this host, and `origins` (as
-    "http://name:port"). Raises PlaceError.
+    "http://name:port"). Raises AddressError.
     """
     found = free_port(host, port)
     allowed = [*_own_origins(host, found), *origins, None]  # None: no browser

@@ -7,7 +7,7 @@ import sys
 from collections.abc import Mapping
 from typing import Any
 
-from uam_lab.flight.settings import FlightSettings
+from uam_lab.flight.flight_settings import FlightSettings
 from uam_lab.results import metrics
 from uam_lab.results.outcome import Outcome
 from uam_lab.results.result_folder import ResultFolder, versions, write_json

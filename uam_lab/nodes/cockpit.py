@@ -17,7 +17,7 @@ from uam_control.settings import configuration
 from uam_control.settings.parameter_set import ParameterError
 from uam_lab.cockpit import web
 from uam_lab.cockpit.page import Page
-from uam_lab.cockpit.place import LOCAL, PORT, PlaceError
+from uam_lab.cockpit.page_address import LOCAL, PORT, AddressError
 from uam_lab.cockpit.services import Services
 from uam_lab.cockpit.watch import Watch
 from uam_msgs_py.node.base_node import StopSignal, refuse
@@ -40,7 +40,7 @@ def main() -> int:
         vehicle = described_vehicle(node)
         refuse_unknown(node)
         server = web.serve(host, port, "uam", origins)
-    except (ParameterError, PlaceError) as error:
+    except (ParameterError, AddressError) as error:
         return refuse(NAME, error)
     print(f"{NAME}: {web.url(server)}", flush=True)
     executor = SingleThreadedExecutor()

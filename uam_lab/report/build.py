@@ -16,8 +16,7 @@ from pathlib import Path
 
 from uam_control.laws import catalogue
 from uam_control.profiles.profile import ProfileError
-from uam_lab.analysis.folder import analyse_folder
-from uam_lab.analysis.stability import Stability
+from uam_lab.analysis.stability import Stability, analyse_folder
 from uam_lab.report.figures import figures
 from uam_lab.report.figures.panels import DrawnFlight
 from uam_lab.report.page import flight_page

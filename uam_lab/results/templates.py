@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import base64
 from collections.abc import Iterable, Sequence
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -14,6 +15,11 @@ MEDIA = {".png": "image/png", ".mp4": "video/mp4"}
 
 def render(package: str, name: str, **values: Any) -> str:
     """Return the page of a template from the folder of `package`; a missing value is an error."""
+    return _template(package, name).render(values)
+
+
+@cache
+def _template(package: str, name: str) -> jinja2.Template:
     environment = jinja2.Environment(
         loader=jinja2.PackageLoader(package, "."),
         autoescape=True,
@@ -21,7 +27,7 @@ def render(package: str, name: str, **values: Any) -> str:
         lstrip_blocks=True,
         undefined=jinja2.StrictUndefined,
     )
-    return environment.get_template(name).render(values)
+    return environment.get_template(name)
 
 
 def embedded(file: Path) -> str:

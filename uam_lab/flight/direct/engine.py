@@ -10,8 +10,8 @@ from uam_control.coordinates import ARM, ATTITUDE, POSITION
 from uam_control.maths.rotations import wrap_angle
 from uam_lab.flight.direct.flight import DirectFlight
 from uam_lab.flight.direct.warm_up import is_cold, warm_up
+from uam_lab.flight.flight_settings import FlightSettings
 from uam_lab.flight.progress import Progress, Status
-from uam_lab.flight.settings import FlightSettings
 from uam_lab.processes.interrupts import Interrupts
 from uam_lab.results.outcome import Outcome, transitions
 from uam_lab.results.result_folder import ResultFolder

@@ -11,18 +11,15 @@ import time
 from pathlib import Path
 
 from uam_control.profiles.profile import CONTROLLERS
-from uam_lab.cockpit import place
+from uam_lab.cockpit import page_address
 from uam_lab.flight.direct.warm_up import is_cold, warm_up
+from uam_lab.flight.flight_settings import ONLOOKERS, FlightSettings
 from uam_lab.flight.progress import Progress
-from uam_lab.flight.ros import nodes as ros_nodes
-from uam_lab.flight.ros.changed_parameters import ChangedParameters
+from uam_lab.flight.ros import node_arguments
 from uam_lab.flight.ros.logged_outcome import read_outcome
-from uam_lab.flight.ros.node_arguments import parameters, write_facts
-from uam_lab.flight.ros.nodes import users_autopilot
 from uam_lab.flight.ros.process_fault_injection import ProcessFaults
-from uam_lab.flight.ros.restart_topic import RestartTopic
+from uam_lab.flight.ros.restarts import ChangedParameters, RestartTopic
 from uam_lab.flight.ros.status_listener import StatusListener
-from uam_lab.flight.settings import ONLOOKERS, FlightSettings
 from uam_lab.processes import child
 from uam_lab.processes.interrupts import Interrupts
 from uam_lab.processes.node_environment import environment
@@ -54,21 +51,21 @@ def fly(settings: FlightSettings, folder: ResultFolder, progress: Progress) -> O
     Raises PortError if no instance is free.
     """
     (folder.path / "logs").mkdir(exist_ok=True)
-    own_autopilot = not users_autopilot(settings)
+    own_autopilot = not node_arguments.users_autopilot(settings)
     with Reservation(settings.instance, own_autopilot=own_autopilot) as reservation:
         if is_cold():
             progress.message("compiling the control path (once)")
             warm_up()
-        child.prepare([*ros_nodes.modules(settings).values(), FORKER, *COMMANDS])
+        child.prepare([*node_arguments.modules(settings).values(), FORKER, *COMMANDS])
         await_orphans(progress.message)
         with Interrupts() as stop:
             ports = reservation.ports
-            sections = parameters(settings, folder, ports)
+            sections = node_arguments.parameters(settings, folder, ports)
             folder.write_parameters(sections)
-            write_facts(settings, folder)
+            node_arguments.write_facts(settings, folder)
             if wiring.COCKPIT in sections:
                 port = sections[wiring.COCKPIT]["port"]
-                progress.message(f"cockpit: {place.address(place.LOCAL, port)}")
+                progress.message(f"cockpit: {page_address.address(page_address.LOCAL, port)}")
             failure = _supervise(settings, folder, ports, progress, stop)
             if failure is not None and failure.status == NOT_READY and not settings.foreign:
                 # on an overloaded machine the middleware may fail to connect all nodes
@@ -131,7 +128,7 @@ def _start(
     # the nodes' output already contains their log messages; separate files would repeat them
     arguments = ["--ros-args", "--disable-external-lib-logs"]
     arguments += ["--params-file", str(folder.parameters)]
-    for name, module in ros_nodes.modules(settings).items():
+    for name, module in node_arguments.modules(settings).items():
         children.start(
             name,
             module,
@@ -140,7 +137,7 @@ def _start(
             optional=name in ONLOOKERS,
             again=RESTARTS if name in CONTROLLERS else 0,
         )
-    module, own = ros_nodes.autopilot(settings, folder, ports)
+    module, own = node_arguments.autopilot(settings, folder, ports)
     if module:
         children.start(AUTOPILOT, module, own, may_end=True)
 
@@ -174,7 +171,7 @@ def _watch(
         for lost in children.revive(changed.arguments):
             text = f"{lost}; restarted"
             progress.message(text)
-            restarts.tell(listener.stamp, lost.name, text)
+            restarts.publish(listener.stamp, lost.name, text)
         children.check()
         for failure in children.missed():
             progress.message(f"{failure}; the flight continues without it")

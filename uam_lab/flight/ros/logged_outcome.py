@@ -6,7 +6,7 @@ import json
 from pathlib import Path
 from typing import Any
 
-from uam_lab.flight.settings import FlightSettings
+from uam_lab.flight.flight_settings import FlightSettings
 from uam_lab.processes.processes import NodeFailed
 from uam_lab.recording.log_reader import read_flight
 from uam_lab.recording.mcap_reader import UnreadableLog

@@ -1,4 +1,4 @@
-"""Parameters of all nodes of a flight: from the profile and from the settings."""
+"""The processes of a flight with the ROS engine: modules, parameters, autopilot's arguments."""
 
 from __future__ import annotations
 
@@ -7,16 +7,32 @@ from pathlib import Path
 from typing import Any
 
 from uam_control.mission.time_limit import time_limit
-from uam_lab.cockpit import place
+from uam_lab.cockpit import page_address
 from uam_lab.flight.conclude import command_line, settings_facts
-from uam_lab.flight.ros.nodes import in_the_loop, users_autopilot
-from uam_lab.flight.settings import BUILTIN, FlightSettings
+from uam_lab.flight.flight_settings import BUILTIN, FlightSettings
 from uam_lab.recording import log_facts
 from uam_lab.results.result_folder import ResultFolder, as_json, versions
 from uam_msgs_py.node import wiring
 from uam_sim_bridge.faults import LINK, PLANT
 from uam_sim_bridge.ports import Ports
 
+# Executable → module. Started and, at the end, stopped in this order, the recorder last.
+MODULES = {
+    wiring.RECORDER: "uam_lab.nodes.recorder",
+    wiring.PLANT: "uam_sim_bridge.nodes.mujoco_sim",
+    wiring.ESTIMATOR: "uam_control.nodes.state_estimator",
+    wiring.MISSION: "uam_control.nodes.mission",
+    wiring.POSITION: "uam_control.nodes.position_controller",
+    wiring.ATTITUDE: "uam_control.nodes.attitude_controller",
+    wiring.ARM: "uam_control.nodes.arm_controller",
+    wiring.BRIDGE: "uam_sim_bridge.nodes.mavlink_bridge",
+    wiring.SCENE: "uam_lab.nodes.scene",
+    wiring.COCKPIT: "uam_lab.nodes.cockpit",
+}
+STAND_IN, SITL = "uam_sim_bridge.autopilot.server", "uam_sim_bridge.px4.sitl"
+HITL_ROUTER = "uam_sim_bridge.mavlink.hil.router"
+PX4_LOG = "px4.ulg"
+AUTOPILOT_WAIT = 60.0  # [s] for which the autopilot waits for the simulator
 FACTS = "facts.json"
 # nodes that load the description of the vehicle
 DESCRIBED = {
@@ -66,7 +82,9 @@ def parameters(
         sections[wiring.BRIDGE]["autopilot"] = settings.autopilot
     sections[wiring.SCENE] = {"scenario": scenario_source(settings)}
     if wiring.COCKPIT not in settings.without:
-        sections[wiring.COCKPIT] = {"port": place.free_port(place.LOCAL, place.PORT)}
+        sections[wiring.COCKPIT] = {
+            "port": page_address.free_port(page_address.LOCAL, page_address.PORT)
+        }
     sections[wiring.RECORDER] = {
         "file": str(folder.log),
         "statistics": str(folder.path / "logs" / "recorder.json"),
@@ -92,3 +110,36 @@ def scenario_source(settings: FlightSettings) -> str:
     """Return the scenario for the mission node: a name, or the absolute path of a file."""
     given = Path(settings.scenario_source)
     return str(given.absolute()) if given.suffix else settings.scenario_source
+
+
+def modules(settings: FlightSettings) -> dict[str, str]:
+    """Return the nodes of a flight: executable → module."""
+    return {name: module for name, module in MODULES.items() if name not in settings.without}
+
+
+def in_the_loop(settings: FlightSettings) -> bool:
+    """Return whether a flight controller is connected by one serial line (hardware in the loop)."""
+    return settings.link is not None and settings.link.kind == "serial"
+
+
+def users_autopilot(settings: FlightSettings) -> bool:
+    """Return whether the user starts the autopilot, which itself connects to the plant."""
+    return settings.link is not None and not in_the_loop(settings)
+
+
+def autopilot(
+    settings: FlightSettings, folder: ResultFolder, ports: Ports
+) -> tuple[str, list[str]]:
+    """Return module and arguments of the autopilot's process; "" if the user starts it."""
+    instance = ["--instance", str(ports.instance)]
+    patience = ["--wait", str(AUTOPILOT_WAIT)]
+    vehicle = ["--vehicle", settings.vehicle.source]
+    if in_the_loop(settings):
+        return HITL_ROUTER, [settings.autopilot, *instance, *patience]
+    if settings.px4 is not None:
+        log = folder.path / PX4_LOG
+        own = ["--px4-dir", str(settings.px4.directory), "--log", str(log.absolute())]
+        return SITL, [*instance, *own, *vehicle]
+    if users_autopilot(settings):
+        return "", []
+    return STAND_IN, [*instance, *patience, *vehicle]

@@ -5,8 +5,6 @@ from __future__ import annotations
 import time
 from collections.abc import Mapping
 
-from rclpy.node import Node
-
 from uam_control.stamps import SECOND
 from uam_lab.flight.progress import Status
 from uam_lab.processes.guest import Guest
@@ -15,22 +13,17 @@ from uam_msgs_py.messages.status import AutopilotState, MissionStatus
 from uam_msgs_py.node.polling import listen, messages
 
 
-class StatusListener:
+class StatusListener(Guest):
     """Context manager with a node in a separate ROS context; polled, so it needs no executor."""
 
     def __init__(self, environment: Mapping[str, str], domain: int):
         """environment: of the flight's processes; ROS reads some of its variables here too."""
-        self._guest = Guest("uam_fly", environment, domain)
-        self._mission = listen(self._guest.node, topics.MISSION_STATUS)
-        self._autopilot = listen(self._guest.node, topics.AUTOPILOT_STATE)
+        super().__init__("uam_fly", environment, domain)
+        self._mission = listen(self.node, topics.MISSION_STATUS)
+        self._autopilot = listen(self.node, topics.AUTOPILOT_STATE)
         self._autopilot_text = ""
         self._last: tuple[float, float] | None = None  # simulated and wall time [s]
         self.stamp, self.mission_time = 0, None  # [ns], [s] of the newest status after take-off
-
-    @property
-    def node(self) -> Node:
-        """The subscribing node."""
-        return self._guest.node
 
     def poll(self) -> Status | None:
         """Return the newest status, None without a new one since the last call."""
@@ -63,9 +56,3 @@ class StatusListener:
             self._last = simulated, wall
         since = wall - self._last[1]
         return (simulated - self._last[0]) / since if since > 0.0 else 0.0
-
-    def __enter__(self) -> StatusListener:
-        return self
-
-    def __exit__(self, *exception) -> None:
-        self._guest.close()

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import mujoco
 import numpy as np
+from scipy.ndimage import uniform_filter1d
 
 from uam_lab.report.figures.poses import Poses
 from uam_lab.results.timeseries import Series
@@ -95,9 +96,7 @@ def _smooth(series: Series) -> np.ndarray:
     half = int(0.5 * SMOOTHING_S * (len(time) - 1) / max(time[-1] - time[0], 1e-9))
     if half < 1 or 2 * half + 1 > len(path):
         return path
-    padded = np.pad(path, ((half, half), (0, 0)), mode="edge")
-    total = np.cumsum(np.vstack([np.zeros(2), padded]), axis=0)
-    return (total[2 * half + 1 :] - total[: -2 * half - 1]) / (2 * half + 1)
+    return uniform_filter1d(path, 2 * half + 1, axis=0, mode="nearest")
 
 
 def _path_rows(series: Series) -> np.ndarray:

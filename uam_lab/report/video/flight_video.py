@@ -134,7 +134,7 @@ def render_here(directory: Path, video: bool, report: Callable[[str], None]) -> 
 
 
 def _snapshots(series: Series, figures: Path, report: Callable[[str], None]) -> None:
-    from uam_lab.report.video import captions
+    from uam_lab.report.video import video
 
     folder = figures / SNAPSHOTS
     folder.mkdir(parents=True, exist_ok=True)
@@ -144,12 +144,12 @@ def _snapshots(series: Series, figures: Path, report: Callable[[str], None]) -> 
     for number, (time, caption) in enumerate(snapshots):
         report(f"snapshot {number + 1} of {len(snapshots)}")
         pixels = scene.picture(series.row_at(time))
-        pictures.append(captions.labelled(pixels, caption, f"t = {time:.1f} s", CAPTION_PART))
+        pictures.append(video.labelled(pixels, caption, f"t = {time:.1f} s", CAPTION_PART))
         with replacing(folder / f"{'abcdefghijklmnopqrstuvwxyz'[number % 26]}.png") as temporary:
             pictures[-1].save(temporary)
     scene.close()
     with replacing(figures / STRIP) as temporary:
-        captions.strip(pictures).save(temporary)
+        video.strip(pictures).save(temporary)
 
 
 def _video(series: Series, path: Path, report: Callable[[str], None]) -> None:

@@ -1,4 +1,4 @@
-"""Parameters changed in flight: a restarted node starts with their newest values."""
+"""Restart of a node: its parameters as changed in flight, and the message about the restart."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ from rclpy.node import Node
 
 from uam_msgs_py.messages import topics
 from uam_msgs_py.messages.parameter_changes import ParameterChange
+from uam_msgs_py.messages.status import WARN, diagnostic
 from uam_msgs_py.node.polling import listen, messages
 
 
@@ -36,3 +37,19 @@ class ChangedParameters:
         return [
             text for name, value in found.items() for text in ("-p", f"{name}:={json.dumps(value)}")
         ]
+
+
+class RestartTopic:
+    """Publishes a restart on /uam/restarts and /diagnostics, for plant, log and displays."""
+
+    def __init__(self, node: Node) -> None:
+        self._publishers = [
+            node.create_publisher(topic.type, topic.name, topic.qos)
+            for topic in (topics.RESTARTS, topics.DIAGNOSTICS)
+        ]
+
+    def publish(self, stamp: int, node: str, text: str) -> None:
+        """Publish the restart of `node`; stamp [ns]: of the flight's clock."""
+        message = diagnostic(stamp, node, WARN, text, {})
+        for publisher in self._publishers:
+            publisher.publish(message)

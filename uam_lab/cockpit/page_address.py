@@ -10,7 +10,7 @@ PORT = 8080
 TRIES = 100  # number of ports to try, from the given one on
 
 
-class PlaceError(OSError):
+class AddressError(OSError):
     """The page cannot be served at this address; the text gives the reason."""
 
 
@@ -20,12 +20,12 @@ def address(host: str, port: int) -> str:
 
 
 def free_port(host: str, port: int) -> int:
-    """Return the first free port of TRIES from `port` on, any for 0. Raises PlaceError."""
+    """Return the first free port of TRIES from `port` on, any for 0. Raises AddressError."""
     for number in range(port, min(port + TRIES, 65536)) if port else (0,):
         try:
             with socket.create_server((host, number)) as probe:
                 return probe.getsockname()[1]
         except OSError as error:
             if error.errno != errno.EADDRINUSE:
-                raise PlaceError(f"cannot serve on {host}: {error.strerror}") from None
-    raise PlaceError(f"cannot serve on {host}: ports {port} to {number} are in use")
+                raise AddressError(f"cannot serve on {host}: {error.strerror}") from None
+    raise AddressError(f"cannot serve on {host}: ports {port} to {number} are in use")
