@@ -13,6 +13,7 @@ from uam_control.profiles.profile import default_profile
 from uam_lab.recording import log_reader
 from uam_lab.recording.mcap_reader import TopicLog
 from uam_lab.results.timeseries import gain_columns
+from uam_msgs_py.messages import topics
 from uam_msgs_py.messages.convert import JointStateWriter
 from uam_msgs_py.messages.status import MissionStatus
 
@@ -26,7 +27,7 @@ def test_the_gains_of_every_law_are_read_by_name(law):
         writer.position[:] = 10.0 * k + np.arange(len(names))
         messages.append(bytes(writer.stamped(20_000_000 * k)))
     topic = log_reader.ADAPTATION["arm"]
-    log = log_reader.Log({topic: TopicLog("sensor_msgs/msg/JointState", [], messages)})
+    log = log_reader.Log({topic.name: TopicLog("sensor_msgs/msg/JointState", [], messages)})
     values = np.full((3, len(COLUMNS)), np.nan)
     ticks = np.array([16_000_000, 36_000_000, 40_000_000])
     log_reader.adaptation(log, "arm", ticks, values, COLUMNS)
@@ -42,8 +43,8 @@ def test_the_thrust_factor_holds_between_its_messages():
     for k, factor in enumerate((1.0, 0.9)):
         writer.position[0] = factor
         messages.append(bytes(writer.stamped(100_000_000 * k)))
-    log = log_reader.Log({log_reader.THRUST: TopicLog("sensor_msgs/msg/JointState", [], messages)})
-    found = log.samples(log_reader.THRUST, ("position",), 1)
+    log = log_reader.Log({topics.THRUST.name: TopicLog("sensor_msgs/msg/JointState", [], messages)})
+    found = log.samples(topics.THRUST, ("position",), 1)
     np.testing.assert_array_equal(found.at(np.array([4_000_000, 104_000_000]))[:, 0], [1.0, 0.9])
 
 

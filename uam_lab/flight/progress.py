@@ -8,6 +8,7 @@ from dataclasses import dataclass
 
 from rich.console import Console
 from rich.live import Live
+from rich.progress_bar import ProgressBar
 from rich.table import Table
 
 PLAIN_INTERVAL = 10.0  # [s] of mission time between two plain lines within a phase
@@ -92,7 +93,10 @@ class Progress:
 
     def _panel(self, status: Status) -> Table:
         table = Table.grid(padding=(0, 3))
-        table.add_row("phase", f"[bold]{status.phase}[/bold]", self._bar(status.time))
+        bar = ""
+        if self._duration is not None:
+            bar = ProgressBar(self._duration, max(status.time, 0.0), width=40)
+        table.add_row("phase", f"[bold]{status.phase}[/bold]", bar)
         table.add_row("mission time", self._when(status))
         table.add_row(
             "errors",
@@ -102,9 +106,3 @@ class Progress:
         )
         table.add_row("real time", f"{status.real_time_factor:.2f}x", status.autopilot)
         return table
-
-    def _bar(self, at: float, width: int = 40) -> str:
-        if self._duration is None:
-            return ""
-        done = round(width * min(max(at / self._duration, 0.0), 1.0))
-        return "━" * done + "[dim]" + "─" * (width - done) + "[/dim]"

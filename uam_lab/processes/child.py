@@ -22,6 +22,7 @@ import threading
 import time
 import traceback
 from collections.abc import Iterable, Mapping, Sequence
+from multiprocessing.process import BaseProcess
 from pathlib import Path
 
 from setproctitle import setproctitle
@@ -54,49 +55,24 @@ def prepare(modules: Iterable[str]) -> None:
                 os.environ[name] = value
 
 
-class Forked:
-    """A running child, with some of the methods of `subprocess.Popen`."""
+def fork(
+    name: str, module: str, arguments: Sequence[str], log: Path, environment: Mapping[str, str]
+) -> BaseProcess:
+    """Start a child, see `Processes.start`; log: file to which its output is appended."""
+    run = (name, module, tuple(arguments), str(log), dict(environment))
+    process = _context.Process(target=_run, args=run, name=name)
+    process.start()
+    while process.exitcode is None and not _apart(process.pid):
+        time.sleep(POLL)
+    return process
 
-    def __init__(
-        self,
-        name: str,
-        module: str,
-        arguments: Sequence[str],
-        log: Path,
-        environment: Mapping[str, str],
-    ) -> None:
-        """Start the child, see `Processes.start`; log: file to which its output is appended."""
-        run = (name, module, tuple(arguments), str(log), dict(environment))
-        self._process = _context.Process(target=_run, args=run, name=name)
-        self._process.start()
-        while self.returncode is None and not self._apart():
-            time.sleep(POLL)
 
-    def _apart(self) -> bool:
-        """Return whether the child has its own process group, so Ctrl-C does not reach it."""
-        try:
-            return os.getpgid(self.pid) == self.pid
-        except ProcessLookupError:  # ended; its status follows
-            return False
-
-    @property
-    def pid(self) -> int:
-        """Process id of the child."""
-        return self._process.pid
-
-    @property
-    def returncode(self) -> int | None:
-        """Exit status, None while the child runs; negative: the signal that ended it."""
-        return self._process.exitcode
-
-    def poll(self) -> int | None:
-        """Return `returncode`."""
-        return self.returncode
-
-    def send_signal(self, number: int) -> None:
-        """Send a signal to the child if it runs."""
-        if self.returncode is None:
-            os.kill(self.pid, number)
+def _apart(pid: int) -> bool:
+    """Return whether a child has its own process group, so Ctrl-C does not reach it."""
+    try:
+        return os.getpgid(pid) == pid
+    except ProcessLookupError:  # ended; its status follows
+        return False
 
 
 def _run(

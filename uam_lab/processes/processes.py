@@ -5,13 +5,15 @@ stops the children in order. The output of a child goes to <logs>/<name>.log. Th
 the session, because schedulers share processor time between sessions first. See also `child`.
 """
 
+import os
 import signal
 import time
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from multiprocessing.process import BaseProcess
 from pathlib import Path
 
-from uam_lab.processes.child import Forked
+from uam_lab.processes.child import fork
 
 LAST_LINES = 12  # of a failed node's log that its error message shows
 INTERRUPT_WAIT, TERMINATE_WAIT = 10.0, 3.0  # seconds until the next, harder signal
@@ -56,12 +58,22 @@ class NodeProcess:
     """One running process."""
 
     name: str
-    process: Forked
+    process: BaseProcess
     log: Path
-    run: Callable[[Sequence[str]], Forked]  # restarts it, with additional arguments
+    run: Callable[[Sequence[str]], BaseProcess]  # restarts it, with additional arguments
     may_end: bool = False  # its end is expected: after a stop or with the mission
     optional: bool = False  # the flight continues without it
     again: int = 0  # remaining number of restarts
+
+    @property
+    def status(self) -> int | None:
+        """Exit status, None while it runs; negative: the signal that ended it."""
+        return self.process.exitcode
+
+    def send_signal(self, number: int) -> None:
+        """Send a signal if it runs."""
+        if self.status is None:
+            os.kill(self.process.pid, number)
 
 
 class Processes:
@@ -90,8 +102,8 @@ class Processes:
         """
         log = self._logs / f"{name}.log"
 
-        def run(further: Sequence[str]) -> Forked:
-            return Forked(name, module, [*arguments, *further], log, self._environment)
+        def run(further: Sequence[str]) -> BaseProcess:
+            return fork(name, module, [*arguments, *further], log, self._environment)
 
         child = NodeProcess(name, run([]), log, run, may_end, optional, again)
         self._children[name] = child
@@ -113,7 +125,7 @@ class Processes:
 
     def running(self, name: str) -> bool:
         """Return whether the child runs."""
-        return self._children[name].process.poll() is None
+        return self._children[name].status is None
 
     def check(self) -> None:
         """Raise NodeFailed for a child that ended unexpectedly.
@@ -122,7 +134,7 @@ class Processes:
         """
         failed = []
         for child in self._children.values():
-            status = child.process.poll()
+            status = child.status
             if status is None or child.optional or (child.may_end and status == 0):
                 continue
             failed.append(NodeFailed(child.name, status, child.log))
@@ -132,10 +144,10 @@ class Processes:
     def missed(self) -> list[NodeFailed]:
         """Return the optional children that ended by themselves, each only once."""
         ended = [c for c in self._children.values() if c.optional and not c.may_end]
-        ended = [child for child in ended if child.process.poll() is not None]
+        ended = [child for child in ended if child.status is not None]
         for child in ended:
             child.may_end = True
-        return [NodeFailed(child.name, child.process.returncode, child.log) for child in ended]
+        return [NodeFailed(child.name, child.status, child.log) for child in ended]
 
     def revive(self, further: Callable[[str], Sequence[str]] = lambda _: ()) -> list[NodeFailed]:
         """Restart children that ended by themselves and have restarts left; return their failures.
@@ -143,8 +155,8 @@ class Processes:
         further: returns additional arguments for a child, by its name.
         """
         ended = [c for c in self._children.values() if c.again and not c.may_end]
-        ended = [child for child in ended if child.process.poll() is not None]
-        failures = [NodeFailed(child.name, child.process.returncode, child.log) for child in ended]
+        ended = [child for child in ended if child.status is not None]
+        failures = [NodeFailed(child.name, child.status, child.log) for child in ended]
         for child in ended:
             child.again -= 1
             child.process = child.run(further(child.name))
@@ -163,16 +175,16 @@ class Processes:
             (signal.SIGTERM, TERMINATE_WAIT),
             (signal.SIGKILL, None),
         ):
-            left = [child for child in chosen if child.process.poll() is None]
+            left = [child for child in chosen if child.status is None]
             if not left:
                 break
             if signum != signal.SIGINT:
                 disobedient |= {child.name for child in left}
             for child in left:
                 child.may_end = True
-                child.process.send_signal(signum)
+                child.send_signal(signum)
             deadline = None if wait is None else time.monotonic() + wait
-            while any(child.process.poll() is None for child in left):
+            while any(child.status is None for child in left):
                 if deadline is not None and (time.monotonic() > deadline or self.hurry()):
                     break
                 time.sleep(POLL)

@@ -18,50 +18,35 @@ import numpy as np
 from diagnostic_msgs.msg import DiagnosticArray
 from rclpy.serialization import deserialize_message
 
-from uam_control.coordinates import ALPHA, ARM
-from uam_control.coordinates import ATTITUDE as ANGLES
+from uam_control.coordinates import ALPHA, ARM, ATTITUDE
 from uam_control.mission import Scenario
 from uam_control.mission.flight_sequence import ABORTED, LANDED, WAITING
 from uam_control.supervision import State
 from uam_lab.recording import cdr
 from uam_lab.recording import fault_records as fault_log
 from uam_lab.recording.mcap_reader import TopicLog, UnreadableLog, read_log
+from uam_lab.results import timeseries
 from uam_lab.results.outcome import transition
-from uam_lab.results.timeseries import (
-    SUBSYSTEMS,
-    Columns,
-    FlightTable,
-    Series,
-    gain_columns,
-)
-from uam_lab.results.timeseries import (
-    columns as columns_for,
-)
+from uam_lab.results.timeseries import SUBSYSTEMS, Columns, FlightTable, Series, gain_columns
 from uam_msgs_py.messages import topics
 from uam_msgs_py.messages.parameter_changes import ParameterChange
 from uam_msgs_py.messages.status import MissionStatus
+from uam_msgs_py.messages.topics import Topic
 
 SECOND = 1e9
 SILENCE = 1e9  # [ns] without references after which the mission counts as lost
 STATE_ROWS = ("positions", "velocities", "accelerations")
-TRUTH, STATE, REFERENCE = (t.name for t in (topics.TRUTH_STATE, topics.STATE, topics.REFERENCE))
-POSITION, ATTITUDE, JOINTS = (
-    t.name for t in (topics.POSITION_COMMAND, topics.ATTITUDE_COMMAND, topics.ARM_COMMAND)
-)
-SETPOINT, STATUS = topics.SETPOINT.name, topics.MISSION_STATUS.name
-THRUST, CHANGES, FAULTS = (t.name for t in (topics.THRUST, topics.CHANGES, topics.FAULTS))
-PAYLOAD, ROTORS, MAGNET = (
-    t.name for t in (topics.TRUTH_PAYLOAD, topics.TRUTH_ROTORS, topics.TRUTH_MAGNET)
-)
 ADAPTATION = {
-    "position": topics.POSITION_ADAPTATION.name,
-    "attitude": topics.ATTITUDE_ADAPTATION.name,
-    "arm": topics.ARM_ADAPTATION.name,
+    "position": topics.POSITION_ADAPTATION,
+    "attitude": topics.ATTITUDE_ADAPTATION,
+    "arm": topics.ARM_ADAPTATION,
 }
-TOPICS = {
-    *(TRUTH, STATE, REFERENCE, POSITION, ATTITUDE, JOINTS, SETPOINT, STATUS),
-    *(PAYLOAD, ROTORS, MAGNET, THRUST, CHANGES, FAULTS, *ADAPTATION.values()),
-}
+TOPICS = (
+    *(topics.TRUTH_STATE, topics.TRUTH_PAYLOAD, topics.TRUTH_ROTORS, topics.TRUTH_MAGNET),
+    *(topics.STATE, topics.REFERENCE, topics.MISSION_STATUS, topics.CHANGES, topics.FAULTS),
+    *(topics.POSITION_COMMAND, topics.ATTITUDE_COMMAND, topics.ARM_COMMAND),
+    *(topics.SETPOINT, topics.THRUST, *ADAPTATION.values()),
+)
 
 
 class StampedRows:
@@ -83,31 +68,31 @@ class StampedRows:
 
 
 class Log:
-    """The topics of a log, decoded on request."""
+    """The topics of a log, decoded on request; found: by name."""
 
     def __init__(self, found: Mapping[str, TopicLog]):
         self._topics = found
 
-    def messages(self, topic: str) -> list[bytes]:
+    def messages(self, topic: Topic) -> list[bytes]:
         """Return the serialized messages of a topic in file order; may be empty."""
-        log = self._topics.get(topic)
+        log = self._topics.get(topic.name)
         return log.messages if log else []
 
-    def width(self, topic: str) -> int:
+    def width(self, topic: Topic) -> int:
         """Number of names in the messages of a topic; 0 without messages."""
         return next((len(block.names) for block in self.blocks(topic)), 0)
 
-    def wall_seconds(self, topic: str) -> float:
+    def wall_seconds(self, topic: Topic) -> float:
         """Return the wall time between first and last message of a topic [s]; 0 without any."""
-        log = self._topics.get(topic)
+        log = self._topics.get(topic.name)
         return (max(log.published) - min(log.published)) / SECOND if log and log.published else 0.0
 
-    def blocks(self, topic: str) -> list[cdr.Block]:
+    def blocks(self, topic: Topic) -> list[cdr.Block]:
         """Return the decoded messages of a topic; may be empty."""
-        log = self._topics.get(topic)
+        log = self._topics.get(topic.name)
         return cdr.read(log.type_name, log.messages) if log and log.messages else []
 
-    def samples(self, topic: str, fields: Sequence[str], width: int) -> StampedRows:
+    def samples(self, topic: Topic, fields: Sequence[str], width: int) -> StampedRows:
         """Return `fields` side by side, `width` numbers each; zeros for empty (idle) messages."""
         stamps, rows = [], []
         for block in self.blocks(topic):
@@ -121,7 +106,7 @@ class Log:
         """Return stamps [ns] and statuses of the mission, in order."""
         return [
             MissionStatus.from_message(deserialize_message(data, DiagnosticArray))
-            for data in self.messages(STATUS)
+            for data in self.messages(topics.MISSION_STATUS)
         ]
 
 
@@ -142,7 +127,7 @@ class References:
         """size: number of entries of chi."""
         stamps, rows, flying = [], [], []
         self.takeoff: int | None = None  # stamp [ns] of mission time 0
-        for block in log.blocks(REFERENCE):
+        for block in log.blocks(topics.REFERENCE):
             whole = len(block.names) == size
             values = np.zeros((len(block.stamps), 3, size))
             for i, row in enumerate(STATE_ROWS):
@@ -188,13 +173,15 @@ def read_flight(
 
     Raises UnreadableLog if the file is no log or its flight did not start.
     """
-    log = Log(read_log(path, TOPICS))
+    log = Log(read_log(path, {topic.name for topic in TOPICS}))
     statuses = log.statuses()
     end = next((stamp for stamp, status in statuses if status.done), None)
     abort_reason = statuses[-1][1].abort_reason if statuses else ""
-    columns = columns_for(log.width(TRUTH) - ALPHA, log.width(ROTORS))
+    columns = timeseries.columns(
+        log.width(topics.TRUTH_STATE) - ALPHA, log.width(topics.TRUTH_ROTORS)
+    )
     references = References(log, columns.size)
-    truth = log.samples(TRUTH, STATE_ROWS, columns.size)
+    truth = log.samples(topics.TRUTH_STATE, STATE_ROWS, columns.size)
     first, last = references.samples.stamps[[0, -1]]
     # The mission is one tick ahead: its last reference is for a tick without control. Ticks after
     # the mission's end depend on the time until the plant receives the end, so they are cut off.
@@ -207,7 +194,8 @@ def read_flight(
     takeoff = references.takeoff if references.takeoff is not None else int(last)
     time = values[:, columns["time"]] = (ticks - takeoff) / SECOND
     values[:, columns.block("truth.")] = truth.at(ticks)
-    values[:, columns.block("estimate.")] = log.samples(STATE, STATE_ROWS, columns.size).at(ticks)
+    state = log.samples(topics.STATE, STATE_ROWS, columns.size)
+    values[:, columns.block("estimate.")] = state.at(ticks)
     reference = references.samples.at(ticks)
     flying = reference[:, -1] > 0.5
     values[:, columns.block("reference.")] = reference[:, :-1]
@@ -222,8 +210,8 @@ def read_flight(
     recording.count = len(ticks)
     changes = parameter_changes(log, takeoff)
     states = transitions(statuses, takeoff)
-    wall = log.wall_seconds(TRUTH)
-    faults = fault_log.records(log.messages(FAULTS), takeoff)
+    wall = log.wall_seconds(topics.TRUTH_STATE)
+    faults = fault_log.records(log.messages(topics.FAULTS), takeoff)
     series = recording.series(info)
     return LoggedFlight(series, end is not None, abort_reason, changes, states, faults, wall)
 
@@ -244,7 +232,7 @@ def parameter_changes(log: Log, takeoff: int) -> list[dict[str, Any]]:
     `ParameterChange`.
     """
     found = []
-    for data in log.messages(CHANGES):
+    for data in log.messages(topics.CHANGES):
         stamp, change = ParameterChange.from_message(deserialize_message(data, DiagnosticArray))
         entry = {
             "time_s": (stamp - takeoff) / SECOND,
@@ -270,19 +258,19 @@ def adaptation(
 def _commands(log: Log, ticks: np.ndarray, table: FlightTable) -> None:
     """Fill in the commands of the controllers and the desired attitude of the position law."""
     values, columns = table.values, table.columns
-    position = log.samples(POSITION, (*STATE_ROWS, "effort"), ALPHA).at(ticks)
+    position = log.samples(topics.POSITION_COMMAND, (*STATE_ROWS, "effort"), ALPHA).at(ticks)
     attitude = [columns[f"reference.{angle}"] for angle in ("roll", "pitch", "yaw")]
     for row in range(3):
         angles = [column + row * columns.size for column in attitude]
-        values[:, angles] = position[:, ALPHA * row :][:, ANGLES]
+        values[:, angles] = position[:, ALPHA * row :][:, ATTITUDE]
     values[:, columns.block("tau_p.")] = position[:, 18:21]
-    values[:, columns.block("tau_q.")] = log.samples(ATTITUDE, ("effort",), 3).at(ticks)
-    values[:, columns.block("tau_alpha.")] = log.samples(JOINTS, ("effort",), columns.joints).at(
-        ticks
-    )
-    setpoint = log.samples(SETPOINT, ("angular", "linear"), 3).at(ticks)
+    torque = log.samples(topics.ATTITUDE_COMMAND, ("effort",), 3)
+    values[:, columns.block("tau_q.")] = torque.at(ticks)
+    effort = log.samples(topics.ARM_COMMAND, ("effort",), columns.joints)
+    values[:, columns.block("tau_alpha.")] = effort.at(ticks)
+    setpoint = log.samples(topics.SETPOINT, ("angular", "linear"), 3).at(ticks)
     values[:, columns.block("setpoint.")] = setpoint[:, [0, 1, 2, 5]]
-    factor = log.samples(THRUST, ("position",), 1).at(ticks)
+    factor = log.samples(topics.THRUST, ("position",), 1).at(ticks)
     values[:, columns["thrust.factor"]] = factor[:, 0]
 
 
@@ -290,14 +278,14 @@ def _truth(log: Log, ticks: np.ndarray, table: FlightTable) -> None:
     """Fill in the data that only the simulator has: rotors, payload, magnet."""
     values, columns = table.values, table.columns
     count = columns.rotors
-    rotors = log.samples(ROTORS, ("position", "effort"), count).at(ticks)
+    rotors = log.samples(topics.TRUTH_ROTORS, ("position", "effort"), count).at(ticks)
     for i in range(count):
         values[:, columns[f"rotor_{i + 1}.command"]] = rotors[:, i]
         values[:, columns[f"rotor_{i + 1}.thrust"]] = rotors[:, count + i]
-    position = log.samples(PAYLOAD, ("position",), 3).at(ticks)
-    x, y, z, w = log.samples(PAYLOAD, ("orientation",), 4).at(ticks).T
+    position = log.samples(topics.TRUTH_PAYLOAD, ("position",), 3).at(ticks)
+    x, y, z, w = log.samples(topics.TRUTH_PAYLOAD, ("orientation",), 4).at(ticks).T
     values[:, columns.block("payload.")] = np.column_stack([position, w, x, y, z])
-    magnet = log.samples(MAGNET, ("position", "effort"), 2).at(ticks)
+    magnet = log.samples(topics.TRUTH_MAGNET, ("position", "effort"), 2).at(ticks)
     values[:, columns.block("magnet.")] = magnet[:, [0, 2, 1]]
 
 

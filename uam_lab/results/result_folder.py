@@ -152,7 +152,9 @@ def _usable(path: Path) -> None:
     """Make the directory and check that it is writable."""
     try:
         path.mkdir(parents=True, exist_ok=True)
-        _try_to_write(path)
+        probe = path / f".writable.{os.getpid()}"
+        probe.touch()
+        probe.unlink()
     except OSError as error:
         raise _refusal(path, error) from None
 
@@ -174,12 +176,6 @@ def new_folder(parent: Path, name: str) -> Path:
                 path = parent / f"{name}-{number}"
     except OSError as error:
         raise _refusal(parent, error) from None
-
-
-def _try_to_write(path: Path) -> None:
-    probe = path / f".writable.{os.getpid()}"
-    probe.touch()
-    probe.unlink()
 
 
 def _refusal(path: Path, error: OSError) -> ResultFolderError:

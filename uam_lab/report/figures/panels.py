@@ -112,7 +112,7 @@ def grid(
         hspace=0.16,
         wspace=0.2,
     )
-    figure.text(0.012, 1.0 - 0.1 / height, title, va="top", fontsize=11.5, fontweight="bold")
+    style.title(figure, title)
     return figure, axes
 
 

@@ -37,8 +37,7 @@ def path_figure(flights: Sequence[DrawnFlight]) -> Figure:
     figure.subplots_adjust(
         left=0.06, right=0.99, top=1.0 - ABOVE / height, bottom=BELOW / height, wspace=0.04
     )
-    title = "Path in the x-z plane"
-    figure.text(0.012, 1.0 - 0.1 / height, title, va="top", fontsize=11.5, fontweight="bold")
+    style.title(figure, "Path in the x-z plane")
     poses = Poses(flights[0].series)
     for axis, (name, start, end) in zip(axes, stretches, strict=True):
         _scenery(axis, poses)

@@ -91,3 +91,9 @@ def note(
     """Write a text at (x of the data, height of the panel), shifted by points."""
     how = {"xycoords": ("data", "axes fraction"), **how}
     axis.annotate(text, at, xytext=shift, textcoords="offset points", **how)
+
+
+def title(figure: Figure, text: str) -> None:
+    """Write the title of a figure in its upper left corner."""
+    top = 1.0 - 0.1 / figure.get_figheight()
+    figure.text(0.012, top, text, va="top", fontsize=11.5, fontweight="bold")
