@@ -85,7 +85,7 @@ def acceleration(
     """
     from scipy.signal import lfilter  # the import takes half a second; `uam --help` skips it
 
-    estimate = series.block("estimate.")[:, 16:]
+    estimate = series.block("estimate.")[:, 2 * series.columns.size :]
     raw = np.nan_to_num(np.linalg.norm(estimate, axis=1))
     if parameters.acceleration_limit:
         raw = np.minimum(raw, parameters.acceleration_limit)
