@@ -36,7 +36,7 @@ LONGEST_WAIT = 20.0  # [s] simulated, for the autopilot to get ready and armed
 class DirectFlight:
     """One flight in the direct engine; `recording` fills while it flies.
 
-    `mission.output` tells how it ended.
+    `mission.output` is its result.
     """
 
     def __init__(
@@ -66,10 +66,10 @@ class DirectFlight:
             self.autopilot.passes = self._faults.link.passes
             self.autopilot.receives = self._faults.link.receives
             self.control.insert("bridge", "faults", self._update_faults)
-        self.ended_by = ""  # why it was ended although the mission was not done
+        self.ended_by = ""  # reason of an end before that of the mission
         self._limit = time_limit(scenario)
         self._lag = 0  # ticks from an IMU sample to its arrival
-        self._truths: deque[Snapshot] = deque()  # of ticks whose IMU sample is on its way
+        self._truths: deque[Snapshot] = deque()  # of ticks whose IMU sample has not arrived yet
         self._complete = False  # every kind of sensor has delivered
         laws, columns = self.control.laws, columns_of(described)
         self._places = Places.of(columns)
@@ -103,7 +103,7 @@ class DirectFlight:
 
     @property
     def mission(self) -> Mission:
-        """The mission that it flies."""
+        """The mission of the flight."""
         return self.control.mission.mission
 
     @property
@@ -113,7 +113,7 @@ class DirectFlight:
 
     @property
     def fault_records(self) -> list[dict[str, Any]]:
-        """The faults that there were; see `faults.timeline.record`."""
+        """The injected faults; see `faults.timeline.record`."""
         return self._faults.records if self._faults else []
 
     def tick(self) -> None:
@@ -180,7 +180,7 @@ class DirectFlight:
         self._lag = len(self._truths)
 
     def _record_blind(self) -> None:
-        """Write the row of a tick without an IMU sample: the truth goes on."""
+        """Write the row of a tick without an IMU sample: the last row with the new true state."""
         if self.recording.count and len(self._truths) > self._lag:
             shot = self._truths.popleft()
             last = self.recording.count - 1
@@ -190,7 +190,7 @@ class DirectFlight:
             record_blind(row, shot, self._places)
 
     def _update_faults(self, control: ControlTick) -> bool:
-        """Stage: tell plant and link the mission's time; where there are faults."""
+        """Stage of a flight with faults: give plant and link the mission time."""
         signals = control.signals
         self._faults.update(signals.stamp / SECOND, signals.time)
         return True

@@ -77,8 +77,9 @@ def record(
     payload_quaternion: np.ndarray,
     at: Places,
 ) -> None:
-    """Copy one tick into its row of the recording; roll and pitch reference are what tau_p asks.
+    """Copy one tick into its row of the recording.
 
+    The reference of roll and pitch is the desired attitude of tau_p.
     gains, gain_columns: three arrays each, the published gains and where they go.
     """
     row[0] = time
@@ -117,7 +118,7 @@ def record_switches(row: np.ndarray, shot: Snapshot, factor: float, at: Places) 
 
 
 def record_blind(row: np.ndarray, shot: Snapshot, at: Places) -> None:
-    """Write a tick without an IMU sample into a copy of the row before: the truth goes on."""
+    """Write the true state of a tick without an IMU sample into a copy of the last row."""
     truth, rotors = shot.truth, len(shot.motors)
     row[at.truth : at.truth + truth.state.size] = truth.state.ravel()
     row[at.command : at.command + rotors] = shot.motors

@@ -1,4 +1,4 @@
-"""Compiles the control path before a flight, so that no node compiles in it.
+"""Compiles the control path before a flight, so that no node compiles during the flight.
 
 The compiled functions are kept on disk beside their sources (see uam_control.maths.compiled). When
 all of them are there and up to date, nothing is compiled.
@@ -23,7 +23,7 @@ LATE_POSES = "mocap_latency@0+1:delay=0.05"  # the estimator corrects earlier pr
 
 
 def compiled_functions() -> Iterator:
-    """Every function under `jit` in the modules imported so far; none without numba."""
+    """Yield every function under `jit` in the imported modules; none without numba."""
     for name, module in list(sys.modules.items()):
         if name.split(".")[0] in PACKAGES:
             for value in vars(module).values():
@@ -32,7 +32,7 @@ def compiled_functions() -> Iterator:
 
 
 def is_cold() -> bool:
-    """Whether a function of the control path has no compiled form of its present source."""
+    """Return whether a function of the control path is not compiled from its present source."""
     return not all(function._cache.filled for function in compiled_functions())
 
 
@@ -45,4 +45,4 @@ def warm_up(laws: Iterable[str] = tuple(LAWS)) -> None:
         flight = DirectFlight(scenario, profile, vehicle, 0.0, seed=1, faults=faults)
         for _ in range(TICKS):
             flight.tick()
-    companion.warm_up()  # the stand-in's descent, which no good flight calls
+    companion.warm_up()  # the stand-in's descent, which a flight without failures does not call

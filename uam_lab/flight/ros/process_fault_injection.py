@@ -40,11 +40,11 @@ class ProcessFaults:
         self,
         children: Processes,
         schedule: Schedule,
-        tell: Callable[[FaultState], None],
+        announce: Callable[[FaultState], None],
         clock: Callable[[], float] = time.monotonic,
     ):
-        """schedule: process faults; tell: called when a fault begins or ends; clock: [s]."""
-        self._children, self._tell, self._clock = children, tell, clock
+        """schedule: process faults; announce: called when a fault begins or ends; clock: [s]."""
+        self._children, self._announce, self._clock = children, announce, clock
         self._all = [FaultState(one, number) for number, one in enumerate(schedule.faults)]
         self._ends: dict[int, float] = {}  # by the clock
         self._hindering: dict[int, _Hindrance | StoppedThreads] = {}
@@ -60,11 +60,11 @@ class ProcessFaults:
                 one.begin = mission_time
                 self._ends[one.number] = now + one.planned.duration
                 self._begin(one)
-                self._tell(one)
+                self._announce(one)
             elif one.active and now >= self._ends[one.number] and mission_time is not None:
                 one.end = mission_time
                 self._release(one.number)
-                self._tell(one)
+                self._announce(one)
 
     def _begin(self, one: FaultState) -> None:
         fault = one.fault
