@@ -81,7 +81,7 @@ def test_every_pattern_is_reachable():
         ]
     )
     used = {advice(text) for text in message}
-    assert [pattern for pattern, what in ADVICE if what not in used] == []
+    assert [pattern for pattern, what in ADVICE.items() if what not in used] == []
 
 
 def test_unknown_texts_stay_as_they_are():

@@ -26,7 +26,7 @@ def make_plant(
 ) -> Plant:
     """Return the plant of a flight, with the plant faults of `faults` if there are any.
 
-    engine: see `plant_class`; the others as in `PlantFactory`. Raises PlantError, FaultError.
+    engine: see `plant_class`; the others as of `MujocoPlant`. Raises PlantError, FaultError.
     """
     check_engine(faults, engine)
     acting = faults.only(PLANT)

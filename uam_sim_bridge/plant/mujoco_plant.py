@@ -32,7 +32,8 @@ class MujocoPlant(Plant):
         arm_start: Sequence[float] = (),
         disturbed: bool = False,
     ) -> None:
-        """See `PlantFactory`."""
+        """payload_mass [kg], 0 for none; seed: of all noise; arm_start (n,) [rad]: joint angles on
+        the ground, empty: stowed as described; disturbed: `disturb` will be called."""
         super().__init__(vehicle)
         numbers = vehicle.numbers
         self.model = model = vehicle.compile(payload_mass, add_to if disturbed else None)

@@ -13,9 +13,7 @@ the simulator calls
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Protocol
 
 import numpy as np
 
@@ -80,7 +78,7 @@ class Disturbance:
 
 
 class Plant(ABC):
-    """Vehicle, payload and surroundings.
+    """Vehicle, payload and surroundings. A class is made with the arguments of `MujocoPlant`.
 
     `vehicle`: as flown; `period` [s]: of control; `joints`: their number n; `tick`: number of
     periods stepped. `DISTURBABLE`: whether the class implements `disturb`; if not, faults of the
@@ -119,18 +117,3 @@ class Plant(ABC):
     def disturb(self, disturbance: Disturbance) -> None:
         """Apply `disturbance` until the next call."""
         raise NotImplementedError
-
-
-class PlantFactory(Protocol):
-    """Signature that makes a plant; the class of a physics engine has it."""
-
-    def __call__(
-        self,
-        vehicle: Vehicle,
-        payload_mass: float,
-        seed: int,
-        arm_start: Sequence[float] = (),
-        disturbed: bool = False,
-    ) -> Plant:
-        """payload_mass [kg], 0 for none; seed: of all noise; arm_start (n,) [rad]: joint angles on
-        the ground, empty: stowed as described; disturbed: `disturb` will be called."""
