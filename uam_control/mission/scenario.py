@@ -67,24 +67,15 @@ class Scenario:
         down = Move("z", self.landing.at, self.landing.at + self.landing.duration, ground - SINK)
         if self.samples is None:
             return Moves(start, [*self.moves, down])
+        names = coordinates(len(self.arm_start))
         climb = [
             Move(name, 0.0, self.samples_start, value)
-            for name, value in zip(
-                coordinates(len(self.arm_start)), self.samples.first, strict=True
-            )
+            for name, value in zip(names, self.samples.first, strict=True)
         ]
-        return Chain(
-            [
-                (0.0, Moves(start, climb)),
-                (self.samples_start, self.samples),
-                (
-                    self.landing.at,
-                    Moves(
-                        self.samples.last, [Move("z", 0.0, self.landing.duration, ground - SINK)]
-                    ),
-                ),
-            ]
-        )
+        down = Move("z", 0.0, self.landing.duration, ground - SINK)
+        parts = Moves(start, climb), self.samples, Moves(self.samples.last, [down])
+        starts = 0.0, self.samples_start, self.landing.at
+        return Chain(list(zip(starts, parts, strict=True)))
 
     def phase(self, time: float) -> str:
         """Return the name of the phase at mission time `time` [s] >= 0."""
@@ -224,10 +215,8 @@ def from_csv(
         rows.fieldnames = columns
         missing = [name for name in CSV_REQUIRED if name not in columns]
         if missing:
-            raise ScenarioError(
-                f"{file} line 1: column {', '.join(missing)} is missing; needed: "
-                f"{','.join(CSV_REQUIRED)}"
-            )
+            needed = f"needed: {','.join(CSV_REQUIRED)}"
+            raise ScenarioError(f"{file} line 1: column {', '.join(missing)} is missing; {needed}")
         joints = arm_coordinates(len(vehicle.joints))
         optional = [name for name in joints if name in columns]
         needed = f"{vehicle.name} has: {','.join(joints)}"
@@ -237,12 +226,8 @@ def from_csv(
         strange = [c for c in columns if c.startswith("alpha") and c not in joints]
         if strange:
             raise ScenarioError(f"{file} line 1: column {strange[0]}; {needed}")
-        table = np.array(
-            [
-                _csv_row(file, line, row, (*CSV_REQUIRED, *optional))
-                for line, row in enumerate(rows, start=2)
-            ]
-        )
+        names = (*CSV_REQUIRED, *optional)
+        table = np.array([_csv_row(file, i, row, names) for i, row in enumerate(rows, start=2)])
     if len(table) < 2:
         raise ScenarioError(f"{file}: at least two rows expected, got {len(table)}")
     times = table[:, 0]

@@ -38,16 +38,9 @@ class Moves:
         value = dict(zip(names, self._start, strict=True))
         rows = []
         for move in sorted(moves, key=lambda m: m.start):
-            rows.append(
-                (
-                    names.index(move.coordinate),
-                    move.start,
-                    move.end,
-                    value[move.coordinate],
-                    move.to,
-                )
-            )
-            value[move.coordinate] = move.to
+            name = move.coordinate
+            rows.append((names.index(name), move.start, move.end, value[name], move.to))
+            value[name] = move.to
         self._rows = np.array(rows, dtype=float).reshape(-1, 5)
 
     def write(self, time: float, reference: np.ndarray) -> None:

@@ -14,7 +14,7 @@ from uam_control.stamps import SECOND
 from uam_msgs_py.messages import topics
 from uam_msgs_py.messages.convert import read_pose, read_values
 from uam_msgs_py.messages.layouts import BadMessage, stamp_of
-from uam_msgs_py.messages.name_checks import check_names
+from uam_msgs_py.messages.serialized import check_names
 from uam_msgs_py.node.base_node import UamNode
 
 GAINS = (

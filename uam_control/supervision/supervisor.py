@@ -218,13 +218,8 @@ class Supervisor:
     def _event(self, command: OperatorCommand, seen: Observation) -> Event:
         """Return the event of a command; DISARM on the ground has its own event."""
         event = command.value
-        if (
-            command is OperatorCommand.DISARM
-            and seen.on_ground
-            and (self.state, event) not in TARGETS
-        ):
-            return Event.DISARM_ON_GROUND
-        return event
+        disarm = command is OperatorCommand.DISARM and seen.on_ground
+        return event if (self.state, event) in TARGETS or not disarm else Event.DISARM_ON_GROUND
 
 
 def _planned(event: Event) -> tuple[Event, str]:

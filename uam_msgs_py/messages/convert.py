@@ -18,8 +18,13 @@ from sensor_msgs.msg import Imu, JointState
 from std_msgs.msg import Bool, Float64MultiArray
 
 from uam_msgs_py.messages.layouts import ENCAPSULATION, BadMessage
-from uam_msgs_py.messages.name_checks import check_length, check_names, refuse_infinite
-from uam_msgs_py.messages.serialized import Serialized, Template
+from uam_msgs_py.messages.serialized import (
+    Serialized,
+    Template,
+    check_length,
+    check_names,
+    refuse_infinite,
+)
 from uam_msgs_py.messages.topics import BODY, WORLD
 
 SWITCH = {on: serialize_message(Bool(data=on)) for on in (False, True)}

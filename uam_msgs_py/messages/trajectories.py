@@ -9,8 +9,13 @@ import numpy as np
 from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
 
 from uam_msgs_py.messages.layouts import BadMessage, Layout
-from uam_msgs_py.messages.name_checks import check_length, check_names, refuse_infinite
-from uam_msgs_py.messages.serialized import Serialized, Template
+from uam_msgs_py.messages.serialized import (
+    Serialized,
+    Template,
+    check_length,
+    check_names,
+    refuse_infinite,
+)
 from uam_msgs_py.messages.topics import WORLD
 
 
