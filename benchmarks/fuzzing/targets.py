@@ -253,7 +253,7 @@ class StandIn:
             self._counts["armed motor answers"] += bool(m.mode & 128)
             require(all(0.0 <= c <= 1.0 for c in m.controls), f"motors {m.controls}")
         for data in self._udp.memory.sent:
-            require(self._companion.decode(data) is not None, f"told no message: {data.hex()}")
+            require(self._companion.decode(data) is not None, f"decoded no message: {data.hex()}")
         self._simulator.sent.clear()
         self._udp.memory.sent.clear()
         require(len(self._server._framer._rest) <= LONGEST_FRAME, "the framer keeps too much")

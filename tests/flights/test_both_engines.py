@@ -30,7 +30,7 @@ from uam_sim_bridge.plant import Vehicle
 
 TOLERANCE = 2000 * 2.0**-24
 POSE = tuple(f"truth.{name}" for name in BASE_COORDINATES)
-# Told less often over ROS than the direct engine records them; compared where they were told.
+# Published less often over ROS than the direct engine records them; compared at these stamps.
 SLOW = ("thrust.factor", *(f"adaptation.{subsystem}." for subsystem in SUBSYSTEMS))
 FLIGHTS = {
     "flown through": (

@@ -146,7 +146,7 @@ def test_five_hundred_changes_in_a_flight(fly):
     assert 100 < sum(one["accepted"] for one in logged) < 400
     found = Counter((one["node"], *one["values"], one["accepted"], one["reason"]) for one in logged)
     assert found == expected
-    for node in NODES:  # in the order in which they were asked, with what was asked
+    for node in NODES:  # in the order of the requests, with the requested values
         requested = [r for r in requests if r[0] == node]
         listed = [one for one in logged if one["node"] == node]
         for (_, name, value), one in zip(requested, listed, strict=True):

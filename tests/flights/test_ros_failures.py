@@ -129,8 +129,8 @@ def test_no_node_survives_a_killed_orchestrator(fly, short_scenario):
 def test_who_does_not_find_the_others_is_started_once_more(short_scenario, tmp_path, monkeypatch):
     monkeypatch.setattr(ros_parameters, "START_TIMEOUT", 0.1)
     with (tmp_path / "said").open("w+") as said, Progress(Console(file=said, width=400)) as shown:
-        wanted = settings(scenario=str(short_scenario))
-        flown = ros_engine.fly(wanted, ResultFolder(tmp_path), shown)
+        requested = settings(scenario=str(short_scenario))
+        flown = ros_engine.fly(requested, ResultFolder(tmp_path), shown)
         said.seek(0)
         text = said.read()
     assert text.count("processes in ROS domain") == 2

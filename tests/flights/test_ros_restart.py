@@ -46,7 +46,7 @@ def test_a_controller_that_is_back_has_what_was_changed_in_flight(fly):
     with Guest("tuner", transport_environment(), domain) as guest:
 
         def called(kind, service, **request):
-            """The answer; asked again each second, as one who is killed does not give any."""
+            """The response; requested again each second, because a killed node sends none."""
             client, answers = guest.node.create_client(kind, f"/{POSITION}/{service}"), []
 
             def answered():

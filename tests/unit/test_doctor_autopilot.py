@@ -69,7 +69,7 @@ def heartbeat(kind=mavlink2.MAV_AUTOPILOT_PX4, base_mode=1, mode=Mode.HOLD):
 
 
 def px4(message):
-    """As PX4: a heartbeat, and its version when asked."""
+    """As PX4: a heartbeat, and its version on request."""
     if message.get_type() == "COMMAND_LONG" and message.command == 512:
         assert message.param1 == mavlink2.MAVLINK_MSG_ID_AUTOPILOT_VERSION
         assert message.target_system == 3

@@ -27,5 +27,5 @@ def test_what_was_never_answered_counts_at_the_end_but_not_what_is_on_its_way():
     latencies.tick(2, 40 * MS, {})
     latencies.conclude(41 * MS)
     assert (numbers.late_ticks, numbers.missed_ticks) == (1, 1)
-    latencies.conclude(400 * MS)  # asked again, nothing counts twice
+    latencies.conclude(400 * MS)  # a second call counts nothing twice
     assert numbers.missed_ticks == 1

@@ -16,7 +16,7 @@ SLEEPER = """
 import signal, sys, time
 def main():
     signal.signal(signal.SIGINT, lambda *_: sys.exit(0))
-    print("told", *sys.argv[1:])
+    print("options", *sys.argv[1:])
     print("ready", flush=True)
     while True:
         time.sleep(0.05)
@@ -109,7 +109,7 @@ def test_who_is_started_again_may_get_further_arguments(children):
     os.kill(children.pid("a"), signal.SIGKILL)
     wait_for(lambda: not children.running("a"))
     children.revive(lambda name: ["and", name])
-    wait_for(lambda: "told first and a" in processes.tail(children._logs / "a.log"))
+    wait_for(lambda: "options first and a" in processes.tail(children._logs / "a.log"))
 
 
 def test_a_stopped_child_is_not_started_again(children):
