@@ -95,7 +95,7 @@ class MavlinkBridgeNode(UamNode):
         self.link, self._station, self._faulty = links.autopilot, links.station, links.faulty
         sets = BridgeSets(mapping.current, hold, thrust.current, vision, setpoint)
         fresh = options.stale_after + LATENCY
-        self.stage = BridgeStage(sets, vehicle, self.link, sequence, fresh, self.say)
+        self.stage = BridgeStage(sets, vehicle, self.link, sequence, fresh, self.warn)
         thrust.apply = self.stage.identification.configure
         self._fault_topic = FaultTopic(self) if self._faulty else None
         self._adopted: tuple[str, ...] = ()
