@@ -29,6 +29,7 @@ class Inputs:
         self._repeats = Repeats()
         self._temperatures: dict[str, float] = {}
         self._oldest = self._oldest_of_pose = math.nan  # [s] stamps of gains
+        self._of_pose: dict[str, float] = {}
         self._controllers: dict[str, float] = {}  # stamps of the newest gains [s]
         self._last: float | None = None
         self._gaps: deque[tuple[float, int]] = deque()  # stamp [s], ticks missed before it
@@ -77,8 +78,9 @@ class Inputs:
         self._readings.gains[SUBSYSTEMS.index(subsystem)] = largest
         self._controllers[subsystem] = stamp
         self._oldest = min(self._controllers.values())
-        pose = [at for name, at in self._controllers.items() if name in POSE]
-        self._oldest_of_pose = min(pose, default=math.nan)
+        if subsystem in POSE:
+            self._of_pose[subsystem] = stamp
+            self._oldest_of_pose = min(self._of_pose.values())
 
     def at(self, stamp: float) -> Readings:
         """Return the readings at the tick `stamp` [s]; the next call reuses the object."""

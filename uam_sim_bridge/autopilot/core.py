@@ -224,7 +224,7 @@ class Autopilot:
         if descending:
             setpoint = self._descent.update(self.estimator.estimate, dt)
         else:
-            self._descent.reset()
+            self._descent.integral = 0.0
             if self._desired is not None:
                 attitude = self.estimator.estimate[ESTIMATED_ATTITUDE]
                 attitude_rates(

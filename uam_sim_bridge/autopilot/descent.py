@@ -42,11 +42,11 @@ def descend(
 
 
 class Descent:
-    """The descent with its integral; call `reset` at each start of a descent."""
+    """The descent. `integral` [m/s^2]: set it to 0 at each start of a descent."""
 
     def __init__(self, parameters: Parameters) -> None:
         self.setpoint = np.zeros(4)
-        self._integral = 0.0
+        self.integral = 0.0
         self.configure(parameters)
 
     def configure(self, parameters: Parameters) -> None:
@@ -64,15 +64,11 @@ class Descent:
             )
         )
 
-    def reset(self) -> None:
-        """Set the integral to 0."""
-        self._integral = 0.0
-
     def update(self, estimate: np.ndarray, dt: float) -> np.ndarray:
         """Return the setpoint (4,): body rates [rad/s, FRD], thrust.
 
         estimate (10,): of `Estimator`; dt [s].
         """
         euler = euler_from_quaternion(estimate[ATTITUDE])
-        self._integral = descend(euler, estimate[9], self._integral, dt, self._gains, self.setpoint)
+        self.integral = descend(euler, estimate[9], self.integral, dt, self._gains, self.setpoint)
         return self.setpoint
