@@ -22,6 +22,7 @@ X, Y, Z, ROLL, PITCH, YAW, ALPHA = range(7)  # columns; ALPHA: the first joint
 POSITION = slice(X, ROLL)
 ATTITUDE = slice(ROLL, ALPHA)
 ARM = slice(ALPHA, None)
+ANGLES = slice(ROLL, None)  # attitude and arm
 BASE_COORDINATES = ("x", "y", "z", "roll", "pitch", "yaw")
 
 

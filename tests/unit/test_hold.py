@@ -13,7 +13,7 @@ LEVEL = np.zeros(3)
 
 
 def flown(thrust=0.52):
-    hold = LevelHold(HoldParameters())
+    hold = LevelHold(HoldParameters(), 9.81)
     for k in range(1000):
         hold.good(k * 0.004, Desired(np.zeros(3), level(0.0), thrust))
     return hold
@@ -89,7 +89,7 @@ def test_ends_after_its_time_and_starts_anew():
 
 
 def test_nothing_before_a_flight_and_after_it():
-    hold = LevelHold(HoldParameters())
+    hold = LevelHold(HoldParameters(), 9.81)
     assert hold.setpoint(0.0, TILTED, UNKNOWN) is None
     hold = flown()
     hold.reset()

@@ -11,7 +11,8 @@ from uam_control.estimation.pose_filter import PoseFilter, correct, nearest, pre
 
 LEVEL = np.array([1.0, 0.0, 0.0, 0.0])
 HALF = math.sqrt(0.5)
-NOTHING, WEIGHT = np.zeros(3), np.array([0.0, 0.0, 9.81])
+GRAVITY = 9.81
+NOTHING, WEIGHT = np.zeros(3), np.array([0.0, 0.0, GRAVITY])
 # a turn by twice the angle whose sine is .6, about (.6, .8, 0): its rotation error is (.72, .96, 0)
 TURNED = np.array([0.8, 0.36, 0.48, 0.0])
 
@@ -22,7 +23,8 @@ def predicted(dt, gyro, force, quaternion=LEVEL, velocity=NOTHING, biases=(NOTHI
     quaternion, rates, acceleration = np.array(quaternion), np.zeros(3), np.zeros(3)
     pose = np.zeros(7)
     predict(
-        dt, np.array(gyro), np.array(force), position, velocity, quaternion, rates, acceleration,
+        dt, GRAVITY, np.array(gyro), np.array(force), position, velocity, quaternion, rates,
+        acceleration,
         np.array(biases[0]), np.array(biases[1]), pose,
     )  # fmt: skip
     np.testing.assert_array_equal(pose, [*position, *quaternion])
@@ -93,7 +95,7 @@ def test_what_was_predicted_since_a_stamp_is_shifted():
 
 def at_rest(stamps, position=NOTHING) -> PoseFilter:
     """A filter with bandwidths 2 and 3 rad/s that has been at rest at the stamps."""
-    found = PoseFilter(2.0, 3.0, 10.0)
+    found = PoseFilter(2.0, 3.0, 10.0, GRAVITY)
     found.start(np.array(position), LEVEL)
     for stamp in stamps:
         found.predict(stamp, 0.01, NOTHING, WEIGHT)
@@ -101,7 +103,7 @@ def at_rest(stamps, position=NOTHING) -> PoseFilter:
 
 
 def test_it_begins_level_and_at_rest():
-    found = PoseFilter(2.0, 3.0, 10.0)
+    found = PoseFilter(2.0, 3.0, 10.0, GRAVITY)
     np.testing.assert_array_equal(found.quaternion, LEVEL)
     vectors = found.position, found.velocity, found.rates, found.acceleration, found.gyro_bias
     np.testing.assert_array_equal([*vectors, found.accelerometer_bias], np.zeros((6, 3)))

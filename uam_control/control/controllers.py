@@ -16,7 +16,7 @@ from uam_control.control.output_limits import (
     limit_torque,
 )
 from uam_control.control.thrust_direction import AttitudeReference
-from uam_control.coordinates import ALPHA, ARM, ATTITUDE, POSITION
+from uam_control.coordinates import ALPHA, ARM, ATTITUDE, CHI, POSITION, YAW
 from uam_control.laws import catalogue
 from uam_control.laws.errors import tracking_errors
 from uam_control.laws.law_parameters import LawParameters
@@ -122,7 +122,7 @@ class PositionController(Controller):
         if not flying:
             self._idle()
             self._tau[:] = 0.0
-            self._attitude.reset(state[0, 5])
+            self._attitude.reset(state[CHI, YAW])
             return self._tau
         tau = self._law_output(state, reference, self._attitude.value, True, dt)
         p = self.parameters

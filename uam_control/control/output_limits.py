@@ -9,6 +9,7 @@ import numpy as np
 
 from uam_control.maths.compiled import jit
 from uam_control.settings.parameter_set import TINY, ParameterError, ParameterSet, number, vector
+from uam_control.vehicle import GRAVITY
 
 
 @dataclass(frozen=True)
@@ -18,7 +19,7 @@ class PositionLimits(ParameterSet):
     gravity_feedforward_mass: float = number(
         0.0, "mass whose weight is added to tau_p, 0 = the printed law", "kg", 0.0, 50.0
     )
-    gravity: float = number(9.81, "acceleration of gravity", "m/s^2", 0.0, 30.0)
+    gravity: float = number(GRAVITY, "acceleration of gravity", "m/s^2", 0.0, 30.0)
     thrust_min: float = number(1.0, "least upward force", "N", TINY, 1e3)
     thrust_max: float = number(36.0, "largest force", "N", TINY, 1e3)
     tilt_max: float = number(0.35, "largest angle of tau_p from the vertical", "rad", 0.01, 1.5)

@@ -11,14 +11,17 @@ import math
 
 import numpy as np
 
+from uam_control.coordinates import CHI, CHI_DDOT, CHI_DOT, YAW, X, Y, Z
 from uam_control.maths.compiled import jit
+
+ANGLE, RATE = range(2)  # columns of the filter
 
 
 class AttitudeReference:
     """Desired attitude: filtered roll and pitch from tau_p, yaw from the mission.
 
     `value` (3, 3): rows q_d = roll, pitch, yaw [rad], Omega_d [rad/s], Omega_d_dot [rad/s^2]; the
-    last two rows are in the desired body frame (FLU).
+    last two rows are in the desired body frame (FLU). Columns: about X, Y, Z.
     """
 
     def __init__(self, cutoff: float) -> None:
@@ -31,7 +34,7 @@ class AttitudeReference:
         """Set the desired attitude to level at `yaw` [rad], with zero rates."""
         self._filter[:] = 0.0
         self.value[:] = 0.0
-        self.value[0, 2] = yaw
+        self.value[CHI, Z] = yaw
 
     def update(self, tau_p: np.ndarray, reference: np.ndarray, dt: float) -> np.ndarray:
         """Advance by dt [s] and return `value` (3, 3).
@@ -56,45 +59,46 @@ def attitude_reference_step(
     tau_p, reference, dt: as in `AttitudeReference.update`; cutoff [Hz]; filtered: (2, 2), rows
     roll, pitch: angle [rad], rate [rad/s].
     """
-    yaw, yaw_rate, yaw_acceleration = reference[0, 5], reference[1, 5], reference[2, 5]
+    yaw, yaw_rate = reference[CHI, YAW], reference[CHI_DOT, YAW]
+    yaw_acceleration = reference[CHI_DDOT, YAW]
     cy, sy = math.cos(yaw), math.sin(yaw)
     # eq. (4a), pos, solved for roll and pitch: the third column of eq. (3), rot_matrix, along tau_p
-    norm = math.sqrt(tau_p[0] ** 2 + tau_p[1] ** 2 + tau_p[2] ** 2)
-    desired_roll = math.asin(max(-1.0, min(1.0, (sy * tau_p[0] - cy * tau_p[1]) / norm)))
-    desired_pitch = math.atan2(cy * tau_p[0] + sy * tau_p[1], tau_p[2])
+    norm = math.sqrt(tau_p[X] ** 2 + tau_p[Y] ** 2 + tau_p[Z] ** 2)
+    desired_roll = math.asin(max(-1.0, min(1.0, (sy * tau_p[X] - cy * tau_p[Y]) / norm)))
+    desired_pitch = math.atan2(cy * tau_p[X] + sy * tau_p[Y], tau_p[Z])
 
     omega = 2.0 * math.pi * cutoff
     accelerations = np.empty(2)
-    for axis in range(2):
-        desired = desired_roll if axis == 0 else desired_pitch
-        angle, rate = filtered[axis, 0], filtered[axis, 1]
+    for axis in (X, Y):
+        desired = desired_roll if axis == X else desired_pitch
+        angle, rate = filtered[axis, ANGLE], filtered[axis, RATE]
         # exact step of the critically damped filter for a constant input
         decay = math.exp(-omega * dt)
         offset = angle - desired
         slope = rate + omega * offset
-        filtered[axis, 0] = desired + decay * (offset + slope * dt)
-        filtered[axis, 1] = decay * (rate - omega * slope * dt)
-        accelerations[axis] = -omega * omega * (filtered[axis, 0] - desired) - (
-            2.0 * omega * filtered[axis, 1]
+        filtered[axis, ANGLE] = desired + decay * (offset + slope * dt)
+        filtered[axis, RATE] = decay * (rate - omega * slope * dt)
+        accelerations[axis] = -omega * omega * (filtered[axis, ANGLE] - desired) - (
+            2.0 * omega * filtered[axis, RATE]
         )
 
-    roll, pitch = filtered[0, 0], filtered[1, 0]
-    roll_rate, pitch_rate = filtered[0, 1], filtered[1, 1]
-    value[0, 0], value[0, 1], value[0, 2] = roll, pitch, yaw
+    roll, pitch = filtered[X, ANGLE], filtered[Y, ANGLE]
+    roll_rate, pitch_rate = filtered[X, RATE], filtered[Y, RATE]
+    value[CHI, X], value[CHI, Y], value[CHI, Z] = roll, pitch, yaw
     cr, sr, cp, sp = math.cos(roll), math.sin(roll), math.cos(pitch), math.sin(pitch)
     # body rates of Z-Y-X Euler rates, and their derivative
-    value[1, 0] = roll_rate - sp * yaw_rate
-    value[1, 1] = cr * pitch_rate + sr * cp * yaw_rate
-    value[1, 2] = -sr * pitch_rate + cr * cp * yaw_rate
-    value[2, 0] = accelerations[0] - sp * yaw_acceleration - cp * pitch_rate * yaw_rate
-    value[2, 1] = (
-        cr * accelerations[1]
+    value[CHI_DOT, X] = roll_rate - sp * yaw_rate
+    value[CHI_DOT, Y] = cr * pitch_rate + sr * cp * yaw_rate
+    value[CHI_DOT, Z] = -sr * pitch_rate + cr * cp * yaw_rate
+    value[CHI_DDOT, X] = accelerations[X] - sp * yaw_acceleration - cp * pitch_rate * yaw_rate
+    value[CHI_DDOT, Y] = (
+        cr * accelerations[Y]
         + sr * cp * yaw_acceleration
         - sr * roll_rate * pitch_rate
         + (cr * cp * roll_rate - sr * sp * pitch_rate) * yaw_rate
     )
-    value[2, 2] = (
-        -sr * accelerations[1]
+    value[CHI_DDOT, Z] = (
+        -sr * accelerations[Y]
         + cr * cp * yaw_acceleration
         - cr * roll_rate * pitch_rate
         - (sr * cp * roll_rate + cr * sp * pitch_rate) * yaw_rate

@@ -17,13 +17,14 @@ from uam_control.estimation.pose_filter import PoseFilter
 from uam_control.maths.compiled import jit
 from uam_control.maths.rotations import euler_from_quaternion
 from uam_control.settings.parameter_set import ParameterSet, number
+from uam_control.vehicle import GRAVITY
 
 LONGEST_STEP = 0.05  # s, longest filter step; a longer gap means lost samples
 
 
 @dataclass(frozen=True)
 class EstimatorParameters(ParameterSet):
-    """Bandwidths and corner frequencies of the estimator's filters."""
+    """Bandwidths and corner frequencies of the estimator's filters, and gravity."""
 
     position_bandwidth: float = number(
         12.0, "correction of position by motion capture", "rad/s", 0.5, 60.0
@@ -49,6 +50,7 @@ class EstimatorParameters(ParameterSet):
     joint_acceleration_cutoff: float = number(
         5.0, "low-pass on the derivative of the joint velocities", "Hz", 0.1, 100.0
     )
+    gravity: float = number(GRAVITY, "acceleration of gravity", "m/s^2", 0.0, 30.0)
 
 
 class StateEstimator:
@@ -61,9 +63,8 @@ class StateEstimator:
     def __init__(self, parameters: EstimatorParameters, joints: int) -> None:
         """joints: how many the arm has."""
         self.parameters = parameters
-        self._pose = PoseFilter(
-            parameters.position_bandwidth, parameters.attitude_bandwidth, parameters.pose_gate
-        )
+        p = parameters
+        self._pose = PoseFilter(p.position_bandwidth, p.attitude_bandwidth, p.pose_gate, p.gravity)
         self._state = np.zeros((3, ALPHA + joints))
         self._joints = np.zeros((2, joints))
         self._rates_filter = np.zeros((2, 3))
@@ -79,6 +80,7 @@ class StateEstimator:
         self.parameters = parameters
         self._pose.set_bandwidths(parameters.position_bandwidth, parameters.attitude_bandwidth)
         self._pose.gate.distance = parameters.pose_gate
+        self._pose.gravity = parameters.gravity
 
     @property
     def refused_poses(self) -> int:

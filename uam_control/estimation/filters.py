@@ -8,6 +8,8 @@ import numpy as np
 
 from uam_control.maths.compiled import jit
 
+VALUE, RATE = range(2)  # rows of a second-order filter's state
+
 
 @jit
 def derivative_step(
@@ -21,11 +23,11 @@ def derivative_step(
     omega = 2.0 * math.pi * cutoff
     decay = math.exp(-omega * dt)
     for i in range(len(value)):
-        offset = state[0, i] - value[i]
-        slope = state[1, i] + omega * offset
-        state[0, i] = value[i] + decay * (offset + slope * dt)
-        state[1, i] = decay * (state[1, i] - omega * slope * dt)
-        derivative[i] = state[1, i]
+        offset = state[VALUE, i] - value[i]
+        slope = state[RATE, i] + omega * offset
+        state[VALUE, i] = value[i] + decay * (offset + slope * dt)
+        state[RATE, i] = decay * (state[RATE, i] - omega * slope * dt)
+        derivative[i] = state[RATE, i]
 
 
 @jit
@@ -51,9 +53,9 @@ def joint_step(
     bandwidth [rad/s]: correction by the angle; velocity_weight [1/s]: by the velocity.
     """
     for i in range(len(angle)):
-        state[0, i] += dt * state[1, i]
-        innovation = angle[i] - state[0, i]
-        state[0, i] += 2.0 * bandwidth * dt * innovation
-        state[1, i] += dt * (
-            bandwidth * bandwidth * innovation + velocity_weight * (velocity[i] - state[1, i])
+        state[VALUE, i] += dt * state[RATE, i]
+        innovation = angle[i] - state[VALUE, i]
+        state[VALUE, i] += 2.0 * bandwidth * dt * innovation
+        state[RATE, i] += dt * (
+            bandwidth * bandwidth * innovation + velocity_weight * (velocity[i] - state[RATE, i])
         )

@@ -10,6 +10,7 @@ import math
 
 import numpy as np
 
+from uam_control.coordinates import Z
 from uam_control.estimation.pose_gate import PoseGate
 from uam_control.estimation.repeats import Repeats
 from uam_control.maths.compiled import jit
@@ -24,7 +25,7 @@ from uam_control.maths.rotations import (
 HISTORY = 64  # stored predictions, 256 ms at 250 Hz
 OLDEST_MATCH = 0.02  # s, largest distance in time between a pose and its prediction
 LATE = 0.03  # s, delay above which a pose also corrects the later predictions
-GRAVITY = 9.81  # m/s^2
+TURN = 3  # a stored pose: position before, quaternion from this index on
 CONJUGATE = np.array([1.0, -1.0, -1.0, -1.0])
 
 
@@ -36,8 +37,12 @@ class PoseFilter:
     bias; gyro_bias (3,) [rad/s, body]; accelerometer_bias (3,) [m/s^2, world].
     """
 
-    def __init__(self, position_bandwidth: float, attitude_bandwidth: float, gate: float) -> None:
-        """Bandwidths [rad/s] of the corrections from motion capture; gate [m]: see `PoseGate`."""
+    def __init__(
+        self, position_bandwidth: float, attitude_bandwidth: float, gate: float, gravity: float
+    ) -> None:
+        """Bandwidths [rad/s] of the corrections from motion capture; gate [m]: see `PoseGate`;
+        gravity [m/s^2]."""
+        self.gravity = gravity
         self.gate = PoseGate(gate)
         self.set_bandwidths(position_bandwidth, attitude_bandwidth)
         self.position = np.zeros(3)
@@ -48,7 +53,7 @@ class PoseFilter:
         self.gyro_bias = np.zeros(3)
         self.accelerometer_bias = np.zeros(3)
         self._stamps = np.full(HISTORY, -1.0)
-        self._poses = np.zeros((HISTORY, 7))
+        self._poses = np.zeros((HISTORY, 7))  # position, quaternion
         self._count = 0
         self._last_correction = -1.0
         self._repeats = Repeats()
@@ -74,6 +79,7 @@ class PoseFilter:
         self._stamps[row] = stamp
         predict(
             dt,
+            self.gravity,
             gyro,
             specific_force,
             self.position,
@@ -96,7 +102,10 @@ class PoseFilter:
         row = nearest(self._stamps, stamp)
         if abs(self._stamps[row] - stamp) > OLDEST_MATCH or self._repeats(position, quaternion):
             return
-        jump, bias = math.dist(position, self._poses[row, :3]), math.hypot(*self.accelerometer_bias)
+        jump, bias = (
+            math.dist(position, self._poses[row, :TURN]),
+            math.hypot(*self.accelerometer_bias),
+        )
         if self.gate(stamp, jump, bias):
             return
         dt = min(max(stamp - self._last_correction, 1e-3), 0.05)
@@ -158,12 +167,13 @@ def shift(
         if stamps[row] >= since:
             for i in range(3):
                 poses[row, i] += displacement[i] - (newest - stamps[row]) * velocity[i]
-            poses[row, 3:] = quaternion_multiply(poses[row, 3:], turn)
+            poses[row, TURN:] = quaternion_multiply(poses[row, TURN:], turn)
 
 
 @jit
 def predict(
     dt: float,
+    gravity: float,
     gyro: np.ndarray,
     specific_force: np.ndarray,
     position: np.ndarray,
@@ -177,8 +187,8 @@ def predict(
 ) -> None:
     """Advance the estimate in place by dt [s]; write position and quaternion into pose (7,).
 
-    gyro (3,), specific_force (3,): see `PoseFilter.predict`. position, velocity, quaternion, rates,
-    acceleration, gyro_bias, accelerometer_bias: see `PoseFilter`.
+    gravity [m/s^2]; gyro (3,), specific_force (3,): see `PoseFilter.predict`. position, velocity,
+    quaternion, rates, acceleration, gyro_bias, accelerometer_bias: see `PoseFilter`.
     """
     for i in range(3):
         rates[i] = gyro[i] - gyro_bias[i]
@@ -186,13 +196,13 @@ def predict(
     norm = np.sqrt(np.sum(turned * turned))
     quaternion[:] = turned / norm
     force = rotate(matrix_from_quaternion(quaternion), specific_force)
-    force[2] -= GRAVITY
+    force[Z] -= gravity
     for i in range(3):
         acceleration[i] = force[i] - accelerometer_bias[i]
         position[i] += dt * velocity[i] + 0.5 * dt * dt * acceleration[i]
         velocity[i] += dt * acceleration[i]
-    pose[:3] = position
-    pose[3:] = quaternion
+    pose[:TURN] = position
+    pose[TURN:] = quaternion
 
 
 @jit
@@ -222,7 +232,7 @@ def correct(
         velocity[i] += 3.0 * w * w * dt * innovation
         accelerometer_bias[i] -= w * w * w * dt * innovation
     w = bandwidths[1]
-    error = rotation_error(measured_quaternion, pose[3:])
+    error = rotation_error(measured_quaternion, pose[TURN:])
     quaternion[:] = quaternion_multiply(
         quaternion, quaternion_from_rotation_vector(2.0 * w * dt * error)
     )

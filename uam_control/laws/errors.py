@@ -11,6 +11,16 @@ import math
 
 import numpy as np
 
+from uam_control.coordinates import (
+    ALPHA,
+    CHI,
+    CHI_DDOT,
+    CHI_DOT,
+    PITCH,
+    ROLL,
+    YAW,
+    X,
+)
 from uam_control.maths.compiled import jit
 from uam_control.maths.rotations import (
     matrix_from_euler,
@@ -20,6 +30,8 @@ from uam_control.maths.rotations import (
 )
 
 ERROR_RATE_FORMS = ("lee", "printed")
+E, E_DOT, FEEDFORWARD = range(3)  # rows of the errors
+XI, ACCELERATION, RATE = range(3)  # ||xi||, ||chi_ddot||, ||chi_dot|| in the norms
 
 
 @jit
@@ -41,58 +53,58 @@ def tracking_errors(
     """
     errors[:] = 0.0
     # eq. (5), err: e = chi - chi_d
-    for i in range(6, state.shape[1]):
-        errors[0, i] = state[0, i] - reference[0, i]
-        errors[1, i] = state[1, i] - reference[1, i]
-        errors[2, i] = reference[2, i]
+    for i in range(ALPHA, state.shape[1]):
+        errors[E, i] = state[CHI, i] - reference[CHI, i]
+        errors[E_DOT, i] = state[CHI_DOT, i] - reference[CHI_DOT, i]
+        errors[FEEDFORWARD, i] = reference[CHI_DDOT, i]
     if flying:
-        for i in range(3):
-            errors[0, i] = state[0, i] - reference[0, i]
-            errors[1, i] = state[1, i] - reference[1, i]
-            errors[2, i] = reference[2, i]
+        for i in range(X, ROLL):
+            errors[E, i] = state[CHI, i] - reference[CHI, i]
+            errors[E_DOT, i] = state[CHI_DOT, i] - reference[CHI_DOT, i]
+            errors[FEEDFORWARD, i] = reference[CHI_DDOT, i]
         attitude_errors(state, attitude_reference, printed, errors)
     # eq. (5), err: ||xi||, xi = [e, e_dot]
     xi = acceleration = rate = 0.0
     for i in range(state.shape[1]):
-        xi += errors[0, i] ** 2 + errors[1, i] ** 2
-        acceleration += state[2, i] ** 2
-        rate += state[1, i] ** 2
-    norms[0] = math.sqrt(xi)
-    norms[1] = math.sqrt(acceleration)
-    norms[2] = math.sqrt(rate)
+        xi += errors[E, i] ** 2 + errors[E_DOT, i] ** 2
+        acceleration += state[CHI_DDOT, i] ** 2
+        rate += state[CHI_DOT, i] ** 2
+    norms[XI] = math.sqrt(xi)
+    norms[ACCELERATION] = math.sqrt(acceleration)
+    norms[RATE] = math.sqrt(rate)
 
 
 @jit
 def attitude_errors(
     state: np.ndarray, attitude_reference: np.ndarray, printed: bool, errors: np.ndarray
 ) -> None:
-    """Write e_q, its rate and the attitude feedforward into columns 3:6 of errors (3, 6 + n).
+    """Write e_q, its rate and the attitude feedforward into columns ROLL..YAW of errors (3, 6 + n).
 
     Eq. (14), e_q, and eq. (15), rate of e_q. Arguments as in `tracking_errors`; the results are
     in the body frame (FLU) [1, rad/s, rad/s^2].
     """
-    actual = matrix_from_euler(state[0, 3:6])
-    desired = matrix_from_euler(attitude_reference[0])
+    actual = matrix_from_euler(state[CHI, ROLL:ALPHA])
+    desired = matrix_from_euler(attitude_reference[CHI])
     relative = relative_rotation(desired, actual)  # R_d^T R
     # eq. (14), e_q
-    errors[0, 3] = 0.5 * (relative[2, 1] - relative[1, 2])
-    errors[0, 4] = 0.5 * (relative[0, 2] - relative[2, 0])
-    errors[0, 5] = 0.5 * (relative[1, 0] - relative[0, 1])
-    rate = state[1, 3:6]
-    rate_d = attitude_reference[1]
-    acceleration_d = attitude_reference[2]
+    errors[E, ROLL] = 0.5 * (relative[2, 1] - relative[1, 2])
+    errors[E, PITCH] = 0.5 * (relative[0, 2] - relative[2, 0])
+    errors[E, YAW] = 0.5 * (relative[1, 0] - relative[0, 1])
+    rate = state[CHI_DOT, ROLL:ALPHA]
+    rate_d = attitude_reference[CHI_DOT]
+    acceleration_d = attitude_reference[CHI_DDOT]
     if printed:  # eq. (15), rate of e_q: q_dot - R_d^T R q_d_dot
         turned = rotate(relative, rate_d)
         for i in range(3):
-            errors[1, 3 + i] = rate[i] - turned[i]
-            errors[2, 3 + i] = acceleration_d[i]
+            errors[E_DOT, ROLL + i] = rate[i] - turned[i]
+            errors[FEEDFORWARD, ROLL + i] = acceleration_d[i]
         return
     # in place of eq. (15), the `lee` form: Omega - R^T R_d Omega_d
     turned = rotate_back(relative, rate_d)  # R^T R_d Omega_d
     feedforward = rotate_back(relative, acceleration_d)
     for i in range(3):
-        errors[1, 3 + i] = rate[i] - turned[i]
+        errors[E_DOT, ROLL + i] = rate[i] - turned[i]
     # d/dt (R^T R_d Omega_d) = R^T R_d Omega_d_dot - Omega x (R^T R_d Omega_d)
-    errors[2, 3] = feedforward[0] - (rate[1] * turned[2] - rate[2] * turned[1])
-    errors[2, 4] = feedforward[1] - (rate[2] * turned[0] - rate[0] * turned[2])
-    errors[2, 5] = feedforward[2] - (rate[0] * turned[1] - rate[1] * turned[0])
+    errors[FEEDFORWARD, ROLL] = feedforward[0] - (rate[1] * turned[2] - rate[2] * turned[1])
+    errors[FEEDFORWARD, PITCH] = feedforward[1] - (rate[2] * turned[0] - rate[0] * turned[2])
+    errors[FEEDFORWARD, YAW] = feedforward[2] - (rate[0] * turned[1] - rate[1] * turned[0])

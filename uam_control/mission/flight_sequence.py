@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from uam_control.coordinates import ARM
+from uam_control.coordinates import ARM, CHI, CHI_DOT, Z
 from uam_control.mission.guidance import Guidance
 from uam_control.mission.scenario import Scenario
 from uam_control.mission.trajectory import empty_reference
@@ -174,8 +174,8 @@ class Mission:
             seen.ready = armed and stamp >= armed_since + p.takeoff_delay
             seen.on_ground = True
             return seen
-        low = state[0, 2] < self._ground + p.touchdown_height
-        seen.on_ground = bool(low and abs(state[1, 2]) < p.touchdown_speed)
+        low = state[CHI, Z] < self._ground + p.touchdown_height
+        seen.on_ground = bool(low and abs(state[CHI_DOT, Z]) < p.touchdown_speed)
         landing, time = self.scenario.landing, guidance.scenario_time
         seen.landing_due = time >= landing.at
         if time >= landing.at + 0.5 * landing.duration or stamp >= self._half_down:

@@ -11,7 +11,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from uam_control.coordinates import ALPHA, ARM, POSITION, YAW
+from uam_control.coordinates import ALPHA, ARM, CHI, CHI_DDOT, CHI_DOT, POSITION, YAW, X, Y, Z
 from uam_control.maths.rotations import wrap_angle
 from uam_control.mission.scenario import SINK
 from uam_control.mission.trajectory import Trajectory
@@ -67,7 +67,7 @@ class Segment:
     ) -> None:
         """Begin at `stamp` [s]; start (3, 6 + n); goal (6 + n,); lengths (6 + n,): times [s]."""
         self._stamp, self._lengths, self._goal = stamp, lengths, goal.copy()
-        p, v, a = start[0], start[1] * lengths, start[2] * lengths**2  # per length
+        p, v, a = start[CHI], start[CHI_DOT] * lengths, start[CHI_DDOT] * lengths**2  # per length
         d = goal - p
         self._powers = np.array([
             p, v, a / 2,
@@ -85,14 +85,14 @@ class Segment:
         """Write the reference (3, 6 + n) at `stamp` [s]."""
         u = np.clip((stamp - self._stamp) / self._lengths, 0.0, 1.0)
         c = self._powers
-        reference[0] = c[0] + u * (c[1] + u * (c[2] + u * (c[3] + u * (c[4] + u * c[5]))))
+        reference[CHI] = c[0] + u * (c[1] + u * (c[2] + u * (c[3] + u * (c[4] + u * c[5]))))
         rate = c[1] + u * (2 * c[2] + u * (3 * c[3] + u * (4 * c[4] + u * 5 * c[5])))
-        reference[1] = rate / self._lengths
+        reference[CHI_DOT] = rate / self._lengths
         second = 2 * c[2] + u * (6 * c[3] + u * (12 * c[4] + u * 20 * c[5]))
-        reference[2] = second / self._lengths**2
+        reference[CHI_DDOT] = second / self._lengths**2
         arrived = u >= 1.0  # without rounding errors
-        reference[0, arrived] = self._goal[arrived]
-        reference[1:, arrived] = 0.0
+        reference[CHI, arrived] = self._goal[arrived]
+        reference[CHI_DOT:, arrived] = 0.0
 
 
 class Guidance:
@@ -145,8 +145,10 @@ class Guidance:
         rate, slope = self._rate, self._slope
         self._trajectory.write(self.scenario_time, self.reference)
         if rate != 1.0 or slope != 0.0:
-            self.reference[2] = rate * rate * self.reference[2] + slope * self.reference[1]
-            self.reference[1] *= rate
+            self.reference[CHI_DDOT] = (
+                rate * rate * self.reference[CHI_DDOT] + slope * self.reference[CHI_DOT]
+            )
+            self.reference[CHI_DOT] *= rate
         if self._arm is not None:
             self._arm.write(stamp, self._path)
             self.reference[:, ARM] = self._path[:, ARM]
@@ -162,17 +164,17 @@ class Guidance:
 
         Otherwise the restarted controller would begin with a large error. state (3, 6 + n).
         """
-        path = self.reference[0].copy()
+        path = self.reference[CHI].copy()
         if self._away is not None:
             self._away.write(stamp, self._path)
-            path[:ALPHA] -= self._path[0, :ALPHA]
+            path[:ALPHA] -= self._path[CHI, :ALPHA]
         offset = np.zeros_like(self.reference)
-        offset[0, POSITION] = state[0, POSITION] - path[POSITION]
-        offset[0, YAW] = wrap_angle(state[0, YAW] - path[YAW])
+        offset[CHI, POSITION] = state[CHI, POSITION] - path[POSITION]
+        offset[CHI, YAW] = wrap_angle(state[CHI, YAW] - path[YAW])
         if not np.all(np.isfinite(offset)):
             return
-        self.reference[0, :ALPHA] = path[:ALPHA] + offset[0, :ALPHA]
-        p, way = self.parameters, float(np.linalg.norm(offset[0, POSITION]))
+        self.reference[CHI, :ALPHA] = path[:ALPHA] + offset[CHI, :ALPHA]
+        p, way = self.parameters, float(np.linalg.norm(offset[CHI, POSITION]))
         length = max(p.stop_time, _PEAK * way / p.travel_speed)
         self._away = Segment(stamp, offset, np.zeros_like(path), np.full_like(path, length))
 
@@ -189,7 +191,7 @@ class Guidance:
         if self._arm is not None:
             time, _, _ = self._clock.at(self._go_on_at)
             self._trajectory.write(time, self._path)
-            self._arm = self._arm_segment(stamp, self._path[0, ARM])
+            self._arm = self._arm_segment(stamp, self._path[CHI, ARM])
             self._go_on_at = max(self._go_on_at, self._arm.end)
         if self._away is not None:
             self._go_on_at = max(self._go_on_at, self._away.end)
@@ -197,17 +199,17 @@ class Guidance:
     def descend(self, stamp: float, state: np.ndarray, ground: float, stow: bool) -> None:
         """Descend vertically from the position in state (3, 6 + n) to the height `ground` [m]."""
         p, now = self.parameters, self.reference
-        offset = state[0, POSITION] - now[0, POSITION]
+        offset = state[CHI, POSITION] - now[CHI, POSITION]
         if not np.all(np.isfinite(offset)):  # then descend from the reference
             offset = np.zeros(3)
         goal, lengths = self._at_rest(stow)
-        across = float(np.hypot(offset[0], offset[1]))
-        lengths[:2] = max(lengths[0], _PEAK * across / p.travel_speed)
-        goal[:2] += offset[:2]
-        goal[2] = ground - SINK
-        way = abs(goal[2] - now[0, 2])
+        across = float(np.hypot(offset[X], offset[Y]))
+        lengths[X:Z] = max(lengths[X], _PEAK * across / p.travel_speed)
+        goal[X:Z] += offset[X:Z]
+        goal[Z] = ground - SINK
+        way = abs(goal[Z] - now[CHI, Z])
         # the other coordinates are at rest before touchdown
-        lengths[2] = max(np.max(lengths) + p.stop_time, _PEAK * way / p.travel_speed)
+        lengths[Z] = max(np.max(lengths) + p.stop_time, _PEAK * way / p.travel_speed)
         self._last = Segment(stamp, now, goal, lengths)
 
     def rest(self, stamp: float, stow: bool) -> None:
@@ -217,26 +219,26 @@ class Guidance:
     def _at_rest(self, stow: bool) -> tuple[np.ndarray, np.ndarray]:
         """Return goal and duration [s] of each coordinate to rest; stow: the arm to `stowed`."""
         p, now = self.parameters, self.reference
-        speed = float(np.linalg.norm(now[1, POSITION]))
+        speed = float(np.linalg.norm(now[CHI_DOT, POSITION]))
         length = max(p.stop_time, 2.0 * _RAMP * speed / p.stop_acceleration)
-        goal, lengths = now[0] + now[1] * length / 2, np.full_like(now[0], length)
+        goal, lengths = now[CHI] + now[CHI_DOT] * length / 2, np.full_like(now[CHI], length)
         if stow:
             goal[ARM] = self._stowed
             lengths[ARM] = self._arm_length(self._stowed)
         return goal, lengths
 
     def _arm_segment(self, stamp: float, angles: np.ndarray) -> Segment:
-        goal = self.reference[0].copy()
+        goal = self.reference[CHI].copy()
         goal[ARM] = angles
         return Segment(stamp, self.reference, goal, np.full_like(goal, self._arm_length(angles)))
 
     def _arm_length(self, angles: np.ndarray) -> float:
         """Return the time [s] for the arm to reach `angles` [rad] within stow_rate."""
-        way = float(np.max(np.abs(angles - self.reference[0, ARM])))
+        way = float(np.max(np.abs(angles - self.reference[CHI, ARM])))
         return max(self.parameters.stop_time, _PEAK * way / self.parameters.stow_rate)
 
     def _ramp_length(self) -> float:
         """Return the time [s] to stop or to resume within stop_acceleration."""
         self._trajectory.write(self.scenario_time, self._path)
-        speed = float(np.linalg.norm(self._path[1, POSITION]))
+        speed = float(np.linalg.norm(self._path[CHI_DOT, POSITION]))
         return max(self.parameters.stop_time, _RAMP * speed / self.parameters.stop_acceleration)

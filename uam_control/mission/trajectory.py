@@ -7,7 +7,7 @@ from typing import Protocol
 
 import numpy as np
 
-from uam_control.coordinates import ALPHA, coordinates
+from uam_control.coordinates import ALPHA, CHI, CHI_DDOT, CHI_DOT, coordinates
 from uam_control.maths.compiled import jit
 
 
@@ -41,11 +41,14 @@ class Moves:
             name = move.coordinate
             rows.append((names.index(name), move.start, move.end, value[name], move.to))
             value[name] = move.to
-        self._rows = np.array(rows, dtype=float).reshape(-1, 5)
+        self._rows = np.array(rows, dtype=float).reshape(-1, len(ROW))
 
     def write(self, time: float, reference: np.ndarray) -> None:
         """Write the reference (3, 6 + n); see `Trajectory.write`."""
         write_moves(time, self._start, self._rows, reference)
+
+
+COORDINATE, START, END, FROM, TO = ROW = range(5)  # columns of the rows of moves
 
 
 @jit
@@ -56,15 +59,17 @@ def write_moves(time: float, start: np.ndarray, rows: np.ndarray, reference: np.
     start [s], end [s], value at start, value at end.
     """
     reference[:] = 0.0
-    reference[0] = start
+    reference[CHI] = start
     for row in rows:
-        if time < row[1]:
+        if time < row[START]:
             continue
-        i, length, distance = int(row[0]), row[2] - row[1], row[4] - row[3]
-        s = min((time - row[1]) / length, 1.0)
-        reference[0, i] = row[3] + distance * s * s * s * (10.0 + s * (6.0 * s - 15.0))
-        reference[1, i] = distance / length * 30.0 * s * s * (1.0 - s) * (1.0 - s)
-        reference[2, i] = distance / (length * length) * 60.0 * s * (1.0 - s) * (1.0 - 2.0 * s)
+        i, length, distance = int(row[COORDINATE]), row[END] - row[START], row[TO] - row[FROM]
+        s = min((time - row[START]) / length, 1.0)
+        reference[CHI, i] = row[FROM] + distance * s * s * s * (10.0 + s * (6.0 * s - 15.0))
+        reference[CHI_DOT, i] = distance / length * 30.0 * s * s * (1.0 - s) * (1.0 - s)
+        reference[CHI_DDOT, i] = (
+            distance / (length * length) * 60.0 * s * (1.0 - s) * (1.0 - 2.0 * s)
+        )
 
 
 class Sampled:
@@ -86,36 +91,36 @@ class Sampled:
     @property
     def first(self) -> np.ndarray:
         """Return chi (6 + n,) of the first sample."""
-        return self._samples[0, 0]
+        return self._samples[0, CHI]
 
     @property
     def last(self) -> np.ndarray:
         """Return chi (6 + n,) of the last sample."""
-        return self._samples[-1, 0]
+        return self._samples[-1, CHI]
 
     def write(self, time: float, reference: np.ndarray) -> None:
         """Write the reference (3, 6 + n); see `Trajectory.write`."""
         times, samples = self._times, self._samples
         reference[:] = 0.0
         if time <= times[0] or time >= times[-1]:
-            reference[0] = samples[0 if time <= times[0] else -1, 0]
+            reference[CHI] = samples[0 if time <= times[0] else -1, CHI]
             return
         row = int(np.searchsorted(times, time, side="right")) - 1
         length = times[row + 1] - times[row]
         s = (time - times[row]) / length
         (p0, v0, a0), (p1, v1, a1) = samples[row], samples[row + 1]
-        reference[0] = (
+        reference[CHI] = (
             (2 * s**3 - 3 * s**2 + 1) * p0
             + (s**3 - 2 * s**2 + s) * length * v0
             + (-2 * s**3 + 3 * s**2) * p1
             + (s**3 - s**2) * length * v1
         )
-        reference[1] = (
+        reference[CHI_DOT] = (
             (6 * s**2 - 6 * s) * (p0 - p1) / length
             + (3 * s**2 - 4 * s + 1) * v0
             + (3 * s**2 - 2 * s) * v1
         )
-        reference[2] = (1 - s) * a0 + s * a1
+        reference[CHI_DDOT] = (1 - s) * a0 + s * a1
 
 
 class Chain:

@@ -7,7 +7,7 @@ from diagnostic_msgs.msg import DiagnosticArray
 from rcl_interfaces.msg import ParameterDescriptor
 from std_msgs.msg import Bool
 
-from uam_control.coordinates import ARM, ATTITUDE, POSITION
+from uam_control.coordinates import ANGLES, ARM, ATTITUDE, CHI, POSITION
 from uam_control.laws.catalogue import DEFAULT
 from uam_control.maths.rotations import wrap_angle
 from uam_control.mission import Mission, MissionOutput, MissionParameters, load_scenario
@@ -114,8 +114,8 @@ class MissionNode(UamNode):
 
         state: (3, 6 + n), see `coordinates`; errors of position [m], attitude and arm [rad].
         """
-        error = state[0] - output.reference[0]
-        error[3:] = wrap_angle(error[3:])
+        error = state[CHI] - output.reference[CHI]
+        error[ANGLES] = wrap_angle(error[ANGLES])
         norms = [float(np.linalg.norm(error[part])) for part in (POSITION, ATTITUDE, ARM)]
         self._errors = tuple(norms) if output.flying else (0.0, 0.0, norms[2])
 

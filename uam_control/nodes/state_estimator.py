@@ -90,7 +90,7 @@ class StateEstimatorNode(UamNode):
         for stamp in range(0, 12_000_000, 4_000_000):
             spare.mocap(stamp, rest, level)
             spare.joints(stamp, joints, joints)
-            spare.imu(stamp, rest, np.array([0.0, 0.0, 9.81]))
+            spare.imu(stamp, rest, np.array([0.0, 0.0, spare.estimator.parameters.gravity]))
 
 
 def main() -> int:

@@ -12,6 +12,7 @@ from collections.abc import Iterator
 from enum import Enum
 from typing import NamedTuple
 
+from uam_control.coordinates import CHI, Z
 from uam_control.supervision.checks import CONTROLLERS, Checks
 from uam_control.supervision.monitor import Level
 from uam_control.supervision.observation import Observation, OperatorCommand
@@ -184,7 +185,7 @@ class Supervisor:
                 yield _planned(Event.READY)
         if seen.landing_due:
             yield _planned(Event.LANDING_DUE)
-        if seen.state[0, 2] - seen.ground > p.airborne_height:
+        if seen.state[CHI, Z] - seen.ground > p.airborne_height:
             yield _planned(Event.AIRBORNE)
 
     def _held_too_long(self, level: Level) -> bool:

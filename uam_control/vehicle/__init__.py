@@ -1,4 +1,11 @@
 """The description of a vehicle: the file in config/vehicle/ and the values derived from it."""
 
-from uam_control.vehicle.description import Joint, Rotor, RotorModel, Servo, VehicleDescription
+from uam_control.vehicle.description import (
+    GRAVITY,
+    Joint,
+    Rotor,
+    RotorModel,
+    Servo,
+    VehicleDescription,
+)
 from uam_control.vehicle.loading import DEFAULT_VEHICLE, VehicleError, load_description

@@ -16,6 +16,7 @@ from uam_control.coordinates import coordinates
 from uam_control.settings import configuration
 
 AXES = ("ROLL", "PITCH", "YAW")  # of PX4's rate loop, MC_*RATE_P
+GRAVITY = 9.81  # [m/s^2] of parameter sets that no vehicle's description fills
 ANGLE_STEP = 0.05  # [rad] the supervisor's limits: joint ranges, rounded down to this step
 
 
@@ -173,6 +174,7 @@ class VehicleDescription:
     def node_parameters(self) -> dict[str, dict[str, Any]]:
         """Return the node parameters derived from the vehicle; a profile can replace them."""
         return {
+            "state_estimator": {"gravity": self.gravity},
             "position_controller": {
                 "gravity": self.gravity,
                 "gravity_feedforward_mass": self.mass,

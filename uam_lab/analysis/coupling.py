@@ -49,7 +49,7 @@ def along(dynamics: Dynamics, acceleration: np.ndarray, supply: Supply, sets: di
 
 
 def nominal_inertia(sets: dict) -> np.ndarray:
-    """Return the diagonal of Mbar (8,) [kg (p), kg m^2 (q, alpha)]."""
+    """Return the diagonal of Mbar (6 + n,) [kg (p), kg m^2 (q, alpha)]."""
     inertia = np.empty(ALPHA + len(sets[NODE_OF["arm"]].inertia))
     for name, columns in COLUMNS_OF.items():
         inertia[columns] = sets[NODE_OF[name]].inertia

@@ -2,11 +2,11 @@
 
 Eq. (1), EL_dynamics: M chi_ddot + C chi_dot + g + d = tau, chi = (p, q, alpha).
 
-Coordinates. This stack uses quasi-velocities for the attitude (docs/law.md): chi_dot[3:6] are the
-body rates Omega (FLU), chi_ddot[3:6] is their derivative, tau_q is a torque in FLU. MuJoCo's free
-joint uses the same: qvel = (velocity in the world, angular velocity in the body). MuJoCo's mass
-matrix and bias force therefore need no change of coordinates. With body rates the equations are
-those of Boltzmann and Hamel; C chi_dot is still quadratic in chi_dot.
+Coordinates. This stack uses quasi-velocities for the attitude (docs/law.md): chi_dot[ATTITUDE] are
+the body rates Omega (FLU), chi_ddot[ATTITUDE] is their derivative, tau_q is a torque in FLU.
+MuJoCo's free joint uses the same: qvel = (velocity in the world, angular velocity in the body).
+MuJoCo's mass matrix and bias force therefore need no change of coordinates. With body rates the
+equations are those of Boltzmann and Hamel; C chi_dot is still quadratic in chi_dot.
 
 The magnet hangs on a passive pivot, which the paper's arm does not have. M, C and g are computed
 with the pivot fixed at its recorded angle; the force of its recorded motion is `pivot`, a part of
@@ -21,7 +21,7 @@ from dataclasses import dataclass
 import mujoco
 import numpy as np
 
-from uam_control.coordinates import ALPHA, ATTITUDE, POSITION
+from uam_control.coordinates import ALPHA, ATTITUDE, CHI, CHI_DOT, POSITION
 from uam_lab.analysis import ticks
 from uam_lab.results.timeseries import Series
 from uam_sim_bridge.plant import Vehicle
@@ -32,14 +32,14 @@ from uam_sim_bridge.plant.vehicle import MAGNET, PAYLOAD
 class Dynamics:
     """True dynamics at m ticks. Forces in the order of chi: N, world (p), N m, FLU (q), N m."""
 
-    mass: np.ndarray  # (m, 8, 8)
-    coriolis: np.ndarray  # (m, 8) C chi_dot
-    gravity: np.ndarray  # (m, 8) g
-    pivot: np.ndarray  # (m, 8) force of the swinging magnet; part of d
+    mass: np.ndarray  # (m, 6 + n, 6 + n)
+    coriolis: np.ndarray  # (m, 6 + n) C chi_dot
+    gravity: np.ndarray  # (m, 6 + n) g
+    pivot: np.ndarray  # (m, 6 + n) force of the swinging magnet; part of d
     carrying: np.ndarray  # (m,) payload on the magnet
 
     def required(self, acceleration: np.ndarray) -> np.ndarray:
-        """Return M chi_ddot + C chi_dot + g (m, 8), units as above, for chi_ddot (m, 8)."""
+        """Return M chi_ddot + C chi_dot + g (m, 6 + n), units as above, for chi_ddot (m, 6 + n)."""
         return np.einsum("kij,kj->ki", self.mass, acceleration) + self.coriolis + self.gravity
 
 
@@ -65,6 +65,7 @@ class Body:
                 )
 
         # the free payload is a tree of its own, which is not evaluated
+        self.rotor_names = vehicle.description.rotor_names
         self.size = len(vehicle.description.coordinates)  # base and arm; the pivot follows them
         self.model = model = vehicle.compile(0.0, hold_payload)
         flags = mujoco.mjtDisableBit
@@ -75,7 +76,7 @@ class Body:
         self._unit, self._column = np.zeros(model.nv), np.zeros(model.nv)
 
     def place(self, chi: np.ndarray, swing: float) -> None:
-        """Set the pose: chi (8,) [m, world; rad, Euler angles; rad, joints], pivot angle [rad]."""
+        """Set the pose: chi (6 + n,) [m, world; rad, Euler angles; rad, joints], pivot [rad]."""
         qpos = self.data.qpos
         qpos[0:3] = chi[POSITION]
         half = 0.5 * chi[ATTITUDE]
@@ -96,9 +97,9 @@ class Body:
         gravity: np.ndarray,
         pivot: np.ndarray,
     ) -> None:
-        """Write M (8, 8), C chi_dot, g and pivot force (8,) of one state into the last four.
+        """Write M (6 + n, 6 + n), C chi_dot, g and pivot force (6 + n,) of a state into the last 4.
 
-        chi, chi_dot (8,): SI units, position in the world, body rates in FLU. swing (3,): angle
+        chi, chi_dot (6 + n,): SI units, position in the world, body rates in FLU. swing (3,): angle
         [rad], rate, acceleration of the pivot. Units of the results: see `Dynamics`.
         """
         model, data, size = self.model, self.data, self.size
@@ -136,7 +137,7 @@ def along(series: Series, rows: np.ndarray, vehicle: Vehicle, payload_mass: floa
     )
     for k in range(count):
         (loaded if held[k] else bare).evaluate(
-            truth[k, 0], truth[k, 1], swing[k],
+            truth[k, CHI], truth[k, CHI_DOT], swing[k],
             found.mass[k], found.coriolis[k], found.gravity[k], found.pivot[k],
         )  # fmt: skip
     return found

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from uam_control.coordinates import ARM, ATTITUDE, POSITION
+from uam_control.coordinates import ARM, ATTITUDE, POSITION, Z
 from uam_control.maths.rotations import matrix_from_euler
 from uam_lab.analysis.dynamics import Body
 from uam_lab.analysis.tracking import Tracking
@@ -20,7 +20,7 @@ NODE_OF = {name: f"{name}_controller" for name in SUBSYSTEMS}
 class Supply:
     """Terms of tau at m ticks, eq. (8a), tau_p; (18a), tau_q; (25a), tau_alpha.
 
-    All (m, 8): N, world (p), N m, FLU (q), N m (alpha). Without saturation
+    All (m, 6 + n): N, world (p), N m, FLU (q), N m (alpha). Without saturation
     tau = feedforward + feedback + adaptive + weight.
     """
 
@@ -49,7 +49,7 @@ def along(series: Series, rows: np.ndarray, estimate: Tracking, sets: dict, body
         scale = series[f"adaptation.{name}.rho"][rows] / np.maximum(length, p["varpi"])
         adaptive[:, columns] = -p["inertia"] * r * scale[:, None]
     limits = sets["position_controller"]
-    weight[:, 2] = limits.gravity_feedforward_mass * limits.gravity
+    weight[:, Z] = limits.gravity_feedforward_mass * limits.gravity
     blocks = [series.block(f"{tau}.")[rows] for tau in ("tau_p", "tau_q", "tau_alpha")]
     recorded = np.hstack(blocks)
     applied = np.hstack([rotor_wrench(series, rows, body), blocks[2]])
@@ -59,10 +59,12 @@ def along(series: Series, rows: np.ndarray, estimate: Tracking, sets: dict, body
 def rotor_wrench(series: Series, rows: np.ndarray, body: Body) -> np.ndarray:
     """Return force [N, world] and torque [N m, FLU] (m, 6) of the recorded rotor thrusts."""
     model = body.model
-    thrust = np.column_stack([series[f"rotor_{i}.thrust"][rows] for i in range(1, 5)])
-    torque = np.zeros((4, 3))  # per newton of thrust: r x e3 and the drag torque
-    for i in range(4):
-        x, y, _ = model.site(f"rotor_{i + 1}").pos
-        torque[i] = y, -x, model.actuator(f"rotor_{i + 1}").gear[5]
-    up = np.array([matrix_from_euler(euler)[:, 2] for euler in series.block("truth.")[rows, 3:6]])
+    count = len(body.rotor_names)
+    thrust = np.column_stack([series[f"rotor_{i}.thrust"][rows] for i in range(1, count + 1)])
+    torque = np.zeros((count, 3))  # per newton of thrust: r x e3 and the drag torque
+    for i, name in enumerate(body.rotor_names):
+        x, y, _ = model.site(name).pos
+        torque[i] = y, -x, model.actuator(name).gear[5]
+    attitudes = series.block("truth.")[rows, ATTITUDE]
+    up = np.array([matrix_from_euler(euler)[:, Z] for euler in attitudes])
     return np.hstack([up * thrust.sum(axis=1)[:, None], thrust @ torque])

@@ -50,7 +50,7 @@ class Health:
             self.errors = mission.position_error, mission.attitude_error, mission.arm_error
 
     def track(self, error: np.ndarray) -> None:
-        """Store the tracking error, estimate - reference: chi (8,), m and rad."""
+        """Store the tracking error, estimate - reference: chi (6 + n,), m and rad."""
         self._tracked = True
         self.errors = tuple(float(np.linalg.norm(error[p])) for p in (POSITION, ATTITUDE, ARM))
 

@@ -20,7 +20,7 @@ import numpy as np
 from diagnostic_msgs.msg import DiagnosticArray
 from std_msgs.msg import String
 
-from uam_control.coordinates import ALPHA, ARM, ATTITUDE, POSITION
+from uam_control.coordinates import ALPHA, ANGLES, ARM, ATTITUDE, CHI, CHI_DDOT, POSITION
 from uam_control.maths.rotations import quaternion_from_euler, wrap_angle
 from uam_control.mission import load_scenario
 from uam_control.nodes.described import described_vehicle
@@ -148,9 +148,9 @@ class SceneNode(UamNode):
         self.done_tick(stamp, begun)
 
     def _compare(self, stamp: int, state: np.ndarray, reference: Reference) -> None:
-        """Publish the tracking errors of this tick; state (3, 8), see `coordinates`."""
-        error = state[:2] - reference.values[:2]
-        error[0, 3:] = wrap_angle(error[0, 3:])
+        """Publish the tracking errors of this tick; state (3, 6 + n), see `coordinates`."""
+        error = state[:CHI_DDOT] - reference.values[:CHI_DDOT]
+        error[CHI, ANGLES] = wrap_angle(error[CHI, ANGLES])
         if not reference.flying:
             error[:, :ALPHA] = 0.0
         writer = self._error_writer
@@ -160,7 +160,7 @@ class SceneNode(UamNode):
     def _transforms(
         self, stamp: int, chi: np.ndarray, desired: np.ndarray | None
     ) -> list[Transform]:
-        """Return the moving transforms at `stamp` [ns] for chi (8,) and the desired chi_d (8,)."""
+        """Return the moving transforms at `stamp` [ns] for chi and the desired chi_d (6 + n,)."""
         turned = quaternion_from_euler(chi[ATTITUDE])
         angles = dict(zip(self._joint_names, chi[ARM], strict=True))
         angles[SWING] = hanging(chi[ATTITUDE][1], chi[ARM])

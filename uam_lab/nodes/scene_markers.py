@@ -12,7 +12,7 @@ from geometry_msgs.msg import Point
 from std_msgs.msg import ColorRGBA
 from visualization_msgs.msg import Marker, MarkerArray
 
-from uam_control.coordinates import ALPHA
+from uam_control.coordinates import ALPHA, CHI, POSITION
 from uam_control.mission import Scenario
 from uam_control.mission.trajectory import empty_reference
 from uam_msgs_py.messages.ros_time import set_stamp
@@ -41,7 +41,7 @@ class ReferencePath:
         trajectory, reference = scenario.trajectory(start), empty_reference(len(start) - ALPHA)
         for time, point in zip(self._times, self._points, strict=True):
             trajectory.write(float(time), reference)
-            point[:] = reference[0, :3]
+            point[:] = reference[CHI, POSITION]
 
     def ahead(self, time: float) -> np.ndarray:
         """Return the points (n, 3) [m, world] from mission time [s] to the landing."""

@@ -18,7 +18,7 @@ import numpy as np
 from diagnostic_msgs.msg import DiagnosticArray
 from rclpy.serialization import deserialize_message
 
-from uam_control.coordinates import ALPHA, ARM, ATTITUDE
+from uam_control.coordinates import ALPHA, ARM, ATTITUDE, ROLL
 from uam_control.mission import Scenario
 from uam_control.mission.flight_sequence import ABORTED, LANDED, WAITING
 from uam_control.supervision import State
@@ -263,7 +263,8 @@ def _commands(log: Log, ticks: np.ndarray, table: FlightTable) -> None:
     for row in range(3):
         angles = [column + row * columns.size for column in attitude]
         values[:, angles] = position[:, ALPHA * row :][:, ATTITUDE]
-    values[:, columns.block("tau_p.")] = position[:, 18:21]
+    efforts = position[:, len(STATE_ROWS) * ALPHA :]  # tau_p, then zeros for the attitude
+    values[:, columns.block("tau_p.")] = efforts[:, :ROLL]
     torque = log.samples(topics.ATTITUDE_COMMAND, ("effort",), 3)
     values[:, columns.block("tau_q.")] = torque.at(ticks)
     effort = log.samples(topics.ARM_COMMAND, ("effort",), columns.joints)

@@ -23,13 +23,12 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 
-from uam_control.coordinates import ALPHA, POSITION, ROLL, coordinates
+from uam_control.coordinates import ALPHA, ANGLES, POSITION, coordinates
 from uam_control.laws import catalogue
 from uam_control.maths.rotations import wrap_angle
 from uam_control.vehicle import VehicleDescription
 from uam_lab.results.atomic import replacing
 
-ANGLES = slice(ROLL, None)  # of chi
 SUBSYSTEMS = ("position", "attitude", "arm")
 AXES = 3  # the largest number of axes of a subsystem
 # Phases of the mission node on the ground; the scenario names those in flight.

@@ -24,7 +24,9 @@ from uam_control.maths.rotations import (
 GRAVITY = 9.80665  # m/s^2, as PX4
 
 # slices of `estimate` (10,): attitude FRD → NED [w x y z], position NED [m], velocity NED [m/s]
-ATTITUDE, POSITION, VELOCITY = slice(0, 4), slice(4, 7), slice(7, 10)
+_PLACE, _SPEED, _END = 4, 7, 10
+ATTITUDE, POSITION, VELOCITY = slice(_PLACE), slice(_PLACE, _SPEED), slice(_SPEED, _END)
+DOWN = _END - 1  # of `estimate`: velocity downwards
 
 VISION_TIMEOUT = 0.5  # s
 ALIGN_SAMPLES = 5  # vision poses until the estimate is valid
@@ -60,7 +62,7 @@ def predict(
     """
     for i in range(3):
         mean_force[i] += min(1.0, dt / _FORCE_TIME) * (accel[i] - mean_force[i])
-    matrix = matrix_from_quaternion(estimate[0:4])
+    matrix = matrix_from_quaternion(estimate[:_PLACE])
     force = rotate(matrix, accel)
     turn = np.empty(3)
     # expected direction of gravity in the body against the measured one: -accel at rest
@@ -72,14 +74,14 @@ def predict(
     turn[0] = dt * (gyro[0] + pull * (-accel[1] * down[2] + accel[2] * down[1]))
     turn[1] = dt * (gyro[1] + pull * (-accel[2] * down[0] + accel[0] * down[2]))
     turn[2] = dt * (gyro[2] + pull * (-accel[0] * down[1] + accel[1] * down[0]))
-    q = quaternion_multiply(estimate[0:4], quaternion_from_rotation_vector(turn))
+    q = quaternion_multiply(estimate[:_PLACE], quaternion_from_rotation_vector(turn))
     scale = 1.0 / math.sqrt(q[0] ** 2 + q[1] ** 2 + q[2] ** 2 + q[3] ** 2)
     for i in range(4):
         estimate[i] = q[i] * scale
     for i in range(3):
         acceleration = force[i] - bias[i] + (GRAVITY if i == 2 else 0.0)
-        estimate[4 + i] += dt * (estimate[7 + i] + 0.5 * dt * acceleration)
-        estimate[7 + i] += dt * acceleration
+        estimate[_PLACE + i] += dt * (estimate[_SPEED + i] + 0.5 * dt * acceleration)
+        estimate[_SPEED + i] += dt * acceleration
 
 
 @jit
@@ -95,16 +97,16 @@ def correct(
     position (3,) [m, NED]; quaternion (4,) [w x y z], FRD → NED; bias (3,): see `predict`.
     """
     interval = min(interval, _LONGEST_PULL)
-    error = rotation_error(quaternion, estimate[0:4])
+    error = rotation_error(quaternion, estimate[:_PLACE])
     for i in range(3):
         error[i] *= _VISION_ATTITUDE * interval
-    q = quaternion_multiply(estimate[0:4], quaternion_from_rotation_vector(error))
+    q = quaternion_multiply(estimate[:_PLACE], quaternion_from_rotation_vector(error))
     for i in range(4):
         estimate[i] = q[i]
     for i in range(3):
-        difference = position[i] - estimate[4 + i]
-        estimate[4 + i] += _VISION_POSITION * interval * difference
-        estimate[7 + i] += _VISION_VELOCITY * interval * difference
+        difference = position[i] - estimate[_PLACE + i]
+        estimate[_PLACE + i] += _VISION_POSITION * interval * difference
+        estimate[_SPEED + i] += _VISION_VELOCITY * interval * difference
         if abs(difference) < _BIAS_WINDOW:
             learnt = bias[i] - _VISION_BIAS * interval * difference
             bias[i] = min(_BIAS_MAX, max(-_BIAS_MAX, learnt))
@@ -117,7 +119,7 @@ class Estimator:
     """
 
     def __init__(self) -> None:
-        self.estimate = np.zeros(10)
+        self.estimate = np.zeros(_END)
         self.estimate[0] = 1.0
         self._vision_time = -math.inf
         self._vision_count = 0

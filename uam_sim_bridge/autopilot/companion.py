@@ -9,6 +9,7 @@ import numpy as np
 
 from uam_control.maths.rotations import matrix_from_quaternion, quaternion_from_euler, rotate
 from uam_control.settings.parameter_set import ParameterError
+from uam_sim_bridge.autopilot.autopilot_estimator import GRAVITY
 from uam_sim_bridge.autopilot.core import Autopilot
 from uam_sim_bridge.autopilot.params import DEFINITIONS
 from uam_sim_bridge.autopilot.telemetry import Telemetry
@@ -164,7 +165,7 @@ def warm_up() -> None:
     """Compile the functions of a flight, so that no tick waits for the compiler."""
     autopilot = Autopilot()
     companion = Companion(autopilot)
-    zero, down, level = np.zeros(3), np.array([0.0, 0.0, -9.81]), np.array([1.0, 0.0, 0.0, 0.0])
+    zero, down, level = np.zeros(3), np.array([0.0, 0.0, -GRAVITY]), np.array([1.0, 0.0, 0.0, 0.0])
     targets = AttitudeTarget.of_rates(zero, 0.5), AttitudeTarget.of_attitude(level, 0.5)
     for k in range(300):
         time = 0.004 * k

@@ -17,7 +17,7 @@ from uam_control.vehicle import load_description
 from uam_sim_bridge.autopilot.allocation import allocate, unallocated_torque
 from uam_sim_bridge.autopilot.attitude_control import attitude_gains, attitude_rates
 from uam_sim_bridge.autopilot.autopilot_estimator import ATTITUDE as ESTIMATED_ATTITUDE
-from uam_sim_bridge.autopilot.autopilot_estimator import Estimator
+from uam_sim_bridge.autopilot.autopilot_estimator import VELOCITY, Estimator
 from uam_sim_bridge.autopilot.commander import Commander
 from uam_sim_bridge.autopilot.descent import Descent
 from uam_sim_bridge.autopilot.landing import LandDetector
@@ -209,7 +209,7 @@ class Autopilot:
     def update(self, time: float, gyro: np.ndarray, accel: np.ndarray) -> np.ndarray:
         """Advance to `time` [s] and return `motors`.
 
-        gyro (3,) [rad/s] and specific force accel (3,) [m/s^2], FRD, float64 (at rest z = -9.81).
+        gyro (3,) [rad/s] and specific force accel (3,) [m/s^2], FRD, float64 (at rest z = -g).
         """
         if self._time is None:
             self._time = time - 1.0 / self._sample_rate
@@ -246,7 +246,7 @@ class Autopilot:
         )
         if commander.armed:
             memory = self._memory
-            velocity = tuple(self.estimator.estimate[7:10].tolist()) if aided else None
+            velocity = tuple(self.estimator.estimate[VELOCITY].tolist()) if aided else None
             landing.update(
                 time,
                 True,

@@ -8,7 +8,7 @@ import numpy as np
 
 from uam_control.maths.compiled import jit
 from uam_control.maths.rotations import euler_from_quaternion
-from uam_sim_bridge.autopilot.autopilot_estimator import ATTITUDE, GRAVITY
+from uam_sim_bridge.autopilot.autopilot_estimator import ATTITUDE, DOWN, GRAVITY
 from uam_sim_bridge.autopilot.params import Parameters
 
 _MIN_COSINE = 0.5  # smallest cosine of the tilt for which the thrust is corrected
@@ -70,5 +70,6 @@ class Descent:
         estimate (10,): of `Estimator`; dt [s].
         """
         euler = euler_from_quaternion(estimate[ATTITUDE])
-        self.integral = descend(euler, estimate[9], self.integral, dt, self._gains, self.setpoint)
+        sink = estimate[DOWN]
+        self.integral = descend(euler, sink, self.integral, dt, self._gains, self.setpoint)
         return self.setpoint

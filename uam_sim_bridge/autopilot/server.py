@@ -23,6 +23,7 @@ import numpy as np
 from uam_control.settings.configuration import ConfigurationError
 from uam_control.settings.parameter_set import ParameterError
 from uam_control.vehicle import load_description
+from uam_sim_bridge.autopilot.autopilot_estimator import GRAVITY
 from uam_sim_bridge.autopilot.companion import Companion, warm_up
 from uam_sim_bridge.autopilot.core import Autopilot
 from uam_sim_bridge.autopilot.params import Parameters
@@ -56,7 +57,7 @@ class Server:
         self._autopilot = autopilot
         self._companion = Companion(autopilot)
         self._simulator, self._udp = simulator, udp
-        self._gyro, self._accel = np.zeros(3), np.array([0.0, 0.0, -9.81])
+        self._gyro, self._accel = np.zeros(3), np.array([0.0, 0.0, -GRAVITY])
         self._microseconds = -1
         self._intervals: list[int] = []
 

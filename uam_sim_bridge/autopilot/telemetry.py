@@ -6,6 +6,7 @@ import math
 from collections.abc import Callable
 
 from uam_control.maths.rotations import matrix_from_quaternion, rotate_back
+from uam_sim_bridge.autopilot.autopilot_estimator import ATTITUDE, POSITION, VELOCITY
 from uam_sim_bridge.autopilot.core import Autopilot
 from uam_sim_bridge.mavlink.protocol.wire import Message, mavlink2
 
@@ -58,20 +59,20 @@ def extended_sys_state(autopilot: Autopilot, time: float) -> Message:
 
 def attitude_quaternion(autopilot: Autopilot, time: float) -> Message:
     """ATTITUDE_QUATERNION: quaternion FRD → NED, body rates FRD [rad/s]."""
-    q, rates = autopilot.estimator.estimate[0:4].tolist(), autopilot.rates.tolist()
+    q, rates = autopilot.estimator.estimate[ATTITUDE].tolist(), autopilot.rates.tolist()
     return mavlink2.MAVLink_attitude_quaternion_message(_milliseconds(time), *q, *rates)
 
 
 def odometry(autopilot: Autopilot, time: float) -> Message:
     """ODOMETRY: pose [m] in local NED, velocity [m/s] and rates [rad/s] in body FRD."""
     estimate = autopilot.estimator.estimate
-    velocity = rotate_back(matrix_from_quaternion(estimate[0:4]), estimate[7:10])
+    velocity = rotate_back(matrix_from_quaternion(estimate[ATTITUDE]), estimate[VELOCITY])
     return mavlink2.MAVLink_odometry_message(
         round(time * 1e6),
         mavlink2.MAV_FRAME_LOCAL_NED,
         mavlink2.MAV_FRAME_BODY_FRD,
-        *estimate[4:7].tolist(),
-        estimate[0:4].tolist(),
+        *estimate[POSITION].tolist(),
+        estimate[ATTITUDE].tolist(),
         *velocity.tolist(),
         *autopilot.rates.tolist(),
         _NO_COVARIANCE,

@@ -19,7 +19,7 @@ from rclpy.clock import Clock, ClockType
 from rclpy.parameter import Parameter
 from std_msgs.msg import Bool
 
-from uam_control.coordinates import ATTITUDE
+from uam_control.coordinates import ATTITUDE, CHI, CHI_DOT
 from uam_control.nodes.described import described_vehicle
 from uam_control.settings.parameter_set import ParameterError
 from uam_control.stamps import SECOND
@@ -277,11 +277,11 @@ class MavlinkBridgeNode(UamNode):
         """Compile the functions of a tick before the flight: a first call takes a second."""
         spare, zero, level = RateThrustMap(), np.zeros(3), np.array([1.0, 0.0, 0.0, 0.0])
         state = np.zeros((3, len(self._vehicle.coordinates)))
-        spare.map(zero, zero, state[0, ATTITUDE], state[1, ATTITUDE])
+        spare.map(zero, zero, state[CHI, ATTITUDE], state[CHI_DOT, ATTITUDE])
         spare.assumed_thrust(0.5)
         for setpoint in SETPOINTS.values():
             setpoint(Desired(zero, np.zeros((3, 3)), 0.5))
-        steady_force(state, 0.1, 1.0)
+        steady_force(state, 0.1, 1.0, self._vehicle.gravity)
         VisionPose(0.0, zero, level, 1.0, 1.0).message()
 
 

@@ -81,7 +81,7 @@ class BridgeStage:
         """sequence: the one of `autopilot`; fresh, say: see `SetpointSource`."""
         self.autopilot, self.sequence = autopilot, sequence
         self.map = RateThrustMap(sets.mapping, vehicle)
-        self.identification = ThrustIdentification(sets.identification)
+        self.identification = ThrustIdentification(sets.identification, vehicle)
         self.source = SetpointSource(self.map, sets.hold, sets.setpoint.type, fresh, say)
         self._vision = VisionPacing(sets.vision)
         self._reports = AutopilotReports(autopilot, sequence)

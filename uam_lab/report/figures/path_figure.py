@@ -10,18 +10,20 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.patches import Rectangle
 
+from uam_control.coordinates import arm_coordinates
 from uam_lab.report.figures import style
 from uam_lab.report.figures.panels import DrawnFlight, corner_legend, flight_keys
 from uam_lab.report.figures.poses import Poses
 from uam_lab.results.timeseries import Series
+from uam_sim_bridge.plant.vehicle import BASE, MAGNET
 
 POSES = 5
 DASHES = (0, (3, 2))  # of the reference
 TALLEST, ABOVE, BELOW = 4.5, 0.62, 0.45  # [in] of a panel, above it, below it
-MOVING = [0, 2, 6, 7]  # x, z and the joints among the coordinates
+FOOT = "foot_"  # beginning of the names of the landing gear's geoms
+JOINT_WEIGHT = 0.2  # [m/rad] of the joints' motion in the distance between two poses
 REACH = 0.35  # [m] shown around the path, for rotors and arm
 SCENERY = {"stand_post": "#b9a58f", "stand_top": "#8c7660", "drop_mat": "#e3c552"}
-CHAIN = ("base", "link_1", "link_2", "magnet")
 
 
 def path_figure(flights: Sequence[DrawnFlight]) -> Figure:
@@ -104,9 +106,11 @@ def _poses(axis: Axes, poses: Poses, start: float, end: float) -> None:
     """Draw vehicle, arm and payload at points evenly spaced along the path, the last darkest."""
     series = poses.series
     first, last = series.row_at(start), series.row_at(end)
-    steps = np.abs(np.diff(series.block("reference.")[first : last + 1, MOVING], axis=0))
+    names = [f"reference.{name}" for name in ("x", "z", *arm_coordinates(series.columns.joints))]
+    moving = np.column_stack([series[name][first : last + 1] for name in names])
+    weights = [1.0, 1.0] + [JOINT_WEIGHT] * series.columns.joints
     # joint motion counts too; the small constant gives a hover a length
-    way = np.append(0.0, np.cumsum(steps @ [1.0, 1.0, 0.2, 0.2] + 1e-9))
+    way = np.append(0.0, np.cumsum(np.abs(np.diff(moving, axis=0)) @ weights + 1e-9))
     for number, part in enumerate(np.linspace(0.0, way[-1], POSES)):
         poses.put(first + int(np.searchsorted(way, part)))
         opacity = 0.25 + 0.75 * number / (POSES - 1)
@@ -115,9 +119,8 @@ def _poses(axis: Axes, poses: Poses, start: float, end: float) -> None:
 
 def _pose(axis: Axes, poses: Poses, opacity: float, order: int) -> None:
     fade = {"alpha": opacity, "zorder": order, "solid_capstyle": "round"}
-    feet = np.array([poses.data.geom(f"foot_{i}").xpos for i in (1, 2)])
     rotors = np.array([poses.site(name) for name in poses.outermost_rotors])
-    base = poses.body("base")
+    base = poses.body(BASE)
     axis.plot(rotors[:, 0], rotors[:, 2], color=style.INK, linewidth=2.6, **fade)
     for rotor in rotors:
         half = 0.11
@@ -128,14 +131,18 @@ def _pose(axis: Axes, poses: Poses, opacity: float, order: int) -> None:
             linewidth=1.6,
             **fade,
         )
-    axis.plot(feet[:, 0], feet[:, 2], color=style.MUTED, linewidth=1.0, **fade)
-    middle = feet.mean(axis=0)
-    axis.plot([base[0], middle[0]], [base[2], middle[2]], color=style.MUTED, linewidth=1.0, **fade)
-    chain = np.array([*(poses.body(name) for name in CHAIN), poses.site("magnet_face")])
+    feet = poses.geoms(FOOT)[:2]  # a front and a back one
+    if len(feet):
+        axis.plot(feet[:, 0], feet[:, 2], color=style.MUTED, linewidth=1.0, **fade)
+        middle = feet.mean(axis=0)
+        leg = ([base[0], middle[0]], [base[2], middle[2]])
+        axis.plot(*leg, color=style.MUTED, linewidth=1.0, **fade)
+    joints = [*poses.arm(), poses.body(MAGNET)]
+    chain = np.array([base, *joints, poses.site("magnet_face")])
     axis.plot(chain[:, 0], chain[:, 2], color="#5b6670", linewidth=2.0, **fade)
     axis.plot(
-        chain[1:4, 0],
-        chain[1:4, 2],
+        chain[1:-1, 0],
+        chain[1:-1, 2],
         linestyle="none",
         marker="o",
         markersize=2.8,
@@ -151,7 +158,8 @@ def _scenery(axis: Axes, poses: Poses) -> None:
     poses.put(0)
     axis.axhline(0.0, color="#a7afb7", linewidth=1.0, zorder=1)
     for name, colour in SCENERY.items():
-        _boxed(axis, poses, name, colour, 1.0, 2)
+        if len(poses.geoms(name)):
+            _boxed(axis, poses, name, colour, 1.0, 2)
 
 
 def _boxed(axis: Axes, poses: Poses, geom: str, colour: str, opacity: float, order: int) -> None:

@@ -50,6 +50,17 @@ class Poses:
         ends = (pick(rotors, key=lambda rotor: rotor.position[0]) for pick in (min, max))
         return tuple(rotor.name for rotor in ends)
 
+    def arm(self) -> list[np.ndarray]:
+        """Return the world positions (3,) [m] of the joints, base to tip."""
+        names = self.vehicle.description.joint_names
+        return [self.data.joint(name).xanchor.copy() for name in names]
+
+    def geoms(self, beginning: str) -> np.ndarray:
+        """Return the world positions (m, 3) [m] of the geoms whose names begin so."""
+        names = [self.model.geom(i).name for i in range(self.model.ngeom)]
+        found = [i for i, name in enumerate(names) if name.startswith(beginning)]
+        return self.data.geom_xpos[found].copy()
+
     def body(self, name: str) -> np.ndarray:
         """Return the world position (3,) [m] of a body's frame."""
         return self.data.body(name).xpos.copy()

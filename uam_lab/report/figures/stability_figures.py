@@ -61,8 +61,9 @@ def coupling(flights: Sequence[DrawnFlight]) -> Figure | None:
     found = _only(flights)
     if found is None:
         return None
+    joints = found.supply.tau.shape[1] - ALPHA
     figure, axes = panels.grid(
-        "Coupling force and its compensation", 4, math.ceil(found.supply.tau.shape[1] / 4), 1.45
+        "Coupling force and its compensation", 3 + math.ceil(joints / 2), 2, 1.45
     )
     figure.subplots_adjust(wspace=0.26)  # small torques have long labels
     supply = found.supply
@@ -74,12 +75,10 @@ def coupling(flights: Sequence[DrawnFlight]) -> Figure | None:
     )
     labels = [f"{axis} [N]" for axis in "xyz"]
     labels += [f"{name} [N m]" for name in ("roll φ", "pitch θ", "yaw ψ")]
-    order = [*range(ALPHA)]
-    for joint in range(found.supply.tau.shape[1] - ALPHA):  # to the right of x, y, z and angles
-        at = min(4 * joint + 3, len(order))
-        labels.insert(at, f"$\\alpha_{joint + 1}$ [N m]")
-        order.insert(at, ALPHA + joint)
-    for axis, label, column in zip(axes.T.flat, labels, order, strict=False):
+    labels += [f"$\\alpha_{joint}$ [N m]" for joint in range(1, joints + 1)]
+    # left x, y, z, right the angles, below them the joints from left to right
+    used = [*axes[:3].T.flat, *axes[3:].flat]
+    for column, (axis, label) in enumerate(zip(used, labels, strict=False)):
         for values, colour, width in drawn:
             if colour == ACTUATORS and column >= ALPHA:
                 continue  # the servos' torque is not recorded
@@ -95,6 +94,10 @@ def coupling(flights: Sequence[DrawnFlight]) -> Figure | None:
         style.key("actuators − τ", ACTUATORS),
     ]
     panels.finish(figure, axes, flights, handles)
+    if joints % 2:  # the time axis of the right column is one panel higher
+        axes[-1, 1].set_visible(False)
+        axes[-2, 1].tick_params(labelbottom=True)
+        axes[-2, 1].set_xlabel(axes[-1, 1].get_xlabel())
     return figure
 
 

@@ -16,6 +16,7 @@ from uam_lab.results.timeseries import Series
 FOLLOW = 0.62  # camera motion / vehicle motion; below 1, so that the motion is visible
 SMOOTHING_S = 2.0
 CAMERA = {"azimuth": 108.0, "elevation": -11.0, "distance": 2.0, "height": 0.52}
+HEADROOM = 0.6  # [m] height of the vehicle above the camera's target that is in the picture
 TRAIL_RGBA = (0.12, 0.37, 0.66, 0.95)
 REFERENCE_RGBA = (0.35, 0.40, 0.45, 0.55)
 SEGMENTS = 140  # of a path; of the reference every second one is drawn
@@ -37,6 +38,8 @@ class Scene:
         self._camera = mujoco.MjvCamera()
         self._camera.azimuth, self._camera.elevation = CAMERA["azimuth"], CAMERA["elevation"]
         self._camera.distance = CAMERA["distance"]
+        highest = float(np.nanmax(series["truth.z"]))
+        self._height = max(CAMERA["height"], highest - HEADROOM)
         self._look_at = FOLLOW * _smooth(series)
         self._path_rows = _path_rows(series)
 
@@ -50,7 +53,7 @@ class Scene:
         # the renderer also needs the poses of cameras and lights
         mujoco.mj_camlight(self.poses.model, self.poses.data)
         x, y = self._look_at[row]
-        self._camera.lookat[:] = x, y, CAMERA["height"]
+        self._camera.lookat[:] = x, y, self._height
         self._renderer.update_scene(self.poses.data, self._camera)
         self._draw_path("reference.", self._path_rows, REFERENCE_RGBA, 1.5, dashed=True)
         flown = self._path_rows[self._path_rows <= row]

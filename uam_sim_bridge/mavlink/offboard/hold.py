@@ -10,9 +10,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from uam_control.coordinates import CHI, X, Y, Z
 from uam_control.settings.parameter_set import ParameterSet, number
 from uam_sim_bridge.mavlink.offboard.setpoints.desired import Desired
-from uam_sim_bridge.mavlink.offboard.thrust_identification import GRAVITY
 
 _LAST = 0.05  # s before the end, rates 0: the autopilot holds the last setpoint until its failsafe
 UNKNOWN = np.full(3, math.nan)  # unknown attitude [rad] or velocity [m/s]
@@ -66,8 +66,10 @@ class LevelHold:
     against it. A swinging arm pushes the vehicle: tilt and thrust act against the velocity.
     """
 
-    def __init__(self, parameters: HoldParameters) -> None:
+    def __init__(self, parameters: HoldParameters, gravity: float) -> None:
+        """gravity [m/s^2]."""
         self.parameters = parameters
+        self._gravity = gravity
         self.rates = np.zeros(3)
         self._desired = np.zeros((3, 3))  # see `Desired.attitude`
         self._integral = np.zeros(2)  # rad/s
@@ -83,7 +85,7 @@ class LevelHold:
     def good(self, time: float, desired: Desired) -> None:
         """Store thrust and yaw of a valid command at `time` [s]."""
         self._since = None
-        self._desired[0, 2], thrust = desired.attitude[0, 2], desired.thrust
+        self._desired[CHI, Z], thrust = desired.attitude[CHI, Z], desired.thrust
         dt = time - self._time
         self._time = time
         if self._thrust is None or not 0.0 < dt < _THRUST_TIME:
@@ -114,15 +116,15 @@ class LevelHold:
         dt, self._time = max(0.0, time - self._time), time
         if remaining < 0.0:
             return None
-        desired = self._desired[0]
+        desired = self._desired[CHI]
         if remaining <= _LAST:
-            self.rates[:] = desired[:2] = 0.0
+            self.rates[:] = desired[X:Z] = 0.0
             return Desired(self.rates, self._desired, self._thrust)
-        forward, left, up = self._braking(velocity, attitude[2])
-        desired[0], desired[1] = -left / GRAVITY, forward / GRAVITY
-        self._turn(0, attitude[0] - desired[0], dt)
-        self._turn(1, attitude[1] - desired[1], dt)
-        thrust = min(1.0, self._thrust * (1.0 + up / GRAVITY))
+        forward, left, up = self._braking(velocity, attitude[Z])
+        desired[X], desired[Y] = -left / self._gravity, forward / self._gravity
+        self._turn(X, attitude[X] - desired[X], dt)
+        self._turn(Y, attitude[Y] - desired[Y], dt)
+        thrust = min(1.0, self._thrust * (1.0 + up / self._gravity))
         return Desired(self.rates, self._desired, thrust)
 
     def _turn(self, axis: int, tilt: float, dt: float) -> None:

@@ -200,6 +200,11 @@ class RateThrustMap:
         self.thrust_factor = self._factor
 
     @property
+    def gravity(self) -> float:
+        """Gravity of the vehicle's description [m/s^2]."""
+        return self._vehicle.gravity
+
+    @property
     def thrust_factor(self) -> float:
         """True thrust / thrust of the parameters' curve."""
         return self._factor

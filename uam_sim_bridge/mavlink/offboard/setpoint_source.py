@@ -18,7 +18,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from uam_control.coordinates import ATTITUDE, POSITION
+from uam_control.coordinates import ATTITUDE, CHI, CHI_DOT, POSITION, Z
 from uam_control.maths.rotations import euler_from_quaternion
 from uam_sim_bridge.mavlink.offboard.hold import UNKNOWN, HoldParameters, LevelHold
 from uam_sim_bridge.mavlink.offboard.setpoint import RateThrustMap, SetpointRefused
@@ -64,7 +64,7 @@ class SetpointSource:
         used; say(text, kind): called for each warning."""
         self.map = rate_map
         self._type = setpoint
-        self._hold = LevelHold(hold)
+        self._hold = LevelHold(hold, rate_map.gravity)
         self._margin = hold.ground_margin
         self._fresh_for = fresh
         self._say = say
@@ -81,8 +81,8 @@ class SetpointSource:
 
     def note_state(self, stamp: float, state: np.ndarray) -> None:
         """Store the estimate (3, 6 + n), see uam_control.coordinates, of `stamp` [s] uncopied."""
-        self._estimated, self._velocity = (stamp, state[0, ATTITUDE]), state[1, POSITION]
-        self._height = float(state[0, 2])
+        self._estimated, self._velocity = (stamp, state[CHI, ATTITUDE]), state[CHI_DOT, POSITION]
+        self._height = float(state[CHI, Z])
 
     def note_pose(self, stamp: float, quaternion: np.ndarray) -> None:
         """Store the attitude (4,) [w x y z], FLU → ENU, of a mocap pose of `stamp` [s]."""
@@ -107,7 +107,9 @@ class SetpointSource:
             return self.without(now, situation)
         if flying and tau_q is not None:
             try:
-                rates, thrust = self.map.map(tau_p, tau_q, state[0, ATTITUDE], state[1, ATTITUDE])
+                rates, thrust = self.map.map(
+                    tau_p, tau_q, state[CHI, ATTITUDE], state[CHI_DOT, ATTITUDE]
+                )
             except SetpointRefused as error:
                 self._say(f"setpoint refused: {error}", None)
             else:

@@ -33,11 +33,11 @@ from typing import Any, Self
 
 import numpy as np
 
+from uam_control.coordinates import CHI, CHI_DDOT, PITCH, ROLL, YAW, X, Y, Z
 from uam_control.maths.compiled import jit
 from uam_control.settings.parameter_set import ParameterSet, choice, number
 from uam_control.vehicle import VehicleDescription, load_description
 
-GRAVITY = 9.81  # m/s^2
 USABLE = (0.1, 0.9)  # normalised thrust: outside, the allocation reduces it in favour of torques
 LONGEST_GAP = 0.1  # s between two ticks; after a longer gap the lag filter starts again
 SETTLED = 3.0  # [times `identification_start`] of learning, after which a payload can be detected
@@ -118,24 +118,26 @@ class ThrustIdentificationParameters(ParameterSet):
 
 
 @jit
-def steady_force(state: np.ndarray, tilt_max: float, acceleration_max: float) -> float:
+def steady_force(
+    state: np.ndarray, tilt_max: float, acceleration_max: float, gravity: float
+) -> float:
     """Return the specific force [m/s^2] along the thrust axis, 0 if the flight is not steady.
 
-    state (3, 6 + n): see uam_control.coordinates; tilt_max [rad]; acceleration_max [m/s^2]. Returns
-    0 also if a value is not finite. The angles are checked first: math.cos of an infinite angle
-    raises an error in plain Python, while compiled it is NaN.
+    state (3, 6 + n): see uam_control.coordinates; tilt_max [rad]; acceleration_max,
+    gravity [m/s^2]. Returns 0 also if a value is not finite. The angles are checked first: math.cos
+    of an infinite angle raises an error in plain Python, while compiled it is NaN.
     """
-    ax, ay, az = state[2, 0], state[2, 1], state[2, 2]
+    ax, ay, az = state[CHI_DDOT, X], state[CHI_DDOT, Y], state[CHI_DDOT, Z]
     if not ax * ax + ay * ay + az * az <= acceleration_max * acceleration_max:
         return 0.0
-    roll, pitch, yaw = state[0, 3], state[0, 4], state[0, 5]
+    roll, pitch, yaw = state[CHI, ROLL], state[CHI, PITCH], state[CHI, YAW]
     if not (math.isfinite(roll) and math.isfinite(pitch) and math.isfinite(yaw)):
         return 0.0
     cr, sr, cp, sp = math.cos(roll), math.sin(roll), math.cos(pitch), math.sin(pitch)
     if not cp * cr >= math.cos(tilt_max):
         return 0.0
     cy, sy = math.cos(yaw), math.sin(yaw)
-    force = ax * (cy * sp * cr + sy * sr) + ay * (sy * sp * cr - cy * sr) + (az + GRAVITY) * cp * cr
+    force = ax * (cy * sp * cr + sy * sr) + ay * (sy * sp * cr - cy * sr) + (az + gravity) * cp * cr
     return force if force > 0.0 else 0.0
 
 
@@ -145,7 +147,14 @@ class ThrustIdentification:
     `factor`: true / assumed thrust, always within its bounds.
     """
 
-    def __init__(self, parameters: ThrustIdentificationParameters | None = None) -> None:
+    def __init__(
+        self,
+        parameters: ThrustIdentificationParameters | None = None,
+        vehicle: VehicleDescription | None = None,
+    ) -> None:
+        """parameters: None for those of the vehicle; vehicle: None for the default one."""
+        vehicle = vehicle or load_description()
+        self._gravity = vehicle.gravity
         self.factor = 1.0
         self._time = -math.inf
         self._assumed = 0.0  # N, lagged as the motors
@@ -157,7 +166,7 @@ class ThrustIdentification:
         self._released: float | None = None  # s, magnet off; None once no payload hangs
         self._recent = math.nan  # measurement since the release, fast low pass
         self._before: float | None = None  # settled factor before the magnet went on
-        self.configure(parameters or ThrustIdentificationParameters.of(load_description()))
+        self.configure(parameters or ThrustIdentificationParameters.of(vehicle))
 
     def configure(self, parameters: ThrustIdentificationParameters) -> None:
         """Apply new parameters; a ParameterError names the bad one and changes nothing."""
@@ -198,7 +207,7 @@ class ThrustIdentification:
             self._learnt = 0.0
             self._move(1.0 - self.factor, dt)
             return self.factor
-        height = float(state[0, 2])
+        height = float(state[CHI, Z])
         if not flying or self._ground is None:
             self._land(height)
             self._unsteady = time
@@ -209,7 +218,8 @@ class ThrustIdentification:
     def _compare(self, time: float, dt: float, state: np.ndarray, command: float) -> None:
         """Measure the factor in steady flight and follow the measurement."""
         p = self.parameters
-        force = steady_force(state, p.identification_tilt, p.identification_acceleration)
+        limits = (p.identification_tilt, p.identification_acceleration)
+        force = steady_force(state, *limits, self._gravity)
         if force == 0.0 or self._assumed <= 0.0 or not USABLE[0] <= command <= USABLE[1]:
             self._unsteady = time
         # A swaying vehicle is at rest for moments, and its motors saturate: rest must last.

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from uam_control.coordinates import CHI
 from uam_control.maths.rotations import quaternion_from_euler
 from uam_sim_bridge.mavlink.offboard.setpoints.desired import Desired
 from uam_sim_bridge.mavlink.protocol.attitude_target import AttitudeTarget
@@ -10,5 +11,5 @@ from uam_sim_bridge.mavlink.protocol.frames import swap_quaternion
 
 def attitude_setpoint(desired: Desired) -> AttitudeTarget:
     """Return attitude (FRD → NED) and thrust of `desired`; the body rates are ignored."""
-    quaternion = swap_quaternion(quaternion_from_euler(desired.attitude[0]))
+    quaternion = swap_quaternion(quaternion_from_euler(desired.attitude[CHI]))
     return AttitudeTarget.of_attitude(quaternion, desired.thrust)

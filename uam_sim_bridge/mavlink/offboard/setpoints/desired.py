@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from uam_control.coordinates import CHI, Z
 from uam_sim_bridge.mavlink.protocol.attitude_target import AttitudeTarget
 
 
@@ -31,5 +32,5 @@ SetpointType = Callable[[Desired], AttitudeTarget]
 def level(yaw: float) -> np.ndarray:
     """Return `Desired.attitude` (3, 3) of a level vehicle at rest with `yaw` [rad]."""
     attitude = np.zeros((3, 3))
-    attitude[0, 2] = yaw
+    attitude[CHI, Z] = yaw
     return attitude
