@@ -20,7 +20,8 @@ def flown(thrust=0.52):
 
 
 def test_levels_with_the_thrust_flown():
-    rates, _, thrust = flown().setpoint(4.0, TILTED, UNKNOWN)
+    held = flown().setpoint(4.0, TILTED, UNKNOWN)
+    rates, thrust = held.rates, held.thrust
     assert rates == pytest.approx([-0.6, 1.2, 0.0], rel=0.05)
     assert thrust == pytest.approx(0.52)
 
@@ -43,7 +44,7 @@ def test_a_tilt_that_stays_is_met_by_more_and_more():
     ],
 )
 def test_tilts_against_the_velocity(velocity, yaw, signs):
-    rates, *_ = flown().setpoint(4.0, np.array([0.0, 0.0, yaw]), np.array(velocity))
+    rates = flown().setpoint(4.0, np.array([0.0, 0.0, yaw]), np.array(velocity)).rates
     assert rates[:2] == pytest.approx(np.array(signs) * 6.0 * 0.5 / 9.81, rel=0.03, abs=1e-9)
 
 
@@ -58,9 +59,9 @@ def test_the_last_setpoints_do_not_turn_it():
     """The autopilot uses them until its failsafe."""
     hold = flown()
     hold.setpoint(4.0, TILTED, UNKNOWN)
-    rates, *_ = hold.setpoint(5.94, TILTED, UNKNOWN)
+    rates = hold.setpoint(5.94, TILTED, UNKNOWN).rates
     assert np.all(rates[:2] != 0.0)
-    rates, *_ = hold.setpoint(5.96, TILTED, UNKNOWN)
+    rates = hold.setpoint(5.96, TILTED, UNKNOWN).rates
     assert rates == pytest.approx([0.0, 0.0, 0.0])
 
 
@@ -97,5 +98,17 @@ def test_nothing_before_a_flight_and_after_it():
 
 
 def test_strange_attitude_gives_bounded_rates():
-    rates, *_ = flown().setpoint(4.0, np.array([math.nan, 50.0, math.nan]), np.ones(3))
+    rates = flown().setpoint(4.0, np.array([math.nan, 50.0, math.nan]), np.ones(3)).rates
     assert rates == pytest.approx([0.0, -2.0, 0.0])
+
+
+def test_less_gravity_means_more_tilt():
+    # the desired tilt of 0.5 m/s^2 is 0.5 / g, and the rate is 6 times the tilt
+    moon, earth = LevelHold(HoldParameters(), 1.625), LevelHold(HoldParameters(), 9.75)
+    for hold in (moon, earth):
+        hold.good(0.0, Desired(np.zeros(3), level(0.0), 0.5))
+    found = [
+        hold.setpoint(0.0, LEVEL, np.array([-0.1, 0.0, 0.0])).rates[1].item()
+        for hold in (moon, earth)
+    ]
+    assert found == pytest.approx([6.0 * 0.1 / 1.625, 6.0 * 0.1 / 9.75])

@@ -9,13 +9,17 @@ import pytest
 import yaml
 
 from uam_control.mission import load_scenario
+from uam_control.profiles.profile import default_profile
 from uam_control.settings import configuration
 from uam_control.settings.configuration import ConfigurationError
 from uam_control.vehicle import VehicleError, load_description
 from uam_control.vehicle.loading import describe
+from uam_lab.analysis import dynamics, supply
+from uam_lab.results.timeseries import Series, columns_of
 from uam_sim_bridge.autopilot.params import Parameters
 from uam_sim_bridge.faults import FaultError, feasibility, read_schedule
 from uam_sim_bridge.mavlink.offboard.rotor_geometry import normalised_mixer
+from uam_sim_bridge.mavlink.offboard.setpoint import RateThrustMap
 from uam_sim_bridge.plant import Vehicle
 from uam_sim_bridge.plant.mujoco_plant import MujocoPlant
 
@@ -195,3 +199,26 @@ def test_faults_count_the_parts_of_the_vehicle(name, fault, message):
         return
     with pytest.raises(FaultError, match=message):
         feasibility.check(schedule, "direct", vehicle=described)
+
+
+def test_the_estimator_and_the_identification_take_the_gravity_of_the_vehicle():
+    moon = describe(changed((("gravity",), 1.62)), S500.file)
+    profile = default_profile("modular", moon)
+    assert profile.sets["state_estimator"].gravity == 1.62
+    assert profile.sets["position_controller"].gravity == 1.62
+    assert RateThrustMap(vehicle=moon).gravity == 1.62
+
+
+def test_the_wrench_of_six_rotors():
+    # upright, rotor i with i newtons: 21 N; roll torque sum of y F, pitch torque -sum of x F
+    vehicle = Vehicle.load("hexa_arm")
+    columns = columns_of(vehicle.description)
+    values = np.zeros((1, len(columns)))
+    for i in range(1, 7):
+        values[0, columns[f"rotor_{i}.thrust"]] = float(i)
+    series = Series(values, np.zeros(1, dtype=np.int8), ("flight",), {}, columns)
+    wrench = supply.rotor_wrench(series, np.array([0]), dynamics.Body(vehicle))[0]
+    roll = -0.275 + 2 * 0.275 + 0.1375 * (3 - 4 - 5 + 6)
+    pitch = -0.2382 * (3 - 4 + 5 - 6)
+    yaw = 0.016 * (1 - 2 + 3 - 4 - 5 + 6)  # a cw propeller turns the base counter-clockwise
+    assert wrench == pytest.approx([0.0, 0.0, 21.0, roll, pitch, yaw], abs=1e-12)
