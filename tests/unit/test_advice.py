@@ -42,8 +42,8 @@ TEXTS = [  # PX4 v1.16.0, STATUSTEXT
     ("Switching to Offboard is currently not available", "requirements"),
     ("Failsafe activated", "reason beside it"),
     ("Manual control loss: switching to RTL", "COM_RCL_EXCEPT"),
-    ("the autopilot left OFFBOARD for LAND", "COM_OF_LOSS_T"),
-    ("the autopilot left OFFBOARD for POSITION", "pilot or a ground station"),
+    ("left OFFBOARD: the autopilot's failsafe, in LAND, has control", "COM_OF_LOSS_T"),
+    ("left OFFBOARD: the pilot or a ground station, in POSITION, has control", "uam resume"),
     ("the autopilot rebooted", "power supply"),
     ("no offboard signal", "2 Hz"),
 ]

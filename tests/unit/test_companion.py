@@ -6,7 +6,7 @@ import struct
 
 import numpy as np
 import pytest
-from pymavlink.dialects.v20 import common as mavlink2
+from pymavlink.dialects.v20 import development as mavlink2
 
 from uam_sim_bridge.autopilot.companion import Companion
 from uam_sim_bridge.autopilot.core import Autopilot

@@ -5,7 +5,7 @@ import random
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from pymavlink.dialects.v20 import common as mavlink2
+from pymavlink.dialects.v20 import development as mavlink2
 
 from uam_sim_bridge.mavlink.protocol.wire import (
     UNREAD,

@@ -1,4 +1,5 @@
 """Missions: scenarios, smooth references, and the sequence of a flight from waiting to landed."""
 
-from uam_control.mission.flight_sequence import Mission, MissionOutput, MissionParameters
+from uam_control.mission.flight_sequence import Mission, MissionOutput
+from uam_control.mission.mission_parameters import MissionParameters, StartParameters
 from uam_control.mission.scenario import Scenario, ScenarioError, load_scenario

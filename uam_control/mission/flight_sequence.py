@@ -9,42 +9,29 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from uam_control.coordinates import ARM, CHI, CHI_DOT, Z
+from uam_control.coordinates import ALPHA, ARM, ATTITUDE, CHI, CHI_DOT, YAW, Z
 from uam_control.mission.guidance import Guidance
+from uam_control.mission.mission_parameters import MissionParameters, StartParameters
 from uam_control.mission.scenario import Scenario
 from uam_control.mission.trajectory import empty_reference
-from uam_control.settings.parameter_set import number
 from uam_control.supervision import (
+    Authority,
     Decision,
     Event,
     Guide,
     Observation,
     OperatorCommand,
+    PreflightCheck,
     Readings,
     State,
     StateTransition,
-    SupervisionParameters,
     Supervisor,
+    preflight,
 )
 
 # phases in addition to those of a scenario
 WAITING, HOLD, LAND, LANDED, ABORTED = "waiting", "hold", "land", "landed", "aborted"
-
-
-@dataclass(frozen=True)
-class MissionParameters(SupervisionParameters):
-    """Times and limits of take-off and touchdown, and the parameters of the supervisor."""
-
-    takeoff_delay: float = number(0.5, "time from armed to take-off", "s", 0.0, 60.0)
-    touchdown_height: float = number(0.05, "height that counts as on the ground", "m", 0.0, 0.5)
-    touchdown_speed: float = number(0.10, "vertical speed that counts as at rest", "m/s", 0.0, 1.0)
-    touchdown_time: float = number(
-        0.3, "time on the ground and at rest before touchdown is detected", "s", 0.0, 5.0
-    )
-    touchdown_timeout: float = number(8.0, "longest wait for touchdown", "s", 0.0, 60.0)
-    settle_time: float = number(
-        1.5, "time from touchdown to the end of the mission", "s", 0.0, 60.0
-    )
+RELEASED, DRY_RUN = "released", "dry run"
 
 
 @dataclass
@@ -52,8 +39,9 @@ class MissionOutput:
     """Output of the mission at one tick.
 
     reference (3, 6 + n), reused by the next step; flying: position and attitude are controlled;
-    time [s]: since take-off, negative before; arm: desired arming of the autopilot; state, cause:
-    of the supervisor; abort_reason: why the scenario was aborted, "" if not.
+    time [s]: since take-off, negative before; arm: desired arming of the autopilot; regains: number
+    of commands so far to regain a released vehicle; state, cause: of the supervisor; abort_reason:
+    why the scenario was aborted, "" if not.
     """
 
     reference: np.ndarray
@@ -61,7 +49,8 @@ class MissionOutput:
     time: float = -1.0
     phase: str = WAITING
     magnet: bool = False
-    arm: bool = True
+    arm: bool = False
+    regains: int = 0
     done: bool = False
     abort_reason: str = ""
     state: State = State.GROUNDED
@@ -69,16 +58,34 @@ class MissionOutput:
 
 
 class Mission:
-    """Steps through a scenario under supervision; its only time is the stamps of the steps."""
+    """Steps through a scenario under supervision; its only time is the stamps of the steps.
 
-    def __init__(self, scenario: Scenario, parameters: MissionParameters) -> None:
+    It waits for `start` before it desires an armed autopilot; after the end of a flight `start`
+    begins the next one.
+    """
+
+    def __init__(
+        self,
+        scenario: Scenario,
+        parameters: MissionParameters,
+        start: StartParameters | None = None,
+    ) -> None:
         self.scenario = scenario
         self.output = MissionOutput(empty_reference(len(scenario.arm_start)))
-        self.output.reference[0, ARM] = scenario.arm_start
+        self._start = start or StartParameters()
+        self._stamp = 0.0
+        self._seen: Observation | None = None
+        self._begin(parameters)
+
+    def _begin(self, parameters: MissionParameters) -> None:
+        """Set the state before a flight; the object of the output stays."""
+        reference = self.output.reference
+        reference[:] = 0.0
+        reference[CHI, ARM] = self.scenario.arm_start
+        vars(self.output).update(vars(MissionOutput(reference)))
         self._supervisor = Supervisor(parameters)
         self._parameters = parameters
         self._requests: deque[OperatorCommand] = deque()
-        self._seen: Observation | None = None
         self._guidance: Guidance | None = None
         self._takeoff = self._ground = 0.0
         self._half_down = math.inf  # stamp [s] from which a descent may detect touchdown
@@ -86,6 +93,46 @@ class Mission:
         self._failsafe_since = math.inf
         self._end: float | None = None
         self._magnet: tuple[bool, bool] | None = None  # overriding value, scenario's value then
+        self._pose: np.ndarray | None = None  # (6 + n,) reference of a dry run
+
+    def start(self) -> tuple[bool, str]:
+        """Desire an armed autopilot from the next step on; the take-off follows.
+
+        After the end of a flight it begins the next one. Returns whether it is accepted, and the
+        reason of a refusal in one line.
+        """
+        output, seen = self.output, self._seen
+        if self._start.dry_run:
+            return False, "refused: dry run, nothing is armed"
+        if seen is None:
+            return False, "refused: no state of the vehicle yet"
+        if output.done and not seen.armed:
+            self._begin(self._parameters)
+            self._supervisor.step(self._stamp, seen)
+        if output.state is not State.GROUNDED or output.arm:
+            return False, f"refused: not while {output.state.value}"
+        if self.not_ready:
+            return False, f"refused: {self.not_ready}"
+        self._supervisor.start()
+        return True, "arming"
+
+    def preflight(self) -> tuple[PreflightCheck, ...]:
+        """Return the pre-arm report of the newest step; () before the first one."""
+        if self._seen is None:
+            return ()
+        p = self._parameters
+        return preflight(
+            self._supervisor.checks,
+            self._seen,
+            self.scenario.arm_start,
+            p.start_speed,
+            p.start_arm_error,
+        )
+
+    @property
+    def not_ready(self) -> str:
+        """The checks of the pre-arm report that fail, in one line; "" if all are green."""
+        return "; ".join(check.text for check in self.preflight() if not check.passed)
 
     def configure(self, parameters: MissionParameters) -> None:
         """Use `parameters` (validated) from the next step on."""
@@ -110,19 +157,22 @@ class Mission:
         state: np.ndarray,
         armed_since: float | None,
         readings: Readings | None = None,
+        authority: Authority | None = None,
     ) -> MissionOutput:
         """Return the output of the next tick, at `stamp` [s]; call it once per tick.
 
         state (3, 6 + n): newest estimate. armed_since: stamp [s] at which the autopilot reported
-        armed, None while disarmed. readings: for the supervisor.
+        armed, None while disarmed. readings: for the supervisor. authority: who has control, None
+        for the companion.
         """
-        output, guidance = self.output, self._guidance
+        output, guidance, self._stamp = self.output, self._guidance, stamp
         if guidance is not None:
             output.time = stamp - self._takeoff
         if output.state is not State.DISARMED:
             if guidance is not None:
                 guidance.advance(stamp)
-            seen = self._seen = self._observe(stamp, state, armed_since, readings or Readings())
+            seen = self._observe(stamp, state, armed_since, readings or Readings())
+            seen.authority, self._seen = authority or Authority(), seen
             command = self._requests.popleft() if self._requests else None
             decision = self._supervisor.step(stamp, seen, command)
             if guidance is not None:
@@ -130,13 +180,22 @@ class Mission:
                 adrift = seen.readings.pose_controller_age > self._parameters.controller_age_hold
                 if adrift and output.state is State.HOLDING:
                     guidance.drift(stamp, state)
+                if output.state is State.RELEASED:
+                    guidance.follow(stamp, state)
             self._follow(stamp, decision)
+            if output.state is State.GROUNDED and not output.arm:
+                self._wait(state)
             if output.state is State.FAILSAFE and self._end is None:
                 deadline = self._failsafe_since + self._parameters.failsafe_timeout
                 if armed_since is None or stamp >= deadline:
                     self._end = stamp + self._parameters.settle_time
         if self._end is not None:
             output.done = stamp >= self._end
+            if output.done:  # the pre-arm report is that of the next flight
+                reference, armed = output.reference, armed_since is not None
+                self._seen = Observation(state, reference, state[CHI, Z], armed, on_ground=True)
+                self._seen.authority = authority or Authority()
+                self._seen.readings = readings or Readings()
         return output
 
     def give_up(self, stamp: float, reason: str) -> None:
@@ -163,6 +222,20 @@ class Mission:
         self._magnet = on, self._scenario_magnet()
         return True, f"magnet {'on' if on else 'off'} until the scenario switches it next"
 
+    def _wait(self, state: np.ndarray) -> None:
+        """Start by itself if it may; in a dry run follow the pose of the first state (3, 6 + n)."""
+        output = self.output
+        if self._start.auto_start and not self._start.dry_run and not self.not_ready:
+            self._supervisor.start()
+        if not self._start.dry_run:
+            return
+        if self._pose is None and np.all(np.isfinite(state)):
+            self._pose = state[CHI].copy()
+            self._pose[ATTITUDE] = 0.0, 0.0, state[CHI, YAW]
+        if self._pose is not None:
+            output.reference[CHI, :ALPHA] = self._pose[:ALPHA]
+            output.flying, output.phase = True, DRY_RUN
+
     def _observe(
         self, stamp: float, state: np.ndarray, armed_since: float | None, readings: Readings
     ) -> Observation:
@@ -171,7 +244,8 @@ class Mission:
             state, self.output.reference, self._ground, armed=armed, readings=readings
         )
         if guidance is None:
-            seen.ready = armed and stamp >= armed_since + p.takeoff_delay
+            started = armed and self.output.arm
+            seen.ready = started and stamp >= armed_since + p.takeoff_delay
             seen.on_ground = True
             return seen
         low = state[CHI, Z] < self._ground + p.touchdown_height
@@ -199,7 +273,7 @@ class Mission:
         if decision.state is not output.state:
             before, output.state = output.state, decision.state
             self._enter(stamp, before, decision)
-        output.cause, output.arm = decision.cause, decision.arm
+        output.cause, output.arm, output.regains = decision.cause, decision.arm, decision.regains
         output.flying = decision.guide is not Guide.NOTHING
         output.phase = self._phase(decision)
         output.magnet = self._magnet_on(decision)
@@ -207,12 +281,14 @@ class Mission:
     def _enter(self, stamp: float, before: State, decision: Decision) -> None:
         state, guidance = decision.state, self._guidance
         planned = decision.guide is Guide.SCENARIO or self.changes[-1].event is Event.TOUCHDOWN
-        if state is not State.HOLDING and not planned:
+        if state not in (State.HOLDING, State.RELEASED) and not planned:
             reasons = (self.output.abort_reason, decision.cause)
             self.output.abort_reason = "; then ".join(filter(None, reasons))
         if state is State.TAKING_OFF:
             self._take_off(stamp)
-        elif state is State.HOLDING:
+        elif state is State.HOLDING and before is State.RELEASED:
+            guidance.stay(stamp, self._seen.state)
+        elif state in (State.HOLDING, State.RELEASED):
             guidance.stop(stamp, decision.stow)
         elif state is State.FLYING and before is State.HOLDING:
             guidance.go_on(stamp)
@@ -248,6 +324,8 @@ class Mission:
         if decision.state is State.DISARMED:
             ended = self.changes[-1].event
             return LANDED if ended in (Event.TOUCHDOWN, Event.DISARM_ON_GROUND) else ABORTED
+        if decision.state is State.RELEASED:
+            return RELEASED
         if decision.guide is Guide.SCENARIO:
             return self.scenario.phase(self._guidance.scenario_time)
         return {Guide.STOP: HOLD, Guide.DESCEND: LAND, Guide.NOTHING: ABORTED}[decision.guide]

@@ -120,6 +120,7 @@ class Guidance:
         self._path = np.zeros_like(reference)
         self._arm: Segment | None = None  # in place of the path's, while holding
         self._away: Segment | None = None  # offset from the path, after a drift
+        self._returns = True  # whether it ends on the path
         self._go_on_at = math.inf  # stamp [s] at which the arm is back and the path continues
         self._last: Segment | None = None  # in place of the path, until the end of the flight
 
@@ -155,7 +156,7 @@ class Guidance:
         if self._away is not None:
             self._away.write(stamp, self._path)
             self.reference[:, :ALPHA] += self._path[:, :ALPHA]
-            if stamp >= self._away.end:
+            if self._returns and stamp >= self._away.end:
                 self._away = None
 
     def drift(self, stamp: float, state: np.ndarray) -> None:
@@ -164,19 +165,40 @@ class Guidance:
 
         Otherwise the restarted controller would begin with a large error. state (3, 6 + n).
         """
-        path = self.reference[CHI].copy()
-        if self._away is not None:
-            self._away.write(stamp, self._path)
-            path[:ALPHA] -= self._path[CHI, :ALPHA]
-        offset = np.zeros_like(self.reference)
-        offset[CHI, POSITION] = state[CHI, POSITION] - path[POSITION]
-        offset[CHI, YAW] = wrap_angle(state[CHI, YAW] - path[YAW])
+        path = self._without_away(stamp)
+        offset = self._offset(path, state)
+        if np.all(np.isfinite(offset)):
+            self.reference[CHI, :ALPHA] = path[CHI, :ALPHA] + offset[0, :ALPHA]
+            self._return(stamp, offset)
+
+    def follow(self, stamp: float, state: np.ndarray) -> None:
+        """Set the reference to the vehicle's pose, at rest, while somebody else has control.
+
+        Call it after `write`; state (3, 6 + n).
+        """
+        pose = self.reference[:, :ALPHA]
+        pose[:] = 0.0
+        pose[CHI, POSITION], pose[CHI, YAW] = state[CHI, POSITION], state[CHI, YAW]
+
+    def stay(self, stamp: float, state: np.ndarray) -> None:
+        """Begin at the vehicle's pose and velocity in state (3, 6 + n), and come to rest there.
+
+        `go_on` then returns to the path.
+        """
+        path = self._path
+        self._trajectory.write(self.scenario_time, path)
+        path[CHI_DDOT] = self._rate**2 * path[CHI_DDOT] + self._slope * path[CHI_DOT]
+        path[CHI_DOT] *= self._rate
+        offset = self._offset(path, state)
+        offset[CHI_DOT, POSITION] = state[CHI_DOT, POSITION] - path[CHI_DOT, POSITION]
         if not np.all(np.isfinite(offset)):
             return
-        self.reference[CHI, :ALPHA] = path[:ALPHA] + offset[CHI, :ALPHA]
-        p, way = self.parameters, float(np.linalg.norm(offset[CHI, POSITION]))
-        length = max(p.stop_time, _PEAK * way / p.travel_speed)
-        self._away = Segment(stamp, offset, np.zeros_like(path), np.full_like(path, length))
+        p, speed = self.parameters, float(np.linalg.norm(offset[CHI_DOT, POSITION]))
+        length = max(p.stop_time, 2.0 * _RAMP * speed / p.stop_acceleration)
+        goal = offset[CHI] + offset[CHI_DOT] * length / 2
+        self._away = Segment(stamp, offset, goal, np.full_like(goal, length))
+        self._returns = False
+        self.write(stamp)
 
     def stop(self, stamp: float, stow: bool) -> None:
         """Slow down to a stop on the path from `stamp` [s] on; stow: move the arm to `stowed`."""
@@ -194,6 +216,10 @@ class Guidance:
             self._arm = self._arm_segment(stamp, self._path[CHI, ARM])
             self._go_on_at = max(self._go_on_at, self._arm.end)
         if self._away is not None:
+            if not self._returns:
+                offset = np.zeros_like(self.reference)
+                self._away.write(stamp, offset)
+                self._return(stamp, offset)
             self._go_on_at = max(self._go_on_at, self._away.end)
 
     def descend(self, stamp: float, state: np.ndarray, ground: float, stow: bool) -> None:
@@ -215,6 +241,30 @@ class Guidance:
     def rest(self, stamp: float, stow: bool) -> None:
         """Bring the reference to rest; in failsafe only its arm angles are used."""
         self._last = Segment(stamp, self.reference, *self._at_rest(stow))
+
+    def _without_away(self, stamp: float) -> np.ndarray:
+        """Return a copy of the reference without the offset from the path."""
+        path = self.reference.copy()
+        if self._away is not None:
+            self._away.write(stamp, self._path)
+            path[CHI, :ALPHA] -= self._path[CHI, :ALPHA]
+        return path
+
+    @staticmethod
+    def _offset(path: np.ndarray, state: np.ndarray) -> np.ndarray:
+        """Return the offset (3, 6 + n) of position and yaw in `state` from `path`; rates zero."""
+        offset = np.zeros_like(path)
+        offset[CHI, POSITION] = state[CHI, POSITION] - path[CHI, POSITION]
+        offset[CHI, YAW] = wrap_angle(state[CHI, YAW] - path[CHI, YAW])
+        return offset
+
+    def _return(self, stamp: float, offset: np.ndarray) -> None:
+        """Let the offset (3, 6 + n) from the path decay to zero."""
+        p, way = self.parameters, float(np.linalg.norm(offset[CHI, POSITION]))
+        length = max(p.stop_time, _PEAK * way / p.travel_speed)
+        goal = np.zeros_like(offset[CHI])
+        self._away = Segment(stamp, offset, goal, np.full_like(goal, length))
+        self._returns = True
 
     def _at_rest(self, stow: bool) -> tuple[np.ndarray, np.ndarray]:
         """Return goal and duration [s] of each coordinate to rest; stow: the arm to `stowed`."""

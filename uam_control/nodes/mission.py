@@ -10,7 +10,13 @@ from std_msgs.msg import Bool
 from uam_control.coordinates import ANGLES, ARM, ATTITUDE, CHI, POSITION
 from uam_control.laws.catalogue import DEFAULT
 from uam_control.maths.rotations import wrap_angle
-from uam_control.mission import Mission, MissionOutput, MissionParameters, load_scenario
+from uam_control.mission import (
+    Mission,
+    MissionOutput,
+    MissionParameters,
+    StartParameters,
+    load_scenario,
+)
 from uam_control.nodes.described import described_vehicle
 from uam_control.nodes.mission_inputs import MissionInputs
 from uam_control.nodes.mission_services import offer
@@ -18,10 +24,11 @@ from uam_control.profiles.profile import default_profile
 from uam_control.stages.mission_stage import MissionStage
 from uam_control.stages.timing import Timing
 from uam_control.stamps import SECOND
-from uam_control.supervision import State
+from uam_control.supervision import Authority, State
 from uam_msgs_py.messages import topics
 from uam_msgs_py.messages.control import ReferenceWriter, read_state
 from uam_msgs_py.messages.convert import SWITCH
+from uam_msgs_py.messages.preflight import preflight_message
 from uam_msgs_py.messages.status import ERROR, OK, WARN, AutopilotState, MissionStatus
 from uam_msgs_py.node.base_node import UamNode, run
 from uam_msgs_py.node.joins import Backlog
@@ -51,7 +58,8 @@ class MissionNode(UamNode):
             description="name of a scenario, or its file; fixed once the node runs", read_only=True
         )
         scenario = self.declare_parameter("scenario", DEFAULT_SCENARIO, about).value
-        self._mission = Mission(load_scenario(scenario, vehicle), self.parameter_set.current)
+        start = NodeParameters(self, StartParameters, read_only=True).current
+        self._mission = Mission(load_scenario(scenario, vehicle), self.parameter_set.current, start)
         self._stage = MissionStage(self._mission, timing)
         spare = Mission(self._mission.scenario, self.parameter_set.current)
         warm_up(spare, self.parameter_set.current.takeoff_delay)
@@ -66,6 +74,7 @@ class MissionNode(UamNode):
         self._magnet = self.publisher(topics.MAGNET)
         self._arming = self.publisher(topics.ARMING)
         self._status = self.publisher(topics.MISSION_STATUS)
+        self._preflight = self.publisher(topics.PREFLIGHT)
         self._writer = ReferenceWriter(len(vehicle.joints))
         MissionInputs(self, self._stage.inputs, vehicle.joint_names)
         self.listen(topics.AUTOPILOT_STATE, self._on_autopilot, required=False)
@@ -76,7 +85,8 @@ class MissionNode(UamNode):
     def _on_autopilot(self, message: DiagnosticArray) -> None:
         stamp, state = AutopilotState.from_message(message)
         since = state.armed_since if state.armed else None
-        self._stage.autopilot(stamp, state.connected, since, state.round_trip)
+        authority = Authority(state.released_to, state.landed)
+        self._stage.autopilot(stamp, state.connected, since, state.round_trip, authority)
 
     def _on_state(self, data: bytes) -> None:
         self._states.put(read_state(data))
@@ -125,13 +135,16 @@ class MissionNode(UamNode):
         if output.arm != self._arm:
             self._arm = output.arm
             self._arming.publish(Bool(data=bool(output.arm)))
-        now = (output.phase, output.done, output.state, output.cause, bool(output.magnet))
+        magnet, regains = bool(output.magnet), output.regains
+        now = (output.phase, output.done, output.state, output.cause, magnet, regains)
         if now == self._published and stamp < self._due:
             return
         if now[:4] != self._published[:4]:
             self._log()
         self._published, self._due = now, stamp + STATUS_PERIOD
         self._status.publish(self.status.to_message(stamp))
+        if output.time < 0.0 or output.done:
+            self._preflight.publish(preflight_message(stamp, self._mission.preflight()))
 
     @property
     def status(self) -> MissionStatus:
@@ -146,6 +159,7 @@ class MissionNode(UamNode):
             bool(output.magnet),
             output.state.value,
             output.cause,
+            output.regains,
         )
 
     def _log(self) -> None:
@@ -153,14 +167,15 @@ class MissionNode(UamNode):
         text = f"{output.phase} at {output.time:.3f} s; {output.state.value}: {output.cause}"
         text += ", done" if output.done else ""
         # two calls: rclpy requires one severity per line of code
-        if output.abort_reason or output.state is State.HOLDING:
+        if output.abort_reason or output.state in (State.HOLDING, State.RELEASED):
             self.get_logger().warning(text)
         else:
             self.get_logger().info(text)
 
     def diagnose(self) -> tuple[bytes, str, dict[str, object]]:
         output, beyond = self._mission.output, self._mission.beyond
-        level = WARN if beyond or output.state is State.HOLDING else OK
+        odd = output.state in (State.HOLDING, State.RELEASED)
+        level = WARN if beyond or odd else OK
         if output.abort_reason:
             level = ERROR
         summary = output.abort_reason or beyond or output.phase

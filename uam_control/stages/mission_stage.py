@@ -11,7 +11,7 @@ from uam_control.mission import Mission
 from uam_control.stages.supervisor_inputs import SupervisorInputs
 from uam_control.stages.timing import Timing
 from uam_control.stamps import SECOND
-from uam_control.supervision import Readings, State
+from uam_control.supervision import Authority, Readings, State
 
 REPORT_DELAY = 200_000_000  # [ns] after which the status of a tick has arrived at every stage
 
@@ -31,20 +31,27 @@ class MissionStage:
         self.flying = False
         self.ahead = -1
         self._armed_since: float | None = None
-        self._reports: deque[tuple[int, bool, int | None, float]] = deque()
+        self._reports: deque[tuple[int, bool, int | None, float, Authority]] = deque()
+        self._authority = Authority()
         self._readings = Readings()
         self._flown = -REPORT_DELAY  # [ns] newest reference that the mission has flown
 
     def autopilot(
-        self, stamp: int, connected: bool, armed_since: int | None, round_trip: float | None
+        self,
+        stamp: int,
+        connected: bool,
+        armed_since: int | None,
+        round_trip: float | None,
+        authority: Authority,
     ) -> None:
         """Take the bridge's report of the tick `stamp` [ns]; it is used from the next tick on.
 
         armed_since [ns]: the first tick at which the autopilot was reported armed, None while it is
-        not armed; round_trip [s]: response time of the autopilot, None if not measured.
+        not armed; round_trip [s]: response time of the autopilot, None if not measured;
+        authority: who has control.
         """
         trip = math.nan if round_trip is None else round_trip
-        self._reports.append((stamp, connected, armed_since, trip))
+        self._reports.append((stamp, connected, armed_since, trip, authority))
 
     def begin(self, stamp: int, state: np.ndarray) -> bool:
         """Start the tick `stamp` [ns] with its state (3, 6 + n), see `coordinates`.
@@ -52,7 +59,7 @@ class MissionStage:
         Returns whether the reference of this tick was computed now: at the first tick, after a gap.
         """
         while self._reports and self._reports[0][0] < stamp:
-            reported, connected, since, round_trip = self._reports.popleft()
+            reported, connected, since, round_trip, self._authority = self._reports.popleft()
             self._armed_since = None if since is None else since / SECOND
             if connected:
                 self.inputs.inputs.autopilot(reported / SECOND, round_trip)
@@ -68,7 +75,9 @@ class MissionStage:
         state: (3, 6 + n) of the tick `stamp`.
         """
         ahead = self.ahead = stamp + self.period
-        output = self.mission.step(ahead / SECOND, state, self._armed_since, self._readings)
+        output = self.mission.step(
+            ahead / SECOND, state, self._armed_since, self._readings, self._authority
+        )
         if output.flying:
             self._flown = ahead
         # In a failsafe the bridge ignores commands. Idle commands mean that the vehicle is on the

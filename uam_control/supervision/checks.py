@@ -6,6 +6,7 @@ The monitors run only if a value is near or beyond a limit, or was so recently.
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 from operator import attrgetter
 from typing import NamedTuple
 
@@ -39,6 +40,12 @@ class Check(NamedTuple):
     sign: int = 1
     failsafe_after: str = "failsafe_after"
     reading: str = ""
+
+    @property
+    def unit(self) -> str:
+        """The unit of the limits, "" for a ratio."""
+        named = [limit for limit in (self.hold, self.land) if isinstance(limit, str)]
+        return SupervisionParameters.specs()[named[0]].unit if named else ""
 
 
 # in the order of the values of `measure` and `read`
@@ -155,6 +162,15 @@ class Checks:
         self.quiet = all(monitor.quiet for monitor in self._monitors)
         self.finding = worst
         return worst
+
+    def on_ground(self) -> Iterator[tuple[Check, float, float]]:
+        """Yield each check that applies on the ground, with the last value and the lowest limit.
+
+        Value and limit have the sign of the check: larger is worse. An unknown value is -inf.
+        """
+        for check, value, limits in zip(CHECKS, self._values.tolist(), self._limits, strict=True):
+            if not check.in_flight:
+                yield check, value, min(limits)
 
 
 def _limit(parameters: SupervisionParameters, check: Check, limit: str | float) -> float:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, field
 from enum import Enum
+from typing import NamedTuple
 
 import numpy as np
 
@@ -18,6 +19,17 @@ class OperatorCommand(Enum):
     RESUME = Event.RESUME
     LAND = Event.LAND
     DISARM = Event.DISARM
+
+
+class Authority(NamedTuple):
+    """Who has control of the vehicle.
+
+    released_to: who has it in place of the companion, "" if nobody has. landed: whether the
+    autopilot reports that the vehicle stands on the ground.
+    """
+
+    released_to: str = ""
+    landed: bool = False
 
 
 @dataclass
@@ -54,15 +66,16 @@ class Observation:
     """One tick.
 
     state, reference (3, 6 + n): the estimate, and the reference. ground: height at take-off [m].
-    armed: by the autopilot's report. ready: the mission allows the take-off. landing_due: the
-    scenario's landing has begun. on_ground: low and slow now; touchdown: on the ground for
-    touchdown_time; overdue: no touchdown in the allowed time.
+    armed: by the autopilot's report. authority: who has control. ready: the mission allows the
+    take-off. landing_due: the scenario's landing has begun. on_ground: low and slow now; touchdown:
+    on the ground for touchdown_time; overdue: no touchdown in the allowed time.
     """
 
     state: np.ndarray
     reference: np.ndarray
     ground: float = 0.0
     armed: bool = False
+    authority: Authority = Authority()
     ready: bool = False
     landing_due: bool = False
     on_ground: bool = False

@@ -18,6 +18,7 @@ class State(Enum):
     FLYING = "flying"
     HOLDING = "holding"
     LANDING = "landing"
+    RELEASED = "released"
     FAILSAFE = "failsafe"
     DISARMED = "disarmed"
 
@@ -39,6 +40,9 @@ class Event(Enum):
     RESTARTED_TO_LAND = "lost controller restarted, after_restart: land"
     NO_TOUCHDOWN = "no touchdown in time"
     LOST_ARMING = "the autopilot disarmed"
+    RELEASED = "the autopilot left OFFBOARD"
+    REGAINED = "OFFBOARD is back"
+    REGAINED_ON_GROUND = "OFFBOARD is back, on the ground"
     GIVEN_UP = "aborted before take-off"
     HOLD = "hold by command"
     RESUME = "resume by command"
@@ -91,6 +95,13 @@ TRANSITIONS = (
     Transition(_S.LANDING, _E.NO_TOUCHDOWN, _S.FAILSAFE),
     Transition(_S.LANDING, _E.DISARM_ON_GROUND, _S.DISARMED),
     Transition(_S.LANDING, _E.LOST_ARMING, _S.DISARMED),
+    Transition(_S.TAKING_OFF, _E.RELEASED, _S.RELEASED),
+    Transition(_S.FLYING, _E.RELEASED, _S.RELEASED),
+    Transition(_S.HOLDING, _E.RELEASED, _S.RELEASED),
+    Transition(_S.LANDING, _E.RELEASED, _S.RELEASED),
+    Transition(_S.RELEASED, _E.REGAINED, _S.HOLDING),
+    Transition(_S.RELEASED, _E.REGAINED_ON_GROUND, _S.DISARMED),
+    Transition(_S.RELEASED, _E.LOST_ARMING, _S.DISARMED),
     Transition(_S.FAILSAFE, _E.DISARM, _S.DISARMED),
 )
 TARGETS = {(source, event): target for source, event, target in TRANSITIONS}
@@ -101,4 +112,10 @@ ORDINARY = {
     Event.LANDING_DUE: "as planned",
     Event.TOUCHDOWN: "touchdown",
 }
-AIRBORNE_STATES = (State.TAKING_OFF, State.FLYING, State.HOLDING, State.LANDING)
+AIRBORNE_STATES = (
+    State.TAKING_OFF,
+    State.FLYING,
+    State.HOLDING,
+    State.LANDING,
+    State.RELEASED,
+)

@@ -125,6 +125,10 @@ class Reactions(ParameterSet):
     arm_holding: str = choice("stay", "arm during a hold", _ARM)
     arm_landing: str = choice("stow", "arm during an unplanned landing", _ARM)
     arm_failsafe: str = choice("stow", "arm during failsafe", _ARM)
+    arm_released: str = choice("stow", "arm while somebody else has control", _ARM)
+    magnet_released: str = choice(
+        "keep", "energised magnet while somebody else has control", _MAGNET
+    )
     magnet_holding: str = choice("keep", "energised magnet during a hold", _MAGNET)
     magnet_landing: str = choice("keep", "energised magnet during an unplanned landing", _MAGNET)
     magnet_failsafe: str = choice("keep", "energised magnet during failsafe", _MAGNET)

@@ -1,8 +1,9 @@
 """The supervisor: from observation and operator command to state and decision.
 
-It never arms again: `Decision.arm` changes from true to false once. It leaves failsafe only by a
-command. It disarms on the ground, by a command in failsafe, or after the autopilot has disarmed.
-In the air the last resort is failsafe, in which the autopilot descends without the companion.
+It never arms by itself: `Decision.arm` becomes true by `start`, and false once after that. It
+leaves failsafe only by a command. It disarms on the ground, by a command in failsafe, or after the
+autopilot has disarmed. In the air the last resort is failsafe, in which the autopilot descends
+without the companion. When somebody else takes control it releases the vehicle at once.
 """
 
 from __future__ import annotations
@@ -34,7 +35,7 @@ class Decision(NamedTuple):
 
     cause: why the state was entered. arm: desired arming of the autopilot. keep_magnet: an
     energised magnet stays energised; stow: the arm moves to its landing angles. Both apply only if
-    the guide is not SCENARIO.
+    the guide is not SCENARIO. regains: number of commands so far to regain a released vehicle.
     """
 
     state: State
@@ -43,6 +44,7 @@ class Decision(NamedTuple):
     arm: bool
     keep_magnet: bool
     stow: bool
+    regains: int
 
 
 class StateTransition(NamedTuple):
@@ -63,9 +65,11 @@ class Supervisor:
 
     def __init__(self, parameters: SupervisionParameters) -> None:
         self.state = State.GROUNDED
-        self.cause = "waiting to take off"
+        self.cause = "waiting for the start"
         self.changes: list[StateTransition] = []
-        self._arm = True
+        self._arm = False
+        self._regains = 0  # commands to regain a released vehicle
+        self._goes_on = False  # whether the scenario goes on after the vehicle is regained
         self._planned = False  # whether a landing is the scenario's
         self._stamp = -math.inf
         self._beyond_since: float | None = None  # stamp [s], during a hold beyond a limit
@@ -92,6 +96,8 @@ class Supervisor:
         finding = self._checks.update(self._stamp, seen, self.state in AIRBORNE_STATES)
         if finding is None and command is None and self._as_usual(seen):
             return self.decision
+        if self.state is State.RELEASED and seen.authority.released_to:
+            self._held_by(seen.authority.released_to)
         for event, cause in self._events(seen, command):
             if (self.state, event) in TARGETS:
                 self._go(event, cause)
@@ -103,7 +109,19 @@ class Supervisor:
 
     def _as_usual(self, seen: Observation) -> bool:
         """Return whether a tick without finding and command needs no event: flying, no landing."""
-        return self.state is State.FLYING and seen.armed and not seen.landing_due
+        flying = self.state is State.FLYING and seen.armed
+        return flying and not seen.landing_due and not seen.authority.released_to
+
+    @property
+    def checks(self) -> Checks:
+        """The checks after the last step."""
+        return self._checks
+
+    def start(self) -> None:
+        """Desire an armed autopilot from the next step on; no effect after the first call."""
+        if not self._arm and self.state is State.GROUNDED:
+            self._arm, self.cause = True, "waiting to take off"
+            self.decision = self._decide()
 
     def give_up(self, stamp: float, reason: str) -> Decision:
         """End a flight before take-off at `stamp` [s]; no effect after take-off."""
@@ -116,7 +134,13 @@ class Supervisor:
     def refusal(self, command: OperatorCommand, seen: Observation) -> str:
         """Return why `command` is refused now, "" if it is accepted."""
         event = self._event(command, seen)
+        if self.state is State.RELEASED and command is OperatorCommand.RESUME:
+            event = Event.REGAINED  # the autopilot is asked first
+            if seen.on_ground or seen.authority.landed:
+                return "on the ground: disarm, then start a new flight"
         if (self.state, event) not in TARGETS:
+            if self.state is State.RELEASED:
+                return f"{seen.authority.released_to} has control"
             if command is OperatorCommand.DISARM and self.state in AIRBORNE_STATES:
                 return f"{self.state.value} and not on the ground: land first"
             return f"not while {self.state.value}"
@@ -147,7 +171,9 @@ class Supervisor:
             keep, stow = p.magnet_failsafe == "keep", p.arm_failsafe == "stow"
         elif state is State.DISARMED:
             keep = False
-        return Decision(state, self.cause, guide, self._arm, keep, stow)
+        elif state is State.RELEASED:
+            keep, stow = p.magnet_released == "keep", p.arm_released == "stow"
+        return Decision(state, self.cause, guide, self._arm, keep, stow, self._regains)
 
     def _events(
         self, seen: Observation, command: OperatorCommand | None
@@ -160,14 +186,25 @@ class Supervisor:
                 yield _planned(Event.TOUCHDOWN)
             still = self.state is State.TAKING_OFF
             when = "before it was airborne" if still else "in flight"
+            if self.state is State.RELEASED:
+                when = f"while released: {self.cause}"
             yield Event.LOST_ARMING, f"the autopilot disarmed {when}"
+        if seen.authority.released_to:
+            yield Event.RELEASED, _in_control(seen.authority.released_to)
+        elif self.state is State.RELEASED:
+            grounded = seen.on_ground or seen.authority.landed
+            event = Event.REGAINED_ON_GROUND if grounded else Event.REGAINED
+            yield event, event.value
         if level is Level.FAILSAFE:
             if seen.on_ground:
                 yield Event.HARD_LIMIT_ON_GROUND, cause
             yield Event.HARD_LIMIT, cause
         if command is not None and not self.refusal(command, seen):
             event = self._event(command, seen)
-            yield event, event.value
+            if self.state is State.RELEASED:
+                self._regain()
+            else:
+                yield event, event.value
         if level is Level.LAND:
             yield Event.LAND_LIMIT, cause
         if seen.touchdown:
@@ -181,6 +218,8 @@ class Supervisor:
         if level is Level.FINE:
             if self.state is State.HOLDING and self._held_for:
                 yield from self._clear()
+            if self.state is State.HOLDING and self._goes_on:
+                yield Event.RESUME, Event.RESUME.value
             if seen.ready and self._checks.quiet:
                 yield _planned(Event.READY)
         if seen.landing_due:
@@ -212,15 +251,33 @@ class Supervisor:
         finding = self._checks.finding
         self._held_for = finding.name if event is Event.HOLD_LIMIT and finding else ""
         self._beyond_since = None
+        self._goes_on = self._goes_on and event is Event.REGAINED
         self._arm = self._arm and self.state is not State.DISARMED
         self.decision = self._decide()
         self.changes.append(StateTransition(self._stamp, source, self.state, event, cause))
+
+    def _held_by(self, released_to: str) -> None:
+        """Store who has control of a released vehicle now."""
+        cause = _in_control(released_to)
+        if cause != self.cause:
+            self.cause = cause
+            self.decision = self._decide()
+
+    def _regain(self) -> None:
+        """Ask for the released vehicle; the scenario goes on once it is regained."""
+        self._regains += 1
+        self._goes_on = True
+        self.decision = self._decide()
 
     def _event(self, command: OperatorCommand, seen: Observation) -> Event:
         """Return the event of a command; DISARM on the ground has its own event."""
         event = command.value
         disarm = command is OperatorCommand.DISARM and seen.on_ground
         return event if (self.state, event) in TARGETS or not disarm else Event.DISARM_ON_GROUND
+
+
+def _in_control(released_to: str) -> str:
+    return f"{released_to}, has control"
 
 
 def _planned(event: Event) -> tuple[Event, str]:

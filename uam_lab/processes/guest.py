@@ -13,10 +13,16 @@ from rclpy.signals import SignalHandlerOptions
 class Guest:
     """Context manager with `node` in the flight's ROS domain; the caller spins or polls it."""
 
-    def __init__(self, name: str, environment: Mapping[str, str], domain: int | None = None):
+    def __init__(
+        self,
+        name: str,
+        environment: Mapping[str, str],
+        domain: int | None = None,
+        namespace: str = "",
+    ):
         """environment: of the flight's processes; ROS reads some of its variables here too.
 
-        domain: ROS domain, None for that of the environment.
+        domain: ROS domain, None for that of the environment; namespace: of the vehicle's nodes.
         """
         before = dict(os.environ)
         os.environ.update(environment)
@@ -30,6 +36,7 @@ class Guest:
             )
             self.node = Node(
                 name,
+                namespace=namespace,
                 context=self.context,
                 use_global_arguments=False,
                 start_parameter_services=False,

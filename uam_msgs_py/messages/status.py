@@ -96,7 +96,8 @@ class AutopilotState(_Status):
 
     armed_since: stamp [ns] of the first tick at which it was reported armed, None while disarmed.
     reasons: why it is not armed or has left OFFBOARD, joined by "; ". round_trip [s]: shortest of
-    the last second, None if unknown.
+    the last second, None if unknown. released_to: who has control in place of the companion, "" if
+    nobody has. landed: by the autopilot's land detector.
     """
 
     connected: bool = False
@@ -105,23 +106,26 @@ class AutopilotState(_Status):
     armed_since: int | None = None
     reasons: str = ""
     round_trip: float | None = None
+    released_to: str = ""
+    landed: bool = False
 
     NAME = "autopilot"
-    LATER = ("round_trip",)
+    LATER = ("round_trip", "released_to", "landed")
 
     @property
     def level(self) -> bytes:
         """Return STALE without a connection, WARN with reasons, else OK."""
         if not self.connected:
             return STALE
-        return WARN if self.reasons else OK
+        return WARN if self.reasons or self.released_to else OK
 
     @property
     def summary(self) -> str:
         """Return the state in one line."""
         if not self.connected:
             return "not connected"
-        return f"{self.mode}, {'armed' if self.armed else 'disarmed'}"
+        held = f"; {self.released_to}, has control" if self.released_to else ""
+        return f"{self.mode}, {'armed' if self.armed else 'disarmed'}{held}"
 
 
 @dataclass(frozen=True)
@@ -130,7 +134,8 @@ class MissionStatus(_Status):
 
     time: mission time [s], negative before take-off. Errors: norms of estimate − reference [m],
     [rad], [rad]. magnet: whether it is on (/uam/magnet has no stamp, this message has one). state,
-    cause: the supervisor's state (uam_control.supervision.State) and the reason for it.
+    cause: the supervisor's state (uam_control.supervision.State) and the reason for it. regains:
+    number of commands so far to regain a released vehicle.
     """
 
     phase: str = "waiting"
@@ -143,16 +148,17 @@ class MissionStatus(_Status):
     magnet: bool = False
     state: str = "grounded"
     cause: str = ""
+    regains: int = 0
 
     NAME = "mission"
-    LATER = ("state", "cause")
+    LATER = ("state", "cause", "regains")
 
     @property
     def level(self) -> bytes:
         """Return ERROR after an abort, WARN during a hold, else OK."""
         if self.abort_reason:
             return ERROR
-        return WARN if self.state == "holding" else OK
+        return WARN if self.state in ("holding", "released") else OK
 
     @property
     def summary(self) -> str:

@@ -114,6 +114,12 @@ ARM_TEMPERATURE = Topic(
 MISSION_STATUS = Topic(
     "/uam/mission/status", DiagnosticArray, LATCHED, "see uam_msgs_py.messages.status.MissionStatus"
 )
+PREFLIGHT = Topic(
+    "/uam/preflight",
+    DiagnosticArray,
+    LATCHED,
+    "pre-arm report, before a flight twice a second: one status per check",
+)
 
 # Events: reliable and latched, as each is sent only once
 CHANGES = Topic(

@@ -1,4 +1,4 @@
-"""Arming, modes and failsafe: PX4's rules (v1.16) for flying OFFBOARD without radio control.
+"""Arming, modes and failsafe: PX4's rules (v1.16).
 
 | event | rule |
 |---|---|
@@ -7,6 +7,12 @@
 | disarming | only when landed, unless forced |
 | in OFFBOARD no setpoint for COM_OF_LOSS_T | armed: failsafe Descend until OFFBOARD is requested \
 again; disarmed: arming is refused |
+| HOLD, RETURN requested in flight | need a valid estimate (PX4 also needs a global origin) |
+| POSITION requested | needs a valid estimate, and sticks (MANUAL_CONTROL) |
+| sticks moved by COM_RC_STICK_OV | POSITION, if COM_RC_OVERRIDE has the bit of the mode |
+| in POSITION no sticks for COM_RC_LOSS_T | armed: failsafe, land |
+| battery below BAT_CRIT_THR | armed: failsafe by COM_LOW_BAT_ACT; below BAT_EMERGEN_THR land |
+| a mode requested in a failsafe | accepted: a person takes over |
 | landed for COM_DISARM_LAND after a flight | disarm |
 | no take-off for COM_DISARM_PRFLT after arming | disarm |
 """
@@ -23,16 +29,23 @@ STREAM_TIME = 0.5  # s, shortest duration of a stream before OFFBOARD
 
 
 class Commander:
-    """The state machine. `texts`: (severity, text) of each STATUSTEXT not yet taken."""
+    """The state machine.
+
+    `mode`: flown; `intended`: chosen last by a person or a companion (it stays in a failsafe);
+    `texts`: (severity, text) of each STATUSTEXT not yet taken.
+    """
 
     def __init__(self, parameters: Parameters) -> None:
         self._parameters = parameters
         self.armed = False
-        self.mode = Mode.HOLD
+        self.mode = self.intended = Mode.HOLD
         self.failsafe = False
         self.texts: list[tuple[Severity, str]] = []
         self._stream_start = -math.inf
         self._stream_last = -math.inf
+        self._sticks_last = -math.inf
+        self._sticks_at_rest: tuple[float, ...] | None = None
+        self._low_battery: Mode | None = None  # failsafe of the battery that has begun
         self._armed_at = 0.0
         self._flew = False
         self._landed_at: float | None = None
@@ -48,8 +61,23 @@ class Commander:
         fresh = time - self._stream_last <= STREAM_GAP
         return fresh and self._stream_last - self._stream_start >= STREAM_TIME
 
-    def request_mode(self, time: float, mode: Mode) -> MavResult:
-        """Handle a request for a mode."""
+    def sticks(self, time: float, values: tuple[float, ...], aided: bool) -> None:
+        """Handle stick positions -1..1 at `time` [s]; aided: whether the estimate is valid."""
+        self._sticks_last = time
+        if self._sticks_at_rest is None or self.mode is Mode.POSITION:
+            self._sticks_at_rest = values
+            return
+        p = self._parameters
+        moved = max(abs(a - b) for a, b in zip(values, self._sticks_at_rest, strict=True))
+        bit = 2 if self.mode is Mode.OFFBOARD else 1
+        overriding = int(p["COM_RC_OVERRIDE"]) & bit and 100.0 * moved > p["COM_RC_STICK_OV"]
+        if self.armed and overriding and aided:
+            self.intended = self.mode = Mode.POSITION
+            self.failsafe = False
+            self._say(Severity.CRITICAL, "Pilot took over using sticks")
+
+    def request_mode(self, time: float, mode: Mode, aided: bool) -> MavResult:
+        """Handle a request for a mode; aided: whether the estimate is valid."""
         if mode is Mode.OFFBOARD:
             if not self.streaming(time):
                 self._say(
@@ -57,12 +85,22 @@ class Commander:
                     "Switching to mode 'Offboard' is currently not possible: no offboard signal",
                 )
                 return MavResult.TEMPORARILY_REJECTED
-        elif mode not in (Mode.LAND, Mode.HOLD) or (mode is Mode.HOLD and self.armed):
+        elif not self._available(time, mode, aided):
             self._say(Severity.CRITICAL, f"Mode {mode.name.title()} is not available")
             return MavResult.DENIED
-        self.mode = mode
+        self.mode = self.intended = mode
         self.failsafe = False
         return MavResult.ACCEPTED
+
+    def _available(self, time: float, mode: Mode, aided: bool) -> bool:
+        if mode is Mode.POSITION:
+            return aided and self._has_sticks(time)
+        if mode in (Mode.HOLD, Mode.RETURN):
+            return aided or not self.armed
+        return mode is Mode.LAND
+
+    def _has_sticks(self, time: float) -> bool:
+        return time - self._sticks_last <= self._parameters["COM_RC_LOSS_T"]
 
     def request_arm(self, time: float, faults: list[str]) -> MavResult:
         """Handle a request to arm; it is refused if the estimator reports `faults`."""
@@ -95,15 +133,20 @@ class Commander:
             self._disarm("Disarmed by external command" + (" (forced)" if force else ""))
         return MavResult.ACCEPTED
 
-    def update(self, time: float, landed: bool) -> None:
-        """Apply the rules for timeouts: failsafe and automatic disarming; call once per tick."""
+    def update(self, time: float, landed: bool, charge: float | None) -> None:
+        """Apply the rules for timeouts: failsafe and automatic disarming; call once per tick.
+
+        charge: of the battery, 0..1, None if there is none.
+        """
         if not self.armed:
             return
         parameters = self._parameters
         if self.mode is Mode.OFFBOARD and time - self._stream_last > parameters["COM_OF_LOSS_T"]:
-            self.mode = Mode.LAND
-            self.failsafe = True
-            self._say(Severity.CRITICAL, "Failsafe activated: no offboard signal, descending")
+            self._fail(Mode.LAND, "no offboard signal, descending")
+        if self.mode is Mode.POSITION and not self._has_sticks(time):
+            self._fail(Mode.LAND, "no manual control signal, landing")
+        if charge is not None:
+            self._watch_battery(charge)
         if not landed:
             self._flew, self._landed_at = True, None
             return
@@ -114,15 +157,33 @@ class Commander:
         if wait > 0.0 and time - since > wait:
             self._disarm("Disarmed by landing" if self._flew else "Disarmed by auto preflight")
 
+    def _watch_battery(self, charge: float) -> None:
+        p, action = self._parameters, None
+        low = int(p["COM_LOW_BAT_ACT"])
+        if low and charge < p["BAT_EMERGEN_THR"]:
+            action = Mode.LAND
+        elif low and charge < p["BAT_CRIT_THR"]:
+            action = Mode.RETURN if low == 3 else Mode.LAND
+        if action is not None and action is not self._low_battery:
+            self._low_battery = action
+            words = "landing" if action is Mode.LAND else "returning"
+            self._fail(action, f"critical battery level, {words}")
+
+    def _fail(self, mode: Mode, text: str) -> None:
+        """Begin a failsafe; `intended` stays."""
+        self.mode, self.failsafe = mode, True
+        self._say(Severity.CRITICAL, f"Failsafe activated: {text}")
+
     def take_texts(self) -> list[tuple[Severity, str]]:
         """Return the texts since the last call."""
         texts, self.texts = self.texts, []
         return texts
 
     def _disarm(self, text: str) -> None:
-        self.armed = False
+        self.armed, self._low_battery = False, None
         if self.failsafe:
             self.mode, self.failsafe = Mode.HOLD, False
+            self.intended = Mode.HOLD
         self._say(Severity.INFO, text)
 
     def _say(self, severity: Severity, text: str) -> None:

@@ -44,6 +44,7 @@ class Companion:
             "PARAM_REQUEST_LIST": self._parameter_list,
             "PARAM_SET": self._parameter_set,
             "TIMESYNC": self._timesync,
+            "MANUAL_CONTROL": self._manual_control,
         }
 
     def handle(self, time: float, message: Message) -> None:
@@ -155,6 +156,13 @@ class Companion:
                 name.encode(), value, kind, len(parameters.names), parameters.names.index(name)
             )
         )
+
+    def _manual_control(self, time: float, m: Message) -> None:
+        if m.target == self._system:
+            right, up = 1e-3 * m.y, 2e-3 * m.z - 1.0  # z: 0..1000, as PX4 reads it
+            sticks = 1e-3 * m.x, right, up, 1e-3 * m.r
+            if all(abs(stick) <= 1.0 for stick in sticks):  # others: not available, or not valid
+                self._autopilot.manual(time, sticks)
 
     def _timesync(self, time: float, m: Message) -> None:
         if m.tc1 == 0:

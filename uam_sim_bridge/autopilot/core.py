@@ -17,11 +17,13 @@ from uam_control.vehicle import load_description
 from uam_sim_bridge.autopilot.allocation import allocate, unallocated_torque
 from uam_sim_bridge.autopilot.attitude_control import attitude_gains, attitude_rates
 from uam_sim_bridge.autopilot.autopilot_estimator import ATTITUDE as ESTIMATED_ATTITUDE
-from uam_sim_bridge.autopilot.autopilot_estimator import VELOCITY, Estimator
+from uam_sim_bridge.autopilot.autopilot_estimator import POSITION, VELOCITY, Estimator
+from uam_sim_bridge.autopilot.battery import SimulatedBattery
 from uam_sim_bridge.autopilot.commander import Commander
 from uam_sim_bridge.autopilot.descent import Descent
 from uam_sim_bridge.autopilot.landing import LandDetector
 from uam_sim_bridge.autopilot.params import Parameters
+from uam_sim_bridge.autopilot.position_modes import MODES, PositionModes
 from uam_sim_bridge.autopilot.rate_control import (
     INTEGRAL,
     TORQUE,
@@ -58,6 +60,7 @@ class AutopilotStatus(NamedTuple):
     mode: Mode
     landed: bool
     failsafe: bool
+    intended: Mode = Mode.UNKNOWN
 
 
 @jit
@@ -128,7 +131,9 @@ class Autopilot:
         self.estimator = Estimator()
         self.commander = Commander(self.parameters)
         self.landing = LandDetector(self.parameters)
+        self.battery = SimulatedBattery(self.parameters)
         self._descent = Descent(self.parameters)
+        self._position_modes = PositionModes(self.parameters)
         self._setpoint = np.zeros(4)  # body rates [rad/s, FRD], thrust
         self._desired: np.ndarray | None = None  # attitude FRD → NED, None: body rates are flown
         self._yaw_rate = 0.0  # [rad/s] about the world's z axis, down
@@ -183,6 +188,11 @@ class Autopilot:
         self.estimator.vision(time, position, quaternion / norm)
         return True
 
+    def manual(self, time: float, sticks: tuple[float, float, float, float]) -> None:
+        """Handle the pilot's sticks: forward, right, up, yaw clockwise, each -1..1 (finite)."""
+        self._position_modes.sticks[:] = sticks
+        self.commander.sticks(time, sticks, self.estimator.aided(time))
+
     def command(self, time: float, command: int, parameters: tuple[float, ...]) -> MavResult:
         """Handle DO_SET_MODE or ARM_DISARM with COMMAND_LONG's parameters; others: UNSUPPORTED."""
         first, second = parameters[0], parameters[1]
@@ -192,7 +202,9 @@ class Autopilot:
                 return self.commander.request_disarm(self.landing.landed, force)
             if first != 1.0:
                 return MavResult.DENIED
-            return self.commander.request_arm(time, [] if force else self.estimator.faults(time))
+            result = self.commander.request_arm(time, [] if force else self.estimator.faults(time))
+            self._position_modes.home[:] = self.estimator.estimate[POSITION]
+            return result
         if command == MavCmd.DO_SET_MODE:
             if not (math.isfinite(first) and int(first) & CUSTOM_MODE_ENABLED):
                 return MavResult.DENIED
@@ -203,7 +215,7 @@ class Autopilot:
                 mode = Mode((int(second), int(third)))
             except ValueError:
                 return MavResult.DENIED
-            return self.commander.request_mode(time, mode)
+            return self.commander.request_mode(time, mode, self.estimator.aided(time))
         return MavResult.UNSUPPORTED
 
     def update(self, time: float, gyro: np.ndarray, accel: np.ndarray) -> np.ndarray:
@@ -218,13 +230,15 @@ class Autopilot:
         self._time = time
         commander, landing = self.commander, self.landing
         aided = self.estimator.predict(time, gyro, accel, dt)
-        commander.update(time, landing.landed)
+        self.battery.update(time, commander.armed)
+        commander.update(time, landing.landed, self.battery.charge)
         setpoint = self._setpoint
-        descending = commander.armed and commander.mode is not Mode.OFFBOARD
-        if descending:
-            setpoint = self._descent.update(self.estimator.estimate, dt)
+        descending = False
+        if commander.armed and commander.mode is not Mode.OFFBOARD:
+            setpoint, descending = self._own_setpoint(commander.mode, aided, dt)
         else:
             self._descent.integral = 0.0
+            self._position_modes.reset()
             if self._desired is not None:
                 attitude = self.estimator.estimate[ESTIMATED_ATTITUDE]
                 attitude_rates(
@@ -263,12 +277,20 @@ class Autopilot:
     def status(self) -> AutopilotStatus:
         """The state that HEARTBEAT and EXTENDED_SYS_STATE report."""
         c = self.commander
-        return AutopilotStatus(c.armed, c.mode, self.landing.landed, c.failsafe)
+        return AutopilotStatus(c.armed, c.mode, self.landing.landed, c.failsafe, c.intended)
 
     @property
     def rates(self) -> np.ndarray:
         """Filtered body rates (3,) FRD [rad/s]."""
         return self._memory[FILTERED]
+
+    def _own_setpoint(self, mode: Mode, aided: bool, dt: float) -> tuple[np.ndarray, bool]:
+        """Return the setpoint (4,) of a mode without a companion, and whether it descends."""
+        if mode in MODES and aided:
+            modes = self._position_modes
+            setpoint = modes.update(mode, self.estimator.estimate, dt)
+            return setpoint, modes.sinking
+        return self._descent.update(self.estimator.estimate, dt), True
 
     def _configure(self) -> None:
         p = self.parameters
@@ -291,3 +313,4 @@ class Autopilot:
         self._attitude_gains = attitude_gains(p)
         self.landing.configure(p)
         self._descent.configure(p)
+        self._position_modes.configure(p)

@@ -13,19 +13,15 @@ import numpy as np
 
 from uam_sim_bridge.autopilot.core import Autopilot, AutopilotStatus
 from uam_sim_bridge.mavlink.offboard.sequence import (
+    COMMANDS,
     HEARTBEAT_TIMEOUT,
     OffboardSequence,
+    Reported,
     Request,
 )
 from uam_sim_bridge.mavlink.protocol.attitude_target import AttitudeTarget
 from uam_sim_bridge.mavlink.protocol.frames import swap_body, swap_quaternion, swap_world
-from uam_sim_bridge.mavlink.protocol.modes import (
-    CUSTOM_MODE_ENABLED,
-    MavCmd,
-    MavResult,
-    Mode,
-    Severity,
-)
+from uam_sim_bridge.mavlink.protocol.modes import MavResult, Mode, Severity
 from uam_sim_bridge.mavlink.protocol.vision import VisionPose
 
 HEARTBEAT, LANDED = 1.0, 0.2  # [s] between two regular reports, as `telemetry.STREAMS`
@@ -43,6 +39,8 @@ class JoinedAutopilot:
         self.autopilot, self.sequence = autopilot, sequence
         self.motors = autopilot.motors
         self.armed, self.mode, self.landed = False, Mode.UNKNOWN, True
+        self.intended, self.failsafe = Mode.UNKNOWN, False
+        self._delivered = -math.inf  # [s] newest setpoint that reached the autopilot
         self.armed_since: float | None = None
         self.passes: Callable[[], bool] = lambda: True  # whether a message reaches the autopilot
         self.receives: Callable[[], bool] = lambda: True  # whether one of the autopilot arrives
@@ -88,18 +86,22 @@ class JoinedAutopilot:
             elif not armed:
                 self.armed_since = None
             self.armed, self.mode = armed, self._told.mode
+            self.intended, self.failsafe = self._told.intended, self._told.failsafe
 
     def tick(self, time: float) -> None:
         """Send the request of the sequence, if there is one."""
-        connected = self.connected(time)
-        request = self.sequence.update(time, connected, self.armed, self.mode)
+        seen = Reported(
+            self.connected(time),
+            self.armed,
+            self.mode,
+            self.intended,
+            self.failsafe,
+            self._delivered,
+        )
+        request = self.sequence.update(time, seen)
         if request is None or not self.passes():
             return
-        if request is Request.OFFBOARD:
-            command = MavCmd.DO_SET_MODE, (CUSTOM_MODE_ENABLED, *Mode.OFFBOARD.value)
-        else:
-            command = MavCmd.ARM_DISARM, (float(request is Request.ARM), 0.0)
-        self._answers.append((request, self.autopilot.command(self.time, *command)))
+        self._answers.append((request, self.autopilot.command(self.time, *COMMANDS[request])))
 
     def send_vision(self, pose: VisionPose) -> None:
         """Send a mocap pose."""
@@ -111,6 +113,7 @@ class JoinedAutopilot:
         """Send the setpoint of the tick `time` [s]."""
         if self.passes():
             self.autopilot.target(self.time, target)
+            self._delivered = time
 
     def update(self, time: float, gyro: np.ndarray, force: np.ndarray) -> np.ndarray:
         """Run the autopilot's cycle of `time` [s] and return its motor commands (rotors,), 0..1.

@@ -66,6 +66,27 @@ DEFINITIONS: dict[str, Definition] = {
     "MPC_LAND_SPEED": Definition(0.7, 0.2, 5.0, "m/s", "speed of the failsafe descent"),
     "MPC_Z_VEL_P_ACC": Definition(4.0, 2.0, 15.0, "1/s", "P of the descent-speed loop"),
     "MPC_Z_VEL_I_ACC": Definition(2.0, 0.2, 3.0, "1/s^2", "I of the descent-speed loop"),
+    "MPC_Z_P": Definition(1.0, 0.1, 1.5, "1/s", "P of the height loop"),
+    "MPC_XY_P": Definition(0.95, 0.0, 2.0, "1/s", "P of the horizontal position loop"),
+    "MPC_XY_VEL_P_ACC": Definition(1.8, 1.2, 5.0, "1/s", "P of the horizontal velocity loop"),
+    "MPC_XY_VEL_I_ACC": Definition(0.4, 0.0, 60.0, "1/s^2", "I of the horizontal velocity loop"),
+    "MPC_TILTMAX_AIR": Definition(45.0, 20.0, 89.0, "deg", "largest tilt of the position modes"),
+    "MPC_VEL_MANUAL": Definition(10.0, 3.0, 20.0, "m/s", "speed of a full stick in POSITION"),
+    "MPC_MAN_Y_MAX": Definition(150.0, 0.0, 400.0, "deg/s", "yaw rate of a full stick"),
+    "COM_RC_LOSS_T": Definition(0.5, 0.0, 35.0, "s", "time without sticks before failsafe"),
+    "COM_RC_OVERRIDE": Definition(
+        1, 0, 7, "1", "stick movement takes over: bit 0 automatic modes, bit 1 OFFBOARD", True
+    ),
+    "COM_RC_STICK_OV": Definition(30.0, 5.0, 80.0, "%", "stick movement that takes over"),
+    "COM_LOW_BAT_ACT": Definition(
+        0, 0, 3, "1", "low battery: 0 warning, 2 land, 3 return, land when empty", True
+    ),
+    "BAT_LOW_THR": Definition(0.15, 0.12, 0.5, "1", "state of charge that warns"),
+    "BAT_CRIT_THR": Definition(0.07, 0.05, 0.5, "1", "state of charge that acts"),
+    "BAT_EMERGEN_THR": Definition(0.05, 0.03, 0.5, "1", "state of charge that always lands"),
+    "SIM_BAT_ENABLE": Definition(0, 0, 1, "1", "simulate a battery", True),
+    "SIM_BAT_DRAIN": Definition(60.0, 1.0, 86400.0, "s", "time from full to empty while armed"),
+    "SIM_BAT_MIN_PCT": Definition(50.0, 0.0, 100.0, "%", "state of charge that is not undercut"),
     "COM_OF_LOSS_T": Definition(1.0, 0.0, 60.0, "s", "time without setpoints before failsafe"),
     "COM_DISARM_LAND": Definition(2.0, -1.0, 20.0, "s", "disarm after landing; <= 0 never"),
     "COM_DISARM_PRFLT": Definition(10.0, -1.0, 200.0, "s", "disarm without take-off; <= 0 never"),

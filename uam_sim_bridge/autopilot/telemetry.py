@@ -41,6 +41,14 @@ def heartbeat(autopilot: Autopilot, time: float) -> Message:
     )
 
 
+def current_mode(autopilot: Autopilot, time: float) -> Message:
+    """CURRENT_MODE: the mode that is flown, and the one that was chosen."""
+    status = autopilot.status
+    return mavlink2.MAVLink_current_mode_message(
+        0, status.mode.custom_mode, status.intended.custom_mode
+    )
+
+
 def sys_status(autopilot: Autopilot, time: float) -> Message:
     """SYS_STATUS: sensors and their health; no battery is simulated."""
     there = _GYRO | _ACCELEROMETER | _VISION
@@ -81,7 +89,8 @@ def odometry(autopilot: Autopilot, time: float) -> Message:
 
 
 def battery_status(autopilot: Autopilot, time: float) -> Message:
-    """BATTERY_STATUS: no battery is simulated, every field is "unknown"."""
+    """BATTERY_STATUS: the state of charge with SIM_BAT_ENABLE; everything else is unknown."""
+    charge = autopilot.battery.charge
     return mavlink2.MAVLink_battery_status_message(
         0,
         mavlink2.MAV_BATTERY_FUNCTION_ALL,
@@ -91,7 +100,7 @@ def battery_status(autopilot: Autopilot, time: float) -> Message:
         -1,
         -1,
         -1,
-        -1,
+        -1 if charge is None else round(100.0 * charge),
     )
 
 
@@ -114,6 +123,7 @@ def _milliseconds(time: float) -> int:
 # message id → (builder, default interval [s]); PX4's onboard link, 0 for off
 STREAMS: dict[int, tuple[Callable[[Autopilot, float], Message], float]] = {
     mavlink2.MAVLINK_MSG_ID_HEARTBEAT: (heartbeat, 1.0),
+    mavlink2.MAVLINK_MSG_ID_CURRENT_MODE: (current_mode, 2.0),
     mavlink2.MAVLINK_MSG_ID_SYS_STATUS: (sys_status, 0.2),
     mavlink2.MAVLINK_MSG_ID_EXTENDED_SYS_STATE: (extended_sys_state, 0.2),
     mavlink2.MAVLINK_MSG_ID_ATTITUDE_QUATERNION: (attitude_quaternion, 0.02),
@@ -135,6 +145,8 @@ class Telemetry:
 
     def set_interval(self, number: int, microseconds: float) -> bool:
         """Handle SET_MESSAGE_INTERVAL: -1 off, 0 default; False if the stream does not exist."""
+        if number == mavlink2.MAVLINK_MSG_ID_CURRENT_MODE:
+            return True  # sent on a change, and at its default interval
         if number not in STREAMS or not math.isfinite(microseconds):
             return False
         if microseconds < 0.0:
@@ -156,6 +168,7 @@ class Telemetry:
             self._told = self._autopilot.status
             self._due[mavlink2.MAVLINK_MSG_ID_HEARTBEAT] = -math.inf
             self._due[mavlink2.MAVLINK_MSG_ID_EXTENDED_SYS_STATE] = -math.inf
+            self._due[mavlink2.MAVLINK_MSG_ID_CURRENT_MODE] = -math.inf
         messages = []
         for number, due in self._due.items():
             interval = self._intervals[number]

@@ -37,7 +37,8 @@ class AutopilotTopics:
         if report.differs(self._last):
             armed = "armed" if report.armed else "disarmed"
             lost = "" if report.connected else ", no heartbeat"
-            text = f"{report.phase.value}; autopilot {report.mode.name}, {armed}{lost}"
+            held = f": {report.released_to}, has control" if report.released_to else ""
+            text = f"{report.phase.value}{held}; autopilot {report.mode.name}, {armed}{lost}"
             self._logger.info("; ".join((text, *report.reasons)))
         self._last = report
         state = AutopilotState(
@@ -47,6 +48,8 @@ class AutopilotTopics:
             report.armed_since,
             "; ".join(report.reasons),
             report.round_trip,
+            report.released_to,
+            report.landed,
         )
         self._state.publish(state.to_message(stamp))
 

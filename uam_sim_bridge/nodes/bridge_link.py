@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 from rcl_interfaces.msg import ParameterDescriptor
 
-from uam_control.settings.parameter_set import ParameterSet, choice, number
+from uam_control.settings.parameter_set import ParameterSet, choice, number, switch
 from uam_msgs_py.node.node_parameters import given
 from uam_msgs_py.node.tunable import TunableNode
 from uam_sim_bridge.faults import LINK, Schedule
@@ -41,6 +41,12 @@ class BridgeParameters(ParameterSet):
         "where the autopilot's MC_*RATE_P/K or THR_MDL_FAC differ from the mapping: warn, "
         "or adopt them before arming",
         ("warn", "adopt"),
+    )
+    dry_run: bool = switch(
+        False, "compute and publish setpoints; send the autopilot none, and never arm it"
+    )
+    kill_confirmation: float = number(
+        3.0, "time within which the second call of /mission/kill must come", "s", 0.5, 30.0
     )
     stale_after: float = number(
         0.1, "time without a command after which commands count as lost", "s", 0.01, 5.0

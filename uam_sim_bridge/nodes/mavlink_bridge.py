@@ -9,6 +9,7 @@ clock) the node runs `BridgeStage.without`.
 
 from __future__ import annotations
 
+import math
 import time
 from collections.abc import Callable
 from enum import Enum
@@ -18,6 +19,7 @@ from diagnostic_msgs.msg import DiagnosticArray
 from rclpy.clock import Clock, ClockType
 from rclpy.parameter import Parameter
 from std_msgs.msg import Bool
+from std_srvs.srv import Trigger
 
 from uam_control.coordinates import ATTITUDE, CHI, CHI_DOT
 from uam_control.nodes.described import described_vehicle
@@ -95,7 +97,9 @@ class MavlinkBridgeNode(UamNode):
         self.link, self._station, self._faulty = links.autopilot, links.station, links.faulty
         sets = BridgeSets(mapping.current, hold, thrust.current, vision, setpoint)
         fresh = options.stale_after + LATENCY
-        self.stage = BridgeStage(sets, vehicle, self.link, sequence, fresh, self.warn)
+        self.stage = BridgeStage(
+            sets, vehicle, self.link, sequence, fresh, self.warn, options.dry_run
+        )
         thrust.apply = self.stage.identification.configure
         self._fault_topic = FaultTopic(self) if self._faulty else None
         self._adopted: tuple[str, ...] = ()
@@ -118,6 +122,8 @@ class MavlinkBridgeNode(UamNode):
         self._feed(topics.POSITION_COMMAND, read_position_command)
         self._feed(topics.ATTITUDE_COMMAND, self._read_attitude_command)
         self.triggers = (topics.ATTITUDE_COMMAND.name,)
+        self._kill_until = -math.inf  # [s] wall time
+        self.create_service(Trigger, "mission/kill", self._on_kill)
         if options.clock == "realtime":
             steady = Clock(clock_type=ClockType.STEADY_TIME)
             self.create_timer(WATCH_PERIOD, self._watch, clock=steady)
@@ -160,9 +166,26 @@ class MavlinkBridgeNode(UamNode):
 
     def _on_mission(self, message: DiagnosticArray) -> None:
         stamp, status = MissionStatus.from_message(message)
-        self.stage.mission(stamp, status.magnet, status.state == State.FAILSAFE.value)
+        failsafe = status.state == State.FAILSAFE.value
+        self.stage.mission(stamp, status.magnet, failsafe, status.regains)
         if self._faulty is not None:
             self._faulty.mission_at(stamp / SECOND, status.time)
+
+    def _on_kill(self, _: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
+        """Stop the motors at the second call within kill_confirmation."""
+        now = time.monotonic()
+        response.success = now <= self._kill_until
+        if response.success:
+            self.link.kill()
+            response.message = "motors stop"
+        else:
+            self._kill_until = now + self._options.kill_confirmation
+            response.message = (
+                "the motors stop, in the air too: call again within "
+                f"{self._options.kill_confirmation:g} s"
+            )
+        self.get_logger().warning(f"command kill: {response.message}")
+        return response
 
     def _on_mocap(self, data: bytes) -> None:
         self.stage.mocap(*read_pose(data))
@@ -257,6 +280,7 @@ class MavlinkBridgeNode(UamNode):
         notes = (*sequence.reasons, *faults(link), *link.warnings)
         values = {
             "sequence": sequence.phase.value,
+            "in control": sequence.in_control,
             "autopilot mode": link.mode.name,
             "armed": link.armed,
             "landed": link.landed,

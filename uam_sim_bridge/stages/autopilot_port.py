@@ -25,6 +25,8 @@ class AutopilotPort(Protocol):
     armed: bool
     mode: Mode
     landed: bool
+    intended: Mode  # chosen last by a person or a companion; UNKNOWN if not reported
+    failsafe: bool  # the autopilot flies its own failsafe
     armed_since: float | None  # [s] tick at which it was first known armed; None while it is not
 
     def connected(self, time: float) -> bool:

@@ -15,8 +15,9 @@ REPORT_PERIOD = 200_000_000  # [ns]
 class AutopilotReport(NamedTuple):
     """The autopilot's state as received by a tick.
 
-    armed_since [ns]: first tick with an armed autopilot, None while disarmed; reasons: against
-    arming, or for leaving OFFBOARD; round_trip [s]: None if unknown.
+    reasons: against arming, or for leaving OFFBOARD; released_to: who has control in place of the
+    companion, "" if nobody has; landed: by the autopilot's land detector; armed_since [ns]: first
+    tick with an armed autopilot, None while disarmed; round_trip [s]: None if unknown.
     """
 
     connected: bool
@@ -24,12 +25,14 @@ class AutopilotReport(NamedTuple):
     armed: bool
     phase: Phase
     reasons: tuple[str, ...]
+    released_to: str = ""
+    landed: bool = False
     armed_since: int | None = None
     round_trip: float | None = None
 
     def differs(self, other: AutopilotReport | None) -> bool:
         """Whether a field other than `armed_since` and `round_trip` differs from `other`."""
-        return other is None or self[:5] != other[:5]
+        return other is None or self[:7] != other[:7]
 
 
 class AutopilotReports:
@@ -45,7 +48,9 @@ class AutopilotReports:
         """Return the report that is due at the tick `stamp` [ns], None for none."""
         autopilot, sequence = self._autopilot, self._sequence
         connected = autopilot.connected(stamp / SECOND)
-        what = (connected, autopilot.mode, autopilot.armed, sequence.phase, sequence.reasons)
+        phase, reasons = sequence.phase, sequence.reasons
+        state = connected, autopilot.mode, autopilot.armed
+        what = *state, phase, reasons, sequence.released_to, autopilot.landed
         if what == self._reported and stamp < self._due:
             return None
         since = autopilot.armed_since

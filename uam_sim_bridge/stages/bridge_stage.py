@@ -77,15 +77,19 @@ class BridgeStage:
         sequence: OffboardSequence,
         fresh: float = math.inf,
         say: Callable[[str, str | None], None] = silent,
+        dry_run: bool = False,
     ) -> None:
-        """sequence: the one of `autopilot`; fresh, say: see `SetpointSource`."""
+        """sequence: the one of `autopilot`; fresh, say: see `SetpointSource`; dry_run: setpoints
+        are computed and not sent, and nothing is armed."""
+        self._dry_run = dry_run
         self.autopilot, self.sequence = autopilot, sequence
         self.map = RateThrustMap(sets.mapping, vehicle)
         self.identification = ThrustIdentification(sets.identification, vehicle)
         self.source = SetpointSource(self.map, sets.hold, sets.setpoint.type, fresh, say)
         self._vision = VisionPacing(sets.vision)
         self._reports = AutopilotReports(autopilot, sequence)
-        self._failsafe: deque[tuple[int, bool]] = deque()
+        self._orders: deque[tuple[int, bool, int]] = deque()  # stamp [ns], failsafe, regains
+        self._regains = 0
         self._situation = Situation(armed=False, landed=True, let_go=False)
         self.report: AutopilotReport | None = None
         self.factor = 1.0
@@ -100,17 +104,18 @@ class BridgeStage:
 
     def arm(self, arm: bool) -> None:
         """Take the mission's desired arming state."""
-        self.sequence.set_desired(arm)
+        self.sequence.set_desired(arm and not self._dry_run)
 
-    def mission(self, stamp: int, magnet: bool, failsafe: bool) -> None:
-        """Take the mission's status: the magnet, and whether the autopilot's failsafe is to act.
+    def mission(self, stamp: int, magnet: bool, failsafe: bool, regains: int) -> None:
+        """Take the mission's status.
 
-        Both count a little later, see STATUS_DELAY.
+        magnet: whether it is on. failsafe: whether the autopilot's failsafe is to act. regains:
+        number of commands so far to regain a released vehicle. They count from STATUS_DELAY on.
         """
         self.identification.switch(stamp / SECOND, magnet)
-        if self._failsafe and stamp < self._failsafe[-1][0]:  # a clock that began anew
-            self._failsafe.clear()
-        self._failsafe.append((stamp, failsafe))
+        if self._orders and stamp < self._orders[-1][0]:  # a clock that began anew
+            self._orders.clear()
+        self._orders.append((stamp, failsafe, regains))
 
     def note_state(self, stamp: int, state: np.ndarray) -> None:
         """Take an estimate (3, SIZE), also where no tick follows; it is kept, not copied."""
@@ -119,9 +124,18 @@ class BridgeStage:
     def hear(self, stamp: int) -> None:
         """Take what the autopilot has sent, and the mission's status that counts by now."""
         self.autopilot.poll(stamp / SECOND)
-        while self._failsafe and self._failsafe[0][0] <= stamp - STATUS_DELAY:
-            self.sequence.let_go = self._failsafe.popleft()[1]
-        situation = self.autopilot.armed, self.autopilot.landed, self.sequence.let_go
+        while self._orders and self._orders[0][0] <= stamp - STATUS_DELAY:
+            _, self.sequence.let_go, regains = self._orders.popleft()
+            if regains > self._regains:
+                self.sequence.regain()
+            self._regains = regains
+        sequence = self.sequence
+        situation = (
+            self.autopilot.armed,
+            self.autopilot.landed,
+            sequence.let_go,
+            sequence.released,
+        )
         if situation != self._situation:
             self._situation = Situation(*situation)
 
@@ -167,5 +181,6 @@ class BridgeStage:
         autopilot = self.autopilot
         autopilot.tick(now)
         self._vision.send(autopilot)
-        if setpoint is not None and self.sequence.streaming:
+        if setpoint is not None and self.sequence.streaming and not self._dry_run:
             autopilot.send_setpoint(setpoint, now)
+            self.sequence.streamed(now)

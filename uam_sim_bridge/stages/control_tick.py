@@ -14,14 +14,14 @@ import numpy as np
 
 from uam_control.control.controllers import ArmController, AttitudeController, PositionController
 from uam_control.coordinates import ARM, coordinates
-from uam_control.mission import Mission, Scenario
+from uam_control.mission import Mission, Scenario, StartParameters
 from uam_control.settings.parameter_set import ParameterSet
 from uam_control.stages.estimator_stage import EstimatorStage
 from uam_control.stages.law_stages import LawStage
 from uam_control.stages.mission_stage import MissionStage
 from uam_control.stages.timing import Timing
 from uam_control.stamps import SECOND
-from uam_control.supervision import State
+from uam_control.supervision import Authority, State
 from uam_sim_bridge.mavlink.offboard.setpoint_source import Setpoint
 from uam_sim_bridge.stages.bridge_stage import BridgeStage
 
@@ -91,7 +91,8 @@ class ControlTick:
         self.signals = Signals.at_rest(len(scenario.arm_start))
         self.stages = list(STAGES)
         self.estimator = EstimatorStage(sets["state_estimator"], len(scenario.arm_start))
-        self.mission = MissionStage(Mission(scenario, sets["mission"]), timing)
+        mission = Mission(scenario, sets["mission"], StartParameters(auto_start=True))
+        self.mission = MissionStage(mission, timing)
         self.position = LawStage(PositionController(sets["position_controller"]), timing)
         self.attitude = LawStage(AttitudeController(sets["attitude_controller"]), timing)
         self.arm = LawStage(ArmController(sets["arm_controller"]), timing)
@@ -102,7 +103,7 @@ class ControlTick:
             "attitude": self.attitude,
             "arm": self.arm,
         }
-        self._told: tuple | None = None  # arm, magnet and failsafe, as the bridge has them
+        self._told: tuple | None = None  # what the bridge has of the mission
 
     def tick(
         self, mocap: Pose | None = None, joints: Joints | None = None, imu: Imu | None = None
@@ -165,7 +166,7 @@ def fly_mission(tick: ControlTick) -> bool:
         s.reference[:, ARM] = output.reference[:, ARM]
     s.flying, s.magnet = mission.flying, output.magnet
     s.time, s.phase = output.time, output.phase
-    told = output.arm, output.magnet, output.state is State.FAILSAFE
+    told = output.arm, output.magnet, output.state is State.FAILSAFE, output.regains
     if told != tick._told:
         tick._told = told
         tick.bridge.arm(output.arm)
@@ -210,7 +211,10 @@ def send_setpoint(tick: ControlTick) -> bool:
     s.setpoint = bridge.tick(s.stamp, s.state, s.flying, s.tau_p, tau_q, s.attitude_reference)
     s.thrust_factor, report = bridge.factor, bridge.report
     if report is not None:
-        tick.mission.autopilot(s.stamp, report.connected, report.armed_since, report.round_trip)
+        authority = Authority(report.released_to, report.landed)
+        tick.mission.autopilot(
+            s.stamp, report.connected, report.armed_since, report.round_trip, authority
+        )
     return True
 
 

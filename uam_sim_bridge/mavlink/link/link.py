@@ -8,10 +8,16 @@ from __future__ import annotations
 
 import math
 
-from uam_sim_bridge.mavlink.offboard.sequence import HEARTBEAT_TIMEOUT, OffboardSequence, Request
+from uam_sim_bridge.mavlink.offboard.sequence import (
+    COMMANDS,
+    HEARTBEAT_TIMEOUT,
+    OffboardSequence,
+    Reported,
+    Request,
+)
 from uam_sim_bridge.mavlink.offboard.setpoint import RateThrustParameters
 from uam_sim_bridge.mavlink.protocol.attitude_target import AttitudeTarget
-from uam_sim_bridge.mavlink.protocol.modes import CUSTOM_MODE_ENABLED, MavCmd, MavResult, Mode
+from uam_sim_bridge.mavlink.protocol.modes import MavCmd, MavResult, Mode
 from uam_sim_bridge.mavlink.protocol.signing import Signing
 from uam_sim_bridge.mavlink.protocol.vision import VisionPose
 from uam_sim_bridge.mavlink.protocol.wire import Codec, Framer, Message, TextAssembler, mavlink2
@@ -30,10 +36,10 @@ EXPLAIN_PERIOD = 3.0  # s between two requests for the failed arming checks
 class OffboardLink:
     """State of the autopilot from its messages, and the messages to it.
 
-    `armed`, `mode`, `landed`: latest report; `armed_since` [s] or None: tick of the first report
-    that it is armed; `values`: its parameters (of WATCHED) by name; `ignored`: number of messages
-    from other systems or for other receivers; `vitals`: battery, estimator and sensors; `reboots`:
-    number of restarts.
+    `armed`, `mode`, `intended`, `failsafe`, `landed`: latest report; `armed_since` [s] or None:
+    tick of the first report that it is armed; `values`: its parameters (of WATCHED) by name;
+    `ignored`: number of messages from other systems or for other receivers; `vitals`: battery,
+    estimator and sensors; `reboots`: number of restarts.
     """
 
     def __init__(
@@ -46,6 +52,7 @@ class OffboardLink:
     ) -> None:
         self.sequence = sequence
         self.mode, self.armed, self.landed = Mode.UNKNOWN, False, True
+        self.intended, self.failsafe = Mode.UNKNOWN, False
         self.armed_since: float | None = None
         self.ignored = self.reboots = 0
         self.vitals = Vitals()
@@ -145,9 +152,16 @@ class OffboardLink:
         self._was_connected = connected
         if connected:
             self._request_telemetry(time)
-        request = self.sequence.update(time, connected, self.armed, self.mode)
+        delivered = self.time_sync.delivered
+        seen = Reported(connected, self.armed, self.mode, self.intended, self.failsafe, delivered)
+        request = self.sequence.update(time, seen)
         if request is not None:
             self._request(request)
+
+    def kill(self) -> None:
+        """Request at once that the motors stop; the ticks repeat it while the vehicle is armed."""
+        self.sequence.kill()
+        self._request(Request.KILL)
 
     def send_setpoint(self, target: AttitudeTarget, time: float) -> None:
         """Send the setpoint of the tick `time` [s]: SET_ATTITUDE_TARGET.
@@ -181,11 +195,15 @@ class OffboardLink:
         if kind == "HEARTBEAT":
             if m.autopilot != mavlink2.MAV_AUTOPILOT_INVALID:
                 self._heartbeat_in = time
+                self.failsafe = m.system_status == mavlink2.MAV_STATE_CRITICAL
                 self._take_state(
                     time,
                     Mode.from_custom_mode(m.custom_mode),
                     bool(m.base_mode & mavlink2.MAV_MODE_FLAG_SAFETY_ARMED),
                 )
+        elif kind == "CURRENT_MODE":  # sent on a change, so before the next heartbeat
+            self.intended = Mode.from_custom_mode(m.intended_custom_mode)
+            self._take_state(time, Mode.from_custom_mode(m.custom_mode), self.armed)
         elif kind == "COMMAND_ACK":
             self._acknowledged(time, m.command, m.result)
         elif kind == "EXTENDED_SYS_STATE":
@@ -254,17 +272,14 @@ class OffboardLink:
             return
         # take the new state now: the next heartbeat may be a second later
         mode = Mode.OFFBOARD if request is Request.OFFBOARD else self.mode
-        armed = {Request.ARM: True, Request.DISARM: False}.get(request, self.armed)
+        changed = {Request.ARM: True, Request.DISARM: False, Request.KILL: False}
+        armed = changed.get(request, self.armed)
         self._take_state(time, mode, armed)
 
     def _request(self, request: Request) -> None:
-        if request is Request.OFFBOARD:
-            main, sub = Mode.OFFBOARD.value
-            self._command(MavCmd.DO_SET_MODE, CUSTOM_MODE_ENABLED, main, sub)
-            self._pending[MavCmd.DO_SET_MODE] = request
-        else:
-            self._command(MavCmd.ARM_DISARM, 1.0 if request is Request.ARM else 0.0)
-            self._pending[MavCmd.ARM_DISARM] = request
+        command, parameters = COMMANDS[request]
+        self._command(command, *parameters)
+        self._pending[command] = request
 
     def _command(self, command: int, *parameters: float) -> None:
         values = (*parameters, *[0.0] * (7 - len(parameters)))

@@ -82,6 +82,11 @@ class LevelHold:
         """Whether the last tick had no valid command."""
         return self._since is not None
 
+    @property
+    def mean_thrust(self) -> float:
+        """The mean thrust setpoint 0..1 of the flight so far, 0 without one."""
+        return self._thrust or 0.0
+
     def good(self, time: float, desired: Desired) -> None:
         """Store thrust and yaw of a valid command at `time` [s]."""
         self._since = None

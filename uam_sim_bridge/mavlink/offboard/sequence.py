@@ -1,19 +1,23 @@
-"""State machine that arms the vehicle in OFFBOARD and disarms it, on simulation time.
+"""State machine that arms the vehicle in OFFBOARD, releases it to a pilot, and disarms it.
 
-It sends and receives no messages: `update` takes the autopilot's state and returns the request to
-send. The bridge and the direct engine use the same class.
+It sends and receives no messages: `update` takes the autopilot's report and returns the request to
+send. The bridge and the direct engine use the same class. All times are simulation time.
 
     WAITING    no heartbeat yet
     STREAMING  setpoints are sent (the autopilot requires a stream before OFFBOARD)
     OFFBOARD   the mode is requested
     ARMING     arming is requested
-    FLYING     armed, in OFFBOARD; the mode is requested again when the autopilot leaves it
-               (the phase stays without heartbeats: the stream must go on)
+    FLYING     armed, in OFFBOARD (the phase stays without heartbeats: the stream must go on)
+    RELEASED   the autopilot left OFFBOARD, and not on our request: somebody else has control.
+               OFFBOARD is not requested. It returns by `regain` (an operator's command) or by the
+               pilot's own switch
     DISARMING  disarming is requested
     DISARMED   done
-    FAILED     too many attempts, disarmed or rebooted in flight; `reasons` says why. Only a new
-               desired state (`set_desired`) starts again: the vehicle is never armed again in the
-               air by itself
+    FAILED     too many attempts, taken over before arming, disarmed or rebooted in flight, killed;
+               `reasons` says why. Only a new desired state (`set_desired`) starts again: the
+               vehicle is never armed again in the air by itself
+
+`return_after_lost_link` is the only exception to the rule of RELEASED: see `_may_return`.
 """
 
 from __future__ import annotations
@@ -21,12 +25,25 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from enum import Enum
+from typing import NamedTuple
 
-from uam_control.settings.parameter_set import ParameterSet, number
+from uam_control.settings.parameter_set import ParameterSet, number, switch
 from uam_sim_bridge.mavlink.offboard.advice import with_advice
-from uam_sim_bridge.mavlink.protocol.modes import MavResult, Mode, Severity, result_word
+from uam_sim_bridge.mavlink.protocol.modes import (
+    CUSTOM_MODE_ENABLED,
+    FORCE,
+    MavCmd,
+    MavResult,
+    Mode,
+    Severity,
+    result_word,
+)
 
 HEARTBEAT_TIMEOUT = 3.0  # s without a heartbeat: not connected
+LINK_GAP = 0.6  # s without a setpoint that reaches the autopilot: the stream counts as lost
+LOST_RECENTLY = 5.0  # s after a lost stream in which the autopilot may leave OFFBOARD because of it
+SETTLING = 0.3  # s after the switch to OFFBOARD in which an older report may still arrive
+REGAIN_REQUESTS = 5  # requests for OFFBOARD after one command of an operator
 _KEPT_REASONS = 5
 
 
@@ -38,6 +55,7 @@ class Phase(Enum):
     OFFBOARD = "requesting OFFBOARD"
     ARMING = "arming"
     FLYING = "flying"
+    RELEASED = "released"
     DISARMING = "disarming"
     DISARMED = "disarmed"
     FAILED = "failed"
@@ -49,6 +67,33 @@ class Request(Enum):
     OFFBOARD = "OFFBOARD"
     ARM = "arming"
     DISARM = "disarming"
+    KILL = "stopping the motors"
+
+
+# the request as COMMAND_LONG: command, first parameters
+COMMANDS: dict[Request, tuple[MavCmd, tuple[float, ...]]] = {
+    Request.OFFBOARD: (MavCmd.DO_SET_MODE, (CUSTOM_MODE_ENABLED, *Mode.OFFBOARD.value)),
+    Request.ARM: (MavCmd.ARM_DISARM, (1.0, 0.0)),
+    Request.DISARM: (MavCmd.ARM_DISARM, (0.0, 0.0)),
+    Request.KILL: (MavCmd.ARM_DISARM, (0.0, FORCE)),
+}
+
+
+class Reported(NamedTuple):
+    """The autopilot's state as last received.
+
+    connected: the last heartbeat is recent. intended: the mode that was chosen last by a person or
+    a companion (CURRENT_MODE.intended_custom_mode), UNKNOWN without that message. failsafe: the
+    autopilot flies its own failsafe (HEARTBEAT.system_status CRITICAL). delivered [s]: when the
+    newest message was sent that certainly arrived.
+    """
+
+    connected: bool
+    armed: bool
+    mode: Mode
+    intended: Mode = Mode.UNKNOWN
+    failsafe: bool = False
+    delivered: float = math.inf
 
 
 @dataclass(frozen=True)
@@ -60,8 +105,13 @@ class OffboardParameters(ParameterSet):
     )
     retry_interval: float = number(0.5, "time between two requests", "s", 0.05, 10.0)
     attempts: float = number(40.0, "requests without success before giving up", "1", 1.0, 10000.0)
+    return_after_lost_link: bool = switch(
+        False,
+        "request OFFBOARD again after the autopilot's failsafe for a lost stream of setpoints; "
+        "never against a mode that a person chose",
+    )
     recovery_attempts: float = number(
-        6.0, "requests for OFFBOARD after it was lost in flight", "1", 0.0, 10000.0
+        6.0, "requests of return_after_lost_link in a whole flight", "1", 0.0, 10000.0
     )
 
 
@@ -69,8 +119,9 @@ class OffboardSequence:
     """The state machine.
 
     `phase`; `armed_stamp` [s]: first time at which this flight was armed, None before; `reasons`:
-    the autopilot's answers to refused requests, with advice, newest last; `let_go`: set by the
-    owner when the autopilot must run its own failsafe; OFFBOARD is then requested no more.
+    the autopilot's answers to refused requests, with advice, newest last; `released_to`: who has
+    control in RELEASED, else ""; `let_go`: set by the owner when the autopilot must run its own
+    failsafe; OFFBOARD is then requested no more.
     """
 
     def __init__(self, parameters: OffboardParameters | None = None) -> None:
@@ -78,17 +129,37 @@ class OffboardSequence:
         self.phase = Phase.WAITING
         self.armed_stamp: float | None = None
         self.reasons: tuple[str, ...] = ()
+        self.released_to = ""
         self.let_go = False
         self._desired = False  # armed
         self._stream_start = math.inf
         self._asked = -math.inf
         self._attempts = 0
         self._in_flight = False  # from FLYING until disarmed on request, or a new desired state
+        self._offboard_since: float | None = None  # [s] the autopilot is in OFFBOARD since then
+        self._streamed = -math.inf  # [s] newest setpoint
+        self._stream_lost = -math.inf  # [s] newest time at which no setpoint reached the autopilot
+        self._regain_requests = 0  # left of an operator's command
+        self._returns = 0  # requests of return_after_lost_link in this flight
+        self._lost_link = False  # the autopilot left OFFBOARD because it had no setpoints
+        self._killed = False
 
     @property
     def streaming(self) -> bool:
         """Whether setpoints must be sent: always after the first heartbeat."""
         return self.phase is not Phase.WAITING
+
+    @property
+    def released(self) -> bool:
+        """Whether somebody else has control of the vehicle."""
+        return self.phase is Phase.RELEASED
+
+    @property
+    def in_control(self) -> str:
+        """Who has control of the vehicle, for displays."""
+        if self.released:
+            return self.released_to
+        return "the companion" if self.phase is Phase.FLYING else "nobody"
 
     def set_desired(self, armed: bool) -> None:
         """Set the desired state: True fly, False disarm. A change clears earlier failures."""
@@ -97,36 +168,63 @@ class OffboardSequence:
         self._desired = armed
         self.reasons = ()
         self._attempts, self._asked = 0, -math.inf
+        self._returns, self._regain_requests = 0, 0
+        self._killed = self._killed and not armed
         if self.phase in (Phase.FAILED, Phase.DISARMED):
             self.phase, self._in_flight = Phase.STREAMING, False
 
-    def update(self, time: float, connected: bool, armed: bool, mode: Mode) -> Request | None:
-        """Advance to `time` [s] and return the request to send now, None for none.
+    def regain(self) -> None:
+        """Request OFFBOARD again by an operator's command; no effect if not released."""
+        if self.released:
+            self._regain_requests, self._asked = REGAIN_REQUESTS, -math.inf
 
-        connected: the last heartbeat is recent; armed, mode: as last reported by the autopilot.
-        """
-        if not connected:
-            if self.phase not in (Phase.FLYING, Phase.FAILED):
+    def kill(self) -> None:
+        """Request that the motors stop at once, in the air too, until the vehicle is disarmed."""
+        self._killed, self._asked = True, -math.inf
+        self._reason("killed by command")
+        self.phase = Phase.FAILED
+
+    def streamed(self, time: float) -> None:
+        """Note that a setpoint was sent at `time` [s]."""
+        self._streamed = time
+
+    def update(self, time: float, seen: Reported) -> Request | None:
+        """Advance to `time` [s] and return the request to send now, None for none."""
+        if time - min(self._streamed, seen.delivered) > LINK_GAP:
+            self._stream_lost = time
+        if self._killed and seen.armed:
+            return self._ask(time, Phase.FAILED, Request.KILL)
+        if not seen.connected:
+            if self.phase not in (Phase.FLYING, Phase.RELEASED, Phase.FAILED):
                 self.phase = Phase.WAITING
             return None
         if self.phase is Phase.WAITING:
             self.phase = Phase.STREAMING
             self._stream_start = time
+        left = self._left_offboard(time, seen.mode)
         if not self._desired:
-            return self._stay_disarmed(time, armed)
+            return self._stay_disarmed(time, seen.armed)
         if self.phase is Phase.FLYING:
-            return self._keep_flying(time, armed, mode)
+            return self._keep_flying(time, seen, left or self._offboard_since is None)
+        if self.phase is Phase.RELEASED:
+            return self._stay_released(time, seen)
         if self.phase is Phase.FAILED:
+            return None
+        if seen.armed and seen.mode is not Mode.OFFBOARD:  # somebody else flies
+            self._release(time, seen)
+            return None
+        if left:
+            self._reason(f"{seen.mode.name} was chosen before arming: start again")
+            self.phase = Phase.FAILED
             return None
         if time - self._stream_start < self.parameters.stream_time:
             self.phase = Phase.STREAMING
             return None
-        if mode is not Mode.OFFBOARD:
+        if seen.mode is not Mode.OFFBOARD:
             return self._ask(time, Phase.OFFBOARD, Request.OFFBOARD)
-        if not armed:
+        if not seen.armed:
             return self._ask(time, Phase.ARMING, Request.ARM)
-        self.phase, self._attempts, self.reasons = Phase.FLYING, 0, ()
-        self.armed_stamp, self._in_flight = time, True
+        self._fly(time)
         return None
 
     def rebooted(self, time: float) -> None:
@@ -134,6 +232,7 @@ class OffboardSequence:
 
         On the ground the sequence starts again with a new stream. In flight it fails.
         """
+        self._offboard_since = None
         if self._in_flight:  # the phase is FAILED if a heartbeat reported "disarmed" before
             self._reason("the autopilot rebooted in flight")
             self.phase = Phase.FAILED
@@ -157,38 +256,108 @@ class OffboardSequence:
         others = tuple(reason for reason in self.reasons if reason != text)
         self.reasons = (*others, text)[-_KEPT_REASONS:]
 
+    def _left_offboard(self, time: float, mode: Mode) -> bool:
+        """Return whether the autopilot has left OFFBOARD by now, which it had entered before."""
+        if mode is Mode.OFFBOARD:
+            if self._offboard_since is None:
+                self._offboard_since = time
+            return False
+        left = self._offboard_since is not None and time - self._offboard_since >= SETTLING
+        if left:
+            self._offboard_since = None
+        return left
+
     def _stay_disarmed(self, time: float, armed: bool) -> Request | None:
-        if armed and self.phase is not Phase.FAILED:
+        """Disarm a vehicle that this sequence has armed; one that somebody else armed stays."""
+        ours = self.phase in (Phase.OFFBOARD, Phase.ARMING, Phase.FLYING, Phase.DISARMING)
+        if armed and ours:
             return self._ask(time, Phase.DISARMING, Request.DISARM)
-        if not armed and self.phase in (Phase.DISARMING, Phase.FLYING, Phase.FAILED):
+        if not armed and self.phase in (
+            Phase.DISARMING,
+            Phase.FLYING,
+            Phase.RELEASED,
+            Phase.FAILED,
+        ):
             self.phase, self.reasons, self._in_flight = Phase.DISARMED, (), False
+            self.released_to, self._offboard_since = "", None
         elif not armed and self.phase is not Phase.DISARMED:
             self.phase = Phase.STREAMING
         return None
 
-    def _keep_flying(self, time: float, armed: bool, mode: Mode) -> Request | None:
-        if not armed:
+    def _fly(self, time: float) -> None:
+        if self.phase is not Phase.RELEASED:
+            self.armed_stamp = time
+        self.phase, self._attempts, self.reasons = Phase.FLYING, 0, ()
+        self.released_to, self._in_flight, self._regain_requests = "", True, 0
+
+    def _keep_flying(self, time: float, seen: Reported, left: bool) -> None:
+        if not seen.armed:
             self._reason("the autopilot disarmed in flight")
             self.phase = Phase.FAILED
-            return None
-        if mode is Mode.OFFBOARD or self.let_go:
-            self._attempts = 0
-            return None
-        self._reason(f"the autopilot left OFFBOARD for {mode.name}")
-        if self._attempts >= self.parameters.recovery_attempts:
+        elif left and seen.mode is not Mode.OFFBOARD and not self.let_go:
+            self._release(time, seen)
+
+    def _release(self, time: float, seen: Reported) -> None:
+        self.phase, self._regain_requests, self._asked = Phase.RELEASED, 0, time
+        self._in_flight, self._offboard_since = True, None
+        self._lost_link = time - self._stream_lost < LOST_RECENTLY
+        self.released_to = self._holder(seen)
+        self._reason(f"left OFFBOARD: {self.released_to}, has control")
+
+    def _holder(self, seen: Reported) -> str:
+        """Return who has control, and in which mode, in one line."""
+        if seen.intended is Mode.OFFBOARD or (seen.failsafe and seen.intended is Mode.UNKNOWN):
+            cause = " after a lost stream of setpoints" if self._lost_link else ""
+            return f"the autopilot's failsafe{cause}, in {seen.mode.name}"
+        return f"the pilot or a ground station, in {seen.mode.name}"
+
+    def _stay_released(self, time: float, seen: Reported) -> Request | None:
+        if not seen.armed:
+            self._reason(f"disarmed while released to {self.released_to}")
             self.phase = Phase.FAILED
             return None
-        return self._ask(time, Phase.FLYING, Request.OFFBOARD)
+        if seen.mode is Mode.OFFBOARD:
+            self._fly(time)
+            return None
+        if seen.intended not in (Mode.OFFBOARD, Mode.UNKNOWN):
+            self._lost_link = False  # a person has chosen a mode since
+        self.released_to = self._holder(seen)
+        if self._regain_requests > 0:
+            request = self._ask(time, Phase.RELEASED, Request.OFFBOARD)
+            self._regain_requests -= request is not None
+            return request
+        if self._may_return(seen):
+            request = self._ask(time, Phase.RELEASED, Request.OFFBOARD)
+            self._returns += request is not None
+            return request
+        return None
+
+    def _may_return(self, seen: Reported) -> bool:
+        """Whether return_after_lost_link may request OFFBOARD.
+
+        The autopilot must report its failsafe, and OFFBOARD as the mode that was chosen last; the
+        stream of setpoints must have been lost before, and must reach the autopilot again. The
+        number of requests is that of the whole flight: a short success does not refill it.
+        """
+        p = self.parameters
+        return (
+            p.return_after_lost_link
+            and self._lost_link
+            and seen.failsafe
+            and seen.intended is Mode.OFFBOARD
+            and self._returns < p.recovery_attempts
+        )
 
     def _ask(self, time: float, phase: Phase, request: Request) -> Request | None:
-        if phase is not self.phase and phase is not Phase.FLYING:
+        if phase is not self.phase:
             self.phase, self._attempts, self._asked = phase, 0, -math.inf
         if time - self._asked < self.parameters.retry_interval:
             return None
-        if self._attempts >= self.parameters.attempts:
+        counted = phase not in (Phase.RELEASED, Phase.FAILED)  # those have budgets of their own
+        if counted and self._attempts >= self.parameters.attempts:
             self._reason(f"no success after {self._attempts} requests for {request.value}")
             self.phase = Phase.FAILED
             return None
         self._asked = time
-        self._attempts += 1
+        self._attempts += counted
         return request

@@ -4,6 +4,7 @@
 |---|---|
 | valid | the setpoint type's part of body rates, attitude and thrust |
 | idle (not flying) | rates 0, level, thrust 0: the stream goes on, the vehicle stays landed |
+| any, while somebody else has control | rates 0, the vehicle's attitude, mean thrust so far |
 | not finite, malformed or none, on the ground | as idle |
 | the same in flight; the mission in failsafe; idle high above the start | level hold for \
 `hold_time` (`release_time` if no commands are expected), then no setpoint: the autopilot's \
@@ -26,6 +27,8 @@ from uam_sim_bridge.mavlink.offboard.setpoints.desired import Desired, SetpointT
 from uam_sim_bridge.mavlink.offboard.setpoints.rates import rates_setpoint
 from uam_sim_bridge.mavlink.protocol.attitude_target import STILL, AttitudeTarget
 
+HANDOVER = 0.2  # s after control came back in which the first commands arrive
+
 Setpoint = AttitudeTarget | None  # None: no setpoint is sent
 
 
@@ -38,11 +41,15 @@ def sent(setpoint: Setpoint) -> tuple[np.ndarray, float]:
 
 
 class Situation(NamedTuple):
-    """State of the autopilot; let_go: the mission requires the autopilot's failsafe."""
+    """State of the autopilot.
+
+    let_go: the mission requires the autopilot's failsafe. released: somebody else has control.
+    """
 
     armed: bool
     landed: bool
     let_go: bool
+    released: bool = False
 
 
 def silent(text: str, key: str | None) -> None:
@@ -73,6 +80,7 @@ class SetpointSource:
         self._velocity = UNKNOWN
         self._height = 0.0
         self._ground: float | None = None  # height [m] at which the vehicle stood
+        self._present_at = -math.inf  # [s] newest setpoint for a released vehicle
 
     @property
     def holding(self) -> bool:
@@ -103,6 +111,8 @@ class SetpointSource:
         now [s]; state (3, 6 + n); flying: whether tau_p (3,) [N, ENU] is valid; tau_q (3,)
         [N m, FLU], None for idle; attitude (3, 3): see `Desired`.
         """
+        if situation.released:
+            return self._present(now, situation)
         if situation.let_go:
             return self.without(now, situation)
         if flying and tau_q is not None:
@@ -127,7 +137,11 @@ class SetpointSource:
 
     def without(self, now: float, situation: Situation) -> Setpoint:
         """Return the setpoint at `now` [s] without valid commands."""
-        armed, landed, let_go = situation
+        if situation.released:
+            return self._present(now, situation)
+        armed, landed, let_go, _ = situation
+        if now - self._present_at < HANDOVER:  # the mission has not resumed yet
+            return self._at_present(now)
         if not armed or (landed and not self._high(armed)):
             return self._idle
         hopeless = let_go or not self._fresh(self._estimated[0], now)
@@ -136,6 +150,22 @@ class SetpointSource:
         doing = "holding level" if desired else "stream stopped, the failsafe acts"
         self._say(f"no usable commands in flight: {doing}", "hold")
         return None if desired is None else self._type(desired)
+
+    def _present(self, now: float, situation: Situation) -> Setpoint:
+        """Return the setpoint at `now` [s] while somebody else has control.
+
+        When OFFBOARD comes back, the autopilot begins with it: it must be free of a jump.
+        """
+        if not situation.armed or (situation.landed and not self._high(situation.armed)):
+            return self._idle
+        self._present_at = now
+        return self._at_present(now)
+
+    def _at_present(self, now: float) -> AttitudeTarget:
+        """Return rates 0, the present attitude and the mean thrust of the flight so far."""
+        angles = np.zeros((3, 3))
+        angles[0] = np.nan_to_num(self._attitude(now))
+        return self._type(Desired(np.zeros(3), angles, self._hold.mean_thrust))
 
     @property
     def _idle(self) -> AttitudeTarget:

@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING
 from uam_sim_bridge.ports import PortError
 
 if TYPE_CHECKING:
-    from pymavlink.dialects.v20.common import MAVLink
+    from pymavlink.dialects.v20.development import MAVLink
 
 EPOCH = 1_420_070_400  # 2015-01-01 00:00 UTC as Unix time [s]
 _STEPS = 100_000  # per second

@@ -10,7 +10,7 @@ from __future__ import annotations
 import re
 import struct
 
-from pymavlink.dialects.v20 import common as mavlink2
+from pymavlink.dialects.v20 import development as mavlink2
 
 from uam_sim_bridge.mavlink.protocol.signing import Seal, Signing
 
@@ -21,18 +21,7 @@ _MARKERS = re.compile(b"[\xfd\xfe]")
 
 # Messages that PX4 sends and pymavlink omits (work in progress in MAVLink): id → CRC_EXTRA. The
 # framer recognises these frames but does not decode them. (EVENT is decoded: event_messages.py.)
-UNREAD = {
-    8: 117,
-    290: 251,
-    291: 10,
-    361: 93,
-    371: 10,
-    380: 232,
-    411: 106,
-    413: 77,
-    435: 134,
-    436: 193,
-}
+UNREAD = {8: 117, 290: 251, 291: 10, 361: 93, 371: 10, 380: 232, 411: 106, 413: 77}
 
 Message = mavlink2.MAVLink_message
 

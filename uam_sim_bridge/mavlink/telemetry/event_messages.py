@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import struct
 
-from pymavlink.dialects.v20 import common as mavlink2
+from pymavlink.dialects.v20 import development as mavlink2
 
 ARGUMENTS = 40  # bytes
 

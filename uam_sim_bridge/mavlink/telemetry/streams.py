@@ -23,6 +23,8 @@ RATES: dict[int, float] = {
     mavlink2.MAVLINK_MSG_ID_ESTIMATOR_STATUS: 2.0,
 }
 ONLY_COUNTED = (mavlink2.MAVLINK_MSG_ID_HEARTBEAT,)
+# sent on a change: PX4 sends CURRENT_MODE at once when the mode changes, HEARTBEAT once a second
+ON_CHANGE: dict[int, float] = {mavlink2.MAVLINK_MSG_ID_CURRENT_MODE: 50.0}
 ENOUGH = 0.5  # fraction of the desired rate, below which a stream is too slow
 WINDOW = 4.0  # s, counting window
 ANSWER_TIMEOUT = 0.5  # s, then the next request is sent without an answer
@@ -43,8 +45,8 @@ class StreamCheck:
         """Request all streams again, for a new or rebooted autopilot."""
         self.warnings: tuple[str, ...] = ()
         self.rates: dict[int, float] = {}
-        self._queue = [number for number in RATES if number not in ONLY_COUNTED]
-        self._attempts = dict.fromkeys(RATES, 0)
+        self._queue = [number for number in RATES if number not in ONLY_COUNTED] + [*ON_CHANGE]
+        self._attempts = dict.fromkeys((*RATES, *ON_CHANGE), 0)
         self._refused: dict[int, str] = {}
         self._counts = dict.fromkeys(RATES, 0)
         self._pending: int | None = None
@@ -77,7 +79,7 @@ class StreamCheck:
         number = self._queue.pop(0)
         self._attempts[number] += 1
         self._pending, self._requested_at = number, time
-        return number, 1e6 / RATES[number]
+        return number, 1e6 / (RATES | ON_CHANGE)[number]
 
     def _judge(self, time: float) -> None:
         if self._window is None:

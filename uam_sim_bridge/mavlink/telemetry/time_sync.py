@@ -27,10 +27,12 @@ class TimeSync:
     """Creates the TIMESYNC requests and estimates the offset from the answers.
 
     `offset` [s] or None: autopilot's clock − companion's clock; `round_trip` [s] or None:
-    smoothed.
+    smoothed; `delivered` [s]: when the newest answered request was sent, inf before the first
+    answer.
     """
 
     def __init__(self) -> None:
+        self.delivered = math.inf
         self._requested: deque[int] = deque(maxlen=_OUTSTANDING)
         self._last = -math.inf
         self.restart()
@@ -69,6 +71,7 @@ class TimeSync:
         if ts1 not in self._requested:
             return False
         self._requested.remove(ts1)
+        self.delivered = ts1 * 1e-9
         round_trip = time - ts1 * 1e-9
         if round_trip < 0.0:  # the companion's clock went back: a new simulation
             self.restart()

@@ -1,0 +1,40 @@
+"""Parameters of the mission node."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from uam_control.settings.parameter_set import ParameterSet, number, switch
+from uam_control.supervision import SupervisionParameters
+
+
+@dataclass(frozen=True)
+class StartParameters(ParameterSet):
+    """How a flight begins; fixed once the node runs."""
+
+    auto_start: bool = switch(
+        False, "arm and take off without /mission/start, as soon as the pre-arm report is green"
+    )
+    dry_run: bool = switch(
+        False, "compute all commands for the present pose; never arm (set it for the bridge too)"
+    )
+
+
+@dataclass(frozen=True)
+class MissionParameters(SupervisionParameters):
+    """Times and limits of start, take-off and touchdown, and the parameters of the supervisor."""
+
+    start_speed: float = number(0.3, "largest speed at the start", "m/s", 0.01, 5.0)
+    start_arm_error: float = number(
+        0.3, "largest distance of a joint from its angle at the start", "rad", 0.01, 6.3
+    )
+    takeoff_delay: float = number(0.5, "time from armed to take-off", "s", 0.0, 60.0)
+    touchdown_height: float = number(0.05, "height that counts as on the ground", "m", 0.0, 0.5)
+    touchdown_speed: float = number(0.10, "vertical speed that counts as at rest", "m/s", 0.0, 1.0)
+    touchdown_time: float = number(
+        0.3, "time on the ground and at rest before touchdown is detected", "s", 0.0, 5.0
+    )
+    touchdown_timeout: float = number(8.0, "longest wait for touchdown", "s", 0.0, 60.0)
+    settle_time: float = number(
+        1.5, "time from touchdown to the end of the mission", "s", 0.0, 60.0
+    )

@@ -1,0 +1,73 @@
+"""The pre-arm report: every quantity with its limit, before the vehicle may be armed."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from uam_control.coordinates import ARM, CHI, CHI_DOT, POSITION
+from uam_control.supervision.checks import CONTROLLERS, Checks
+from uam_control.supervision.observation import Observation
+
+# quantities that must be known; others (battery, temperature) may be missing
+REQUIRED = ("mocap", "joint angles", CONTROLLERS, "autopilot")
+UNKNOWN = "unknown"
+
+
+class PreflightCheck(NamedTuple):
+    """One line of the report; value and limit with their units."""
+
+    name: str
+    value: str
+    limit: str
+    passed: bool
+
+    @property
+    def text(self) -> str:
+        """The check in one line."""
+        return f"{self.name}: {self.value} ({self.limit})"
+
+
+def preflight(
+    checks: Checks,
+    seen: Observation,
+    arm_start: Sequence[float],
+    start_speed: float,
+    start_arm_error: float,
+) -> tuple[PreflightCheck, ...]:
+    """Return the report of the newest tick.
+
+    checks: updated with `seen`; arm_start (n,): angles of the arm at the start [rad]; start_speed
+    [m/s], start_arm_error [rad]: limits of the vehicle's speed and of the arm's angle error.
+    """
+    return (*_limits(checks), *_at_rest(seen, arm_start, start_speed, start_arm_error))
+
+
+def _limits(checks: Checks) -> Iterator[PreflightCheck]:
+    for check, value, limit in checks.on_ground():
+        known = value != -math.inf
+        yield PreflightCheck(
+            check.name,
+            f"{check.sign * value:.3g} {check.unit}".strip() if known else UNKNOWN,
+            f"{'at most' if check.sign > 0 else 'at least'} {check.sign * limit:.3g} {check.unit}",
+            value < limit if known else check.name not in REQUIRED,
+        )
+
+
+def _at_rest(
+    seen: Observation, arm_start: Sequence[float], start_speed: float, start_arm_error: float
+) -> Iterator[PreflightCheck]:
+    yield PreflightCheck(
+        "motors", "armed" if seen.armed else "disarmed", "disarmed", not seen.armed
+    )
+    held = seen.authority.released_to
+    yield PreflightCheck("control", held or "free", "free", not held)
+    speed = float(np.linalg.norm(seen.state[CHI_DOT, POSITION]))
+    limit = f"at most {start_speed:.3g} m/s"
+    yield PreflightCheck("speed", f"{speed:.3g} m/s", limit, speed <= start_speed)
+    away = float(np.max(np.abs(seen.state[CHI, ARM] - arm_start), initial=0.0))
+    limit = f"at most {start_arm_error:.3g} rad from its start"
+    yield PreflightCheck("arm", f"{away:.3g} rad", limit, away <= start_arm_error)

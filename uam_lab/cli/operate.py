@@ -1,0 +1,157 @@
+"""`uam start`, `hold`, `resume`, `land`, `disarm`, `kill`, `goto`, `status`, `preflight`."""
+
+from __future__ import annotations
+
+import argparse
+import math
+import sys
+from collections.abc import Callable
+from functools import partial
+from typing import TYPE_CHECKING
+
+from uam_lab.cli.command import Command, number
+from uam_lab.flight.settings import SettingsError, require_ros
+from uam_sim_bridge.ports import domain_of_flight
+
+if TYPE_CHECKING:
+    from uam_lab.flight.operator import Operator
+
+DONE, REFUSED = 0, 1
+WHAT = {
+    "start": ("arm and take off", "Arm and take off, if the pre-arm report is green."),
+    "hold": ("stop on the path", "Stop on the path and hold the position."),
+    "resume": (
+        "go on after a hold",
+        "Continue on the path after a hold. After the pilot or a failsafe took over: request\n"
+        "OFFBOARD, then continue from the present position.",
+    ),
+    "land": ("land here", "Descend vertically and disarm."),
+    "disarm": ("motors off", "Motors off: on the ground, or in failsafe."),
+}
+ELSEWHERE = """\
+  uam {name}                            the flight that runs
+  uam {name} --instance 2               one of several flights
+  ROS_DOMAIN_ID=5 uam {name} --namespace uav1   nodes that uam fly did not start
+
+Exit status: 0 accepted, 1 refused (the reason is printed), 2 no flight or wrong use.
+"""
+
+
+def add(commands: argparse._SubParsersAction) -> None:
+    """Add the subcommands to the command line."""
+    for name, (summary, description) in WHAT.items():
+        _command(commands, name, partial(_send, name), summary, description)
+    kill = _command(
+        commands,
+        "kill",
+        _kill,
+        "stop the motors at once, in the air too",
+        "Stop the motors at once: a vehicle in the air falls. Asks first.",
+    )
+    kill.switch("--yes", "do not ask")
+    goto = _command(
+        commands,
+        "goto",
+        _goto,
+        "fly to a position",
+        "Fly to a position [m, ENU] and hold it there.",
+        "  uam goto 0.5 0 1.2                  keep the heading\n"
+        "  uam goto 0.5 0 1.2 --yaw 90         turn north\n",
+    )
+    for axis in "xyz":
+        goto.option(axis, axis.upper(), "[m]", type=number(axis, "m"))
+    goto.option("--yaw", "DEGREES", "heading (default: as it is)", type=number("yaw", "degrees"))
+    _command(commands, "status", _status, "phase, errors, who has control", "Show the flight.")
+    _command(
+        commands,
+        "preflight",
+        _preflight,
+        "the pre-arm report",
+        "Show every check before arming with value and limit. Exit status 1 if one fails.",
+    )
+
+
+def _command(
+    commands: argparse._SubParsersAction,
+    name: str,
+    act: Callable[[Operator, argparse.Namespace], int],
+    summary: str,
+    description: str,
+    examples: str = "",
+) -> Command:
+    text = f"examples:\n{examples}{ELSEWHERE.format(name=name)}"
+    command = Command(commands, name, partial(_run, act), summary, description, text)
+    command.instance()
+    command.option("--namespace", "NAME", "namespace of the vehicle's nodes (default: none)", "")
+    return command
+
+
+def _run(act: Callable[[Operator, argparse.Namespace], int], options: argparse.Namespace) -> int:
+    """Run a command on the flight; return the exit status."""
+    require_ros()
+    from uam_lab.flight.operator import NoFlight, Operator
+    from uam_lab.processes.guest import Guest
+    from uam_lab.processes.node_environment import transport_environment
+
+    domain = domain_of_flight(options.instance)
+    environment = {} if domain is None else transport_environment()  # of uam fly, or the user's
+    with Guest(f"uam_{options.command}", environment, domain, options.namespace) as guest:
+        try:
+            return act(Operator(guest.node), options)
+        except NoFlight as error:
+            raise SettingsError(str(error)) from None
+
+
+def _send(name: str, operator: Operator, _: argparse.Namespace) -> int:
+    return _said(name, *operator.command(name))
+
+
+def _kill(operator: Operator, options: argparse.Namespace) -> int:
+    if not options.yes:
+        print("The motors stop at once; a vehicle in the air falls. Type kill to confirm: ", end="")
+        sys.stdout.flush()
+        if sys.stdin.readline().strip() != "kill":
+            return _said("kill", False, "not confirmed, nothing was sent")
+    return _said("kill", *operator.kill())
+
+
+def _goto(operator: Operator, options: argparse.Namespace) -> int:
+    yaw = math.nan if options.yaw is None else math.radians(options.yaw)
+    return _said("goto", *operator.goto(options.x, options.y, options.z, yaw))
+
+
+def _status(operator: Operator, _: argparse.Namespace) -> int:
+    mission, autopilot = operator.mission(), operator.autopilot()
+    time = "before take-off" if mission.time < 0.0 else f"{mission.time:.1f} s"
+    rows = {
+        "phase": f"{mission.phase}, {time}",
+        "state": f"{mission.state}: {mission.cause}",
+        "control": autopilot.released_to or ("companion" if autopilot.armed else "nobody"),
+        "autopilot": autopilot.summary,
+        "errors": f"{mission.position_error:.3f} m, "
+        f"attitude {math.degrees(mission.attitude_error):.2f} deg, "
+        f"arm {math.degrees(mission.arm_error):.2f} deg",
+    }
+    if mission.abort_reason:
+        rows["aborted"] = mission.abort_reason
+    if autopilot.reasons:
+        rows["reasons"] = autopilot.reasons
+    for name, text in rows.items():
+        print(f"{name:<10} {text}")
+    return DONE
+
+
+def _preflight(operator: Operator, _: argparse.Namespace) -> int:
+    checks = operator.preflight()
+    width = max((len(check.name) for check in checks), default=0)
+    for check in checks:
+        mark = "ok  " if check.passed else "FAIL"
+        print(f"{mark} {check.name:<{width}}  {check.value:<16} {check.limit}")
+    failed = [check.name for check in checks if not check.passed]
+    print(f"not ready: {', '.join(failed)}" if failed else "ready to start")
+    return REFUSED if failed else DONE
+
+
+def _said(name: str, accepted: bool, text: str) -> int:
+    print(f"{name}: {text}", file=sys.stdout if accepted else sys.stderr)
+    return DONE if accepted else REFUSED

@@ -1,0 +1,113 @@
+"""The operator's commands to a running flight: services and topics of mission and bridge."""
+
+from __future__ import annotations
+
+import math
+import time
+from typing import Any
+
+from diagnostic_msgs.msg import DiagnosticArray
+from geometry_msgs.msg import PoseStamped
+from rclpy.executors import SingleThreadedExecutor
+from rclpy.node import Node
+from std_srvs.srv import Trigger
+
+from uam_control.supervision import PreflightCheck
+from uam_msgs_py.messages import topics
+from uam_msgs_py.messages.status import OK, AutopilotState, MissionStatus
+
+COMMANDS = ("start", "hold", "resume", "land", "disarm")
+PATIENCE = 5.0  # [s] wall time to find the flight, and the same for its answer
+STATUS_PERIOD = 2.0  # [s] wall time within which a flight that runs sends its status
+
+
+class NoFlight(RuntimeError):
+    """No flight answers; the text is one line and says what to do."""
+
+
+class Operator:
+    """Client of one flight; `node`: a node in its ROS domain and namespace, not spun by others."""
+
+    def __init__(self, node: Node) -> None:
+        self._node = node
+        self._executor = SingleThreadedExecutor(context=node.context)
+        self._executor.add_node(node)
+        self._newest: dict[str, DiagnosticArray] = {}
+        for topic in (topics.MISSION_STATUS, topics.AUTOPILOT_STATE, topics.PREFLIGHT):
+            node.create_subscription(
+                topic.type, topic.name, lambda m, name=topic.name: self._take(name, m), topic.qos
+            )
+
+    def command(self, name: str) -> tuple[bool, str]:
+        """Call the service of one of COMMANDS; return whether it was accepted, and the answer.
+
+        Raises NoFlight.
+        """
+        return self._call(f"mission/{name}")
+
+    def kill(self) -> tuple[bool, str]:
+        """Stop the motors at once, in the air too: both calls of /mission/kill. Raises NoFlight."""
+        self._call("mission/kill")
+        return self._call("mission/kill")
+
+    def goto(self, x: float, y: float, z: float, yaw: float) -> None:
+        """Send a goal pose: position [m, ENU], yaw [rad]. Raises NoFlight."""
+        topic = topics.GOAL_POSE
+        publisher = self._node.create_publisher(topic.type, topic.name, topic.qos)
+        self._until(lambda: publisher.get_subscription_count() > 0, "no mission listens")
+        goal = PoseStamped()
+        goal.header.frame_id = "world"
+        position, turn = goal.pose.position, goal.pose.orientation
+        position.x, position.y, position.z = float(x), float(y), float(z)
+        turn.w, turn.z = math.cos(yaw / 2.0), math.sin(yaw / 2.0)
+        publisher.publish(goal)
+        publisher.wait_for_all_acked()
+
+    def mission(self) -> MissionStatus:
+        """Return the mission's newest status. Raises NoFlight."""
+        return MissionStatus.from_message(self._latest(topics.MISSION_STATUS))[1]
+
+    def autopilot(self) -> AutopilotState:
+        """Return the autopilot's newest state. Raises NoFlight."""
+        return AutopilotState.from_message(self._latest(topics.AUTOPILOT_STATE))[1]
+
+    def preflight(self) -> list[PreflightCheck]:
+        """Return the newest pre-arm report. Raises NoFlight."""
+        return [
+            PreflightCheck(
+                status.name,
+                status.message,
+                {pair.key: pair.value for pair in status.values}.get("limit", ""),
+                status.level == OK,
+            )
+            for status in self._latest(topics.PREFLIGHT).status
+        ]
+
+    def _take(self, name: str, message: DiagnosticArray) -> None:
+        self._newest[name] = message
+
+    def _latest(self, topic: topics.Topic) -> Any:
+        """Return the newest message of a topic; the node may have sent it before this call."""
+        self._until(lambda: topic.name in self._newest, f"no message on {topic.name}")
+        return self._newest[topic.name]
+
+    def _call(self, service: str) -> tuple[bool, str]:
+        client = self._node.create_client(Trigger, service)
+        try:
+            self._until(client.service_is_ready, f"no service {service}")
+            future = client.call_async(Trigger.Request())
+            self._until(future.done, f"no answer of {service}")
+            answer = future.result()
+            return answer.success, answer.message
+        finally:
+            self._node.destroy_client(client)
+
+    def _until(self, done: Any, complaint: str) -> None:
+        end = time.monotonic() + PATIENCE
+        while not done():
+            if time.monotonic() > end:
+                raise NoFlight(
+                    f"{complaint} in ROS domain {self._node.context.get_domain_id()}: "
+                    "start a flight, or choose it by --instance or ROS_DOMAIN_ID"
+                )
+            self._executor.spin_once(timeout_sec=0.05)

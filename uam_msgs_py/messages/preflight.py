@@ -1,0 +1,38 @@
+"""The pre-arm report in a diagnostic_msgs/DiagnosticArray: one status per check."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from typing import Protocol
+
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
+
+from uam_msgs_py.messages.stamps import set_stamp
+from uam_msgs_py.messages.status import ERROR, OK
+
+
+class Check(Protocol):
+    """A line of the report, see `uam_control.supervision.PreflightCheck`."""
+
+    name: str
+    value: str
+    limit: str
+    passed: bool
+
+
+def preflight_message(stamp: int, checks: Iterable[Check]) -> DiagnosticArray:
+    """Return the message; stamp [ns]."""
+    array = DiagnosticArray(
+        status=[
+            DiagnosticStatus(
+                level=OK if check.passed else ERROR,
+                name=check.name,
+                hardware_id="uam",
+                message=check.value,
+                values=[KeyValue(key="limit", value=check.limit)],
+            )
+            for check in checks
+        ]
+    )
+    set_stamp(array.header.stamp, stamp)
+    return array
