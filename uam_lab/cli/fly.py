@@ -33,6 +33,7 @@ examples:
   uam fly --profile mine.yaml --engine direct
   uam fly --autopilot px4 --px4-dir ~/PX4-Autopilot/build/px4_sitl_default
   uam fly --autopilot serial:/dev/ttyACM0:921600 --clock realtime --gcs udp:127.0.0.1:14550
+  uam fly --dry-run                          all commands computed, none sent, nothing armed
   uam fly --view --clock realtime            monitor and tune in a browser
   uam fly --clock realtime                   paced by the wall clock, latency measured
   uam fly --without arm_controller           with your own arm controller: examples/
@@ -78,6 +79,10 @@ def add(commands: argparse._SubParsersAction) -> None:
     option("--autopilot", "builtin|px4|URL", text, "builtin")
     text = "PX4's build directory, with bin/px4 and etc/ (default: $PX4_SITL_DIR)"
     option("--px4-dir", "DIR", text)
+    command.switch(
+        "--arm", "arm and take off by itself also with a real autopilot (serial, another host)"
+    )
+    command.switch("--dry-run", "compute all commands for the present pose; send none, arm nothing")
     option("--gcs", "URL", "ground station, as udp:127.0.0.1:14550 (default: none)", "")
     mass = number("mass", "kg", 0.0)
     option("--payload-mass", "KG", "default: the scenario's", type=mass)
@@ -161,6 +166,8 @@ def fly(settings: FlightSettings) -> int:
             print(f"  | {line}", file=sys.stderr)
     if outcome.interrupted:
         return INTERRUPTED
+    if settings.dry_run:
+        return NOT_COMPLETED if outcome.failure else COMPLETED
     completed = metrics is not None and metrics["mission_completed"] and not outcome.failure
     return COMPLETED if completed else NOT_COMPLETED
 

@@ -6,11 +6,22 @@ import argparse
 import sys
 from collections.abc import Sequence
 
-from uam_lab.cli import campaign, compare, doctor, faults, fly, profile, report, tune, view
+from uam_lab.cli import (
+    campaign,
+    compare,
+    doctor,
+    faults,
+    fly,
+    operate,
+    profile,
+    report,
+    tune,
+    view,
+)
 from uam_lab.cli.command import INTERRUPTED, USER_ERRORS, WRONG_USE
 
 # each has add(subparsers), which sets `run`: arguments → exit status
-COMMANDS = (fly, view, profile, report, compare, tune, campaign, faults, doctor)
+COMMANDS = (fly, operate, view, profile, report, compare, tune, campaign, faults, doctor)
 
 
 class OneLineParser(argparse.ArgumentParser):

@@ -43,7 +43,8 @@ class FlightSettings:
     payload_mass [kg]; vehicle_changes: dotted entries of config/vehicle/*.yaml to replace, as
     {"air.wind": [3.0, 0.0, 0.0]}; out: the result folder, None for the default. autopilot:
     BUILTIN, PX4, or the URL of an autopilot started by the user; link: that URL, parsed. without:
-    nodes that are not started, see `foreign`.
+    nodes that are not started, see `foreign`. auto_start: the flight begins without a command;
+    dry_run: nothing is armed.
     """
 
     scenario: Scenario
@@ -67,6 +68,8 @@ class FlightSettings:
     without: tuple[str, ...] = (COCKPIT,)
     log_limit: float = LOG_LIMIT  # [MB] size at which log.mcap ends
     faults: Schedule = Schedule()
+    auto_start: bool = True
+    dry_run: bool = False
 
     @property
     def foreign(self) -> tuple[str, ...]:
@@ -95,11 +98,13 @@ def settings(
     view: bool = False,
     log_limit: float = LOG_LIMIT,
     faults: Sequence[str] = (),
+    arm: bool = False,
+    dry_run: bool = False,
 ) -> FlightSettings:
     """Check the options and load scenario, profile and faults.
 
     profile: see `load_profile` for several profiles; faults: see `faults.read_schedule`; view:
-    serve the cockpit. Raises SettingsError, ConfigurationError, ScenarioError, ProfileError,
+    serve the cockpit; arm: begin by itself also with a real autopilot. Raises SettingsError, ConfigurationError, ScenarioError, ProfileError,
     Px4Error, PortError, FaultError; each text is one line for the user.
     """
     _choice("controller", controller, catalogue.LAWS)
@@ -113,6 +118,8 @@ def settings(
         )
     for node in without:
         _choice("node to fly without", node, REPLACEABLE + ONLOOKERS)
+    if dry_run and engine == "direct":
+        raise SettingsError("a dry run needs --engine ros: the direct engine is a simulation")
     if without and engine == "direct":
         raise SettingsError("the direct engine has no nodes: --without needs --engine ros")
     if view and engine == "direct":
@@ -176,6 +183,8 @@ def settings(
         without=left_out,
         faults=injected,
         log_limit=log_limit,
+        auto_start=not dry_run and (arm or link is None or not link.real),
+        dry_run=dry_run,
     )
 
 

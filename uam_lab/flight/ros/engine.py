@@ -39,7 +39,7 @@ FORKER = "uam_lab.flight.ros.forker"
 # Each child process imports its parent's main module again: the command and these modules.
 COMMANDS = [
     f"uam_lab.cli.{name}"
-    for name in "campaign compare doctor faults fly profile report tune view".split()
+    for name in "campaign compare doctor faults fly operate profile report tune view".split()
 ]
 RESTARTS = 3  # of each controller in a flight
 POLL = 0.05  # [s]
@@ -107,6 +107,10 @@ def _supervise(
             )
             for name in settings.foreign:
                 progress.message(f"waiting for {name}: start it with ROS_DOMAIN_ID={ports.domain}")
+            if not settings.auto_start and not settings.dry_run:
+                progress.message(
+                    "waiting for uam start: a real autopilot arms by itself only with --arm"
+                )
             with (
                 StatusListener(surroundings, ports.domain) as listener,
                 _process_faults(settings, children, listener, progress) as faults,

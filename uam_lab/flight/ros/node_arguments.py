@@ -40,6 +40,7 @@ DESCRIBED = {
     *(wiring.PLANT, wiring.BRIDGE, wiring.SCENE, wiring.COCKPIT),
 }
 PX4_LINGER = 4.0  # [s] simulated, after the mission, in which PX4 disarms and closes its log
+DRY_RUN = 20.0  # [s] simulated, length of a dry run
 START_TIMEOUT = 20.0  # [s] without progress until every node is connected to the others
 OWN_START_TIMEOUT = 600.0  # [s] the same if the user starts a node by hand
 ANSWER_TIMEOUT = 10.0  # [s] for the answers to one lockstep tick
@@ -50,7 +51,11 @@ def parameters(
 ) -> dict[str, dict[str, Any]]:
     """Return the parameters of each node, from the profile and from the settings."""
     sections = {node: values.to_mapping() for node, values in settings.profile.sets.items()}
-    sections[wiring.MISSION]["scenario"] = scenario_source(settings)
+    sections[wiring.MISSION] |= {
+        "scenario": scenario_source(settings),
+        "auto_start": settings.auto_start,
+        "dry_run": settings.dry_run,
+    }
     sections[wiring.PLANT] = {
         "vehicle_changes": json.dumps(settings.vehicle_changes),
         "plant": settings.plant,
@@ -66,7 +71,7 @@ def parameters(
         "foreign": ",".join(settings.foreign),
         "faults": settings.faults.only(PLANT).to_text(),
         "answer_timeout": ANSWER_TIMEOUT,
-        "time_limit": time_limit(settings.scenario),
+        "time_limit": _time_limit(settings),
         "statistics": str(folder.path / "logs" / "mujoco_sim.json"),
     }
     sections[wiring.BRIDGE] = settings.profile.bridge() | {
@@ -77,6 +82,7 @@ def parameters(
         "autopilot_system": 1.0 if in_the_loop(settings) else float(ports.instance + 1),
         "gcs": settings.gcs,
         "faults": settings.faults.only(LINK).to_text(),
+        "dry_run": settings.dry_run,
     }
     if users_autopilot(settings):
         sections[wiring.BRIDGE]["autopilot"] = settings.autopilot
@@ -115,6 +121,13 @@ def scenario_source(settings: FlightSettings) -> str:
 def modules(settings: FlightSettings) -> dict[str, str]:
     """Return the nodes of a flight: executable → module."""
     return {name: module for name, module in MODULES.items() if name not in settings.without}
+
+
+def _time_limit(settings: FlightSettings) -> float:
+    """Return the simulated time [s] after which the plant ends; 0: none, an operator starts."""
+    if settings.dry_run:
+        return DRY_RUN
+    return time_limit(settings.scenario) if settings.auto_start else 0.0
 
 
 def in_the_loop(settings: FlightSettings) -> bool:

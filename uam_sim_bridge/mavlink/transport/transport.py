@@ -90,6 +90,11 @@ class LinkUrl:
     number: int
     local: int = 0
 
+    @property
+    def real(self) -> bool:
+        """Whether a vehicle may be at the other end: a serial line, or another host."""
+        return self.kind == "serial" or self.place not in ("localhost", "127.0.0.1", "::1")
+
 
 def parse_url(url: str) -> LinkUrl:
     """Return the parts of `url`; raises PortError in one line for other than the table above."""
