@@ -104,8 +104,9 @@ def settings(
     """Check the options and load scenario, profile and faults.
 
     profile: see `load_profile` for several profiles; faults: see `faults.read_schedule`; view:
-    serve the cockpit; arm: begin by itself also with a real autopilot. Raises SettingsError, ConfigurationError, ScenarioError, ProfileError,
-    Px4Error, PortError, FaultError; each text is one line for the user.
+    serve the cockpit; arm: begin by itself also with a real autopilot. Raises SettingsError,
+    ConfigurationError, ScenarioError, ProfileError, Px4Error, PortError, FaultError; each text is
+    one line for the user.
     """
     _choice("controller", controller, catalogue.LAWS)
     _choice("engine", engine, ENGINES)
