@@ -10,7 +10,7 @@ from functools import partial
 from typing import TYPE_CHECKING
 
 from uam_lab.cli.command import Command, number
-from uam_lab.flight.settings import SettingsError, require_ros
+from uam_lab.flight.flight_settings import SettingsError, require_ros
 from uam_sim_bridge.ports import domain_of_flight
 
 if TYPE_CHECKING:
