@@ -7,7 +7,7 @@ from typing import Protocol
 
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 
-from uam_msgs_py.messages.stamps import set_stamp
+from uam_msgs_py.messages.ros_time import set_stamp
 from uam_msgs_py.messages.status import ERROR, OK
 
 
