@@ -93,6 +93,7 @@ class Mission:
         self._failsafe_since = math.inf
         self._end: float | None = None
         self._magnet: tuple[bool, bool] | None = None  # overriding value, scenario's value then
+        self._stowing = False  # whether the arm of a released vehicle is being stowed
         self._pose: np.ndarray | None = None  # (6 + n,) reference of a dry run
 
     def start(self) -> tuple[bool, str]:
@@ -273,6 +274,9 @@ class Mission:
         if decision.state is not output.state:
             before, output.state = output.state, decision.state
             self._enter(stamp, before, decision)
+        if decision.state is State.RELEASED and decision.stow and not self._stowing:
+            self._guidance.stop(stamp, decision.stow)
+        self._stowing = decision.state is State.RELEASED and decision.stow
         output.cause, output.arm, output.regains = decision.cause, decision.arm, decision.regains
         output.flying = decision.guide is not Guide.NOTHING
         output.phase = self._phase(decision)

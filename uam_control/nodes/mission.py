@@ -85,7 +85,7 @@ class MissionNode(UamNode):
     def _on_autopilot(self, message: DiagnosticArray) -> None:
         stamp, state = AutopilotState.from_message(message)
         since = state.armed_since if state.armed else None
-        authority = Authority(state.released_to, state.landed)
+        authority = Authority(state.released_to, state.landed, state.lands)
         self._stage.autopilot(stamp, state.connected, since, state.round_trip, authority)
 
     def _on_state(self, data: bytes) -> None:

@@ -25,11 +25,13 @@ class Authority(NamedTuple):
     """Who has control of the vehicle.
 
     released_to: who has it in place of the companion, "" if nobody has. landed: whether the
-    autopilot reports that the vehicle stands on the ground.
+    autopilot reports that the vehicle stands on the ground. lands: whether the autopilot's mode
+    brings the vehicle to the ground by itself.
     """
 
     released_to: str = ""
     landed: bool = False
+    lands: bool = False
 
 
 @dataclass

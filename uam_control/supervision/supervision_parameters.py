@@ -125,7 +125,12 @@ class Reactions(ParameterSet):
     arm_holding: str = choice("stay", "arm during a hold", _ARM)
     arm_landing: str = choice("stow", "arm during an unplanned landing", _ARM)
     arm_failsafe: str = choice("stow", "arm during failsafe", _ARM)
-    arm_released: str = choice("stow", "arm while somebody else has control", _ARM)
+    arm_released: str = choice(
+        "stow_to_land",
+        "arm while somebody else has control; stow_to_land: stays, but is stowed if the autopilot "
+        "lands",
+        (*_ARM, "stow_to_land"),
+    )
     magnet_released: str = choice(
         "keep", "energised magnet while somebody else has control", _MAGNET
     )

@@ -16,7 +16,7 @@ from typing import NamedTuple
 from uam_control.coordinates import CHI, Z
 from uam_control.supervision.checks import CONTROLLERS, Checks
 from uam_control.supervision.monitor import Level
-from uam_control.supervision.observation import Observation, OperatorCommand
+from uam_control.supervision.observation import Authority, Observation, OperatorCommand
 from uam_control.supervision.states import AIRBORNE_STATES, ORDINARY, TARGETS, Event, State
 from uam_control.supervision.supervision_parameters import SupervisionParameters
 
@@ -69,6 +69,7 @@ class Supervisor:
         self.changes: list[StateTransition] = []
         self._arm = False
         self._regains = 0  # commands to regain a released vehicle
+        self._lands = False  # whether the autopilot lands a released vehicle
         self._goes_on = False  # whether the scenario goes on after the vehicle is regained
         self._planned = False  # whether a landing is the scenario's
         self._stamp = -math.inf
@@ -96,8 +97,7 @@ class Supervisor:
         finding = self._checks.update(self._stamp, seen, self.state in AIRBORNE_STATES)
         if finding is None and command is None and self._as_usual(seen):
             return self.decision
-        if self.state is State.RELEASED and seen.authority.released_to:
-            self._held_by(seen.authority.released_to)
+        self._held_by(seen.authority)
         for event, cause in self._events(seen, command):
             if (self.state, event) in TARGETS:
                 self._go(event, cause)
@@ -173,6 +173,7 @@ class Supervisor:
             keep = False
         elif state is State.RELEASED:
             keep, stow = p.magnet_released == "keep", p.arm_released == "stow"
+            stow |= p.arm_released == "stow_to_land" and self._lands
         return Decision(state, self.cause, guide, self._arm, keep, stow, self._regains)
 
     def _events(
@@ -256,12 +257,14 @@ class Supervisor:
         self.decision = self._decide()
         self.changes.append(StateTransition(self._stamp, source, self.state, event, cause))
 
-    def _held_by(self, released_to: str) -> None:
+    def _held_by(self, authority: Authority) -> None:
         """Store who has control of a released vehicle now."""
-        cause = _in_control(released_to)
-        if cause != self.cause:
-            self.cause = cause
-            self.decision = self._decide()
+        self._lands = authority.lands
+        if self.state is State.RELEASED and authority.released_to:
+            cause = _in_control(authority.released_to)
+            if cause != self.cause:
+                self.cause = cause
+                self.decision = self._decide()
 
     def _regain(self) -> None:
         """Ask for the released vehicle; the scenario goes on once it is regained."""

@@ -97,7 +97,8 @@ class AutopilotState(_Status):
     armed_since: stamp [ns] of the first tick at which it was reported armed, None while disarmed.
     reasons: why it is not armed or has left OFFBOARD, joined by "; ". round_trip [s]: shortest of
     the last second, None if unknown. released_to: who has control in place of the companion, "" if
-    nobody has. landed: by the autopilot's land detector.
+    nobody has. landed: by the autopilot's land detector. lands: its mode lands the
+    vehicle by itself.
     """
 
     connected: bool = False
@@ -108,9 +109,10 @@ class AutopilotState(_Status):
     round_trip: float | None = None
     released_to: str = ""
     landed: bool = False
+    lands: bool = False
 
     NAME = "autopilot"
-    LATER = ("round_trip", "released_to", "landed")
+    LATER = ("round_trip", "released_to", "landed", "lands")
 
     @property
     def level(self) -> bytes:

@@ -50,6 +50,7 @@ class AutopilotTopics:
             report.round_trip,
             report.released_to,
             report.landed,
+            report.mode.lands,
         )
         self._state.publish(state.to_message(stamp))
 

@@ -211,7 +211,7 @@ def send_setpoint(tick: ControlTick) -> bool:
     s.setpoint = bridge.tick(s.stamp, s.state, s.flying, s.tau_p, tau_q, s.attitude_reference)
     s.thrust_factor, report = bridge.factor, bridge.report
     if report is not None:
-        authority = Authority(report.released_to, report.landed)
+        authority = Authority(report.released_to, report.landed, report.mode.lands)
         tick.mission.autopilot(
             s.stamp, report.connected, report.armed_since, report.round_trip, authority
         )

@@ -22,6 +22,11 @@ class Mode(Enum):
     UNKNOWN = (0, 0)
 
     @property
+    def lands(self) -> bool:
+        """Whether the mode brings the vehicle to the ground by itself."""
+        return self in (Mode.LAND, Mode.RETURN)
+
+    @property
     def custom_mode(self) -> int:
         """Return HEARTBEAT.custom_mode: main mode in bits 16..23, sub mode in bits 24..31."""
         main, sub = self.value
