@@ -315,7 +315,7 @@ def phases(
     It is the phase of the scenario; once the mission has left the scenario, that of its status.
     """
     left = any(
-        status.state == State.HOLDING.value
+        status.state in (State.HOLDING.value, State.RELEASED.value)
         or (status.state == State.LANDING.value and status.abort_reason)
         for _, status in statuses
     )
@@ -327,8 +327,9 @@ def phases(
         ended = ABORTED if last.abort_reason else LANDED
     stamps = [stamp for stamp, _ in statuses]
     for number, now in enumerate(time.tolist()):
-        if flying[number]:
-            newest = bisect_right(stamps, ticks[number]) - 1 if left else -1
+        newest = bisect_right(stamps, ticks[number]) - 1 if left else -1
+        released = newest >= 0 and statuses[newest][1].state == State.RELEASED.value
+        if flying[number] or released:
             yield statuses[newest][1].phase if newest >= 0 else scenario.phase(max(now, 0.0))
         elif number < takeoff:
             yield WAITING

@@ -203,7 +203,10 @@ class OffboardLink:
                 )
         elif kind == "CURRENT_MODE":  # sent on a change, so before the next heartbeat
             self.intended = Mode.from_custom_mode(m.intended_custom_mode)
-            self._take_state(time, Mode.from_custom_mode(m.custom_mode), self.armed)
+            mode = Mode.from_custom_mode(m.custom_mode)
+            # PX4 goes back to OFFBOARD when it disarms; only the heartbeat says that it has
+            if mode is not Mode.OFFBOARD or not self.landed:
+                self._take_state(time, mode, self.armed)
         elif kind == "COMMAND_ACK":
             self._acknowledged(time, m.command, m.result)
         elif kind == "EXTENDED_SYS_STATE":
