@@ -8,6 +8,7 @@ import time
 import pytest
 from mcap.reader import make_reader
 from mcap_ros2.decoder import DecoderFactory
+from rosbags.highlevel import AnyReader
 from rosgraph_msgs.msg import Clock
 from std_msgs.msg import Bool
 
@@ -15,6 +16,8 @@ from uam_lab.recording.mcap_reader import read_log
 from uam_msgs_py.messages import topics
 from uam_msgs_py.messages.convert import SetpointWriter
 from uam_msgs_py.messages.ros_time import set_stamp
+from uam_msgs_py.messages.serialized import type_name
+from uam_msgs_py.messages.transforms import transforms_message
 from uam_msgs_py.node.connections import WRITERS, Connections
 
 MODULE = "uam_lab.nodes.recorder"
@@ -27,7 +30,7 @@ def recorder(start, tmp_path, probe):
     """Start a recorder; return (process, file, statistics file)."""
     file, statistics = tmp_path / "log.mcap", tmp_path / "recorder.json"
     running = start(MODULE, "--ros-args", "-p", f"file:={file}", "-p", f"statistics:={statistics}")
-    running.until_logged("recorder: ")
+    running.until_logged("[recorder]: ")
     return running, file, statistics
 
 
@@ -141,6 +144,49 @@ def test_a_full_disk_is_announced_and_ends_the_log_alone(start, probe):
 
 def test_a_file_that_cannot_be_written_is_named(start):
     running = start(MODULE, "--ros-args", "-p", "file:=/proc/nowhere/log.mcap")
-    assert running.process.wait(60) == 1
-    assert "recorder: cannot write /proc/nowhere/log.mcap: No such file" in running.output
+    assert running.process.wait(60) == 2
+    assert "recorder: file: cannot write /proc/nowhere/log.mcap: No such file" in running.output
     assert "Traceback" not in running.output
+
+
+def test_an_existing_log_is_refused_in_one_line(start, tmp_path):
+    file = tmp_path / "log.mcap"
+    file.write_text("a flight")
+    running = start(MODULE, "--ros-args", "-p", f"file:={file}")
+    assert running.process.wait(60) == 2
+    said = [line for line in running.output.splitlines() if line]
+    assert said == [f"recorder: file: {file} exists; a log is never overwritten, give another name"]
+    assert file.read_text() == "a flight"
+
+
+def test_without_a_name_each_log_is_a_bag_of_its_own(start, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    for _ in range(2):
+        running = start(MODULE)
+        running.until_logged("[recorder]: ")
+        time.sleep(1.0)  # the name has the second
+        assert running.interrupt() == 0
+    logs = sorted(tmp_path.rglob("*.mcap"))
+    assert len(logs) == 2
+    for log in logs:
+        assert log.stem == log.parent.name
+        with AnyReader([log.parent]) as reader:
+            assert {c.topic for c in reader.connections} == {topic.name for topic in topics.ALL}
+
+
+def test_the_log_of_every_topic_is_read_by_rosbags(recorder, probe):
+    running, file, _ = recorder
+    serialized = [t for t in topics.ALL if t.type is topics.TF.type]
+    publishers = {topic.name: probe.publisher(topic) for topic in topics.ALL}
+    connected(probe, *publishers.values())
+    for topic in topics.ALL:
+        message = transforms_message([]) if topic in serialized else topic.type()
+        publishers[topic.name].publish(message)
+    time.sleep(0.5)
+    assert running.interrupt() == 0
+    seen = {}
+    with AnyReader([file.parent]) as reader:
+        for connection, _, data in reader.messages():
+            message = reader.deserialize(data, connection.msgtype)
+            seen[connection.topic] = message.__msgtype__
+    assert seen == {topic.name: type_name(topic.type) for topic in topics.ALL}

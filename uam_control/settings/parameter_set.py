@@ -25,6 +25,7 @@ class Bound:
     """Meaning, unit and range of a numeric parameter.
 
     length: None for one number, else the number of entries; 0: one entry per axis of the subsystem.
+    whole: an integer. optional: the list may be empty.
     """
 
     description: str
@@ -32,6 +33,15 @@ class Bound:
     low: float
     high: float
     length: int | None = None
+    whole: bool = False
+    optional: bool = False
+
+    @property
+    def allowed(self) -> str:
+        """Return the range as text."""
+        if self.whole:
+            return f"{self.low:d} to {self.high:d}"
+        return f"{self.low:g} to {self.high:g} {self.unit}"
 
 
 @dataclass(frozen=True)
@@ -50,19 +60,43 @@ class Switch:
     description: str
 
 
+@dataclass(frozen=True)
+class Text:
+    """Meaning of a parameter that is a text; allowed: its form, for the user."""
+
+    description: str
+    allowed: str
+
+
+Spec = Bound | Choice | Switch | Text
+
+
+def integer(default: int, description: str, low: int, high: int) -> Any:
+    """Declare a field that is one integer within [low, high]."""
+    spec = Bound(description, "", low, high, whole=True)
+    return field(default=default, metadata={"spec": spec})
+
+
 def number(default: float, description: str, unit: str, low: float, high: float) -> Any:
     """Declare a field that is one number within [low, high]."""
     return field(default=default, metadata={"spec": Bound(description, unit, low, high)})
 
 
 def vector(
-    default: tuple, description: str, unit: str, low: float, high: float, length: int = 0
+    default: tuple,
+    description: str,
+    unit: str,
+    low: float,
+    high: float,
+    length: int = 0,
+    optional: bool = False,
 ) -> Any:
     """Declare a field of `length` numbers (0: one per axis), each within [low, high].
 
-    A per-axis default has one entry, used for every axis; () means that there is no default.
+    A per-axis default has one entry, used for every axis; () means that there is no default, or
+    the empty list if the field is optional.
     """
-    spec = Bound(description, unit, low, high, length)
+    spec = Bound(description, unit, low, high, length, optional=optional)
     return field(default=default, metadata={"spec": spec})
 
 
@@ -76,12 +110,17 @@ def switch(default: bool, description: str) -> Any:
     return field(default=default, metadata={"spec": Switch(description)})
 
 
+def text(default: str, description: str, allowed: str) -> Any:
+    """Declare a field that is a text; allowed: its form, for the user."""
+    return field(default=default, metadata={"spec": Text(description, allowed)})
+
+
 @dataclass(frozen=True)
 class ParameterSet:
     """Base of every parameter set."""
 
     @classmethod
-    def specs(cls) -> dict[str, Bound | Choice | Switch]:
+    def specs(cls) -> dict[str, Spec]:
         """Return name → meaning, unit and range of each parameter, in order."""
         return {item.name: item.metadata["spec"] for item in fields(cls)}
 
@@ -123,6 +162,8 @@ class ParameterSet:
                 raise ParameterError(f"{name}: '{value}' is not one of {', '.join(spec.choices)}")
             elif isinstance(spec, Switch) and not isinstance(value, bool):
                 raise ParameterError(f"{name}: {value!r} is not true or false")
+            elif isinstance(spec, Text) and not isinstance(value, str):
+                raise ParameterError(f"{name}: {value!r} is no text; allowed: {spec.allowed}")
         checked = replace(self, **clean)
         checked.check_together()
         return checked
@@ -132,7 +173,15 @@ class ParameterSet:
 
 
 def _number(name: str, value: Any, spec: Bound, axes: int) -> float | tuple[float, ...]:
-    allowed = f"{spec.low:g} to {spec.high:g} {spec.unit}"
+    allowed = spec.allowed
+    if spec.whole:
+        if isinstance(value, bool) or not isinstance(value, int):
+            raise ParameterError(f"{name}: {value!r} is no integer; allowed: {allowed}")
+        if not spec.low <= value <= spec.high:
+            raise ParameterError(f"{name}: {value} is outside {allowed}")
+        return value
+    if spec.optional and not np.size(value):
+        return ()
     try:
         numbers = np.asarray(value)
     except ValueError:  # lists of different lengths

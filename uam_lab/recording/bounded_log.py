@@ -20,16 +20,21 @@ class BoundedLog:
     """One MCAP file with profile `ros2`. Not thread-safe.
 
     ended: reason of the end of the log, "" while it is open. counts: messages per topic.
+    begin, end: least and largest log time [ns], 0 without messages.
     """
 
     def __init__(self, file: Path, limit: float) -> None:
-        """Create the file, replacing an existing one. limit [MB], 0 for none.
+        """Create the file and its folder. limit [MB], 0 for none.
 
-        Raises OSError if the file cannot be created.
+        Raises FileExistsError for an existing file, OSError if the file cannot be created.
         """
         self.ended = ""
         self.counts: Counter[str] = Counter()
-        self._file = file.open("wb")
+        self.begin = self.end = 0
+        self._written = False
+        self.file = file
+        file.parent.mkdir(parents=True, exist_ok=True)
+        self._file = file.open("wb" if file.is_char_device() else "xb")
         self._limit = limit * MEGABYTE
         self._schemas: dict[str, int] = {}  # type name → schema id
         self._topics: dict[int, str] = {}  # channel id → topic
@@ -57,7 +62,12 @@ class BoundedLog:
         if not self.ended:
             add = self._writer.add_message
             self._try(add, channel, log_time, data, publish_time, sequence)
+            if self.ended:
+                return
             self.counts[self._topics[channel]] += 1
+            self.begin = min(self.begin, log_time) if self._written else log_time
+            self.end = max(self.end, log_time)
+            self._written = True
 
     def add_metadata(self, name: str, values: Mapping[str, str]) -> None:
         """Add named text values to the file."""

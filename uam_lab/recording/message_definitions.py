@@ -5,6 +5,7 @@ a line `MSG: package/Name` and that type's .msg file (MCAP specification, append
 """
 
 import importlib.util
+import json
 import re
 from functools import cache
 from pathlib import Path
@@ -27,18 +28,40 @@ class DefinitionMissing(LookupError):
 @cache
 def definition(type_name: str) -> str:
     """Return the .msg text of `package/msg/Name`. Raises DefinitionMissing."""
+    own = _own(type_name)
+    return tf_message.DEFINITION if own else _file(type_name, "msg").read_text()
+
+
+@cache
+def type_hash(type_name: str) -> str:
+    """Return the hash of `package/msg/Name` by which ROS compares types, `RIHS01_...`.
+
+    Raises DefinitionMissing.
+    """
+    if _own(type_name):
+        return f"RIHS01_{tf_message.HASH.hex()}"
+    hashes = json.loads(_file(type_name, "json").read_text())["type_hashes"]
+    return next(one["hash_string"] for one in hashes if one["type_name"] == type_name)
+
+
+def _own(type_name: str) -> bool:
+    """Return whether the type is the one that this project brings itself."""
+    package = type_name.partition("/")[0]
+    return package == tf_message.PACKAGE and importlib.util.find_spec(package) is None
+
+
+def _file(type_name: str, suffix: str) -> Path:
+    """Return the file of a type in share/<package>/msg. Raises DefinitionMissing."""
     package, _, name = type_name.partition("/msg/")
     module = importlib.util.find_spec(package)
-    if module is None and package == tf_message.PACKAGE:
-        return tf_message.DEFINITION
     if module is None or module.origin is None:
         raise DefinitionMissing(f"message package {package} is not installed")
     # in wheels and apt installations, lib/pythonX.Y/site-packages/<package> and share/<package>
     # have a common parent folder
     for prefix in Path(module.origin).parents:
-        file = prefix / "share" / package / "msg" / f"{name}.msg"
+        file = prefix / "share" / package / "msg" / f"{name}.{suffix}"
         if file.is_file():
-            return file.read_text()
+            return file
     raise DefinitionMissing(f"no definition of {type_name} above {module.origin}")
 
 

@@ -69,7 +69,7 @@ class ResultFolder:
         if out is not None:
             folder = cls(Path(out).expanduser())
             _usable(folder.path)
-            if folder.metrics.exists() or folder.timeseries.exists():
+            if any(file.exists() for file in (folder.metrics, folder.timeseries, folder.log)):
                 raise ResultFolderError(
                     f"result folder {folder.path} already contains a flight; give another --out"
                 )

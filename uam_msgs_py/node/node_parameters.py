@@ -9,6 +9,7 @@ from typing import Any, Generic, TypeVar
 
 from rcl_interfaces.msg import (
     FloatingPointRange,
+    IntegerRange,
     ParameterDescriptor,
     ParameterValue,
     SetParametersResult,
@@ -16,14 +17,19 @@ from rcl_interfaces.msg import (
 from rclpy.node import Node
 from rclpy.parameter import Parameter, parameter_value_to_python
 
-from uam_control.settings.parameter_set import Bound, Choice, ParameterError, ParameterSet, Switch
+from uam_control.settings.parameter_set import (
+    Choice,
+    ParameterError,
+    ParameterSet,
+    Spec,
+    Switch,
+    Text,
+)
 
 S = TypeVar("S", bound=ParameterSet)
 
 
-def descriptor(
-    spec: Bound | Choice | Switch, read_only: bool, axes: Sequence[str] = ()
-) -> ParameterDescriptor:
+def descriptor(spec: Spec, read_only: bool, axes: Sequence[str] = ()) -> ParameterDescriptor:
     """Return the texts of `ros2 param describe`: meaning, unit, range, and the order of a vector.
 
     axes: names of the entries of a per-axis vector. Typing is dynamic, so that a user may write `5`
@@ -36,14 +42,23 @@ def descriptor(
     )
     if isinstance(spec, Choice):
         text.additional_constraints = "one of: " + ", ".join(spec.choices)
-    if isinstance(spec, Bound):
+    elif isinstance(spec, Switch):
+        text.additional_constraints = "true or false"
+    elif isinstance(spec, Text):
+        text.additional_constraints = spec.allowed
+    elif spec.whole:
+        text.additional_constraints = spec.allowed
+        text.integer_range = [IntegerRange(from_value=spec.low, to_value=spec.high, step=1)]
+    else:
         text.description = f"{spec.description} [{spec.unit}]"
         each = "" if spec.length is None else "each "
         order = f"; {', '.join(axes)}" if spec.length == 0 and axes else ""
-        text.additional_constraints = f"{each}{spec.low:g} to {spec.high:g} {spec.unit}{order}"
+        text.additional_constraints = f"{each}{spec.allowed}{order}"
         if spec.length is None:
+            # float(): the C structure of an int would hold 5e-324
+            low, high = float(spec.low), float(spec.high)
             text.floating_point_range = [
-                FloatingPointRange(from_value=spec.low, to_value=spec.high, step=0.0)
+                FloatingPointRange(from_value=low, to_value=high, step=0.0)
             ]
     return text
 

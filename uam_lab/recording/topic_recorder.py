@@ -1,0 +1,181 @@
+"""Subscribes to topics without decoding them, and writes each message at its time of the flight.
+
+The subscriptions are polled and have no callbacks: the threads of the middleware collect the
+messages, and taking fifty messages in one poll costs a tenth of fifty callbacks.
+
+Log time is simulation time: the stamp in the header. For types without a header, and for
+/diagnostics, whose publishers may not have received a tick yet, it is the last /clock published
+before the message. Publish time is the publisher's wall clock. On hardware, without /clock, both
+are wall time.
+"""
+
+from __future__ import annotations
+
+import time
+from bisect import bisect_right
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+from rclpy.node import Node
+from rclpy.qos import QoSHistoryPolicy, QoSProfile
+from rclpy.subscription import Subscription
+
+from uam_control.stamps import SECOND
+from uam_lab.recording.bag import BagTopic, add_topic, write_metadata
+from uam_lab.recording.bounded_log import BoundedLog
+from uam_msgs_py.messages import topics
+from uam_msgs_py.messages.layouts import stamp_of
+from uam_msgs_py.messages.serialized import type_name
+from uam_msgs_py.node.polling import listen
+
+DEPTH = 2000  # queue length per topic: 8 s at control rate
+CLOCK = "/clock"
+
+
+def begins_with_stamp(message_type: type) -> bool:
+    """Return whether `stamp_of` applies to the message type."""
+    fields = list(message_type.get_fields_and_field_types().items())
+    return fields[0] in (("header", "std_msgs/Header"), ("clock", "builtin_interfaces/Time"))
+
+
+@dataclass
+class Track:
+    """One recorded topic."""
+
+    topic: str
+    subscription: Subscription
+    message_type: type
+    stamped: bool
+    channel: int
+    one_publisher: bool
+    arrived: float | None = None  # time.monotonic() of the newest message
+    last_sequence: int = 0
+    lost: int = 0
+
+
+class TopicRecorder:
+    """The open file and its subscriptions."""
+
+    def __init__(
+        self,
+        node: Node,
+        file: Path,
+        chosen: list[topics.Topic],
+        simulated: bool,
+        metadata: Mapping[str, Mapping[str, str]] | None = None,
+        size_limit: float = 0.0,
+    ):
+        """Subscribe to `chosen` and create `file` with the named texts `metadata`.
+
+        size_limit [MB], 0 for none. Raises FileExistsError for an existing file, OSError.
+        """
+        self._simulated = simulated
+        self._writer = BoundedLog(file, size_limit)
+        for name, values in (metadata or {}).items():
+            self._writer.add_metadata(name, values)
+        self._bag: list[BagTopic] = []
+        self._tracks = [self._track(node, topic) for topic in chosen]
+        # /clock is taken last in each poll: then every /clock published before any other message
+        # of this poll is available
+        self._tracks.sort(key=lambda track: track.topic == CLOCK)
+        self._clock_wall: list[int] = []  # publisher's wall clock of each /clock [ns]
+        self._clock_sim: list[int] = []
+
+    def _track(self, node: Node, topic: topics.Topic) -> Track:
+        qos = QoSProfile(
+            history=QoSHistoryPolicy.KEEP_LAST,
+            depth=DEPTH,
+            reliability=topic.reading.reliability,
+            durability=topic.qos.durability,
+        )
+        subscription = listen(node, topic, qos, raw=True)
+        self._bag.append(BagTopic(topic.name, type_name(topic.type), topic.qos))
+        channel = add_topic(self._writer, self._bag[-1])
+        stamped = begins_with_stamp(topic.type) and topic.one_publisher
+        return Track(topic.name, subscription, topic.type, stamped, channel, topic.one_publisher)
+
+    def poll(self) -> int:
+        """Write all received messages; return their number."""
+        batch, now = [], time.monotonic()
+        for track in self._tracks:
+            take = track.subscription.handle.take_message
+            while (taken := take(track.message_type, True)) is not None:
+                data, info = taken
+                published = info["source_timestamp"]
+                if track.topic == CLOCK:
+                    self._clock_wall.append(published)
+                    self._clock_sim.append(stamp_of(data))
+                sequence = info["publication_sequence_number"]
+                self._count_lost(track, sequence)
+                batch.append((track, data, published, sequence))
+                track.arrived = now
+        for track, data, published, sequence in batch:
+            at = stamp_of(data) if track.stamped else self._sim_time(published)
+            self._writer.write(track.channel, max(at, 0), published, data, sequence & 0xFFFFFFFF)
+        del self._clock_wall[:-DEPTH], self._clock_sim[:-DEPTH]
+        return len(batch)
+
+    def drain(self, quiet: float = 0.2, longest: float = 1.0) -> None:
+        """Write the last messages until none arrives for `quiet` [s], for at most `longest` [s]."""
+        now = last = time.monotonic()
+        end = now + longest
+        while now - last < quiet and now < end:
+            if self.poll():
+                last = time.monotonic()
+            time.sleep(quiet / 10.0)
+            now = time.monotonic()
+
+    def _sim_time(self, published: int) -> int:
+        """Return the simulation time [ns] at the wall time `published` [ns]."""
+        if not self._simulated:
+            return published
+        before = bisect_right(self._clock_wall, published)
+        return self._clock_sim[before - 1] if before else 0
+
+    @staticmethod
+    def _count_lost(track: Track, sequence: int) -> None:
+        if track.one_publisher and 0 < track.last_sequence < sequence - 1:
+            track.lost += sequence - 1 - track.last_sequence
+        track.last_sequence = sequence
+
+    @property
+    def inlets(self) -> dict[str, Subscription]:
+        """The subscriptions by topic."""
+        return {track.topic: track.subscription for track in self._tracks}
+
+    @property
+    def arrivals(self) -> dict[str, float]:
+        """time.monotonic() of the newest message of each topic with messages."""
+        return {t.topic: t.arrived for t in self._tracks if t.arrived is not None}
+
+    def flush(self) -> None:
+        """Flush the written messages to the file."""
+        self._writer.flush()
+
+    @property
+    def ended(self) -> str:
+        """Reason of the end of the recording, "" while it runs."""
+        return self._writer.ended
+
+    @property
+    def until(self) -> float:
+        """Simulation time [s] of the newest /clock, 0 before the first."""
+        return self._clock_sim[-1] / SECOND if self._clock_sim else 0.0
+
+    @property
+    def lost(self) -> dict[str, int]:
+        """Number of lost messages, for topics with losses."""
+        return {track.topic: track.lost for track in self._tracks if track.lost}
+
+    @property
+    def counts(self) -> dict[str, int]:
+        """Messages written, per topic."""
+        return self._writer.counts
+
+    def close(self) -> bool:
+        """Complete the file and write metadata.yaml beside it; see `bag.write_metadata`."""
+        lost = {topic: str(count) for topic, count in self.lost.items()}
+        self._writer.add_metadata("lost messages", lost)
+        self._writer.close()
+        return write_metadata(self._writer, self._bag)
