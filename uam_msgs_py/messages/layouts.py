@@ -53,6 +53,7 @@ class Layout:
     points: int = 0  # of a trajectory; `fields` are those of the first point
     fields: dict[str, slice] = field(default_factory=dict)  # name → bytes of float64 numbers
     duration: slice | None = None  # bytes of time_from_start
+    end: int = 0  # first byte after the message, if it has at most one point
     checked: dict[object, Any] = field(default_factory=dict)  # reader → result of its check
     _fixed: struct.Struct = struct.Struct("")
     _expected: tuple[bytes, ...] = ()
@@ -182,6 +183,7 @@ class Layouts:
             else:
                 cursor.doubles(*((part,) if isinstance(part, str) else part))
         layout = cursor.layout
+        layout.end = cursor.at
         layout.fix(data, cursor.fixed)
         if self._count >= KNOWN_LAYOUTS:  # a sender with ever new names: bound the memory
             self._known.clear()

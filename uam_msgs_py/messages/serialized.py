@@ -56,6 +56,8 @@ class Template:
             message.header.frame_id = frame
         data = serialize_message(message)
         layout = LAYOUTS[type(message)].of(data)
+        # rclpy adds undefined bytes after empty sequences; strict readers refuse such a message
+        data = data[: layout.end]
         # CDR aligns numbers from the end of the encapsulation: align this byte in memory
         self._bytes = np.zeros(4 + len(data), dtype=np.uint8)[4:]
         self._bytes[:] = np.frombuffer(data, dtype=np.uint8)
