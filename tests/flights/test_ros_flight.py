@@ -1,12 +1,14 @@
 """Lockstep flights through the ROS engine, whole."""
 
 import json
+from collections import Counter
 
 import numpy as np
 import pytest
 from default_columns import COLUMNS
 from mcap.reader import make_reader
 from mcap_ros2.decoder import DecoderFactory
+from rosbags.highlevel import AnyReader
 
 from uam_control.laws.modular import ModularLaw
 from uam_control.mission import load_scenario
@@ -113,6 +115,19 @@ def test_the_log_opens_with_the_public_readers_and_is_whole(two_flights):
     assert list(found["/uam/state"].joint_names)[-1] == "alpha_2"
     assert found["/imu/data"].orientation_covariance[0] == -1.0
     assert 0.0 < found["/uam/setpoint"].twist.linear.z < 1.0
+
+
+def test_the_result_folder_is_a_bag_for_rosbags(two_flights):
+    """Folder and file; every message of every type is deserialised."""
+    flight = two_flights[0]
+    for bag in (flight.out, flight.out / "log.mcap"):
+        with AnyReader([bag]) as reader:
+            counted = Counter()
+            for connection, _, data in reader.messages():
+                reader.deserialize(data, connection.msgtype)
+                counted[connection.topic] += 1
+            listed = {c.topic: c.msgcount for c in reader.connections if c.msgcount}
+        assert counted == listed and counted["/uam/state"] > 1000
 
 
 def test_messages_without_a_stamp_lie_at_their_tick(two_flights):
