@@ -32,6 +32,7 @@ from uam_control.supervision import (
 # phases in addition to those of a scenario
 WAITING, HOLD, LAND, LANDED, ABORTED = "waiting", "hold", "land", "landed", "aborted"
 RELEASED, DRY_RUN = "released", "dry run"
+PHASES = (WAITING, HOLD, LAND, LANDED, ABORTED, RELEASED, DRY_RUN)
 
 
 @dataclass

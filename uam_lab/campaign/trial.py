@@ -2,22 +2,22 @@
 
 from __future__ import annotations
 
-import os
 import tempfile
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-from rich.console import Console
 
 from uam_control.coordinates import ALPHA, coordinates
 from uam_control.mission import Scenario, load_scenario
 from uam_control.profiles.profile import Profile
 from uam_lab.campaign.fault_outcome import COMPLETED, LOST, classify
 from uam_lab.flight.direct.flight import DirectFlight
+from uam_lab.flight.direct.warm_up import prepare
 from uam_lab.flight.flight_settings import ONLOOKERS, FlightSettings
-from uam_lab.flight.progress import Progress
+from uam_lab.flight.observer import Observer
+from uam_lab.processes.interrupts import Interrupts
 from uam_lab.results import metrics
 from uam_lab.results.outcome import Outcome, transitions
 from uam_lab.results.result_folder import ResultFolder
@@ -129,12 +129,9 @@ def _fly_nodes(trial: Trial, scenario: Scenario) -> Outcome:
         without=tuple(name for name in ONLOOKERS if name not in needed),
         faults=trial.faults,
     )
-    with (
-        tempfile.TemporaryDirectory(prefix="uam-flight-") as folder,
-        open(os.devnull, "w") as nowhere,
-        Progress(Console(file=nowhere)) as progress,
-    ):
-        outcome = engine.fly(settings, ResultFolder(Path(folder)), progress)
+    prepare()
+    with tempfile.TemporaryDirectory(prefix="uam-flight-") as folder, Interrupts() as stop:
+        outcome = engine.fly(settings, ResultFolder(Path(folder)), Observer(), stop)
     if outcome.series is not None:
         outcome.series.info["controller"] = trial.label
     return outcome

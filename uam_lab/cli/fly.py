@@ -3,23 +3,23 @@
 from __future__ import annotations
 
 import argparse
+import contextlib
 import sys
-from collections.abc import Callable
-from pathlib import Path
 
 from rich.console import Console
 
 from uam_control.laws import catalogue
 from uam_control.settings import configuration
-from uam_lab.cli.command import INTERRUPTED, USER_ERRORS, Command, number
+from uam_lab.cli.command import INTERRUPTED, Command, number
 from uam_lab.flight import flight_settings
-from uam_lab.flight.conclude import command_line, conclude
+from uam_lab.flight.conclude import command_line
 from uam_lab.flight.flight_settings import LOG_LIMIT, ONLOOKERS, REPLACEABLE, FlightSettings
 from uam_lab.flight.progress import Progress
+from uam_lab.library.errors import FlightFailed
+from uam_lab.library.flight import Flight
+from uam_lab.processes.interrupts import Interrupts
 from uam_lab.report.build import build_report
 from uam_lab.report.page.console import reporting, summary
-from uam_lab.results.outcome import Outcome
-from uam_lab.results.result_folder import ResultFolder
 from uam_sim_bridge.mavlink.transport.transport import ALLOWED
 from uam_sim_bridge.plant.engines import DEFAULT_PLANT, PLANTS
 from uam_sim_bridge.ports import INSTANCES
@@ -131,33 +131,31 @@ def run(options: argparse.Namespace) -> int:
         "sensors.noise_scale": given.pop("noise"),
     }
     changes = {name: value for name, value in changes.items() if value is not None}
-    return fly(flight_settings.settings(**given, vehicle_changes=changes))
+    settings = flight_settings.settings(**given, vehicle_changes=changes, command=command_line())
+    return fly(settings)
 
 
 def fly(settings: FlightSettings) -> int:
     """Fly and report; return the exit status. Raises USER_ERRORS before the flight starts."""
-    engine = _engine(settings.engine)
-    folder = ResultFolder.create(settings.scenario.name, settings.controller, settings.out)
     landing = settings.scenario.landing
     console = Console()
-    with Progress(console, landing.at + landing.duration) as progress:
-        try:
-            outcome = engine(settings, folder, progress)
-        except USER_ERRORS:
-            _remove_if_empty(folder.path)
-            raise
-    metrics = conclude(settings, folder, outcome, command_line())
+    with Progress(console, landing.at + landing.duration) as progress, Interrupts() as stop:
+        flight = Flight.of(settings, progress, stop)
+        with contextlib.suppress(FlightFailed), flight:
+            flight.wait()
+    result = flight.result
+    outcome, metrics = result.outcome, result.metrics
     if metrics is not None:
         # after Ctrl-C the report has figures, but no rendered pictures, which take long
         with reporting(console) as show:
             report = build_report(
-                folder.path, show, video=settings.video, pictures=not outcome.interrupted
+                result.folder, show, video=settings.video, pictures=not outcome.interrupted
             )
         if report.problem:
             outcome.notes.append(report.problem)
-        console.print(summary(metrics, folder.path))
+        console.print(summary(metrics, result.folder))
     else:
-        print(f"results: {folder.path}")
+        print(f"results: {result.folder}")
     for note in outcome.notes:
         print(f"note: {note}")
     if outcome.failure:
@@ -168,26 +166,4 @@ def fly(settings: FlightSettings) -> int:
         return INTERRUPTED
     if settings.dry_run:
         return NOT_COMPLETED if outcome.failure else COMPLETED
-    completed = metrics is not None and metrics["mission_completed"] and not outcome.failure
-    return COMPLETED if completed else NOT_COMPLETED
-
-
-def _engine(name: str) -> Callable[..., Outcome]:
-    """Return the engine's `fly`. Raises SettingsError if ROS is not installed."""
-    if name == "direct":
-        from uam_lab.flight.direct.engine import fly as engine
-
-        return engine
-    flight_settings.require_ros()
-    from uam_lab.flight.ros.engine import fly as engine
-
-    return engine
-
-
-def _remove_if_empty(folder: Path) -> None:
-    """Remove the empty result folder of a refused flight."""
-    for path in (folder / "logs", folder):
-        try:
-            path.rmdir()
-        except OSError:
-            return
+    return COMPLETED if result.completed else NOT_COMPLETED

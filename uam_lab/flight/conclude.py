@@ -18,7 +18,7 @@ def command_line() -> str:
     return shlex.join(["uam", *sys.argv[1:]])
 
 
-def settings_facts(settings: FlightSettings, command: str) -> dict[str, Any]:
+def settings_facts(settings: FlightSettings) -> dict[str, Any]:
     """Return the settings of a flight as facts for info.json and the log."""
     scenario = settings.scenario
     return {
@@ -36,16 +36,16 @@ def settings_facts(settings: FlightSettings, command: str) -> dict[str, Any]:
         "drop_point": list(scenario.drop_point) if scenario.drop_point else None,
         "snapshots": [list(snapshot) for snapshot in scenario.snapshots],
         "faults_planned": settings.faults.entries,
-        "command": command,
+        "command": settings.command,
     }
 
 
 def conclude(
-    settings: FlightSettings, folder: ResultFolder, outcome: Outcome, command: str
+    settings: FlightSettings, folder: ResultFolder, outcome: Outcome
 ) -> dict[str, Any] | None:
     """Write metrics, table and facts; return the metrics, None if nothing was recorded."""
     write_json(folder.versions, versions())
-    return complete(folder, settings_facts(settings, command), outcome)
+    return complete(folder, settings_facts(settings), outcome)
 
 
 def complete(

@@ -3,15 +3,18 @@
 from __future__ import annotations
 
 import importlib.util
-from collections.abc import Collection, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Any
 
 from uam_control.laws import catalogue
 from uam_control.mission import Scenario, load_scenario
 from uam_control.profiles.profile import Profile, default_profile, load_profile
 from uam_control.settings import configuration
 from uam_control.vehicle import DEFAULT_VEHICLE, VehicleDescription, load_description
+from uam_lab.flight import node_options
+from uam_lab.flight.node_options import SettingsError
 from uam_lab.processes.node_environment import without_discovery
 from uam_sim_bridge.faults import Schedule, feasibility, read_schedule
 from uam_sim_bridge.faults.faulty_plant import check_engine
@@ -32,10 +35,6 @@ ONLOOKERS = ("scene", COCKPIT)  # nodes that only display: their end does not en
 PAYLOAD_MAX = 2.0  # [kg] more than the rotors can carry
 
 
-class SettingsError(ValueError):
-    """An invalid option; the text is one line: what is wrong and what is allowed."""
-
-
 @dataclass(frozen=True)
 class FlightSettings:
     """Checked settings of one flight, with scenario and profile loaded.
@@ -44,7 +43,9 @@ class FlightSettings:
     {"air.wind": [3.0, 0.0, 0.0]}; out: the result folder, None for the default. autopilot:
     BUILTIN, PX4, or the URL of an autopilot started by the user; link: that URL, parsed. without:
     nodes that are not started, see `foreign`. auto_start: the flight begins without a command;
-    dry_run: nothing is armed.
+    dry_run: nothing is armed. parameters: of the nodes without a profile, node → name → value.
+    remappings: node, or EVERY_NODE → topic or service → new name. command: how the flight was
+    requested, for its record.
     """
 
     scenario: Scenario
@@ -70,6 +71,9 @@ class FlightSettings:
     faults: Schedule = Schedule()
     auto_start: bool = True
     dry_run: bool = False
+    parameters: dict[str, dict[str, Any]] = field(default_factory=dict)
+    remappings: dict[str, dict[str, str]] = field(default_factory=dict)
+    command: str = ""
 
     @property
     def foreign(self) -> tuple[str, ...]:
@@ -78,9 +82,9 @@ class FlightSettings:
 
 
 def settings(
-    scenario: str = "pick_and_place",
+    scenario: str | Path = "pick_and_place",
     controller: str = catalogue.DEFAULT,
-    profile: str | Sequence[str] | None = None,
+    profile: str | Path | Sequence[str | Path] | None = None,
     vehicle: str = DEFAULT_VEHICLE,
     engine: str = "ros",
     clock: str = "lockstep",
@@ -100,11 +104,17 @@ def settings(
     faults: Sequence[str] = (),
     arm: bool = False,
     dry_run: bool = False,
+    auto_start: bool = True,
+    parameters: Mapping[str, Mapping[str, Any]] | None = None,
+    remappings: Mapping[str, str | Mapping[str, str]] | None = None,
+    command: str = "",
 ) -> FlightSettings:
     """Check the options and load scenario, profile and faults.
 
     profile: see `load_profile` for several profiles; faults: see `faults.read_schedule`; view:
-    serve the cockpit; arm: begin by itself also with a real autopilot. Raises SettingsError,
+    serve the cockpit; arm: begin by itself also with a real autopilot; auto_start False: wait for
+    the command start. parameters: node → name → value, each replaces the profile's. remappings:
+    topic or service → new name for every node, or node → such a mapping. Raises SettingsError,
     ConfigurationError, ScenarioError, ProfileError, Px4Error, PortError, FaultError; each text is
     one line for the user.
     """
@@ -136,16 +146,17 @@ def settings(
         raise SettingsError("--gcs must be udp:HOST:PORT and needs --engine ros")
     if not 0 <= seed < 2**31:
         raise SettingsError(f"seed {seed} is outside 0..{2**31 - 1}")
-    described = load_description(vehicle)
-    loaded = load_scenario(str(configuration.named("scenarios", scenario)), described)
-    given = [profile] if isinstance(profile, str) else profile
+    described = load_description(str(vehicle))
+    loaded = load_scenario(str(configuration.named("scenarios", str(scenario))), described)
+    given = [profile] if isinstance(profile, str | Path) else profile
     flown = (
         load_profile(
-            *(str(configuration.named("profiles", one)) for one in given), vehicle=described
+            *(str(configuration.named("profiles", str(one))) for one in given), vehicle=described
         )
         if given
         else default_profile(controller, described)
     )
+    flown, own = node_options.parameters(flown, parameters or {}, engine)
     for node, law in flown.laws().items():
         if law != controller:
             raise SettingsError(
@@ -178,14 +189,17 @@ def settings(
         seed=seed,
         video=video,
         plant=plant,
-        scenario_source=scenario,
+        scenario_source=str(scenario),
         instance=_instance_of(link) if instance is None else instance,
         vehicle_changes=dict(vehicle_changes or {}),
         without=left_out,
         faults=injected,
         log_limit=log_limit,
-        auto_start=not dry_run and (arm or link is None or not link.real),
+        auto_start=auto_start and not dry_run and (arm or link is None or not link.real),
         dry_run=dry_run,
+        parameters=own,
+        remappings=node_options.remappings(remappings or {}, engine),
+        command=command,
     )
 
 

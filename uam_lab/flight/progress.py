@@ -4,30 +4,18 @@ from __future__ import annotations
 
 import math
 import time
-from dataclasses import dataclass
 
 from rich.console import Console
 from rich.live import Live
 from rich.progress_bar import ProgressBar
 from rich.table import Table
 
+from uam_lab.flight.observer import FlightStatus, Observer
+
 PLAIN_INTERVAL = 10.0  # [s] of mission time between two plain lines within a phase
 
 
-@dataclass(frozen=True)
-class Status:
-    """State of a flight. Errors are norms: [m], [rad], [rad]; time: mission time [s]."""
-
-    phase: str
-    time: float
-    position_error: float
-    attitude_error: float
-    arm_error: float
-    real_time_factor: float
-    autopilot: str = ""
-
-
-class Progress:
+class Progress(Observer):
     """Shows messages and the newest status. A context manager."""
 
     def __init__(self, console: Console | None = None, duration: float | None = None):
@@ -37,7 +25,6 @@ class Progress:
         self._live: Live | None = None
         self._shown: tuple[str, float] = ("", -math.inf)
         self._begin = time.monotonic()
-        self.last: Status | None = None
         self._autopilot = ""
 
     def __enter__(self) -> Progress:
@@ -50,9 +37,8 @@ class Progress:
         """Print one permanent line."""
         self.console.print(text, highlight=False, markup=False)
 
-    def update(self, status: Status) -> None:
-        """Show the newest status and store it as `last`."""
-        self.last = status
+    def update(self, status: FlightStatus) -> None:
+        """Show the newest status."""
         if not self.console.is_terminal:
             self._plain(status)
             return
@@ -69,7 +55,7 @@ class Progress:
             self._live.stop()
             self._live = None
 
-    def _plain(self, status: Status) -> None:
+    def _plain(self, status: FlightStatus) -> None:
         if status.time < 0.0 and status.autopilot != self._autopilot:
             self._autopilot = status.autopilot
             self.message(f"autopilot {status.autopilot}")
@@ -84,14 +70,14 @@ class Progress:
             f"{status.real_time_factor:.2f}x real time"
         )
 
-    def _when(self, status: Status) -> str:
+    def _when(self, status: FlightStatus) -> str:
         if status.time < 0.0:
             return "before take-off"
         if self._duration is None:
             return f"{status.time:.1f} s"
         return f"{status.time:.1f} of {self._duration:.0f} s"
 
-    def _panel(self, status: Status) -> Table:
+    def _panel(self, status: FlightStatus) -> Table:
         table = Table.grid(padding=(0, 3))
         bar = ""
         if self._duration is not None:

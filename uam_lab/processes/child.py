@@ -15,6 +15,7 @@ import importlib
 import multiprocessing
 import multiprocessing.connection
 import multiprocessing.forkserver
+import multiprocessing.spawn
 import os
 import signal
 import sys
@@ -24,8 +25,11 @@ import traceback
 from collections.abc import Iterable, Mapping, Sequence
 from multiprocessing.process import BaseProcess
 from pathlib import Path
+from typing import Any
 
 from setproctitle import setproctitle
+
+from uam_lab.processes.borrowed_environment import borrowed
 
 GRACE = 5.0  # [s] from SIGINT to SIGKILL, after the end of the orchestrator
 TITLE = "uam-node"  # first word of a child's command line, for `ps` and `process_table`
@@ -35,6 +39,22 @@ POLL = 0.002  # seconds
 SINGLE_THREAD = dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "NUMBA_NUM_THREADS"), "1")
 
 _context = multiprocessing.get_context("forkserver")
+_preparation_data = multiprocessing.spawn.get_preparation_data
+
+
+def _without_main(name: str) -> dict[str, Any]:
+    """Return what a child process is prepared by; a node does not import the user's program.
+
+    Otherwise every node would run again a script that starts a flight.
+    """
+    data = _preparation_data(name)
+    if name.startswith(f"{TITLE} "):
+        data.pop("init_main_from_name", None)
+        data.pop("init_main_from_path", None)
+    return data
+
+
+multiprocessing.spawn.get_preparation_data = _without_main
 
 
 def prepare(modules: Iterable[str]) -> None:
@@ -42,17 +62,9 @@ def prepare(modules: Iterable[str]) -> None:
 
     Without this call the first child starts that process, and each child does its own imports.
     """
-    before = {name: os.environ.get(name) for name in SINGLE_THREAD}
-    os.environ.update(SINGLE_THREAD)
-    try:
+    with borrowed(SINGLE_THREAD):
         _context.set_forkserver_preload([__name__, *modules])
         multiprocessing.forkserver.ensure_running()
-    finally:
-        for name, value in before.items():
-            if value is None:
-                del os.environ[name]
-            else:
-                os.environ[name] = value
 
 
 def fork(
@@ -60,7 +72,7 @@ def fork(
 ) -> BaseProcess:
     """Start a child, see `Processes.start`; log: file to which its output is appended."""
     run = (name, module, tuple(arguments), str(log), dict(environment))
-    process = _context.Process(target=_run, args=run, name=name)
+    process = _context.Process(target=_run, args=run, name=f"{TITLE} {name}")
     process.start()
     while process.exitcode is None and not _apart(process.pid):
         time.sleep(POLL)

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-import os
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 import rclpy
 from rclpy.node import Node
 from rclpy.signals import SignalHandlerOptions
+
+from uam_lab.processes.borrowed_environment import borrowed
 
 
 class Guest:
@@ -19,17 +20,17 @@ class Guest:
         environment: Mapping[str, str],
         domain: int | None = None,
         namespace: str = "",
+        arguments: Sequence[str] = (),
     ):
         """environment: of the flight's processes; ROS reads some of its variables here too.
 
-        domain: ROS domain, None for that of the environment; namespace: of the vehicle's nodes.
+        domain: ROS domain, None for that of the environment; namespace: of the vehicle's nodes;
+        arguments: of ROS, as remappings.
         """
-        before = dict(os.environ)
-        os.environ.update(environment)
-        try:
+        with borrowed(environment):
             self.context = rclpy.Context()
             rclpy.init(
-                args=["--ros-args", "--disable-external-lib-logs"],
+                args=["--ros-args", "--disable-external-lib-logs", *arguments],
                 context=self.context,
                 domain_id=domain,
                 signal_handler_options=SignalHandlerOptions.NO,
@@ -38,13 +39,11 @@ class Guest:
                 name,
                 namespace=namespace,
                 context=self.context,
+                cli_args=["--ros-args", *arguments],
                 use_global_arguments=False,
                 start_parameter_services=False,
                 enable_rosout=False,
             )
-        finally:
-            os.environ.clear()
-            os.environ.update(before)
 
     def close(self) -> None:
         """Destroy the node and its context."""

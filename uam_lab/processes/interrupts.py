@@ -1,4 +1,4 @@
-"""Ctrl-C during a flight: only counted, so that the flight can end in order."""
+"""Requests to end a flight early: by a program, or by Ctrl-C, which is only counted."""
 
 from __future__ import annotations
 
@@ -7,28 +7,36 @@ import signal
 SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 
 
-class Interrupts:
-    """Context manager that counts SIGINT, SIGTERM and SIGHUP instead of their normal effect."""
+class StopRequest:
+    """Request to end a flight in order, or at once if it is repeated."""
 
-    def __init__(self):
+    def __init__(self) -> None:
         self.count = 0
-        self._before: dict[int, object] = {}
+
+    def repeat(self, *_) -> None:
+        """Count one more request."""
+        self.count += 1
 
     @property
     def raised(self) -> bool:
-        """Whether a signal was received: the flight has to end."""
+        """Whether the flight has to end."""
         return self.count > 0
 
     @property
     def impatient(self) -> bool:
-        """Whether a second signal was received: the flight has to end at once."""
+        """Whether the flight has to end at once."""
         return self.count > 1
 
-    def _note(self, *_) -> None:
-        self.count += 1
+
+class Interrupts(StopRequest):
+    """Context manager that counts SIGINT, SIGTERM and SIGHUP instead of their normal effect."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self._before: dict[int, object] = {}
 
     def __enter__(self) -> Interrupts:
-        self._before = {number: signal.signal(number, self._note) for number in SIGNALS}
+        self._before = {number: signal.signal(number, self.repeat) for number in SIGNALS}
         return self
 
     def __exit__(self, *exception) -> None:

@@ -7,6 +7,7 @@ from pathlib import Path
 
 from uam_control.settings import configuration
 from uam_lab.processes import thread_stop
+from uam_lab.processes.borrowed_environment import copied
 from uam_lab.processes.child import SINGLE_THREAD
 
 PROFILES_FILE = "FASTRTPS_DEFAULT_PROFILES_FILE"
@@ -15,7 +16,7 @@ FAST_DDS = "fastrtps"  # in the names of its middlewares
 
 def environment(domain: int, log_folder: Path) -> dict[str, str]:
     """Return the environment of the children: a private, local ROS domain and one thread each."""
-    return {**os.environ, **ros_environment(domain, log_folder), **SINGLE_THREAD}
+    return {**copied(), **ros_environment(domain, log_folder), **SINGLE_THREAD}
 
 
 def ros_environment(domain: int, log_folder: Path) -> dict[str, str]:

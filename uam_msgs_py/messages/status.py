@@ -151,9 +151,10 @@ class MissionStatus(_Status):
     state: str = "grounded"
     cause: str = ""
     regains: int = 0
+    tilt: float = 0.0
 
     NAME = "mission"
-    LATER = ("state", "cause", "regains")
+    LATER = ("state", "cause", "regains", "tilt")
 
     @property
     def level(self) -> bytes:

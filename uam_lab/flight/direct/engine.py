@@ -1,4 +1,4 @@
-"""`uam fly --engine direct`: one flight of the direct engine, with progress and outcome."""
+"""One flight of the direct engine, with progress and outcome."""
 
 from __future__ import annotations
 
@@ -9,20 +9,19 @@ import numpy as np
 from uam_control.coordinates import ARM, ATTITUDE, POSITION
 from uam_control.maths.rotations import wrap_angle
 from uam_lab.flight.direct.flight import DirectFlight
-from uam_lab.flight.direct.warm_up import is_cold, warm_up
 from uam_lab.flight.flight_settings import FlightSettings
-from uam_lab.flight.progress import Progress, Status
-from uam_lab.processes.interrupts import Interrupts
+from uam_lab.flight.observer import FlightStatus, Observer
+from uam_lab.processes.interrupts import StopRequest
 from uam_lab.results.outcome import Outcome, transitions
 from uam_lab.results.result_folder import ResultFolder
 from uam_sim_bridge.plant import Vehicle
 
 
-def fly(settings: FlightSettings, folder: ResultFolder, progress: Progress) -> Outcome:
-    """Fly until the mission is done or the user interrupts."""
-    if is_cold():
-        progress.message("compiling the control path (once)")
-        warm_up()
+def fly(
+    settings: FlightSettings, folder: ResultFolder, observer: Observer, stop: StopRequest
+) -> Outcome:
+    """Fly until the mission is done or a stop is requested."""
+    observer.started(None)
     vehicle = Vehicle.of(settings.vehicle).changed(settings.vehicle_changes)
     flight = DirectFlight(
         settings.scenario,
@@ -35,11 +34,10 @@ def fly(settings: FlightSettings, folder: ResultFolder, progress: Progress) -> O
     )
     folder.write_parameters({node: vars(values) for node, values in settings.profile.sets.items()})
     begin = time.monotonic()
-    with Interrupts() as stop:
-        try:
-            flight.run(lambda *_: _report(flight, begin, progress, stop))
-        except _Stopped:
-            pass
+    try:
+        flight.run(lambda *_: _report(flight, begin, observer, stop))
+    except _Stopped:
+        pass
     output = flight.mission.output
     return Outcome(
         series=flight.recording.series() if flight.recording.count else None,
@@ -53,10 +51,10 @@ def fly(settings: FlightSettings, folder: ResultFolder, progress: Progress) -> O
 
 
 class _Stopped(Exception):
-    """The user interrupted the flight."""
+    """A stop was requested."""
 
 
-def _report(flight: DirectFlight, begin: float, progress: Progress, stop: Interrupts) -> None:
+def _report(flight: DirectFlight, begin: float, observer: Observer, stop: StopRequest) -> None:
     """Show where the flight is; called once a simulated second. Raises _Stopped."""
     if stop.raised:
         raise _Stopped
@@ -70,12 +68,13 @@ def _report(flight: DirectFlight, begin: float, progress: Progress, stop: Interr
     error[ATTITUDE.start :] = wrap_angle(error[ATTITUDE.start :])
     norms = [float(np.linalg.norm(error[part])) for part in (POSITION, ATTITUDE, ARM)]
     wall = time.monotonic() - begin
-    progress.update(
-        Status(
+    observer.update(
+        FlightStatus(
             phase=output.phase,
             time=output.time,
             position_error=norms[0] * output.flying,
             attitude_error=norms[1] * output.flying,
+            tilt=0.0,
             arm_error=norms[2],
             real_time_factor=flight.plant.time / wall if wall > 0.0 else 0.0,
         )

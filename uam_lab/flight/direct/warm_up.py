@@ -7,7 +7,7 @@ all of them are there and up to date, nothing is compiled.
 from __future__ import annotations
 
 import sys
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 
 from uam_control.laws.catalogue import LAWS
 from uam_control.mission import load_scenario
@@ -34,6 +34,13 @@ def compiled_functions() -> Iterator:
 def is_cold() -> bool:
     """Return whether a function of the control path is not compiled from its present source."""
     return not all(function._cache.filled for function in compiled_functions())
+
+
+def prepare(say: Callable[[str], None] = lambda text: None) -> None:
+    """Compile the control path unless it is compiled; say: called before that takes its time."""
+    if is_cold():
+        say("compiling the control path (once)")
+        warm_up()
 
 
 def warm_up(laws: Iterable[str] = tuple(LAWS)) -> None:

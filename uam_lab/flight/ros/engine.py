@@ -12,16 +12,15 @@ from pathlib import Path
 
 from uam_control.profiles.profile import CONTROLLERS
 from uam_lab.cockpit import page_address
-from uam_lab.flight.direct.warm_up import is_cold, warm_up
 from uam_lab.flight.flight_settings import ONLOOKERS, FlightSettings
-from uam_lab.flight.progress import Progress
+from uam_lab.flight.observer import FlightStatus, Observer
 from uam_lab.flight.ros import node_arguments
 from uam_lab.flight.ros.logged_outcome import read_outcome
 from uam_lab.flight.ros.process_fault_injection import ProcessFaults
 from uam_lab.flight.ros.restarts import ChangedParameters, RestartTopic
 from uam_lab.flight.ros.status_listener import StatusListener
 from uam_lab.processes import child
-from uam_lab.processes.interrupts import Interrupts
+from uam_lab.processes.interrupts import StopRequest
 from uam_lab.processes.node_environment import environment
 from uam_lab.processes.process_table import await_orphans
 from uam_lab.processes.processes import NodeFailed, Processes
@@ -36,46 +35,39 @@ from uam_sim_bridge.ports import Ports, Reservation
 
 AUTOPILOT = "autopilot"
 FORKER = "uam_lab.flight.ros.forker"
-# Each child process imports its parent's main module again: the command and these modules.
-COMMANDS = [
-    f"uam_lab.cli.{name}"
-    for name in "campaign compare doctor faults fly operate profile report tune view".split()
-]
 RESTARTS = 3  # of each controller in a flight
 POLL = 0.05  # [s]
 
 
-def fly(settings: FlightSettings, folder: ResultFolder, progress: Progress) -> Outcome:
-    """Fly, and record to `folder`; a failure or Ctrl-C keeps the recording so far.
+def fly(
+    settings: FlightSettings, folder: ResultFolder, observer: Observer, stop: StopRequest
+) -> Outcome:
+    """Fly, and record to `folder`; a failure or a requested stop keeps the recording so far.
 
     Raises PortError if no instance is free.
     """
     (folder.path / "logs").mkdir(exist_ok=True)
     own_autopilot = not node_arguments.users_autopilot(settings)
     with Reservation(settings.instance, own_autopilot=own_autopilot) as reservation:
-        if is_cold():
-            progress.message("compiling the control path (once)")
-            warm_up()
-        child.prepare([*node_arguments.modules(settings).values(), FORKER, *COMMANDS])
-        await_orphans(progress.message)
-        with Interrupts() as stop:
-            ports = reservation.ports
-            sections = node_arguments.parameters(settings, folder, ports)
-            folder.write_parameters(sections)
-            node_arguments.write_facts(settings, folder)
-            if wiring.COCKPIT in sections:
-                port = sections[wiring.COCKPIT]["port"]
-                progress.message(f"cockpit: {page_address.address(page_address.LOCAL, port)}")
-            failure = _supervise(settings, folder, ports, progress, stop)
-            if failure is not None and failure.status == NOT_READY and not settings.foreign:
-                # on an overloaded machine the middleware may fail to connect all nodes
-                progress.message(f"{failure}; starting again")
-                _keep_logs(folder.path / "logs")
-                failure = _supervise(settings, folder, ports, progress, stop)
+        child.prepare([*node_arguments.modules(settings).values(), FORKER])
+        await_orphans(observer.message)
+        ports = reservation.ports
+        sections = node_arguments.parameters(settings, folder, ports)
+        folder.write_parameters(sections)
+        node_arguments.write_facts(settings, folder)
+        if wiring.COCKPIT in sections:
+            port = sections[wiring.COCKPIT]["port"]
+            observer.message(f"cockpit: {page_address.address(page_address.LOCAL, port)}")
+        last: list[FlightStatus] = []
+        failure = _supervise(settings, folder, ports, observer, stop, last)
+        if failure is not None and failure.status == NOT_READY and not settings.foreign:
+            # on an overloaded machine the middleware may fail to connect all nodes
+            observer.message(f"{failure}; starting again")
+            _keep_logs(folder.path / "logs")
+            failure = _supervise(settings, folder, ports, observer, stop, last)
     outcome = read_outcome(settings, folder, failure, stop.raised)
-    last = progress.last
-    if outcome.failure and failure is None and last is not None and last.time < 0.0:
-        outcome.failure = f"no take-off ({outcome.failure}); autopilot {last.autopilot}"
+    if outcome.failure and failure is None and last and last[-1].time < 0.0:
+        outcome.failure = f"no take-off ({outcome.failure}); autopilot {last[-1].autopilot}"
     return outcome
 
 
@@ -91,38 +83,45 @@ def _supervise(
     settings: FlightSettings,
     folder: ResultFolder,
     ports: Ports,
-    progress: Progress,
-    stop: Interrupts,
+    observer: Observer,
+    stop: StopRequest,
+    last: list[FlightStatus],
 ) -> NodeFailed | None:
-    """Start all processes, watch them until the plant ends, stop them; return the failure."""
+    """Start all processes, watch them until the plant ends, stop them; return the failure.
+
+    last: receives the newest status.
+    """
     logs = folder.path / "logs"
     surroundings = environment(ports.domain, logs)
+    common = node_arguments.common_remappings(settings)
     with Processes(logs, surroundings) as children:
         children.hurry = lambda: stop.impatient
         try:
             _start(children, settings, folder, ports)
-            progress.message(
+            observer.message(
                 f"{len(children.names)} processes in ROS domain {ports.domain}, "
                 f"autopilot on TCP {ports.simulator_tcp}, UDP {ports.autopilot_udp}"
             )
             for name in settings.foreign:
-                progress.message(f"waiting for {name}: start it with ROS_DOMAIN_ID={ports.domain}")
+                observer.message(f"waiting for {name}: start it with ROS_DOMAIN_ID={ports.domain}")
             if not settings.auto_start and not settings.dry_run:
-                progress.message(
-                    "waiting for uam start: a real autopilot arms by itself only with --arm"
-                )
+                real = settings.link is not None and settings.link.real
+                why = ": a real autopilot arms by itself only with --arm" if real else ""
+                observer.message(f"waiting for uam start{why}")
             with (
-                StatusListener(surroundings, ports.domain) as listener,
-                _process_faults(settings, children, listener, progress) as faults,
+                StatusListener(surroundings, ports.domain, common) as listener,
+                _process_faults(settings, children, listener, observer) as faults,
             ):
-                _watch(children, listener, progress, stop, faults)
+                observer.started(ports.domain)
+                _watch(children, listener, observer, stop, faults)
+                last[:] = listener.newest
         except NodeFailed as failure:
             return failure
         finally:
             others = [name for name in children.names if name != wiring.RECORDER]
             disobedient = children.stop(others) + children.stop([wiring.RECORDER])
             if disobedient and not stop.impatient:
-                progress.message(f"did not stop and were killed: {', '.join(disobedient)}")
+                observer.message(f"did not stop and were killed: {', '.join(disobedient)}")
     return None
 
 
@@ -136,7 +135,7 @@ def _start(
         children.start(
             name,
             module,
-            arguments,
+            arguments + node_arguments.remappings(settings, name),
             may_end=name == wiring.PLANT,
             optional=name in ONLOOKERS,
             again=RESTARTS if name in CONTROLLERS else 0,
@@ -147,7 +146,7 @@ def _start(
 
 
 def _process_faults(
-    settings: FlightSettings, children: Processes, listener: StatusListener, progress: Progress
+    settings: FlightSettings, children: Processes, listener: StatusListener, observer: Observer
 ) -> ProcessFaults:
     """Return the process faults; their start and end are printed and recorded."""
     schedule = settings.faults.only(PROCESS)
@@ -155,7 +154,7 @@ def _process_faults(
 
     def announce(one: FaultState) -> None:
         stage = f"begins at {one.begin:.2f} s" if one.active else f"ends at {one.end:.2f} s"
-        progress.message(f"fault {one.fault.NAME} of {one.fault.values['node']} {stage}")
+        observer.message(f"fault {one.fault.NAME} of {one.fault.values['node']} {stage}")
         topic.publish(listener.stamp, [one])
 
     return ProcessFaults(children, schedule, announce)
@@ -164,8 +163,8 @@ def _process_faults(
 def _watch(
     children: Processes,
     listener: StatusListener,
-    progress: Progress,
-    stop: Interrupts,
+    observer: Observer,
+    stop: StopRequest,
     faults: ProcessFaults,
 ) -> None:
     """Show the progress until the plant ends or the user stops it. Raises NodeFailed."""
@@ -174,16 +173,15 @@ def _watch(
         changed.poll()
         for lost in children.revive(changed.arguments):
             text = f"{lost}; restarted"
-            progress.message(text)
+            observer.message(text)
             restarts.publish(listener.stamp, lost.name, text)
         children.check()
         for failure in children.missed():
-            progress.message(f"{failure}; the flight continues without it")
-        status = listener.poll()
+            observer.message(f"{failure}; the flight continues without it")
+        for status in listener.poll():
+            observer.update(status)
         faults.update(listener.mission_time)
-        if status is not None:
-            progress.update(status)
         time.sleep(POLL)
-    progress.finish()
+    observer.finish()
     if not stop.raised:
         children.check()

@@ -8,8 +8,9 @@ from typing import Any
 
 from uam_control.mission.time_limit import time_limit
 from uam_lab.cockpit import page_address
-from uam_lab.flight.conclude import command_line, settings_facts
+from uam_lab.flight.conclude import settings_facts
 from uam_lab.flight.flight_settings import BUILTIN, FlightSettings
+from uam_lab.flight.node_options import EVERY_NODE
 from uam_lab.recording import log_facts
 from uam_lab.results.result_folder import ResultFolder, as_json, versions
 from uam_msgs_py.node import wiring
@@ -97,6 +98,9 @@ def parameters(
         "facts": str(folder.path / "logs" / FACTS),
         "size_limit": settings.log_limit,
     }
+    for node, values in settings.parameters.items():
+        if node in sections:
+            sections[node] |= values
     for node in DESCRIBED & sections.keys():
         sections[node]["vehicle"] = settings.vehicle.source
     return sections
@@ -108,7 +112,7 @@ def write_facts(settings: FlightSettings, folder: ResultFolder) -> None:
         folder.parameters.name: folder.parameters.read_text(),
         folder.versions.name: as_json(versions()),
     }
-    known = settings_facts(settings, command_line())
+    known = settings_facts(settings)
     log_facts.write(folder.path / "logs" / FACTS, known, scenario_source(settings), texts)
 
 
@@ -121,6 +125,21 @@ def scenario_source(settings: FlightSettings) -> str:
 def modules(settings: FlightSettings) -> dict[str, str]:
     """Return the nodes of a flight: executable → module."""
     return {name: module for name, module in MODULES.items() if name not in settings.without}
+
+
+def remappings(settings: FlightSettings, node: str) -> list[str]:
+    """Return the ROS arguments with the remappings of a node; those of its own come first."""
+    names = settings.remappings.get(node, {}) | {
+        old: new
+        for old, new in settings.remappings.get(EVERY_NODE, {}).items()
+        if old not in settings.remappings.get(node, {})
+    }
+    return [word for old, new in names.items() for word in ("-r", f"{old}:={new}")]
+
+
+def common_remappings(settings: FlightSettings) -> list[str]:
+    """Return the ROS arguments with the remappings of every node."""
+    return remappings(settings, EVERY_NODE)
 
 
 def _time_limit(settings: FlightSettings) -> float:

@@ -1,4 +1,4 @@
-"""Switches the profile in flight: all nodes apply it, or none.
+"""Changes parameters in flight, as a whole profile: all nodes apply them, or none.
 
 First every node checks its values (`~/check_parameters`, without any change). If all accept, each
 node receives its values in one request and applies them between two ticks. If a node still
@@ -47,14 +47,18 @@ class ProfileSwitch:
 
         Raises SwitchRefused without any change.
         """
-        desired = _desired(profile)
+        return self.change(_desired(profile))
+
+    def change(self, desired: Mapping[str, Values]) -> dict[str, dict[str, tuple[Any, Any]]]:
+        """Set parameters, node → name → value; otherwise as `switch`."""
         old = self._current(desired)
         new = {
             node: {name: value for name, value in values.items() if value != old[node].get(name)}
             for node, values in desired.items()
         }
         new = {node: values for node, values in new.items() if values}
-        self._all_accept(self._ask(CHECK, new))
+        if len(new) > 1:
+            self._all_accept(self._ask(CHECK, new))
         answers = self._ask(APPLY, new)
         try:
             self._all_accept(answers)
@@ -82,7 +86,9 @@ class ProfileSwitch:
             node: dict(zip(own, map(plain, found[node].values), strict=True))
             for node, own in names.items()
         }
-        laws = {node: current[node].get("law") for node in CONTROLLERS}
+        laws = {
+            node: current[node].get("law") for node in CONTROLLERS if "law" in desired.get(node, ())
+        }
         self._all_accept({
             node: f"the active law {law} cannot change to {desired[node]['law']} in flight"
             for node, law in laws.items() if law != desired[node]["law"]

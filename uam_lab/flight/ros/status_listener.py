@@ -3,50 +3,66 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
+
+from diagnostic_msgs.msg import DiagnosticArray
+from rclpy.qos import QoSProfile
 
 from uam_control.stamps import SECOND
-from uam_lab.flight.progress import Status
+from uam_lab.flight.observer import FlightStatus
 from uam_lab.processes.guest import Guest
 from uam_msgs_py.messages import topics
 from uam_msgs_py.messages.status import AutopilotState, MissionStatus
 from uam_msgs_py.node.polling import listen, messages
 
+# The topic keeps one message; here no change of phase may be lost between two polls.
+EVERY_STATUS = QoSProfile(
+    depth=topics.DEPTH,
+    reliability=topics.MISSION_STATUS.qos.reliability,
+    durability=topics.MISSION_STATUS.qos.durability,
+)
+
 
 class StatusListener(Guest):
     """Context manager with a node in a separate ROS context; polled, so it needs no executor."""
 
-    def __init__(self, environment: Mapping[str, str], domain: int):
-        """environment: of the flight's processes; ROS reads some of its variables here too."""
-        super().__init__("uam_fly", environment, domain)
-        self._mission = listen(self.node, topics.MISSION_STATUS)
+    def __init__(self, environment: Mapping[str, str], domain: int, arguments: Sequence[str] = ()):
+        """See `Guest`."""
+        super().__init__("uam_fly", environment, domain, arguments=arguments)
+        self._mission = listen(self.node, topics.MISSION_STATUS, EVERY_STATUS)
         self._autopilot = listen(self.node, topics.AUTOPILOT_STATE)
-        self._autopilot_text = ""
+        self._state = AutopilotState()
+        self._heard = False  # whether the autopilot's state is known
         self._last: tuple[float, float] | None = None  # simulated and wall time [s]
+        self.newest: list[FlightStatus] = []  # at most one
         self.stamp, self.mission_time = 0, None  # [ns], [s] of the newest status after take-off
 
-    def poll(self) -> Status | None:
-        """Return the newest status, None without a new one since the last call."""
+    def poll(self) -> list[FlightStatus]:
+        """Return the status messages received since the last call."""
         for message in messages(self._autopilot):
-            _, state = AutopilotState.from_message(message)
-            reasons = f": {state.reasons}" if state.reasons else ""
-            self._autopilot_text = f"{state.summary}{reasons}"
-        newest = None
-        for message in messages(self._mission):
-            newest = message
-        if newest is None:
-            return None
-        stamp, mission = MissionStatus.from_message(newest)
+            self._state, self._heard = AutopilotState.from_message(message)[1], True
+        found = [self._status(message) for message in messages(self._mission)]
+        self.newest = found[-1:] or self.newest
+        return found
+
+    def _status(self, message: DiagnosticArray) -> FlightStatus:
+        stamp, mission = MissionStatus.from_message(message)
         if mission.time >= 0.0:
             self.stamp, self.mission_time = stamp, mission.time
-        return Status(
+        state = self._state
+        reasons = f": {state.reasons}" if state.reasons else ""
+        return FlightStatus(
             phase=mission.phase,
             time=mission.time,
             position_error=mission.position_error,
             attitude_error=mission.attitude_error,
             arm_error=mission.arm_error,
+            tilt=mission.tilt,
             real_time_factor=self._real_time_factor(stamp / SECOND),
-            autopilot=self._autopilot_text,
+            autopilot=f"{state.summary}{reasons}" if self._heard else "",
+            state=mission.state,
+            cause=mission.cause,
+            released_to=state.released_to,
         )
 
     def _real_time_factor(self, simulated: float) -> float:
