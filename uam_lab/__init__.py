@@ -17,7 +17,7 @@ OFFERED = {
     "FlightStatus": "flight",
     "Observer": "flight",
     "FlightError": "errors",
-    "FlightFailed": "errors",
+    "FlightFailed": "flight_result",
     "FlightEnded": "errors",
     "CommandRefused": "errors",
     "NotInTime": "errors",

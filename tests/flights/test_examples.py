@@ -51,3 +51,37 @@ def test_the_scenario_of_ones_own_is_flown(fly):
     assert flight.wait() == 0, flight.said + flight.complained
     found = json.loads((flight.out / "metrics.json").read_text())
     assert found["mission_completed"] and found["scenario"] == "own_scenario"
+
+
+def run(example: str, *arguments: object) -> str:
+    """Run an example; return its output."""
+    command = [sys.executable, EXAMPLES / example, *map(str, arguments)]
+    done = subprocess.run(
+        command, capture_output=True, text=True, timeout=PATIENCE, check=False, cwd=ROOT
+    )
+    assert done.returncode == 0, done.stdout + done.stderr
+    return done.stdout
+
+
+def test_a_gain_is_swept(tmp_path):
+    rows = run("sweep_gain.py", tmp_path).splitlines()[1:]
+    assert len(rows) == 3 and all(row.endswith("True") for row in rows)
+    figures = [json.loads(file.read_text()) for file in tmp_path.glob("*/metrics.json")]
+    errors = {tuple(one["rms"]["position_m"]) for one in figures}
+    assert len(errors) == 3, "each gain has errors of its own"
+
+
+def test_two_vehicles_fly_at_once(tmp_path, short_scenario):
+    said = run("two_vehicles.py", tmp_path, short_scenario)
+    assert "follower: arming" in said
+    assert "leader True" in said and "follower True" in said
+    one, other = said.split("domains ")[1].splitlines()[0].split()
+    assert one != other
+
+
+@pytest.mark.parametrize("engine", ["direct", "ros"])
+def test_the_simulator_of_ones_own_flies(engine, tmp_path, short_scenario):
+    said = run("own_simulator.py", tmp_path, engine, short_scenario)
+    found = json.loads((tmp_path / "metrics.json").read_text())
+    assert found["mission_completed"] and str(found["rms"]) in said
+    assert max(found["max"]["arm_deg"]) == 0.0, "its arm stands still"

@@ -15,6 +15,7 @@ from uam_lab.flight.flight_settings import settings
 from uam_lab.flight.progress import Progress
 from uam_lab.flight.ros import engine as ros_engine
 from uam_lab.flight.ros import node_arguments as ros_parameters
+from uam_lab.processes.interrupts import StopRequest
 from uam_lab.results import timeseries
 from uam_lab.results.result_folder import ResultFolder
 from uam_sim_bridge.ports import Reservation
@@ -130,7 +131,7 @@ def test_who_does_not_find_the_others_is_started_once_more(short_scenario, tmp_p
     monkeypatch.setattr(ros_parameters, "START_TIMEOUT", 0.1)
     with (tmp_path / "said").open("w+") as said, Progress(Console(file=said, width=400)) as shown:
         requested = settings(scenario=str(short_scenario))
-        flown = ros_engine.fly(requested, ResultFolder(tmp_path), shown)
+        flown = ros_engine.fly(requested, ResultFolder(tmp_path), shown, StopRequest())
         said.seek(0)
         text = said.read()
     assert text.count("processes in ROS domain") == 2

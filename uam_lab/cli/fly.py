@@ -15,8 +15,8 @@ from uam_lab.flight import flight_settings
 from uam_lab.flight.conclude import command_line
 from uam_lab.flight.flight_settings import LOG_LIMIT, ONLOOKERS, REPLACEABLE, FlightSettings
 from uam_lab.flight.progress import Progress
-from uam_lab.library.errors import FlightFailed
 from uam_lab.library.flight import Flight
+from uam_lab.library.flight_result import FlightFailed
 from uam_lab.processes.interrupts import Interrupts
 from uam_lab.report.build import build_report
 from uam_lab.report.page.console import reporting, summary

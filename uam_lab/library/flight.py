@@ -20,8 +20,8 @@ from uam_lab.flight.conclude import conclude
 from uam_lab.flight.direct.warm_up import prepare
 from uam_lab.flight.flight_settings import FlightSettings, SettingsError
 from uam_lab.flight.observer import FlightStatus, Observer
-from uam_lab.library.errors import FlightEnded, FlightError, FlightFailed, NotInTime
-from uam_lab.library.flight_result import FlightResult
+from uam_lab.library.errors import FlightEnded, FlightError, NotInTime
+from uam_lab.library.flight_result import FlightFailed, FlightResult
 from uam_lab.library.history import Condition, History
 from uam_lab.processes.interrupts import StopRequest
 from uam_lab.results.outcome import Outcome

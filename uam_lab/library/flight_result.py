@@ -85,3 +85,14 @@ class FlightResult:
         if self.metrics is None:
             raise FlightError(f"no report: {self.reason}")
         return build_report(self.folder, video=video).page
+
+
+class FlightFailed(FlightError):
+    """A technical failure ended the flight, for instance the loss of a node.
+
+    result: of the flight up to then.
+    """
+
+    def __init__(self, reason: str, result: FlightResult) -> None:
+        super().__init__(reason)
+        self.result = result

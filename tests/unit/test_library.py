@@ -1,0 +1,105 @@
+"""The library's options and errors, and flights of the direct engine."""
+
+import numpy as np
+import pytest
+
+from uam_control.settings.parameter_file import ProfileError
+from uam_lab import Flight, FlightError, NotInTime
+from uam_lab.flight.flight_settings import SettingsError
+from uam_lab.flight.observer import FlightStatus, Observer
+from uam_lab.library.history import History
+from uam_lab.results.result_folder import ResultFolderError
+
+
+@pytest.mark.parametrize(
+    ("options", "why"),
+    [
+        ({"scenari": "hover"}, "unknown option 'scenari'; there are: scenario, "),
+        ({"parameters": {"pilot": {}}}, "unknown node 'pilot'; there are: position_controller"),
+        ({"parameters": {"mission": 3}}, "parameters of mission: name → value expected"),
+        ({"parameters": {"mission": {"scenario": "hover"}}}, "follows from the other options"),
+        ({"parameters": {"scene": {"frame_rate": 5.0}}, "engine": "direct"}, "has no scene"),
+        ({"remappings": {"goal_pose": "goal"}, "engine": "direct"}, "has no topics"),
+        ({"remappings": {"goal_pose": ""}}, "two names"),
+        ({"remappings": {"pilot": {"a": "b"}}}, "unknown node 'pilot'"),
+    ],
+)
+def test_wrong_options_are_refused_in_one_line(options, why):
+    with pytest.raises(SettingsError) as refused:
+        Flight(**options)
+    assert why in str(refused.value) and "\n" not in str(refused.value)
+
+
+def test_a_parameter_is_checked_like_a_profile():
+    with pytest.raises(ProfileError, match="position_controller: lambda_1"):
+        Flight(parameters={"position_controller": {"lambda_1": [-1.0, 1.0, 1.0]}})
+
+
+def test_parameters_replace_single_values_of_the_profile():
+    plain = Flight().settings
+    changed = Flight(
+        parameters={
+            "position_controller": {"lambda_1": np.array([1.0, 2.0, 3.0])},
+            "mavlink_bridge": {"setpoint": "attitude"},
+            "scene": {"frame_rate": 5.0},
+        }
+    ).settings
+    before, after = (s.profile.sets["position_controller"] for s in (plain, changed))
+    assert after.lambda_1 == (1.0, 2.0, 3.0) and after.lambda_2 == before.lambda_2
+    assert changed.profile.sets["arm_controller"] == plain.profile.sets["arm_controller"]
+    assert changed.profile.bridge()["setpoint"] == "attitude"
+    assert changed.profile.name == plain.profile.name
+    assert changed.parameters == {"scene": {"frame_rate": 5.0}}
+
+
+def test_a_flight_of_the_direct_engine(tmp_path, capfd):
+    flight = Flight(scenario="hover", engine="direct", out=tmp_path)
+    with pytest.raises(FlightError, match="not launched"):
+        flight.wait()
+    with flight:
+        for act in (lambda: flight.wait_for("land"), flight.hold, lambda: flight.node("planner")):
+            with pytest.raises(FlightError, match="needs engine='ros'"):
+                act()
+        with pytest.raises(NotInTime):
+            flight.wait(0.0)
+        result = flight.wait()
+    assert result.completed and not flight.running and flight.domain is None
+    frame = pytest.importorskip("pandas") and result.frame()
+    assert len(frame) == len(result["time"]) and set(frame["phase"]) >= {"waiting", "landed"}
+    assert np.array_equal(frame["error.x"], result["error.x"])
+    assert capfd.readouterr() == ("", "")
+    with pytest.raises(ResultFolderError, match="already contains a flight"):
+        Flight(scenario="hover", engine="direct", out=tmp_path).launch()
+
+
+def test_two_flights_of_the_direct_engine_at_once_are_those_of_single_ones(tmp_path):
+    def options(name):
+        return {"scenario": "hover", "engine": "direct", "out": tmp_path / name, "seed": 5}
+
+    with Flight(**options("a")) as a, Flight(**options("b")) as b:
+        first, second = a.wait(), b.wait()
+    assert np.array_equal(first.series.values, second.series.values, equal_nan=True)
+
+
+def status(phase: str) -> FlightStatus:
+    return FlightStatus(phase, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0)
+
+
+def test_a_status_is_found_once_and_the_newest_again():
+    history = History(Observer())
+
+    def found(phase):
+        return history.found(lambda one: one.phase == phase)
+
+    assert found("pick") is None
+    for phase in ("approach", "pick", "carry"):
+        history.update(status(phase))
+    assert found("pick").phase == "pick"
+    assert found("approach") is None and found("carry").phase == "carry"
+    assert found("carry").phase == "carry", "it is the newest"
+    history.update(status("place"))
+    assert found("carry") is None and found("place").phase == "place"
+    history.update(status("carry"))
+    history.update(status("land"))
+    history.forget()
+    assert found("carry") is None and found("land").phase == "land"
