@@ -13,7 +13,7 @@ from uam_sim_bridge.autopilot.core import Autopilot
 from uam_sim_bridge.autopilot.server import Server, UdpPort
 from uam_sim_bridge.mavlink.hil.hil_server import HilParameters, HilServer
 from uam_sim_bridge.mavlink.link.link import OffboardLink
-from uam_sim_bridge.mavlink.offboard.sequence import OffboardSequence
+from uam_sim_bridge.mavlink.offboard.sequence import OffboardSequence, Phase
 from uam_sim_bridge.mavlink.offboard.setpoint import RateThrustMap, SetpointRefused
 from uam_sim_bridge.mavlink.offboard.thrust_identification import ThrustIdentification
 from uam_sim_bridge.mavlink.protocol.attitude_target import AttitudeTarget
@@ -80,7 +80,8 @@ class Bridge:
         self._ticks += 1
         if self._ticks % REBORN == 0:
             self._begin()
-        if self._ticks % 400 == 100:
+        failed = self._sequence.phase is Phase.FAILED or not self._armed_desired
+        if self._ticks % 400 == 100 or (failed and self._ticks % 20 == 0):  # a new start
             self._armed_desired = not self._armed_desired
             self._sequence.set_desired(self._armed_desired)
         now = self._ticks * PERIOD

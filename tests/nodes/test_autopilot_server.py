@@ -14,7 +14,7 @@ from quadrotor import MASS, Quadrotor
 from uam_control.vehicle import load_description
 from uam_sim_bridge.mavlink.hil.hil_server import HilError, HilParameters, HilServer
 from uam_sim_bridge.mavlink.link.link import OffboardLink
-from uam_sim_bridge.mavlink.offboard.sequence import OffboardSequence, Phase
+from uam_sim_bridge.mavlink.offboard.sequence import OffboardParameters, OffboardSequence, Phase
 from uam_sim_bridge.mavlink.offboard.setpoint import RateThrustMap, RateThrustParameters
 from uam_sim_bridge.mavlink.protocol.attitude_target import AttitudeTarget
 from uam_sim_bridge.mavlink.protocol.frames import swap_body
@@ -54,7 +54,7 @@ class Flight:
             self.local,
             *arguments,
         )
-        self.sequence = OffboardSequence()
+        self.sequence = OffboardSequence(OffboardParameters(return_after_lost_link=True))
         self.link = OffboardLink(
             UdpTransport(self.local, ("127.0.0.1", self.udp)),
             self.sequence,
@@ -76,6 +76,7 @@ class Flight:
         if self.vision and self.ticks % 5 == 0:
             link.send_vision(VisionPose(body.time, body.position, body.quaternion, 0.005, 0.02))
         if self.streaming and self.sequence.streaming:
+            self.sequence.streamed(body.time)
             link.send_setpoint(
                 AttitudeTarget.of_rates(swap_body(np.array(rates, float)), thrust), body.time
             )

@@ -15,7 +15,7 @@ from uam_sim_bridge.mavlink.protocol.modes import Mode
 
 
 def test_bad_commands_in_flight_hold_level_then_the_failsafe_acts(make_rig):
-    rig = make_rig("-p", "hold_braking:=0.0")
+    rig = make_rig("-p", "hold_braking:=0.0", "-p", "return_after_lost_link:=true")
     rig.fly()
     thrusts = []
     for _ in range(200):
@@ -70,7 +70,7 @@ def test_idle_high_up_is_not_thrust_zero(make_rig):
 
 def test_states_without_commands_hold_level_then_the_failsafe_acts(make_rig):
     """Without a controller the states continue; the bridge counts time by their stamps."""
-    rig = make_rig()
+    rig = make_rig("-p", "return_after_lost_link:=true")
     rig.fly()
     stopped, thrusts, rolls = rig.count, [], []
     tilted = np.zeros((3, 8))

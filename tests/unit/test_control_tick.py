@@ -12,7 +12,7 @@ from uam_control.mission import load_scenario
 from uam_control.profiles.profile import load_profile
 from uam_control.stages.timing import Timing
 from uam_control.vehicle import load_description
-from uam_sim_bridge.mavlink.offboard.sequence import OffboardSequence, Request
+from uam_sim_bridge.mavlink.offboard.sequence import OffboardSequence, Reported, Request
 from uam_sim_bridge.mavlink.protocol.modes import Mode
 from uam_sim_bridge.stages.bridge_stage import BridgeSets, BridgeStage
 from uam_sim_bridge.stages.control_tick import STAGES, ControlTick
@@ -39,7 +39,7 @@ class Port:
         pass
 
     def tick(self, time):
-        request = self.sequence.update(time, True, self.armed, self.mode)
+        request = self.sequence.update(time, Reported(True, self.armed, self.mode))
         if request is Request.OFFBOARD:
             self.mode = Mode.OFFBOARD
         elif request is not None:

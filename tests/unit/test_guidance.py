@@ -168,3 +168,105 @@ def test_a_state_that_is_not_finite_does_not_move_the_reference():
     before = guide.reference.copy()
     guide.drift(110.0, np.full((3, 8), np.nan))
     np.testing.assert_array_equal(guide.reference, before)
+
+
+ACROSS, HEIGHT, TURN, SPEED = (
+    st.floats(-2.0, 2.0), st.floats(0.5, 2.0), st.floats(-3.0, 3.0), st.floats(-0.5, 0.5)
+)  # fmt: skip
+FLOWN = st.tuples(ACROSS, ACROSS, HEIGHT, TURN, SPEED, SPEED, SPEED)
+
+
+def state_of(flown):
+    """Return a state (3, 8) of position [m], yaw [rad] and velocity [m/s]."""
+    state = np.zeros((3, 8))
+    state[0, :3], state[0, 5], state[1, :3] = flown[:3], flown[3], flown[4:]
+    return state
+
+
+def release(guide, begin, state, length=5.0, stow=False):
+    """Stop at 100 + `begin` s, follow `state` for `length` s; return the stamp after it."""
+    fly(guide, begin - 0.1, begin)
+    guide.stop(100.0 + begin, stow)
+    fly(guide, begin, begin + length)
+    guide.follow(100.0 + begin + length, state)
+    np.testing.assert_array_equal(guide.reference[0, :3], state[0, :3])
+    assert guide.reference[0, 5] == state[0, 5]
+    np.testing.assert_array_equal(guide.reference[1:, :6], 0.0)
+    return begin + length
+
+
+@settings(deadline=None, max_examples=20, phases=NO_SHRINKING)
+@given(st.floats(0.5, 80.0), FLOWN, st.floats(0.02, 6.0), st.booleans())
+def test_after_a_release_it_begins_at_pose_and_velocity_and_returns_to_the_path(
+    at, flown, held, stow
+):
+    guide, state = guidance(), state_of(flown)
+    back = release(guide, at, state, stow=stow)
+    guide.advance(100.0 + back)
+    guide.stay(100.0 + back, state, START[2])
+    np.testing.assert_allclose(guide.reference[0, :3], state[0, :3], atol=1e-9)
+    np.testing.assert_allclose(guide.reference[1, :3], state[1, :3], atol=1e-9)
+    assert np.cos(guide.reference[0, 5] - state[0, 5]) == pytest.approx(1.0)
+    time = guide.scenario_time
+    references = fly(guide, back, back + held + 30.0, [(back + held, guide.go_on)])
+    steps = np.abs(np.diff(references[:, :2], axis=0))
+    assert np.max(steps[:, 0, :6]) < 0.02 and np.max(steps[:, 1, :6]) < 0.03
+    assert np.max(steps[:, 0, 6:]) < 0.02
+    np.testing.assert_allclose(  # rows are derivatives of each other
+        (references[3:, 0] - references[1:-2, 0]) / (2 * DT), references[2:-1, 1], atol=5e-3
+    )
+    expected = np.zeros((3, 8))
+    load_scenario("pick_and_place").trajectory(START).write(guide.scenario_time, expected)
+    np.testing.assert_allclose(references[-1], expected, atol=1e-9)
+    assert guide.scenario_time > time
+
+
+def test_it_comes_to_rest_where_the_velocity_leads_within_the_acceleration():
+    """0.5 m/s ends after 0.5 t / 2, t = 2 * 1.5 * 0.5 / stop_acceleration."""
+    guide, state = guidance(), state_of((0.3, -0.2, 1.4, 0.0, 0.5, 0.0, 0.0))
+    back = release(guide, 20.0, state)
+    guide.advance(100.0 + back)
+    guide.stay(100.0 + back, state, START[2])
+    length = max(guide.parameters.stop_time, 1.5 / guide.parameters.stop_acceleration)
+    end = fly(guide, back, back + length + 0.1)[-1]
+    np.testing.assert_allclose(end[0, :3], [0.3 + 0.25 * length, -0.2, 1.4], atol=1e-6)
+    np.testing.assert_allclose(end[1:, :3], 0.0, atol=1e-9)
+
+
+def test_a_sinking_vehicle_stops_above_the_ground():
+    """From 0.6 m above the ground at 0.8 m/s: 0.75 s, 0.3 m; the other axes take longer."""
+    guide, state = guidance(), state_of((0.0, 0.0, START[2] + 0.6, 0.0, 0.4, 0.0, -0.8))
+    back = release(guide, 20.0, state)
+    guide.advance(100.0 + back)
+    guide.stay(100.0 + back, state, START[2])
+    references = fly(guide, back, back + 6.0)
+    assert references[76, 0, 2] == pytest.approx(START[2] + 0.3, abs=1e-6)
+    assert np.min(references[:, 0, 2]) > START[2] + 0.29
+    assert references[76, 1, 0] > 0.1
+
+
+def test_a_descent_that_is_interrupted_by_a_release_is_over():
+    """The reference begins at the vehicle, not below it, and the scenario goes on where it was."""
+    guide, state = guidance(), state_of((0.0, 0.0, 1.5, 0.0, 0.0, 0.0, 0.0))
+    fly(guide, 19.9, 20.0)
+    guide.descend(120.0, guide.reference.copy(), START[2], True)
+    time = guide.scenario_time
+    back = release(guide, 30.0, state)
+    assert guide.end == np.inf
+    guide.advance(100.0 + back)
+    guide.stay(100.0 + back, state, START[2])
+    assert guide.reference[0, 2] == pytest.approx(1.5)
+    assert guide.reference[0, 6:] == pytest.approx(START[6:])
+    assert guide.scenario_time == pytest.approx(time, abs=1.0)
+    references = fly(guide, back, back + 60.0, [(back + 1.0, guide.go_on)])
+    assert np.max(np.abs(np.diff(references[:, 0], axis=0))) < 0.02
+    assert guide.scenario_time > time + 40.0
+
+
+def test_a_state_that_is_not_finite_does_not_reach_the_reference():
+    guide, state = guidance(), state_of((0.0, 0.0, np.nan, 0.0, 0.0, 0.0, 0.0))
+    fly(guide, 19.9, 20.0)
+    guide.stop(120.0, False)
+    before = fly(guide, 20.0, 25.0)[-1]
+    guide.stay(125.0, state, START[2])
+    np.testing.assert_array_equal(guide.reference, before)

@@ -20,10 +20,9 @@ def flown(thrust=0.52):
 
 
 def test_levels_with_the_thrust_flown():
-    held = flown().setpoint(4.0, TILTED, UNKNOWN)
-    rates, thrust = held.rates, held.thrust
-    assert rates == pytest.approx([-0.6, 1.2, 0.0], rel=0.05)
-    assert thrust == pytest.approx(0.52)
+    desired = flown().setpoint(4.0, TILTED, UNKNOWN)
+    assert desired.rates == pytest.approx([-0.6, 1.2, 0.0], rel=0.05)
+    assert desired.thrust == pytest.approx(0.52)
 
 
 def test_a_tilt_that_stays_is_met_by_more_and_more():

@@ -10,7 +10,11 @@ from uam_sim_bridge.autopilot.companion import Companion
 from uam_sim_bridge.autopilot.core import Autopilot
 from uam_sim_bridge.mavlink.link.link import OffboardLink
 from uam_sim_bridge.mavlink.link.link_report import faults, report
-from uam_sim_bridge.mavlink.offboard.sequence import OffboardSequence, Phase
+from uam_sim_bridge.mavlink.offboard.sequence import (
+    OffboardParameters,
+    OffboardSequence,
+    Phase,
+)
 from uam_sim_bridge.mavlink.offboard.setpoint import RateThrustParameters
 from uam_sim_bridge.mavlink.protocol.attitude_target import AttitudeTarget
 from uam_sim_bridge.mavlink.protocol.modes import MavCmd, MavResult, Mode
@@ -18,7 +22,7 @@ from uam_sim_bridge.mavlink.protocol.wire import Codec, Framer, clean_text, mavl
 from uam_sim_bridge.mavlink.telemetry.event_messages import EventMessage
 from uam_sim_bridge.mavlink.telemetry.events import SUMMARY, event_id
 from uam_sim_bridge.mavlink.telemetry.parameter_check import WATCHED
-from uam_sim_bridge.mavlink.telemetry.streams import ONLY_COUNTED, RATES
+from uam_sim_bridge.mavlink.telemetry.streams import ON_CHANGE, ONLY_COUNTED, RATES
 
 DOWN = np.array([0.0, 0.0, -9.81])
 LEVEL = np.array([1.0, 0.0, 0.0, 0.0])
@@ -51,8 +55,9 @@ class Rig:
     `received`: the messages that did; `reasons_seen`: all reasons of the sequence.
     """
 
-    def __init__(self):
-        self.memory, self.sequence = Memory(), OffboardSequence()
+    def __init__(self, **parameters):
+        self.memory = Memory()
+        self.sequence = OffboardSequence(OffboardParameters(**parameters))
         self.link = OffboardLink(
             self.memory, self.sequence, RateThrustParameters.of(load_description())
         )
@@ -94,6 +99,7 @@ class Rig:
             link.tick(self.time)
             if self.sequence.streaming:
                 link.send_setpoint(AttitudeTarget.of_rates(np.zeros(3), 0.5), self.time)
+                self.sequence.streamed(self.time)
             self.reasons_seen.update(self.sequence.reasons)
             sent, self.memory.to_autopilot = self.memory.to_autopilot, []
             if autopilot:
@@ -133,7 +139,7 @@ def test_set_up(rig):
     rig.run(6.0)
     link = rig.link
     streams = [first for command, first in rig.commands() if command == MavCmd.SET_MESSAGE_INTERVAL]
-    assert streams == [number for number in RATES if number not in ONLY_COUNTED]
+    assert streams == [*(number for number in RATES if number not in ONLY_COUNTED), *ON_CHANGE]
     read = [clean_text(m.param_id) for m in rig.received if m.get_type() == "PARAM_REQUEST_READ"]
     assert sorted(read) == sorted(WATCHED)
     assert link.mapping_read and link.warnings == ()
@@ -179,17 +185,51 @@ def test_cut_of_a_fifth_of_a_second_changes_nothing(rig):
     assert not any(c == MavCmd.DO_SET_MODE for c, _ in rig.commands())
 
 
-def test_cut_of_two_seconds_is_a_failsafe_and_offboard_is_requested_again(rig):
+def offboard_requests(rig):
+    return sum(command == MavCmd.DO_SET_MODE for command, _ in rig.commands())
+
+
+def test_cut_of_two_seconds_is_a_failsafe_and_the_vehicle_stays_released(rig):
     rig.fly().cut = True
     rig.run(2.0)
     assert rig.autopilot.status.mode is Mode.LAND and rig.link.connected(rig.time)
     assert rig.sequence.phase is Phase.FLYING and rig.sequence.streaming
     rig.cut = False
     rig.run(2.0)
-    assert rig.autopilot.status.mode is Mode.OFFBOARD and rig.autopilot.status.armed
-    assert rig.sequence.phase is Phase.FLYING
+    assert rig.sequence.phase is Phase.RELEASED and rig.sequence.streaming
+    assert rig.sequence.released_to == (
+        "the autopilot's failsafe after a lost stream of setpoints, in LAND"
+    )
+    assert rig.autopilot.status.mode is Mode.LAND and offboard_requests(rig) == 0
     assert "left OFFBOARD for LAND → a failsafe" in rig.reasons()
+    rig.sequence.regain()
+    rig.run(1.0)
+    assert rig.autopilot.status.mode is Mode.OFFBOARD and rig.sequence.phase is Phase.FLYING
+
+
+def test_return_after_lost_link_requests_offboard_after_a_cut():
+    rig = Rig(return_after_lost_link=True)
+    rig.fly().cut = True
+    rig.run(2.0)
+    rig.cut = False
+    rig.run(2.0)
+    assert rig.autopilot.status.mode is Mode.OFFBOARD and rig.autopilot.status.armed
+    assert rig.sequence.phase is Phase.FLYING and offboard_requests(rig) == 1
     assert ARM not in rig.commands()
+
+
+def test_return_after_lost_link_leaves_a_mode_of_the_pilot():
+    """The pilot chooses HOLD during the cut, and LAND in the failsafe that came before."""
+    for wait, mode in ((0.5, Mode.HOLD), (1.5, Mode.LAND)):
+        rig = Rig(return_after_lost_link=True)
+        rig.fly().cut = True
+        rig.run(wait)
+        rig.autopilot.command(rig.uptime, MavCmd.DO_SET_MODE, (1.0, *map(float, mode.value)))
+        rig.run(2.0 - wait)
+        rig.cut = False
+        rig.run(5.0)
+        assert rig.autopilot.status.mode is mode and offboard_requests(rig) == 0
+        assert rig.sequence.released_to == f"the pilot or a ground station, in {mode.name}"
 
 
 def test_cut_for_good(rig):
@@ -216,12 +256,61 @@ def test_disarmed_behind_a_cut_is_not_armed_again(rig):
     assert ARM not in rig.commands()
 
 
-def test_the_autopilot_leaves_offboard_by_itself(rig):
+@pytest.mark.parametrize("mode", [Mode.LAND, Mode.HOLD, Mode.RETURN])
+def test_a_mode_of_a_ground_station_stays(mode):
+    """CURRENT_MODE reports the change at once: the next heartbeat may be a second later."""
+    rig = Rig(return_after_lost_link=True).fly()
+    rig.run(0.5)
+    rig.autopilot.command(rig.uptime, MavCmd.DO_SET_MODE, (1.0, *map(float, mode.value)))
+    rig.run(0.012)
+    assert rig.sequence.phase is Phase.RELEASED
+    assert rig.sequence.released_to == f"the pilot or a ground station, in {mode.name}"
+    rig.run(5.0)
+    assert rig.autopilot.status.mode is mode and offboard_requests(rig) == 0
+    assert f"left OFFBOARD for {mode.name}" in rig.reasons()
+    assert rig.link.intended is mode and not rig.link.failsafe
+
+
+def test_sticks_take_over_and_the_pilots_switch_gives_control_back(rig):
+    rig.autopilot.set_parameter("COM_RC_OVERRIDE", 2)
     rig.fly()
-    rig.autopilot.command(rig.uptime, MavCmd.DO_SET_MODE, (1.0, 4.0, 6.0))
-    rig.run(2.0)
-    assert rig.autopilot.status.mode is Mode.OFFBOARD
-    assert "left OFFBOARD for LAND" in rig.reasons()
+    rig.autopilot.manual(rig.uptime, (0.0, 0.0, 0.0, 0.0))
+    rig.autopilot.manual(rig.uptime, (0.5, 0.0, 0.0, 0.0))
+    assert rig.autopilot.status.mode is Mode.POSITION
+    rig.run(0.1)
+    assert rig.sequence.released_to == "the pilot or a ground station, in POSITION"
+    rig.autopilot.command(rig.uptime, MavCmd.DO_SET_MODE, (1.0, 6.0, 0.0))
+    rig.run(0.1)
+    assert rig.sequence.phase is Phase.FLYING and offboard_requests(rig) == 0
+
+
+def test_a_failsafe_of_the_battery_is_named_and_stays():
+    rig = Rig(return_after_lost_link=True).fly()
+    for name, value in (("SIM_BAT_ENABLE", 1), ("SIM_BAT_DRAIN", 1.0), ("SIM_BAT_MIN_PCT", 6.0)):
+        rig.autopilot.set_parameter(name, value)
+    rig.autopilot.set_parameter("COM_LOW_BAT_ACT", 2)
+    rig.run(3.0)
+    assert rig.autopilot.status.mode is Mode.LAND and offboard_requests(rig) == 0
+    assert rig.link.failsafe and rig.link.intended is Mode.OFFBOARD
+    assert rig.sequence.released_to == "the autopilot's failsafe, in LAND"
+
+
+def test_kill_is_sent_at_once_and_until_the_motors_stop(rig):
+    rig.fly()
+    rig.lost_kinds = ("COMMAND_LONG",)
+    rig.link.kill()
+    rig.run(0.6)
+    assert rig.autopilot.status.armed
+    rig.lost_kinds = ()
+    rig.run(0.6)
+    assert not rig.autopilot.status.armed
+    kills = [m for m in rig.received if m.get_type() == "COMMAND_LONG"]
+    assert {(m.command, m.param1, m.param2) for m in kills} == {
+        (MavCmd.ARM_DISARM, 0.0, 21196.0)  # MAV_CMD_COMPONENT_ARM_DISARM's "force"
+    }
+    rig.received.clear()
+    rig.run(5.0)
+    assert ARM not in rig.commands() and "killed by command" in rig.reasons()
 
 
 def test_reboot_on_the_ground_repeats_all_requests(rig):
@@ -231,7 +320,7 @@ def test_reboot_on_the_ground_repeats_all_requests(rig):
     rig.run(1.0)
     assert rig.link.reboots == 1 and rig.sequence.phase is Phase.STREAMING
     intervals = [c for c, _ in rig.commands() if c == MavCmd.SET_MESSAGE_INTERVAL]
-    assert len(intervals) == len(RATES) - len(ONLY_COUNTED)
+    assert len(intervals) == len(RATES) - len(ONLY_COUNTED) + len(ON_CHANGE)
     assert rig.link.mapping_read and rig.link.time_sync.offset == pytest.approx(-8.0, abs=0.01)
     rig.sequence.set_desired(True)
     rig.run(2.0)

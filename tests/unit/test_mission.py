@@ -7,9 +7,15 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from uam_control.mission import Mission, MissionParameters, ScenarioError, load_scenario
+from uam_control.mission import (
+    Mission,
+    MissionParameters,
+    ScenarioError,
+    StartParameters,
+    load_scenario,
+)
 from uam_control.mission.trajectory import Move, Moves, Sampled
-from uam_control.supervision import OperatorCommand, State
+from uam_control.supervision import Authority, OperatorCommand, Readings, State
 
 START = np.array([0.0, 0.0, 0.28, 0.0, 0.0, 0.0, 0.0, np.pi / 2])
 
@@ -186,19 +192,24 @@ def test_unknown_scenario_lists_the_known_ones():
         load_scenario("nonsense")
 
 
+AUTOMATIC = StartParameters(auto_start=True)
+KNOWN = Readings(mocap_age=0.01, joint_age=0.01, controller_age=0.01, autopilot_age=0.1)
+
+
 class Flight:
     """Steps a mission with a state equal to the reference."""
 
-    def __init__(self, name="hover", armed_at=1.0):
-        self.mission = Mission(load_scenario(name), MissionParameters())
+    def __init__(self, name="hover", armed_at=1.0, start=AUTOMATIC, **parameters):
+        self.mission = Mission(load_scenario(name), MissionParameters(**parameters), start)
         self.state = np.zeros((3, 8))
         self.state[0] = START
         self.armed_at, self.stamp = armed_at, 0.0
+        self.authority, self.readings = Authority(), KNOWN
 
     def step(self, follow=True):
         self.stamp += 0.01
         armed = self.armed_at if self.stamp >= self.armed_at else None
-        output = self.mission.step(self.stamp, self.state, armed)
+        output = self.mission.step(self.stamp, self.state, armed, self.readings, self.authority)
         if follow and output.flying:
             self.state[:2] = output.reference[:2]
             self.state[0, 2] = max(self.state[0, 2], START[2])
@@ -331,11 +342,17 @@ def test_the_magnet_command_holds_until_the_scenario_switches():
 
 
 def test_no_take_off_beyond_a_limit():
-    flight = Flight()
+    flight = Flight(armed_at=np.inf)
     flight.state[0, 3] = 1.2  # lying on its side
     for _ in range(300):
         output = flight.step()
-    assert output.state is State.GROUNDED and "tilt" in flight.mission.beyond
+    assert output.state is State.GROUNDED and "tilt" in flight.mission.beyond and not output.arm
+    flight.state[0, 3] = 0.0
+    assert flight.until(lambda o: o.arm).state is State.GROUNDED
+    flight.armed_at, flight.state[0, 3] = flight.stamp, 1.2
+    for _ in range(300):
+        output = flight.step()
+    assert output.state is State.GROUNDED and output.arm
     flight.state[0, 3] = 0.0
     assert flight.until(lambda o: o.flying).state is State.TAKING_OFF
 
@@ -346,6 +363,164 @@ def test_disarming_in_flight_ends_the_mission():
     flight.armed_at = np.inf
     output = flight.step()
     assert "disarmed" in output.abort_reason and output.phase == "aborted"
+
+
+MANUAL = StartParameters()
+
+
+def test_nothing_arms_before_the_start_command():
+    flight = Flight(start=MANUAL, armed_at=np.inf)
+    assert flight.mission.start() == (False, "refused: no state of the vehicle yet")
+    assert flight.mission.preflight() == ()
+    for _ in range(500):
+        output = flight.step()
+        assert not output.arm and output.state is State.GROUNDED
+    assert output.cause == "waiting for the start"
+    assert flight.mission.start() == (True, "arming")
+    assert flight.step().arm
+    assert flight.mission.start() == (False, "refused: not while grounded")
+    flight.armed_at = flight.stamp
+    flight.until(lambda o: o.flying)
+    assert flight.mission.start() == (False, "refused: not while taking off")
+
+
+def test_a_red_check_refuses_the_start_in_words():
+    flight = Flight(start=MANUAL, armed_at=np.inf)
+    flight.readings = Readings(joint_age=0.01, controller_age=0.01, autopilot_age=0.1)
+    flight.state[0, 7] += 0.4
+    flight.step()
+    accepted, words = flight.mission.start()
+    assert not accepted and words == (
+        "refused: mocap: unknown (at most 0.25 s); arm: 0.4 rad (at most 0.3 rad from its start)"
+    )
+    assert not flight.step().arm
+    flight.readings, flight.state[0, 7] = KNOWN, START[7]
+    flight.step()
+    assert flight.mission.start()[0]
+
+
+def test_after_the_end_start_begins_the_next_flight():
+    flight = Flight(start=MANUAL, armed_at=np.inf)
+    for _ in range(2):
+        flight.step()
+        assert flight.mission.start() == (True, "arming")
+        flight.armed_at = flight.stamp
+        flight.until(lambda o: o.phase == "landed", limit=np.inf)
+        flight.armed_at = np.inf
+        assert flight.mission.start()[0] is False  # the flight is not over yet
+        flight.until(lambda o: o.done, limit=np.inf)
+        flight.state[:], flight.state[0] = 0.0, START
+    assert not flight.step().arm
+    events = [change.target for change in flight.mission.changes]
+    assert events.count(State.TAKING_OFF) == 1  # of the second flight
+
+
+def test_a_dry_run_has_a_reference_at_the_first_pose_and_never_arms():
+    flight = Flight(start=StartParameters(auto_start=True, dry_run=True), armed_at=np.inf)
+    flight.state[0, :6] = 0.3, -0.2, 1.1, 0.2, -0.1, 0.5
+    for _ in range(300):
+        output = flight.step(follow=False)
+        assert output.flying and not output.arm and output.phase == "dry run"
+    assert output.reference[0, :6] == pytest.approx([0.3, -0.2, 1.1, 0.0, 0.0, 0.5])
+    flight.state[0, 3] = 0.4  # tilted in the hand: the reference stays
+    assert flight.step(follow=False).reference[0, 3] == 0.0
+    assert flight.mission.start() == (False, "refused: dry run, nothing is armed")
+
+
+PILOT = Authority("the pilot, in POSITION")
+
+
+def released(at=25.0, **parameters):
+    """A flight that the pilot took over at `at` [s] and flew 1 m to the side."""
+    flight = Flight("pick_and_place", **parameters)
+    flight.until(lambda o: o.time > at, limit=100.0)
+    flight.authority = PILOT
+    assert flight.step().state is State.RELEASED
+    flight.state[0, 1] += 1.0
+    flight.state[1] = 0.0
+    for _ in range(300):
+        output = flight.step()
+    assert output.phase == "released" and not output.flying and output.arm
+    assert output.cause == "the pilot, in POSITION, has control" and not output.abort_reason
+    return flight
+
+
+def test_a_released_vehicle_is_followed_and_the_clock_stands():
+    flight = released()
+    kept = flight.mission._guidance.scenario_time
+    assert 25.0 < kept < 27.0
+    for _ in range(100):
+        flight.state[0, 0] += 0.01
+        output = flight.step()
+        assert output.reference[0, 0] == flight.state[0, 0]
+        np.testing.assert_array_equal(output.reference[1:, :6], 0.0)
+    assert flight.mission._guidance.scenario_time == kept
+
+
+def test_resume_asks_once_per_command_and_the_scenario_goes_on():
+    flight = released()
+    assert flight.mission.request(OperatorCommand.RESUME) == (True, "resume by command")
+    assert flight.step().regains == 1 and flight.step().regains == 1
+    flight.authority, pose = Authority(), flight.state[0].copy()
+    output = flight.step()
+    assert output.state is State.HOLDING and output.flying
+    np.testing.assert_allclose(output.reference[0, :6], pose[:6], atol=1e-6)
+    assert flight.step().state is State.FLYING
+    output = flight.until(lambda o: o.done, limit=200.0)
+    assert output.phase == "landed" and not output.abort_reason
+
+
+def test_the_pilots_switch_alone_is_a_hold_that_waits():
+    flight = released()
+    flight.authority = Authority()
+    assert flight.step().state is State.HOLDING
+    for _ in range(3000):
+        output = flight.step()
+    assert output.state is State.HOLDING and output.regains == 0
+    assert output.reference[0, 1] == pytest.approx(1.0, abs=0.1)
+    assert flight.mission.request(OperatorCommand.RESUME)[0]
+    assert flight.until(lambda o: o.done, limit=200.0).phase == "landed"
+
+
+def test_a_landing_that_the_pilot_ended_does_not_pull_the_vehicle_down():
+    flight = Flight("pick_and_place")
+    flight.until(lambda o: o.time > 25.0)
+    flight.mission.request(OperatorCommand.LAND)
+    flight.until(lambda o: o.state is State.LANDING and o.reference[0, 2] < 0.7)
+    flight.authority = PILOT
+    flight.step()
+    flight.state[0, 2], flight.state[1] = 1.5, 0.0
+    for _ in range(1500):
+        flight.step()
+    flight.authority = Authority()
+    for _ in range(300):
+        output = flight.step()
+    assert output.state is State.HOLDING
+    assert output.reference[0, 2] == pytest.approx(1.5, abs=0.05)
+
+
+def test_the_magnet_of_a_released_vehicle_follows_the_policy():
+    assert released(at=50.0).step().magnet
+    assert not released(at=50.0, magnet_released="release").step().magnet
+
+
+def test_a_flight_that_the_pilot_lands_is_over():
+    flight = released()
+    flight.state[0, 2] = START[2]
+    flight.authority = PILOT._replace(landed=True)
+    flight.step()
+    assert flight.mission.request(OperatorCommand.RESUME) == (
+        False,
+        "refused: on the ground: disarm, then start a new flight",
+    )
+    flight.armed_at = np.inf
+    output = flight.step()
+    assert (
+        output.state is State.DISARMED
+        and not output.arm
+        and output.abort_reason
+        == ("the autopilot disarmed while released: the pilot, in POSITION, has control")
+    )
 
 
 STRANGE = st.floats(-10.0, 10.0) | st.sampled_from([np.nan, np.inf, -np.inf])

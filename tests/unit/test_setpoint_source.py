@@ -189,3 +189,61 @@ def test_idle_attitude_setpoints_are_level_with_the_yaw_of_the_vehicle():
     source.note_state(0.0, state)
     sent = source.without(0.0, STANDING)
     assert desired(sent) == pytest.approx([0.0, 0.0, -1.2], abs=1e-12) and sent.thrust == 0.0
+
+
+RELEASED = FLYING._replace(released=True)
+
+
+@pytest.mark.parametrize("kind", ["rates", "attitude"])
+@pytest.mark.parametrize("commands", [True, False])
+def test_a_released_vehicle_gets_its_own_attitude_rates_zero_and_the_mean_thrust(kind, commands):
+    source, said = in_flight(setpoint=kind), []
+    state = state_at(1.0)
+    flown = source.commanded(1.004, state, True, WEIGHT, REST, ATTITUDE, FLYING).thrust
+    for k in range(2000):  # longer than hold_time: the stream does not end
+        now = 1.008 + TICK * k
+        state[0, 3:6] = 0.3 * math.sin(now), 0.2 * math.cos(now), 0.5 + 0.1 * now
+        source.note_state(now, state)
+        if commands:
+            sent = source.commanded(now, state, True, 2 * WEIGHT, REST + 1, ATTITUDE, RELEASED)
+        else:
+            sent = source.without(now, RELEASED)
+        assert sent.thrust == pytest.approx(flown) and not source.holding
+        np.testing.assert_array_equal(sent.rates, 0.0)
+        if kind == "attitude":
+            angles = euler_from_quaternion(swap_quaternion(sent.quaternion))
+            np.testing.assert_allclose(angles, state[0, 3:6], atol=1e-9)
+    assert said == []
+
+
+def test_a_released_vehicle_without_a_known_attitude_gets_a_finite_setpoint():
+    source, state = in_flight(setpoint="attitude"), state_at(1.0)
+    state[0, 3] = math.nan
+    source.note_state(1.1, state)
+    sent = source.without(1.1, RELEASED)
+    assert not sent.refused() and sent.thrust > 0.3
+
+
+def test_a_released_vehicle_on_the_ground_gets_the_idle_setpoint():
+    source, state = in_flight(), state_at()
+    source.note_state(1.1, state)
+    assert source.without(1.1, RELEASED._replace(landed=True)).thrust == 0.0
+    assert source.without(1.2, RELEASED._replace(armed=False)).thrust == 0.0
+
+
+@pytest.mark.parametrize("height", [1.0, 0.1])
+def test_until_the_mission_has_resumed_the_setpoint_stays(height):
+    """Idle commands near the ground would otherwise be thrust 0 for a tick."""
+    source, state = in_flight(), state_at(height)
+    source.note_state(1.1, state)
+    before = source.without(1.1, RELEASED)
+    for now in (1.104, 1.108, 1.29):
+        source.note_state(now, state)
+        sent = source.commanded(now, state, False, WEIGHT, None, ATTITUDE, FLYING)
+        assert sent.thrust == before.thrust > 0.3
+        np.testing.assert_array_equal(sent.rates, 0.0)
+    sent = source.commanded(1.295, state, True, WEIGHT, REST, ATTITUDE, FLYING)
+    assert sent.thrust == pytest.approx(before.thrust, rel=0.05)
+    source.note_state(1.4, state)
+    sent = source.commanded(1.4, state, False, WEIGHT, None, ATTITUDE, FLYING)
+    assert source.holding == (height > 0.3) and (sent.thrust == 0.0) == (height < 0.3)

@@ -16,6 +16,7 @@ from uam_control.stages.mission_stage import MissionStage
 from uam_control.stages.supervisor_inputs import SupervisorInputs
 from uam_control.stages.timing import Timing
 from uam_control.stamps import SECOND, nanoseconds
+from uam_control.supervision import Authority
 from uam_sim_bridge.autopilot.core import Autopilot
 from uam_sim_bridge.autopilot.joined import JoinedAutopilot
 from uam_sim_bridge.mavlink.offboard.sequence import OffboardSequence, Phase
@@ -86,12 +87,15 @@ def test_the_mission_makes_the_reference_of_the_next_tick():
 
 def test_a_report_of_the_autopilot_counts_from_the_next_tick_on():
     stage, state = mission_stage(), np.zeros((3, 8))
-    stage.autopilot(0, True, 0, 0.01)
+    stage.autopilot(0, True, 0, 0.01, Authority("the pilot, in HOLD"))
     stage.begin(0, state)
     assert np.isnan(stage.inputs.readings.autopilot_age)
     stage.begin(PERIOD, state)
     assert stage.inputs.readings.autopilot_age == 0.004
     assert stage.inputs.readings.round_trip == 0.01
+    stage.advance(PERIOD, state)
+    checks = {check.name: check for check in stage.mission.preflight()}
+    assert not checks["control"].passed and checks["control"].value == "the pilot, in HOLD"
 
 
 class Joined:

@@ -13,6 +13,7 @@ from uam_msgs_py.messages.status import ERROR, OK, STALE, WARN, AutopilotState, 
         (AutopilotState(True, "OFFBOARD", True, 12_000_000_000), OK),
         (AutopilotState(True, "OFFBOARD", True, 12_000_000_000, "", 0.008), OK),
         (AutopilotState(True, "AUTO.LAND", True, 5, "setpoint lost"), WARN),
+        (AutopilotState(True, "HOLD", True, 5, "", 0.008, "the pilot, in HOLD", True), WARN),
     ],
 )
 def test_autopilot_state_round_trip(state, level):
@@ -33,8 +34,19 @@ def test_mission_status_round_trip():
 def test_a_mission_that_holds_is_a_warning_and_an_older_log_has_no_states():
     holding = MissionStatus("hold", state="holding", cause="tilt").to_message(1)
     assert holding.status[0].level == WARN
-    del holding.status[0].values[-2:]
+    del holding.status[0].values[-3:]
     assert MissionStatus.from_message(holding)[1] == MissionStatus("hold")
+
+
+def test_a_released_vehicle_is_a_warning_that_names_who_has_control():
+    released = AutopilotState(True, "HOLD", True, 5, released_to="the pilot, in HOLD")
+    assert released.summary == "HOLD, armed; the pilot, in HOLD, has control"
+    message = MissionStatus("released", state="released", regains=2).to_message(1)
+    assert message.status[0].level == WARN
+    assert MissionStatus.from_message(message)[1].regains == 2
+    old = released.to_message(1)
+    del old.status[0].values[-2:]
+    assert AutopilotState.from_message(old)[1] == AutopilotState(True, "HOLD", True, 5)
 
 
 def test_missing_or_invalid_entries_are_refused():

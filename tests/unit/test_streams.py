@@ -9,9 +9,11 @@ from uam_sim_bridge.mavlink.telemetry.streams import StreamCheck
 ODOMETRY = mavlink2.MAVLINK_MSG_ID_ODOMETRY
 HEARTBEAT = mavlink2.MAVLINK_MSG_ID_HEARTBEAT
 BATTERY = mavlink2.MAVLINK_MSG_ID_BATTERY_STATUS
-EXTENDED, ATTITUDE, STATUS, ESTIMATOR = 245, 31, 1, 230
+EXTENDED, ATTITUDE, STATUS, ESTIMATOR, CURRENT_MODE = 245, 31, 1, 230, 436
 # message id → desired rate [Hz]; the heartbeat is counted, but not requested
 RATES = {HEARTBEAT: 1, EXTENDED: 5, ATTITUDE: 10, ODOMETRY: 10, STATUS: 2, BATTERY: 1, ESTIMATOR: 2}
+# requested, but not counted: an autopilot sends it on a change
+REQUESTED = RATES | {CURRENT_MODE: 50}
 WINDOW = 4.0  # s
 
 
@@ -27,7 +29,7 @@ def run(streams, seconds, start=0.0, rates=RATES, result=MavResult.ACCEPTED, ans
         request = streams.request(time)
         if request:
             requests.append((round(time, 3), request[0]))
-            assert request[1] == pytest.approx(1e6 / RATES[request[0]])
+            assert request[1] == pytest.approx(1e6 / REQUESTED[request[0]])
             if answered:
                 streams.answer(result)
     return requests
@@ -43,6 +45,7 @@ def test_each_stream_is_requested_once_without_a_warning():
         STATUS,
         BATTERY,
         ESTIMATOR,
+        CURRENT_MODE,
     ]
     assert requests[-1][0] < 0.1
     assert streams.warnings == ()
@@ -75,7 +78,7 @@ def test_missing_streams_and_heartbeat_without_request():
 def test_refusals_are_warnings():
     streams = StreamCheck()
     requests = run(streams, 5 * WINDOW, result=MavResult.FAILED)
-    assert len(requests) == 3 * 6
+    assert len(requests) == 3 * 6 + 1  # CURRENT_MODE once
     assert "ODOMETRY received at 10.0 Hz, request for 10 Hz refused (failed)" in streams.warnings
 
 
@@ -93,10 +96,27 @@ def test_restart_requests_all_streams_again():
     streams = StreamCheck()
     run(streams, 1.0)
     streams.restart()
-    assert len(run(streams, 1.0, start=1.0)) == 6
+    assert len(run(streams, 1.0, start=1.0)) == 7
 
 
 def test_an_answer_without_a_request_is_ignored():
     streams = StreamCheck()
     streams.answer(MavResult.DENIED)
     assert streams.warnings == ()
+
+
+def test_an_autopilot_without_current_mode_is_no_warning():
+    """PX4 before v1.15 refuses the request: the heartbeat then reports the mode alone."""
+    streams = StreamCheck()
+    requests = []
+    for k in range(3000):
+        time = 0.004 * k
+        for number, rate in RATES.items():
+            if k % round(250 / rate) == 0:
+                streams.count(number)
+        request = streams.request(time)
+        if request:
+            requests.append(request[0])
+            refused = request[0] == CURRENT_MODE
+            streams.answer(MavResult.UNSUPPORTED if refused else MavResult.ACCEPTED)
+    assert requests.count(CURRENT_MODE) == 1 and streams.warnings == ()

@@ -292,9 +292,10 @@ class Mission:
         if state is State.TAKING_OFF:
             self._take_off(stamp)
         elif state is State.HOLDING and before is State.RELEASED:
-            guidance.stay(stamp, self._seen.state)
+            guidance.stay(stamp, self._seen.state, self._ground)
         elif state in (State.HOLDING, State.RELEASED):
             guidance.stop(stamp, decision.stow)
+            self._half_down = math.inf
         elif state is State.FLYING and before is State.HOLDING:
             guidance.go_on(stamp)
         elif decision.guide is Guide.DESCEND:

@@ -18,6 +18,7 @@ from uam_control.mission.trajectory import Trajectory
 from uam_control.supervision import SupervisionParameters
 
 _PEAK = 1.875  # largest rate of a quintic from rest to rest, times its mean rate
+_SHORTEST = 0.3  # s in which a sinking vehicle near the ground is stopped
 _RAMP = 1.5  # largest slope of a cubic from rest to rest, times its mean slope
 
 
@@ -180,10 +181,11 @@ class Guidance:
         pose[:] = 0.0
         pose[CHI, POSITION], pose[CHI, YAW] = state[CHI, POSITION], state[CHI, YAW]
 
-    def stay(self, stamp: float, state: np.ndarray) -> None:
+    def stay(self, stamp: float, state: np.ndarray, ground: float) -> None:
         """Begin at the vehicle's pose and velocity in state (3, 6 + n), and come to rest there.
 
-        `go_on` then returns to the path.
+        A sinking vehicle loses at most half of its height above `ground` [m]. `go_on` then returns
+        to the path.
         """
         path = self._path
         self._trajectory.write(self.scenario_time, path)
@@ -195,15 +197,25 @@ class Guidance:
             return
         p, speed = self.parameters, float(np.linalg.norm(offset[CHI_DOT, POSITION]))
         length = max(p.stop_time, 2.0 * _RAMP * speed / p.stop_acceleration)
-        goal = offset[CHI] + offset[CHI_DOT] * length / 2
-        self._away = Segment(stamp, offset, goal, np.full_like(goal, length))
+        lengths = np.full_like(offset[CHI], length)
+        z, rate = state[CHI, Z], state[CHI_DOT, Z]
+        if rate < 0.0:
+            lengths[Z] = min(length, max(_SHORTEST, (ground - z) / rate))
+        goal = offset[CHI] + offset[CHI_DOT] * lengths / 2
+        self._away = Segment(stamp, offset, goal, lengths)
         self._returns = False
         self.write(stamp)
 
     def stop(self, stamp: float, stow: bool) -> None:
-        """Slow down to a stop on the path from `stamp` [s] on; stow: move the arm to `stowed`."""
+        """Slow down to a stop on the path from `stamp` [s] on; stow: move the arm to `stowed`.
+
+        A descent ends: `stay` then sets the reference.
+        """
         self._clock.change(stamp, 0.0, self._ramp_length())
         self._go_on_at = math.inf
+        if self._last is not None:
+            self._last = None
+            self._arm = self._arm_segment(stamp, self._at_rest(stow=False)[0][ARM])
         if stow:
             self._arm = self._arm_segment(stamp, self._stowed)
 
@@ -237,6 +249,7 @@ class Guidance:
         # the other coordinates are at rest before touchdown
         lengths[Z] = max(np.max(lengths) + p.stop_time, _PEAK * way / p.travel_speed)
         self._last = Segment(stamp, now, goal, lengths)
+        self._clock.change(stamp, 0.0, self._ramp_length())  # for a scenario that goes on later
 
     def rest(self, stamp: float, stow: bool) -> None:
         """Bring the reference to rest; in failsafe only its arm angles are used."""
@@ -261,7 +274,8 @@ class Guidance:
     def _return(self, stamp: float, offset: np.ndarray) -> None:
         """Let the offset (3, 6 + n) from the path decay to zero."""
         p, way = self.parameters, float(np.linalg.norm(offset[CHI, POSITION]))
-        length = max(p.stop_time, _PEAK * way / p.travel_speed)
+        turn = abs(float(offset[CHI, YAW]))
+        length = max(p.stop_time, _PEAK * way / p.travel_speed, _PEAK * turn / p.turn_rate)
         goal = np.zeros_like(offset[CHI])
         self._away = Segment(stamp, offset, goal, np.full_like(goal, length))
         self._returns = True

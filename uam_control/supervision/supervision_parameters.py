@@ -147,6 +147,7 @@ class Reactions(ParameterSet):
     travel_speed: float = number(
         0.3, "peak speed of the reference in an unplanned landing", "m/s", 0.05, 3.0
     )
+    turn_rate: float = number(0.8, "peak yaw rate of the return to the path", "rad/s", 0.05, 3.0)
     stow_rate: float = number(0.8, "peak rate of the joints when stowing", "rad/s", 0.05, 5.0)
     failsafe_timeout: float = number(
         30.0, "longest wait in failsafe for the autopilot to disarm", "s", 1.0, 600.0

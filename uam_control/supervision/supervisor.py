@@ -192,6 +192,8 @@ class Supervisor:
             yield Event.LOST_ARMING, f"the autopilot disarmed {when}"
         if seen.authority.released_to:
             yield Event.RELEASED, _in_control(seen.authority.released_to)
+            if self._arm:
+                yield Event.GIVEN_UP, _in_control(seen.authority.released_to)
         elif self.state is State.RELEASED:
             grounded = seen.on_ground or seen.authority.landed
             event = Event.REGAINED_ON_GROUND if grounded else Event.REGAINED
@@ -221,7 +223,7 @@ class Supervisor:
                 yield from self._clear()
             if self.state is State.HOLDING and self._goes_on:
                 yield Event.RESUME, Event.RESUME.value
-            if seen.ready and self._checks.quiet:
+            if self._arm and seen.ready and self._checks.quiet:
                 yield _planned(Event.READY)
         if seen.landing_due:
             yield _planned(Event.LANDING_DUE)

@@ -40,7 +40,7 @@ from uam_sim_bridge.mavlink.protocol.modes import (
 )
 
 HEARTBEAT_TIMEOUT = 3.0  # s without a heartbeat: not connected
-LINK_GAP = 0.6  # s without a setpoint that reaches the autopilot: the stream counts as lost
+LINK_GAP = 0.45  # s without a setpoint that arrives: the stream counts as lost; below COM_OF_LOSS_T
 LOST_RECENTLY = 5.0  # s after a lost stream in which the autopilot may leave OFFBOARD because of it
 SETTLING = 0.3  # s after the switch to OFFBOARD in which an older report may still arrive
 REGAIN_REQUESTS = 5  # requests for OFFBOARD after one command of an operator
@@ -140,6 +140,7 @@ class OffboardSequence:
         self._streamed = -math.inf  # [s] newest setpoint
         self._stream_lost = -math.inf  # [s] newest time at which no setpoint reached the autopilot
         self._regain_requests = 0  # left of an operator's command
+        self._chosen = (Mode.UNKNOWN, Mode.UNKNOWN)  # mode and intended one, while released
         self._returns = 0  # requests of return_after_lost_link in this flight
         self._lost_link = False  # the autopilot left OFFBOARD because it had no setpoints
         self._killed = False
@@ -179,7 +180,10 @@ class OffboardSequence:
             self._regain_requests, self._asked = REGAIN_REQUESTS, -math.inf
 
     def kill(self) -> None:
-        """Request that the motors stop at once, in the air too, until the vehicle is disarmed."""
+        """Request that the motors stop at once, in the air too, until the vehicle is disarmed.
+
+        The first request is sent even if the vehicle is reported disarmed: it may be arming.
+        """
         self._killed, self._asked = True, -math.inf
         self._reason("killed by command")
         self.phase = Phase.FAILED
@@ -190,10 +194,12 @@ class OffboardSequence:
 
     def update(self, time: float, seen: Reported) -> Request | None:
         """Advance to `time` [s] and return the request to send now, None for none."""
-        if time - min(self._streamed, seen.delivered) > LINK_GAP:
+        if self._in_flight and time - min(self._streamed, seen.delivered) > LINK_GAP:
             self._stream_lost = time
-        if self._killed and seen.armed:
-            return self._ask(time, Phase.FAILED, Request.KILL)
+        if self._killed:
+            if seen.armed or self._asked == -math.inf:
+                return self._ask(time, Phase.FAILED, Request.KILL)
+            self._killed = time - self._asked < self.parameters.retry_interval
         if not seen.connected:
             if self.phase not in (Phase.FLYING, Phase.RELEASED, Phase.FAILED):
                 self.phase = Phase.WAITING
@@ -300,6 +306,7 @@ class OffboardSequence:
     def _release(self, time: float, seen: Reported) -> None:
         self.phase, self._regain_requests, self._asked = Phase.RELEASED, 0, time
         self._in_flight, self._offboard_since = True, None
+        self._chosen = seen.mode, seen.intended
         self._lost_link = time - self._stream_lost < LOST_RECENTLY
         self.released_to = self._holder(seen)
         self._reason(f"left OFFBOARD: {self.released_to}, has control")
@@ -321,6 +328,10 @@ class OffboardSequence:
             return None
         if seen.intended not in (Mode.OFFBOARD, Mode.UNKNOWN):
             self._lost_link = False  # a person has chosen a mode since
+        chosen = seen.mode, seen.intended
+        if chosen != self._chosen and seen.intended is not Mode.OFFBOARD:
+            self._regain_requests = 0  # a person has chosen another mode since the command
+        self._chosen = chosen
         self.released_to = self._holder(seen)
         if self._regain_requests > 0:
             request = self._ask(time, Phase.RELEASED, Request.OFFBOARD)

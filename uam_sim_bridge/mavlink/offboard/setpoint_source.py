@@ -130,7 +130,7 @@ class SetpointSource:
                     self._hold.good(now, desired)
                     return setpoint
                 self._say(f"setpoint refused: {refused}", None)
-        elif not flying and tau_q is None and not self._high(situation.armed):
+        elif not flying and tau_q is None and self._low(now, situation.armed):
             self._hold.reset()
             return self._idle
         return self.without(now, situation)
@@ -140,7 +140,7 @@ class SetpointSource:
         if situation.released:
             return self._present(now, situation)
         armed, landed, let_go, _ = situation
-        if now - self._present_at < HANDOVER:  # the mission has not resumed yet
+        if self._handed_over(now):
             return self._at_present(now)
         if not armed or (landed and not self._high(armed)):
             return self._idle
@@ -171,6 +171,14 @@ class SetpointSource:
     def _idle(self) -> AttitudeTarget:
         yaw = self._estimated[1][2]
         return self._type(Desired(np.zeros(3), level(yaw if math.isfinite(yaw) else 0.0), 0.0))
+
+    def _handed_over(self, now: float) -> bool:
+        """Whether control came back just before, and the mission may not have resumed yet."""
+        return now - self._present_at < HANDOVER
+
+    def _low(self, now: float, armed: bool) -> bool:
+        """Whether an idle command means thrust 0."""
+        return not self._high(armed) and not self._handed_over(now)
 
     def _high(self, armed: bool) -> bool:
         """Whether the vehicle is armed and more than `ground_margin` above its last disarmed
