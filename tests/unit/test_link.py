@@ -201,7 +201,7 @@ def test_cut_of_two_seconds_is_a_failsafe_and_the_vehicle_stays_released(rig):
         "the autopilot's failsafe after a lost stream of setpoints, in LAND"
     )
     assert rig.autopilot.status.mode is Mode.LAND and offboard_requests(rig) == 0
-    assert "left OFFBOARD for LAND → a failsafe" in rig.reasons()
+    assert "left OFFBOARD: the autopilot's failsafe after a lost stream" in rig.reasons()
     rig.sequence.regain()
     rig.run(1.0)
     assert rig.autopilot.status.mode is Mode.OFFBOARD and rig.sequence.phase is Phase.FLYING
@@ -267,7 +267,7 @@ def test_a_mode_of_a_ground_station_stays(mode):
     assert rig.sequence.released_to == f"the pilot or a ground station, in {mode.name}"
     rig.run(5.0)
     assert rig.autopilot.status.mode is mode and offboard_requests(rig) == 0
-    assert f"left OFFBOARD for {mode.name}" in rig.reasons()
+    assert f"left OFFBOARD: the pilot or a ground station, in {mode.name}" in rig.reasons()
     assert rig.link.intended is mode and not rig.link.failsafe
 
 

@@ -371,7 +371,10 @@ def test_any_state_in_the_air_is_released_in_the_same_tick(command):
     decision = supervisor.step(1.004, observation(authority=PILOT))
     assert decision.state is State.RELEASED and decision.guide is Guide.NOTHING and decision.arm
     assert decision.cause == "the pilot, in POSITION, has control"
-    assert decision.stow and decision.keep_magnet and decision.regains == 0
+    assert decision.keep_magnet and decision.regains == 0
+    assert not decision.stow  # a pilot flies on: the arm stays
+    landing = Authority("the pilot, in LAND", lands=True)
+    assert supervisor.step(1.008, observation(authority=landing)).stow
 
 
 def test_the_take_off_is_released_too():
