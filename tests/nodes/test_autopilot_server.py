@@ -182,7 +182,7 @@ def test_loss_of_the_stream_and_recovery(flight):
 def test_stream_lost_for_good_lands_and_disarms(flight):
     flight.airborne(2.0)
     flight.streaming = False
-    flight.sequence.parameters = flight.sequence.parameters.__class__(recovery_attempts=0.0)
+    flight.sequence.parameters = flight.sequence.parameters.__class__(recovery_attempts=0)
     for _ in range(4000):
         flight.tick()
         if not flight.hil.armed:

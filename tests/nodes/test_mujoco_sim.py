@@ -41,7 +41,7 @@ def test_a_bounded_start_names_missing_nodes(start, tmp_path):
 
 def test_wrong_parameters_are_refused_in_one_line(start):
     for arguments, message in (
-        (options(clock="sundial"), "clock: 'sundial' is not lockstep or realtime"),
+        (options(clock="sundial"), "clock: 'sundial' is not one of lockstep, realtime"),
         (options(vehicle="glider"), "unknown vehicle 'glider'; there are: hexa_arm, s500_arm"),
         (options(plant="bullet"), "unknown plant 'bullet'; there are: mujoco, or a class as"),
         (options(gravity="9.81"), "gravity: unknown"),

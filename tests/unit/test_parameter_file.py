@@ -24,7 +24,7 @@ DUMP = """\
     takeoff_delay: 1.0
 /mavlink_bridge:
   ros__parameters:
-    local_port: 14540.0
+    local_port: 14540
     signing_key: set
     autopilot: udp:127.0.0.1:14580
     thr_mdl_fac: 0.3

@@ -190,3 +190,14 @@ time.sleep(60)
     orchestrator.wait()
     orchestrator.stdout.close()
     wait_for(lambda: all(map(gone, pids)))
+
+
+@pytest.mark.parametrize(
+    "line",
+    ["mujoco_sim: a port is in use", "[FATAL] [1795394174.460] [mujoco_sim]: a port is in use"],
+)
+def test_the_reason_of_a_failure_is_its_last_line_printed_or_logged(tmp_path, line):
+    log = tmp_path / "mujoco_sim.log"
+    log.write_text(f"something before\n{line}\n")
+    failure = NodeFailed("mujoco_sim", 1, log)
+    assert str(failure) == "mujoco_sim ended by itself with exit status 1: a port is in use"

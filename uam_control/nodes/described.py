@@ -1,28 +1,32 @@
-"""The read-only parameter `vehicle` of a node: the name or file of the vehicle description."""
+"""The read-only parameters `vehicle` and `scenario` of a node: names or files."""
 
-from rcl_interfaces.msg import ParameterDescriptor
 from rclpy.node import Node
 
 from uam_control.settings.configuration import ConfigurationError
-from uam_control.settings.parameter_set import ParameterError
+from uam_control.settings.parameter_set import ParameterError, Text
 from uam_control.vehicle import (
     DEFAULT_VEHICLE,
     VehicleDescription,
     VehicleError,
     load_description,
 )
+from uam_msgs_py.node.node_parameters import declared_text
 
 PARAMETER = "vehicle"
+DEFAULT_SCENARIO = "pick_and_place"
 
 
 def described_vehicle(node: Node) -> VehicleDescription:
     """Declare the parameter and return the description it names. Raises ParameterError."""
-    about = ParameterDescriptor(
-        description="name of a file in config/vehicle, or a file; fixed once the node runs",
-        read_only=True,
-    )
-    given = node.declare_parameter(PARAMETER, DEFAULT_VEHICLE, about).value
+    about = Text("description of the vehicle", "name of a file in config/vehicle, or a file")
+    given = declared_text(node, PARAMETER, DEFAULT_VEHICLE, about)
     try:
         return load_description(given)
     except (VehicleError, ConfigurationError) as error:
         raise ParameterError(f"{PARAMETER}: {error}") from None
+
+
+def declared_scenario(node: Node) -> str:
+    """Declare the parameter `scenario` and return the name or file. Raises ParameterError."""
+    about = Text("what is flown", "name of a file in config/scenarios, or a file")
+    return declared_text(node, "scenario", DEFAULT_SCENARIO, about)

@@ -4,7 +4,6 @@ import time
 
 import numpy as np
 from diagnostic_msgs.msg import DiagnosticArray
-from rcl_interfaces.msg import ParameterDescriptor
 from std_msgs.msg import Bool
 
 from uam_control.coordinates import ANGLES, ARM, ATTITUDE, CHI, POSITION
@@ -17,7 +16,7 @@ from uam_control.mission import (
     StartParameters,
     load_scenario,
 )
-from uam_control.nodes.described import described_vehicle
+from uam_control.nodes.described import declared_scenario, described_vehicle
 from uam_control.nodes.mission_inputs import MissionInputs
 from uam_control.nodes.mission_services import offer
 from uam_control.profiles.profile import default_profile
@@ -35,7 +34,6 @@ from uam_msgs_py.node.joins import Backlog
 from uam_msgs_py.node.node_parameters import NodeParameters
 
 NAME = "mission"
-DEFAULT_SCENARIO = "pick_and_place"
 STATUS_PERIOD = 500_000_000  # [ns]
 
 
@@ -54,10 +52,7 @@ class MissionNode(UamNode):
         axes = vehicle.coordinates[ARM]
         self.parameter_set = NodeParameters(self, MissionParameters, axes, section, derived)
         timing = NodeParameters(self, Timing, read_only=True).current
-        about = ParameterDescriptor(
-            description="name of a scenario, or its file; fixed once the node runs", read_only=True
-        )
-        scenario = self.declare_parameter("scenario", DEFAULT_SCENARIO, about).value
+        scenario = declared_scenario(self)
         start = NodeParameters(self, StartParameters, read_only=True).current
         self._mission = Mission(load_scenario(scenario, vehicle), self.parameter_set.current, start)
         self._stage = MissionStage(self._mission, timing)

@@ -16,8 +16,9 @@ from uam_lab.cli.command import Command, count, jobs_of, number
 from uam_lab.cli.counting import Counting
 from uam_lab.compare import plan
 from uam_lab.flight.conclude import command_line
-from uam_lab.flight.flight_settings import ENGINES, PAYLOAD_MAX, require_ros
+from uam_lab.flight.flight_settings import ENGINES, require_ros
 from uam_lab.results.result_folder import make_folder
+from uam_sim_bridge.plant.vehicle import PAYLOAD_MAX
 
 EXAMPLES = """\
 examples:

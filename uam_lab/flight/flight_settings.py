@@ -21,6 +21,7 @@ from uam_sim_bridge.faults.faulty_plant import check_engine
 from uam_sim_bridge.faults.process_faults import DiscoveryLoss
 from uam_sim_bridge.mavlink.transport.transport import ALLOWED, LinkUrl, parse_url
 from uam_sim_bridge.plant.engines import DEFAULT_PLANT
+from uam_sim_bridge.plant.vehicle import PAYLOAD_MAX
 from uam_sim_bridge.ports import AUTOPILOT_UDP, INSTANCES
 from uam_sim_bridge.px4.px4_installation import Px4Installation
 
@@ -32,7 +33,6 @@ REPLACEABLE = ("state_estimator", "position_controller", "attitude_controller", 
 COCKPIT = "cockpit"
 LOG_LIMIT = 4000.0  # [MB] some four hours of flight
 ONLOOKERS = ("scene", COCKPIT)  # nodes that only display: their end does not end the flight
-PAYLOAD_MAX = 2.0  # [kg] more than the rotors can carry
 
 
 @dataclass(frozen=True)

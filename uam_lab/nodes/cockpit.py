@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import sys
 import time
+from dataclasses import dataclass
 
 import rclpy
 import yaml
@@ -14,32 +15,42 @@ from rclpy.signals import SignalHandlerOptions
 from uam_control.coordinates import ARM
 from uam_control.nodes.described import described_vehicle
 from uam_control.settings import configuration
-from uam_control.settings.parameter_set import ParameterError
+from uam_control.settings.parameter_set import ParameterError, ParameterSet, integer, text
 from uam_lab.cockpit import web
 from uam_lab.cockpit.page import Page
 from uam_lab.cockpit.page_address import LOCAL, PORT, AddressError
 from uam_lab.cockpit.services import Services
 from uam_lab.cockpit.watch import Watch
 from uam_msgs_py.node.base_node import StopSignal, refuse
-from uam_msgs_py.node.node_parameters import refuse_unknown
+from uam_msgs_py.node.node_parameters import NodeParameters, refuse_unknown
 
 NAME = "cockpit"
 OPTIONS = "views/cockpit.yaml"
+
+
+@dataclass(frozen=True)
+class CockpitParameters(ParameterSet):
+    """Address of the page; it cannot change while the node runs."""
+
+    host: str = text(LOCAL, "address at which the page is served", f"{LOCAL}: this computer only")
+    port: int = integer(PORT, "TCP port; the next free one from it on, 0: any", 0, 65535)
+    origins: str = text(
+        "", "other pages that may connect", "as http://name:port, with commas between; empty: none"
+    )
 
 
 def main() -> int:
     """Serve the page until SIGINT or SIGTERM; return the exit status."""
     rclpy.init(args=sys.argv, signal_handler_options=SignalHandlerOptions.NO)
     stop = StopSignal()
-    node = Node(NAME, start_parameter_services=False)
-    host = node.declare_parameter("host", LOCAL).value
-    port = node.declare_parameter("port", PORT).value
-    origins = [one for one in node.declare_parameter("origins", "").value.split(",") if one]
+    node = Node(NAME)
     options = yaml.safe_load(configuration.path(OPTIONS).read_text())
     try:
+        served = NodeParameters(node, CockpitParameters, read_only=True).current
         vehicle = described_vehicle(node)
         refuse_unknown(node)
-        server = web.serve(host, port, "uam", origins)
+        origins = [one for one in served.origins.split(",") if one]
+        server = web.serve(served.host, served.port, "uam", origins)
     except (ParameterError, AddressError) as error:
         return refuse(NAME, error)
     print(f"{NAME}: {web.url(server)}", flush=True)

@@ -23,7 +23,7 @@ from std_msgs.msg import String
 from uam_control.coordinates import ALPHA, ANGLES, ARM, ATTITUDE, CHI, CHI_DDOT, POSITION
 from uam_control.maths.rotations import quaternion_from_euler, wrap_angle
 from uam_control.mission import load_scenario
-from uam_control.nodes.described import described_vehicle
+from uam_control.nodes.described import declared_scenario, described_vehicle
 from uam_control.settings.parameter_set import ParameterSet, number
 from uam_control.stamps import SECOND
 from uam_lab.nodes.scene_markers import PAYLOAD, FlownPath, Markers, ReferencePath
@@ -42,7 +42,6 @@ from uam_sim_bridge.plant.vehicle import SWING
 
 NAME = "scene"
 REFERENCE = "reference"  # frame of the desired pose
-DEFAULT_SCENARIO = "pick_and_place"
 REFERENCES = 8  # stored until the state of the same tick arrives: they come one tick earlier
 
 
@@ -64,7 +63,7 @@ class SceneNode(UamNode):
         options = NodeParameters(self, SceneParameters, read_only=True).current
         self._frame_period = round(SECOND / options.frame_rate)
         self._marker_period = round(SECOND / options.marker_rate)
-        scenario = self.declare_parameter("scenario", DEFAULT_SCENARIO).value
+        scenario = declared_scenario(self)
         described = described_vehicle(self)
         vehicle = Vehicle.of(described)
         self._joint_names = described.joint_names

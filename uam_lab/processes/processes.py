@@ -6,6 +6,7 @@ the session, because schedulers share processor time between sessions first. See
 """
 
 import os
+import re
 import signal
 import time
 from collections.abc import Callable, Iterable, Mapping, Sequence
@@ -27,7 +28,8 @@ class NodeFailed(RuntimeError):
         self.name, self.status = name, status
         self.last_lines = tail(log)
         own_words = self.last_lines[-1] if self.last_lines else ""
-        why = own_words.removeprefix(f"{name}: ")  # prefix of a node's last line
+        # prefix of a node's last line, or of a line that it logs by rclpy
+        why = re.sub(rf"^({name}: |\[\w+\] \[[\d.]+\] \[{name}\]: )", "", own_words)
         said = f": {why}" if why != own_words else ""
         super().__init__(f"{name} {describe(status)}{said}")
 

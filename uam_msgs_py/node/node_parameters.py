@@ -126,6 +126,21 @@ class NodeParameters(Generic[S]):
             self.apply(new)
 
 
+def declared_text(node: Node, name: str, default: str, spec: Text, secret: bool = False) -> str:
+    """Declare a read-only text parameter and return its value; a secret is shown as 'set'.
+
+    For texts that a node needs outside a ParameterSet. Raises ParameterError if the value is no
+    text, for example a key that YAML reads as a number.
+    """
+    value = given(node).get(name, default)
+    if not isinstance(value, str):
+        what = "the value" if secret else repr(value)
+        raise ParameterError(f"{name}: {what} is no text; allowed: {spec.allowed}")
+    shown = "set" if secret and value else value
+    node.declare_parameter(name, shown, descriptor(spec, read_only=True), ignore_override=True)
+    return value
+
+
 def given(node: Node) -> dict[str, Any]:
     """Return the values of the parameter file and the command line, by name."""
     return {name: value.value for name, value in node._parameter_overrides.items()}

@@ -4,10 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from rcl_interfaces.msg import ParameterDescriptor
-
-from uam_control.settings.parameter_set import ParameterSet, choice, number, switch
-from uam_msgs_py.node.node_parameters import given
+from uam_control.settings.parameter_set import ParameterSet, Text, choice, integer, number, switch
+from uam_msgs_py.node.node_parameters import declared_text
 from uam_msgs_py.node.tunable import TunableNode
 from uam_sim_bridge.faults import LINK, Schedule
 from uam_sim_bridge.mavlink.link.link import OffboardLink
@@ -18,7 +16,6 @@ from uam_sim_bridge.mavlink.protocol.wire import Codec, mavlink2
 from uam_sim_bridge.mavlink.transport.faulty_transport import FaultyTransport
 from uam_sim_bridge.mavlink.transport.forwarding import GroundStation
 from uam_sim_bridge.mavlink.transport.transport import Transport, UdpTransport, open_transport
-from uam_sim_bridge.ports import PortError
 
 
 @dataclass(frozen=True)
@@ -30,12 +27,10 @@ class BridgeParameters(ParameterSet):
         "lockstep: only ticks; realtime: also a watchdog on wall time",
         ("lockstep", "realtime"),
     )
-    local_port: float = number(14540, "own UDP port (14540 + instance)", "1", 1, 65535)
-    autopilot_port: float = number(
-        14580, "UDP port of the autopilot (14580 + instance)", "1", 1, 65535
-    )
-    autopilot_system: float = number(1, "MAVLink system id of the autopilot", "1", 1, 255)
-    signing_link_id: float = number(0, "number of this link in MAVLink 2 signatures", "1", 0, 255)
+    local_port: int = integer(14540, "own UDP port (14540 + instance)", 1, 65535)
+    autopilot_port: int = integer(14580, "UDP port of the autopilot (14580 + instance)", 1, 65535)
+    autopilot_system: int = integer(1, "MAVLink system id of the autopilot", 1, 255)
+    signing_link_id: int = integer(0, "number of this link in MAVLink 2 signatures", 0, 255)
     autopilot_parameters: str = choice(
         "warn",
         "where the autopilot's MC_*RATE_P/K or THR_MDL_FAC differ from the mapping: warn, "
@@ -70,39 +65,50 @@ def open_links(
 ) -> Links:
     """Declare the parameters of the links, and open the links.
 
-    Raises PortError, FaultError in one line.
+    Raises PortError, ParameterError, FaultError in one line.
     """
-    system = int(options.autopilot_system)
-    about = ParameterDescriptor(
-        description="host of the autopilot's UDP port, used if `autopilot` is empty",
-        read_only=True,
+    system = options.autopilot_system
+    host = declared_text(
+        node,
+        "autopilot_host",
+        "127.0.0.1",
+        Text("host of the autopilot's UDP port, used if `autopilot` is empty", "name or address"),
     )
-    host = node.declare_parameter("autopilot_host", "127.0.0.1", about).value
-    url = _text(
+    url = declared_text(
         node,
         "autopilot",
-        "link to the autopilot, in place of the UDP port: "
-        "udp:HOST:PORT[:LOCAL_PORT], tcp:HOST:PORT or serial:DEVICE:BAUD",
+        "",
+        Text(
+            "link to the autopilot, in place of the UDP port",
+            "udp:HOST:PORT[:LOCAL_PORT], tcp:HOST:PORT or serial:DEVICE:BAUD; empty: none",
+        ),
     )
-    watching = _text(node, "gcs", "link to a ground station: udp:HOST:PORT[:LOCAL_PORT]")
-    key = _text(
+    watching = declared_text(
+        node, "gcs", "", Text("link to a ground station", "udp:HOST:PORT[:LOCAL_PORT]; empty: none")
+    )
+    key = declared_text(
         node,
         "signing_key",
-        "MAVLink 2 signing: 64 hex digits, or a file with them; shown as 'set'",
+        "",
+        Text("MAVLink 2 signing; shown as 'set'", "64 hex digits, or a file with them"),
         secret=True,
     )
-    signing = Signing.from_text(key, int(options.signing_link_id))
-    planned = _text(
+    signing = Signing.from_text(key, options.signing_link_id)
+    planned = declared_text(
         node,
         "faults",
-        "JSON, faults of the MAVLink connection with their times, see docs/faults.md; empty = none",
+        "",
+        Text(
+            "faults of the MAVLink connection with their times",
+            "JSON, see docs/faults.md; empty: none",
+        ),
     )
     faults = Schedule.from_text(planned).only(LINK)
     transport: Transport
     if url:
         transport = open_transport(url)
     else:
-        transport = UdpTransport(int(options.local_port), (host, int(options.autopilot_port)))
+        transport = UdpTransport(options.local_port, (host, options.autopilot_port))
     faulty = station = None
     if faults:
         transport = faulty = FaultyTransport(transport, faults)
@@ -111,17 +117,3 @@ def open_links(
         transport = station = GroundStation(watching, transport, codec)
     link = OffboardLink(transport, sequence, mapping, system, signing)
     return Links(link, station, faulty)
-
-
-def _text(node: TunableNode, name: str, description: str, secret: bool = False) -> str:
-    """Declare a read-only text parameter, '' by default, and return it; a secret is not shown.
-
-    Raises PortError if the value is not a text, for example a key that YAML reads as a number.
-    """
-    value = given(node).get(name, "")
-    if not isinstance(value, str):
-        raise PortError(f"{name}: a text expected" + (", or a file's name" if secret else ""))
-    shown = "set" if secret and value else value
-    descriptor = ParameterDescriptor(description=description, read_only=True)
-    node.declare_parameter(name, shown, descriptor, ignore_override=True)
-    return value

@@ -73,9 +73,11 @@ class NotReady(PlantStopped):
 class Simulator:
     """Plant, topics and autopilot link, tick by tick."""
 
-    def __init__(self, node: TunableNode, options: Options, stop: StopSignal):
+    def __init__(self, node: TunableNode, declared: Options, stop: StopSignal):
+        options = declared.parameters
         self.node, self.options, self._stop = node, options, stop
-        vehicle = Vehicle.load(options.vehicle).changed(json.loads(options.vehicle_changes))
+        self._log = node.get_logger()
+        vehicle = Vehicle.of(declared.vehicle).changed(json.loads(options.vehicle_changes))
         described = vehicle.description
         start = (vehicle, options.payload_mass, options.seed, tuple(options.arm_start))
         faults = Schedule.from_text(options.faults).only(PLANT)
@@ -122,12 +124,12 @@ class Simulator:
             if patience.over:
                 raise NotReady(f"no progress for {limit:g} s, waiting for {_listed(waiting)}")
             if waiting != last and now - reported > 1.0 or now - reported > REPORT_INTERVAL:
-                print(f"{NAME}: waiting for {_listed(waiting)}", flush=True)
+                self._log.info(f"waiting for {_listed(waiting)}")
                 reported, last = now, waiting
         settled = time.monotonic() + (FOREIGN_WAIT if self._foreign else 0.0)
         while time.monotonic() < settled and not self._stop.raised:
             self.executor.spin_once(0.05)
-        print(f"{NAME}: all nodes are connected", flush=True)
+        self._log.info("all nodes are connected")
 
     def _waiting_for(self) -> list[str]:
         recorded, foreign = self.options.recorded, self._foreign
@@ -330,7 +332,7 @@ def main() -> int:
             simulator.wait_for_nodes()
             simulator.run()
         except PlantStopped as error:
-            print(f"{NAME}: {error}", file=sys.stderr, flush=True)
+            node.get_logger().fatal(str(error))
             simulator.statistics.ended_by = str(error)
             return NOT_READY if isinstance(error, NotReady) else 1
         return 0
@@ -339,8 +341,8 @@ def main() -> int:
     finally:
         if simulator is not None:
             simulator.close()
-            if options.statistics:
-                Path(options.statistics).write_text(json.dumps(simulator.report().to_mapping()))
+            if statistics := options.parameters.statistics:
+                Path(statistics).write_text(json.dumps(simulator.report().to_mapping()))
         node.destroy_node()
         rclpy.try_shutdown()
 

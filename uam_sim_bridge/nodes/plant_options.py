@@ -2,75 +2,95 @@
 
 from __future__ import annotations
 
+import math
 from array import array
 from dataclasses import asdict, dataclass, field, replace
 
-from rcl_interfaces.msg import ParameterDescriptor
 from rclpy.node import Node
 
-from uam_control.settings.parameter_set import ParameterError
-from uam_control.vehicle import DEFAULT_VEHICLE
+from uam_control.coordinates import ARM
+from uam_control.nodes.described import described_vehicle
+from uam_control.settings.parameter_set import (
+    ParameterSet,
+    choice,
+    integer,
+    number,
+    switch,
+    text,
+    vector,
+)
+from uam_control.vehicle import VehicleDescription
+from uam_msgs_py.node.node_parameters import NodeParameters
 from uam_sim_bridge.plant.engines import DEFAULT_PLANT, PLANTS
+from uam_sim_bridge.plant.vehicle import PAYLOAD_MAX
 
 NOT_READY = 3  # exit status: not every node has started, or not all are connected
 
 
 @dataclass(frozen=True)
+class PlantParameters(ParameterSet):
+    """Parameters of the plant node; they cannot change while it runs."""
+
+    vehicle_changes: str = text(
+        "{}", "dotted entries of the vehicle's file to replace", 'JSON, as {"air.gust": 1.0}'
+    )
+    plant: str = text(
+        DEFAULT_PLANT, "physics engine", ", ".join(PLANTS) + ", or a class as module:Class"
+    )
+    payload_mass: float = number(0.2, "mass of the payload, 0 for none", "kg", 0.0, PAYLOAD_MAX)
+    seed: int = integer(1, "seed of all noise", 0, 2**31 - 1)
+    arm_start: tuple = vector(
+        (),
+        "joint angles on the ground, empty = stowed as described",
+        "rad",
+        -math.pi,
+        math.pi,
+        optional=True,
+    )
+    clock: str = choice(
+        "lockstep",
+        "lockstep: each tick waits for all answers; realtime: ticks of the wall clock",
+        ("lockstep", "realtime"),
+    )
+    hil_port: int = integer(4560, "TCP port at which the autopilot connects", 1, 65535)
+    autopilot_always_answers: bool = switch(
+        True, "true for the stand-in; false for PX4, which is silent at boot"
+    )
+    linger: float = number(
+        0.0, "time after the mission, in which the autopilot can land and disarm", "s", 0.0, 600.0
+    )
+    recorded: bool = switch(False, "wait for the recorder as well")
+    foreign: str = text(
+        "", "nodes that are not the stack's own", "names with commas between them; empty: none"
+    )
+    faults: str = text(
+        "", "faults of the plant with their times", "JSON, see docs/faults.md; empty: none"
+    )
+    start_timeout: float = number(
+        0.0, "longest wait for the other nodes without progress, 0 = for ever", "s", 0.0, 86400.0
+    )
+    answer_timeout: float = number(
+        10.0, "longest wait for the answers to a tick, of wall time", "s", 0.01, 3600.0
+    )
+    time_limit: float = number(
+        0.0, "simulation time at which the flight ends in any case, 0 = never", "s", 0.0, 1e6
+    )
+    statistics: str = text("", "JSON file to write at the end", "a file; empty: none")
+
+
+@dataclass(frozen=True)
 class Options:
-    """The node's parameters."""
+    """The vehicle and the parameters of the plant node."""
 
-    vehicle: str = DEFAULT_VEHICLE
-    vehicle_changes: str = "{}"
-    plant: str = DEFAULT_PLANT
-    payload_mass: float = 0.2
-    seed: int = 1
-    arm_start: list[float] = field(default_factory=list)
-    clock: str = "lockstep"
-    hil_port: int = 4560
-    autopilot_always_answers: bool = True
-    linger: float = 0.0
-    recorded: bool = False
-    foreign: str = ""
-    faults: str = ""
-    start_timeout: float = 0.0
-    answer_timeout: float = 10.0
-    time_limit: float = 0.0
-    statistics: str = ""
-
-
-DESCRIPTIONS = {
-    "vehicle": "name of a file in config/vehicle",
-    "vehicle_changes": 'JSON, dotted entries of that file to replace, as {"air.gust": 1.0}',
-    "plant": "physics engine: " + ", ".join(PLANTS) + ", or a class as module:Class",
-    "payload_mass": "mass of the payload [kg], 0 for none",
-    "seed": "of all noise",
-    "arm_start": "joint angles on the ground [rad], empty = stowed as described",
-    "clock": "lockstep or realtime",
-    "hil_port": "TCP port at which the autopilot connects",
-    "autopilot_always_answers": "true for the stand-in; false for PX4, which is silent at boot",
-    "linger": "time after the mission, in which the autopilot can land and disarm [s]",
-    "recorded": "wait for the recorder as well",
-    "foreign": "names of nodes that are not the stack's own, with commas between them",
-    "faults": "JSON, faults of the plant with their times, see docs/faults.md; empty = none",
-    "start_timeout": "longest wait for the other nodes [s] without progress, 0 = for ever",
-    "answer_timeout": "longest wait for the answers to a tick [s of wall time]",
-    "time_limit": "simulation time at which the flight ends in any case [s], 0 = never",
-    "statistics": "JSON file to write at the end, empty = none",
-}
+    vehicle: VehicleDescription
+    parameters: PlantParameters
 
 
 def declare(node: Node) -> Options:
     """Declare the parameters and return their values. Raises ParameterError for a bad one."""
-    values = {}
-    for name, default in asdict(Options()).items():
-        text = ParameterDescriptor(
-            description=DESCRIPTIONS[name], read_only=True, dynamic_typing=default == []
-        )
-        values[name] = node.declare_parameter(name, default, text).value
-    options = Options(**values)
-    if options.clock not in ("lockstep", "realtime"):
-        raise ParameterError(f"clock: '{options.clock}' is not lockstep or realtime")
-    return options
+    vehicle = described_vehicle(node)
+    joints = vehicle.coordinates[ARM]
+    return Options(vehicle, NodeParameters(node, PlantParameters, joints, read_only=True).current)
 
 
 @dataclass

@@ -23,6 +23,7 @@ from uam_control.vehicle import (
     load_description,
 )
 
+PAYLOAD_MAX = 2.0  # [kg] more than the rotors can carry
 BASE, PAYLOAD, MAGNET = "base", "payload", "magnet"  # bodies of the MJCF
 SWING = "magnet_swing"  # the joint of the magnet's pivot, without a sensor
 MASS_TOLERANCE = 1e-3  # relative

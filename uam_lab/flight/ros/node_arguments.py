@@ -80,7 +80,7 @@ def parameters(
         "local_port": ports.offboard_udp,
         "autopilot_port": ports.autopilot_udp,
         # system id: as PX4 SITL numbers its instances; 1 for a flight controller
-        "autopilot_system": 1.0 if in_the_loop(settings) else float(ports.instance + 1),
+        "autopilot_system": 1 if in_the_loop(settings) else ports.instance + 1,
         "gcs": settings.gcs,
         "faults": settings.faults.only(LINK).to_text(),
         "dry_run": settings.dry_run,

@@ -27,7 +27,7 @@ from dataclasses import dataclass
 from enum import Enum
 from typing import NamedTuple
 
-from uam_control.settings.parameter_set import ParameterSet, number, switch
+from uam_control.settings.parameter_set import ParameterSet, integer, number, switch
 from uam_sim_bridge.mavlink.offboard.advice import with_advice
 from uam_sim_bridge.mavlink.protocol.modes import (
     CUSTOM_MODE_ENABLED,
@@ -104,14 +104,14 @@ class OffboardParameters(ParameterSet):
         1.0, "time of streaming setpoints before the first request for OFFBOARD", "s", 0.0, 30.0
     )
     retry_interval: float = number(0.5, "time between two requests", "s", 0.05, 10.0)
-    attempts: float = number(40.0, "requests without success before giving up", "1", 1.0, 10000.0)
+    attempts: int = integer(40, "requests without success before giving up", 1, 10000)
     return_after_lost_link: bool = switch(
         False,
         "request OFFBOARD again after the autopilot's failsafe for a lost stream of setpoints; "
         "never against a mode that a person chose",
     )
-    recovery_attempts: float = number(
-        6.0, "requests of return_after_lost_link in a whole flight", "1", 0.0, 10000.0
+    recovery_attempts: int = integer(
+        6, "requests of return_after_lost_link in a whole flight", 0, 10000
     )
 
 
