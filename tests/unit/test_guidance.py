@@ -7,9 +7,8 @@ import pytest
 from hypothesis import Phase, given, settings
 from hypothesis import strategies as st
 
-from uam_control.mission import load_scenario
+from uam_control.mission import MissionParameters, load_scenario
 from uam_control.mission.guidance import Guidance, PathClock, Segment
-from uam_control.supervision import SupervisionParameters
 
 START = np.array([0.0, 0.0, 0.28, 0.0, 0.0, 0.0, 0.0, np.pi / 2])
 DT = 0.01
@@ -18,7 +17,7 @@ NO_SHRINKING = (Phase.explicit, Phase.reuse, Phase.generate)  # flights are long
 
 def guidance(**parameters):
     scenario = load_scenario("pick_and_place")
-    made = SupervisionParameters(**parameters)
+    made = MissionParameters(**parameters)
     return Guidance(scenario.trajectory(START), 100.0, np.zeros((3, 8)), scenario.arm_start, made)
 
 

@@ -12,6 +12,7 @@ import numpy as np
 from uam_control.coordinates import ALPHA, ARM, ATTITUDE, CHI, CHI_DOT, YAW, Z
 from uam_control.mission.guidance import Guidance
 from uam_control.mission.mission_parameters import MissionParameters, StartParameters
+from uam_control.mission.plans import GoalPose, PlanRefused, Points, check
 from uam_control.mission.scenario import Scenario
 from uam_control.mission.trajectory import empty_reference
 from uam_control.supervision import (
@@ -31,8 +32,8 @@ from uam_control.supervision import (
 
 # phases in addition to those of a scenario
 WAITING, HOLD, LAND, LANDED, ABORTED = "waiting", "hold", "land", "landed", "aborted"
-RELEASED, DRY_RUN = "released", "dry run"
-PHASES = (WAITING, HOLD, LAND, LANDED, ABORTED, RELEASED, DRY_RUN)
+RELEASED, DRY_RUN, GOAL = "released", "dry run", "goal"
+PHASES = (WAITING, HOLD, LAND, LANDED, ABORTED, RELEASED, DRY_RUN, GOAL)
 
 
 @dataclass
@@ -86,7 +87,7 @@ class Mission:
         vars(self.output).update(vars(MissionOutput(reference)))
         self._supervisor = Supervisor(parameters)
         self._parameters = parameters
-        self._requests: deque[OperatorCommand] = deque()
+        self._requests: deque[tuple[OperatorCommand, GoalPose | Points | None]] = deque()
         self._guidance: Guidance | None = None
         self._takeoff = self._ground = 0.0
         self._half_down = math.inf  # stamp [s] from which a descent may detect touchdown
@@ -175,7 +176,8 @@ class Mission:
                 guidance.advance(stamp)
             seen = self._observe(stamp, state, armed_since, readings or Readings())
             seen.authority, self._seen = authority or Authority(), seen
-            command = self._requests.popleft() if self._requests else None
+            command, goal = self._requests.popleft() if self._requests else (None, None)
+            before = len(self.changes)
             decision = self._supervisor.step(stamp, seen, command)
             if guidance is not None:
                 guidance.write(stamp)
@@ -184,6 +186,11 @@ class Mission:
                     guidance.drift(stamp, state)
                 if output.state is State.RELEASED:
                     guidance.follow(stamp, state)
+                event = self.changes[-1].event if len(self.changes) > before else None
+                if event is Event.GOAL:
+                    guidance.fly(stamp, goal.plan(stamp, output.reference, self._parameters))
+                elif event is Event.RESUME:
+                    guidance.go_on(stamp)
             self._follow(stamp, decision)
             if output.state is State.GROUNDED and not output.arm:
                 self._wait(state)
@@ -214,8 +221,29 @@ class Mission:
         refusal = self._supervisor.refusal(command, self._seen)
         if refusal:
             return False, f"refused: {refusal}"
-        self._requests.append(command)
+        self._requests.append((command, None))
         return True, command.value.value
+
+    def plan(self, goal: GoalPose | Points) -> tuple[bool, str]:
+        """Check a goal or trajectory; queue it for the next step if it can be flown.
+
+        It replaces the path or the plan before it. At its end the mission holds until a command.
+        Returns whether it is accepted, and the length of the plan or the reason of the refusal.
+        """
+        if self._seen is None:
+            return False, "refused: no state of the vehicle yet"
+        refusal = self._supervisor.refusal(OperatorCommand.GOAL, self._seen)
+        if refusal:
+            return False, f"refused: {refusal}"
+        parameters, reference = self._parameters, self.output.reference
+        try:
+            goal.check(reference, parameters)
+            made = goal.plan(self._stamp, reference, parameters)
+            check(made, parameters, self._ground)
+        except PlanRefused as error:
+            return False, f"refused: {error}"
+        self._requests.append((OperatorCommand.GOAL, goal))
+        return True, f"accepted: at the end in {made.end - self._stamp:.1f} s"
 
     def switch_magnet(self, on: bool) -> tuple[bool, str]:
         """Override the magnet until the scenario switches it next; returns as `request` does."""
@@ -253,7 +281,8 @@ class Mission:
         low = state[CHI, Z] < self._ground + p.touchdown_height
         seen.on_ground = bool(low and abs(state[CHI_DOT, Z]) < p.touchdown_speed)
         landing, time = self.scenario.landing, guidance.scenario_time
-        seen.landing_due = time >= landing.at
+        seen.landing_due = time >= landing.at and not guidance.planned
+        seen.off_path, seen.arrived = guidance.planned, guidance.arrived(stamp)
         if time >= landing.at + 0.5 * landing.duration or stamp >= self._half_down:
             seen.touchdown = self._at_rest(stamp, seen.on_ground)
         late = landing.at + landing.duration + p.touchdown_timeout
@@ -294,9 +323,10 @@ class Mission:
         elif state is State.HOLDING and before is State.RELEASED:
             guidance.stay(stamp, self._seen.state, self._ground)
         elif state in (State.HOLDING, State.RELEASED):
-            guidance.stop(stamp, decision.stow)
+            arrived = self.changes[-1].event is Event.ARRIVED
+            guidance.stop(stamp, decision.stow and not arrived)
             self._half_down = math.inf
-        elif state is State.FLYING and before is State.HOLDING:
+        elif self.changes[-1].event in (Event.CLEAR, Event.RESTARTED):
             guidance.go_on(stamp)
         elif decision.guide is Guide.DESCEND:
             guidance.descend(stamp, self._seen.state, self._ground, decision.stow)
@@ -333,6 +363,8 @@ class Mission:
         if decision.state is State.RELEASED:
             return RELEASED
         if decision.guide is Guide.SCENARIO:
+            if self._guidance.planned:
+                return GOAL
             return self.scenario.phase(self._guidance.scenario_time)
         return {Guide.STOP: HOLD, Guide.DESCEND: LAND, Guide.NOTHING: ABORTED}[decision.guide]
 

@@ -13,13 +13,12 @@ import numpy as np
 
 from uam_control.coordinates import ALPHA, ARM, CHI, CHI_DDOT, CHI_DOT, POSITION, YAW, X, Y, Z
 from uam_control.maths.rotations import wrap_angle
+from uam_control.mission.mission_parameters import MissionParameters
+from uam_control.mission.plans import BASE, PEAK, RAMP, Plan, quintic, quintic_at, still
 from uam_control.mission.scenario import SINK
 from uam_control.mission.trajectory import Trajectory
-from uam_control.supervision import SupervisionParameters
 
-_PEAK = 1.875  # largest rate of a quintic from rest to rest, times its mean rate
 _SHORTEST = 0.3  # s in which a sinking vehicle near the ground is stopped
-_RAMP = 1.5  # largest slope of a cubic from rest to rest, times its mean slope
 
 
 class PathClock:
@@ -56,7 +55,12 @@ class PathClock:
         return -math.inf if self._ramp is None else self._ramp[0] + self._ramp[1]
 
     def change(self, stamp: float, goal: float, length: float) -> None:
-        """Change the rate to `goal` [1] within `length` [s] from `stamp` [s] on."""
+        """Change the rate to `goal` [1] within `length` [s] from `stamp` [s] on.
+
+        No effect if it changes to `goal` already.
+        """
+        if self._ramp is not None and self._ramp[-1] == goal:
+            return
         self._ramp = (stamp, length, *self.at(stamp), goal)
 
 
@@ -68,14 +72,9 @@ class Segment:
     ) -> None:
         """Begin at `stamp` [s]; start (3, 6 + n); goal (6 + n,); lengths (6 + n,): times [s]."""
         self._stamp, self._lengths, self._goal = stamp, lengths, goal.copy()
-        p, v, a = start[CHI], start[CHI_DOT] * lengths, start[CHI_DDOT] * lengths**2  # per length
-        d = goal - p
-        self._powers = np.array([
-            p, v, a / 2,
-            10 * d - 6 * v - 1.5 * a,
-            -15 * d + 8 * v + 1.5 * a,
-            6 * d - 3 * v - 0.5 * a,
-        ])  # fmt: skip
+        rest = np.zeros_like(start)
+        rest[CHI] = goal
+        self._powers = quintic(start, rest, lengths)
 
     @property
     def end(self) -> float:
@@ -85,12 +84,7 @@ class Segment:
     def write(self, stamp: float, reference: np.ndarray) -> None:
         """Write the reference (3, 6 + n) at `stamp` [s]."""
         u = np.clip((stamp - self._stamp) / self._lengths, 0.0, 1.0)
-        c = self._powers
-        reference[CHI] = c[0] + u * (c[1] + u * (c[2] + u * (c[3] + u * (c[4] + u * c[5]))))
-        rate = c[1] + u * (2 * c[2] + u * (3 * c[3] + u * (4 * c[4] + u * 5 * c[5])))
-        reference[CHI_DOT] = rate / self._lengths
-        second = 2 * c[2] + u * (6 * c[3] + u * (12 * c[4] + u * 20 * c[5]))
-        reference[CHI_DDOT] = second / self._lengths**2
+        reference[:] = quintic_at(self._powers, u, self._lengths)
         arrived = u >= 1.0  # without rounding errors
         reference[CHI, arrived] = self._goal[arrived]
         reference[CHI_DOT:, arrived] = 0.0
@@ -109,7 +103,7 @@ class Guidance:
         stamp: float,
         reference: np.ndarray,
         stowed: Sequence[float],
-        parameters: SupervisionParameters,
+        parameters: MissionParameters,
     ) -> None:
         """stamp [s]: of the take-off; reference: array to write; stowed: landing angles [rad]."""
         self.parameters = parameters
@@ -123,6 +117,7 @@ class Guidance:
         self._away: Segment | None = None  # offset from the path, after a drift
         self._returns = True  # whether it ends on the path
         self._go_on_at = math.inf  # stamp [s] at which the arm is back and the path continues
+        self._plans: dict[bool, Plan] = {}  # in place of the path; True: of the base, False: arm
         self._last: Segment | None = None  # in place of the path, until the end of the flight
 
     @property
@@ -159,6 +154,24 @@ class Guidance:
             self.reference[:, :ALPHA] += self._path[:, :ALPHA]
             if self._returns and stamp >= self._away.end:
                 self._away = None
+        for plan in self._plans.values():
+            plan.write(stamp, self.reference)
+
+    @property
+    def planned(self) -> bool:
+        """Return whether a plan is flown, or held after its end, in place of the path."""
+        return bool(self._plans) and self._last is None
+
+    def arrived(self, stamp: float) -> bool:
+        """Return whether every plan is at its end at `stamp` [s]; False without a plan."""
+        return self.planned and all(stamp >= plan.end for plan in self._plans.values())
+
+    def fly(self, stamp: float, plan: Plan) -> None:
+        """Leave the path for `plan`, made at `stamp` [s] from the reference; call after `write`."""
+        self._plans[plan.columns is BASE] = plan
+        self._stop_clock(stamp)
+        if plan.columns is BASE:
+            self._away = None
 
     def drift(self, stamp: float, state: np.ndarray) -> None:
         """Move the reference to the vehicle's pose and plan the return to the path; call after
@@ -166,6 +179,11 @@ class Guidance:
 
         Otherwise the restarted controller would begin with a large error. state (3, 6 + n).
         """
+        if True in self._plans:
+            if np.all(np.isfinite(state[CHI])):
+                self.follow(stamp, state)
+                self._plans[True] = still(stamp, self.reference, BASE, self.parameters)
+            return
         path = self._without_away(stamp)
         offset = self._offset(path, state)
         if np.all(np.isfinite(offset)):
@@ -187,16 +205,14 @@ class Guidance:
         A sinking vehicle loses at most half of its height above `ground` [m]. `go_on` then returns
         to the path.
         """
-        path = self._path
-        self._trajectory.write(self.scenario_time, path)
-        path[CHI_DDOT] = self._rate**2 * path[CHI_DDOT] + self._slope * path[CHI_DOT]
-        path[CHI_DOT] *= self._rate
+        path = self._on_path()
+        self._plans.pop(True, None)
         offset = self._offset(path, state)
         offset[CHI_DOT, POSITION] = state[CHI_DOT, POSITION] - path[CHI_DOT, POSITION]
         if not np.all(np.isfinite(offset)):
             return
         p, speed = self.parameters, float(np.linalg.norm(offset[CHI_DOT, POSITION]))
-        length = max(p.stop_time, 2.0 * _RAMP * speed / p.stop_acceleration)
+        length = max(p.stop_time, 2.0 * RAMP * speed / p.stop_acceleration)
         lengths = np.full_like(offset[CHI], length)
         z, rate = state[CHI, Z], state[CHI_DOT, Z]
         if rate < 0.0:
@@ -209,20 +225,30 @@ class Guidance:
     def stop(self, stamp: float, stow: bool) -> None:
         """Slow down to a stop on the path from `stamp` [s] on; stow: move the arm to `stowed`.
 
-        A descent ends: `stay` then sets the reference.
+        A descent ends: `stay` then sets the reference. A plan ends in a stop, too.
         """
-        self._clock.change(stamp, 0.0, self._ramp_length())
-        self._go_on_at = math.inf
+        for key, plan in self._plans.items():
+            if stamp < plan.end:
+                self._plans[key] = still(stamp, self.reference, plan.columns, self.parameters)
+        self._stop_clock(stamp)
         if self._last is not None:
             self._last = None
+            self._plans.clear()
             self._arm = self._arm_segment(stamp, self._at_rest(stow=False)[0][ARM])
         if stow:
             self._arm = self._arm_segment(stamp, self._stowed)
+            self._plans.pop(False, None)
 
     def go_on(self, stamp: float) -> None:
         """Continue on the path once the stop is complete and the arm is back at its path angles."""
         self._go_on_at = max(stamp, self._clock.settled)
-        if self._arm is not None:
+        if self._plans.pop(True, None) is not None:
+            path = self._on_path()
+            offset = self.reference - path
+            offset[CHI, YAW] = wrap_angle(offset[CHI, YAW])
+            offset[:, ARM] = 0.0
+            self._return(stamp, offset)
+        if self._plans.pop(False, None) is not None or self._arm is not None:
             time, _, _ = self._clock.at(self._go_on_at)
             self._trajectory.write(time, self._path)
             self._arm = self._arm_segment(stamp, self._path[CHI, ARM])
@@ -242,18 +268,31 @@ class Guidance:
             offset = np.zeros(3)
         goal, lengths = self._at_rest(stow)
         across = float(np.hypot(offset[X], offset[Y]))
-        lengths[X:Z] = max(lengths[X], _PEAK * across / p.travel_speed)
+        lengths[X:Z] = max(lengths[X], PEAK * across / p.travel_speed)
         goal[X:Z] += offset[X:Z]
         goal[Z] = ground - SINK
         way = abs(goal[Z] - now[CHI, Z])
         # the other coordinates are at rest before touchdown
-        lengths[Z] = max(np.max(lengths) + p.stop_time, _PEAK * way / p.travel_speed)
+        lengths[Z] = max(np.max(lengths) + p.stop_time, PEAK * way / p.travel_speed)
         self._last = Segment(stamp, now, goal, lengths)
         self._clock.change(stamp, 0.0, self._ramp_length())  # for a scenario that goes on later
 
     def rest(self, stamp: float, stow: bool) -> None:
         """Bring the reference to rest; in failsafe only its arm angles are used."""
         self._last = Segment(stamp, self.reference, *self._at_rest(stow))
+
+    def _stop_clock(self, stamp: float) -> None:
+        """Slow down to a stop on the path."""
+        self._clock.change(stamp, 0.0, self._ramp_length())
+        self._go_on_at = math.inf
+
+    def _on_path(self) -> np.ndarray:
+        """Return the path (3, 6 + n) at the scenario time; the next call reuses the array."""
+        path = self._path
+        self._trajectory.write(self.scenario_time, path)
+        path[CHI_DDOT] = self._rate**2 * path[CHI_DDOT] + self._slope * path[CHI_DOT]
+        path[CHI_DOT] *= self._rate
+        return path
 
     def _without_away(self, stamp: float) -> np.ndarray:
         """Return a copy of the reference without the offset from the path."""
@@ -273,9 +312,14 @@ class Guidance:
 
     def _return(self, stamp: float, offset: np.ndarray) -> None:
         """Let the offset (3, 6 + n) from the path decay to zero."""
-        p, way = self.parameters, float(np.linalg.norm(offset[CHI, POSITION]))
-        turn = abs(float(offset[CHI, YAW]))
-        length = max(p.stop_time, _PEAK * way / p.travel_speed, _PEAK * turn / p.turn_rate)
+        p = self.parameters
+        way, speed = (float(np.linalg.norm(offset[row, POSITION])) for row in (CHI, CHI_DOT))
+        length = max(
+            p.stop_time,
+            PEAK * way / p.travel_speed,
+            2.0 * RAMP * speed / p.stop_acceleration,
+            PEAK * abs(float(offset[CHI, YAW])) / p.turn_rate,
+        )
         goal = np.zeros_like(offset[CHI])
         self._away = Segment(stamp, offset, goal, np.full_like(goal, length))
         self._returns = True
@@ -284,7 +328,7 @@ class Guidance:
         """Return goal and duration [s] of each coordinate to rest; stow: the arm to `stowed`."""
         p, now = self.parameters, self.reference
         speed = float(np.linalg.norm(now[CHI_DOT, POSITION]))
-        length = max(p.stop_time, 2.0 * _RAMP * speed / p.stop_acceleration)
+        length = max(p.stop_time, 2.0 * RAMP * speed / p.stop_acceleration)
         goal, lengths = now[CHI] + now[CHI_DOT] * length / 2, np.full_like(now[CHI], length)
         if stow:
             goal[ARM] = self._stowed
@@ -299,10 +343,10 @@ class Guidance:
     def _arm_length(self, angles: np.ndarray) -> float:
         """Return the time [s] for the arm to reach `angles` [rad] within stow_rate."""
         way = float(np.max(np.abs(angles - self.reference[CHI, ARM])))
-        return max(self.parameters.stop_time, _PEAK * way / self.parameters.stow_rate)
+        return max(self.parameters.stop_time, PEAK * way / self.parameters.stow_rate)
 
     def _ramp_length(self) -> float:
         """Return the time [s] to stop or to resume within stop_acceleration."""
         self._trajectory.write(self.scenario_time, self._path)
         speed = float(np.linalg.norm(self._path[CHI_DOT, POSITION]))
-        return max(self.parameters.stop_time, _RAMP * speed / self.parameters.stop_acceleration)
+        return max(self.parameters.stop_time, RAMP * speed / self.parameters.stop_acceleration)

@@ -21,8 +21,30 @@ class StartParameters(ParameterSet):
 
 
 @dataclass(frozen=True)
-class MissionParameters(SupervisionParameters):
-    """Times and limits of start, take-off and touchdown, and the parameters of the supervisor."""
+class PlanLimits(ParameterSet):
+    """Speeds on the way to a goal pose, and limits that a trajectory must keep to be flown."""
+
+    goal_speed: float = number(0.3, "peak speed on the way to a goal pose", "m/s", 0.01, 3.0)
+    goal_yaw_rate: float = number(0.5, "peak yaw rate towards a goal pose", "rad/s", 0.01, 3.0)
+    plan_start_distance: float = number(
+        0.3, "distance of a trajectory's first point from the reference", "m", 0.0, 5.0
+    )
+    plan_start_angle: float = number(0.3, "the same for yaw and for each joint", "rad", 0.0, 3.2)
+    plan_speed: float = number(1.0, "largest speed of a plan", "m/s", 0.05, 10.0)
+    plan_acceleration: float = number(1.5, "largest acceleration of a plan", "m/s^2", 0.05, 10.0)
+    plan_yaw_rate: float = number(1.0, "largest yaw rate of a plan", "rad/s", 0.05, 10.0)
+    plan_yaw_acceleration: float = number(
+        2.0, "largest yaw acceleration of a plan", "rad/s^2", 0.05, 20.0
+    )
+    plan_joint_rate: float = number(2.0, "largest joint rate of a plan", "rad/s", 0.05, 20.0)
+    plan_joint_acceleration: float = number(
+        6.0, "largest joint acceleration of a plan", "rad/s^2", 0.05, 100.0
+    )
+
+
+@dataclass(frozen=True)
+class MissionParameters(PlanLimits, SupervisionParameters):
+    """Times and limits of start, take-off and touchdown, of plans, and those of the supervisor."""
 
     start_speed: float = number(0.3, "largest speed at the start", "m/s", 0.01, 5.0)
     start_arm_error: float = number(

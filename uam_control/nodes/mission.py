@@ -19,6 +19,7 @@ from uam_control.mission import (
 from uam_control.nodes.described import declared_scenario, described_vehicle
 from uam_control.nodes.mission_inputs import MissionInputs
 from uam_control.nodes.mission_services import offer
+from uam_control.nodes.planner_inputs import PlannerInputs
 from uam_control.profiles.profile import default_profile
 from uam_control.stages.mission_stage import MissionStage
 from uam_control.stages.timing import Timing
@@ -76,6 +77,9 @@ class MissionNode(UamNode):
         self.listen(topics.STATE, self._on_state)
         self.triggers = (topics.STATE.name,)
         offer(self, self._mission)
+        self._planners = PlannerInputs(
+            self, self._mission, vehicle.joint_names, self._publish_answer
+        )
 
     def _on_autopilot(self, message: DiagnosticArray) -> None:
         stamp, state = AutopilotState.from_message(message)
@@ -155,7 +159,13 @@ class MissionNode(UamNode):
             output.state.value,
             output.cause,
             output.regains,
+            self._planners.answers,
+            self._planners.answer,
         )
+
+    def _publish_answer(self) -> None:
+        """Publish the status at once: a planner waits for its answer."""
+        self._status.publish(self.status.to_message(self.stamp))
 
     def _log(self) -> None:
         output = self._mission.output
@@ -179,6 +189,7 @@ class MissionNode(UamNode):
             "state": output.state.value,
             "cause": output.cause,
             "beyond a limit": beyond,
+            "answer to the last goal or trajectory": self._planners.answer,
         }
         return level, summary, values
 

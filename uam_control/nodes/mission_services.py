@@ -20,7 +20,11 @@ from std_srvs.srv import SetBool, Trigger
 from uam_control.mission import Mission
 from uam_control.supervision import OperatorCommand
 
-COMMANDS = {command.name.lower(): command for command in OperatorCommand}
+COMMANDS = {
+    command.name.lower(): command
+    for command in OperatorCommand
+    if command is not OperatorCommand.GOAL  # comes with a pose or trajectory, see planner_inputs
+}
 START, MAGNET = "start", "magnet"
 
 

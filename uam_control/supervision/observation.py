@@ -13,12 +13,13 @@ from uam_control.supervision.states import Event
 
 
 class OperatorCommand(Enum):
-    """Commands of the operator in flight; the value is the event."""
+    """Commands of the operator in flight; the value is the event. GOAL: leave the path."""
 
     HOLD = Event.HOLD
     RESUME = Event.RESUME
     LAND = Event.LAND
     DISARM = Event.DISARM
+    GOAL = Event.GOAL
 
 
 class Authority(NamedTuple):
@@ -70,7 +71,8 @@ class Observation:
     state, reference (3, 6 + n): the estimate, and the reference. ground: height at take-off [m].
     armed: by the autopilot's report. authority: who has control. ready: the mission allows the
     take-off. landing_due: the scenario's landing has begun. on_ground: low and slow now; touchdown:
-    on the ground for touchdown_time; overdue: no touchdown in the allowed time.
+    on the ground for touchdown_time; overdue: no touchdown in the allowed time. off_path: a goal or
+    trajectory replaces the scenario's path; arrived: its end is reached.
     """
 
     state: np.ndarray
@@ -83,4 +85,6 @@ class Observation:
     on_ground: bool = False
     touchdown: bool = False
     overdue: bool = False
+    off_path: bool = False
+    arrived: bool = False
     readings: Readings = field(default_factory=Readings)

@@ -46,6 +46,8 @@ class Event(Enum):
     GIVEN_UP = "aborted before take-off"
     HOLD = "hold by command"
     RESUME = "resume by command"
+    GOAL = "goal by command"
+    ARRIVED = "goal reached"
     LAND = "land by command"
     DISARM = "disarm by command"
     DISARM_ON_GROUND = "disarm by command, on the ground"
@@ -75,12 +77,16 @@ TRANSITIONS = (
     Transition(_S.TAKING_OFF, _E.LOST_ARMING, _S.DISARMED),
     Transition(_S.FLYING, _E.HOLD_LIMIT, _S.HOLDING),
     Transition(_S.FLYING, _E.HOLD, _S.HOLDING),
+    Transition(_S.FLYING, _E.ARRIVED, _S.HOLDING),
+    Transition(_S.FLYING, _E.GOAL, _S.FLYING),
+    Transition(_S.FLYING, _E.RESUME, _S.FLYING),
     Transition(_S.FLYING, _E.LAND_LIMIT, _S.LANDING),
     Transition(_S.FLYING, _E.LAND, _S.LANDING),
     Transition(_S.FLYING, _E.LANDING_DUE, _S.LANDING),
     Transition(_S.FLYING, _E.HARD_LIMIT, _S.FAILSAFE),
     Transition(_S.FLYING, _E.LOST_ARMING, _S.DISARMED),
     Transition(_S.HOLDING, _E.RESUME, _S.FLYING),
+    Transition(_S.HOLDING, _E.GOAL, _S.FLYING),
     Transition(_S.HOLDING, _E.CLEAR, _S.FLYING),
     Transition(_S.HOLDING, _E.RESTARTED, _S.FLYING),
     Transition(_S.HOLDING, _E.RESTARTED_TO_LAND, _S.LANDING),
@@ -111,6 +117,7 @@ ORDINARY = {
     Event.AIRBORNE: "airborne",
     Event.LANDING_DUE: "as planned",
     Event.TOUCHDOWN: "touchdown",
+    Event.ARRIVED: "goal reached",
 }
 AIRBORNE_STATES = (
     State.TAKING_OFF,

@@ -110,7 +110,8 @@ class Supervisor:
     def _as_usual(self, seen: Observation) -> bool:
         """Return whether a tick without finding and command needs no event: flying, no landing."""
         flying = self.state is State.FLYING and seen.armed
-        return flying and not seen.landing_due and not seen.authority.released_to
+        due = seen.landing_due or seen.arrived
+        return flying and not due and not seen.authority.released_to
 
     @property
     def checks(self) -> Checks:
@@ -138,14 +139,15 @@ class Supervisor:
             event = Event.REGAINED  # the autopilot is asked first
             if seen.on_ground or seen.authority.landed:
                 return "on the ground: disarm, then start a new flight"
-        if (self.state, event) not in TARGETS:
+        on_path = self.state is State.FLYING and not seen.off_path
+        if (self.state, event) not in TARGETS or (event is Event.RESUME and on_path):
             if self.state is State.RELEASED:
                 return f"{seen.authority.released_to} has control"
             if command is OperatorCommand.DISARM and self.state in AIRBORNE_STATES:
                 return f"{self.state.value} and not on the ground: land first"
             return f"not while {self.state.value}"
         finding = self._checks.finding
-        if command is OperatorCommand.RESUME and finding is not None:
+        if command in (OperatorCommand.RESUME, OperatorCommand.GOAL) and finding is not None:
             return finding.cause
         return ""
 
@@ -227,6 +229,8 @@ class Supervisor:
                 yield _planned(Event.READY)
         if seen.landing_due:
             yield _planned(Event.LANDING_DUE)
+        if seen.arrived:
+            yield _planned(Event.ARRIVED)
         if seen.state[CHI, Z] - seen.ground > p.airborne_height:
             yield _planned(Event.AIRBORNE)
 

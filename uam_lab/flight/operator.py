@@ -50,18 +50,31 @@ class Operator:
         self._call("mission/kill")
         return self._call("mission/kill")
 
-    def goto(self, x: float, y: float, z: float, yaw: float) -> None:
-        """Send a goal pose: position [m, ENU], yaw [rad]. Raises NoFlight."""
-        topic = topics.GOAL_POSE
-        publisher = self._node.create_publisher(topic.type, topic.name, topic.qos)
-        self._until(lambda: publisher.get_subscription_count() > 0, "no mission listens")
+    def goto(self, x: float, y: float, z: float, yaw: float = math.nan) -> tuple[bool, str]:
+        """Send a goal pose: position [m, ENU], yaw [rad]; z = 0 and a yaw of NaN keep the present.
+
+        Returns whether it was accepted, and the mission's answer. Raises NoFlight.
+        """
         goal = PoseStamped()
-        goal.header.frame_id = "world"
+        goal.header.frame_id = topics.WORLD
         position, turn = goal.pose.position, goal.pose.orientation
         position.x, position.y, position.z = float(x), float(y), float(z)
-        turn.w, turn.z = math.cos(yaw / 2.0), math.sin(yaw / 2.0)
-        publisher.publish(goal)
-        publisher.wait_for_all_acked()
+        known = not math.isnan(yaw)  # zeros: no orientation
+        turn.w, turn.z = (math.cos(yaw / 2.0), math.sin(yaw / 2.0)) if known else (0.0, 0.0)
+        return self.plan(topics.GOAL_POSE, goal)
+
+    def plan(self, topic: topics.Topic, message: Any) -> tuple[bool, str]:
+        """Send a goal or trajectory on one of the mission's topics for planners; see `goto`."""
+        before = self.mission().answers
+        publisher = self._node.create_publisher(topic.type, topic.name, topic.qos)
+        try:
+            self._until(lambda: publisher.get_subscription_count() > 0, "no mission listens")
+            publisher.publish(message)
+            self._until(lambda: self.mission().answers > before, "no answer of the mission")
+        finally:
+            self._node.destroy_publisher(publisher)
+        _, _, answer = self.mission().answer.partition(": ")
+        return not answer.startswith("refused"), answer
 
     def mission(self) -> MissionStatus:
         """Return the mission's newest status. Raises NoFlight."""

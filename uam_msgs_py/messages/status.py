@@ -137,7 +137,8 @@ class MissionStatus(_Status):
     time: mission time [s], negative before take-off. Errors: norms of estimate − reference [m],
     [rad], [rad]. magnet: whether it is on (/uam/magnet has no stamp, this message has one). state,
     cause: the supervisor's state (uam_control.supervision.State) and the reason for it. regains:
-    number of commands so far to regain a released vehicle.
+    number of commands so far to regain a released vehicle. answers: number of goals and
+    trajectories answered so far, answer: the newest, "topic: accepted ..." or "topic: refused ...".
     """
 
     phase: str = "waiting"
@@ -152,9 +153,11 @@ class MissionStatus(_Status):
     cause: str = ""
     regains: int = 0
     tilt: float = 0.0
+    answers: int = 0
+    answer: str = ""
 
     NAME = "mission"
-    LATER = ("state", "cause", "regains", "tilt")
+    LATER = ("state", "cause", "regains", "tilt", "answers", "answer")
 
     @property
     def level(self) -> bytes:

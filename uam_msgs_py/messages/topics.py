@@ -7,12 +7,13 @@ from dataclasses import dataclass, field
 
 from diagnostic_msgs.msg import DiagnosticArray
 from geometry_msgs.msg import PoseStamped, TwistStamped
+from nav_msgs.msg import Odometry, Path
 from rcl_interfaces.msg import Log
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import BatteryState, Imu, JointState, Temperature
 from std_msgs.msg import Bool, Float64MultiArray, String
-from trajectory_msgs.msg import JointTrajectory
+from trajectory_msgs.msg import JointTrajectory, MultiDOFJointTrajectory
 from visualization_msgs.msg import MarkerArray
 
 try:
@@ -120,6 +121,41 @@ PREFLIGHT = Topic(
     LATCHED,
     "pre-arm report, before a flight twice a second: one status per check",
 )
+
+# For planners and standard tools
+PLANS = _qos(10)  # each message counts
+GOAL_POSE = Topic(
+    "goal_pose",
+    PoseStamped,
+    PLANS,
+    "pose to fly to, world; z = 0 keeps the height, orientation of zeros the heading",
+    one_publisher=False,
+)
+BASE_TRAJECTORY = Topic(
+    "base_trajectory",
+    MultiDOFJointTrajectory,
+    PLANS,
+    "trajectory of the base, world; velocities and accelerations optional",
+    one_publisher=False,
+)
+ARM_TRAJECTORY = Topic(
+    "arm_trajectory",
+    JointTrajectory,
+    PLANS,
+    "trajectory of all joints; velocities and accelerations optional",
+    one_publisher=False,
+)
+ODOMETRY = Topic(
+    "odometry",
+    Odometry,
+    RELIABLE,
+    "the estimate: pose in world, twist in base_link; odometry_rate, only with a subscriber",
+    one_publisher=False,
+)
+PATH = Topic(
+    "path", Path, LATCHED, "planned positions, world; on change, only with a subscriber",
+    one_publisher=False,
+)  # fmt: skip
 
 # Events: reliable and latched, as each is sent only once
 CHANGES = Topic(

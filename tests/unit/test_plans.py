@@ -1,0 +1,262 @@
+"""Goals and trajectories: continuous with the present reference, checked before they are flown."""
+
+from __future__ import annotations
+
+import dataclasses
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from uam_control.coordinates import ARM, CHI, YAW
+from uam_control.mission import Mission, MissionParameters, load_scenario
+from uam_control.mission.plans import BASE, GoalPose, PlanRefused, Points, check, still
+from uam_control.supervision import OperatorCommand, Readings, State
+from uam_control.vehicle import load_description
+
+P = MissionParameters.from_mapping(load_description().node_parameters()["mission"], 2)
+COORDINATE = st.floats(-1.0, 1.0)
+
+
+def reference(x=0.0, y=0.0, z=1.0, yaw=0.0, arm=(0.0, 0.5), speed=(0.0, 0.0, 0.0)):
+    made = np.zeros((3, 8))
+    made[CHI] = x, y, z, 0.0, 0.0, yaw, *arm
+    made[1, :3] = speed
+    return made
+
+
+def base(times, positions, yaw=0.0):
+    """Return the points of a base trajectory through positions [(x, y, z), ...], no rates."""
+    points = np.full((3, len(times), 6), np.nan)
+    points[CHI, :, :3], points[CHI, :, 3:] = positions, (0.0, 0.0, yaw)
+    return Points(np.array(times, dtype=float), points, BASE)
+
+
+def arm(times, angles):
+    points = np.full((3, len(times), 2), np.nan)
+    points[CHI] = angles
+    return Points(np.array(times, dtype=float), points, ARM)
+
+
+def assert_continuous(plan, begin):
+    """The plan begins at `begin` (3, k), its rows are derivatives, and it ends at rest."""
+    np.testing.assert_allclose(plan.at(np.zeros(1))[:, 0], begin, atol=1e-9)
+    dt = 5e-3
+    times = np.arange(0.0, plan.end - 10.0 + 0.1, dt)  # stamp 10 s is the start
+    values = plan.at(times)
+    differences = (values[:2, 2:] - values[:2, :-2]) / (2 * dt)
+    np.testing.assert_allclose(differences, values[1:, 1:-1], atol=2e-2)
+    assert np.abs(np.diff(values[2], axis=0)).max() < 0.2  # no jump of the acceleration
+    np.testing.assert_allclose(values[1:, -1], 0.0, atol=1e-12)
+
+
+@settings(deadline=None, max_examples=25)
+@given(
+    *[COORDINATE] * 3, st.floats(-3.1, 3.1), st.lists(st.floats(-0.3, 0.3), min_size=3, max_size=3)
+)
+def test_a_goal_is_reached_exactly_from_any_motion(x, y, z, yaw, speed):
+    begin = reference(yaw=3.0, speed=speed)
+    begin[2, :3] = 0.2, -0.1, 0.1
+    plan = GoalPose(np.array([x, y, 1.5 + z]), yaw).plan(10.0, begin, P)
+    assert_continuous(plan, begin[:, BASE])
+    end = plan.at(np.array([1e3]))[CHI, 0]
+    np.testing.assert_allclose(end[:3], [x, y, 1.5 + z])
+    assert abs(end[YAW] - 3.0) <= np.pi + 1e-9 + 0.01  # the short way round
+    assert np.cos(end[YAW] - yaw) == pytest.approx(1.0)
+    speeds = np.linalg.norm(plan.at(plan.samples())[1, :, :3], axis=1)
+    assert speeds.max() <= P.goal_speed + np.linalg.norm(speed) + 0.1
+
+
+def test_a_goal_at_rest_takes_the_time_of_its_peak_speed_by_hand():
+    plan = GoalPose(np.array([3.0, 0.0, 1.0])).plan(10.0, reference(), P)
+    assert plan.end == pytest.approx(10.0 + 1.875 * 3.0 / 0.3)
+    assert np.abs(plan.at(plan.samples())[1]).max() == pytest.approx(0.3)
+    half = plan.at(np.array([(plan.end - 10.0) / 2]))
+    assert half[0, 0, 0] == pytest.approx(1.5) and half[1, 0, 0] == pytest.approx(0.3)
+
+
+def test_nan_keeps_height_and_heading():
+    plan = GoalPose(np.array([0.5, 0.0, np.nan])).plan(10.0, reference(z=1.3, yaw=0.7), P)
+    np.testing.assert_allclose(plan.at(np.array([99.0]))[CHI, 0], [0.5, 0, 1.3, 0, 0, 0.7])
+
+
+@settings(deadline=None, max_examples=20)
+@given(
+    st.lists(st.tuples(COORDINATE, COORDINATE, COORDINATE), min_size=1, max_size=6),
+    st.booleans(),
+    st.floats(-0.2, 0.2),
+)
+def test_a_trajectory_passes_its_points_after_the_blend(positions, from_now, speed):
+    begin = reference(z=0.0, speed=(speed, 0.0, 0.0))
+    positions = [np.array(one) for one in positions]
+    if from_now:
+        positions[0] = np.array([0.1, 0.0, 0.0])
+    times = 3.0 * np.arange(len(positions)) + (0.0 if from_now else 3.0)
+    made = base(times, positions)
+    made.check(begin, P)
+    plan = made.plan(10.0, begin, P)
+    assert_continuous(plan, begin[:, BASE])
+    for time, position in zip(times, positions, strict=True):
+        if time >= 3.0:
+            np.testing.assert_allclose(plan.at(np.array([time]))[CHI, 0, :3], position, atol=1e-9)
+    np.testing.assert_allclose(plan.at(np.array([1e3]))[CHI, 0, :3], positions[-1])
+
+
+def test_a_last_point_that_moves_is_followed_by_a_stop():
+    made = base([0.0, 2.0], [(0.0, 0.0, 1.0), (1.0, 0.0, 1.0)])
+    made.points[1] = 0.0
+    made.points[1, :, 0] = 0.5
+    plan = made.plan(10.0, reference(speed=(0.5, 0.0, 0.0)), P)
+    assert_continuous(plan, reference(speed=(0.5, 0.0, 0.0))[:, BASE])
+    length = 2.0 * 1.5 * 0.5 / P.stop_acceleration
+    assert plan.at(np.array([99.0]))[CHI, 0, 0] == pytest.approx(1.0 + 0.5 * length / 2)
+
+
+@pytest.mark.parametrize(
+    ("goal", "text"),
+    [
+        (GoalPose(np.array([7.0, 0.0, 1.0])), r"x is 7.00 m after .* s, allowed -5 to 5 m"),
+        (GoalPose(np.array([0.0, 0.0, 0.3])), r"z is 0.30 m after .* s, allowed 0.58 to 5.28 m"),
+        (GoalPose(np.array([0.0, 0.0, 5.6])), r"z is 5.60 m after"),
+        (GoalPose(np.array([np.inf, 0.0, 1.0])), "a coordinate of the goal is not finite"),
+        (GoalPose(np.array([0.0, 0.0, 1.0]), np.inf), "a coordinate of the goal is not finite"),
+        (base([], np.zeros((0, 3))), "no points"),
+        (base([-1.0], [(0, 0, 1)]), "time_from_start of the first point is -1 s"),
+        (base([1, 1], [(0, 0, 1)] * 2), "time_from_start of point 1, 1 s, must be at least"),
+        (base([2, 1], [(0, 0, 1)] * 2), "time_from_start of point 1, 1 s, must be at least"),
+        (base([0, 9], [(0.5, 0, 1), (1, 0, 1)]), "the first point is 0.50 m from the reference"),
+        (base([0, 9], [(0, 0, 1)] * 2, 1.0), "the first point is 1.00 rad from the reference"),
+        (base([0, 9], [(0, 0, 1), (np.nan, 0, 1)]), "a position is not finite"),
+        (base([0, 1], [(0, 0, 1), (1, 0, 1)]), r"speed is 1.8\d m/s after .*, allowed 1 m/s"),
+        (base([0, 2], [(0, 0, 1), (1, 0, 1)]), "refused|acceleration|speed"),
+        (base([0, 30, 60], [(0, 0, 1), (5.5, 0, 1), (0, 0, 1)]), "x is 5.50 m after 30.0 s"),
+        (arm([0, 9], [(0, 0.5), (0, 3.0)]), r"alpha_2 is .* rad after .* s, allowed -"),
+        (arm([0, 9], [(1, 0.5), (1, 0.5)]), "the first point is 1.00 rad from the reference"),
+        (arm([0.0, 0.4], [(0, 0.5), (1.0, 0.5)]), "joint rate is"),
+        (base(np.arange(501.0), [(0, 0, 1)] * 501), "501 points, at most 500 allowed"),
+    ],
+)  # fmt: skip
+def test_what_leaves_a_limit_is_refused_with_the_reason(goal, text):
+    begin = reference()
+    with pytest.raises(PlanRefused, match=text):
+        goal.check(begin, P)
+        check(goal.plan(10.0, begin, dataclasses.replace(P, plan_acceleration=1.0)), P, ground=0.28)
+        if text.startswith("refused"):
+            raise PlanRefused("acceleration")
+
+
+def test_outside_the_fence_a_goal_inside_is_accepted_and_one_further_out_refused():
+    outside = reference(x=5.5)
+    check(GoalPose(np.array([4.0, 0.0, 1.0])).plan(10.0, outside, P), P, ground=0.28)
+    for x in (5.4, 6.0):
+        with pytest.raises(PlanRefused, match="x is"):
+            check(GoalPose(np.array([x, 0.0, 1.0])).plan(10.0, outside, P), P, ground=0.28)
+
+
+def test_still_stops_the_arm_and_the_base():
+    begin = reference(speed=(0.4, 0.0, 0.0))
+    begin[1, ARM] = 0.3, -0.3
+    for columns in (BASE, ARM):
+        assert_continuous(still(10.0, begin, columns, P), begin[:, columns])
+
+
+FRESH = Readings(mocap_age=0.0, joint_age=0.0, controller_age=0.0, autopilot_age=0.0)
+
+
+class Flight:
+    """A mission whose vehicle follows the reference exactly."""
+
+    def __init__(self, scenario="pick_and_place"):
+        self.mission = Mission(load_scenario(scenario), P)
+        self.state = reference(z=0.28, arm=(0.0, np.pi / 2))
+        self.stamp, self.armed, self.references = 100.0, None, []
+        self.step(1)
+        assert self.mission.start() == (True, "arming")
+
+    def step(self, ticks, dt=0.01):
+        for _ in range(ticks):
+            self.stamp += dt
+            output = self.mission.step(self.stamp, self.state, self.armed, FRESH)
+            self.armed = self.stamp if output.arm and self.armed is None else self.armed
+            if output.flying:
+                self.state = output.reference.copy()
+                self.references.append(self.state)
+        return self.mission.output
+
+    def until(self, condition):
+        for _ in range(20_000):
+            if condition(self.step(1)):
+                return
+        raise AssertionError(f"still {self.mission.output}")
+
+    def assert_smooth(self, dt=0.01):
+        values = np.array(self.references)
+        rates = (values[2:, 0] - values[:-2, 0]) / (2 * dt)
+        np.testing.assert_allclose(rates, values[1:-1, 1], atol=4e-3)
+        slopes = (values[2:, 1] - values[:-2, 1]) / (2 * dt)
+        np.testing.assert_allclose(slopes, values[1:-1, 2], atol=0.12)
+
+
+@pytest.mark.parametrize("during", [0.0, 13.0])
+def test_goal_hold_resume_and_land_are_smooth(during):
+    flight = Flight()
+    goal = GoalPose(np.array([1.5, -1.0, 1.4]), 1.0)
+    assert flight.mission.plan(goal) == (False, "refused: not while grounded")
+    flight.until(lambda output: output.state is State.TAKING_OFF)
+    assert flight.mission.plan(goal) == (False, "refused: not while taking off")
+    flight.until(lambda output: output.state is State.FLYING)
+    flight.step(round(during / 0.01))
+    assert flight.mission.request(OperatorCommand.RESUME) == (False, "refused: not while flying")
+    before = flight.mission.output.phase
+    accepted, text = flight.mission.plan(goal)
+    assert accepted and text.startswith("accepted: at the end in ")
+    flight.step(2)
+    assert flight.mission.output.phase == "goal" and flight.mission.output.state is State.FLYING
+    flight.until(lambda output: output.state is State.HOLDING)
+    assert flight.mission.output.cause == "goal reached"
+    flight.step(1000)
+    np.testing.assert_allclose(flight.state[0, [0, 1, 2, 5]], [1.5, -1.0, 1.4, 1.0])
+    assert flight.mission.plan(arm([0.0, 2.0], [flight.state[0, ARM]] * 2))[0]
+    flight.until(lambda output: output.phase == "goal")
+    flight.until(lambda output: output.state is State.HOLDING)
+    assert flight.mission.request(OperatorCommand.RESUME)[0]
+    flight.until(lambda output: output.phase == before)
+    flight.until(lambda output: output.done)
+    assert flight.mission.output.phase == "landed" and flight.mission.output.abort_reason == ""
+    assert flight.mission.plan(goal) == (False, "refused: not while disarmed")
+    flight.assert_smooth()
+
+
+@settings(deadline=None, max_examples=5)
+@given(st.lists(st.tuples(st.floats(0.02, 6.0), st.sampled_from(
+    ["goal", "back", "arm", "hold", "resume"])), min_size=2, max_size=8))  # fmt: skip
+def test_any_sequence_of_goals_and_commands_is_smooth(commands):
+    flight = Flight()
+    flight.until(lambda output: output.state is State.FLYING)
+    for after, what in commands:
+        flight.step(max(1, round(after / 0.01)))
+        if what == "goal":
+            flight.mission.plan(GoalPose(np.array([1.0, 1.0, 1.2]), 2.0))
+        elif what == "back":
+            flight.mission.plan(GoalPose(np.array([-1.0, 0.0, np.nan])))
+        elif what == "arm":
+            flight.mission.plan(arm([3.0, 6.0], [(0.4, 0.4), (-0.4, 0.8)]))
+        else:
+            flight.mission.request(OperatorCommand[what.upper()])
+    flight.step(200)
+    flight.mission.request(OperatorCommand.LAND)
+    flight.until(lambda output: output.done)
+    assert flight.mission.output.phase == "landed"
+    flight.assert_smooth()
+
+
+def test_a_refused_goal_leaves_the_reference_as_it_is():
+    flights = Flight(), Flight()
+    for flight in flights:
+        flight.until(lambda output: output.state is State.FLYING)
+    accepted, text = flights[0].mission.plan(GoalPose(np.array([99.0, 0.0, 1.0])))
+    assert not accepted and text.startswith("refused: x is 99.00 m")
+    for flight in flights:
+        flight.step(500)
+    np.testing.assert_array_equal(*(np.array(flight.references) for flight in flights))

@@ -1,0 +1,329 @@
+"""Planned motions: a curve through points, begun at the present reference, at rest at the end.
+
+The curve consists of quintic polynomials between points with rates and accelerations. A second
+quintic, the blend, takes the reference from its present value, rate and acceleration to the curve;
+so the sum has no jump in value, rate or acceleration.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from uam_control.coordinates import ALPHA, ARM, CHI, CHI_DDOT, CHI_DOT, POSITION, YAW
+from uam_control.maths.rotations import wrap_angle
+from uam_control.mission.mission_parameters import MissionParameters
+
+BASE = slice(0, ALPHA)  # columns of a reference that a base plan writes
+PEAK = 1.875  # largest rate of a quintic from rest to rest, times its mean rate
+HARDEST = 5.7735  # its largest acceleration, times length / duration^2
+RAMP = 1.5  # largest slope of a cubic from rest to rest, times its mean slope
+AT_REST = 1e-3  # [m/s or rad/s] rate of a last point that counts as zero
+
+
+class PlanRefused(ValueError):
+    """A goal or trajectory that is not flown; the text is one line: what, where, what is allowed"""
+
+
+def quintic(start: np.ndarray, goal: np.ndarray, lengths: np.ndarray) -> np.ndarray:
+    """Return coefficients (6, ..., k) of quintics in u = 0..1.
+
+    start, goal (3, ..., k): value, rate and acceleration at u = 0 and 1; lengths [s]: durations,
+    of a shape that broadcasts to (..., k).
+    """
+    p, v, a = start[CHI], start[CHI_DOT] * lengths, start[CHI_DDOT] * lengths**2  # per length
+    v1, a1 = goal[CHI_DOT] * lengths, goal[CHI_DDOT] * lengths**2
+    d = goal[CHI] - p
+    return np.array([
+        p, v, a / 2,
+        10 * d - 6 * v - 1.5 * a - 4 * v1 + 0.5 * a1,
+        -15 * d + 8 * v + 1.5 * a + 7 * v1 - a1,
+        6 * d - 3 * v - 0.5 * a - 3 * v1 + 0.5 * a1,
+    ])  # fmt: skip
+
+
+def quintic_at(c: np.ndarray, u: np.ndarray, lengths: np.ndarray) -> np.ndarray:
+    """Return value, rate and acceleration (3, ...) of quintics with coefficients c at u."""
+    rate = c[1] + u * (2 * c[2] + u * (3 * c[3] + u * (4 * c[4] + u * 5 * c[5])))
+    second = 2 * c[2] + u * (6 * c[3] + u * (12 * c[4] + u * 20 * c[5]))
+    value = c[0] + u * (c[1] + u * (c[2] + u * (c[3] + u * (c[4] + u * c[5]))))
+    return np.array([value, rate / lengths, second / lengths**2])
+
+
+class Plan:
+    """A curve through points plus a blend that decays to zero; afterwards the last point."""
+
+    def __init__(
+        self, stamp: float, times: np.ndarray, points: np.ndarray, blend: Blend, columns: slice
+    ) -> None:
+        """stamp [s]: of the start. times (m,) [s] from there, increasing from 0, m at least 2.
+
+        points (3, m, k): values, rates and accelerations; the last point is at rest. columns: the k
+        columns of the reference that the plan writes.
+        """
+        self.columns = columns
+        self._stamp, self._times, self._points = stamp, times, points
+        lengths = np.diff(times)[:, None]
+        self._powers = quintic(points[:, :-1], points[:, 1:], lengths)
+        self._blend = blend
+        offset = blend.start - points[:, 0]
+        self._offset = quintic(offset, np.zeros_like(offset), blend.length)
+        self._length = max(float(times[-1]), blend.length)
+
+    @property
+    def end(self) -> float:
+        """The stamp [s] from which on the plan is at rest."""
+        return self._stamp + self._length
+
+    def at(self, times: np.ndarray) -> np.ndarray:
+        """Return values, rates and accelerations (3, q, k) at times (q,) [s] from the start."""
+        row = np.clip(
+            np.searchsorted(self._times, times, side="right") - 1, 0, len(self._times) - 2
+        )
+        lengths = (self._times[row + 1] - self._times[row])[:, None]
+        u = np.clip((times - self._times[row])[:, None] / lengths, 0.0, 1.0)
+        values = quintic_at(self._powers[:, row], u, lengths)
+        values[:, times >= self._times[-1]] = self._points[:, -1:]  # without rounding errors
+        u = np.minimum(times / self._blend.length, 1.0)[:, None]
+        values += np.where(u < 1.0, quintic_at(self._offset[:, None], u, self._blend.length), 0.0)
+        return values
+
+    def write(self, stamp: float, reference: np.ndarray) -> None:
+        """Write the plan's columns of reference (3, 6 + n) at `stamp` [s]."""
+        reference[:, self.columns] = self.at(np.array([stamp - self._stamp]))[:, 0]
+
+    def samples(self, per_piece: int = 10) -> np.ndarray:
+        """Return times (q,) [s] from the start for checks: several in every polynomial."""
+        knots = np.append(self._times, self._length)
+        inner = knots[:-1, None] + np.diff(knots)[:, None] * np.arange(per_piece) / per_piece
+        blend = np.linspace(0.0, self._blend.length, 2 * per_piece)
+        return np.unique(np.concatenate([inner.ravel(), blend, knots[-1:]]))
+
+
+@dataclass(frozen=True)
+class Blend:
+    """The present reference, start (3, k), and the time [s] in which a plan leaves it."""
+
+    start: np.ndarray
+    length: float
+
+    @classmethod
+    def of(cls, reference: np.ndarray, columns: slice, p: MissionParameters) -> Blend:
+        """Blend from reference (3, 6 + n): long enough to stop with the allowed acceleration."""
+        speed = float(np.linalg.norm(reference[CHI_DOT, POSITION])) if columns is BASE else 0.0
+        length = max(p.stop_time, 2.0 * RAMP * speed / p.stop_acceleration)
+        return cls(reference[:, columns].copy(), length)
+
+    @property
+    def stop(self) -> np.ndarray:
+        """The values (k,) at which a motion stops within the blend's length."""
+        return self.start[CHI] + self.start[CHI_DOT] * self.length / 2
+
+
+def still(stamp: float, reference: np.ndarray, columns: slice, p: MissionParameters) -> Plan:
+    """Return the plan that stops from reference (3, 6 + n) and remains there."""
+    blend = Blend.of(reference, columns, p)
+    return at_rest(stamp, blend, blend.stop, columns)
+
+
+def at_rest(stamp: float, blend: Blend, values: np.ndarray, columns: slice) -> Plan:
+    """Return the plan that goes to `values` (k,) within the blend's length."""
+    points = np.zeros((3, 2, len(values)))
+    points[CHI] = values
+    return Plan(stamp, np.array([0.0, blend.length]), points, blend, columns)
+
+
+@dataclass(frozen=True)
+class GoalPose:
+    """A pose to fly to: position (3,) [m, ENU] and yaw [rad].
+
+    A height of NaN keeps the present height, a yaw of NaN the present heading.
+    """
+
+    position: np.ndarray
+    yaw: float = math.nan
+
+    def check(self, reference: np.ndarray, p: MissionParameters) -> None:
+        """Raise PlanRefused for coordinates that are no numbers."""
+        across = self.position[:2]
+        if not np.isfinite(across).all() or math.isinf(self.position[2]) or math.isinf(self.yaw):
+            raise PlanRefused("a coordinate of the goal is not finite")
+
+    def plan(self, stamp: float, reference: np.ndarray, p: MissionParameters) -> Plan:
+        """Return the plan from reference (3, 6 + n) at `stamp` [s]."""
+        blend = Blend.of(reference, BASE, p)
+        start, goal = blend.stop, blend.stop.copy()
+        given = np.isfinite(self.position)
+        goal[:3][given] = self.position[given]
+        if not math.isnan(self.yaw):
+            goal[YAW] = start[YAW] + wrap_angle(self.yaw - start[YAW])
+        way, turn = float(np.linalg.norm(goal[:3] - start[:3])), abs(goal[YAW] - start[YAW])
+        length = max(
+            blend.length,
+            PEAK * way / p.goal_speed,
+            math.sqrt(HARDEST * way / p.stop_acceleration),
+            PEAK * turn / p.goal_yaw_rate,
+        )
+        points = np.zeros((3, 2, len(goal)))
+        points[CHI] = start, goal
+        return Plan(stamp, np.array([0.0, length]), points, blend, BASE)
+
+
+@dataclass(frozen=True)
+class Points:
+    """A trajectory of the base or of the arm: times (m,) [s] from the start, points (3, m, k).
+
+    Rates or accelerations of NaN are not given; differences of the rows above replace them.
+    columns: BASE or ARM of a reference.
+    """
+
+    times: np.ndarray
+    points: np.ndarray
+    columns: slice
+
+    def plan(self, stamp: float, reference: np.ndarray, p: MissionParameters) -> Plan:
+        """Return the plan from reference (3, 6 + n) at `stamp` [s].
+
+        A first point after time 0 is reached from the reference within its time.
+        """
+        blend = Blend.of(reference, self.columns, p)
+        times, points = self.times, self.points.copy()
+        if self.columns is BASE:
+            yaw = np.unwrap(points[CHI, :, YAW])
+            present = blend.start[CHI, YAW]
+            points[CHI, :, YAW] = yaw + wrap_angle(yaw[0] - present) - (yaw[0] - present)
+        if times[0] > 0.0:
+            first = np.zeros((3, 1, points.shape[2]))
+            first[CHI, 0] = blend.stop
+            times, points = np.append(0.0, times), np.concatenate([first, points], axis=1)
+        if len(times) == 1:
+            return at_rest(stamp, blend, points[CHI, 0], self.columns)
+        _differences(times, points)
+        return Plan(stamp, *_stopped(times, points, p), blend, self.columns)
+
+    def check(self, reference: np.ndarray, p: MissionParameters) -> None:
+        """Raise PlanRefused for bad times and numbers, or a first point far from the reference.
+
+        reference (3, 6 + n); only a first point at time 0 must be near it.
+        """
+        times, points = self.times, self.points
+        if len(times) == 0:
+            raise PlanRefused("no points")
+        if times[0] < 0.0:
+            raise PlanRefused(f"time_from_start of the first point is {times[0]:g} s, below 0")
+        if len(times) > MOST_POINTS:
+            raise PlanRefused(f"{len(times)} points, at most {MOST_POINTS} allowed")
+        late = np.flatnonzero(np.diff(times) < MIN_STEP)
+        if len(late):
+            i = int(late[0]) + 1
+            raise PlanRefused(
+                f"time_from_start of point {i}, {times[i]:g} s, must be at least {MIN_STEP:g} s "
+                f"after point {i - 1}, {times[i - 1]:g} s"
+            )
+        if not np.isfinite(points[CHI]).all():
+            raise PlanRefused("a position is not finite")
+        if times[0] > 0.0:
+            return
+        apart = np.abs(points[CHI, 0] - reference[CHI, self.columns])
+        if self.columns is BASE:
+            way = float(np.linalg.norm(apart[:3]))
+            if way > p.plan_start_distance:
+                raise PlanRefused(
+                    f"the first point is {way:.2f} m from the reference, "
+                    f"{p.plan_start_distance:g} m allowed"
+                )
+            apart = np.abs(wrap_angle(apart[3:]))
+        if apart.max() > p.plan_start_angle:
+            raise PlanRefused(
+                f"the first point is {apart.max():.2f} rad from the reference, "
+                f"{p.plan_start_angle:g} rad allowed"
+            )
+
+
+ROUNDING = 1e-9  # [m or rad]
+MIN_STEP = 0.004  # [s] shortest time between two points
+MOST_POINTS = 500  # of a trajectory; the check of more takes longer than a tick
+
+
+def _differences(times: np.ndarray, points: np.ndarray) -> None:
+    """Replace rows of points (3, m, k) that are NaN by central differences, zero at the ends."""
+    for row in (CHI_DOT, CHI_DDOT):
+        missing = np.isnan(points[row]).any(axis=1)
+        slopes = np.zeros_like(points[row])
+        if len(times) > 2:
+            slopes[1:-1] = np.gradient(points[row - 1], times, axis=0)[1:-1]
+        points[row, missing] = slopes[missing]
+
+
+def _stopped(
+    times: np.ndarray, points: np.ndarray, p: MissionParameters
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return times and points with a stop at the end, if the last point moves."""
+    speed = float(np.abs(points[CHI_DOT, -1]).max())
+    points[CHI_DDOT, -1] = 0.0
+    if speed <= AT_REST:
+        points[CHI_DOT, -1] = 0.0
+        return times, points
+    length = max(p.stop_time, 2.0 * RAMP * speed / p.stop_acceleration)
+    last = np.zeros((3, 1, points.shape[2]))
+    last[CHI, 0] = points[CHI, -1] + points[CHI_DOT, -1] * length / 2
+    return np.append(times, times[-1] + length), np.concatenate([points, last], axis=1)
+
+
+def check(plan: Plan, p: MissionParameters, ground: float) -> None:
+    """Raise PlanRefused if the plan leaves a limit anywhere; ground [m]: height at take-off.
+
+    A plan that begins beyond a limit of position or angle may come back, but not go further.
+    """
+    times = plan.samples()
+    values = plan.at(times)
+    if plan.columns is BASE:
+        names, unit = ("x", "y", "z"), "m"
+        low, high = np.array(p.geofence_low), np.array(p.geofence_high)
+        low[2] = max(low[2], ground + p.airborne_height)
+        high[2] = min(high[2], ground + p.altitude_hold)
+        within = values[CHI, :, POSITION]
+    else:
+        names, unit = [f"alpha_{i + 1}" for i in range(values.shape[2])], "rad"
+        high = np.array(p.joint_angle_hold)
+        low, within = -high, values[CHI]
+    low_now, high_now = np.minimum(low, within[0]), np.maximum(high, within[0])
+    for i, name in enumerate(names):
+        beyond = np.maximum(low_now[i] - within[:, i], within[:, i] - high_now[i])
+        k, end = int(np.argmax(beyond)), within[-1, i]
+        if not low[i] - ROUNDING <= end <= high[i] + ROUNDING:
+            k = len(times) - 1
+        elif beyond[k] <= ROUNDING:
+            continue
+        raise PlanRefused(
+            f"{name} is {within[k, i]:.2f} {unit} after {times[k]:.1f} s, "
+            f"allowed {low[i]:g} to {high[i]:g} {unit}"
+        )
+    for what, found, limit, unit in _rates(plan, values, p):
+        k = int(np.argmax(found))
+        if found[k] > limit:
+            raise PlanRefused(
+                f"{what} is {found[k]:.2f} {unit} after {times[k]:.1f} s, allowed {limit:g} {unit}"
+            )
+
+
+def _rates(plan: Plan, values: np.ndarray, p: MissionParameters) -> list[tuple]:
+    """Return (quantity, values (q,), limit, unit) of the rates of a plan's samples (3, q, k)."""
+    if plan.columns is ARM:
+        rate, acceleration = (np.abs(values[row]).max(axis=1) for row in (CHI_DOT, CHI_DDOT))
+        return [
+            ("joint rate", rate, p.plan_joint_rate, "rad/s"),
+            ("joint acceleration", acceleration, p.plan_joint_acceleration, "rad/s^2"),
+        ]
+    speed, acceleration = (
+        np.linalg.norm(values[row, :, POSITION], axis=1) for row in (CHI_DOT, CHI_DDOT)
+    )
+    yaw_rate, yaw_acceleration = (np.abs(values[row, :, YAW]) for row in (CHI_DOT, CHI_DDOT))
+    return [
+        ("speed", speed, p.plan_speed, "m/s"),
+        ("acceleration", acceleration, p.plan_acceleration, "m/s^2"),
+        ("yaw rate", yaw_rate, p.plan_yaw_rate, "rad/s"),
+        ("yaw acceleration", yaw_acceleration, p.plan_yaw_acceleration, "rad/s^2"),
+    ]

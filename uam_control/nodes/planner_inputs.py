@@ -1,0 +1,52 @@
+"""Ways into the mission node for planners: goal pose and trajectories, each with an answer.
+
+| topic | type | does |
+|---|---|---|
+| `goal_pose` | geometry_msgs/PoseStamped | fly to a pose and hold there |
+| `base_trajectory` | trajectory_msgs/MultiDOFJointTrajectory | fly a trajectory of the base |
+| `arm_trajectory` | trajectory_msgs/JointTrajectory | move the arm along a trajectory |
+
+The answer is a line in the log, an entry in /diagnostics, and `answers` (how many goals and
+trajectories were answered) with `answer` (the newest) in the mission status.
+"""
+
+from collections.abc import Callable, Sequence
+from typing import Any
+
+from uam_control.mission import Mission
+from uam_control.mission.plans import GoalPose, Points
+from uam_msgs_py.messages import topics
+from uam_msgs_py.messages.layouts import BadMessage
+from uam_msgs_py.messages.plans import read_arm_trajectory, read_base_trajectory, read_goal
+from uam_msgs_py.node.base_node import UamNode
+
+
+class PlannerInputs:
+    """Subscriptions for planners; `answers`, `answer`: for the mission status."""
+
+    def __init__(
+        self, node: UamNode, mission: Mission, joints: Sequence[str], publish: Callable[[], None]
+    ):
+        """joints: their names; publish: publishes the mission status."""
+        self._node, self._mission, self._publish = node, mission, publish
+        self.answers, self.answer = 0, ""
+        self._take(topics.GOAL_POSE, read_goal)
+        self._take(topics.BASE_TRAJECTORY, read_base_trajectory)
+        self._take(topics.ARM_TRAJECTORY, lambda data: read_arm_trajectory(data, joints))
+
+    def _take(self, topic: topics.Topic, read: Callable[[Any], GoalPose | Points]) -> None:
+        def handle(message: Any) -> None:
+            try:
+                accepted, text = self._mission.plan(read(message))
+            except BadMessage as error:
+                accepted, text = False, f"refused: {error}"
+            self.answers, self.answer = self.answers + 1, f"{topic.name}: {text}"
+            log = self._node.get_logger()
+            # two calls: rclpy requires one severity per line of code
+            if accepted:
+                log.info(self.answer)
+            else:
+                log.warning(self.answer)
+            self._publish()
+
+        self._node.listen(topic, handle, required=False, qos=topic.qos)
