@@ -85,7 +85,7 @@ class Probe:
 
     def has_writers(self, topic) -> bool:
         """Return whether each of the test's subscriptions to `topic` has a publisher."""
-        ours = [s for s in self.node.subscriptions if s.topic_name == topic.name]
+        ours = [s for s in self.node.subscriptions if s.topic_name.endswith(topic.name)]
         return all(listener.get_publisher_count() for listener in ours)
 
     def call(self, kind, name: str, request):

@@ -1,82 +1,14 @@
 """The mission node: its services and the states that it publishes."""
 
-import numpy as np
 import pytest
 from diagnostic_msgs.msg import DiagnosticArray
 from sensor_msgs.msg import BatteryState, Temperature
 from std_msgs.msg import Header
-from std_srvs.srv import SetBool, Trigger
+from vehicle_rig import Vehicle, take_off
 
-from uam_control.coordinates import coordinates
 from uam_msgs_py.messages import topics
 from uam_msgs_py.messages.control import read_reference
-from uam_msgs_py.messages.status import AutopilotState, MissionStatus
-from uam_msgs_py.messages.trajectories import TrajectoryWriter
-
-COORDINATES = coordinates(2)
-
-PERIOD = 4_000_000  # [ns]
-
-
-class Vehicle:
-    """A vehicle that follows its reference exactly, one tick later."""
-
-    def __init__(self, probe):
-        self.probe, self.stamp = probe, 0
-        self.states = probe.publisher(topics.STATE)
-        self.autopilot = probe.publisher(topics.AUTOPILOT_STATE)
-        self.battery = probe.publisher(topics.AUTOPILOT_BATTERY)
-        self.references = probe.collect(topics.REFERENCE)
-        self.magnet = probe.collect(topics.MAGNET)
-        self.reported = probe.collect(topics.MISSION_STATUS)
-        self.writer = TrajectoryWriter(COORDINATES)
-        self.state = np.zeros((3, 8))
-        self.state[0, 2], self.state[0, 7] = 0.28, np.pi / 2
-        probe.until_connected(
-            "mission",
-            [self.states, self.autopilot, self.battery],
-            [topics.REFERENCE, topics.MAGNET, topics.MISSION_STATUS],
-        )
-
-        self.armed = False
-
-    def arm(self):
-        self.armed = True
-        self.tell()
-
-    def tell(self):
-        state = AutopilotState(True, "OFFBOARD", self.armed, 1 if self.armed else None)
-        self.autopilot.publish(state.to_message(self.stamp))
-
-    def fly(self, ticks):
-        for _ in range(ticks):
-            self.stamp += PERIOD
-            if self.stamp % (50 * PERIOD) == 0:
-                self.tell()
-            before = len(self.magnet)
-            self.states.publish(self.writer.fill(self.stamp, self.state))
-            self.probe.until(lambda n=before: len(self.magnet) > n, "an answered tick")
-            _, reference = read_reference(self.references[-1])
-            if reference.flying:
-                self.state[:2] = reference.values[:2]
-                self.state[0, 2] = max(self.state[0, 2], 0.28)
-
-    def until_state(self, state):
-        for _ in range(3000):
-            self.fly(1)
-            if self.status.state == state:
-                return
-        raise AssertionError(f"still {self.status}")
-
-    @property
-    def status(self) -> MissionStatus:
-        return MissionStatus.from_message(self.reported[-1])[1]
-
-    def ask(self, name, on=None):
-        kind = Trigger if on is None else SetBool
-        request = Trigger.Request() if on is None else SetBool.Request(data=on)
-        answer = self.probe.call(kind, f"/mission/{name}", request)
-        return answer.success, answer.message
+from uam_msgs_py.messages.status import MissionStatus
 
 
 @pytest.fixture
@@ -86,13 +18,6 @@ def vehicle(start, probe):
     made.node = node
     made.fly(1)
     return made
-
-
-def take_off(vehicle):
-    vehicle.arm()
-    vehicle.until_state("taking off")
-    assert vehicle.ask("hold") == (False, "refused: not while taking off")
-    vehicle.until_state("flying")
 
 
 def test_hold_resume_land_and_disarm_are_answered_and_executed(vehicle):

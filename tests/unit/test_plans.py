@@ -208,7 +208,6 @@ def test_goal_hold_resume_and_land_are_smooth(during):
     flight.until(lambda output: output.state is State.FLYING)
     flight.step(round(during / 0.01))
     assert flight.mission.request(OperatorCommand.RESUME) == (False, "refused: not while flying")
-    before = flight.mission.output.phase
     accepted, text = flight.mission.plan(goal)
     assert accepted and text.startswith("accepted: at the end in ")
     flight.step(2)
@@ -221,7 +220,7 @@ def test_goal_hold_resume_and_land_are_smooth(during):
     flight.until(lambda output: output.phase == "goal")
     flight.until(lambda output: output.state is State.HOLDING)
     assert flight.mission.request(OperatorCommand.RESUME)[0]
-    flight.until(lambda output: output.phase == before)
+    flight.until(lambda output: output.phase in ("approach", "pick"))
     flight.until(lambda output: output.done)
     assert flight.mission.output.phase == "landed" and flight.mission.output.abort_reason == ""
     assert flight.mission.plan(goal) == (False, "refused: not while disarmed")

@@ -245,6 +245,16 @@ class Mission:
         self._requests.append((OperatorCommand.GOAL, goal))
         return True, f"accepted: at the end in {made.end - self._stamp:.1f} s"
 
+    def preview(self, step: float) -> tuple[np.ndarray, np.ndarray]:
+        """Return stamps (m,) [s] and planned chi (m, 6 + n), every `step` [s]; m = 0 on the ground.
+
+        Nothing is planned in failsafe or while somebody else has control.
+        """
+        idle = self.output.state in (State.FAILSAFE, State.DISARMED, State.RELEASED)
+        if self._guidance is None or idle:
+            return np.zeros(0), np.zeros((0, self.output.reference.shape[1]))
+        return self._guidance.preview(self._stamp, step)
+
     def switch_magnet(self, on: bool) -> tuple[bool, str]:
         """Override the magnet until the scenario switches it next; returns as `request` does."""
         if self.output.state is State.DISARMED:
@@ -349,6 +359,7 @@ class Mission:
             self.output.reference,
             self.scenario.arm_start,
             self._parameters,
+            self.scenario.landing.at + self.scenario.landing.duration,
         )
         self._guidance.advance(stamp)
         self._guidance.write(stamp)

@@ -50,6 +50,11 @@ class PathClock:
         return time, now, change
 
     @property
+    def goal(self) -> float:
+        """Return the rate [1] to which the clock changes, or has changed."""
+        return 1.0 if self._ramp is None else self._ramp[-1]
+
+    @property
     def settled(self) -> float:
         """Return the stamp [s] from which on the rate is constant."""
         return -math.inf if self._ramp is None else self._ramp[0] + self._ramp[1]
@@ -59,7 +64,7 @@ class PathClock:
 
         No effect if it changes to `goal` already.
         """
-        if self._ramp is not None and self._ramp[-1] == goal:
+        if self._ramp is not None and goal == self.goal:
             return
         self._ramp = (stamp, length, *self.at(stamp), goal)
 
@@ -104,8 +109,12 @@ class Guidance:
         reference: np.ndarray,
         stowed: Sequence[float],
         parameters: MissionParameters,
+        end: float = 0.0,
     ) -> None:
-        """stamp [s]: of the take-off; reference: array to write; stowed: landing angles [rad]."""
+        """stamp [s]: of the take-off; reference: array to write; stowed: landing angles [rad];
+        end [s]: scenario time at which the path ends.
+        """
+        self._end = end
         self.parameters = parameters
         self.reference = reference
         self.scenario_time = 0.0
@@ -165,6 +174,30 @@ class Guidance:
     def arrived(self, stamp: float) -> bool:
         """Return whether every plan is at its end at `stamp` [s]; False without a plan."""
         return self.planned and all(stamp >= plan.end for plan in self._plans.values())
+
+    def preview(self, stamp: float, step: float) -> tuple[np.ndarray, np.ndarray]:
+        """Return the planned chi (m, 6 + n) from `stamp` [s] on, every `step` [s] to its end.
+
+        Also returns the stamps (m,) [s]. A hold is one point; after it the path is not planned.
+        """
+        row, rows = np.zeros_like(self.reference), []
+        base = self._plans.get(True)
+        if self._last is not None or base is not None:
+            motion = self._last or base
+            stamps = np.arange(stamp, max(motion.end, stamp) + step, step)
+            for one in stamps:
+                row[:] = self.reference
+                motion.write(min(one, motion.end), row)
+                rows.append(row[CHI].copy())
+            return stamps, np.array(rows)
+        if self._clock.goal == 0.0 and math.isinf(self._go_on_at):
+            return np.array([stamp]), self.reference[CHI][None].copy()
+        begin = self.scenario_time
+        times = np.arange(begin, max(self._end, begin) + step, step)
+        for one in times:
+            self._trajectory.write(min(one, self._end), row)
+            rows.append(row[CHI].copy())
+        return stamp + times - begin, np.array(rows)
 
     def fly(self, stamp: float, plan: Plan) -> None:
         """Leave the path for `plan`, made at `stamp` [s] from the reference; call after `write`."""

@@ -28,6 +28,7 @@ from uam_control.supervision import Authority, State
 from uam_msgs_py.messages import topics
 from uam_msgs_py.messages.control import ReferenceWriter, read_state
 from uam_msgs_py.messages.convert import SWITCH
+from uam_msgs_py.messages.navigation import path_message
 from uam_msgs_py.messages.preflight import preflight_message
 from uam_msgs_py.messages.status import ERROR, OK, WARN, AutopilotState, MissionStatus
 from uam_msgs_py.node.base_node import UamNode, run
@@ -36,6 +37,7 @@ from uam_msgs_py.node.node_parameters import NodeParameters
 
 NAME = "mission"
 STATUS_PERIOD = 500_000_000  # [ns]
+PATH_STEP = 0.25  # [s] between two poses of the path
 
 
 class MissionNode(UamNode):
@@ -71,6 +73,8 @@ class MissionNode(UamNode):
         self._arming = self.publisher(topics.ARMING)
         self._status = self.publisher(topics.MISSION_STATUS)
         self._preflight = self.publisher(topics.PREFLIGHT)
+        self._path = self.publisher(topics.PATH)
+        self._path_of = ""  # the plan that was published, see _publish_path
         self._writer = ReferenceWriter(len(vehicle.joints))
         MissionInputs(self, self._stage.inputs, vehicle.joint_names)
         self.listen(topics.AUTOPILOT_STATE, self._on_autopilot, required=False)
@@ -142,6 +146,7 @@ class MissionNode(UamNode):
             self._log()
         self._published, self._due = now, stamp + STATUS_PERIOD
         self._status.publish(self.status.to_message(stamp))
+        self._publish_path(stamp)
         if output.time < 0.0 or output.done:
             self._preflight.publish(preflight_message(stamp, self._mission.preflight()))
 
@@ -162,6 +167,14 @@ class MissionNode(UamNode):
             self._planners.answers,
             self._planners.answer,
         )
+
+    def _publish_path(self, stamp: int) -> None:
+        """Publish the planned positions after a change, if the topic has a subscriber."""
+        plan = f"{len(self._mission.changes)} {self._mission.output.state}"
+        if plan != self._path_of and self._path.get_subscription_count():
+            self._path_of = plan
+            stamps, chi = self._mission.preview(PATH_STEP)
+            self._path.publish(path_message(stamp, np.rint(stamps * SECOND).astype(int), chi))
 
     def _publish_answer(self) -> None:
         """Publish the status at once: a planner waits for its answer."""

@@ -1,6 +1,7 @@
 """Node: motion capture + IMU + joints → chi, chi_dot, chi_ddot, once per IMU sample."""
 
 import time
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -8,9 +9,12 @@ from uam_control.estimation import EstimatorParameters
 from uam_control.laws.catalogue import DEFAULT
 from uam_control.nodes.described import described_vehicle
 from uam_control.profiles.profile import default_profile
+from uam_control.settings.parameter_set import ParameterSet, number
 from uam_control.stages.estimator_stage import EstimatorStage
+from uam_control.stamps import SECOND
 from uam_msgs_py.messages import topics
 from uam_msgs_py.messages.convert import read_imu, read_joints, read_pose
+from uam_msgs_py.messages.navigation import odometry_message
 from uam_msgs_py.messages.status import OK, WARN
 from uam_msgs_py.messages.trajectories import TrajectoryWriter
 from uam_msgs_py.node.base_node import UamNode, run
@@ -18,6 +22,13 @@ from uam_msgs_py.node.joins import Backlog
 from uam_msgs_py.node.node_parameters import NodeParameters
 
 NAME = "state_estimator"
+
+
+@dataclass(frozen=True)
+class OdometryParameters(ParameterSet):
+    """Rate of nav_msgs/Odometry; fixed once the node runs."""
+
+    odometry_rate: float = number(50.0, "odometry messages per second of stamps", "Hz", 1.0, 1000.0)
 
 
 class StateEstimatorNode(UamNode):
@@ -38,6 +49,11 @@ class StateEstimatorNode(UamNode):
         self._warm_up()
         self._state = self.publisher(topics.STATE)
         self._writer = TrajectoryWriter(vehicle.coordinates)
+        self._odometry = self.publisher(topics.ODOMETRY)
+        rate = NodeParameters(self, OdometryParameters, read_only=True).current.odometry_rate
+        self._odometry_period = round(SECOND / rate)  # [ns]
+        self._odometry_at = 0  # [ns] stamp of the last odometry
+        self._to_publish: tuple[int, np.ndarray] | None = None  # stamp [ns] and state
         self._mocap = self.listen(topics.MOCAP, self._on_mocap)
         self._joints = self.listen(topics.JOINTS, self._on_joints)
         self.listen(topics.IMU, self._on_imu)
@@ -66,6 +82,10 @@ class StateEstimatorNode(UamNode):
             return
         # one output per sample: the filters need every sample
         self._updates.put((stamp, self._writer.fill(stamp, state), begun))
+        if not 0 <= stamp - self._odometry_at < self._odometry_period:
+            self._odometry_at = stamp - stamp % self._odometry_period
+            if self._odometry.get_subscription_count():
+                self._to_publish = stamp, state.copy()
         if not self.deferred:
             self.settle()
 
@@ -73,6 +93,9 @@ class StateEstimatorNode(UamNode):
         for stamp, data, begun in self._updates.take():
             self._state.publish(data)
             self.done_tick(stamp, begun)
+        if self._to_publish is not None:  # after the state, for which the controllers wait
+            self._odometry.publish(odometry_message(*self._to_publish))
+            self._to_publish = None
 
     def diagnose(self) -> tuple[bytes, str, dict[str, object]]:
         refused = self._stage.estimator.refused_poses

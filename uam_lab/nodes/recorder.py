@@ -72,7 +72,7 @@ def _open(node: Node, options: RecorderParameters) -> TopicRecorder:
     except (OSError, ValueError) as error:
         raise ParameterError(f"facts: {source} cannot be read: {error}") from None
     try:
-        chosen, limit = topics.ALL, options.size_limit
+        chosen, limit = topics.RECORDED, options.size_limit
         made = TopicRecorder(node, file, chosen, options.simulated, facts, limit)
     except FileExistsError:
         raise ParameterError(

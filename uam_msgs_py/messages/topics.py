@@ -43,13 +43,17 @@ LATCHED = _qos(1, latched=True)  # a late subscriber gets the last message
 
 @dataclass(frozen=True)
 class Topic:
-    """A topic. one_publisher: a gap in its sequence numbers is then a lost message."""
+    """A topic. one_publisher: a gap in its sequence numbers is then a lost message.
+
+    recorded: the recorder subscribes to it.
+    """
 
     name: str
     type: type
     qos: QoSProfile = field(hash=False)  # not hashable
     content: str
     one_publisher: bool = True
+    recorded: bool = True
 
     @property
     def reading(self) -> QoSProfile:
@@ -149,12 +153,12 @@ ODOMETRY = Topic(
     "odometry",
     Odometry,
     RELIABLE,
-    "the estimate: pose in world, twist in base_link; odometry_rate, only with a subscriber",
-    one_publisher=False,
+    "the estimate: pose in world, twist in base_link; 50 Hz, only with a subscriber",
+    recorded=False,
 )
 PATH = Topic(
     "path", Path, LATCHED, "planned positions, world; on change, only with a subscriber",
-    one_publisher=False,
+    recorded=False,
 )  # fmt: skip
 
 # Events: reliable and latched, as each is sent only once
@@ -212,3 +216,4 @@ DIAGNOSTICS = Topic("/diagnostics", DiagnosticArray, RELIABLE, "health, 1 Hz", o
 ROSOUT = Topic("/rosout", Log, _qos(1000, latched=True), "log of all nodes", one_publisher=False)
 
 ALL = [topic for topic in list(vars().values()) if isinstance(topic, Topic)]
+RECORDED = [topic for topic in ALL if topic.recorded]
