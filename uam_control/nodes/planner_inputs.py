@@ -15,9 +15,9 @@ from typing import Any
 
 from uam_control.mission import Mission
 from uam_control.mission.plans import GoalPose, Points
+from uam_control.nodes.planner_messages import read_arm_trajectory, read_base_trajectory, read_goal
 from uam_msgs_py.messages import topics
 from uam_msgs_py.messages.layouts import BadMessage
-from uam_msgs_py.messages.plans import read_arm_trajectory, read_base_trajectory, read_goal
 from uam_msgs_py.node.base_node import UamNode
 
 
