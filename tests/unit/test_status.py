@@ -34,7 +34,7 @@ def test_mission_status_round_trip():
 def test_a_mission_that_holds_is_a_warning_and_an_older_log_has_no_states():
     holding = MissionStatus("hold", state="holding", cause="tilt").to_message(1)
     assert holding.status[0].level == WARN
-    del holding.status[0].values[-3:]
+    del holding.status[0].values[-len(MissionStatus.LATER) :]
     assert MissionStatus.from_message(holding)[1] == MissionStatus("hold")
 
 
@@ -45,7 +45,7 @@ def test_a_released_vehicle_is_a_warning_that_names_who_has_control():
     assert message.status[0].level == WARN
     assert MissionStatus.from_message(message)[1].regains == 2
     old = released.to_message(1)
-    del old.status[0].values[-3:]
+    del old.status[0].values[-len(MissionStatus.LATER) :]
     assert AutopilotState.from_message(old)[1] == AutopilotState(True, "HOLD", True, 5)
 
 

@@ -164,8 +164,8 @@ class MissionNode(UamNode):
             output.state.value,
             output.cause,
             output.regains,
-            self._planners.answers,
-            self._planners.answer,
+            answers=self._planners.answers,
+            answer=self._planners.answer,
         )
 
     def _publish_path(self, stamp: int) -> None:
