@@ -45,7 +45,7 @@ def test_a_released_vehicle_is_a_warning_that_names_who_has_control():
     assert message.status[0].level == WARN
     assert MissionStatus.from_message(message)[1].regains == 2
     old = released.to_message(1)
-    del old.status[0].values[-len(MissionStatus.LATER) :]
+    del old.status[0].values[-len(AutopilotState.LATER) :]
     assert AutopilotState.from_message(old)[1] == AutopilotState(True, "HOLD", True, 5)
 
 
