@@ -1,6 +1,7 @@
 """Lockstep flights through the ROS engine, whole."""
 
 import json
+import re
 from collections import Counter
 
 import numpy as np
@@ -20,6 +21,7 @@ from uam_lab.results import timeseries
 from uam_lab.results.metrics import errors
 from uam_lab.results.timeseries import gain_columns
 from uam_msgs_py.messages import topics
+from uam_msgs_py.messages.interface import CONTENTS
 from uam_sim_bridge.plant import Vehicle
 
 WALL = ("wall_s", "real_time_factor")  # what may differ between two runs of one flight
@@ -128,6 +130,24 @@ def test_the_result_folder_is_a_bag_for_rosbags(two_flights):
                 counted[connection.topic] += 1
             listed = {c.topic: c.msgcount for c in reader.connections if c.msgcount}
         assert counted == listed and counted["/uam/state"] > 1000
+
+
+def test_rates_and_frames_are_those_of_the_interface_table(two_flights):
+    """docs/interfaces.md is made from these CONTENTS."""
+    with AnyReader([two_flights[0].out]) as reader:
+        span = (reader.end_time - reader.start_time) * 1e-9
+        counts = {c.topic: c.msgcount for c in reader.connections}
+        frames = {}
+        for connection, _, data in reader.messages():
+            if connection.topic not in frames:
+                header = getattr(reader.deserialize(data, connection.msgtype), "header", None)
+                frames[connection.topic] = header.frame_id if header else ""
+    for topic, content in CONTENTS.items():
+        if found := re.fullmatch(r"(\d+) Hz", content.rate):
+            if topic is not topics.ARM_TEMPERATURE:  # no servo driver in a simulation
+                assert counts[topic.name] / span == pytest.approx(float(found[1]), rel=0.1), topic
+    for topic in (topics.IMU, topics.MOCAP, topics.STATE, topics.REFERENCE, topics.SETPOINT):
+        assert frames[topic.name] == CONTENTS[topic].frame
 
 
 def test_messages_without_a_stamp_lie_at_their_tick(two_flights):

@@ -1,0 +1,70 @@
+"""What each topic carries: frame, unit, rate, and its publisher if it is no wire of a flight.
+
+`docs/interfaces.md` is made from this table, from `topics` and from `node.wiring`.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from uam_msgs_py.messages import topics
+from uam_msgs_py.messages.topics import BODY, WORLD
+
+TICK, MOCAP, FRAMES, GAINS, SLOW = "250 Hz", "120 Hz", "25 Hz", "50 Hz", "1 Hz"
+ON_CHANGE, ONCE = "on change", "once"
+JOINT_SPACE = "joints"  # angles and torques about the joints' axes
+CHI_UNITS = "m, rad; /s; /s²"
+
+
+@dataclass(frozen=True)
+class Content:
+    """frame: of the numbers, "" for none; rate: in messages per second of the flight's time.
+
+    publisher, readers: of topics that are no wire of a flight (`node.wiring`).
+    """
+
+    frame: str
+    unit: str
+    rate: str
+    publisher: str = ""
+    readers: str = ""
+
+
+CONTENTS = {
+    topics.CLOCK: Content("", "s", TICK),
+    topics.IMU: Content(BODY, "rad/s, m/s²", TICK),
+    topics.JOINTS: Content(JOINT_SPACE, "rad, rad/s, N m", TICK),
+    topics.MOCAP: Content(WORLD, "m, quaternion", MOCAP),
+    topics.STATE: Content(WORLD, CHI_UNITS, TICK),
+    topics.REFERENCE: Content(WORLD, CHI_UNITS, TICK),
+    topics.POSITION_COMMAND: Content(WORLD, f"{CHI_UNITS}; N", TICK),
+    topics.ATTITUDE_COMMAND: Content(BODY, "N m", TICK),
+    topics.ARM_COMMAND: Content(JOINT_SPACE, "N m", TICK),
+    topics.ARM_EFFORT: Content(JOINT_SPACE, "N m", TICK),
+    topics.MAGNET: Content("", "on or off", TICK),
+    topics.SETPOINT: Content(BODY, "rad/s, thrust 0..1", TICK),
+    topics.THRUST: Content("", "1", "10 Hz"),
+    topics.POSITION_ADAPTATION: Content("", "of each gain", GAINS),
+    topics.ATTITUDE_ADAPTATION: Content("", "of each gain", GAINS),
+    topics.ARM_ADAPTATION: Content("", "of each gain", GAINS),
+    topics.ARMING: Content("", "yes or no", ON_CHANGE),
+    topics.AUTOPILOT_STATE: Content("", "text", "5 Hz and on change"),
+    topics.AUTOPILOT_BATTERY: Content("", "V, A, 0..1", SLOW),
+    topics.ARM_TEMPERATURE: Content("", "°C", SLOW, "the servos' driver", "mission"),
+    topics.MISSION_STATUS: Content("", "text", "2 Hz and on change"),
+    topics.PREFLIGHT: Content("", "text", "2 Hz before a flight", "mission", "cockpit, uam"),
+    topics.CHANGES: Content("", "text", ON_CHANGE, "every tunable node", "cockpit, uam fly"),
+    topics.FAULTS: Content("", "text", ON_CHANGE, "mujoco_sim, mavlink_bridge, uam fly", "cockpit"),
+    topics.RESTARTS: Content("", "text", ON_CHANGE, "uam fly", "mujoco_sim, cockpit"),
+    topics.TRUTH_STATE: Content(WORLD, CHI_UNITS, TICK),
+    topics.TRUTH_PAYLOAD: Content(WORLD, "m, quaternion", TICK),
+    topics.TRUTH_ROTORS: Content("", "0..1, rad/s, N", TICK),
+    topics.TRUTH_MAGNET: Content("", "on or off, N, rad", TICK),
+    topics.ROBOT_DESCRIPTION: Content(BODY, "URDF", ONCE, "scene", "viewers"),
+    topics.TF: Content(WORLD, "m, quaternion", FRAMES, "scene", "viewers"),
+    topics.TF_STATIC: Content(BODY, "m, quaternion", ONCE, "scene", "viewers"),
+    topics.TRACKING_ERROR: Content(WORLD, "m, rad; /s", FRAMES, "scene", "viewers"),
+    topics.MARKERS: Content(WORLD, "m", "2 Hz and on change", "scene", "viewers"),
+    topics.DIAGNOSTICS: Content("", "text", "1 Hz each node", "every node", "mujoco_sim, cockpit"),
+    topics.ROSOUT: Content("", "text", "on each line", "every node", "viewers"),
+}
