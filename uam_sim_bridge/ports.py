@@ -9,7 +9,7 @@ import fcntl
 import os
 import socket
 import tempfile
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from types import TracebackType
 from typing import NamedTuple
@@ -76,6 +76,14 @@ def is_discovery_port(port: int) -> bool:
     return port % 2 == 0
 
 
+class Flight(NamedTuple):
+    """A flight of `uam fly` that runs; namespace: of its nodes, as `/uav1`."""
+
+    instance: int
+    domain: int
+    namespace: str
+
+
 class BusyPort(NamedTuple):
     """A port that another program holds; protocol: TCP or UDP."""
 
@@ -95,8 +103,6 @@ def busy_port(ports: Ports, own_autopilot: bool = True) -> BusyPort | None:
     required = [
         BusyPort("TCP", ports.simulator_tcp, "simulator link"),
         BusyPort("UDP", ports.offboard_udp, "offboard link"),
-        # of the domain's first participant: in use if any participant is in the domain
-        BusyPort("UDP", discovery_port(ports.domain), "ROS discovery"),
     ]
     if own_autopilot:
         required.append(BusyPort("UDP", ports.autopilot_udp, "autopilot"))
@@ -140,10 +146,14 @@ class Reservation:
         instance: int | None = None,
         folder: Path | None = None,
         own_autopilot: bool = True,
+        domain: int | None = None,
+        namespace: str = "/",
     ):
         """Reserve `instance`, or the first free one; folder: of the locks, see `lock_file`.
 
-        own_autopilot: see `busy_port`. Raises PortError if the instance, or every one, is in use.
+        own_autopilot: see `busy_port`; domain: None for that of the instance; namespace: of the
+        flight's nodes. Raises PortError if the instance, or every one, is in use, or if another
+        flight has this namespace in the domain.
         """
         self._folder = folder or Path(tempfile.gettempdir())
         self._lock: int | None = None
@@ -157,13 +167,30 @@ class Reservation:
                 continue
             busy = busy_port(ports, own_autopilot)
             if busy is None:
-                self.ports = ports
+                self.ports = ports if domain is None else replace(ports, domain=domain)
+                self._claim(namespace)
                 return
             why = f"{busy} is in use by another program"
             self._drop(self._path(number))
         if instance is not None:
             raise PortError(f"instance {instance} is not free: {why}")
         raise PortError(f"none of the {INSTANCES} instances is free; the last one: {why}")
+
+    def _claim(self, namespace: str) -> None:
+        """Write domain and namespace to the lock file, where no other flight has both."""
+        own = self.ports
+        for other in flights(self._folder):
+            if other.instance != own.instance and (other.domain, other.namespace) == (
+                own.domain,
+                namespace,
+            ):
+                self.release()
+                raise PortError(
+                    f"instance {other.instance} flies in namespace {namespace} of ROS domain "
+                    f"{own.domain} already: give another --namespace, or no --domain"
+                )
+        os.ftruncate(self._lock, 0)
+        os.write(self._lock, f"{own.domain} {namespace}".encode())
 
     def _path(self, instance: int) -> Path:
         return lock_file(self._folder, instance)
@@ -204,16 +231,34 @@ class Reservation:
         self.release()
 
 
-def domain_of_flight(instance: int | None) -> int | None:
-    """Return the ROS domain of the flight `instance`; instance None: the only running flight.
+def flights(folder: Path | None = None) -> list[Flight]:
+    """Return the running flights of this user, by instance; folder: see `lock_file`."""
+    found = []
+    for instance in instances_in_use(folder):
+        try:
+            domain, namespace = lock_file(folder, instance).read_text().split()
+        except (OSError, ValueError):  # it has just ended, or has not written it yet
+            domain, namespace = ports_of(instance).domain, "/"
+        found.append(Flight(instance, int(domain), namespace))
+    return found
 
-    Returns None without a running flight: the environment's domain applies. Raises PortError if
-    several flights are running.
+
+def flight_of(
+    instance: int | None, namespace: str = "", folder: Path | None = None
+) -> Flight | None:
+    """Return the flight `instance`, else that in `namespace`, else the only one that runs.
+
+    namespace: in the form of ROS, "" for any. Returns None without a running flight: the
+    environment's domain applies. Raises PortError if several flights are possible.
     """
+    running = flights(folder)
     if instance is not None:
-        return ports_of(instance).domain
-    flying = instances_in_use()
-    if len(flying) > 1:
-        numbers = ", ".join(map(str, flying))
-        raise PortError(f"several flights are running: choose one by --instance ({numbers})")
-    return ports_of(flying[0]).domain if flying else None
+        missing = Flight(instance, ports_of(instance).domain, namespace or "/")
+        return next((one for one in running if one.instance == instance), missing)
+    possible = [one for one in running if namespace in ("", one.namespace)]
+    if len(possible) > 1:
+        numbers = ", ".join(f"{one.instance}: {one.namespace}" for one in possible)
+        raise PortError(
+            f"several flights are running: choose one by --instance or --namespace ({numbers})"
+        )
+    return possible[0] if possible else None

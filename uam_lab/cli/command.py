@@ -21,9 +21,10 @@ from uam_lab.recording.mcap_reader import UnreadableLog
 from uam_lab.results.result_folder import ResultFolderError
 from uam_lab.results.timeseries import UnreadableFlight
 from uam_lab.tuning.space import TuningError
+from uam_msgs_py.node.namespace import normal
 from uam_sim_bridge.faults import FaultError
 from uam_sim_bridge.plant.engines import PlantError
-from uam_sim_bridge.ports import INSTANCES, PortError
+from uam_sim_bridge.ports import INSTANCES, PortError, flight_of
 from uam_sim_bridge.px4.px4_installation import Px4Error
 
 WRONG_USE, INTERRUPTED = 2, 130  # exit status
@@ -114,6 +115,24 @@ class Command:
         """Add --instance, of a running flight."""
         text = f"instance of the flight, 0..{INSTANCES - 1} (default: the running one)"
         self.option("--instance", "N", text, type=int)
+        text = "namespace of its nodes (default: that of the running flight)"
+        self.option("--namespace", "NAME", text, "")
+
+
+def chosen_flight(options: argparse.Namespace) -> tuple[int | None, str]:
+    """Return ROS domain and namespace of the flight that --instance and --namespace choose.
+
+    The domain is None without a running flight: that of the environment. Raises SettingsError,
+    PortError.
+    """
+    try:
+        namespace = normal(options.namespace) if options.namespace else ""
+    except ValueError as error:
+        raise SettingsError(str(error)) from None
+    flight = flight_of(options.instance, namespace)
+    if flight is None:
+        return None, namespace or "/"
+    return flight.domain, namespace or flight.namespace
 
 
 def given_profile(name_or_file: str | None, vehicle: VehicleDescription) -> Profile:

@@ -22,7 +22,7 @@ from uam_lab.report.build import build_report
 from uam_lab.report.page.console import reporting, summary
 from uam_sim_bridge.mavlink.transport.transport import ALLOWED
 from uam_sim_bridge.plant.engines import DEFAULT_PLANT, PLANTS
-from uam_sim_bridge.ports import INSTANCES
+from uam_sim_bridge.ports import INSTANCES, LAST_DOMAIN
 
 COMPLETED, NOT_COMPLETED = 0, 1
 EXAMPLES = """\
@@ -36,6 +36,7 @@ examples:
   uam fly --dry-run                          all commands computed, none sent, nothing armed
   uam fly --view --clock realtime            monitor and tune in a browser
   uam fly --clock realtime                   paced by the wall clock, latency measured
+  uam fly --namespace uav1 --domain 1        one of several vehicles in a ROS domain
   uam fly --without arm_controller           with your own arm controller: examples/
   uam fly --payload-mass 0.3 --wind 2 0 0    heavier payload, 2 m/s from the west
   uam fly --fault mocap_dropout@20+3         no motion capture from 20 s on, for 3 s
@@ -120,6 +121,10 @@ def add(commands: argparse._SubParsersAction) -> None:
         "(default: the first free one)"
     )
     option("--instance", "N", text, type=int)
+    text = "namespace of all nodes, for several vehicles in one ROS domain (default: none)"
+    option("--namespace", "NAME", text, "")
+    text = f"ROS domain, 0..{LAST_DOMAIN} (default: that of the instance)"
+    option("--domain", "N", text, type=int)
 
 
 def run(options: argparse.Namespace) -> int:

@@ -9,9 +9,8 @@ from collections.abc import Callable
 from functools import partial
 from typing import TYPE_CHECKING
 
-from uam_lab.cli.command import Command, number
+from uam_lab.cli.command import Command, chosen_flight, number
 from uam_lab.flight.flight_settings import SettingsError, require_ros
-from uam_sim_bridge.ports import domain_of_flight
 
 if TYPE_CHECKING:
     from uam_lab.flight.operator import Operator
@@ -31,6 +30,7 @@ WHAT = {
 ELSEWHERE = """\
   uam {name}                            the flight that runs
   uam {name} --instance 2               one of several flights
+  uam {name} --namespace uav1           the same, by the namespace of its nodes
   ROS_DOMAIN_ID=5 uam {name} --namespace uav1   nodes that uam fly did not start
 
 Exit status: 0 accepted, 1 refused (the reason is printed), 2 no flight or wrong use.
@@ -82,7 +82,6 @@ def _command(
     text = f"examples:\n{examples}{ELSEWHERE.format(name=name)}"
     command = Command(commands, name, partial(_run, act), summary, description, text)
     command.instance()
-    command.option("--namespace", "NAME", "namespace of the vehicle's nodes (default: none)", "")
     return command
 
 
@@ -93,9 +92,9 @@ def _run(act: Callable[[Operator, argparse.Namespace], int], options: argparse.N
     from uam_lab.processes.guest import Guest
     from uam_lab.processes.node_environment import transport_environment
 
-    domain = domain_of_flight(options.instance)
+    domain, namespace = chosen_flight(options)
     environment = {} if domain is None else transport_environment()  # of uam fly, or the user's
-    with Guest(f"uam_{options.command}", environment, domain, options.namespace) as guest:
+    with Guest(f"uam_{options.command}", environment, domain, namespace) as guest:
         try:
             return act(Operator(guest.node), options)
         except NoFlight as error:

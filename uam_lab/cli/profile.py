@@ -8,9 +8,8 @@ from typing import Any
 
 from uam_control.profiles.profile import Profile, load_profile
 from uam_control.settings import configuration
-from uam_lab.cli.command import Command
+from uam_lab.cli.command import Command, chosen_flight
 from uam_lab.flight.flight_settings import require_ros
-from uam_sim_bridge.ports import domain_of_flight
 
 CHANGED, REFUSED = 0, 1
 EXAMPLES = """\
@@ -44,17 +43,17 @@ def run(options: argparse.Namespace) -> int:
     """Run the command; return the exit status."""
     require_ros()
     given = [str(configuration.named("profiles", one)) for one in options.profile]
-    return switch(load_profile(*given), domain_of_flight(options.instance))
+    return switch(load_profile(*given), *chosen_flight(options))
 
 
-def switch(profile: Profile, domain: int | None) -> int:
-    """Switch the nodes of a ROS domain, print the changes; return the exit status."""
+def switch(profile: Profile, domain: int | None, namespace: str = "/") -> int:
+    """Switch the nodes of a vehicle, print the changes; return the exit status."""
     from uam_lab.flight.ros.profile_switch import ProfileSwitch, SwitchRefused
     from uam_lab.processes.guest import Guest
     from uam_lab.processes.node_environment import transport_environment
 
     environment = {} if domain is None else transport_environment()  # of uam fly, or the user's
-    with Guest("uam_profile", environment, domain) as guest:
+    with Guest("uam_profile", environment, domain, namespace) as guest:
         try:
             changed = ProfileSwitch(guest.node).switch(profile)
         except SwitchRefused as refusal:

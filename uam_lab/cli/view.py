@@ -7,9 +7,8 @@ import json
 import os
 import sys
 
-from uam_lab.cli.command import Command
+from uam_lab.cli.command import Command, chosen_flight
 from uam_lab.flight.flight_settings import require_ros
-from uam_sim_bridge.ports import domain_of_flight
 
 EXAMPLES = """\
 examples:
@@ -52,7 +51,7 @@ def _port(text: str) -> int:
 def run(options: argparse.Namespace) -> int:
     """Serve until Ctrl-C; return the exit status."""
     require_ros()
-    domain = domain_of_flight(options.instance)
+    domain, namespace = chosen_flight(options)
     from uam_lab.nodes import cockpit
     from uam_lab.processes.node_environment import transport_environment
 
@@ -62,4 +61,5 @@ def run(options: argparse.Namespace) -> int:
     texts = [f"{name}:={json.dumps(value)}" for name, value in given.items() if value != ""]
     parameters = [word for text in texts for word in ("-p", text)]
     sys.argv = ["cockpit", "--ros-args", "--disable-external-lib-logs", *parameters]
+    sys.argv += ["-r", f"__ns:={namespace}"]
     return cockpit.main()

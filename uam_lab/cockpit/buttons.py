@@ -31,17 +31,17 @@ class Button:
 
 
 def _each(service: str) -> tuple[str, ...]:
-    return tuple(f"/{name}/{service}" for name in CONTROLLERS)
+    return tuple(f"{name}/{service}" for name in CONTROLLERS)
 
 
 BUTTONS = (
-    Button("Hold", "PLAYER_PAUSE", ("/mission/hold",), "stop here and stay"),
-    Button("Resume", "PLAYER_PLAY", ("/mission/resume",), "continue the scenario"),
-    Button("Land", "ARROW_BAR_TO_DOWN", ("/mission/land",), "land here", colour="orange"),
-    Button("Disarm", "POWER", ("/mission/disarm",), "motors off", colour="red",
+    Button("Hold", "PLAYER_PAUSE", ("mission/hold",), "stop here and stay"),
+    Button("Resume", "PLAYER_PLAY", ("mission/resume",), "continue the scenario"),
+    Button("Land", "ARROW_BAR_TO_DOWN", ("mission/land",), "land here", colour="orange"),
+    Button("Disarm", "POWER", ("mission/disarm",), "motors off", colour="red",
            ask="Motors off: a vehicle in the air falls. Disarm?"),
-    Button("Magnet on", "MAGNET", ("/mission/magnet",), "until the scenario switches it", on=True),
-    Button("Magnet off", "MAGNET_OFF", ("/mission/magnet",), "drops the payload", on=False),
+    Button("Magnet on", "MAGNET", ("mission/magnet",), "until the scenario switches it", on=True),
+    Button("Magnet off", "MAGNET_OFF", ("mission/magnet",), "drops the payload", on=False),
     Button("Freeze adaptation", "SNOWFLAKE", _each("freeze_adaptation"),
            "adapted gains stay constant", on=True),
     Button("Free adaptation", "SNOWFLAKE_OFF", _each("freeze_adaptation"),

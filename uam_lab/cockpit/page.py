@@ -27,6 +27,7 @@ from uam_msgs_py.messages.parameter_changes import ParameterChange
 from uam_msgs_py.messages.status import AutopilotState, MissionStatus
 from uam_msgs_py.messages.topics import Topic
 from uam_msgs_py.messages.transforms import read_transforms
+from uam_msgs_py.node.namespace import prefix
 
 # nodes whose parameters are shown, and what their tabs are called
 TUNED = {
@@ -52,12 +53,16 @@ class Page:
         services: Services,
         options: dict[str, Any],
         joints: Sequence[str],
+        namespace: str = "/",
     ):
-        """options: config/views/cockpit.yaml; joints: names of the arm's coordinates."""
+        """options: config/views/cockpit.yaml; joints: names of the arm's coordinates.
+
+        namespace: of the vehicle's nodes.
+        """
         self._server, self._options = server, options
         self._todo: queue.SimpleQueue[Callable[[], None]] = queue.SimpleQueue()
         self._watch, self._services = watch, services
-        self._health = Health(options["silent_after"])
+        self._health = Health(options["silent_after"], namespace)
         self._lines: deque[str] = deque(maxlen=LINES)
         self._gains: dict[str, NodeGains] = {}
         self._asked: set[str] = set()
@@ -67,7 +72,7 @@ class Page:
         server.initial_camera.position = tuple(camera["position"])
         server.initial_camera.look_at = tuple(camera["look_at"])
         gui.configure_theme(show_logo=False, show_share_button=False)
-        self._view = VehicleView(server.scene)
+        self._view = VehicleView(server.scene, prefix(namespace))
         self._headline = gui.add_html("")
         self._shown = ""
         with gui.add_folder("Commands"):

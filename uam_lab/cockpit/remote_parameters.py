@@ -43,12 +43,12 @@ class RemoteParameters:
         self._services = services
 
     def _call(self, kind: type, service: str, request: Any, answer: Answer) -> None:
-        self._services.call(kind, f"/{self.node}/{service}", request, answer)
+        self._services.call(kind, f"{self.node}/{service}", request, answer)
 
     @property
     def is_there(self) -> bool:
         """Whether the node offers its parameters."""
-        return self._services.ready(ListParameters, f"/{self.node}/list_parameters")
+        return self._services.ready(ListParameters, f"{self.node}/list_parameters")
 
     def load(self, done: Callable[[str], None]) -> None:
         """Request descriptions and values; then call done(""), or done(reason) on failure."""

@@ -12,6 +12,7 @@ from diagnostic_msgs.msg import DiagnosticArray
 from uam_control.coordinates import ARM, ATTITUDE, POSITION
 from uam_control.supervision import State
 from uam_msgs_py.messages.status import ERROR, OK, STALE, WARN, AutopilotState, MissionStatus
+from uam_msgs_py.node.namespace import unlabelled
 
 GOOD, CAUTION, BAD, UNKNOWN = "good", "caution", "bad", "unknown"
 LEVELS = {OK: GOOD, WARN: CAUTION, ERROR: BAD, STALE: CAUTION}
@@ -32,6 +33,7 @@ class Health:
     """Last received states; a node counts as lost after `silent_after` [s] wall time."""
 
     silent_after: float
+    namespace: str = "/"  # of the vehicle's nodes
     mission: MissionStatus | None = None
     autopilot: AutopilotState | None = None
     battery: float = math.nan  # 0..1
@@ -57,14 +59,17 @@ class Health:
     def diagnose(self, message: DiagnosticArray) -> None:
         """Store a message of /diagnostics."""
         for status in message.status:
+            name = unlabelled(self.namespace, status.name)
+            if name is None:
+                continue
             level = LEVELS.get(status.level, BAD)
-            self.nodes[status.name] = NodeHealth(level, status.message, time.monotonic())
+            self.nodes[name] = NodeHealth(level, status.message, time.monotonic())
             for pair in status.values:
                 if pair.key == "real time factor":
                     self.real_time_factor = pair.value
                 elif pair.key == "saturated":
                     change = set.add if pair.value == "True" else set.discard
-                    change(self.saturated, status.name)
+                    change(self.saturated, name)
 
     def state(self) -> tuple[str, str, str]:
         """Return level, text and reason ("" without one) of the flight's state."""

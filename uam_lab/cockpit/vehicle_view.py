@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -22,7 +23,9 @@ AXES = 0.12  # [m] of the reference frame
 class VehicleView:
     """Shows the last messages in viser's scene. A frame appears when its parent is known."""
 
-    def __init__(self, scene: viser.SceneApi):
+    def __init__(self, scene: viser.SceneApi, prefix: str = ""):
+        """prefix: of the vehicle's frames; links of the URDF have none."""
+        self._prefix = prefix
         self._scene = scene
         self._paths: dict[str, str] = {WORLD: f"/{WORLD}"}
         self._frames: dict[str, viser.FrameHandle] = {}
@@ -48,12 +51,19 @@ class VehicleView:
     def transforms(self, transforms: list[Transform]) -> None:
         """Apply transforms of /tf or /tf_static."""
         for transform in transforms:
-            self._orphans[transform.child] = transform
+            own = replace(
+                transform, parent=self._own(transform.parent), child=self._own(transform.child)
+            )
+            self._orphans[own.child] = own
         placed = True
         while placed:
             placed = [c for c, t in self._orphans.items() if t.parent in self._paths]
             for child in placed:
                 self._place(child, self._orphans.pop(child))
+
+    def _own(self, frame: str) -> str:
+        """Return a frame's name without the vehicle's prefix."""
+        return frame.removeprefix(self._prefix)
 
     def _place(self, child: str, transform: Transform) -> None:
         position, wxyz = transform.position, transform.quaternion
@@ -90,7 +100,7 @@ class VehicleView:
     def markers(self, message: MarkerArray) -> None:
         """Show a visualization_msgs/MarkerArray, with the types used by the scene node."""
         for marker in message.markers:
-            name, frame = marker.ns, marker.header.frame_id
+            name, frame = marker.ns, self._own(marker.header.frame_id)
             if marker.action == Marker.DELETE:
                 if name in self._markers:
                     self._markers.pop(name).remove()

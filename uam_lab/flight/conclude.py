@@ -29,6 +29,7 @@ def settings_facts(settings: FlightSettings) -> dict[str, Any]:
         "plant": settings.plant,
         "clock": settings.clock,
         "autopilot": settings.autopilot,
+        "namespace": settings.namespace,
         "seed": settings.seed,
         "payload_mass_kg": settings.payload_mass,
         "vehicle": settings.vehicle.source,

@@ -16,13 +16,14 @@ from uam_control.vehicle import DEFAULT_VEHICLE, VehicleDescription, load_descri
 from uam_lab.flight import node_options
 from uam_lab.flight.node_options import SettingsError
 from uam_lab.processes.node_environment import without_discovery
+from uam_msgs_py.node.namespace import normal
 from uam_sim_bridge.faults import Schedule, feasibility, read_schedule
 from uam_sim_bridge.faults.faulty_plant import check_engine
 from uam_sim_bridge.faults.process_faults import DiscoveryLoss
 from uam_sim_bridge.mavlink.transport.transport import ALLOWED, LinkUrl, parse_url
 from uam_sim_bridge.plant.engines import DEFAULT_PLANT
 from uam_sim_bridge.plant.vehicle import PAYLOAD_MAX
-from uam_sim_bridge.ports import AUTOPILOT_UDP, INSTANCES
+from uam_sim_bridge.ports import AUTOPILOT_UDP, INSTANCES, LAST_DOMAIN
 from uam_sim_bridge.px4.px4_installation import Px4Installation
 
 ENGINES = ("ros", "direct")
@@ -45,7 +46,8 @@ class FlightSettings:
     nodes that are not started, see `foreign`. auto_start: the flight begins without a command;
     dry_run: nothing is armed. parameters: of the nodes without a profile, node → name → value.
     remappings: node, or EVERY_NODE → topic or service → new name. command: how the flight was
-    requested, for its record.
+    requested, for its record. namespace: of all nodes, in the form of ROS; domain: ROS domain,
+    None for that of the instance.
     """
 
     scenario: Scenario
@@ -74,6 +76,8 @@ class FlightSettings:
     parameters: dict[str, dict[str, Any]] = field(default_factory=dict)
     remappings: dict[str, dict[str, str]] = field(default_factory=dict)
     command: str = ""
+    namespace: str = "/"
+    domain: int | None = None
 
     @property
     def foreign(self) -> tuple[str, ...]:
@@ -108,6 +112,8 @@ def settings(
     parameters: Mapping[str, Mapping[str, Any]] | None = None,
     remappings: Mapping[str, str | Mapping[str, str]] | None = None,
     command: str = "",
+    namespace: str = "",
+    domain: int | None = None,
 ) -> FlightSettings:
     """Check the options and load scenario, profile and faults.
 
@@ -141,6 +147,16 @@ def settings(
         raise SettingsError(
             "a flight controller runs on its own clock: --autopilot serial:... "
             "needs --clock realtime"
+        )
+    try:
+        namespace = normal(namespace)
+    except ValueError as error:
+        raise SettingsError(str(error)) from None
+    if domain is not None and not 0 <= domain <= LAST_DOMAIN:
+        raise SettingsError(f"domain {domain} is not in 0..{LAST_DOMAIN}")
+    if engine == "direct" and (namespace != "/" or domain is not None):
+        raise SettingsError(
+            "the direct engine has no nodes: --namespace and --domain need --engine ros"
         )
     if gcs and (parse_url(gcs).kind != "udp" or engine == "direct"):
         raise SettingsError("--gcs must be udp:HOST:PORT and needs --engine ros")
@@ -200,6 +216,8 @@ def settings(
         parameters=own,
         remappings=node_options.remappings(remappings or {}, engine),
         command=command,
+        namespace=namespace,
+        domain=domain,
     )
 
 

@@ -101,7 +101,10 @@ class Operator:
 
     def _latest(self, topic: topics.Topic) -> Any:
         """Return the newest message of a topic; the node may have sent it before this call."""
-        self._until(lambda: topic.name in self._newest, f"no message on {topic.name}")
+        self._until(
+            lambda: topic.name in self._newest,
+            f"no message on {self._node.resolve_topic_name(topic.name)}",
+        )
         return self._newest[topic.name]
 
     def _call(self, service: str) -> tuple[bool, str]:
@@ -121,6 +124,6 @@ class Operator:
             if time.monotonic() > end:
                 raise NoFlight(
                     f"{complaint} in ROS domain {self._node.context.get_domain_id()}: "
-                    "start a flight, or choose it by --instance or ROS_DOMAIN_ID"
+                    "start a flight, or choose it by --instance, --namespace or ROS_DOMAIN_ID"
                 )
             self._executor.spin_once(timeout_sec=0.05)

@@ -22,6 +22,7 @@ from uam_lab.cockpit.page_address import LOCAL, PORT, AddressError
 from uam_lab.cockpit.services import Services
 from uam_lab.cockpit.watch import Watch
 from uam_msgs_py.node.base_node import StopSignal, refuse
+from uam_msgs_py.node.namespace import adopt_sections
 from uam_msgs_py.node.node_parameters import NodeParameters, refuse_unknown
 
 NAME = "cockpit"
@@ -44,6 +45,7 @@ def main() -> int:
     rclpy.init(args=sys.argv, signal_handler_options=SignalHandlerOptions.NO)
     stop = StopSignal()
     node = Node(NAME)
+    adopt_sections(node)
     options = yaml.safe_load(configuration.path(OPTIONS).read_text())
     try:
         served = NodeParameters(node, CockpitParameters, read_only=True).current
@@ -58,7 +60,8 @@ def main() -> int:
     executor.add_node(node)
     # not spun: an executor would take the messages that the page polls
     watcher = Node(f"{NAME}_watch", start_parameter_services=False, enable_rosout=False)
-    page = Page(server, Watch(watcher), Services(node), options, vehicle.coordinates[ARM])
+    joints, namespace = vehicle.coordinates[ARM], node.get_namespace()
+    page = Page(server, Watch(watcher), Services(node), options, joints, namespace)
     period = options["scene_period"]
     while not stop.raised:
         end = time.monotonic() + period

@@ -27,6 +27,7 @@ from uam_msgs_py.messages.status import ERROR, OK, WARN, diagnostic
 from uam_msgs_py.node import connections
 from uam_msgs_py.node.base_node import StopSignal, refuse
 from uam_msgs_py.node.health import LoopTime, ages
+from uam_msgs_py.node.namespace import adopt_sections, label
 from uam_msgs_py.node.node_parameters import NodeParameters, refuse_unknown
 
 NAME = "recorder"
@@ -55,11 +56,12 @@ def _health(node: Node, recording: TopicRecorder, polls: LoopTime) -> Diagnostic
     lost = sum(recording.lost.values())
     summary = recording.ended or (f"{lost} messages lost" if lost else "recording")
     values = {"messages lost": lost, connections.RECORDED_UNTIL: recording.until}
-    values |= polls.report("poll") | ages(recording.inlets, recording.arrivals)
-    values |= connections.of({}, recording.inlets)
+    namespace = node.get_namespace()
+    values |= polls.report("poll") | ages(recording.inlets, recording.arrivals, namespace)
+    values |= connections.of({}, recording.inlets, namespace)
     now = node.get_clock().now().nanoseconds
     level = ERROR if recording.ended else WARN if lost else OK
-    return diagnostic(now, node.get_name(), level, summary, values)
+    return diagnostic(now, label(node), level, summary, values)
 
 
 def _open(node: Node, options: RecorderParameters) -> TopicRecorder:
@@ -93,6 +95,7 @@ def main() -> int:
     rclpy.init(args=sys.argv, signal_handler_options=SignalHandlerOptions.NO)
     stop = StopSignal()
     node = Node(NAME)
+    adopt_sections(node)
     log = node.get_logger()
     try:
         options = NodeParameters(node, RecorderParameters, read_only=True).current

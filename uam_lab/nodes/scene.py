@@ -15,6 +15,7 @@ from __future__ import annotations
 
 import time
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 from diagnostic_msgs.msg import DiagnosticArray
@@ -34,6 +35,7 @@ from uam_msgs_py.messages.status import ERROR, OK, MissionStatus
 from uam_msgs_py.messages.topics import BODY, WORLD
 from uam_msgs_py.messages.transforms import Transform, transforms_message
 from uam_msgs_py.node.base_node import UamNode, run
+from uam_msgs_py.node.namespace import frame
 from uam_msgs_py.node.node_parameters import NodeParameters
 from uam_sim_bridge.plant import Vehicle
 from uam_sim_bridge.plant.frames import box, frames, hanging
@@ -71,7 +73,9 @@ class SceneNode(UamNode):
         hung = frames(model)
         self._fixed = [frame for frame in hung if not frame.joint]
         self._moving = [frame for frame in hung if frame.joint]
-        self._maker = Markers(self._scenario, box(model, "magnet_face"), box(model, "payload"))
+        self._frame = partial(frame, self)
+        boxes = box(model, "magnet_face"), box(model, "payload")
+        self._maker = Markers(self._scenario, *boxes, self._frame(""))
 
         self._state: tuple[int, np.ndarray] | None = None
         self._references: dict[int, Reference] = {}
@@ -97,7 +101,10 @@ class SceneNode(UamNode):
     def _describe(self, robot: str) -> None:
         """Publish the constant data: URDF and fixed transforms."""
         self.publisher(topics.ROBOT_DESCRIPTION).publish(String(data=robot))
-        still = [Transform(0, f.parent, f.name, f.position, f.quaternion) for f in self._fixed]
+        still = [
+            Transform(0, self._frame(f.parent), self._frame(f.name), f.position, f.quaternion)
+            for f in self._fixed
+        ]
         self.publisher(topics.TF_STATIC).publish(transforms_message(still))
 
     def _on_status(self, message: DiagnosticArray) -> None:
@@ -163,17 +170,18 @@ class SceneNode(UamNode):
         turned = quaternion_from_euler(chi[ATTITUDE])
         angles = dict(zip(self._joint_names, chi[ARM], strict=True))
         angles[SWING] = hanging(chi[ATTITUDE][1], chi[ARM])
-        found = [Transform(stamp, WORLD, BODY, chi[POSITION], turned)]
+        own = self._frame
+        found = [Transform(stamp, WORLD, own(BODY), chi[POSITION], turned)]
         found += [
-            Transform(stamp, f.parent, f.name, f.position, f.turned(angles[f.joint]))
+            Transform(stamp, own(f.parent), own(f.name), f.position, f.turned(angles[f.joint]))
             for f in self._moving
         ]
         if desired is not None:
             pose = desired[POSITION], quaternion_from_euler(desired[ATTITUDE])
-            found.append(Transform(stamp, WORLD, REFERENCE, *pose))
+            found.append(Transform(stamp, WORLD, own(REFERENCE), *pose))
         if self._payload is not None:
             at, position, quaternion = self._payload
-            found.append(Transform(at, WORLD, PAYLOAD, position, quaternion))
+            found.append(Transform(at, WORLD, own(PAYLOAD), position, quaternion))
             self._payload, self._payload_is_there = None, True  # publish each stamp only once
         return found
 

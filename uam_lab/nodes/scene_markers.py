@@ -74,9 +74,10 @@ class FlownPath:
 class Markers:
     """Builds the MarkerArray of one stamp."""
 
-    def __init__(self, scenario: Scenario, face: Box, payload: Box):
-        """face: of the magnet, in frame MAGNET; payload: in frame PAYLOAD."""
+    def __init__(self, scenario: Scenario, face: Box, payload: Box, prefix: str = ""):
+        """face: of the magnet, in frame MAGNET; payload: in frame PAYLOAD; prefix: of frames."""
         self._drop, self._face, self._payload = scenario.drop_point, face, payload
+        self._prefix = prefix
 
     def message(
         self,
@@ -91,17 +92,18 @@ class Markers:
             _line(stamp, "reference path", ahead, AHEAD),
             _line(stamp, "flown path", flown, FLOWN),
             self._magnet(stamp, status.magnet),
-            _text(stamp, status),
+            _text(stamp, self._prefix + BODY, status),
         ]
         if self._drop is not None:
             markers.append(_disc(stamp, self._drop))
         if payload:
-            markers.append(_box(stamp, "payload", PAYLOAD, self._payload, CUBE))
+            markers.append(_box(stamp, "payload", self._prefix + PAYLOAD, self._payload, CUBE))
         return MarkerArray(markers=markers)
 
     def _magnet(self, stamp: int, on: bool) -> Marker:
         around = Box(self._face.centre, self._face.edges + MAGNET_MARGIN)
-        return _box(stamp, "magnet", MAGNET, around, ENERGISED if on else OFF)
+        colour = ENERGISED if on else OFF
+        return _box(stamp, "magnet", self._prefix + MAGNET, around, colour)
 
 
 def _marker(
@@ -139,9 +141,9 @@ def _disc(stamp: int, place: tuple[float, float]) -> Marker:
     return marker
 
 
-def _text(stamp: int, status: MissionStatus) -> Marker:
+def _text(stamp: int, frame: str, status: MissionStatus) -> Marker:
     colour, scale = FAILED if status.abort_reason else TEXT, (0.0, 0.0, TEXT_HEIGHT)
-    marker = _marker(stamp, "phase", BODY, Marker.TEXT_VIEW_FACING, scale, colour)
+    marker = _marker(stamp, "phase", frame, Marker.TEXT_VIEW_FACING, scale, colour)
     _place(marker, (0.0, 0.0, TEXT_ABOVE))
     marker.text = status.summary
     return marker

@@ -22,99 +22,18 @@ from uam_control.coordinates import ALPHA, ARM, ATTITUDE, ROLL
 from uam_control.mission import Scenario
 from uam_control.mission.flight_sequence import ABORTED, LANDED, WAITING
 from uam_control.supervision import State
-from uam_lab.recording import cdr
 from uam_lab.recording import fault_records as fault_log
-from uam_lab.recording.mcap_reader import TopicLog, UnreadableLog, read_log
+from uam_lab.recording.logged_topics import ADAPTATION, SECOND, Log, StampedRows
+from uam_lab.recording.mcap_reader import UnreadableLog
 from uam_lab.results import timeseries
 from uam_lab.results.outcome import transition
 from uam_lab.results.timeseries import SUBSYSTEMS, Columns, FlightTable, Series, gain_columns
 from uam_msgs_py.messages import topics
 from uam_msgs_py.messages.parameter_changes import ParameterChange
 from uam_msgs_py.messages.status import MissionStatus
-from uam_msgs_py.messages.topics import Topic
 
-SECOND = 1e9
 SILENCE = 1e9  # [ns] without references after which the mission counts as lost
 STATE_ROWS = ("positions", "velocities", "accelerations")
-ADAPTATION = {
-    "position": topics.POSITION_ADAPTATION,
-    "attitude": topics.ATTITUDE_ADAPTATION,
-    "arm": topics.ARM_ADAPTATION,
-}
-TOPICS = (
-    *(topics.TRUTH_STATE, topics.TRUTH_PAYLOAD, topics.TRUTH_ROTORS, topics.TRUTH_MAGNET),
-    *(topics.STATE, topics.REFERENCE, topics.MISSION_STATUS, topics.CHANGES, topics.FAULTS),
-    *(topics.POSITION_COMMAND, topics.ATTITUDE_COMMAND, topics.ARM_COMMAND),
-    *(topics.SETPOINT, topics.THRUST, *ADAPTATION.values()),
-)
-
-
-class StampedRows:
-    """Values of one topic, sorted by stamp: stamps (m,) [ns], rows (m, n)."""
-
-    def __init__(self, stamps: np.ndarray, rows: np.ndarray):
-        order = np.argsort(stamps, kind="stable")
-        self.stamps, self.rows = stamps[order], rows[order]
-
-    def at(self, ticks: np.ndarray) -> np.ndarray:
-        """Return the rows (k, n) at the stamps ticks (k,) [ns] or last before them; else NaN."""
-        out = np.full((len(ticks), self.rows.shape[1]), np.nan)
-        if not len(self.stamps):
-            return out
-        index = np.searchsorted(self.stamps, ticks, side="right") - 1
-        there = index >= 0
-        out[there] = self.rows[index[there]]
-        return out
-
-
-class Log:
-    """The topics of a log, decoded on request; found: by name."""
-
-    def __init__(self, found: Mapping[str, TopicLog]):
-        self._topics = found
-
-    def messages(self, topic: Topic) -> list[bytes]:
-        """Return the serialized messages of a topic in file order; may be empty."""
-        log = self._topics.get(topic.name)
-        return log.messages if log else []
-
-    def width(self, topic: Topic) -> int:
-        """Number of names in the messages of a topic; 0 without messages."""
-        return next((len(block.names) for block in self.blocks(topic)), 0)
-
-    def wall_seconds(self, topic: Topic) -> float:
-        """Return the wall time between first and last message of a topic [s]; 0 without any."""
-        log = self._topics.get(topic.name)
-        return (max(log.published) - min(log.published)) / SECOND if log and log.published else 0.0
-
-    def blocks(self, topic: Topic) -> list[cdr.Block]:
-        """Return the decoded messages of a topic; may be empty."""
-        log = self._topics.get(topic.name)
-        return cdr.read(log.type_name, log.messages) if log and log.messages else []
-
-    def samples(self, topic: Topic, fields: Sequence[str], width: int) -> StampedRows:
-        """Return `fields` side by side, `width` numbers each; zeros for empty (idle) messages."""
-        stamps, rows = [], []
-        for block in self.blocks(topic):
-            stamps.append(block.stamps)
-            rows.append(np.hstack([_field(block, field, width) for field in fields]))
-        if not stamps:
-            return StampedRows(np.zeros(0, np.int64), np.zeros((0, width * len(fields))))
-        return StampedRows(np.concatenate(stamps), np.vstack(rows))
-
-    def statuses(self) -> list[tuple[int, MissionStatus]]:
-        """Return stamps [ns] and statuses of the mission, in order."""
-        return [
-            MissionStatus.from_message(deserialize_message(data, DiagnosticArray))
-            for data in self.messages(topics.MISSION_STATUS)
-        ]
-
-
-def _field(block: cdr.Block, field: str, width: int) -> np.ndarray:
-    found = block.fields.get(field)
-    if found is None:
-        return np.zeros((len(block.stamps), width))
-    return found[:, :width]
 
 
 class References:
@@ -173,7 +92,7 @@ def read_flight(
 
     Raises UnreadableLog if the file is no log or its flight did not start.
     """
-    log = Log(read_log(path, {topic.name for topic in TOPICS}))
+    log = Log.read(path)
     statuses = log.statuses()
     end = next((stamp for stamp, status in statuses if status.done), None)
     abort_reason = statuses[-1][1].abort_reason if statuses else ""

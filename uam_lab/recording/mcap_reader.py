@@ -1,7 +1,7 @@
 """Reads an MCAP log in one pass, also without an index (after a kill of the recorder)."""
 
 import struct
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -25,8 +25,8 @@ class TopicLog:
     published: list[int] = field(default_factory=list)
 
 
-def read_log(path: Path, topics: set[str] | None = None) -> dict[str, TopicLog]:
-    """Return all messages of `topics` (default: all), by topic.
+def read_log(path: Path, chosen: Callable[[str], bool] = lambda _: True) -> dict[str, TopicLog]:
+    """Return all messages of the topics for whose names `chosen` is true, by topic.
 
     An incomplete last record is ignored. Raises UnreadableLog, OSError.
     """
@@ -42,7 +42,7 @@ def read_log(path: Path, topics: set[str] | None = None) -> dict[str, TopicLog]:
                 log.messages.append(record.data)
         elif isinstance(record, Schema):
             types[record.id] = record.name
-        elif isinstance(record, Channel) and (topics is None or record.topic in topics):
+        elif isinstance(record, Channel) and chosen(record.topic):
             log = TopicLog(types[record.schema_id])
             logs[record.id] = found.setdefault(record.topic, log)
     return found

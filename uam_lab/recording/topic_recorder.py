@@ -27,10 +27,10 @@ from uam_lab.recording.bounded_log import BoundedLog
 from uam_msgs_py.messages import topics
 from uam_msgs_py.messages.layouts import stamp_of
 from uam_msgs_py.messages.serialized import type_name
+from uam_msgs_py.node.namespace import expanded
 from uam_msgs_py.node.polling import listen
 
 DEPTH = 2000  # queue length per topic: 8 s at control rate
-CLOCK = "/clock"
 
 
 def begins_with_stamp(message_type: type) -> bool:
@@ -70,7 +70,7 @@ class TopicRecorder:
 
         size_limit [MB], 0 for none. Raises FileExistsError for an existing file, OSError.
         """
-        self._simulated = simulated
+        self._simulated, self._namespace = simulated, node.get_namespace()
         self._writer = BoundedLog(file, size_limit)
         for name, values in (metadata or {}).items():
             self._writer.add_metadata(name, values)
@@ -78,7 +78,7 @@ class TopicRecorder:
         self._tracks = [self._track(node, topic) for topic in chosen]
         # /clock is taken last in each poll: then every /clock published before any other message
         # of this poll is available
-        self._tracks.sort(key=lambda track: track.topic == CLOCK)
+        self._tracks.sort(key=lambda track: track.topic == topics.CLOCK.name)
         self._clock_wall: list[int] = []  # publisher's wall clock of each /clock [ns]
         self._clock_sim: list[int] = []
 
@@ -90,7 +90,8 @@ class TopicRecorder:
             durability=topic.qos.durability,
         )
         subscription = listen(node, topic, qos, raw=True)
-        self._bag.append(BagTopic(topic.name, type_name(topic.type), topic.qos))
+        name = node.resolve_topic_name(topic.name)
+        self._bag.append(BagTopic(name, type_name(topic.type), topic.qos))
         channel = add_topic(self._writer, self._bag[-1])
         stamped = begins_with_stamp(topic.type) and topic.one_publisher
         return Track(topic.name, subscription, topic.type, stamped, channel, topic.one_publisher)
@@ -103,7 +104,7 @@ class TopicRecorder:
             while (taken := take(track.message_type, True)) is not None:
                 data, info = taken
                 published = info["source_timestamp"]
-                if track.topic == CLOCK:
+                if track.topic == topics.CLOCK.name:
                     self._clock_wall.append(published)
                     self._clock_sim.append(stamp_of(data))
                 sequence = info["publication_sequence_number"]
@@ -166,7 +167,8 @@ class TopicRecorder:
     @property
     def lost(self) -> dict[str, int]:
         """Number of lost messages, for topics with losses."""
-        return {track.topic: track.lost for track in self._tracks if track.lost}
+        lost = {track.topic: track.lost for track in self._tracks if track.lost}
+        return {expanded(self._namespace, topic): count for topic, count in lost.items()}
 
     @property
     def counts(self) -> dict[str, int]:

@@ -79,10 +79,11 @@ def read_values(data: bytes, field: str) -> tuple[int, list[str], np.ndarray]:
 class ImuWriter(Template):
     """Writes an Imu without orientation (orientation_covariance[0] = -1)."""
 
-    def __init__(self):
+    def __init__(self, frame: str = BODY):
+        """frame: of the body."""
         message = Imu()
         message.orientation_covariance[0] = -1.0
-        super().__init__(message, BODY)
+        super().__init__(message, frame)
         self._gyro = self.values["angular_velocity"]
         self._force = self.values["linear_acceleration"]
 
@@ -154,8 +155,9 @@ def read_effort(data: bytes, names: Sequence[str]) -> np.ndarray:
 class SetpointWriter(Template):
     """Writes the TwistStamped with the setpoint that was sent to the autopilot."""
 
-    def __init__(self):
-        super().__init__(TwistStamped(), BODY)
+    def __init__(self, frame: str = BODY):
+        """frame: of the body."""
+        super().__init__(TwistStamped(), frame)
         self._rates, self._linear = self.values["angular"], self.values["linear"]
 
     def fill(self, stamp: int, rates: np.ndarray, thrust: float) -> bytes:

@@ -1,6 +1,10 @@
 """All topics of the stack: name, message type, quality of service.
 
-Frames are those of REP-103: ENU world, FLU body. Names can be remapped as usual in ROS.
+Names are relative: a namespace moves them, without one `uam/state` is `/uam/state`. They can be
+remapped as usual in ROS. Absolute, as all ROS programs expect: /tf, /tf_static, /diagnostics and
+/rosout; there `uam_msgs_py.node.namespace` puts the namespace before frames and names. The clock
+is relative: each simulated vehicle has its own time. Frames are those of REP-103: ENU world, FLU
+body.
 """
 
 from dataclasses import dataclass, field
@@ -21,8 +25,8 @@ try:
 except ImportError:  # not among the wheels of PyPI
     from uam_msgs_py.messages.tf_message import TFMessage
 
-WORLD = "world"  # frame of poses and states, ENU
-BODY = "base_link"  # frame of rates, forces and torques, FLU
+WORLD = "world"  # frame of poses and states, ENU; the vehicles of a domain share it
+BODY = "base_link"  # frame of rates, forces and torques, FLU; with the prefix of the namespace
 
 
 def _qos(depth: int, reliable: bool = True, latched: bool = False) -> QoSProfile:
@@ -65,62 +69,60 @@ class Topic:
         return SENSOR_DATA if self.qos is RELIABLE and self is not DIAGNOSTICS else self.qos
 
 
-CLOCK = Topic("/clock", Clock, _qos(1, reliable=False), "simulation time")
+CLOCK = Topic("clock", Clock, _qos(1, reliable=False), "simulation time")
 
 # Sensors
-IMU = Topic("/imu/data", Imu, SENSOR_DATA, "body rates and specific force, FLU, 250 Hz")
-JOINTS = Topic("/joint_states", JointState, SENSOR_DATA, "alpha_1, alpha_2, 250 Hz")
-MOCAP = Topic("/vrpn_mocap/uam/pose", PoseStamped, SENSOR_DATA, "motion capture, world, 120 Hz")
+IMU = Topic("imu/data", Imu, SENSOR_DATA, "body rates and specific force, FLU, 250 Hz")
+JOINTS = Topic("joint_states", JointState, SENSOR_DATA, "alpha_1, alpha_2, 250 Hz")
+MOCAP = Topic("vrpn_mocap/uam/pose", PoseStamped, SENSOR_DATA, "motion capture, world, 120 Hz")
 
 # Control, once per tick, stamped with the IMU sample that the tick belongs to
-STATE = Topic("/uam/state", JointTrajectory, RELIABLE, "estimated chi, chi_dot, chi_ddot")
+STATE = Topic("uam/state", JointTrajectory, RELIABLE, "estimated chi, chi_dot, chi_ddot")
 REFERENCE = Topic(
-    "/uam/reference", JointTrajectory, RELIABLE, "chi_d ... of the controlled coordinates"
+    "uam/reference", JointTrajectory, RELIABLE, "chi_d ... of the controlled coordinates"
 )
 POSITION_COMMAND = Topic(
-    "/uam/position/command", JointTrajectory, RELIABLE, "p_d, q_d, their derivatives, and tau_p"
+    "uam/position/command", JointTrajectory, RELIABLE, "p_d, q_d, their derivatives, and tau_p"
 )
-ATTITUDE_COMMAND = Topic("/uam/attitude/command", JointTrajectory, RELIABLE, "tau_q, FLU")
-ARM_COMMAND = Topic("/uam/arm/command", JointTrajectory, RELIABLE, "tau_alpha")
-ARM_EFFORT = Topic(
-    "/arm_effort_controller/commands", Float64MultiArray, RELIABLE, "tau_alpha [N m]"
-)
-MAGNET = Topic("/uam/magnet", Bool, RELIABLE, "magnet on")
+ATTITUDE_COMMAND = Topic("uam/attitude/command", JointTrajectory, RELIABLE, "tau_q, FLU")
+ARM_COMMAND = Topic("uam/arm/command", JointTrajectory, RELIABLE, "tau_alpha")
+ARM_EFFORT = Topic("arm_effort_controller/commands", Float64MultiArray, RELIABLE, "tau_alpha [N m]")
+MAGNET = Topic("uam/magnet", Bool, RELIABLE, "magnet on")
 SETPOINT = Topic(
-    "/uam/setpoint", TwistStamped, RELIABLE, "body rates FLU and thrust 0..1 (linear.z) as sent"
+    "uam/setpoint", TwistStamped, RELIABLE, "body rates FLU and thrust 0..1 (linear.z) as sent"
 )
 THRUST = Topic(
-    "/uam/thrust", JointState, RELIABLE, "factor: true / assumed thrust as identified, 10 Hz"
+    "uam/thrust", JointState, RELIABLE, "factor: true / assumed thrust as identified, 10 Hz"
 )
 POSITION_ADAPTATION = Topic(
-    "/uam/position/adaptation", JointState, RELIABLE, "the gains of the law, by its names, 50 Hz"
+    "uam/position/adaptation", JointState, RELIABLE, "the gains of the law, by its names, 50 Hz"
 )
-ATTITUDE_ADAPTATION = Topic("/uam/attitude/adaptation", JointState, RELIABLE, "as for position")
-ARM_ADAPTATION = Topic("/uam/arm/adaptation", JointState, RELIABLE, "as for position")
+ATTITUDE_ADAPTATION = Topic("uam/attitude/adaptation", JointState, RELIABLE, "as for position")
+ARM_ADAPTATION = Topic("uam/arm/adaptation", JointState, RELIABLE, "as for position")
 
 # States of mission and autopilot
-ARMING = Topic("/uam/arming", Bool, LATCHED, "desired: armed and in OFFBOARD; Bool: no stamp")
+ARMING = Topic("uam/arming", Bool, LATCHED, "desired: armed and in OFFBOARD; Bool: no stamp")
 AUTOPILOT_STATE = Topic(
-    "/uam/autopilot/state",
+    "uam/autopilot/state",
     DiagnosticArray,
     LATCHED,
     "see uam_msgs_py.messages.status.AutopilotState",
 )
 AUTOPILOT_BATTERY = Topic(
-    "/uam/autopilot/battery", BatteryState, RELIABLE, "autopilot's battery, 1 Hz; NaN: unknown"
+    "uam/autopilot/battery", BatteryState, RELIABLE, "autopilot's battery, 1 Hz; NaN: unknown"
 )
 ARM_TEMPERATURE = Topic(
-    "/uam/arm/temperature",
+    "uam/arm/temperature",
     Temperature,
     RELIABLE,
     "servo temperature; frame_id: its joint; from a vehicle's driver, not simulated",
     one_publisher=False,
 )
 MISSION_STATUS = Topic(
-    "/uam/mission/status", DiagnosticArray, LATCHED, "see uam_msgs_py.messages.status.MissionStatus"
+    "uam/mission/status", DiagnosticArray, LATCHED, "see uam_msgs_py.messages.status.MissionStatus"
 )
 PREFLIGHT = Topic(
-    "/uam/preflight",
+    "uam/preflight",
     DiagnosticArray,
     LATCHED,
     "pre-arm report, before a flight twice a second: one status per check",
@@ -163,7 +165,7 @@ PATH = Topic(
 
 # Events: reliable and latched, as each is sent only once
 CHANGES = Topic(
-    "/uam/parameter_changes",
+    "uam/parameter_changes",
     DiagnosticArray,
     _qos(1000, latched=True),
     "see uam_msgs_py.messages.parameter_changes.ParameterChange",
@@ -171,7 +173,7 @@ CHANGES = Topic(
 )
 
 FAULTS = Topic(
-    "/uam/faults",
+    "uam/faults",
     DiagnosticArray,
     _qos(1000, latched=True),
     "faults put into the flight; see uam_msgs_py.messages.fault_events.FaultEvent",
@@ -179,7 +181,7 @@ FAULTS = Topic(
 )
 
 RESTARTS = Topic(
-    "/uam/restarts",
+    "uam/restarts",
     DiagnosticArray,
     _qos(100, latched=True),
     "nodes that uam fly starts again after a loss; name: the node",
@@ -187,28 +189,28 @@ RESTARTS = Topic(
 )
 
 # True values, from the simulator only
-TRUTH_STATE = Topic("/uam/truth/state", JointTrajectory, RELIABLE, "true chi, chi_dot, chi_ddot")
-TRUTH_PAYLOAD = Topic("/uam/truth/payload", PoseStamped, RELIABLE, "payload, world")
+TRUTH_STATE = Topic("uam/truth/state", JointTrajectory, RELIABLE, "true chi, chi_dot, chi_ddot")
+TRUTH_PAYLOAD = Topic("uam/truth/payload", PoseStamped, RELIABLE, "payload, world")
 TRUTH_ROTORS = Topic(
-    "/uam/truth/rotors", JointState, RELIABLE, "rotor_1..4: command 0..1, speed rad/s, thrust N"
+    "uam/truth/rotors", JointState, RELIABLE, "rotor_1..4: command 0..1, speed rad/s, thrust N"
 )
 TRUTH_MAGNET = Topic(
-    "/uam/truth/magnet", JointState, RELIABLE, "magnet: on 0/1, holding force N; swing: angle rad"
+    "uam/truth/magnet", JointState, RELIABLE, "magnet: on 0/1, holding force N; swing: angle rad"
 )
 
 # For RViz and Foxglove. A lost message is no problem: the next one is complete.
-ROBOT_DESCRIPTION = Topic("/robot_description", String, LATCHED, "URDF", one_publisher=False)
+ROBOT_DESCRIPTION = Topic("robot_description", String, LATCHED, "URDF", one_publisher=False)
 TF = Topic("/tf", TFMessage, _qos(100), "vehicle, reference, payload, 25 Hz", one_publisher=False)
 TF_STATIC = Topic("/tf_static", TFMessage, LATCHED, "fixed frames", one_publisher=False)
 TRACKING_ERROR = Topic(
-    "/uam/tracking/error",
+    "uam/tracking/error",
     JointState,
     RELIABLE,
     "estimate - reference: chi, chi_dot; 0 without a reference; 25 Hz",
     one_publisher=False,
 )
 MARKERS = Topic(
-    "/uam/markers", MarkerArray, LATCHED, "paths, payload, magnet, phase", one_publisher=False
+    "uam/markers", MarkerArray, LATCHED, "paths, payload, magnet, phase", one_publisher=False
 )
 
 # ROS conventions

@@ -24,6 +24,7 @@ from uam_msgs_py.node import connections, polling
 from uam_msgs_py.node.executor import spin
 from uam_msgs_py.node.health import LoopTime, ages
 from uam_msgs_py.node.joins import StampJoin
+from uam_msgs_py.node.namespace import expanded, label
 from uam_msgs_py.node.node_parameters import refuse_unknown
 from uam_msgs_py.node.tunable import TunableNode
 
@@ -89,7 +90,7 @@ class UamNode(TunableNode):
                 handle(message)
             except BadMessage as error:
                 self.refused += 1
-                self.warn(f"{name}: refused: {error}", key=name)
+                self.warn(f"{self._shown(name)}: refused: {error}", key=name)
                 return
             counts[name] += 1
             arrivals[name] = time.monotonic()
@@ -146,6 +147,10 @@ class UamNode(TunableNode):
             names = [self.resolve_topic_name(name) for name in self._waiting]
             self.get_logger().info("waiting for " + ", ".join(names))
 
+    def _shown(self, name: str) -> str:
+        """Return the absolute name of a topic, for messages."""
+        return expanded(self.get_namespace(), name)
+
     def diagnose(self) -> tuple[bytes, str, dict[str, object]]:
         """Return level, summary and further values for /diagnostics; overridden by subclasses."""
         return OK, "running", {}
@@ -158,7 +163,7 @@ class UamNode(TunableNode):
         dropped = sum(join.dropped for join in self.joins)
         self._at_last_report = (self.ticks, now)
         if self._waiting and level < ERROR:
-            level, summary = STALE, "waiting for " + ", ".join(self._waiting)
+            level, summary = STALE, "waiting for " + ", ".join(map(self._shown, self._waiting))
         elif self.refused and level == OK:
             level, summary = WARN, f"{self.refused} messages refused"
         elif dropped > self._dropped_before and level == OK:
@@ -172,12 +177,11 @@ class UamNode(TunableNode):
             "incomplete ticks dropped": dropped,
             "messages refused": self.refused,
         }
-        common |= ages(self._counts, self._arrivals)
-        common |= connections.of(self._outlets, self._inlets)
+        namespace = self.get_namespace()
+        common |= ages(self._counts, self._arrivals, namespace)
+        common |= connections.of(self._outlets, self._inlets, namespace)
         stamp = self.stamp or self.get_clock().now().nanoseconds
-        self._diagnostics.publish(
-            diagnostic(stamp, self.get_name(), level, summary, common | values)
-        )
+        self._diagnostics.publish(diagnostic(stamp, label(self), level, summary, common | values))
 
 
 class StopSignal:

@@ -13,25 +13,41 @@ from rclpy.publisher import Publisher
 from rclpy.subscription import Subscription
 
 from uam_msgs_py.messages import topics
+from uam_msgs_py.node.namespace import expanded, prefix
 
 READERS, WRITERS = "readers of ", "writers of "
 RECORDER, RECORDED_UNTIL = "recorder", "recorded until [s]"
 
 
-def of(outlets: Mapping[str, Publisher], inlets: Mapping[str, Subscription]) -> dict[str, int]:
-    """Return the diagnostic values: for each topic of a node, its number of connected ends."""
-    found = {READERS + name: outlet.get_subscription_count() for name, outlet in outlets.items()}
-    return found | {WRITERS + name: inlet.get_publisher_count() for name, inlet in inlets.items()}
+def of(
+    outlets: Mapping[str, Publisher], inlets: Mapping[str, Subscription], namespace: str
+) -> dict[str, int]:
+    """Return the diagnostic values: for each topic of a node, its number of connected ends.
+
+    namespace: of the node.
+    """
+    counts = {
+        READERS: {name: outlet.get_subscription_count() for name, outlet in outlets.items()},
+        WRITERS: {name: inlet.get_publisher_count() for name, inlet in inlets.items()},
+    }
+    return {
+        kind + expanded(namespace, name): count
+        for kind, found in counts.items()
+        for name, count in found.items()
+    }
 
 
 class Connections:
-    """Collects the nodes' diagnostic values; a node without diagnostics has no connections.
+    """Collects the diagnostic values of the nodes in the namespace of `node`.
+
+    A node without diagnostics has no connections.
 
     Diagnostics are sent once a second, so the counts may be a second old.
     """
 
     def __init__(self, node: Node):
         self._values: dict[str, dict[str, str]] = {}
+        self._namespace = node.get_namespace()
         topic = topics.DIAGNOSTICS
         node.create_subscription(topic.type, topic.name, self._note, topic.qos)
 
@@ -41,8 +57,12 @@ class Connections:
 
     def count(self, node: str, kind: str, topic: str) -> int:
         """Return the number of READERS or WRITERS (kind) of `topic` that `node` is connected to."""
-        return int(self._values.get(node, {}).get(kind + topic, 0))
+        return int(self._of(node).get(kind + expanded(self._namespace, topic), 0))
 
     def recorded_until(self) -> float:
         """Return the simulation time [s] up to which the recorder has reported a complete log."""
-        return float(self._values.get(RECORDER, {}).get(RECORDED_UNTIL, 0.0))
+        return float(self._of(RECORDER).get(RECORDED_UNTIL, 0.0))
+
+    def _of(self, node: str) -> Mapping[str, str]:
+        """Return the values of the node of this name in the same namespace."""
+        return self._values.get(prefix(self._namespace) + node, {})

@@ -3,6 +3,8 @@
 import time
 from collections.abc import Iterable, Mapping
 
+from uam_msgs_py.node.namespace import expanded
+
 
 class LoopTime:
     """Mean and largest processing time since the last report."""
@@ -29,13 +31,16 @@ class LoopTime:
         }
 
 
-def ages(inputs: Iterable[str], arrivals: Mapping[str, float]) -> dict[str, str]:
+def ages(inputs: Iterable[str], arrivals: Mapping[str, float], namespace: str) -> dict[str, str]:
     """Return the diagnostic values: age (wall time) of each input's newest valid message.
 
     arrivals: topic → time.monotonic() [s]; the age is "" for an input without a message.
+    namespace: of the node.
     """
     now = time.monotonic()
     return {
-        f"age of {name} [ms]": f"{1e3 * (now - arrivals[name]):.1f}" if name in arrivals else ""
+        f"age of {expanded(namespace, name)} [ms]": (
+            f"{1e3 * (now - arrivals[name]):.1f}" if name in arrivals else ""
+        )
         for name in inputs
     }

@@ -17,6 +17,7 @@ from rclpy.parameter import Parameter
 
 from uam_msgs_py.messages import topics
 from uam_msgs_py.messages.parameter_changes import ParameterChange
+from uam_msgs_py.node.namespace import adopt_sections
 
 SERVICE = "parameter service"
 CHECK = "check_parameters"
@@ -27,6 +28,7 @@ class TunableNode(Node):
 
     def __init__(self, name: str):
         super().__init__(name)
+        adopt_sections(self)
         self.stamp = 0  # [ns] of the newest tick
         self._changes = self.create_publisher(
             topics.CHANGES.type, topics.CHANGES.name, topics.CHANGES.qos

@@ -11,9 +11,11 @@ from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 from rclpy.node import Node
+from rclpy.topic_endpoint_info import TopicEndpointInfo
 
 from uam_msgs_py.messages import topics
 from uam_msgs_py.node.connections import READERS, WRITERS, Connections
+from uam_msgs_py.node.namespace import expanded
 
 ESTIMATOR, MISSION = "state_estimator", "mission"
 POSITION, ATTITUDE, ARM = "position_controller", "attitude_controller", "arm_controller"
@@ -79,11 +81,21 @@ def with_foreign(node: Node, foreign: Collection[str]) -> Sequence[Wire]:
     for wire in WIRES:
         if wire.publisher in foreign and (wire.optional or not wire.subscribers):
             continue
-        name = node.resolve_topic_name(wire.topic.name)
-        listeners = {info.node_name for info in node.get_subscriptions_info_by_topic(name)}
+        listeners = _listeners(node, wire.topic)
         required = tuple(one for one in wire.subscribers if one not in foreign or one in listeners)
         found.append(replace(wire, subscribers=required))
     return found
+
+
+def _listeners(node: Node, topic: topics.Topic) -> set[str]:
+    """Return the names of the vehicle's nodes that subscribe to `topic`."""
+    name = node.resolve_topic_name(topic.name)
+    return _own(node, node.get_subscriptions_info_by_topic(name))
+
+
+def _own(node: Node, ends: Sequence[TopicEndpointInfo]) -> set[str]:
+    """Return the names of the nodes of `ends` that are in the namespace of `node`."""
+    return {end.node_name for end in ends if end.node_namespace == node.get_namespace()}
 
 
 def missing(node: Node, recorded: bool, wires: Sequence[Wire] = WIRES) -> list[str]:
@@ -94,8 +106,8 @@ def missing(node: Node, recorded: bool, wires: Sequence[Wire] = WIRES) -> list[s
     found = []
     for wire in wires:
         name = node.resolve_topic_name(wire.topic.name)
-        publishers = {info.node_name for info in node.get_publishers_info_by_topic(name)}
-        listeners = {info.node_name for info in node.get_subscriptions_info_by_topic(name)}
+        publishers = _own(node, node.get_publishers_info_by_topic(name))
+        listeners = _listeners(node, wire.topic)
         if wire.publisher not in publishers:
             found.append(f"{wire.publisher} to publish {name}")
         required = wire.listeners(recorded)
@@ -109,21 +121,24 @@ def unconnected(
     recorded: bool,
     wires: Sequence[Wire] = WIRES,
     foreign: Collection[str] = (),
+    namespace: str = "/",
 ) -> Iterator[str]:
     """Yield one text per end of `wires` that lacks a connection.
 
     reported: connections that the other nodes report; plant: those of the plant itself
-    (`connections.of`); foreign: nodes without such reports.
+    (`connections.of`); foreign: nodes without such reports; namespace: of the plant.
     """
 
     def count(node: str, kind: str, topic: str) -> int:
-        return plant.get(kind + topic, 0) if node == PLANT else reported.count(node, kind, topic)
+        if node == PLANT:
+            return plant.get(kind + expanded(namespace, topic), 0)
+        return reported.count(node, kind, topic)
 
     for wire in wires:
         name, required = wire.topic.name, wire.listeners(recorded)
-        reports = wire.publisher not in foreign
+        reports, shown = wire.publisher not in foreign, expanded(namespace, name)
         if reports and count(wire.publisher, READERS, name) < len(required):
-            yield f"{wire.publisher} to connect to the subscribers of {name}"
+            yield f"{wire.publisher} to connect to the subscribers of {shown}"
         for one in required:
             if one not in foreign and count(one, WRITERS, name) < 1:
-                yield f"{one} to connect to the publisher of {name}"
+                yield f"{one} to connect to the publisher of {shown}"

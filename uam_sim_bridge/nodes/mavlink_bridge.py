@@ -38,6 +38,7 @@ from uam_msgs_py.messages.layouts import BadMessage, stamp_of
 from uam_msgs_py.messages.status import OK, WARN, MissionStatus
 from uam_msgs_py.node.base_node import UamNode, run
 from uam_msgs_py.node.joins import StampJoin
+from uam_msgs_py.node.namespace import frame
 from uam_msgs_py.node.node_parameters import NodeParameters
 from uam_sim_bridge.mavlink.link.link_report import faults, report
 from uam_sim_bridge.mavlink.offboard.hold import HoldParameters
@@ -110,7 +111,7 @@ class MavlinkBridgeNode(UamNode):
         self._setpoint = self.publisher(topics.SETPOINT)
         self._autopilot = AutopilotTopics(self, self.link)
         self._thrust = self.publisher(topics.THRUST)
-        self._writer = SetpointWriter()
+        self._writer = SetpointWriter(frame(self, topics.BODY))
         self._factor_writer = JointStateWriter(["factor"])
         names = [t.name for t in (topics.STATE, topics.POSITION_COMMAND, topics.ATTITUDE_COMMAND)]
         self._join = StampJoin(names, self._tick)

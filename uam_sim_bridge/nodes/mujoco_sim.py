@@ -136,8 +136,11 @@ class Simulator:
         wires = wiring.with_foreign(self.node, foreign)
         waiting = wiring.missing(self.node, recorded, wires)
         if not waiting:  # all publishers and subscriptions exist: are they connected?
-            plant = of(self.sensors.outlets | self.truth.outlets, self.answers.inlets)
-            waiting = list(wiring.unconnected(self.connections, plant, recorded, wires, foreign))
+            namespace = self.node.get_namespace()
+            plant = of(self.sensors.outlets | self.truth.outlets, self.answers.inlets, namespace)
+            waiting = list(
+                wiring.unconnected(self.connections, plant, recorded, wires, foreign, namespace)
+            )
         if not self.hil.accept(0.0):
             waiting.append(f"autopilot to connect to TCP port {self.options.hil_port}")
         return waiting

@@ -10,6 +10,7 @@ from uam_msgs_py.messages import topics
 from uam_msgs_py.messages.status import OK, STALE, WARN, diagnostic
 from uam_msgs_py.node.base_node import DIAGNOSTICS_PERIOD
 from uam_msgs_py.node.health import LoopTime, ages
+from uam_msgs_py.node.namespace import label
 from uam_sim_bridge.nodes.plant_options import Statistics
 from uam_sim_bridge.nodes.plant_topics import Answers, nanoseconds
 
@@ -24,7 +25,8 @@ class PlantHealth:
     def __init__(self, node: Node, answers: Answers, statistics: Statistics):
         topic = topics.DIAGNOSTICS
         self._publisher = node.create_publisher(topic.type, topic.name, topic.qos)
-        self._name, self._answers, self._statistics = node.get_name(), answers, statistics
+        self._name, self._namespace = label(node), node.get_namespace()
+        self._answers, self._statistics = answers, statistics
         self._loop = LoopTime()
         self._ticks = 0
         self._missed = 0
@@ -61,7 +63,9 @@ class PlantHealth:
             "ticks missed": self._statistics.missed_ticks,
             "late motor commands": self._statistics.late_motor_commands,
         }
-        values |= self._loop.report() | ages(self._answers.inlets, self._answers.arrivals)
+        values |= self._loop.report() | ages(
+            self._answers.inlets, self._answers.arrivals, self._namespace
+        )
         self._publisher.publish(
             diagnostic(nanoseconds(simulated), self._name, level, summary, values)
         )

@@ -26,6 +26,7 @@ from uam_msgs_py.messages.layouts import stamp_of
 from uam_msgs_py.messages.serialized import Template
 from uam_msgs_py.messages.status import MissionStatus
 from uam_msgs_py.messages.trajectories import TrajectoryWriter
+from uam_msgs_py.node.namespace import frame
 from uam_sim_bridge.plant import Samples, Truth
 
 
@@ -49,7 +50,7 @@ class Sensors(Outlets):
         super().__init__(node, (topics.CLOCK, topics.IMU, topics.JOINTS, topics.MOCAP))
         self._clock, self._imu, self._joints, self._mocap = self.outlets.values()
         self._clock_writer = Template(Clock())
-        self._imu_writer, self._mocap_writer = ImuWriter(), PoseWriter()
+        self._imu_writer, self._mocap_writer = ImuWriter(frame(node, topics.BODY)), PoseWriter()
         self._joint_writer = JointStateWriter(vehicle.joint_names)
 
     def clock(self, stamp: int) -> None:

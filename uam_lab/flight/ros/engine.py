@@ -48,7 +48,12 @@ def fly(
     """
     (folder.path / "logs").mkdir(exist_ok=True)
     own_autopilot = not node_arguments.users_autopilot(settings)
-    with Reservation(settings.instance, own_autopilot=own_autopilot) as reservation:
+    with Reservation(
+        settings.instance,
+        own_autopilot=own_autopilot,
+        domain=settings.domain,
+        namespace=settings.namespace,
+    ) as reservation:
         child.prepare([*node_arguments.modules(settings).values(), FORKER])
         await_orphans(observer.message)
         ports = reservation.ports
@@ -109,7 +114,7 @@ def _supervise(
                 why = ": a real autopilot arms by itself only with --arm" if real else ""
                 observer.message(f"waiting for uam start{why}")
             with (
-                StatusListener(surroundings, ports.domain, common) as listener,
+                StatusListener(surroundings, ports.domain, settings.namespace, common) as listener,
                 _process_faults(settings, children, listener, observer) as faults,
             ):
                 observer.started(ports.domain)
@@ -130,7 +135,7 @@ def _start(
 ) -> None:
     # the nodes' output already contains their log messages; separate files would repeat them
     arguments = ["--ros-args", "--disable-external-lib-logs"]
-    arguments += ["--params-file", str(folder.parameters)]
+    arguments += ["--params-file", str(folder.parameters), "-r", f"__ns:={settings.namespace}"]
     for name, module in node_arguments.modules(settings).items():
         children.start(
             name,

@@ -35,7 +35,7 @@ class SwitchRefused(ValueError):
 
 
 class ProfileSwitch:
-    """Client of the parameter services of one ROS domain, through `node`."""
+    """Client of the parameter services of one vehicle: of the nodes in the namespace of `node`."""
 
     def __init__(self, node: Node):
         self._node = node
@@ -117,7 +117,7 @@ class ProfileSwitch:
 
     def _call(self, kind: type, service: str, requests: Mapping[str, Any]) -> dict[str, Any]:
         """Call a service of several nodes in parallel; node → response. Raises SwitchRefused."""
-        clients = {node: self._node.create_client(kind, f"/{node}/{service}") for node in requests}
+        clients = {node: self._node.create_client(kind, f"{node}/{service}") for node in requests}
         try:
             self._until(lambda node: clients[node].service_is_ready(), clients, "service not found")
             calls = {node: _Call(clients[node], requests[node]) for node in clients}

@@ -10,6 +10,7 @@ from rclpy.node import Node
 from uam_msgs_py.messages import topics
 from uam_msgs_py.messages.parameter_changes import ParameterChange
 from uam_msgs_py.messages.status import WARN, diagnostic
+from uam_msgs_py.node.namespace import prefix
 from uam_msgs_py.node.polling import listen, messages
 
 
@@ -43,13 +44,13 @@ class RestartTopic:
     """Publishes a restart on /uam/restarts and /diagnostics, for plant, log and displays."""
 
     def __init__(self, node: Node) -> None:
-        self._publishers = [
+        self._prefix = prefix(node.get_namespace())
+        self._restarts, self._diagnostics = (
             node.create_publisher(topic.type, topic.name, topic.qos)
             for topic in (topics.RESTARTS, topics.DIAGNOSTICS)
-        ]
+        )
 
     def publish(self, stamp: int, node: str, text: str) -> None:
         """Publish the restart of `node`; stamp [ns]: of the flight's clock."""
-        message = diagnostic(stamp, node, WARN, text, {})
-        for publisher in self._publishers:
-            publisher.publish(message)
+        self._restarts.publish(diagnostic(stamp, node, WARN, text, {}))
+        self._diagnostics.publish(diagnostic(stamp, self._prefix + node, WARN, text, {}))

@@ -26,9 +26,15 @@ EVERY_STATUS = QoSProfile(
 class StatusListener(Guest):
     """Context manager with a node in a separate ROS context; polled, so it needs no executor."""
 
-    def __init__(self, environment: Mapping[str, str], domain: int, arguments: Sequence[str] = ()):
+    def __init__(
+        self,
+        environment: Mapping[str, str],
+        domain: int,
+        namespace: str = "",
+        arguments: Sequence[str] = (),
+    ):
         """See `Guest`."""
-        super().__init__("uam_fly", environment, domain, arguments=arguments)
+        super().__init__("uam_fly", environment, domain, namespace, arguments)
         self._mission = listen(self.node, topics.MISSION_STATUS, EVERY_STATUS)
         self._autopilot = listen(self.node, topics.AUTOPILOT_STATE)
         self._state = AutopilotState()

@@ -1,0 +1,119 @@
+"""The topics of a log as rows of numbers by stamp, and as messages."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+
+import numpy as np
+from diagnostic_msgs.msg import DiagnosticArray
+from rclpy.serialization import deserialize_message
+
+from uam_lab.recording import cdr
+from uam_lab.recording.mcap_reader import TopicLog, UnreadableLog, read_log
+from uam_msgs_py.messages import topics
+from uam_msgs_py.messages.status import MissionStatus
+from uam_msgs_py.messages.topics import Topic
+from uam_msgs_py.node.namespace import expanded
+
+SECOND = 1e9
+ADAPTATION = {
+    "position": topics.POSITION_ADAPTATION,
+    "attitude": topics.ATTITUDE_ADAPTATION,
+    "arm": topics.ARM_ADAPTATION,
+}
+TOPICS = (
+    *(topics.TRUTH_STATE, topics.TRUTH_PAYLOAD, topics.TRUTH_ROTORS, topics.TRUTH_MAGNET),
+    *(topics.STATE, topics.REFERENCE, topics.MISSION_STATUS, topics.CHANGES, topics.FAULTS),
+    *(topics.POSITION_COMMAND, topics.ATTITUDE_COMMAND, topics.ARM_COMMAND),
+    *(topics.SETPOINT, topics.THRUST, *ADAPTATION.values()),
+)
+
+
+class StampedRows:
+    """Values of one topic, sorted by stamp: stamps (m,) [ns], rows (m, n)."""
+
+    def __init__(self, stamps: np.ndarray, rows: np.ndarray):
+        order = np.argsort(stamps, kind="stable")
+        self.stamps, self.rows = stamps[order], rows[order]
+
+    def at(self, ticks: np.ndarray) -> np.ndarray:
+        """Return the rows (k, n) at the stamps ticks (k,) [ns] or last before them; else NaN."""
+        out = np.full((len(ticks), self.rows.shape[1]), np.nan)
+        if not len(self.stamps):
+            return out
+        index = np.searchsorted(self.stamps, ticks, side="right") - 1
+        there = index >= 0
+        out[there] = self.rows[index[there]]
+        return out
+
+
+class Log:
+    """The topics of one vehicle in a log, decoded on request.
+
+    found: by name; namespace: of the vehicle's nodes.
+    """
+
+    def __init__(self, found: Mapping[str, TopicLog], namespace: str = "/"):
+        self._topics = {
+            topic: found[name]
+            for topic in TOPICS
+            if (name := expanded(namespace, topic.name)) in found
+        }
+
+    @classmethod
+    def read(cls, path: Path) -> Log:
+        """Read a log; its namespace is that of the true state's topic.
+
+        Raises UnreadableLog, also for a log of several vehicles; OSError.
+        """
+        ends = tuple(f"/{topic.name}" for topic in TOPICS)
+        found = read_log(path, lambda name: name.endswith(ends))
+        truth = f"/{topics.TRUTH_STATE.name}"
+        spaces = [name.removesuffix(truth) for name in found if name.endswith(truth)]
+        if len(spaces) > 1:
+            raise UnreadableLog(f"{path} has several vehicles: {', '.join(sorted(spaces))}")
+        return cls(found, spaces[0] if spaces else "/")
+
+    def messages(self, topic: Topic) -> list[bytes]:
+        """Return the serialized messages of a topic in file order; may be empty."""
+        log = self._topics.get(topic)
+        return log.messages if log else []
+
+    def width(self, topic: Topic) -> int:
+        """Number of names in the messages of a topic; 0 without messages."""
+        return next((len(block.names) for block in self.blocks(topic)), 0)
+
+    def wall_seconds(self, topic: Topic) -> float:
+        """Return the wall time between first and last message of a topic [s]; 0 without any."""
+        log = self._topics.get(topic)
+        return (max(log.published) - min(log.published)) / SECOND if log and log.published else 0.0
+
+    def blocks(self, topic: Topic) -> list[cdr.Block]:
+        """Return the decoded messages of a topic; may be empty."""
+        log = self._topics.get(topic)
+        return cdr.read(log.type_name, log.messages) if log and log.messages else []
+
+    def samples(self, topic: Topic, fields: Sequence[str], width: int) -> StampedRows:
+        """Return `fields` side by side, `width` numbers each; zeros for empty (idle) messages."""
+        stamps, rows = [], []
+        for block in self.blocks(topic):
+            stamps.append(block.stamps)
+            rows.append(np.hstack([_field(block, field, width) for field in fields]))
+        if not stamps:
+            return StampedRows(np.zeros(0, np.int64), np.zeros((0, width * len(fields))))
+        return StampedRows(np.concatenate(stamps), np.vstack(rows))
+
+    def statuses(self) -> list[tuple[int, MissionStatus]]:
+        """Return stamps [ns] and statuses of the mission, in order."""
+        return [
+            MissionStatus.from_message(deserialize_message(data, DiagnosticArray))
+            for data in self.messages(topics.MISSION_STATUS)
+        ]
+
+
+def _field(block: cdr.Block, field: str, width: int) -> np.ndarray:
+    found = block.fields.get(field)
+    if found is None:
+        return np.zeros((len(block.stamps), width))
+    return found[:, :width]

@@ -1,0 +1,89 @@
+"""Names of a vehicle's nodes in a ROS graph with several vehicles.
+
+A namespace moves topics, services and parameters by itself. This module does it where ROS does not:
+
+| what | without a namespace | in /uav1 |
+|---|---|---|
+| status name on /diagnostics | `mission` | `uav1/mission` |
+| frame on /tf and in headers | `base_link` | `uav1/base_link` |
+| section of a parameter file | `mission:` | `mission:` too, if the file has no `/uav1/mission:` |
+"""
+
+from __future__ import annotations
+
+import re
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from uam_control.settings import yaml_file
+from uam_control.settings.parameter_set import ParameterError
+
+if TYPE_CHECKING:
+    from rclpy.node import Node
+
+NAME = re.compile(r"[A-Za-z_]\w*(/[A-Za-z_]\w*)*", re.ASCII)
+ALLOWED = "letters, digits and _, not a digit first; / between several names"
+
+
+def normal(namespace: str) -> str:
+    """Return a namespace in the form of ROS: `uav1` → `/uav1`, "" → `/`.
+
+    Raises ValueError, in one line, for an invalid one.
+    """
+    inner = namespace.removeprefix("/")
+    if inner and not NAME.fullmatch(inner):
+        raise ValueError(f"namespace '{namespace}': allowed are {ALLOWED}")
+    return f"/{inner}"
+
+
+def prefix(namespace: str) -> str:
+    """Return the prefix of frames and status names: `/uav1` → `uav1/`, `/` → ""."""
+    inner = namespace.strip("/")
+    return f"{inner}/" if inner else ""
+
+
+def label(node: Node) -> str:
+    """Return the name of a node's status on /diagnostics."""
+    return prefix(node.get_namespace()) + node.get_name()
+
+
+def frame(node: Node, name: str) -> str:
+    """Return the name of one of the vehicle's frames."""
+    return prefix(node.get_namespace()) + name
+
+
+def expanded(namespace: str, name: str) -> str:
+    """Return the absolute name of a topic, without remappings; an absolute one is unchanged."""
+    return name if name.startswith("/") else f"/{prefix(namespace)}{name}"
+
+
+def unlabelled(namespace: str, name: str) -> str | None:
+    """Return the node of a status name on /diagnostics; None for a node of another namespace."""
+    own = prefix(namespace)
+    inner = name.removeprefix(own)
+    return inner if name.startswith(own) and "/" not in inner else None
+
+
+def adopt_sections(node: Node) -> None:
+    """Give a node in a namespace also the sections of its bare name in its parameter files.
+
+    ROS applies `mission:` only to `/mission`; the files of config/ name the nodes so. Values from
+    the command line and from sections with the full name go first. Raises ParameterError.
+    """
+    if node.get_namespace() == "/":
+        return
+    from rclpy.parameter import Parameter
+
+    found: dict[str, Any] = {}
+    for flag, value in zip(sys.argv, sys.argv[1:], strict=False):
+        if flag == "--params-file":
+            document = yaml_file.read(Path(value), ParameterError)
+            for name in (node.get_name(), f"/{node.get_name()}"):
+                body = document.get(name) if isinstance(document, dict) else None
+                if isinstance(body, dict):
+                    found |= body.get("ros__parameters") or {}
+    overrides = node._parameter_overrides
+    for name, value in found.items():
+        if name not in overrides:
+            overrides[name] = Parameter(name, value=value)
