@@ -24,11 +24,11 @@ class OwnArmController(Node):
     def __init__(self):
         super().__init__("arm_controller")
         self.reference, self.integral = None, [0.0, 0.0]
-        effort = "/arm_effort_controller/commands"
+        effort = "arm_effort_controller/commands"
         self.effort = self.create_publisher(Float64MultiArray, effort, 10)
-        self.command = self.create_publisher(JointTrajectory, "/uam/arm/command", 10)
-        self.create_subscription(JointTrajectory, "/uam/reference", self.on_reference, 10)
-        self.create_subscription(JointTrajectory, "/uam/state", self.on_state, 10)
+        self.command = self.create_publisher(JointTrajectory, "uam/arm/command", 10)
+        self.create_subscription(JointTrajectory, "uam/reference", self.on_reference, 10)
+        self.create_subscription(JointTrajectory, "uam/state", self.on_state, 10)
 
     def on_reference(self, message):
         self.reference = arm(message)

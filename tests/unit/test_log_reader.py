@@ -11,11 +11,15 @@ from uam_control.laws.catalogue import LAWS
 from uam_control.mission import load_scenario
 from uam_control.profiles.profile import default_profile
 from uam_lab.recording import log_reader
-from uam_lab.recording.mcap_reader import TopicLog
+from uam_lab.recording.bounded_log import BoundedLog
+from uam_lab.recording.logged_topics import ADAPTATION, Log
+from uam_lab.recording.mcap_reader import TopicLog, UnreadableLog
+from uam_lab.recording.message_definitions import schema
 from uam_lab.results.timeseries import gain_columns
 from uam_msgs_py.messages import topics
 from uam_msgs_py.messages.convert import JointStateWriter
 from uam_msgs_py.messages.status import MissionStatus
+from uam_msgs_py.node.namespace import expanded
 
 
 @pytest.mark.parametrize("law", LAWS)
@@ -26,8 +30,8 @@ def test_the_gains_of_every_law_are_read_by_name(law):
     for k in (1, 2):
         writer.position[:] = 10.0 * k + np.arange(len(names))
         messages.append(bytes(writer.stamped(20_000_000 * k)))
-    topic = log_reader.ADAPTATION["arm"]
-    log = log_reader.Log({topic.name: TopicLog("sensor_msgs/msg/JointState", [], messages)})
+    topic = ADAPTATION["arm"]
+    log = Log({expanded("/", topic.name): TopicLog("sensor_msgs/msg/JointState", [], messages)})
     values = np.full((3, len(COLUMNS)), np.nan)
     ticks = np.array([16_000_000, 36_000_000, 40_000_000])
     log_reader.adaptation(log, "arm", ticks, values, COLUMNS)
@@ -43,9 +47,35 @@ def test_the_thrust_factor_holds_between_its_messages():
     for k, factor in enumerate((1.0, 0.9)):
         writer.position[0] = factor
         messages.append(bytes(writer.stamped(100_000_000 * k)))
-    log = log_reader.Log({topics.THRUST.name: TopicLog("sensor_msgs/msg/JointState", [], messages)})
+    log = Log(
+        {expanded("/", topics.THRUST.name): TopicLog("sensor_msgs/msg/JointState", [], messages)}
+    )
     found = log.samples(topics.THRUST, ("position",), 1)
     np.testing.assert_array_equal(found.at(np.array([4_000_000, 104_000_000]))[:, 0], [1.0, 0.9])
+
+
+def written(path, *names):
+    """Write a log with one message on each topic."""
+    kind = "sensor_msgs/msg/JointState"
+    log = BoundedLog(path, 0.0)
+    for name in names:
+        channel = log.add_channel(name, kind, schema(kind), {})
+        log.write(channel, 0, 0, name.encode(), 1)
+    log.close()
+    return path
+
+
+@pytest.mark.parametrize("space", ["", "/uav1", "/lab/uav1"])
+def test_a_log_is_read_in_the_namespace_of_its_true_state(tmp_path, space):
+    names = [f"{space}/{topic.name}" for topic in (topics.TRUTH_STATE, topics.THRUST)]
+    log = Log.read(written(tmp_path / "log.mcap", *names, "/other/uam/thrust"))
+    assert log.messages(topics.THRUST) == [names[1].encode()]
+
+
+def test_a_log_of_two_vehicles_is_refused(tmp_path):
+    path = written(tmp_path / "log.mcap", "/uav1/uam/truth/state", "/uav2/uam/truth/state")
+    with pytest.raises(UnreadableLog, match="several vehicles: /uav1, /uav2"):
+        Log.read(path)
 
 
 SECOND = 1_000_000_000

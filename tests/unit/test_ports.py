@@ -63,3 +63,39 @@ def test_a_port_held_by_another_program_is_skipped_and_named(tmp_path):
         with pytest.raises(PortError, match=f"TCP {held.simulator_tcp}"):
             Reservation(held.instance, folder=tmp_path)
     assert list(tmp_path.iterdir()) == []
+
+
+def test_a_flight_is_found_by_instance_and_by_namespace(tmp_path):
+    with (
+        Reservation(folder=tmp_path, domain=7, namespace="/uav1") as first,
+        Reservation(folder=tmp_path, domain=7, namespace="/uav2") as second,
+    ):
+        assert first.ports.domain == second.ports.domain == 7
+        assert first.ports.simulator_tcp != second.ports.simulator_tcp
+        number = second.ports.instance
+        expected = ports.Flight(number, 7, "/uav2")
+        assert ports.flight_of(number, folder=tmp_path) == expected
+        assert ports.flight_of(None, "/uav2", folder=tmp_path) == expected
+        with pytest.raises(PortError, match=f"choose one by .*{number}: /uav2"):
+            ports.flight_of(None, folder=tmp_path)
+        assert ports.flight_of(None, "/uav3", folder=tmp_path) is None
+    assert ports.flight_of(None, folder=tmp_path) is None
+
+
+def test_one_namespace_of_a_domain_has_one_flight(tmp_path):
+    with Reservation(folder=tmp_path, domain=7, namespace="/uav1"):
+        with pytest.raises(PortError, match="flies in namespace /uav1 of ROS domain 7 already"):
+            Reservation(folder=tmp_path, domain=7, namespace="/uav1")
+        assert len(list(tmp_path.iterdir())) == 1
+        with Reservation(folder=tmp_path, domain=8, namespace="/uav1"):
+            pass
+
+
+def test_a_ros_program_in_the_domain_does_not_move_a_flight(tmp_path):
+    """A ros2 daemon holds the discovery port of the domain that its user works in."""
+    with Reservation(folder=tmp_path) as free:
+        held = free.ports
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as daemon:
+        daemon.bind(("127.0.0.1", ports.discovery_port(held.domain)))
+        with Reservation(folder=tmp_path) as flight:
+            assert flight.ports == held

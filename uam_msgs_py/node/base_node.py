@@ -90,7 +90,7 @@ class UamNode(TunableNode):
                 handle(message)
             except BadMessage as error:
                 self.refused += 1
-                self.warn(f"{self._shown(name)}: refused: {error}", key=name)
+                self.warn(f"{self._absolute(name)}: refused: {error}", key=name)
                 return
             counts[name] += 1
             arrivals[name] = time.monotonic()
@@ -147,7 +147,7 @@ class UamNode(TunableNode):
             names = [self.resolve_topic_name(name) for name in self._waiting]
             self.get_logger().info("waiting for " + ", ".join(names))
 
-    def _shown(self, name: str) -> str:
+    def _absolute(self, name: str) -> str:
         """Return the absolute name of a topic, for messages."""
         return expanded(self.get_namespace(), name)
 
@@ -163,7 +163,7 @@ class UamNode(TunableNode):
         dropped = sum(join.dropped for join in self.joins)
         self._at_last_report = (self.ticks, now)
         if self._waiting and level < ERROR:
-            level, summary = STALE, "waiting for " + ", ".join(map(self._shown, self._waiting))
+            level, summary = STALE, "waiting for " + ", ".join(map(self._absolute, self._waiting))
         elif self.refused and level == OK:
             level, summary = WARN, f"{self.refused} messages refused"
         elif dropped > self._dropped_before and level == OK:
