@@ -93,9 +93,8 @@ def test_one_namespace_of_a_domain_has_one_flight(tmp_path):
 
 def test_a_ros_program_in_the_domain_does_not_move_a_flight(tmp_path):
     """A ros2 daemon holds the discovery port of the domain that its user works in."""
-    with Reservation(folder=tmp_path) as free:
-        held = free.ports
+    instance = 37  # not used by flights beside this test
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as daemon:
-        daemon.bind(("127.0.0.1", ports.discovery_port(held.domain)))
-        with Reservation(folder=tmp_path) as flight:
-            assert flight.ports == held
+        daemon.bind(("127.0.0.1", ports.discovery_port(ports.ports_of(instance).domain)))
+        with Reservation(instance, folder=tmp_path) as flight:
+            assert flight.ports == ports.ports_of(instance)

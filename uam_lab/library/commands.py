@@ -22,9 +22,9 @@ Found = TypeVar("Found")
 class Commands:
     """Clients in the ROS domain of a flight, made at their first use. Raises CommandRefused."""
 
-    def __init__(self, domain: int, arguments: Sequence[str]) -> None:
-        """domain: of the flight; arguments: of ROS, as remappings."""
-        self._domain, self._arguments = domain, tuple(arguments)
+    def __init__(self, domain: int, namespace: str, arguments: Sequence[str]) -> None:
+        """domain, namespace: of the flight; arguments: of ROS, as remappings."""
+        self._place, self._arguments = (domain, namespace), tuple(arguments)
         self._lock = threading.Lock()
         self._guests: list[Guest] = []
         self._operator: Operator | None = None
@@ -32,7 +32,7 @@ class Commands:
 
     def guest(self, name: str) -> Guest:
         """Return a new node in the flight's graph; the caller closes it."""
-        return Guest(name, transport_environment(), self._domain, arguments=self._arguments)
+        return Guest(name, transport_environment(), *self._place, self._arguments)
 
     def _own(self, name: str) -> Any:
         guest = self.guest(name)

@@ -314,7 +314,9 @@ class Flight:
 
         with self._lock:
             if self._clients is None:
-                self._clients = Commands(self.domain, common_remappings(self.settings))
+                self._clients = Commands(
+                    self.domain, self.settings.namespace, common_remappings(self.settings)
+                )
             return self._clients
 
     # --- errors ----------------------------------------------------------------------------
