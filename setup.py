@@ -54,6 +54,8 @@ setup(
     data_files=shared_data(),
     # colcon downloads nothing; `uam doctor` compares what is there with this list
     install_requires=PROJECT["project"]["dependencies"],
+    # by this `colcon test` selects pytest
+    extras_require={"test": PROJECT["project"]["optional-dependencies"]["test"]},
     entry_points={
         "console_scripts": [f"{k} = {v}" for k, v in PROJECT["project"]["scripts"].items()]
     },

@@ -142,10 +142,14 @@ def test_rates_and_frames_are_those_of_the_interface_table(two_flights):
             if connection.topic not in frames:
                 header = getattr(reader.deserialize(data, connection.msgtype), "header", None)
                 frames[connection.topic] = header.frame_id if header else ""
+    counts = {name.removeprefix("/"): count for name, count in counts.items()}
+    frames = {name.removeprefix("/"): frame for name, frame in frames.items()}
     for topic, content in CONTENTS.items():
         if found := re.fullmatch(r"(\d+) Hz", content.rate):
             if topic is not topics.ARM_TEMPERATURE:  # no servo driver in a simulation
-                assert counts[topic.name] / span == pytest.approx(float(found[1]), rel=0.1), topic
+                assert counts[topic.name.removeprefix("/")] / span == pytest.approx(
+                    float(found[1]), rel=0.1
+                ), topic.name
     for topic in (topics.IMU, topics.MOCAP, topics.STATE, topics.REFERENCE, topics.SETPOINT):
         assert frames[topic.name] == CONTENTS[topic].frame
 

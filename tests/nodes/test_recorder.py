@@ -46,6 +46,11 @@ def connected(probe, *publishers):
     )
 
 
+def absolute(topic):
+    """The topic's name in a log without a namespace."""
+    return f"/{topic.name.removeprefix('/')}"
+
+
 def decoded(file):
     with file.open("rb") as stream:
         reader = make_reader(stream, decoder_factories=[DecoderFactory()])
@@ -172,7 +177,7 @@ def test_without_a_name_each_log_is_a_bag_of_its_own(start, tmp_path, monkeypatc
         assert log.stem == log.parent.name
         with AnyReader([log.parent]) as reader:
             assert {c.topic for c in reader.connections} == {
-                topic.name for topic in topics.RECORDED
+                absolute(topic) for topic in topics.RECORDED
             }
 
 
@@ -191,4 +196,4 @@ def test_the_log_of_every_topic_is_read_by_rosbags(recorder, probe):
         for connection, _, data in reader.messages():
             message = reader.deserialize(data, connection.msgtype)
             seen[connection.topic] = message.__msgtype__
-    assert seen == {topic.name: type_name(topic.type) for topic in topics.RECORDED}
+    assert seen == {absolute(topic): type_name(topic.type) for topic in topics.RECORDED}

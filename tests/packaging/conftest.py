@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).resolve().parents[2]
-NOT_SOURCES = (".git", ".venv", "results", "build", "install", "log", "__pycache__", ".*_cache")
+NOT_SOURCES = {".git", ".venv", "results", "build", "install", "log"}  # of the top folder
 NOWHERE = "http://127.0.0.1:9"  # where a build that wants to download would have to ask
 PATIENCE = 300.0  # [s] for a build; only a failing test waits that long
 
@@ -50,7 +50,11 @@ def workspace(request, tmp_path_factory) -> Workspace:
     if importlib.util.find_spec("colcon") is None:
         pytest.skip("colcon is not installed: it comes with the test extra, or from apt")
     folder = tmp_path_factory.mktemp(request.param)
-    ignored = shutil.ignore_patterns(*NOT_SOURCES)
+    caches = shutil.ignore_patterns("__pycache__", ".*_cache")
+
+    def ignored(place: str, names: list[str]) -> set[str]:
+        return caches(place, names) | (NOT_SOURCES if Path(place) == ROOT else set())
+
     shutil.copytree(ROOT, folder / "src" / "uam", ignore=ignored)
     clean = {k: v for k, v in os.environ.items() if k != "PYTHONPATH"}
     offline = {"http_proxy": NOWHERE, "https_proxy": NOWHERE, "PIP_NO_INDEX": "1"}

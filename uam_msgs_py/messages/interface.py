@@ -12,6 +12,7 @@ from uam_msgs_py.messages.topics import BODY, WORLD
 
 TICK, MOCAP, FRAMES, GAINS, SLOW = "250 Hz", "120 Hz", "25 Hz", "50 Hz", "1 Hz"
 ON_CHANGE, ONCE = "on change", "once"
+PLANNERS = "planners, RViz, MoveIt"
 JOINT_SPACE = "joints"  # angles and torques about the joints' axes
 CHI_UNITS = "m, rad; /s; /s²"
 
@@ -53,6 +54,21 @@ CONTENTS = {
     topics.ARM_TEMPERATURE: Content("", "°C", SLOW, "the servos' driver", "mission"),
     topics.MISSION_STATUS: Content("", "text", "2 Hz and on change"),
     topics.PREFLIGHT: Content("", "text", "2 Hz before a flight", "mission", "cockpit, uam"),
+    topics.GOAL_POSE: Content(WORLD, "m, quaternion", ON_CHANGE, PLANNERS, "mission"),
+    topics.BASE_TRAJECTORY: Content(
+        WORLD, "m, quaternion; /s; /s²", ON_CHANGE, PLANNERS, "mission"
+    ),
+    topics.ARM_TRAJECTORY: Content(JOINT_SPACE, "rad; /s; /s²", ON_CHANGE, PLANNERS, "mission"),
+    topics.ODOMETRY: Content(
+        WORLD,
+        "m, quaternion; m/s, rad/s",
+        "50 Hz with a subscriber",
+        "state_estimator",
+        "planners, viewers",
+    ),
+    topics.PATH: Content(
+        WORLD, "m", "on change, with a subscriber", "mission", "planners, viewers"
+    ),
     topics.CHANGES: Content("", "text", ON_CHANGE, "every tunable node", "cockpit, uam fly"),
     topics.FAULTS: Content("", "text", ON_CHANGE, "mujoco_sim, mavlink_bridge, uam fly", "cockpit"),
     topics.RESTARTS: Content("", "text", ON_CHANGE, "uam fly", "mujoco_sim, cockpit"),

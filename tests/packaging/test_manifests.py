@@ -1,0 +1,67 @@
+"""The manifests of the ROS packages name what their code imports, by keys of rosdep."""
+
+import ast
+import sys
+import tomllib
+import xml.etree.ElementTree as xml
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).resolve().parents[2]
+PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
+OWN = ("uam_control", "uam_msgs_py", "uam_sim_bridge", "uam_lab")
+MANIFESTS = {name: ROOT / "ros/share" / name / "package.xml" for name in OWN}
+# module → key in rosdep/python.yaml of ros/rosdistro; "-pip": not in apt
+KEYS = {
+    **{name: f"python3-{name}" for name in ("numpy", "scipy", "numba", "matplotlib", "jinja2")},
+    **{name: f"python3-{name}" for name in ("packaging", "psutil", "rich", "setproctitle")},
+    **{name: f"python3-{name}-pip" for name in ("mujoco", "pymavlink")},
+    "websockets": "python3-websockets",
+    "serial": "python3-serial",
+    "PIL": "python3-pil",
+    "yaml": "python3-yaml",
+}
+# rosdep has no key for these: docs/install.md installs them by pip
+WITHOUT_KEY = {"imageio_ffmpeg", "mcap", "optuna", "pyarrow", "viser"}
+# imported only where they are installed
+OPTIONAL = {"pandas", "OpenGL", "ament_index_python"}
+
+
+def imported(package):
+    """Modules from outside the standard library that the package imports."""
+    found = set()
+    for file in (ROOT / package).rglob("*.py"):
+        for node in ast.walk(ast.parse(file.read_text())):
+            if isinstance(node, ast.Import):
+                found |= {name.name.split(".")[0] for name in node.names}
+            elif isinstance(node, ast.ImportFrom) and node.module and not node.level:
+                found.add(node.module.split(".")[0])
+    return found - set(sys.stdlib_module_names) - {package}
+
+
+def depends(manifest, kind="exec_depend"):
+    return [entry.text for entry in xml.parse(manifest).getroot().findall(kind)]
+
+
+@pytest.mark.parametrize("package", OWN)
+def test_a_manifest_has_exactly_the_dependencies_of_its_code(package):
+    needed = imported(package) - OPTIONAL - WITHOUT_KEY
+    assert sorted(depends(MANIFESTS[package])) == sorted(KEYS.get(name, name) for name in needed)
+
+
+def test_the_manifest_of_the_workspace_package_has_them_all():
+    """`rosdep install --from-paths` reads only this one: the others lie within its folder."""
+    every = {key for manifest in MANIFESTS.values() for key in depends(manifest)}
+    assert set(depends(ROOT / "package.xml")) == every - set(OWN)
+    assert "python3-pytest" in depends(ROOT / "package.xml", "test_depend")
+
+
+@pytest.mark.parametrize("manifest", [ROOT / "package.xml", *MANIFESTS.values()])
+def test_version_maintainer_and_licence_are_those_of_the_project(manifest):
+    top = xml.parse(manifest).getroot()
+    assert top.findtext("version") == PROJECT["version"]
+    assert top.findtext("license") == PROJECT["license"]
+    (maintainer,) = top.findall("maintainer")
+    assert maintainer.text and "@" in maintainer.get("email")
+    assert top.find("export/build_type").text == "ament_python"
