@@ -7,7 +7,7 @@ from mcap_ros2.decoder import DecoderFactory
 from uam_control.coordinates import coordinates
 from uam_lab.recording.message_definitions import schema
 from uam_msgs_py.messages import topics
-from uam_msgs_py.messages.control import ReferenceWriter
+from uam_msgs_py.messages.control import PositionCommandWriter, ReferenceWriter
 from uam_msgs_py.messages.convert import PoseWriter, read_joints
 from uam_msgs_py.messages.status import MissionStatus
 from uam_msgs_py.messages.trajectories import TrajectoryWriter
@@ -18,6 +18,8 @@ SIZE = len(COORDINATES)
 
 MODULE = "uam_lab.nodes.scene"
 TICK = 4_000_000  # [ns]
+# rows q_d, Omega_d, Omega_d_dot: what the position law desires
+ATTITUDE_DESIRED = np.array([[-0.1, 0.0, 0.0], [0.0, 0.2, 0.0], [0.0, 0.0, 0.0]])
 FRAME = 10 * TICK
 
 
@@ -45,10 +47,16 @@ class Rig:
         self.markers = probe.collect(topics.MARKERS)
         self.errors = probe.collect(topics.TRACKING_ERROR)
         self.robot = probe.collect(topics.ROBOT_DESCRIPTION)
-        inputs = [topics.STATE, topics.REFERENCE] + [topics.TRUTH_PAYLOAD] * truth
+        inputs = [topics.STATE, topics.REFERENCE, topics.POSITION_COMMAND]
+        inputs += [topics.TRUTH_PAYLOAD] * truth
         self.outlets = [probe.publisher(topic) for topic in inputs]
         self.status = probe.publisher(topics.MISSION_STATUS)
-        self.writers = TrajectoryWriter(COORDINATES), ReferenceWriter(2), PoseWriter()
+        self.writers = (
+            TrajectoryWriter(COORDINATES),
+            ReferenceWriter(2),
+            PositionCommandWriter(),
+            PoseWriter(),
+        )
         self.tell(MissionStatus(phase="waiting"))
         probe.until(lambda: self.robot and self.still, "URDF and fixed frames")
         probe.until_connected("scene", self.outlets, [topics.TF, topics.TRACKING_ERROR])
@@ -65,7 +73,8 @@ class Rig:
         messages = (
             self.writers[0].fill(self.stamp, state),
             self.writers[1].fill(self.stamp, desired, flying, 0),
-            self.writers[2].fill(self.stamp, np.array([0.7, 0.0, 0.0]), level),
+            self.writers[2].fill(self.stamp, desired, ATTITUDE_DESIRED, np.zeros(3)),
+            self.writers[3].fill(self.stamp, np.array([0.7, 0.0, 0.0]), level),
         )
         for outlet, message in list(zip(self.outlets, messages, strict=False))[::-1]:
             outlet.publish(message)
@@ -94,7 +103,8 @@ def test_frames_urdf_and_markers_of_a_simulated_flight(start, probe):
     frames = (stamps[-1] - stamps[0]) / FRAME
     assert len(stamps) <= frames + 2, "25 Hz of the messages' time, however fast they come"
     _, position, velocity = read_joints(rig.errors[-1], list(COORDINATES))
-    assert position.round(9).tolist() == [-0.2, 0, 0, 0, 0, 0, 0, -0.5] and not velocity.any()
+    assert position.round(9).tolist() == [-0.2, 0, 0, 0.1, 0, 0, 0, -0.5]
+    assert velocity.round(9).tolist() == [0, 0, 0, 0, -0.2, 0, 0, 0]
     probe.until(lambda: any(m.text == "hover" for m in rig.markers[-1].markers), "the phase")
     assert {"payload", "magnet", "reference path"} <= {m.ns for m in rig.markers[-1].markers}
     assert rig.node.interrupt() == 0 and "Traceback" not in rig.node.output

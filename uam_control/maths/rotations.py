@@ -152,3 +152,12 @@ def rotation_error(reference: np.ndarray, actual: np.ndarray) -> np.ndarray:
 def wrap_angle(angle: float | np.ndarray) -> float | np.ndarray:
     """Return `angle` [rad] (number or array of any shape) wrapped to [-pi, pi)."""
     return (np.asarray(angle) + math.pi) % (2.0 * math.pi) - math.pi
+
+
+@jit
+def tilt(euler: np.ndarray) -> float:
+    """Return the angle [rad] between the vertical axes of body and world.
+
+    euler: (3,) roll, pitch, yaw [rad].
+    """
+    return math.acos(max(-1.0, min(1.0, math.cos(euler[0]) * math.cos(euler[1]))))

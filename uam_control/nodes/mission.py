@@ -6,17 +6,16 @@ import numpy as np
 from diagnostic_msgs.msg import DiagnosticArray
 from std_msgs.msg import Bool
 
-from uam_control.coordinates import ANGLES, ARM, ATTITUDE, CHI, POSITION
+from uam_control.coordinates import ARM
 from uam_control.laws.catalogue import DEFAULT
-from uam_control.maths.rotations import wrap_angle
 from uam_control.mission import (
     Mission,
-    MissionOutput,
     MissionParameters,
     StartParameters,
     load_scenario,
 )
 from uam_control.nodes.described import declared_scenario, described_vehicle
+from uam_control.nodes.mission_errors import TrackingErrors
 from uam_control.nodes.mission_inputs import MissionInputs
 from uam_control.nodes.mission_services import offer
 from uam_control.nodes.planner_inputs import PlannerInputs
@@ -64,7 +63,6 @@ class MissionNode(UamNode):
         self.parameter_set.apply = self._mission.configure
         self._arm: bool | None = None
         self._published: tuple = ()  # content of the last status
-        self._errors = (0.0, 0.0, 0.0)
         self._due = 0  # stamp [ns] of the next status
         self._states = Backlog()
 
@@ -76,6 +74,7 @@ class MissionNode(UamNode):
         self._path = self.publisher(topics.PATH)
         self._path_of = ""  # the plan that was published, see _publish_path
         self._writer = ReferenceWriter(len(vehicle.joints))
+        self._errors = TrackingErrors(self)
         MissionInputs(self, self._stage.inputs, vehicle.joint_names)
         self.listen(topics.AUTOPILOT_STATE, self._on_autopilot, required=False)
         self.listen(topics.STATE, self._on_state)
@@ -105,7 +104,7 @@ class MissionNode(UamNode):
         if stage.begin(stamp, state):
             self._publish_reference()
         output = stage.output
-        self._measure(state, output)
+        self._errors.tick(stamp, state, output.reference, output.flying)
         self._publish_status(
             stamp
         )  # before the magnet, so that the status of a tick arrives before it
@@ -121,16 +120,6 @@ class MissionNode(UamNode):
         self._reference.publish(
             self._writer.fill(stage.ahead, output.reference, stage.flying, since_takeoff)
         )
-
-    def _measure(self, state: np.ndarray, output: MissionOutput) -> None:
-        """Compute the errors of this tick: norms of estimate − reference; 0 if not controlled.
-
-        state: (3, 6 + n), see `coordinates`; errors of position [m], attitude and arm [rad].
-        """
-        error = state[CHI] - output.reference[CHI]
-        error[ANGLES] = wrap_angle(error[ANGLES])
-        norms = [float(np.linalg.norm(error[part])) for part in (POSITION, ATTITUDE, ARM)]
-        self._errors = tuple(norms) if output.flying else (0.0, 0.0, norms[2])
 
     def _publish_status(self, stamp: int) -> None:
         """Publish arming when it changes, and the status when it changes and twice a second."""
@@ -153,17 +142,20 @@ class MissionNode(UamNode):
     @property
     def status(self) -> MissionStatus:
         """Phase, errors and state of the mission at the newest tick."""
-        output = self._mission.output
+        output, errors = self._mission.output, self._errors.newest()
         return MissionStatus(
             output.phase,
             output.time,
-            *self._errors,
+            errors.position,
+            errors.attitude,
+            errors.arm,
             output.done,
             output.abort_reason,
             bool(output.magnet),
             output.state.value,
             output.cause,
             output.regains,
+            tilt=errors.tilt,
             answers=self._planners.answers,
             answer=self._planners.answer,
         )

@@ -12,8 +12,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from uam_control.coordinates import ALPHA, CHI, CHI_DOT, PITCH, ROLL, X, Z
+from uam_control.coordinates import ALPHA, CHI, CHI_DOT, ROLL, X, Z
 from uam_control.maths.compiled import jit
+from uam_control.maths.rotations import tilt
 from uam_control.supervision.monitor import Level, Monitor
 from uam_control.supervision.observation import Observation, Readings
 from uam_control.supervision.supervision_parameters import SupervisionParameters
@@ -214,9 +215,8 @@ def measure(
         apart += (position - state[CHI_DOT, X + i] * age - mocap[i]) ** 2
         outside = max(outside, box[0, i] - position, position - box[1, i])
         rate = max(rate, abs(state[CHI_DOT, ROLL + i]))
-    cosine = math.cos(state[CHI, ROLL]) * math.cos(state[CHI, PITCH])
     values[1] = math.sqrt(squared)
-    values[2] = math.acos(min(1.0, max(-1.0, cosine)))
+    values[2] = tilt(state[CHI, ROLL:ALPHA])
     values[3] = rate
     values[4] = state[CHI, Z] - ground
     values[5] = outside

@@ -130,6 +130,7 @@ def _status(operator: Operator, _: argparse.Namespace) -> int:
         "errors": f"{mission.position_error:.3f} m, "
         f"attitude {math.degrees(mission.attitude_error):.2f} deg, "
         f"arm {math.degrees(mission.arm_error):.2f} deg",
+        "tilt": f"{math.degrees(mission.tilt):.2f} deg",
     }
     if mission.abort_reason:
         rows["aborted"] = mission.abort_reason

@@ -23,7 +23,7 @@ class Progress(Observer):
         self.console = console or Console()
         self._duration = duration
         self._live: Live | None = None
-        self._shown: tuple[str, float] = ("", -math.inf)
+        self._shown: tuple[str, float, str] = ("", -math.inf, "")
         self._begin = time.monotonic()
         self._autopilot = ""
 
@@ -59,15 +59,17 @@ class Progress(Observer):
         if status.time < 0.0 and status.autopilot != self._autopilot:
             self._autopilot = status.autopilot
             self.message(f"autopilot {status.autopilot}")
-        phase, last = self._shown
-        if status.phase == phase and status.time < last + PLAIN_INTERVAL:
+        phase, last, control = self._shown
+        known = (status.phase, status.released_to) == (phase, control)
+        if known and status.time < last + PLAIN_INTERVAL:
             return
-        self._shown = (status.phase, status.time)
+        self._shown = (status.phase, status.time, status.released_to)
         self.message(
             f"{self._when(status):>15}  {status.phase:<9} "
             f"errors {status.position_error:.3f} m, {math.degrees(status.attitude_error):.1f} deg, "
             f"arm {math.degrees(status.arm_error):.1f} deg; "
-            f"{status.real_time_factor:.2f}x real time"
+            f"tilt {math.degrees(status.tilt):.1f} deg; "
+            f"{status.real_time_factor:.2f}x real time{released(status)}"
         )
 
     def _when(self, status: FlightStatus) -> str:
@@ -90,5 +92,13 @@ class Progress(Observer):
             f"attitude {math.degrees(status.attitude_error):.2f}°   "
             f"arm {math.degrees(status.arm_error):.2f}°",
         )
+        table.add_row("tilt", f"{math.degrees(status.tilt):.2f}°")
+        if status.released_to:
+            table.add_row("control", f"[bold yellow]{status.released_to}[/bold yellow]")
         table.add_row("real time", f"{status.real_time_factor:.2f}x", status.autopilot)
         return table
+
+
+def released(status: FlightStatus) -> str:
+    """Return who has control if it is not the companion computer, for the end of a line."""
+    return f"; {status.released_to}, has control" if status.released_to else ""

@@ -16,6 +16,7 @@ from __future__ import annotations
 import time
 from dataclasses import dataclass
 from functools import partial
+from typing import Any
 
 import numpy as np
 from diagnostic_msgs.msg import DiagnosticArray
@@ -29,7 +30,13 @@ from uam_control.settings.parameter_set import ParameterSet, number
 from uam_control.stamps import SECOND
 from uam_lab.nodes.scene_markers import PAYLOAD, FlownPath, Markers, ReferencePath
 from uam_msgs_py.messages import topics
-from uam_msgs_py.messages.control import Reference, read_reference, read_state
+from uam_msgs_py.messages.control import (
+    PositionCommand,
+    Reference,
+    read_position_command,
+    read_reference,
+    read_state,
+)
 from uam_msgs_py.messages.convert import JointStateWriter, read_pose
 from uam_msgs_py.messages.status import ERROR, OK, MissionStatus
 from uam_msgs_py.messages.topics import BODY, WORLD
@@ -44,7 +51,7 @@ from uam_sim_bridge.plant.vehicle import SWING
 
 NAME = "scene"
 REFERENCE = "reference"  # frame of the desired pose
-REFERENCES = 8  # stored until the state of the same tick arrives: they come one tick earlier
+STORED = 8  # ticks, until the messages of the same tick have arrived
 
 
 @dataclass(frozen=True)
@@ -79,6 +86,8 @@ class SceneNode(UamNode):
 
         self._state: tuple[int, np.ndarray] | None = None
         self._references: dict[int, Reference] = {}
+        self._states: dict[int, np.ndarray] = {}
+        self._command: tuple[int, PositionCommand] | None = None
         self._payload: tuple[int, np.ndarray, np.ndarray] | None = None
         self._payload_is_there = False  # only a simulator publishes its pose
         self._status: tuple[int, MissionStatus] | None = None
@@ -115,20 +124,22 @@ class SceneNode(UamNode):
                 for topic, handle in (
                     (topics.REFERENCE, self._on_reference),
                     (topics.TRUTH_PAYLOAD, self._on_payload),
+                    (topics.POSITION_COMMAND, self._on_command),
                     (topics.STATE, self._on_state),
                 )
             ]
 
     def _on_state(self, data: bytes) -> None:
         self._state = read_state(data)
+        _store(self._states, *self._state)
         if not self.deferred:
             self.settle()
 
     def _on_reference(self, data: bytes) -> None:
-        stamp, reference = read_reference(data)
-        self._references[stamp] = reference
-        if len(self._references) > REFERENCES:
-            del self._references[min(self._references)]
+        _store(self._references, *read_reference(data))
+
+    def _on_command(self, data: bytes) -> None:
+        self._command = read_position_command(data)
 
     def _on_payload(self, data: bytes) -> None:
         self._payload = read_pose(data)
@@ -144,8 +155,7 @@ class SceneNode(UamNode):
         stamp, state = self._state
         reference = self._references.get(stamp)
         self._due = max(self._due, stamp - self._frame_period) + self._frame_period
-        if reference is not None:
-            self._compare(stamp, state, reference)
+        self._compare()
         desired = reference.values[0] if reference is not None and reference.flying else None
         self._tf.publish(transforms_message(self._transforms(stamp, state[0], desired)))
         self._follow(stamp, state[0], desired)
@@ -153,9 +163,19 @@ class SceneNode(UamNode):
         self._state = None
         self.done_tick(stamp, begun)
 
-    def _compare(self, stamp: int, state: np.ndarray, reference: Reference) -> None:
-        """Publish the tracking errors of this tick; state (3, 6 + n), see `coordinates`."""
-        error = state[:CHI_DDOT] - reference.values[:CHI_DDOT]
+    def _compare(self) -> None:
+        """Publish the tracking errors of the newest tick of which all messages have arrived.
+
+        The reference of the attitude is that of the position law.
+        """
+        stamp, command = self._command or (-1, None)
+        state, reference = self._states.get(stamp), self._references.get(stamp)
+        if state is None or reference is None:
+            return
+        self._command = None  # each tick is published once
+        desired = reference.values[:CHI_DDOT].copy()
+        desired[:, ATTITUDE] = command.attitude[:CHI_DDOT]
+        error = state[:CHI_DDOT] - desired
         error[CHI, ANGLES] = wrap_angle(error[CHI, ANGLES])
         if not reference.flying:
             error[:, :ALPHA] = 0.0
@@ -213,6 +233,13 @@ class SceneNode(UamNode):
         status = self._status[1]
         level = ERROR if status.abort_reason else OK
         return level, f"showing {status.summary}", {"payload": self._payload_is_there}
+
+
+def _store(ticks: dict[int, Any], stamp: int, value: Any) -> None:
+    """Store a value by its stamp, and at most STORED of them."""
+    ticks[stamp] = value
+    if len(ticks) > STORED:
+        del ticks[min(ticks)]
 
 
 def main() -> int:

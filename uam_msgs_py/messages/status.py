@@ -135,10 +135,12 @@ class MissionStatus(_Status):
     """State of the mission; sent on each change of phase and twice a second.
 
     time: mission time [s], negative before take-off. Errors: norms of estimate − reference [m],
-    [rad], [rad]. magnet: whether it is on (/uam/magnet has no stamp, this message has one). state,
+    [rad], [rad], two ticks before; that of the attitude is from the desired attitude of the
+    position law. magnet: whether it is on (/uam/magnet has no stamp, this message has one). state,
     cause: the supervisor's state (uam_control.supervision.State) and the reason for it. regains:
-    number of commands so far to regain a released vehicle. answers: number of goals and
-    trajectories answered so far, answer: the newest, "topic: accepted ..." or "topic: refused ...".
+    number of commands so far to regain a released vehicle. tilt [rad]: angle between the vertical
+    axes of body and world. answers: number of goals and trajectories answered so far, answer: the
+    newest, "topic: accepted ..." or "topic: refused ...".
     """
 
     phase: str = "waiting"

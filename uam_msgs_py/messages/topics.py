@@ -206,7 +206,8 @@ TRACKING_ERROR = Topic(
     "uam/tracking/error",
     JointState,
     RELIABLE,
-    "estimate - reference: chi, chi_dot; 0 without a reference; 25 Hz",
+    "estimate - reference: chi, chi_dot; attitude: from q_d of the position law; 0 without a "
+    "reference; 25 Hz",
     one_publisher=False,
 )
 MARKERS = Topic(

@@ -49,7 +49,7 @@ WIRES = (
     Wire(topics.MAGNET, MISSION, (PLANT,)),
     Wire(topics.ARMING, MISSION, (BRIDGE,)),
     Wire(topics.MISSION_STATUS, MISSION, (PLANT, BRIDGE)),
-    Wire(topics.POSITION_COMMAND, POSITION, (ATTITUDE, ARM, BRIDGE)),
+    Wire(topics.POSITION_COMMAND, POSITION, (ATTITUDE, ARM, BRIDGE, MISSION)),
     Wire(topics.ATTITUDE_COMMAND, ATTITUDE, (BRIDGE,)),
     Wire(topics.ARM_EFFORT, ARM, (PLANT,)),
     Wire(topics.SETPOINT, BRIDGE, (PLANT,)),

@@ -7,7 +7,7 @@ import time
 import numpy as np
 
 from uam_control.coordinates import ARM, ATTITUDE, POSITION
-from uam_control.maths.rotations import wrap_angle
+from uam_control.maths.rotations import tilt, wrap_angle
 from uam_lab.flight.direct.flight import DirectFlight
 from uam_lab.flight.flight_settings import FlightSettings
 from uam_lab.flight.observer import FlightStatus, Observer
@@ -64,7 +64,8 @@ def _report(flight: DirectFlight, begin: float, observer: Observer, stop: StopRe
     row, output = recording.values[recording.count - 1], flight.mission.output
     columns = recording.columns
     size = columns.size
-    error = row[columns.block("estimate.")][:size] - row[columns.block("reference.")][:size]
+    estimate = row[columns.block("estimate.")][:size]
+    error = estimate - row[columns.block("reference.")][:size]
     error[ATTITUDE.start :] = wrap_angle(error[ATTITUDE.start :])
     norms = [float(np.linalg.norm(error[part])) for part in (POSITION, ATTITUDE, ARM)]
     wall = time.monotonic() - begin
@@ -74,7 +75,7 @@ def _report(flight: DirectFlight, begin: float, observer: Observer, stop: StopRe
             time=output.time,
             position_error=norms[0] * output.flying,
             attitude_error=norms[1] * output.flying,
-            tilt=0.0,
+            tilt=tilt(estimate[ATTITUDE]),
             arm_error=norms[2],
             real_time_factor=flight.plant.time / wall if wall > 0.0 else 0.0,
         )
