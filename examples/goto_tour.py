@@ -1,0 +1,34 @@
+"""A tour of goals: take off, fly to some places one after the other, come back and land.
+
+python examples/goto_tour.py results/tour
+"""
+
+import math
+import sys
+
+from uam_lab import CommandRefused, Flight
+
+TOUR = [(0.5, 0.0, 1.0, 0.0), (0.5, 0.5, 1.2, 90.0), (0.0, 0.5, 1.0, 180.0), (0.0, 0.0, 1.0, 0.0)]
+
+
+def main():
+    """Fly the tour; print each goal, and where the vehicle was when it held there."""
+    out = sys.argv[1] if len(sys.argv) > 1 else "results/tour"
+    with Flight(scenario="hover", out=out) as flight:
+        flight.wait_for("hover")
+        for x, y, z, degrees in TOUR:  # [m, ENU], [deg]
+            print(f"({x}, {y}, {z}):", flight.goto(x, y, z, math.radians(degrees)))
+            flight.wait_for("goal")
+            held = flight.wait_for("holding")
+            print(f"  there at {held.time:.1f} s, {1000.0 * held.position_error:.1f} mm off")
+        try:
+            flight.goto(99.0, 0.0, 1.0)
+        except CommandRefused as refusal:
+            print("too far:", refusal)
+        print(flight.land())
+        result = flight.wait()
+    print("landed:", result.outcome.transitions[-1]["cause"])
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,57 @@
+"""Your own planner: a node computes a circle and sends it as a trajectory of the base.
+
+    python examples/own_planner.py results/planner
+
+The mission checks the trajectory against its limits before it replaces what is flown, and answers in
+its status. The same messages come from any other planner, also from other processes.
+"""
+
+import math
+import sys
+
+from geometry_msgs.msg import Transform
+from rclpy.duration import Duration
+from trajectory_msgs.msg import MultiDOFJointTrajectory, MultiDOFJointTrajectoryPoint
+
+from uam_lab import Flight
+
+RADIUS, ROUND, STEP = 0.4, 12.0, 0.25  # [m], [s], [s]
+
+
+def circle(height: float) -> MultiDOFJointTrajectory:
+    """Return one round through (0, 0), from rest to rest; yaw stays 0."""
+    plan = MultiDOFJointTrajectory(joint_names=["base_link"])
+    plan.header.frame_id = "world"
+    for k in range(1, round(ROUND / STEP) + 1):
+        share = k * STEP / ROUND
+        angle = 2.0 * math.pi * share**2 * (3.0 - 2.0 * share)  # at rest at both ends
+        pose = Transform()
+        pose.translation.x = RADIUS * math.sin(angle)
+        pose.translation.y = RADIUS * (1.0 - math.cos(angle))
+        pose.translation.z = height
+        point = MultiDOFJointTrajectoryPoint(transforms=[pose])
+        point.time_from_start = Duration(seconds=k * STEP).to_msg()
+        plan.points.append(point)
+    return plan
+
+
+def main():
+    """Take off, fly the circle, land."""
+    out = sys.argv[1] if len(sys.argv) > 1 else "results/planner"
+    with Flight(scenario="hover", out=out) as flight:
+        flight.wait_for("hover")
+        with flight.node("planner") as guest:
+            planner = guest.node.create_publisher(MultiDOFJointTrajectory, "base_trajectory", 10)
+            while not planner.get_subscription_count():
+                flight.wait_for(lambda status: True)
+            planner.publish(circle(1.0))
+            flight.wait_for("goal", timeout=30.0)
+        flight.wait_for("holding")
+        flight.land()
+        result = flight.wait()
+    east = result["truth.x"][result.phase() == "goal"]
+    print(f"circle: {east.min():.2f} to {east.max():.2f} m east; {result.reason or 'completed'}")
+
+
+if __name__ == "__main__":
+    main()
