@@ -2,8 +2,8 @@
 
     python examples/own_planner.py results/planner
 
-The mission checks the trajectory against its limits before it replaces what is flown, and answers in
-its status. The same messages come from any other planner, also from other processes.
+The mission checks the trajectory against its limits before it replaces what is flown. The same
+messages may come from any other process (docs/planners.md).
 """
 
 import math
@@ -42,8 +42,7 @@ def main():
         flight.wait_for("hover")
         with flight.node("planner") as guest:
             planner = guest.node.create_publisher(MultiDOFJointTrajectory, "base_trajectory", 10)
-            while not planner.get_subscription_count():
-                flight.wait_for(lambda status: True)
+            flight.wait_for(lambda status: planner.get_subscription_count() > 0, timeout=30.0)
             planner.publish(circle(1.0))
             flight.wait_for("goal", timeout=30.0)
         flight.wait_for("holding")

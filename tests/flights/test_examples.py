@@ -85,3 +85,17 @@ def test_the_simulator_of_ones_own_flies(engine, tmp_path, short_scenario):
     found = json.loads((tmp_path / "metrics.json").read_text())
     assert found["mission_completed"] and str(found["rms"]) in said
     assert max(found["max"]["arm_deg"]) == 0.0, "its arm stands still"
+
+
+def test_a_tour_of_goals_is_flown(tmp_path):
+    said = run("goto_tour.py", tmp_path)
+    assert said.count("accepted") == said.count("there at") == 4
+    assert "too far: refused: x is 99.00 m" in said and "landed: touchdown" in said
+    off = [float(line.split(", ")[1].split()[0]) for line in said.splitlines() if "there" in line]
+    assert max(off) < 20.0, "[mm]"
+
+
+def test_the_planner_of_ones_own_flies_a_circle(tmp_path):
+    said = run("own_planner.py", tmp_path)
+    west, east = (float(word) for word in said.split("circle: ")[1].split()[:3:2])
+    assert abs(west + 0.4) < 0.03 and abs(east - 0.4) < 0.03

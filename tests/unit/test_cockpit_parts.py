@@ -9,12 +9,22 @@ from diagnostic_msgs.msg import DiagnosticArray
 from hypothesis import given
 from hypothesis import strategies as st
 
+from uam_control.supervision import PreflightCheck
 from uam_lab.cockpit import page_address
+from uam_lab.cockpit.buttons import BUTTONS
 from uam_lab.cockpit.entry import axes, bounds, reach, text_of, value_of
 from uam_lab.cockpit.headline import headline
 from uam_lab.cockpit.remote_parameters import About
 from uam_lab.cockpit.urdf_shapes import shapes
-from uam_lab.cockpit.vehicle_health import BAD, CAUTION, GOOD, UNKNOWN, Health, grade
+from uam_lab.cockpit.vehicle_health import (
+    BAD,
+    CAUTION,
+    CHAIN,
+    GOOD,
+    UNKNOWN,
+    Health,
+    grade,
+)
 from uam_msgs_py.messages.layouts import BadMessage
 from uam_msgs_py.messages.status import ERROR, OK, AutopilotState, MissionStatus, diagnostic
 from uam_msgs_py.messages.transforms import Transform, read_transforms, transforms_message
@@ -130,6 +140,51 @@ def test_errors_come_from_tracking_once_it_is_there():
     health.track(np.array([0.3, 0.4, 0.0, 0.1, 0.0, 0.0, 0.0, 0.2]))
     health.set_mission(MissionStatus("approach", 1.5, 0.9, 0.9, 0.9))
     assert health.errors == pytest.approx((0.5, 0.1, 0.2))
+
+
+def shown(health: Health) -> str:
+    return headline(health, LIMITS)
+
+
+def test_the_headline_names_who_has_control_and_the_tilt():
+    health = Health(silent_after=3.0, silence=0.1)
+    health.set_mission(MissionStatus("carry", 12.0, attitude_error=0.01, tilt=0.09))
+    health.autopilot = AutopilotState(True, "OFFBOARD", True, 0, "")
+    assert "companion" in shown(health) and "5.2°" in shown(health) and ">0.6<" in shown(health)
+    health.autopilot = AutopilotState(True, "POSCTL", True, 0, released_to="POSCTL, by the pilot")
+    assert "POSCTL, by the pilot, has control" in shown(health)
+    health.set_mission(MissionStatus("released", 13.0, state="released", cause="POSCTL"))
+    assert health.state() == (CAUTION, "released", "POSCTL")
+
+
+def test_the_pre_arm_report_is_shown_on_the_ground():
+    health = Health(silent_after=3.0)
+    health.preflight = [
+        PreflightCheck("battery", "0.9", "at least 0.3", True),
+        PreflightCheck("mocap", "unknown", "at most 0.2 s", False),
+    ]
+    health.set_mission(MissionStatus())
+    assert "battery" in shown(health) and "unknown (at most 0.2 s)" in shown(health)
+    assert shown(health).count("■") == 1
+    health.set_mission(MissionStatus("carry", 3.0))
+    assert "pre-arm" not in shown(health)
+
+
+def test_the_delays_are_shown_with_their_limits():
+    health = Health(silent_after=3.0, round_trip_limit=0.03, period=0.004)
+    health.set_mission(MissionStatus("carry", 3.0))
+    health.autopilot = AutopilotState(True, "OFFBOARD", True, 0, round_trip=0.0241)
+    assert "24.1 of 30 ms" in shown(health) and "per tick" not in shown(health)
+    for node in CHAIN:
+        health.diagnose(reported(node, OK, "running", **{"tick max [ms]": "0.45"}))
+    assert health.latency == pytest.approx(0.0018) and "1.8 of 4 ms per tick" in shown(health)
+
+
+def test_kill_is_guarded_and_called_twice():
+    kill = next(button for button in BUTTONS if button.label == "Kill")
+    assert kill.ask and kill.calls == 2
+    labels = [button.label for button in BUTTONS[:6]]
+    assert labels == ["Start", "Hold", "Resume", "Land", "Disarm", "Kill"]
 
 
 def test_a_node_without_diagnostics_is_reported():

@@ -18,7 +18,7 @@ Later = Callable[[Callable[[], None]], None]
 class Button:
     """A button and its services. on: value of a SetBool request, None for a Trigger.
 
-    ask: question to confirm first, "" for none.
+    ask: question to confirm first, "" for none. calls: of each service; kill counts at the second.
     """
 
     label: str
@@ -28,6 +28,7 @@ class Button:
     on: bool | None = None
     ask: str = ""
     colour: str | None = None
+    calls: int = 1
 
 
 def _each(service: str) -> tuple[str, ...]:
@@ -35,11 +36,15 @@ def _each(service: str) -> tuple[str, ...]:
 
 
 BUTTONS = (
+    Button("Start", "PLANE_DEPARTURE", ("mission/start",), "arm and take off, if the pre-arm "
+           "report is green", colour="green"),
     Button("Hold", "PLAYER_PAUSE", ("mission/hold",), "stop here and stay"),
     Button("Resume", "PLAYER_PLAY", ("mission/resume",), "continue the scenario"),
     Button("Land", "ARROW_BAR_TO_DOWN", ("mission/land",), "land here", colour="orange"),
     Button("Disarm", "POWER", ("mission/disarm",), "motors off", colour="red",
            ask="Motors off: a vehicle in the air falls. Disarm?"),
+    Button("Kill", "SKULL", ("mission/kill",), "motors off at once, in every state", colour="red",
+           ask="The motors stop at once; a vehicle in the air falls. Kill?", calls=2),
     Button("Magnet on", "MAGNET", ("mission/magnet",), "until the scenario switches it", on=True),
     Button("Magnet off", "MAGNET_OFF", ("mission/magnet",), "drops the payload", on=False),
     Button("Freeze adaptation", "SNOWFLAKE", _each("freeze_adaptation"),
@@ -100,10 +105,14 @@ class CommandButtons:
         request = Trigger.Request() if button.on is None else SetBool.Request(data=button.on)
         for name in button.services:
             if self._services.ready(kind, name):
-                self._services.call(kind, name, request, self._answer(button, name))
+                self._services.call(kind, name, request, self._answer(button, name, button.calls))
 
-    def _answer(self, button: Button, name: str):
+    def _answer(self, button: Button, name: str, calls: int):
         def answered(response: Trigger.Response | SetBool.Response | None, why: str) -> None:
+            if calls > 1 and not why:
+                again = self._answer(button, name, calls - 1)
+                self._services.call(Trigger, name, Trigger.Request(), again)
+                return
             done = response is not None and response.success
             said = why or response.message or ("done" if done else "refused")
             node = name.strip("/").partition("/")[0]

@@ -10,6 +10,7 @@ import psutil
 INTERVAL = 1.0  # [s] of one measurement
 SHARE = 0.08  # [cores] for this process while the machine is short; the limit is a tenth
 BUSY = 0.85  # of all processor time: from here on the machine is short
+REST = 10  # measurements without shortage before the page shows everything again
 STEP = 2.0  # largest change of the period per measurement
 
 
@@ -34,11 +35,8 @@ class FrameRate:
         self.period = fastest  # [s]
         self.short = False  # whether the machine is short
         self.cores = 0.0  # used by this process
-
-    @property
-    def starved(self) -> bool:
-        """Whether the slowest frame rate still costs too much."""
-        return self.short and self.period >= self._slowest and self.cores > SHARE
+        self.sparing = False  # whether the slowest frame rate still costs too much
+        self._rested = 0  # measurements since the machine was last short
 
     def measure(self) -> None:
         """Adapt the period to the last INTERVAL; call it with each frame."""
@@ -50,7 +48,15 @@ class FrameRate:
         self.short = self._machine() >= BUSY
         factor = self.cores / SHARE if self.short else 1.0 / STEP
         factor = min(STEP, max(1.0 / STEP, factor))
-        self.period = min(self._slowest, max(self._fastest, self.period * factor))
+        before, self.period = (
+            self.period,
+            min(self._slowest, max(self._fastest, self.period * factor)),
+        )
+        self._rested = 0 if self.short else self._rested + 1
+        if self.short and before >= self._slowest and self.cores > SHARE:
+            self.sparing = True
+        elif self._rested >= REST:
+            self.sparing = False
 
 
 def _process_time() -> float:

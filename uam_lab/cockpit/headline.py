@@ -7,9 +7,11 @@ from collections.abc import Iterator, Mapping
 
 from uam_lab.cockpit.vehicle_health import BAD, CAUTION, GOOD, UNKNOWN, Health, grade
 from uam_lab.results import templates
+from uam_msgs_py.messages.status import AutopilotState
 
 COLOURS = {GOOD: "#1b8a5a", CAUTION: "#c77700", BAD: "#c62828", UNKNOWN: "#777777"}
 MARKS = {GOOD: "●", CAUTION: "▲", BAD: "■", UNKNOWN: "○"}
+WARY = 0.7  # share of a limit from which on a delay is shown as a caution
 SHOWN = 4  # largest number of listed nodes with problems
 # title, name of the limits, factor to the unit
 ERRORS = (
@@ -35,6 +37,7 @@ def headline(health: Health, limits: Mapping[str, list[float]]) -> str:
         errors=list(_errors(health, limits)),
         facts=list(_facts(health, limits)),
         nodes=_nodes(health),
+        preflight=_preflight(health),
     )
 
 
@@ -55,6 +58,11 @@ def _facts(health: Health, limits: Mapping[str, list[float]]) -> Iterator[Row]:
     yield "autopilot", level, "no message" if autopilot is None else autopilot.summary
     if autopilot is not None and autopilot.reasons:
         yield "", CAUTION, autopilot.reasons
+    if autopilot is not None:
+        yield "control", *_control(autopilot)
+    if mission is not None:
+        yield "tilt", GOOD, f"{math.degrees(mission.tilt):.1f}°"
+    yield from _delays(health)
     if math.isfinite(health.battery):
         yield "battery", grade(health.battery, *limits["battery"]), f"{health.battery:.0%}"
     yield "magnet", GOOD, "on" if mission is not None and mission.magnet else "off"
@@ -62,8 +70,40 @@ def _facts(health: Health, limits: Mapping[str, list[float]]) -> Iterator[Row]:
         yield "adaptation", CAUTION, "frozen: " + ", ".join(sorted(health.frozen))
     if health.saturated:
         yield "saturated", CAUTION, ", ".join(sorted(health.saturated))
+    if health.sparing:
+        yield "page", CAUTION, "the processor is busy: fewer frames, no charts of each tick"
     if health.real_time_factor:
         yield "speed", GOOD, f"{health.real_time_factor} × real time"
+
+
+def _control(autopilot: AutopilotState) -> tuple[str, str]:
+    """Return level and text: who has control."""
+    if autopilot.released_to:
+        return BAD, f"{autopilot.released_to}, has control"
+    return GOOD, "companion" if autopilot.armed else "nobody: disarmed"
+
+
+def _delays(health: Health) -> Iterator[Row]:
+    """Yield the measured delays of the loop, with their limits."""
+    trip = health.autopilot.round_trip if health.autopilot is not None else None
+    limit, latency, period = health.round_trip_limit, health.latency, health.period
+    if trip is not None and math.isfinite(limit):
+        level = grade(trip, WARY * limit, limit)
+        yield "link delay", level, f"{1e3 * trip:.1f} of {1e3 * limit:.0f} ms (round trip)"
+    if math.isfinite(latency) and math.isfinite(period):
+        level = grade(latency, WARY * period, period)
+        yield "computing", level, f"{1e3 * latency:.1f} of {1e3 * period:.0f} ms per tick"
+
+
+def _preflight(health: Health) -> list[Row]:
+    """Return the pre-arm report while the vehicle is on the ground."""
+    mission = health.mission
+    if mission is None or not (mission.time < 0.0 or mission.done):
+        return []
+    return [
+        (check.name, GOOD if check.passed else BAD, f"{check.value} ({check.limit})")
+        for check in health.preflight
+    ]
 
 
 def _nodes(health: Health) -> list[Row]:

@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 import viser
 
+from uam_control.supervision import PreflightCheck
 from uam_lab.cockpit.buttons import CommandButtons
 from uam_lab.cockpit.charts import Charts
 from uam_lab.cockpit.gains import NodeGains
@@ -24,6 +25,7 @@ from uam_lab.cockpit.watch import Watch
 from uam_msgs_py.messages import topics
 from uam_msgs_py.messages.layouts import BadMessage
 from uam_msgs_py.messages.parameter_changes import ParameterChange
+from uam_msgs_py.messages.preflight import read_preflight
 from uam_msgs_py.messages.status import AutopilotState, MissionStatus
 from uam_msgs_py.messages.topics import Topic
 from uam_msgs_py.messages.transforms import read_transforms
@@ -53,16 +55,16 @@ class Page:
         services: Services,
         options: dict[str, Any],
         joints: Sequence[str],
+        period: float,
         namespace: str = "/",
     ):
-        """options: config/views/cockpit.yaml; joints: names of the arm's coordinates.
-
-        namespace: of the vehicle's nodes.
+        """options: config/views/cockpit.yaml; joints: names of the arm's coordinates; period: of
+        control [s]; namespace: of the vehicle's nodes.
         """
         self._server, self._options = server, options
         self._todo: queue.SimpleQueue[Callable[[], None]] = queue.SimpleQueue()
         self._watch, self._services = watch, services
-        self._health = Health(options["silent_after"], namespace)
+        self._health = Health(options["silent_after"], namespace, period=period)
         self._lines: deque[str] = deque(maxlen=LINES)
         self._gains: dict[str, NodeGains] = {}
         self._asked: set[str] = set()
@@ -136,6 +138,8 @@ class Page:
             health.set_mission(MissionStatus.from_message(message)[1])
         elif topic is topics.AUTOPILOT_STATE:
             health.autopilot = AutopilotState.from_message(message)[1]
+        elif topic is topics.PREFLIGHT:
+            health.preflight = [PreflightCheck(*line) for line in read_preflight(message)]
         elif topic is topics.CHANGES:
             self._changed(ParameterChange.from_message(message)[1])
         elif topic is topics.DIAGNOSTICS:
@@ -163,8 +167,20 @@ class Page:
         if "adapt" in new:
             mark = self._health.frozen.discard if new["adapt"] else self._health.frozen.add
             mark(change.node)
+        self._know(change.node, new)
         if change.node in self._gains:
             self._gains[change.node].changed(new)
+
+    def _know(self, node: str, values: dict[str, Any]) -> None:
+        """Take the limits that the headline shows from the parameters of a node."""
+        if node == "mission":
+            health = self._health
+            health.round_trip_limit = values.get("round_trip_land", health.round_trip_limit)
+
+    def spare(self, sparing: bool) -> None:
+        """Do without the charts of each tick, or show them again."""
+        self._watch.spare(sparing)
+        self._health.sparing = sparing
 
     def _find_nodes(self) -> None:
         """Load the parameters of nodes that have appeared."""
@@ -180,6 +196,7 @@ class Page:
         if why:
             self._asked.discard(remote.node)
             return
+        self._know(remote.node, remote.values)
         frozen = remote.values.get("adapt") is False
         if frozen:
             self._health.frozen.add(remote.node)

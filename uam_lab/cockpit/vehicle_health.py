@@ -10,13 +10,15 @@ import numpy as np
 from diagnostic_msgs.msg import DiagnosticArray
 
 from uam_control.coordinates import ARM, ATTITUDE, POSITION
-from uam_control.supervision import State
+from uam_control.supervision import PreflightCheck, State
 from uam_msgs_py.messages.status import ERROR, OK, STALE, WARN, AutopilotState, MissionStatus
 from uam_msgs_py.node.namespace import unlabelled
 
 GOOD, CAUTION, BAD, UNKNOWN = "good", "caution", "bad", "unknown"
 LEVELS = {OK: GOOD, WARN: CAUTION, ERROR: BAD, STALE: CAUTION}
 ORDER = (UNKNOWN, GOOD, CAUTION, BAD)
+TICK = "tick max [ms]"  # in the diagnostics of each node
+CHAIN = ("state_estimator", "position_controller", "attitude_controller", "mavlink_bridge")
 
 
 @dataclass
@@ -43,6 +45,11 @@ class Health:
     frozen: set[str] = field(default_factory=set)
     silence: float | None = None  # [s] wall time since the last message of the control loop
     errors: tuple[float, float, float] = (math.nan,) * 3  # norms: [m], [rad], [rad]
+    preflight: list[PreflightCheck] = field(default_factory=list)
+    ticks: dict[str, float] = field(default_factory=dict)  # node → longest of the last second [s]
+    round_trip_limit: float = math.nan  # [s] at which the mission lands
+    period: float = math.nan  # [s] of control
+    sparing: bool = False  # whether the page leaves out charts, as processor time is short
     _tracked: bool = False  # whether the errors come from /uam/tracking/error
 
     def set_mission(self, mission: MissionStatus) -> None:
@@ -70,6 +77,16 @@ class Health:
                 elif pair.key == "saturated":
                     change = set.add if pair.value == "True" else set.discard
                     change(self.saturated, name)
+                elif pair.key == TICK and pair.value:
+                    self.ticks[name] = 1e-3 * float(pair.value)
+
+    @property
+    def latency(self) -> float:
+        """Computing time [s] from sensors to setpoint: the longest ticks of the nodes on that way.
+
+        NaN until all of them have reported.
+        """
+        return sum(self.ticks.get(node, math.nan) for node in CHAIN)
 
     def state(self) -> tuple[str, str, str]:
         """Return level, text and reason ("" without one) of the flight's state."""
@@ -84,7 +101,7 @@ class Health:
             return BAD, mission.state, mission.cause
         if mission.abort_reason:
             return BAD, mission.phase, mission.abort_reason
-        if mission.state == State.HOLDING.value:
+        if mission.state in (State.HOLDING.value, State.RELEASED.value):
             return CAUTION, mission.state, mission.cause
         return GOOD, mission.phase, ""
 

@@ -19,6 +19,7 @@ from uam_msgs_py.node.polling import listen, messages
 EARLY = (
     topics.MISSION_STATUS,
     topics.AUTOPILOT_STATE,
+    topics.PREFLIGHT,
     topics.DIAGNOSTICS,
     topics.CHANGES,
     topics.ROBOT_DESCRIPTION,
@@ -26,8 +27,8 @@ EARLY = (
     topics.TF_STATIC,
     topics.MARKERS,
 )
-LATE = (
-    topics.TRACKING_ERROR,
+# Messages of every tick: receiving them costs most. They are left out if processor time is short.
+EACH_TICK = (
     topics.SETPOINT,
     topics.POSITION_COMMAND,
     topics.ATTITUDE_COMMAND,
@@ -35,9 +36,9 @@ LATE = (
     topics.POSITION_ADAPTATION,
     topics.ATTITUDE_ADAPTATION,
     topics.ARM_ADAPTATION,
-    topics.AUTOPILOT_BATTERY,
     topics.CLOCK,
 )
+LATE = (topics.TRACKING_ERROR, *EACH_TICK, topics.AUTOPILOT_BATTERY)
 SERIALIZED = (topics.TF, topics.TF_STATIC)  # taken raw: tf2_msgs may not be installed
 WHOLE = (topics.DIAGNOSTICS, topics.CHANGES, topics.TF, topics.TF_STATIC)  # each message counts
 
@@ -50,6 +51,7 @@ class Watch:
         self._late = False
         self._subscriptions: dict[Topic, Any] = {}
         self._arrivals: dict[Topic, float] = {}
+        self.sparing = False  # whether EACH_TICK is left out
         for topic in EARLY:
             self._listen(topic)
 
@@ -59,7 +61,7 @@ class Watch:
 
     def look(self, show: Callable[[Topic, Any], None]) -> None:
         """Call show(topic, message) for new messages: all of WHOLE, the newest of the others."""
-        for topic, subscription in self._subscriptions.items():
+        for topic, subscription in list(self._subscriptions.items()):
             newest = None
             for message in messages(subscription):
                 if topic in WHOLE:
@@ -73,7 +75,19 @@ class Watch:
         if topics.MISSION_STATUS in self._arrivals and not self._late:
             self._late = True
             for topic in LATE:
+                if not (self.sparing and topic in EACH_TICK):
+                    self._listen(topic)
+
+    def spare(self, sparing: bool) -> None:
+        """Leave out the messages of every tick, or receive them again."""
+        if sparing == self.sparing:
+            return
+        self.sparing = sparing
+        for topic in EACH_TICK if self._late else ():
+            if not sparing:
                 self._listen(topic)
+            elif topic in self._subscriptions:
+                self._node.destroy_subscription(self._subscriptions.pop(topic))
 
     @property
     def silence(self) -> float | None:

@@ -14,7 +14,8 @@ from std_srvs.srv import Trigger
 
 from uam_control.supervision import PreflightCheck
 from uam_msgs_py.messages import topics
-from uam_msgs_py.messages.status import OK, AutopilotState, MissionStatus
+from uam_msgs_py.messages.preflight import read_preflight
+from uam_msgs_py.messages.status import AutopilotState, MissionStatus
 
 COMMANDS = ("start", "hold", "resume", "land", "disarm")
 PATIENCE = 5.0  # [s] wall time to find the flight, and the same for its answer
@@ -86,15 +87,8 @@ class Operator:
 
     def preflight(self) -> list[PreflightCheck]:
         """Return the newest pre-arm report. Raises NoFlight."""
-        return [
-            PreflightCheck(
-                status.name,
-                status.message,
-                {pair.key: pair.value for pair in status.values}.get("limit", ""),
-                status.level == OK,
-            )
-            for status in self._latest(topics.PREFLIGHT).status
-        ]
+        lines = read_preflight(self._latest(topics.PREFLIGHT))
+        return [PreflightCheck(*line) for line in lines]
 
     def _take(self, name: str, message: DiagnosticArray) -> None:
         self._newest[name] = message

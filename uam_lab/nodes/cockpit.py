@@ -17,6 +17,7 @@ from uam_control.nodes.described import described_vehicle
 from uam_control.settings import configuration
 from uam_control.settings.parameter_set import ParameterError, ParameterSet, integer, text
 from uam_lab.cockpit import web
+from uam_lab.cockpit.frame_rate import FrameRate
 from uam_lab.cockpit.page import Page
 from uam_lab.cockpit.page_address import LOCAL, PORT, AddressError
 from uam_lab.cockpit.services import Services
@@ -60,12 +61,21 @@ def main() -> int:
     executor.add_node(node)
     # not spun: an executor would take the messages that the page polls
     watcher = Node(f"{NAME}_watch", start_parameter_services=False, enable_rosout=False)
-    joints, namespace = vehicle.coordinates[ARM], node.get_namespace()
-    page = Page(server, Watch(watcher), Services(node), options, joints, namespace)
-    period = options["scene_period"]
+    page = Page(
+        server,
+        Watch(watcher),
+        Services(node),
+        options,
+        vehicle.coordinates[ARM],
+        vehicle.control_period,
+        node.get_namespace(),
+    )
+    rate = FrameRate(options["scene_period"], options["slowest_period"])
     while not stop.raised:
-        end = time.monotonic() + period
+        end = time.monotonic() + rate.period
         page.look()
+        rate.measure()
+        page.spare(rate.sparing)
         while (left := end - time.monotonic()) > 0.0 and not stop.raised:
             executor.spin_once(timeout_sec=left)
     server.stop()

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from typing import Protocol
 
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
@@ -36,3 +36,10 @@ def preflight_message(stamp: int, checks: Iterable[Check]) -> DiagnosticArray:
     )
     set_stamp(array.header.stamp, stamp)
     return array
+
+
+def read_preflight(message: DiagnosticArray) -> Iterator[tuple[str, str, str, bool]]:
+    """Yield name, value, limit and whether it passed, of each check."""
+    for status in message.status:
+        limit = {pair.key: pair.value for pair in status.values}.get("limit", "")
+        yield status.name, status.message, limit, status.level == OK
