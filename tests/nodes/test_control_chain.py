@@ -1,14 +1,17 @@
 """All control nodes, each in its process: the same numbers as the maths in one loop."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from uam_control.control.controllers import ArmController, AttitudeController, PositionController
 from uam_control.coordinates import arm_coordinates, coordinates
 from uam_control.estimation import StateEstimator
-from uam_control.mission import Mission, load_scenario
+from uam_control.mission import Mission, StartParameters, load_scenario
 from uam_control.profiles.profile import load_profile
 from uam_control.stamps import SECOND
+from uam_control.supervision import Readings
 from uam_msgs_py.messages import topics
 from uam_msgs_py.messages.control import (
     read_position_command,
@@ -27,6 +30,7 @@ JOINTS = arm_coordinates(2)
 PERIOD = 4_000_000  # [ns]
 ARMED_AT = 40 * PERIOD  # take-off follows 0.5 s later
 TICKS = 200
+SHAKEN = 5.0  # [m/s] largest speed at the start: the samples are noisy
 NODES = (
     "state_estimator",
     "mission",
@@ -57,7 +61,10 @@ def expected():
     """Return the maths' results for `samples`: state, tau_p, tau_q (None: idle), tau_alpha."""
     sets = load_profile("s500").sets
     estimator = StateEstimator(sets["state_estimator"], 2)
-    mission = Mission(load_scenario("pick_and_place"), sets["mission"])
+    parameters = replace(sets["mission"], start_speed=SHAKEN)
+    starts = StartParameters(auto_start=True)
+    mission = Mission(load_scenario("pick_and_place"), parameters, starts)
+    known = Readings(mocap_age=0.0, joint_age=0.0, controller_age=0.0, autopilot_age=0.0)
     position = PositionController(sets["position_controller"])
     attitude = AttitudeController(sets["attitude_controller"])
     arm = ArmController(sets["arm_controller"])
@@ -77,7 +84,7 @@ def expected():
         tau_alpha = arm.update(state, output.reference, desired, flying, dt).copy()
         yield state.copy(), tau_p if flying else None, tau_q if flying else None, tau_alpha
         armed = ARMED_AT / SECOND if stamp >= ARMED_AT else None
-        mission.step((stamp + PERIOD) / SECOND, state, armed)
+        mission.step((stamp + PERIOD) / SECOND, state, armed, known)
 
 
 class Plant:
@@ -151,8 +158,9 @@ class Plant:
         self.joint.position[:], self.joint.velocity[:] = joints
         self.joints.publish(self.joint.stamped(stamp))
         self.imu.publish(self.imu_writer.fill(stamp, *imu))
-        if stamp >= ARMED_AT and (stamp - ARMED_AT) % (50 * PERIOD) == 0:
-            state = AutopilotState(True, "OFFBOARD", True, ARMED_AT)
+        if (stamp - ARMED_AT) % (25 * PERIOD) == 0:
+            armed = stamp >= ARMED_AT
+            state = AutopilotState(True, "OFFBOARD", armed, ARMED_AT if armed else None)
             self.autopilot.publish(state.to_message(stamp))
         answers = (self.states, self.position, self.attitude, self.effort, self.magnet)
         self.probe.until(
@@ -161,8 +169,9 @@ class Plant:
 
 
 def test_the_nodes_compute_what_the_maths_does_bit_for_bit(start, probe):
+    started = ("--ros-args", "-p", "auto_start:=true", "-p", f"start_speed:={SHAKEN}")
     for name in NODES:
-        start(f"uam_control.nodes.{name}")
+        start(f"uam_control.nodes.{name}", *(started if name == "mission" else ()))
     plant = Plant(probe)
     plant.wait_for_connections()
     for number, sample in enumerate(samples()):
@@ -189,7 +198,7 @@ def test_the_nodes_compute_what_the_maths_does_bit_for_bit(start, probe):
     stamps = [read_reference(message)[0] for message in plant.references]
     assert stamps == [(i + 1) * PERIOD for i in range(TICKS + 1)]  # the last is one tick ahead
     assert len(plant.effort) == len(plant.magnet) == TICKS
-    assert [message.data for message in plant.arming] == [True]
+    assert [message.data for message in plant.arming] == [False, True]
     phases = [MissionStatus.from_message(message)[1].phase for message in plant.status]
     assert list(dict.fromkeys(phases)) == ["waiting", "take-off"]
     assert len(plant.adaptation) == pytest.approx(TICKS * 0.004 * 50, abs=1)

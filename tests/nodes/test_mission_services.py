@@ -20,6 +20,16 @@ def vehicle(start, probe):
     return made
 
 
+def test_a_start_is_refused_with_the_checks_that_fail(vehicle):
+    accepted, answer = vehicle.ask("start")
+    assert not accepted and "autopilot: unknown (at most 0.75 s)" in answer
+    vehicle.state[0, 7] = 0.0  # the second joint is not where the scenario begins
+    vehicle.fly(2)
+    accepted, answer = vehicle.ask("start")
+    assert not accepted and "arm: 1.57 rad" in answer
+    assert vehicle.status.cause == "waiting for the start"
+
+
 def test_hold_resume_land_and_disarm_are_answered_and_executed(vehicle):
     take_off(vehicle)
     assert vehicle.ask("resume") == (False, "refused: not while flying")

@@ -39,13 +39,13 @@ NODES = (*CONTROLLERS, *OTHERS)
 BRIDGE = "mavlink_bridge"
 BRIDGE_LINKS = (
     *("clock", "local_port", "autopilot_port", "autopilot_host", "autopilot_system"),
-    *("autopilot", "gcs", "vehicle"),
+    *("autopilot", "gcs", "vehicle", "dry_run"),
 )
 # Parameters of a node that are not in a profile: they belong to one flight.
 FLIGHT_OWN = {
     **dict.fromkeys(CONTROLLERS, ("control_period", "vehicle")),
     "state_estimator": ("vehicle",),
-    "mission": ("control_period", "scenario", "vehicle"),
+    "mission": ("control_period", "scenario", "vehicle", "auto_start", "dry_run"),
 }
 
 

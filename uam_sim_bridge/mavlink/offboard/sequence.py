@@ -337,13 +337,13 @@ class OffboardSequence:
             request = self._ask(time, Phase.RELEASED, Request.OFFBOARD)
             self._regain_requests -= request is not None
             return request
-        if self._may_return(seen):
+        if self._may_return(time, seen):
             request = self._ask(time, Phase.RELEASED, Request.OFFBOARD)
             self._returns += request is not None
             return request
         return None
 
-    def _may_return(self, seen: Reported) -> bool:
+    def _may_return(self, time: float, seen: Reported) -> bool:
         """Whether return_after_lost_link may request OFFBOARD.
 
         The autopilot must report its failsafe, and OFFBOARD as the mode that was chosen last; the
@@ -354,6 +354,7 @@ class OffboardSequence:
         return (
             p.return_after_lost_link
             and self._lost_link
+            and self._stream_lost < time
             and seen.failsafe
             and seen.intended is Mode.OFFBOARD
             and self._returns < p.recovery_attempts

@@ -4,7 +4,8 @@
 |---|---|
 | valid | the setpoint type's part of body rates, attitude and thrust |
 | idle (not flying) | rates 0, level, thrust 0: the stream goes on, the vehicle stays landed |
-| any, while somebody else has control | rates 0, the vehicle's attitude, mean thrust so far |
+| valid or idle, while somebody else has control | rates 0, the vehicle's attitude, mean thrust \
+so far; without commands none |
 | not finite, malformed or none, on the ground | as idle |
 | the same in flight; the mission in failsafe; idle high above the start | level hold for \
 `hold_time` (`release_time` if no commands are expected), then no setpoint: the autopilot's \
@@ -137,9 +138,12 @@ class SetpointSource:
 
     def without(self, now: float, situation: Situation) -> Setpoint:
         """Return the setpoint at `now` [s] without valid commands."""
-        if situation.released:
-            return self._present(now, situation)
-        armed, landed, let_go, _ = situation
+        armed, landed, let_go, released = situation
+        if released and armed and self._high(armed):
+            self._say(
+                "no usable commands while released: no stream, OFFBOARD is not possible", "hold"
+            )
+            return None
         if self._handed_over(now):
             return self._at_present(now)
         if not armed or (landed and not self._high(armed)):
