@@ -195,8 +195,8 @@ RELEASED = FLYING._replace(released=True)
 
 
 @pytest.mark.parametrize("kind", ["rates", "attitude"])
-@pytest.mark.parametrize("commands", [True, False])
-def test_a_released_vehicle_gets_its_own_attitude_rates_zero_and_the_mean_thrust(kind, commands):
+@pytest.mark.parametrize("flying", [True, False])
+def test_a_released_vehicle_gets_its_own_attitude_rates_zero_and_the_mean_thrust(kind, flying):
     source, said = in_flight(setpoint=kind), []
     state = state_at(1.0)
     flown = source.commanded(1.004, state, True, WEIGHT, REST, ATTITUDE, FLYING).thrust
@@ -204,10 +204,8 @@ def test_a_released_vehicle_gets_its_own_attitude_rates_zero_and_the_mean_thrust
         now = 1.008 + TICK * k
         state[0, 3:6] = 0.3 * math.sin(now), 0.2 * math.cos(now), 0.5 + 0.1 * now
         source.note_state(now, state)
-        if commands:
-            sent = source.commanded(now, state, True, 2 * WEIGHT, REST + 1, ATTITUDE, RELEASED)
-        else:
-            sent = source.without(now, RELEASED)
+        torque = REST + 1 if flying else None
+        sent = source.commanded(now, state, flying, 2 * WEIGHT, torque, ATTITUDE, RELEASED)
         assert sent.thrust == pytest.approx(flown) and not source.holding
         np.testing.assert_array_equal(sent.rates, 0.0)
         if kind == "attitude":
@@ -216,11 +214,18 @@ def test_a_released_vehicle_gets_its_own_attitude_rates_zero_and_the_mean_thrust
     assert said == []
 
 
+def test_without_commands_a_released_vehicle_gets_no_stream():
+    """OFFBOARD would bring it back to a chain without controllers: the autopilot refuses it."""
+    source, state = in_flight(), state_at(1.0)
+    source.note_state(1.1, state)
+    assert source.without(1.1, RELEASED) is None
+
+
 def test_a_released_vehicle_without_a_known_attitude_gets_a_finite_setpoint():
     source, state = in_flight(setpoint="attitude"), state_at(1.0)
     state[0, 3] = math.nan
     source.note_state(1.1, state)
-    sent = source.without(1.1, RELEASED)
+    sent = source.commanded(1.1, state, False, WEIGHT, None, ATTITUDE, RELEASED)
     assert not sent.refused() and sent.thrust > 0.3
 
 
@@ -236,7 +241,7 @@ def test_until_the_mission_has_resumed_the_setpoint_stays(height):
     """Idle commands near the ground would otherwise be thrust 0 for a tick."""
     source, state = in_flight(), state_at(height)
     source.note_state(1.1, state)
-    before = source.without(1.1, RELEASED)
+    before = source.commanded(1.1, state, False, WEIGHT, None, ATTITUDE, RELEASED)
     for now in (1.104, 1.108, 1.29):
         source.note_state(now, state)
         sent = source.commanded(now, state, False, WEIGHT, None, ATTITUDE, FLYING)
