@@ -15,6 +15,7 @@ from uam_lab import (
     Observer,
 )
 from uam_lab.flight.ros import node_arguments
+from uam_sim_bridge.faults import FaultError
 
 
 class Notes(Observer):
@@ -102,3 +103,20 @@ def test_a_failure_is_an_exception_with_its_reason(short_scenario, tmp_path, mon
     assert failed.value.result is flight.result and not flight.result.completed
     with pytest.raises(FlightError, match="nothing was recorded"):
         _ = flight.result["time"]
+
+
+def test_a_fault_is_injected_in_flight(tmp_path):
+    with Flight(scenario="hover", out=tmp_path, without=["scene"]) as flight:
+        flight.wait_for("hover", 60.0)
+        for fault, why in (
+            ({"fault": "motor_loss"}, "plan a fault of the plant by option faults"),
+            ({"fault": "node_kill", "node": "scene"}, "does not start scene"),
+            ({"fault": "earthquake"}, "earthquake"),
+        ):
+            with pytest.raises(FaultError, match=why):
+                flight.inject(**fault)
+        flight.inject("node_kill", node="arm_controller")
+        result = flight.wait()
+    (fault,) = result.outcome.faults
+    assert fault["fault"] == "node_kill" and fault["begin_s"] > 3.0
+    assert any("arm_controller was killed by SIGKILL; restarted" in m for m in flight.messages)

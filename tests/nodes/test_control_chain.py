@@ -122,7 +122,7 @@ class Plant:
             ("state_estimator", topics.STATE.name): 5,
             ("mission", topics.REFERENCE.name): 4,
             ("mission", topics.MAGNET.name): 1,
-            ("position_controller", topics.POSITION_COMMAND.name): 3,
+            ("position_controller", topics.POSITION_COMMAND.name): 4,
             ("attitude_controller", topics.ATTITUDE_COMMAND.name): 1,
             ("arm_controller", topics.ARM_EFFORT.name): 1,
         }

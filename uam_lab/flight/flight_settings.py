@@ -184,12 +184,7 @@ def settings(
         raise SettingsError(f"payload mass {mass:g} kg is outside 0..{PAYLOAD_MAX:g} kg")
     injected = read_schedule(faults, loaded, seed)
     left_out = tuple(dict.fromkeys(without if view else (*without, COCKPIT)))
-    absent = (*left_out, "autopilot") if link is not None else left_out
-    check_engine(injected, plant)
-    feasibility.check(
-        injected, engine, absent, {DiscoveryLoss.NAME: without_discovery()}, described
-    )
-    return FlightSettings(
+    made = FlightSettings(
         scenario=loaded,
         profile=flown,
         vehicle=described,
@@ -219,6 +214,16 @@ def settings(
         namespace=namespace,
         domain=domain,
     )
+    check_feasible(made, injected)
+    return made
+
+
+def check_feasible(flight: FlightSettings, faults: Schedule) -> None:
+    """Raise FaultError for faults that this flight cannot have."""
+    absent = (*flight.without, "autopilot") if flight.link is not None else flight.without
+    refused = {DiscoveryLoss.NAME: without_discovery()}
+    check_engine(faults, flight.plant)
+    feasibility.check(faults, flight.engine, absent, refused, flight.vehicle)
 
 
 def check_clock(engine: str, clock: str) -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import inspect
+import math
 import shlex
 import sys
 import threading
@@ -26,6 +27,8 @@ from uam_lab.library.history import Condition, History
 from uam_lab.processes.interrupts import StopRequest
 from uam_lab.results.outcome import Outcome
 from uam_lab.results.result_folder import ResultFolder
+from uam_sim_bridge.faults import PROCESS, FaultError, Schedule
+from uam_sim_bridge.faults.schedule import timed
 
 if TYPE_CHECKING:
     from uam_lab.library.commands import Changes, Commands
@@ -288,6 +291,20 @@ class Flight:
         """Switch to another profile in flight, see `load_profile`; otherwise as set_parameters."""
         given = [str(configuration.named("profiles", str(one))) for one in names_or_files]
         return self._commands().switch(load_profile(*given, vehicle=self.settings.vehicle))
+
+    def inject(self, fault: str, duration: float = math.inf, **parameters: Any) -> None:
+        """Inject a fault of a process now, as inject("node_stall", 2.0, node="arm_controller").
+
+        duration: [s] of wall time. Faults of plant and link are planned before the flight: option
+        faults. Raises FaultError.
+        """
+        self._need_nodes("inject a fault")
+        lasting = {} if math.isinf(duration) else {"duration": duration}
+        one = timed({"fault": fault, "at": 0.0, **lasting, **parameters}, {}, "inject")
+        if one.fault.PLACE != PROCESS:
+            raise FaultError(f"{fault}: plan a fault of the {one.fault.PLACE} by option faults")
+        flight_settings.check_feasible(self.settings, Schedule((one,)))
+        self._stop.injected.put(one)
 
     def node(self, name: str) -> Guest:
         """Return a context manager with `.node`, a new rclpy node in the flight's graph."""

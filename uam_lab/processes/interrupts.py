@@ -2,16 +2,22 @@
 
 from __future__ import annotations
 
+import queue
 import signal
+from typing import Any
 
 SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 
 
 class StopRequest:
-    """Request to end a flight in order, or at once if it is repeated."""
+    """Request to end a flight in order, or at once if it is repeated; and faults to inject now.
+
+    injected: queue of faults, each a `TimedFault` whose begin does not count.
+    """
 
     def __init__(self) -> None:
         self.count = 0
+        self.injected: queue.SimpleQueue[Any] = queue.SimpleQueue()
 
     def repeat(self, *_) -> None:
         """Count one more request."""

@@ -155,12 +155,14 @@ def _process_faults(
 ) -> ProcessFaults:
     """Return the process faults; their start and end are printed and recorded."""
     schedule = settings.faults.only(PROCESS)
-    topic = FaultTopic(listener.node) if schedule else None
+    topics: list[FaultTopic] = []  # made with the first fault
 
     def announce(one: FaultState) -> None:
         stage = f"begins at {one.begin:.2f} s" if one.active else f"ends at {one.end:.2f} s"
         observer.message(f"fault {one.fault.NAME} of {one.fault.values['node']} {stage}")
-        topic.publish(listener.stamp, [one])
+        if not topics:
+            topics.append(FaultTopic(listener.node))
+        topics[0].publish(listener.stamp, [one])
 
     return ProcessFaults(children, schedule, announce)
 
@@ -185,6 +187,8 @@ def _watch(
             observer.message(f"{failure}; the flight continues without it")
         for status in listener.poll():
             observer.update(status)
+        while not stop.injected.empty():
+            faults.add(stop.injected.get(), listener.mission_time or 0.0)
         faults.update(listener.mission_time)
         time.sleep(POLL)
     observer.finish()

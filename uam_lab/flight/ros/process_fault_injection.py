@@ -12,12 +12,14 @@ import signal
 import threading
 import time
 from collections.abc import Callable
+from dataclasses import replace
 from functools import partial
 
 from uam_lab.processes.processes import Processes
 from uam_lab.processes.thread_stop import StoppedThreads
 from uam_sim_bridge.faults import Schedule
 from uam_sim_bridge.faults.process_faults import DiscoveryLoss, NodeKill, NodeSlow, ProcessFault
+from uam_sim_bridge.faults.schedule import TimedFault
 from uam_sim_bridge.faults.timeline import FaultState
 from uam_sim_bridge.ports import is_discovery_port
 
@@ -48,6 +50,11 @@ class ProcessFaults:
         self._all = [FaultState(one, number) for number, one in enumerate(schedule.faults)]
         self._ends: dict[int, float] = {}  # by the clock
         self._hindering: dict[int, _Hindrance | StoppedThreads] = {}
+
+    def add(self, planned: TimedFault, mission_time: float) -> None:
+        """Begin a fault at the next update; its own begin does not count."""
+        due = replace(planned, at=mission_time)
+        self._all.append(FaultState(due, len(self._all)))
 
     def update(self, mission_time: float | None) -> None:
         """Begin the due faults and end the expired ones; mission_time [s], None: unknown."""
