@@ -60,6 +60,7 @@ def _health(node: Node, recording: TopicRecorder, polls: LoopTime) -> Diagnostic
     values |= polls.report("poll") | ages(recording.inlets, recording.arrivals, namespace)
     values |= connections.of({}, recording.inlets, namespace)
     now = node.get_clock().now().nanoseconds
+    values["foreign publishers"] = "; ".join(recording.foreign)
     level = ERROR if recording.ended else WARN if lost else OK
     return diagnostic(now, label(node), level, summary, values)
 

@@ -13,8 +13,8 @@ from __future__ import annotations
 
 import time
 from bisect import bisect_right
-from collections.abc import Mapping
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
 from pathlib import Path
 
 from rclpy.node import Node
@@ -29,6 +29,8 @@ from uam_msgs_py.messages.layouts import stamp_of
 from uam_msgs_py.messages.serialized import type_name
 from uam_msgs_py.node.namespace import expanded
 from uam_msgs_py.node.polling import listen
+from uam_msgs_py.node.sole_publisher import PUBLISHERS, SolePublisher, complaints
+from uam_msgs_py.node.taking import Taker
 
 DEPTH = 2000  # queue length per topic: 8 s at control rate
 
@@ -45,12 +47,13 @@ class Track:
 
     topic: str
     subscription: Subscription
-    message_type: type
+    taker: Taker
+    take: Callable[[], bytes | None]
     stamped: bool
     channel: int
     one_publisher: bool
     arrived: float | None = None  # time.monotonic() of the newest message
-    last_sequence: int = 0
+    last_sequences: dict[bytes, int] = field(default_factory=dict)  # by publisher
     lost: int = 0
 
 
@@ -75,6 +78,7 @@ class TopicRecorder:
         for name, values in (metadata or {}).items():
             self._writer.add_metadata(name, values)
         self._bag: list[BagTopic] = []
+        self._guards: list[SolePublisher] = []
         self._tracks = [self._track(node, topic) for topic in chosen]
         # /clock is taken last in each poll: then every /clock published before any other message
         # of this poll is available
@@ -94,21 +98,28 @@ class TopicRecorder:
         self._bag.append(BagTopic(name, type_name(topic.type), topic.qos))
         channel = add_topic(self._writer, self._bag[-1])
         stamped = begins_with_stamp(topic.type) and topic.one_publisher
-        return Track(topic.name, subscription, topic.type, stamped, channel, topic.one_publisher)
+        if topic.name in PUBLISHERS:  # a foreign message would be a row of the table
+            guard = SolePublisher(node, subscription, topic.name, lambda: self._clock_sim != [])
+            self._guards.append(guard)
+            taker, take = guard.taker, guard.take
+        else:
+            taker = Taker(subscription)
+            take = taker.take
+        single = topic.one_publisher
+        return Track(topic.name, subscription, taker, take, stamped, channel, single)
 
     def poll(self) -> int:
         """Write all received messages; return their number."""
         batch, now = [], time.monotonic()
         for track in self._tracks:
-            take = track.subscription.handle.take_message
-            while (taken := take(track.message_type, True)) is not None:
-                data, info = taken
-                published = info["source_timestamp"]
+            taker, info = track.taker, track.taker.info
+            while (data := track.take()) is not None:
+                published = info.source_timestamp
                 if track.topic == topics.CLOCK.name:
                     self._clock_wall.append(published)
                     self._clock_sim.append(stamp_of(data))
-                sequence = info["publication_sequence_number"]
-                self._count_lost(track, sequence)
+                sequence = info.publication_sequence_number
+                self._count_lost(track, bytes(taker.gid), sequence)
                 batch.append((track, data, published, sequence))
                 track.arrived = now
         for track, data, published, sequence in batch:
@@ -135,10 +146,17 @@ class TopicRecorder:
         return self._clock_sim[before - 1] if before else 0
 
     @staticmethod
-    def _count_lost(track: Track, sequence: int) -> None:
-        if track.one_publisher and 0 < track.last_sequence < sequence - 1:
-            track.lost += sequence - 1 - track.last_sequence
-        track.last_sequence = sequence
+    def _count_lost(track: Track, publisher: bytes, sequence: int) -> None:
+        """Count the messages between two numbers of one publisher; publisher: its gid."""
+        last = track.last_sequences.get(publisher, 0)
+        if track.one_publisher and 0 < last < sequence - 1:
+            track.lost += sequence - 1 - last
+        track.last_sequences[publisher] = sequence
+
+    @property
+    def foreign(self) -> list[str]:
+        """One line per topic with foreign publishers."""
+        return complaints(self._guards)
 
     @property
     def inlets(self) -> dict[str, Subscription]:

@@ -26,6 +26,7 @@ from uam_msgs_py.node.health import LoopTime, ages
 from uam_msgs_py.node.joins import StampJoin
 from uam_msgs_py.node.namespace import expanded, label
 from uam_msgs_py.node.node_parameters import refuse_unknown
+from uam_msgs_py.node.sole_publisher import PUBLISHERS, SolePublisher, complaints
 from uam_msgs_py.node.tunable import TunableNode
 
 DIAGNOSTICS_PERIOD = 1.0  # s
@@ -50,6 +51,8 @@ class UamNode(TunableNode):
         self._logged: dict[str, float] = {}
         self._outlets: dict[str, Publisher] = {}
         self._inlets: dict[str, Subscription] = {}
+        self.sole_publishers: dict[Subscription, SolePublisher] = {}
+        self._foreign: list[str] = []  # complaints at the last report
         self.joins: list[StampJoin] = []
         self.triggers: tuple[str, ...] = ()  # topics that wake the node, () for all of them
         self.ticks = self.refused = 0
@@ -98,6 +101,8 @@ class UamNode(TunableNode):
         raw = stays_serialized(topic.type)
         made = self.create_subscription(topic.type, name, callback, qos or topic.reading, raw=raw)
         self._inlets[name] = made
+        if name in PUBLISHERS:
+            self.sole_publishers[made] = SolePublisher(self, made, name, lambda: self.ticks > 0)
         return made
 
     def take_waiting(self, subscription: Subscription) -> None:
@@ -107,7 +112,7 @@ class UamNode(TunableNode):
         topics in another order. A node that acts on the last message of a tick calls this first for
         its other inputs.
         """
-        for message in polling.messages(subscription):
+        for message in polling.messages(subscription, self.sole_publishers.get(subscription)):
             subscription.callback(message)
 
     def defer(self) -> None:
@@ -162,7 +167,12 @@ class UamNode(TunableNode):
         done = self.ticks - ticks
         dropped = sum(join.dropped for join in self.joins)
         self._at_last_report = (self.ticks, now)
-        if self._waiting and level < ERROR:
+        foreign, before = complaints(self.sole_publishers.values()), self._foreign
+        self._foreign = foreign
+        if new := [text for text in foreign if text not in before]:
+            level, summary = ERROR, "; ".join(new)
+            self.get_logger().error(summary)
+        elif self._waiting and level < ERROR:
             level, summary = STALE, "waiting for " + ", ".join(map(self._absolute, self._waiting))
         elif self.refused and level == OK:
             level, summary = WARN, f"{self.refused} messages refused"
@@ -176,6 +186,7 @@ class UamNode(TunableNode):
             **self._loop.report(),
             "incomplete ticks dropped": dropped,
             "messages refused": self.refused,
+            "foreign publishers": "; ".join(foreign),
         }
         namespace = self.get_namespace()
         common |= ages(self._counts, self._arrivals, namespace)

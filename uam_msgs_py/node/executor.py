@@ -62,7 +62,10 @@ class LeanExecutor:
         node, context = self._node, self._node.context.handle
         names = {node.resolve_topic_name(name) for name in self._trigger_names}
         by_trigger = sorted(node.subscriptions, key=lambda s: s.topic_name in names)
-        self._subscriptions = [(s.handle, s.msg_type, s.raw, s.callback) for s in by_trigger]
+        guards = getattr(node, "sole_publishers", {})
+        self._subscriptions = [
+            (guards.get(s, s.handle), s.msg_type, s.raw, s.callback) for s in by_trigger
+        ]
         self._triggers = [s.handle for s in by_trigger if s.topic_name in names]
         self._inputs = [s.handle for s in by_trigger]
         self._services = [s.handle for s in node.services]

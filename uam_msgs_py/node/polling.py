@@ -11,6 +11,7 @@ from rclpy.qos import QoSProfile
 from rclpy.subscription import Subscription
 
 from uam_msgs_py.messages.topics import Topic
+from uam_msgs_py.node.sole_publisher import SolePublisher
 
 
 class Polled(CallbackGroup):
@@ -42,8 +43,8 @@ def listen(
     )
 
 
-def messages(subscription: Subscription) -> Iterator[Any]:
-    """Take and yield the received messages, oldest first."""
-    kind, raw = subscription.msg_type, subscription.raw
-    while (taken := subscription.handle.take_message(kind, raw)) is not None:
+def messages(subscription: Subscription, guard: SolePublisher | None = None) -> Iterator[Any]:
+    """Take and yield the received messages, oldest first; guard: of the subscription, if any."""
+    kind, raw, take = subscription.msg_type, subscription.raw, guard or subscription.handle
+    while (taken := take.take_message(kind, raw)) is not None:
         yield taken[0]

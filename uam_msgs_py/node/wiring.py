@@ -11,6 +11,7 @@ from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 from rclpy.node import Node
+from rclpy.qos import QoSCompatibility, qos_check_compatible
 from rclpy.topic_endpoint_info import TopicEndpointInfo
 
 from uam_msgs_py.messages import topics
@@ -115,6 +116,19 @@ def missing(node: Node, recorded: bool, wires: Sequence[Wire] = WIRES) -> list[s
     return found
 
 
+def publishers(node: Node) -> dict[str, int]:
+    """Return the number of publishers of each topic that its subscriptions can connect to.
+
+    A foreign publisher counts, too: its connection must not be taken for that of the own one.
+    """
+    found = {}
+    for wire in WIRES:
+        ends = node.get_publishers_info_by_topic(node.resolve_topic_name(wire.topic.name))
+        fit = [qos_check_compatible(end.qos_profile, wire.topic.reading)[0] for end in ends]
+        found[wire.topic.name] = sum(one != QoSCompatibility.ERROR for one in fit)
+    return found
+
+
 def unconnected(
     reported: Connections,
     plant: Mapping[str, int],
@@ -122,11 +136,13 @@ def unconnected(
     wires: Sequence[Wire] = WIRES,
     foreign: Collection[str] = (),
     namespace: str = "/",
+    writers: Mapping[str, int] | None = None,
 ) -> Iterator[str]:
     """Yield one text per end of `wires` that lacks a connection.
 
     reported: connections that the other nodes report; plant: those of the plant itself
-    (`connections.of`); foreign: nodes without such reports; namespace: of the plant.
+    (`connections.of`); foreign: nodes without such reports; namespace: of the plant;
+    writers: see `publishers`, None for one of each.
     """
 
     def count(node: str, kind: str, topic: str) -> int:
@@ -140,5 +156,5 @@ def unconnected(
         if reports and count(wire.publisher, READERS, name) < len(required):
             yield f"{wire.publisher} to connect to the subscribers of {shown}"
         for one in required:
-            if one not in foreign and count(one, WRITERS, name) < 1:
+            if one not in foreign and count(one, WRITERS, name) < (writers or {}).get(name, 1):
                 yield f"{one} to connect to the publisher of {shown}"

@@ -139,7 +139,15 @@ class Simulator:
             namespace = self.node.get_namespace()
             plant = of(self.sensors.outlets | self.truth.outlets, self.answers.inlets, namespace)
             waiting = list(
-                wiring.unconnected(self.connections, plant, recorded, wires, foreign, namespace)
+                wiring.unconnected(
+                    self.connections,
+                    plant,
+                    recorded,
+                    wires,
+                    foreign,
+                    namespace,
+                    wiring.publishers(self.node),
+                )
             )
         if not self.hil.accept(0.0):
             waiting.append(f"autopilot to connect to TCP port {self.options.hil_port}")

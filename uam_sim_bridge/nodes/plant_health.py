@@ -7,10 +7,11 @@ import time
 from rclpy.node import Node
 
 from uam_msgs_py.messages import topics
-from uam_msgs_py.messages.status import OK, STALE, WARN, diagnostic
+from uam_msgs_py.messages.status import ERROR, OK, STALE, WARN, diagnostic
 from uam_msgs_py.node.base_node import DIAGNOSTICS_PERIOD
 from uam_msgs_py.node.health import LoopTime, ages
 from uam_msgs_py.node.namespace import label
+from uam_msgs_py.node.sole_publisher import complaints
 from uam_sim_bridge.nodes.plant_options import Statistics
 from uam_sim_bridge.nodes.plant_topics import Answers, nanoseconds
 
@@ -29,6 +30,7 @@ class PlantHealth:
         self._answers, self._statistics = answers, statistics
         self._loop = LoopTime()
         self._ticks = 0
+        self._log, self._foreign = node.get_logger(), []
         self._missed = 0
         self._last = (time.monotonic(), 0.0)  # wall and simulated time of the last report [s]
 
@@ -57,11 +59,17 @@ class PlantHealth:
         wall, before = self._last
         now = time.monotonic()
         self._last = now, simulated
+        foreign = complaints(self._answers.guards.values())
+        if new := [text for text in foreign if text not in self._foreign]:
+            level, summary = ERROR, "; ".join(new)
+            self._log.error(summary)
+        self._foreign = foreign
         values = {
             "ticks": self._ticks,
             "real time factor": f"{(simulated - before) / (now - wall):.2f}",
             "ticks missed": self._statistics.missed_ticks,
             "late motor commands": self._statistics.late_motor_commands,
+            "foreign publishers": "; ".join(foreign),
         }
         values |= self._loop.report() | ages(
             self._answers.inlets, self._answers.arrivals, self._namespace

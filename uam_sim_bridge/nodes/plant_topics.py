@@ -27,6 +27,7 @@ from uam_msgs_py.messages.serialized import Template
 from uam_msgs_py.messages.status import MissionStatus
 from uam_msgs_py.messages.trajectories import TrajectoryWriter
 from uam_msgs_py.node.namespace import frame
+from uam_msgs_py.node.sole_publisher import PUBLISHERS, SolePublisher
 from uam_sim_bridge.plant import Samples, Truth
 
 
@@ -152,6 +153,12 @@ class Answers:
             )
         }
 
+        self.guards = node.sole_publishers = {
+            inlet: SolePublisher(node, inlet, name, lambda: self._setpoint_stamp >= 0)
+            for name, inlet in self.inlets.items()
+            if name in PUBLISHERS
+        }
+
     def begin(self) -> None:
         """Begin a tick: clear the set of received answers."""
         self._arrived.clear()
@@ -164,7 +171,7 @@ class Answers:
     def take(self) -> None:
         """Take every message in the queues, without waiting."""
         for subscription in self.inlets.values():
-            take = subscription.handle.take_message
+            take = self.guards.get(subscription, subscription.handle).take_message
             while (taken := take(subscription.msg_type, subscription.raw)) is not None:
                 subscription.callback(*taken)
 

@@ -27,6 +27,7 @@ from uam_lab.processes.processes import NodeFailed, Processes
 from uam_lab.results.outcome import Outcome
 from uam_lab.results.result_folder import ResultFolder
 from uam_msgs_py.node import wiring
+from uam_msgs_py.node.sole_publisher import NAMED
 from uam_sim_bridge.faults import PROCESS
 from uam_sim_bridge.faults.timeline import FaultState
 from uam_sim_bridge.nodes.fault_topic import FaultTopic
@@ -134,7 +135,7 @@ def _start(
     children: Processes, settings: FlightSettings, folder: ResultFolder, ports: Ports
 ) -> None:
     # the nodes' output already contains their log messages; separate files would repeat them
-    arguments = ["--ros-args", "--disable-external-lib-logs"]
+    arguments = [NAMED, "--ros-args", "--disable-external-lib-logs"]
     arguments += ["--params-file", str(folder.parameters), "-r", f"__ns:={settings.namespace}"]
     for name, module in node_arguments.modules(settings).items():
         children.start(
