@@ -22,7 +22,7 @@ from uam_msgs_py.node.connections import WRITERS, Connections
 
 MODULE = "uam_lab.nodes.recorder"
 TICK = 4_000_000
-SETPOINT = topics.SETPOINT.name
+SETPOINT = "/uam/setpoint"
 
 
 @pytest.fixture
@@ -75,7 +75,7 @@ def test_every_message_is_there_at_its_simulated_time(recorder, probe):
         time.sleep(0.001)
     assert running.interrupt() == 0
     found = decoded(file)
-    sent = [(time, content) for topic, time, content in found if topic == topics.SETPOINT.name]
+    sent = [(time, content) for topic, time, content in found if topic == SETPOINT]
     assert [time for time, _ in sent] == [k * TICK - 1000 for k in range(1, 301)]
     assert [content.twist.angular.z for _, content in sent] == [0.001 * k for k in range(1, 301)]
     # a message without a stamp gets the time of /clock at its publication
