@@ -1,5 +1,6 @@
 """What the processes of a flight inherit, and what discovery loss needs of it."""
 
+import subprocess
 from pathlib import Path
 
 import pytest
@@ -39,3 +40,19 @@ def test_threads_of_another_middleware_are_not_known(monkeypatch):
     monkeypatch.delenv("RMW_IMPLEMENTATION")
     monkeypatch.setattr(node_environment.thread_stop, "refusal", lambda: "")
     assert node_environment.without_discovery() == ""
+
+
+def test_the_line_for_ros2_works_when_pasted(monkeypatch, tmp_path):
+    """A path with a space and a quote stays one value."""
+    odd = str(tmp_path / "it's a prefix")
+    monkeypatch.setenv("AMENT_PREFIX_PATH", odd)
+    line = node_environment.export_line(17)
+    assert "\n" not in line
+    shell = ["sh", "-c", f"{line}; env -0"]
+    text = subprocess.run(shell, capture_output=True, text=True, check=True).stdout
+    found = dict(one.split("=", 1) for one in text.split("\0") if one)
+    assert found["ROS_DOMAIN_ID"] == "17"
+    assert found["RMW_IMPLEMENTATION"] == node_environment.middleware()
+    assert found["AMENT_PREFIX_PATH"].split(":")[0] == odd
+    for name, value in node_environment.transport_environment().items():
+        assert found[name] == value

@@ -19,6 +19,7 @@ from uam_msgs_py.messages.status import OK, WARN
 from uam_msgs_py.messages.trajectories import TrajectoryWriter
 from uam_msgs_py.node.base_node import UamNode, run
 from uam_msgs_py.node.joins import Backlog
+from uam_msgs_py.node.namespace import frame
 from uam_msgs_py.node.node_parameters import NodeParameters
 
 NAME = "state_estimator"
@@ -50,6 +51,7 @@ class StateEstimatorNode(UamNode):
         self._state = self.publisher(topics.STATE)
         self._writer = TrajectoryWriter(vehicle.coordinates)
         self._odometry = self.publisher(topics.ODOMETRY)
+        self._body = frame(self, topics.BODY)
         rate = NodeParameters(self, OdometryParameters, read_only=True).current.odometry_rate
         self._odometry_period = round(SECOND / rate)  # [ns]
         self._odometry_at = 0  # [ns] stamp of the last odometry
@@ -94,7 +96,7 @@ class StateEstimatorNode(UamNode):
             self._state.publish(data)
             self.done_tick(stamp, begun)
         if self._to_publish is not None:  # after the state, for which the controllers wait
-            self._odometry.publish(odometry_message(*self._to_publish))
+            self._odometry.publish(odometry_message(*self._to_publish, self._body))
             self._to_publish = None
 
     def diagnose(self) -> tuple[bytes, str, dict[str, object]]:

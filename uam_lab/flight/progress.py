@@ -35,7 +35,7 @@ class Progress(Observer):
 
     def message(self, text: str) -> None:
         """Print one permanent line."""
-        self.console.print(text, highlight=False, markup=False)
+        self.console.print(text, highlight=False, markup=False, soft_wrap=True)
 
     def update(self, status: FlightStatus) -> None:
         """Show the newest status."""

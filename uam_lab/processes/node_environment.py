@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import os
+import shlex
+import sys
 from pathlib import Path
 
 from uam_control.settings import configuration
@@ -27,6 +29,23 @@ def ros_environment(domain: int, log_folder: Path) -> dict[str, str]:
         "ROS_LOG_DIR": str(log_folder),
         "RCUTILS_COLORIZED_OUTPUT": "0",
     }
+
+
+def export_line(domain: int) -> str:
+    """Return a line for the user's shell: with it `ros2` finds the nodes of a flight.
+
+    It works in any shell of POSIX form; the values are quoted.
+    """
+    prefixes = [one for one in os.environ.get("AMENT_PREFIX_PATH", "").split(os.pathsep) if one]
+    if sys.prefix not in prefixes and (Path(sys.prefix) / "share" / "ament_index").is_dir():
+        prefixes.append(sys.prefix)
+    values = {
+        "ROS_DOMAIN_ID": str(domain),
+        "RMW_IMPLEMENTATION": middleware(),
+        **transport_environment(),
+        "AMENT_PREFIX_PATH": os.pathsep.join(prefixes),
+    }
+    return "export " + " ".join(f"{name}={shlex.quote(value)}" for name, value in values.items())
 
 
 def transport_environment() -> dict[str, str]:

@@ -12,9 +12,12 @@ from uam_msgs_py.messages.ros_time import set_stamp
 from uam_msgs_py.messages.topics import BODY, WORLD
 
 
-def odometry_message(stamp: int, state: np.ndarray) -> Odometry:
-    """Return the state (3, 6 + n) at `stamp` [ns]: pose in the world, twist in base_link (FLU)."""
-    message = Odometry(child_frame_id=BODY)
+def odometry_message(stamp: int, state: np.ndarray, frame: str = BODY) -> Odometry:
+    """Return the state (3, 6 + n) at `stamp` [ns]: pose in the world, twist in the body (FLU).
+
+    frame: name of the body's frame.
+    """
+    message = Odometry(child_frame_id=frame)
     message.header.frame_id = WORLD
     set_stamp(message.header.stamp, stamp)
     _fill(message.pose.pose, state[CHI])

@@ -21,7 +21,7 @@ from uam_lab.flight.ros.restarts import ChangedParameters, RestartTopic
 from uam_lab.flight.ros.status_listener import StatusListener
 from uam_lab.processes import child
 from uam_lab.processes.interrupts import StopRequest
-from uam_lab.processes.node_environment import environment
+from uam_lab.processes.node_environment import environment, export_line
 from uam_lab.processes.process_table import await_orphans
 from uam_lab.processes.processes import NodeFailed, Processes
 from uam_lab.results.outcome import Outcome
@@ -108,6 +108,7 @@ def _supervise(
                 f"{len(children.names)} processes in ROS domain {ports.domain}, "
                 f"autopilot on TCP {ports.simulator_tcp}, UDP {ports.autopilot_udp}"
             )
+            observer.message(f"for ros2 in another shell:\n{export_line(ports.domain)}")
             for name in settings.foreign:
                 observer.message(f"waiting for {name}: start it with ROS_DOMAIN_ID={ports.domain}")
             if not settings.auto_start and not settings.dry_run:
