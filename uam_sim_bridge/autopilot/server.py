@@ -132,6 +132,11 @@ def parser() -> argparse.ArgumentParser:
         help="use this line instead of TCP and UDP, as in HITL",
     )
     p.add_argument(
+        "--once",
+        action="store_true",
+        help="end with the simulator (default: wait for the next one)",
+    )
+    p.add_argument(
         "--signing-key",
         default="",
         metavar="KEY",
@@ -140,8 +145,17 @@ def parser() -> argparse.ArgumentParser:
     return p
 
 
+def _autopilot(options: argparse.Namespace) -> Autopilot:
+    """Return the autopilot of the vehicle, as after power-on."""
+    made = Autopilot(Parameters.of(load_description(options.vehicle), options.params))
+    # as PX4 SITL; the highest instances exceed MAVLink's one byte
+    made.set_parameter("MAV_SYS_ID", min(options.instance + 1, 250))
+    return made
+
+
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Run until the simulator closes the link: 0; wrong use, port taken, no simulator: 2."""
+    """Run until SIGTERM, with --once until the simulator closes the link: 0; wrong use, port
+    taken, no simulator: 2."""
     options = parser().parse_args(arguments)
     fill_ports(options)
     signal.signal(signal.SIGTERM, lambda *_: sys.exit(0))
@@ -149,9 +163,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     try:
         if options.serial and options.signing_key:
             raise ValueError("--signing-key is for UDP: omit it with --serial, which is not signed")
-        autopilot = Autopilot(Parameters.of(load_description(options.vehicle), options.params))
-        # as PX4 SITL; the highest instances exceed MAVLink's one byte
-        autopilot.set_parameter("MAV_SYS_ID", min(options.instance + 1, 250))
+        autopilot = _autopilot(options)
         codec = Codec(
             int(autopilot.parameters["MAV_SYS_ID"]),
             int(autopilot.parameters["MAV_COMP_ID"]),
@@ -166,14 +178,19 @@ def main(arguments: Sequence[str] | None = None) -> int:
             return 0
         udp = UdpPort(options.mavlink_port, options.companion_port, codec)
         warm_up()
-        link = connect("autopilot", options.sim_host, options.sim_port, options.wait)
-        print(
-            f"autopilot: connected to the simulator at {options.sim_host}:{options.sim_port}",
-            flush=True,
-        )
-        Server(autopilot, link, udp).run()
-        print("autopilot: the simulator closed the link", flush=True)
-        return 0
+        wait = options.wait
+        while True:
+            link = connect("autopilot", options.sim_host, options.sim_port, wait)
+            print(
+                f"autopilot: connected to the simulator at {options.sim_host}:{options.sim_port}",
+                flush=True,
+            )
+            Server(autopilot, link, udp).run()
+            print("autopilot: the simulator closed the link", flush=True)
+            if options.once:
+                return 0
+            link.close()
+            autopilot, wait = _autopilot(options), math.inf  # starts anew with a new simulator
     except (ParameterError, ConfigurationError, ValueError) as error:
         print(f"autopilot: {error}", file=sys.stderr, flush=True)
         return 2

@@ -68,6 +68,11 @@ class FaultyPlant(Plant):
         )
         self._noise = [np.random.default_rng(stream) for stream in streams]
 
+    def count_from(self, tick: int) -> None:
+        """See `Plant.count_from`."""
+        super().count_from(tick)
+        self.inner.count_from(tick)
+
     def mission_at(self, stamp: float, time: float) -> None:
         """See `Timeline.mission_at`."""
         self.timeline.mission_at(stamp, time)

@@ -25,15 +25,18 @@ import json
 import math
 import sys
 import time
+from functools import partial
 from pathlib import Path
 
 import numpy as np
 import rclpy
 from rclpy.signals import SignalHandlerOptions
+from std_srvs.srv import Trigger
 
 from uam_control.coordinates import POSITION
 from uam_control.mission.time_limit import DISARMED, Settled
 from uam_control.settings.parameter_set import ParameterError
+from uam_control.stamps import SECOND
 from uam_msgs_py.messages import topics
 from uam_msgs_py.node import wiring
 from uam_msgs_py.node.base_node import StopSignal, refuse
@@ -59,6 +62,7 @@ CATCH_UP = 1.25  # [1] largest real-time factor after a stall of the machine
 FOREIGN_WAIT = 1.0  # [s] for discovery by foreign nodes, which do not report their connections
 LAST_WAIT = 3.0  # [s] longest wait for the recorder after the last tick
 RECORDER_LAG = 2.0  # [s] the recorder reports its progress each second; its queue is 4 times longer
+AFTER_OTHERS = 1.0  # [s] the status of a mission is at most half a second older than its last tick
 SERVICE_TICKS = 25  # [ticks] between two calls of the parameter services in real time
 
 
@@ -81,9 +85,13 @@ class Simulator:
         described = vehicle.description
         start = (vehicle, options.payload_mass, options.seed, tuple(options.arm_start))
         faults = Schedule.from_text(options.faults).only(PLANT)
-        self.plant = make_plant(*start, faults, options.plant)
+        self._make = partial(make_plant, *start, faults, options.plant)
+        self.plant = self._make()
         self._faulty = self.plant if isinstance(self.plant, FaultyPlant) else None
         self._fault_topic = FaultTopic(node) if faults else None
+        self._first_tick = 0
+        self._reset_due = False
+        node.create_service(Trigger, "~/reset", self._on_reset)
         _warm_up(make_plant(*start, Schedule(), options.plant))
         self.sensors, self.truth = Sensors(node, described), TruthTopics(node, described)
         self.answers = Answers(node, described)
@@ -130,6 +138,29 @@ class Simulator:
         while time.monotonic() < settled and not self._stop.raised:
             self.executor.spin_once(0.05)
         self._log.info("all nodes are connected")
+        if self.answers.mission_stamp > 0:  # the other nodes are older: stamps must not go back
+            after = self.answers.mission_stamp / SECOND + AFTER_OTHERS
+            self._first_tick = math.ceil(after / self.plant.period)
+            self.plant.count_from(self._first_tick)
+            self._log.info(f"the nodes are from an earlier simulation: begins at {after:.1f} s")
+
+    def _on_reset(self, _: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
+        """Put the simulated world back to its start; time goes on."""
+        response.success = not self.hil.armed
+        if response.success:
+            self._reset_due = True
+            response.message = "vehicle and payload at their start; time goes on"
+        else:
+            response.message = "refused: the vehicle is armed"
+        self._log.info(f"command reset: {response.message}")
+        return response
+
+    def _reset(self) -> None:
+        """Make the plant anew at the present tick."""
+        tick, self._reset_due = self.plant.tick, False
+        self.plant = self._make()
+        self.plant.count_from(tick)
+        self._faulty = self.plant if isinstance(self.plant, FaultyPlant) else None
 
     def _waiting_for(self) -> list[str]:
         recorded, foreign = self.options.recorded, self._foreign
@@ -162,6 +193,8 @@ class Simulator:
         begin, settled = time.monotonic(), Settled()
         while not self._stop.raised:
             begun = time.perf_counter()
+            if self._reset_due:
+                self._reset()
             samples, truth = self._begin_tick()
             if realtime:
                 self._send_hil(samples, truth)
@@ -177,6 +210,11 @@ class Simulator:
                 self._faulty.mission_at(answers.mission_stamp * 1e-9, answers.mission.time)
             self.plant.step(self.hil.motors, self.answers.effort, self.answers.magnet)
             self.health.done_tick(begun, self.plant.time)
+            if not self.options.end_with_mission:
+                if self.plant.time >= limit:
+                    self.statistics.ended_by = f"time limit of {limit:g} s"
+                    break
+                continue
             if self.answers.mission.done and not self.statistics.ended_by:
                 self.statistics.ended_by = "mission"
                 end = self.plant.time + self.options.linger
@@ -198,7 +236,7 @@ class Simulator:
 
         After a stall ticks run faster, but not in a burst: the other nodes could not follow.
         """
-        on_time = begin + (self.plant.tick + 1) * self.plant.period
+        on_time = begin + (self.plant.tick - self._first_tick + 1) * self.plant.period
         return max(on_time, self._begun + self.plant.period / CATCH_UP)
 
     def _begin_tick(self) -> tuple[Samples, Truth]:
@@ -228,6 +266,9 @@ class Simulator:
     def _receive_hil(self, timeout: float | None = None) -> None:
         """Receive the autopilot's motor commands; timeout [s], None: see HilServer.receive."""
         self.hil.receive(timeout)
+        if not self.hil.connected and not self.options.end_with_mission:
+            self._await_autopilot()
+            return
         if not self.hil.connected:
             raise PlantStopped(f"the autopilot closed the link at t = {self.plant.time:.3f} s")
         required = self.options.autopilot_always_answers and timeout is None
@@ -236,6 +277,12 @@ class Simulator:
                 f"no motor commands for t = {self.plant.time:.3f} s within "
                 f"{self.options.answer_timeout:g} s; the autopilot is silent"
             )
+
+    def _await_autopilot(self) -> None:
+        """Wait for the autopilot to connect again; time stands still, services are served."""
+        self._log.warning(f"waiting for the autopilot on TCP port {self.options.hil_port}")
+        while not self._stop.raised and not self.hil.accept(0.0):
+            self.executor.spin_once(0.05)
 
     def _wait_for_answers(self) -> None:
         if not self._recorder_has_caught_up(RECORDER_LAG, self.options.answer_timeout):
@@ -254,7 +301,10 @@ class Simulator:
             if self._stop.raised or (self._restart.going_on and left <= 0.0):
                 break
             if patience.over:
-                raise PlantStopped(self._no_answer(missing))
+                if self.options.end_with_mission:
+                    raise PlantStopped(self._no_answer(missing))
+                self._log.warning(f"{self._no_answer(missing)}; time goes on without it")
+                self._restart.begin(math.inf)
         self._restart.tick(complete=not missing)
 
     def _recorder_has_caught_up(self, lag: float, patience: float) -> bool:

@@ -59,6 +59,9 @@ class PlantParameters(ParameterSet):
     linger: float = number(
         0.0, "time after the mission, in which the autopilot can land and disarm", "s", 0.0, 600.0
     )
+    end_with_mission: bool = switch(
+        False, "end the node with the mission or a lost node; false: wait for the next flight"
+    )
     recorded: bool = switch(False, "wait for the recorder as well")
     foreign: str = text(
         "", "nodes that are not the stack's own", "names with commas between them; empty: none"

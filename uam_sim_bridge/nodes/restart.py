@@ -24,8 +24,13 @@ class Restart:
     def look(self, announced: int) -> None:
         """Register the number of restarts announced so far."""
         if announced > self._seen:
-            self._seen, self._complete = announced, 0
-            self._patience = Patience(self._longest)
+            self._seen = announced
+            self.begin(self._longest)
+
+    def begin(self, longest: float) -> None:
+        """Begin a restart now, for at most `longest` [s of wall time]."""
+        self._complete = 0
+        self._patience = Patience(longest)
 
     def tick(self, complete: bool) -> None:
         """Register a tick; complete: all answers were in time."""

@@ -98,6 +98,10 @@ class Plant(ABC):
         """Simulation time [s]."""
         return self.tick * self.period
 
+    def count_from(self, tick: int) -> None:
+        """Begin to count at `tick`: stamps then follow those of an earlier simulation."""
+        self.tick = tick
+
     @abstractmethod
     def sense(self) -> Samples:
         """Sample the sensors and return the samples that arrive now; call it once per tick."""

@@ -84,6 +84,8 @@ class Mocap:
         """Return whether mocap takes a pose at `time` [s]; call it once per tick."""
         if time + 1e-9 < self._next:
             return False
+        if time > self._next + self._period:  # the first tick of a plant that begins later
+            self._next = time
         self._next += self._period
         return True
 

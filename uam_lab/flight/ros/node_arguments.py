@@ -68,6 +68,7 @@ def parameters(
         "autopilot_always_answers": settings.autopilot == BUILTIN,
         "linger": 0.0 if settings.autopilot == BUILTIN else PX4_LINGER,
         "recorded": True,
+        "end_with_mission": True,
         "start_timeout": OWN_START_TIMEOUT if settings.foreign else START_TIMEOUT,
         "foreign": ",".join(settings.foreign),
         "faults": settings.faults.only(PLANT).to_text(),
@@ -174,4 +175,4 @@ def autopilot(
         return SITL, [*instance, *own, *vehicle]
     if users_autopilot(settings):
         return "", []
-    return STAND_IN, [*instance, *patience, *vehicle]
+    return STAND_IN, [*instance, *patience, *vehicle, "--once"]

@@ -81,7 +81,7 @@ def connect(name: str, host: str, port: int, patience: float) -> socket.socket:
     printed = False
     while True:
         try:
-            link = socket.create_connection((host, port), timeout=max(0.1, patience))
+            link = socket.create_connection((host, port), timeout=min(max(0.1, patience), 60.0))
             break
         except socket.gaierror as error:
             raise PortError(f"simulator host {host}: {error.strerror}") from None
