@@ -4,6 +4,7 @@ from __future__ import annotations
 
 SECOND = 1_000_000_000  # [ns]
 _MICROSECOND = 1_000  # [ns]
+NEW_TIME = SECOND  # [ns] a stamp that goes back by more belongs to a new simulation, not to jitter
 
 
 def nanoseconds(time: float) -> int:

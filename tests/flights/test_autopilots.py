@@ -12,7 +12,7 @@ import pytest
 
 from uam_sim_bridge.ports import AUTOPILOT_UDP, Reservation
 
-AUTOPILOT = [sys.executable, "-m", "uam_sim_bridge.autopilot.server"]
+AUTOPILOT = [sys.executable, "-m", "uam_sim_bridge.autopilot.server", "--once"]
 
 
 class SerialLine:

@@ -172,3 +172,23 @@ def test_nodes_by_hand_fly_twice_and_after_a_restart_of_the_simulator(by_hand):
     by_hand.until(lambda: len(ticks) > 250, "ticks of the new simulator")
     third = by_hand.fly()
     np.testing.assert_allclose(third, first, atol=0.03)
+
+
+def test_every_node_may_be_stopped_and_started(by_hand):
+    first = by_hand.fly()
+    for name in (wiring.ESTIMATOR, wiring.ARM, wiring.BRIDGE):
+        by_hand.stop(name)
+        by_hand.until(lambda: "time goes on without it" in by_hand.said(wiring.PLANT), "a report")
+        by_hand.start(name)
+    # the simulator is lost in flight: the next flight begins from the ground
+    by_hand.begin()
+    by_hand.until(lambda: by_hand.operator.mission().state == "flying", "a flight")
+    by_hand.stop(wiring.PLANT)
+    by_hand.start(wiring.PLANT)
+    np.testing.assert_allclose(by_hand.fly(), first, atol=0.03)
+    # neither mission nor simulator is left: the estimator is older than both
+    by_hand.stop(wiring.MISSION)
+    by_hand.stop(wiring.PLANT)
+    by_hand.start(wiring.MISSION)
+    by_hand.start(wiring.PLANT)
+    np.testing.assert_allclose(by_hand.fly(), first, atol=0.03)

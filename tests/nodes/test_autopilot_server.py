@@ -31,7 +31,7 @@ HOVER = MASS * 9.81
 
 def start(*arguments):
     return subprocess.Popen(
-        [sys.executable, "-m", "uam_sim_bridge.autopilot.server", *map(str, arguments)],
+        [sys.executable, "-m", "uam_sim_bridge.autopilot.server", "--once", *map(str, arguments)],
         stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,
         text=True,

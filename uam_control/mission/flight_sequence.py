@@ -119,6 +119,11 @@ class Mission:
         self._supervisor.start()
         return True, "arming"
 
+    def begin_anew(self) -> None:
+        """Forget the flight and wait on the ground: for stamps of a new simulation."""
+        self._begin(self._parameters)
+        self._seen, self._stamp = None, 0.0
+
     def preflight(self) -> tuple[PreflightCheck, ...]:
         """Return the pre-arm report of the newest step; () before the first one."""
         if self._seen is None:

@@ -129,7 +129,7 @@ class MissionNode(UamNode):
             self._arming.publish(Bool(data=bool(output.arm)))
         magnet, regains = bool(output.magnet), output.regains
         now = (output.phase, output.done, output.state, output.cause, magnet, regains)
-        if now == self._published and stamp < self._due:
+        if now == self._published and 0 < self._due - stamp <= STATUS_PERIOD:
             return
         if now[:4] != self._published[:4]:
             self._log()

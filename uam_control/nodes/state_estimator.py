@@ -11,7 +11,7 @@ from uam_control.nodes.described import described_vehicle
 from uam_control.profiles.profile import default_profile
 from uam_control.settings.parameter_set import ParameterSet, number
 from uam_control.stages.estimator_stage import EstimatorStage
-from uam_control.stamps import SECOND
+from uam_control.stamps import NEW_TIME, SECOND
 from uam_msgs_py.messages import topics
 from uam_msgs_py.messages.convert import read_imu, read_joints, read_pose
 from uam_msgs_py.messages.navigation import odometry_message
@@ -72,6 +72,8 @@ class StateEstimatorNode(UamNode):
     def _on_imu(self, data: bytes) -> None:
         begun = time.perf_counter()
         stamp, gyro, force = read_imu(data)
+        if stamp < self._stage.stamp - NEW_TIME:
+            self._begin_anew(stamp)
         if stamp <= self._stage.stamp:
             self.warn(
                 f"IMU stamp {stamp} ns does not follow {self._stage.stamp} ns; ignored", "imu"
@@ -90,6 +92,15 @@ class StateEstimatorNode(UamNode):
                 self._to_publish = stamp, state.copy()
         if not self.deferred:
             self.settle()
+
+    def _begin_anew(self, stamp: int) -> None:
+        """Forget all samples: the stamps, now `stamp` [ns], are those of a new simulation."""
+        self.get_logger().warning(
+            f"stamps went back from {self._stage.stamp / SECOND:.3f} s to "
+            f"{stamp / SECOND:.3f} s: the estimate begins anew"
+        )
+        self._stage = EstimatorStage(self.parameter_set.current, len(self._names))
+        self.parameter_set.apply = self._stage.estimator.set_parameters
 
     def settle(self) -> None:
         for stamp, data, begun in self._updates.take():

@@ -10,7 +10,7 @@ import numpy as np
 from uam_control.mission import Mission
 from uam_control.stages.supervisor_inputs import SupervisorInputs
 from uam_control.stages.timing import Timing
-from uam_control.stamps import SECOND
+from uam_control.stamps import NEW_TIME, SECOND
 from uam_control.supervision import Authority, Readings, State
 
 REPORT_DELAY = 200_000_000  # [ns] after which the status of a tick has arrived at every stage
@@ -58,6 +58,8 @@ class MissionStage:
 
         Returns whether the reference of this tick was computed now: at the first tick, after a gap.
         """
+        if stamp < self.ahead - NEW_TIME:
+            self._begin_anew()
         while self._reports and self._reports[0][0] < stamp:
             reported, connected, since, round_trip, self._authority = self._reports.popleft()
             self._armed_since = None if since is None else since / SECOND
@@ -68,6 +70,14 @@ class MissionStage:
             return False
         self.advance(stamp - self.period, state)
         return True
+
+    def _begin_anew(self) -> None:
+        """Forget the flight: stamps went back, the simulation is a new one."""
+        self.mission.begin_anew()
+        self.inputs.begin_anew()
+        self._reports.clear()
+        self._armed_since, self._authority = None, Authority()
+        self._flown = -REPORT_DELAY
 
     def advance(self, stamp: int, state: np.ndarray) -> None:
         """Compute the reference of the tick after `stamp` [ns], with the inputs of `begin`.

@@ -35,6 +35,12 @@ class SupervisorInputs:
         """
         self._kept[name] = read, message, answers
 
+    def begin_anew(self) -> None:
+        """Forget all values: stamps of a new simulation follow."""
+        self.inputs.begin_anew()
+        self.readings = Readings()
+        self._kept.clear()
+
     def mocap(self, stamp: int, position: np.ndarray, quaternion: np.ndarray) -> None:
         """Read a pose of `stamp` [ns]: position (3,) [m, ENU], quaternion (4,) [w x y z]."""
         self.inputs.mocap(stamp / SECOND, position, quaternion)

@@ -22,8 +22,12 @@ class Inputs:
 
     def __init__(self, period: float) -> None:
         """period [s]: of control ticks."""
-        self._readings = Readings()
         self._period = period
+        self.begin_anew()
+
+    def begin_anew(self) -> None:
+        """Forget all values: stamps of a new simulation follow."""
+        self._readings = Readings()
         self._mocap = self._joints = self._autopilot = math.nan  # stamps [s]
         self._moved = math.nan  # stamp [s] of the first pose like the newest
         self._repeats = Repeats()

@@ -7,6 +7,8 @@ reproducible bit for bit.
 from collections.abc import Callable, Sequence
 from typing import Any
 
+from uam_control.stamps import NEW_TIME
+
 BACKLOG = 3  # ticks; equals the allowed delay of a setpoint in mujoco_sim
 
 
@@ -41,7 +43,8 @@ class StampJoin:
     """Calls `fire(stamp, *values)` when all inputs have delivered their values for a stamp.
 
     Ticks fire in the order of their stamps. A firing tick drops older incomplete ticks; these, and
-    later messages for them, are counted in `dropped`.
+    later messages for them, are counted in `dropped`. Stamps that go back by more than NEW_TIME
+    belong to a new simulation: the join begins anew.
 
     deferred: complete ticks fire in `settle`, not in `add`; see `Backlog`.
     """
@@ -61,6 +64,9 @@ class StampJoin:
     def add(self, name: str, stamp: int, value: Any) -> None:
         """Add the value (not None) of input `name` for `stamp` [ns]; may fire."""
         self.last_seen[name] = stamp
+        if stamp < self._last - NEW_TIME:
+            self._open.clear()
+            self._last = -1
         if stamp <= self._last:
             self._dropped += 1
             return

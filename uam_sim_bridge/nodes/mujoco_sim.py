@@ -38,7 +38,8 @@ from uam_control.mission.time_limit import DISARMED, Settled
 from uam_control.settings.parameter_set import ParameterError
 from uam_control.stamps import SECOND
 from uam_msgs_py.messages import topics
-from uam_msgs_py.node import wiring
+from uam_msgs_py.messages.ros_time import nanoseconds as from_message
+from uam_msgs_py.node import polling, wiring
 from uam_msgs_py.node.base_node import StopSignal, refuse
 from uam_msgs_py.node.connections import Connections, of
 from uam_msgs_py.node.executor import LeanExecutor
@@ -62,6 +63,7 @@ CATCH_UP = 1.25  # [1] largest real-time factor after a stall of the machine
 FOREIGN_WAIT = 1.0  # [s] for discovery by foreign nodes, which do not report their connections
 LAST_WAIT = 3.0  # [s] longest wait for the recorder after the last tick
 RECORDER_LAG = 2.0  # [s] the recorder reports its progress each second; its queue is 4 times longer
+LATCHED_WAIT = 0.5  # [s] of wall time, in which a latched message arrives
 AFTER_OTHERS = 1.0  # [s] the status of a mission is at most half a second older than its last tick
 SERVICE_TICKS = 25  # [ticks] between two calls of the parameter services in real time
 
@@ -138,8 +140,25 @@ class Simulator:
         while time.monotonic() < settled and not self._stop.raised:
             self.executor.spin_once(0.05)
         self._log.info("all nodes are connected")
-        if self.answers.mission_stamp > 0:  # the other nodes are older: stamps must not go back
-            after = self.answers.mission_stamp / SECOND + AFTER_OTHERS
+        if not self.options.end_with_mission:
+            self._begin_after(max(self.answers.mission_stamp, self._newest_report()))
+
+    def _newest_report(self) -> int:
+        """Return the stamp [ns] of the bridge's latched report, 0 without one."""
+        topic, newest = topics.AUTOPILOT_STATE, 0
+        reader = self.node.create_subscription(topic.type, topic.name, lambda _: None, topic.qos)
+        end = time.monotonic() + LATCHED_WAIT
+        while not newest and time.monotonic() < end:
+            time.sleep(0.02)
+            for message in polling.messages(reader):
+                newest = max(newest, from_message(message.header.stamp))
+        self.node.destroy_subscription(reader)
+        return newest
+
+    def _begin_after(self, stamp: int) -> None:
+        """Begin after `stamp` [ns] of an earlier simulation, so that stamps do not go back."""
+        if stamp > 0:
+            after = stamp / SECOND + AFTER_OTHERS
             self._first_tick = math.ceil(after / self.plant.period)
             self.plant.count_from(self._first_tick)
             self._log.info(f"the nodes are from an earlier simulation: begins at {after:.1f} s")
