@@ -12,7 +12,7 @@ import rclpy
 from rclpy.node import Node
 from std_srvs.srv import Trigger
 
-from uam_lab.flight.operator import Operator
+from uam_lab.flight.operator import NoFlight, Operator
 from uam_lab.flight.ros.node_arguments import MODULES
 from uam_lab.processes.node_environment import ros_environment
 from uam_msgs_py.messages import topics
@@ -96,7 +96,10 @@ class ByHand:
         """Call /mission/start until the pre-arm report is green."""
         end = time.monotonic() + PATIENCE
         while True:
-            accepted, text = self.operator.command("start")
+            try:
+                accepted, text = self.operator.command("start")
+            except NoFlight as absent:
+                accepted, text = False, str(absent)
             if accepted:
                 return
             assert time.monotonic() < end, f"{text}\n{self.statuses()}"
