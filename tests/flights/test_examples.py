@@ -12,13 +12,15 @@ EXAMPLES = ROOT / "examples"
 
 
 @pytest.fixture
-def own_controller(tmp_path):
-    """own_controller(domain) starts the example; it ends with the test."""
+def beside(tmp_path):
+    """beside(example, flight) starts an example in the domain of a flight; it ends with the test."""
     running = []
 
-    def start(domain: str) -> subprocess.Popen:
+    def start(example: str, flight) -> subprocess.Popen:
+        flight.until(lambda: "ROS_DOMAIN_ID=" in flight.said, "the domain to be named")
+        domain = flight.said.split("ROS_DOMAIN_ID=")[1].split()[0]
         surroundings = os.environ | {"ROS_DOMAIN_ID": domain, "ROS_LOG_DIR": str(tmp_path)}
-        program = [sys.executable, EXAMPLES / "own_controller.py"]
+        program = [sys.executable, EXAMPLES / example]
         running.append(subprocess.Popen(program, env=surroundings))
         return running[-1]
 
@@ -28,10 +30,9 @@ def own_controller(tmp_path):
         process.wait()
 
 
-def test_a_controller_of_ones_own_flies_and_its_log_is_read(fly, short_scenario, own_controller):
+def test_a_controller_of_ones_own_flies_and_its_log_is_read(fly, short_scenario, beside):
     flight = fly("--scenario", str(short_scenario), "--without", "arm_controller")
-    flight.until(lambda: "ROS_DOMAIN_ID=" in flight.said, "the domain to be named")
-    own_controller(flight.said.split("ROS_DOMAIN_ID=")[1].split()[0])
+    beside("own_controller.py", flight)
     assert flight.wait() == 0, flight.said + flight.complained
     assert "arm_controller" not in {file.stem for file in (flight.out / "logs").glob("*.log")}
     found = json.loads((flight.out / "metrics.json").read_text())
@@ -44,6 +45,16 @@ def test_a_controller_of_ones_own_flies_and_its_log_is_read(fly, short_scenario,
     rms = {words[0]: float(words[1]) for words in map(str.split, done.stdout.splitlines()[2:])}
     assert set(rms) == {"x", "y", "z", "yaw", "alpha_1", "alpha_2"}
     assert rms["z"] < 0.1 and rms["alpha_1"] < 5.0 and rms["alpha_2"] < 5.0, done.stdout
+
+
+def test_a_mission_of_ones_own_flies(fly, beside):
+    flight = fly("--scenario", "hover", "--without", "mission")
+    beside("own_mission.py", flight)
+    assert flight.wait() == 0, flight.said + flight.complained
+    assert "mission" not in {file.stem for file in (flight.out / "logs").glob("*.log")}
+    found = json.loads((flight.out / "metrics.json").read_text())
+    assert found["mission_completed"] and found["abort_reason"] in (None, "")
+    assert 8.0 < found["duration_s"] < 9.0 and found["rms"]["position_m"][2] < 0.1
 
 
 def test_the_scenario_of_ones_own_is_flown(fly):

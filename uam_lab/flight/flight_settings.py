@@ -30,7 +30,13 @@ ENGINES = ("ros", "direct")
 CLOCKS = ("lockstep", "realtime")
 BUILTIN, PX4 = "builtin", "px4"
 # Nodes that the user may replace by own nodes with the same topics.
-REPLACEABLE = ("state_estimator", "position_controller", "attitude_controller", "arm_controller")
+REPLACEABLE = (
+    "state_estimator",
+    "mission",
+    "position_controller",
+    "attitude_controller",
+    "arm_controller",
+)
 COCKPIT = "cockpit"
 LOG_LIMIT = 4000.0  # [MB] some four hours of flight
 ONLOOKERS = ("scene", COCKPIT)  # nodes that only display: their end does not end the flight
