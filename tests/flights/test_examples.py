@@ -13,7 +13,7 @@ EXAMPLES = ROOT / "examples"
 
 @pytest.fixture
 def beside(tmp_path):
-    """beside(example, flight) starts an example in the domain of a flight; it ends with the test."""
+    """beside(example, flight) starts an example beside a flight; it ends with the test."""
     running = []
 
     def start(example: str, flight) -> subprocess.Popen:
