@@ -65,7 +65,8 @@ class ControllerNode(UamNode):
         self._gains = JointStateWriter(self.controller.names)
         inputs = [topics.STATE, topics.REFERENCE]
         inputs += [] if last in inputs else [last]
-        self._join = StampJoin([topic.name for topic in inputs], self._joined)
+        names, reference = [topic.name for topic in inputs], topics.REFERENCE.name
+        self._join = StampJoin(names, self._joined, ahead=reference)
         self.joins.append(self._join)
         self.triggers = (last.name,)
         for topic in inputs:

@@ -33,7 +33,7 @@ class OdometryParameters(ParameterSet):
 
 
 class StateEstimatorNode(UamNode):
-    """Publishes /uam/state with the stamp of its IMU sample.
+    """Publishes /uam/state with the stamp of its IMU sample, without its jitter.
 
     The IMU sample starts a tick. The sensor hub (here the simulator) publishes it last. All other
     samples of the tick have then arrived, and a repeated flight uses the same samples.
@@ -45,7 +45,8 @@ class StateEstimatorNode(UamNode):
         self._names = list(vehicle.joint_names)
         section = default_profile(DEFAULT, vehicle).section(NAME)
         self.parameter_set = NodeParameters(self, EstimatorParameters, defaults=section)
-        self._stage = EstimatorStage(self.parameter_set.current, len(self._names))
+        self._period = vehicle.control_period
+        self._stage = EstimatorStage(self.parameter_set.current, len(self._names), self._period)
         self.parameter_set.apply = self._stage.estimator.set_parameters
         self._warm_up()
         self._state = self.publisher(topics.STATE)
@@ -74,16 +75,16 @@ class StateEstimatorNode(UamNode):
         stamp, gyro, force = read_imu(data)
         if stamp < self._stage.stamp - NEW_TIME:
             self._begin_anew(stamp)
-        if stamp <= self._stage.stamp:
-            self.warn(
-                f"IMU stamp {stamp} ns does not follow {self._stage.stamp} ns; ignored", "imu"
-            )
-            return
         self.take_waiting(self._mocap)
         self.take_waiting(self._joints)
-        state = self._stage.imu(stamp, gyro, force)
+        try:
+            state = self._stage.imu(stamp, gyro, force)
+        except ValueError as error:
+            self.warn(f"{error}; ignored", "imu")
+            return
         if state is None:
             return
+        stamp = self._stage.stamp
         # one output per sample: the filters need every sample
         self._updates.put((stamp, self._writer.fill(stamp, state), begun))
         if not 0 <= stamp - self._odometry_at < self._odometry_period:
@@ -113,14 +114,19 @@ class StateEstimatorNode(UamNode):
     def diagnose(self) -> tuple[bytes, str, dict[str, object]]:
         refused = self._stage.estimator.refused_poses
         fresh, self._refused_before = refused - self._refused_before, refused
-        values = {"poses refused": refused}
+        ticks = self._stage.ticks
+        values: dict[str, object] = {
+            "poses refused": refused,
+            "IMU samples repeated": ticks.repeated,
+            "IMU samples missing": ticks.missing,
+        }
         if fresh:
             return WARN, f"{fresh} new poses refused: too far from the estimate", values
         return OK, "running", values
 
     def _warm_up(self) -> None:
         """Compile the filters with a spare estimator."""
-        spare = EstimatorStage(self.parameter_set.current, len(self._names))
+        spare = EstimatorStage(self.parameter_set.current, len(self._names), self._period)
         rest, level = np.zeros(3), np.array([1.0, 0.0, 0.0, 0.0])
         joints = np.zeros(len(self._names))
         for stamp in range(0, 12_000_000, 4_000_000):

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from uam_control.estimation import EstimatorParameters, StateEstimator
+from uam_control.stages.tick_stamps import TickStamps
 from uam_control.stamps import SECOND
 
 
@@ -12,13 +13,19 @@ class EstimatorStage:
     """Takes samples as they arrive and returns the state at each IMU sample.
 
     All stamps are in [ns]. The IMU sample starts a tick; the other samples of the tick come before.
+    `ticks`: the stamps of the ticks, see `TickStamps`.
     """
 
-    def __init__(self, parameters: EstimatorParameters, joints: int) -> None:
-        """joints: number of joints of the arm."""
+    def __init__(self, parameters: EstimatorParameters, joints: int, period: float) -> None:
+        """joints: number of joints of the arm; period [s]: of the control ticks."""
         self.estimator = StateEstimator(parameters, joints)
-        self.stamp = -1  # [ns] of the newest IMU sample
+        self.ticks = TickStamps(round(period * SECOND))
         self._waiting = True  # for the first sample of an input
+
+    @property
+    def stamp(self) -> int:
+        """Return the stamp [ns] of the newest tick."""
+        return self.ticks.stamp
 
     def mocap(self, stamp: int, position: np.ndarray, quaternion: np.ndarray) -> None:
         """Take a pose: position (3,) [m, ENU], unit quaternion (4,) [w x y z], FLU → ENU."""
@@ -31,14 +38,16 @@ class EstimatorStage:
     def imu(self, stamp: int, gyro: np.ndarray, force: np.ndarray) -> np.ndarray | None:
         """Take an IMU sample: gyro (3,) [rad/s], specific force (3,) [m/s^2], FLU.
 
-        Returns the state (3, 6 + n), see `coordinates`; the next call reuses the array. Returns
-        None until every input has arrived once. Raises ValueError if the stamp is not after the
-        last one.
+        Returns the state (3, 6 + n) of the tick `stamp`, see `coordinates`; the next call reuses
+        the array. Returns None until every input has arrived once, and for a repeated sample.
+        Raises ValueError if the stamp is older than the last one.
         """
-        if stamp <= self.stamp:
+        before = self.ticks.repeated
+        if not self.ticks.follows(stamp):
+            if self.ticks.repeated > before:
+                return None
             raise ValueError(f"IMU stamp {stamp} ns does not follow {self.stamp} ns")
-        self.stamp = stamp
         estimator = self.estimator
-        estimator.imu(stamp / SECOND, gyro, force)
+        estimator.imu(self.ticks.next(stamp) / SECOND, gyro, force)
         self._waiting = self._waiting and bool(estimator.waiting_for)
         return None if self._waiting else estimator.update()

@@ -44,13 +44,24 @@ class StampJoin:
 
     Ticks fire in the order of their stamps. A firing tick drops older incomplete ticks; these, and
     later messages for them, are counted in `dropped`. Stamps that go back by more than NEW_TIME
-    belong to a new simulation: the join begins anew.
+    belong to a new simulation: the join begins anew. An input that is sent one tick `ahead` makes
+    no tick alone: there is none if the sample that starts it is missing.
 
     deferred: complete ticks fire in `settle`, not in `add`; see `Backlog`.
     """
 
-    def __init__(self, inputs: Sequence[str], fire: Callable[..., None], depth: int = 32):
-        """inputs: names, in the order of the values; depth: most incomplete stamps stored."""
+    def __init__(
+        self,
+        inputs: Sequence[str],
+        fire: Callable[..., None],
+        depth: int = 32,
+        ahead: str | None = None,
+    ):
+        """inputs: names, in the order of the values; depth: most incomplete stamps stored.
+
+        ahead: the input that is sent one tick ahead, if any.
+        """
+        self._ahead = None if ahead is None else list(inputs).index(ahead)
         self._index = {name: i for i, name in enumerate(inputs)}
         self._fire = fire
         self._depth = depth
@@ -74,8 +85,7 @@ class StampJoin:
         if values is None:
             values = self._open[stamp] = [None] * len(self._index)
             if len(self._open) > self._depth:
-                del self._open[min(self._open)]
-                self._dropped += 1
+                self._dropped += self._is_tick(self._open.pop(min(self._open)))
         values[self._index[name]] = value
         if any(value is None for value in values):
             return
@@ -88,9 +98,11 @@ class StampJoin:
         """Remove the ticks up to `stamp` [ns]; return their number."""
         self._last = stamp
         closed = [key for key in self._open if key <= stamp]
-        for old in closed:
-            del self._open[old]
-        return len(closed)
+        return sum(self._is_tick(self._open.pop(old)) for old in closed)
+
+    def _is_tick(self, values: list[Any]) -> bool:
+        """Return whether more than the input of `ahead` has arrived."""
+        return any(v is not None for i, v in enumerate(values) if i != self._ahead)
 
     def settle(self) -> None:
         """Fire the complete ticks of the backlog."""

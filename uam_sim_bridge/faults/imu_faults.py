@@ -1,4 +1,4 @@
-"""Faults of the IMUs (bias, saturation, dropout) and of the joint encoders."""
+"""Faults of the IMUs (bias, saturation, dropout, stamps) and of the joint encoders."""
 
 from __future__ import annotations
 
@@ -67,6 +67,23 @@ class ImuDropout(PlantFault):
             samples.hil = (samples.hil[0], *now.memory)
 
 
+class ImuStamps(PlantFault):
+    """The companion's IMU has stamps with jitter, and single samples are repeated or missing."""
+
+    jitter: float = number(0.001, "largest error of a stamp, uniform", "s", 0.0, 0.01)
+    repeated: float = number(0.01, "fraction of samples that arrive twice", "1", 0.0, 1.0)
+    missing: float = number(0.01, "fraction of samples that do not arrive", "1", 0.0, 0.5)
+
+    def sense(self, samples: Samples, now: Occurrence) -> None:
+        late, repeated, missing = now.noise.random(3)
+        if samples.imu is None or missing < self.missing:
+            samples.imu = None
+            return
+        stamp, gyro, force = samples.imu
+        samples.imu = stamp + self.jitter * (2.0 * late - 1.0), gyro, force
+        samples.imu_copies += bool(repeated < self.repeated)
+
+
 class EncoderStuck(PlantFault):
     """A joint's encoder repeats its angle and reports zero velocity."""
 
@@ -84,4 +101,4 @@ class EncoderStuck(PlantFault):
         samples.joints = stamp, alpha, alpha_dot, torque
 
 
-FAULTS = (ImuBias, ImuSaturation, ImuDropout, EncoderStuck)
+FAULTS = (ImuBias, ImuSaturation, ImuDropout, ImuStamps, EncoderStuck)

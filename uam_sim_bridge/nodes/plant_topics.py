@@ -53,15 +53,17 @@ class Sensors(Outlets):
         self._clock_writer = Template(Clock())
         self._imu_writer, self._mocap_writer = ImuWriter(frame(node, topics.BODY)), PoseWriter()
         self._joint_writer = JointStateWriter(vehicle.joint_names)
+        self._period = nanoseconds(vehicle.control_period)
 
     def clock(self, stamp: int) -> None:
         """Publish simulation time [ns]."""
         self._clock.publish(self._clock_writer.stamped(stamp))
 
     def publish(self, samples: Samples) -> int | None:
-        """Publish the samples of this tick; return the stamp [ns] of the IMU's, None without one.
+        """Publish the samples of this tick; return the stamp [ns] of the tick, None without IMU.
 
-        The IMU's is published last: it starts the estimator's tick.
+        The IMU's is published last: it starts the estimator's tick. The stamp of the tick is the
+        IMU's without jitter, a multiple of the control period.
         """
         if samples.mocap is not None:
             time, position, quaternion = samples.mocap
@@ -75,8 +77,9 @@ class Sensors(Outlets):
             return None
         time, gyro, force = samples.imu
         stamp = nanoseconds(time)
-        self._imu.publish(self._imu_writer.fill(stamp, gyro, force))
-        return stamp
+        for _ in range(samples.imu_copies):
+            self._imu.publish(self._imu_writer.fill(stamp, gyro, force))
+        return round(stamp / self._period) * self._period
 
 
 class TruthTopics(Outlets):
@@ -138,6 +141,8 @@ class Answers:
         self.restarts = 0  # of nodes that were lost
         self._arrived: set[str] = set()
         self._setpoint_stamp = -1
+        # [ns] the stack's ticks may lie beside the plant's if an IMU with jitter started them
+        self._tolerance = nanoseconds(vehicle.control_period) // 2
 
         events = SubscriptionEventCallbacks(use_default_callbacks=False)
         self.inlets: dict[str, Subscription] = {
@@ -166,7 +171,8 @@ class Answers:
     def missing(self, stamp: int) -> frozenset[str]:
         """Return the missing answers to the tick of `stamp` [ns]."""
         lacking = {"effort", "magnet"} - self._arrived
-        return frozenset(lacking | {"setpoint"} if self._setpoint_stamp < stamp else lacking)
+        answered = self._setpoint_stamp >= stamp - self._tolerance
+        return frozenset(lacking if answered else lacking | {"setpoint"})
 
     def take(self) -> None:
         """Take every message in the queues, without waiting."""

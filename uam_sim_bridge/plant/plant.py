@@ -27,13 +27,14 @@ class Samples:
     imu: (stamp, gyro (3,) [rad/s], specific force (3,) [m/s^2]), FLU, of the companion computer.
     joints: (stamp, alpha (n,) [rad], alpha_dot (n,) [rad/s], torque (n,) [N m]). mocap: (stamp,
     position (3,) [m, ENU], quaternion (4,) [w x y z], FLU → ENU). hil: as imu, without delay, for
-    the autopilot's own sensors.
+    the autopilot's own sensors. imu_copies: messages with this IMU sample.
     """
 
     imu: tuple | None
     joints: tuple | None
     mocap: tuple | None
     hil: tuple
+    imu_copies: int = 1
 
 
 @dataclass

@@ -90,7 +90,8 @@ class ControlTick:
         """sets: parameters by the names of the nodes, see `Profile.sets`."""
         self.signals = Signals.at_rest(len(scenario.arm_start))
         self.stages = list(STAGES)
-        self.estimator = EstimatorStage(sets["state_estimator"], len(scenario.arm_start))
+        estimator, joints = sets["state_estimator"], len(scenario.arm_start)
+        self.estimator = EstimatorStage(estimator, joints, timing.control_period)
         mission = Mission(scenario, sets["mission"], StartParameters(auto_start=True))
         self.mission = MissionStage(mission, timing)
         self.position = LawStage(PositionController(sets["position_controller"]), timing)
@@ -150,7 +151,7 @@ def estimate(tick: ControlTick) -> bool:
     state = None if s.imu is None else estimator.imu(*s.imu)
     if state is None:
         return False
-    s.stamp, s.state = s.imu[0], state
+    s.stamp, s.state = estimator.stamp, state
     return True
 
 
