@@ -43,7 +43,7 @@ def flown():
 def test_the_mission_is_flown_as_without_jitter(flown, jitter):
     flight, errors = flown(jitter)
     assert flight.mission.output.done and not flight.mission.output.abort_reason
-    states = [change.now.name for change in flight.mission.changes]
+    states = [change.target.name for change in flight.mission.changes]
     assert states == ["TAKING_OFF", "FLYING", "LANDING", "DISARMED"]
     _, nominal = flown(0)
     for name in RMS:

@@ -100,7 +100,7 @@ class StateEstimatorNode(UamNode):
             f"stamps went back from {self._stage.stamp / SECOND:.3f} s to "
             f"{stamp / SECOND:.3f} s: the estimate begins anew"
         )
-        self._stage = EstimatorStage(self.parameter_set.current, len(self._names))
+        self._stage = EstimatorStage(self.parameter_set.current, len(self._names), self._period)
         self.parameter_set.apply = self._stage.estimator.set_parameters
 
     def settle(self) -> None:
