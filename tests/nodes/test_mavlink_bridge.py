@@ -34,7 +34,7 @@ def test_alone_it_waits_and_stops(start):
         (["-p", "local_port:=99999"], "local_port"),
         (["-p", "autopilot:=pigeon"], "allowed: udp:HOST:PORT"),
         (["-p", "autopilot:=serial:/dev/nothing:57600"], "No such file"),
-        (["-p", "autopilot:=14550"], "autopilot: a text expected"),
+        (["-p", "autopilot:=14550"], "autopilot: 14550 is no text"),
         (["-p", "autopilot:=udp:127.0.0.1:9", "-p", "gcs:=tcp:localhost:5760"], "udp:HOST:PORT"),
         (["-p", "signing_key:=no/such/file"], "signing key: not 64 hex digits"),
     ],

@@ -44,7 +44,7 @@ BRIDGE_LINKS = (
 # Parameters of a node that are not in a profile: they belong to one flight.
 FLIGHT_OWN = {
     **dict.fromkeys(CONTROLLERS, ("control_period", "vehicle")),
-    "state_estimator": ("vehicle",),
+    "state_estimator": ("vehicle", "odometry_rate"),
     "mission": ("control_period", "scenario", "vehicle", "auto_start", "dry_run"),
 }
 
