@@ -69,7 +69,7 @@ def fly(
         if failure is not None and failure.status == NOT_READY and not settings.foreign:
             # on an overloaded machine the middleware may fail to connect all nodes
             observer.message(f"{failure}; starting again")
-            _keep_logs(folder.path / "logs")
+            _put_aside(folder)
             failure = _supervise(settings, folder, ports, observer, stop, last)
     outcome = read_outcome(settings, folder, failure, stop.raised)
     if outcome.failure and failure is None and last and last[-1].time < 0.0:
@@ -77,11 +77,13 @@ def fly(
     return outcome
 
 
-def _keep_logs(logs: Path) -> None:
-    """Move the logs of a failed start to first_start/."""
+def _put_aside(folder: ResultFolder) -> None:
+    """Move the logs of a failed start to logs/first_start/: the next one begins its own."""
+    logs = folder.path / "logs"
     aside = logs / "first_start"
     aside.mkdir()
-    for file in logs.glob("*.log"):
+    recorded = (folder.log, folder.path / "metadata.yaml")
+    for file in (*logs.glob("*.log"), *filter(Path.exists, recorded)):
         file.rename(aside / file.name)
 
 
