@@ -23,7 +23,7 @@ fly: setup       ## fly the pick-and-place mission; options: make fly ARGS="--co
 
 # Flights that fail on purpose are flown alone: they look at what is left on the machine. And those
 # that share two flights, flown at once, in one process.
-ALONE := $(patsubst %,tests/flights/test_%.py,ros_failures ros_flight recorded_scene report_again namespaces impostors)
+ALONE := $(patsubst %,tests/flights/test_%.py,ros_failures ros_flight recorded_scene report_again)
 PYTEST = $(BIN)/python -m pytest -m "not slow"
 
 test: setup      ## the tests but the slow ones; options: make test ARGS="tests/unit -x"

@@ -19,6 +19,8 @@ from uam_msgs_py.messages import topics
 from uam_msgs_py.node import wiring
 from uam_sim_bridge.ports import Reservation
 
+pytestmark = pytest.mark.slow
+
 PATIENCE = 90.0  # [s] only a failing test waits that long
 # the order of docs/commands.md
 ORDER = (
@@ -177,7 +179,6 @@ def test_nodes_by_hand_fly_twice_and_after_a_restart_of_the_simulator(by_hand):
     np.testing.assert_allclose(third, first, atol=0.03)
 
 
-@pytest.mark.slow
 def test_every_node_may_be_stopped_and_started(by_hand):
     first = by_hand.fly()
     for name in (wiring.ESTIMATOR, wiring.ARM, wiring.BRIDGE):

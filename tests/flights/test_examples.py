@@ -82,6 +82,7 @@ def test_a_gain_is_swept(tmp_path):
     assert len(errors) == 3, "each gain has errors of its own"
 
 
+@pytest.mark.slow
 def test_two_vehicles_fly_at_once(tmp_path, short_scenario):
     said = run("two_vehicles.py", tmp_path, short_scenario)
     assert "follower: arming" in said
@@ -98,6 +99,7 @@ def test_the_simulator_of_ones_own_flies(engine, tmp_path, short_scenario):
     assert max(found["max"]["arm_deg"]) == 0.0, "its arm stands still"
 
 
+@pytest.mark.slow
 def test_a_tour_of_goals_is_flown(tmp_path):
     said = run("goto_tour.py", tmp_path)
     assert said.count("accepted") == said.count("there at") == 4
@@ -106,6 +108,7 @@ def test_a_tour_of_goals_is_flown(tmp_path):
     assert max(off) < 20.0, "[mm]"
 
 
+@pytest.mark.slow
 def test_the_planner_of_ones_own_flies_a_circle(tmp_path):
     said = run("own_planner.py", tmp_path)
     west, east = (float(word) for word in said.split("circle: ")[1].split()[:3:2])

@@ -22,6 +22,9 @@ PROGRAM = Path(__file__).parents[1] / "impostor.py"
 ONLY_RECORDED = "/uam/arm/command"
 
 
+pytestmark = pytest.mark.slow
+
+
 @pytest.fixture(scope="module")
 def disturbed(tmp_path_factory, short_scenario):
     """A flight among impostors that were there before it."""

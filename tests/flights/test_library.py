@@ -73,6 +73,7 @@ def test_commands_parameters_and_phases_of_a_flight(tmp_path, capfd):
     assert capfd.readouterr() == ("", "")
 
 
+@pytest.mark.slow
 def test_several_at_once_with_asyncio(short_scenario, tmp_path):
     async def one(seed):
         out = tmp_path / str(seed)
@@ -105,6 +106,7 @@ def test_a_failure_is_an_exception_with_its_reason(short_scenario, tmp_path, mon
         _ = flight.result["time"]
 
 
+@pytest.mark.slow
 def test_a_fault_is_injected_in_flight(tmp_path):
     with Flight(scenario="hover", out=tmp_path, without=["scene"]) as flight:
         flight.wait_for("hover", 60.0)

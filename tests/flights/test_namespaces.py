@@ -12,6 +12,9 @@ DOMAIN = "99"
 SHARED = {"/tf", "/tf_static", "/diagnostics", "/rosout"}
 
 
+pytestmark = pytest.mark.slow
+
+
 @pytest.fixture(scope="module")
 def vehicles(tmp_path_factory, short_scenario):
     """Flights of uav1 and uav2 with the seed of `two_flights`; both have ended."""
