@@ -17,9 +17,7 @@ from uam_msgs_py.messages import topics
 from uam_msgs_py.messages.preflight import read_preflight
 from uam_msgs_py.messages.status import AutopilotState, MissionStatus
 
-COMMANDS = ("start", "hold", "resume", "land", "disarm")
 PATIENCE = 5.0  # [s] wall time to find the flight, and the same for its answer
-STATUS_PERIOD = 2.0  # [s] wall time within which a flight that runs sends its status
 
 
 class NoFlight(RuntimeError):
@@ -40,9 +38,9 @@ class Operator:
             )
 
     def command(self, name: str) -> tuple[bool, str]:
-        """Call the service of one of COMMANDS; return whether it was accepted, and the answer.
+        """Call a Trigger service of the mission; return whether it was accepted, and the answer.
 
-        Raises NoFlight.
+        name: start, or one of `mission_services.COMMANDS`. Raises NoFlight.
         """
         return self._call(f"mission/{name}")
 

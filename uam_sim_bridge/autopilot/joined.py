@@ -121,10 +121,9 @@ class JoinedAutopilot:
         gyro (3,) [rad/s] and specific force (3,) [m/s^2], FLU: sample of the autopilot's IMU.
         """
         motors = self.autopilot.update(time, swap_body(gyro), swap_body(force))
-        commander, landing = self.autopilot.commander, self.autopilot.landing
-        state = commander.armed, commander.mode, landing.landed, commander.failsafe
-        if state != self._told:
-            self._told = self.autopilot.status
+        status = self.autopilot.status
+        if status != self._told:
+            self._told = status
             self._heartbeat_due = self._landed_due = -math.inf
         if time >= self._heartbeat_due - 1e-9:
             self._heartbeat = True

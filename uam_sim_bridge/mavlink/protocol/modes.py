@@ -72,7 +72,6 @@ class MavCmd(IntEnum):
     """MAV_CMD: the values in use."""
 
     DO_SET_MODE = 176
-    FLIGHT_TERMINATION = 185
     ARM_DISARM = 400
     RUN_PREARM_CHECKS = 401
     SET_MESSAGE_INTERVAL = 511
