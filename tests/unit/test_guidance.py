@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from hypothesis import Phase, given, settings
+from hypothesis import Phase, example, given, settings
 from hypothesis import strategies as st
 
 from uam_control.mission import MissionParameters, load_scenario
@@ -44,7 +44,7 @@ def assert_smooth(references):
     np.testing.assert_allclose(
         (references[2:, 1] - references[:-2, 1]) / (2 * DT), middle[:, 2], atol=0.12
     )
-    for part, rate, acceleration in ((slice(0, 6), 0.6, 1.0), (slice(6, 8), 1.6, 4.0)):
+    for part, rate, acceleration in ((slice(0, 6), 0.6, 1.0), (slice(6, 8), 1.0, 3.0)):
         assert np.max(np.abs(middle[:, 1, part])) < rate
         assert np.max(np.abs(middle[:, 2, part])) < acceleration
 
@@ -62,6 +62,7 @@ def test_undisturbed_it_is_the_trajectory_itself_bit_for_bit():
 
 @settings(deadline=None, max_examples=20, phases=NO_SHRINKING)
 @given(st.floats(0.5, 80.0), st.floats(0.1, 6.0), st.floats(0.1, 4.0), st.booleans())
+@example(66.98373119957263, 1.875, 1.7713514926379688, True)  # back while the arm moves away
 def test_hold_and_resume_are_smooth_at_any_time(at, held, again, stow):
     guide = guidance()
     references = fly(guide, at - 0.1, at + held + again + 14.0, [

@@ -374,9 +374,16 @@ class Guidance:
         return Segment(stamp, self.reference, goal, np.full_like(goal, self._arm_length(angles)))
 
     def _arm_length(self, angles: np.ndarray) -> float:
-        """Return the time [s] for the arm to reach `angles` [rad] within stow_rate."""
-        way = float(np.max(np.abs(angles - self.reference[CHI, ARM])))
-        return max(self.parameters.stop_time, PEAK * way / self.parameters.stow_rate)
+        """Return the time [s] for the arm to reach `angles` [rad] within stow_rate.
+
+        A joint that moves away from them first stops. Its way back is longer by rate * time / 2,
+        and at the peak of the way back, midway, half of the rate away is left.
+        """
+        p, way = self.parameters, angles - self.reference[CHI, ARM]
+        away = np.clip(-np.sign(way) * self.reference[CHI_DOT, ARM], 0.0, p.stow_rate)
+        back = np.abs(way) + away * p.stop_time / 2
+        peak = p.stow_rate - (PEAK - 1.0) / 2.0 * away
+        return max(p.stop_time, PEAK * float(np.max(back / peak)))
 
     def _ramp_length(self) -> float:
         """Return the time [s] to stop or to resume within stop_acceleration."""
