@@ -77,6 +77,17 @@ def test_the_stand_in_has_no_battery():
     assert not from_sys_status(sys_status(autopilot, 0.0)).known
 
 
+def test_the_stand_in_reports_its_simulated_battery():
+    autopilot = Autopilot()
+    for name, value in {"SIM_BAT_ENABLE": 1, "SIM_BAT_DRAIN": 100, "SIM_BAT_MIN_PCT": 1}.items():
+        autopilot.set_parameter(name, value)
+    autopilot.battery.update(0.0, armed=True)
+    autopilot.battery.update(88.0, armed=True)
+    m = battery_status(autopilot, 88.0)
+    assert m.charge_state == mavlink2.MAV_BATTERY_CHARGE_STATE_LOW
+    assert m.battery_remaining == 12 and from_battery_status(m).left == pytest.approx(0.12)
+
+
 def test_the_stand_ins_estimate_needs_vision():
     autopilot = Autopilot()
     assert estimate_faults(estimator_status(autopilot, 0.0).flags) == (

@@ -5,10 +5,10 @@ from __future__ import annotations
 import pytest
 
 from uam_control.vehicle import load_description
-from uam_sim_bridge.autopilot.battery import SimulatedBattery
+from uam_sim_bridge.autopilot.battery import ChargeState, SimulatedBattery
 from uam_sim_bridge.autopilot.commander import Commander
 from uam_sim_bridge.autopilot.params import Parameters
-from uam_sim_bridge.mavlink.protocol.modes import MavResult, Mode
+from uam_sim_bridge.mavlink.protocol.modes import MavResult, Mode, Severity
 
 CENTRED, PUSHED = (0.0, 0.0, 0.0, 0.0), (0.31, 0.0, 0.0, 0.0)  # COM_RC_STICK_OV is 30 %
 
@@ -60,30 +60,31 @@ def test_lost_sticks_in_position_are_a_failsafe():
     commander = in_flight()
     commander.sticks(1.0, CENTRED, True)
     commander.request_mode(1.0, Mode.POSITION, True)
-    commander.update(1.5, False, None)
+    commander.update(1.5, False, ChargeState.UNDEFINED)
     assert commander.mode is Mode.POSITION
-    commander.update(1.51, False, None)
+    commander.update(1.51, False, ChargeState.UNDEFINED)
     assert commander.mode is Mode.LAND and commander.failsafe
     assert commander.intended is Mode.POSITION
 
 
 @pytest.mark.parametrize(
-    ("action", "charge", "mode"),
-    [(0, 0.01, Mode.OFFBOARD), (2, 0.071, Mode.OFFBOARD), (2, 0.069, Mode.LAND),
-     (3, 0.069, Mode.RETURN), (3, 0.049, Mode.LAND)],
+    ("action", "battery", "mode"),
+    [(0, ChargeState.EMERGENCY, Mode.OFFBOARD), (2, ChargeState.LOW, Mode.OFFBOARD),
+     (2, ChargeState.CRITICAL, Mode.LAND), (3, ChargeState.CRITICAL, Mode.RETURN),
+     (3, ChargeState.EMERGENCY, Mode.LAND)],
 )  # fmt: skip
-def test_the_battery_failsafe_keeps_the_intended_mode(action, charge, mode):
+def test_the_battery_failsafe_keeps_the_intended_mode(action, battery, mode):
     commander = in_flight(COM_LOW_BAT_ACT=action)
-    commander.update(1.004, False, charge)
+    commander.update(1.004, False, battery)
     assert commander.mode is mode and commander.intended is Mode.OFFBOARD
     assert commander.failsafe is (mode is not Mode.OFFBOARD)
 
 
 def test_a_person_may_leave_the_battery_failsafe_once():
     commander = in_flight(COM_LOW_BAT_ACT=2)
-    commander.update(1.004, False, 0.06)
+    commander.update(1.004, False, ChargeState.CRITICAL)
     assert commander.request_mode(1.1, Mode.HOLD, True) is MavResult.ACCEPTED
-    commander.update(1.2, False, 0.06)
+    commander.update(1.2, False, ChargeState.CRITICAL)
     assert commander.mode is Mode.HOLD and not commander.failsafe
 
 
@@ -99,3 +100,38 @@ def test_the_battery_falls_linearly_while_armed_down_to_its_minimum():
     for time, charge in ((10.0, 1.0), (25.0, 0.75), (100.0, 0.5)):
         battery.update(time, True)
         assert battery.charge == pytest.approx(charge)
+
+
+@pytest.mark.parametrize(
+    ("time", "state"),
+    [(0.0, "OK"), (84.9, "OK"), (85.1, "LOW"), (92.9, "LOW"), (93.1, "CRITICAL"),
+     (94.9, "CRITICAL"), (95.1, "EMERGENCY"), (200.0, "EMERGENCY")],
+)  # fmt: skip
+def test_the_charge_state_follows_the_three_thresholds(time, state):
+    """Full to empty in 100 s; PX4's defaults 0.15, 0.07 and 0.05."""
+    parameters = Parameters.of(load_description())
+    battery = SimulatedBattery(parameters)
+    assert battery.state is ChargeState.UNDEFINED
+    for name, value in {"SIM_BAT_ENABLE": 1, "SIM_BAT_DRAIN": 100, "SIM_BAT_MIN_PCT": 1}.items():
+        parameters.set(name, value)
+    battery.update(0.0, True)
+    battery.update(time, True)
+    assert battery.state.name == state
+
+
+def test_each_worse_charge_state_warns_once_in_a_flight():
+    commander = in_flight(COM_LOW_BAT_ACT=0)
+    commander.take_texts()
+    for state in (ChargeState.OK, ChargeState.LOW, ChargeState.LOW, ChargeState.OK,
+                  ChargeState.LOW, ChargeState.CRITICAL, ChargeState.EMERGENCY):  # fmt: skip
+        commander.update(1.004, False, state)
+    assert commander.take_texts() == [
+        (Severity.EMERGENCY, "Low battery"),
+        (Severity.EMERGENCY, "Critical battery"),
+        (Severity.EMERGENCY, "Emergency battery level"),
+    ]
+    assert commander.mode is Mode.OFFBOARD and not commander.failsafe
+    commander.request_disarm(landed=True, force=False)
+    commander.take_texts()
+    commander.update(1.1, True, ChargeState.LOW)
+    assert commander.take_texts() == [], "no warnings while disarmed"

@@ -2,7 +2,19 @@
 
 from __future__ import annotations
 
+from enum import IntEnum
+
 from uam_sim_bridge.autopilot.params import Parameters
+
+
+class ChargeState(IntEnum):
+    """MAV_BATTERY_CHARGE_STATE: the values in use. `LOW` and worse are PX4's warnings."""
+
+    UNDEFINED = 0
+    OK = 1
+    LOW = 2
+    CRITICAL = 3
+    EMERGENCY = 4
 
 
 class SimulatedBattery:
@@ -23,3 +35,15 @@ class SimulatedBattery:
             self._full_since = time
         used = (time - self._full_since) / p["SIM_BAT_DRAIN"]
         self.charge = max(1.0 - used, 0.01 * p["SIM_BAT_MIN_PCT"])
+
+    @property
+    def state(self) -> ChargeState:
+        """Return the state that the charge has by BAT_LOW_THR, BAT_CRIT_THR, BAT_EMERGEN_THR."""
+        p, charge = self._parameters, self.charge
+        if charge is None:
+            return ChargeState.UNDEFINED
+        if charge < p["BAT_EMERGEN_THR"]:
+            return ChargeState.EMERGENCY
+        if charge < p["BAT_CRIT_THR"]:
+            return ChargeState.CRITICAL
+        return ChargeState.LOW if charge < p["BAT_LOW_THR"] else ChargeState.OK

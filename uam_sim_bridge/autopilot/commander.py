@@ -11,6 +11,7 @@ again; disarmed: arming is refused |
 | POSITION requested | needs a valid estimate, and sticks (MANUAL_CONTROL) |
 | sticks moved by COM_RC_STICK_OV | POSITION, if COM_RC_OVERRIDE has the bit of the mode |
 | in POSITION no sticks for COM_RC_LOSS_T | armed: failsafe, land |
+| battery below BAT_LOW_THR | armed: warning |
 | battery below BAT_CRIT_THR | armed: failsafe by COM_LOW_BAT_ACT; below BAT_EMERGEN_THR land |
 | a mode requested in a failsafe | accepted: a person takes over |
 | landed for COM_DISARM_LAND after a flight | disarm |
@@ -21,11 +22,17 @@ from __future__ import annotations
 
 import math
 
+from uam_sim_bridge.autopilot.battery import ChargeState
 from uam_sim_bridge.autopilot.params import Parameters
 from uam_sim_bridge.mavlink.protocol.modes import MavResult, Mode, Severity
 
 STREAM_GAP = 0.5  # s, longest interval between two setpoints of a stream (2 Hz)
 STREAM_TIME = 0.5  # s, shortest duration of a stream before OFFBOARD
+BATTERY_WARNINGS = {
+    ChargeState.LOW: "Low battery",
+    ChargeState.CRITICAL: "Critical battery",
+    ChargeState.EMERGENCY: "Emergency battery level",
+}
 
 
 class Commander:
@@ -45,6 +52,7 @@ class Commander:
         self._stream_last = -math.inf
         self._sticks_last = -math.inf
         self._sticks_at_rest: tuple[float, ...] | None = None
+        self._battery = ChargeState.UNDEFINED  # the worst since arming
         self._low_battery: Mode | None = None  # failsafe of the battery that has begun
         self._armed_at = 0.0
         self._flew = False
@@ -133,11 +141,8 @@ class Commander:
             self._disarm("Disarmed by external command" + (" (forced)" if force else ""))
         return MavResult.ACCEPTED
 
-    def update(self, time: float, landed: bool, charge: float | None) -> None:
-        """Apply the rules for timeouts: failsafe and automatic disarming; call once per tick.
-
-        charge: of the battery, 0..1, None if there is none.
-        """
+    def update(self, time: float, landed: bool, battery: ChargeState) -> None:
+        """Apply the rules for timeouts, battery and automatic disarming; call once per tick."""
         if not self.armed:
             return
         parameters = self._parameters
@@ -145,8 +150,8 @@ class Commander:
             self._fail(Mode.LAND, "no offboard signal, descending")
         if self.mode is Mode.POSITION and not self._has_sticks(time):
             self._fail(Mode.LAND, "no manual control signal, landing")
-        if charge is not None:
-            self._watch_battery(charge)
+        if battery > self._battery:
+            self._watch_battery(battery)
         if not landed:
             self._flew, self._landed_at = True, None
             return
@@ -157,12 +162,15 @@ class Commander:
         if wait > 0.0 and time - since > wait:
             self._disarm("Disarmed by landing" if self._flew else "Disarmed by auto preflight")
 
-    def _watch_battery(self, charge: float) -> None:
-        p, action = self._parameters, None
-        low = int(p["COM_LOW_BAT_ACT"])
-        if low and charge < p["BAT_EMERGEN_THR"]:
+    def _watch_battery(self, state: ChargeState) -> None:
+        """Warn and act once for a worse charge state; while armed a better one has no effect."""
+        self._battery = state
+        if state in BATTERY_WARNINGS:
+            self._say(Severity.EMERGENCY, BATTERY_WARNINGS[state])
+        low, action = int(self._parameters["COM_LOW_BAT_ACT"]), None
+        if low and state is ChargeState.EMERGENCY:
             action = Mode.LAND
-        elif low and charge < p["BAT_CRIT_THR"]:
+        elif low and state is ChargeState.CRITICAL:
             action = Mode.RETURN if low == 3 else Mode.LAND
         if action is not None and action is not self._low_battery:
             self._low_battery = action
@@ -181,6 +189,7 @@ class Commander:
 
     def _disarm(self, text: str) -> None:
         self.armed, self._low_battery = False, None
+        self._battery = ChargeState.UNDEFINED
         if self.failsafe:
             self.mode, self.failsafe = Mode.HOLD, False
             self.intended = Mode.HOLD

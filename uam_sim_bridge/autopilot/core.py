@@ -231,7 +231,7 @@ class Autopilot:
         commander, landing = self.commander, self.landing
         aided = self.estimator.predict(time, gyro, accel, dt)
         self.battery.update(time, commander.armed)
-        commander.update(time, landing.landed, self.battery.charge)
+        commander.update(time, landing.landed, self.battery.state)
         setpoint = self._setpoint
         descending = False
         if commander.armed and commander.mode is not Mode.OFFBOARD:

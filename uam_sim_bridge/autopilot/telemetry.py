@@ -50,7 +50,7 @@ def current_mode(autopilot: Autopilot, time: float) -> Message:
 
 
 def sys_status(autopilot: Autopilot, time: float) -> Message:
-    """SYS_STATUS: sensors and their health; no battery is simulated."""
+    """SYS_STATUS: sensors and their health; nothing of the battery."""
     there = _GYRO | _ACCELEROMETER | _VISION
     healthy = there if autopilot.estimator.aided(time) else _GYRO | _ACCELEROMETER
     return mavlink2.MAVLink_sys_status_message(
@@ -89,7 +89,7 @@ def odometry(autopilot: Autopilot, time: float) -> Message:
 
 
 def battery_status(autopilot: Autopilot, time: float) -> Message:
-    """BATTERY_STATUS: the state of charge with SIM_BAT_ENABLE; everything else is unknown."""
+    """BATTERY_STATUS: charge and charge state with SIM_BAT_ENABLE; all else is unknown."""
     charge = autopilot.battery.charge
     return mavlink2.MAVLink_battery_status_message(
         0,
@@ -101,6 +101,8 @@ def battery_status(autopilot: Autopilot, time: float) -> Message:
         -1,
         -1,
         -1 if charge is None else round(100.0 * charge),
+        0,
+        autopilot.battery.state,
     )
 
 

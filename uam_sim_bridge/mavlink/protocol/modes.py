@@ -62,6 +62,7 @@ def result_word(result: int) -> str:
 class Severity(IntEnum):
     """MAV_SEVERITY: the values in use."""
 
+    EMERGENCY = 0
     CRITICAL = 2
     ERROR = 3
     WARNING = 4
