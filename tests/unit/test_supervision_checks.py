@@ -260,6 +260,19 @@ def test_a_value_is_clear_when_it_is_below_the_limit_by_the_hysteresis_for_long_
     assert checks.quiet and checks.finding is None
 
 
+def test_the_cause_has_the_largest_value_since_the_limit_was_exceeded():
+    # beyond the limit for one tick, then within it by less than the hysteresis until hold_after
+    checks = Checks(replace(AT_ONCE, hold_after=1.0))
+    for stamp, tilt in ((0.0, 0.75), (0.5, 0.3)):
+        assert checks.update(stamp, seen([((0, 3), tilt)]), True) is None
+    found = checks.update(1.0, seen([((0, 3), 0.3)]), True)
+    assert found == (HOLD, "tilt 0.75 rad exceeds 0.5 rad", "tilt")
+    # a second excess has its own largest value
+    checks.update(2.0, seen([((0, 3), 0.1)]), True)
+    checks.update(2.5, seen([((0, 3), 0.6)]), True)
+    assert checks.update(3.5, seen([((0, 3), 0.4)]), True).cause == "tilt 0.60 rad exceeds 0.5 rad"
+
+
 def test_the_battery_is_clear_when_it_is_above_its_limit_by_the_hysteresis():
     checks = Checks(AT_ONCE)
     assert checks.update(0.0, seen(battery=0.2), True).level is LAND

@@ -159,7 +159,8 @@ class Checks:
                 value = -math.inf
             level = monitor.update(stamp, value, limits, after, p.clear_after, p.hysteresis)
             if level and (worst is None or level > worst.level):
-                worst = ExceededLimit(level, _cause(check, value, limits[level - 1]), check.name)
+                cause = _cause(check, monitor.largest, limits[level - 1])
+                worst = ExceededLimit(level, cause, check.name)
         self.quiet = all(monitor.quiet for monitor in self._monitors)
         self.finding = worst
         return worst

@@ -23,14 +23,24 @@ class Monitor:
 
     The level rises when the value has exceeded the limit of a higher level for the time `after`,
     without being clear in between. It falls when the value has been clear for `clear_after`. Clear
-    means: within the limit by at least the hysteresis. `level`: current one; `value`: last one.
+    means: within the limit by at least the hysteresis. `level`: current one; `value`: last one;
+    `largest`: the largest value since the limit of the current level was exceeded.
     """
 
     def __init__(self) -> None:
         self.level = Level.FINE
         self.value = -math.inf
+        self._largest = [-math.inf] * len(REACTIONS)
         self._since: list[float | None] = [None] * len(REACTIONS)
         self._clear_since: float | None = None
+
+    @property
+    def largest(self) -> float:
+        """Return the largest value since the limit of the current level was exceeded.
+
+        The value itself may have returned below the limit, but not below the hysteresis.
+        """
+        return self._largest[self.level - 1] if self.level else self.value
 
     @property
     def quiet(self) -> bool:
@@ -58,8 +68,10 @@ class Monitor:
             if limit == math.inf or value < limit - hysteresis * abs(limit):
                 self._since[i] = None
             elif self._since[i] is None and not value < limit:
-                self._since[i] = stamp
+                self._since[i], self._largest[i] = stamp, value
             since = self._since[i]
+            if since is not None and not value <= self._largest[i]:
+                self._largest[i] = value
             if since is not None and stamp - since >= after[i]:
                 reached = reaction
         if reached >= self.level:
