@@ -12,6 +12,7 @@ from uam_lab.cli import (
     doctor,
     faults,
     fly,
+    margins,
     operate,
     profile,
     report,
@@ -21,7 +22,9 @@ from uam_lab.cli import (
 from uam_lab.cli.command import INTERRUPTED, USER_ERRORS, WRONG_USE
 
 # each has add(subparsers), which sets `run`: arguments → exit status
-COMMANDS = (fly, operate, view, profile, report, compare, tune, campaign, faults, doctor)
+COMMANDS = (
+    *(fly, operate, view, profile, report, compare, tune, campaign, faults, margins, doctor),
+)
 
 
 class OneLineParser(argparse.ArgumentParser):

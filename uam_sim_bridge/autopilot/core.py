@@ -244,20 +244,7 @@ class Autopilot:
                 attitude_rates(
                     attitude, self._desired, self._yaw_rate, self._attitude_gains, setpoint
                 )
-        control_tick(
-            gyro,
-            dt,
-            commander.armed,
-            landing.maybe_landed,
-            setpoint,
-            self._model_factor,
-            self._filters,
-            self._gains,
-            self._mixer,
-            self._inverse,
-            self._memory,
-            self.motors,
-        )
+        self._cycle(gyro, dt, commander.armed, landing.maybe_landed, setpoint)
         if commander.armed:
             memory = self._memory
             velocity = tuple(self.estimator.estimate[VELOCITY].tolist()) if aided else None
@@ -272,6 +259,32 @@ class Autopilot:
         else:
             landing.update(time, False, False, 0.0, (0.0, 0.0), (0.0, 0.0, 0.0))
         return self.motors
+
+    def rate_loop(self, gyro: np.ndarray, dt: float, setpoint: np.ndarray) -> np.ndarray:
+        """Run one cycle of the rate loop alone, armed and in flight; return `motors`.
+
+        gyro (3,) [rad/s, FRD]; dt [s]; setpoint (4,): body rates [rad/s, FRD], thrust 0..1.
+        """
+        self._cycle(gyro, dt, True, False, setpoint)
+        return self.motors
+
+    def _cycle(
+        self, gyro: np.ndarray, dt: float, armed: bool, landed: bool, setpoint: np.ndarray
+    ) -> None:
+        control_tick(
+            gyro,
+            dt,
+            armed,
+            landed,
+            setpoint,
+            self._model_factor,
+            self._filters,
+            self._gains,
+            self._mixer,
+            self._inverse,
+            self._memory,
+            self.motors,
+        )
 
     @property
     def status(self) -> AutopilotStatus:

@@ -1,0 +1,207 @@
+"""Margins worked by hand, blocks and their connection, and the model of the stack."""
+
+import math
+
+import numpy as np
+import pytest
+
+from uam_control.estimation import EstimatorParameters, StateEstimator
+from uam_control.estimation.filters import low_pass_step
+from uam_control.profiles.profile import default_profile
+from uam_lab.margins.linear import IN, Block, delay, join, linearise
+from uam_lab.margins.loops import analyse, step_response
+from uam_lab.margins.margins import common_delay, margins
+from uam_lab.margins.plant_model import plant_model, rotor_model, zero_order_hold
+from uam_lab.margins.stack_model import stack_model
+from uam_sim_bridge.plant import Vehicle
+from uam_sim_bridge.plant.actuators import Rotors
+
+OMEGA = np.geomspace(0.01, 400.0, 4000)
+
+
+@pytest.mark.parametrize(("gain", "late"), [(2.0, 0.1), (5.0, 0.05), (0.5, 0.4)])
+def test_integrator_with_delay(gain, late):
+    """L = k e^(-s T) / s: crossover k, phase margin 90 deg - k T, gain margin pi / (2 k T)."""
+    found = margins(OMEGA, gain / (1j * OMEGA) * np.exp(-1j * OMEGA * late))
+    assert found.crossover == pytest.approx(gain, rel=1e-3)
+    assert found.phase == pytest.approx(90.0 - math.degrees(gain * late), abs=0.05)
+    expected = 20.0 * math.log10(math.pi / (2.0 * gain * late))
+    assert found.gain == pytest.approx(expected, abs=0.02)
+    assert found.gain_down == math.inf
+    assert found.delay == pytest.approx(0.5 * math.pi / gain - late, rel=2e-3)
+
+
+def test_bandwidth_of_a_first_order_loop():
+    found = margins(OMEGA, 4.0 / (1j * OMEGA))
+    assert found.bandwidth == pytest.approx(4.0 / (2.0 * math.pi), rel=1e-3)
+    assert found.peak == pytest.approx(1.0, abs=1e-3)
+
+
+def test_a_loop_that_must_not_lose_gain():
+    """L = 4 (s + 1)^2 / s^3 has -180 deg at 1 rad/s with |L| = 8: the gain may fall by 8."""
+    s = 1j * OMEGA
+    found = margins(OMEGA, 4.0 * (s + 1.0) ** 2 / s**3)
+    assert found.gain_down == pytest.approx(20.0 * math.log10(8.0), abs=0.01)
+    assert found.gain == math.inf
+
+
+def test_two_loops_that_are_delayed_together():
+    """Two integrators that drive each other: eigenvalues ± j k / s, so pi / 2 is the phase."""
+    gain = 3.0
+    matrix = np.array([[1.0, 0.0], [0.0, 2.0]])
+    loops = gain / (1j * OMEGA)[:, None, None] * matrix
+    assert common_delay(OMEGA, loops) == pytest.approx(0.5 * math.pi / (2.0 * gain), rel=1e-3)
+    # the eigenvalue 2 + j k of [[2, -k], [k, 2]] / s needs the least delay
+    turned = np.array([[2.0, 1.0], [-1.0, 2.0]]) / (1j * OMEGA)[:, None, None]
+    size, angle = math.sqrt(5.0), math.atan2(1.0, 2.0)
+    expected = (0.5 * math.pi - angle) / size
+    assert common_delay(OMEGA, turned) == pytest.approx(expected, rel=1e-3)
+
+
+def test_join_closes_and_opens_a_loop():
+    """x+ = x + u, u = -k x one tick later: z^2 - z + k = 0."""
+    k = 0.2
+    one = np.ones((1, 1))
+    plant = Block(one, one, one, 0.0 * one, ("u",), ("x",))
+    law = Block(np.zeros((0, 0)), np.zeros((0, 1)), np.zeros((1, 0)), -k * one, ("seen",), ("u",))
+    blocks = [plant, delay(["x"], ["seen"], 1), law]
+    closed = join(blocks, added=["u"])
+    assert closed.inputs == (IN + "u",)
+    np.testing.assert_allclose(np.sort(np.linalg.eigvals(closed.a)), np.sort(np.roots([1, -1, k])))
+    opened = join(blocks, opened=["u"]).only([IN + "u"], ["u"])
+    z = np.exp(1j * np.array([0.1, 0.5, 2.0]))
+    np.testing.assert_allclose(opened.response(z)[:, 0, 0], -k / (z * (z - 1.0)))
+    # and the closed loop has the sensitivity of the open one
+    through = closed.only([IN + "u"], ["u"]).response(z)[:, 0, 0]
+    np.testing.assert_allclose(through, -k / (z * (z - 1.0)) / (1.0 + k / (z * (z - 1.0))))
+    with pytest.raises(ValueError, match="two outputs"):
+        join([plant, plant])
+
+
+def test_a_delay_of_no_tick_is_a_wire():
+    block = delay(["a", "b"], ["c", "d"], 0)
+    np.testing.assert_array_equal(block.simulate(np.eye(2)), np.eye(2))
+    later = delay(["a", "b"], ["c", "d"], 2).simulate(np.vstack([np.eye(2), np.zeros((2, 2))]))
+    np.testing.assert_array_equal(later, np.vstack([np.zeros((2, 2)), np.eye(2)]))
+
+
+def test_linearised_filter():
+    """x+ = keep x + (1 - keep) u, and the output is the new x."""
+    state, cutoff, dt = np.zeros(1), 3.0, 0.004
+
+    def step(given):
+        low_pass_step(given, cutoff, dt, state)
+        return [2.0 * state[0] + given[0] ** 2]
+
+    block = linearise(step, [[state]], ["u"], ["y"], np.array([0.0]))
+    keep = math.exp(-2.0 * math.pi * cutoff * dt)
+    np.testing.assert_allclose(block.a, [[keep]], atol=1e-9)
+    np.testing.assert_allclose(block.b, [[1.0 - keep]], atol=1e-9)
+    np.testing.assert_allclose(block.c, [[2.0 * keep]], atol=1e-9)
+    np.testing.assert_allclose(block.d, [[2.0 * (1.0 - keep)]], atol=1e-9)
+    assert state[0] == 0.0
+
+
+def test_double_integrator_under_hold():
+    a, b = zero_order_hold(np.array([[0.0, 1.0], [0.0, 0.0]]), np.array([[0.0], [1.0]]), 0.1)
+    np.testing.assert_allclose(a, [[1.0, 0.1], [0.0, 1.0]])
+    np.testing.assert_allclose(b, [[0.005], [0.1]])
+
+
+@pytest.fixture(scope="module")
+def vehicle():
+    return Vehicle.load()
+
+
+def test_rotor_with_one_lag_is_that_lag(vehicle):
+    numbers = vehicle.numbers["rotors"] | {"lag_up": 0.03, "lag_down": 0.03}
+    rotors = Rotors(numbers, 0.002)
+    thrust = 5.0
+    command, slope, lag = rotor_model(rotors, thrust, 0.002)
+    full, factor = rotors.constants[1], rotors.constants[2]
+    assert full * (factor * command**2 + (1.0 - factor) * command) == pytest.approx(thrust)
+    assert slope == pytest.approx(full * (2.0 * factor * command + 1.0 - factor), rel=1e-3)
+    # the plant applies the speed at the end of a physics step during that step: half a step less
+    behind = math.atan(0.03 * 20.0) - 20.0 * 0.001
+    assert lag == pytest.approx(math.tan(behind) / 20.0, rel=0.01)
+    both = rotor_model(Rotors(vehicle.numbers["rotors"], 0.002), thrust, 0.002)[2]
+    assert 0.0125 < both < 0.025
+
+
+@pytest.mark.parametrize("payload", [0.0, 0.3])
+def test_rigid_body_in_hover(vehicle, payload):
+    """All rotors together lift the mass; a tilted vehicle accelerates with g times the angle."""
+    block, hover = plant_model(vehicle, payload, vehicle.description.stowed)
+    mass = 2.2 + payload
+    assert hover.weight == pytest.approx(9.81 * mass)
+    period, steps = vehicle.description.control_period, 300
+    motors = np.zeros((steps, len(block.inputs)))
+    motors[:, :4] = 0.01
+    moved = block.simulate(motors)
+    numbers = vehicle.numbers["rotors"]
+    full = numbers["thrust_coefficient"] * numbers["speed_max"] ** 2
+    slope = full * (2.0 * 0.3 * hover.command + 0.7)
+    late = moved[:, block.outputs.index("true.z_dot")]
+    gained = (late[-1] - late[-101]) / (100 * period)
+    drag = 0.2 * late[-51] / mass
+    assert gained == pytest.approx(4.0 * 0.01 * slope / mass - drag, rel=0.02)
+
+
+def test_law_in_the_model_has_the_gains_of_its_equation(vehicle):
+    """tau_p of z = -Mbar (lambda_1 + rho p12 / varpi) e inside the boundary layer, eq. (8)."""
+    profile = default_profile("modular", vehicle.description)
+    gains = {"position": np.array([0.5, 0.0, 0.0, 0.0, 0.1])}
+    stack = stack_model(profile, vehicle, gains=gains)
+    (law,) = (block for block in stack.blocks if "setpoint.thrust" in block.outputs
+              and "state.z" in block.inputs)  # fmt: skip
+    p = profile.sets["position_controller"]
+    _, p12, p22 = p.lyapunov_matrix()
+    extra = 0.6 / p.varpi
+    stiffness = p.inertia[2] * (p.lambda_1[2] + extra * p12[2])
+    damping = p.inertia[2] * (p.lambda_2[2] + extra * p22[2])
+    row = law.outputs.index("setpoint.thrust")
+    by_z, by_rate = (law.d[row, law.inputs.index(f"state.z{end}")] for end in ("", "_dot"))
+    assert by_z / by_rate == pytest.approx(stiffness / damping, rel=1e-4)
+    rotors = vehicle.numbers["rotors"]
+    full = 4.0 * rotors["thrust_coefficient"] * rotors["speed_max"] ** 2
+    # thrust command with THR_MDL_FAC: the thrust is proportional to the command
+    assert by_z == pytest.approx(-stiffness / full, rel=0.01)
+
+
+def test_estimate_of_the_base_is_exact_while_the_sensors_agree(vehicle):
+    """Therefore the latency of motion capture is not in the loops of the model."""
+    profile = default_profile("modular", vehicle.description)
+    estimator = StateEstimator(profile.sets["state_estimator"], 2)
+    assert isinstance(profile.sets["state_estimator"], EstimatorParameters)
+    period, gravity = 0.004, np.array([0.0, 0.0, 9.81])
+    level, late, poses = np.array([1.0, 0.0, 0.0, 0.0]), 3, []
+    estimator.joints(0.0, np.zeros(2), np.zeros(2))
+    worst = 0.0
+    for k in range(2000):
+        time = k * period
+        position = np.array([0.1 * math.sin(3.0 * time), 0.0, 0.0])
+        # mean acceleration of the last period, as an accelerometer that averages
+        before = 0.3 * math.cos(3.0 * (time - period))
+        force = gravity + [(0.3 * math.cos(3.0 * time) - before) / period, 0.0, 0.0]
+        poses.append((time, position))
+        if k >= late and k % 2 == 0:
+            estimator.mocap(*poses[k - late], level)
+        estimator.imu(time, np.zeros(3), force)
+        state = estimator.update()
+        if k > 1000:
+            worst = max(worst, abs(state[0, 0] - position[0]))
+    assert worst < 1e-3  # of 0.1 m
+
+
+def test_analysis_of_the_profile(vehicle):
+    """A late setpoint takes its delay from the margin, and the steps end at one."""
+    profile = default_profile("modular", vehicle.description)
+    stack = stack_model(profile, vehicle)
+    found = analyse(stack)
+    later = analyse(stack_model(profile, vehicle, late_setpoints=2))
+    assert later.setpoint_delay == pytest.approx(found.setpoint_delay - 0.008, abs=2e-4)
+    assert found.setpoint_delay <= min(found.loops[n][1].delay for n in ("roll", "pitch", "yaw"))
+    time, value = step_response(stack, found, "z", 6.0)
+    assert time[-1] == pytest.approx(6.0 - stack.period)
+    assert value[-1] == pytest.approx(1.0, abs=0.05)
+    assert later.loops["roll"][1].phase < found.loops["roll"][1].phase

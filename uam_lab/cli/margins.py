@@ -1,0 +1,101 @@
+"""`uam margins`: delay, gain and phase margin and bandwidth of every loop."""
+
+from __future__ import annotations
+
+import argparse
+import time
+from pathlib import Path
+
+from uam_control.mission import load_scenario
+from uam_control.profiles.profile import default_profile, load_profile
+from uam_control.settings import configuration
+from uam_control.vehicle import load_description
+from uam_lab.cli.command import Command, number
+from uam_lab.flight.conclude import command_line
+from uam_lab.flight.flight_settings import SettingsError
+from uam_lab.results.result_folder import make_folder
+
+STABLE, UNSTABLE = 0, 1
+EXAMPLES = """\
+examples:
+  uam margins                              default profile: without payload and with 0.2 kg
+  uam margins --profile s500 --profile mine.yaml      mine.yaml overrides
+  uam margins --payload 0 --payload 0.4    other payloads
+  uam margins --delay 16                   with setpoints that come 16 ms later
+  uam margins --flight results/latest      adapted gains of a flight (default: one is flown)
+  uam margins --initial                    only the initial gains; no flight
+
+The model is linear, around hover; docs/margins.md. Results in --out: margins.md, margins.json,
+bode.png, step.png. Exit status: 0 every case is stable, 1 one is not, 2 wrong use.
+"""
+
+
+def add(commands: argparse._SubParsersAction) -> None:
+    """Add the subcommand to the command line."""
+    command = Command(
+        commands,
+        "margins",
+        run,
+        "delay, gain and phase margin and bandwidth of every loop",
+        "Linearise the objects that fly around hover and compute the margins of each loop: "
+        "attitude, position, joints.",
+        EXAMPLES,
+    )
+    command.repeated("--profile", "NAME|FILE", "a later one overrides (default: the vehicle's)")
+    command.vehicle()
+    command.scenario()
+    mass = number("mass", "kg", 0.0)
+    command.repeated("--payload", "KG", "payload on the magnet (default: 0 and 0.2)", type=mass)
+    angle = number("angle", "rad")
+    command.option("--arm", "RAD", "angles of the joints (default: stowed)", type=angle, nargs="+")
+    text = "delay added to the setpoints, in whole control periods"
+    command.option("--delay", "MS", text, 0.0, type=number("delay", "ms", 0.0, 200.0))
+    text = "result folder of a flight with the adapted gains (default: --scenario is flown)"
+    command.option("--flight", "DIR", text, type=Path)
+    command.switch("--initial", "only the initial gains of the profile")
+    command.out()
+
+
+def run(options: argparse.Namespace) -> int:
+    """Compute, print and write the margins; return the exit status."""
+    from uam_lab.margins import gains, report
+    from uam_lab.margins.cases import cases_of
+    from uam_lab.report.rebuild import series_of
+    from uam_sim_bridge.plant import Vehicle
+
+    described = load_description(options.vehicle)
+    given = [str(configuration.named("profiles", one)) for one in options.profile]
+    profile = (
+        load_profile(*given, vehicle=described) if given else default_profile("modular", described)
+    )
+    vehicle = Vehicle.of(described)
+    joints = len(described.joints)
+    if options.arm is not None and len(options.arm) != joints:
+        raise SettingsError(f"--arm: {len(options.arm)} angles, the vehicle has {joints} joints")
+    if profile.section("mavlink_bridge").get("setpoint", "rates") != "rates":
+        raise SettingsError(f"{profile.name}: margins need body-rate setpoints, setpoint: rates")
+    payloads = options.payload or [0.0, 0.2]
+    flown = None
+    if not options.initial:
+        mass = load_scenario(options.scenario, described).payload_mass
+        series = (
+            series_of(options.flight)
+            if options.flight
+            else gains.fly(profile, vehicle, options.scenario, mass)
+        )
+        flown = gains.flown_gains(profile, series)
+    ticks = round(1e-3 * options.delay / described.control_period)
+    out = make_folder(options.out, "margins")
+    cases = cases_of(profile, vehicle, payloads, flown, options.arm, ticks)
+    facts = {
+        "profile": profile.name,
+        "vehicle": described.name,
+        "added_delay_s": ticks * described.control_period,
+        "command": command_line(),
+        "made": time.strftime("%Y-%m-%dT%H:%M:%S"),
+    }
+    report.write(out, cases, facts)
+    print(f"{profile.name} on {described.name}, hover, linear")
+    print(report.table(cases))
+    print(f"results  {out}")
+    return STABLE if all(case.analysis.stable for case in cases) else UNSTABLE

@@ -1,0 +1,214 @@
+"""Linear discrete-time blocks with named signals: x+ = A x + B u, y = C x + D u.
+
+`linearise` makes a block from a function and the arrays in which its objects keep their state;
+`join` connects the blocks by the names of their signals.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Collection, Iterable, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+TOGETHER = 100  # frequencies that are solved together
+STEP = 1e-6  # of inputs and states, for the central differences
+IN = "in:"  # prefix of an input of a joined block that opens, or adds to, the signal of that name
+MODULES = "uam_"  # packages whose objects are searched for arrays
+
+
+@dataclass(frozen=True)
+class Block:
+    """A linear system with m inputs, p outputs and n states; the time step is that of the model.
+
+    a (n, n), b (n, m), c (p, n), d (p, m); inputs (m), outputs (p): names of the signals.
+    """
+
+    a: np.ndarray
+    b: np.ndarray
+    c: np.ndarray
+    d: np.ndarray
+    inputs: tuple[str, ...]
+    outputs: tuple[str, ...]
+
+    def response(self, z: np.ndarray) -> np.ndarray:
+        """Return the transfer matrices (k, p, m) at the complex numbers z (k,)."""
+        identity, parts = np.eye(len(self.a)), []
+        for some in np.array_split(z, max(1, len(z) // TOGETHER)):
+            solved = np.linalg.solve(some[:, None, None] * identity - self.a, self.b)
+            parts.append(self.c @ solved + self.d)
+        return np.concatenate(parts)
+
+    def only(self, inputs: Sequence[str], outputs: Sequence[str]) -> Block:
+        """Return the block with these inputs and outputs, in this order."""
+        m = [self.inputs.index(name) for name in inputs]
+        p = [self.outputs.index(name) for name in outputs]
+        b, c, d = self.b[:, m], self.c[p], self.d[np.ix_(p, m)]
+        return Block(self.a, b, c, d, tuple(inputs), tuple(outputs))
+
+    def simulate(self, inputs: np.ndarray) -> np.ndarray:
+        """Return the outputs (steps, p) for inputs (steps, m), from rest."""
+        state, found = np.zeros(len(self.a)), np.empty((len(inputs), len(self.outputs)))
+        for k, u in enumerate(inputs):
+            found[k] = self.c @ state + self.d @ u
+            state = self.a @ state + self.b @ u
+        return found
+
+    def reduced(self) -> Block:
+        """Return the block without states that influence neither an output nor another state."""
+        block = self
+        while True:
+            seen = np.any(np.vstack([block.a, block.c]) != 0.0, axis=0)
+            if seen.all():
+                return block
+            a, b, c = block.a[np.ix_(seen, seen)], block.b[seen], block.c[:, seen]
+            block = Block(a, b, c, block.d, block.inputs, block.outputs)
+
+
+def delay(inputs: Sequence[str], outputs: Sequence[str], ticks: int) -> Block:
+    """Return the block that delays each of `inputs` by `ticks` and names it as in `outputs`."""
+    width, size = len(inputs), ticks * len(inputs)
+    a, b = np.eye(size, k=-width), np.eye(size, width)
+    c, d = np.eye(size)[size - width :] if ticks else np.zeros((width, 0)), np.zeros((width, width))
+    return Block(a, b, c, d if ticks else np.eye(width), tuple(inputs), tuple(outputs))
+
+
+def join(
+    blocks: Iterable[Block], opened: Collection[str] = (), added: Collection[str] = ()
+) -> Block:
+    """Connect each input with the output of the same name; return the whole as a block.
+
+    opened: signals that are cut: the output stays, the inputs of that name get IN + name instead.
+    added: signals to which the input IN + name is added. Inputs that no block drives stay inputs.
+    Raises ValueError for two outputs of one name.
+    """
+    blocks = list(blocks)
+    outputs = [name for block in blocks for name in block.outputs]
+    inputs = [name for block in blocks for name in block.inputs]
+    if len(set(outputs)) < len(outputs):
+        raise ValueError(f"two outputs of one name among {outputs}")
+    free = [name for name in dict.fromkeys(inputs) if name not in outputs]
+    free += [IN + name for name in (*opened, *added)]
+    feedback = np.zeros((len(inputs), len(outputs)))
+    outside = np.zeros((len(inputs), len(free)))
+    for row, name in enumerate(inputs):
+        if name in opened or name in added:
+            outside[row, free.index(IN + name)] = 1.0
+        elif name not in outputs:
+            outside[row, free.index(name)] = 1.0
+        if name in outputs and name not in opened:
+            feedback[row, outputs.index(name)] = 1.0
+    a, b, c, d = (_diagonal([getattr(block, part) for block in blocks]) for part in "abcd")
+    loop = np.linalg.inv(np.eye(len(inputs)) - feedback @ d)
+    of_state, of_input = loop @ feedback @ c, loop @ outside
+    return Block(
+        a + b @ of_state,
+        b @ of_input,
+        c + d @ of_state,
+        d @ of_input,
+        tuple(free),
+        tuple(outputs),
+    )
+
+
+def _diagonal(matrices: Sequence[np.ndarray]) -> np.ndarray:
+    """Return the block-diagonal matrix of `matrices`, which may have no rows or no columns."""
+    whole = np.zeros((sum(len(one) for one in matrices), sum(one.shape[1] for one in matrices)))
+    row = column = 0
+    for one in matrices:
+        whole[row : row + len(one), column : column + one.shape[1]] = one
+        row, column = row + len(one), column + one.shape[1]
+    return whole
+
+
+def linearise(
+    step: Callable[[np.ndarray], np.ndarray],
+    objects: Sequence[Any],
+    inputs: Sequence[str],
+    outputs: Sequence[str],
+    at: np.ndarray | None = None,
+) -> Block:
+    """Return the block of `step`: inputs (m,) → outputs (p,), by central differences.
+
+    objects: what keeps the state between two steps; every float array that can be reached from them
+    and changes is a state. at (m,): the operating point, None for zero; the objects must be at rest
+    there. Their arrays have the old values afterwards.
+    """
+    at = np.zeros(len(inputs)) if at is None else np.array(at, dtype=float)
+    arrays = list(arrays_of(*objects))
+    rest = _read(arrays)
+
+    def run(state: np.ndarray, given: np.ndarray) -> np.ndarray:
+        """Return the outputs and the next state (p + n,)."""
+        _write(arrays, state)
+        found = np.array(step(given), dtype=float)
+        return np.concatenate([found, _read(arrays)])
+
+    # what neither input changes nor changes by itself is no state
+    changed = np.zeros(len(rest), dtype=bool)
+    for sign in (1.0, -1.0):
+        state = rest
+        for _ in range(3):
+            state = run(state, at + sign * STEP * np.arange(1.0, len(at) + 1.0))[len(outputs) :]
+            changed |= state != rest
+    states = np.flatnonzero(changed)
+    directions = [(rest, column) for column in STEP * np.eye(len(at))]
+    size = len(outputs) + len(rest)
+    by_input = np.empty((size, len(at)))
+    for i, (state, change) in enumerate(directions):
+        by_input[:, i] = (run(state, at + change) - run(state, at - change)) / (2.0 * STEP)
+    by_state = np.empty((size, len(states)))
+    for i, index in enumerate(states):
+        change = np.zeros(len(rest))
+        change[index] = STEP
+        by_state[:, i] = (run(rest + change, at) - run(rest - change, at)) / (2.0 * STEP)
+    _write(arrays, rest)
+    rows, count = len(outputs) + states, len(outputs)
+    return Block(
+        by_state[rows],
+        by_input[rows],
+        by_state[:count],
+        by_input[:count],
+        tuple(inputs),
+        tuple(outputs),
+    ).reduced()
+
+
+def arrays_of(*objects: Any) -> list[np.ndarray]:
+    """Return the float64 arrays that own their data and are reachable from attributes of `objects`.
+
+    Lists, tuples and dictionaries are followed, and objects of this project's classes.
+    """
+    found: dict[int, np.ndarray] = {}
+    seen: set[int] = set()
+    waiting = list(objects)
+    while waiting:
+        one = waiting.pop()
+        if id(one) in seen:
+            continue
+        seen.add(id(one))
+        if isinstance(one, np.ndarray):
+            while isinstance(one.base, np.ndarray):
+                one = one.base
+            if one.dtype == np.float64 and one.flags.writeable:
+                found[id(one)] = one
+        elif isinstance(one, list | tuple):
+            waiting += one
+        elif isinstance(one, dict):
+            waiting += one.values()
+        elif type(one).__module__.startswith(MODULES) and not isinstance(one, type):
+            waiting += getattr(one, "__dict__", {}).values()
+            waiting += [getattr(one, name, None) for name in getattr(one, "__slots__", ())]
+    return list(found.values())
+
+
+def _read(arrays: Sequence[np.ndarray]) -> np.ndarray:
+    return np.concatenate([one.ravel() for one in arrays] or [np.zeros(0)])
+
+
+def _write(arrays: Sequence[np.ndarray], values: np.ndarray) -> None:
+    begin = 0
+    for one in arrays:
+        one[...] = values[begin : begin + one.size].reshape(one.shape)
+        begin += one.size
