@@ -12,6 +12,7 @@ from uam_control.profiles.profile import load_profile
 from uam_control.supervision import OperatorCommand, State
 from uam_lab.flight.direct.flight import DirectFlight
 from uam_lab.results.metrics import compute
+from uam_sim_bridge.faults import read_schedule
 from uam_sim_bridge.plant import Vehicle
 
 
@@ -106,3 +107,16 @@ def test_motors_that_are_switched_off_by_the_autopilot_end_it():
     output = until(made, lambda o: o.done)
     assert output.abort_reason == "the autopilot disarmed in flight"
     assert not made.armed
+
+
+def test_holds_whose_cause_is_gone_end_and_the_mission_is_completed():
+    """IMU and mocap are gone for 0.5 s in transit, mocap is gone for 0.8 s during the pick."""
+    profile, scenario = load_profile("s500"), load_scenario("pick_and_place")
+    given = ("imu_dropout@15+0.5", "mocap_dropout@15+0.5", "mocap_dropout@31+0.8")
+    faults = read_schedule(given, scenario, 1)
+    made = DirectFlight(scenario, profile, Vehicle.load(), 0.2, seed=1, faults=faults)
+    output = until(made, lambda o: o.done)
+    assert states(made).count(State.HOLDING) == 2 and not output.abort_reason
+    info = {"payload_mass_kg": 0.2, "drop_point": scenario.drop_point}
+    result = compute(made.recording.series(), info)
+    assert result["mission_completed"], result["shortfalls"]

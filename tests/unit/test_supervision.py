@@ -268,24 +268,70 @@ def test_leaving_the_geofence_starts_a_landing():
     assert decision.cause == "geofence left by 0.20 m, 0.1 m allowed"
 
 
-def test_a_cleared_limit_resumes_only_with_resume_automatically():
+@pytest.mark.parametrize(
+    ("policy", "state", "cause"),
+    [
+        ("resume", State.FLYING, "clear again"),
+        ("land", State.LANDING, "position error 1.20 m exceeds 1 m; clear again"),
+        ("wait", State.HOLDING, "position error 1.20 m exceeds 1 m"),
+    ],
+)
+def test_a_hold_whose_limit_is_clear_ends_by_the_policy(policy, state, cause):
     far, near = with_state((0, 0), 1.2), observation()
-    for automatic, expected in ((False, State.HOLDING), (True, State.FLYING)):
-        supervisor = flying(resume_automatically=automatic)
-        assert watch(supervisor, far, 0.6).state is State.HOLDING
-        assert supervisor.refusal(OperatorCommand.RESUME, far).startswith("position error")
-        assert watch(supervisor, near, 0.9, 2.0).state is State.HOLDING
-        assert watch(supervisor, near, 3.0, 3.0).state is expected
+    supervisor = flying(when_clear=policy)
+    assert watch(supervisor, far, 0.6).state is State.HOLDING
+    assert supervisor.refusal(OperatorCommand.RESUME, far).startswith("position error")
+    assert watch(supervisor, near, 0.9, 2.0).state is State.HOLDING
+    decision = watch(supervisor, near, 3.0, 3.0)
+    assert (decision.state, decision.cause) == (state, cause)
+
+
+def test_a_hold_that_waits_is_ended_by_a_command_or_becomes_a_landing():
+    far, near = with_state((0, 0), 1.2), observation()
+    for command, state, cause in (
+        (OperatorCommand.RESUME, State.FLYING, "resume by command"),
+        (None, State.LANDING, "position error 1.20 m exceeds 1 m; no command for 30 s"),
+    ):
+        supervisor = flying(when_clear="wait")
+        watch(supervisor, far, 0.6)
+        assert watch(supervisor, near, 28.0, 2.0).state is State.HOLDING
+        supervisor.step(30.1, near, command)
+        decision = watch(supervisor, near, 2.0, 30.2)
+        assert (decision.state, decision.cause) == (state, cause)
+
+
+def test_a_limit_that_comes_back_again_and_again_lands():
+    far, near = with_state((0, 0), 1.2), observation()
+    supervisor, stamp = flying(resumes_allowed=2.0), 1.0
+    for _ in range(3):
+        assert watch(supervisor, far, 0.6, stamp).state is State.HOLDING
+        decision = watch(supervisor, near, 2.0, stamp + 0.7)
+        stamp += 4.0
+    assert decision.state is State.LANDING
+    assert decision.cause == "position error 1.20 m exceeds 1 m; clear again, after 2 resumes"
+
+
+def test_after_a_goal_a_cleared_limit_waits():
+    """Resume would leave the goal for the scenario."""
     supervisor = flying()
-    watch(supervisor, far, 0.6)
-    watch(supervisor, near, 2.0, 2.0)
-    assert supervisor.step(5.0, near, OperatorCommand.RESUME).state is State.FLYING
+    watch(supervisor, with_state((0, 0), 1.2), 0.6)
+    assert watch(supervisor, observation(off_path=True), 3.0, 2.0).state is State.HOLDING
 
 
-def test_a_hold_by_command_ends_only_by_command():
-    supervisor = flying(resume_automatically=True)
+def test_a_hold_by_command_ends_by_command_or_after_its_own_time():
+    supervisor = flying()
     supervisor.step(1.0, observation(), OperatorCommand.HOLD)
     assert watch(supervisor, observation(), 60.0, 2.0).state is State.HOLDING
+    decision = watch(supervisor, observation(), 1.0, 301.0)
+    assert decision.state is State.LANDING
+    assert decision.cause == "hold by command; no command for 300 s"
+
+
+def test_a_hold_by_command_replaces_that_of_a_limit():
+    supervisor = flying()
+    watch(supervisor, with_state((0, 0), 1.2), 0.6)
+    supervisor.step(1.7, observation(), OperatorCommand.HOLD)
+    assert watch(supervisor, observation(), 20.0, 2.0).state is State.HOLDING
 
 
 def test_a_hard_limit_on_the_ground_disarms():
@@ -315,12 +361,6 @@ def test_the_reaction_to_a_restarted_controller_follows_the_policy(policy, state
     )
     decision = watch(supervisor, observation(readings=Readings(controller_age=0.02)), 2.0, 3.0)
     assert (decision.state, decision.cause) == (state, cause)
-
-
-def test_other_cleared_limits_wait_for_a_command():
-    supervisor = flying(after_restart="go_on")
-    watch(supervisor, observation(readings=Readings(joint_age=0.3)), 1.0)
-    assert watch(supervisor, observation(), 2.0, 3.0).state is State.HOLDING
 
 
 @pytest.mark.parametrize("keep", ["keep", "release"])

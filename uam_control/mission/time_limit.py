@@ -2,16 +2,19 @@
 
 from __future__ import annotations
 
-from uam_control.mission import Scenario
+from uam_control.mission import MissionParameters, Scenario
 
 SETTLED = 5.0  # s of simulation time disarmed, after which a flight without end is over
 DISARMED = "the autopilot has disarmed, and the mission did not end"
-OVERTIME = 60.0  # s of simulation time after the scenario's landing, then the flight is ended
+OVERTIME = 60.0  # s of simulation time for start, holds by limits and touchdown
 
 
-def time_limit(scenario: Scenario) -> float:
-    """Return the simulation time [s] at which a flight of this scenario is ended."""
-    return scenario.landing.at + scenario.landing.duration + OVERTIME
+def time_limit(scenario: Scenario, parameters: MissionParameters) -> float:
+    """Return the simulation time [s] at which a flight of this scenario is ended.
+
+    A hold by command lasts up to command_timeout and then lands; this limit comes later.
+    """
+    return scenario.landing.at + scenario.landing.duration + OVERTIME + parameters.command_timeout
 
 
 class Settled:

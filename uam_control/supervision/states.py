@@ -35,7 +35,9 @@ class Event(Enum):
     HARD_LIMIT = "failsafe limit exceeded"
     HARD_LIMIT_ON_GROUND = "failsafe limit exceeded on the ground"
     HELD_TOO_LONG = "limit exceeded for hold_timeout"
-    CLEAR = "limit clear, resume_automatically"
+    WAITED_TOO_LONG = "no command in time"
+    CLEAR = "limit clear, when_clear: resume"
+    CLEAR_TO_LAND = "limit clear, when_clear: land"
     RESTARTED = "lost controller restarted, after_restart: go_on"
     RESTARTED_TO_LAND = "lost controller restarted, after_restart: land"
     NO_TOUCHDOWN = "no touchdown in time"
@@ -90,7 +92,10 @@ TRANSITIONS = (
     Transition(_S.HOLDING, _E.CLEAR, _S.FLYING),
     Transition(_S.HOLDING, _E.RESTARTED, _S.FLYING),
     Transition(_S.HOLDING, _E.RESTARTED_TO_LAND, _S.LANDING),
+    Transition(_S.HOLDING, _E.CLEAR_TO_LAND, _S.LANDING),
     Transition(_S.HOLDING, _E.HELD_TOO_LONG, _S.LANDING),
+    Transition(_S.HOLDING, _E.WAITED_TOO_LONG, _S.LANDING),
+    Transition(_S.HOLDING, _E.HOLD, _S.HOLDING),
     Transition(_S.HOLDING, _E.LAND_LIMIT, _S.LANDING),
     Transition(_S.HOLDING, _E.LAND, _S.LANDING),
     Transition(_S.HOLDING, _E.HARD_LIMIT, _S.FAILSAFE),

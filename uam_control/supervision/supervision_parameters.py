@@ -12,7 +12,6 @@ from uam_control.settings.parameter_set import (
     ParameterSet,
     choice,
     number,
-    switch,
     vector,
 )
 
@@ -114,8 +113,20 @@ class Reactions(ParameterSet):
     hold_timeout: float = number(
         5.0, "time of a hold beyond a limit before a landing", "s", 0.0, 600.0
     )
-    resume_automatically: bool = switch(
-        False, "resume without a command when the limit is clear again"
+    when_clear: str = choice(
+        "resume",
+        "reaction when the limit that started a hold is clear again: resume, land, wait (for a "
+        "command)",
+        ("resume", "land", "wait"),
+    )
+    resumes_allowed: float = number(
+        5.0, "holds in a flight after which when_clear resumes; the next one lands", "1", 0.0, 1e3
+    )
+    wait_timeout: float = number(
+        30.0, "time of a hold without a command before a landing", "s", 1.0, 3600.0
+    )
+    command_timeout: float = number(
+        300.0, "the same for a hold by command and at a goal", "s", 1.0, 36000.0
     )
     after_restart: str = choice(
         "go_on",

@@ -14,7 +14,8 @@ from enum import Enum
 from typing import NamedTuple
 
 from uam_control.coordinates import CHI, Z
-from uam_control.supervision.checks import CONTROLLERS, Checks
+from uam_control.supervision.checks import Checks
+from uam_control.supervision.holds import Holds
 from uam_control.supervision.monitor import Level
 from uam_control.supervision.observation import Authority, Observation, OperatorCommand
 from uam_control.supervision.states import AIRBORNE_STATES, ORDINARY, TARGETS, Event, State
@@ -73,8 +74,7 @@ class Supervisor:
         self._goes_on = False  # whether the scenario goes on after the vehicle is regained
         self._planned = False  # whether a landing is the scenario's
         self._stamp = -math.inf
-        self._beyond_since: float | None = None  # stamp [s], during a hold beyond a limit
-        self._held_for = ""  # name of the quantity whose limit started the hold
+        self._holds = Holds()
         self._checks = Checks(parameters)
         self._parameters = parameters
         self.decision = self._decide()
@@ -216,13 +216,11 @@ class Supervisor:
             yield _planned(Event.TOUCHDOWN)
         if seen.overdue:
             yield Event.NO_TOUCHDOWN, "no touchdown in time"
-        if self._held_too_long(level):
-            yield Event.HELD_TOO_LONG, f"{cause} for {p.hold_timeout:g} s"
+        yield from self._holds.events(self._stamp, level, cause, self.cause, p)
         if level is Level.HOLD:
             yield Event.HOLD_LIMIT, cause
         if level is Level.FINE:
-            if self.state is State.HOLDING and self._held_for:
-                yield from self._clear()
+            yield from self._holds.clear(self.cause, seen.off_path, p)
             if self.state is State.HOLDING and self._goes_on:
                 yield Event.RESUME, Event.RESUME.value
             if self._arm and seen.ready and self._checks.quiet:
@@ -234,30 +232,16 @@ class Supervisor:
         if seen.state[CHI, Z] - seen.ground > p.airborne_height:
             yield _planned(Event.AIRBORNE)
 
-    def _held_too_long(self, level: Level) -> bool:
-        if self.state is not State.HOLDING or level is Level.FINE:
-            self._beyond_since = None
-            return False
-        if self._beyond_since is None:
-            self._beyond_since = self._stamp
-        return self._stamp - self._beyond_since >= self._parameters.hold_timeout
-
-    def _clear(self) -> Iterator[tuple[Event, str]]:
-        """Yield the event for a hold whose quantity is within its limit again."""
-        p, back = self._parameters, "the controller is back"
-        if p.resume_automatically:
-            yield Event.CLEAR, "clear again"
-        elif self._held_for == CONTROLLERS and p.after_restart != "stay":
-            landing = p.after_restart == "land"
-            yield (Event.RESTARTED_TO_LAND if landing else Event.RESTARTED), back
-
     def _go(self, event: Event, cause: str) -> None:
         source, self.state = self.state, TARGETS[self.state, event]
         self.cause = cause
         self._planned = event is Event.LANDING_DUE
         finding = self._checks.finding
-        self._held_for = finding.name if event is Event.HOLD_LIMIT and finding else ""
-        self._beyond_since = None
+        if self.state is State.HOLDING:
+            quantity = finding.name if event is Event.HOLD_LIMIT and finding else ""
+            self._holds.begin(self._stamp, event, quantity)
+        else:
+            self._holds.end(event)
         self._goes_on = self._goes_on and event is Event.REGAINED
         self._arm = self._arm and self.state is not State.DISARMED
         self.decision = self._decide()

@@ -67,7 +67,7 @@ class DirectFlight:
             self.autopilot.receives = self._faults.link.receives
             self.control.insert("bridge", "faults", self._update_faults)
         self.ended_by = ""  # reason of an end before that of the mission
-        self._limit = time_limit(scenario)
+        self._limit = time_limit(scenario, sets["mission"])
         self._lag = 0  # ticks from an IMU sample to its arrival
         self._truths: deque[Snapshot] = deque()  # of ticks whose IMU sample has not arrived yet
         self._complete = False  # every kind of sensor has delivered

@@ -147,7 +147,9 @@ def _time_limit(settings: FlightSettings) -> float:
     """Return the simulated time [s] after which the plant ends; 0: none, an operator starts."""
     if settings.dry_run:
         return DRY_RUN
-    return time_limit(settings.scenario) if settings.auto_start else 0.0
+    if not settings.auto_start:
+        return 0.0
+    return time_limit(settings.scenario, settings.profile.sets["mission"])
 
 
 def in_the_loop(settings: FlightSettings) -> bool:
