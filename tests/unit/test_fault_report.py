@@ -166,7 +166,7 @@ def test_a_bad_matrix_is_refused_in_one_line(tmp_path, text, message):
     [
         (["--only", "wind"], "unknown fault 'wind'; there are: mocap_dropout"),
         (["--moment", "tea"], "unknown moment 'tea'; there are: take-off"),
-        (["--matrix", "no"], "unknown campaign 'no'; there are: faults"),
+        (["--matrix", "no"], "unknown campaign 'no'; there are: delays, faults"),
         (["--engine", "fast"], "--engine: invalid choice: 'fast'"),
         (["--clock", "realtime"], "the direct engine has no clock"),
         (["--vehicle", "none"], "unknown vehicle 'none'; there are: hexa_arm"),

@@ -26,7 +26,7 @@ from uam_sim_bridge.faults import (
     feasibility,
     read_schedule,
 )
-from uam_sim_bridge.faults.schedule import KEYS, TimedFault, parse_spec
+from uam_sim_bridge.faults.schedule import KEYS, TimedFault, late, parse_spec, timed
 from uam_sim_bridge.faults.timeline import Timeline
 
 SCENARIO = load_scenario("pick_and_place")
@@ -111,16 +111,16 @@ def test_a_phase_means_its_beginning():
 
 REFUSED = {
     "mocap_dropot@20": "unknown fault 'mocap_dropot'; there are: mocap_dropout, mocap_freeze",
-    "mocap_dropout": "NAME@SECONDS[+DURATION] or",
-    "mocap_dropout@": "NAME@SECONDS[+DURATION] or",
-    "mocap_dropout@20+3+4": "NAME@SECONDS[+DURATION] or",
+    "mocap_dropout": "NAME@SECONDS[+DURATION], NAME@PHASE",
+    "mocap_dropout@": "NAME@SECONDS[+DURATION], NAME@PHASE",
+    "mocap_dropout@20+3+4": "NAME@SECONDS[+DURATION], NAME@PHASE",
     "mocap_dropout@picking": "no phase 'picking' in the scenario, which has: take-off, approach",
     "mocap_dropout@-1": "at: -1.0 is not a time within 0 to",
     "mocap_dropout@20+-3": "duration: -3.0 is not a time",
     "mocap_dropout@20+long": "duration: 'long' is not a time",
     "mocap_dropout@pick+nan": "after: nan is not a time",
     "mocap_dropout@inf": "at: inf is not a time",
-    "mocap_dropout@20:": "NAME@SECONDS[+DURATION] or",
+    "mocap_dropout@20:": "NAME@SECONDS[+DURATION], NAME@PHASE",
     "mocap_dropout@20:speed=3": "speed: unknown parameter; there are: none",
     "motor_loss@20:motor=2.5": "motor: 2.5 is not a whole number",
     "motor_loss@20:motor=13": "motor: 13.0 is outside 1 to 12",
@@ -170,7 +170,7 @@ def test_faults_of_file_option_and_scenario_are_joined(tmp_path):
     ("text", "why"),
     [
         ("node_kill@20", "has no processes: needs --engine ros"),
-        ("mavlink_delay@20", "no MAVLink connection to delay: needs --engine ros"),
+        ("mavlink_corruption@20:direction=from_autopilot", "connection from the autopilot: needs"),
         ("mavlink_cut@20:direction=from_autopilot", "connection from the autopilot: needs"),
     ],
 )
@@ -228,3 +228,37 @@ def test_numbers_of_an_option():
         "a": 3.0,
         "b": "c",
     }
+
+
+def test_a_fault_from_the_start_acts_before_take_off_and_lasts():
+    (text,) = late(0.016, 0.004, 0.0, 0.0)
+    schedule = read_schedule([text, "mavlink_cut@2+1"], SCENARIO, 1)
+    again = Schedule.from_text(schedule.to_text())
+    assert again == schedule
+    timeline = Timeline(again)
+    assert [one.fault.NAME for one in timeline.update(0.1)] == ["mavlink_delay"]
+    assert timeline.update(0.2) == []
+    assert timeline.records == [
+        {
+            "fault": "mavlink_delay",
+            "begin_s": 0.0,
+            "end_s": None,
+            "parameters": {"direction": "to_autopilot", "delay": 0.016, "jitter": 0.004},
+        }
+    ]
+    timeline.mission_at(10.0, 0.0)
+    assert [one.fault.NAME for one in timeline.update(12.1)] == ["mavlink_cut"]
+    assert [one.end is None for one in timeline.update(13.1)] == [False]
+    assert timeline.all[0].active
+
+
+@pytest.mark.parametrize("more", ["after: 1", "duration: 2"])
+def test_a_fault_from_the_start_has_no_time(more):
+    entry = yaml.safe_load(f"{{fault: mocap_latency, at: start, {more}}}")
+    with pytest.raises(FaultError, match="lasts for the whole flight"):
+        timed(entry, {}, "here")
+
+
+def test_delays_of_nothing_are_no_faults():
+    assert late(0.0, 0.0, 0.0, 0.0) == []
+    assert late(0.0, 0.0, 0.0, 0.002) == ["mocap_latency@start:delay=0,jitter=0.002"]

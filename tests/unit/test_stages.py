@@ -134,6 +134,43 @@ def test_what_the_joined_autopilot_does_is_known_a_tick_later():
     assert rig.sequence.phase is Phase.FLYING
 
 
+def test_messages_of_the_joined_autopilot_are_late_in_order():
+    rig = Joined()
+    rig.run(2.0)
+    assert rig.port.round_trip == pytest.approx(0.004)
+    late = iter([0.012, 0.0, 0.004] + 10 * [0.0])
+    rig.port.late_to, rig.port.late_from = lambda: next(late, 0.0), lambda: 0.02
+    seen = []
+    rig.port.autopilot.target = lambda time, target: seen.append((round(time, 3), target.thrust))
+    begin = rig.ticks
+    for i in range(5):
+        time = 0.004 * (begin + i)
+        rig.port.time = time
+        if i:
+            late_to, rig.port.late_to = rig.port.late_to, lambda: 0.0
+            rig.port.poll(time)  # the round trip takes a value of its own
+            rig.port.late_to = late_to
+        else:
+            rig.port._now = time
+        rig.port.send_setpoint(AttitudeTarget.of_rates(REST, 0.1 * i), time)
+    # 12 ms, 0 ms and 4 ms: the second and the third wait for the first
+    start = round(0.004 * begin, 3)
+    arrived = [(round(at - start, 3), round(thrust, 1)) for at, thrust in seen]
+    assert arrived == [(0.012, 0.0), (0.012, 0.1), (0.012, 0.2), (0.012, 0.3), (0.016, 0.4)]
+    assert rig.port.round_trip == pytest.approx(0.024)
+
+
+def test_late_reports_of_the_joined_autopilot():
+    rig = Joined()
+    rig.port.late_from = lambda: 0.02
+    while not rig.port.autopilot.commander.armed:
+        rig.run(0.004)
+    rig.run(0.02)
+    assert not rig.port.armed
+    rig.run(0.004)
+    assert rig.port.armed
+
+
 def test_heartbeats_that_are_lost_are_missed_after_3_s_and_a_change_is_reported_by_the_next():
     rig = Joined()
     rig.run(2.0)

@@ -20,7 +20,7 @@ def in_the_air(series: Series, frequency: float = FREQUENCY) -> np.ndarray:
 
     Rows on the ground are left out: the paper's model has no ground contact.
     """
-    if len(series) < FEWEST:
+    if len(series) < FEWEST or not series.flown.any():
         return np.zeros(0, dtype=int)
     flown = series.flown & (series["truth.z"] > series["truth.z"][0] + CLEARANCE)
     names = ModularLaw.gain_names(AXES)

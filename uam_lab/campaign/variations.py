@@ -7,11 +7,19 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-import yaml
 
 from uam_control.profiles.profile import Profile
+from uam_control.settings import yaml_file
 from uam_control.settings.configuration import path
 from uam_lab.campaign.trial import Trial
+from uam_sim_bridge.faults.schedule import Schedule, late, parse_spec, timed
+
+NAMES = ("payload", "payload_offset", "wind", "gust", "noise", "mass", "inertia", "efficiency")
+DELAYS = ("setpoint_delay", "setpoint_jitter", "mocap_delay", "mocap_jitter")  # optional, [s]
+
+
+class VariationError(ValueError):
+    """The file of ranges is not usable; the text is one line."""
 
 
 @dataclass(frozen=True)
@@ -23,9 +31,21 @@ class Draw:
 
 
 def ranges(file: Path | None = None) -> dict[str, tuple[float, float]]:
-    """Return lowest and highest value of each variation; default: campaign/robustness.yaml."""
-    document = yaml.safe_load((file or path("campaign/robustness.yaml")).read_text())
-    return {name: (float(low), float(high)) for name, (low, high) in document.items()}
+    """Return lowest and highest value of each variation; default: campaign/robustness.yaml.
+
+    Raises VariationError if an entry is missing, unknown or no pair of numbers.
+    """
+    file = file or path("campaign/robustness.yaml")
+    document = yaml_file.read(file, VariationError)
+    known = set(NAMES) | set(DELAYS)
+    if not isinstance(document, dict) or not set(NAMES) <= set(document) <= known:
+        raise VariationError(
+            f"{file}: expected are {', '.join(NAMES)} and, if wanted, {', '.join(DELAYS)}"
+        )
+    try:
+        return {name: (float(low), float(high)) for name, (low, high) in document.items()}
+    except (TypeError, ValueError):
+        raise VariationError(f"{file}: [least, largest] expected for each entry") from None
 
 
 def draw(
@@ -50,12 +70,15 @@ def _one(
     seed: int,
     allowed: dict[str, tuple[float, float]],
 ) -> Draw:
-    drawn = {name: float(random.uniform(low, high)) for name, (low, high) in allowed.items()}
+    drawn = {name: float(random.uniform(*allowed[name])) for name in NAMES}
     direction = random.uniform(0.0, 2.0 * np.pi)
     efficiency = random.uniform(*allowed["efficiency"], size=len(profile.vehicle.rotors))
     offset = random.uniform(0.0, 2.0 * np.pi)
     speed, away = drawn["wind"], drawn["payload_offset"]
     drawn["efficiency"] = float(efficiency.min())
+    drawn |= {name: float(random.uniform(*allowed[name])) for name in DELAYS if name in allowed}
+    given = late(*(drawn.get(name, 0.0) for name in DELAYS))
+    faults = tuple(timed(parse_spec(text), {}, "delays") for text in given)
     changes = {
         "air.wind": [float(speed * np.cos(direction)), float(speed * np.sin(direction)), 0.0],
         "air.gust": drawn["gust"] * speed,
@@ -65,7 +88,15 @@ def _one(
         "variation.payload_offset": [float(away * np.cos(offset)), float(away * np.sin(offset))],
         "rotors.efficiency": efficiency.tolist(),
     }
-    trial = Trial("random", profile, drawn["payload"], seed, scenario, vehicle_changes=changes)
+    trial = Trial(
+        "random",
+        profile,
+        drawn["payload"],
+        seed,
+        scenario,
+        vehicle_changes=changes,
+        faults=Schedule(faults, seed),
+    )
     return Draw(drawn, trial)
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 
 from uam_control.mission import load_scenario
+from uam_control.settings import configuration
 from uam_control.vehicle import load_description
 from uam_lab.campaign.pool import fly_all
 from uam_lab.campaign.trial import TrialResult
@@ -18,11 +19,13 @@ examples:
   uam campaign                             1,000 flights of the flying profile
   uam campaign --flights 100 --profile asmc2
   uam campaign --flights 100 --vehicle mine.yaml
+  uam campaign --ranges delays             late setpoints and poses as well, up to 30 ms
   uam campaign --out robust                stop with Ctrl-C; the same command continues
 
 Mass and position of the payload, wind, gusts, sensor noise, masses, inertias and motors are drawn
-from the ranges of config/campaign/robustness.yaml. Results in --out: summary.md, flights.csv,
-campaign.json, campaign.png. The same seed gives the same flights; more --flights only add some.
+from the ranges of config/campaign/robustness.yaml (--ranges). Results in --out: summary.md,
+flights.csv, campaign.json, campaign.png. The same seed gives the same flights; more --flights only
+add some.
 """
 
 
@@ -41,6 +44,7 @@ def add(commands: argparse._SubParsersAction) -> None:
     command.vehicle()
     command.scenario()
     command.profile()
+    command.option("--ranges", "NAME|FILE", "values to draw: robustness, delays", "robustness")
     command.seed("of the draw")
     command.jobs()
     command.out()
@@ -55,9 +59,10 @@ def run(options: argparse.Namespace) -> int:
     vehicle = load_description(options.vehicle)
     load_scenario(options.scenario, vehicle)  # an invalid one is refused before any flight
     profile = given_profile(options.profile, vehicle)
+    allowed = ranges(configuration.named("campaign", options.ranges))
     out = make_folder(options.out, "campaign")
-    draws = draw(profile, options.flights, options.seed, scenario=options.scenario)
-    settings = (options.seed, ranges(), profile.sets, profile.bridge())
+    draws = draw(profile, options.flights, options.seed, allowed, options.scenario)
+    settings = (options.seed, allowed, profile.sets, profile.bridge())
     flown = Flown(out, (*settings, vehicle.numbers, options.scenario))
     trials = [one.trial for one in draws if one.trial.seed not in flown.results]
     if flown.results:

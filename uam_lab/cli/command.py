@@ -16,6 +16,7 @@ from uam_control.settings.configuration import ConfigurationError
 from uam_control.vehicle import DEFAULT_VEHICLE, VehicleDescription, VehicleError
 from uam_lab.campaign.pool import cores
 from uam_lab.campaign.trial import TrialFailed
+from uam_lab.campaign.variations import VariationError
 from uam_lab.flight.flight_settings import SettingsError
 from uam_lab.recording.mcap_reader import UnreadableLog
 from uam_lab.results.result_folder import ResultFolderError
@@ -31,7 +32,7 @@ WRONG_USE, INTERRUPTED = 2, 130  # exit status
 # the text of each is one line for the user
 USER_ERRORS = (
     *(ConfigurationError, ProfileError, ScenarioError, VehicleError, SettingsError, PortError),
-    *(Px4Error, FaultError, PlantError, TuningError, TrialFailed),
+    *(Px4Error, FaultError, PlantError, TuningError, TrialFailed, VariationError),
     *(ResultFolderError, UnreadableFlight, UnreadableLog),
 )
 

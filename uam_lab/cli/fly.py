@@ -20,6 +20,7 @@ from uam_lab.library.flight_result import FlightFailed
 from uam_lab.processes.interrupts import Interrupts
 from uam_lab.report.build import build_report
 from uam_lab.report.page.console import reporting, summary
+from uam_sim_bridge.faults.schedule import late
 from uam_sim_bridge.mavlink.transport.transport import ALLOWED
 from uam_sim_bridge.plant.engines import DEFAULT_PLANT, PLANTS
 from uam_sim_bridge.ports import INSTANCES, LAST_DOMAIN
@@ -39,6 +40,7 @@ examples:
   uam fly --namespace uav1 --domain 1        one of several vehicles in a ROS domain
   uam fly --without arm_controller           with your own arm controller: examples/
   uam fly --payload-mass 0.3 --wind 2 0 0    heavier payload, 2 m/s from the west
+  uam fly --setpoint-delay 16 --mocap-delay 8 --mocap-jitter 4    later by so many milliseconds
   uam fly --fault mocap_dropout@20+3         no motion capture from 20 s on, for 3 s
   uam fly --fault motor_loss@pick+1:motor=2,remaining=0.7
 
@@ -93,6 +95,14 @@ def add(commands: argparse._SubParsersAction) -> None:
     option("--gust", "M/S", text, type=number("gust", "m/s", 0.0))
     text = "multiplies noise and bias of the sensors (default 1)"
     option("--noise", "FACTOR", text, type=number("noise", "", 0.0))
+    milliseconds = number("delay", "ms", 0.0, 1000.0)
+    for what, text in (
+        ("setpoint", "messages to the autopilot"),
+        ("mocap", "poses of the motion capture"),
+    ):
+        option(f"--{what}-delay", "MS", f"{text} arrive later", 0.0, type=milliseconds)
+        text = "largest further delay of each message, uniform"
+        option(f"--{what}-jitter", "MS", text, 0.0, type=milliseconds)
     command.seed("of all noise")
     command.repeated(
         "--without",
@@ -130,6 +140,12 @@ def add(commands: argparse._SubParsersAction) -> None:
 def run(options: argparse.Namespace) -> int:
     """Run the command; return the exit status."""
     given = {name: value for name, value in vars(options).items() if name not in ("command", "run")}
+    delays = [
+        1e-3 * given.pop(f"{what}_{kind}")
+        for what in ("setpoint", "mocap")
+        for kind in ("delay", "jitter")
+    ]
+    given["faults"] = [*given["faults"], *late(*delays)]
     changes = {
         "air.wind": given.pop("wind"),
         "air.gust": given.pop("gust"),

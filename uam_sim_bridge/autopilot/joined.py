@@ -1,13 +1,16 @@
 """The autopilot stand-in joined to the bridge without messages, for the direct engine.
 
 It has the timing of the MAVLink link: the bridge receives a change of the autopilot's state one
-tick later, by the heartbeat sent at once, or by the next regular one if that is lost.
+tick later, by the heartbeat sent at once, or by the next regular one if that is lost. Messages may
+be delayed further; none overtakes another.
 """
 
 from __future__ import annotations
 
 import math
+from collections import deque
 from collections.abc import Callable
+from typing import NamedTuple
 
 import numpy as np
 
@@ -27,6 +30,15 @@ from uam_sim_bridge.mavlink.protocol.vision import VisionPose
 HEARTBEAT, LANDED = 1.0, 0.2  # [s] between two regular reports, as `telemetry.STREAMS`
 
 
+class _Received(NamedTuple):
+    """Messages of the autopilot; status: of a heartbeat, landed: of its report, None without."""
+
+    answers: list[tuple[Request, MavResult]]
+    texts: list[tuple[Severity, str]]
+    status: AutopilotStatus | None
+    landed: bool | None
+
+
 class JoinedAutopilot:
     """An `AutopilotPort` to the `Autopilot` in the same process.
 
@@ -44,6 +56,12 @@ class JoinedAutopilot:
         self.armed_since: float | None = None
         self.passes: Callable[[], bool] = lambda: True  # whether a message reaches the autopilot
         self.receives: Callable[[], bool] = lambda: True  # whether one of the autopilot arrives
+        self.late_to: Callable[[], float] = lambda: 0.0  # [s] of a message to the autopilot
+        self.late_from: Callable[[], float] = lambda: 0.0  # [s] of a message of the autopilot
+        self._outgoing: deque[tuple[float, Callable[[], None]]] = deque()  # due [s], delivers it
+        self._incoming: deque[tuple[float, _Received]] = deque()
+        self.round_trip: float | None = None
+        self._now = -math.inf  # [s] tick of the last `poll`
         self.time = 0.0
         self._received_at = -math.inf
         self._told: AutopilotStatus | None = None
@@ -51,42 +69,50 @@ class JoinedAutopilot:
         self._heartbeat = self._landed = False  # sent, not yet received
         self._answers: list[tuple[Request, MavResult]] = []
 
-    @property
-    def round_trip(self) -> float | None:
-        """None: without a link there is no round trip."""
-        return None
-
     def connected(self, time: float) -> bool:
         """Whether the last heartbeat is younger than HEARTBEAT_TIMEOUT at `time` [s]."""
         return time - self._received_at < HEARTBEAT_TIMEOUT
 
     def poll(self, time: float) -> None:
-        """Receive the autopilot's messages since the last call."""
+        """Deliver delayed messages; receive the autopilot's messages since the last call.
+
+        `round_trip` is that of a message of this tick: its delays, and one tick for the answer.
+        """
+        period, self._now = time - self._now, time
+        late_to, late_from = self.late_to(), self.late_from()
+        self.round_trip = period + late_to + late_from if math.isfinite(period) else None
+        while self._outgoing and self._outgoing[0][0] <= time + 1e-9:
+            self._outgoing.popleft()[1]()
         texts = self.autopilot.commander.texts
         if self._answers or texts or self._heartbeat or self._landed:
-            self._take(time, self.autopilot.commander.take_texts())
+            self._take(time, late_from, self.autopilot.commander.take_texts())
+        while self._incoming and self._incoming[0][0] <= time + 1e-9:
+            self._handle(time, self._incoming.popleft()[1])
 
-    def _take(self, time: float, texts: list[tuple[Severity, str]]) -> None:
+    def _take(self, time: float, late: float, texts: list[tuple[Severity, str]]) -> None:
         answers, self._answers = self._answers, []
-        heartbeat, landed = self._heartbeat, self._landed
+        status = self._told if self._heartbeat else None
+        landed = self._told.landed if self._landed else None
         self._heartbeat = self._landed = False
-        if not self.receives():
-            return
-        for request, result in answers:
+        if self.receives():
+            self._incoming.append((time + late, _Received(answers, texts, status, landed)))
+
+    def _handle(self, time: float, received: _Received) -> None:
+        for request, result in received.answers:
             self.sequence.answer(request, result)
-        for severity, text in texts:
+        for severity, text in received.texts:
             self.sequence.text(severity, text)
-        if landed:
-            self.landed = self._told.landed
-        if heartbeat:
+        if received.landed is not None:
+            self.landed = received.landed
+        status = received.status
+        if status is not None:
             self._received_at = time
-            armed = self._told.armed
-            if armed and not self.armed:
+            if status.armed and not self.armed:
                 self.armed_since = time
-            elif not armed:
+            elif not status.armed:
                 self.armed_since = None
-            self.armed, self.mode = armed, self._told.mode
-            self.intended, self.failsafe = self._told.intended, self._told.failsafe
+            self.armed, self.mode = status.armed, status.mode
+            self.intended, self.failsafe = status.intended, status.failsafe
 
     def tick(self, time: float) -> None:
         """Send the request of the sequence, if there is one."""
@@ -99,21 +125,34 @@ class JoinedAutopilot:
             self._delivered,
         )
         request = self.sequence.update(time, seen)
-        if request is None or not self.passes():
-            return
-        self._answers.append((request, self.autopilot.command(self.time, *COMMANDS[request])))
+        if request is not None:
+            self._send(lambda: self._command(request))
 
     def send_vision(self, pose: VisionPose) -> None:
         """Send a mocap pose."""
-        if self.passes():
-            position, quaternion = swap_world(pose.position), swap_quaternion(pose.quaternion)
-            self.autopilot.vision(self.time, position, quaternion)
+        position, quaternion = swap_world(pose.position), swap_quaternion(pose.quaternion)
+        self._send(lambda: self.autopilot.vision(self.time, position, quaternion))
 
     def send_setpoint(self, target: AttitudeTarget, time: float) -> None:
         """Send the setpoint of the tick `time` [s]."""
-        if self.passes():
-            self.autopilot.target(self.time, target)
-            self._delivered = time
+        self._send(lambda: self._target(target))
+
+    def _send(self, deliver: Callable[[], object]) -> None:
+        """Send a message: call `deliver` in the cycle in which it arrives, if it arrives."""
+        if not self.passes():
+            return
+        late = self.late_to()
+        if late or self._outgoing:
+            self._outgoing.append((self._now + late, deliver))
+        else:
+            deliver()
+
+    def _command(self, request: Request) -> None:
+        self._answers.append((request, self.autopilot.command(self.time, *COMMANDS[request])))
+
+    def _target(self, target: AttitudeTarget) -> None:
+        self.autopilot.target(self.time, target)
+        self._delivered = self._now
 
     def update(self, time: float, gyro: np.ndarray, force: np.ndarray) -> np.ndarray:
         """Run the autopilot's cycle of `time` [s] and return its motor commands (rotors,), 0..1.

@@ -8,17 +8,17 @@ import numpy as np
 
 from uam_sim_bridge.faults.fault import LINK
 from uam_sim_bridge.faults.faulty_plant import FaultyPlant
-from uam_sim_bridge.faults.link_faults import LinkFault, MavlinkCorruption, MavlinkCut
+from uam_sim_bridge.faults.link_faults import LinkFault, MavlinkCorruption, MavlinkCut, MavlinkDelay
 from uam_sim_bridge.faults.schedule import Schedule
 from uam_sim_bridge.faults.timeline import Timeline
 from uam_sim_bridge.plant import Plant
 
 
 class DirectLink:
-    """Decides for each message whether it arrives.
+    """Decides for each message whether and how late it arrives.
 
-    It covers cuts, and corruption of messages to the autopilot; `feasibility.needs_nodes` lists the
-    faults that the direct engine refuses.
+    It covers cuts, delays, and corruption of messages to the autopilot; `feasibility.needs_nodes`
+    lists the faults that the direct engine refuses.
     """
 
     def __init__(self, schedule: Schedule) -> None:
@@ -33,6 +33,18 @@ class DirectLink:
     def passes(self) -> bool:
         """Return whether the next message to the autopilot arrives uncorrupted."""
         return not any(self._loses(fault) for fault in self._active)
+
+    def late_to(self) -> float:
+        """Return the delay [s] of the next message to the autopilot."""
+        return self._late([fault for fault in self._active if fault.outwards])
+
+    def late_from(self) -> float:
+        """Return the delay [s] of the next message from the autopilot."""
+        return self._late([fault for fault in self._active if fault.inwards])
+
+    def _late(self, faults: list[LinkFault]) -> float:
+        late = [fault.late(self._noise) for fault in faults if isinstance(fault, MavlinkDelay)]
+        return sum(late)
 
     def _loses(self, fault: LinkFault) -> bool:
         if isinstance(fault, MavlinkCorruption):

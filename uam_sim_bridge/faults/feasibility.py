@@ -48,8 +48,6 @@ def needs_nodes(fault: Fault) -> str:
     """Return the reason why the direct engine cannot inject this fault; "" if it can."""
     if fault.PLACE == PROCESS:
         return "the direct engine has no processes"
-    if isinstance(fault, MavlinkDelay):
-        return "the direct engine has no MAVLink connection to delay"
-    if isinstance(fault, LinkFault) and not fault.outwards:
+    if isinstance(fault, LinkFault) and not (fault.outwards or isinstance(fault, MavlinkDelay)):
         return "the direct engine has no MAVLink connection from the autopilot"
     return ""

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from typing import ClassVar
 
+import numpy as np
+
 from uam_control.settings.parameter_set import choice, number
 from uam_sim_bridge.faults.fault import LINK, Fault
 
@@ -36,6 +38,11 @@ class MavlinkDelay(LinkFault):
     """Every message arrives later."""
 
     delay: float = number(0.05, "added delay", "s", 0.0, 10.0)
+    jitter: float = number(0.0, "largest further delay of a message, uniform", "s", 0.0, 10.0)
+
+    def late(self, noise: np.random.Generator) -> float:
+        """Return the delay [s] of the next message."""
+        return self.delay + (noise.uniform(0.0, self.jitter) if self.jitter else 0.0)
 
 
 class MavlinkCorruption(LinkFault):

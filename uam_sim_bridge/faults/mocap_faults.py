@@ -72,13 +72,15 @@ class MocapLatency(PlantFault):
     """Poses arrive later; their stamp is still that of the exposure."""
 
     delay: float = number(0.1, "delay added to the usual latency", "s", 0.0, 5.0)
+    jitter: float = number(0.0, "largest further delay of a pose, uniform", "s", 0.0, 5.0)
 
     def sense(self, samples: Samples, now: Occurrence) -> None:
         time, waiting = samples.hil[0], now.memory
         if waiting is None:
             waiting = now.memory = deque()  # time [s] at which it arrives, pose
         if samples.mocap is not None:
-            waiting.append((time + self.delay, samples.mocap))
+            late = self.delay + (now.noise.uniform(0.0, self.jitter) if self.jitter else 0.0)
+            waiting.append((time + late, samples.mocap))
         due = waiting and waiting[0][0] <= time + 1e-9
         samples.mocap = waiting.popleft()[1] if due else None
 

@@ -4,12 +4,14 @@ The text of an option --fault:
 
     NAME@SECONDS[+DURATION][:parameter=value,...]        mocap_dropout@20+3
     NAME@PHASE[+AFTER[+DURATION]][:parameter=value,...]  motor_loss@pick+1:motor=2,remaining=0.7
+    NAME@start[:parameter=value,...]                     mavlink_delay@start:delay=0.02
 
 The entry of a file (a list, or a mapping with the list `faults`) and of a scenario's `faults`:
 
     - {fault: motor_loss, at: pick, after: 1, duration: 5, motor: 2, remaining: 0.7}
 
-A fault without a duration lasts until the end of the flight.
+A fault without a duration lasts until the end of the flight. A fault at `start` acts from the first
+tick on, also before take-off, and lasts.
 """
 
 from __future__ import annotations
@@ -26,7 +28,12 @@ from uam_control.settings import yaml_file
 from uam_sim_bridge.faults.fault import Fault, FaultError
 from uam_sim_bridge.faults.fault_catalogue import make
 
-FORM = "NAME@SECONDS[+DURATION] or NAME@PHASE[+AFTER[+DURATION]], then :parameter=value,..."
+FORM = (
+    "NAME@SECONDS[+DURATION], NAME@PHASE[+AFTER[+DURATION]] or NAME@start, "
+    "then :parameter=value,..."
+)
+START = "start"  # in place of a time: from the first tick on
+FROM_START = -math.inf  # [s] of mission time
 KEYS = ("fault", "at", "after", "duration")
 LATEST = 1e5  # [s] of mission time
 SUFFIXES = (".yaml", ".yml")
@@ -34,7 +41,10 @@ SUFFIXES = (".yaml", ".yml")
 
 @dataclass(frozen=True)
 class TimedFault:
-    """A fault from mission time `at` [s] for `duration` [s]; inf: until the end of the flight."""
+    """A fault from mission time `at` [s] for `duration` [s]; inf: until the end of the flight.
+
+    at FROM_START: from the first tick on.
+    """
 
     fault: Fault
     at: float
@@ -44,7 +54,8 @@ class TimedFault:
     def entry(self) -> dict[str, Any]:
         """Return the fault as an entry of a file."""
         lasting = {} if math.isinf(self.duration) else {"duration": self.duration}
-        return {"fault": self.fault.NAME, "at": self.at, **lasting, **self.fault.values}
+        at = START if self.at == FROM_START else self.at
+        return {"fault": self.fault.NAME, "at": at, **lasting, **self.fault.values}
 
 
 @dataclass(frozen=True)
@@ -83,6 +94,22 @@ class Schedule:
             raise FaultError('faults: {"seed": N, "faults": [...]} expected, as JSON') from None
         where = "faults"
         return cls(tuple(timed(entry, {}, where) for entry in listed(entries, where)), seed)
+
+
+def late(setpoint: float, setpoint_jitter: float, mocap: float, mocap_jitter: float) -> list[str]:
+    """Return the option texts of delays [s] from the start: of setpoints and of mocap poses.
+
+    jitter [s]: largest further delay of a single message.
+    """
+    given = (
+        ("mavlink_delay", setpoint, setpoint_jitter, ",direction=to_autopilot"),
+        ("mocap_latency", mocap, mocap_jitter, ""),
+    )
+    return [
+        f"{name}@{START}:delay={delay:.6g},jitter={jitter:.6g}{more}"
+        for name, delay, jitter, more in given
+        if delay or jitter
+    ]
 
 
 def read_schedule(given: Sequence[str], scenario: Scenario, seed: int) -> Schedule:
@@ -157,7 +184,11 @@ def timed(entry: Mapping[str, Any], phases: Mapping[str, float], where: str) -> 
     try:
         fault = make(entry.get("fault"), values)
         at = entry.get("at")
-        if isinstance(at, str):
+        if at == START:
+            if "after" in entry or "duration" in entry:
+                raise FaultError(f"at: {START}: such a fault lasts for the whole flight")
+            at = FROM_START
+        elif isinstance(at, str):
             if at not in phases:
                 raise FaultError(
                     f"at: no phase '{at}' in the scenario, which has: " + ", ".join(phases)

@@ -7,14 +7,17 @@ from dataclasses import dataclass
 from typing import Any
 
 from uam_sim_bridge.faults.fault import Fault
-from uam_sim_bridge.faults.schedule import Schedule, TimedFault
+from uam_sim_bridge.faults.schedule import FROM_START, Schedule, TimedFault
 
 TOLERANCE = 1e-6  # s; stamps are whole microseconds
 
 
 @dataclass
 class FaultState:
-    """State of a fault; begin, end: mission times [s], None before they occur."""
+    """State of a fault; begin, end: mission times [s], None before they occur.
+
+    begin of a fault from the start: 0.
+    """
 
     planned: TimedFault
     number: int
@@ -54,6 +57,7 @@ class Timeline:
         self.all = [FaultState(one, number) for number, one in enumerate(schedule.faults)]
         self._takeoff: float | None = None
         self._pending = bool(self.all)
+        self._at_start = any(one.planned.at == FROM_START for one in self.all)
 
     def mission_at(self, stamp: float, time: float) -> None:
         """Set the mission time `time` [s] at `stamp` [s]; time is negative before take-off."""
@@ -66,13 +70,14 @@ class Timeline:
 
     def update(self, stamp: float) -> list[FaultState]:
         """Advance to `stamp` [s]; return the faults that began or ended."""
-        if self._takeoff is None or not self._pending:
+        if not self._pending or (self._takeoff is None and not self._at_start):
             return []
-        now, changed = stamp - self._takeoff + TOLERANCE, []
+        now = FROM_START if self._takeoff is None else stamp - self._takeoff + TOLERANCE
+        self._at_start, changed = False, []
         for one in self.all:
             end = one.planned.at + one.planned.duration
             if one.begin is None and now >= one.planned.at:
-                one.begin = now - TOLERANCE
+                one.begin = max(now - TOLERANCE, 0.0)
                 changed.append(one)
             elif one.active and now >= end:
                 one.end = now - TOLERANCE

@@ -65,6 +65,8 @@ class DirectFlight:
         if self._faults:
             self.autopilot.passes = self._faults.link.passes
             self.autopilot.receives = self._faults.link.receives
+            self.autopilot.late_to = self._faults.link.late_to
+            self.autopilot.late_from = self._faults.link.late_from
             self.control.insert("bridge", "faults", self._update_faults)
         self.ended_by = ""  # reason of an end before that of the mission
         self._limit = time_limit(scenario, sets["mission"])

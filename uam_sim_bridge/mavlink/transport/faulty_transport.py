@@ -72,7 +72,7 @@ class FaultyTransport(WrappedTransport):
             if isinstance(fault, MavlinkCut):
                 return None
             if isinstance(fault, MavlinkDelay):
-                late += fault.delay
+                late += fault.late(self._noise)
             if isinstance(fault, MavlinkCorruption) and self._noise.random() < fault.share:
                 corrupted = bytearray(data)
                 corrupted[self._noise.integers(len(corrupted))] ^= int(self._noise.integers(1, 256))
