@@ -9,12 +9,17 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from uam_control.maths.rotations import euler_from_quaternion, quaternion_from_euler
+from uam_control.maths.rotations import (
+    euler_from_quaternion,
+    matrix_from_euler,
+    quaternion_from_euler,
+)
+from uam_control.vehicle import GRAVITY
 from uam_sim_bridge.mavlink.offboard.hold import HoldParameters
 from uam_sim_bridge.mavlink.offboard.setpoint import RateThrustMap, RateThrustParameters
 from uam_sim_bridge.mavlink.offboard.setpoint_source import SetpointSource, Situation
 from uam_sim_bridge.mavlink.offboard.setpoints.catalogue import SETPOINTS
-from uam_sim_bridge.mavlink.protocol.frames import swap_quaternion
+from uam_sim_bridge.mavlink.protocol.frames import swap_body, swap_quaternion
 
 TICK = 0.004
 FLYING = Situation(armed=True, landed=False, let_go=False)
@@ -194,24 +199,48 @@ def test_idle_attitude_setpoints_are_level_with_the_yaw_of_the_vehicle():
 RELEASED = FLYING._replace(released=True)
 
 
+def pushed(state: np.ndarray, lift: float) -> np.ndarray:
+    """Set the acceleration of a thrust of `lift` times the weight along the thrust axis."""
+    axis = matrix_from_euler(state[0, 3:6])[:, 2]
+    state[2, :3] = GRAVITY * (lift * axis - np.array([0.0, 0.0, 1.0]))
+    return state
+
+
 @pytest.mark.parametrize("kind", ["rates", "attitude"])
 @pytest.mark.parametrize("flying", [True, False])
-def test_a_released_vehicle_gets_its_own_attitude_rates_zero_and_the_mean_thrust(kind, flying):
+def test_a_released_vehicle_gets_its_own_attitude_rates_and_thrust(kind, flying):
     source, said = in_flight(setpoint=kind), []
     state = state_at(1.0)
     flown = source.commanded(1.004, state, True, WEIGHT, REST, ATTITUDE, FLYING).thrust
     for k in range(2000):  # longer than hold_time: the stream does not end
         now = 1.008 + TICK * k
         state[0, 3:6] = 0.3 * math.sin(now), 0.2 * math.cos(now), 0.5 + 0.1 * now
-        source.note_state(now, state)
+        state[1, 3:6] = 0.4 * math.cos(now), 0.5, -0.1
+        source.note_state(now, pushed(state, 1.0 + 0.1 * math.sin(now)))
         torque = REST + 1 if flying else None
         sent = source.commanded(now, state, flying, 2 * WEIGHT, torque, ATTITUDE, RELEASED)
-        assert sent.thrust == pytest.approx(flown) and not source.holding
-        np.testing.assert_array_equal(sent.rates, 0.0)
+        assert not source.holding
+        newtons = source.map.assumed_thrust(sent.thrust) / source.map.assumed_thrust(flown)
+        assert newtons == pytest.approx(1.0 + 0.1 * math.sin(now))
         if kind == "attitude":
             angles = euler_from_quaternion(swap_quaternion(sent.quaternion))
             np.testing.assert_allclose(angles, state[0, 3:6], atol=1e-9)
+        else:
+            np.testing.assert_allclose(swap_body(sent.rates), state[1, 3:6])
     assert said == []
+
+
+@pytest.mark.parametrize(("lift", "part"), [(0.0, 0.5), (5.0, 1.5)])
+def test_thrust_and_rates_of_a_released_vehicle_are_bounded(lift, part):
+    source = in_flight()
+    state = state_at(1.0)
+    flown = source.commanded(1.004, state, True, WEIGHT, REST, ATTITUDE, FLYING).thrust
+    state[1, 3:6] = 9.0, -9.0, 1.0
+    source.note_state(1.1, pushed(state, lift))
+    sent = source.commanded(1.1, state, False, WEIGHT, None, ATTITUDE, RELEASED)
+    np.testing.assert_array_equal(swap_body(sent.rates), [2.0, -2.0, 1.0])
+    newtons = source.map.assumed_thrust(sent.thrust) / source.map.assumed_thrust(flown)
+    assert newtons == pytest.approx(part)
 
 
 def test_without_commands_a_released_vehicle_gets_no_stream():
@@ -240,13 +269,16 @@ def test_a_released_vehicle_on_the_ground_gets_the_idle_setpoint():
 def test_until_the_mission_has_resumed_the_setpoint_stays(height):
     """Idle commands near the ground would otherwise be thrust 0 for a tick."""
     source, state = in_flight(), state_at(height)
+    state[1, 3] = 1.0
     source.note_state(1.1, state)
     before = source.commanded(1.1, state, False, WEIGHT, None, ATTITUDE, RELEASED)
-    for now in (1.104, 1.108, 1.29):
+    for now in (1.104, 1.15, 1.29):
         source.note_state(now, state)
         sent = source.commanded(now, state, False, WEIGHT, None, ATTITUDE, FLYING)
         assert sent.thrust == before.thrust > 0.3
-        np.testing.assert_array_equal(sent.rates, 0.0)
+        decayed = 1.0 - (now - 1.1) / 0.2
+        np.testing.assert_allclose(swap_body(sent.rates), [decayed, 0.0, 0.0], atol=1e-12)
+    state[1, 3] = 0.0
     sent = source.commanded(1.295, state, True, WEIGHT, REST, ATTITUDE, FLYING)
     assert sent.thrust == pytest.approx(before.thrust, rel=0.05)
     source.note_state(1.4, state)

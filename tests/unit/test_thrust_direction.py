@@ -9,9 +9,12 @@ import math
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 from scipy.linalg import expm
 
 from uam_control.control.thrust_direction import AttitudeReference, attitude_reference_step
+from uam_control.maths.rotations import matrix_from_euler
 
 A, B = math.atan2(0.6, 0.8), math.atan2(0.8, 0.6)
 ONE = 0.5 / math.pi  # [Hz] corner of the filter whose omega is 1 rad/s
@@ -24,7 +27,7 @@ def step(filtered, tau=TAU, yaw=(A, 0.0, 0.0), cutoff=ONE, dt=0.0):
     """Advance the filter rows (roll, pitch), each (angle, rate); return them and q_d with rates."""
     reference, state, value = np.zeros((3, 8)), np.array(filtered), np.full((3, 3), 77.0)
     reference[:, 5] = yaw
-    attitude_reference_step(np.array(tau), reference, cutoff, dt, state, value)
+    attitude_reference_step(np.array(tau), reference, cutoff, dt, state, np.zeros(2), value)
     return state, value
 
 
@@ -103,3 +106,29 @@ def test_reset_is_level_at_a_yaw_and_at_rest():
     filtered.reset(0.7)
     np.testing.assert_array_equal(filtered.value, [[0.0, 0.0, 0.7], [0.0] * 3, [0.0] * 3])
     np.testing.assert_array_equal(filtered.update(TAU, reference, 0.1), first)
+
+
+@given(
+    st.tuples(*[st.floats(-0.6, 0.6)] * 2, st.floats(-3.1, 3.1)),
+    st.tuples(*[st.floats(-3.0, 3.0)] * 3),
+    st.tuples(*[st.floats(-9.0, 9.0)] * 2, st.floats(5.0, 30.0)),
+)
+def test_a_vehicle_in_motion_begins_with_its_attitude_rates_and_no_torque(euler, rates, tau):
+    """Whatever tau_p desires; the difference decays, until the thrust points along tau_p."""
+    state, reference, filtered = np.zeros((3, 8)), np.zeros((3, 8)), AttitudeReference(cutoff=2.0)
+    state[0, 3:6], state[1, 3:6] = euler, rates
+    filtered.reset(euler[2])
+    filtered.begin(state)
+    roll, pitch, _ = euler
+    yaw_rate = (math.sin(roll) * rates[1] + math.cos(roll) * rates[2]) / math.cos(pitch)
+    reference[0, 5], reference[1, 5] = euler[2], yaw_rate
+    value = filtered.update(np.array(tau), reference, 1e-6)
+    np.testing.assert_allclose(value[0], euler, atol=1e-5)
+    np.testing.assert_allclose(value[1], rates, atol=1e-4)
+    coupling = np.linalg.norm(rates) ** 2  # of the Euler rates: zero without rotation
+    assert np.max(np.abs(value[2])) < 3.0 * coupling + 1e-3
+    reference[1, 5] = 0.0
+    for _ in range(1000):
+        value = filtered.update(np.array(tau), reference, 0.01)
+    axis = matrix_from_euler(value[0])[:, 2]
+    np.testing.assert_allclose(axis, np.array(tau) / np.linalg.norm(tau), atol=1e-6)

@@ -16,7 +16,7 @@ from uam_control.control.output_limits import (
     limit_torque,
 )
 from uam_control.control.thrust_direction import AttitudeReference
-from uam_control.coordinates import ALPHA, ARM, ATTITUDE, CHI, POSITION, YAW
+from uam_control.coordinates import ALPHA, ARM, ATTITUDE, CHI, CHI_DOT, POSITION, YAW
 from uam_control.laws import catalogue
 from uam_control.laws.errors import tracking_errors
 from uam_control.laws.law_parameters import LawParameters
@@ -100,6 +100,7 @@ class PositionController(Controller):
         super().__init__(parameters)
         self._attitude = AttitudeReference(parameters.attitude_cutoff)
         self._tau = np.zeros(3)
+        self._flying = False
 
     def set_parameters(self, parameters: PositionLimits) -> None:
         """See `Controller.set_parameters`; also sets the corner of the attitude filter."""
@@ -123,7 +124,12 @@ class PositionController(Controller):
             self._idle()
             self._tau[:] = 0.0
             self._attitude.reset(state[CHI, YAW])
+            self._flying = False
             return self._tau
+        if not self._flying:
+            self._flying = True
+            if np.any(reference[CHI_DOT, POSITION]):  # else from the ground, or at rest
+                self._attitude.begin(state)
         tau = self._law_output(state, reference, self._attitude.value, True, dt)
         p = self.parameters
         self.saturated = limit_force(

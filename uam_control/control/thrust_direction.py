@@ -11,10 +11,12 @@ import math
 
 import numpy as np
 
-from uam_control.coordinates import CHI, CHI_DDOT, CHI_DOT, YAW, X, Y, Z
+from uam_control.coordinates import ATTITUDE, CHI, CHI_DDOT, CHI_DOT, YAW, X, Y, Z
 from uam_control.maths.compiled import jit
 
 ANGLE, RATE = range(2)  # columns of the filter
+LEAD_TIME = 0.5  # [s] in which the lead decays by a factor e
+_LEAST_COSINE = 0.1  # of the pitch, in Euler rates
 
 
 class AttitudeReference:
@@ -29,19 +31,35 @@ class AttitudeReference:
         self.cutoff = cutoff
         self.value = np.zeros((3, 3))
         self._filter = np.zeros((2, 2))  # rows roll, pitch: angle, rate
+        self._lead = np.zeros(2)  # of roll, pitch [rad]
 
     def reset(self, yaw: float) -> None:
         """Set the desired attitude to level at `yaw` [rad], with zero rates."""
-        self._filter[:] = 0.0
+        self._filter[:] = self._lead[:] = 0.0
         self.value[:] = 0.0
         self.value[CHI, Z] = yaw
+
+    def begin(self, state: np.ndarray) -> None:
+        """Begin with roll, pitch and their rates of state (3, 6 + n), for a vehicle that moves.
+
+        The next update adds the lead to the filter's input that makes the angular acceleration
+        zero, so the torque has no step; it decays within LEAD_TIME.
+        """
+        (roll, pitch, _), about = state[CHI, ATTITUDE], state[CHI_DOT, ATTITUDE]
+        across = math.sin(roll) * about[Y] + math.cos(roll) * about[Z]
+        level = max(_LEAST_COSINE, math.cos(pitch))
+        self._filter[X] = roll, about[X] + across * math.sin(pitch) / level
+        self._filter[Y] = pitch, math.cos(roll) * about[Y] - math.sin(roll) * about[Z]
+        self._lead[:] = math.nan
 
     def update(self, tau_p: np.ndarray, reference: np.ndarray, dt: float) -> np.ndarray:
         """Advance by dt [s] and return `value` (3, 3).
 
         tau_p: (3,) [N, ENU], z > 0; reference: (3, 6 + n), gives yaw and its derivatives.
         """
-        attitude_reference_step(tau_p, reference, self.cutoff, dt, self._filter, self.value)
+        attitude_reference_step(
+            tau_p, reference, self.cutoff, dt, self._filter, self._lead, self.value
+        )
         return self.value
 
 
@@ -52,12 +70,14 @@ def attitude_reference_step(
     cutoff: float,
     dt: float,
     filtered: np.ndarray,
+    lead: np.ndarray,
     value: np.ndarray,
 ) -> None:
     """Advance the filter and write q_d, Omega_d, Omega_d_dot into value (3, 3).
 
     tau_p, reference, dt: as in `AttitudeReference.update`; cutoff [Hz]; filtered: (2, 2), rows
-    roll, pitch: angle [rad], rate [rad/s].
+    roll, pitch: angle [rad], rate [rad/s]; lead: (2,), of roll and pitch [rad], added to the input;
+    NaN: see `AttitudeReference.begin`.
     """
     yaw, yaw_rate = reference[CHI, YAW], reference[CHI_DOT, YAW]
     yaw_acceleration = reference[CHI_DDOT, YAW]
@@ -72,6 +92,10 @@ def attitude_reference_step(
     for axis in (X, Y):
         desired = desired_roll if axis == X else desired_pitch
         angle, rate = filtered[axis, ANGLE], filtered[axis, RATE]
+        if math.isnan(lead[axis]):
+            lead[axis] = angle + 2.0 * rate / omega - desired
+        desired += lead[axis]
+        lead[axis] *= math.exp(-dt / LEAD_TIME)
         # exact step of the critically damped filter for a constant input
         decay = math.exp(-omega * dt)
         offset = angle - desired

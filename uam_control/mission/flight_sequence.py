@@ -34,6 +34,7 @@ from uam_control.supervision import (
 WAITING, HOLD, LAND, LANDED, ABORTED = "waiting", "hold", "land", "landed", "aborted"
 RELEASED, DRY_RUN, GOAL = "released", "dry run", "goal"
 PHASES = (WAITING, HOLD, LAND, LANDED, ABORTED, RELEASED, DRY_RUN, GOAL)
+_OLDEST = 0.02  # [s] largest age of a state; the time between two steps is longer after a gap
 
 
 @dataclass
@@ -76,6 +77,7 @@ class Mission:
         self.output = MissionOutput(empty_reference(len(scenario.arm_start)))
         self._start = start or StartParameters()
         self._stamp = 0.0
+        self._age = 0.0  # [s] of the newest state: one tick
         self._seen: Observation | None = None
         self._begin(parameters)
 
@@ -173,7 +175,8 @@ class Mission:
         armed, None while disarmed. readings: for the supervisor. authority: who has control, None
         for the companion.
         """
-        output, guidance, self._stamp = self.output, self._guidance, stamp
+        output, guidance = self.output, self._guidance
+        self._age, self._stamp = min(max(stamp - self._stamp, 0.0), _OLDEST), stamp
         if guidance is not None:
             output.time = stamp - self._takeoff
         if output.state is not State.DISARMED:
@@ -188,7 +191,7 @@ class Mission:
                 guidance.write(stamp)
                 adrift = seen.readings.pose_controller_age > self._parameters.controller_age_hold
                 if adrift and output.state is State.HOLDING:
-                    guidance.drift(stamp, state)
+                    guidance.stay(stamp, state, self._ground, self._age)
                 if output.state is State.RELEASED:
                     guidance.follow(stamp, state)
                 event = self.changes[-1].event if len(self.changes) > before else None
@@ -336,7 +339,7 @@ class Mission:
         if state is State.TAKING_OFF:
             self._take_off(stamp)
         elif state is State.HOLDING and before is State.RELEASED:
-            guidance.stay(stamp, self._seen.state, self._ground)
+            guidance.stay(stamp, self._seen.state, self._ground, self._age)
         elif state in (State.HOLDING, State.RELEASED):
             arrived = self.changes[-1].event is Event.ARRIVED
             guidance.stop(stamp, decision.stow and not arrived)

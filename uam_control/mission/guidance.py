@@ -13,12 +13,11 @@ import numpy as np
 
 from uam_control.coordinates import ALPHA, ARM, CHI, CHI_DDOT, CHI_DOT, POSITION, YAW, X, Y, Z
 from uam_control.maths.rotations import wrap_angle
+from uam_control.mission.braking import Braking
 from uam_control.mission.mission_parameters import MissionParameters
 from uam_control.mission.plans import BASE, PEAK, RAMP, Plan, quintic, quintic_at, still
 from uam_control.mission.scenario import SINK
 from uam_control.mission.trajectory import Trajectory
-
-_SHORTEST = 0.3  # s in which a sinking vehicle near the ground is stopped
 
 
 class PathClock:
@@ -123,8 +122,9 @@ class Guidance:
         self._rate, self._slope = 1.0, 0.0  # of the clock
         self._path = np.zeros_like(reference)
         self._arm: Segment | None = None  # in place of the path's, while holding
-        self._away: Segment | None = None  # offset from the path, after a drift
-        self._returns = True  # whether it ends on the path
+        self._away: Segment | None = None  # offset from the path, on the way back to it
+        self._brake: Braking | None = None  # in place of the path, after a release
+        self._return_at = math.inf  # stamp [s] at which the brake is over and the return begins
         self._go_on_at = math.inf  # stamp [s] at which the arm is back and the path continues
         self._plans: dict[bool, Plan] = {}  # in place of the path; True: of the base, False: arm
         self._last: Segment | None = None  # in place of the path, until the end of the flight
@@ -138,6 +138,8 @@ class Guidance:
         """Set the scenario time for `stamp` [s]; call before `write`. No effect in a descent."""
         if self._last is not None:
             return
+        if stamp >= self._return_at:
+            self.go_on(stamp)
         if stamp >= self._go_on_at:
             self._arm, self._go_on_at = None, math.inf
             self._clock.change(stamp, 1.0, self._ramp_length())
@@ -161,8 +163,10 @@ class Guidance:
         if self._away is not None:
             self._away.write(stamp, self._path)
             self.reference[:, :ALPHA] += self._path[:, :ALPHA]
-            if self._returns and stamp >= self._away.end:
+            if stamp >= self._away.end:
                 self._away = None
+        if self._brake is not None:
+            self._brake.write(stamp, self.reference)
         for plan in self._plans.values():
             plan.write(stamp, self.reference)
 
@@ -181,9 +185,8 @@ class Guidance:
         Also returns the stamps (m,) [s]. A hold is one point; after it the path is not planned.
         """
         row, rows = np.zeros_like(self.reference), []
-        base = self._plans.get(True)
-        if self._last is not None or base is not None:
-            motion = self._last or base
+        motion = self._last or self._plans.get(True) or self._brake
+        if motion is not None:
             stamps = np.arange(stamp, max(motion.end, stamp) + step, step)
             for one in stamps:
                 row[:] = self.reference
@@ -204,24 +207,8 @@ class Guidance:
         self._plans[plan.columns is BASE] = plan
         self._stop_clock(stamp)
         if plan.columns is BASE:
-            self._away = None
-
-    def drift(self, stamp: float, state: np.ndarray) -> None:
-        """Move the reference to the vehicle's pose and plan the return to the path; call after
-        `write` while no controller is active.
-
-        Otherwise the restarted controller would begin with a large error. state (3, 6 + n).
-        """
-        if True in self._plans:
-            if np.all(np.isfinite(state[CHI])):
-                self.follow(stamp, state)
-                self._plans[True] = still(stamp, self.reference, BASE, self.parameters)
-            return
-        path = self._without_away(stamp)
-        offset = self._offset(path, state)
-        if np.all(np.isfinite(offset)):
-            self.reference[CHI, :ALPHA] = path[CHI, :ALPHA] + offset[0, :ALPHA]
-            self._return(stamp, offset)
+            self._away = self._brake = None
+            self._return_at = math.inf
 
     def follow(self, stamp: float, state: np.ndarray) -> None:
         """Set the reference to the vehicle's pose, at rest, while somebody else has control.
@@ -232,27 +219,23 @@ class Guidance:
         pose[:] = 0.0
         pose[CHI, POSITION], pose[CHI, YAW] = state[CHI, POSITION], state[CHI, YAW]
 
-    def stay(self, stamp: float, state: np.ndarray, ground: float) -> None:
-        """Begin at the vehicle's pose and velocity in state (3, 6 + n), and come to rest there.
+    def stay(self, stamp: float, state: np.ndarray, ground: float, age: float = 0.0) -> None:
+        """Begin in the vehicle's motion of state (3, 6 + n), and come to rest; see `Braking`.
 
-        A sinking vehicle loses at most half of its height above `ground` [m]. `go_on` then returns
-        to the path.
+        Call it after `write`, when the laws begin: after a release, and at each tick without a
+        controller. age [s]: of the state at `stamp` [s]. A joint that is farther from its reference
+        than `start_arm_error` begins at its angle. `go_on` then returns to the path.
         """
-        path = self._on_path()
-        self._plans.pop(True, None)
-        offset = self._offset(path, state)
-        offset[CHI_DOT, POSITION] = state[CHI_DOT, POSITION] - path[CHI_DOT, POSITION]
-        if not np.all(np.isfinite(offset)):
+        if not np.all(np.isfinite(state[CHI])):
             return
-        p, speed = self.parameters, float(np.linalg.norm(offset[CHI_DOT, POSITION]))
-        length = max(p.stop_time, 2.0 * RAMP * speed / p.stop_acceleration)
-        lengths = np.full_like(offset[CHI], length)
-        z, rate = state[CHI, Z], state[CHI_DOT, Z]
-        if rate < 0.0:
-            lengths[Z] = min(length, max(_SHORTEST, (ground - z) / rate))
-        goal = offset[CHI] + offset[CHI_DOT] * lengths / 2
-        self._away = Segment(stamp, offset, goal, lengths)
-        self._returns = False
+        self._plans.pop(True, None)
+        self._away = None
+        self._brake = Braking(stamp - age, state, self.parameters, ground)
+        angles = state[CHI, ARM]
+        if np.any(np.abs(angles - self.reference[CHI, ARM]) > self.parameters.start_arm_error):
+            self.reference[CHI, ARM], self.reference[CHI_DOT:, ARM] = angles, 0.0
+            self._plans.pop(False, None)
+            self._arm = self._arm_segment(stamp, angles)
         self.write(stamp)
 
     def stop(self, stamp: float, stow: bool) -> None:
@@ -273,9 +256,16 @@ class Guidance:
             self._plans.pop(False, None)
 
     def go_on(self, stamp: float) -> None:
-        """Continue on the path once the stop is complete and the arm is back at its path angles."""
-        self._go_on_at = max(stamp, self._clock.settled)
-        if self._plans.pop(True, None) is not None:
+        """Continue on the path once the stop is complete and the arm is back at its path angles.
+
+        A brake comes to rest first.
+        """
+        if self._brake is not None and stamp < self._brake.end:
+            self._return_at = self._brake.end
+            return
+        self._go_on_at, self._return_at = max(stamp, self._clock.settled), math.inf
+        if self._brake is not None or self._plans.pop(True, None) is not None:
+            self._brake = None
             path = self._on_path()
             offset = self.reference - path
             offset[CHI, YAW] = wrap_angle(offset[CHI, YAW])
@@ -287,10 +277,6 @@ class Guidance:
             self._arm = self._arm_segment(stamp, self._path[CHI, ARM])
             self._go_on_at = max(self._go_on_at, self._arm.end)
         if self._away is not None:
-            if not self._returns:
-                offset = np.zeros_like(self.reference)
-                self._away.write(stamp, offset)
-                self._return(stamp, offset)
             self._go_on_at = max(self._go_on_at, self._away.end)
 
     def descend(self, stamp: float, state: np.ndarray, ground: float, stow: bool) -> None:
@@ -317,7 +303,7 @@ class Guidance:
     def _stop_clock(self, stamp: float) -> None:
         """Slow down to a stop on the path."""
         self._clock.change(stamp, 0.0, self._ramp_length())
-        self._go_on_at = math.inf
+        self._go_on_at = self._return_at = math.inf
 
     def _on_path(self) -> np.ndarray:
         """Return the path (3, 6 + n) at the scenario time; the next call reuses the array."""
@@ -326,22 +312,6 @@ class Guidance:
         path[CHI_DDOT] = self._rate**2 * path[CHI_DDOT] + self._slope * path[CHI_DOT]
         path[CHI_DOT] *= self._rate
         return path
-
-    def _without_away(self, stamp: float) -> np.ndarray:
-        """Return a copy of the reference without the offset from the path."""
-        path = self.reference.copy()
-        if self._away is not None:
-            self._away.write(stamp, self._path)
-            path[CHI, :ALPHA] -= self._path[CHI, :ALPHA]
-        return path
-
-    @staticmethod
-    def _offset(path: np.ndarray, state: np.ndarray) -> np.ndarray:
-        """Return the offset (3, 6 + n) of position and yaw in `state` from `path`; rates zero."""
-        offset = np.zeros_like(path)
-        offset[CHI, POSITION] = state[CHI, POSITION] - path[CHI, POSITION]
-        offset[CHI, YAW] = wrap_angle(state[CHI, YAW] - path[CHI, YAW])
-        return offset
 
     def _return(self, stamp: float, offset: np.ndarray) -> None:
         """Let the offset (3, 6 + n) from the path decay to zero."""
@@ -355,13 +325,13 @@ class Guidance:
         )
         goal = np.zeros_like(offset[CHI])
         self._away = Segment(stamp, offset, goal, np.full_like(goal, length))
-        self._returns = True
 
     def _at_rest(self, stow: bool) -> tuple[np.ndarray, np.ndarray]:
         """Return goal and duration [s] of each coordinate to rest; stow: the arm to `stowed`."""
         p, now = self.parameters, self.reference
         speed = float(np.linalg.norm(now[CHI_DOT, POSITION]))
-        length = max(p.stop_time, 2.0 * RAMP * speed / p.stop_acceleration)
+        acceleration = p.stop_acceleration if self._brake is None else p.brake_acceleration
+        length = max(p.stop_time, 2.0 * RAMP * speed / acceleration)
         goal, lengths = now[CHI] + now[CHI_DOT] * length / 2, np.full_like(now[CHI], length)
         if stow:
             goal[ARM] = self._stowed

@@ -43,8 +43,20 @@ class PlanLimits(ParameterSet):
 
 
 @dataclass(frozen=True)
-class MissionParameters(PlanLimits, SupervisionParameters):
-    """Times and limits of start, take-off and touchdown, of plans, and those of the supervisor."""
+class BrakeLimits(ParameterSet):
+    """Bounds of the reference that begins in the vehicle's motion, after somebody else flew it."""
+
+    brake_acceleration: float = number(
+        2.0, "largest acceleration of the braking reference", "m/s^2", 0.1, 20.0
+    )
+    brake_jerk: float = number(16.0, "largest jerk of the braking reference", "m/s^3", 1.0, 200.0)
+    brake_yaw_acceleration: float = number(2.0, "the same for yaw", "rad/s^2", 0.1, 20.0)
+    brake_yaw_jerk: float = number(8.0, "the same for yaw", "rad/s^3", 1.0, 200.0)
+
+
+@dataclass(frozen=True)
+class MissionParameters(PlanLimits, BrakeLimits, SupervisionParameters):
+    """Times and limits of start, take-off, touchdown, plans, braking, and of the supervisor."""
 
     start_speed: float = number(0.3, "largest speed at the start", "m/s", 0.01, 5.0)
     start_arm_error: float = number(

@@ -230,6 +230,12 @@ class RateThrustMap:
             raise SetpointRefused(f"{INPUTS[int(-thrust) - 1]} is not finite")
         return self.rates, thrust
 
+    def scaled(self, command: float, factor: float) -> float:
+        """Return the normalised thrust that makes `factor` times the thrust of `command`."""
+        p = self._flat
+        curves = p[_FULL], p[_BATTERY], p[_MOTOR], p[_MODEL]
+        return command_of_thrust(factor * thrust_of_command(command, *curves), *curves)
+
     def assumed_thrust(self, command: float) -> float:
         """Return the collective [N] of a normalised thrust by the curve without `thrust_factor`."""
         p = self._flat

@@ -4,8 +4,8 @@
 |---|---|
 | valid | the setpoint type's part of body rates, attitude and thrust |
 | idle (not flying) | rates 0, level, thrust 0: the stream goes on, the vehicle stays landed |
-| valid or idle, while somebody else has control | rates 0, the vehicle's attitude, mean thrust \
-so far; without commands none |
+| valid or idle, while somebody else has control | the vehicle's rates, attitude and thrust; \
+without commands none |
 | not finite, malformed or none, on the ground | as idle |
 | the same in flight; the mission in failsafe; idle high above the start | level hold for \
 `hold_time` (`release_time` if no commands are expected), then no setpoint: the autopilot's \
@@ -20,8 +20,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from uam_control.coordinates import ATTITUDE, CHI, CHI_DOT, POSITION, Z
-from uam_control.maths.rotations import euler_from_quaternion
+from uam_control.coordinates import ALPHA, ATTITUDE, CHI, CHI_DDOT, CHI_DOT, POSITION, Z
+from uam_control.maths.rotations import euler_from_quaternion, matrix_from_euler
 from uam_sim_bridge.mavlink.offboard.hold import UNKNOWN, HoldParameters, LevelHold
 from uam_sim_bridge.mavlink.offboard.setpoint import RateThrustMap, SetpointRefused
 from uam_sim_bridge.mavlink.offboard.setpoints.desired import Desired, SetpointType, level
@@ -29,6 +29,8 @@ from uam_sim_bridge.mavlink.offboard.setpoints.rates import rates_setpoint
 from uam_sim_bridge.mavlink.protocol.attitude_target import STILL, AttitudeTarget
 
 HANDOVER = 0.2  # s after control came back in which the first commands arrive
+MOST_RATE = 2.0  # rad/s, largest body rate that is kept for a released vehicle
+LEAST_LIFT, MOST_LIFT = 0.5, 1.5  # bounds of its thrust, in parts of the mean thrust
 
 Setpoint = AttitudeTarget | None  # None: no setpoint is sent
 
@@ -79,6 +81,7 @@ class SetpointSource:
         self._estimated = -math.inf, UNKNOWN  # stamp [s]; roll, pitch, yaw
         self._seen = -math.inf, UNKNOWN  # stamp [s]; quaternion
         self._velocity = UNKNOWN
+        self._motion = np.zeros((3, ALPHA))  # estimate
         self._height = 0.0
         self._ground: float | None = None  # height [m] at which the vehicle stood
         self._present_at = -math.inf  # [s] newest setpoint for a released vehicle
@@ -91,7 +94,7 @@ class SetpointSource:
     def note_state(self, stamp: float, state: np.ndarray) -> None:
         """Store the estimate (3, 6 + n), see uam_control.coordinates, of `stamp` [s] uncopied."""
         self._estimated, self._velocity = (stamp, state[CHI, ATTITUDE]), state[CHI_DOT, POSITION]
-        self._height = float(state[CHI, Z])
+        self._motion, self._height = state, float(state[CHI, Z])
 
     def note_pose(self, stamp: float, quaternion: np.ndarray) -> None:
         """Store the attitude (4,) [w x y z], FLU → ENU, of a mocap pose of `stamp` [s]."""
@@ -166,10 +169,22 @@ class SetpointSource:
         return self._at_present(now)
 
     def _at_present(self, now: float) -> AttitudeTarget:
-        """Return rates 0, the present attitude and the mean thrust of the flight so far."""
-        angles = np.zeros((3, 3))
+        """Return the setpoint that keeps the present motion: body rates, attitude and thrust.
+
+        The thrust is the mean thrust of the flight so far, times the present acceleration along
+        the thrust axis in parts of gravity. After control came back the rates decay to zero within
+        HANDOVER: nothing else would stop the rotation if no commands came.
+        """
+        angles, rates, lift = np.zeros((3, 3)), np.zeros(3), 1.0
         angles[0] = np.nan_to_num(self._attitude(now))
-        return self._type(Desired(np.zeros(3), angles, self._hold.mean_thrust))
+        if self._fresh(self._estimated[0], now) and np.all(np.isfinite(self._motion)):
+            part = 1.0 - min(1.0, max(0.0, now - self._present_at) / HANDOVER)
+            rates = part * np.clip(self._motion[CHI_DOT, ATTITUDE], -MOST_RATE, MOST_RATE)
+            gravity = self.map.gravity
+            force = self._motion[CHI_DDOT, POSITION] + np.array([0.0, 0.0, gravity])
+            lift = float(force @ matrix_from_euler(angles[0])[:, Z]) / gravity
+        thrust = self.map.scaled(self._hold.mean_thrust, min(MOST_LIFT, max(LEAST_LIFT, lift)))
+        return self._type(Desired(rates, angles, thrust))
 
     @property
     def _idle(self) -> AttitudeTarget:

@@ -1,0 +1,155 @@
+"""Braking: a reference that begins in the vehicle's present motion and comes to rest.
+
+Each group of coordinates is the sum of two polynomials of time. The fade takes the acceleration and
+the jerk of the start to zero: its acceleration is a cubic. The brake takes the rate that is left to
+zero: its rate is a quintic. Both have the least degree for which value, rate, acceleration and jerk
+are continuous, at the start, between the parts, and at rest.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from uam_control.coordinates import ALPHA, ATTITUDE, CHI, CHI_DDOT, CHI_DOT, POSITION, YAW, X, Y, Z
+from uam_control.maths.rotations import matrix_from_euler
+from uam_control.mission.mission_parameters import MissionParameters
+from uam_control.vehicle import GRAVITY
+
+DERIVATIVES = 5  # value, rate, acceleration, jerk, snap
+SHORTEST = 0.3  # [s] of a fade, and of the stop of a sinking vehicle near the ground
+MOST_ACROSS, MOST_UP = 7.0, 3.0  # [m/s^2] largest acceleration at the start: 35 deg of tilt, 0.3 g
+ACROSS = slice(X, Z)
+# The fade's jerk keeps half of the bound for any jerk at the start up to it: sup over s of
+# 6 s (1 - s) |a| / (T J) + |1 - 4 s + 3 s^2| is 1 for T = 3 / sqrt(2) |a| / J.
+_FADE = 3.0 / math.sqrt(2.0)
+_PEAK, _STEEPEST = 1.875, 5.7735  # of the brake's quintic: acceleration T / v and jerk T^2 / v
+# A brake at least this much longer than the fade grows more slowly than the fade decays, so their
+# sum stays below the larger of the two accelerations.
+_LONGER = 2.5
+
+
+class Stop:
+    """Motion of k coordinates from value, rate, acceleration and jerk to rest.
+
+    The norm of the jerk stays within `jerk`; that of the acceleration within `acceleration`, or
+    within that of the start plus 0.15 of the jerk's run-out, where this is larger. `length` [s].
+    """
+
+    def __init__(
+        self, start: np.ndarray, acceleration: float, jerk: float, shorter: float = 1.0
+    ) -> None:
+        """start (4, k): value .. jerk [SI]; a jerk beyond half of the bound is cut to it.
+
+        acceleration [1/s^2], jerk [1/s^3]: bounds; shorter: factor on the duration, below 1 the
+        bounds are exceeded.
+        """
+        value, rate, a, j = start
+        share = jerk / 2.0
+        j = j * min(1.0, share / max(float(np.linalg.norm(j)), 1e-9))
+        fade = shorter * max(SHORTEST, _FADE * float(np.linalg.norm(a)) / share)
+        gained = fade * (a / 2.0 + j * fade / 12.0)  # rate at the end of the fade
+        speed = float(np.linalg.norm(rate + gained))
+        quick = max(_PEAK * speed / acceleration, math.sqrt(_STEEPEST * speed / share))
+        brake = max(shorter * quick, _LONGER * fade)
+        zero, a, j = np.zeros_like(value), a * fade**2, j * fade**3
+        first = [zero, -gained * fade, a / 2, j / 6, -a / 4 - j / 6, a / 10 + j / 20]
+        v = (rate + gained) * brake
+        second = [value, v, zero, zero, -2.5 * v, 3.0 * v, -v]
+        self._parts = (_Polynomial(first, fade), _Polynomial(second, brake))
+        self.length = brake
+
+    def at(self, time: float) -> np.ndarray:
+        """Return value, rate, acceleration, jerk and snap (5, k) at `time` [s] from the start."""
+        return sum(part.at(time) for part in self._parts)
+
+
+class _Polynomial:
+    """A polynomial of time / length with its derivatives; constant after its length."""
+
+    def __init__(self, coefficients: list[np.ndarray], length: float) -> None:
+        """coefficients: (k,) each, constant first; length [s]."""
+        c, self._length = np.array(coefficients), length
+        self._orders = []
+        for order in range(DERIVATIVES):
+            self._orders.append(c / length**order)
+            c = c[1:] * np.arange(1.0, len(c))[:, None]
+
+    def at(self, time: float) -> np.ndarray:
+        """Return the derivatives (5, k) at `time` [s]."""
+        u = min(max(time / self._length, 0.0), 1.0)
+        values = np.array([u ** np.arange(len(c)) @ c for c in self._orders])
+        if time >= self._length:
+            values[CHI_DOT:] = 0.0
+        return values
+
+
+class Braking:
+    """The base's reference from the vehicle's present motion to rest; `end` [s]: stamp of it.
+
+    The horizontal motion, the vertical motion and the yaw have their own durations.
+    """
+
+    def __init__(self, stamp: float, state: np.ndarray, p: MissionParameters, ground: float):
+        """Begin at `stamp` [s] from `state` (3, 6 + n) of that time; ground: its height [m].
+
+        A vehicle that sinks loses at most half of its height above ground, unless this takes less
+        than 0.3 s; the bounds give way to this.
+        """
+        self._stamp = stamp
+        start = present_motion(state)
+        bounds = p.brake_acceleration, p.brake_jerk
+        low = ground + max(0.0, float(state[CHI, Z]) - ground) / 2.0
+        yaw_bounds = p.brake_yaw_acceleration, p.brake_yaw_jerk
+        self._stops = (
+            (ACROSS, Stop(start[:, ACROSS], *bounds)),
+            (slice(Z, Z + 1), _above(low, start[:, Z : Z + 1], *bounds)),
+            (slice(YAW, YAW + 1), Stop(start[:, YAW : YAW + 1], *yaw_bounds)),
+        )
+        self.end = stamp + max(stop.length for _, stop in self._stops)
+
+    def write(self, stamp: float, reference: np.ndarray) -> None:
+        """Write the base's columns of reference (3 to 5, 6 + n): its derivatives at `stamp` [s]."""
+        reference[:, :ALPHA] = 0.0
+        for columns, stop in self._stops:
+            reference[:, columns] = stop.at(stamp - self._stamp)[: len(reference)]
+
+
+def present_motion(state: np.ndarray) -> np.ndarray:
+    """Return value, rate, acceleration and jerk (4, 6) of position and yaw of state (3, 6 + n).
+
+    The acceleration is that of the present thrust in the direction of the present thrust axis, the
+    jerk that of the present body rates. A law that follows them begins with the present attitude,
+    rates and thrust, as nearly as MOST_ACROSS and MOST_UP allow. A derivative that is not finite
+    counts as zero.
+    """
+    motion = np.zeros((4, ALPHA))
+    motion[CHI] = state[CHI, :ALPHA]
+    motion[CHI, ATTITUDE] = 0.0, 0.0, state[CHI, YAW]
+    moving = np.nan_to_num(state[CHI_DOT:, :ALPHA], nan=0.0, posinf=0.0, neginf=0.0)
+    roll, pitch, yaw = np.nan_to_num(state[CHI, ATTITUDE])
+    rotation = matrix_from_euler(np.array([roll, pitch, yaw]))
+    axis, about = rotation[:, Z], moving[0, ATTITUDE]
+    up = np.array([0.0, 0.0, GRAVITY])
+    lift = float((moving[1, POSITION] + up) @ axis)
+    acceleration = lift * axis - up
+    across = float(np.hypot(acceleration[X], acceleration[Y]))
+    acceleration[ACROSS] *= min(1.0, MOST_ACROSS / max(across, MOST_ACROSS))
+    acceleration[Z] = min(MOST_UP, max(-MOST_UP, acceleration[Z]))
+    motion[CHI_DOT, POSITION], motion[CHI_DDOT, POSITION] = moving[0, POSITION], acceleration
+    motion[3, POSITION] = lift * (about[Y] * rotation[:, X] - about[X] * rotation[:, Y])
+    level = max(0.1, math.cos(pitch))
+    motion[CHI_DOT, YAW] = (math.sin(roll) * about[Y] + math.cos(roll) * about[Z]) / level
+    return motion
+
+
+def _above(low: float, start: np.ndarray, acceleration: float, jerk: float) -> Stop:
+    """Return the stop from start (4, 1) that stays above `low` [m], shortened if necessary."""
+    shorter = 1.0
+    while True:
+        stop = Stop(start, acceleration, jerk, shorter)
+        times = np.linspace(0.0, stop.length, 20)
+        if stop.length <= SHORTEST or min(float(stop.at(t)[CHI, 0]) for t in times) >= low:
+            return stop
+        shorter *= 0.8
