@@ -34,15 +34,18 @@ landing: {at: 2, duration: 2}
 class Flight:
     """`uam fly` in a process of its own."""
 
-    def __init__(self, folder: Path, *options: str):
-        """Fly to <folder>/<out>; `options` go to the command line."""
+    def __init__(self, folder: Path, *options: str, report: bool = False):
+        """Fly to <folder>/<out>; `options` go to the command line.
+
+        report: make the report, without video; it takes longer than a short flight.
+        """
         folder.mkdir(exist_ok=True)
         self.out = folder / "out"
         self._text = (folder / "stdout").open("w+")
         self._errors = (folder / "stderr").open("w+")
         command = [sys.executable, "-m", "uam_lab.cli.main", "fly", "--out", str(self.out)]
         self.process = subprocess.Popen(
-            [*command, "--no-video", *options],
+            [*command, "--no-video" if report else "--no-report", *options],
             stdout=self._text,
             stderr=self._errors,
             cwd=ROOT,

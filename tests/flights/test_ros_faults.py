@@ -42,7 +42,7 @@ def test_without_the_autopilots_voice_it_lands_by_itself(fly):
 @pytest.mark.slow
 def test_faults_begin_on_time_and_are_in_the_log(fly, short_scenario, tmp_path):
     options = [word for text in (*IN_BOTH, *IN_NODES) for word in ("--fault", text)]
-    flight = fly("--scenario", str(short_scenario), *options)
+    flight = fly("--scenario", str(short_scenario), *options, report=True)
     assert flight.wait() == 0, flight.said + flight.complained
     assert "scene was killed by SIGKILL; the flight continues without it" in flight.said
     figures = json.loads((flight.out / "metrics.json").read_text())

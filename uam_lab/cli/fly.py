@@ -32,6 +32,7 @@ examples:
   uam fly --scenario hover --seed 7          another scenario, other noise
   uam fly --scenario path.csv --no-video     a trajectory from a file
   uam fly --profile mine.yaml --engine direct
+  uam fly --engine direct --no-report        recording and metrics only, in seconds
   uam fly --autopilot px4 --px4-dir ~/PX4-Autopilot/build/px4_sitl_default
   uam fly --autopilot serial:/dev/ttyACM0:921600 --clock realtime --gcs udp:127.0.0.1:14550
   uam fly --dry-run                          all commands computed, none sent, nothing armed
@@ -126,6 +127,8 @@ def add(commands: argparse._SubParsersAction) -> None:
     command.switch(
         "--no-video", "leave out the video, which takes longest", "store_false", dest="video"
     )
+    text = "leave out the report with its video; uam report makes it later"
+    command.switch("--no-report", text, "store_false", dest="report")
     text = (
         f"ROS domain and ports of this instance, 0..{INSTANCES - 1}, numbered as PX4 does "
         "(default: the first free one)"
@@ -146,6 +149,7 @@ def run(options: argparse.Namespace) -> int:
         for kind in ("delay", "jitter")
     ]
     given["faults"] = [*given["faults"], *late(*delays)]
+    video, report = given.pop("video"), given.pop("report")
     changes = {
         "air.wind": given.pop("wind"),
         "air.gust": given.pop("gust"),
@@ -153,10 +157,10 @@ def run(options: argparse.Namespace) -> int:
     }
     changes = {name: value for name, value in changes.items() if value is not None}
     settings = flight_settings.settings(**given, vehicle_changes=changes, command=command_line())
-    return fly(settings)
+    return fly(settings, video, report)
 
 
-def fly(settings: FlightSettings) -> int:
+def fly(settings: FlightSettings, video: bool, report: bool) -> int:
     """Fly and report; return the exit status. Raises USER_ERRORS before the flight starts."""
     landing = settings.scenario.landing
     console = Console()
@@ -167,13 +171,14 @@ def fly(settings: FlightSettings) -> int:
     result = flight.result
     outcome, metrics = result.outcome, result.metrics
     if metrics is not None:
-        # after Ctrl-C the report has figures, but no rendered pictures, which take long
-        with reporting(console) as show:
-            report = build_report(
-                result.folder, show, video=settings.video, pictures=not outcome.interrupted
-            )
-        if report.problem:
-            outcome.notes.append(report.problem)
+        if report:
+            # after Ctrl-C it has figures, but no rendered pictures, which take long
+            with reporting(console) as show:
+                made = build_report(
+                    result.folder, show, video=video, pictures=not outcome.interrupted
+                )
+            if made.problem:
+                outcome.notes.append(made.problem)
         console.print(summary(metrics, result.folder))
     else:
         print(f"results: {result.folder}")

@@ -69,7 +69,6 @@ class FlightSettings:
     link: LinkUrl | None = None
     gcs: str = ""  # URL of a ground station
     seed: int = 1
-    video: bool = True
     plant: str = DEFAULT_PLANT  # see `plant_class`
     scenario_source: str = ""  # as given by the user: a name or a file
     instance: int | None = None  # of ROS domain and ports; None: the first free one
@@ -105,7 +104,6 @@ def settings(
     payload_mass: float | None = None,
     seed: int = 1,
     out: str | Path | None = None,
-    video: bool = True,
     vehicle_changes: dict[str, object] | None = None,
     instance: int | None = None,
     without: Sequence[str] = (),
@@ -204,7 +202,6 @@ def settings(
         link=link,
         gcs=gcs,
         seed=seed,
-        video=video,
         plant=plant,
         scenario_source=str(scenario),
         instance=_instance_of(link) if instance is None else instance,
