@@ -2,8 +2,6 @@
 
 import os
 import signal
-import subprocess
-import sys
 import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -11,6 +9,7 @@ from pathlib import Path
 import pytest
 import rclpy
 from bridge_rig import Rig
+from node_forks import Forked, Forks
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 
@@ -112,16 +111,8 @@ def probe() -> Iterator[Probe]:
 class Running:
     """A node in a separate process; its output goes to a file."""
 
-    def __init__(self, module: str, arguments: list[str], log: Path):
-        self.log = log
-        code = f"import sys; from {module} import main; sys.exit(main())"
-        with log.open("wb") as output:
-            self.process = subprocess.Popen(
-                [sys.executable, "-c", code, *arguments],
-                stdin=subprocess.DEVNULL,
-                stdout=output,
-                stderr=subprocess.STDOUT,
-            )
+    def __init__(self, process: Forked, log: Path):
+        self.process, self.log = process, log
 
     @property
     def output(self) -> str:
@@ -144,21 +135,29 @@ class Running:
         return self.process.wait(PATIENCE)
 
 
+@pytest.fixture(scope="session")
+def forks() -> Iterator[Forks]:
+    """The process that has imported the nodes."""
+    made = Forks()
+    yield made
+    made.close()
+
+
 @pytest.fixture
-def start(tmp_path) -> Iterator[Callable[..., Running]]:
+def start(forks, tmp_path) -> Iterator[Callable[..., Running]]:
     """start(module, *arguments) runs module.main() in a process that ends with the test."""
     running: list[Running] = []
 
-    def launch(module: str, *arguments: str) -> Running:
-        node = Running(module, list(arguments), tmp_path / f"node_{len(running)}.log")
+    def launch(module: str, *arguments: object) -> Running:
+        log = tmp_path / f"node_{len(running)}.log"
+        node = Running(forks.start(module, [str(one) for one in arguments], log), log)
         running.append(node)
         return node
 
     yield launch
     for node in running:
-        if node.process.poll() is None:
-            node.process.kill()
-        node.process.wait()
+        node.process.kill()
+        node.process.wait(PATIENCE)
 
 
 @pytest.fixture
