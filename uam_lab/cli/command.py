@@ -24,6 +24,8 @@ from uam_lab.results.timeseries import UnreadableFlight
 from uam_lab.tuning.space import TuningError
 from uam_msgs_py.node.namespace import normal
 from uam_sim_bridge.faults import FaultError
+from uam_sim_bridge.plant.effects.catalogue import EFFECTS
+from uam_sim_bridge.plant.effects.presets import CALM
 from uam_sim_bridge.plant.engines import PlantError
 from uam_sim_bridge.ports import INSTANCES, PortError, flight_of
 from uam_sim_bridge.px4.px4_installation import Px4Error
@@ -96,6 +98,20 @@ class Command:
     def profile(self) -> None:
         """Add --profile, for `given_profile`."""
         self.option("--profile", "NAME|FILE", "(default: the vehicle's)")
+
+    def plant(self) -> None:
+        """Add --plant-preset and --effect."""
+        known = ", ".join(configuration.names("plant"))
+        text = (
+            f"effects of the plant: {known}, or a file; a later one overrides (default {CALM}); "
+            "docs/plant.md"
+        )
+        self.repeated("--plant-preset", "NAME|FILE", text)
+        text = (
+            "one effect of the plant: NAME (as in laboratory), NAME=off, or "
+            f"NAME:parameter=value,...; there are: {', '.join(EFFECTS)}"
+        )
+        self.repeated("--effect", "SPEC", text, dest="effects")
 
     def seed(self, what: str) -> None:
         """Add --seed."""

@@ -42,6 +42,8 @@ examples:
   uam fly --without arm_controller           with your own arm controller: examples/
   uam fly --payload-mass 0.3 --wind 2 0 0    heavier payload, 2 m/s from the west
   uam fly --setpoint-delay 16 --mocap-delay 8 --mocap-jitter 4    later by so many milliseconds
+  uam fly --plant-preset laboratory          a plant as hard as a laboratory: docs/plant.md
+  uam fly --plant-preset laboratory --effect joint_gear=off --effect downwash:drag=2
   uam fly --fault mocap_dropout@20+3         no motion capture from 20 s on, for 3 s
   uam fly --fault motor_loss@pick+1:motor=2,remaining=0.7
 
@@ -76,6 +78,7 @@ def add(commands: argparse._SubParsersAction) -> None:
     option("--clock", "lockstep|realtime", text, "lockstep")
     text = f"physics engine: {', '.join(PLANTS)}, or a class of your own"
     option("--plant", "NAME|MODULE:CLASS", text, DEFAULT_PLANT)
+    command.plant()
     text = (
         "the stand-in; PX4 in software; or the link of an autopilot that you started: "
         f"{ALLOWED}; serial: a flight controller in HITL mode"

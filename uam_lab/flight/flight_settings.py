@@ -21,6 +21,7 @@ from uam_sim_bridge.faults import Schedule, feasibility, read_schedule
 from uam_sim_bridge.faults.faulty_plant import check_engine
 from uam_sim_bridge.faults.process_faults import DiscoveryLoss
 from uam_sim_bridge.mavlink.transport.transport import ALLOWED, LinkUrl, parse_url
+from uam_sim_bridge.plant.effects import presets
 from uam_sim_bridge.plant.engines import DEFAULT_PLANT
 from uam_sim_bridge.plant.vehicle import PAYLOAD_MAX
 from uam_sim_bridge.ports import AUTOPILOT_UDP, INSTANCES, LAST_DOMAIN
@@ -98,6 +99,8 @@ def settings(
     engine: str = "ros",
     clock: str = "lockstep",
     plant: str = DEFAULT_PLANT,
+    plant_preset: str | Sequence[str] = (),
+    effects: Sequence[str] = (),
     autopilot: str = BUILTIN,
     px4_dir: str | None = None,
     gcs: str = "",
@@ -121,12 +124,13 @@ def settings(
 ) -> FlightSettings:
     """Check the options and load scenario, profile and faults.
 
-    profile: see `load_profile` for several profiles; faults: see `faults.read_schedule`; view:
-    serve the cockpit; arm: begin by itself also with a real autopilot; auto_start False: wait for
-    the command start. parameters: node → name → value, each replaces the profile's. remappings:
-    topic or service → new name for every node, or node → such a mapping. Raises SettingsError,
-    ConfigurationError, ScenarioError, ProfileError, Px4Error, PortError, FaultError; each text is
-    one line for the user.
+    profile: see `load_profile` for several profiles; plant_preset: names or files of effects of
+    the plant, effects: changes to them, see `effects.presets.read`; faults: see
+    `faults.read_schedule`; view: serve the cockpit; arm: begin by itself also with a real
+    autopilot; auto_start False: wait for the command start. parameters: node → name → value, each
+    replaces the profile's. remappings: topic or service → new name for every node, or node → such a
+    mapping. Raises SettingsError, ConfigurationError, ScenarioError, ProfileError, Px4Error,
+    PortError, PlantError, FaultError; each text is one line for the user.
     """
     _choice("controller", controller, catalogue.LAWS)
     _choice("engine", engine, ENGINES)
@@ -187,6 +191,9 @@ def settings(
     if not 0.0 <= mass <= PAYLOAD_MAX:
         raise SettingsError(f"payload mass {mass:g} kg is outside 0..{PAYLOAD_MAX:g} kg")
     injected = read_schedule(faults, loaded, seed)
+    acting = presets.read(
+        [plant_preset] if isinstance(plant_preset, str) else plant_preset, effects
+    )
     left_out = tuple(dict.fromkeys(without if view else (*without, COCKPIT)))
     made = FlightSettings(
         scenario=loaded,
@@ -205,7 +212,7 @@ def settings(
         plant=plant,
         scenario_source=str(scenario),
         instance=_instance_of(link) if instance is None else instance,
-        vehicle_changes=dict(vehicle_changes or {}),
+        vehicle_changes=presets.added(vehicle_changes or {}, acting),
         without=left_out,
         faults=injected,
         log_limit=log_limit,
@@ -225,7 +232,7 @@ def check_feasible(flight: FlightSettings, faults: Schedule) -> None:
     """Raise FaultError for faults that this flight cannot have."""
     absent = (*flight.without, "autopilot") if flight.link is not None else flight.without
     refused = {DiscoveryLoss.NAME: without_discovery()}
-    check_engine(faults, flight.plant)
+    check_engine(faults, flight.plant, flight.vehicle_changes.get("effects"))
     feasibility.check(faults, flight.engine, absent, refused, flight.vehicle)
 
 

@@ -13,7 +13,7 @@ from uam_sim_bridge.faults.fault import PLANT, FaultError, Occurrence, PlantComm
 from uam_sim_bridge.faults.schedule import Schedule
 from uam_sim_bridge.faults.timeline import FaultState, Timeline
 from uam_sim_bridge.plant import Disturbance, Plant, Samples, Truth, Vehicle
-from uam_sim_bridge.plant.engines import DEFAULT_PLANT, plant_class
+from uam_sim_bridge.plant.engines import DEFAULT_PLANT, PlantError, plant_class
 
 
 def make_plant(
@@ -28,14 +28,19 @@ def make_plant(
 
     engine: see `plant_class`; the others as of `MujocoPlant`. Raises PlantError, FaultError.
     """
-    check_engine(faults, engine)
+    check_engine(faults, engine, vehicle.numbers["effects"])
     acting = faults.only(PLANT)
     plant = plant_class(engine)(vehicle, payload_mass, seed, arm_start, bool(_physical(acting)))
     return FaultyPlant(plant, acting) if acting else plant
 
 
-def check_engine(faults: Schedule, engine: str) -> None:
-    """Raise PlantError for an unknown engine, FaultError for faults that it cannot simulate."""
+def check_engine(faults: Schedule, engine: str, effects: object = None) -> None:
+    """Raise PlantError for an unknown engine, or one without the effects of the flight.
+
+    Raises FaultError for faults that it cannot simulate.
+    """
+    if effects and not plant_class(engine).HAS_EFFECTS:
+        raise PlantError(f"plant {engine} has no effects: it flies with the preset calm only")
     physical = _physical(faults)
     if not plant_class(engine).DISTURBABLE and physical:
         raise FaultError(

@@ -15,7 +15,9 @@ from uam_sim_bridge.mavlink.protocol.signing import Signing
 from uam_sim_bridge.mavlink.protocol.wire import Codec, mavlink2
 from uam_sim_bridge.mavlink.transport.faulty_transport import FaultyTransport
 from uam_sim_bridge.mavlink.transport.forwarding import GroundStation
+from uam_sim_bridge.mavlink.transport.late_transport import LateTransport
 from uam_sim_bridge.mavlink.transport.transport import Transport, UdpTransport, open_transport
+from uam_sim_bridge.plant.effects.network_delay import SetpointDelay
 
 
 @dataclass(frozen=True)
@@ -50,11 +52,12 @@ class BridgeParameters(ParameterSet):
 
 @dataclass(frozen=True)
 class Links:
-    """The open links; station, faulty: None if not configured."""
+    """The open links; station, faulty, late: None if not configured."""
 
     autopilot: OffboardLink
     station: GroundStation | None
     faulty: FaultyTransport | None
+    late: LateTransport | None
 
 
 def open_links(
@@ -104,16 +107,28 @@ def open_links(
         ),
     )
     faults = Schedule.from_text(planned).only(LINK)
+    network = declared_text(
+        node,
+        "network_delay",
+        "",
+        Text(
+            "simulated delay of the messages to the autopilot",
+            'JSON, {"fixed", "jitter", "longest" [s], "seed"}: docs/plant.md; empty: none',
+        ),
+    )
+    delay = SetpointDelay.from_text(network)
     transport: Transport
     if url:
         transport = open_transport(url)
     else:
         transport = UdpTransport(options.local_port, (host, options.autopilot_port))
-    faulty = station = None
+    faulty = station = late = None
+    if delay is not None:
+        transport = late = LateTransport(transport, delay)
     if faults:
         transport = faulty = FaultyTransport(transport, faults)
     if watching:
         codec = Codec(system, mavlink2.MAV_COMP_ID_ONBOARD_COMPUTER, signing)
         transport = station = GroundStation(watching, transport, codec)
     link = OffboardLink(transport, sequence, mapping, system, signing)
-    return Links(link, station, faulty)
+    return Links(link, station, faulty, late)

@@ -96,6 +96,7 @@ class MavlinkBridgeNode(UamNode):
         options, sequence = self._options, OffboardSequence(offboard)
         links = open_links(self, options, sequence, mapping.current)
         self.link, self._station, self._faulty = links.autopilot, links.station, links.faulty
+        self._late = links.late
         sets = BridgeSets(mapping.current, hold, thrust.current, vision, setpoint)
         fresh = options.stale_after + LATENCY
         self.stage = BridgeStage(
@@ -216,7 +217,9 @@ class MavlinkBridgeNode(UamNode):
         self.done_tick(stamp, begun)
 
     def _begin_tick(self, stamp: int) -> None:
-        """Begin a tick: update the faults of the link and receive the autopilot's messages."""
+        """Begin a tick: update delay and faults of the link, receive the autopilot's messages."""
+        if self._late:
+            self._late.update(stamp / SECOND)
         if self._faulty and self._fault_topic:
             self._fault_topic.publish(stamp, self._faulty.update(stamp / SECOND))
         self.stage.hear(stamp)

@@ -56,6 +56,7 @@ from uam_sim_bridge.nodes.plant_topics import SUSPECTS, Answers, Sensors, TruthT
 from uam_sim_bridge.nodes.restart import Restart
 from uam_sim_bridge.patience import Patience
 from uam_sim_bridge.plant import Plant, Samples, Truth, Vehicle
+from uam_sim_bridge.plant.effects import presets
 
 NAME = "mujoco_sim"
 REPORT_INTERVAL = 5.0  # [s] between two log lines with the missing nodes
@@ -83,7 +84,9 @@ class Simulator:
         options = declared.parameters
         self.node, self.options, self._stop = node, options, stop
         self._log = node.get_logger()
-        vehicle = Vehicle.of(declared.vehicle).changed(json.loads(options.vehicle_changes))
+        named = presets.read(tuple(filter(None, options.plant_preset.split(","))))
+        changes = presets.added({}, named) | json.loads(options.vehicle_changes)
+        vehicle = Vehicle.of(declared.vehicle).changed(changes)
         described = vehicle.description
         start = (vehicle, options.payload_mass, options.seed, tuple(options.arm_start))
         faults = Schedule.from_text(options.faults).only(PLANT)

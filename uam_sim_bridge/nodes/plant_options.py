@@ -37,6 +37,9 @@ class PlantParameters(ParameterSet):
     plant: str = text(
         DEFAULT_PLANT, "physics engine", ", ".join(PLANTS) + ", or a class as module:Class"
     )
+    plant_preset: str = text(
+        "", "effects of the plant", "names or files of config/plant with commas; empty: calm"
+    )
     payload_mass: float = number(0.2, "mass of the payload, 0 for none", "kg", 0.0, PAYLOAD_MAX)
     seed: int = integer(1, "seed of all noise", 0, 2**31 - 1)
     arm_start: tuple = vector(

@@ -23,23 +23,33 @@ class Rotors:
                 numbers["thrust_coefficient"],
                 numbers["thrust_coefficient"] * numbers["speed_max"] ** 2,
                 numbers["curve_factor"],
-                1.0 - math.exp(-step / numbers["lag_up"]),
-                1.0 - math.exp(-step / numbers["lag_down"]),
             ]
         )
+        self._lags, self._step = (numbers["lag_up"], numbers["lag_down"]), step
+        self.gains = np.empty((2, len(self.efficiency)))
+        self.scale_lags(np.ones(len(self.efficiency)))
         self.speed = np.zeros(len(self.efficiency))
         self.thrust = np.zeros(len(self.efficiency))
+
+    def scale_lags(self, factors: np.ndarray) -> None:
+        """Set the time constants of the rotors to factors (rotors,) times the vehicle's."""
+        for row, lag in enumerate(self._lags):
+            for i, factor in enumerate(factors):
+                self.gains[row, i] = 1.0 - math.exp(-self._step / (lag * factor))
 
     def step(self, commands: np.ndarray, output: np.ndarray) -> None:
         """Advance one physics step with commands (rotors,) 0..1; write thrust [N] to output
         (rotors,)."""
-        rotor_step(commands, self.constants, self.efficiency, self.speed, self.thrust, output)
+        rotor_step(
+            commands, self.constants, self.gains, self.efficiency, self.speed, self.thrust, output
+        )
 
 
 @jit
 def rotor_step(
     commands: np.ndarray,
     constants: np.ndarray,
+    gains: np.ndarray,
     efficiency: np.ndarray,
     speed: np.ndarray,
     thrust: np.ndarray,
@@ -47,15 +57,15 @@ def rotor_step(
 ) -> None:
     """Advance rotors by one step: first-order speed lag, different up and down; T = c speed^2.
 
-    commands (rotors,) 0..1; constants (5,): of `Rotors`; efficiency (rotors,): factor on thrust;
-    speed (rotors,) [rad/s], thrust and output (rotors,) [N] are overwritten.
+    commands (rotors,) 0..1; constants (3,): of `Rotors`; gains (2, rotors): share of the difference
+    per step while speeding up and slowing down; efficiency (rotors,): factor on thrust; speed
+    (rotors,) [rad/s], thrust and output (rotors,) [N] are overwritten.
     """
-    coefficient, thrust_max, factor = constants[0], constants[1], constants[2]
-    gain_up, gain_down = constants[3], constants[4]
+    coefficient, thrust_max, factor = constants
     for i in range(len(commands)):
         u = min(max(commands[i], 0.0), 1.0)
         desired = math.sqrt(thrust_max * (factor * u * u + (1.0 - factor) * u) / coefficient)
-        gain = gain_up if desired > speed[i] else gain_down
+        gain = gains[0, i] if desired > speed[i] else gains[1, i]
         speed[i] += gain * (desired - speed[i])
         thrust[i] = efficiency[i] * coefficient * speed[i] * speed[i]
         output[i] = thrust[i]

@@ -12,6 +12,8 @@ from uam_control.maths.compiled import jit
 from uam_control.maths.rotations import euler_from_quaternion
 from uam_control.vehicle import VehicleError
 from uam_sim_bridge.plant.actuators import Rotors, Servos, rotor_step, servo_step
+from uam_sim_bridge.plant.effects.acting_effects import ActingEffects
+from uam_sim_bridge.plant.effects.effect import Acting, Bench
 from uam_sim_bridge.plant.magnet import magnet_constants, pull_fraction
 from uam_sim_bridge.plant.payload_hinge import PayloadHinge, add_to
 from uam_sim_bridge.plant.plant import Disturbance, Plant, Samples, Truth
@@ -23,6 +25,8 @@ STIFF = 0.9999  # constraint impedance for friction without creep, see MuJoCo's 
 
 class MujocoPlant(Plant):
     """Vehicle with arm, magnet and payload in MuJoCo; the numbers are in config/vehicle/."""
+
+    HAS_EFFECTS = True
 
     def __init__(
         self,
@@ -69,6 +73,9 @@ class MujocoPlant(Plant):
         self._swing_rate: float | None = None  # [rad/s] of a payload that hangs on the hinge
         self._hinge = PayloadHinge(model, data) if disturbed else None
         self._arm_dofs = [model.joint(name).dofadr[0] for name in vehicle.description.joint_names]
+        effects = numbers["effects"]
+        self._effects = ActingEffects(effects, self._bench(), seed) if effects else None
+        self._rotor_factor = self.rotors.efficiency.copy()  # with the faults, without the effects
         self._undisturbed = (
             self.rotors.efficiency.copy(),
             model.dof_frictionloss[self._arm_dofs].copy(),
@@ -112,6 +119,20 @@ class MujocoPlant(Plant):
         if payload_mass <= 0.0:  # moved far away: the model stays the same
             self._payload_position[:] = (5.0, 5.0, 0.02)
 
+    def _bench(self) -> Bench:
+        """Return the parts on which effects act."""
+        first = self.vehicle.description.joint_names[0]
+        return Bench(
+            self.vehicle,
+            self.model,
+            self.data,
+            self.rotors,
+            self.period,
+            (self.model.joint(first).dofadr[0], self.joints),
+            self._torque_control,
+            self.servos.torque,
+        )
+
     def _controls(self, names: Sequence[str]) -> np.ndarray:
         """Return a view (len(names),) of the controls of these actuators."""
         found = [self.model.actuator(name).id for name in names]
@@ -130,16 +151,21 @@ class MujocoPlant(Plant):
     def sense(self) -> Samples:
         """See `Plant.sense`."""
         tick, time = self.tick, self.tick * self.period
+        effects = self._effects
         gyro, force = self._imu.sample(self._rates, self._specific_force)
+        if effects is not None:
+            gyro, force = effects.imu(gyro, force)
         hil = (time, gyro, force)
         joints = (time, *self._encoders.sample(self._alpha, self._alpha_dot))
-        mocap = None
+        mocap, late = None, 0
         if self._mocap.due(time):
             mocap = (time, *self._mocap.sample(self._position, self._quaternion))
+            if effects is not None:
+                mocap, late = effects.pose(mocap)
         return Samples(
             self._imu_delay(tick, hil),
             self._joints_delay(tick, (*joints, self.servos.torque.copy())),
-            self._mocap_delay(tick, mocap),
+            self._mocap_delay(tick, mocap, late),
             hil,
         )
 
@@ -166,10 +192,16 @@ class MujocoPlant(Plant):
             self._specific_force,
         )
         rotors, servos = self.rotors, self.servos
+        gears: tuple[Acting, ...] = ()
+        if self._effects is not None:
+            self._effects.tick()
+            np.multiply(self._rotor_factor, self._effects.bench.lift, out=rotors.efficiency)
+            gears = self._effects.gears
         for _ in range(self._steps):
             actuate(
                 motor_commands,
                 rotors.constants,
+                rotors.gains,
                 rotors.efficiency,
                 rotors.speed,
                 rotors.thrust,
@@ -180,6 +212,8 @@ class MujocoPlant(Plant):
                 self._thrust_control,
                 self._torque_control,
             )
+            for gear in gears:
+                gear.joints()
             mujoco.mj_step(self.model, self.data)
             average(self._sensed_force, 1.0 / self._steps, self._specific_force)
         self.tick += 1
@@ -188,7 +222,8 @@ class MujocoPlant(Plant):
         """See `Plant.disturb`."""
         efficiency, friction, softness, gain = self._undisturbed
         model, dofs = self.model, self._arm_dofs
-        self.rotors.efficiency[:] = efficiency * disturbance.rotor_parts
+        self._rotor_factor[:] = efficiency * disturbance.rotor_parts
+        self.rotors.efficiency[:] = self._rotor_factor
         braked = disturbance.joint_friction > 0.0
         model.dof_frictionloss[dofs] = friction + disturbance.joint_friction
         model.dof_solimp[dofs, 0:2] = np.where(braked[:, None], STIFF, softness[:, 0:2])
@@ -298,6 +333,7 @@ def surroundings(
 def actuate(
     commands: np.ndarray,
     rotor_constants: np.ndarray,
+    rotor_gains: np.ndarray,
     efficiency: np.ndarray,
     speed: np.ndarray,
     thrust: np.ndarray,
@@ -312,7 +348,7 @@ def actuate(
 
     The arguments are those of `rotor_step` and `servo_step`.
     """
-    rotor_step(commands, rotor_constants, efficiency, speed, thrust, thrust_control)
+    rotor_step(commands, rotor_constants, rotor_gains, efficiency, speed, thrust, thrust_control)
     servo_step(effort, joint_rates, servo_constants, torque, torque_control)
 
 

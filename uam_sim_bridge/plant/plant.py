@@ -83,10 +83,12 @@ class Plant(ABC):
 
     `vehicle`: as flown; `period` [s]: of control; `joints`: their number n; `tick`: number of
     periods stepped. `DISTURBABLE`: whether the class implements `disturb`; if not, faults of the
-    physics are refused, faults of sensors and commands are accepted.
+    physics are refused, faults of sensors and commands are accepted. `HAS_EFFECTS`: whether it
+    simulates the effects of a preset (`vehicle.numbers["effects"]`); if not, presets are refused.
     """
 
     DISTURBABLE = True
+    HAS_EFFECTS = False
 
     def __init__(self, vehicle: Vehicle) -> None:
         self.vehicle = vehicle

@@ -30,16 +30,19 @@ class Noise:
 
 
 class Delay:
-    """Delay line of a fixed number of ticks."""
+    """Delay line of a number of ticks. No sample overtakes another."""
 
     def __init__(self, ticks: int) -> None:
         self._ticks = ticks
         self._queue: deque = deque()
 
-    def __call__(self, tick: int, sample: tuple | None) -> tuple | None:
-        """Store the sample taken at `tick`, if any; return the sample due by then, or None."""
+    def __call__(self, tick: int, sample: tuple | None, added: int = 0) -> tuple | None:
+        """Store the sample taken at `tick`, if any; return the sample due by then, or None.
+
+        added: ticks by which this sample is later than usual.
+        """
         if sample is not None:
-            self._queue.append((tick + self._ticks, sample))
+            self._queue.append((tick + self._ticks + added, sample))
         if self._queue and self._queue[0][0] <= tick:
             return self._queue.popleft()[1]
         return None

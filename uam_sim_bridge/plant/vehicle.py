@@ -33,7 +33,8 @@ MASS_TOLERANCE = 1e-3  # relative
 class Vehicle:
     """A description and the numbers of its file; a flight may change some numbers.
 
-    The controllers use the description, the plant uses the numbers.
+    The controllers use the description, the plant uses the numbers. The entry `effects` of the
+    numbers are the effects of the plant, see `effects.presets`.
     """
 
     description: VehicleDescription
@@ -46,8 +47,8 @@ class Vehicle:
 
     @classmethod
     def of(cls, description: VehicleDescription) -> Vehicle:
-        """Return the vehicle as described."""
-        return cls(description, description.numbers)
+        """Return the vehicle as described, on a plant without effects."""
+        return cls(description, {"effects": {}} | description.numbers)
 
     def changed(self, changes: dict[str, object]) -> Vehicle:
         """Return a copy with dotted entries replaced, e.g. {"air.gust": 1.0}."""

@@ -26,6 +26,7 @@ from uam_sim_bridge.faults.faulty_plant import make_plant
 from uam_sim_bridge.mavlink.offboard.sequence import OffboardParameters, OffboardSequence
 from uam_sim_bridge.mavlink.offboard.setpoint_source import sent
 from uam_sim_bridge.plant import Samples, Vehicle
+from uam_sim_bridge.plant.effects.network_delay import SetpointDelay
 from uam_sim_bridge.plant.engines import DEFAULT_PLANT
 from uam_sim_bridge.stages.bridge_stage import BridgeSets, BridgeStage
 from uam_sim_bridge.stages.control_tick import ControlTick, Imu, Joints, Pose, Signals
@@ -68,6 +69,9 @@ class DirectFlight:
             self.autopilot.late_to = self._faults.link.late_to
             self.autopilot.late_from = self._faults.link.late_from
             self.control.insert("bridge", "faults", self._update_faults)
+        if network := SetpointDelay.of(vehicle.numbers["effects"], seed):
+            usual, signals = self.autopilot.late_to, self.control.signals
+            self.autopilot.late_to = lambda: usual() + network.at(signals.stamp / SECOND)
         self.ended_by = ""  # reason of an end before that of the mission
         self._limit = time_limit(scenario, sets["mission"])
         self._lag = 0  # ticks from an IMU sample to its arrival

@@ -15,6 +15,7 @@ from uam_lab.recording import log_facts
 from uam_lab.results.result_folder import ResultFolder, as_json, versions
 from uam_msgs_py.node import wiring
 from uam_sim_bridge.faults import LINK, PLANT
+from uam_sim_bridge.plant.effects.network_delay import SetpointDelay
 from uam_sim_bridge.ports import Ports
 
 # Executable → module. Started and, at the end, stopped in this order, the recorder last.
@@ -84,6 +85,7 @@ def parameters(
         "autopilot_system": 1 if in_the_loop(settings) else ports.instance + 1,
         "gcs": settings.gcs,
         "faults": settings.faults.only(LINK).to_text(),
+        "network_delay": _network_delay(settings),
         "dry_run": settings.dry_run,
     }
     if users_autopilot(settings):
@@ -105,6 +107,12 @@ def parameters(
     for node in DESCRIBED & sections.keys():
         sections[node]["vehicle"] = settings.vehicle.source
     return sections
+
+
+def _network_delay(settings: FlightSettings) -> str:
+    """Return the delay of the messages to the autopilot as text; "" for none."""
+    delay = SetpointDelay.of(settings.vehicle_changes.get("effects", {}), settings.seed)
+    return "" if delay is None else delay.to_text()
 
 
 def write_facts(settings: FlightSettings, folder: ResultFolder) -> None:

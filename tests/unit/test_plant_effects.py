@@ -1,0 +1,424 @@
+"""The effects of a laboratory on the plant: each by hand, and what they leave alone."""
+
+import math
+
+import mujoco
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from uam_sim_bridge.faults import Schedule
+from uam_sim_bridge.faults.faulty_plant import make_plant
+from uam_sim_bridge.mavlink.transport.late_transport import LateTransport
+from uam_sim_bridge.plant import Vehicle
+from uam_sim_bridge.plant.effects import presets
+from uam_sim_bridge.plant.effects.acting_effects import generator
+from uam_sim_bridge.plant.effects.arm_occlusion import distance, seen_markers
+from uam_sim_bridge.plant.effects.catalogue import EFFECTS
+from uam_sim_bridge.plant.effects.downwash import momentum
+from uam_sim_bridge.plant.effects.ground_effect import raise_thrust, thrust_ratio
+from uam_sim_bridge.plant.effects.joint_gear import gear_step
+from uam_sim_bridge.plant.effects.network_delay import SetpointDelay
+from uam_sim_bridge.plant.effects.propeller_vibration import mean_of_wave, vibrated
+from uam_sim_bridge.plant.engines import PlantError
+from uam_sim_bridge.plant.mujoco_plant import MujocoPlant
+
+LEVEL = np.eye(3).ravel()
+SENSING = ("propeller_vibration", "mocap_jitter", "mocap_dropouts", "arm_occlusion")
+MOCAP = ("mocap_jitter", "mocap_dropouts", "arm_occlusion")
+
+
+def plant(*specs, seed=1, vehicle="s500_arm", payload=0.2):
+    effects = presets.read((), specs)
+    return MujocoPlant(Vehicle.load(vehicle).changed({"effects": effects}), payload, seed)
+
+
+def flown(one, ticks=60, command=0.6):
+    """Return the samples and the true states of some ticks with constant commands."""
+    rotors, samples, states = len(one.vehicle.description.rotors), [], []
+    for tick in range(ticks):
+        samples.append(one.sense())
+        states.append(one.truth().state)
+        one.step(np.full(rotors, command), np.full(one.joints, 0.3 * math.sin(tick)), False)
+    return samples, np.array(states)
+
+
+def column(samples, kind):
+    return [s and np.concatenate([np.atleast_1d(x) for x in s]) for s in map(kind, samples)]
+
+
+def same(a, b):
+    return len(a) == len(b) and all(
+        (x is None and y is None) or (x is not None and y is not None and np.array_equal(x, y))
+        for x, y in zip(a, b, strict=True)
+    )
+
+
+# Presets
+
+
+def test_calm_has_no_effects_and_laboratory_has_all():
+    assert presets.read() == presets.read(["calm"]) == {}
+    assert set(presets.read(["laboratory"])) == set(EFFECTS)
+
+
+def test_every_effect_names_its_source_and_describes_its_numbers():
+    for kind in EFFECTS.values():
+        assert len(kind.SOURCE) > 20 and len(kind.ABOUT) > 20
+        assert all(spec.description and spec.unit for _, spec in kind.ranges())
+
+
+@given(st.permutations(sorted(EFFECTS)))
+@settings(max_examples=5)
+def test_all_effects_switched_off_are_the_calm_plant(names):
+    assert presets.read(["laboratory"], [f"{name}=off" for name in names]) == {}
+
+
+@given(seed=st.integers(0, 1000), command=st.floats(0.0, 1.0))
+@settings(max_examples=4, deadline=None)
+def test_without_effects_the_plant_is_calm_bit_for_bit(seed, command):
+    off = presets.read(["laboratory", "calm"], [f"{name}=off" for name in EFFECTS])
+    calm = MujocoPlant(Vehicle.load(), 0.2, seed)
+    same_plant = MujocoPlant(Vehicle.load().changed({"effects": off}), 0.2, seed)
+    (samples, states), (others, other_states) = (
+        flown(calm, 30, command),
+        flown(same_plant, 30, command),
+    )
+    assert np.array_equal(states, other_states)
+    assert same(column(samples, lambda s: s.hil), column(others, lambda s: s.hil))
+
+
+def test_a_later_file_overrides_and_the_rest_is_from_the_laboratory(tmp_path):
+    file = tmp_path / "mine.yaml"
+    file.write_text("downwash: {drag: 2.0}\njoint_gear: off\nground_effect: on\n")
+    mine = presets.read([str(file)])
+    assert set(mine) == {"downwash", "ground_effect"}
+    assert mine["downwash"] == presets.laboratory()["downwash"] | {"drag": 2.0}
+    both = presets.read(["laboratory", str(file)], ["downwash:drag=3,spreading=0.2"])
+    assert "joint_gear" not in both and both["downwash"]["drag"] == 3.0
+    assert both["downwash"]["spreading"] == 0.2
+
+
+@pytest.mark.parametrize(
+    ("spec", "words"),
+    [
+        ("earthquake", "unknown effect 'earthquake'; there are: propeller_vibration"),
+        ("downwash:weight=1", "weight: unknown; allowed: spreading"),
+        ("downwash:drag=9", "drag: 9.0 is outside 0 to 3"),
+        ("downwash:drag=much", "'much' is not a number"),
+        ("downwash=maybe", "NAME=off"),
+    ],
+)
+def test_a_bad_switch_is_refused_in_one_line(spec, words):
+    with pytest.raises(PlantError) as refused:
+        presets.read((), [spec])
+    assert words in str(refused.value) and "\n" not in str(refused.value)
+
+
+def test_a_plant_without_effects_refuses_them():
+    vehicle = Vehicle.load().changed({"effects": presets.read(["laboratory"])})
+    with pytest.raises(PlantError, match="preset calm only"):
+        make_plant(vehicle, 0.0, 1, (), Schedule(), "tests.rigid_body_plant:RigidBodyPlant")
+
+
+# All together
+
+
+@pytest.mark.parametrize("vehicle", ["s500_arm", "hexa_arm", "s500_arm3"])
+def test_a_seed_gives_the_same_laboratory_on_every_vehicle(vehicle):
+    runs = [flown(plant(*EFFECTS, seed=seed, vehicle=vehicle)) for seed in (1, 1, 2)]
+    for kind in (lambda s: s.hil, lambda s: s.mocap, lambda s: s.joints):
+        assert same(column(runs[0][0], kind), column(runs[1][0], kind))
+    assert np.array_equal(runs[0][1], runs[1][1])
+    assert not np.array_equal(runs[0][1], runs[2][1])
+    assert np.all(np.isfinite(runs[0][1]))
+
+
+def test_the_draws_of_an_effect_do_not_depend_on_the_others():
+    assert np.array_equal(
+        generator(3, "downwash").standard_normal(3), generator(3, "downwash").standard_normal(3)
+    )
+    alone, together = plant("rotor_spread"), plant("rotor_spread", "mocap_dropouts", "downwash")
+    assert np.array_equal(alone.rotors.efficiency, together.rotors.efficiency)
+
+
+@pytest.mark.parametrize("name", SENSING)
+def test_effects_of_the_sensors_leave_the_motion_alone(name):
+    assert np.array_equal(flown(plant())[1], flown(plant(name))[1])
+
+
+@pytest.mark.parametrize("name", MOCAP)
+def test_effects_of_the_mocap_leave_the_imu_alone(name):
+    calm, changed = flown(plant())[0], flown(plant(name))[0]
+    assert same(column(calm, lambda s: s.hil), column(changed, lambda s: s.hil))
+
+
+# Propellers
+
+
+def test_the_mean_of_a_wave_over_whole_turns_is_zero_and_over_none_its_value():
+    cosine, sine = mean_of_wave(0.7, 4.0 * math.pi)
+    assert cosine == pytest.approx(0.0, abs=1e-15) and sine == pytest.approx(0.0, abs=1e-15)
+    assert mean_of_wave(0.7, 0.0) == (math.cos(0.7), math.sin(0.7))
+
+
+def test_an_unbalanced_rotor_shakes_the_imu_by_hand():
+    # 500 rad/s for 4 ms: 2 rad; mean of cos: sin(2)/2 = 0.45465, of sin: (1 - cos 2)/2 = 0.70807
+    zero, phases = np.zeros(3), np.zeros(1)
+    gyro, force = vibrated(
+        zero, zero, np.array([500.0]), np.ones(1), np.array([[0.0, 0.0, 0.05]]), phases,
+        np.array([1e-6]), 0.0, 1.0 / 2.0, np.full(3, 1.0 / 0.02), 0.004,
+    )  # fmt: skip
+    push = 1e-6 * 500.0**2  # 0.25 N
+    assert force == pytest.approx([0.45465 * push / 2, 0.70807 * push / 2, 0.0], abs=1e-6)
+    # torque 0.05 m x F about y from the x force, about -x from the y force; integrated: / omega
+    turn = 0.05 * push / 500.0 / 0.02
+    assert gyro == pytest.approx([0.45465 * turn, 0.70807 * turn, 0.0], abs=1e-8)
+    assert phases == pytest.approx([2.0])
+
+
+def test_vibration_needs_turning_rotors_and_has_the_size_that_the_preset_states():
+    still, hover = plant("propeller_vibration"), plant("propeller_vibration")
+    bare, shaken = flown(plant(), 300, 0.0)[0], flown(still, 300, 0.0)[0]
+    assert same(column(bare, lambda s: s.hil), column(shaken, lambda s: s.hil))
+    bare, shaken = flown(plant(), 300, 0.45)[0], flown(hover, 300, 0.45)[0]
+    added = np.array([a.hil[2] - b.hil[2] for a, b in zip(shaken, bare, strict=True)])[100:]
+    assert 0.5 < np.sqrt(np.mean(added[:, :2] ** 2)) < 2.0  # about 1 m/s^2 RMS
+
+
+def test_rotors_differ_but_not_wildly_and_lags_with_them():
+    one, calm = plant("rotor_spread", seed=4), plant(seed=4)
+    drawn = generator(4, "rotor_spread").standard_normal((2, 4))
+    assert one.rotors.efficiency == pytest.approx(1.0 + 0.03 * np.clip(drawn[0], -2.5, 2.5))
+    lag = 0.0125 * (1.0 + 0.10 * np.clip(drawn[1], -2.5, 2.5))
+    assert one.rotors.gains[0] == pytest.approx(1.0 - np.exp(-0.002 / lag))
+    assert np.array_equal(calm.rotors.efficiency, np.ones(4))
+
+
+# Battery
+
+
+def test_the_battery_sags_by_charge_and_current_by_hand():
+    one = plant("battery_sag:start=1", payload=0.0)
+    battery = one._effects._ticks[0]
+    one.rotors.thrust[:] = 5.4
+    # ideal power 5.4^1.5 / sqrt(2 1.2 pi 0.127^2) = 35.98 W per rotor; 4 / 0.6 of it and 20 W
+    power = 4 * 35.98 / 0.6 + 20.0
+    battery.tick()
+    assert one.rotors.constants[1] == pytest.approx(8.549e-6 * 1100.0**2)  # full, no current yet
+    gain = 1.0 - math.exp(-0.004 / 0.1)
+    assert battery._current == pytest.approx(gain * power / 16.2, rel=1e-3)
+    battery._current = 16.0
+    battery.tick()
+    sag = (16.2 - 4 * 0.005 * 16.0) / 16.2  # 0.98025
+    assert one.rotors.constants[1] == pytest.approx(8.549e-6 * 1100.0**2 * sag**2, rel=1e-5)
+    battery._charge = 0.0
+    battery.tick()
+    assert one.rotors.constants[1] < 8.549e-6 * 1100.0**2 * (3.6 / 4.05) ** 2
+
+
+# Air
+
+
+def test_ground_effect_on_the_skids_by_hand():
+    # R 0.127, d 0.342, b 0.4837 m; z 0.335 m: losses 0.00898, 0.01269, 0.00479, 0.03830
+    shape = np.array([0.127, 0.342, 0.4837, 2.0, 1.0])
+    assert thrust_ratio(0.335, shape) == pytest.approx(1.0 / (1.0 - 0.06476), abs=1e-4)
+    assert thrust_ratio(3.0, shape) == pytest.approx(1.0, abs=0.003)
+    assert thrust_ratio(0.0, shape) == thrust_ratio(0.0635, shape) < 2.5  # bounded
+
+
+def test_each_rotor_has_the_ground_effect_of_its_own_height():
+    shape, lift = np.array([0.127, 0.342, 0.4837, 2.0, 1.0]), np.ones(2)
+    tilted = np.array([1.0, 0, 0, 0, 0.8, -0.6, 0, 0.6, 0.8])  # about x: the left rotor is higher
+    raise_thrust(
+        np.array([0.0, 0.0, 0.5]), tilted, np.array([[0, 0.2, 0], [0, -0.2, 0]]), shape, lift
+    )
+    assert lift == pytest.approx([thrust_ratio(0.62, shape), thrust_ratio(0.38, shape)])
+
+
+def test_a_jet_begins_with_momentum_theory_and_keeps_its_momentum():
+    rotor, thrust = np.zeros((1, 3)), np.array([5.4])
+    down = np.array([0.0, 0.0, -1e-9])
+    at_disc = momentum(down, LEVEL, rotor, thrust, 0.127, 0.1)
+    assert at_disc == pytest.approx(2 * 5.4 / (1.2 * math.pi * 0.127**2), rel=1e-6)  # (2 v_i)^2
+    for below in (0.2, 1.0):  # rho times the integral of u^2 over the plane is the thrust
+        r = np.linspace(0.0, 3.0, 3001)
+        u2 = [momentum(np.array([x, 0, -below]), LEVEL, rotor, thrust, 0.127, 0.1) for x in r]
+        assert 1.2 * np.trapezoid(2 * math.pi * r * u2, r) == pytest.approx(5.4, rel=1e-3)
+    assert momentum(np.array([0.0, 0.0, 0.1]), LEVEL, rotor, thrust, 0.127, 0.1) == 0.0  # above
+
+
+def test_the_downwash_pushes_the_payload_down():
+    one = plant("downwash:turbulence=0")
+    payload = one.model.body("payload").id
+    one._effects.bench.rotors.thrust[:] = 5.4
+    one.data.xpos[payload] = one.data.xpos[one.model.body("base").id] + [0.17, 0.17, -0.3]
+    one._effects.tick()
+    force = one.data.xfrc_applied[payload]
+    # below rotor 3: b = 0.1057 + 0.1 0.35 = 0.1407 m, u^2 = 100.5; half 1.2 1.05 0.0036 of it
+    assert force[2] == pytest.approx(-0.5 * 1.2 * 1.05 * 0.0036 * 100.5, rel=0.02)
+    assert force[0] == force[1] == 0.0
+
+
+# Joints
+
+
+def gear(torque, alpha, angle, speed=0.0, friction=0.1, alpha_dot=0.0):
+    """One step of a gear of 0.02 rad half play, 100 N m/rad; return contact, angle, speed."""
+    constants = np.array([0.02, 100.0, 0.0, 1.5, 0.05, 0.002])
+    angles, speeds, output = np.array([angle]), np.array([speed]), np.zeros(1)
+    gear_step(
+        np.array([torque]), np.array([alpha]), np.array([alpha_dot]), np.array([0.01]),
+        np.array([friction]), constants, angles, speeds, output,
+    )  # fmt: skip
+    return output[0], angles[0], speeds[0]
+
+
+def test_inside_the_play_no_torque_and_beyond_it_a_spring():
+    assert gear(0.0, 0.0, 0.019)[0] == 0.0
+    assert gear(0.0, 0.0, 0.03)[0] == pytest.approx(1.0)  # 100 N m/rad * 0.01 rad
+    assert gear(0.0, 0.0, -0.03)[0] == pytest.approx(-1.0)
+
+
+def test_stiction_holds_a_resting_motor_and_coulomb_brakes_a_moving_one():
+    assert gear(0.149, 0.0, 0.0)[2] == 0.0  # below 1.5 * 0.1 N m
+    assert gear(0.16, 0.0, 0.0)[2] == pytest.approx((0.16 - 0.15) * 0.002 / 0.01)
+    # at 1 rad/s the Stribeck excess is gone: 0.1 N m brakes
+    assert gear(0.0, 0.0, 0.0, speed=1.0)[2] == pytest.approx(1.0 - 0.1 * 0.002 / 0.01)
+
+
+def test_a_joint_with_play_swings_freely_within_it():
+    one = plant("joint_gear:backlash_deg=2")
+    for _ in range(250):
+        one.sense()
+        one.step(np.zeros(4), np.array([0.0, 0.0]), False)
+    gear_ = one._effects.gears[0]
+    assert np.all(np.abs(gear_._angle - one._alpha) <= math.radians(1.0) + 0.01)
+
+
+def test_cables_pull_to_their_rest_angle():
+    one = plant("cable_torque:stiffness=0.02,stiffness_spread=0,rest_spread_deg=0")
+    one._alpha[:] = [0.5, math.radians(90.0) - 0.25]
+    one._effects.tick()
+    dofs = one._effects.bench.arm_dofs
+    assert one.data.qfrc_applied[dofs] == pytest.approx([-0.01, 0.005])
+
+
+# Mocap
+
+
+@pytest.mark.parametrize(
+    ("ends", "gap"),
+    [
+        (([0, 0, 0], [1, 0, 0], [0, 1, 0], [1, 1, 0]), 1.0),  # parallel
+        (([0, 0, 0], [1, 0, 0], [0.5, -1, 0.3], [0.5, 1, 0.3]), 0.3),  # crossing above
+        (([0, 0, 0], [1, 0, 0], [2, 0, 0], [3, 0, 0]), 1.0),  # in line
+        (([0, 0, 0], [0, 0, 0], [0, 3, 4], [0, 3, 8]), 5.0),  # a point
+    ],
+)
+def test_distance_of_segments(ends, gap):
+    assert distance(*(np.array(end, dtype=float) for end in ends)) == pytest.approx(gap)
+
+
+def test_a_link_in_the_line_of_sight_hides_a_marker():
+    base, marker = np.array([0.0, 0.0, 1.0]), np.zeros((1, 3))
+    cameras = np.array([[4.0, 0, 1.0], [-4.0, 0, 1.0]])
+    seen = np.zeros(1, dtype=np.bool_)
+    away = np.array([[0.2, 0, 0.5], [0.2, 0, 0.8]])
+    across = np.array([[0.2, 0, 0.5], [0.2, 0, 1.2]])
+    assert seen_markers(base, LEVEL, marker, cameras, away, 0.03, seen) == 1
+    assert seen_markers(base, LEVEL, marker, cameras, across, 0.03, seen) == 0 and not seen[0]
+
+
+def test_hidden_markers_shift_the_pose_by_their_errors():
+    one = plant("arm_occlusion")
+    occlusion = one._effects._poses[0]
+    pose = (0.0, np.zeros(3), np.array([1.0, 0, 0, 0]))
+    assert occlusion.pose(pose) is pose  # the arm hangs below all lines of sight
+    mujoco.mj_forward(one.model, one.data)
+    occlusion._thickness = 0.4  # a thick arm hides some
+    moved = occlusion.pose(pose)
+    assert moved is None or np.linalg.norm(moved[1]) < 5 * 0.0005
+    occlusion._thickness = 5.0
+    assert occlusion.pose(pose) is None
+
+
+def test_stamps_jitter_but_never_go_back_and_the_position_wanders():
+    one = plant("mocap_jitter:stamp=0.01,wander=0.001,wander_time=0.01")
+    jitter = one._effects._poses[0]
+    poses = [jitter.pose((k / 120.0, np.zeros(3), np.ones(4))) for k in range(2000)]
+    stamps = np.array([p[0] for p in poses])
+    assert np.all(np.diff(stamps) > 0.0)
+    assert np.std([p[1] for p in poses]) == pytest.approx(0.001, rel=0.1)
+
+
+def test_dropouts_lose_their_share_and_bursts():
+    def kept(spec):
+        drop = plant(f"mocap_dropouts:{spec}")._effects._poses[0]
+        return [drop.pose((k / 120.0, np.zeros(3), np.ones(4))) for k in range(12000)]
+
+    single = kept("share=0.1,bursts=0")
+    assert sum(p is None for p in single) / 12000 == pytest.approx(0.1, abs=0.01)
+    bursts = kept("share=0,bursts=1,burst_time=0.05,longest=0.2")
+    lost = "".join("x" if p is None else "." for p in bursts)
+    longest = max(map(len, lost.split(".")))
+    assert 6 <= longest <= 1 + 0.2 * 120 and 0.02 < lost.count("x") / 12000 < 0.1
+
+
+# Network
+
+
+class Wire:
+    """A transport that notes what it sends."""
+
+    stream, bytes_per_second, connected, dropped = False, None, True, 0
+
+    def __init__(self):
+        self.sent = []
+
+    def send(self, data):
+        self.sent.append(data)
+        return True
+
+
+def test_messages_arrive_after_the_delay_and_in_order():
+    wire = Wire()
+    late = LateTransport(wire, SetpointDelay(0.006, 0.0, 0.0, 1))
+    for tick in range(5):
+        late.update(0.004 * tick)
+        assert late.send(bytes([tick]))
+        assert wire.sent == [bytes([k]) for k in range(max(0, tick - 1))]  # 6 ms: two ticks later
+
+
+def test_a_message_without_delay_is_sent_at_once_unless_another_waits():
+    wire = Wire()
+    late = LateTransport(wire, SetpointDelay(0.0, 0.0, 0.0, 1))
+    late.update(0.0)
+    late.send(b"a")
+    assert wire.sent == [b"a"]
+
+
+def test_delays_have_the_stated_quantiles_and_are_those_of_the_seed():
+    made = presets.read((), ["network_delay"])
+    delay = SetpointDelay.of(made, 5)
+    again = SetpointDelay.from_text(delay.to_text())
+    late = np.array([delay.at(0.004 * tick) for tick in range(20000)])
+    assert delay.at(0.0) == late[-1]  # further messages of a tick, and older ticks
+    assert np.array_equal(late, [again.at(0.004 * tick) for tick in range(20000)])
+    assert np.quantile(late, 0.5) == pytest.approx(0.004, abs=2e-4)
+    assert np.quantile(late, 0.99) == pytest.approx(0.012, abs=6e-4)
+    assert SetpointDelay.of({}, 5) is None and SetpointDelay.from_text("") is None
+    with pytest.raises(ValueError, match="is not valid"):
+        SetpointDelay.from_text("late")
+
+
+def test_poses_arrive_later_with_the_stamp_of_their_exposure():
+    def ages(*specs):
+        samples, _ = flown(plant(*specs), 200, 0.0)
+        return [0.004 * k - s.mocap[0] for k, s in enumerate(samples) if s.mocap is not None]
+
+    assert set(np.round(ages(), 9)) == {0.012}
+    late = ages("network_delay:mocap=0.02,mocap_jitter=0")
+    assert set(np.round(late, 9)) == {0.032}

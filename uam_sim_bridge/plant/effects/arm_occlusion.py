@@ -1,0 +1,149 @@
+"""Occlusion of the markers by arm and payload.
+
+A marker sits on each rotor's mount and one on the top deck. Cameras stand on a ring around the
+room, high and low in turn. A camera does not see a marker if the line between them passes through
+the arm (capsules between the joints and the magnet) or the payload (a sphere at the magnet). A
+marker needs two cameras, a pose three markers. Every marker has a calibration error, constant in a
+flight: the pose jumps when the set of seen markers changes, by the mean of the errors.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import ClassVar
+
+import numpy as np
+
+from uam_control.maths.compiled import jit
+from uam_control.maths.rotations import quaternion_from_rotation_vector, quaternion_multiply
+from uam_sim_bridge.plant.effects.effect import Acting, Bench, Effect, Pose, size
+from uam_sim_bridge.plant.vehicle import MAGNET, PAYLOAD
+
+DECK = (0.0, 0.0, 0.08)  # [m, FLU] marker on the top deck
+FEWEST_CAMERAS, FEWEST_MARKERS = 2, 3
+AT_THE_MAGNET = 0.1  # [m] distance up to which the payload covers markers
+
+
+class ArmOcclusion(Effect):
+    """Arm and payload hide markers from cameras: the pose jumps a little, or is lost."""
+
+    SOURCE: ClassVar[str] = (
+        "geometry; two cameras per marker and three markers per rigid body: OptiTrack, Motive; "
+        "cameras and calibration error: assumptions (8 cameras on a ring of 4 m)"
+    )
+
+    cameras: float = size("number of cameras", "1", 2.0, 64.0)
+    ring: float = size("radius of the cameras' ring", "m", 0.5, 50.0)
+    high: float = size("height of every other camera", "m", 0.0, 20.0)
+    low: float = size("height of the others", "m", 0.0, 20.0)
+    thickness: float = size("radius of arm and payload", "m", 0.0, 0.2)
+    marker_error: float = size("standard deviation of a marker's calibration", "m", 0.0, 0.01)
+
+    def begin(self, bench: Bench, noise: np.random.Generator) -> Acting:
+        angles = 2.0 * math.pi * np.arange(int(self.cameras)) / int(self.cameras)
+        heights = np.where(np.arange(int(self.cameras)) % 2, self.low, self.high)
+        cameras = np.column_stack([self.ring * np.cos(angles), self.ring * np.sin(angles), heights])
+        markers = np.vstack([bench.positions, DECK])
+        errors = self.marker_error * noise.standard_normal(markers.shape)
+        return _Occlusion(bench, cameras, markers, errors - errors.mean(axis=0), self.thickness)
+
+
+class _Occlusion(Acting):
+    def __init__(
+        self,
+        bench: Bench,
+        cameras: np.ndarray,
+        markers: np.ndarray,
+        errors: np.ndarray,
+        thickness: float,
+    ) -> None:
+        model = bench.model
+        joints = range(bench.arm_dofs.start, bench.arm_dofs.stop)
+        bodies = [model.jnt_bodyid[model.dof_jntid[dof]] for dof in joints]
+        self._chain = np.array([*bodies, model.body(MAGNET).id])
+        self._payload = model.body(PAYLOAD).id
+        self._bench, self._thickness = bench, thickness
+        self._cameras, self._markers, self._errors = cameras, markers, errors
+        self._arms = markers - markers.mean(axis=0)
+        self._seen = np.zeros(len(markers), dtype=np.bool_)
+
+    def pose(self, pose: Pose) -> Pose | None:
+        bench = self._bench
+        points = bench.data.xpos[self._chain]
+        payload = bench.data.xpos[self._payload]
+        if float(np.linalg.norm(payload - points[-1])) < AT_THE_MAGNET:
+            points = np.vstack([points, payload])
+        count = seen_markers(
+            bench.base_position,
+            bench.base_axes,
+            self._markers,
+            self._cameras,
+            points,
+            self._thickness,
+            self._seen,
+        )
+        if count == len(self._seen):
+            return pose
+        if count < FEWEST_MARKERS:
+            return None
+        shift = self._errors[self._seen].mean(axis=0)
+        arms = self._arms[self._seen] - self._arms[self._seen].mean(axis=0)
+        turn = np.cross(arms, self._errors[self._seen] - shift).sum(axis=0) / np.sum(arms * arms)
+        axes = bench.base_axes.reshape(3, 3)
+        turned = quaternion_multiply(pose[2], quaternion_from_rotation_vector(turn))
+        return pose[0], pose[1] + axes @ shift, turned
+
+
+@jit
+def seen_markers(
+    base: np.ndarray,
+    axes: np.ndarray,
+    markers: np.ndarray,
+    cameras: np.ndarray,
+    chain: np.ndarray,
+    thickness: float,
+    seen: np.ndarray,
+) -> int:
+    """Return the number of markers that enough cameras see; write them to seen (markers,).
+
+    base (3,) [m, ENU]; axes (9,): body → world, row by row; markers (markers, 3) [m, FLU]; cameras
+    (cameras, 3) [m, ENU]; chain (points, 3) [m, ENU]: of the arm, base to tip; thickness [m].
+    """
+    total = 0
+    marker = np.empty(3)
+    for i in range(len(markers)):
+        for k in range(3):
+            marker[k] = base[k]
+            for m in range(3):
+                marker[k] += axes[3 * k + m] * markers[i, m]
+        count = 0
+        for j in range(len(cameras)):
+            free = True
+            for link in range(len(chain) - 1):
+                if distance(marker, cameras[j], chain[link], chain[link + 1]) < thickness:
+                    free = False
+                    break
+            count += free
+        seen[i] = count >= FEWEST_CAMERAS
+        total += seen[i]
+    return total
+
+
+@jit
+def distance(a: np.ndarray, b: np.ndarray, c: np.ndarray, d: np.ndarray) -> float:
+    """Return the distance [m] of the segments a-b and c-d, all points (3,) [m]."""
+    uu, vv, uv, uw, vw = 0.0, 0.0, 0.0, 0.0, 0.0
+    for k in range(3):
+        u, v, w = b[k] - a[k], d[k] - c[k], a[k] - c[k]
+        uu, vv, uv, uw, vw = uu + u * u, vv + v * v, uv + u * v, uw + u * w, vw + v * w
+    det = uu * vv - uv * uv
+    s = min(1.0, max(0.0, (uv * vw - vv * uw) / det)) if det > 1e-12 * uu * vv else 0.0
+    t = (uv * s + vw) / vv if vv > 0.0 else 0.0
+    if t < 0.0 or t > 1.0:
+        t = min(1.0, max(0.0, t))
+        s = min(1.0, max(0.0, (uv * t - uw) / uu)) if uu > 0.0 else 0.0
+    squared = 0.0
+    for k in range(3):
+        gap = a[k] + s * (b[k] - a[k]) - c[k] - t * (d[k] - c[k])
+        squared += gap * gap
+    return math.sqrt(squared)

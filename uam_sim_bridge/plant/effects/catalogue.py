@@ -1,0 +1,32 @@
+"""All effects by name. A new one is a file beside this one and a line in KINDS."""
+
+from __future__ import annotations
+
+from uam_sim_bridge.plant.effects.arm_occlusion import ArmOcclusion
+from uam_sim_bridge.plant.effects.battery_sag import BatterySag
+from uam_sim_bridge.plant.effects.cable_torque import CableTorque
+from uam_sim_bridge.plant.effects.downwash import Downwash
+from uam_sim_bridge.plant.effects.effect import Effect
+from uam_sim_bridge.plant.effects.ground_effect import GroundEffect
+from uam_sim_bridge.plant.effects.joint_gear import JointGear
+from uam_sim_bridge.plant.effects.mocap_dropouts import MocapDropouts
+from uam_sim_bridge.plant.effects.mocap_jitter import MocapJitter
+from uam_sim_bridge.plant.effects.network_delay import NetworkDelay
+from uam_sim_bridge.plant.effects.propeller_vibration import PropellerVibration
+from uam_sim_bridge.plant.effects.rotor_spread import RotorSpread
+
+# in this order they change a sample one after another
+KINDS: tuple[type[Effect], ...] = (
+    PropellerVibration,
+    RotorSpread,
+    BatterySag,
+    GroundEffect,
+    Downwash,
+    JointGear,
+    CableTorque,
+    ArmOcclusion,
+    MocapJitter,
+    MocapDropouts,
+    NetworkDelay,
+)
+EFFECTS: dict[str, type[Effect]] = {kind.NAME: kind for kind in KINDS}

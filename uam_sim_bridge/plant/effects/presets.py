@@ -1,0 +1,87 @@
+"""Presets of the plant: which effects act, and their numbers; files of config/plant.
+
+    ground_effect: {strength: 1.0, fountain: 2.0}
+    downwash: on            as in laboratory.yaml
+    battery_sag: off
+
+A parameter that a file does not give is that of laboratory.yaml.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from functools import cache
+
+from uam_control.settings import configuration, yaml_file
+from uam_control.settings.parameter_set import ParameterError
+from uam_sim_bridge.plant.effects.catalogue import EFFECTS
+from uam_sim_bridge.plant.engines import PlantError
+
+CALM, LABORATORY = "calm", "laboratory"
+Effects = dict[str, dict[str, float]]  # name → parameters
+
+
+def read(presets: Sequence[str] = (), switches: Sequence[str] = ()) -> Effects:
+    """Return the effects of presets (names or files) and switches; later ones override.
+
+    switches: NAME, NAME=off or NAME:parameter=value,...  Raises PlantError, ConfigurationError in
+    one line.
+    """
+    effects: Effects = {}
+    for preset in presets:
+        file = configuration.named("plant", preset, suffixes=(".yaml",))
+        document = yaml_file.read(file, PlantError) or {}
+        if not isinstance(document, Mapping):
+            raise PlantError(f"{file}: 'effect: {{parameter: value}}' lines expected")
+        for name, value in document.items():
+            _change(effects, name, value, f"{file}: ")
+    for text in switches:
+        name, value = _switch(text)
+        _change(effects, name, value, "--effect ")
+    return effects
+
+
+def added(changes: Mapping[str, object], effects: Effects) -> dict[str, object]:
+    """Return dotted changes of a vehicle's numbers with the effects added, if there are any."""
+    return {**changes, "effects": effects} if effects else dict(changes)
+
+
+def _switch(text: str) -> tuple[str, object]:
+    name, colon, rest = text.partition(":")
+    if colon:
+        pairs = [part.partition("=") for part in rest.split(",")]
+        return name, {key: _number(text, value) for key, _, value in pairs}
+    name, _, state = text.partition("=")
+    if state not in ("", "on", "off"):
+        raise PlantError(f"--effect {text}: NAME, NAME=off or NAME:parameter=value,... expected")
+    return name, state != "off"
+
+
+def _number(text: str, value: str) -> float:
+    try:
+        return float(value)
+    except ValueError:
+        raise PlantError(f"--effect {text}: {value!r} is not a number") from None
+
+
+def _change(effects: Effects, name: object, value: object, where: str) -> None:
+    if not isinstance(name, str) or name not in EFFECTS:
+        raise PlantError(f"{where}unknown effect '{name}'; there are: {', '.join(EFFECTS)}")
+    if value is False:
+        effects.pop(name, None)
+        return
+    if value is not True and not isinstance(value, Mapping):
+        raise PlantError(f"{where}{name}: {value!r}: on, off or parameters expected")
+    usual = effects.get(name) or laboratory().get(name, {})
+    given = {} if value is True else dict(value)
+    try:
+        checked = EFFECTS[name].from_mapping(usual | given)
+    except ParameterError as error:
+        raise PlantError(f"{where}{name}: {error}") from None
+    effects[name] = checked.to_mapping()
+
+
+@cache
+def laboratory() -> Effects:
+    """Return the content of config/plant/laboratory.yaml."""
+    return yaml_file.read(configuration.path(f"plant/{LABORATORY}.yaml"), PlantError)
