@@ -13,6 +13,8 @@ from uam_control.settings import yaml_file
 from uam_control.settings.configuration import path
 from uam_lab.campaign.trial import Trial
 from uam_sim_bridge.faults.schedule import Schedule, late, parse_spec, timed
+from uam_sim_bridge.plant.effects import presets
+from uam_sim_bridge.plant.effects.presets import Effects
 
 NAMES = ("payload", "payload_offset", "wind", "gust", "noise", "mass", "inertia", "efficiency")
 DELAYS = ("setpoint_delay", "setpoint_jitter", "mocap_delay", "mocap_jitter")  # optional, [s]
@@ -54,12 +56,16 @@ def draw(
     seed: int,
     allowed: dict[str, tuple[float, float]] | None = None,
     scenario: str = "pick_and_place",
+    effects: Effects | None = None,
 ) -> list[Draw]:
-    """Return `count` random flights. Flight i depends on the seed and i, not on `count`."""
-    allowed = allowed or ranges()
+    """Return `count` random flights. Flight i depends on the seed and i, not on `count`.
+
+    effects: of the plant, in every flight.
+    """
+    allowed, numbers = allowed or ranges(), [seed * 100_000 + i for i in range(count)]
     return [
-        _one(profile, scenario, np.random.default_rng([seed, i]), seed * 100_000 + i, allowed)
-        for i in range(count)
+        _one(profile, scenario, np.random.default_rng([seed, i]), number, allowed, effects or {})
+        for i, number in enumerate(numbers)
     ]
 
 
@@ -69,6 +75,7 @@ def _one(
     random: np.random.Generator,
     seed: int,
     allowed: dict[str, tuple[float, float]],
+    effects: Effects,
 ) -> Draw:
     drawn = {name: float(random.uniform(*allowed[name])) for name in NAMES}
     direction = random.uniform(0.0, 2.0 * np.pi)
@@ -88,6 +95,7 @@ def _one(
         "variation.payload_offset": [float(away * np.cos(offset)), float(away * np.sin(offset))],
         "rotors.efficiency": efficiency.tolist(),
     }
+    changes = presets.added(changes, effects)
     trial = Trial(
         "random",
         profile,

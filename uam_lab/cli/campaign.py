@@ -9,7 +9,7 @@ from uam_control.settings import configuration
 from uam_control.vehicle import load_description
 from uam_lab.campaign.pool import fly_all
 from uam_lab.campaign.trial import TrialResult
-from uam_lab.cli.command import Command, count, given_profile, jobs_of
+from uam_lab.cli.command import Command, chosen_effects, count, given_profile, jobs_of
 from uam_lab.cli.counting import Counting
 from uam_lab.flight.conclude import command_line
 from uam_lab.results.result_folder import make_folder
@@ -20,6 +20,7 @@ examples:
   uam campaign --flights 100 --profile asmc2
   uam campaign --flights 100 --vehicle mine.yaml
   uam campaign --ranges delays             late setpoints and poses as well, up to 30 ms
+  uam campaign --plant-preset laboratory
   uam campaign --out robust                stop with Ctrl-C; the same command continues
 
 Mass and position of the payload, wind, gusts, sensor noise, masses, inertias and motors are drawn
@@ -45,6 +46,7 @@ def add(commands: argparse._SubParsersAction) -> None:
     command.scenario()
     command.profile()
     command.option("--ranges", "NAME|FILE", "values to draw: robustness, delays", "robustness")
+    command.plant()
     command.seed("of the draw")
     command.jobs()
     command.out()
@@ -60,10 +62,11 @@ def run(options: argparse.Namespace) -> int:
     load_scenario(options.scenario, vehicle)  # an invalid one is refused before any flight
     profile = given_profile(options.profile, vehicle)
     allowed = ranges(configuration.named("campaign", options.ranges))
+    effects = chosen_effects(options)
     out = make_folder(options.out, "campaign")
-    draws = draw(profile, options.flights, options.seed, allowed, options.scenario)
+    draws = draw(profile, options.flights, options.seed, allowed, options.scenario, effects)
     settings = (options.seed, allowed, profile.sets, profile.bridge())
-    flown = Flown(out, (*settings, vehicle.numbers, options.scenario))
+    flown = Flown(out, (*settings, vehicle.numbers, options.scenario, effects))
     trials = [one.trial for one in draws if one.trial.seed not in flown.results]
     if flown.results:
         print(f"campaign: continuing after {len(flown.results)} earlier flights", flush=True)

@@ -24,8 +24,9 @@ from uam_lab.results.timeseries import UnreadableFlight
 from uam_lab.tuning.space import TuningError
 from uam_msgs_py.node.namespace import normal
 from uam_sim_bridge.faults import FaultError
+from uam_sim_bridge.plant.effects import presets
 from uam_sim_bridge.plant.effects.catalogue import EFFECTS
-from uam_sim_bridge.plant.effects.presets import CALM
+from uam_sim_bridge.plant.effects.presets import CALM, Effects
 from uam_sim_bridge.plant.engines import PlantError
 from uam_sim_bridge.ports import INSTANCES, PortError, flight_of
 from uam_sim_bridge.px4.px4_installation import Px4Error
@@ -160,6 +161,14 @@ def given_profile(name_or_file: str | None, vehicle: VehicleDescription) -> Prof
     if name_or_file is None:
         return default_profile(catalogue.DEFAULT, vehicle)
     return load_profile(str(configuration.named("profiles", name_or_file)), vehicle=vehicle)
+
+
+def chosen_effects(options: argparse.Namespace) -> Effects:
+    """Return the effects of the plant that --plant-preset and --effect choose.
+
+    Raises PlantError, ConfigurationError.
+    """
+    return presets.read(options.plant_preset, options.effects)
 
 
 def jobs_of(options: argparse.Namespace) -> int:

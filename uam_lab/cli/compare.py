@@ -12,7 +12,7 @@ from uam_control.settings.configuration import ConfigurationError
 from uam_control.vehicle import VehicleDescription, load_description
 from uam_lab.campaign.pool import fly_all
 from uam_lab.campaign.trial import TrialResult
-from uam_lab.cli.command import Command, count, jobs_of, number
+from uam_lab.cli.command import Command, chosen_effects, count, jobs_of, number
 from uam_lab.cli.counting import Counting
 from uam_lab.compare import plan
 from uam_lab.flight.conclude import command_line
@@ -26,6 +26,7 @@ examples:
   uam compare --seeds 10 --jobs 4
   uam compare --engine ros --rows proposed --seeds 10    with the nodes, one flight at a time
   uam compare --profile mine=mine.yaml     with one more row, for the profile mine.yaml
+  uam compare --plant-preset laboratory    on a plant with the effects of a laboratory
   uam compare --vehicle mine.yaml --scenario hover --rows proposed frozen
 
 Results in --out: report.html, tables.md, flights.csv, comparison.json, figures/. The baselines are
@@ -54,6 +55,7 @@ def add(commands: argparse._SubParsersAction) -> None:
     text = f"rows of the tables: {', '.join(plan.ROWS)} (default: all)"
     command.option("--rows", "NAME", text, nargs="+", choices=tuple(plan.ROWS))
     command.repeated("--profile", "LABEL=FILE", "an additional row")
+    command.plant()
     command.jobs(with_ros=True)
     command.out()
 
@@ -79,10 +81,11 @@ def run(options: argparse.Namespace) -> int:
         *plan.entries(options.rows or tuple(plan.ROWS), vehicle),
         *(_further(text, vehicle) for text in options.profile),
     )
+    effects = chosen_effects(options)
     out = make_folder(options.out, "compare")
     (out / "flights").mkdir(exist_ok=True)
     seeds = tuple(range(1, options.seeds + 1))
-    flights = plan.Flights(vehicle, options.scenario, payloads, seeds, options.engine)
+    flights = plan.Flights(vehicle, options.scenario, payloads, seeds, options.engine, effects)
     trials = plan.trials(rows, flights, out / "flights")
     proposed = default_profile(catalogue.DEFAULT, vehicle)
     kept = out / "flights" / "modularity.parquet"
@@ -105,6 +108,7 @@ def run(options: argparse.Namespace) -> int:
         "scenario": options.scenario,
         "payloads_kg": payloads,
         "seeds": seeds,
+        "effects": effects,
         "profiles": {row.label: row.profile.file.name for row in rows},
         "budgets": comparison_report.budgets(rows),
     }

@@ -9,12 +9,13 @@ from uam_control.settings import configuration
 from uam_control.vehicle import load_description
 from uam_lab.campaign.pool import fly_all
 from uam_lab.campaign.trial import Trial
-from uam_lab.cli.command import Command, count, given_profile, jobs_of
+from uam_lab.cli.command import Command, chosen_effects, count, given_profile, jobs_of
 from uam_lab.cli.counting import Counting
 from uam_lab.flight.conclude import command_line
 from uam_lab.flight.flight_settings import CLOCKS, ENGINES, check_clock, require_ros
 from uam_lab.results.result_folder import make_folder
 from uam_sim_bridge.faults import fault_catalogue, feasibility
+from uam_sim_bridge.plant.effects import presets
 
 BROKEN = 1
 EXAMPLES = """\
@@ -51,6 +52,7 @@ def add(commands: argparse._SubParsersAction) -> None:
     command.option("--scenario", "NAME|FILE", "default: that of the matrix")
     command.vehicle()
     command.profile()
+    command.plant()
     command.choice("--engine", ENGINES, "direct", "")
     command.choice("--clock", CLOCKS, "lockstep", "of the ROS engine")
     command.seed("of all noise")
@@ -78,6 +80,7 @@ def run(options: argparse.Namespace) -> int:
     cells = matrix.cells(options.seed, options.repeat)
     for cell in cells:
         feasibility.check(cell.schedule, options.engine, vehicle=vehicle)
+    changes = presets.added({}, chosen_effects(options))
     trials = [
         fault_trial.FaultTrial(
             cell,
@@ -87,6 +90,7 @@ def run(options: argparse.Namespace) -> int:
                 mass,
                 options.seed,
                 matrix.scenario,
+                vehicle_changes=changes,
                 faults=cell.schedule,
                 engine=options.engine,
                 clock=options.clock,

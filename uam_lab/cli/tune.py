@@ -9,7 +9,14 @@ import sys
 from uam_control.laws import catalogue
 from uam_control.settings import configuration
 from uam_control.vehicle import load_description
-from uam_lab.cli.command import INTERRUPTED, Command, count, given_profile, jobs_of
+from uam_lab.cli.command import (
+    INTERRUPTED,
+    Command,
+    chosen_effects,
+    count,
+    given_profile,
+    jobs_of,
+)
 from uam_lab.cli.counting import Counting
 from uam_lab.flight.conclude import command_line
 from uam_lab.flight.direct.warm_up import is_cold, warm_up
@@ -49,6 +56,7 @@ def add(commands: argparse._SubParsersAction) -> None:
     command.vehicle()
     text = "start of the search (default: the vehicle's profile for the controller)"
     command.option("--profile", "NAME|FILE", text)
+    command.plant()
     text = "total number of evaluations of the study"
     command.option("--evaluations", "N", text, 200, type=count)
     command.jobs()
@@ -72,6 +80,7 @@ def run(options: argparse.Namespace) -> int:
     vehicle = load_description(options.vehicle)
     start = given_profile(options.profile, vehicle) if options.profile else None
     space = load_space(options.space or options.controller, start, vehicle)
+    space = space.with_effects(chosen_effects(options))
     if not 0.0 < options.step <= 0.5:  # before a folder is made
         raise TuningError(f"--step {options.step:g} is outside 0 to 0.5")
     out = make_folder(options.out, "tune", space.name)

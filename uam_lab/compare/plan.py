@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import copy
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 
 from uam_control.laws import catalogue
@@ -17,6 +17,8 @@ from uam_control.profiles.profile import (
 )
 from uam_control.vehicle import VehicleDescription
 from uam_lab.campaign.trial import Trial
+from uam_sim_bridge.plant.effects import presets
+from uam_sim_bridge.plant.effects.presets import Effects
 
 POSITION = "position_controller"
 PROPOSED = "proposed"
@@ -54,6 +56,7 @@ class Flights:
     payloads: tuple[float, ...]
     seeds: tuple[int, ...]
     engine: str = "direct"
+    effects: Effects = field(default_factory=dict)  # of the plant
 
     @property
     def shown(self) -> tuple[float, int]:
@@ -110,6 +113,7 @@ def trials(rows: Sequence[ComparedController], flights: Flights, folder: Path) -
             flights.scenario,
             keep=folder / f"{number}.parquet" if (mass, seed) == flights.shown else None,
             engine=flights.engine,
+            vehicle_changes=presets.added({}, flights.effects),
         )
         for number, row in enumerate(rows)
         for mass in flights.payloads

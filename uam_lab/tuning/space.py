@@ -5,7 +5,7 @@ from __future__ import annotations
 import copy
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -14,6 +14,8 @@ from uam_control.profiles.profile import NODES, Profile, default_profile, profil
 from uam_control.settings import configuration, yaml_file
 from uam_control.vehicle import VehicleDescription
 from uam_lab.campaign.trial import Trial, TrialResult
+from uam_sim_bridge.plant.effects import presets
+from uam_sim_bridge.plant.effects.presets import Effects
 
 DIGITS = 4  # significant digits of a value
 
@@ -106,6 +108,11 @@ class Space:
             section[knob.parameter] = vector
         return profile_of(sections, Path(f"{name}.yaml"), self.start.vehicle)
 
+    def with_effects(self, effects: Effects) -> Space:
+        """Return the space with these effects of the plant in every flight that has none."""
+        flights = ({**flight, "effects": flight["effects"] or effects} for flight in self.flights)
+        return replace(self, flights=tuple(flights))
+
     def trials(self, profile: Profile) -> list[Trial]:
         """Return the flights that evaluate a profile."""
         return [
@@ -115,7 +122,7 @@ class Space:
                 flight["payload_mass"],
                 flight["seed"],
                 flight.get("scenario", "pick_and_place"),
-                vehicle_changes=flight.get("vehicle", {}),
+                vehicle_changes=presets.added(flight.get("vehicle", {}), flight["effects"]),
             )
             for flight in self.flights
         ]
@@ -147,7 +154,12 @@ def load_space(
             for key, value in document["cost"].items()
         }
         flights = tuple(
-            {**flight, "payload_mass": float(flight["payload_mass"]), "seed": int(flight["seed"])}
+            {
+                **flight,
+                "payload_mass": float(flight["payload_mass"]),
+                "seed": int(flight["seed"]),
+                "effects": presets.read([flight.get("plant_preset", presets.CALM)]),
+            }
             for flight in document["flights"]
         )
         space = Space(file.stem, start, knobs, flights, Cost(**cost))

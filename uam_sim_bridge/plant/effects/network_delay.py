@@ -23,8 +23,8 @@ class NetworkDelay(Effect):
     """Setpoints reach the autopilot later, and poses the companion computer."""
 
     SOURCE: ClassVar[str] = (
-        "setpoints: p50 4 ms and p99 12 ms, measured with PX4 v1.16.1 paced by the wall clock "
-        "(docs/px4.md); poses: the same shape on Wi-Fi, assumption"
+        "setpoints: p50 4 ms and p99 12 ms, measured on this stack with PX4 v1.16 paced by the "
+        "wall clock; poses: the same shape on Wi-Fi, assumption"
     )
 
     setpoint: float = size("fixed delay of messages to the autopilot", "s", 0.0, 0.2)

@@ -85,3 +85,17 @@ def _change(effects: Effects, name: object, value: object, where: str) -> None:
 def laboratory() -> Effects:
     """Return the content of config/plant/laboratory.yaml."""
     return yaml_file.read(configuration.path(f"plant/{LABORATORY}.yaml"), PlantError)
+
+
+def table() -> str:
+    """Return effects, sources and the laboratory's numbers in Markdown: of docs/plant.md."""
+    lines = ["| effect | does | parameters (range: laboratory) | source |", "|---|---|---|---|"]
+    for name, values in laboratory().items():
+        kind = EFFECTS[name]
+        words = "; ".join(
+            f"`{parameter}`: {spec.description} ({spec.allowed.removesuffix(' 1')}: "
+            f"{values[parameter]:g})"
+            for parameter, spec in kind.ranges()
+        )
+        lines.append(f"| `{name}` | {kind.ABOUT} | {words} | {kind.SOURCE} |")
+    return "\n".join(lines) + "\n"
