@@ -34,7 +34,7 @@ class OwnSimulator(Plant):
         imu, joints = (self.time, self.w, self.force), (self.time, self.arm, self.still, self.still)
         return Samples(imu, joints, None if self.tick % 2 else pose, imu)
 
-    def step(self, motor_commands, arm_effort, magnet):
+    def step(self, motor_commands, arm_command, magnet):
         vehicle, h = self.vehicle.description, self.period
         f, u = vehicle.rotor.curve_factor, np.clip(motor_commands, 0.0, 1.0)
         thrust = vehicle.rotor.thrust_max * (f * u * u + (1.0 - f) * u)

@@ -18,8 +18,8 @@ from uam_control.coordinates import coordinates
 from uam_msgs_py.messages import topics
 from uam_msgs_py.messages.convert import (
     SWITCH,
-    EffortWriter,
     ImuWriter,
+    JointCommandWriter,
     JointStateWriter,
     PoseWriter,
     SetpointWriter,
@@ -54,7 +54,7 @@ def nonsense(topic: topics.Topic):
         writer = SetpointWriter()
         return lambda stamp: writer.fill(stamp, np.full(3, 2.0), 1.0)
     if topic is topics.ARM_EFFORT:
-        writer = EffortWriter(2)
+        writer = JointCommandWriter(2)
         return lambda _: writer.fill(np.full(2, 2.0))
     if topic is topics.JOINTS:
         writer = JointStateWriter(list(reversed(JOINTS)))

@@ -37,9 +37,9 @@ class RigidBodyPlant(Plant):
         mocap = (now, position, body.quaternion.copy())
         return Samples(imu, joints, None if self.tick % MOCAP_TICKS else mocap, imu)
 
-    def step(self, motor_commands, arm_effort, magnet):
+    def step(self, motor_commands, arm_command, magnet):
         self.body.step(motor_commands, self.period)
-        self.effort[:] = arm_effort
+        self.effort[:] = arm_command
         acceleration = (self.effort - JOINT_DAMPING * self.alpha_dot) / JOINT_INERTIA
         self.alpha_dot += self.period * acceleration
         self.alpha += self.period * self.alpha_dot

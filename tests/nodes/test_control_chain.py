@@ -19,7 +19,7 @@ from uam_msgs_py.messages.control import (
     read_state,
     read_torque,
 )
-from uam_msgs_py.messages.convert import ImuWriter, JointStateWriter, PoseWriter, read_effort
+from uam_msgs_py.messages.convert import ImuWriter, JointStateWriter, PoseWriter, read_joint_command
 from uam_msgs_py.messages.status import AutopilotState, MissionStatus
 from uam_msgs_py.messages.trajectories import TrajectoryWriter
 from uam_msgs_py.node.connections import READERS, WRITERS, Connections
@@ -188,7 +188,7 @@ def test_the_nodes_compute_what_the_maths_does_bit_for_bit(start, probe):
         assert at == stamp and command.flying == (tau_p is not None)
         at, torque = read_torque(plant.attitude[i])
         assert at == stamp and (torque is None) == (tau_q is None)
-        np.testing.assert_array_equal(read_effort(plant.effort[i], JOINTS), tau_alpha)
+        np.testing.assert_array_equal(read_joint_command(plant.effort[i], JOINTS), tau_alpha)
         if tau_p is not None:
             airborne += 1
             np.testing.assert_array_equal(command.tau, tau_p)

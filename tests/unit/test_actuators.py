@@ -43,6 +43,9 @@ def test_commands_of_rotors_are_clamped():
 
 
 SERVOS = {
+    "mode": "current",
+    "position_p_gain": 800,
+    "pwm_limit": 885,
     "stall_torque": 3.0,
     "no_load_speed": 8.0,
     "torque_per_current": 0.5,
@@ -66,8 +69,43 @@ SERVOS = {
     (1.0, -10.0, 1.0),
 ])  # fmt: skip
 def test_servos_give_whole_units_within_the_torque_speed_line(effort, velocity, expected):
-    servos, output = Servos(SERVOS, 2), np.full(2, 77.0)
+    servos, output = Servos(SERVOS, np.array([0.3, 0.4])), np.full(2, 77.0)
     np.testing.assert_array_equal(servos.torque, [0.0, 0.0])
-    servos.step(np.array([0.25, effort]), np.array([0.0, velocity]), output)
+    servos.take(np.array([0.25, effort]))
+    servos.step(np.array([0.3, 0.4]), np.array([0.0, velocity]), output)
     np.testing.assert_allclose(servos.torque, [0.25, expected], atol=1e-15)
     np.testing.assert_array_equal(output, servos.torque)
+
+
+COUNT = 2.0 * math.pi / 4096.0
+
+
+# gain 800 / 128 = 6.25 PWM units per count; 885 units are the supply voltage, which gives 3 N m at
+# rest and 8 rad/s without load
+@pytest.mark.parametrize(("counts", "velocity", "limit", "expected"), [
+    (70.8, 0.0, 885, 3.0 * 443.75 / 885),  # 71 counts: 443.75 units
+    (-70.8, 0.0, 885, -3.0 * 443.75 / 885),
+    (0.4, 0.0, 885, 0.0),  # less than half a count
+    (141.0, 0.0, 885, 3.0 * 881.25 / 885),
+    (500.0, 0.0, 885, 3.0),
+    (500.0, 4.0, 885, 1.5),  # the motor's own voltage leaves half
+    (0.0, 4.0, 885, -1.5),  # and brakes without an error
+    (-500.0, 4.0, 885, -3.0),  # -4.5 within the stall torque
+    (500.0, 0.0, 295, 1.0),  # a third of the voltage
+])  # fmt: skip
+def test_servos_in_position_control_act_like_a_spring_with_the_makers_gain(
+    counts, velocity, limit, expected
+):
+    numbers = SERVOS | {"mode": "position", "pwm_limit": limit}
+    start = np.array([0.0, 100 * COUNT])
+    servos, output = Servos(numbers, start), np.full(2, 77.0)
+    servos.take(np.array([0.0, (100 + counts) * COUNT]))
+    servos.step(start, np.array([0.0, velocity]), output)
+    np.testing.assert_allclose(output, [0.0, expected], atol=1e-12)
+    np.testing.assert_array_equal(servos.torque, output)
+
+
+def test_a_servo_in_position_control_stays_until_the_first_goal():
+    servos = Servos(SERVOS | {"mode": "position"}, np.array([0.5, -0.5]))
+    servos.take(np.array([np.nan, -0.25]))
+    np.testing.assert_array_equal(servos.command, [0.5, -0.25])

@@ -56,11 +56,12 @@ class Port:
 class Rig:
     """A control tick on a vehicle that stands still."""
 
-    def __init__(self):
+    def __init__(self, **section):
+        """section: parameters of the bridge."""
         vehicle = load_description()
         sequence = OffboardSequence()
         self.port = Port(sequence)
-        bridge = BridgeStage(BridgeSets.of(vehicle, {}), vehicle, self.port, sequence)
+        bridge = BridgeStage(BridgeSets.of(vehicle, section), vehicle, self.port, sequence)
         sets = load_profile("s500").sets
         self.control = ControlTick(load_scenario("hover"), sets, bridge, Timing())
         self.signals = self.control.signals
@@ -196,3 +197,16 @@ def max_gain(rig):
     law = rig.control.laws["arm"].controller
     watched = [i for i, name in enumerate(law.names) if name.startswith(("K", "zeta"))]
     return np.abs(law.adaptation[watched]).max()
+
+
+def test_setpoints_in_flight_are_new_at_their_rate_and_are_sent_at_every_tick():
+    rig = Rig(setpoint_rate=25.0)
+    rig.run(3.0)
+    assert rig.signals.flying
+    rates = [tuple(setpoint.rates) for _, setpoint in rig.port.setpoints[-30:]]
+    new = [i for i in range(1, 30) if rates[i] != rates[i - 1]]
+    assert [b - a for a, b in zip(new, new[1:], strict=False)] == [10] * (len(new) - 1)
+    assert len(new) in (2, 3)
+    rig.run(0.1, imu=False)
+    rig.control.bridge.without(rig.stamp)  # the level hold is not held back
+    assert tuple(rig.port.setpoints[-1][1].rates) != rates[-1]

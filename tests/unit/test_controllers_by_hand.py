@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 from uam_control.control.controllers import ArmController, AttitudeController, PositionController
-from uam_control.control.output_limits import PositionLimits, TorqueLimits
+from uam_control.control.output_limits import ArmLimits, PositionLimits, TorqueLimits
 from uam_control.laws.asmc1 import Asmc1Parameters
 from uam_control.laws.modular import ModularParameters
 from uam_control.profiles.profile import controller_parameters
@@ -38,7 +38,8 @@ def position(**changes):
 
 
 def torque(kind, axes, **changes):
-    return kind(parameters(TorqueLimits, axes, **{"torque_max": [100.0] * axes} | changes))
+    limits = ArmLimits if kind is ArmController else TorqueLimits
+    return kind(parameters(limits, axes, **{"torque_max": [100.0] * axes} | changes))
 
 
 def vehicle():
@@ -176,3 +177,38 @@ def test_another_corner_of_the_attitude_filter_from_the_next_tick_on():
     # 8 N forward, 10 N up; the fast filter is there after 31 time constants
     assert fast.attitude_reference[0, 1] == pytest.approx(math.atan2(8.0, 10.0))
     assert slow.attitude_reference[0, 1] < 0.01
+
+
+@pytest.mark.parametrize(("base", "expected"), [
+    ("reference", (0.5 - 0.1 * 3.0, -0.25 + 0.1 * 6.0)),
+    ("state", (0.4 - 0.1 * 3.0, -0.25 + 0.1 * 6.0)),
+])  # fmt: skip
+def test_goal_positions_are_the_torque_times_a_compliance_beside_the_reference(base, expected):
+    to_goals = {"setpoint": "position", "goal_from": base, "goal_compliance": 0.1}
+    controller = torque(ArmController, 2, **to_goals)
+    state, reference, desired = vehicle()
+    assert np.isnan(controller.command).all()
+    reference[0, 6:], state[0, 6:] = (0.5, -0.25), (0.4, -0.25)
+    reference[1, 6:], state[1, 6:] = (0.3, 0.0), (0.8, -1.0)  # tau = -6 (0.5, -1)
+    tau = controller.update(state, reference, desired, True, 0.004)
+    np.testing.assert_allclose(tau, [-3.0, 6.0])
+    np.testing.assert_allclose(controller.command, expected)
+
+
+def test_goal_positions_stay_until_the_next_period_of_their_rate():
+    controller = torque(ArmController, 2, setpoint="position", goal_rate=25.0)
+    state, reference, desired = vehicle()
+    goals = []
+    for tick in range(30):  # of 4 ms, ten to a period
+        reference[0, 6:] = tick
+        controller.update(state, reference, desired, False, 0.004)
+        goals.append(controller.command[0])
+    assert goals == [0.0] * 9 + [9.0] * 10 + [19.0] * 10 + [29.0]
+
+
+def test_the_servos_of_torque_commands_get_the_torque():
+    controller, (state, reference, desired) = torque(ArmController, 2), vehicle()
+    state[1, 6:] = 0.5
+    tau = controller.update(state, reference, desired, True, 0.004)
+    np.testing.assert_array_equal(controller.command, tau)
+    np.testing.assert_allclose(controller.command, [-3.0, -3.0])

@@ -28,13 +28,13 @@ from uam_msgs_py.messages.control import (
 )
 from uam_msgs_py.messages.convert import (
     SWITCH,
-    EffortWriter,
     ImuWriter,
+    JointCommandWriter,
     JointStateWriter,
     PoseWriter,
     SetpointWriter,
-    read_effort,
     read_imu,
+    read_joint_command,
     read_joints,
     read_pose,
     read_switch,
@@ -245,11 +245,11 @@ def test_torque_round_trip_and_refusal():
 
 
 def test_effort_and_setpoint():
-    data = EffortWriter(2).fill(np.array([0.5, -0.5]))
+    data = JointCommandWriter(2).fill(np.array([0.5, -0.5]))
     assert list(deserialize_message(data, Float64MultiArray).data) == [0.5, -0.5]
-    assert list(read_effort(data, JOINTS)) == [0.5, -0.5]
-    with pytest.raises(BadMessage, match="3 efforts, 2 expected"):
-        read_effort(serialize_message(Float64MultiArray(data=[1.0, 2.0, 3.0])), JOINTS)
+    assert list(read_joint_command(data, JOINTS)) == [0.5, -0.5]
+    with pytest.raises(BadMessage, match="3 joint commands, 2 expected"):
+        read_joint_command(serialize_message(Float64MultiArray(data=[1.0, 2.0, 3.0])), JOINTS)
     data = SetpointWriter().fill(6, np.array([0.1, 0.2, 0.3]), 0.6)
     setpoint = deserialize_message(data, TwistStamped)
     rates = setpoint.twist.angular

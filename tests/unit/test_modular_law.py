@@ -99,6 +99,12 @@ def test_table_form_by_hand():
     assert value == pytest.approx(-7.95)
 
 
+def test_sliding_form_by_hand():
+    # c = 4/3: Lambda (e_dot + c e) = 1.5 (1/4 + 2/3) = 11/8, c e_dot = 1/3; dtau = 2.1
+    value = update(law(lambda_form="sliding"), 0.5, 0.25, 0.0, (2.0, 8.0, 0.0))
+    assert value == pytest.approx(-2.0 * (11.0 / 8.0 + 1.0 / 3.0 + 2.1))
+
+
 def test_adaptive_laws_by_hand():
     """K' = r x - nu K integrated exactly over a tick: K e^(-nu dt) + (1 - e^(-nu dt)) r x / nu."""
     a_law = law()
@@ -286,7 +292,7 @@ def test_safeguards_that_are_on_are_named():
         ({"lambda_2": [1.0, 2.0]}, "lambda_2.*1 numbers"),
         ({"nu": [1.0]}, "nu.*4 numbers"),
         ({"varpi": "wide"}, "varpi.*not numeric"),
-        ({"lambda_form": "other"}, "lambda_form.*theory, table"),
+        ({"lambda_form": "other"}, "lambda_form.*theory, table, sliding"),
         ({"freeze_when_saturated": 1}, "true or false"),
         ({"gain": 1.0}, "gain: unknown"),
     ],

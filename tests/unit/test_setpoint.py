@@ -58,6 +58,24 @@ def test_proportional_path_of_the_autopilot_gives_the_torque_back(r, p, y, wx, w
     assert gain * (rates - omega) == pytest.approx(tau_q, abs=1e-12)
 
 
+def test_a_throttle_per_newton_replaces_the_thrust_curve():
+    values = {"throttle_per_newton": 0.06, "thrust_max": 12.0}
+    m = RateThrustMap(RateThrustParameters.of(VEHICLE, values | {"thr_mdl_fac": 0.0}))
+    tau_p, tilted = np.array([2.0, -3.0, 6.0]), np.array([0.5, -0.4, 1.0])
+    for attitude in (ZERO, tilted):  # the norm is 7 N for every attitude
+        assert m.map(tau_p, ZERO, attitude, ZERO)[1] == pytest.approx(0.42)
+    m.thrust_factor = 0.5  # of the thrust curve, which does not act
+    assert m.map(tau_p, ZERO, ZERO, ZERO)[1] == pytest.approx(0.42)
+    assert m.map(3.0 * tau_p, ZERO, ZERO, ZERO)[1] == pytest.approx(0.72)  # 12 N at most
+
+
+def test_a_throttle_per_newton_is_the_motor_command_whatever_the_autopilots_model():
+    m = RateThrustMap(RateThrustParameters.of(VEHICLE, {"throttle_per_newton": 0.06}))
+    # THR_MDL_FAC 0.3: 0.3 * 0.6^2 + 0.7 * 0.6
+    thrust = m.map(np.array([0.0, 0.0, 10.0]), ZERO, ZERO, ZERO)[1]
+    assert thrust == pytest.approx(0.528)
+
+
 def test_limits():
     m = RateThrustMap(RateThrustParameters.of(VEHICLE, {"command_max": 0.9}))
     rates, thrust = m.map(np.array([0.0, 0.0, 1e6]), np.array([1e6, -1e6, 1e6]), ZERO, ZERO)

@@ -10,17 +10,20 @@ from __future__ import annotations
 import numpy as np
 
 from uam_control.control.output_limits import (
+    ArmLimits,
     PositionLimits,
     TorqueLimits,
     limit_force,
     limit_torque,
 )
+from uam_control.control.sample_hold import SampleHold
 from uam_control.control.thrust_direction import AttitudeReference
 from uam_control.coordinates import ALPHA, ARM, ATTITUDE, CHI, CHI_DOT, POSITION, YAW
 from uam_control.laws import catalogue
 from uam_control.laws.errors import tracking_errors
 from uam_control.laws.law_parameters import LawParameters
 from uam_control.settings.parameter_set import ParameterError
+from uam_control.vehicle import POSITION_SERVO
 
 
 class Controller:
@@ -189,7 +192,40 @@ class AttitudeController(TorqueController):
 
 
 class ArmController(TorqueController):
-    """tau_alpha (n,) [N m], eq. (25), ct3, one torque per joint; it also runs on the ground."""
+    """tau_alpha (n,) [N m], eq. (25), ct3, one torque per joint; it also runs on the ground.
+
+    `command` (n,): what the servos are given, tau_alpha or, with `setpoint: position`, goal
+    positions [rad] = reference or state + goal_compliance tau_alpha, renewed at `goal_rate`.
+    """
 
     columns = ARM
     on_ground = True
+
+    def __init__(self, parameters: ArmLimits) -> None:
+        super().__init__(parameters)
+        self._hold, self._time = SampleHold(parameters.goal_rate), 0.0
+        to_goals = parameters.setpoint == POSITION_SERVO
+        # goals do not exist before the first tick
+        self.command = np.full(len(self._tau), np.nan) if to_goals else self._tau
+
+    def set_parameters(self, parameters: ArmLimits) -> None:
+        """See `Controller.set_parameters`."""
+        super().set_parameters(parameters)
+        self._hold.rate = parameters.goal_rate
+
+    def update(
+        self,
+        state: np.ndarray,
+        reference: np.ndarray,
+        attitude_reference: np.ndarray,
+        flying: bool,
+        dt: float,
+    ) -> np.ndarray:
+        """See `TorqueController.update`; also sets `command`."""
+        tau, p = super().update(state, reference, attitude_reference, flying, dt), self.parameters
+        if p.setpoint == POSITION_SERVO:
+            self._time += dt
+            if self._hold.due(self._time):
+                base = reference if p.goal_from == "reference" else state
+                self.command[:] = base[CHI, ARM] + p.goal_compliance * tau
+        return tau

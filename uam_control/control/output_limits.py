@@ -8,8 +8,15 @@ from dataclasses import dataclass
 import numpy as np
 
 from uam_control.maths.compiled import jit
-from uam_control.settings.parameter_set import TINY, ParameterError, ParameterSet, number, vector
-from uam_control.vehicle import GRAVITY
+from uam_control.settings.parameter_set import (
+    TINY,
+    ParameterError,
+    ParameterSet,
+    choice,
+    number,
+    vector,
+)
+from uam_control.vehicle import CURRENT_SERVO, GRAVITY, SERVO_MODES
 
 
 @dataclass(frozen=True)
@@ -39,6 +46,27 @@ class TorqueLimits(ParameterSet):
     """Largest torque per axis, of tau_q or tau_alpha."""
 
     torque_max: tuple = vector((), "largest torque per axis", "N m", TINY, 1e3)
+
+
+@dataclass(frozen=True)
+class ArmLimits(TorqueLimits):
+    """Limits of tau_alpha, and what the servos are given."""
+
+    setpoint: str = choice(
+        CURRENT_SERVO,
+        "what the servos are given: current = tau_alpha, position = goal positions",
+        SERVO_MODES,
+        fixed=True,
+    )
+    goal_from: str = choice(
+        "reference",
+        "goal positions: tau_alpha goal_compliance is added to the reference, or to the state",
+        ("reference", "state"),
+    )
+    goal_compliance: float = number(
+        0.0, "goal offset per torque; 0: the arm law does not act", "rad/(N m)", 0.0, 100.0
+    )
+    goal_rate: float = number(0.0, "rate of new goal positions, 0 = every tick", "Hz", 0.0, 1e3)
 
 
 @jit

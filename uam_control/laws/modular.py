@@ -52,8 +52,9 @@ class ModularParameters(LawParameters):
     lambda_2: tuple = vector((), "lambda_2, gain on e_dot", "1/s", TINY, HUGE)
     lambda_form: str = choice(
         "theory",
-        "theory: Lambda = [lambda_1 lambda_2]; table: lambda_table (e_dot + 2 e)",
-        ("theory", "table"),
+        "theory: Lambda = [lambda_1 lambda_2]; table: lambda_table (e_dot + 2 e); sliding: "
+        "lambda_table (e_dot + c e) + c e_dot with c = lambda_1 / lambda_2",
+        ("theory", "table", "sliding"),
     )
     lambda_table: tuple = vector(
         (), "Lambda as printed, used by lambda_form: table", "1/s", TINY, HUGE
@@ -93,13 +94,21 @@ class ModularParameters(LawParameters):
         given = (self.lambda_1, self.lambda_2, self.q_position, self.q_velocity)
         return lyapunov.solve(*map(np.array, given))
 
+    def feedback_gains(self) -> tuple[np.ndarray, np.ndarray]:
+        """Return the gains on e [1/s^2] and on e_dot [1/s], each (n,), by `lambda_form`."""
+        first, second, table = map(np.array, (self.lambda_1, self.lambda_2, self.lambda_table))
+        if self.lambda_form == "theory":
+            return first, second
+        if self.lambda_form == "table":
+            return 2.0 * table, table
+        return table * first / second, table + first / second
+
     def derived(self) -> dict[str, Any]:
         p11, p12, p22 = self.lyapunov_matrix()
-        theory = self.lambda_form == "theory"
-        table = np.array(self.lambda_table)
+        gain_e, gain_e_dot = self.feedback_gains()
         return {
-            "gain_e": self.lambda_1 if theory else 2.0 * table,
-            "gain_e_dot": self.lambda_2 if theory else table,
+            "gain_e": gain_e,
+            "gain_e_dot": gain_e_dot,
             "p11": p11,
             "p12": p12,
             "p22": p22,

@@ -17,7 +17,7 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
-from uam_control.control.output_limits import PositionLimits, TorqueLimits
+from uam_control.control.output_limits import ArmLimits, PositionLimits, TorqueLimits
 from uam_control.coordinates import ARM, ATTITUDE, POSITION
 from uam_control.estimation import EstimatorParameters
 from uam_control.laws import catalogue
@@ -32,7 +32,7 @@ from uam_control.vehicle import VehicleDescription, load_description
 CONTROLLERS: dict[str, tuple[type[ParameterSet], slice]] = {
     "position_controller": (PositionLimits, POSITION),
     "attitude_controller": (TorqueLimits, ATTITUDE),
-    "arm_controller": (TorqueLimits, ARM),
+    "arm_controller": (ArmLimits, ARM),
 }
 OTHERS = {"state_estimator": EstimatorParameters, "mission": MissionParameters}
 NODES = (*CONTROLLERS, *OTHERS)
@@ -76,6 +76,11 @@ class Profile:
     def laws(self) -> dict[str, str]:
         """Return controller → law."""
         return {node: self.sets[node].law for node in CONTROLLERS}
+
+
+def servo_mode(profile: Profile) -> dict[str, str]:
+    """Return the change of the vehicle's numbers that the arm controller's setpoints require."""
+    return {"servos.mode": profile.sets["arm_controller"].setpoint}
 
 
 @cache

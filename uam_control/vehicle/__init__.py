@@ -1,7 +1,10 @@
 """The description of a vehicle: the file in config/vehicle/ and the values derived from it."""
 
 from uam_control.vehicle.description import (
+    CURRENT_SERVO,
     GRAVITY,
+    POSITION_SERVO,
+    SERVO_MODES,
     Joint,
     Rotor,
     RotorModel,

@@ -55,6 +55,10 @@ class RotorModel:
         return self.thrust_coefficient * self.speed_max**2
 
 
+# servos.mode: efforts to the servos' current loop, or goal positions to their position loop
+SERVO_MODES = CURRENT_SERVO, POSITION_SERVO = "current", "position"
+
+
 @dataclass(frozen=True)
 class Servo:
     """Parameters common to all joint servos.

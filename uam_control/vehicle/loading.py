@@ -10,6 +10,7 @@ from uam_control.settings import configuration
 from uam_control.settings.section import Section, read_section
 from uam_control.vehicle.description import (
     AXES,
+    SERVO_MODES,
     Joint,
     Rotor,
     RotorModel,
@@ -133,6 +134,11 @@ def _check_rotors(described: VehicleDescription, rotor: Section) -> None:
 
 
 def _check_servo(servo: Servo, section: Section) -> None:
+    mode = section.text("mode")
+    if mode not in SERVO_MODES:
+        raise VehicleError(f"{section.where}.mode: '{mode}' is not one of {', '.join(SERVO_MODES)}")
+    section.positive("position_p_gain")
+    section.positive("pwm_limit")
     if servo.effort_limit > servo.stall_torque:
         raise VehicleError(
             f"{section.where}.effort_limit: {servo.effort_limit:g} N m is above stall_torque, "

@@ -12,12 +12,18 @@ from uam_control.laws import catalogue
 from uam_control.mission import Scenario, load_scenario
 from uam_control.profiles.profile import Profile, default_profile, load_profile
 from uam_control.settings import configuration
-from uam_control.vehicle import DEFAULT_VEHICLE, VehicleDescription, load_description
+from uam_control.vehicle import (
+    DEFAULT_VEHICLE,
+    POSITION_SERVO,
+    VehicleDescription,
+    load_description,
+)
 from uam_lab.flight import node_options
 from uam_lab.flight.node_options import SettingsError
 from uam_lab.processes.node_environment import without_discovery
 from uam_msgs_py.node.namespace import normal
-from uam_sim_bridge.faults import Schedule, feasibility, read_schedule
+from uam_sim_bridge.faults import FaultError, Schedule, feasibility, read_schedule
+from uam_sim_bridge.faults.actuator_faults import ServoWeak
 from uam_sim_bridge.faults.faulty_plant import check_engine
 from uam_sim_bridge.faults.process_faults import DiscoveryLoss
 from uam_sim_bridge.mavlink.transport.transport import ALLOWED, LinkUrl, parse_url
@@ -233,6 +239,12 @@ def check_feasible(flight: FlightSettings, faults: Schedule) -> None:
     absent = (*flight.without, "autopilot") if flight.link is not None else flight.without
     refused = {DiscoveryLoss.NAME: without_discovery()}
     check_engine(faults, flight.plant, flight.vehicle_changes.get("effects"))
+    weak = [one for one in faults.faults if isinstance(one.fault, ServoWeak)]
+    if weak and flight.profile.sets["arm_controller"].setpoint == POSITION_SERVO:
+        raise FaultError(
+            f"{ServoWeak.NAME}: scales torque commands, but profile {flight.profile.name} sends "
+            "goal positions (setpoint of arm_controller)"
+        )
     feasibility.check(faults, flight.engine, absent, refused, flight.vehicle)
 
 

@@ -131,25 +131,26 @@ def read_pose(data: bytes, frame: str = WORLD) -> tuple[int, np.ndarray, np.ndar
     return message.stamp, message.vector("position"), quaternion
 
 
-class EffortWriter(Template):
-    """Writes the Float64MultiArray of a ros2_control effort controller."""
+class JointCommandWriter(Template):
+    """Writes the Float64MultiArray of a ros2_control effort or position controller."""
 
     def __init__(self, count: int):
         super().__init__(Float64MultiArray(data=[0.0] * count))
-        self._effort = self.values["data"]
+        self._command = self.values["data"]
 
-    def fill(self, effort: np.ndarray) -> bytes:
-        """Return the message; effort (n,) [N m]."""
-        self._effort[:] = effort
+    def fill(self, command: np.ndarray) -> bytes:
+        """Return the message; command (n,): efforts [N m] or goal positions [rad]."""
+        self._command[:] = command
         return self.plain()
 
 
-def read_effort(data: bytes, names: Sequence[str]) -> np.ndarray:
-    """Return the efforts (n,) [N m]; raises BadMessage for a wrong length or a value not finite."""
-    effort = Serialized(Float64MultiArray, data).numbers("data")
-    check_length("efforts", len(effort), names)
-    refuse_infinite("effort", effort, names)
-    return effort
+def read_joint_command(data: bytes, names: Sequence[str]) -> np.ndarray:
+    """Return efforts [N m] or goal positions [rad] (n,); raises BadMessage for a wrong length or a
+    value not finite."""
+    command = Serialized(Float64MultiArray, data).numbers("data")
+    check_length("joint commands", len(command), names)
+    refuse_infinite("joint command", command, names)
+    return command
 
 
 class SetpointWriter(Template):

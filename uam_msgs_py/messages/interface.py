@@ -42,6 +42,7 @@ CONTENTS = {
     topics.ATTITUDE_COMMAND: Content(BODY, "N m", TICK),
     topics.ARM_COMMAND: Content(JOINT_SPACE, "N m", TICK),
     topics.ARM_EFFORT: Content(JOINT_SPACE, "N m", TICK),
+    topics.ARM_GOALS: Content(JOINT_SPACE, "rad", f"{TICK}, in place of the efforts"),
     topics.MAGNET: Content("", "on or off", TICK),
     topics.SETPOINT: Content(BODY, "rad/s, thrust 0..1", TICK),
     topics.THRUST: Content("", "1", "10 Hz"),

@@ -87,6 +87,12 @@ POSITION_COMMAND = Topic(
 ATTITUDE_COMMAND = Topic("uam/attitude/command", JointTrajectory, RELIABLE, "tau_q, FLU")
 ARM_COMMAND = Topic("uam/arm/command", JointTrajectory, RELIABLE, "tau_alpha")
 ARM_EFFORT = Topic("arm_effort_controller/commands", Float64MultiArray, RELIABLE, "tau_alpha [N m]")
+ARM_GOALS = Topic(
+    "arm_position_controller/commands",
+    Float64MultiArray,
+    RELIABLE,
+    "goal positions [rad], with setpoint: position of the arm controller",
+)
 MAGNET = Topic("uam/magnet", Bool, RELIABLE, "magnet on")
 SETPOINT = Topic(
     "uam/setpoint", TwistStamped, RELIABLE, "body rates FLU and thrust 0..1 (linear.z) as sent"

@@ -53,6 +53,7 @@ WIRES = (
     Wire(topics.POSITION_COMMAND, POSITION, (ATTITUDE, ARM, BRIDGE, MISSION)),
     Wire(topics.ATTITUDE_COMMAND, ATTITUDE, (BRIDGE,)),
     Wire(topics.ARM_EFFORT, ARM, (PLANT,)),
+    Wire(topics.ARM_GOALS, ARM, (PLANT,), optional=True),
     Wire(topics.SETPOINT, BRIDGE, (PLANT,)),
     Wire(topics.AUTOPILOT_STATE, BRIDGE, (MISSION,)),
     Wire(topics.AUTOPILOT_BATTERY, BRIDGE, (MISSION,), optional=True),

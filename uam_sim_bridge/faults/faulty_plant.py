@@ -95,13 +95,13 @@ class FaultyPlant(Plant):
             fault.sense(samples, now)
         return samples
 
-    def step(self, motor_commands: np.ndarray, arm_effort: np.ndarray, magnet: bool) -> None:
+    def step(self, motor_commands: np.ndarray, arm_command: np.ndarray, magnet: bool) -> None:
         """Step the inner plant, with commands and physics changed by the active faults.
 
         Arguments as in `Plant.step`.
         """
         if self._active or self._touched:
-            commands = PlantCommands(np.array(motor_commands), np.array(arm_effort), bool(magnet))
+            commands = PlantCommands(np.array(motor_commands), np.array(arm_command), bool(magnet))
             described = self.vehicle.description
             physics = Disturbance.none(len(described.rotors), len(described.joints))
             for fault, now in self._active.values():
@@ -109,10 +109,10 @@ class FaultyPlant(Plant):
                 now.since += self.period
             if self.inner.DISTURBABLE:
                 self.inner.disturb(physics)
-            motor_commands, arm_effort = commands.motors, commands.effort
+            motor_commands, arm_command = commands.motors, commands.effort
             magnet = commands.magnet
             self._touched = bool(self._active)
-        self.inner.step(motor_commands, arm_effort, magnet)
+        self.inner.step(motor_commands, arm_command, magnet)
         self.tick = self.inner.tick
 
     def truth(self) -> Truth:

@@ -99,7 +99,7 @@ class Simulator:
         node.create_service(Trigger, "~/reset", self._on_reset)
         _warm_up(make_plant(*start, Schedule(), options.plant))
         self.sensors, self.truth = Sensors(node, described), TruthTopics(node, described)
-        self.answers = Answers(node, described)
+        self.answers = Answers(node, described, vehicle.numbers["servos"]["mode"])
         self.connections = Connections(node)
         self.executor = LeanExecutor(node, [topics.SETPOINT.name], lambda: self._setpoint_is_there)
         patience = options.answer_timeout
@@ -230,7 +230,7 @@ class Simulator:
             if self._faulty:
                 answers = self.answers
                 self._faulty.mission_at(answers.mission_stamp * 1e-9, answers.mission.time)
-            self.plant.step(self.hil.motors, self.answers.effort, self.answers.magnet)
+            self.plant.step(self.hil.motors, self.answers.arm_command, self.answers.magnet)
             self.health.done_tick(begun, self.plant.time)
             if not self.options.end_with_mission:
                 if self.plant.time >= limit:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from functools import partial
 
 import numpy as np
 from diagnostic_msgs.msg import DiagnosticArray
@@ -13,13 +14,13 @@ from rclpy.subscription import Subscription
 from rosgraph_msgs.msg import Clock
 
 from uam_control.stamps import nanoseconds
-from uam_control.vehicle import VehicleDescription
+from uam_control.vehicle import CURRENT_SERVO, POSITION_SERVO, VehicleDescription
 from uam_msgs_py.messages import topics
 from uam_msgs_py.messages.convert import (
     ImuWriter,
     JointStateWriter,
     PoseWriter,
-    read_effort,
+    read_joint_command,
     read_switch,
 )
 from uam_msgs_py.messages.layouts import stamp_of
@@ -115,25 +116,29 @@ class TruthTopics(Outlets):
 
 # The node named when answers are missing: the last one that all of them depend on.
 SUSPECTS = {
-    frozenset({"setpoint", "effort", "magnet"}): "state_estimator",
-    frozenset({"setpoint", "effort"}): "position_controller or mission",
+    frozenset({"setpoint", "arm", "magnet"}): "state_estimator",
+    frozenset({"setpoint", "arm"}): "position_controller or mission",
     frozenset({"setpoint"}): "attitude_controller or mavlink_bridge",
-    frozenset({"effort"}): "arm_controller",
+    frozenset({"arm"}): "arm_controller",
     frozenset({"magnet"}): "mission",
 }
 
 
 class Answers:
-    """Answers of the nodes to a tick: setpoint sent, joint efforts, magnet; state of the mission.
+    """Answers of the nodes to a tick: setpoint sent, servo commands, magnet; state of the mission.
 
-    `effort` (n,) [N m] and `magnet` hold until the next message. `setpoints`: stamp [ns] → wall
-    time [ns] of the bridge's publication; filled only by `take`, cleared after the measurement of
-    the latency.
+    `arm_command` (n,), see `Servos`, and `magnet` hold until the next message. `setpoints`: stamp
+    [ns] → wall time [ns] of the bridge's publication; filled only by `take`, cleared after the
+    measurement of the latency.
     """
 
-    def __init__(self, node: Node, vehicle: VehicleDescription):
+    def __init__(self, node: Node, vehicle: VehicleDescription, servo_mode: str = CURRENT_SERVO):
+        """servo_mode: of SERVO_MODES; only the commands of this mode are used."""
         self._names = list(vehicle.joint_names)
-        self.effort = np.zeros(len(self._names))
+        to_goals = servo_mode == POSITION_SERVO
+        self._arm_topic = topics.ARM_GOALS if to_goals else topics.ARM_EFFORT
+        # NaN: no goal yet, the servos hold their position
+        self.arm_command = np.full(len(self._names), np.nan if to_goals else 0.0)
         self.magnet = False
         self.mission, self.mission_stamp = MissionStatus(), 0  # [ns]
         self.setpoints: dict[int, int] = {}
@@ -151,7 +156,8 @@ class Answers:
             )
             for topic, callback, raw in (
                 (topics.SETPOINT, self._on_setpoint, True),
-                (topics.ARM_EFFORT, self._on_effort, True),
+                (topics.ARM_EFFORT, partial(self._on_arm, topics.ARM_EFFORT), True),
+                (topics.ARM_GOALS, partial(self._on_arm, topics.ARM_GOALS), True),
                 (topics.MAGNET, self._on_magnet, True),
                 (topics.MISSION_STATUS, self._on_mission, False),
                 (topics.RESTARTS, self._on_restart, False),
@@ -170,7 +176,7 @@ class Answers:
 
     def missing(self, stamp: int) -> frozenset[str]:
         """Return the missing answers to the tick of `stamp` [ns]."""
-        lacking = {"effort", "magnet"} - self._arrived
+        lacking = {"arm", "magnet"} - self._arrived
         answered = self._setpoint_stamp >= stamp - self._tolerance
         return frozenset(lacking if answered else lacking | {"setpoint"})
 
@@ -187,10 +193,12 @@ class Answers:
         if info is not None:
             self.setpoints[self._setpoint_stamp] = info["source_timestamp"]
 
-    def _on_effort(self, data: bytes, info: dict | None = None) -> None:
-        self.effort = read_effort(data, self._names)
-        self._arrived.add("effort")
-        self.arrivals[topics.ARM_EFFORT.name] = time.monotonic()
+    def _on_arm(self, topic: topics.Topic, data: bytes, info: dict | None = None) -> None:
+        command = read_joint_command(data, self._names)
+        if topic is self._arm_topic:
+            self.arm_command = command
+            self._arrived.add("arm")
+            self.arrivals[topic.name] = time.monotonic()
 
     def _on_magnet(self, data: bytes, info: dict | None = None) -> None:
         self.magnet = read_switch(data)

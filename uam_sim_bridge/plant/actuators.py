@@ -7,6 +7,12 @@ import math
 import numpy as np
 
 from uam_control.maths.compiled import jit
+from uam_control.vehicle import POSITION_SERVO
+
+# Dynamixel XM430-W210, ROBOTIS e-manual: units of its control table
+P_GAIN_SCALE = 128.0  # Position P Gain / 128 = PWM units per count
+PWM_FULL = 885.0  # PWM units of the whole supply voltage
+COUNTS_PER_TURN = 4096
 
 
 class Rotors:
@@ -72,13 +78,25 @@ def rotor_step(
 
 
 class Servos:
-    """Dynamixel XM430-W210 in current control: quantised current, torque-speed limit.
+    """Dynamixel XM430-W210 in current or position control, `servos.mode` of the vehicle.
 
     `torque` (n,) [N m]: of the gear before friction. The MJCF has friction and reflected inertia.
+    `command` (n,): effort [N m], or goal positions [rad]. A servo in position control holds its
+    initial angle until the first goal.
     """
 
-    def __init__(self, numbers: dict, joints: int) -> None:
-        """numbers: the `servos` entry of the vehicle."""
+    def __init__(self, numbers: dict, start: np.ndarray) -> None:
+        """numbers: the `servos` entry of the vehicle; start (n,): initial joint angles [rad]."""
+        self.in_position_mode = numbers["mode"] == POSITION_SERVO
+        self.command = np.array(start if self.in_position_mode else np.zeros(len(start)))
+        self.loop = np.array(
+            [
+                numbers["position_p_gain"] / P_GAIN_SCALE / PWM_FULL,
+                numbers["pwm_limit"] / PWM_FULL,
+                2.0 * np.pi / COUNTS_PER_TURN,
+                float(self.in_position_mode),
+            ]
+        )
         self.constants = np.array(
             [
                 numbers["stall_torque"],
@@ -86,11 +104,63 @@ class Servos:
                 numbers["torque_per_current"] * numbers["current_unit"],
             ]
         )
-        self.torque = np.zeros(joints)
+        self.torque = np.zeros(len(start))
 
-    def step(self, effort: np.ndarray, velocity: np.ndarray, output: np.ndarray) -> None:
-        """Write the torque (n,) [N m] for effort (n,) [N m] at velocity (n,) [rad/s] to output."""
-        servo_step(effort, velocity, self.constants, self.torque, output)
+    def take(self, command: np.ndarray) -> None:
+        """Use `command` (n,) from now on; entries that are NaN, no command yet, change nothing."""
+        known = np.isfinite(command)
+        self.command[known] = np.asarray(command)[known]
+
+    def step(self, angle: np.ndarray, velocity: np.ndarray, output: np.ndarray) -> None:
+        """Write the torque (n,) [N m] at angle (n,) [rad] and velocity (n,) [rad/s] to output."""
+        joint_step(self.command, angle, velocity, self.constants, self.loop, self.torque, output)
+
+
+@jit
+def joint_step(
+    command: np.ndarray,
+    angle: np.ndarray,
+    velocity: np.ndarray,
+    constants: np.ndarray,
+    loop: np.ndarray,
+    torque: np.ndarray,
+    output: np.ndarray,
+) -> None:
+    """Write torque and output (n,) [N m] in the mode of the servos.
+
+    command (n,): see `Servos`; angle (n,) [rad]; velocity (n,) [rad/s]; constants: see
+    `servo_step`; loop (4,): duty per count of position error, largest duty, count [rad], whether
+    the servos are in position control.
+    """
+    if loop[3] > 0.0:
+        position_step(command, angle, velocity, constants, loop, torque, output)
+    else:
+        servo_step(command, velocity, constants, torque, output)
+
+
+@jit
+def position_step(
+    goal: np.ndarray,
+    angle: np.ndarray,
+    velocity: np.ndarray,
+    constants: np.ndarray,
+    loop: np.ndarray,
+    torque: np.ndarray,
+    output: np.ndarray,
+) -> None:
+    """Write torque and output (n,) [N m] of the position loop; arguments as in `joint_step`.
+
+    duty = gain (goal - angle) in whole counts, limited; torque = stall (duty - speed / no-load
+    speed), the line of a DC motor at the voltage of the duty. Source: ROBOTIS e-manual, XM430-W210,
+    Position PID Gain. The maker's I and D gains are 0.
+    """
+    stall, no_load = constants[0], constants[1]
+    gain, limit, count = loop[0], loop[1], loop[2]
+    for i in range(len(goal)):
+        error = np.round(goal[i] / count) - np.round(angle[i] / count)
+        duty = min(limit, max(-limit, gain * error))
+        torque[i] = min(stall, max(-stall, stall * (duty - velocity[i] / no_load)))
+        output[i] = torque[i]
 
 
 @jit

@@ -11,7 +11,7 @@ from uam_control.coordinates import ALPHA, CHI, CHI_DDOT, CHI_DOT, ROLL, X
 from uam_control.maths.compiled import jit
 from uam_control.maths.rotations import euler_from_quaternion
 from uam_control.vehicle import VehicleError
-from uam_sim_bridge.plant.actuators import Rotors, Servos, rotor_step, servo_step
+from uam_sim_bridge.plant.actuators import Rotors, Servos, joint_step, rotor_step
 from uam_sim_bridge.plant.effects.acting_effects import ActingEffects
 from uam_sim_bridge.plant.effects.effect import Acting, Bench
 from uam_sim_bridge.plant.magnet import magnet_constants, pull_fraction
@@ -54,11 +54,10 @@ class MujocoPlant(Plant):
         self._imu_delay, self._mocap_delay, self._joints_delay = (
             Delay(sensors[name]["latency_ticks"]) for name in ("imu", "mocap", "joints")
         )
-        self._effort_delay = Delay(numbers["servos"]["command_latency_ticks"])
-        self._effort = np.zeros(self.joints)
+        self._command_delay = Delay(numbers["servos"]["command_latency_ticks"])
 
         self.rotors = Rotors(numbers["rotors"], model.opt.timestep)
-        self.servos = Servos(numbers["servos"], self.joints)
+        self.servos = Servos(numbers["servos"], self._alpha)
         air = numbers["air"]
         self._drag = np.array(air["drag"], dtype=float)
         self._wind_mean = np.array(air["wind"], dtype=float)
@@ -169,13 +168,13 @@ class MujocoPlant(Plant):
             hil,
         )
 
-    def step(self, motor_commands: np.ndarray, arm_effort: np.ndarray, magnet: bool) -> None:
+    def step(self, motor_commands: np.ndarray, arm_command: np.ndarray, magnet: bool) -> None:
         """See `Plant.step`."""
         if self._hinge is not None:
             magnet = self._held_by_magnet(magnet)
-        due = self._effort_delay(self.tick, tuple(map(float, arm_effort)))
+        due = self._command_delay(self.tick, tuple(map(float, arm_command)))
         if due is not None:
-            self._effort[:] = due
+            self.servos.take(due)
         if self._gust is not None:
             self.wind += (1.0 - self._gust_keep) * (self._wind_mean - self.wind) + self._gust()
         surroundings(
@@ -205,9 +204,11 @@ class MujocoPlant(Plant):
                 rotors.efficiency,
                 rotors.speed,
                 rotors.thrust,
-                self._effort,
+                servos.command,
+                self._alpha,
                 self._alpha_dot,
                 servos.constants,
+                servos.loop,
                 servos.torque,
                 self._thrust_control,
                 self._torque_control,
@@ -337,19 +338,21 @@ def actuate(
     efficiency: np.ndarray,
     speed: np.ndarray,
     thrust: np.ndarray,
-    effort: np.ndarray,
+    command: np.ndarray,
+    angles: np.ndarray,
     joint_rates: np.ndarray,
     servo_constants: np.ndarray,
+    loop: np.ndarray,
     torque: np.ndarray,
     thrust_control: np.ndarray,
     torque_control: np.ndarray,
 ) -> None:
     """Write thrusts (rotors,) [N] and joint torques (n,) [N m] of the next physics step.
 
-    The arguments are those of `rotor_step` and `servo_step`.
+    The arguments are those of `rotor_step` and `joint_step`.
     """
     rotor_step(commands, rotor_constants, rotor_gains, efficiency, speed, thrust, thrust_control)
-    servo_step(effort, joint_rates, servo_constants, torque, torque_control)
+    joint_step(command, angles, joint_rates, servo_constants, loop, torque, torque_control)
 
 
 @jit

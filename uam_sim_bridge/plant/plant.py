@@ -7,7 +7,7 @@ the simulator calls
     samples = plant.sense()                    samples of the sensors
     truth = plant.truth()                      for the recording and the autopilot's simulator link
     plant.disturb(disturbance)                 only in a flight with faults of the physics
-    plant.step(motors, effort, magnet)         physics of one control period
+    plant.step(motors, arm, magnet)            physics of one control period
 """
 
 from __future__ import annotations
@@ -110,11 +110,12 @@ class Plant(ABC):
         """Sample the sensors and return the samples that arrive now; call it once per tick."""
 
     @abstractmethod
-    def step(self, motor_commands: np.ndarray, arm_effort: np.ndarray, magnet: bool) -> None:
+    def step(self, motor_commands: np.ndarray, arm_command: np.ndarray, magnet: bool) -> None:
         """Advance one control period, and `tick` by 1.
 
-        motor_commands (rotors,): 0..1 in PX4's order; arm_effort (n,) [N m]: sent now, delayed by
-        the bus; magnet: current on.
+        motor_commands (rotors,): 0..1 in PX4's order; arm_command (n,): effort [N m], or goal
+        positions [rad] of servos in position control, sent now, delayed by the bus; magnet: current
+        on.
         """
 
     @abstractmethod

@@ -15,6 +15,7 @@ from typing import Any, Self
 
 import numpy as np
 
+from uam_control.control.sample_hold import SampleHold
 from uam_control.stamps import SECOND
 from uam_control.vehicle import VehicleDescription
 from uam_sim_bridge.mavlink.offboard.hold import HoldParameters
@@ -87,6 +88,7 @@ class BridgeStage:
         self.identification = ThrustIdentification(sets.identification, vehicle)
         self.source = SetpointSource(self.map, sets.hold, sets.setpoint.type, fresh, say)
         self._vision = VisionPacing(sets.vision)
+        self._hold, self._kept = SampleHold(sets.setpoint.setpoint_rate), None
         self._reports = AutopilotReports(autopilot, sequence)
         self._orders: deque[tuple[int, bool, int]] = deque()  # stamp [ns], failsafe, regains
         self._regains = 0
@@ -155,6 +157,7 @@ class BridgeStage:
         """
         now, situation = stamp / SECOND, self._situation
         setpoint = self.source.commanded(now, state, flying, tau_p, tau_q, attitude, situation)
+        setpoint = self._sampled(now, setpoint, flying)
         self._send(now, setpoint)
         self.report = self._reports.due(stamp)
         thrust, self.factor = setpoint.thrust if setpoint else 0.0, self.map.thrust_factor
@@ -167,9 +170,18 @@ class BridgeStage:
         )
         return setpoint
 
+    def _sampled(self, now: float, setpoint: Setpoint, flying: bool) -> Setpoint:
+        """Return the setpoint of the last period at `now` [s] if this one is not due."""
+        if not flying or setpoint is None:
+            self._kept = None
+            return setpoint
+        if self._hold.due(now) or self._kept is None:
+            self._kept = setpoint
+        return self._kept
+
     def without(self, stamp: int) -> Setpoint:
         """Send the setpoint of a tick without valid commands, and return it."""
-        now = stamp / SECOND
+        now, self._kept = stamp / SECOND, None
         setpoint = self.source.without(now, self._situation)
         self._send(now, setpoint)
         self.report = self._reports.due(stamp)

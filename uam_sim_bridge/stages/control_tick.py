@@ -43,6 +43,7 @@ class Signals:
     reference: np.ndarray  # (3, SIZE) chi_d, chi_d_dot, chi_d_ddot
     # laws
     tau_alpha: np.ndarray  # (n,) [N m]
+    arm_command: np.ndarray  # (n,) see `ArmController.command`
     tau_p: np.ndarray  # (3,) [N, ENU]
     attitude_reference: np.ndarray  # (3, 3) rows q_d [rad], Omega_d, Omega_d_dot, FLU
     tau_q: np.ndarray  # (3,) [N m, FLU]
@@ -68,6 +69,7 @@ class Signals:
             state=np.zeros((3, size)),
             reference=np.zeros((3, size)),
             tau_alpha=np.zeros(joints),
+            arm_command=np.zeros(joints),
             tau_p=np.zeros(3),
             attitude_reference=np.zeros((3, 3)),
             tau_q=np.zeros(3),
@@ -104,6 +106,7 @@ class ControlTick:
             "attitude": self.attitude,
             "arm": self.arm,
         }
+        self.signals.arm_command = self.arm.controller.command
         self._told: tuple | None = None  # what the bridge has of the mission
 
     def tick(
@@ -195,7 +198,7 @@ def control_attitude(tick: ControlTick) -> bool:
 
 
 def control_arm(tick: ControlTick) -> bool:
-    """state, reference, attitude reference → tau_alpha."""
+    """state, reference, attitude reference → tau_alpha, command of the servos."""
     s, stage = tick.signals, tick.arm
     s.tau_alpha = stage.update(s.stamp, s.state, s.reference, s.attitude_reference, s.flying)
     if stage.gains_due:

@@ -12,7 +12,7 @@ from typing import Any
 
 from uam_control.mission import Mission, Scenario
 from uam_control.mission.time_limit import DISARMED, Settled, time_limit
-from uam_control.profiles.profile import Profile
+from uam_control.profiles.profile import Profile, servo_mode
 from uam_control.stages.timing import Timing
 from uam_control.stamps import SECOND, nanoseconds
 from uam_lab.flight.direct.record import Places, Snapshot, record, record_blind, record_switches
@@ -53,6 +53,7 @@ class DirectFlight:
         """payload_mass [kg]; faults: those that `faults.feasibility.check` lets pass; plant: see
         `plant_class`."""
         sets = profile.sets
+        vehicle = vehicle.changed(servo_mode(profile))
         started = (vehicle, payload_mass, seed, scenario.arm_start)
         self.plant = make_plant(*started, faults or Schedule(), plant)
         self._faults = DirectFaults(faults, self.plant) if faults else None
@@ -136,7 +137,7 @@ class DirectFlight:
             self._record(signals)
         else:
             self._record_blind()
-        plant.step(motors, signals.tau_alpha, signals.magnet)
+        plant.step(motors, signals.arm_command, signals.magnet)
 
     def _delivered(self, samples: Samples) -> tuple[Pose | None, Joints | None, Imu | None]:
         """What the stages get of `samples`, with stamps [ns].

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from uam_control.mission.time_limit import time_limit
+from uam_control.profiles.profile import servo_mode
 from uam_lab.cockpit import page_address
 from uam_lab.flight.conclude import settings_facts
 from uam_lab.flight.flight_settings import BUILTIN, FlightSettings
@@ -59,7 +60,7 @@ def parameters(
         "dry_run": settings.dry_run,
     }
     sections[wiring.PLANT] = {
-        "vehicle_changes": json.dumps(settings.vehicle_changes),
+        "vehicle_changes": json.dumps(settings.vehicle_changes | servo_mode(settings.profile)),
         "plant": settings.plant,
         "payload_mass": float(settings.payload_mass),
         "seed": settings.seed,

@@ -3,6 +3,10 @@
 Thrust. The collective is the part of tau_p along the body's thrust axis, u1 = tau_p · (R e3). It is
 clamped to [thrust_min, thrust_max] and mapped to 0..1 by the inverse of the thrust curve.
 
+With `throttle_per_newton` c the motor command is c ||tau_p|| instead, without a thrust curve: the
+convention of many laboratories, in which tau_p is an acceleration of a unit mass (docs/table1.md).
+The bridge inverts only the autopilot's curve, as if THR_MDL_FAC were 0.
+
 Rates. PX4's rate loop makes the torque
 
     tau = S ( K P (omega_sp - omega) + integral - K D omega_dot )
@@ -41,6 +45,7 @@ from uam_control.vehicle import VehicleDescription, load_description
 from uam_sim_bridge.mavlink.offboard.rotor_geometry import torque_scale
 from uam_sim_bridge.mavlink.offboard.thrust_curve import (
     command_of_thrust,
+    curve,
     thrust_of_command,
     thrust_slope,
 )
@@ -49,7 +54,8 @@ from uam_sim_bridge.mavlink.offboard.thrust_curve import (
 (_FULL, _BATTERY, _MOTOR, _MODEL, _MIN, _MAX, _COMMAND_MAX, _GAIN, _LIMIT) = (
     0, 1, 2, 3, 4, 5, 6, 7, 10,
 )  # fmt: skip
-_LENGTH = 13
+_THROTTLE = 13
+_LENGTH = 14
 
 INPUTS = (
     *(f"tau_p.{axis}" for axis in "xyz"),
@@ -104,6 +110,9 @@ class RateThrustParameters(ParameterSet):
     command_max: float = number(
         1.0, "largest normalised thrust sent; below 1 leaves room for torques", "1", 0.1, 1.0
     )
+    throttle_per_newton: float = number(
+        0.0, "motor command per newton of ||tau_p||, without thrust curve; 0 = off", "1/N", 0.0, 1.0
+    )
 
     @classmethod
     def of(cls, vehicle: VehicleDescription, values: Mapping[str, Any] | None = None) -> Self:
@@ -115,7 +124,7 @@ class RateThrustParameters(ParameterSet):
         return torque_scale(*vehicle.geometry(), self.rotor_thrust_max)
 
     def flat(self, vehicle: VehicleDescription) -> np.ndarray:
-        """Return the parameters (13,) of `rate_thrust_map`, SI units."""
+        """Return the parameters (14,) of `rate_thrust_map`, SI units."""
         p = np.empty(_LENGTH)
         p[_FULL] = len(vehicle.rotors) * self.rotor_thrust_max
         p[_BATTERY] = self.battery_factor
@@ -124,6 +133,7 @@ class RateThrustParameters(ParameterSet):
         p[_MIN] = self.thrust_min
         p[_MAX] = self.thrust_max
         p[_COMMAND_MAX] = self.command_max
+        p[_THROTTLE] = self.throttle_per_newton
         scale = self.torque_scale(vehicle)
         p[_GAIN : _GAIN + 3] = scale * np.array(self.rate_p) * np.array(self.rate_k)
         p[_LIMIT : _LIMIT + 3] = self.rate_limit
@@ -142,7 +152,7 @@ def rate_thrust_map(
     """Write the body-rate setpoint [rad/s, FLU] into rates (3,); return the normalised thrust.
 
     tau_p (3,) [N, ENU], tau_q (3,) [N m, FLU], attitude (3,) roll, pitch, yaw [rad, FLU in ENU],
-    body_rates (3,) [rad/s, FLU], p (13,): `RateThrustParameters.flat`. Returns -1 - i and leaves
+    body_rates (3,) [rad/s, FLU], p (14,): `RateThrustParameters.flat`. Returns -1 - i and leaves
     `rates` unchanged if INPUTS[i] is not finite.
     """
     for i in range(3):
@@ -163,8 +173,13 @@ def rate_thrust_map(
         + tau_p[1] * (sy * sp * cr - cy * sr)
         + tau_p[2] * cp * cr
     )
-    newtons = min(p[_MAX], max(p[_MIN], newtons))
-    thrust = command_of_thrust(newtons, p[_FULL], p[_BATTERY], p[_MOTOR], p[_MODEL])
+    if p[_THROTTLE] > 0.0:
+        newtons = math.sqrt(tau_p[0] ** 2 + tau_p[1] ** 2 + tau_p[2] ** 2)
+        newtons = min(p[_MAX], max(p[_MIN], newtons))
+        thrust = curve(p[_MODEL], p[_THROTTLE] * newtons)
+    else:
+        newtons = min(p[_MAX], max(p[_MIN], newtons))
+        thrust = command_of_thrust(newtons, p[_FULL], p[_BATTERY], p[_MOTOR], p[_MODEL])
     thrust = min(p[_COMMAND_MAX], thrust)
     slope = thrust_slope(thrust, p[_FULL], p[_BATTERY], p[_MOTOR], p[_MODEL]) / p[_FULL]
     for i in range(3):

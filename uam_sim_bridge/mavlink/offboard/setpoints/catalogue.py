@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from uam_control.settings.parameter_set import ParameterSet, choice
+from uam_control.settings.parameter_set import ParameterSet, choice, number
 from uam_sim_bridge.mavlink.offboard.setpoints.attitude import attitude_setpoint
 from uam_sim_bridge.mavlink.offboard.setpoints.desired import SetpointType
 from uam_sim_bridge.mavlink.offboard.setpoints.rates import rates_setpoint
@@ -23,6 +23,14 @@ class SetpointParameters(ParameterSet):
         "rates",
         "what is sent with the thrust; only rates act as tau_q",
         tuple(SETPOINTS),
+    )
+
+    setpoint_rate: float = number(
+        0.0,
+        "rate of new setpoints; in between the last one is repeated; 0 = every tick",
+        "Hz",
+        0.0,
+        1e3,
     )
 
     @property
