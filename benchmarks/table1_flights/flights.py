@@ -1,0 +1,98 @@
+"""The rows of the tables: profiles with other readings of an assumption, and the baselines."""
+
+from __future__ import annotations
+
+import copy
+from dataclasses import dataclass, field
+from itertools import product
+from pathlib import Path
+from typing import Any
+
+import yaml
+
+from uam_control.profiles.profile import Profile, load_profile, profile_of
+
+AS_FLOWN = "paper_table1_as_flown"
+ASSUMPTIONS = Path(__file__).with_name("assumptions.yaml")
+POSITION, ARM, BRIDGE = "position_controller", "arm_controller", "mavlink_bridge"
+VEHICLE = "vehicle"
+# of the search: every combination
+SCALES = (0.0594, 0.06, 0.0606, 0.0612)
+FORMS = ("theory", "table", "sliding")
+RATES = (0.0, 30.0, 10.0)
+NOISES = (1.0, 2.0, 3.0)
+
+
+@dataclass(frozen=True)
+class Row:
+    """One row: what is assumed otherwise, profile and changes of the vehicle."""
+
+    group: str
+    label: str
+    profile: Profile
+    vehicle: dict[str, Any] = field(default_factory=dict)
+
+
+def changed(changes: dict[str, dict[str, Any]], *names: str) -> Profile:
+    """Return a profile (default: AS_FLOWN) with other parameters: node → name → value."""
+    profile = load_profile(*(names or (AS_FLOWN,)))
+    sections = copy.deepcopy(profile.sections)
+    for node, values in changes.items():
+        sections[node] = sections.get(node, {}) | values
+    return profile_of(sections, Path(f"{profile.name}_changed.yaml"), profile.vehicle)
+
+
+def as_flown() -> Row:
+    """Return the row of the profile itself."""
+    return Row("", "as flown", load_profile(AS_FLOWN))
+
+
+def sensitivity() -> list[Row]:
+    """Return a row per reading in `assumptions.yaml`, each with one assumption changed."""
+    rows = []
+    for group, readings in yaml.safe_load(ASSUMPTIONS.read_text()).items():
+        for label, changes in readings.items():
+            vehicle = changes.pop(VEHICLE, {})
+            rows.append(Row(group, label, changed(changes), vehicle))
+    return rows
+
+
+def search() -> list[Row]:
+    """Return a row for each combination of throttle scale, Lambda, rate and noise."""
+    rows = []
+    for scale, form, rate, noise in product(SCALES, FORMS, RATES, NOISES):
+        profile = changed({
+            POSITION: {"lambda_form": form},
+            BRIDGE: {"throttle_per_newton": scale, "setpoint_rate": rate},
+            ARM: {"goal_rate": rate},
+        })  # fmt: skip
+        often = f"{rate:g} Hz" if rate else "every tick"
+        label = f"{scale:g} per N, {form}, {often}, noise x {noise:g}"
+        rows.append(Row("search", label, profile, {"sensors.noise_scale": noise}))
+    return rows
+
+
+def baselines() -> list[Row]:
+    """Return the reconstructed baselines in the same reading; their published gains are unknown.
+
+    Their tau_p is the force on the vehicle's mass: the throttle per newton is smaller by it.
+    """
+    own = load_profile(AS_FLOWN).sections
+    rows = []
+    for name, label in (("asmc1", "ASMC-1"), ("asmc2", "ASMC-2")):
+        mass = load_profile(name).sets[POSITION].gravity_feedforward_mass
+        shared = {
+            POSITION: {"attitude_cutoff": own[POSITION]["attitude_cutoff"]},
+            ARM: {
+                k: own[ARM][k] for k in ("setpoint", "goal_from", "goal_compliance", "goal_rate")
+            },
+            BRIDGE: own[BRIDGE]
+            | {"throttle_per_newton": own[BRIDGE]["throttle_per_newton"] / mass},
+        }
+        rows.append(Row("baseline", f"{label}, gains tuned here", changed(shared, name)))
+        if name == "asmc1":
+            start = {"damping": [5.0] * 3, "switching": [4.0] * 3, "gamma": 5.0}
+            sections = copy.deepcopy(shared)
+            sections[POSITION] |= start
+            rows.append(Row("baseline", f"{label}, start values", changed(sections, name)))
+    return rows
