@@ -16,6 +16,7 @@ from uam_lab.flight.direct.flight import DirectFlight
 from uam_sim_bridge.autopilot import companion
 from uam_sim_bridge.faults.schedule import read_schedule
 from uam_sim_bridge.plant import Vehicle
+from uam_sim_bridge.plant.effects import presets
 
 PACKAGES = ("uam_control", "uam_sim_bridge", "uam_lab")
 TICKS = 1000  # 4 s: the vehicle is armed and in the air by then, and every function has run
@@ -45,7 +46,8 @@ def prepare(say: Callable[[str], None] = lambda text: None) -> None:
 
 def warm_up(laws: Iterable[str] = tuple(LAWS)) -> None:
     """Fly a few seconds in the direct engine with each law: it runs every function of the nodes."""
-    scenario, vehicle = load_scenario("hover"), Vehicle.load()
+    scenario = load_scenario("hover")
+    vehicle = Vehicle.load().changed({"effects": presets.laboratory()})
     faults = read_schedule([LATE_POSES], scenario, seed=1)
     for law in laws:
         profile = default_profile(law)
