@@ -2,12 +2,14 @@
 
     .venv/bin/python benchmarks/table1.py                   # as flown, and one change at a time
     .venv/bin/python benchmarks/table1.py --only flown --seeds 20
+    .venv/bin/python benchmarks/table1.py --only flown --plant-preset laboratory --throttle 0.064
     .venv/bin/python benchmarks/table1.py --only search     # every combination of assumptions
     .venv/bin/python benchmarks/table1.py --only flown --engine ros --seeds 2
 
 The mission is the paper's, with a payload of 0.2 kg. The profile is paper_table1_as_flown; what it
 assumes and the other readings stand in table1_flights/assumptions.yaml. Rows: root mean square over
-the seeds. Writes table1.md to --out. docs/table1.md has the tables and what follows from them.
+the seeds. Writes table1.md and a picture of the part flown to --out. docs/table1.md has the tables
+and what follows from them.
 """
 
 from __future__ import annotations
@@ -16,10 +18,11 @@ import argparse
 from pathlib import Path
 
 import numpy as np
-from table1_flights import flights, table
+from table1_flights import flights, picture, table
 
 from uam_lab.campaign.pool import cores, fly_all
 from uam_lab.campaign.trial import Trial
+from uam_sim_bridge.plant.effects import presets
 
 PAYLOAD = 0.2  # [kg], the paper's
 SHOWN = 6  # rows of the search
@@ -28,13 +31,14 @@ SHOWN = 6  # rows of the search
 def fly(rows, options) -> list[table.Flown]:
     """Fly every row with every seed."""
     seeds = range(1, options.seeds + 1)
+    effects = presets.read(options.plant_preset)
     trials = [
         Trial(
             row.label,
             row.profile,
             PAYLOAD,
             seed,
-            vehicle_changes=row.vehicle,
+            vehicle_changes=presets.added(row.vehicle, effects),
             engine=options.engine,
         )
         for row in rows
@@ -56,9 +60,14 @@ def fly(rows, options) -> list[table.Flown]:
 
 def flown(options) -> str:
     """Return the table of the profile itself and of the baselines in the same reading."""
-    found = fly([flights.as_flown(), *flights.baselines()], options)
-    labels = ["Table I as flown", *(f"{one.row.label} (reconstruction)" for one in found[1:])]
-    return table.beside_the_paper(list(zip(labels, found, strict=True)))
+    found = fly([flights.as_flown(options.throttle), *flights.baselines()], options)
+    labels = [
+        f"Table I {found[0].row.label}",
+        *(f"{one.row.label} (reconstruction)" for one in found[1:]),
+    ]
+    labelled = list(zip(labels, found, strict=True))
+    picture.draw(labelled, options.out / "flown.svg")
+    return table.beside_the_paper(labelled)
 
 
 def sensitivity(options) -> str:
@@ -82,6 +91,10 @@ def main() -> int:
     option = parser.add_argument
     text = "part to fly (default: flown and sensitivity); may be repeated"
     option("--only", action="append", choices=tuple(PARTS), help=text)
+    text = "effects of the plant (default: calm); may be repeated"
+    option("--plant-preset", action="append", default=[], help=text)
+    text = "throttle_per_newton of the first row, in place of the profile's"
+    option("--throttle", type=float, metavar="1/N", help=text)
     option("--seeds", type=int, default=3, help="seeds 1..N (default %(default)s)")
     option("--engine", choices=("direct", "ros"), default="direct", help="(default %(default)s)")
     option("--jobs", type=int, default=cores(), help="processes (default: one per core)")

@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import numpy as np
 import pytest
+from table1_flights import flights, table
 
 from uam_control.profiles.profile import CONTROLLERS, load_profile, servo_mode
+from uam_lab.compare import plan
 from uam_lab.flight.flight_settings import settings
 from uam_sim_bridge.faults import FaultError
 from uam_sim_bridge.plant import Vehicle
@@ -31,6 +34,31 @@ def test_the_servos_take_the_mode_that_the_arms_setpoints_need():
     assert changed.numbers["servos"]["mode"] == "position"
 
 
+def test_it_is_a_row_of_the_comparison():
+    (row,) = plan.entries(["table1_flown"])
+    assert (row.label, row.profile.name) == ("Table I as probably flown", NAME)
+
+
 def test_a_fault_of_torque_commands_is_refused_with_goal_positions():
     with pytest.raises(FaultError, match="servo_weak: .*goal positions"):
         settings(profile=NAME, faults=["servo_weak@10:joint=1"], engine="direct")
+
+
+def test_a_row_is_close_within_a_factor_of_two_of_the_papers():
+    row = flights.Row("", "a row", load_profile(NAME))
+    rms = np.array(
+        [[0.1, 0.01, 0.5, 3.0, 2.0, 3.0, 2.0, 1.0], [0.1, 0.01, 0.5, 3.0, 2.0, 3.0, 2.0, 7.0]]
+    )
+    one = table.Flown(row, rms, ("completed", "lost"))
+    # root mean square of 1 and 7 is 5; x exactly 2, y exactly 1/2 of the paper's
+    assert one.mean[7] == pytest.approx(5.0)
+    np.testing.assert_allclose(one.ratios[:3], [2.0, 0.5, 0.5 / 0.09])
+    assert (one.close, one.completed) == (6, "1 of 2")
+
+
+def test_every_reading_changes_one_assumption_of_a_valid_profile():
+    rows, own = flights.sensitivity(), load_profile(NAME)
+    assert len(rows) > 20 and len({row.label + row.group for row in rows}) == len(rows)
+    for row in rows:
+        assert row.profile.sections != own.sections or row.vehicle
+        Vehicle.load().changed(row.vehicle)  # the entries exist

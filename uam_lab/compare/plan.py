@@ -25,8 +25,9 @@ PROPOSED = "proposed"
 ASMC1, ASMC2 = catalogue.label("asmc1"), catalogue.label("asmc2")
 FROZEN = "proposed, adaptation frozen"
 VERBATIM, WITH_WEIGHT = "Table I verbatim", "Table I and the weight"
+FLOWN = "Table I as probably flown"
 PAYLOADS = (0.1, 0.2, 0.3)  # [kg]
-TABLE1 = "paper_table1"  # profile
+TABLE1, TABLE1_FLOWN = "paper_table1", "paper_table1_as_flown"  # profiles
 
 
 # Row names of the command line → labels: baselines, proposed law, variants of the proposed law.
@@ -36,6 +37,7 @@ ROWS = {
     "frozen": FROZEN,
     "table1": VERBATIM,
     "table1_weight": WITH_WEIGHT,
+    "table1_flown": FLOWN,
 }
 
 
@@ -76,6 +78,7 @@ def entries(
         "proposed": lambda: proposed,
         "frozen": lambda: frozen(proposed),
         "table1": lambda: load_profile(TABLE1, vehicle=vehicle),
+        "table1_flown": lambda: load_profile(TABLE1_FLOWN, vehicle=vehicle),
         "table1_weight": lambda: with_weight(load_profile(TABLE1, vehicle=vehicle), proposed),
     }
     return tuple(
