@@ -27,6 +27,7 @@ FROZEN = "proposed, adaptation frozen"
 VERBATIM, WITH_WEIGHT = "Table I verbatim", "Table I and the weight"
 FLOWN = "Table I as probably flown"
 PAYLOADS = (0.1, 0.2, 0.3)  # [kg]
+PX4_POSITION, PX4_PROFILE = "PX4's position control", "px4_position"  # label, profile
 TABLE1, TABLE1_FLOWN = "paper_table1", "paper_table1_as_flown"  # profiles
 
 
@@ -38,6 +39,7 @@ ROWS = {
     "table1": VERBATIM,
     "table1_weight": WITH_WEIGHT,
     "table1_flown": FLOWN,
+    "px4_position": PX4_POSITION,
 }
 
 
@@ -79,6 +81,7 @@ def entries(
         "frozen": lambda: frozen(proposed),
         "table1": lambda: load_profile(TABLE1, vehicle=vehicle),
         "table1_flown": lambda: load_profile(TABLE1_FLOWN, vehicle=vehicle),
+        "px4_position": lambda: load_profile(str(proposed.file), PX4_PROFILE, vehicle=vehicle),
         "table1_weight": lambda: with_weight(load_profile(TABLE1, vehicle=vehicle), proposed),
     }
     return tuple(

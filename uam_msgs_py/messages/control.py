@@ -89,14 +89,16 @@ def read_reference(data: bytes) -> tuple[int, Reference]:
 
 @dataclass(frozen=True)
 class PositionCommand:
-    """tau_p (3,) [N, world]; attitude (3, 3): rows q_d, Omega_d, Omega_d_dot. Zeros while idle."""
+    """tau_p (3,) [N, world]; attitude (3, 3): rows q_d, Omega_d, Omega_d_dot; reference (3, 3):
+    rows p_d, p_d_dot, p_d_ddot. Zeros while idle."""
 
     tau: np.ndarray
     attitude: np.ndarray
     flying: bool
+    reference: np.ndarray
 
 
-NO_COMMAND = PositionCommand(np.zeros(3), np.zeros((3, 3)), False)
+NO_COMMAND = PositionCommand(np.zeros(3), np.zeros((3, 3)), False, np.zeros((3, 3)))
 
 
 class PositionCommandWriter(CommandWriter):
@@ -128,8 +130,8 @@ def read_position_command(data: bytes) -> tuple[int, PositionCommand]:
         return message.stamp, NO_COMMAND
     values = POSE.read(message)
     # a copy: a strided array would make Numba compile the control path a second time, in flight
-    attitude = values[:3, ATTITUDE].copy()
-    return message.stamp, PositionCommand(values[3, POSITION], attitude, True)
+    attitude, reference = values[:3, ATTITUDE].copy(), values[:3, POSITION].copy()
+    return message.stamp, PositionCommand(values[3, POSITION], attitude, True, reference)
 
 
 class TorqueWriter(CommandWriter):

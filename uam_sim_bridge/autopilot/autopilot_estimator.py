@@ -28,6 +28,8 @@ _PLACE, _SPEED, _END = 4, 7, 10
 ATTITUDE, POSITION, VELOCITY = slice(_PLACE), slice(_PLACE, _SPEED), slice(_SPEED, _END)
 DOWN = _END - 1  # of `estimate`: velocity downwards
 
+HISTORY = 64  # samples of the estimate that are kept: a quarter of a second
+OLDEST = 0.2  # [s] age up to which the stamp of a pose is used
 VISION_TIMEOUT = 0.5  # s
 ALIGN_SAMPLES = 5  # vision poses until the estimate is valid
 MAX_TILT_DIFFERENCE = math.radians(10.0)  # between vision and measured gravity, at rest
@@ -42,6 +44,12 @@ _BIAS_MAX = 0.4  # m/s^2
 _LONGEST_PULL = 0.04  # s, longest interval used for the correction by one pose
 _FORCE_TIME = 0.2  # s, time constant of the mean specific force
 _VELOCITY_KEPT = 5.0  # s without vision, after which the next pose resets the velocity to 0
+
+
+def age_of(stamp: float, time: float) -> float:
+    """Return the age [s] of a pose of `stamp` [s] at `time` [s]; 0 for a stamp of another clock."""
+    age = time - stamp
+    return age if 0.0 <= age <= OLDEST else 0.0
 
 
 @jit
@@ -125,6 +133,9 @@ class Estimator:
         self._vision_count = 0
         self._vision_down = np.array([0.0, 0.0, 1.0])
         self._force = np.zeros(3)
+        self._past = np.zeros((HISTORY, _SPEED))  # attitude and position of the last samples
+        self._stamps = np.full(HISTORY, -math.inf)  # [s]
+        self._newest = 0
         self._bias = np.zeros(3)
 
     def aided(self, time: float) -> bool:
@@ -138,13 +149,20 @@ class Estimator:
         """
         aided = self.aided(time)
         predict(gyro, accel, dt, aided, self.estimate, self._bias, self._force)
+        self._newest = (self._newest + 1) % HISTORY
+        self._past[self._newest], self._stamps[self._newest] = self.estimate[:_SPEED], time
         return aided
 
-    def vision(self, time: float, position: np.ndarray, quaternion: np.ndarray) -> None:
+    def vision(
+        self, time: float, position: np.ndarray, quaternion: np.ndarray, age: float = 0.0
+    ) -> None:
         """Correct by a pose that arrives at `time` [s]; the first after a gap sets the estimate.
 
-        position (3,) [m, NED]; quaternion (4,) [w x y z], FRD → NED.
+        position (3,) [m, NED]; quaternion (4,) [w x y z], FRD → NED; age [s]: the pose is compared
+        with the estimate at time - age, as PX4's EKF2 fuses at its delayed horizon.
         """
+        if age > 0.0:
+            position, quaternion = self._moved_on(time - age, position, quaternion)
         gap = time - self._vision_time
         self._vision_time = time
         self._vision_down = matrix_from_quaternion(quaternion)[2].copy()
@@ -157,6 +175,16 @@ class Estimator:
             return
         self._vision_count += 1
         correct(position, quaternion, gap, self.estimate, self._bias)
+
+    def _moved_on(
+        self, exposed: float, position: np.ndarray, quaternion: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """Return a pose of `exposed` [s], moved by the estimated motion since then."""
+        past = self._past[np.argmin(np.abs(self._stamps - exposed))]
+        now, back = self.estimate, past[ATTITUDE] * np.array([1.0, -1.0, -1.0, -1.0])
+        error = quaternion_multiply(back, quaternion)
+        moved = quaternion_multiply(now[ATTITUDE], error)
+        return position + now[POSITION] - past[POSITION], moved
 
     def faults(self, time: float) -> list[str]:
         """Return the reasons against arming in PX4's wording; empty if the estimate is valid."""

@@ -9,12 +9,13 @@ import numpy as np
 
 from uam_control.maths.rotations import matrix_from_quaternion, quaternion_from_euler, rotate
 from uam_control.settings.parameter_set import ParameterError
-from uam_sim_bridge.autopilot.autopilot_estimator import GRAVITY
+from uam_sim_bridge.autopilot.autopilot_estimator import GRAVITY, age_of
 from uam_sim_bridge.autopilot.core import Autopilot
 from uam_sim_bridge.autopilot.params import DEFINITIONS
 from uam_sim_bridge.autopilot.telemetry import Telemetry
 from uam_sim_bridge.mavlink.protocol.attitude_target import AttitudeTarget
 from uam_sim_bridge.mavlink.protocol.modes import MavCmd, MavResult, Severity
+from uam_sim_bridge.mavlink.protocol.position_target import PositionTarget
 from uam_sim_bridge.mavlink.protocol.wire import Message, clean_text, mavlink2, text_chunks
 
 _PARAMETERS_PER_TICK = 10
@@ -35,6 +36,7 @@ class Companion:
         self._said: set[str] = set()
         self._handlers = {
             "SET_ATTITUDE_TARGET": self._attitude_target,
+            "SET_POSITION_TARGET_LOCAL_NED": self._position_target,
             "VISION_POSITION_ESTIMATE": self._vision_position,
             "ODOMETRY": self._odometry,
             "COMMAND_LONG": self._command_long,
@@ -76,18 +78,26 @@ class Companion:
         if refused:
             self._say_once(f"setpoint refused: {refused}")
 
+    def _position_target(self, time: float, m: Message) -> None:
+        refused = f"frame {m.coordinate_frame}, local NED expected"
+        if m.coordinate_frame == mavlink2.MAV_FRAME_LOCAL_NED:
+            refused = self._autopilot.target(time, PositionTarget.from_message(m))
+        if refused:
+            self._say_once(f"setpoint refused: {refused}")
+
     def _vision_position(self, time: float, m: Message) -> None:
         euler = np.array([m.roll, m.pitch, m.yaw])
         position = np.array([m.x, m.y, m.z])
         if np.all(np.isfinite(euler)):
-            self._autopilot.vision(time, position, quaternion_from_euler(euler))
+            age = age_of(1e-6 * m.usec, time)
+            self._autopilot.vision(time, position, quaternion_from_euler(euler), age)
 
     def _odometry(self, time: float, m: Message) -> None:
         position, quaternion = np.array([m.x, m.y, m.z]), np.array(m.q, dtype=float)
         if m.frame_id not in _POSE_FRAMES:
             self._say_once(f"odometry refused: frame {m.frame_id}, local NED or FRD expected")
         else:
-            self._autopilot.vision(time, position, quaternion)
+            self._autopilot.vision(time, position, quaternion, age_of(1e-6 * m.time_usec, time))
 
     def _command_long(self, time: float, m: Message) -> None:
         parameters = (m.param1, m.param2, m.param3, m.param4, m.param5, m.param6, m.param7)

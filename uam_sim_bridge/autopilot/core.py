@@ -23,6 +23,7 @@ from uam_sim_bridge.autopilot.commander import Commander
 from uam_sim_bridge.autopilot.descent import Descent
 from uam_sim_bridge.autopilot.landing import LandDetector
 from uam_sim_bridge.autopilot.params import Parameters
+from uam_sim_bridge.autopilot.position_control import PositionControl
 from uam_sim_bridge.autopilot.position_modes import MODES, PositionModes
 from uam_sim_bridge.autopilot.rate_control import (
     INTEGRAL,
@@ -48,6 +49,7 @@ from uam_sim_bridge.mavlink.protocol.modes import (
     MavResult,
     Mode,
 )
+from uam_sim_bridge.mavlink.protocol.position_target import PositionTarget
 
 FARTHEST_VISION = 1e5  # m
 SHORTEST_STEP, LONGEST_STEP = 0.000125, 0.02  # s, bounds of the time step (PX4)
@@ -135,6 +137,8 @@ class Autopilot:
         self._descent = Descent(self.parameters)
         self._position_modes = PositionModes(self.parameters)
         self._setpoint = np.zeros(4)  # body rates [rad/s, FRD], thrust
+        self._position: PositionTarget | None = None  # flown in place of body rates or attitude
+        self._position_control = PositionControl(self.parameters)
         self._desired: np.ndarray | None = None  # attitude FRD → NED, None: body rates are flown
         self._yaw_rate = 0.0  # [rad/s] about the world's z axis, down
         self._memory = np.zeros((7, 3))
@@ -157,14 +161,19 @@ class Autopilot:
         self._sample_rate = sample_rate
         self._configure()
 
-    def target(self, time: float, target: AttitudeTarget) -> str:
-        """Set the setpoint of body rates or attitude; return the reason of a refusal, else "".
+    def target(self, time: float, target: AttitudeTarget | PositionTarget) -> str:
+        """Set the setpoint of body rates, attitude or position; return why it is refused, else "".
 
         A setpoint that is not finite is refused; the thrust is clamped to 0..1.
         """
         refused = target.refused()
         if refused:
             return refused
+        if isinstance(target, PositionTarget):
+            self._position = target
+            self.commander.setpoint(time)
+            return ""
+        self._position = None
         setpoint, rates = self._setpoint, target.rates
         setpoint[0] = rates[0]
         setpoint[1] = rates[1]
@@ -177,15 +186,17 @@ class Autopilot:
         self.commander.setpoint(time)
         return ""
 
-    def vision(self, time: float, position: np.ndarray, quaternion: np.ndarray) -> bool:
+    def vision(
+        self, time: float, position: np.ndarray, quaternion: np.ndarray, age: float = 0.0
+    ) -> bool:
         """Handle an external pose; False: refused as not usable.
 
-        position (3,) [m, NED]; quaternion (4,) [w x y z], FRD → NED.
+        position (3,) [m, NED]; quaternion (4,) [w x y z], FRD → NED; age [s] at its arrival.
         """
         norm = magnitude_of_usable(position, quaternion)
         if not norm:
             return False
-        self.estimator.vision(time, position, quaternion / norm)
+        self.estimator.vision(time, position, quaternion / norm, age)
         return True
 
     def manual(self, time: float, sticks: tuple[float, float, float, float]) -> None:
@@ -234,12 +245,19 @@ class Autopilot:
         commander.update(time, landing.landed, self.battery.state)
         setpoint = self._setpoint
         descending = False
+        if self._position is None or not commander.armed or commander.mode is not Mode.OFFBOARD:
+            self._position_control.reset()
         if commander.armed and commander.mode is not Mode.OFFBOARD:
             setpoint, descending = self._own_setpoint(commander.mode, aided, dt)
+        elif commander.armed and self._position is not None and not aided:
+            setpoint, descending = self._descent.update(self.estimator.estimate, dt), True
         else:
             self._descent.integral = 0.0
             self._position_modes.reset()
-            if self._desired is not None:
+            if commander.armed and self._position is not None:
+                estimate = self.estimator.estimate
+                setpoint = self._position_control.update(self._position, estimate, dt)
+            elif self._desired is not None:
                 attitude = self.estimator.estimate[ESTIMATED_ATTITUDE]
                 attitude_rates(
                     attitude, self._desired, self._yaw_rate, self._attitude_gains, setpoint
@@ -327,3 +345,4 @@ class Autopilot:
         self.landing.configure(p)
         self._descent.configure(p)
         self._position_modes.configure(p)
+        self._position_control.configure(p)

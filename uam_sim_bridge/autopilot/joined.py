@@ -14,6 +14,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from uam_sim_bridge.autopilot.autopilot_estimator import age_of
 from uam_sim_bridge.autopilot.core import Autopilot, AutopilotStatus
 from uam_sim_bridge.mavlink.offboard.sequence import (
     COMMANDS,
@@ -22,7 +23,7 @@ from uam_sim_bridge.mavlink.offboard.sequence import (
     Reported,
     Request,
 )
-from uam_sim_bridge.mavlink.protocol.attitude_target import AttitudeTarget
+from uam_sim_bridge.mavlink.offboard.setpoints.desired import Target
 from uam_sim_bridge.mavlink.protocol.frames import swap_body, swap_quaternion, swap_world
 from uam_sim_bridge.mavlink.protocol.modes import MavResult, Mode, Severity
 from uam_sim_bridge.mavlink.protocol.vision import VisionPose
@@ -131,9 +132,9 @@ class JoinedAutopilot:
     def send_vision(self, pose: VisionPose) -> None:
         """Send a mocap pose."""
         position, quaternion = swap_world(pose.position), swap_quaternion(pose.quaternion)
-        self._send(lambda: self.autopilot.vision(self.time, position, quaternion))
+        self._send(lambda: self._vision(pose.stamp, position, quaternion))
 
-    def send_setpoint(self, target: AttitudeTarget, time: float) -> None:
+    def send_setpoint(self, target: Target, time: float) -> None:
         """Send the setpoint of the tick `time` [s]."""
         self._send(lambda: self._target(target))
 
@@ -147,10 +148,13 @@ class JoinedAutopilot:
         else:
             deliver()
 
+    def _vision(self, stamp: float, position: np.ndarray, quaternion: np.ndarray) -> None:
+        self.autopilot.vision(self.time, position, quaternion, age_of(stamp, self.time))
+
     def _command(self, request: Request) -> None:
         self._answers.append((request, self.autopilot.command(self.time, *COMMANDS[request])))
 
-    def _target(self, target: AttitudeTarget) -> None:
+    def _target(self, target: Target) -> None:
         self.autopilot.target(self.time, target)
         self._delivered = self._now
 

@@ -70,6 +70,16 @@ DEFINITIONS: dict[str, Definition] = {
     "MPC_XY_P": Definition(0.95, 0.0, 2.0, "1/s", "P of the horizontal position loop"),
     "MPC_XY_VEL_P_ACC": Definition(1.8, 1.2, 5.0, "1/s", "P of the horizontal velocity loop"),
     "MPC_XY_VEL_I_ACC": Definition(0.4, 0.0, 60.0, "1/s^2", "I of the horizontal velocity loop"),
+    "MPC_XY_VEL_D_ACC": Definition(0.2, 0.1, 2.0, "1", "D of the horizontal velocity loop"),
+    "MPC_Z_VEL_D_ACC": Definition(0.0, 0.0, 2.0, "1", "D of the vertical velocity loop"),
+    "MPC_VELD_LP": Definition(5.0, 0.0, 50.0, "Hz", "low pass on the velocity's derivative"),
+    "MPC_XY_VEL_MAX": Definition(12.0, 0.0, 20.0, "m/s", "largest horizontal velocity setpoint"),
+    "MPC_Z_VEL_MAX_UP": Definition(3.0, 0.5, 8.0, "m/s", "largest velocity setpoint upwards"),
+    "MPC_Z_VEL_MAX_DN": Definition(1.5, 0.5, 4.0, "m/s", "largest velocity setpoint downwards"),
+    "MPC_THR_XY_MARG": Definition(0.3, 0.0, 0.5, "1", "thrust kept for the horizontal direction"),
+    "MPC_ACC_DECOUPLE": Definition(
+        1, 0, 1, "1", "vertical acceleration does not change the tilt", True
+    ),
     "MPC_TILTMAX_AIR": Definition(45.0, 20.0, 89.0, "deg", "largest tilt of the position modes"),
     "MPC_VEL_MANUAL": Definition(10.0, 3.0, 20.0, "m/s", "speed of a full stick in POSITION"),
     "MPC_MAN_Y_MAX": Definition(150.0, 0.0, 400.0, "deg/s", "yaw rate of a full stick"),

@@ -207,7 +207,13 @@ class MavlinkBridgeNode(UamNode):
             setpoint = self.stage.without(stamp)
         else:
             setpoint = self.stage.tick(
-                stamp, state, position.flying, position.tau, *torque, position.attitude
+                stamp,
+                state,
+                position.flying,
+                position.tau,
+                *torque,
+                position.attitude,
+                position.reference,
             )
         self._end_tick(stamp)
         if stamp // THRUST_PERIOD != self.stamp // THRUST_PERIOD:

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from typing import Protocol
 
-from uam_sim_bridge.mavlink.protocol.attitude_target import AttitudeTarget
+from uam_sim_bridge.mavlink.offboard.setpoints.desired import Target
 from uam_sim_bridge.mavlink.protocol.modes import Mode
 from uam_sim_bridge.mavlink.protocol.vision import VisionPose
 
@@ -50,6 +50,6 @@ class AutopilotPort(Protocol):
         """Send a mocap pose."""
         ...
 
-    def send_setpoint(self, target: AttitudeTarget, time: float) -> None:
+    def send_setpoint(self, target: Target, time: float) -> None:
         """Send the setpoint of the tick `time` [s]."""
         ...

@@ -149,14 +149,18 @@ class BridgeStage:
         tau_p: np.ndarray,
         tau_q: np.ndarray | None,
         attitude: np.ndarray,
+        reference: np.ndarray,
     ) -> Setpoint:
         """Send the setpoint of a tick with commands, and return it; None: none was sent.
 
         state (3, 6 + n); flying: whether tau_p (3,) [N, ENU] is valid; tau_q (3,) [N m, FLU], None
-        for idle; attitude (3, 3): of the position law, see `Desired`.
+        for idle; attitude (3, 3): of the position law, reference (3, 3): of the mission, see
+        `Desired`.
         """
         now, situation = stamp / SECOND, self._situation
-        setpoint = self.source.commanded(now, state, flying, tau_p, tau_q, attitude, situation)
+        setpoint = self.source.commanded(
+            now, state, flying, tau_p, tau_q, attitude, situation, reference
+        )
         setpoint = self._sampled(now, setpoint, flying)
         self._send(now, setpoint)
         self.report = self._reports.due(stamp)
@@ -166,7 +170,7 @@ class BridgeStage:
             state,
             thrust,
             self.map.assumed_thrust(thrust),
-            flying and situation.armed and not situation.let_go,
+            flying and situation.armed and not situation.let_go and math.isfinite(thrust),
         )
         return setpoint
 

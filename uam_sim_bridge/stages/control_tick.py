@@ -13,7 +13,7 @@ from typing import Self
 import numpy as np
 
 from uam_control.control.controllers import ArmController, AttitudeController, PositionController
-from uam_control.coordinates import ARM, coordinates
+from uam_control.coordinates import ARM, POSITION, coordinates
 from uam_control.mission import Mission, Scenario, StartParameters
 from uam_control.settings.parameter_set import ParameterSet
 from uam_control.stages.estimator_stage import EstimatorStage
@@ -212,7 +212,10 @@ def send_setpoint(tick: ControlTick) -> bool:
     bridge.hear(s.stamp)
     bridge.note_state(s.stamp, s.state)
     tau_q = s.tau_q if s.flying else None
-    s.setpoint = bridge.tick(s.stamp, s.state, s.flying, s.tau_p, tau_q, s.attitude_reference)
+    reference = s.reference[:, POSITION]
+    s.setpoint = bridge.tick(
+        s.stamp, s.state, s.flying, s.tau_p, tau_q, s.attitude_reference, reference
+    )
     s.thrust_factor, report = bridge.factor, bridge.report
     if report is not None:
         authority = Authority(report.released_to, report.landed, report.mode.lands)

@@ -16,7 +16,7 @@ from uam_sim_bridge.mavlink.offboard.sequence import (
     Request,
 )
 from uam_sim_bridge.mavlink.offboard.setpoint import RateThrustParameters
-from uam_sim_bridge.mavlink.protocol.attitude_target import AttitudeTarget
+from uam_sim_bridge.mavlink.offboard.setpoints.desired import Target
 from uam_sim_bridge.mavlink.protocol.modes import MavCmd, MavResult, Mode
 from uam_sim_bridge.mavlink.protocol.signing import Signing
 from uam_sim_bridge.mavlink.protocol.vision import VisionPose
@@ -163,12 +163,13 @@ class OffboardLink:
         self.sequence.kill()
         self._request(Request.KILL)
 
-    def send_setpoint(self, target: AttitudeTarget, time: float) -> None:
-        """Send the setpoint of the tick `time` [s]: SET_ATTITUDE_TARGET.
+    def send_setpoint(self, target: Target, time: float) -> None:
+        """Send the setpoint of the tick `time` [s]: SET_ATTITUDE_TARGET, or
+        SET_POSITION_TARGET_LOCAL_NED.
 
         Raises ValueError if a value is not finite or thrust is out of range.
         """
-        if target.refused() or not 0.0 <= target.thrust <= 1.0:
+        if target.refused() or target.thrust < 0.0 or target.thrust > 1.0:
             raise ValueError(f"setpoint {target}; finite values and thrust 0..1 allowed")
         self._send(target.message(time, self._target))
 

@@ -24,21 +24,21 @@ from uam_control.coordinates import ALPHA, ATTITUDE, CHI, CHI_DDOT, CHI_DOT, POS
 from uam_control.maths.rotations import euler_from_quaternion, matrix_from_euler
 from uam_sim_bridge.mavlink.offboard.hold import UNKNOWN, HoldParameters, LevelHold
 from uam_sim_bridge.mavlink.offboard.setpoint import RateThrustMap, SetpointRefused
-from uam_sim_bridge.mavlink.offboard.setpoints.desired import Desired, SetpointType, level
+from uam_sim_bridge.mavlink.offboard.setpoints.desired import Desired, SetpointType, Target, level
 from uam_sim_bridge.mavlink.offboard.setpoints.rates import rates_setpoint
-from uam_sim_bridge.mavlink.protocol.attitude_target import STILL, AttitudeTarget
+from uam_sim_bridge.mavlink.protocol.attitude_target import STILL
 
 HANDOVER = 0.2  # s after control came back in which the first commands arrive
 MOST_RATE = 2.0  # rad/s, largest body rate that is kept for a released vehicle
 LEAST_LIFT, MOST_LIFT = 0.5, 1.5  # bounds of its thrust, in parts of the mean thrust
 
-Setpoint = AttitudeTarget | None  # None: no setpoint is sent
+Setpoint = Target | None  # None: no setpoint is sent
 
 
 def sent(setpoint: Setpoint) -> tuple[np.ndarray, float]:
     """Return body rates (3,) [rad/s, FLU] and thrust 0..1 of a setpoint for the recording.
 
-    The rates are NaN for a setpoint without body rates. Without a setpoint both are zero.
+    NaN for what the setpoint does not contain. Without a setpoint both are zero.
     """
     return (STILL, 0.0) if setpoint is None else (setpoint.body_rates, setpoint.thrust)
 
@@ -109,11 +109,12 @@ class SetpointSource:
         tau_q: np.ndarray | None,
         attitude: np.ndarray,
         situation: Situation,
+        reference: np.ndarray | None = None,
     ) -> Setpoint:
         """Return the setpoint of a tick with commands.
 
         now [s]; state (3, 6 + n); flying: whether tau_p (3,) [N, ENU] is valid; tau_q (3,)
-        [N m, FLU], None for idle; attitude (3, 3): see `Desired`.
+        [N m, FLU], None for idle; attitude, reference (3, 3): see `Desired`.
         """
         if situation.released:
             return self._present(now, situation)
@@ -127,7 +128,7 @@ class SetpointSource:
             except SetpointRefused as error:
                 self._say(f"setpoint refused: {error}", None)
             else:
-                desired = Desired(rates, attitude, thrust)
+                desired = Desired(rates, attitude, thrust, reference)
                 setpoint = self._type(desired)
                 refused = setpoint.refused()
                 if not refused:
@@ -168,7 +169,7 @@ class SetpointSource:
         self._present_at = now
         return self._at_present(now)
 
-    def _at_present(self, now: float) -> AttitudeTarget:
+    def _at_present(self, now: float) -> Target:
         """Return the setpoint that keeps the present motion: body rates, attitude and thrust.
 
         The thrust is the mean thrust of the flight so far, times the present acceleration along
@@ -187,7 +188,7 @@ class SetpointSource:
         return self._type(Desired(rates, angles, thrust))
 
     @property
-    def _idle(self) -> AttitudeTarget:
+    def _idle(self) -> Target:
         yaw = self._estimated[1][2]
         return self._type(Desired(np.zeros(3), level(yaw if math.isfinite(yaw) else 0.0), 0.0))
 

@@ -7,11 +7,13 @@ from dataclasses import dataclass
 from uam_control.settings.parameter_set import ParameterSet, choice, number
 from uam_sim_bridge.mavlink.offboard.setpoints.attitude import attitude_setpoint
 from uam_sim_bridge.mavlink.offboard.setpoints.desired import SetpointType
+from uam_sim_bridge.mavlink.offboard.setpoints.position import position_setpoint
 from uam_sim_bridge.mavlink.offboard.setpoints.rates import rates_setpoint
 
 SETPOINTS: dict[str, SetpointType] = {
     "rates": rates_setpoint,
     "attitude": attitude_setpoint,
+    "position": position_setpoint,
 }
 
 
@@ -21,7 +23,7 @@ class SetpointParameters(ParameterSet):
 
     setpoint: str = choice(
         "rates",
-        "what is sent with the thrust; only rates act as tau_q",
+        "what is sent: rates or attitude with the thrust, or position; only rates act as tau_q",
         tuple(SETPOINTS),
     )
 

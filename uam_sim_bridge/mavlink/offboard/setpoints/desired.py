@@ -9,6 +9,7 @@ import numpy as np
 
 from uam_control.coordinates import CHI, Z
 from uam_sim_bridge.mavlink.protocol.attitude_target import AttitudeTarget
+from uam_sim_bridge.mavlink.protocol.position_target import PositionTarget
 
 
 @dataclass(slots=True)
@@ -17,16 +18,19 @@ class Desired:
 
     rates (3,): body rates that make tau_q in the autopilot's rate loop [rad/s, FLU]; attitude
     (3, 3): rows q_d = roll, pitch, yaw [rad, FLU in ENU], Omega_d [rad/s], Omega_d_dot [rad/s^2],
-    both in the desired body frame (FLU); thrust: 0..1.
+    both in the desired body frame (FLU); thrust: 0..1; reference (3, 3): rows position [m],
+    velocity [m/s], acceleration [m/s^2] of the mission, ENU; None: there is none.
     """
 
     rates: np.ndarray
     attitude: np.ndarray
     thrust: float
+    reference: np.ndarray | None = None
 
 
 # A setpoint type returns the part of the desired motion that is sent, in the autopilot's frames.
-SetpointType = Callable[[Desired], AttitudeTarget]
+Target = AttitudeTarget | PositionTarget
+SetpointType = Callable[[Desired], Target]
 
 
 def level(yaw: float) -> np.ndarray:
