@@ -86,61 +86,6 @@ def test_sampled_trajectory_meets_its_samples():
     assert value(sampled, 99.0)[0, 0] == samples[-1, 0, 0] and not value(sampled, 99.0)[1:].any()
 
 
-CSV_REQUIRED = "t,px,py,pz,yaw,vx,vy,vz,ax,ay,az,dyaw".split(",")
-ROW = "{t},0,0,1,0,0,0,0,0,0,0,0"
-
-
-HEADER = ",".join(CSV_REQUIRED)
-TWO_ROWS = (ROW.format(t=0), ROW.format(t=1))
-
-
-def csv_file(folder, header=HEADER, rows=TWO_ROWS):
-    file = folder / "trajectory.csv"
-    file.write_text("\n".join([header, *rows]) + "\n")
-    return str(file)
-
-
-def test_csv_is_flown_between_take_off_and_landing(tmp_path):
-    rows = [f"{t},{0.1 * t},0,1.2,0,0.1,0,0,0,0,0,0,0.1,1.2" for t in range(5)]
-    scenario = load_scenario(csv_file(tmp_path, ",".join(CSV_REQUIRED) + ",alpha_1,alpha_2", rows))
-    trajectory = scenario.trajectory(START)
-    assert value(trajectory, 0.0)[0] == pytest.approx(START)
-    assert value(trajectory, 3.0)[0, [2, 6, 7]] == pytest.approx([1.2, 0.1, 1.2])
-    assert value(trajectory, 5.0)[0, 0] == pytest.approx(0.2)
-    end = scenario.landing.at + scenario.landing.duration
-    assert value(trajectory, end)[0, 2] < START[2]
-
-
-@pytest.mark.parametrize(
-    ("changes", "reason"),
-    [
-        ({"header": "t,px,py"}, "line 1: column pz, yaw.* is missing"),
-        ({"rows": [ROW.format(t=0), ROW.format(t="nan")]}, "line 3 column t: 'nan'"),
-        ({"rows": [ROW.format(t=1), ROW.format(t=0.5)]}, "line 3 column t: time does not increase"),
-        ({"rows": [ROW.format(t=0)]}, "at least two rows"),
-        ({"rows": [ROW.format(t=0), "1,0,0,x,0,0,0,0,0,0,0,0"]}, "line 3 column pz: 'x'"),
-        ({"rows": [ROW.format(t=0), "1,0,0,-1,0,0,0,0,0,0,0,0"]}, "line 3 column pz: below"),
-        (
-            {
-                "header": ",".join(CSV_REQUIRED) + ",alpha_1",
-                "rows": [ROW.format(t=0) + ",0", ROW.format(t=1) + ",0"],
-            },
-            "without alpha_",
-        ),
-        (
-            {
-                "header": ",".join(CSV_REQUIRED) + ",alpha_1,alpha_2,alpha_3",
-                "rows": [ROW.format(t=0) + ",0,0,0", ROW.format(t=1) + ",0,0,0"],
-            },
-            "s500_arm has: alpha_1,alpha_2",
-        ),
-    ],
-)
-def test_bad_csv_is_refused_naming_line_and_column(tmp_path, changes, reason):
-    with pytest.raises(ScenarioError, match=reason):
-        load_scenario(csv_file(tmp_path, **changes))
-
-
 @pytest.mark.parametrize(
     ("text", "reason"),
     [

@@ -2,4 +2,6 @@
 
 from uam_control.mission.flight_sequence import Mission, MissionOutput
 from uam_control.mission.mission_parameters import MissionParameters, StartParameters
-from uam_control.mission.scenario import Scenario, ScenarioError, load_scenario
+from uam_control.mission.scenario import Scenario, ScenarioError
+from uam_control.mission.scenario_files import load_scenario
+from uam_control.mission.scenario_options import ScenarioOptions

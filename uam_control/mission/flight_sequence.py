@@ -73,7 +73,7 @@ class Mission:
         parameters: MissionParameters,
         start: StartParameters | None = None,
     ) -> None:
-        self.scenario = scenario
+        self.scenario = self._planned = scenario
         self.output = MissionOutput(empty_reference(len(scenario.arm_start)))
         self._start = start or StartParameters()
         self._stamp = 0.0
@@ -83,7 +83,7 @@ class Mission:
 
     def _begin(self, parameters: MissionParameters) -> None:
         """Set the state before a flight; the object of the output stays."""
-        reference = self.output.reference
+        reference, self.scenario = self.output.reference, self._planned
         reference[:] = 0.0
         reference[CHI, ARM] = self.scenario.arm_start
         vars(self.output).update(vars(MissionOutput(reference)))
@@ -361,6 +361,7 @@ class Mission:
         start[3:5] = 0.0
         start[ARM] = self.scenario.arm_start
         self._takeoff, self._ground = stamp, start[2]
+        self.scenario = self._planned.begun_at(start)
         self._guidance = Guidance(
             self.scenario.trajectory(start),
             stamp,

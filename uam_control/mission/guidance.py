@@ -16,7 +16,7 @@ from uam_control.maths.rotations import wrap_angle
 from uam_control.mission.braking import Braking
 from uam_control.mission.mission_parameters import MissionParameters
 from uam_control.mission.plans import BASE, PEAK, RAMP, Plan, quintic, quintic_at, still
-from uam_control.mission.scenario import SINK
+from uam_control.mission.route import SINK
 from uam_control.mission.trajectory import Trajectory
 
 

@@ -23,6 +23,10 @@ class Section:
     def __init__(self, values: dict[str, Any], where: str, error: type[ValueError]) -> None:
         self.values, self.where, self._error = values, where, error
 
+    def error(self, key: str, text: str) -> ValueError:
+        """Return the error that the entry `key` is wrong; text: what is wrong, what is allowed."""
+        return self._error(f"{self._name(key)}: {text}")
+
     def section(self, key: str) -> Section:
         """Return the entry `key`, a mapping."""
         value = self._entry(key)
@@ -71,7 +75,16 @@ class Section:
 
     def numbers(self, key: str, count: int) -> tuple[float, ...]:
         """Return the entry `key`, a list of `count` finite numbers."""
+        return self._listed(key, self._entry(key), count)
+
+    def rows(self, key: str, count: int) -> tuple[tuple[float, ...], ...]:
+        """Return the entry `key`, a list of lists of `count` finite numbers each."""
         value = self._entry(key)
+        if not isinstance(value, list) or not value:
+            raise self._error(f"{self._name(key)}: a list of lists of numbers expected: {value!r}")
+        return tuple(self._listed(f"{key}[{i}]", row, count) for i, row in enumerate(value))
+
+    def _listed(self, key: str, value: Any, count: int) -> tuple[float, ...]:
         if not isinstance(value, list) or len(value) != count:
             raise self._error(f"{self._name(key)}: a list of {count} numbers expected: {value!r}")
         return tuple(self._checked(key, item) for item in value)

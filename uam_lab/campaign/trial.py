@@ -139,9 +139,11 @@ def _fly_nodes(trial: Trial, scenario: Scenario) -> Outcome:
 
 def figures_of(trial: Trial, outcome: Outcome, abort_reason: str) -> dict[str, Any]:
     """Return the content of metrics.json for a flight with a recorded series."""
+    scenario = trial.load_scenario()
     info = {
         "payload_mass_kg": trial.payload_mass,
-        "drop_point": trial.load_scenario().drop_point,
+        "drop_point": scenario.drop_point,
+        "landing_point": scenario.landing_point,
         "abort_reason": abort_reason,
         "transitions": outcome.transitions,
         "faults": outcome.faults,

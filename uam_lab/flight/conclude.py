@@ -35,6 +35,7 @@ def settings_facts(settings: FlightSettings) -> dict[str, Any]:
         "vehicle": settings.vehicle.source,
         "vehicle_changes": settings.vehicle_changes,
         "drop_point": list(scenario.drop_point) if scenario.drop_point else None,
+        "landing_point": list(scenario.landing_point) if scenario.landing_point else None,
         "snapshots": [list(snapshot) for snapshot in scenario.snapshots],
         "faults_planned": settings.faults.entries,
         "command": settings.command,

@@ -35,7 +35,7 @@ class ReferencePath:
 
     def __init__(self, scenario: Scenario, start: np.ndarray):
         """start: chi (6 + n,) at take-off, SI units."""
-        landing = scenario.landing
+        landing = scenario.begun_at(start).landing
         self._times = np.arange(0.0, landing.at + landing.duration + PATH_STEP, PATH_STEP)
         self._points = np.empty((len(self._times), 3))
         trajectory, reference = scenario.trajectory(start), empty_reference(len(start) - ALPHA)

@@ -117,6 +117,8 @@ def read_flight(
     values[:, columns.block("estimate.")] = state.at(ticks)
     reference = references.samples.at(ticks)
     flying = reference[:, -1] > 0.5
+    if flying.any():
+        scenario = scenario.begun_at(reference[np.argmax(flying), : columns.size])
     values[:, columns.block("reference.")] = reference[:, :-1]
     _commands(log, ticks, recording)
     for subsystem in SUBSYSTEMS:

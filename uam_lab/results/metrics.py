@@ -66,12 +66,12 @@ def compute(
 
     info: PASSED_ON, `wall_s`, `abort_reason` ("" or None without an abort); optionally
     `transitions` (of the supervisor, see `outcome.transition`), `faults`, `drop_point` [x, y] and
-    `landing_point` [x, y] (default the origin) [m], `missed_ticks`.
+    `landing_point` [x, y] (default the take-off point) [m], `missed_ticks`.
     latency_s: sensor-to-setpoint latency per tick [s], used when `clock` is "realtime".
     """
     criteria = criteria or Criteria()
     payload = payload_facts(series, info.get("payload_mass_kg"), info.get("drop_point"), criteria)
-    landing = landing_error(series, info.get("landing_point") or (0.0, 0.0))
+    landing = landing_error(series, info.get("landing_point") or takeoff_point(series))
     shortfalls = what_is_missing(
         flown=bool(series.flown.any()),
         landed=bool(series.in_phase("landed").any()),
@@ -175,6 +175,14 @@ def _first_held(time: np.ndarray, true: np.ndarray, span: float) -> float | None
         if time[end] - time[begin] >= span:
             return float(time[begin])
     return None
+
+
+def takeoff_point(series: Series) -> tuple[float, float]:
+    """Return x, y [m, world] of the reference at the take-off command; 0, 0 without a take-off."""
+    if not series.flown.any():
+        return 0.0, 0.0
+    row = int(np.argmax(series.flown))
+    return float(series["reference.x"][row]), float(series["reference.y"][row])
 
 
 def landing_error(series: Series, point: Sequence[float]) -> float | None:

@@ -1,0 +1,194 @@
+"""CSV trajectories: what is read, what is refused, and how exactly the samples are met."""
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from uam_control.mission import ScenarioError, load_scenario
+from uam_control.mission.fitted_spline import Misfit, Samples, fitted
+
+HEADER = "t,px,py,pz,yaw,vx,vy,vz,ax,ay,az,dyaw"
+ROW = "{t},0,0,1,0,0,0,0,0,0,0,0"
+TWO_ROWS = (ROW.format(t=0), ROW.format(t=1))
+AGILICIOUS = (
+    "t,p_x,p_y,p_z,q_w,q_x,q_y,q_z,v_x,v_y,v_z,w_x,w_y,w_z,a_lin_x,a_lin_y,a_lin_z,a_rot_x,a_rot_y,"
+    "a_rot_z,u_1,u_2,u_3,u_4,jerk_x,jerk_y,jerk_z,snap_x,snap_y,snap_z"
+)
+
+
+def csv_file(folder, header=HEADER, rows=TWO_ROWS):
+    file = folder / "trajectory.csv"
+    file.write_text("\n".join([header, *rows]) + "\n")
+    return str(file)
+
+
+def text(table, digits=6):
+    return [",".join(f"{number:.{digits}f}" for number in row) for row in table]
+
+
+def circle(times, rate=2.0):
+    """Columns of HEADER: radius 1 m, yaw turns with 0.3 rad/s."""
+    c, s, one = np.cos(rate * times), np.sin(rate * times), np.ones_like(times)
+    return np.column_stack(
+        [times, c, s, 1.2 * one, 0.3 * times, -rate * s, rate * c, 0 * one]
+        + [-(rate**2) * c, -(rate**2) * s, 0 * one, 0.3 * one]
+    )
+
+
+def trajectory_of(scenario):
+    """The leg of the samples."""
+    return next(leg.path for leg in scenario.route.legs if leg.phase == "trajectory")
+
+
+@pytest.mark.parametrize(
+    ("columns", "step"), [(4, 0.02), (5, 0.02), (8, 0.1), (12, 0.02), (12, 0.1), (12, 0.4)]
+)
+def test_the_reference_is_the_planners_curve(tmp_path, columns, step):
+    times = np.arange(0.0, 8.0 + step / 2, step)
+    header = ",".join(HEADER.split(",")[:columns])
+    scenario = load_scenario(csv_file(tmp_path, header, text(circle(times)[:, :columns])))
+    assert not scenario.notes
+    path, inner = trajectory_of(scenario), np.linspace(1.0, 7.0, 500)
+    rows = path.rows(inner)
+    for k, allowed in enumerate((1e-4, 1e-3, 1e-2, 0.05, 0.5)):  # of 2^k
+        exact = 2.0**k * np.cos(2.0 * inner + k * np.pi / 2)
+        assert np.abs(rows[k, :, 0] - exact).max() < allowed
+    yaw = 0.3 * inner if columns > 4 else 0.0 * inner
+    np.testing.assert_allclose(rows[0, :, 5], yaw, atol=1e-4)
+
+
+def test_agilicious_form_with_the_heading_from_the_attitude(tmp_path):
+    times = np.arange(0.0, 6.0, 0.05)
+    own = circle(times)
+    table = np.zeros((len(times), 30))
+    table[:, 0:4] = own[:, 0:4]
+    table[:, 4], table[:, 7] = np.cos(own[:, 4] / 2), np.sin(own[:, 4] / 2)
+    table[:, 8:11], table[:, 14:17] = own[:, 5:8], own[:, 8:11]
+    scenario = load_scenario(csv_file(tmp_path, AGILICIOUS, text(table)))
+    assert not scenario.notes
+    rows = trajectory_of(scenario).rows(np.array([3.0]))
+    np.testing.assert_allclose(
+        rows[0, 0, [0, 1, 2, 5]], [np.cos(6), np.sin(6), 1.2, 0.9], atol=1e-5
+    )
+    np.testing.assert_allclose(rows[1, 0, 5], 0.3, atol=1e-3)
+
+
+def test_yaw_goes_on_beyond_a_turn(tmp_path):
+    times = np.arange(0.0, 8.01, 0.1)
+    table = circle(times)
+    table[:, 4] = (2.0 * times + np.pi) % (2.0 * np.pi) - np.pi
+    table[:, 11] = 2.0
+    path = trajectory_of(load_scenario(csv_file(tmp_path, rows=text(table))))
+    assert path.last[5] - path.first[5] == pytest.approx(16.0, abs=1e-5)
+
+
+@pytest.mark.parametrize(
+    ("column", "note"),
+    [("vx", "vx, vy, vz do not fit"), ("ax", "ax, ay, az do not fit"), ("dyaw", "dyaw does not")],
+)
+def test_columns_that_contradict_the_positions_are_not_used(tmp_path, column, note):
+    times = np.arange(0.0, 8.0, 0.02)
+    table = circle(times)
+    first = HEADER.split(",").index(column)
+    table[:, first : first + (1 if column == "dyaw" else 3)] = 0.0  # as some planners write
+    scenario = load_scenario(csv_file(tmp_path, rows=text(table)))
+    assert note in "; ".join(scenario.notes)
+    rows = trajectory_of(scenario).rows(np.array([4.0]))
+    np.testing.assert_allclose(rows[:2, 0, 0], [np.cos(8), -2 * np.sin(8)], atol=1e-3)
+
+
+@pytest.mark.parametrize("digits", [3, 4, 6])
+def test_rounded_numbers_give_no_jumps_of_the_jerk(tmp_path, digits):
+    times = np.arange(0.0, 8.0, 0.01)
+    scenario = load_scenario(csv_file(tmp_path, rows=text(circle(times), digits)))
+    rows = trajectory_of(scenario).rows(np.linspace(1.0, 7.0, 2000))
+    assert np.abs(rows[3, :, :2]).max() < 8.0 * 1.2 and np.abs(rows[4, :, :2]).max() < 16.0 * 2
+
+
+def test_arm_angles_are_flown(tmp_path):
+    times = np.arange(0.0, 4.01, 0.1)
+    angles = np.column_stack([0.5 * np.sin(times), 1.2 - 0.2 * times])
+    rows = text(np.hstack([circle(times), angles]))
+    scenario = load_scenario(csv_file(tmp_path, HEADER + ",alpha_1,alpha_2", rows))
+    found = trajectory_of(scenario).rows(np.array([2.0]))
+    np.testing.assert_allclose(found[0, 0, 6:], [0.5 * np.sin(2.0), 0.8], atol=1e-4)
+    np.testing.assert_allclose(found[1, 0, 6:], [0.5 * np.cos(2.0), -0.2], atol=1e-3)
+
+
+@pytest.mark.parametrize(
+    ("changes", "reason"),
+    [
+        ({"header": "t,px,py"}, "line 1: column pz is missing beside px"),
+        ({"header": "px,py,pz"}, "line 1: column t is missing"),
+        ({"header": HEADER + ",speed"}, "line 1: column 'speed' is unknown; known: t,px,py"),
+        ({"header": HEADER + ",yaw"}, "line 1: column yaw is there twice"),
+        ({"header": HEADER + ",q_w,q_x,q_y,q_z"}, "column yaw beside q_w: only one"),
+        (
+            {"header": "t,px,py,pz,ax,ay,az", "rows": ["0" + ",1" * 6, ",".join("1" * 7)]},
+            "ax, ay, az need vx",
+        ),
+        ({"rows": [ROW.format(t=0), ROW.format(t="nan")]}, "line 3 column t: 'nan'"),
+        ({"rows": [ROW.format(t=1), ROW.format(t=0.5)]}, "line 3 column t: time does not increase"),
+        ({"rows": [ROW.format(t=0)]}, "at least two rows"),
+        ({"rows": [ROW.format(t=0), "1,0,0,x,0,0,0,0,0,0,0,0"]}, "line 3 column pz: 'x'"),
+        ({"rows": [ROW.format(t=0), "1,0,0,-1,0,0,0,0,0,0,0,0"]}, "line 3 column pz: below"),
+        (
+            {"header": "t,p_x,p_y,p_z", "rows": ["0,0,0,1", "1,0,0,"]},
+            "line 3 column p_z: '' is not a finite number",
+        ),
+        (
+            {"header": "t,px,py,pz,qw,qx,qy,qz", "rows": ["0,0,0,1,1,0,0,0", "1,0,0,1,0,0,0,0"]},
+            "line 3 column qw: the quaternion's norm is 0, 1 expected",
+        ),
+        (
+            {
+                "header": HEADER + ",alpha_1",
+                "rows": [ROW.format(t=0) + ",0", ROW.format(t=1) + ",0"],
+            },
+            "column alpha_2 is missing beside alpha_1",
+        ),
+        (
+            {
+                "header": HEADER + ",alpha_1,alpha_2,alpha_3",
+                "rows": [ROW.format(t=0) + ",0,0,0", ROW.format(t=1) + ",0,0,0"],
+            },
+            "column 'alpha_3' is unknown; known: .*alpha_1,alpha_2",
+        ),
+        (
+            {
+                "header": HEADER + ",alpha_1,alpha_2",
+                "rows": [ROW.format(t=0) + ",0,0", ROW.format(t=1) + ",0,2.5"],
+            },
+            "line 3 column alpha_2: joint angle beyond its range, -2.09 to 2.09 rad",
+        ),
+    ],
+)
+def test_bad_csv_is_refused_naming_line_and_column(tmp_path, changes, reason):
+    with pytest.raises(ScenarioError, match=reason):
+        load_scenario(csv_file(tmp_path, **changes))
+
+
+def test_a_jump_has_no_smooth_curve(tmp_path):
+    rows = [f"{0.01 * i:.2f},{float(i > 50)},0,1" for i in range(100)]
+    with pytest.raises(ScenarioError, match=r"line 5\d column px: no smooth curve passes within"):
+        load_scenario(csv_file(tmp_path, "t,px,py,pz", rows))
+
+
+@settings(max_examples=40, deadline=None)
+@given(
+    st.lists(st.floats(0.02, 0.5), min_size=3, max_size=40),
+    st.floats(0.2, 3.0),
+    st.integers(0, 2),
+)
+def test_every_sample_is_met(steps, rate, given_rows):
+    times = np.append(0.0, np.cumsum(steps))
+    table = circle(times, rate)
+    rows = [table[:, 1:4], table[:, 5:8], table[:, 8:11]]
+    group = Samples(*rows[: given_rows + 1])
+    try:
+        (path,) = fitted(times, [group], 1e-3)
+    except Misfit:
+        pytest.fail("a smooth curve is met")
+    inside = path.rows(np.clip(times, 1e-9, times[-1] - 1e-9))
+    assert np.abs(inside[0] - table[:, 1:4]).max() <= 1.1e-3

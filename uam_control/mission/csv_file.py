@@ -1,0 +1,256 @@
+"""CSV trajectories, as planners write them: times and positions, and what else is known.
+
+| columns | meaning |
+|---|---|
+| t | time [s], increasing |
+| px, py, pz | position [m, ENU] |
+| yaw, or qw, qx, qy, qz | heading [rad], or attitude (body FLU to ENU), of which yaw is used |
+| vx, vy, vz; ax, ay, az | velocity, acceleration [SI, ENU] |
+| dyaw | rate of yaw [rad/s] |
+| alpha_1 .. alpha_n | angles of all joints [rad] |
+
+t and the position are required. Agilicious' names p_x, q_w, v_x, a_lin_x ... mean the same; its
+body rates, angular accelerations, rotor thrusts, jerk and snap are accepted and not used.
+"""
+
+from __future__ import annotations
+
+import csv
+import math
+from pathlib import Path
+
+import numpy as np
+
+from uam_control.coordinates import YAW, Z, arm_coordinates
+from uam_control.mission.fitted_spline import Misfit, Samples, fitted
+from uam_control.mission.polynomials import Polynomials
+from uam_control.mission.route import Route, with_ramps
+from uam_control.mission.scenario import Landing, Scenario, ScenarioError, standing
+from uam_control.mission.scenario_options import AS_SCENARIO, RETURN, ScenarioOptions
+from uam_control.vehicle import VehicleDescription
+
+AXES = "xyz"
+# group → its columns; a group is there as a whole or not at all
+GROUPS = {
+    "position": tuple(f"p{a}" for a in AXES),
+    "velocity": tuple(f"v{a}" for a in AXES),
+    "acceleration": tuple(f"a{a}" for a in AXES),
+    "quaternion": ("qw", "qx", "qy", "qz"),
+    "yaw": ("yaw",),
+    "yaw rate": ("dyaw",),
+}
+AGILICIOUS = {f"{k}_{a}": f"{k}{a}" for k in "pv" for a in AXES}
+AGILICIOUS |= {f"a_lin_{a}": f"a{a}" for a in AXES} | {f"q_{a}": f"q{a}" for a in "wxyz"}
+NOT_USED = {f"{k}_{a}" for k in ("w", "a_rot", "jerk", "snap") for a in AXES}
+NOT_USED |= {f"w{a}" for a in AXES} | {f"u_{i}" for i in range(1, 5)}
+PASSES_WITHIN = 1e-3  # [m or rad] distance of the interpolation from every row
+UNIT = 0.02  # largest deviation of a quaternion's norm from 1
+# rates that fit the values: RMS of the difference to the change of the values / RMS of the rates
+FITS, FITS_ANYWAY = 0.15, 0.05  # relative; absolute [SI]
+
+
+def from_csv(file: Path, vehicle: VehicleDescription, options: ScenarioOptions) -> Scenario:
+    """Read a trajectory; take-off, transit, return and landing are added, see `route`.
+
+    Raises ScenarioError with line and column.
+    """
+    table = _Table.read(file, len(vehicle.joints))
+    times = table.times - table.times[0]
+    notes: list[str] = []
+    path = _path(table, times, vehicle, notes)
+    end = RETURN if options.end == AS_SCENARIO else options.end
+    scenario = Scenario(
+        name=file.stem,
+        description=f"trajectory from {file.name}",
+        arm_start=vehicle.stowed,
+        phases=(),
+        landing=Landing(0.0, 0.0),
+        route=Route(with_ramps(path, options), end, options),
+        notes=tuple(notes),
+    )
+    return scenario.begun_at(standing(vehicle.stowed))
+
+
+class _Table:
+    """Numbers of a file: `columns` by their own names; errors name the file's."""
+
+    def __init__(self, file: Path, names: dict[str, str], numbers: np.ndarray) -> None:
+        self.file, self._names = file, list(names)
+        self._written, self._numbers = names, numbers
+
+    @classmethod
+    def read(cls, file: Path, joints: int) -> _Table:
+        """Read and check the header and the numbers."""
+        with file.open(newline="") as lines:
+            rows = csv.DictReader(lines)
+            header = [name.strip() for name in rows.fieldnames or []]
+            rows.fieldnames = header
+            names = _names(file, header, joints)
+            numbers = np.array(
+                [_numbers(file, i, row, names) for i, row in enumerate(rows, start=2)]
+            )
+        if len(numbers) < 2:
+            raise ScenarioError(f"{file}: at least two rows expected, got {len(numbers)}")
+        table = cls(file, names, numbers)
+        backward = np.flatnonzero(np.diff(table.times) <= 0.0)
+        if len(backward):
+            raise table.error(int(backward[0]) + 1, "t", "time does not increase")
+        low = table.columns("position")[:, Z] <= 0.0
+        if low.any():
+            raise table.error(int(np.argmax(low)), "pz", "below the ground")
+        return table
+
+    @property
+    def times(self) -> np.ndarray:
+        """Times (m,) [s]."""
+        return self._column("t")
+
+    def columns(self, group: str) -> np.ndarray | None:
+        """Return the columns of a group (m, k), None if the file does not have it."""
+        if GROUPS[group][0] not in self._names:
+            return None
+        return np.column_stack([self._column(name) for name in GROUPS[group]])
+
+    def joints(self, names: tuple[str, ...]) -> np.ndarray | None:
+        """Return the joint angles (m, n) [rad], None without."""
+        if names[0] not in self._names:
+            return None
+        return np.column_stack([self._column(name) for name in names])
+
+    def error(self, row: int, column: str, text: str) -> ScenarioError:
+        """Return the error of a row, counted from 0."""
+        return ScenarioError(f"{self.file} line {row + 2} column {self._written[column]}: {text}")
+
+    def _column(self, name: str) -> np.ndarray:
+        return self._numbers[:, self._names.index(name)]
+
+
+def _names(file: Path, header: list[str], joints: int) -> dict[str, str]:
+    """Return our name → name in the file, of the columns in use; raise ScenarioError."""
+    arm = arm_coordinates(joints)
+    groups = {**GROUPS, "arm": arm}
+    known = {"t"}.union(*groups.values())
+    found: dict[str, str] = {}
+    for written in header:
+        name = AGILICIOUS.get(written, written)
+        if name in found:
+            raise ScenarioError(f"{file} line 1: column {written} is there twice")
+        if name in known:
+            found[name] = written
+        elif written not in NOT_USED:
+            allowed = ",".join(["t", *(name for group in groups.values() for name in group)])
+            raise ScenarioError(f"{file} line 1: column {written!r} is unknown; known: {allowed}")
+    for group, names in groups.items():
+        missing = [name for name in names if name not in found]
+        if not missing or (len(missing) == len(names) and group != "position"):
+            continue
+        there = [name for name in names if name in found]
+        beside = f" beside {there[0]}" if there else ""
+        raise ScenarioError(f"{file} line 1: column {', '.join(missing)} is missing{beside}")
+    if "t" not in found:
+        raise ScenarioError(f"{file} line 1: column t is missing")
+    if "yaw" in found and "qw" in found:
+        raise ScenarioError(f"{file} line 1: column yaw beside {found['qw']}: only one is possible")
+    return found
+
+
+def _numbers(file: Path, line: int, row: dict, names: dict[str, str]) -> list[float]:
+    numbers = []
+    for written in names.values():
+        try:
+            value = float(row[written])
+        except (TypeError, ValueError):
+            value = math.nan
+        if not math.isfinite(value):
+            raise ScenarioError(
+                f"{file} line {line} column {written}: {row[written]!r} is not a finite number"
+            )
+        numbers.append(value)
+    return numbers
+
+
+def _path(
+    table: _Table, times: np.ndarray, vehicle: VehicleDescription, notes: list[str]
+) -> Polynomials:
+    """Return the interpolation (6 + n coordinates) of the rows."""
+    velocity, acceleration = table.columns("velocity"), table.columns("acceleration")
+    position = table.columns("position")
+    if acceleration is not None and velocity is None:
+        raise ScenarioError(f"{table.file} line 1: ax, ay, az need vx, vy, vz beside them")
+    if acceleration is not None and not _fits(times, velocity, acceleration):
+        notes.append(f"{table.file.name}: ax, ay, az do not fit vx, vy, vz and are not used")
+        acceleration = None
+    if velocity is not None and not _fits(times, position, velocity, acceleration):
+        notes.append(f"{table.file.name}: vx, vy, vz do not fit px, py, pz and are not used")
+        velocity = acceleration = None
+    yaw, turning = _yaw(table), table.columns("yaw rate")
+    if turning is not None and not _fits(times, yaw, turning):
+        notes.append(f"{table.file.name}: dyaw does not fit yaw and is not used")
+        turning = None
+    names = arm_coordinates(len(vehicle.joints))
+    angles = table.joints(names)
+    if angles is not None:
+        _check_angles(table, angles, vehicle, names)
+    else:
+        angles = np.tile(vehicle.stowed, (len(times), 1))
+    columns = ("px", "yaw" if table.columns("quaternion") is None else "qw", names[0])
+    groups = (Samples(position, velocity, acceleration), Samples(yaw, turning), Samples(angles))
+    try:
+        base, heading, arm = fitted(times, groups, PASSES_WITHIN)
+    except Misfit as error:
+        raise table.error(
+            error.row,
+            columns[error.group],
+            f"no smooth curve passes within {PASSES_WITHIN:g}; it is {error.distance:.3g} off here",
+        ) from None
+    powers = base.coefficients
+    none = np.zeros((*powers.shape[:2], YAW - Z - 1))  # roll and pitch
+    together = (powers, none, heading.coefficients, arm.coefficients)
+    return Polynomials(base.knots, np.concatenate(together, axis=2))
+
+
+def _yaw(table: _Table) -> np.ndarray:
+    """Return the heading (m, 1) [rad], without jumps; 0 if the file has none."""
+    yaw, quaternion = table.columns("yaw"), table.columns("quaternion")
+    if quaternion is not None:
+        norm = np.linalg.norm(quaternion, axis=1)
+        if (np.abs(norm - 1.0) > UNIT).any():
+            row = int(np.argmax(np.abs(norm - 1.0)))
+            raise table.error(row, "qw", f"the quaternion's norm is {norm[row]:.3g}, 1 expected")
+        w, x, y, z = quaternion.T
+        yaw = np.arctan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z))[:, None]
+    return np.zeros((len(table.times), 1)) if yaw is None else np.unwrap(yaw, axis=0)
+
+
+def _fits(
+    times: np.ndarray,
+    values: np.ndarray,
+    rates: np.ndarray,
+    second: np.ndarray | None = None,
+) -> bool:
+    """Return whether rates (m, k) are those of values (m, k), by the trapezoidal rule.
+
+    second: derivative of the rates, for its correction.
+    """
+    width = np.diff(times)[:, None]
+    mean = (rates[:-1] + rates[1:]) / 2.0
+    if second is not None:
+        mean += width / 12.0 * (second[:-1] - second[1:])
+    apart = np.sqrt(np.mean((np.diff(values, axis=0) / width - mean) ** 2))
+    return bool(apart <= FITS_ANYWAY + FITS * np.sqrt(np.mean(rates**2)))
+
+
+def _check_angles(
+    table: _Table, angles: np.ndarray, vehicle: VehicleDescription, names: tuple[str, ...]
+) -> None:
+    """Raise ScenarioError for the first of angles (m, n) [rad] out of its joint's range."""
+    low = np.array([joint.low for joint in vehicle.joints])
+    high = np.array([joint.high for joint in vehicle.joints])
+    beyond = np.argwhere((angles < low) | (angles > high))
+    if len(beyond):
+        row, i = beyond[0]
+        raise table.error(
+            row,
+            names[i],
+            f"joint angle beyond its range, {low[i]:.2f} to {high[i]:.2f} rad",
+        )

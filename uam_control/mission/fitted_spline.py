@@ -1,0 +1,108 @@
+"""Smooth interpolation of samples: a spline of degree 7, with six continuous derivatives.
+
+The spline is the least-squares fit to values and, where they are given, rates and accelerations.
+The knots lie close enough that it passes every value within a tolerance. A planner's file has
+rounded numbers, and rates and accelerations that belong only approximately to its positions; an
+interpolation through all of them (quintic Hermite) has jumps in the jerk. This one has none.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+from scipy.interpolate import BSpline
+from scipy.sparse import csc_matrix, diags, vstack
+from scipy.sparse.linalg import spsolve
+
+from uam_control.mission.polynomials import Polynomials
+
+DEGREE = 7
+COARSEST = 0.2  # [s] distance of the knots in the first attempt, or that of the samples
+ATTEMPTS = 5  # each with knots at half the distance
+# A unit of misfit in rate, acceleration and snap weighs as much as these in value [s, s^2, s^4].
+RATE, ACCELERATION, SNAP = 1e-2, 1e-3, 1e-8
+
+
+class Misfit(ValueError):
+    """No spline passes the samples: number of the worst group and row, and its distance."""
+
+    def __init__(self, group: int, row: int, distance: float) -> None:
+        super().__init__(f"{distance:.3g} at row {row}")
+        self.group, self.row, self.distance = group, row, distance
+
+
+class Samples(NamedTuple):
+    """Values (m, n) at m times; rates, accelerations (m, n): None if not given."""
+
+    values: np.ndarray
+    rates: np.ndarray | None = None
+    accelerations: np.ndarray | None = None
+
+
+def fitted(times: np.ndarray, groups: Sequence[Samples], tolerance: float) -> list[Polynomials]:
+    """Return a spline per group through its values, all with the same knots.
+
+    times (m,) [s], increasing; tolerance: of every value. Raises Misfit.
+    """
+    span = float(times[-1] - times[0])
+    step = max(COARSEST, span / (len(times) - 1))
+    for _ in range(ATTEMPTS):
+        knots = _knots(times, max(1, round(span / step)))
+        found = [_solved(times, group, knots) for group in groups]
+        apart = np.array(
+            [
+                np.abs(spline(times) - group.values).max(axis=1)
+                for spline, group in zip(found, groups, strict=True)
+            ]
+        )
+        if apart.max() <= tolerance:
+            return [_polynomials(spline) for spline in found]
+        step /= 2.0
+    worst, row = np.unravel_index(np.argmax(apart), apart.shape)
+    raise Misfit(int(worst), int(row), float(apart.max()))
+
+
+def _knots(times: np.ndarray, intervals: int) -> np.ndarray:
+    inner = np.linspace(times[0], times[-1], intervals + 1)
+    return np.concatenate([[times[0]] * DEGREE, inner, [times[-1]] * DEGREE])
+
+
+def _solved(times: np.ndarray, given: Samples, knots: np.ndarray) -> BSpline:
+    inner = knots[DEGREE:-DEGREE]
+    between = 0.5 * (inner[:-1] + inner[1:])
+    rows, right = [], []
+    for order, (samples, weight) in enumerate(zip(given, (1.0, RATE, ACCELERATION), strict=True)):
+        if samples is not None:
+            rows.append(weight * _basis(times, knots, order))
+            right.append(weight * samples)
+    size = given.values.shape[1]
+    rows.append(SNAP * _basis(between, knots, 4))  # so that few samples also have one solution
+    right.append(np.zeros((len(between), size)))
+    matrix, target = vstack(rows).tocsc(), np.concatenate(right)
+    solution = spsolve((matrix.T @ matrix).tocsc(), matrix.T @ target)
+    return BSpline(knots, solution.reshape(-1, size), DEGREE)
+
+
+def _basis(times: np.ndarray, knots: np.ndarray, order: int) -> csc_matrix:
+    """Return the matrix from the coefficients to derivative `order` at the times."""
+    change, degree = None, DEGREE
+    for _ in range(order):
+        width = degree / (knots[degree + 1 : -1] - knots[1 : -degree - 1])
+        count = len(width)
+        step = diags([-width, width], [0, 1], shape=(count, count + 1))
+        change = step if change is None else step @ change
+        knots, degree = knots[1:-1], degree - 1
+    basis = BSpline.design_matrix(times, knots, degree)
+    return basis if change is None else basis @ change
+
+
+def _polynomials(spline: BSpline) -> Polynomials:
+    knots = spline.t[DEGREE:-DEGREE]
+    width, powers, scale = np.diff(knots)[:, None], [], 1.0
+    for order in range(DEGREE + 1):
+        scale *= max(order, 1)
+        rows = _basis(knots[:-1], spline.t, order) @ spline.c
+        powers.append(rows * width**order / scale)
+    return Polynomials(knots, np.array(powers).swapaxes(0, 1))

@@ -1,0 +1,217 @@
+"""Scenario files: YAML (config/scenarios), or CSV trajectories."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+from uam_control.coordinates import BASE_COORDINATES, arm_coordinates
+from uam_control.mission.csv_file import from_csv
+from uam_control.mission.reference_kinds import Middle, legs
+from uam_control.mission.route import Route
+from uam_control.mission.scenario import Landing, Scenario, ScenarioError, standing
+from uam_control.mission.scenario_options import AS_SCENARIO, LAND, RETURN, ScenarioOptions
+from uam_control.mission.trajectory import Move
+from uam_control.settings import configuration
+from uam_control.settings.section import Section, read_section
+from uam_control.vehicle import VehicleDescription, load_description
+
+KEYS = (
+    *("description", "arm_start", "phases", "moves", "trajectory", "end", "magnet", "payload"),
+    *("landing", "snapshots", "faults"),
+)
+
+
+def load_scenario(
+    name_or_file: str,
+    vehicle: VehicleDescription | None = None,
+    options: ScenarioOptions | None = None,
+) -> Scenario:
+    """Return a scenario by name, or from a .yaml or .csv file; raises ScenarioError.
+
+    vehicle: that it is for, None for the default one; options: None for the defaults.
+    """
+    vehicle, options = vehicle or load_description(), options or ScenarioOptions()
+    file = Path(name_or_file)
+    if file.suffix not in (".yaml", ".csv"):
+        try:
+            file = configuration.named("scenarios", name_or_file)
+        except configuration.ConfigurationError as error:
+            raise ScenarioError(str(error)) from None
+    try:
+        read = from_csv if file.suffix == ".csv" else from_yaml
+        return read(file, vehicle, options).slowed(options.slowdown)
+    except OSError as error:
+        raise ScenarioError(f"{file}: {error.strerror}") from None
+
+
+def from_yaml(file: Path, vehicle: VehicleDescription, options: ScenarioOptions) -> Scenario:
+    """Read a scenario file; see docs/scenarios.md for the form.
+
+    Without arm_start the arm begins stowed.
+    """
+    top = read_section(file, ScenarioError)
+    for key in top.values:
+        if key not in KEYS:
+            raise top.error(key, f"not an entry of a scenario, which has: {', '.join(KEYS)}")
+    arm_start = _arm_start(top, vehicle)
+    timed = "landing" in top.values or "moves" in top.values
+    if "trajectory" in top.values and not timed:
+        return _along_route(file, top, arm_start, vehicle, options)
+    if "end" in top.values:
+        raise top.error("end", "only for a trajectory without moves and landing")
+    landing = top.section("landing")
+    phases = [(p.number("from"), p.values.get("name", "")) for p in top.entries("phases", True)]
+    payload = top.section("payload") if top.values.get("payload") else None
+    faults = top.values.get("faults") or []
+    if not isinstance(faults, list):
+        raise ScenarioError(f"{file}: 'faults' is not a list")
+    scenario = Scenario(
+        name=file.stem,
+        description=str(top.values.get("description", "")),
+        arm_start=arm_start,
+        phases=tuple((start, str(name)) for start, name in phases or [(0.0, "flight")]),
+        landing=Landing(landing.number("at"), landing.number("duration")),
+        moves=_moves(top, vehicle),
+        magnet=tuple((m.number("at"), m.switch("energised")) for m in top.entries("magnet", True)),
+        payload_mass=payload.number("mass") if payload else 0.0,
+        drop_point=(
+            payload.numbers("drop_point", 2) if payload and "drop_point" in payload.values else None
+        ),
+        snapshots=tuple(
+            (s.number("at"), str(s.values.get("caption", "")))
+            for s in top.entries("snapshots", True)
+        ),
+        faults=tuple(faults),
+    )
+    if "trajectory" not in top.values:
+        return scenario
+    return _with_trajectory(scenario, top, vehicle, options)
+
+
+def _along_route(
+    file: Path,
+    top: Section,
+    arm_start: tuple[float, ...],
+    vehicle: VehicleDescription,
+    options: ScenarioOptions,
+) -> Scenario:
+    """Return the scenario that consists of a trajectory and the ways to it and from it."""
+    for key in top.values:
+        if key not in ("description", "arm_start", "trajectory", "end"):
+            raise top.error(key, "not together with a trajectory alone; give moves and landing")
+    end = top.text("end") if "end" in top.values else RETURN
+    if end not in (RETURN, LAND):
+        raise top.error("end", f"{end!r}, allowed: {RETURN}, {LAND}")
+    end = end if options.end == AS_SCENARIO else options.end
+    entry = top.section("trajectory")
+    if "at" in entry.values:
+        raise entry.error("at", "only with moves and landing")
+    start = standing(arm_start)
+    route = Route(legs(entry, _middle(start, vehicle)), end, options)
+    scenario = Scenario(
+        name=file.stem,
+        description=str(top.values.get("description", "")),
+        arm_start=arm_start,
+        phases=(),
+        landing=Landing(0.0, 0.0),
+        route=route,
+    )
+    return scenario.begun_at(start)
+
+
+def _middle(chi: np.ndarray, vehicle: VehicleDescription) -> Middle:
+    return Middle(chi.copy(), tuple((joint.low, joint.high) for joint in vehicle.joints))
+
+
+def _with_trajectory(
+    scenario: Scenario, top: Section, vehicle: VehicleDescription, options: ScenarioOptions
+) -> Scenario:
+    """Return the scenario with its trajectory, which begins where the moves are at `at`."""
+    entry = top.section("trajectory")
+    at = entry.number("at")
+    for key in ("height", "centre", "arm_deg"):
+        if key in entry.values:
+            raise entry.error(key, "not with at: the trajectory begins where the moves are")
+    pieces = legs(entry, _middle(standing(scenario.arm_start), vehicle))
+    route = Route(pieces, RETURN, options)
+    path = route.path
+    apart = float(np.abs(path.last - path.first)[:3].max())
+    if apart > 1e-6:
+        raise entry.error("at", f"the trajectory ends {apart:.3g} m from its begin, 0 m allowed")
+    end = at + path.length
+    for i, move in enumerate(scenario.moves):
+        if move.coordinate in BASE_COORDINATES and move.start < end and move.end > at:
+            raise top.error(
+                f"moves[{i}]",
+                f"{move.coordinate} moves during the trajectory, from {at:g} to {end:g} s",
+            )
+    if scenario.landing.at < end:
+        raise top.error(
+            "landing", f"at {scenario.landing.at:g} s, the trajectory ends at {end:g} s"
+        )
+    begin, phases = at, list(scenario.phases)
+    for leg in pieces:
+        phases.append((begin, leg.phase))
+        begin += leg.path.length
+    return replace(
+        scenario, route=route, route_at=at, phases=tuple(sorted(phases, key=lambda p: p[0]))
+    )
+
+
+def _arm_start(top: Section, vehicle: VehicleDescription) -> tuple[float, ...]:
+    """Return the joint angles [rad] on the ground: `arm_start`, or stowed."""
+    if "arm_start" not in top.values:
+        return vehicle.stowed
+    arm, joints = top.section("arm_start"), arm_coordinates(len(vehicle.joints))
+    expected = [f"{name}_deg" for name in joints]
+    for name in arm.values:
+        if name not in expected:
+            has = f"{vehicle.name} has: {', '.join(expected)}"
+            raise ScenarioError(f"{arm.where}.{name}: no joint; {has}")
+    return tuple(_angle(arm, f"{name}_deg", name, vehicle) for name in joints)
+
+
+def _angle(entry: Section, key: str, coordinate: str, vehicle: VehicleDescription) -> float:
+    """Return an angle [rad]; a joint's must be within its range."""
+    angle = math.radians(entry.number(key))
+    joints = dict(zip(arm_coordinates(len(vehicle.joints)), vehicle.joints, strict=True))
+    joint = joints.get(coordinate)
+    if joint is not None and not joint.low <= angle <= joint.high:
+        raise ScenarioError(
+            f"{entry.where}.{key}: {entry.values[key]:g}; {vehicle.name} allows "
+            f"{math.degrees(joint.low):g} to {math.degrees(joint.high):g}"
+        )
+    return angle
+
+
+def _moves(top: Section, vehicle: VehicleDescription) -> tuple[Move, ...]:
+    """Return `moves`; angles are in degrees. Moves of one coordinate must not overlap in time."""
+    moves = tuple(_move(entry, vehicle) for entry in top.entries("moves", True))
+    last: dict[str, Move] = {}
+    for move in sorted(moves, key=lambda m: m.start):
+        before = last.get(move.coordinate)
+        if before and before.end > move.start:
+            raise ScenarioError(
+                f"{top.where} two moves of {move.coordinate} overlap at {move.start} s"
+            )
+        last[move.coordinate] = move
+    return moves
+
+
+def _move(entry: Section, vehicle: VehicleDescription) -> Move:
+    coordinate = entry.text("coordinate")
+    allowed = [c for c in vehicle.coordinates if c not in ("roll", "pitch")]
+    if coordinate not in allowed:
+        raise ScenarioError(
+            f"{entry.where}.coordinate: {coordinate!r}, allowed: {', '.join(allowed)}"
+        )
+    length = coordinate in ("x", "y", "z")
+    target = entry.number("to") if length else _angle(entry, "to_deg", coordinate, vehicle)
+    start, end = entry.number("from"), entry.number("until")
+    if end <= start:
+        raise ScenarioError(f"{entry.where}: ends at {end} s, before it begins")
+    return Move(coordinate, start, end, target)
