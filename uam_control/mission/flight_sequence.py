@@ -10,6 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from uam_control.coordinates import ALPHA, ARM, ATTITUDE, CHI, CHI_DOT, YAW, Z
+from uam_control.mission.feasibility import Feasibility, in_words
 from uam_control.mission.guidance import Guidance
 from uam_control.mission.mission_parameters import MissionParameters, StartParameters
 from uam_control.mission.plans import GoalPose, PlanRefused, Points, check
@@ -29,6 +30,7 @@ from uam_control.supervision import (
     Supervisor,
     preflight,
 )
+from uam_control.vehicle import VehicleDescription
 
 # phases in addition to those of a scenario
 WAITING, HOLD, LAND, LANDED, ABORTED = "waiting", "hold", "land", "landed", "aborted"
@@ -72,14 +74,19 @@ class Mission:
         scenario: Scenario,
         parameters: MissionParameters,
         start: StartParameters | None = None,
+        vehicle: VehicleDescription | None = None,
     ) -> None:
+        """vehicle: whose limits the pre-arm report compares the reference with, if given."""
         self.scenario = self._planned = scenario
         self.output = MissionOutput(empty_reference(len(scenario.arm_start)))
         self._start = start or StartParameters()
         self._stamp = 0.0
         self._age = 0.0  # [s] of the newest state: one tick
         self._seen: Observation | None = None
+        self._vehicle = vehicle
+        self._feasible: tuple[PreflightCheck, ...] = ()
         self._begin(parameters)
+        self._check_reference(parameters)
 
     def _begin(self, parameters: MissionParameters) -> None:
         """Set the state before a flight; the object of the output stays."""
@@ -131,13 +138,23 @@ class Mission:
         if self._seen is None:
             return ()
         p = self._parameters
-        return preflight(
+        report = preflight(
             self._supervisor.checks,
             self._seen,
             self.scenario.arm_start,
             p.start_speed,
             p.start_arm_error,
         )
+        return report + self._feasible
+
+    def _check_reference(self, parameters: MissionParameters) -> None:
+        """Update the line of the pre-arm report about the whole reference."""
+        if self._vehicle is None:
+            return
+        check = Feasibility(self._vehicle, parameters, self._planned.payload_mass)
+        found = in_words(check.excesses(self._planned))
+        line = PreflightCheck("reference", found or "within", "within all limits", not found)
+        self._feasible = (line,)
 
     @property
     def not_ready(self) -> str:
@@ -148,6 +165,8 @@ class Mission:
         """Use `parameters` (validated) from the next step on."""
         self._parameters = parameters
         self._supervisor.configure(parameters)
+        if self._guidance is None:
+            self._check_reference(parameters)
         if self._guidance is not None:
             self._guidance.parameters = parameters
 

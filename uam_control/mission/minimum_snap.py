@@ -15,6 +15,7 @@ from uam_control.mission.polynomials import Polynomials
 
 ORDER = 8  # coefficients of a polynomial
 CONTINUOUS = range(1, ORDER - 1)  # derivatives that are continuous at an inner point
+END_SHARE = 2.0  # the mean speed from rest is half of the speed reached
 AT_REST = range(1, ORDER // 2)  # derivatives that are zero at both ends
 
 
@@ -58,6 +59,11 @@ def _derivatives(u: float) -> np.ndarray:
 
 
 def shares(points: np.ndarray) -> np.ndarray:
-    """Return times (m,) from 0 to 1 for points (m, 3) [m]: in proportion to the distances."""
+    """Return times (m,) from 0 to 1 for points (m, 3) [m]: in proportion to the distances.
+
+    The first and the last piece, from rest and to rest, have END_SHARE times as much.
+    """
     ways = np.linalg.norm(np.diff(points, axis=0), axis=1)
+    ways[0] *= END_SHARE
+    ways[-1] *= END_SHARE
     return np.append(0.0, np.cumsum(ways)) / ways.sum()

@@ -55,7 +55,16 @@ class BrakeLimits(ParameterSet):
 
 
 @dataclass(frozen=True)
-class MissionParameters(PlanLimits, BrakeLimits, SupervisionParameters):
+class FeasibilityLimits(ParameterSet):
+    """Limits of the reference before take-off, in addition to the supervisor's. Without a value
+    in the profile they are the position controller's thrust_max and tilt_max."""
+
+    reference_thrust: float = number(36.0, "largest force that a reference needs", "N", 0.1, 1e3)
+    reference_tilt: float = number(0.35, "largest tilt that a reference needs", "rad", 0.01, 1.5)
+
+
+@dataclass(frozen=True)
+class MissionParameters(FeasibilityLimits, PlanLimits, BrakeLimits, SupervisionParameters):
     """Times and limits of start, take-off, touchdown, plans, braking, and of the supervisor."""
 
     start_speed: float = number(0.3, "largest speed at the start", "m/s", 0.01, 5.0)

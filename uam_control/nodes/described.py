@@ -1,7 +1,8 @@
-"""The read-only parameters `vehicle` and `scenario` of a node: names or files."""
+"""The read-only parameters `vehicle` and `scenario` of a node, names or files, and its options."""
 
 from rclpy.node import Node
 
+from uam_control.mission import Scenario, ScenarioError, ScenarioOptions, load_scenario
 from uam_control.settings.configuration import ConfigurationError
 from uam_control.settings.parameter_set import ParameterError, Text
 from uam_control.vehicle import (
@@ -10,7 +11,7 @@ from uam_control.vehicle import (
     VehicleError,
     load_description,
 )
-from uam_msgs_py.node.node_parameters import declared_text
+from uam_msgs_py.node.node_parameters import NodeParameters, declared_text
 
 PARAMETER = "vehicle"
 DEFAULT_SCENARIO = "pick_and_place"
@@ -26,7 +27,12 @@ def described_vehicle(node: Node) -> VehicleDescription:
         raise ParameterError(f"{PARAMETER}: {error}") from None
 
 
-def declared_scenario(node: Node) -> str:
-    """Declare the parameter `scenario` and return the name or file. Raises ParameterError."""
+def described_scenario(node: Node, vehicle: VehicleDescription) -> Scenario:
+    """Declare `scenario` and its options, and return the scenario. Raises ParameterError."""
     about = Text("what is flown", "name of a file in config/scenarios, or a file")
-    return declared_text(node, "scenario", DEFAULT_SCENARIO, about)
+    name = declared_text(node, "scenario", DEFAULT_SCENARIO, about)
+    options = NodeParameters(node, ScenarioOptions, read_only=True).current
+    try:
+        return load_scenario(name, vehicle, options)
+    except ScenarioError as error:
+        raise ParameterError(f"scenario: {error}") from None

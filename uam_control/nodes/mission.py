@@ -9,21 +9,24 @@ from std_msgs.msg import Bool
 from uam_control.coordinates import ARM
 from uam_control.laws.catalogue import DEFAULT
 from uam_control.mission import (
+    Feasibility,
+    InfeasibleReference,
     Mission,
     MissionParameters,
+    Scenario,
     StartParameters,
-    load_scenario,
 )
-from uam_control.nodes.described import declared_scenario, described_vehicle
+from uam_control.nodes.described import described_scenario, described_vehicle
 from uam_control.nodes.mission_errors import TrackingErrors
 from uam_control.nodes.mission_inputs import MissionInputs
 from uam_control.nodes.mission_services import offer
 from uam_control.nodes.planner_inputs import PlannerInputs
-from uam_control.profiles.profile import default_profile
+from uam_control.profiles.profile import default_profile, reference_limits
 from uam_control.stages.mission_stage import MissionStage
 from uam_control.stages.timing import Timing
 from uam_control.stamps import SECOND
 from uam_control.supervision import Authority, State
+from uam_control.vehicle import VehicleDescription
 from uam_msgs_py.messages import topics
 from uam_msgs_py.messages.control import ReferenceWriter, read_state
 from uam_msgs_py.messages.convert import SWITCH
@@ -49,14 +52,18 @@ class MissionNode(UamNode):
     def __init__(self):
         super().__init__(NAME)
         vehicle = described_vehicle(self)
-        section = default_profile(DEFAULT, vehicle).section(NAME)
-        derived = vehicle.node_parameters()[NAME]
+        profile = default_profile(DEFAULT, vehicle)
+        derived = vehicle.node_parameters()[NAME] | reference_limits(
+            profile.sets["position_controller"]
+        )
         axes = vehicle.coordinates[ARM]
-        self.parameter_set = NodeParameters(self, MissionParameters, axes, section, derived)
+        self.parameter_set = NodeParameters(
+            self, MissionParameters, axes, profile.section(NAME), derived
+        )
         timing = NodeParameters(self, Timing, read_only=True).current
-        scenario = declared_scenario(self)
+        scenario = self._scenario(vehicle)
         start = NodeParameters(self, StartParameters, read_only=True).current
-        self._mission = Mission(load_scenario(scenario, vehicle), self.parameter_set.current, start)
+        self._mission = Mission(scenario, self.parameter_set.current, start, vehicle)
         self._stage = MissionStage(self._mission, timing)
         spare = Mission(self._mission.scenario, self.parameter_set.current)
         warm_up(spare, self.parameter_set.current.takeoff_delay)
@@ -83,6 +90,21 @@ class MissionNode(UamNode):
         self._planners = PlannerInputs(
             self, self._mission, vehicle.joint_names, self._publish_answer
         )
+
+    def _scenario(self, vehicle: VehicleDescription) -> Scenario:
+        """Return the scenario; with the parameter `retime` slowed down until it is feasible."""
+        scenario = described_scenario(self, vehicle)
+        if not self.get_parameter("retime").value:
+            return scenario
+        limits = self.parameter_set.current
+        check = Feasibility(vehicle, limits, scenario.payload_mass)
+        try:
+            scenario, factor = check.retimed(scenario)
+        except InfeasibleReference as error:
+            self.get_logger().error(str(error))  # the pre-arm report has it, too
+            return scenario
+        self.get_logger().info(f"scenario {scenario.name}: {factor:.3g} times as slow")
+        return scenario
 
     def _on_autopilot(self, message: DiagnosticArray) -> None:
         stamp, state = AutopilotState.from_message(message)

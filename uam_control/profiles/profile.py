@@ -22,7 +22,7 @@ from uam_control.coordinates import ARM, ATTITUDE, POSITION
 from uam_control.estimation import EstimatorParameters
 from uam_control.laws import catalogue
 from uam_control.laws.law_parameters import LawParameters
-from uam_control.mission import MissionParameters
+from uam_control.mission import MissionParameters, ScenarioOptions
 from uam_control.settings import configuration
 from uam_control.settings.parameter_file import ProfileError, read_sections
 from uam_control.settings.parameter_set import ParameterError, ParameterSet
@@ -45,7 +45,10 @@ BRIDGE_LINKS = (
 FLIGHT_OWN = {
     **dict.fromkeys(CONTROLLERS, ("control_period", "vehicle")),
     "state_estimator": ("vehicle", "odometry_rate"),
-    "mission": ("control_period", "scenario", "vehicle", "auto_start", "dry_run"),
+    "mission": (
+        *("control_period", "scenario", "vehicle", "auto_start", "dry_run"),
+        *ScenarioOptions.specs(),
+    ),
 }
 
 
@@ -167,6 +170,11 @@ def _file(name_or_file: str) -> Path:
         raise ProfileError(str(error)) from None
 
 
+def reference_limits(position: PositionLimits) -> dict[str, float]:
+    """Return the limits of the mission's reference that follow from the position controller's."""
+    return {"reference_thrust": position.thrust_max, "reference_tilt": position.tilt_max}
+
+
 def profile_of(
     sections: dict[str, dict[str, Any]], file: Path, vehicle: VehicleDescription | None = None
 ) -> Profile:
@@ -180,6 +188,8 @@ def profile_of(
         aside = FLIGHT_OWN.get(node, ())
         values = {k: v for k, v in sections.get(node, {}).items() if k not in aside}
         values = derived.get(node, {}) | values
+        if node == "mission":
+            values = reference_limits(sets["position_controller"]) | values
         try:
             kind, axes = parameter_set(node, values, vehicle)
             sets[node] = kind.from_mapping(values, len(axes))

@@ -9,6 +9,7 @@ import sys
 from rich.console import Console
 
 from uam_control.laws import catalogue
+from uam_control.mission.scenario_options import AS_SCENARIO
 from uam_control.settings import configuration
 from uam_lab.cli.command import INTERRUPTED, Command, number
 from uam_lab.flight import flight_settings
@@ -31,6 +32,8 @@ examples:
   uam fly                                    the paper's mission, default profile
   uam fly --scenario hover --seed 7          another scenario, other noise
   uam fly --scenario path.csv --no-video     a trajectory from a file
+  uam fly --scenario circle_fast --end land  a curve of the library; it lands where it ends
+  uam fly --scenario ellipse --retime        too fast for the vehicle: slowed down
   uam fly --profile mine.yaml --engine direct
   uam fly --engine direct --no-report        recording and metrics only, in seconds
   uam fly --autopilot px4 --px4-dir ~/PX4-Autopilot/build/px4_sitl_default
@@ -47,8 +50,9 @@ examples:
   uam fly --fault mocap_dropout@20+3         no motion capture from 20 s on, for 3 s
   uam fly --fault motor_loss@pick+1:motor=2,remaining=0.7
 
-A trajectory has the columns t,px,py,pz,yaw,vx,vy,vz,ax,ay,az,dyaw (SI, ENU) and, if the arm is to
-move, alpha_1,alpha_2. Exit status: 0 mission completed, 1 flown but not completed, 2 wrong use.
+A trajectory has the columns t,px,py,pz and any of yaw | qw,qx,qy,qz; vx,vy,vz; ax,ay,az; dyaw;
+alpha_1,alpha_2 (SI, ENU). A scenario that exceeds a limit of the vehicle is refused.
+Exit status: 0 mission completed, 1 flown but not completed, 2 wrong use.
 """
 
 
@@ -73,6 +77,15 @@ def add(commands: argparse._SubParsersAction) -> None:
     option("--profile", "NAME|FILE", text, action="append")
     command.vehicle()
     command.scenario()
+    text = "after a trajectory: to the take-off point, or down where it ends (default: its file's)"
+    option("--end", "return|land", text, AS_SCENARIO)
+    command.switch(
+        "--retime", "slow a scenario that exceeds a limit of the vehicle down until it does not"
+    )
+    text = "largest speed on the way to a trajectory and back (default 1)"
+    option("--transit-speed", "M/S", text, type=number("speed", "m/s", 0.05, 5.0))
+    text = "largest acceleration there (default 1)"
+    option("--transit-acceleration", "M/S2", text, type=number("acceleration", "m/s^2", 0.05, 5.0))
     option("--engine", "ros|direct", "nodes and sockets, or one loop without them", "ros")
     text = "simulated time, repeatable for the same seed; or the wall clock"
     option("--clock", "lockstep|realtime", text, "lockstep")

@@ -25,6 +25,7 @@ def settings_facts(settings: FlightSettings) -> dict[str, Any]:
         "controller": settings.controller,
         "profile": settings.profile.name,
         "scenario": scenario.name,
+        "scenario_options": settings.scenario_options.to_mapping(),
         "engine": settings.engine,
         "plant": settings.plant,
         "clock": settings.clock,
@@ -47,6 +48,7 @@ def conclude(
 ) -> dict[str, Any] | None:
     """Write metrics, table and facts; return the metrics, None if nothing was recorded."""
     write_json(folder.versions, versions())
+    outcome.notes.extend(settings.notes)
     return complete(folder, settings_facts(settings), outcome)
 
 

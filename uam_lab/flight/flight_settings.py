@@ -4,14 +4,16 @@ from __future__ import annotations
 
 import importlib.util
 from collections.abc import Collection, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
 from uam_control.laws import catalogue
-from uam_control.mission import Scenario, load_scenario
+from uam_control.mission import Feasibility, Scenario, ScenarioOptions, load_scenario
+from uam_control.mission.scenario_options import AS_SCENARIO
 from uam_control.profiles.profile import Profile, default_profile, load_profile
 from uam_control.settings import configuration
+from uam_control.settings.parameter_set import ParameterError
 from uam_control.vehicle import (
     DEFAULT_VEHICLE,
     POSITION_SERVO,
@@ -78,6 +80,8 @@ class FlightSettings:
     seed: int = 1
     plant: str = DEFAULT_PLANT  # see `plant_class`
     scenario_source: str = ""  # as given by the user: a name or a file
+    scenario_options: ScenarioOptions = ScenarioOptions()
+    notes: tuple[str, ...] = ()  # about the settings, for the user
     instance: int | None = None  # of ROS domain and ports; None: the first free one
     vehicle_changes: dict[str, object] = field(default_factory=dict)
     without: tuple[str, ...] = (COCKPIT,)
@@ -99,6 +103,10 @@ class FlightSettings:
 
 def settings(
     scenario: str | Path = "pick_and_place",
+    end: str = AS_SCENARIO,
+    retime: bool = False,
+    transit_speed: float | None = None,
+    transit_acceleration: float | None = None,
     controller: str = catalogue.DEFAULT,
     profile: str | Path | Sequence[str | Path] | None = None,
     vehicle: str = DEFAULT_VEHICLE,
@@ -130,13 +138,15 @@ def settings(
 ) -> FlightSettings:
     """Check the options and load scenario, profile and faults.
 
-    profile: see `load_profile` for several profiles; plant_preset: names or files of effects of
-    the plant, effects: changes to them, see `effects.presets.read`; faults: see
-    `faults.read_schedule`; view: serve the cockpit; arm: begin by itself also with a real
-    autopilot; auto_start False: wait for the command start. parameters: node → name → value, each
-    replaces the profile's. remappings: topic or service → new name for every node, or node → such a
-    mapping. Raises SettingsError, ConfigurationError, ScenarioError, ProfileError, Px4Error,
-    PortError, PlantError, FaultError; each text is one line for the user.
+    end, transit_speed [m/s], transit_acceleration [m/s^2]: see `ScenarioOptions`; retime: slow the
+    scenario down until it is feasible. profile: see `load_profile` for several profiles;
+    plant_preset: names or files of effects of the plant, effects: changes to them, see
+    `effects.presets.read`; faults: see `faults.read_schedule`; view: serve the cockpit; arm: begin
+    by itself also with a real autopilot; auto_start False: wait for the command start. parameters:
+    node → name → value, each replaces the profile's. remappings: topic or service → new name for
+    every node, or node → such a mapping. Raises SettingsError, ConfigurationError, ScenarioError
+    (InfeasibleReference too), ProfileError, Px4Error, PortError, PlantError, FaultError; each text
+    is one line for the user.
     """
     _choice("controller", controller, catalogue.LAWS)
     _choice("engine", engine, ENGINES)
@@ -177,7 +187,11 @@ def settings(
     if not 0 <= seed < 2**31:
         raise SettingsError(f"seed {seed} is outside 0..{2**31 - 1}")
     described = load_description(str(vehicle))
-    loaded = load_scenario(str(configuration.named("scenarios", str(scenario))), described)
+    options = _scenario_options(
+        end=end, transit_speed=transit_speed, transit_acceleration=transit_acceleration
+    )
+    source = str(configuration.named("scenarios", str(scenario)))
+    loaded = load_scenario(source, described, options)
     given = [profile] if isinstance(profile, str | Path) else profile
     flown = (
         load_profile(
@@ -196,6 +210,16 @@ def settings(
     mass = loaded.payload_mass if payload_mass is None else payload_mass
     if not 0.0 <= mass <= PAYLOAD_MAX:
         raise SettingsError(f"payload mass {mass:g} kg is outside 0..{PAYLOAD_MAX:g} kg")
+    feasible = Feasibility(described, flown.sets["mission"], mass)
+    slower: tuple[str, ...] = ()
+    if retime:
+        loaded, factor = feasible.retimed(loaded)
+        options = replace(options, slowdown=factor)
+        slower = (
+            f"retimed: {factor:.4g} times as slow" if factor > 1.0 else "retimed: as written",
+        )
+    else:
+        feasible.check(loaded)
     injected = read_schedule(faults, loaded, seed)
     acting = presets.read(
         [plant_preset] if isinstance(plant_preset, str) else plant_preset, effects
@@ -217,6 +241,8 @@ def settings(
         seed=seed,
         plant=plant,
         scenario_source=str(scenario),
+        scenario_options=options,
+        notes=loaded.notes + slower,
         instance=_instance_of(link) if instance is None else instance,
         vehicle_changes=presets.added(vehicle_changes or {}, acting),
         without=left_out,
@@ -232,6 +258,15 @@ def settings(
     )
     check_feasible(made, injected)
     return made
+
+
+def _scenario_options(**given: Any) -> ScenarioOptions:
+    """Return the options that are given; raise SettingsError for an invalid one."""
+    try:
+        known = {name: value for name, value in given.items() if value is not None}
+        return ScenarioOptions.from_mapping(known)
+    except ParameterError as error:
+        raise SettingsError(str(error)) from None
 
 
 def check_feasible(flight: FlightSettings, faults: Schedule) -> None:

@@ -24,8 +24,7 @@ from std_msgs.msg import String
 
 from uam_control.coordinates import ALPHA, ANGLES, ARM, ATTITUDE, CHI, CHI_DDOT, POSITION
 from uam_control.maths.rotations import quaternion_from_euler, wrap_angle
-from uam_control.mission import load_scenario
-from uam_control.nodes.described import declared_scenario, described_vehicle
+from uam_control.nodes.described import described_scenario, described_vehicle
 from uam_control.settings.parameter_set import ParameterSet, number
 from uam_control.stamps import SECOND
 from uam_lab.nodes.scene_markers import PAYLOAD, FlownPath, Markers, ReferencePath
@@ -72,11 +71,10 @@ class SceneNode(UamNode):
         options = NodeParameters(self, SceneParameters, read_only=True).current
         self._frame_period = round(SECOND / options.frame_rate)
         self._marker_period = round(SECOND / options.marker_rate)
-        scenario = declared_scenario(self)
         described = described_vehicle(self)
         vehicle = Vehicle.of(described)
         self._joint_names = described.joint_names
-        self._scenario, model = load_scenario(scenario, described), vehicle.compile(0.0)
+        self._scenario, model = described_scenario(self, described), vehicle.compile(0.0)
         hung = frames(model)
         self._fixed = [frame for frame in hung if not frame.joint]
         self._moving = [frame for frame in hung if frame.joint]

@@ -17,7 +17,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from uam_control.mission import Scenario, load_scenario
+from uam_control.mission import Scenario, ScenarioOptions, load_scenario
 from uam_control.settings import configuration
 from uam_control.vehicle import DEFAULT_VEHICLE, load_description
 from uam_lab.recording.mcap_reader import read_metadata
@@ -51,15 +51,19 @@ def read(log: Path) -> LogFacts:
     """Read the metadata of a log; missing parts are empty. Raises UnreadableLog, OSError."""
     records = read_metadata(log)
     info = {name: json.loads(text) for name, text in records.get(FLIGHT, {}).items()}
-    return LogFacts(
-        info, _scenario(records.get(SCENARIO), info.get("vehicle")), records.get(TEXTS, {})
-    )
+    return LogFacts(info, _scenario(records.get(SCENARIO), info), records.get(TEXTS, {}))
 
 
-def _scenario(record: Mapping[str, str] | None, vehicle: str | None) -> Scenario | None:
+def options_of(info: Mapping[str, Any]) -> ScenarioOptions:
+    """Return the options of the scenario in the facts of a flight."""
+    return ScenarioOptions.from_mapping(dict(info.get("scenario_options") or {}))
+
+
+def _scenario(record: Mapping[str, str] | None, info: Mapping[str, Any]) -> Scenario | None:
     if not record:
         return None
     with tempfile.TemporaryDirectory() as folder:
         file = Path(folder) / Path(record["name"]).name
         file.write_text(record["text"])
-        return load_scenario(str(file), load_description(vehicle or DEFAULT_VEHICLE))
+        vehicle = load_description(info.get("vehicle") or DEFAULT_VEHICLE)
+        return load_scenario(str(file), vehicle, options_of(info))

@@ -85,7 +85,8 @@ def _scenario(
     name = asked or (None if facts.scenario else known.get("scenario"))
     if name is not None:
         vehicle = load_description(known.get("vehicle") or DEFAULT_VEHICLE)
-        return load_scenario(str(configuration.named("scenarios", name)), vehicle)
+        options = log_facts.options_of(known)
+        return load_scenario(str(configuration.named("scenarios", name)), vehicle, options)
     if facts.scenario is None:
         raise ResultFolderError(f"{directory / LOG} contains no scenario: give --scenario")
     return facts.scenario

@@ -11,6 +11,8 @@ from collections.abc import Callable, Iterable, Iterator
 
 from uam_control.laws.catalogue import LAWS
 from uam_control.mission import load_scenario
+from uam_control.mission.scenario import standing
+from uam_control.mission.trajectory import empty_reference
 from uam_control.profiles.profile import default_profile
 from uam_lab.flight.direct.flight import DirectFlight
 from uam_sim_bridge.autopilot import companion
@@ -54,4 +56,6 @@ def warm_up(laws: Iterable[str] = tuple(LAWS)) -> None:
         flight = DirectFlight(scenario, profile, vehicle, 0.0, seed=1, faults=faults)
         for _ in range(TICKS):
             flight.tick()
+    curve = load_scenario("circle")
+    curve.trajectory(standing(curve.arm_start)).write(4.0, empty_reference(len(curve.arm_start)))
     companion.warm_up()  # the stand-in's descent, which a flight without failures does not call

@@ -56,6 +56,7 @@ def parameters(
     sections = {node: values.to_mapping() for node, values in settings.profile.sets.items()}
     sections[wiring.MISSION] |= {
         "scenario": scenario_source(settings),
+        **settings.scenario_options.to_mapping(),
         "auto_start": settings.auto_start,
         "dry_run": settings.dry_run,
     }
@@ -91,7 +92,10 @@ def parameters(
     }
     if users_autopilot(settings):
         sections[wiring.BRIDGE]["autopilot"] = settings.autopilot
-    sections[wiring.SCENE] = {"scenario": scenario_source(settings)}
+    sections[wiring.SCENE] = {
+        "scenario": scenario_source(settings),
+        **settings.scenario_options.to_mapping(),
+    }
     if wiring.COCKPIT not in settings.without:
         sections[wiring.COCKPIT] = {
             "port": page_address.free_port(page_address.LOCAL, page_address.PORT)

@@ -1,0 +1,261 @@
+"""Whether a vehicle can fly a reference, before it takes off: what exceeds which limit, and when.
+
+The force follows from the acceleration, the weight and the drag; it points along the body's z axis,
+which with yaw gives the attitude; its derivative gives the body rates. The joint torques follow
+from the motion of the arm's masses.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+
+from uam_control.coordinates import ALPHA, ARM, CHI, CHI_DDOT, CHI_DOT, POSITION, YAW, Z
+from uam_control.mission.mission_parameters import MissionParameters
+from uam_control.mission.polynomials import Polynomials
+from uam_control.mission.scenario import Scenario, ScenarioError, standing
+from uam_control.mission.scenario_options import SLOWEST
+from uam_control.mission.trajectory import Trajectory, empty_reference
+from uam_control.vehicle import VehicleDescription, VehicleError
+from uam_control.vehicle.arm_model import ArmModel
+
+STEP = 0.01  # [s] between two checks
+ROUNDING = 1e-6  # [SI]
+PRECISION = 1e-3  # of the slowdown, relative
+ROOM = 1.002  # by which the slowdown is larger than the least one found
+
+
+class InfeasibleReference(ScenarioError):
+    """A reference that exceeds a limit; the text is one line: what, which limit, when."""
+
+
+class Excess(NamedTuple):
+    """A quantity beyond its limit; value: the worst, at `time` [s]; first [s]: where it begins."""
+
+    quantity: str
+    value: float
+    limit: float
+    unit: str
+    time: float
+    first: float
+
+    @property
+    def text(self) -> str:
+        """The excess in words."""
+        beyond = "exceeds" if self.value > self.limit else "is below"
+        return (
+            f"{self.quantity} {self.value:.3g} {self.unit} {beyond} {self.limit:.3g} {self.unit} "
+            f"at {self.time:.1f} s (from {self.first:.1f} s on)"
+        )
+
+
+class Demand(NamedTuple):
+    """What a reference needs at times (m,) [s] of mission time.
+
+    position (m, 3) [m]; speed (m,) [m/s]; thrust (m,) [N]; tilt (m,) [rad]; body_rates (m, 3)
+    [rad/s, FLU]; angles (m, n) [rad]; joint_rates (m, n) [rad/s]; joint_torques (m, n) [N m], NaN
+    if the arm's masses are unknown.
+    """
+
+    times: np.ndarray
+    position: np.ndarray
+    speed: np.ndarray
+    thrust: np.ndarray
+    tilt: np.ndarray
+    body_rates: np.ndarray
+    angles: np.ndarray
+    joint_rates: np.ndarray
+    joint_torques: np.ndarray
+
+
+@dataclass(frozen=True)
+class Feasibility:
+    """The check of references for one vehicle with its limits.
+
+    payload_mass [kg] is carried while the scenario's magnet is on.
+    """
+
+    vehicle: VehicleDescription
+    limits: MissionParameters
+    payload_mass: float
+
+    def excesses(self, scenario: Scenario) -> list[Excess]:
+        """Return every limit that the scenario exceeds on a flight from the origin."""
+        return self.exceeded(self.demand(scenario))
+
+    def exceeded(self, demand: Demand) -> list[Excess]:
+        """Return every limit that a demand exceeds, the earliest first."""
+        p, servo = self.limits, self.vehicle.servo
+        low, high = np.array(p.geofence_low), np.array(p.geofence_high)
+        high[Z] = min(high[Z], demand.position[0, Z] + p.altitude_hold)
+        rates = np.abs(demand.body_rates).max(axis=1)
+        upper = [
+            ("thrust", demand.thrust, p.reference_thrust, "N"),
+            ("tilt", demand.tilt, min(p.reference_tilt, p.tilt_hold), "rad"),
+            ("body rate", rates, p.body_rate_hold, "rad/s"),
+        ]
+        for i in range(demand.angles.shape[1]):
+            angle, rate, torque = (
+                np.abs(values[:, i])
+                for values in (demand.angles, demand.joint_rates, demand.joint_torques)
+            )
+            upper += [
+                (f"joint {i + 1} angle", angle, p.joint_angle_hold[i], "rad"),
+                (f"joint {i + 1} rate", rate, servo.no_load_speed, "rad/s"),
+                (f"joint {i + 1} torque", torque, p.joint_effort_hold[i], "N m"),
+            ]
+        place = demand.position.T
+        upper += [("xyz"[i], place[i], high[i], "m") for i in range(3)]
+        lower = [("xyz"[i], place[i], low[i], "m") for i in range(3)]
+        found = []
+        for sign, checks in ((1.0, upper), (-1.0, lower)):
+            for quantity, values, limit, unit in checks:
+                beyond = sign * values > sign * limit + ROUNDING
+                if beyond.any():
+                    worst, first = int(np.nanargmax(sign * values)), int(np.argmax(beyond))
+                    at = float(demand.times[worst]), float(demand.times[first])
+                    found.append(Excess(quantity, float(values[worst]), float(limit), unit, *at))
+        return sorted(found, key=lambda excess: excess.first)
+
+    def check(self, scenario: Scenario) -> None:
+        """Raise InfeasibleReference if the scenario exceeds a limit."""
+        if found := self.excesses(scenario):
+            raise InfeasibleReference(f"scenario {scenario.name}: {in_words(found)}")
+
+    def retimed(self, scenario: Scenario) -> tuple[Scenario, float]:
+        """Return the scenario slowed down until it is feasible, and the factor, 1 if it is already.
+
+        Raises InfeasibleReference if no slowdown up to SLOWEST makes it feasible.
+        """
+        found = self.excesses(scenario)
+        if not found:
+            return scenario, 1.0
+        low, high = 1.0, 1.1
+        while found:
+            places = [
+                excess for excess in found if excess.unit == "m" or "angle" in excess.quantity
+            ]
+            if places or low >= SLOWEST:
+                text = f"{in_words(places or found)}, and a slowdown does not help"
+                raise InfeasibleReference(f"scenario {scenario.name}: {text}")
+            found = self.excesses(scenario.slowed(high))
+            if found:
+                low, high = high, min(high * high, SLOWEST)
+        while high / low > 1.0 + PRECISION:
+            middle = math.sqrt(low * high)
+            if self.excesses(scenario.slowed(middle)):
+                low = middle
+            else:
+                high = middle
+        factor = min(high * ROOM, SLOWEST)
+        return scenario.slowed(factor), factor
+
+    def demand(self, scenario: Scenario) -> Demand:
+        """Return what a flight from the origin needs, from the take-off to the landing."""
+        start = standing(scenario.arm_start)
+        begun = scenario.begun_at(start)
+        times = np.arange(0.0, begun.landing.at + begun.landing.duration, STEP)
+        return self.along(begun.trajectory(start), times, self.carried(begun, times))
+
+    def carried(self, scenario: Scenario, times: np.ndarray) -> np.ndarray:
+        """Return the carried mass (m,) [kg] at times (m,) [s]."""
+        on = np.array([scenario.magnet_on(time) for time in times.tolist()])
+        return self.payload_mass * on
+
+    def along(self, trajectory: Trajectory, times: np.ndarray, carried: np.ndarray) -> Demand:
+        """Return the demand of a reference at times (m,) [s], STEP apart; carried (m,) [kg]."""
+        rows = _rows(trajectory, times, len(self.vehicle.joints))
+        velocity, acceleration = rows[CHI_DOT, :, POSITION], rows[CHI_DDOT, :, POSITION]
+        mass = self.vehicle.mass + carried
+        drag = np.array(self.vehicle.numbers["air"]["drag"])
+        up = np.array([0.0, 0.0, self.vehicle.gravity])
+        force = mass[:, None] * (acceleration + up) + drag * velocity
+        yaw = rows[CHI, :, YAW]
+        roll, pitch = _attitude(force, yaw)
+        rates = _body_rates(roll, pitch, np.gradient(roll, times), np.gradient(pitch, times),
+                            rows[CHI_DOT, :, YAW])  # fmt: skip
+        thrust = np.linalg.norm(force, axis=1)
+        return Demand(
+            times,
+            rows[CHI, :, POSITION],
+            np.linalg.norm(velocity, axis=1),
+            thrust,
+            np.arccos(np.clip(force[:, Z] / np.maximum(thrust, 1e-9), -1.0, 1.0)),
+            rates,
+            rows[CHI, :, ARM],
+            rows[CHI_DOT, :, ARM],
+            self._joint_torques(times, rows[CHI], roll, pitch, carried),
+        )
+
+    def _joint_torques(
+        self,
+        times: np.ndarray,
+        chi: np.ndarray,
+        roll: np.ndarray,
+        pitch: np.ndarray,
+        carried: np.ndarray,
+    ) -> np.ndarray:
+        try:
+            arm = ArmModel.of(self.vehicle)
+        except VehicleError:
+            return np.full((len(times), chi.shape[1] - ALPHA), np.nan)
+        rotation = _matrices(roll, pitch, chi[:, YAW])
+        gravity = self.vehicle.gravity
+        return arm.torques(times, chi[:, POSITION], rotation, chi[:, ARM], gravity, carried)
+
+
+def in_words(excesses: list[Excess]) -> str:
+    """Return the excesses in one line."""
+    return "; ".join(excess.text for excess in excesses)
+
+
+def _rows(trajectory: Trajectory, times: np.ndarray, joints: int) -> np.ndarray:
+    """Return the reference (3, m, 6 + n) at times (m,) [s]."""
+    if isinstance(trajectory, Polynomials):
+        return trajectory.rows(times, CHI_DDOT + 1)
+    found = np.empty((len(times), *empty_reference(joints).shape))
+    for time, reference in zip(times.tolist(), found, strict=True):
+        trajectory.write(time, reference)
+    return found.swapaxes(0, 1)
+
+
+def _attitude(force: np.ndarray, yaw: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return roll and pitch (m,) [rad] whose body z axis is along force (m, 3) [N, world]."""
+    cosine, sine = np.cos(yaw), np.sin(yaw)
+    x, y, z = force.T
+    size = np.maximum(np.linalg.norm(force, axis=1), 1e-9)
+    roll = np.arcsin(np.clip((sine * x - cosine * y) / size, -1.0, 1.0))
+    return roll, np.arctan2(cosine * x + sine * y, z)
+
+
+def _body_rates(
+    roll: np.ndarray,
+    pitch: np.ndarray,
+    roll_rate: np.ndarray,
+    pitch_rate: np.ndarray,
+    yaw_rate: np.ndarray,
+) -> np.ndarray:
+    """Return the body rates (m, 3) [rad/s, FLU] of Euler angles [rad] and their rates, (m,)."""
+    cr, sr, cp, sp = np.cos(roll), np.sin(roll), np.cos(pitch), np.sin(pitch)
+    return np.column_stack(
+        [
+            roll_rate - sp * yaw_rate,
+            cr * pitch_rate + sr * cp * yaw_rate,
+            -sr * pitch_rate + cr * cp * yaw_rate,
+        ]
+    )
+
+
+def _matrices(roll: np.ndarray, pitch: np.ndarray, yaw: np.ndarray) -> np.ndarray:
+    """Return R_B^W (m, 3, 3) of Euler angles (m,) [rad]."""
+    cr, sr, cp, sp = np.cos(roll), np.sin(roll), np.cos(pitch), np.sin(pitch)
+    cy, sy = np.cos(yaw), np.sin(yaw)
+    rows = (
+        (cy * cp, cy * sp * sr - sy * cr, cy * sp * cr + sy * sr),
+        (sy * cp, sy * sp * sr + cy * cr, sy * sp * cr - cy * sr),
+        (-sp, sr * cp, cp * cr),
+    )
+    return np.moveaxis(np.array(rows), 2, 0)

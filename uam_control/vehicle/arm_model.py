@@ -1,0 +1,191 @@
+"""Masses and lengths of the arm, read from the vehicle's MJCF, and the joint torques they need.
+
+Only the parts that this needs are read: bodies, hinges and geoms with a mass, and their classes.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from xml.etree import ElementTree
+
+import numpy as np
+
+from uam_control.vehicle.description import VehicleDescription
+from uam_control.vehicle.loading import VehicleError
+
+TIP = "magnet"  # body that carries the payload
+FACE = "magnet_face"  # its site, where the payload hangs
+
+
+@dataclass(frozen=True)
+class Link:
+    """One link of the arm, in the frame of its joint.
+
+    offset (3,) [m]: of the joint in the frame of the link before (of the base); axis (3,): unit
+    vector; mass [kg]; centre (3,) [m]: of the mass.
+    """
+
+    offset: np.ndarray
+    axis: np.ndarray
+    mass: float
+    centre: np.ndarray
+
+
+@dataclass(frozen=True)
+class ArmModel:
+    """The arm: links from base to tip; tip (3,) [m]: of the payload, in the last link's frame.
+
+    armature [kg m^2], damping [N m s/rad], friction [N m]: of every joint.
+    """
+
+    links: tuple[Link, ...]
+    tip: np.ndarray
+    armature: float
+    damping: float
+    friction: float
+
+    @classmethod
+    def of(cls, vehicle: VehicleDescription) -> ArmModel:
+        """Read the arm of a vehicle. Raises VehicleError if its MJCF has another form."""
+        return _Reader(vehicle).arm()
+
+    def torques(
+        self,
+        times: np.ndarray,
+        position: np.ndarray,
+        rotation: np.ndarray,
+        angles: np.ndarray,
+        gravity: float,
+        payload: np.ndarray,
+    ) -> np.ndarray:
+        """Return the joint torques (m, n) [N m] of a motion, with point masses.
+
+        times (m,) [s], equidistant; position (m, 3) [m, world] and rotation (m, 3, 3) [body to
+        world] of the base; angles (m, n) [rad]; gravity [m/s^2]; payload (m,): carried mass [kg].
+        """
+        origins, axes, centres = [], [], []
+        place, frame = position, rotation
+        for i, link in enumerate(self.links):
+            place = place + frame @ link.offset
+            origins.append(place)
+            axes.append(frame @ link.axis)
+            frame = frame @ _about(link.axis, angles[:, i])
+            centres.append(place + frame @ link.centre)
+        masses = [np.full(len(times), link.mass) for link in self.links]
+        centres.append(place + frame @ self.tip)
+        masses.append(payload)
+        up = np.array([0.0, 0.0, gravity])
+        forces = [
+            mass[:, None] * (_derived(_derived(centre, times), times) + up)
+            for mass, centre in zip(masses, centres, strict=True)
+        ]
+        rates = _derived(angles, times)
+        own = (
+            self.armature * _derived(rates, times)
+            + self.damping * rates
+            + self.friction * np.sign(np.round(rates, 6))
+        )
+        found = np.empty_like(angles)
+        for i in range(len(self.links)):
+            moment = sum(
+                np.cross(centre - origins[i], force)
+                for centre, force in zip(centres[i:], forces[i:], strict=True)
+            )
+            found[:, i] = np.einsum("ij,ij->i", moment, axes[i])
+        return found + own
+
+
+def _derived(values: np.ndarray, times: np.ndarray) -> np.ndarray:
+    return np.gradient(values, times, axis=0)
+
+
+def _about(axis: np.ndarray, angles: np.ndarray) -> np.ndarray:
+    """Return the rotations (m, 3, 3) about a unit axis (3,) by angles (m,) [rad]."""
+    x, y, z = axis
+    cross = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
+    sine, rest = np.sin(angles)[:, None, None], (1.0 - np.cos(angles))[:, None, None]
+    return np.eye(3) + sine * cross + rest * (cross @ cross)
+
+
+class _Reader:
+    """Reads an MJCF file with its includes."""
+
+    def __init__(self, vehicle: VehicleDescription) -> None:
+        self._file, self._names = vehicle.model, vehicle.joint_names
+        try:
+            self._root = _included(vehicle.model, vehicle.model.parent)
+        except (ElementTree.ParseError, OSError) as error:
+            raise VehicleError(f"{vehicle.model}: {error}") from None
+        self._classes = {
+            (one.get("class"), part.tag): part.attrib
+            for one in self._root.iter("default")
+            if one.get("class")
+            for part in one
+        }
+
+    def arm(self) -> ArmModel:
+        """Return the arm."""
+        bodies = {}
+        parents = {child: parent for parent in self._root.iter() for child in parent}
+        for body in self._root.iter("body"):
+            for joint in body.findall("joint"):
+                bodies[joint.get("name")] = (body, joint)
+        if missing := [name for name in self._names if name not in bodies]:
+            raise VehicleError(f"{self._file}: no joint '{missing[0]}'")
+        links = []
+        for name in self._names:
+            body, joint = bodies[name]
+            attributes = self._attributes(joint)
+            mass, centre = self._mass(body)
+            axis = _vector(attributes.get("axis", "0 0 1"))
+            links.append(
+                Link(_vector(body.get("pos", "0 0 0")), axis / np.linalg.norm(axis), mass, centre)
+            )
+        tip = next((body for body in self._root.iter("body") if body.get("name") == TIP), None)
+        if tip is None or parents[tip] is not body:
+            raise VehicleError(f"{self._file}: the last link has no body '{TIP}'")
+        face = next((one for one in tip.iter("site") if one.get("name") == FACE), None)
+        hangs = _vector(tip.get("pos", "0 0 0"))
+        if face is not None:
+            hangs = hangs + _vector(face.get("pos", "0 0 0"))
+        values = (float(attributes.get(key, 0)) for key in ("armature", "damping", "frictionloss"))
+        return ArmModel(tuple(links), hangs, *values)
+
+    def _attributes(self, part: ElementTree.Element) -> dict[str, str]:
+        return {**self._classes.get((part.get("class"), part.tag), {}), **part.attrib}
+
+    def _mass(self, body: ElementTree.Element) -> tuple[float, np.ndarray]:
+        """Return mass [kg] and centre (3,) [m] of a body and of the tip that hangs on it."""
+        total, moment = 0.0, np.zeros(3)
+        for part in (*body.findall("inertial"), *body.findall("geom")):
+            attributes = self._attributes(part)
+            if "mass" not in attributes:
+                raise VehicleError(f"{self._file}: body '{body.get('name')}': a part without mass")
+            mass = float(attributes["mass"])
+            centre = _vector(attributes.get("pos", "0 0 0"))
+            if "fromto" in attributes:
+                centre = _vector(attributes["fromto"]).reshape(2, 3).mean(axis=0)
+            total, moment = total + mass, moment + mass * centre
+        for child in body.findall("body"):
+            if not any(joint.get("name") in self._names for joint in child.findall("joint")):
+                mass, centre = self._mass(child)
+                moment += mass * (centre + _vector(child.get("pos", "0 0 0")))
+                total += mass
+        return total, moment / total if total else moment
+
+
+def _included(file: Path, folder: Path) -> ElementTree.Element:
+    """Return the tree of a file; the content of its file, in `folder`, replaces an `include`."""
+    root = ElementTree.parse(file).getroot()
+    for parent in list(root.iter()):
+        for i, child in reversed(list(enumerate(parent))):
+            if child.tag == "include":
+                parent.remove(child)
+                for part in reversed(list(_included(folder / child.get("file"), folder))):
+                    parent.insert(i, part)
+    return root
+
+
+def _vector(text: str) -> np.ndarray:
+    return np.array([float(number) for number in text.split()])
