@@ -9,7 +9,6 @@ import sys
 from rich.console import Console
 
 from uam_control.laws import catalogue
-from uam_control.mission.scenario_options import AS_SCENARIO
 from uam_control.settings import configuration
 from uam_lab.cli.command import INTERRUPTED, Command, number
 from uam_lab.flight import flight_settings
@@ -77,8 +76,8 @@ def add(commands: argparse._SubParsersAction) -> None:
     option("--profile", "NAME|FILE", text, action="append")
     command.vehicle()
     command.scenario()
-    text = "after a trajectory: to the take-off point, or down where it ends (default: its file's)"
-    option("--end", "return|land", text, AS_SCENARIO)
+    text = "after a trajectory: to the take-off point, or down where it ends (default: its own)"
+    option("--end", "return|land", text)
     command.switch(
         "--retime", "slow a scenario that exceeds a limit of the vehicle down until it does not"
     )

@@ -10,7 +10,6 @@ from typing import Any
 
 from uam_control.laws import catalogue
 from uam_control.mission import Feasibility, Scenario, ScenarioOptions, load_scenario
-from uam_control.mission.scenario_options import AS_SCENARIO
 from uam_control.profiles.profile import Profile, default_profile, load_profile
 from uam_control.settings import configuration
 from uam_control.settings.parameter_set import ParameterError
@@ -103,7 +102,7 @@ class FlightSettings:
 
 def settings(
     scenario: str | Path = "pick_and_place",
-    end: str = AS_SCENARIO,
+    end: str | None = None,
     retime: bool = False,
     transit_speed: float | None = None,
     transit_acceleration: float | None = None,

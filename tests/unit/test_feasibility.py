@@ -1,0 +1,238 @@
+"""Feasibility of references: hand-worked demands, refusals in words, retiming."""
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from uam_control.mission import (
+    Feasibility,
+    InfeasibleReference,
+    Mission,
+    load_scenario,
+)
+from uam_control.mission.feasibility import in_words
+from uam_control.mission.scenario_options import SLOWEST
+from uam_control.profiles.profile import load_profile
+from uam_control.vehicle import VehicleError, load_description
+from uam_control.vehicle.arm_model import ArmModel
+from uam_lab.flight.flight_settings import settings as flight_settings
+from uam_sim_bridge.plant import Vehicle
+
+PROFILE = load_profile("s500")
+OPEN = replace(
+    PROFILE.sets["mission"], reference_thrust=36.0, reference_tilt=1.2, tilt_hold=1.25,
+    tilt_failsafe=1.4,
+)  # fmt: skip
+TIMES = np.arange(0.0, 3.0, 0.01)
+
+
+def checked(limits=OPEN, payload=0.0):
+    return Feasibility(PROFILE.vehicle, limits, payload)
+
+
+def scenario_of(folder, text):
+    file = folder / "made.yaml"
+    file.write_text(text)
+    return load_scenario(str(file))
+
+
+def circle(folder, radius=1.0, speed=2.0, more=""):
+    return scenario_of(
+        folder,
+        f"trajectory: {{kind: circle, radius: {radius}, speed: {speed}, laps: 4, height: 1.5, "
+        f"ramp: {1 + speed}{more}}}",
+    )
+
+
+class Motion:
+    """A reference from a function of time that returns value, rate, acceleration (3, 8)."""
+
+    def __init__(self, function):
+        self.function = function
+
+    def write(self, time, reference):
+        reference[:] = self.function(time)
+
+
+def rows(**columns):
+    """Reference (3, 8) with z = 1 m and the given columns: name → value, rate, acceleration."""
+    names = ("x", "y", "z", "roll", "pitch", "yaw", "alpha_1", "alpha_2")
+    found = np.zeros((3, 8))
+    found[0, 2] = 1.0
+    for name, values in columns.items():
+        found[:, names.index(name)] = values
+    return found
+
+
+def test_hover_needs_the_weight():
+    demand = checked().along(Motion(lambda t: rows()), TIMES, np.zeros(len(TIMES)))
+    np.testing.assert_allclose(demand.thrust, 2.2 * 9.81)
+    np.testing.assert_allclose(demand.tilt, 0.0)
+    np.testing.assert_allclose(demand.body_rates, 0.0, atol=1e-12)
+    np.testing.assert_allclose(demand.joint_torques, 0.0, atol=1e-12)  # both links straight down
+
+
+def test_a_constant_acceleration_tilts_by_its_ratio_to_gravity():
+    motion = Motion(lambda t: rows(x=(0.0, 0.0, 9.81)))
+    demand = checked().along(motion, TIMES, np.full(len(TIMES), 0.2))
+    np.testing.assert_allclose(demand.tilt, math.pi / 4)
+    np.testing.assert_allclose(demand.thrust, 2.4 * 9.81 * math.sqrt(2.0))
+
+
+def test_drag_counts():
+    motion = Motion(lambda t: rows(y=(0.0, 10.0, 0.0)))
+    demand = checked().along(motion, TIMES, np.zeros(len(TIMES)))
+    assert demand.tilt[0] == pytest.approx(math.atan(1.5 / (2.2 * 9.81)))
+
+
+def test_a_steady_circle_turns_the_thrust_about_the_vertical():
+    # radius r, rate w: the thrust leans by atan(r w^2 / g) inwards; with yaw fixed the body turns
+    # about a horizontal axis: |rates| = w sin(tilt)
+    w, r = 2.0, 1.0
+    no_drag = replace(
+        PROFILE.vehicle, numbers={**PROFILE.vehicle.numbers, "air": {"drag": [0] * 3}}
+    )
+    motion = Motion(
+        lambda t: rows(
+            x=(r * math.cos(w * t), -r * w * math.sin(w * t), -r * w * w * math.cos(w * t)),
+            y=(r * math.sin(w * t), r * w * math.cos(w * t), -r * w * w * math.sin(w * t)),
+        )
+    )
+    demand = Feasibility(no_drag, OPEN, 0.0).along(motion, TIMES, np.zeros(len(TIMES)))
+    tilt = math.atan(r * w * w / 9.81)
+    np.testing.assert_allclose(demand.tilt, tilt)
+    inner = demand.body_rates[2:-2]
+    # the tip of the unit vector z_b moves with w sin(tilt)
+    np.testing.assert_allclose(np.hypot(inner[:, 0], inner[:, 1]), w * math.sin(tilt), rtol=1e-3)
+
+
+def test_joint_torques_of_a_still_arm_are_those_of_its_weight():
+    still = Motion(lambda t: rows(alpha_1=(math.pi / 2, 0, 0)))  # both links horizontal, forward
+    demand = checked().along(still, TIMES, np.full(len(TIMES), 0.2))
+    # link 1: 0.177 kg at 74.5 mm; link 2: 0.16 kg at 100 + 113 mm; payload at 270 mm from joint 1
+    first = 9.81 * (0.177 * 0.0745 + 0.16 * 0.213 + 0.2 * 0.270)
+    second = 9.81 * (0.16 * 0.113 + 0.2 * 0.170)
+    np.testing.assert_allclose(demand.joint_torques[100], [first, second], rtol=2e-3)
+
+
+@pytest.mark.parametrize("name", ["s500_arm", "s500_arm3", "hexa_arm"])
+def test_the_arm_model_has_the_masses_of_the_plants_model(name):
+    vehicle = load_description(name)
+    model, arm = Vehicle.of(vehicle).compile(0.0), ArmModel.of(vehicle)
+    first = model.jnt_bodyid[model.joint(vehicle.joint_names[0]).id]
+    assert sum(link.mass for link in arm.links) == pytest.approx(model.body_subtreemass[first])
+    for link, joint in zip(arm.links, vehicle.joint_names, strict=True):
+        np.testing.assert_allclose(link.axis, model.joint(joint).axis)
+        np.testing.assert_allclose(link.offset, model.body(model.joint(joint).bodyid[0]).pos)
+
+
+def test_an_mjcf_of_another_form_is_refused(tmp_path):
+    file = tmp_path / "other.xml"
+    file.write_text("<mujoco><worldbody><body name='base'/></worldbody></mujoco>")
+    with pytest.raises(VehicleError, match="no joint 'alpha_1'"):
+        ArmModel.of(replace(load_description(), model=file))
+
+
+def test_the_refusal_says_what_exceeds_which_limit_and_when():
+    with pytest.raises(InfeasibleReference) as caught:
+        checked().check(load_scenario("ellipse"))
+    assert str(caught.value) == (
+        "scenario ellipse: thrust 42.3 N exceeds 36 N at 22.7 s (from 22.3 s on)"
+    )
+
+
+@pytest.mark.parametrize(
+    ("change", "text"),
+    [
+        ({"tilt_hold": 0.3}, "tilt 0.387 rad exceeds 0.3 rad at"),
+        ({"reference_tilt": 0.3}, "tilt 0.387 rad exceeds 0.3 rad at"),
+        ({"reference_thrust": 22.0}, "thrust 23.8 N exceeds 22 N at"),
+        ({"body_rate_hold": 0.5}, r"body rate 0.8\d* rad/s exceeds 0.5 rad/s at"),
+        ({"geofence_high": (0.5, 5.0, 6.0)}, "^x 1 m exceeds 0.5 m at"),
+        ({"geofence_low": (-5.0, -0.5, -1.0)}, "^y -1 m is below -0.5 m at"),
+        ({"altitude_hold": 1.0}, r"z 1.5 m exceeds 1.2\d m at"),
+        ({"joint_effort_hold": (0.1, 2.8)}, r"joint 1 torque 0.\d+ N m exceeds 0.1 N m at"),
+        ({"joint_angle_hold": (1.9, 1.2)}, r"joint 2 angle 1.57 rad exceeds 1.2 rad at 0.0 s"),
+    ],
+)
+def test_every_limit_counts(tmp_path, change, text):
+    import re
+
+    scenario = circle(tmp_path)
+    assert not checked().excesses(scenario)
+    found = checked(replace(OPEN, **change)).excesses(scenario)
+    assert re.search(text, in_words(found))
+
+
+@settings(max_examples=12, deadline=None)
+@given(radius=st.floats(0.5, 3.0), speed=st.floats(2.0, 5.0), payload=st.floats(0.0, 0.4))
+def test_retimed_is_feasible_and_not_slower_than_necessary(
+    tmp_path_factory, radius, speed, payload
+):
+    text = f"{{kind: circle, radius: {radius}, speed: {speed}, laps: 30, height: 1.5, ramp: 6}}"
+    scenario = scenario_of(tmp_path_factory.mktemp("made"), f"trajectory: {text}")
+    check = checked(payload=payload)
+    retimed, factor = check.retimed(scenario)
+    assert not check.excesses(retimed) and 1.0 <= factor <= SLOWEST
+    if factor > 1.0:
+        assert check.excesses(scenario)
+        assert check.excesses(scenario.slowed(factor / 1.02))
+    else:
+        assert retimed is scenario
+
+
+def test_a_place_outside_the_geofence_is_not_retimed(tmp_path):
+    with pytest.raises(InfeasibleReference, match="x 6 m exceeds 5 m .* a slowdown does not help"):
+        checked().retimed(circle(tmp_path, more=", centre: [5, 0]"))
+
+
+def test_payload_counts_while_the_magnet_is_on():
+    scenario = load_scenario("quick_pick")
+    bare, loaded = (checked(payload=mass).demand(scenario) for mass in (0.0, 0.4))
+    on = np.array([scenario.magnet_on(t) for t in bare.times])
+    np.testing.assert_allclose(bare.thrust[~on], loaded.thrust[~on])
+    assert (loaded.thrust[on] > bare.thrust[on] + 0.35 * 9.0).all()
+    assert loaded.joint_torques[on].max() > bare.joint_torques[on].max() + 0.1
+
+
+@pytest.mark.parametrize("name", ["pick_and_place", "quick_pick", "hover", "circle", "arm_motions"])
+@pytest.mark.parametrize("law", ["s500", "asmc1", "asmc2", "paper_table1"])
+def test_the_missions_of_every_profile_are_feasible(name, law):
+    limits = load_profile(law).sets["mission"]
+    assert not Feasibility(PROFILE.vehicle, limits, 0.4).excesses(load_scenario(name))
+
+
+def test_limits_of_the_reference_follow_from_the_position_controller(tmp_path):
+    file = tmp_path / "mine.yaml"
+    file.write_text("position_controller:\n  ros__parameters: {tilt_max: 0.5, thrust_max: 39.0}\n")
+    limits = load_profile("s500", str(file)).sets["mission"]
+    assert (limits.reference_tilt, limits.reference_thrust) == (0.5, 39.0)
+
+
+def test_a_flight_is_refused_before_it_starts_or_slowed_down():
+    with pytest.raises(InfeasibleReference, match="scenario ellipse: .*thrust 42.3 N"):
+        flight_settings("ellipse", engine="direct")
+    made = flight_settings("ellipse", engine="direct", retime=True)
+    factor = made.scenario_options.slowdown
+    assert factor > 1.0 and made.notes == (f"retimed: {factor:.4g} times as slow",)
+    assert made.scenario.landing.at > load_scenario("ellipse").landing.at
+
+
+def test_the_pre_arm_report_has_the_reference():
+    parameters = PROFILE.sets["mission"]
+    for name, passed in (("hover", True), ("ellipse", False)):
+        mission = Mission(load_scenario(name), parameters, vehicle=PROFILE.vehicle)
+        state = np.zeros((3, 8))
+        state[0, 2], state[0, 6:] = 0.285, mission.scenario.arm_start
+        mission.step(0.0, state, None)
+        (line,) = [check for check in mission.preflight() if check.name == "reference"]
+        assert line.passed is passed
+        assert ("thrust 42.3 N exceeds" in mission.not_ready) is not passed
+    mission.configure(
+        replace(parameters, reference_thrust=45.0, reference_tilt=1.0, tilt_hold=1.04)
+    )
+    assert "thrust" not in mission.not_ready and "reference: tilt 1.04" in mission.not_ready
