@@ -1,34 +1,31 @@
-"""The pilot, a ground station or the autopilot's failsafe takes over in flight (direct engine).
+"""A pilot, a ground station or the autopilot's failsafe takes over in flight; seen on the wire.
 
-Every case begins in a fork of the process that has flown up to that instant.
+Bridge, stand-in and ground station speak MAVLink over UDP (`wired_flight`). Every case begins in a
+fork of the process that has flown up to that instant, and opens its own sockets.
 """
 
 from __future__ import annotations
 
 import multiprocessing
-from dataclasses import dataclass
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass, field
 
 import numpy as np
 import pytest
+from wired_flight import Steps, WiredAutopilot, wired_flight
 
-from uam_control.mission import load_scenario
-from uam_control.profiles.profile import load_profile
+from uam_control.coordinates import ATTITUDE, CHI
+from uam_control.maths.rotations import matrix_from_euler
 from uam_control.supervision import OperatorCommand, State
 from uam_lab.flight.direct.flight import DirectFlight
-from uam_sim_bridge.autopilot.autopilot_estimator import ATTITUDE
-from uam_sim_bridge.mavlink.protocol.modes import MavCmd, MavResult, Mode
-from uam_sim_bridge.plant import Vehicle
+from uam_sim_bridge.mavlink.protocol.modes import Mode
 
-TAKE_OFF, APPROACH, PICK, CARRY, LANDING = 1.0, 20.0, 34.0, 50.0, 83.5  # [s] mission time
-BATTERY = "battery"
-BACK_IN_OFFBOARD = (Mode.POSITION, Mode.HOLD, Mode.RETURN)
-STAYS = (Mode.LAND, BATTERY)
-HELD = 6.0  # [s] for which somebody else has control
-# [s] of it in RETURN, then HOLD: RETURN descends as soon as it is at home
-RETURNING = {TAKE_OFF: 0.1, APPROACH: 2.0, PICK: 1.9, CARRY: 0.5, LANDING: 0.3}
-WATCHED = 2.0  # [s] after control is back
-FORWARD = (0.12, 0.0, 0.0, 0.0)  # sticks, 1.2 m/s
-CENTRED = (0.0, 0.0, 0.0, 0.0)
+# quick_pick [s] mission time; the magnet is energised at 8.2 s
+TAKE_OFF, APPROACH, PICK, CARRY, LANDING = PHASES = 1.0, 4.0, 7.5, 11.0, 18.5
+GRASP = 8.2
+SHORTLY = 0.3  # [s] of RETURN near home, where it descends at once
+BACK_HOME = {TAKE_OFF: SHORTLY, APPROACH: 1.0, PICK: 1.0, CARRY: SHORTLY, LANDING: SHORTLY}
+PUSHED = 0.12  # of the sticks, 1.2 m/s
 LOW_BATTERY = {
     "COM_LOW_BAT_ACT": 2,
     "SIM_BAT_ENABLE": 1,
@@ -41,19 +38,22 @@ LOW_BATTERY = {
 class Outcome:
     """What happened in a case.
 
-    released_after [s]; offboard_requests: while somebody else had control; tilt [deg], thrust_step,
-    rate_step [rad/s]: the largest, the steps after control was back; modes: of the autopilot since
-    the take-over.
+    released_after [s]; requests: for mode or arming, on the wire while somebody else had control,
+    and after that; steps: of body rates [rad/s] and thrust, from the return of control on; unlike:
+    angle [deg] of the first desired attitude to the present one; tilt [deg]: the largest.
     """
 
     released_after: float = np.inf
+    requests: list[str] = field(default_factory=list)
+    requests_later: list[str] = field(default_factory=list)
+    setpoints: int = 0
     resumed: bool = False
     answer: str = ""
-    offboard_requests: int = 0
+    steps: tuple[float, float] = (0.0, 0.0)
+    unlike: float = np.inf
     tilt: float = 0.0
-    thrust_step: float = 0.0
-    rate_step: float = 0.0
     modes: tuple[Mode, ...] = ()
+    held: State = State.GROUNDED
     phase: str = ""
     state: State = State.GROUNDED
     abort_reason: str = ""
@@ -61,125 +61,263 @@ class Outcome:
 
 
 class Case:
-    """One take-over of a flight."""
+    """One take-over of a flight; `pushed`: the pilot's stick, None without a radio."""
 
     def __init__(self, flight: DirectFlight) -> None:
-        self.flight, self.autopilot = flight, flight.autopilot.autopilot
-        self.outcome = Outcome()
-        self._command, self.autopilot.command = self.autopilot.command, self._count
+        self.flight, self.outcome, self.pushed = flight, Outcome(), None
+        self.autopilot: WiredAutopilot = flight.autopilot
+        self.ground = self.autopilot.ground
+        self.begin = flight.plant.time
 
-    def _count(self, time, command, parameters):
-        self.outcome.offboard_requests += command == MavCmd.DO_SET_MODE
-        return self._command(time, command, parameters)
+    @property
+    def state(self) -> State:
+        return self.flight.mission.output.state
 
-    def take_over(self, by: Mode | str) -> None:
-        flight, autopilot = self.flight, self.autopilot
-        if by is BATTERY:
-            for name, value in LOW_BATTERY.items():
-                autopilot.set_parameter(name, value)
-            while autopilot.commander.mode is Mode.OFFBOARD:
-                flight.tick()
-            return
-        if by is Mode.POSITION:
-            autopilot.manual(flight.plant.time, CENTRED)
-        self.choose(by)
-
-    def choose(self, mode: Mode) -> None:
-        commander, time = self.autopilot.commander, self.flight.plant.time
-        assert commander.request_mode(time, mode, aided=True) is MavResult.ACCEPTED
-
-    def held(self, by: Mode | str, at: float) -> None:
-        """Fly without control, or until the motors stop."""
-        flight, outcome, begin = self.flight, self.outcome, self.flight.plant.time
-        stops = begin + RETURNING[at] if by is Mode.RETURN else np.inf
-        while flight.armed and (by in STAYS or flight.plant.time < begin + HELD):
-            if flight.plant.time >= stops:
-                self.choose(Mode.HOLD)
-                stops = np.inf
-            if by is Mode.POSITION:
-                pushed = 1.0 < flight.plant.time - begin < 2.0
-                self.autopilot.manual(flight.plant.time, FORWARD if pushed else CENTRED)
+    def fly(self, seconds: float = np.inf, until: Callable[[], bool] = lambda: False) -> None:
+        """Fly on, or until the motors have stopped."""
+        end = self.flight.plant.time + seconds
+        while self.flight.plant.time < end and not until():
             self.tick()
-            if flight.mission.output.state is State.RELEASED:
-                outcome.released_after = min(outcome.released_after, flight.plant.time - begin)
-
-    def resume(self) -> None:
-        flight, outcome = self.flight, self.outcome
-        outcome.resumed, outcome.answer = flight.mission.request(OperatorCommand.RESUME)
-        if not outcome.resumed:
-            return
-        requests, begin = outcome.offboard_requests, flight.plant.time
-        before = self.autopilot._setpoint.copy()
-        while flight.plant.time < begin + WATCHED:
-            self.tick()
-            now = self.autopilot._setpoint.copy()
-            steps = np.abs(now - before)
-            outcome.thrust_step = max(outcome.thrust_step, float(steps[3]))
-            outcome.rate_step = max(outcome.rate_step, float(np.max(steps[:3])))
-            before = now
-        outcome.offboard_requests = requests  # those of the command do not count
+            if not self.flight.armed:
+                return
 
     def tick(self) -> None:
-        self.flight.tick()
-        outcome, (_, x, y, _) = self.outcome, self.autopilot.estimator.estimate[ATTITUDE]
-        outcome.tilt = max(outcome.tilt, float(np.degrees(np.arccos(1.0 - 2.0 * (x**2 + y**2)))))
-        outcome.modes = tuple(dict.fromkeys((*outcome.modes, self.autopilot.commander.mode)))
+        flight, outcome = self.flight, self.outcome
+        if self.pushed is not None and flight.plant.tick % 10 == 0:
+            self.ground.sticks(self.pushed)
+        flight.tick()
+        if self.state is State.RELEASED:
+            outcome.released_after = min(outcome.released_after, flight.plant.time - self.begin)
+        rotation = matrix_from_euler(flight.plant.truth().state[CHI, ATTITUDE])
+        outcome.tilt = max(outcome.tilt, float(np.degrees(np.arccos(rotation[2, 2]))))
+        mode = self.autopilot.autopilot.commander.mode
+        outcome.modes = tuple(dict.fromkeys((*outcome.modes, mode)))
+
+    def take_over(self, mode: Mode, seconds: float = 0.0) -> None:
+        """The ground station chooses a mode."""
+        self.ground.choose(mode)
+        self.fly(seconds)
+
+    def resume(self) -> None:
+        """Give the command, and watch the first second of the laws."""
+        flight, outcome = self.flight, self.outcome
+        self.count()
+        outcome.resumed, outcome.answer = flight.mission.request(OperatorCommand.RESUME)
+        if outcome.resumed:
+            self.watch()
+
+    def watch(self) -> None:
+        """Fly until the laws have flown for a second; take the steps."""
+        flight, outcome = self.flight, self.outcome
+        steps = Steps(self.autopilot.autopilot)
+        signals, flying = flight.control.signals, 0
+        while flying < 250 and flight.armed:
+            self.tick()
+            steps.tick()
+            flying += signals.flying
+            if flying == 1:
+                attitudes = signals.attitude_reference[CHI], signals.state[CHI, ATTITUDE]
+                desired, present = map(matrix_from_euler, attitudes)
+                cosine = (np.trace(desired.T @ present) - 1.0) / 2.0
+                outcome.unlike = float(np.degrees(np.arccos(min(1.0, cosine))))
+        outcome.steps = steps.rates, steps.thrust
+
+    def count(self) -> None:
+        """Take the requests on the wire so far."""
+        outcome, autopilot = self.outcome, self.autopilot
+        outcome.requests += autopilot.requests()
+        outcome.setpoints += autopilot.setpoints
+        autopilot.transport.sent.clear()
+
+    def end(self) -> Outcome:
+        """Fly to the end of the flight."""
+        flight, outcome = self.flight, self.outcome
+        if not outcome.resumed:
+            self.count()
+        flight.run()
+        outcome.requests_later = self.autopilot.requests()
+        output = flight.mission.output
+        outcome.phase, outcome.state = output.phase, output.state
+        outcome.abort_reason, outcome.armed = output.abort_reason, flight.armed
+        return outcome
 
 
-def fly_case(flight: DirectFlight, by: Mode | str, at: float, sender) -> None:
+def hold(case: Case) -> None:
+    case.take_over(Mode.HOLD, 2.0)
+    case.resume()
+
+
+def position(case: Case) -> None:
+    """Handed back at 1.2 m/s."""
+    case.pushed = 0.0
+    case.fly(0.1)
+    case.begin = case.flight.plant.time
+    case.take_over(Mode.POSITION, 1.0)
+    case.pushed = PUSHED
+    case.fly(1.5)
+    case.resume()
+    case.pushed = 0.0
+
+
+def back_home(case: Case) -> None:
+    """RETURN, handed back in motion."""
+    at = min(BACK_HOME, key=lambda phase: abs(phase - case.flight.mission.output.time))
+    case.take_over(Mode.RETURN, BACK_HOME[at])
+    case.resume()
+
+
+def land(case: Case) -> None:
+    case.take_over(Mode.LAND, np.inf)
+
+
+def battery(case: Case) -> None:
+    for name, value in LOW_BATTERY.items():
+        case.ground.set_parameter(name, value)
+    commander = case.autopilot.autopilot.commander
+    case.fly(5.0, lambda: commander.mode is not Mode.OFFBOARD)
+    case.begin = case.flight.plant.time
+    case.fly()
+
+
+def sticks(case: Case) -> None:
+    """The pilot moves the sticks in OFFBOARD; back in motion."""
+    case.ground.set_parameter("COM_RC_OVERRIDE", 3)
+    case.pushed = 0.0
+    case.fly(0.5)
+    case.begin, case.pushed = case.flight.plant.time, 0.4
+    case.fly(0.1)
+    case.pushed = PUSHED
+    case.fly(1.5)
+    case.resume()
+    case.pushed = 0.0
+
+
+def twice(case: Case) -> None:
+    """The mode is switched a second time while OFFBOARD is being requested."""
+    case.take_over(Mode.HOLD, 1.0)
+    case.flight.mission.request(OperatorCommand.RESUME)
+    case.fly(0.1, lambda: bool(case.autopilot.requests()))
+    case.autopilot.transport.sent.clear()  # those of the command
+    case.take_over(Mode.LAND, 0.3)
+    case.take_over(Mode.HOLD, 2.0)
+    case.resume()
+
+
+def own_switch(case: Case) -> None:
+    """The pilot's own switch gives control back: the vehicle brakes and waits for the command."""
+    case.pushed = 0.0
+    case.fly(0.1)
+    case.begin = case.flight.plant.time
+    case.take_over(Mode.POSITION, 1.0)
+    case.pushed = PUSHED
+    case.fly(1.5)
+    case.count()
+    case.ground.choose(Mode.OFFBOARD)
+    case.watch()
+    case.pushed = 0.0
+    case.fly(2.0)
+    case.outcome.held = case.state
+    case.outcome.resumed, case.outcome.answer = case.flight.mission.request(OperatorCommand.RESUME)
+
+
+def grasp(case: Case) -> None:
+    """In the tick of the grasp: the magnet stays on, the payload is carried after the command."""
+    case.fly(2.0, lambda: case.flight.control.signals.magnet)
+    case.begin = case.flight.plant.time
+    hold(case)
+
+
+def stop_motors(case: Case) -> None:
+    """The pilot stops the motors in the air."""
+    case.ground.stop_motors()
+    case.fly(3.0)
+
+
+ALL = hold, position, back_home, land, battery
+STAY = land, battery
+HELD_OUT = sticks, twice, own_switch, grasp
+
+
+def _fly(flight: DirectFlight, do: Callable[[Case], None], sender) -> None:
+    flight.autopilot.connect()
     case = Case(flight)
-    case.take_over(by)
-    case.held(by, at)
-    if by in BACK_IN_OFFBOARD:
-        case.resume()
-    flight.run()
-    output, outcome = flight.mission.output, case.outcome
-    outcome.phase, outcome.state = output.phase, output.state
-    outcome.abort_reason, outcome.armed = output.abort_reason, flight.armed
-    sender.send(outcome)
+    do(case)
+    sender.send(case.end())
 
 
-def outcomes(at: float) -> dict[Mode | str, Outcome]:
+def outcomes(at: float, cases: Iterable[Callable[[Case], None]]) -> dict[str, Outcome]:
     """Fly the nominal mission up to `at` [s], then each case in a fork."""
-    flight = DirectFlight(
-        load_scenario("pick_and_place"), load_profile("s500"), Vehicle.load(), 0.2, 1
-    )
+    flight = wired_flight()
     while flight.mission.output.time < at:
         flight.tick()
-    forked, cases = multiprocessing.get_context("fork"), {}
-    for by in (*BACK_IN_OFFBOARD, *STAYS):
+    forked, started = multiprocessing.get_context("fork"), {}
+    for do in cases:
         receiver, sender = forked.Pipe(duplex=False)
-        process = forked.Process(target=fly_case, args=(flight, by, at, sender))
+        process = forked.Process(target=_fly, args=(flight, do, sender))
         process.start()
         sender.close()
-        cases[by] = process, receiver
+        started[do.__name__] = process, receiver
     found = {}
-    for by, (process, receiver) in cases.items():
-        found[by] = receiver.recv()
+    for name, (process, receiver) in started.items():
+        found[name] = receiver.recv()
         process.join()
     return found
 
 
-@pytest.mark.parametrize(
-    "at",
-    [
-        pytest.param(TAKE_OFF, marks=pytest.mark.slow),
-        pytest.param(APPROACH, marks=pytest.mark.slow),
-        PICK,
-        pytest.param(CARRY, marks=pytest.mark.slow),
-        pytest.param(LANDING, marks=pytest.mark.slow),
-    ],
-)
-def test_the_vehicle_is_released_at_once_and_comes_back_by_command_only(at):
-    for by, outcome in outcomes(at).items():
+def assert_final(outcomes: dict[str, Outcome]) -> None:
+    """The pilot's word is final, and control comes back without a step."""
+    for by, outcome in outcomes.items():
         assert outcome.released_after < 0.1, by
-        assert outcome.offboard_requests == 0, by
-        assert outcome.tilt < 20.0, by
-        assert outcome.state is State.DISARMED, by
-        if by in STAYS:
-            assert outcome.modes[:1] == (Mode.LAND,) and Mode.OFFBOARD not in outcome.modes, by
-            assert "has control" in outcome.abort_reason and not outcome.armed, by
-        else:
-            assert outcome.resumed, (by, outcome.answer)
-            assert outcome.thrust_step < 0.1 and outcome.rate_step < 0.5, by
-            assert outcome.phase == "landed" and not outcome.abort_reason, by
+        assert outcome.requests == [], by
+        assert outcome.setpoints > 50, (by, "the stream goes on")
+        assert outcome.tilt < 25.0, by
+        if by in [case.__name__ for case in STAY]:
+            assert outcome.modes[:1] in ((Mode.LAND,), (Mode.OFFBOARD,)), by
+            assert Mode.OFFBOARD not in outcome.modes[1:] and outcome.requests_later == [], by
+            assert outcome.state is State.DISARMED and not outcome.armed, by
+            assert "has control" in outcome.abort_reason, by
+            continue
+        assert outcome.resumed, (by, outcome.answer)
+        rates, thrust = outcome.steps
+        assert rates < 0.5 and thrust < 0.1 and outcome.unlike < 1.0, (by, outcome)
+        assert outcome.phase == "landed" and not outcome.abort_reason, by
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("at", PHASES)
+def test_the_vehicle_is_released_at_once_and_comes_back_by_command_only(at):
+    assert_final(outcomes(at, ALL))
+
+
+def test_in_short_the_vehicle_is_released_and_comes_back_by_command_only():
+    assert_final(outcomes(PICK, (position, land)))
+
+
+@pytest.mark.slow
+def test_held_out_take_overs():
+    found = outcomes(PICK, HELD_OUT)
+    assert_final(found)
+    assert found["own_switch"].held is State.HOLDING
+    assert Mode.LAND in found["twice"].modes
+
+
+@pytest.mark.slow
+def test_motors_stopped_in_the_air_are_not_started_again():
+    (outcome,) = outcomes(TAKE_OFF, (stop_motors,)).values()
+    assert outcome.requests == outcome.requests_later == [] and not outcome.armed
+    assert outcome.state is State.DISARMED
+
+
+@pytest.mark.slow
+def test_a_mode_chosen_while_the_vehicle_arms_ends_the_flight_before_take_off():
+    """At the first tick with motors: nothing is requested any more, nothing takes off."""
+    flight = wired_flight()
+    while not flight.armed:
+        flight.tick()
+    case = Case(flight)
+    case.autopilot.transport.sent.clear()
+    case.take_over(Mode.HOLD, 0.1)
+    height = flight.plant.truth().state[CHI, 2]
+    case.fly(15.0)
+    assert case.autopilot.requests() == [] and not flight.armed
+    assert flight.plant.truth().state[CHI, 2] < height + 0.02

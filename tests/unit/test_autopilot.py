@@ -321,3 +321,24 @@ def test_parameter_files(tmp_path):
         with pytest.raises(ParameterError, match=message) as error:
             Parameters.of(load_description(), bad)
         assert "\n" not in str(error.value) and "bad.yaml" in str(error.value)
+
+
+@pytest.mark.parametrize("mode", [Mode.HOLD, Mode.RETURN])
+def test_on_the_ground_hold_and_return_idle_and_disarm(mode):
+    bench = Bench().fly()
+    assert bench.command(MavCmd.DO_SET_MODE, 1.0, *mode.value) == MavResult.ACCEPTED
+    bench.run(9.0)
+    assert bench.autopilot.status.armed and np.all(bench.autopilot.motors < 0.1)
+    bench.run(2.0)
+    assert not bench.autopilot.status.armed and bench.body.position[2] == pytest.approx(0.0)
+
+
+def test_in_position_the_stick_takes_off():
+    bench = Bench().fly()
+    bench.autopilot.manual(bench.time, (0.0, 0.0, 0.0, 0.0))
+    assert bench.command(MavCmd.DO_SET_MODE, 1.0, *Mode.POSITION.value) == MavResult.ACCEPTED
+    for stick, rises in ((0.0, False), (0.5, True)):
+        for _ in range(8):
+            bench.autopilot.manual(bench.time, (0.0, 0.0, stick, 0.0))
+            bench.run(0.25)
+        assert (bench.body.position[2] > 0.2) == rises

@@ -50,7 +50,11 @@ def parser() -> argparse.ArgumentParser:
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command line; return the exit status."""
-    options = parser().parse_args(arguments)
+    options, unknown = parser().parse_known_args(arguments)
+    if unknown:
+        said = f"unrecognized arguments: {' '.join(unknown)}"
+        print(f"uam {options.command}: {said} (see uam {options.command} --help)", file=sys.stderr)
+        return WRONG_USE
     try:
         return options.run(options)
     except KeyboardInterrupt:

@@ -58,9 +58,9 @@ def add(commands: argparse._SubParsersAction) -> None:
         "  uam goto 0.5 0 1.2                  keep the heading\n"
         "  uam goto 0.5 0 1.2 --yaw 90         turn north\n",
     )
-    for axis in "xyz":
-        goto.option(axis, axis.upper(), "[m]", type=number(axis, "m"))
-    goto.option("--yaw", "DEGREES", "heading (default: as it is)", type=number("yaw", "degrees"))
+    for axis, text in (("x", "[m]"), ("y", "[m]"), ("z", "[m]; 0: as it is")):
+        goto.option(axis, axis.upper(), text, type=number("coordinate", "m"))
+    goto.option("--yaw", "DEGREES", "heading (default: as it is)", type=number("heading", "degrees"))
     _command(commands, "status", _status, "phase, errors, who has control", "Show the flight.")
     _command(
         commands,
@@ -109,7 +109,10 @@ def _kill(operator: Operator, options: argparse.Namespace) -> int:
     if not options.yes:
         print("The motors stop at once; a vehicle in the air falls. Type kill to confirm: ", end="")
         sys.stdout.flush()
-        if sys.stdin.readline().strip() != "kill":
+        typed = sys.stdin.readline()
+        if not typed.endswith("\n"):  # the end of a file or pipe
+            print()
+        if typed.strip() != "kill":
             return _said("kill", False, "not confirmed, nothing was sent")
     return _said("kill", *operator.kill())
 

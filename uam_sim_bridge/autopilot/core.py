@@ -320,6 +320,9 @@ class Autopilot:
         if mode in MODES and aided:
             modes = self._position_modes
             setpoint = modes.update(mode, self.estimator.estimate, dt)
+            if self.landing.landed and not modes.climbing:  # PX4 idles until it takes off
+                modes.reset()
+                setpoint[:] = 0.0
             return setpoint, modes.sinking
         return self._descent.update(self.estimator.estimate, dt), True
 

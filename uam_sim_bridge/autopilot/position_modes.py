@@ -27,14 +27,14 @@ _LEAST_LIFT = 0.3 * GRAVITY  # m/s^2, smallest upward part of the thrust
 class PositionModes:
     """The cascade with its memory; call `reset` while another mode flies.
 
-    `sinking`: whether the last setpoint descends to the ground.
+    `sinking`, `climbing`: whether the last setpoint descends to the ground, or climbs by the stick.
     """
 
     def __init__(self, parameters: Parameters) -> None:
         self.setpoint = np.zeros(4)
         self.home = np.zeros(3)  # position of arming [m, NED]
         self.sticks = np.zeros(4)  # forward, right, up, yaw clockwise, -1..1
-        self.sinking = False
+        self.sinking = self.climbing = False
         self._held: np.ndarray | None = None  # position [m, NED]
         self._mode: Mode | None = None
         self._yaw = 0.0
@@ -75,7 +75,7 @@ class PositionModes:
 
     def _desired_velocity(self, mode: Mode, position: np.ndarray, dt: float) -> np.ndarray:
         """Return the desired velocity (3,) [m/s, NED]; moves the held position."""
-        p, self.sinking = self._parameters, False
+        p, self.sinking, self.climbing = self._parameters, False, False
         speed, vertical = p["MPC_VEL_MANUAL"], np.zeros(3)
         if mode is Mode.RETURN:
             away = self.home[:2] - position[:2]
@@ -89,7 +89,7 @@ class PositionModes:
             forward, right = speed * sticks[:2]
             moving[:2] = cosine * forward - sine * right, sine * forward + cosine * right
             moving[2] = -p["MPC_LAND_SPEED"] * sticks[2]
-            self.sinking = sticks[2] < 0.0
+            self.sinking, self.climbing = bool(sticks[2] < 0.0), bool(sticks[2] > 0.0)
             self._yaw += math.radians(p["MPC_MAN_Y_MAX"]) * sticks[3] * dt
         if self.sinking and mode is Mode.RETURN:
             vertical[2] = p["MPC_LAND_SPEED"]
