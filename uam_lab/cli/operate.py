@@ -60,7 +60,8 @@ def add(commands: argparse._SubParsersAction) -> None:
     )
     for axis, text in (("x", "[m]"), ("y", "[m]"), ("z", "[m]; 0: as it is")):
         goto.option(axis, axis.upper(), text, type=number("coordinate", "m"))
-    goto.option("--yaw", "DEGREES", "heading (default: as it is)", type=number("heading", "degrees"))
+    text = "heading (default: as it is)"
+    goto.option("--yaw", "DEGREES", text, type=number("heading", "degrees"))
     _command(commands, "status", _status, "phase, errors, who has control", "Show the flight.")
     _command(
         commands,
