@@ -67,6 +67,43 @@ def test_rms_and_maximum_run_over_the_flight_only():
     assert result["real_time_factor"] == 4.5 / 2.0
 
 
+def test_errors_by_phase_and_of_the_trajectory_alone():
+    made = flight([*["waiting"] * 2, "take-off", *["trajectory"] * 3, "hold", "trajectory",
+                   *["landed"] * 2])  # fmt: skip
+    made.values[:, COLUMNS["truth.y"]] = 0.0
+    made.values[2:8, COLUMNS["truth.x"]] = [9, 0, 0, 2, 9, 0]
+    made.values[2:8, COLUMNS["truth.z"]] = [0, 0, 0, 1, 0, 2]
+    made.values[7, COLUMNS["truth.roll"]] = math.radians(60.0)
+    for i in range(1, 5):
+        made.values[4, COLUMNS[f"rotor_{i}.thrust"]] = i
+    result = metrics.compute(made.series(), INFO)
+    assert [one["phase"] for one in result["phases"]] == ["take-off", "trajectory", "hold"]
+    whole = result["trajectory"]
+    assert whole == result["phases"][1]
+    # distances in the trajectory: 0, 0, sqrt(5), 2
+    assert whole["position_3d_m"] == pytest.approx(1.5)
+    assert whole["largest_3d_m"] == pytest.approx(math.sqrt(5.0))
+    assert whole["rms"]["position_m"] == pytest.approx([1.0, 0.0, math.sqrt(5 / 4)])
+    assert (whole["from_s"], whole["seconds"]) == (0.5, 2.0)
+    assert whole["tilt_deg"] == pytest.approx(60.0) and whole["thrust_n"] == 10.0
+    assert result["position_3d_m"] == pytest.approx(math.sqrt((81 + 5 + 81 + 4) / 6))
+
+
+def test_a_flight_without_take_off_has_no_phases():
+    result = metrics.compute(flight(["waiting"] * 10).series(), INFO)
+    assert result["phases"] == [] and result["trajectory"] is None
+    assert result["position_3d_m"] is None
+
+
+def test_the_landing_is_judged_at_the_scenarios_own_end():
+    made = flight()
+    made.values[:, COLUMNS["reference.x"]] = 2.0  # take-off point (2, 0), landed at (0.03, 0.04)
+    series = made.series()
+    assert metrics.compute(series, INFO)["landing_error_m"] == pytest.approx(math.hypot(1.97, 0.04))
+    there = metrics.compute(series, INFO | {"landing_point": [0.03, 0.0]})
+    assert there["landing_error_m"] == pytest.approx(0.04)
+
+
 def test_a_completed_mission():
     result = metrics.compute(flight().series(), INFO)
     assert result["mission_completed"] is True

@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 
 from uam_control.coordinates import ARM, ATTITUDE, POSITION
+from uam_lab.results import phase_errors
 from uam_lab.results.timeseries import SUBSYSTEMS, Series
 
 # (key, columns of the error block, factor from SI to the unit that the key names)
@@ -83,6 +84,7 @@ def compute(
     duration = _span(series.time[series.flown])
     wall = info.get("wall_s")
     simulated = _span(series.time)
+    phases = phase_errors.by_phase(series, GROUPS)
     metrics = {key: info.get(key) for key in PASSED_ON}
     metrics |= {
         "duration_s": round(duration, 6),
@@ -99,6 +101,9 @@ def compute(
         "landing_error_m": landing,
         "rms": errors(series, rms),
         "max": errors(series, largest),
+        "position_3d_m": phase_errors.root_mean_square(phase_errors.distance(series, series.flown)),
+        "phases": phases,
+        "trajectory": next((p for p in phases if p["phase"] == phase_errors.TRAJECTORY), None),
         "faults": info.get("faults") or [],
     }
     if info.get("clock") == "realtime":

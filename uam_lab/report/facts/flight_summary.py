@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import math
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -48,6 +49,49 @@ def error_rows(metrics: Mapping[str, Any]) -> list[ErrorRow]:
         )
         rows += [ErrorRow(heading, name, unit, digits, *figures) for name, *figures in columns]
     return rows
+
+
+PHASE_HEADINGS = (
+    *("phase", "time [s]", "position [mm]", "largest [mm]", "attitude [°]"),
+    *("arm [°]", "tilt [°]", "thrust [N]"),
+)
+
+
+@dataclass(frozen=True)
+class PhaseRow:
+    """One phase: its texts, one per PHASE_HEADINGS; whole: the trajectory's own phase."""
+
+    texts: tuple[str, ...]
+    whole: bool
+
+
+def phase_rows(metrics: Mapping[str, Any]) -> list[PhaseRow]:
+    """Return one row per phase. position: root mean square of the distance to the reference, 3-D;
+    attitude, arm: of the norm of their errors; tilt, thrust: largest.
+    """
+    rows = []
+    for one in metrics.get("phases") or []:
+        attitude, arm = (_norm(one["rms"][key]) for key in ("attitude_deg", "arm_deg"))
+        texts = (
+            one["phase"],
+            f"{one['seconds']:.1f}",
+            _number(one["position_3d_m"], 1e3, 1),
+            _number(one["largest_3d_m"], 1e3, 1),
+            _number(attitude, 1.0, 2),
+            _number(arm, 1.0, 2),
+            _number(one["tilt_deg"], 1.0, 1),
+            _number(one["thrust_n"], 1.0, 1),
+        )
+        rows.append(PhaseRow(texts, one["phase"] == "trajectory"))
+    return rows
+
+
+def _norm(values: Sequence[float | None]) -> float | None:
+    return None if None in values else math.hypot(*values)
+
+
+def _number(value: float | None, factor: float, digits: int) -> str:
+    return "–" if value is None else f"{factor * value:.{digits}f}"
 
 
 def verdict(metrics: Mapping[str, Any]) -> str:

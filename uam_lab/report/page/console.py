@@ -43,7 +43,7 @@ def summary(metrics: Mapping[str, Any], directory: Path | None = None) -> Group:
     headline = Text(flight_summary.verdict(metrics), style="bold green" if done else "bold red")
     for shortfall in metrics.get("shortfalls") or []:
         headline.append(f"\n  {shortfall}", style="red")
-    return Group(headline, error_table(metrics), facts(metrics, directory))
+    return Group(headline, error_table(metrics), phase_table(metrics), facts(metrics, directory))
 
 
 def error_table(metrics: Mapping[str, Any]) -> Table:
@@ -69,6 +69,16 @@ def error_table(metrics: Mapping[str, Any]) -> Table:
             row.shown(row.largest),
             Text(word, style=colour),
         )
+    return table
+
+
+def phase_table(metrics: Mapping[str, Any]) -> Table:
+    """Return the table of the errors of every phase."""
+    table = Table(title="RMS error by phase", title_justify="left")
+    for heading in flight_summary.PHASE_HEADINGS:
+        table.add_column(heading, justify="left" if heading == "phase" else "right")
+    for row in flight_summary.phase_rows(metrics):
+        table.add_row(*row.texts, style="bold" if row.whole else "")
     return table
 
 
