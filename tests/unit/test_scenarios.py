@@ -139,7 +139,7 @@ def test_slower_takes_longer_by_the_factor(tmp_path):
 def test_a_trajectory_amid_moves_adds_to_them(tmp_path):
     entry = "{kind: lemniscate, size: [2.0, 1.0], period: 8.0, laps: 2, ramp: 3.0, at: 10}"
     scenario = made(tmp_path, f"{MOVES}trajectory: {entry}")
-    assert names(scenario) == ["take-off", "run-up", "trajectory", "run-out", "land"]
+    assert names(scenario) == ["take-off", "run-up", "trajectory", "run-out", "take-off", "land"]
     times, rows = rows_of(scenario)
     np.testing.assert_allclose(np.ptp(rows[:, 0, 0]), 2.0, atol=1e-3)  # -0.5 to 1.5
     inner = (times > 14.0) & (times < 28.0)

@@ -157,6 +157,7 @@ def _with_trajectory(
     for leg in pieces:
         phases.append((begin, leg.phase))
         begin += leg.path.length
+    phases.append((end, scenario.phase(at)))
     return replace(
         scenario, route=route, route_at=at, phases=tuple(sorted(phases, key=lambda p: p[0]))
     )

@@ -74,9 +74,10 @@ def error_table(metrics: Mapping[str, Any]) -> Table:
 
 def phase_table(metrics: Mapping[str, Any]) -> Table:
     """Return the table of the errors of every phase."""
-    table = Table(title="RMS error by phase", title_justify="left")
+    table = Table(title="RMS error by phase", title_justify="left", padding=(0, 0, 0, 1))
     for heading in flight_summary.PHASE_HEADINGS:
-        table.add_column(heading, justify="left" if heading == "phase" else "right")
+        first = heading == "phase"
+        table.add_column(heading, justify="left" if first else "right", no_wrap=first)
     for row in flight_summary.phase_rows(metrics):
         table.add_row(*row.texts, style="bold" if row.whole else "")
     return table
