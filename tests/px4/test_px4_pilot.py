@@ -1,0 +1,73 @@
+"""A pilot takes over from a real PX4's OFFBOARD; PX4's own battery failsafe does, too."""
+
+import json
+import subprocess
+import sys
+
+import pytest
+from px4_at_hand import NO_PX4, installation
+from px4_pilot import Pilot
+from whole_flight import ROOT, Flight
+
+from uam_sim_bridge.mavlink.protocol.modes import Mode
+
+INSTANCE = 31
+TAKE_OFF, APPROACH, PICK, CARRY, LANDING = PHASES = 1.5, 4.5, 8.0, 11.5, 18.5  # [s] after arming
+BACK = Mode.HOLD, Mode.POSITION, Mode.RETURN
+
+pytestmark = [
+    pytest.mark.slow,
+    pytest.mark.skipif(installation() is None, reason=NO_PX4),
+]
+
+
+@pytest.fixture
+def take_over(tmp_path):
+    """Start quick_pick with a pilot who acts; both end with the test."""
+    started = []
+
+    def start(at, mode):
+        options = "--autopilot", "px4", "--scenario", "quick_pick", "--instance", str(INSTANCE)
+        flight = Flight(tmp_path / "flight", *options)
+        started.append((flight, Pilot(INSTANCE + 1, at, mode)))
+        return started[-1]
+
+    yield start
+    for flight, pilot in started:
+        flight.end()
+        pilot.close()
+
+
+def resume():
+    """Give the command as a user does; return its exit status and words."""
+    command = [sys.executable, "-m", "uam_lab.cli.main", "resume", "--instance", str(INSTANCE)]
+    done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=False)
+    return done.returncode, done.stdout + done.stderr
+
+
+@pytest.mark.parametrize("at", PHASES)
+@pytest.mark.parametrize("mode", BACK)
+def test_a_mode_of_the_pilot_stays_until_the_command(take_over, mode, at):
+    flight, pilot = take_over(at, mode)
+    flight.until_phase("released")
+    assert pilot.since_acted[-1:] == [mode]
+    status, said = resume()
+    assert Mode.OFFBOARD not in pilot.since_acted[:1], "not before the command"
+    if mode is not Mode.RETURN:  # near home RETURN lands, and may be down before the command
+        assert status == 0, said
+    assert flight.wait() == 0, flight.said + flight.complained
+    metrics = json.loads((flight.out / "metrics.json").read_text())
+    assert metrics["mission_completed"] or mode is Mode.RETURN
+
+
+@pytest.mark.parametrize("at", PHASES)
+@pytest.mark.parametrize("mode", [Mode.LAND, None], ids=["LAND", "battery"])
+def test_a_landing_of_the_pilot_or_of_the_batterys_failsafe_is_not_overridden(take_over, mode, at):
+    flight, pilot = take_over(at, mode)
+    flight.until_phase("released")
+    assert flight.wait() != 0, "the mission is not completed"
+    # PX4 shows OFFBOARD again once it has disarmed
+    flown = [found for found in pilot.since_acted if found is not Mode.OFFBOARD]
+    assert flown[:1] == [Mode.LAND]
+    metrics = json.loads((flight.out / "metrics.json").read_text())
+    assert "has control" in metrics["abort_reason"]
