@@ -124,9 +124,10 @@ class WiredAutopilot:
 
 
 class Steps:
-    """Largest steps of the rate loop's input, over a change of mode too: `rates` [rad/s], `thrust`.
+    """Largest steps of the companion's setpoint, from the last tick of the autopilot's own mode on:
+    `rates` [rad/s], `thrust`.
 
-    The autopilot's own modes and the companion's setpoints count alike.
+    The first setpoint is compared with the vehicle's body rates and the thrust of the own mode.
     """
 
     def __init__(self, autopilot) -> None:
@@ -137,13 +138,13 @@ class Steps:
 
     def _keep(self, *arguments):
         made = self._made(*arguments)
-        self._own = made[0].copy()
+        self._own = np.array([*self._autopilot.rates, made[0][3]])
         return made
 
     def tick(self) -> None:
         """Call it after each tick; the first tick is what the next ones are compared with."""
         used = self._autopilot._setpoint.copy() if self._own is None else self._own
-        if self._last is not None:
+        if self._last is not None and self._own is None:
             step = np.abs(used - self._last)
             self.rates = max(self.rates, float(np.max(step[:3])))
             self.thrust = max(self.thrust, float(step[3]))
