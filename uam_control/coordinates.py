@@ -12,12 +12,18 @@ chi_dot[ATTITUDE] contains the body rates [rad/s] and chi_ddot[ATTITUDE] their d
 attitude they equal the Euler rates. chi_ddot[POSITION] is the acceleration in the world frame
 [m/s^2], gravity removed.
 
+A motion is a planned reference with two more rows, (5, 6 + n): jerk and snap, the third and fourth
+derivatives. The base's desired attitude, body rates and their derivatives follow from them
+(`mission/flatness.py`).
+
 Compiled functions use the indices, for example state[CHI, ROLL]; numba compiles them as constants.
 """
 
 from __future__ import annotations
 
 CHI, CHI_DOT, CHI_DDOT = range(3)  # rows
+JERK, SNAP = 3, 4  # further rows of a motion
+MOTION_ROWS = 5
 X, Y, Z, ROLL, PITCH, YAW, ALPHA = range(7)  # columns; ALPHA: the first joint
 POSITION = slice(X, ROLL)
 ATTITUDE = slice(ROLL, ALPHA)

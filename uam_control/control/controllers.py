@@ -102,13 +102,18 @@ class PositionController(Controller):
     def __init__(self, parameters: PositionLimits) -> None:
         super().__init__(parameters)
         self._attitude = AttitudeReference(parameters.attitude_cutoff)
+        self._set_drag(parameters)
         self._tau = np.zeros(3)
         self._flying = False
 
     def set_parameters(self, parameters: PositionLimits) -> None:
         """See `Controller.set_parameters`; also sets the corner of the attitude filter."""
         super().set_parameters(parameters)
+        self._set_drag(parameters)
         self._attitude.cutoff = parameters.attitude_cutoff
+
+    def _set_drag(self, p: PositionLimits) -> None:
+        self._drag = p.gravity_feedforward_mass * np.array(p.drag_feedforward)  # [N s/m]
 
     @property
     def attitude_reference(self) -> np.ndarray:
@@ -132,9 +137,10 @@ class PositionController(Controller):
         if not self._flying:
             self._flying = True
             if np.any(reference[CHI_DOT, POSITION]):  # else from the ground, or at rest
-                self._attitude.begin(state)
-        tau = self._law_output(state, reference, self._attitude.value, True, dt)
+                self._attitude.begin(state, reference)
         p = self.parameters
+        tau = self._law_output(state, reference, self._attitude.value, True, dt)
+        tau += self._drag * reference[CHI_DOT, POSITION]
         self.saturated = limit_force(
             tau,
             p.gravity_feedforward_mass * p.gravity,

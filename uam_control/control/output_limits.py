@@ -27,10 +27,20 @@ class PositionLimits(ParameterSet):
         0.0, "mass whose weight is added to tau_p, 0 = the printed law", "kg", 0.0, 50.0
     )
     gravity: float = number(GRAVITY, "acceleration of gravity", "m/s^2", 0.0, 30.0)
+    drag_feedforward: tuple = vector(
+        (0.0, 0.0, 0.0),
+        "linear drag per mass along the world axes, added for the desired velocity, 0 = none",
+        "1/s",
+        0.0,
+        10.0,
+        3,
+    )
     thrust_min: float = number(1.0, "least upward force", "N", TINY, 1e3)
     thrust_max: float = number(36.0, "largest force", "N", TINY, 1e3)
     tilt_max: float = number(0.35, "largest angle of tau_p from the vertical", "rad", 0.01, 1.5)
-    attitude_cutoff: float = number(5.0, "filter on the desired attitude", "Hz", 0.1, 100.0)
+    attitude_cutoff: float = number(
+        5.0, "filter on the correction of the reference's attitude", "Hz", 0.1, 100.0
+    )
 
     def check_together(self) -> None:
         """See `ParameterSet.check_together`."""

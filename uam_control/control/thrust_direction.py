@@ -1,8 +1,10 @@
 """The desired attitude, which points the thrust along tau_p, and its filter.
 
-tau_p = R_B^W U, U = [0 0 u_1], eq. (4a), pos, determines roll and pitch for a given yaw. The raw
-angles contain the noise of the position loop. A critically damped second-order filter gives q_d,
-Omega_d and Omega_d_dot without differentiating the noise.
+tau_p = R_B^W U, U = [0 0 u_1], eq. (4a), pos, determines roll and pitch for a given yaw. They are
+the angles that the reference has by its own acceleration (`mission/flatness.py`) plus a correction
+from the feedback. The reference's angles and their derivatives are exact and pass unchanged. The
+correction contains the noise of the position loop; a critically damped second-order filter gives it
+with two derivatives, without differentiating the noise.
 """
 
 from __future__ import annotations
@@ -11,7 +13,18 @@ import math
 
 import numpy as np
 
-from uam_control.coordinates import ATTITUDE, CHI, CHI_DDOT, CHI_DOT, YAW, X, Y, Z
+from uam_control.coordinates import (
+    ATTITUDE,
+    CHI,
+    CHI_DDOT,
+    CHI_DOT,
+    PITCH,
+    ROLL,
+    YAW,
+    X,
+    Y,
+    Z,
+)
 from uam_control.maths.compiled import jit
 
 ANGLE, RATE = range(2)  # columns of the filter
@@ -20,14 +33,14 @@ _LEAST_COSINE = 0.1  # of the pitch, in Euler rates
 
 
 class AttitudeReference:
-    """Desired attitude: filtered roll and pitch from tau_p, yaw from the mission.
+    """Desired attitude: roll and pitch from tau_p, yaw from the mission.
 
     `value` (3, 3): rows q_d = roll, pitch, yaw [rad], Omega_d [rad/s], Omega_d_dot [rad/s^2]; the
     last two rows are in the desired body frame (FLU). Columns: about X, Y, Z.
     """
 
     def __init__(self, cutoff: float) -> None:
-        """cutoff: corner frequency of the filter [Hz]."""
+        """cutoff: corner frequency of the filter on the correction [Hz]."""
         self.cutoff = cutoff
         self.value = np.zeros((3, 3))
         self._filter = np.zeros((2, 2))  # rows roll, pitch: angle, rate
@@ -39,9 +52,10 @@ class AttitudeReference:
         self.value[:] = 0.0
         self.value[CHI, Z] = yaw
 
-    def begin(self, state: np.ndarray) -> None:
+    def begin(self, state: np.ndarray, reference: np.ndarray) -> None:
         """Begin with roll, pitch and their rates of state (3, 6 + n), for a vehicle that moves.
 
+        reference (3, 6 + n): of the same tick; what it lacks of the state is the first correction.
         The next update adds the lead to the filter's input that makes the angular acceleration
         zero, so the torque has no step; it decays within LEAD_TIME.
         """
@@ -50,12 +64,15 @@ class AttitudeReference:
         level = max(_LEAST_COSINE, math.cos(pitch))
         self._filter[X] = roll, about[X] + across * math.sin(pitch) / level
         self._filter[Y] = pitch, math.cos(roll) * about[Y] - math.sin(roll) * about[Z]
+        self._filter[:, ANGLE] -= reference[CHI, ROLL:YAW]
+        self._filter[:, RATE] -= reference[CHI_DOT, ROLL:YAW]
         self._lead[:] = math.nan
 
     def update(self, tau_p: np.ndarray, reference: np.ndarray, dt: float) -> np.ndarray:
         """Advance by dt [s] and return `value` (3, 3).
 
-        tau_p: (3,) [N, ENU], z > 0; reference: (3, 6 + n), gives yaw and its derivatives.
+        tau_p: (3,) [N, ENU], z > 0; reference: (3, 6 + n), gives roll, pitch, yaw and their
+        derivatives.
         """
         attitude_reference_step(
             tau_p, reference, self.cutoff, dt, self._filter, self._lead, self.value
@@ -76,7 +93,7 @@ def attitude_reference_step(
     """Advance the filter and write q_d, Omega_d, Omega_d_dot into value (3, 3).
 
     tau_p, reference, dt: as in `AttitudeReference.update`; cutoff [Hz]; filtered: (2, 2), rows
-    roll, pitch: angle [rad], rate [rad/s]; lead: (2,), of roll and pitch [rad], added to the input;
+    roll, pitch: angle [rad], rate [rad/s] of the correction; lead: (2,), of roll and pitch [rad], added to the input;
     NaN: see `AttitudeReference.begin`.
     """
     yaw, yaw_rate = reference[CHI, YAW], reference[CHI_DOT, YAW]
@@ -86,11 +103,13 @@ def attitude_reference_step(
     norm = math.sqrt(tau_p[X] ** 2 + tau_p[Y] ** 2 + tau_p[Z] ** 2)
     desired_roll = math.asin(max(-1.0, min(1.0, (sy * tau_p[X] - cy * tau_p[Y]) / norm)))
     desired_pitch = math.atan2(cy * tau_p[X] + sy * tau_p[Y], tau_p[Z])
+    correction_roll = desired_roll - reference[CHI, ROLL]
+    correction_pitch = desired_pitch - reference[CHI, PITCH]
 
     omega = 2.0 * math.pi * cutoff
     accelerations = np.empty(2)
     for axis in (X, Y):
-        desired = desired_roll if axis == X else desired_pitch
+        desired = correction_roll if axis == X else correction_pitch
         angle, rate = filtered[axis, ANGLE], filtered[axis, RATE]
         if math.isnan(lead[axis]):
             lead[axis] = angle + 2.0 * rate / omega - desired
@@ -106,8 +125,14 @@ def attitude_reference_step(
             2.0 * omega * filtered[axis, RATE]
         )
 
-    roll, pitch = filtered[X, ANGLE], filtered[Y, ANGLE]
-    roll_rate, pitch_rate = filtered[X, RATE], filtered[Y, RATE]
+    for axis in (X, Y):
+        accelerations[axis] += reference[CHI_DDOT, ROLL + axis]
+    roll, pitch = (
+        reference[CHI, ROLL] + filtered[X, ANGLE],
+        reference[CHI, PITCH] + filtered[Y, ANGLE],
+    )
+    roll_rate = reference[CHI_DOT, ROLL] + filtered[X, RATE]
+    pitch_rate = reference[CHI_DOT, PITCH] + filtered[Y, RATE]
     value[CHI, X], value[CHI, Y], value[CHI, Z] = roll, pitch, yaw
     cr, sr, cp, sp = math.cos(roll), math.sin(roll), math.cos(pitch), math.sin(pitch)
     # body rates of Z-Y-X Euler rates, and their derivative

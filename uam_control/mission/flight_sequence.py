@@ -168,7 +168,7 @@ class Mission:
         if self._guidance is None:
             self._check_reference(parameters)
         if self._guidance is not None:
-            self._guidance.parameters = parameters
+            self._guidance.configure(parameters)
 
     @property
     def changes(self) -> list[StateTransition]:
@@ -215,7 +215,7 @@ class Mission:
                     guidance.follow(stamp, state)
                 event = self.changes[-1].event if len(self.changes) > before else None
                 if event is Event.GOAL:
-                    guidance.fly(stamp, goal.plan(stamp, output.reference, self._parameters))
+                    guidance.fly(stamp, goal.plan(stamp, guidance.motion, self._parameters))
                 elif event is Event.RESUME:
                     guidance.go_on(stamp)
             self._follow(stamp, decision)
@@ -262,10 +262,10 @@ class Mission:
         refusal = self._supervisor.refusal(OperatorCommand.GOAL, self._seen)
         if refusal:
             return False, f"refused: {refusal}"
-        parameters, reference = self._parameters, self.output.reference
+        parameters, motion = self._parameters, self._guidance.motion
         try:
-            goal.check(reference, parameters)
-            made = goal.plan(self._stamp, reference, parameters)
+            goal.check(motion, parameters)
+            made = goal.plan(self._stamp, motion, parameters)
             check(made, parameters, self._ground)
         except PlanRefused as error:
             return False, f"refused: {error}"

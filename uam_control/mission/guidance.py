@@ -11,13 +11,34 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from uam_control.coordinates import ALPHA, ARM, CHI, CHI_DDOT, CHI_DOT, POSITION, YAW, X, Y, Z
+from uam_control.coordinates import (
+    ALPHA,
+    ARM,
+    CHI,
+    CHI_DDOT,
+    CHI_DOT,
+    JERK,
+    POSITION,
+    SNAP,
+    YAW,
+    X,
+    Y,
+    Z,
+)
 from uam_control.maths.rotations import wrap_angle
 from uam_control.mission.braking import Braking
+from uam_control.mission.flatness import write_attitude
 from uam_control.mission.mission_parameters import MissionParameters
+<<<<<<< HEAD
 from uam_control.mission.plans import BASE, PEAK, RAMP, Plan, quintic, quintic_at, still
 from uam_control.mission.route import SINK
 from uam_control.mission.trajectory import Trajectory
+=======
+from uam_control.mission.plans import BASE, PEAK, RAMP, Plan, still
+from uam_control.mission.polynomials import quintic, quintic_at
+from uam_control.mission.scenario import SINK
+from uam_control.mission.trajectory import Trajectory, empty_motion
+>>>>>>> ca94a7a (Motions carry jerk and snap; the reference's attitude follows from differential flatness)
 
 
 class PathClock:
@@ -31,10 +52,10 @@ class PathClock:
         self._begin = stamp
         self._ramp: tuple[float, float, float, float, float, float] | None = None
 
-    def at(self, stamp: float) -> tuple[float, float, float]:
-        """Return scenario time [s], its rate [1] and the slope of the rate [1/s]."""
+    def at(self, stamp: float) -> tuple[float, float, float, float, float]:
+        """Return scenario time [s] and its first to fourth derivative [1, 1/s, 1/s^2, 1/s^3]."""
         if self._ramp is None:
-            return stamp - self._begin, 1.0, 0.0
+            return stamp - self._begin, 1.0, 0.0, 0.0, 0.0
         begin, length, time, rate, slope, goal = self._ramp
         u = min(max((stamp - begin) / length, 0.0), 1.0)
         after = max(stamp - begin - length, 0.0)
@@ -46,7 +67,11 @@ class PathClock:
         now = rate * (1 - 3 * u**2 + 2 * u**3) + goal * (3 * u**2 - 2 * u**3)
         now += length * slope * (u - 2 * u**2 + u**3)
         change = (goal - rate) * 6 * (u - u**2) / length + slope * (1 - 4 * u + 3 * u**2)
-        return time, now, change
+        if not 0.0 < u < 1.0:
+            return time, now, change, 0.0, 0.0
+        third = (goal - rate) * 6 * (1 - 2 * u) / length**2 + slope * (6 * u - 4) / length
+        fourth = (rate - goal) * 12 / length**3 + slope * 6 / length**2
+        return time, now, change, third, fourth
 
     @property
     def goal(self) -> float:
@@ -65,16 +90,18 @@ class PathClock:
         """
         if self._ramp is not None and goal == self.goal:
             return
-        self._ramp = (stamp, length, *self.at(stamp), goal)
+        self._ramp = (stamp, length, *self.at(stamp)[:3], goal)
 
 
 class Segment:
-    """Quintic polynomials from a reference to rest at a goal, one duration per coordinate."""
+    """Quintic polynomials from a motion to rest at a goal, one duration per coordinate."""
 
     def __init__(
         self, stamp: float, start: np.ndarray, goal: np.ndarray, lengths: np.ndarray
     ) -> None:
-        """Begin at `stamp` [s]; start (3, 6 + n); goal (6 + n,); lengths (6 + n,): times [s]."""
+        """Begin at `stamp` [s] at start (3, 6 + n) or (5, 6 + n); end at goal (6 + n,), after
+        lengths (6 + n,) [s].
+        """
         self._stamp, self._lengths, self._goal = stamp, lengths, goal.copy()
         rest = np.zeros_like(start)
         rest[CHI] = goal
@@ -85,20 +112,22 @@ class Segment:
         """Return the stamp [s] at which all coordinates are at rest."""
         return self._stamp + float(np.max(self._lengths))
 
-    def write(self, stamp: float, reference: np.ndarray) -> None:
-        """Write the reference (3, 6 + n) at `stamp` [s]."""
+    def write(self, stamp: float, motion: np.ndarray) -> None:
+        """Write the motion (5, 6 + n) at `stamp` [s]."""
         u = np.clip((stamp - self._stamp) / self._lengths, 0.0, 1.0)
-        reference[:] = quintic_at(self._powers, u, self._lengths)
+        motion[:] = quintic_at(self._powers, u, self._lengths)
         arrived = u >= 1.0  # without rounding errors
-        reference[CHI, arrived] = self._goal[arrived]
-        reference[CHI_DOT:, arrived] = 0.0
+        motion[CHI, arrived] = self._goal[arrived]
+        motion[CHI_DOT:, arrived] = 0.0
 
 
 class Guidance:
     """Writes the reference of a flight; the mission calls `stop`, `go_on`, `descend` and `rest`.
 
-    `reference` (3, 6 + n): rewritten by every `write`; `scenario_time` [s]: time on the scenario,
-    constant during a hold; `end` [s]: stamp at which a descent reaches the ground, inf without one.
+    `reference` (3, 6 + n): rewritten by every `write`, with the attitude of `flatness`; `motion`
+    (5, 6 + n): the same without attitude, with jerk and snap. `scenario_time` [s]: time on the
+    scenario, constant during a hold; `end` [s]: stamp at which a descent reaches the ground, inf
+    without one.
     """
 
     def __init__(
@@ -114,13 +143,14 @@ class Guidance:
         end [s]: scenario time at which the path ends.
         """
         self._end = end
-        self.parameters = parameters
+        self.configure(parameters)
         self.reference = reference
+        self.motion = empty_motion(reference.shape[1] - ALPHA)
         self.scenario_time = 0.0
         self._trajectory, self._stowed = trajectory, np.array(stowed, dtype=float)
         self._clock = PathClock(stamp)
-        self._rate, self._slope = 1.0, 0.0  # of the clock
-        self._path = np.zeros_like(reference)
+        self._rates = 1.0, 0.0, 0.0, 0.0  # derivatives of the scenario time
+        self._path = np.zeros_like(self.motion)
         self._arm: Segment | None = None  # in place of the path's, while holding
         self._away: Segment | None = None  # offset from the path, on the way back to it
         self._brake: Braking | None = None  # in place of the path, after a release
@@ -128,6 +158,11 @@ class Guidance:
         self._go_on_at = math.inf  # stamp [s] at which the arm is back and the path continues
         self._plans: dict[bool, Plan] = {}  # in place of the path; True: of the base, False: arm
         self._last: Segment | None = None  # in place of the path, until the end of the flight
+
+    def configure(self, parameters: MissionParameters) -> None:
+        """Use `parameters` (validated) from the next manoeuvre on."""
+        self.parameters = parameters
+        self._drag = np.array(parameters.drag)
 
     @property
     def end(self) -> float:
@@ -143,32 +178,44 @@ class Guidance:
         if stamp >= self._go_on_at:
             self._arm, self._go_on_at = None, math.inf
             self._clock.change(stamp, 1.0, self._ramp_length())
-        self.scenario_time, self._rate, self._slope = self._clock.at(stamp)
+        self.scenario_time, *self._rates = self._clock.at(stamp)
 
     def write(self, stamp: float) -> None:
-        """Write the reference at `stamp` [s]."""
+        """Write motion and reference at `stamp` [s]."""
+        self._write_motion(stamp)
+        self._publish()
+
+    def _write_motion(self, stamp: float) -> None:
+        motion = self.motion
         if self._last is not None:
-            self._last.write(stamp, self.reference)
+            self._last.write(stamp, motion)
             return
-        rate, slope = self._rate, self._slope
-        self._trajectory.write(self.scenario_time, self.reference)
-        if rate != 1.0 or slope != 0.0:
-            self.reference[CHI_DDOT] = (
-                rate * rate * self.reference[CHI_DDOT] + slope * self.reference[CHI_DOT]
-            )
-            self.reference[CHI_DOT] *= rate
+        self._write_path(motion)
         if self._arm is not None:
             self._arm.write(stamp, self._path)
-            self.reference[:, ARM] = self._path[:, ARM]
+            motion[:, ARM] = self._path[:, ARM]
         if self._away is not None:
             self._away.write(stamp, self._path)
-            self.reference[:, :ALPHA] += self._path[:, :ALPHA]
+            motion[:, :ALPHA] += self._path[:, :ALPHA]
             if stamp >= self._away.end:
                 self._away = None
         if self._brake is not None:
-            self._brake.write(stamp, self.reference)
+            self._brake.write(stamp, motion)
         for plan in self._plans.values():
-            plan.write(stamp, self.reference)
+            plan.write(stamp, motion)
+
+    def _publish(self) -> None:
+        """Write the motion to the reference, with the attitude that it needs."""
+        p = self.parameters
+        self.reference[:] = self.motion[: len(self.reference)]
+        write_attitude(
+            self.motion,
+            self._drag,
+            p.gravity,
+            p.attitude_rate_max,
+            p.attitude_acceleration_max,
+            self.reference,
+        )
 
     @property
     def planned(self) -> bool:
@@ -184,17 +231,17 @@ class Guidance:
 
         Also returns the stamps (m,) [s]. A hold is one point; after it the path is not planned.
         """
-        row, rows = np.zeros_like(self.reference), []
+        row, rows = np.zeros_like(self.motion), []
         motion = self._last or self._plans.get(True) or self._brake
         if motion is not None:
             stamps = np.arange(stamp, max(motion.end, stamp) + step, step)
             for one in stamps:
-                row[:] = self.reference
+                row[:] = self.motion
                 motion.write(min(one, motion.end), row)
                 rows.append(row[CHI].copy())
             return stamps, np.array(rows)
         if self._clock.goal == 0.0 and math.isinf(self._go_on_at):
-            return np.array([stamp]), self.reference[CHI][None].copy()
+            return np.array([stamp]), self.motion[CHI][None].copy()
         begin = self.scenario_time
         times = np.arange(begin, max(self._end, begin) + step, step)
         for one in times:
@@ -203,7 +250,7 @@ class Guidance:
         return stamp + times - begin, np.array(rows)
 
     def fly(self, stamp: float, plan: Plan) -> None:
-        """Leave the path for `plan`, made at `stamp` [s] from the reference; call after `write`."""
+        """Leave the path for `plan`, made at `stamp` [s] from the motion; call after `write`."""
         self._plans[plan.columns is BASE] = plan
         self._stop_clock(stamp)
         if plan.columns is BASE:
@@ -215,9 +262,10 @@ class Guidance:
 
         Call it after `write`; state (3, 6 + n).
         """
-        pose = self.reference[:, :ALPHA]
+        pose = self.motion[:, :ALPHA]
         pose[:] = 0.0
         pose[CHI, POSITION], pose[CHI, YAW] = state[CHI, POSITION], state[CHI, YAW]
+        self._publish()
 
     def stay(self, stamp: float, state: np.ndarray, ground: float, age: float = 0.0) -> None:
         """Begin in the vehicle's motion of state (3, 6 + n), and come to rest; see `Braking`.
@@ -232,8 +280,8 @@ class Guidance:
         self._away = None
         self._brake = Braking(stamp - age, state, self.parameters, ground)
         angles = state[CHI, ARM]
-        if np.any(np.abs(angles - self.reference[CHI, ARM]) > self.parameters.start_arm_error):
-            self.reference[CHI, ARM], self.reference[CHI_DOT:, ARM] = angles, 0.0
+        if np.any(np.abs(angles - self.motion[CHI, ARM]) > self.parameters.start_arm_error):
+            self.motion[CHI, ARM], self.motion[CHI_DOT:, ARM] = angles, 0.0
             self._plans.pop(False, None)
             self._arm = self._arm_segment(stamp, angles)
         self.write(stamp)
@@ -245,7 +293,7 @@ class Guidance:
         """
         for key, plan in self._plans.items():
             if stamp < plan.end:
-                self._plans[key] = still(stamp, self.reference, plan.columns, self.parameters)
+                self._plans[key] = still(stamp, self.motion, plan.columns, self.parameters)
         self._stop_clock(stamp)
         if self._last is not None:
             self._last = None
@@ -267,12 +315,12 @@ class Guidance:
         if self._brake is not None or self._plans.pop(True, None) is not None:
             self._brake = None
             path = self._on_path()
-            offset = self.reference - path
+            offset = self.motion - path
             offset[CHI, YAW] = wrap_angle(offset[CHI, YAW])
             offset[:, ARM] = 0.0
             self._return(stamp, offset)
         if self._plans.pop(False, None) is not None or self._arm is not None:
-            time, _, _ = self._clock.at(self._go_on_at)
+            time = self._clock.at(self._go_on_at)[0]
             self._trajectory.write(time, self._path)
             self._arm = self._arm_segment(stamp, self._path[CHI, ARM])
             self._go_on_at = max(self._go_on_at, self._arm.end)
@@ -281,7 +329,7 @@ class Guidance:
 
     def descend(self, stamp: float, state: np.ndarray, ground: float, stow: bool) -> None:
         """Descend vertically from the position in state (3, 6 + n) to the height `ground` [m]."""
-        p, now = self.parameters, self.reference
+        p, now = self.parameters, self.motion
         offset = state[CHI, POSITION] - now[CHI, POSITION]
         if not np.all(np.isfinite(offset)):  # then descend from the reference
             offset = np.zeros(3)
@@ -298,7 +346,7 @@ class Guidance:
 
     def rest(self, stamp: float, stow: bool) -> None:
         """Bring the reference to rest; in failsafe only its arm angles are used."""
-        self._last = Segment(stamp, self.reference, *self._at_rest(stow))
+        self._last = Segment(stamp, self.motion, *self._at_rest(stow))
 
     def _stop_clock(self, stamp: float) -> None:
         """Slow down to a stop on the path."""
@@ -306,15 +354,28 @@ class Guidance:
         self._go_on_at = self._return_at = math.inf
 
     def _on_path(self) -> np.ndarray:
-        """Return the path (3, 6 + n) at the scenario time; the next call reuses the array."""
-        path = self._path
+        """Return the path (5, 6 + n) at the scenario time; the next call reuses the array."""
+        self._write_path(self._path)
+        return self._path
+
+    def _write_path(self, path: np.ndarray) -> None:
+        """Write the path (5, 6 + n) at the scenario time, by the chain rule for its clock."""
         self._trajectory.write(self.scenario_time, path)
-        path[CHI_DDOT] = self._rate**2 * path[CHI_DDOT] + self._slope * path[CHI_DOT]
-        path[CHI_DOT] *= self._rate
-        return path
+        one, two, three, four = self._rates
+        if one == 1.0 and two == three == four == 0.0:
+            return
+        path[SNAP] = (
+            one**4 * path[SNAP]
+            + 6.0 * one**2 * two * path[JERK]
+            + (4.0 * one * three + 3.0 * two**2) * path[CHI_DDOT]
+            + four * path[CHI_DOT]
+        )
+        path[JERK] = one**3 * path[JERK] + 3.0 * one * two * path[CHI_DDOT] + three * path[CHI_DOT]
+        path[CHI_DDOT] = one**2 * path[CHI_DDOT] + two * path[CHI_DOT]
+        path[CHI_DOT] *= one
 
     def _return(self, stamp: float, offset: np.ndarray) -> None:
-        """Let the offset (3, 6 + n) from the path decay to zero."""
+        """Let the offset (5, 6 + n) from the path decay to zero."""
         p = self.parameters
         way, speed = (float(np.linalg.norm(offset[row, POSITION])) for row in (CHI, CHI_DOT))
         length = max(
@@ -328,7 +389,7 @@ class Guidance:
 
     def _at_rest(self, stow: bool) -> tuple[np.ndarray, np.ndarray]:
         """Return goal and duration [s] of each coordinate to rest; stow: the arm to `stowed`."""
-        p, now = self.parameters, self.reference
+        p, now = self.parameters, self.motion
         speed = float(np.linalg.norm(now[CHI_DOT, POSITION]))
         acceleration = p.stop_acceleration if self._brake is None else p.brake_acceleration
         length = max(p.stop_time, 2.0 * RAMP * speed / acceleration)
@@ -339,9 +400,9 @@ class Guidance:
         return goal, lengths
 
     def _arm_segment(self, stamp: float, angles: np.ndarray) -> Segment:
-        goal = self.reference[CHI].copy()
+        goal = self.motion[CHI].copy()
         goal[ARM] = angles
-        return Segment(stamp, self.reference, goal, np.full_like(goal, self._arm_length(angles)))
+        return Segment(stamp, self.motion, goal, np.full_like(goal, self._arm_length(angles)))
 
     def _arm_length(self, angles: np.ndarray) -> float:
         """Return the time [s] for the arm to reach `angles` [rad] within stow_rate.
@@ -349,8 +410,8 @@ class Guidance:
         A joint that moves away from them first stops. Its way back is longer by rate * time / 2,
         and at the peak of the way back, midway, half of the rate away is left.
         """
-        p, way = self.parameters, angles - self.reference[CHI, ARM]
-        away = np.clip(-np.sign(way) * self.reference[CHI_DOT, ARM], 0.0, p.stow_rate)
+        p, way = self.parameters, angles - self.motion[CHI, ARM]
+        away = np.clip(-np.sign(way) * self.motion[CHI_DOT, ARM], 0.0, p.stow_rate)
         back = np.abs(way) + away * p.stop_time / 2
         peak = p.stow_rate - (PEAK - 1.0) / 2.0 * away
         return max(p.stop_time, PEAK * float(np.max(back / peak)))

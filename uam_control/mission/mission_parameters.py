@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from uam_control.settings.parameter_set import ParameterSet, number, switch
+from uam_control.settings.parameter_set import ParameterSet, number, switch, vector
 from uam_control.supervision import SupervisionParameters
+from uam_control.vehicle import GRAVITY
 
 
 @dataclass(frozen=True)
@@ -55,6 +56,7 @@ class BrakeLimits(ParameterSet):
 
 
 @dataclass(frozen=True)
+<<<<<<< HEAD
 class FeasibilityLimits(ParameterSet):
     """Limits of the reference before take-off, in addition to the supervisor's. Without a value
     in the profile they are the position controller's thrust_max and tilt_max."""
@@ -65,6 +67,25 @@ class FeasibilityLimits(ParameterSet):
 
 @dataclass(frozen=True)
 class MissionParameters(FeasibilityLimits, PlanLimits, BrakeLimits, SupervisionParameters):
+=======
+class FlatnessParameters(ParameterSet):
+    """What the attitude of the reference depends on, see `flatness.write_attitude`."""
+
+    gravity: float = number(GRAVITY, "acceleration of gravity", "m/s^2", 0.1, 30.0)
+    drag: tuple = vector(
+        (0.0, 0.0, 0.0), "linear drag per mass along the world axes, 0 = none", "1/s", 0.0, 10.0, 3
+    )
+    attitude_rate_max: float = number(
+        8.0, "largest rate of roll and pitch in the reference", "rad/s", 0.0, 50.0
+    )
+    attitude_acceleration_max: float = number(
+        40.0, "largest second derivative of roll and pitch in the reference", "rad/s^2", 0.0, 1e3
+    )
+
+
+@dataclass(frozen=True)
+class MissionParameters(PlanLimits, BrakeLimits, FlatnessParameters, SupervisionParameters):
+>>>>>>> ca94a7a (Motions carry jerk and snap; the reference's attitude follows from differential flatness)
     """Times and limits of start, take-off, touchdown, plans, braking, and of the supervisor."""
 
     start_speed: float = number(0.3, "largest speed at the start", "m/s", 0.01, 5.0)

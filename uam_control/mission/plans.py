@@ -12,9 +12,18 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from uam_control.coordinates import ALPHA, ARM, CHI, CHI_DDOT, CHI_DOT, POSITION, YAW
+from uam_control.coordinates import (
+    ALPHA,
+    ARM,
+    CHI,
+    CHI_DDOT,
+    CHI_DOT,
+    POSITION,
+    YAW,
+)
 from uam_control.maths.rotations import wrap_angle
 from uam_control.mission.mission_parameters import MissionParameters
+from uam_control.mission.polynomials import quintic, quintic_at
 
 BASE = slice(0, ALPHA)  # columns of a reference that a base plan writes
 PEAK = 1.875  # largest rate of a quintic from rest to rest, times its mean rate
@@ -25,31 +34,6 @@ AT_REST = 1e-3  # [m/s or rad/s] rate of a last point that counts as zero
 
 class PlanRefused(ValueError):
     """A goal or trajectory that is not flown; the text is one line: what, where, what is allowed"""
-
-
-def quintic(start: np.ndarray, goal: np.ndarray, lengths: np.ndarray) -> np.ndarray:
-    """Return coefficients (6, ..., k) of quintics in u = 0..1.
-
-    start, goal (3, ..., k): value, rate and acceleration at u = 0 and 1; lengths [s]: durations,
-    of a shape that broadcasts to (..., k).
-    """
-    p, v, a = start[CHI], start[CHI_DOT] * lengths, start[CHI_DDOT] * lengths**2  # per length
-    v1, a1 = goal[CHI_DOT] * lengths, goal[CHI_DDOT] * lengths**2
-    d = goal[CHI] - p
-    return np.array([
-        p, v, a / 2,
-        10 * d - 6 * v - 1.5 * a - 4 * v1 + 0.5 * a1,
-        -15 * d + 8 * v + 1.5 * a + 7 * v1 - a1,
-        6 * d - 3 * v - 0.5 * a - 3 * v1 + 0.5 * a1,
-    ])  # fmt: skip
-
-
-def quintic_at(c: np.ndarray, u: np.ndarray, lengths: np.ndarray) -> np.ndarray:
-    """Return value, rate and acceleration (3, ...) of quintics with coefficients c at u."""
-    rate = c[1] + u * (2 * c[2] + u * (3 * c[3] + u * (4 * c[4] + u * 5 * c[5])))
-    second = 2 * c[2] + u * (6 * c[3] + u * (12 * c[4] + u * 20 * c[5]))
-    value = c[0] + u * (c[1] + u * (c[2] + u * (c[3] + u * (c[4] + u * c[5]))))
-    return np.array([value, rate / lengths, second / lengths**2])
 
 
 class Plan:
@@ -78,21 +62,23 @@ class Plan:
         return self._stamp + self._length
 
     def at(self, times: np.ndarray) -> np.ndarray:
-        """Return values, rates and accelerations (3, q, k) at times (q,) [s] from the start."""
+        """Return values, rates .. snaps (5, q, k) at times (q,) [s] from the start."""
         row = np.clip(
             np.searchsorted(self._times, times, side="right") - 1, 0, len(self._times) - 2
         )
         lengths = (self._times[row + 1] - self._times[row])[:, None]
         u = np.clip((times - self._times[row])[:, None] / lengths, 0.0, 1.0)
         values = quintic_at(self._powers[:, row], u, lengths)
-        values[:, times >= self._times[-1]] = self._points[:, -1:]  # without rounding errors
+        arrived = times >= self._times[-1]  # without rounding errors
+        values[:, arrived] = 0.0
+        values[CHI, arrived] = self._points[CHI, -1]
         u = np.minimum(times / self._blend.length, 1.0)[:, None]
         values += np.where(u < 1.0, quintic_at(self._offset[:, None], u, self._blend.length), 0.0)
         return values
 
-    def write(self, stamp: float, reference: np.ndarray) -> None:
-        """Write the plan's columns of reference (3, 6 + n) at `stamp` [s]."""
-        reference[:, self.columns] = self.at(np.array([stamp - self._stamp]))[:, 0]
+    def write(self, stamp: float, motion: np.ndarray) -> None:
+        """Write the plan's columns of motion (5, 6 + n) at `stamp` [s]."""
+        motion[:, self.columns] = self.at(np.array([stamp - self._stamp]))[:, 0]
 
     def samples(self, per_piece: int = 10) -> np.ndarray:
         """Return times (q,) [s] from the start for checks: several in every polynomial."""
@@ -114,7 +100,7 @@ class Blend:
         """Blend from reference (3, 6 + n): long enough to stop with the allowed acceleration."""
         speed = float(np.linalg.norm(reference[CHI_DOT, POSITION])) if columns is BASE else 0.0
         length = max(p.stop_time, 2.0 * RAMP * speed / p.stop_acceleration)
-        return cls(reference[:, columns].copy(), length)
+        return cls(reference[: CHI_DDOT + 1, columns].copy(), length)
 
     @property
     def stop(self) -> np.ndarray:

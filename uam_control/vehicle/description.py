@@ -177,13 +177,17 @@ class VehicleDescription:
 
     def node_parameters(self) -> dict[str, dict[str, Any]]:
         """Return the node parameters derived from the vehicle; a profile can replace them."""
+        drag = [round(drag / self.mass, 6) for drag in self.numbers["air"]["drag"]]
         return {
             "state_estimator": {"gravity": self.gravity},
             "position_controller": {
                 "gravity": self.gravity,
                 "gravity_feedforward_mass": self.mass,
+                "drag_feedforward": drag,
             },
             "mission": {
+                "gravity": self.gravity,
+                "drag": drag,
                 "joint_angle_hold": [
                     _rounded_down(min(-joint.low, joint.high)) for joint in self.joints
                 ],

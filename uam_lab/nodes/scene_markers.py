@@ -14,7 +14,7 @@ from visualization_msgs.msg import Marker, MarkerArray
 
 from uam_control.coordinates import ALPHA, CHI, POSITION
 from uam_control.mission import Scenario
-from uam_control.mission.trajectory import empty_reference
+from uam_control.mission.trajectory import empty_motion
 from uam_msgs_py.messages.ros_time import set_stamp
 from uam_msgs_py.messages.status import MissionStatus
 from uam_msgs_py.messages.topics import BODY, WORLD
@@ -38,10 +38,10 @@ class ReferencePath:
         landing = scenario.begun_at(start).landing
         self._times = np.arange(0.0, landing.at + landing.duration + PATH_STEP, PATH_STEP)
         self._points = np.empty((len(self._times), 3))
-        trajectory, reference = scenario.trajectory(start), empty_reference(len(start) - ALPHA)
+        trajectory, motion = scenario.trajectory(start), empty_motion(len(start) - ALPHA)
         for time, point in zip(self._times, self._points, strict=True):
-            trajectory.write(float(time), reference)
-            point[:] = reference[CHI, POSITION]
+            trajectory.write(float(time), motion)
+            point[:] = motion[CHI, POSITION]
 
     def ahead(self, time: float) -> np.ndarray:
         """Return the points (n, 3) [m, world] from mission time [s] to the landing."""

@@ -1,0 +1,83 @@
+"""Differential flatness of the base: its attitude follows from the motion of position and yaw.
+
+The thrust must make the force f = m (p_ddot + g e3 + d p_dot), with d the linear drag per mass. Its
+direction gives roll and pitch by eq. (4a), pos; jerk and snap give their first and second
+derivatives. Source: Faessler, Franchi, Scaramuzza 2018, "Differential flatness of quadrotor dynamics
+subject to rotor drag"; here the drag acts along the world axes.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from uam_control.coordinates import CHI, CHI_DDOT, CHI_DOT, JERK, PITCH, ROLL, SNAP, YAW, X, Y, Z
+from uam_control.maths.compiled import jit
+
+
+@jit
+def write_attitude(
+    motion: np.ndarray,
+    drag: np.ndarray,
+    gravity: float,
+    rate_max: float,
+    acceleration_max: float,
+    reference: np.ndarray,
+) -> None:
+    """Write roll and pitch with first and second derivative into those columns of reference.
+
+    motion (5, 6 + n): see `coordinates`; drag (3,): linear drag per mass along the world axes
+    [1/s]; gravity [m/s^2]; rate_max [rad/s] and acceleration_max [rad/s^2] bound the derivatives
+    of motions with steps in acceleration or jerk. reference (3, 6 + n): Euler angles of the body
+    (Z-Y-X) [rad], their derivatives [rad/s], [rad/s^2].
+    """
+    # f / m and its derivatives
+    f, f_dot, f_ddot = np.empty(3), np.empty(3), np.empty(3)
+    for i in range(3):
+        f[i] = motion[CHI_DDOT, i] + drag[i] * motion[CHI_DOT, i]
+        f_dot[i] = motion[JERK, i] + drag[i] * motion[CHI_DDOT, i]
+        f_ddot[i] = motion[SNAP, i] + drag[i] * motion[JERK, i]
+    f[Z] += gravity
+    yaw, rate, acceleration = motion[CHI, YAW], motion[CHI_DOT, YAW], motion[CHI_DDOT, YAW]
+    c, s = math.cos(yaw), math.sin(yaw)
+    # ahead, aside: the force along the heading and to its right; d/dt of c is -s rate
+    ahead, aside = c * f[X] + s * f[Y], s * f[X] - c * f[Y]
+    ahead_1, aside_1 = c * f_dot[X] + s * f_dot[Y], s * f_dot[X] - c * f_dot[Y]
+    ahead_2, aside_2 = c * f_ddot[X] + s * f_ddot[Y], s * f_ddot[X] - c * f_ddot[Y]
+    ahead_dot, aside_dot = ahead_1 - rate * aside, aside_1 + rate * ahead
+    ahead_ddot = ahead_2 - 2.0 * rate * aside_1 - acceleration * aside - rate * rate * ahead
+    aside_ddot = aside_2 + 2.0 * rate * ahead_1 + acceleration * ahead - rate * rate * aside
+    # pitch = atan2(ahead, up); roll = atan2(aside, across), across^2 = ahead^2 + up^2
+    up, up_dot, up_ddot = f[Z], f_dot[Z], f_ddot[Z]
+    across = math.sqrt(ahead * ahead + up * up)
+    if across < 1e-3 * gravity:  # free fall has no attitude: level
+        reference[:, ROLL] = 0.0
+        reference[:, PITCH] = 0.0
+        return
+    across_dot = (ahead * ahead_dot + up * up_dot) / across
+    across_ddot = (
+        ahead_dot * ahead_dot + ahead * ahead_ddot + up_dot * up_dot + up * up_ddot
+        - across_dot * across_dot
+    ) / across  # fmt: skip
+    write_angle(aside, aside_dot, aside_ddot, across, across_dot, across_ddot, reference[:, ROLL])
+    write_angle(ahead, ahead_dot, ahead_ddot, up, up_dot, up_ddot, reference[:, PITCH])
+    for i in (ROLL, PITCH):
+        reference[CHI_DOT, i] = min(rate_max, max(-rate_max, reference[CHI_DOT, i]))
+        reference[CHI_DDOT, i] = min(
+            acceleration_max, max(-acceleration_max, reference[CHI_DDOT, i])
+        )
+
+
+@jit
+def write_angle(
+    a: float, a_dot: float, a_ddot: float, b: float, b_dot: float, b_ddot: float, rows: np.ndarray
+) -> None:
+    """Write atan2(a, b) and its first and second derivative to rows (3,)."""
+    square = a * a + b * b
+    turn = a_dot * b - a * b_dot
+    rows[CHI] = math.atan2(a, b)
+    rows[CHI_DOT] = turn / square
+    rows[CHI_DDOT] = (a_ddot * b - a * b_ddot) / square - turn * 2.0 * (a * a_dot + b * b_dot) / (
+        square * square
+    )
