@@ -1,9 +1,9 @@
 """Differential flatness of the base: its attitude follows from the motion of position and yaw.
 
 The thrust must make the force f = m (p_ddot + g e3 + d p_dot), with d the linear drag per mass. Its
-direction gives roll and pitch by eq. (4a), pos; jerk and snap give their first and second
-derivatives. Source: Faessler, Franchi, Scaramuzza 2018, "Differential flatness of quadrotor dynamics
-subject to rotor drag"; here the drag acts along the world axes.
+direction gives roll and pitch by eq. (4a), pos; jerk and snap give their derivatives. Source:
+Faessler, Franchi, Scaramuzza 2018, "Differential flatness of quadrotor dynamics subject to rotor
+drag"; here the drag acts along the world axes.
 """
 
 from __future__ import annotations
