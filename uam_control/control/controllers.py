@@ -11,16 +11,19 @@ import numpy as np
 
 from uam_control.control.output_limits import (
     ArmLimits,
+    AttitudeLimits,
     PositionLimits,
     TorqueLimits,
+    integrate,
     limit_force,
     limit_torque,
+    wash_out,
 )
 from uam_control.control.sample_hold import SampleHold
 from uam_control.control.thrust_direction import AttitudeReference
 from uam_control.coordinates import ALPHA, ARM, ATTITUDE, CHI, CHI_DOT, POSITION, YAW
 from uam_control.laws import catalogue
-from uam_control.laws.errors import tracking_errors
+from uam_control.laws.errors import FEEDFORWARD, E, tracking_errors
 from uam_control.laws.law_parameters import LawParameters
 from uam_control.settings.parameter_set import ParameterError
 from uam_control.vehicle import POSITION_SERVO
@@ -87,7 +90,11 @@ class Controller:
         tracking_errors(
             state, reference, attitude_reference, flying, self._printed, self._errors, self._norms
         )
+        self._adjust(dt)
         return self.law.update(*self._own, self._norms, self.saturated, dt)
+
+    def _adjust(self, dt: float) -> None:
+        """Change the errors of this tick before the law uses them."""
 
     def _idle(self) -> None:
         self.law.reset()
@@ -102,23 +109,28 @@ class PositionController(Controller):
     def __init__(self, parameters: PositionLimits) -> None:
         super().__init__(parameters)
         self._attitude = AttitudeReference(parameters.attitude_cutoff)
-        self._set_drag(parameters)
+        self._integral = np.zeros(3)  # [m/s^2] integral of integral_gain e
         self._tau = np.zeros(3)
         self._flying = False
+        self.set_parameters(parameters)
 
     def set_parameters(self, parameters: PositionLimits) -> None:
         """See `Controller.set_parameters`; also sets the corner of the attitude filter."""
         super().set_parameters(parameters)
-        self._set_drag(parameters)
+        self._drag = parameters.gravity_feedforward_mass * np.array(parameters.drag_feedforward)
+        self._integral_gain = np.array(parameters.integral_gain)
+        self._inertia = np.array(parameters.inertia)
         self._attitude.cutoff = parameters.attitude_cutoff
-
-    def _set_drag(self, p: PositionLimits) -> None:
-        self._drag = p.gravity_feedforward_mass * np.array(p.drag_feedforward)  # [N s/m]
 
     @property
     def attitude_reference(self) -> np.ndarray:
         """Rows q_d [rad], Omega_d, Omega_d_dot (3, 3); see `AttitudeReference.value`."""
         return self._attitude.value
+
+    def reset_adaptation(self) -> None:
+        """See `Controller.reset_adaptation`; the integral is set to zero, too."""
+        super().reset_adaptation()
+        self._integral[:] = 0.0
 
     def update(
         self, state: np.ndarray, reference: np.ndarray, flying: bool, dt: float
@@ -130,7 +142,7 @@ class PositionController(Controller):
         """
         if not flying:
             self._idle()
-            self._tau[:] = 0.0
+            self._tau[:] = self._integral[:] = 0.0
             self._attitude.reset(state[CHI, YAW])
             self._flying = False
             return self._tau
@@ -140,7 +152,10 @@ class PositionController(Controller):
                 self._attitude.begin(state, reference)
         p = self.parameters
         tau = self._law_output(state, reference, self._attitude.value, True, dt)
-        tau += self._drag * reference[CHI_DOT, POSITION]
+        integrate(
+            self._own[E], self._integral_gain, p.integral_limit, self.saturated, dt, self._integral
+        )
+        tau += self._drag * reference[CHI_DOT, POSITION] - self._inertia * self._integral
         self.saturated = limit_force(
             tau,
             p.gravity_feedforward_mass * p.gravity,
@@ -161,7 +176,7 @@ class TorqueController(Controller):
     def __init__(self, parameters: TorqueLimits) -> None:
         super().__init__(parameters)
         self._tau = np.zeros(len(parameters.torque_max))
-        self._torque_max = np.array(parameters.torque_max)
+        self.set_parameters(parameters)
 
     def set_parameters(self, parameters: TorqueLimits) -> None:
         """See `Controller.set_parameters`."""
@@ -192,9 +207,29 @@ class TorqueController(Controller):
 
 
 class AttitudeController(TorqueController):
-    """tau_q (3,) [N m, FLU], eq. (18), ct2."""
+    """tau_q (3,) [N m, FLU], eq. (18), ct2.
+
+    The autopilot's rate loop integrates: it adds its integral of the feedforward's effect to
+    tau_q. `feedforward_washout` takes this part out of Omega_d_dot beforehand.
+    """
 
     columns = ATTITUDE
+
+    def __init__(self, parameters: AttitudeLimits) -> None:
+        super().__init__(parameters)
+        self._slow = np.zeros(3)  # [rad/s^2] part of the feedforward that the autopilot integrates
+
+    def set_parameters(self, parameters: AttitudeLimits) -> None:
+        """See `Controller.set_parameters`."""
+        super().set_parameters(parameters)
+        self._washout = np.array(parameters.feedforward_washout)
+
+    def _adjust(self, dt: float) -> None:
+        wash_out(self._errors[FEEDFORWARD, ATTITUDE], self._washout, dt, self._slow)
+
+    def _idle(self) -> None:
+        super()._idle()
+        self._slow[:] = 0.0
 
 
 class ArmController(TorqueController):

@@ -35,6 +35,12 @@ class PositionLimits(ParameterSet):
         10.0,
         3,
     )
+    integral_gain: tuple = vector(
+        (0.0, 0.0, 0.0), "integral action on e, 0 = none, as printed", "1/s^3", 0.0, 1e3, 3
+    )
+    integral_limit: float = number(
+        3.0, "largest acceleration of the integral action, per axis", "m/s^2", 0.0, 20.0
+    )
     thrust_min: float = number(1.0, "least upward force", "N", TINY, 1e3)
     thrust_max: float = number(36.0, "largest force", "N", TINY, 1e3)
     tilt_max: float = number(0.35, "largest angle of tau_p from the vertical", "rad", 0.01, 1.5)
@@ -79,6 +85,20 @@ class ArmLimits(TorqueLimits):
     goal_rate: float = number(0.0, "rate of new goal positions, 0 = every tick", "Hz", 0.0, 1e3)
 
 
+@dataclass(frozen=True)
+class AttitudeLimits(TorqueLimits):
+    """Limits of tau_q, and what its feedforward leaves to the autopilot's rate loop."""
+
+    feedforward_washout: tuple = vector(
+        (0.0, 0.0, 0.0),
+        "high-pass on Omega_d_dot: I/P of the autopilot's rate loop, 0 = none",
+        "1/s",
+        0.0,
+        100.0,
+        3,
+    )
+
+
 @jit
 def limit_force(
     tau: np.ndarray,
@@ -117,3 +137,28 @@ def limit_torque(tau: np.ndarray, torque_max: np.ndarray, limited: np.ndarray) -
         limited[i] = min(max(tau[i], -torque_max[i]), torque_max[i])
         cut = cut or limited[i] != tau[i]
     return cut
+
+
+@jit
+def wash_out(feedforward: np.ndarray, corner: np.ndarray, dt: float, slow: np.ndarray) -> None:
+    """Take the slow part out of feedforward (n,), in place: a first-order high-pass.
+
+    corner (n,): [rad/s], 0 = no change; dt [s]; slow (n,): state of the filter, of the same unit.
+    """
+    for i in range(len(feedforward)):
+        slow[i] += (1.0 - math.exp(-corner[i] * dt)) * (feedforward[i] - slow[i])
+        feedforward[i] -= slow[i]
+
+
+@jit
+def integrate(
+    e: np.ndarray, gain: np.ndarray, limit: float, saturated: bool, dt: float, integral: np.ndarray
+) -> None:
+    """Advance integral (3,) [m/s^2] of gain e by dt [s], in place, within ±limit [m/s^2].
+
+    e (3,): tracking error [m]; gain (3,) [1/s^3]. While saturated it does not grow.
+    """
+    for i in range(len(e)):
+        following = integral[i] + gain[i] * e[i] * dt
+        if not (saturated and abs(following) > abs(integral[i])):
+            integral[i] = min(limit, max(-limit, following))

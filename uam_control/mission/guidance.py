@@ -29,16 +29,10 @@ from uam_control.maths.rotations import wrap_angle
 from uam_control.mission.braking import Braking
 from uam_control.mission.flatness import write_attitude
 from uam_control.mission.mission_parameters import MissionParameters
-<<<<<<< HEAD
-from uam_control.mission.plans import BASE, PEAK, RAMP, Plan, quintic, quintic_at, still
-from uam_control.mission.route import SINK
-from uam_control.mission.trajectory import Trajectory
-=======
 from uam_control.mission.plans import BASE, PEAK, RAMP, Plan, still
-from uam_control.mission.polynomials import quintic, quintic_at
-from uam_control.mission.scenario import SINK
+from uam_control.mission.quintics import quintic, quintic_at
+from uam_control.mission.route import SINK
 from uam_control.mission.trajectory import Trajectory, empty_motion
->>>>>>> ca94a7a (Motions carry jerk and snap; the reference's attitude follows from differential flatness)
 
 
 class PathClock:

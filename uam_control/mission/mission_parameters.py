@@ -56,7 +56,6 @@ class BrakeLimits(ParameterSet):
 
 
 @dataclass(frozen=True)
-<<<<<<< HEAD
 class FeasibilityLimits(ParameterSet):
     """Limits of the reference before take-off, in addition to the supervisor's. Without a value
     in the profile they are the position controller's thrust_max and tilt_max."""
@@ -66,8 +65,6 @@ class FeasibilityLimits(ParameterSet):
 
 
 @dataclass(frozen=True)
-class MissionParameters(FeasibilityLimits, PlanLimits, BrakeLimits, SupervisionParameters):
-=======
 class FlatnessParameters(ParameterSet):
     """What the attitude of the reference depends on, see `flatness.write_attitude`."""
 
@@ -84,8 +81,9 @@ class FlatnessParameters(ParameterSet):
 
 
 @dataclass(frozen=True)
-class MissionParameters(PlanLimits, BrakeLimits, FlatnessParameters, SupervisionParameters):
->>>>>>> ca94a7a (Motions carry jerk and snap; the reference's attitude follows from differential flatness)
+class MissionParameters(
+    FeasibilityLimits, PlanLimits, BrakeLimits, FlatnessParameters, SupervisionParameters
+):
     """Times and limits of start, take-off, touchdown, plans, braking, and of the supervisor."""
 
     start_speed: float = number(0.3, "largest speed at the start", "m/s", 0.01, 5.0)

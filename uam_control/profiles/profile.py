@@ -17,7 +17,11 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
-from uam_control.control.output_limits import ArmLimits, PositionLimits, TorqueLimits
+from uam_control.control.output_limits import (
+    ArmLimits,
+    AttitudeLimits,
+    PositionLimits,
+)
 from uam_control.coordinates import ARM, ATTITUDE, POSITION
 from uam_control.estimation import EstimatorParameters
 from uam_control.laws import catalogue
@@ -31,7 +35,7 @@ from uam_control.vehicle import VehicleDescription, load_description
 # controller → (parameters of its limits, its part of chi)
 CONTROLLERS: dict[str, tuple[type[ParameterSet], slice]] = {
     "position_controller": (PositionLimits, POSITION),
-    "attitude_controller": (TorqueLimits, ATTITUDE),
+    "attitude_controller": (AttitudeLimits, ATTITUDE),
     "arm_controller": (ArmLimits, ARM),
 }
 OTHERS = {"state_estimator": EstimatorParameters, "mission": MissionParameters}

@@ -185,6 +185,7 @@ class VehicleDescription:
                 "gravity_feedforward_mass": self.mass,
                 "drag_feedforward": drag,
             },
+            "attitude_controller": {"feedforward_washout": self._integral_ratios()},
             "mission": {
                 "gravity": self.gravity,
                 "drag": drag,
@@ -202,6 +203,12 @@ class VehicleDescription:
                 "rate_k": [self.autopilot_gains.get(f"MC_{axis}RATE_K", 1.0) for axis in AXES],
             },
         }
+
+    def _integral_ratios(self) -> list[float]:
+        """Return I/P of the autopilot's rate loop about roll, pitch, yaw [1/s]."""
+        gains = self.autopilot_gains
+        pairs = [(gains.get(f"MC_{axis}RATE_I", 0.0), gains[f"MC_{axis}RATE_P"]) for axis in AXES]
+        return [round(integral / proportional, 6) for integral, proportional in pairs]
 
 
 def _rounded_down(angle: float) -> float:
