@@ -26,7 +26,7 @@ class PositionLimits(ParameterSet):
     gravity_feedforward_mass: float = number(
         0.0, "mass whose weight is added to tau_p, 0 = the printed law", "kg", 0.0, 50.0
     )
-    gravity: float = number(GRAVITY, "acceleration of gravity", "m/s^2", 0.0, 30.0)
+    gravity: float = number(GRAVITY, "acceleration of gravity", "m/s^2", 0.1, 30.0)
     drag_feedforward: tuple = vector(
         (0.0, 0.0, 0.0),
         "linear drag per mass along the world axes, added for the desired velocity, 0 = none",
