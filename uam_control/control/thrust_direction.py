@@ -93,8 +93,8 @@ def attitude_reference_step(
     """Advance the filter and write q_d, Omega_d, Omega_d_dot into value (3, 3).
 
     tau_p, reference, dt: as in `AttitudeReference.update`; cutoff [Hz]; filtered: (2, 2), rows
-    roll, pitch: angle [rad], rate [rad/s] of the correction; lead: (2,), of roll and pitch [rad], added to the input;
-    NaN: see `AttitudeReference.begin`.
+    roll, pitch: angle [rad], rate [rad/s] of the correction; lead: (2,), of roll and pitch [rad],
+    added to the input; NaN: see `AttitudeReference.begin`.
     """
     yaw, yaw_rate = reference[CHI, YAW], reference[CHI_DOT, YAW]
     yaw_acceleration = reference[CHI_DDOT, YAW]

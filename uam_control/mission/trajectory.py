@@ -59,7 +59,14 @@ class Moves:
 
     def write(self, time: float, motion: np.ndarray) -> None:
         """Write the motion (5, 6 + n); see `Trajectory.write`."""
+        check_rows(motion)
         write_moves(time, self._start, self._rows, motion)
+
+
+def check_rows(motion: np.ndarray) -> None:
+    """Raise ValueError unless motion has five rows: compiled functions do not check bounds."""
+    if len(motion) != MOTION_ROWS:
+        raise ValueError(f"a motion has {MOTION_ROWS} rows, not {len(motion)}")
 
 
 COORDINATE, START, END, FROM, TO = ROW = range(5)  # columns of the rows of moves
@@ -132,6 +139,7 @@ class Sampled:
 
     def write(self, time: float, motion: np.ndarray) -> None:
         """Write the motion (5, 6 + n); see `Trajectory.write`."""
+        check_rows(motion)
         write_sample(time, self._times, self._samples, self._pieces, motion)
 
 
