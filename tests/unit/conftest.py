@@ -10,6 +10,7 @@ from whole_flight import SHORT
 
 from uam_control.laws.modular import ModularLaw
 from uam_control.mission import load_scenario
+from uam_control.mission.trajectory import empty_motion
 from uam_control.profiles.profile import load_profile
 from uam_lab.flight.direct.flight import DirectFlight
 from uam_lab.results import metrics, result_folder
@@ -31,7 +32,8 @@ def made_up_flight(seed=1, scale=1.0, info=None):
     start[2], start[6:] = 0.285, scenario.arm_start
     trajectory = scenario.trajectory(start)
     recording = FlightTable(len(times), COLUMNS)
-    reference = np.zeros((3, 8))
+    motion = empty_motion(2)
+    reference = motion[:3]
     phase_of_error = noise.uniform(0, 6, 8)
     amplitude = scale * np.array([0.02, 0.01, 0.015, 0.02, 0.015, 0.01, 0.01, 0.012])
     payload = np.array([-0.789, 0.0, 0.77])
@@ -40,7 +42,7 @@ def made_up_flight(seed=1, scale=1.0, info=None):
         row = recording.next_row(
             scenario.phase(time) if flying else "waiting" if time < 0.0 else "landed"
         )
-        trajectory.write(max(time, 0.0), reference)
+        trajectory.write(max(time, 0.0), motion)
         error = amplitude * np.sin(0.7 * time + phase_of_error) * flying
         error += 4.0 * amplitude * np.exp(-abs(time - 35.5)) * flying
         magnet = scenario.magnet_on(time) and flying

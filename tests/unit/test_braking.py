@@ -141,6 +141,7 @@ def test_the_laws_begin_without_a_step_in_attitude_and_thrust(laws, state):
     p = position.parameters
     force = p.inertia[0] * reference[CHI_DDOT, POSITION]
     force[Z] += p.gravity_feedforward_mass * p.gravity
+    force += p.gravity_feedforward_mass * np.array(p.drag_feedforward) * reference[1, POSITION]
     np.testing.assert_allclose(tau_p, force, atol=1e-6)
     desired = position.attitude_reference
     np.testing.assert_allclose(desired[CHI], state[CHI, ATTITUDE], atol=0.03)

@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 from uam_control.control.controllers import ArmController, AttitudeController, PositionController
-from uam_control.control.output_limits import ArmLimits, PositionLimits, TorqueLimits
+from uam_control.control.output_limits import ArmLimits, AttitudeLimits, PositionLimits
 from uam_control.laws.asmc1 import Asmc1Parameters
 from uam_control.laws.modular import ModularParameters
 from uam_control.profiles.profile import controller_parameters
@@ -38,7 +38,7 @@ def position(**changes):
 
 
 def torque(kind, axes, **changes):
-    limits = ArmLimits if kind is ArmController else TorqueLimits
+    limits = ArmLimits if kind is ArmController else AttitudeLimits
     return kind(parameters(limits, axes, **{"torque_max": [100.0] * axes} | changes))
 
 

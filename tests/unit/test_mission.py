@@ -14,16 +14,16 @@ from uam_control.mission import (
     StartParameters,
     load_scenario,
 )
-from uam_control.mission.trajectory import Move, Moves, Sampled
+from uam_control.mission.trajectory import Move, Moves, Sampled, empty_motion
 from uam_control.supervision import Authority, OperatorCommand, Readings, State
 
 START = np.array([0.0, 0.0, 0.28, 0.0, 0.0, 0.0, 0.0, np.pi / 2])
 
 
 def value(trajectory, time):
-    reference = np.zeros((3, 8))
-    trajectory.write(time, reference)
-    return reference
+    motion = empty_motion(2)
+    trajectory.write(time, motion)
+    return motion
 
 
 def assert_smooth(trajectory, end, speed, acceleration, step=1e-3):
@@ -41,7 +41,7 @@ def test_a_move_starts_and_ends_at_rest(length, to):
     for time, expected in ((0.5, 0.0), (1.0, 0.0), (1.0 + length, to), (2.0 + length, to)):
         reference = value(moves, time)
         assert reference[0, 0] == pytest.approx(expected, abs=1e-12)
-        np.testing.assert_allclose(reference[1:], 0.0, atol=1e-9)
+        np.testing.assert_allclose(reference[1:4], 0.0, atol=1e-9)
     assert value(moves, 1.0 + length / 2)[0, 0] == pytest.approx(to / 2)
 
 

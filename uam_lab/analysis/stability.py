@@ -130,6 +130,7 @@ def shares(forces: coupling.Coupling, terms: supply.Supply, columns: slice) -> d
         "adaptive": terms.adaptive[:, columns],
         "feedback": terms.feedback[:, columns],
         "feedforward": terms.feedforward[:, columns],
+        "integral": terms.integral[:, columns],
         "actuators": (terms.applied - terms.tau)[:, columns],
     }
     found = {"rms": rms(plant), "rest_rms": rms(forces.rest[:, columns])}

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from uam_control.control.output_limits import PositionLimits, integrate
 from uam_control.coordinates import ARM, ATTITUDE, POSITION, Z
 from uam_control.maths.rotations import matrix_from_euler
 from uam_lab.analysis.dynamics import Body
@@ -20,14 +21,15 @@ NODE_OF = {name: f"{name}_controller" for name in SUBSYSTEMS}
 class Supply:
     """Terms of tau at m ticks, eq. (8a), tau_p; (18a), tau_q; (25a), tau_alpha.
 
-    All (m, 6 + n): N, world (p), N m, FLU (q), N m (alpha). Without saturation
-    tau = feedforward + feedback + adaptive + weight.
+    All (m, 6 + n): N, world (p), N m, FLU (q), N m (alpha).
+    tau = feedforward + feedback + adaptive + weight + integral.
     """
 
-    feedforward: np.ndarray  # Mbar chi_d_ddot
+    feedforward: np.ndarray  # Mbar chi_d_ddot, drag, washout: what depends on the reference; limits
     feedback: np.ndarray  # -Mbar Lambda xi
     adaptive: np.ndarray  # -Mbar dtau
     weight: np.ndarray  # gravity_feedforward_mass g e3
+    integral: np.ndarray  # -Mbar times the integral action of the position
     tau: np.ndarray  # as recorded, after its limits
     applied: np.ndarray  # force and torque of the rotors; tau for the arm (no recorded torque)
 
@@ -38,11 +40,10 @@ def along(series: Series, rows: np.ndarray, estimate: Tracking, sets: dict, body
     estimate: errors of the estimated state, the input of the law. sets: parameter sets by node.
     """
     shape = (len(rows), series.columns.size)
-    feedforward, feedback, adaptive, weight = (np.zeros(shape) for _ in range(4))
+    feedback, adaptive, weight, integral = (np.zeros(shape) for _ in range(4))
     for name, columns in COLUMNS_OF.items():
         p = sets[NODE_OF[name]].record()[0]
         e, e_dot = estimate.e[:, columns], estimate.e_dot[:, columns]
-        feedforward[:, columns] = p["inertia"] * estimate.acceleration_d[:, columns]
         feedback[:, columns] = -p["inertia"] * (p["gain_e"] * e + p["gain_e_dot"] * e_dot)
         r = p["p12"] * e + p["p22"] * e_dot
         length = np.linalg.norm(r, axis=1)
@@ -52,8 +53,28 @@ def along(series: Series, rows: np.ndarray, estimate: Tracking, sets: dict, body
     weight[:, Z] = limits.gravity_feedforward_mass * limits.gravity
     blocks = [series.block(f"{tau}.")[rows] for tau in ("tau_p", "tau_q", "tau_alpha")]
     recorded = np.hstack(blocks)
+    integral[:, POSITION] = integral_action(series, limits)[rows]
+    feedforward = recorded - feedback - adaptive - weight - integral
     applied = np.hstack([rotor_wrench(series, rows, body), blocks[2]])
-    return Supply(feedforward, feedback, adaptive, weight, recorded, applied)
+    return Supply(feedforward, feedback, adaptive, weight, integral, recorded, applied)
+
+
+def integral_action(series: Series, p: PositionLimits) -> np.ndarray:
+    """Return the force (ticks, 3) [N, ENU] of the integral action, from the recorded errors.
+
+    It is integrated as in flight, at every tick; ticks of saturation count as the others.
+    """
+    force, integral = np.zeros((len(series), 3)), np.zeros(3)
+    gain, inertia = np.array(p.integral_gain), np.array(p.inertia)
+    if not gain.any():
+        return force
+    e = (series.block("estimate.") - series.block("reference."))[:, POSITION]
+    flown = np.any(series.block("tau_p.") != 0.0, axis=1)
+    steps = np.diff(series["time"], prepend=series["time"][0])
+    for k in np.flatnonzero(flown & np.isfinite(e).all(axis=1)):
+        integrate(e[k], gain, p.integral_limit, False, steps[k], integral)
+        force[k] = -inertia * integral
+    return force
 
 
 def rotor_wrench(series: Series, rows: np.ndarray, body: Body) -> np.ndarray:

@@ -73,7 +73,7 @@ def caveats(found: Mapping[str, Any]) -> list[str]:
 def _row(name: str, one: Mapping[str, Any]) -> StabilityRow:
     value, shares = one["V"], one["coupling"]
     met = (("adaptive_share", "adaptive"), ("feedback_share", "feedback"),
-           ("actuators_share", "actuators"))  # fmt: skip
+           ("integral_share", "integral action"), ("actuators_share", "actuators"))  # fmt: skip
     return StabilityRow(
         name=name,
         value=_number(value["max"]),

@@ -24,7 +24,8 @@ SYMBOLS = {"position": "p", "attitude": "q", "arm": "\\alpha"}
 BOUND, ENVELOPE = (0, (6, 2)), (0, (1, 1.4))
 LOWEST = 1e-6  # lower limit of the drawn tracking term, which may be zero
 MEAN_S = 0.2  # [s] averaging time of the forces, against the noise of the estimate
-COUPLING, ADAPTIVE, FEEDBACK, ACTUATORS = style.INK, *style.FLIGHTS[:2], "#9aa5af"
+COUPLING, ADAPTIVE, FEEDBACK, INTEGRAL = style.INK, *style.FLIGHTS[:3]
+ACTUATORS = "#9aa5af"
 
 
 def lyapunov(flights: Sequence[DrawnFlight]) -> Figure | None:
@@ -70,6 +71,7 @@ def coupling(flights: Sequence[DrawnFlight]) -> Figure | None:
     drawn = (
         (supply.applied - supply.tau, ACTUATORS, 0.9),
         (supply.feedback, FEEDBACK, 0.9),
+        (supply.integral, INTEGRAL, 0.9),
         (supply.adaptive, ADAPTIVE, 1.2),
         (found.coupling.plant, COUPLING, 1.2),
     )
@@ -91,6 +93,7 @@ def coupling(flights: Sequence[DrawnFlight]) -> Figure | None:
         style.key("true coupling", COUPLING, 1.4),
         style.key("adaptive term", ADAPTIVE, 1.4),
         style.key("feedback Λξ", FEEDBACK),
+        style.key("integral action", INTEGRAL),
         style.key("actuators − τ", ACTUATORS),
     ]
     panels.finish(figure, axes, flights, handles)
