@@ -191,7 +191,8 @@ class Flight:
         raise AssertionError(f"still {self.mission.output}")
 
     def assert_smooth(self, dt=0.01):
-        values = np.array(self.references)
+        """All but roll and pitch, whose rates may have steps where the jerk has."""
+        values = np.delete(np.array(self.references), [3, 4], axis=2)
         rates = (values[2:, 0] - values[:-2, 0]) / (2 * dt)
         np.testing.assert_allclose(rates, values[1:-1, 1], atol=4e-3)
         slopes = (values[2:, 1] - values[:-2, 1]) / (2 * dt)
