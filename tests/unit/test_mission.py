@@ -14,7 +14,7 @@ from uam_control.mission import (
     StartParameters,
     load_scenario,
 )
-from uam_control.mission.trajectory import Move, Moves, Sampled, empty_motion
+from uam_control.mission.trajectory import Move, Moves, empty_motion
 from uam_control.supervision import Authority, OperatorCommand, Readings, State
 
 START = np.array([0.0, 0.0, 0.28, 0.0, 0.0, 0.0, 0.0, np.pi / 2])
@@ -68,22 +68,6 @@ def test_the_papers_scenario():
         "return",
         "land",
     ]
-
-
-def test_sampled_trajectory_meets_its_samples():
-    times = np.linspace(0.0, 6.0, 61)
-    samples = np.zeros((61, 3, 8))
-    samples[:, 0, 0], samples[:, 1, 0], samples[:, 2, 0] = (
-        np.sin(times),
-        np.cos(times),
-        -np.sin(times),
-    )
-    sampled = Sampled(times, samples)
-    for time in (0.05, 1.234, 3.3, 5.99):
-        np.testing.assert_allclose(
-            value(sampled, time)[:, 0], [np.sin(time), np.cos(time), -np.sin(time)], atol=2e-3
-        )
-    assert value(sampled, 99.0)[0, 0] == samples[-1, 0, 0] and not value(sampled, 99.0)[1:].any()
 
 
 @pytest.mark.parametrize(

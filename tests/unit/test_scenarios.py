@@ -36,10 +36,10 @@ def rows_of(scenario, start=None, step=0.01):
     times = np.arange(0.0, begun.landing.at + begun.landing.duration, step)
     if isinstance(trajectory, Polynomials):
         return times, trajectory.rows(times, 3).swapaxes(0, 1)
-    rows = np.empty((len(times), 3, 8))
+    rows = np.empty((len(times), 5, 8))
     for time, reference in zip(times, rows, strict=True):
         trajectory.write(time, reference)
-    return times, rows
+    return times, rows[:, :3]
 
 
 def names(scenario):
@@ -166,7 +166,7 @@ def test_every_scenario_of_the_library_is_smooth(name):
     start = standing(scenario.arm_start)
     trajectory, end = scenario.trajectory(start), scenario.landing.at + scenario.landing.duration
     times = np.arange(0.0, end, 0.01)
-    rows = np.empty((len(times), 3, len(start)))
+    rows = np.empty((len(times), 5, len(start)))
     for time, reference in zip(times, rows, strict=True):
         trajectory.write(time, reference)
     for row in (0, 1):

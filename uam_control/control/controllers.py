@@ -179,7 +179,7 @@ class TorqueController(Controller):
     def __init__(self, parameters: TorqueLimits) -> None:
         super().__init__(parameters)
         self._tau = np.zeros(len(parameters.torque_max))
-        self.set_parameters(parameters)
+        self._torque_max = np.array(parameters.torque_max)
 
     def set_parameters(self, parameters: TorqueLimits) -> None:
         """See `Controller.set_parameters`."""
@@ -221,6 +221,7 @@ class AttitudeController(TorqueController):
     def __init__(self, parameters: AttitudeLimits) -> None:
         super().__init__(parameters)
         self._slow = np.zeros(3)  # [rad/s^2] part of the feedforward that the autopilot integrates
+        self._washout = np.array(parameters.feedforward_washout)
 
     def set_parameters(self, parameters: AttitudeLimits) -> None:
         """See `Controller.set_parameters`."""

@@ -18,7 +18,7 @@ from uam_control.mission.mission_parameters import MissionParameters
 from uam_control.mission.polynomials import Polynomials
 from uam_control.mission.scenario import Scenario, ScenarioError, standing
 from uam_control.mission.scenario_options import SLOWEST
-from uam_control.mission.trajectory import Trajectory, empty_reference
+from uam_control.mission.trajectory import Trajectory, empty_motion
 from uam_control.vehicle import VehicleDescription, VehicleError
 from uam_control.vehicle.arm_model import ArmModel
 
@@ -216,10 +216,10 @@ def _rows(trajectory: Trajectory, times: np.ndarray, joints: int) -> np.ndarray:
     """Return the reference (3, m, 6 + n) at times (m,) [s]."""
     if isinstance(trajectory, Polynomials):
         return trajectory.rows(times, CHI_DDOT + 1)
-    found = np.empty((len(times), *empty_reference(joints).shape))
-    for time, reference in zip(times.tolist(), found, strict=True):
-        trajectory.write(time, reference)
-    return found.swapaxes(0, 1)
+    found = np.empty((len(times), *empty_motion(joints).shape))
+    for time, motion in zip(times.tolist(), found, strict=True):
+        trajectory.write(time, motion)
+    return found.swapaxes(0, 1)[: CHI_DDOT + 1]
 
 
 def _attitude(force: np.ndarray, yaw: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -128,14 +128,14 @@ class Added:
         self._moves, self._curve, self._first = moves, curve, curve.first
         self._offset = np.empty((0, 0))
 
-    def write(self, time: float, reference: np.ndarray) -> None:
-        """Write the reference; see `Trajectory.write`."""
-        if self._offset.shape != reference.shape:
-            self._offset = np.empty_like(reference)
-        self._moves.write(time, reference)
+    def write(self, time: float, motion: np.ndarray) -> None:
+        """Write the motion (5, 6 + n); see `Trajectory.write`."""
+        if self._offset.shape != motion.shape:
+            self._offset = np.empty_like(motion)
+        self._moves.write(time, motion)
         self._curve.write(time, self._offset)
-        reference += self._offset
-        reference[CHI] -= self._first
+        motion += self._offset
+        motion[CHI] -= self._first
 
 
 def standing(arm_start: tuple[float, ...]) -> np.ndarray:

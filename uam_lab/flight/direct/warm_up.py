@@ -12,7 +12,7 @@ from collections.abc import Callable, Iterable, Iterator
 from uam_control.laws.catalogue import LAWS
 from uam_control.mission import load_scenario
 from uam_control.mission.scenario import standing
-from uam_control.mission.trajectory import empty_reference
+from uam_control.mission.trajectory import empty_motion
 from uam_control.profiles.profile import default_profile
 from uam_lab.flight.direct.flight import DirectFlight
 from uam_sim_bridge.autopilot import companion
@@ -57,5 +57,5 @@ def warm_up(laws: Iterable[str] = tuple(LAWS)) -> None:
         for _ in range(TICKS):
             flight.tick()
     curve = load_scenario("circle")
-    curve.trajectory(standing(curve.arm_start)).write(4.0, empty_reference(len(curve.arm_start)))
+    curve.trajectory(standing(curve.arm_start)).write(4.0, empty_motion(len(curve.arm_start)))
     companion.warm_up()  # the stand-in's descent, which a flight without failures does not call
