@@ -83,8 +83,27 @@ def test_the_mission_makes_the_reference_of_the_next_tick():
     assert stage.ahead == PERIOD
     assert not stage.begin(PERIOD, state)
     stage.advance(PERIOD, state)
-    assert stage.begin(5 * PERIOD, state)  # after a gap as well
-    assert stage.ahead == 5 * PERIOD
+    assert stage.begin(12 * PERIOD, state)  # after a long gap as well
+    assert stage.ahead == 12 * PERIOD
+
+
+@pytest.mark.parametrize("step", [0.8, 1.2, 2.0, 10.0])
+def test_each_tick_has_one_reference_carried_to_its_stamp(step):
+    stage, state = mission_stage(), np.zeros((3, 8))
+    stage.begin(0, state)
+    stage.advance(0, state)
+    reference = stage.output.reference
+    reference[:] = np.arange(24.0).reshape(3, 8)
+    stamp = round(step * PERIOD)
+    assert not stage.begin(stamp, state) and stage.ahead == PERIOD
+    late = (stamp - PERIOD) * 1e-9
+    position, velocity, acceleration = reference
+    expected = position + late * velocity + late**2 / 2 * acceleration
+    np.testing.assert_allclose(stage.reference[0], expected, rtol=1e-15)
+    np.testing.assert_allclose(stage.reference[1], velocity + late * acceleration, rtol=1e-15)
+    np.testing.assert_array_equal(stage.reference[2], acceleration)
+    stage.advance(stamp, state)
+    assert stage.ahead == stamp + PERIOD
 
 
 def test_a_report_of_the_autopilot_counts_from_the_next_tick_on():

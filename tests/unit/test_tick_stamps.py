@@ -1,12 +1,15 @@
 """Ticks lie one control period apart, also when the stamps of the IMU do not."""
 
+from functools import partial
+
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from uam_control.stages.tick_stamps import TickStamps
-from uam_msgs_py.node.joins import StampJoin
+from uam_control.stages.ahead import serves
+from uam_control.stages.tick_stamps import LONG, TickStamps
+from uam_msgs_py.node.joins import Ahead, StampJoin
 
 PERIOD = 4_000_000
 MS = 1_000_000
@@ -74,7 +77,7 @@ def test_an_older_sample_starts_no_tick_and_is_not_a_repeated_one():
 def test_a_reference_of_a_missing_tick_is_no_lost_tick():
     fired = []
     join = StampJoin(
-        ("state", "reference"), lambda *values: fired.append(values), ahead="reference"
+        ("state", "reference"), lambda *values: fired.append(values), ahead=Ahead("reference")
     )
     join.add("reference", 1, "r1")
     join.add("reference", 2, "r2")
@@ -84,3 +87,42 @@ def test_a_reference_of_a_missing_tick_is_no_lost_tick():
     join.add("reference", 4, "r4")
     join.add("state", 4, "s4")
     assert join.dropped == 1
+
+
+def early_join():
+    """Join of state and a reference (a stamp) that is sent one tick ahead."""
+    fired = []
+    ahead = Ahead("reference", partial(serves, period=PERIOD), lambda value, step: value + step)
+    return StampJoin(("state", "reference"), lambda *values: fired.append(values), ahead=ahead), (
+        fired
+    )
+
+
+@given(
+    st.lists(st.sampled_from([0.8, 1.0, 1.0, 1.0, 1.2, 2.0, 3.0, LONG]), max_size=30),
+    st.lists(st.booleans(), min_size=30, max_size=30),
+)
+def test_one_reference_per_tick_serves_every_tick_in_any_order(steps, late):
+    """late: the tick's state arrives before the reference that was sent at the tick before."""
+    join, fired = early_join()
+    stamps = np.cumsum([10 * PERIOD, *(round(step * PERIOD) for step in steps)]).tolist()
+    join.add("state", stamps[0], "s")
+    join.add("reference", stamps[0], stamps[0])  # the first tick has one of its own
+    for before, stamp, state_first in zip(stamps, stamps[1:], late, strict=False):
+        sent = before + PERIOD
+        order = [("state", stamp, "s"), ("reference", sent, sent)]
+        for one in order if state_first else order[::-1]:
+            join.add(*one)
+    assert fired == [(stamp, "s", stamp) for stamp in stamps]
+    assert join.dropped == 0
+
+
+def test_after_a_long_gap_the_tick_waits_for_its_own_reference():
+    join, fired = early_join()
+    for stamp in (PERIOD, (LONG + 2) * PERIOD):
+        join.add("reference", stamp, stamp)
+        join.add("state", stamp, "s")
+        join.add("reference", stamp + PERIOD, stamp + PERIOD)
+    assert [stamp for stamp, *_ in fired] == [PERIOD, (LONG + 2) * PERIOD]
+    join.add("state", (2 * LONG + 3) * PERIOD, "s")
+    assert len(fired) == 2

@@ -2,6 +2,7 @@
 
 import time
 from collections.abc import Callable
+from dataclasses import replace
 from functools import partial
 
 import numpy as np
@@ -12,6 +13,7 @@ from uam_control.control.controllers import Controller
 from uam_control.laws import catalogue
 from uam_control.nodes.described import described_vehicle
 from uam_control.profiles.profile import default_profile, parameter_set
+from uam_control.stages.ahead import carried, serves
 from uam_control.stages.law_stages import LawStage
 from uam_control.stages.timing import Timing
 from uam_msgs_py.messages import topics
@@ -27,7 +29,7 @@ from uam_msgs_py.messages.convert import JointStateWriter
 from uam_msgs_py.messages.parameter_changes import ParameterChange
 from uam_msgs_py.messages.topics import Topic
 from uam_msgs_py.node.base_node import UamNode
-from uam_msgs_py.node.joins import StampJoin
+from uam_msgs_py.node.joins import Ahead, StampJoin
 from uam_msgs_py.node.node_parameters import NodeParameters, given
 
 RESET, FREEZE = "reset_adaptation", "freeze_adaptation"  # services
@@ -66,7 +68,8 @@ class ControllerNode(UamNode):
         inputs = [topics.STATE, topics.REFERENCE]
         inputs += [] if last in inputs else [last]
         names, reference = [topic.name for topic in inputs], topics.REFERENCE.name
-        self._join = StampJoin(names, self._joined, ahead=reference)
+        ahead = Ahead(reference, partial(serves, period=timing.period), _later)
+        self._join = StampJoin(names, self._joined, ahead=ahead)
         self.joins.append(self._join)
         self.triggers = (last.name,)
         for topic in inputs:
@@ -124,6 +127,11 @@ class ControllerNode(UamNode):
         level, summary, values = super().diagnose()
         gains = {name: f"{value:.4g}" for name, value in self._adapted().items()}
         return level, summary, values | gains | {"saturated": self.controller.saturated}
+
+
+def _later(reference: Reference, step: int) -> Reference:
+    """Return the reference `step` [ns] later."""
+    return replace(reference, values=carried(reference.values, step))
 
 
 def _listed(gains: dict[str, float]) -> str:

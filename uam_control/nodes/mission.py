@@ -126,7 +126,7 @@ class MissionNode(UamNode):
         if stage.begin(stamp, state):
             self._publish_reference()
         output = stage.output
-        self._errors.tick(stamp, state, output.reference, output.flying)
+        self._errors.tick(stamp, state, stage.reference, output.flying)
         self._publish_status(
             stamp
         )  # before the magnet, so that the status of a tick arrives before it

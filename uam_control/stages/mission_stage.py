@@ -8,6 +8,7 @@ from collections import deque
 import numpy as np
 
 from uam_control.mission import Mission
+from uam_control.stages.ahead import carried, serves
 from uam_control.stages.supervisor_inputs import SupervisorInputs
 from uam_control.stages.timing import Timing
 from uam_control.stamps import NEW_TIME, SECOND
@@ -20,8 +21,8 @@ class MissionStage:
     """Computes the reference one tick ahead, so that it is ready when the state arrives.
 
     Between `begin` and `advance`, `output` is the mission's output at this tick, see
-    `MissionOutput`, and `flying` is
-    whether the controllers fly its reference. `ahead` [ns]: the tick of the newest reference.
+    `MissionOutput`, `flying` is whether the controllers fly its reference, and `reference`
+    (3, 6 + n) is what they fly, see `ahead`. `ahead` [ns]: the stamp of the newest reference.
     """
 
     def __init__(self, mission: Mission, timing: Timing) -> None:
@@ -29,7 +30,8 @@ class MissionStage:
         self.period = timing.period
         self.inputs = SupervisorInputs(self.period / SECOND)
         self.flying = False
-        self.ahead = -1
+        self.reference = self.output.reference
+        self.ahead = self._last = -1  # [ns]; _last: the tick before
         self._armed_since: float | None = None
         self._reports: deque[tuple[int, bool, int | None, float, Authority]] = deque()
         self._authority = Authority()
@@ -56,7 +58,8 @@ class MissionStage:
     def begin(self, stamp: int, state: np.ndarray) -> bool:
         """Start the tick `stamp` [ns] with its state (3, 6 + n), see `coordinates`.
 
-        Returns whether the reference of this tick was computed now: at the first tick, after a gap.
+        Returns whether the reference of this tick was computed now: at the first tick, and where
+        the newest one does not serve it.
         """
         if stamp < self.ahead - NEW_TIME:
             self._begin_anew()
@@ -66,9 +69,15 @@ class MissionStage:
             if connected:
                 self.inputs.inputs.autopilot(reported / SECOND, round_trip)
         self._readings = self.inputs.tick(stamp)
+        last, self._last = self._last, stamp
         if stamp == self.ahead:
+            self.reference = self.output.reference
+            return False
+        if serves(self.ahead, last, stamp, self.period):
+            self.reference = carried(self.output.reference, stamp - self.ahead)
             return False
         self.advance(stamp - self.period, state)
+        self.reference = self.output.reference
         return True
 
     def _begin_anew(self) -> None:
@@ -76,6 +85,7 @@ class MissionStage:
         self.mission.begin_anew()
         self.inputs.begin_anew()
         self._reports.clear()
+        self._last = -1
         self._armed_since, self._authority = None, Authority()
         self._flown = -REPORT_DELAY
 

@@ -5,7 +5,7 @@ reproducible bit for bit.
 """
 
 from collections.abc import Callable, Sequence
-from typing import Any
+from typing import Any, NamedTuple
 
 from uam_control.stamps import NEW_TIME
 
@@ -39,13 +39,26 @@ class Backlog:
         return items[-1:]
 
 
+class Ahead(NamedTuple):
+    """An input that is sent one tick ahead, for a stamp that the next tick may not have.
+
+    serves(stamp, before, tick): whether its value of a stamp serves another tick, given the tick
+    before [ns]; later(value, step): the value `step` [ns] later.
+    """
+
+    name: str
+    serves: Callable[[int, int, int], bool] = lambda stamp, before, tick: False
+    later: Callable[[Any, int], Any] = lambda value, step: value
+
+
 class StampJoin:
     """Calls `fire(stamp, *values)` when all inputs have delivered their values for a stamp.
 
     Ticks fire in the order of their stamps. A firing tick drops older incomplete ticks; these, and
     later messages for them, are counted in `dropped`. Stamps that go back by more than NEW_TIME
     belong to a new simulation: the join begins anew. An input that is sent one tick `ahead` makes
-    no tick alone: there is none if the sample that starts it is missing.
+    no tick alone: there is none if the sample that starts it is missing. Its value may serve the
+    tick that follows, see `Ahead`.
 
     deferred: complete ticks fire in `settle`, not in `add`; see `Backlog`.
     """
@@ -55,13 +68,14 @@ class StampJoin:
         inputs: Sequence[str],
         fire: Callable[..., None],
         depth: int = 32,
-        ahead: str | None = None,
+        ahead: Ahead | None = None,
     ):
         """inputs: names, in the order of the values; depth: most incomplete stamps stored.
 
         ahead: the input that is sent one tick ahead, if any.
         """
-        self._ahead = None if ahead is None else list(inputs).index(ahead)
+        self._early = ahead
+        self._ahead = None if ahead is None else list(inputs).index(ahead.name)
         self._index = {name: i for i, name in enumerate(inputs)}
         self._fire = fire
         self._depth = depth
@@ -87,12 +101,39 @@ class StampJoin:
             if len(self._open) > self._depth:
                 self._dropped += self._is_tick(self._open.pop(min(self._open)))
         values[self._index[name]] = value
-        if any(value is None for value in values):
+        self._fire_if_complete(stamp)
+        if self._index[name] == self._ahead:  # it may serve a tick of another stamp
+            for tick in sorted(self._open):
+                self._fire_if_complete(tick)
+
+    def _fire_if_complete(self, stamp: int) -> None:
+        values = self._open.get(stamp)
+        if values is None:
             return
+        if any(value is None for value in values):
+            served = self._served(stamp, values)
+            if served is None:
+                return
+            values[self._ahead] = served
         self._dropped += self._close(stamp) - 1  # all but this one
         self._backlog.put((stamp, values))
         if not self.deferred:
             self.settle()
+
+    def _served(self, stamp: int, values: list[Any]) -> Any:
+        """Take what the input `ahead` has for the tick `stamp` under another stamp, or None.
+
+        values: of the tick; None also if another input is missing.
+        """
+        early = self._early
+        if early is None or any(v is None for i, v in enumerate(values) if i != self._ahead):
+            return None
+        ticks = [key for key, others in self._open.items() if self._is_tick(others)]
+        before = max([self._last, *(key for key in ticks if key < stamp)])
+        for key in self._open.keys() - ticks:
+            if early.serves(key, before, stamp):
+                return early.later(self._open.pop(key)[self._ahead], stamp - key)
+        return None
 
     def _close(self, stamp: int) -> int:
         """Remove the ticks up to `stamp` [ns]; return their number."""

@@ -165,9 +165,9 @@ def fly_mission(tick: ControlTick) -> bool:
     output = mission.output
     # a copy, as `look_ahead` writes the next one; on the ground only the arm has a reference
     if mission.flying:
-        s.reference[:] = output.reference
+        s.reference[:] = mission.reference
     else:
-        s.reference[:, ARM] = output.reference[:, ARM]
+        s.reference[:, ARM] = mission.reference[:, ARM]
     s.flying, s.magnet = mission.flying, output.magnet
     s.time, s.phase = output.time, output.phase
     told = output.arm, output.magnet, output.state is State.FAILSAFE, output.regains
