@@ -20,6 +20,8 @@ from uam_msgs_py.messages.control import (
     read_torque,
 )
 from uam_msgs_py.messages.convert import ImuWriter, JointStateWriter, PoseWriter, read_joint_command
+from uam_msgs_py.messages.interface import CONTENTS
+from uam_msgs_py.messages.serialized import Serialized
 from uam_msgs_py.messages.status import AutopilotState, MissionStatus
 from uam_msgs_py.messages.trajectories import TrajectoryWriter
 from uam_msgs_py.node.connections import READERS, WRITERS, Connections
@@ -194,6 +196,15 @@ def test_the_nodes_compute_what_the_maths_does_bit_for_bit(start, probe):
             np.testing.assert_array_equal(command.tau, tau_p)
             np.testing.assert_array_equal(torque, tau_q)
     assert airborne == TICKS - (ARMED_AT + 500_000_000) // PERIOD + 1
+
+    for topic, messages in (
+        (topics.STATE, plant.states),
+        (topics.REFERENCE, plant.references),
+        (topics.POSITION_COMMAND, plant.position),
+        (topics.ATTITUDE_COMMAND, plant.attitude),
+    ):
+        frames = {Serialized(topic.type, message).layout.frame for message in messages}
+        assert frames == {CONTENTS[topic].frame}, topic.name
 
     stamps = [read_reference(message)[0] for message in plant.references]
     assert stamps == [(i + 1) * PERIOD for i in range(TICKS + 1)]  # the last is one tick ahead

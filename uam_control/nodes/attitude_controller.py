@@ -7,6 +7,7 @@ from uam_control.nodes.controller_node import ControllerNode
 from uam_msgs_py.messages import topics
 from uam_msgs_py.messages.control import ATTITUDE_NAMES, Reference, TorqueWriter
 from uam_msgs_py.node.base_node import run
+from uam_msgs_py.node.namespace import frame
 
 NAME = "attitude_controller"
 
@@ -18,7 +19,7 @@ class AttitudeControllerNode(ControllerNode):
         last = topics.POSITION_COMMAND
         super().__init__(NAME, AttitudeController, topics.ATTITUDE_ADAPTATION, last)
         self._command = self.publisher(topics.ATTITUDE_COMMAND)
-        self._writer = TorqueWriter(ATTITUDE_NAMES)
+        self._writer = TorqueWriter(ATTITUDE_NAMES, frame(self, topics.BODY))
 
     def send(self, stamp: int, tau: np.ndarray, reference: Reference, flying: bool) -> None:
         self._command.publish(self._writer.fill(stamp, tau) if flying else self._writer.idle(stamp))

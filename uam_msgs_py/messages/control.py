@@ -137,8 +137,9 @@ def read_position_command(data: bytes) -> tuple[int, PositionCommand]:
 class TorqueWriter(CommandWriter):
     """Writes tau_q or tau_alpha as the effort of a trajectory point."""
 
-    def __init__(self, names: list[str]):
-        super().__init__(names, ["effort"])
+    def __init__(self, names: list[str], frame: str = ""):
+        """names: of the n coordinates; frame: of the torques, "" for those about joints."""
+        super().__init__(names, ["effort"], frame)
 
     def fill(self, stamp: int, tau: np.ndarray) -> bytes:
         """Return the message; tau (n,) [N m]."""

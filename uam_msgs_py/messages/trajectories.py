@@ -27,10 +27,10 @@ class TrajectoryWriter(Template):
 
     ROWS = ("positions", "velocities", "accelerations", "effort")
 
-    def __init__(self, names: Sequence[str], rows: Sequence[str] = ROWS[:3]):
-        """names: of the n joints; rows: used rows, a subset of ROWS."""
+    def __init__(self, names: Sequence[str], rows: Sequence[str] = ROWS[:3], frame: str = WORLD):
+        """names: of the n joints; rows: used rows, a subset of ROWS; frame: of the numbers."""
         point = JointTrajectoryPoint(**{row: [0.0] * len(names) for row in rows})
-        super().__init__(JointTrajectory(joint_names=list(names), points=[point]), WORLD)
+        super().__init__(JointTrajectory(joint_names=list(names), points=[point]), frame)
 
     def fill(self, stamp: int, state: np.ndarray, time_from_start: int = 0) -> bytes:
         """Return the message with state (3, n): positions, velocities, accelerations."""
@@ -44,9 +44,10 @@ class TrajectoryWriter(Template):
 class CommandWriter(TrajectoryWriter):
     """Writes a command, or no command: a JointTrajectory without names and points."""
 
-    def __init__(self, names: Sequence[str], rows: Sequence[str]):
-        super().__init__(names, rows)
-        self._idle = Template(JointTrajectory(), WORLD)
+    def __init__(self, names: Sequence[str], rows: Sequence[str], frame: str = WORLD):
+        """See TrajectoryWriter."""
+        super().__init__(names, rows, frame)
+        self._idle = Template(JointTrajectory(), frame)
 
     def idle(self, stamp: int) -> bytes:
         """Return the message without a command at this stamp [ns]."""
