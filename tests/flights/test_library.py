@@ -34,6 +34,7 @@ class Notes(Observer):
 def test_commands_parameters_and_phases_of_a_flight(tmp_path, capfd):
     notes = Notes()
     given = {"scenario": "hover", "out": tmp_path / "out", "without": ["scene"]}
+    given["remappings"] = {"uam/state": "estimate", "imu/data": "imu", "uam/mission/status": "told"}
     limit = {"mission": {"takeoff_delay": 1.0}}
     with Flight(auto_start=False, parameters=limit, observer=notes, **given) as flight:
         with pytest.raises(NotInTime, match="'hover': not within 0.5 s"):

@@ -148,7 +148,10 @@ def start(forks, tmp_path) -> Iterator[Callable[..., Running]]:
     """start(module, *arguments) runs module.main() in a process that ends with the test."""
     running: list[Running] = []
 
-    def launch(module: str, *arguments: object) -> Running:
+    def launch(module: str, *arguments: object, publishers: str = "any") -> Running:
+        """publishers: the node's parameter; by default the probe may publish every topic."""
+        if ".nodes." in module and publishers:
+            arguments = (*arguments, "--ros-args", "-p", f"publishers:={publishers}")
         log = tmp_path / f"node_{len(running)}.log"
         node = Running(forks.start(module, [str(one) for one in arguments], log), log)
         running.append(node)

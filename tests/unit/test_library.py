@@ -7,6 +7,7 @@ from uam_control.settings.parameter_file import ProfileError
 from uam_lab import Flight, FlightError, NotInTime
 from uam_lab.flight.flight_settings import SettingsError
 from uam_lab.flight.observer import FlightStatus, Observer
+from uam_lab.flight.ros import node_arguments
 from uam_lab.library.history import History
 from uam_lab.results.result_folder import ResultFolderError
 
@@ -22,6 +23,13 @@ from uam_lab.results.result_folder import ResultFolderError
         ({"remappings": {"goal_pose": "goal"}, "engine": "direct"}, "has no topics"),
         ({"remappings": {"goal_pose": ""}}, "two names"),
         ({"remappings": {"pilot": {"a": "b"}}}, "unknown node 'pilot'"),
+        ({"remappings": {"mission": {"/uam/state": "x"}}}, "uam/state of mission alone would cut"),
+        ({"remappings": {"scene": {"/diagnostics": "x"}}}, "diagnostics of scene alone would cut"),
+        ({"remappings": {"uam/state": "uam/reference"}}, "that is the topic uam/reference"),
+        ({"remappings": {"uam/state": "x", "/imu/data": "/x"}}, "that is the topic uam/state"),
+        ({"remappings": {"mission": {"goal_pose": "path"}}}, "that is the topic path"),
+        ({"without": ["mission=my planner"]}, "'my planner' is no name of a node"),
+        ({"without": ["scene=mine"]}, "unknown node to fly without 'scene'"),
     ],
 )
 def test_wrong_options_are_refused_in_one_line(options, why):
@@ -50,6 +58,20 @@ def test_parameters_replace_single_values_of_the_profile():
     assert changed.profile.bridge()["setpoint"] == "attitude"
     assert changed.profile.name == plain.profile.name
     assert changed.parameters == {"scene": {"frame_rate": 5.0}}
+
+
+def test_topics_may_be_remapped_for_every_node_and_others_for_one():
+    every = {"uam/state": "estimate", "uam/reference": "uam/state_desired"}
+    given = {**every, "mission": {"goal_pose": "goal"}}
+    found = Flight(remappings=given).settings.remappings
+    assert found == {"": every, "mission": {"goal_pose": "goal"}}
+
+
+def test_an_own_node_may_have_a_name_of_its_own():
+    settings = Flight(without=["mission=my_planner", "arm_controller", "scene"]).settings
+    assert settings.foreign == ("mission", "arm_controller")
+    assert settings.own_names == {"mission": "my_planner"}
+    assert node_arguments.publishers(settings) == "mujoco_sim=mujoco_sim,mission=my_planner"
 
 
 def test_a_flight_of_the_direct_engine(tmp_path, capfd):

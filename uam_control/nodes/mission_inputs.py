@@ -52,8 +52,7 @@ class MissionInputs:
             try:
                 read(message)
             except BadMessage as error:
-                self._node.refused += 1
-                self._node.warn(f"{name}: refused: {error}", key=name)
+                self._node.refuse(name, error)
 
         def handle(message: Any) -> None:
             self._supervisor.keep(name, guarded, (message,), answers(message))

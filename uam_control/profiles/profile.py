@@ -43,14 +43,14 @@ NODES = (*CONTROLLERS, *OTHERS)
 BRIDGE = "mavlink_bridge"
 BRIDGE_LINKS = (
     *("clock", "local_port", "autopilot_port", "autopilot_host", "autopilot_system"),
-    *("autopilot", "gcs", "vehicle", "dry_run", "network_delay"),
+    *("autopilot", "gcs", "vehicle", "dry_run", "network_delay", "publishers"),
 )
 # Parameters of a node that are not in a profile: they belong to one flight.
 FLIGHT_OWN = {
-    **dict.fromkeys(CONTROLLERS, ("control_period", "vehicle")),
-    "state_estimator": ("vehicle", "odometry_rate"),
+    **dict.fromkeys(CONTROLLERS, ("control_period", "vehicle", "publishers")),
+    "state_estimator": ("vehicle", "odometry_rate", "publishers"),
     "mission": (
-        *("control_period", "scenario", "vehicle", "auto_start", "dry_run"),
+        *("control_period", "scenario", "vehicle", "auto_start", "dry_run", "publishers"),
         *ScenarioOptions.specs(),
     ),
 }

@@ -122,8 +122,9 @@ def add(commands: argparse._SubParsersAction) -> None:
     command.seed("of all noise")
     command.repeated(
         "--without",
-        "NODE",
-        f"do not start this node, wait for yours of that name: {', '.join(REPLACEABLE)}; "
+        "NODE[=NAME]",
+        "do not start this node, wait for yours of that name, or of NAME: "
+        f"{', '.join(REPLACEABLE)}; "
         f"or do not start a display: {', '.join(ONLOOKERS)}",
     )
     command.switch(

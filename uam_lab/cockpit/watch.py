@@ -12,6 +12,8 @@ from rclpy.qos import QoSProfile
 from uam_msgs_py.messages import topics
 from uam_msgs_py.messages.topics import Topic
 from uam_msgs_py.node.polling import listen, messages
+from uam_msgs_py.node.rightful import PUBLISHERS, RightfulNodes
+from uam_msgs_py.node.sole_publisher import SolePublisher
 
 # Before the first tick of a simulated flight every publisher of the control loop counts its
 # subscribers. The cockpit must not be counted in place of another node, so it subscribes to LATE
@@ -46,8 +48,10 @@ WHOLE = (topics.DIAGNOSTICS, topics.CHANGES, topics.TF, topics.TF_STATIC)  # eac
 class Watch:
     """Polls the topics through `node`, which is not spun."""
 
-    def __init__(self, node: Node):
-        self._node = node
+    def __init__(self, node: Node, rightful: RightfulNodes):
+        """rightful: whose messages are shown."""
+        self._node, self._rightful = node, rightful
+        self._guards: dict[Topic, SolePublisher] = {}
         self._late = False
         self._subscriptions: dict[Topic, Any] = {}
         self._arrivals: dict[Topic, float] = {}
@@ -57,13 +61,17 @@ class Watch:
 
     def _listen(self, topic: Topic) -> None:
         qos: QoSProfile = topic.qos if topic in EARLY else topics.NEWEST
-        self._subscriptions[topic] = listen(self._node, topic, qos, raw=topic in SERIALIZED)
+        made = listen(self._node, topic, qos, raw=topic in SERIALIZED)
+        self._subscriptions[topic] = made
+        if topic.name in PUBLISHERS:
+            rightful = self._rightful.of(topic.name)
+            self._guards[topic] = SolePublisher(self._node, made, rightful, lambda: False)
 
     def look(self, show: Callable[[Topic, Any], None]) -> None:
         """Call show(topic, message) for new messages: all of WHOLE, the newest of the others."""
         for topic, subscription in list(self._subscriptions.items()):
             newest = None
-            for message in messages(subscription):
+            for message in messages(subscription, self._guards.get(topic)):
                 if topic in WHOLE:
                     show(topic, message)
                 newest = message
@@ -87,6 +95,7 @@ class Watch:
             if not sparing:
                 self._listen(topic)
             elif topic in self._subscriptions:
+                self._guards.pop(topic, None)
                 self._node.destroy_subscription(self._subscriptions.pop(topic))
 
     @property

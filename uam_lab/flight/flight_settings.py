@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import importlib.util
+import re
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -46,6 +47,7 @@ REPLACEABLE = (
     "arm_controller",
 )
 COCKPIT = "cockpit"
+NODE_NAME = re.compile(r"[A-Za-z_]\w*", re.ASCII)
 LOG_LIMIT = 4000.0  # [MB] some four hours of flight
 ONLOOKERS = ("scene", COCKPIT)  # nodes that only display: their end does not end the flight
 
@@ -57,7 +59,8 @@ class FlightSettings:
     payload_mass [kg]; vehicle_changes: dotted entries of config/vehicle/*.yaml to replace, as
     {"air.wind": [3.0, 0.0, 0.0]}; out: the result folder, None for the default. autopilot:
     BUILTIN, PX4, or the URL of an autopilot started by the user; link: that URL, parsed. without:
-    nodes that are not started, see `foreign`. auto_start: the flight begins without a command;
+    nodes that are not started, see `foreign`; own_names: those of the nodes that the user starts in
+    place of them, where they differ. auto_start: the flight begins without a command;
     dry_run: nothing is armed. parameters: of the nodes without a profile, node → name → value.
     remappings: node, or EVERY_NODE → topic or service → new name. command: how the flight was
     requested, for its record. namespace: of all nodes, in the form of ROS; domain: ROS domain,
@@ -84,6 +87,7 @@ class FlightSettings:
     instance: int | None = None  # of ROS domain and ports; None: the first free one
     vehicle_changes: dict[str, object] = field(default_factory=dict)
     without: tuple[str, ...] = (COCKPIT,)
+    own_names: dict[str, str] = field(default_factory=dict)
     log_limit: float = LOG_LIMIT  # [MB] size at which log.mcap ends
     faults: Schedule = Schedule()
     auto_start: bool = True
@@ -140,12 +144,12 @@ def settings(
     end, transit_speed [m/s], transit_acceleration [m/s^2]: see `ScenarioOptions`; retime: slow the
     scenario down until it is feasible. profile: see `load_profile` for several profiles;
     plant_preset: names or files of effects of the plant, effects: changes to them, see
-    `effects.presets.read`; faults: see `faults.read_schedule`; view: serve the cockpit; arm: begin
-    by itself also with a real autopilot; auto_start False: wait for the command start. parameters:
-    node → name → value, each replaces the profile's. remappings: topic or service → new name for
-    every node, or node → such a mapping. Raises SettingsError, ConfigurationError, ScenarioError
-    (InfeasibleReference too), ProfileError, Px4Error, PortError, PlantError, FaultError; each text
-    is one line for the user.
+    `effects.presets.read`; faults: see `faults.read_schedule`; view: serve the cockpit; without:
+    nodes, or node=name for an own node of another name; arm: begin by itself also with a real
+    autopilot; auto_start False: wait for the command start. parameters: node → name → value, each
+    replaces the profile's. remappings: topic or service → new name for every node, or node → such a
+    mapping. Raises SettingsError, ConfigurationError, ScenarioError (InfeasibleReference too),
+    ProfileError, Px4Error, PortError, PlantError, FaultError; each text is one line for the user.
     """
     _choice("controller", controller, catalogue.LAWS)
     _choice("engine", engine, ENGINES)
@@ -156,8 +160,7 @@ def settings(
             "the direct engine has only the built-in autopilot: "
             f"--autopilot {autopilot} needs --engine ros"
         )
-    for node in without:
-        _choice("node to fly without", node, REPLACEABLE + ONLOOKERS)
+    without, own_names = _left_out(without)
     if dry_run and engine == "direct":
         raise SettingsError("a dry run needs --engine ros: the direct engine is a simulation")
     if without and engine == "direct":
@@ -245,6 +248,7 @@ def settings(
         instance=_instance_of(link) if instance is None else instance,
         vehicle_changes=presets.added(vehicle_changes or {}, acting),
         without=left_out,
+        own_names=own_names,
         faults=injected,
         log_limit=log_limit,
         auto_start=auto_start and not dry_run and (arm or link is None or not link.real),
@@ -295,6 +299,20 @@ def require_ros() -> None:
             "the ROS engine needs rclpy, which is not installed: make setup, or source a ROS 2 "
             "installation, or fly with --engine direct"
         )
+
+
+def _left_out(without: Sequence[str]) -> tuple[tuple[str, ...], dict[str, str]]:
+    """Return the nodes that are not started, and the names of own nodes that replace them."""
+    names, own = [], {}
+    for entry in without:
+        node, equals, name = entry.partition("=")
+        _choice("node to fly without", node, REPLACEABLE if equals else REPLACEABLE + ONLOOKERS)
+        names.append(node)
+        if equals:
+            if not NODE_NAME.fullmatch(name):
+                raise SettingsError(f"without {entry}: '{name}' is no name of a node")
+            own[node] = name
+    return tuple(names), own
 
 
 def _link(autopilot: str) -> LinkUrl:

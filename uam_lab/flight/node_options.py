@@ -56,7 +56,10 @@ def parameters(
 def remappings(
     given: Mapping[str, str | Mapping[str, str]], engine: str
 ) -> dict[str, dict[str, str]]:
-    """Return node, or EVERY_NODE → old name → new name. Raises SettingsError."""
+    """Return node, or EVERY_NODE → old name → new name.
+
+    Raises SettingsError, also for names with which the nodes would not find each other.
+    """
     if given and engine == "direct":
         raise SettingsError("the direct engine has no topics: remappings need engine ros")
     found: dict[str, dict[str, str]] = {}
@@ -71,7 +74,30 @@ def remappings(
             raise SettingsError(
                 f"remapping {old!r} → {new!r}: two names of topics or services expected"
             )
+    for node, names in found.items():
+        _check_topics(node, names)
     return found
+
+
+def _check_topics(node: str, names: Mapping[str, str]) -> None:
+    """Refuse remappings that would cut the control loop. Raises SettingsError."""
+    from uam_msgs_py.messages import topics  # needs ROS, as remappings do
+    from uam_msgs_py.node.wiring import WIRES
+
+    every = {topic.name.removeprefix("/") for topic in topics.ALL}
+    loop = {wire.topic.name for wire in WIRES} | {topics.DIAGNOSTICS.name.removeprefix("/")}
+    bare = {old.removeprefix("/"): new.removeprefix("/") for old, new in names.items()}
+    taken: dict[str, str] = {}
+    for old, new in bare.items():
+        if node != EVERY_NODE and old in loop:
+            raise SettingsError(
+                f"remapping {old} of {node} alone would cut the control loop: "
+                "give it for every node, as topic → new name"
+            )
+        other = new if new in every - bare.keys() and new != old else taken.get(new)
+        if other is not None and (old in every or other in every):
+            raise SettingsError(f"remapping {old} → {new}: that is the topic {other}")
+        taken[new] = old
 
 
 def _known_node(node: str, nodes: Collection[str]) -> None:

@@ -25,6 +25,7 @@ from uam_lab.cockpit.watch import Watch
 from uam_msgs_py.node.base_node import StopSignal, refuse
 from uam_msgs_py.node.namespace import adopt_sections
 from uam_msgs_py.node.node_parameters import NodeParameters, refuse_unknown
+from uam_msgs_py.node.rightful import rightful_nodes
 
 NAME = "cockpit"
 OPTIONS = "views/cockpit.yaml"
@@ -51,6 +52,7 @@ def main() -> int:
     try:
         served = NodeParameters(node, CockpitParameters, read_only=True).current
         vehicle = described_vehicle(node)
+        rightful = rightful_nodes(node)
         refuse_unknown(node)
         origins = [one for one in served.origins.split(",") if one]
         server = web.serve(served.host, served.port, "uam", origins)
@@ -63,7 +65,7 @@ def main() -> int:
     watcher = Node(f"{NAME}_watch", start_parameter_services=False, enable_rosout=False)
     page = Page(
         server,
-        Watch(watcher),
+        Watch(watcher, rightful),
         Services(node),
         options,
         vehicle.coordinates[ARM],

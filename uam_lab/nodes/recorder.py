@@ -9,6 +9,7 @@ from __future__ import annotations
 import json
 import sys
 import time
+from collections.abc import Sequence
 from dataclasses import dataclass
 from datetime import datetime
 from pathlib import Path
@@ -25,10 +26,11 @@ from uam_lab.recording.topic_recorder import TopicRecorder
 from uam_msgs_py.messages import topics
 from uam_msgs_py.messages.status import ERROR, OK, WARN, diagnostic
 from uam_msgs_py.node import connections
-from uam_msgs_py.node.base_node import StopSignal, refuse
+from uam_msgs_py.node.base_node import DIAGNOSTICS_PERIOD, StopSignal, refuse
 from uam_msgs_py.node.health import LoopTime, ages
 from uam_msgs_py.node.namespace import adopt_sections, label
 from uam_msgs_py.node.node_parameters import NodeParameters, refuse_unknown
+from uam_msgs_py.node.rightful import RightfulNodes, rightful_nodes
 
 NAME = "recorder"
 POLLS_PER_SERVICE = 5  # polls between two calls of the parameter services
@@ -51,21 +53,38 @@ class RecorderParameters(ParameterSet):
     poll_period: float = number(0.02, "time between two polls of the topics", "s", 0.001, 1.0)
 
 
-def _health(node: Node, recording: TopicRecorder, polls: LoopTime) -> DiagnosticArray:
-    """Return the node's /diagnostics entry: lost messages, loop times, connections."""
+def _health(
+    node: Node, recording: TopicRecorder, polls: LoopTime, new: Sequence[str]
+) -> DiagnosticArray:
+    """Return the node's /diagnostics entry: lost messages, loop times, connections.
+
+    new: lines about foreign publishers since the last entry.
+    """
     lost = sum(recording.lost.values())
     summary = recording.ended or (f"{lost} messages lost" if lost else "recording")
-    values = {"messages lost": lost, connections.RECORDED_UNTIL: recording.until}
+    values = {"messages lost": lost, "lost of": _losses(recording)}
+    values[connections.RECORDED_UNTIL] = recording.until
     namespace = node.get_namespace()
     values |= polls.report("poll") | ages(recording.inlets, recording.arrivals, namespace)
     values |= connections.of({}, recording.inlets, namespace)
     now = node.get_clock().now().nanoseconds
     values["foreign publishers"] = "; ".join(recording.foreign)
     level = ERROR if recording.ended else WARN if lost else OK
+    if new and not recording.ended:
+        level, summary = ERROR, "; ".join(new)
     return diagnostic(now, label(node), level, summary, values)
 
 
-def _open(node: Node, options: RecorderParameters) -> TopicRecorder:
+def _losses(recording: TopicRecorder) -> str:
+    """Return the lost messages with their topics and publishers."""
+    return "; ".join(
+        f"{topic} of {node}: {count}"
+        for topic, counts in recording.lost_by_publisher.items()
+        for node, count in counts.items()
+    )
+
+
+def _open(node: Node, options: RecorderParameters, rightful: RightfulNodes) -> TopicRecorder:
     """Create the log and its subscriptions. Raises ParameterError in one line."""
     stamp = datetime.now().strftime("%Y%m%d-%H%M%S")
     file = Path(options.file).expanduser() if options.file else new_log_file(stamp)
@@ -76,7 +95,7 @@ def _open(node: Node, options: RecorderParameters) -> TopicRecorder:
         raise ParameterError(f"facts: {source} cannot be read: {error}") from None
     try:
         chosen, limit = topics.RECORDED, options.size_limit
-        made = TopicRecorder(node, file, chosen, options.simulated, facts, limit)
+        made = TopicRecorder(node, file, chosen, options.simulated, rightful, facts, limit)
     except FileExistsError:
         raise ParameterError(
             f"file: {file} exists; a log is never overwritten, give another name"
@@ -100,8 +119,9 @@ def main() -> int:
     log = node.get_logger()
     try:
         options = NodeParameters(node, RecorderParameters, read_only=True).current
+        rightful = rightful_nodes(node)
         refuse_unknown(node)
-        recording = _open(node, options)
+        recording = _open(node, options, rightful)
     except ParameterError as error:
         return refuse(NAME, error)
     health = node.create_publisher(
@@ -111,6 +131,8 @@ def main() -> int:
     services.add_node(node)
     polls_per_flush = max(1, round(options.flush_period / options.poll_period))
     polls, loop, ended = 0, LoopTime(), ""
+    foreign: list[str] = []  # lines about foreign publishers at the last report
+    due = 0.0  # time.monotonic() of the next comparison
     while not stop.raised:
         time.sleep(options.poll_period)
         begun = time.perf_counter()
@@ -124,12 +146,19 @@ def main() -> int:
             if recording.ended and not ended:
                 ended = recording.ended
                 log.error(f"{ended}; recorded until {recording.until:g} s")
-            health.publish(_health(node, recording, loop))
+            new = []
+            if time.monotonic() >= due:
+                due = time.monotonic() + DIAGNOSTICS_PERIOD
+                new = [line for line in recording.foreign if line not in foreign]
+                foreign = recording.foreign
+                if new:
+                    log.error("; ".join(new))
+            health.publish(_health(node, recording, loop, new))
     recording.drain()
     if not recording.close():
         log.warning("the folder has the metadata.yaml of another log: give this one's file a name")
-    for topic, count in recording.lost.items():
-        log.warning(f"{count} messages of {topic} were lost")
+    if recording.lost:
+        log.warning(f"messages were lost: {_losses(recording)}")
     if options.statistics:
         summary = {"messages": recording.counts, "lost": recording.lost, "ended": recording.ended}
         Path(options.statistics).write_text(json.dumps(summary, indent=1))

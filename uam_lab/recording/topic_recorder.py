@@ -1,5 +1,9 @@
 """Subscribes to topics without decoding them, and writes each message at its time of the flight.
 
+A topic has its own name in the log, also where it is remapped: readers know it by that name. Of
+topics shared by several vehicles only the own part is written, see `own_part`. Losses are gaps
+in the sequence numbers of one publisher.
+
 The subscriptions are polled and have no callbacks: the threads of the middleware collect the
 messages, and taking fifty messages in one poll costs a tenth of fifty callbacks.
 
@@ -24,12 +28,14 @@ from rclpy.subscription import Subscription
 from uam_control.stamps import SECOND
 from uam_lab.recording.bag import BagTopic, add_topic, write_metadata
 from uam_lab.recording.bounded_log import BoundedLog
+from uam_lab.recording.own_part import Filter, own_part
 from uam_msgs_py.messages import topics
 from uam_msgs_py.messages.layouts import stamp_of
 from uam_msgs_py.messages.serialized import type_name
 from uam_msgs_py.node.namespace import expanded
 from uam_msgs_py.node.polling import listen
-from uam_msgs_py.node.sole_publisher import PUBLISHERS, SolePublisher, complaints
+from uam_msgs_py.node.rightful import PUBLISHERS, RightfulNodes
+from uam_msgs_py.node.sole_publisher import UNKNOWN, SolePublisher, complaints, publishers
 from uam_msgs_py.node.taking import Taker
 
 DEPTH = 2000  # queue length per topic: 8 s at control rate
@@ -51,10 +57,10 @@ class Track:
     take: Callable[[], bytes | None]
     stamped: bool
     channel: int
-    one_publisher: bool
+    own: Filter | None
     arrived: float | None = None  # time.monotonic() of the newest message
     last_sequences: dict[bytes, int] = field(default_factory=dict)  # by publisher
-    lost: int = 0
+    lost: dict[str, int] = field(default_factory=dict)  # by the publisher's node
 
 
 class TopicRecorder:
@@ -66,12 +72,14 @@ class TopicRecorder:
         file: Path,
         chosen: list[topics.Topic],
         simulated: bool,
+        rightful: RightfulNodes,
         metadata: Mapping[str, Mapping[str, str]] | None = None,
         size_limit: float = 0.0,
     ):
         """Subscribe to `chosen` and create `file` with the named texts `metadata`.
 
-        size_limit [MB], 0 for none. Raises FileExistsError for an existing file, OSError.
+        rightful: whose messages are written; size_limit [MB], 0 for none. Raises FileExistsError
+        for an existing file, OSError.
         """
         self._simulated, self._namespace = simulated, node.get_namespace()
         self._writer = BoundedLog(file, size_limit)
@@ -79,6 +87,7 @@ class TopicRecorder:
             self._writer.add_metadata(name, values)
         self._bag: list[BagTopic] = []
         self._guards: list[SolePublisher] = []
+        self._node, self._rightful = node, rightful
         self._tracks = [self._track(node, topic) for topic in chosen]
         # /clock is taken last in each poll: then every /clock published before any other message
         # of this poll is available
@@ -94,19 +103,20 @@ class TopicRecorder:
             durability=topic.qos.durability,
         )
         subscription = listen(node, topic, qos, raw=True)
-        name = node.resolve_topic_name(topic.name)
+        name = expanded(self._namespace, topic.name)
         self._bag.append(BagTopic(name, type_name(topic.type), topic.qos))
         channel = add_topic(self._writer, self._bag[-1])
         stamped = begins_with_stamp(topic.type) and topic.one_publisher
         if topic.name in PUBLISHERS:  # a foreign message would be a row of the table
-            guard = SolePublisher(node, subscription, topic.name, lambda: self._clock_sim != [])
+            rightful = self._rightful.of(topic.name)
+            guard = SolePublisher(node, subscription, rightful, lambda: self._clock_sim != [])
             self._guards.append(guard)
             taker, take = guard.taker, guard.take
         else:
             taker = Taker(subscription)
             take = taker.take
-        single = topic.one_publisher
-        return Track(topic.name, subscription, taker, take, stamped, channel, single)
+        own = own_part(topic, self._namespace)
+        return Track(topic.name, subscription, taker, take, stamped, channel, own)
 
     def poll(self) -> int:
         """Write all received messages; return their number."""
@@ -120,6 +130,9 @@ class TopicRecorder:
                     self._clock_sim.append(stamp_of(data))
                 sequence = info.publication_sequence_number
                 self._count_lost(track, bytes(taker.gid), sequence)
+                data = data if track.own is None else track.own(data)
+                if data is None:
+                    continue
                 batch.append((track, data, published, sequence))
                 track.arrived = now
         for track, data, published, sequence in batch:
@@ -145,13 +158,14 @@ class TopicRecorder:
         before = bisect_right(self._clock_wall, published)
         return self._clock_sim[before - 1] if before else 0
 
-    @staticmethod
-    def _count_lost(track: Track, publisher: bytes, sequence: int) -> None:
-        """Count the messages between two numbers of one publisher; publisher: its gid."""
-        last = track.last_sequences.get(publisher, 0)
-        if track.one_publisher and 0 < last < sequence - 1:
-            track.lost += sequence - 1 - last
-        track.last_sequences[publisher] = sequence
+    def _count_lost(self, track: Track, gid: bytes, sequence: int) -> None:
+        """Count the messages between two numbers of one publisher."""
+        last = track.last_sequences.get(gid, 0)
+        if 0 < last < sequence - 1:
+            topic = track.subscription.topic_name
+            name = publishers(self._node, topic).get(gid, UNKNOWN)
+            track.lost[name] = track.lost.get(name, 0) + sequence - 1 - last
+        track.last_sequences[gid] = sequence
 
     @property
     def foreign(self) -> list[str]:
@@ -185,8 +199,13 @@ class TopicRecorder:
     @property
     def lost(self) -> dict[str, int]:
         """Number of lost messages, for topics with losses."""
+        return {topic: sum(lost.values()) for topic, lost in self.lost_by_publisher.items()}
+
+    @property
+    def lost_by_publisher(self) -> dict[str, dict[str, int]]:
+        """Number of lost messages, for topics with losses: topic → publisher's node → number."""
         lost = {track.topic: track.lost for track in self._tracks if track.lost}
-        return {expanded(self._namespace, topic): count for topic, count in lost.items()}
+        return {expanded(self._namespace, topic): counts for topic, counts in lost.items()}
 
     @property
     def counts(self) -> dict[str, int]:

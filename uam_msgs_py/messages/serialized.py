@@ -44,6 +44,11 @@ def stays_serialized(message_type: type) -> bool:
     return message_type in LAYOUTS
 
 
+def stays_stamped(message_type: type) -> bool:
+    """Return whether `stamp_of` reads the header of a serialized message of this type."""
+    return message_type in LAYOUTS and message_type not in (Float64MultiArray, Clock)
+
+
 class Template:
     """A serialized message to publish; `values`: field name → writable view (n,) of its numbers."""
 

@@ -47,7 +47,7 @@ LATCHED = _qos(1, latched=True)  # a late subscriber gets the last message
 
 @dataclass(frozen=True)
 class Topic:
-    """A topic. one_publisher: a gap in its sequence numbers is then a lost message.
+    """A topic. one_publisher: a second one is a mistake; see `uam_msgs_py.node.sole_publisher`.
 
     recorded: the recorder subscribes to it.
     """

@@ -16,8 +16,8 @@ from rclpy.signals import SignalHandlerOptions
 from rclpy.subscription import Subscription
 
 from uam_msgs_py.messages import topics
-from uam_msgs_py.messages.layouts import BadMessage
-from uam_msgs_py.messages.serialized import stays_serialized
+from uam_msgs_py.messages.layouts import BadMessage, stamp_of
+from uam_msgs_py.messages.serialized import stays_serialized, stays_stamped
 from uam_msgs_py.messages.status import ERROR, OK, STALE, WARN, diagnostic
 from uam_msgs_py.messages.topics import Topic
 from uam_msgs_py.node import connections, polling
@@ -26,7 +26,10 @@ from uam_msgs_py.node.health import LoopTime, ages
 from uam_msgs_py.node.joins import StampJoin
 from uam_msgs_py.node.namespace import expanded, label
 from uam_msgs_py.node.node_parameters import refuse_unknown
-from uam_msgs_py.node.sole_publisher import PUBLISHERS, SolePublisher, complaints
+from uam_msgs_py.node.refusals import Refusals
+from uam_msgs_py.node.rightful import PUBLISHERS, rightful_nodes
+from uam_msgs_py.node.sole_publisher import SolePublisher, complaints, publishers
+from uam_msgs_py.node.stamp_watch import StampWatch
 from uam_msgs_py.node.tunable import TunableNode
 
 DIAGNOSTICS_PERIOD = 1.0  # s
@@ -52,10 +55,13 @@ class UamNode(TunableNode):
         self._outlets: dict[str, Publisher] = {}
         self._inlets: dict[str, Subscription] = {}
         self.sole_publishers: dict[Subscription, SolePublisher] = {}
-        self._foreign: list[str] = []  # complaints at the last report
+        self._rightful = rightful_nodes(self)
+        self._refusals = Refusals()
+        self._stamps = StampWatch()
+        self._complaints: list[str] = []  # at the last report
         self.joins: list[StampJoin] = []
         self.triggers: tuple[str, ...] = ()  # topics that wake the node, () for all of them
-        self.ticks = self.refused = 0
+        self.ticks = 0
         self.deferred = False
         self._loop = LoopTime()
         self._at_last_report = (0, 0.0)
@@ -78,7 +84,7 @@ class UamNode(TunableNode):
         required: bool = True,
         qos: QoSProfile | None = None,
     ) -> Subscription:
-        """Call `handle(message)` for each message; if it raises BadMessage, count and log it.
+        """Call `handle(message)` for each message; if it raises BadMessage, `refuse` it.
 
         The message is serialized if uam_msgs_py.messages.serialized reads its type. required: the
         node reports that it waits while no message arrives. qos: None for `Topic.reading`.
@@ -88,12 +94,15 @@ class UamNode(TunableNode):
         if required:
             self._required[name] = 0
 
+        stamped = name in PUBLISHERS and stays_stamped(topic.type)
+
         def callback(message: Any) -> None:
             try:
+                if stamped:
+                    self._check_stamp(name, stamp_of(message))
                 handle(message)
             except BadMessage as error:
-                self.refused += 1
-                self.warn(f"{self._absolute(name)}: refused: {error}", key=name)
+                self.refuse(name, error)
                 return
             counts[name] += 1
             arrivals[name] = time.monotonic()
@@ -102,8 +111,25 @@ class UamNode(TunableNode):
         made = self.create_subscription(topic.type, name, callback, qos or topic.reading, raw=raw)
         self._inlets[name] = made
         if name in PUBLISHERS:
-            self.sole_publishers[made] = SolePublisher(self, made, name, lambda: self.ticks > 0)
+            rightful = self._rightful.of(name)
+            self.sole_publishers[made] = SolePublisher(self, made, rightful, lambda: self.ticks > 0)
+        self._stamps.listen(name)
         return made
+
+    def refuse(self, name: str, error: BadMessage) -> None:
+        """Count a message of topic `name` that cannot be used; the next report names its sender."""
+        guard = self.sole_publishers.get(self._inlets[name])
+        topic = self.resolve_topic_name(name)
+        if guard is None:
+            sender = rightful = " or ".join(publishers(self, topic).values())
+        else:
+            sender, rightful = guard.rightful, guard.publisher
+        self._refusals.note(self._absolute(name), sender, rightful, str(error))
+
+    def _check_stamp(self, name: str, stamp: int) -> None:
+        clock = self._inlets.get(self._stamps.clock)
+        guard = None if clock is None else self.sole_publishers.get(clock)
+        self._stamps.check(name, stamp, "" if guard is None else guard.publisher)
 
     def take_waiting(self, subscription: Subscription) -> None:
         """Deliver all received messages of `subscription` now.
@@ -167,15 +193,13 @@ class UamNode(TunableNode):
         done = self.ticks - ticks
         dropped = sum(join.dropped for join in self.joins)
         self._at_last_report = (self.ticks, now)
-        foreign, before = complaints(self.sole_publishers.values()), self._foreign
-        self._foreign = foreign
-        if new := [text for text in foreign if text not in before]:
+        foreign, bad = complaints(self.sole_publishers.values()), self._refusals.texts()
+        before, self._complaints = self._complaints, foreign + bad
+        if new := [text for text in self._complaints if text not in before]:
             level, summary = ERROR, "; ".join(new)
             self.get_logger().error(summary)
         elif self._waiting and level < ERROR:
             level, summary = STALE, "waiting for " + ", ".join(map(self._absolute, self._waiting))
-        elif self.refused and level == OK:
-            level, summary = WARN, f"{self.refused} messages refused"
         elif dropped > self._dropped_before and level == OK:
             newly = dropped - self._dropped_before
             level, summary = WARN, f"{newly} ticks dropped since last report"
@@ -185,7 +209,8 @@ class UamNode(TunableNode):
             "tick rate [Hz]": f"{done / (now - last):.1f}" if last else "",
             **self._loop.report(),
             "incomplete ticks dropped": dropped,
-            "messages refused": self.refused,
+            "messages refused": self._refusals.count,
+            "unusable messages": "; ".join(bad),
             "foreign publishers": "; ".join(foreign),
         }
         namespace = self.get_namespace()

@@ -1,11 +1,8 @@
 """One publisher per topic of the control loop: messages of any other are refused.
 
-Two publishers of one command would alternate and tumble the vehicle. Who is the rightful one:
-
-- the node that `wiring.WIRES` names, in the same namespace, wherever it publishes the topic;
-- without it the first that sends. A sensor's publisher stays, once the node works with it: a
-  simulator that somebody starts must not replace the sensors of a vehicle in the air;
-- with NAMED on the command line (`uam fly`) nobody else than the named node, from the start.
+Two publishers of one command would alternate and tumble the vehicle. `rightful` says who may
+publish. Where that is the first that sends, it stays once the node works with it: a simulator that
+somebody starts must not replace the sensors of a vehicle in the air.
 
 Another one takes over when the rightful one has left the graph, or when it has the same node name
 and the rightful one is silent: a node that was started again after a crash.
@@ -13,7 +10,6 @@ and the rightful one is silent: a node that was started again after a crash.
 
 from __future__ import annotations
 
-import sys
 import time
 from collections.abc import Callable, Iterable
 from typing import Any
@@ -22,27 +18,25 @@ from rclpy.node import Node
 from rclpy.serialization import deserialize_message
 from rclpy.subscription import Subscription
 
-from uam_msgs_py.node import wiring
+from uam_msgs_py.node.rightful import Rightful, full_name
 from uam_msgs_py.node.taking import Taker
 
-NAMED = "--named-publishers"
-PUBLISHERS = {wire.topic.name: wire.publisher for wire in wiring.WIRES}
 LOOK_PERIOD = 0.02  # [s] wall time between two looks at the graph
+NAME_WAIT = 0.1  # [s] for the node name of a new publisher, which may arrive after its messages
 SILENT = 250_000_000  # [ns] wall time after which a publisher of the same name takes over
 UNKNOWN = "unknown node"
+NAMELESS = "_NODE_NAME_UNKNOWN_"  # of the middleware, before it has the name
 
 
 class SolePublisher:
     """Takes the messages of one publisher of a subscription, in place of rclpy's handle."""
 
     def __init__(
-        self, node: Node, subscription: Subscription, name: str, works: Callable[[], bool]
+        self, node: Node, subscription: Subscription, rightful: Rightful, works: Callable[[], bool]
     ):
-        """name: of the topic in WIRES; works: whether the node has worked with the messages."""
+        """works: whether the node has worked with the messages."""
         self._node, self._topic, self._works = node, subscription.topic_name, works
-        self._expected = _full(node.get_namespace(), PUBLISHERS[name])
-        self._is_sensor = PUBLISHERS[name] == wiring.PLANT
-        self._only_named = NAMED in sys.argv
+        self._expected = rightful
         self.taker = Taker(subscription)
         self._gid = b""  # of the rightful publisher
         self._last = 0  # [ns] wall time of its last message
@@ -77,20 +71,26 @@ class SolePublisher:
             found[name] = found.get(name, 0) + count
         return found
 
+    @property
+    def publisher(self) -> str:
+        """Name of the rightful node: the one that publishes, else the one that may."""
+        return self.rightful or self._expected.name
+
     def complaint(self) -> str:
         """Return one line about foreign publishers, "" without any."""
         refused = self.refused
         if not refused:
             return ""
         names = ", ".join(f"{name} ({count} messages)" for name, count in refused.items())
-        return f"{self._topic}: refused {names}; publisher is {self.rightful or self._expected}"
+        absent = "" if self.rightful else ", which is not there (parameter publishers: another)"
+        return f"{self._topic}: refused {names}; publisher is {self.publisher}{absent}"
 
     def _takes_over(self) -> bool:
         """Return whether the publisher of the last message becomes the rightful one."""
         gid, now = bytes(self.taker.gid), time.monotonic()
         if gid not in self._counts or now - self._looked >= LOOK_PERIOD:
             self._looked = now
-            names = self._publishers()
+            names = self._named_publishers(gid)
             if self._may(gid, names):
                 self._gid, self.rightful = gid, names.get(gid, UNKNOWN)
                 self._counts.pop(gid, None)
@@ -102,25 +102,36 @@ class SolePublisher:
 
     def _may(self, gid: bytes, names: dict[bytes, str]) -> bool:
         name, expected = names.get(gid, UNKNOWN), self._expected
-        named = name == expected
         if self._gid in names:  # the rightful one is there
             if name == self.rightful:
                 return self.taker.info.received_timestamp - self._last > SILENT
-            return named and not (self._is_sensor and self._works())
-        return named or not (self._only_named or expected in names.values())
+            return name == expected.name and not self._works()
+        return name == expected.name or not (expected.only or expected.name in names.values())
 
-    def _publishers(self) -> dict[bytes, str]:
-        """Return the publishers in the graph: gid → full node name."""
-        return {
-            bytes(end.endpoint_gid): _full(end.node_namespace, end.node_name)
-            for end in self._node.get_publishers_info_by_topic(self._topic)
-        }
+    def _named_publishers(self, gid: bytes) -> dict[bytes, str]:
+        """Return `publishers`; before the node works wait until the name of `gid` is there.
+
+        A latched message is sent once: it must not be refused for a name that comes later.
+        """
+        names = publishers(self._node, self._topic)
+        end = time.monotonic() + NAME_WAIT
+        while gid not in names and gid not in self._counts and not self._works():
+            if time.monotonic() > end:
+                break
+            time.sleep(NAME_WAIT / 50.0)
+            names = publishers(self._node, self._topic)
+        return names
+
+
+def publishers(node: Node, topic: str) -> dict[bytes, str]:
+    """Return the publishers of a topic (absolute name) in the graph: gid → full node name."""
+    return {
+        bytes(end.endpoint_gid): full_name(end.node_namespace, end.node_name)
+        for end in node.get_publishers_info_by_topic(topic)
+        if end.node_name != NAMELESS
+    }
 
 
 def complaints(guards: Iterable[SolePublisher]) -> list[str]:
     """Return one line per topic with foreign publishers."""
     return [text for guard in guards if (text := guard.complaint())]
-
-
-def _full(namespace: str, name: str) -> str:
-    return f"{namespace.rstrip('/')}/{name}"

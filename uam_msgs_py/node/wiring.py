@@ -71,11 +71,11 @@ WIRES = (
 )
 
 
-def with_foreign(node: Node, foreign: Collection[str]) -> Sequence[Wire]:
-    """Return WIRES for a flight in which the nodes `foreign` (names) are the user's own.
+def with_foreign(node: Node, foreign: Mapping[str, str]) -> Sequence[Wire]:
+    """Return WIRES for a flight in which the user's own nodes replace others.
 
-    A foreign node must publish the topics that other nodes require. Its own subscriptions are free;
-    they are read from the ROS graph of `node`.
+    foreign: node of the stack → name of the own one. It must publish the topics that other nodes
+    require. Its own subscriptions are free; they are read from the ROS graph of `node`.
     """
     if not foreign:
         return WIRES
@@ -84,8 +84,13 @@ def with_foreign(node: Node, foreign: Collection[str]) -> Sequence[Wire]:
         if wire.publisher in foreign and (wire.optional or not wire.subscribers):
             continue
         listeners = _listeners(node, wire.topic)
-        required = tuple(one for one in wire.subscribers if one not in foreign or one in listeners)
-        found.append(replace(wire, subscribers=required))
+        required = tuple(
+            foreign.get(one, one)
+            for one in wire.subscribers
+            if one not in foreign or foreign[one] in listeners
+        )
+        publisher = foreign.get(wire.publisher, wire.publisher)
+        found.append(replace(wire, publisher=publisher, subscribers=required))
     return found
 
 

@@ -99,7 +99,8 @@ class Simulator:
         node.create_service(Trigger, "~/reset", self._on_reset)
         _warm_up(make_plant(*start, Schedule(), options.plant))
         self.sensors, self.truth = Sensors(node, described), TruthTopics(node, described)
-        self.answers = Answers(node, described, vehicle.numbers["servos"]["mode"])
+        servo_mode = vehicle.numbers["servos"]["mode"]
+        self.answers = Answers(node, described, declared.rightful, servo_mode)
         self.connections = Connections(node)
         self.executor = LeanExecutor(node, [topics.SETPOINT.name], lambda: self._setpoint_is_there)
         patience = options.answer_timeout
@@ -110,7 +111,9 @@ class Simulator:
         self.hil = HilServer(options.hil_port, rotors, parameters=waits, seed=options.seed)
         self.statistics = Statistics(options.clock)
         self.health = PlantHealth(node, self.answers, self.statistics)
-        self._foreign = tuple(filter(None, options.foreign.split(",")))
+        pairs = [entry.partition("=") for entry in options.foreign.split(",") if entry]
+        self._own_names = {node: name or node for node, _, name in pairs}
+        self._foreign = tuple(self._own_names.values())
         self._setpoint_is_there = False  # usually the last answer to arrive
         self._complete = False  # every kind of sensor has delivered a sample
         self._stamp: int | None = None  # of this tick's IMU sample [ns]
@@ -186,7 +189,7 @@ class Simulator:
 
     def _waiting_for(self) -> list[str]:
         recorded, foreign = self.options.recorded, self._foreign
-        wires = wiring.with_foreign(self.node, foreign)
+        wires = wiring.with_foreign(self.node, self._own_names)
         waiting = wiring.missing(self.node, recorded, wires)
         if not waiting:  # all publishers and subscriptions exist: are they connected?
             namespace = self.node.get_namespace()

@@ -30,7 +30,7 @@ class PlantHealth:
         self._answers, self._statistics = answers, statistics
         self._loop = LoopTime()
         self._ticks = 0
-        self._log, self._foreign = node.get_logger(), []
+        self._log, self._complaints = node.get_logger(), []
         self._missed = 0
         self._last = (time.monotonic(), 0.0)  # wall and simulated time of the last report [s]
 
@@ -59,16 +59,17 @@ class PlantHealth:
         wall, before = self._last
         now = time.monotonic()
         self._last = now, simulated
-        foreign = complaints(self._answers.guards.values())
-        if new := [text for text in foreign if text not in self._foreign]:
+        foreign, bad = complaints(self._answers.guards.values()), self._answers.refusals.texts()
+        if new := [text for text in foreign + bad if text not in self._complaints]:
             level, summary = ERROR, "; ".join(new)
             self._log.error(summary)
-        self._foreign = foreign
+        self._complaints = foreign + bad
         values = {
             "ticks": self._ticks,
             "real time factor": f"{(simulated - before) / (now - wall):.2f}",
             "ticks missed": self._statistics.missed_ticks,
             "late motor commands": self._statistics.late_motor_commands,
+            "unusable messages": "; ".join(bad),
             "foreign publishers": "; ".join(foreign),
         }
         values |= self._loop.report() | ages(

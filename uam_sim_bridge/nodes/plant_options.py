@@ -21,6 +21,7 @@ from uam_control.settings.parameter_set import (
 )
 from uam_control.vehicle import VehicleDescription
 from uam_msgs_py.node.node_parameters import NodeParameters
+from uam_msgs_py.node.rightful import RightfulNodes, rightful_nodes
 from uam_sim_bridge.plant.engines import DEFAULT_PLANT, PLANTS
 from uam_sim_bridge.plant.vehicle import PAYLOAD_MAX
 
@@ -67,7 +68,9 @@ class PlantParameters(ParameterSet):
     )
     recorded: bool = switch(False, "wait for the recorder as well")
     foreign: str = text(
-        "", "nodes that are not the stack's own", "names with commas between them; empty: none"
+        "",
+        "nodes of the stack that the user replaces, with the names of the own ones",
+        "NODE=NAME with commas between; empty: none",
     )
     faults: str = text(
         "", "faults of the plant with their times", "JSON, see docs/faults.md; empty: none"
@@ -86,17 +89,19 @@ class PlantParameters(ParameterSet):
 
 @dataclass(frozen=True)
 class Options:
-    """The vehicle and the parameters of the plant node."""
+    """The vehicle, the parameters of the plant node, and who may publish its inputs."""
 
     vehicle: VehicleDescription
     parameters: PlantParameters
+    rightful: RightfulNodes
 
 
 def declare(node: Node) -> Options:
     """Declare the parameters and return their values. Raises ParameterError for a bad one."""
     vehicle = described_vehicle(node)
     joints = vehicle.coordinates[ARM]
-    return Options(vehicle, NodeParameters(node, PlantParameters, joints, read_only=True).current)
+    declared = NodeParameters(node, PlantParameters, joints, read_only=True).current
+    return Options(vehicle, declared, rightful_nodes(node))
 
 
 @dataclass

@@ -23,12 +23,14 @@ from uam_msgs_py.messages.convert import (
     read_joint_command,
     read_switch,
 )
-from uam_msgs_py.messages.layouts import stamp_of
+from uam_msgs_py.messages.layouts import BadMessage, stamp_of
 from uam_msgs_py.messages.serialized import Template
 from uam_msgs_py.messages.status import MissionStatus
 from uam_msgs_py.messages.trajectories import TrajectoryWriter
 from uam_msgs_py.node.namespace import frame
-from uam_msgs_py.node.sole_publisher import PUBLISHERS, SolePublisher
+from uam_msgs_py.node.refusals import Refusals
+from uam_msgs_py.node.rightful import PUBLISHERS, RightfulNodes
+from uam_msgs_py.node.sole_publisher import SolePublisher
 from uam_sim_bridge.plant import Samples, Truth
 
 
@@ -127,14 +129,21 @@ SUSPECTS = {
 class Answers:
     """Answers of the nodes to a tick: setpoint sent, servo commands, magnet; state of the mission.
 
-    `arm_command` (n,), see `Servos`, and `magnet` hold until the next message. `setpoints`: stamp
-    [ns] → wall time [ns] of the bridge's publication; filled only by `take`, cleared after the
+    `arm_command` (n,), see `Servos`, and `magnet` hold until the next valid message.
+    `setpoints`: stamp [ns] → wall time [ns] of the bridge's publication; filled only by `take`, cleared after the
     measurement of the latency.
     """
 
-    def __init__(self, node: Node, vehicle: VehicleDescription, servo_mode: str = CURRENT_SERVO):
+    def __init__(
+        self,
+        node: Node,
+        vehicle: VehicleDescription,
+        rightful: RightfulNodes,
+        servo_mode: str = CURRENT_SERVO,
+    ):
         """servo_mode: of SERVO_MODES; only the commands of this mode are used."""
         self._names = list(vehicle.joint_names)
+        self.refusals = Refusals()
         to_goals = servo_mode == POSITION_SERVO
         self._arm_topic = topics.ARM_GOALS if to_goals else topics.ARM_EFFORT
         # NaN: no goal yet, the servos hold their position
@@ -165,7 +174,7 @@ class Answers:
         }
 
         self.guards = node.sole_publishers = {
-            inlet: SolePublisher(node, inlet, name, lambda: self._setpoint_stamp >= 0)
+            inlet: SolePublisher(node, inlet, rightful.of(name), lambda: self._setpoint_stamp >= 0)
             for name, inlet in self.inlets.items()
             if name in PUBLISHERS
         }
@@ -188,26 +197,48 @@ class Answers:
                 subscription.callback(*taken)
 
     def _on_setpoint(self, data: bytes, info: dict | None = None) -> None:
-        self._setpoint_stamp = stamp_of(data)
+        try:
+            self._setpoint_stamp = stamp_of(data)
+        except BadMessage as error:
+            self._refuse(topics.SETPOINT, error)
+            return
         self.arrivals[topics.SETPOINT.name] = time.monotonic()
         if info is not None:
             self.setpoints[self._setpoint_stamp] = info["source_timestamp"]
 
     def _on_arm(self, topic: topics.Topic, data: bytes, info: dict | None = None) -> None:
-        command = read_joint_command(data, self._names)
+        if topic is self._arm_topic:
+            self._arrived.add("arm")
+        try:
+            command = read_joint_command(data, self._names)
+        except BadMessage as error:
+            self._refuse(topic, error)
+            return
         if topic is self._arm_topic:
             self.arm_command = command
-            self._arrived.add("arm")
             self.arrivals[topic.name] = time.monotonic()
 
     def _on_magnet(self, data: bytes, info: dict | None = None) -> None:
-        self.magnet = read_switch(data)
         self._arrived.add("magnet")
+        try:
+            self.magnet = read_switch(data)
+        except BadMessage as error:
+            self._refuse(topics.MAGNET, error)
+            return
         self.arrivals[topics.MAGNET.name] = time.monotonic()
 
     def _on_restart(self, message: DiagnosticArray, info: dict | None = None) -> None:
         self.restarts += 1
 
     def _on_mission(self, message: DiagnosticArray, info: dict | None = None) -> None:
-        self.mission_stamp, self.mission = MissionStatus.from_message(message)
+        try:
+            self.mission_stamp, self.mission = MissionStatus.from_message(message)
+        except BadMessage as error:
+            self._refuse(topics.MISSION_STATUS, error)
+            return
         self.arrivals[topics.MISSION_STATUS.name] = time.monotonic()
+
+    def _refuse(self, topic: topics.Topic, error: BadMessage) -> None:
+        inlet = self.inlets[topic.name]
+        guard = self.guards[inlet]
+        self.refusals.note(inlet.topic_name, guard.rightful, guard.publisher, str(error))

@@ -27,7 +27,7 @@ from uam_lab.processes.processes import NodeFailed, Processes
 from uam_lab.results.outcome import Outcome
 from uam_lab.results.result_folder import ResultFolder
 from uam_msgs_py.node import wiring
-from uam_msgs_py.node.sole_publisher import NAMED
+from uam_msgs_py.node.rightful import PARAMETER as PUBLISHERS
 from uam_sim_bridge.faults import PROCESS
 from uam_sim_bridge.faults.timeline import FaultState
 from uam_sim_bridge.nodes.fault_topic import FaultTopic
@@ -102,6 +102,7 @@ def _supervise(
     logs = folder.path / "logs"
     surroundings = environment(ports.domain, logs)
     common = node_arguments.common_remappings(settings)
+    publishers = node_arguments.publishers(settings)
     with Processes(logs, surroundings) as children:
         children.hurry = lambda: stop.impatient
         try:
@@ -112,13 +113,16 @@ def _supervise(
             )
             observer.message(f"for ros2 in another shell:\n{export_line(ports.domain)}")
             for name in settings.foreign:
-                observer.message(f"waiting for {name}: start it with ROS_DOMAIN_ID={ports.domain}")
+                own = settings.own_names.get(name, name)
+                observer.message(f"waiting for {own}: start it with ROS_DOMAIN_ID={ports.domain}")
             if not settings.auto_start and not settings.dry_run:
                 real = settings.link is not None and settings.link.real
                 why = ": a real autopilot arms by itself only with --arm" if real else ""
                 observer.message(f"waiting for uam start{why}")
             with (
-                StatusListener(surroundings, ports.domain, settings.namespace, common) as listener,
+                StatusListener(
+                    surroundings, ports.domain, settings.namespace, common, publishers
+                ) as listener,
                 _process_faults(settings, children, listener, observer) as faults,
             ):
                 observer.started(ports.domain)
@@ -138,7 +142,8 @@ def _start(
     children: Processes, settings: FlightSettings, folder: ResultFolder, ports: Ports
 ) -> None:
     # the nodes' output already contains their log messages; separate files would repeat them
-    arguments = [NAMED, "--ros-args", "--disable-external-lib-logs"]
+    arguments = ["--ros-args", "--disable-external-lib-logs"]
+    arguments += ["-p", f"{PUBLISHERS}:={node_arguments.publishers(settings)}"]
     arguments += ["--params-file", str(folder.parameters), "-r", f"__ns:={settings.namespace}"]
     for name, module in node_arguments.modules(settings).items():
         children.start(

@@ -73,7 +73,9 @@ def parameters(
         "recorded": True,
         "end_with_mission": True,
         "start_timeout": OWN_START_TIMEOUT if settings.foreign else START_TIMEOUT,
-        "foreign": ",".join(settings.foreign),
+        "foreign": ",".join(
+            f"{name}={settings.own_names.get(name, name)}" for name in settings.foreign
+        ),
         "faults": settings.faults.only(PLANT).to_text(),
         "answer_timeout": ANSWER_TIMEOUT,
         "time_limit": _time_limit(settings),
@@ -154,6 +156,12 @@ def remappings(settings: FlightSettings, node: str) -> list[str]:
 def common_remappings(settings: FlightSettings) -> list[str]:
     """Return the ROS arguments with the remappings of every node."""
     return remappings(settings, EVERY_NODE)
+
+
+def publishers(settings: FlightSettings) -> str:
+    """Return the parameter `publishers` of every node: the simulator's topics are its own."""
+    pairs = {wiring.PLANT: wiring.PLANT} | settings.own_names
+    return ",".join(f"{node}={name}" for node, name in pairs.items())
 
 
 def _time_limit(settings: FlightSettings) -> float:

@@ -14,6 +14,8 @@ from uam_lab.processes.guest import Guest
 from uam_msgs_py.messages import topics
 from uam_msgs_py.messages.status import AutopilotState, MissionStatus
 from uam_msgs_py.node.polling import listen, messages
+from uam_msgs_py.node.rightful import RightfulNodes
+from uam_msgs_py.node.sole_publisher import SolePublisher
 
 # The topic keeps one message; here no change of phase may be lost between two polls.
 EVERY_STATUS = QoSProfile(
@@ -32,11 +34,20 @@ class StatusListener(Guest):
         domain: int,
         namespace: str = "",
         arguments: Sequence[str] = (),
+        publishers: str = "",
     ):
-        """See `Guest`."""
+        """See `Guest`; publishers: the parameter of that name of the flight's nodes."""
         super().__init__("uam_fly", environment, domain, namespace, arguments)
         self._mission = listen(self.node, topics.MISSION_STATUS, EVERY_STATUS)
         self._autopilot = listen(self.node, topics.AUTOPILOT_STATE)
+        rightful = RightfulNodes(self.node.get_namespace(), publishers)
+        self._guards = {
+            made: SolePublisher(self.node, made, rightful.of(topic.name), lambda: False)
+            for made, topic in (
+                (self._mission, topics.MISSION_STATUS),
+                (self._autopilot, topics.AUTOPILOT_STATE),
+            )
+        }
         self._state = AutopilotState()
         self._heard = False  # whether the autopilot's state is known
         self._last: tuple[float, float] | None = None  # simulated and wall time [s]
@@ -45,9 +56,10 @@ class StatusListener(Guest):
 
     def poll(self) -> list[FlightStatus]:
         """Return the status messages received since the last call."""
-        for message in messages(self._autopilot):
+        for message in messages(self._autopilot, self._guards[self._autopilot]):
             self._state, self._heard = AutopilotState.from_message(message)[1], True
-        found = [self._status(message) for message in messages(self._mission)]
+        guard = self._guards[self._mission]
+        found = [self._status(message) for message in messages(self._mission, guard)]
         self.newest = found[-1:] or self.newest
         return found
 

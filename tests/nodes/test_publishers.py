@@ -1,0 +1,170 @@
+"""Who may publish, over ROS: early impostors, configured names, messages that cannot be used."""
+
+import numpy as np
+import pytest
+from rclpy.node import Node
+
+from uam_control.coordinates import coordinates
+from uam_msgs_py.messages import topics
+from uam_msgs_py.messages.control import read_reference
+from uam_msgs_py.messages.convert import PoseWriter
+from uam_msgs_py.messages.status import ERROR
+from uam_msgs_py.messages.trajectories import TrajectoryWriter
+from uam_msgs_py.node.connections import READERS, Connections
+
+PERIOD = 4_000_000
+NAMES = coordinates(2)
+LEVEL = np.array([1.0, 0.0, 0.0, 0.0])
+MODULE = "uam_control.nodes.mission"
+
+
+class States:
+    """States of a vehicle at rest, published by a node."""
+
+    def __init__(self, node, probe):
+        self.node, self.probe, self.stamp = node, probe, 0
+        self.out = node.create_publisher(topics.STATE.type, topics.STATE.name, topics.STATE.qos)
+        self.writer = TrajectoryWriter(NAMES)
+
+    def send(self, values=None, writer=None, steps=1):
+        self.stamp += steps * PERIOD
+        state = np.zeros((3, 8)) if values is None else values
+        self.out.publish((writer or self.writer).fill(self.stamp, state))
+
+    def until(self, condition, what):
+        """Send states until `condition()`."""
+
+        def met():
+            self.send()
+            return condition()
+
+        self.probe.until(met, what)
+
+
+@pytest.fixture
+def node_named(probe):
+    """node_named(name): a further node in the test's process."""
+    made = []
+
+    def make(name):
+        made.append(Node(name, context=probe.node.context))
+        return made[-1]
+
+    yield make
+    for node in made:
+        node.destroy_node()
+
+
+class Diagnostics:
+    """The newest status of the mission node."""
+
+    def __init__(self, probe):
+        self.messages = probe.collect(topics.DIAGNOSTICS)
+
+    def statuses(self):
+        return [s for m in self.messages for s in m.status if s.name == "mission"]
+
+    def error(self, *texts):
+        """Whether an ERROR contains the texts."""
+        wrong = [s.message for s in self.statuses() if s.level == ERROR]
+        return any(all(text in message for text in texts) for message in wrong)
+
+    def calm(self):
+        """Whether the newest status has no ERROR."""
+        newest = self.statuses()[-1:]
+        return newest and newest[0].level != ERROR
+
+
+def test_an_impostor_before_the_rightful_node_is_refused_and_named(start, probe, node_named):
+    magnet, diagnostics = probe.collect(topics.MAGNET), Diagnostics(probe)
+    mission = start(MODULE, publishers="")
+    early = States(probe.node, probe)
+    probe.until_connected("mission", [early.out], [topics.MAGNET])
+    early.until(
+        lambda: diagnostics.error("/uam/state: refused /probe (", "publisher is /state_estimator"),
+        "the impostor is named",
+    )
+    assert magnet == []
+    mission.until_logged("/uam/state: refused /probe (")
+    rightful = States(node_named("state_estimator"), probe)
+    rightful.stamp = early.stamp
+    rightful.until(lambda: magnet, "the rightful node is obeyed")
+    connections = Connections(probe.node)
+    probe.until(lambda: connections.count("mission", READERS, "uam/magnet"), "diagnostics")
+    before = len(magnet)
+    for _ in range(5):
+        early.send()
+        rightful.send()
+        probe.until(lambda n=before: len(magnet) > n, "an answer")
+        before += 1
+    assert len(magnet) == before
+
+
+def test_a_configured_node_is_the_rightful_one(start, probe, node_named):
+    magnet = probe.collect(topics.MAGNET)
+    mission = start(MODULE, publishers="state_estimator=probe")
+    own, usual = States(probe.node, probe), States(node_named("state_estimator"), probe)
+    usual.until(lambda: "refused /state_estimator (" in mission.output, "the usual one is refused")
+    assert "publisher is /probe" in mission.output and magnet == []
+    own.until(lambda: magnet, "the configured one is obeyed")
+
+
+def test_a_wrong_name_is_refused_at_the_start(start):
+    running = start(MODULE, publishers="misson=mine")
+    assert running.process.wait(60) == 2
+    assert "mission: publishers: 'misson' is none of the nodes " in running.output
+
+
+def test_unusable_messages_of_the_rightful_node_are_named_and_the_next_good_one_is_used(
+    start, probe
+):
+    magnet, references = probe.collect(topics.MAGNET), probe.collect(topics.REFERENCE)
+    diagnostics = Diagnostics(probe)
+    start(MODULE, publishers="state_estimator=probe")
+    poses = probe.publisher(topics.MOCAP)
+    states = States(probe.node, probe)
+    probe.until_connected("mission", [states.out, poses], [topics.MAGNET, topics.REFERENCE])
+
+    infinite = np.zeros((3, 8))
+    infinite[1, 2] = np.nan
+    swapped = TrajectoryWriter([*NAMES[:6], NAMES[7], NAMES[6]])
+    unknown = TrajectoryWriter([*NAMES[:7], "elbow"])
+    for bad, reason in (
+        ({"values": infinite}, "velocities of z is nan"),
+        ({"writer": swapped}, "expected x, y, z, roll, pitch, yaw, alpha_1, alpha_2"),
+        ({"writer": unknown}, "joint names x, y, z, roll, pitch, yaw, alpha_1, elbow"),
+    ):
+        states.send(**bad)
+        sender = "/uam/state: refused /probe ("
+        probe.until(
+            lambda text=reason, start=sender: diagnostics.error(start, text, "publisher is /probe"),
+            reason,
+        )
+        before = len(magnet)
+        states.until(lambda n=before: len(magnet) > n, "the next state is used")
+    probe.until(diagnostics.calm, "no error that stays")
+
+    # one reference per tick, also after a missing sample; the first tick has one of its own
+    assert len(references) == len(magnet) + 1
+    for steps in (2, 1, 3):
+        before = len(magnet)
+        states.send(steps=steps)
+        probe.until(lambda n=before: len(magnet) > n, "an answer")
+    probe.until(lambda: len(references) > len(magnet), "the last reference")
+    assert len(references) == len(magnet) + 1
+    assert read_reference(references[-1])[0] == states.stamp + PERIOD
+
+    writer = PoseWriter()
+
+    def other_clock():
+        states.send()
+        poses.publish(writer.fill(states.stamp + 1_700_000_000 * 10**9, np.zeros(3), LEVEL))
+        return diagnostics.error(
+            "/vrpn_mocap/uam/pose: refused /probe (",
+            "is of another clock than",
+            "of uam/state by /probe",
+        )
+
+    probe.until(other_clock, "stamps of another clock are named")
+    before = len(magnet)
+    states.until(lambda n=before: len(magnet) > n, "states are used")
