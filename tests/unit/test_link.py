@@ -433,3 +433,28 @@ def test_the_same_messages_twice():
         return [rig.codec.encode(m) for m in rig.received]
 
     assert messages() == messages()
+
+
+def test_the_autopilots_imu_is_requested_and_stamped_with_the_companions_clock():
+    rig = Rig()
+    began = 1_000.0  # [s] companion's clock at the first tick
+    rig.link = OffboardLink(
+        rig.memory,
+        rig.sequence,
+        RateThrustParameters.of(load_description()),
+        imu_rate=250.0,
+        clock=lambda: began + rig.time,
+    )
+    rig.run(4.0)
+    samples = rig.link.imu.samples()
+    steps = np.diff([sample.stamp for sample in samples])
+    assert len(samples) == 32  # those not yet read are bounded
+    assert np.abs(steps - 4_000_000).max() < 1000
+    newest = samples[-1]
+    # request and answer take a tick each way, or less: half of the difference is the error
+    assert newest.stamp * 1e-9 - began == pytest.approx(rig.time - 0.004, abs=0.0041)
+    np.testing.assert_allclose(newest.force, [0.0, 0.0, 9.80665], atol=0.01)
+    assert rig.link.streams.warnings == ()
+    rig.boot()
+    rig.run(0.5)
+    assert rig.link.reboots == 1

@@ -12,8 +12,9 @@ BATTERY = mavlink2.MAVLINK_MSG_ID_BATTERY_STATUS
 EXTENDED, ATTITUDE, STATUS, ESTIMATOR, CURRENT_MODE = 245, 31, 1, 230, 436
 # message id → desired rate [Hz]; the heartbeat is counted, but not requested
 RATES = {HEARTBEAT: 1, EXTENDED: 5, ATTITUDE: 10, ODOMETRY: 10, STATUS: 2, BATTERY: 1, ESTIMATOR: 2}
-# requested, but not counted: an autopilot sends it on a change
-REQUESTED = RATES | {CURRENT_MODE: 50}
+HIGHRES_IMU = mavlink2.MAVLINK_MSG_ID_HIGHRES_IMU
+# CURRENT_MODE is requested, but not counted: an autopilot sends it on a change
+REQUESTED = RATES | {CURRENT_MODE: 50, HIGHRES_IMU: 250}
 WINDOW = 4.0  # s
 
 
@@ -50,6 +51,13 @@ def test_each_stream_is_requested_once_without_a_warning():
     assert requests[-1][0] < 0.1
     assert streams.warnings == ()
     assert streams.rates[ODOMETRY] == pytest.approx(10.0, abs=0.5)
+
+
+def test_a_further_stream_is_requested_and_counted():
+    streams = StreamCheck({HIGHRES_IMU: 250.0})
+    requests = run(streams, 10.0, rates=RATES | {HIGHRES_IMU: 120.0})
+    assert HIGHRES_IMU in [number for _, number in requests]
+    assert streams.warnings == ("HIGHRES_IMU received at 120.0 Hz, requested at 250 Hz",)
 
 
 def test_the_next_request_waits_for_the_answer():

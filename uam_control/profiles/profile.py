@@ -44,6 +44,7 @@ BRIDGE = "mavlink_bridge"
 BRIDGE_LINKS = (
     *("clock", "local_port", "autopilot_port", "autopilot_host", "autopilot_system"),
     *("autopilot", "gcs", "vehicle", "dry_run", "network_delay", "publishers"),
+    *("imu_source", "imu_clock"),
 )
 # Parameters of a node that are not in a profile: they belong to one flight.
 FLIGHT_OWN = {

@@ -42,6 +42,7 @@ examples:
   uam fly --clock realtime                   paced by the wall clock, latency measured
   uam fly --namespace uav1 --domain 1        one of several vehicles in a ROS domain
   uam fly --without arm_controller           with your own arm controller: examples/
+  uam fly --imu autopilot                    the estimator has the autopilot's IMU
   uam fly --payload-mass 0.3 --wind 2 0 0    heavier payload, 2 m/s from the west
   uam fly --setpoint-delay 16 --mocap-delay 8 --mocap-jitter 4    later by so many milliseconds
   uam fly --plant-preset laboratory          a plant as hard as a laboratory: docs/plant.md
@@ -88,6 +89,8 @@ def add(commands: argparse._SubParsersAction) -> None:
     option("--engine", "ros|direct", "nodes and sockets, or one loop without them", "ros")
     text = "simulated time, repeatable for the same seed; or the wall clock"
     option("--clock", "lockstep|realtime", text, "lockstep")
+    text = "IMU of the estimator: the companion's, or the autopilot's over MAVLink"
+    option("--imu", "topic|autopilot", text, "topic")
     text = f"physics engine: {', '.join(PLANTS)}, or a class of your own"
     option("--plant", "NAME|MODULE:CLASS", text, DEFAULT_PLANT)
     command.plant()

@@ -29,6 +29,7 @@ def settings_facts(settings: FlightSettings) -> dict[str, Any]:
         "engine": settings.engine,
         "plant": settings.plant,
         "clock": settings.clock,
+        "imu": settings.imu,
         "autopilot": settings.autopilot,
         "namespace": settings.namespace,
         "seed": settings.seed,

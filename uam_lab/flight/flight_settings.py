@@ -38,6 +38,8 @@ from uam_sim_bridge.px4.px4_installation import Px4Installation
 ENGINES = ("ros", "direct")
 CLOCKS = ("lockstep", "realtime")
 BUILTIN, PX4 = "builtin", "px4"
+AUTOPILOT_IMU = "autopilot"
+IMUS = ("topic", AUTOPILOT_IMU)
 # Nodes that the user may replace by own nodes with the same topics.
 REPLACEABLE = (
     "state_estimator",
@@ -57,11 +59,12 @@ class FlightSettings:
     """Checked settings of one flight, with scenario and profile loaded.
 
     payload_mass [kg]; vehicle_changes: dotted entries of config/vehicle/*.yaml to replace, as
-    {"air.wind": [3.0, 0.0, 0.0]}; out: the result folder, None for the default. autopilot:
-    BUILTIN, PX4, or the URL of an autopilot started by the user; link: that URL, parsed. without:
-    nodes that are not started, see `foreign`; own_names: those of the nodes that the user starts in
-    place of them, where they differ. auto_start: the flight begins without a command;
-    dry_run: nothing is armed. parameters: of the nodes without a profile, node → name → value.
+    {"air.wind": [3.0, 0.0, 0.0]}; imu: the estimator's, of the companion or the autopilot's over
+    MAVLink; out: the result folder, None for the default. autopilot: BUILTIN, PX4, or the URL of an
+    autopilot started by the user; link: that URL, parsed. without: nodes that are not started, see
+    `foreign`; own_names: those of the nodes that the user starts in place of them, where they
+    differ. auto_start: the flight begins without a command; dry_run: nothing is armed. parameters:
+    of the nodes without a profile, node → name → value.
     remappings: node, or EVERY_NODE → topic or service → new name. command: how the flight was
     requested, for its record. namespace: of all nodes, in the form of ROS; domain: ROS domain,
     None for that of the instance.
@@ -75,6 +78,7 @@ class FlightSettings:
     controller: str = catalogue.DEFAULT
     engine: str = "ros"
     clock: str = "lockstep"
+    imu: str = IMUS[0]
     autopilot: str = BUILTIN
     px4: Px4Installation | None = None  # for the autopilot PX4
     link: LinkUrl | None = None
@@ -115,6 +119,7 @@ def settings(
     vehicle: str = DEFAULT_VEHICLE,
     engine: str = "ros",
     clock: str = "lockstep",
+    imu: str = IMUS[0],
     plant: str = DEFAULT_PLANT,
     plant_preset: str | Sequence[str] = (),
     effects: Sequence[str] = (),
@@ -154,7 +159,13 @@ def settings(
     _choice("controller", controller, catalogue.LAWS)
     _choice("engine", engine, ENGINES)
     _choice("clock", clock, CLOCKS)
+    _choice("imu", imu, IMUS)
     check_clock(engine, clock)
+    if imu == AUTOPILOT_IMU and autopilot != BUILTIN and clock != "realtime":
+        raise SettingsError(
+            "only the stand-in sends its IMU in step with the plant: --imu autopilot with another "
+            "--autopilot needs --clock realtime"
+        )
     if engine == "direct" and autopilot != BUILTIN:
         raise SettingsError(
             "the direct engine has only the built-in autopilot: "
@@ -236,6 +247,7 @@ def settings(
         controller=controller,
         engine=engine,
         clock=clock,
+        imu=imu,
         autopilot=autopilot,
         px4=px4,
         link=link,

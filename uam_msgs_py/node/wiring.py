@@ -94,6 +94,15 @@ def with_foreign(node: Node, foreign: Mapping[str, str]) -> Sequence[Wire]:
     return found
 
 
+def with_autopilot_imu(wires: Sequence[Wire]) -> Sequence[Wire]:
+    """Return `wires` for a flight in which the bridge publishes the autopilot's IMU.
+
+    Its stamps are those of the plant's clock.
+    """
+    changed = {topics.IMU: {"publisher": BRIDGE}, topics.CLOCK: {"subscribers": (BRIDGE,)}}
+    return [replace(wire, **changed.get(wire.topic, {})) for wire in wires]
+
+
 def _listeners(node: Node, topic: topics.Topic) -> set[str]:
     """Return the names of the vehicle's nodes that subscribe to `topic`."""
     name = node.resolve_topic_name(topic.name)

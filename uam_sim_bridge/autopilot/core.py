@@ -143,6 +143,7 @@ class Autopilot:
         self._yaw_rate = 0.0  # [rad/s] about the world's z axis, down
         self._memory = np.zeros((7, 3))
         self._time: float | None = None
+        self.imu = np.zeros(3), np.zeros(3)  # newest sample: gyro, specific force, as in `update`
         self._sample_rate = sample_rate
         self._configure()
 
@@ -239,6 +240,7 @@ class Autopilot:
             reset_filters(gyro, self._filters, self._memory)
         dt = min(LONGEST_STEP, max(SHORTEST_STEP, time - self._time))
         self._time = time
+        self.imu = gyro, accel
         commander, landing = self.commander, self.landing
         aided = self.estimator.predict(time, gyro, accel, dt)
         self.battery.update(time, commander.armed)

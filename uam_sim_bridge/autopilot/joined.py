@@ -65,6 +65,7 @@ class JoinedAutopilot:
         self._now = -math.inf  # [s] tick of the last `poll`
         self.time = 0.0
         self._received_at = -math.inf
+        self._sample: tuple[float, np.ndarray, np.ndarray] | None = None
         self._told: AutopilotStatus | None = None
         self._heartbeat_due = self._landed_due = -math.inf  # [s]
         self._heartbeat = self._landed = False  # sent, not yet received
@@ -158,12 +159,20 @@ class JoinedAutopilot:
         self.autopilot.target(self.time, target)
         self._delivered = self._now
 
+    def imu(self) -> tuple[float, np.ndarray, np.ndarray] | None:
+        """Return the sample of the last cycle: time [s], gyro and specific force (3,), FLU.
+
+        None before the first cycle. Both clocks are the same: nothing is converted.
+        """
+        return self._sample
+
     def update(self, time: float, gyro: np.ndarray, force: np.ndarray) -> np.ndarray:
         """Run the autopilot's cycle of `time` [s] and return its motor commands (rotors,), 0..1.
 
         gyro (3,) [rad/s] and specific force (3,) [m/s^2], FLU: sample of the autopilot's IMU.
         """
         motors = self.autopilot.update(time, swap_body(gyro), swap_body(force))
+        self._sample = time, gyro, force
         status = self.autopilot.status
         if status != self._told:
             self._told = status

@@ -23,6 +23,7 @@ _AIDED = (
     | mavlink2.ESTIMATOR_POS_VERT_ABS
     | mavlink2.ESTIMATOR_PRED_POS_HORIZ_REL
 )
+_IMU_FIELDS = 0x3F  # HIGHRES_IMU.fields_updated: accelerometer and gyroscope
 FASTEST = 0.004  # s
 
 
@@ -88,6 +89,14 @@ def odometry(autopilot: Autopilot, time: float) -> Message:
     )
 
 
+def highres_imu(autopilot: Autopilot, time: float) -> Message:
+    """HIGHRES_IMU: the newest sample, FRD; the fields of other sensors are empty."""
+    gyro, force = autopilot.imu
+    return mavlink2.MAVLink_highres_imu_message(
+        round(time * 1e6), *force.tolist(), *gyro.tolist(), *[0.0] * 7, _IMU_FIELDS
+    )
+
+
 def battery_status(autopilot: Autopilot, time: float) -> Message:
     """BATTERY_STATUS: charge and charge state with SIM_BAT_ENABLE; all else is unknown."""
     charge = autopilot.battery.charge
@@ -130,6 +139,7 @@ STREAMS: dict[int, tuple[Callable[[Autopilot, float], Message], float]] = {
     mavlink2.MAVLINK_MSG_ID_EXTENDED_SYS_STATE: (extended_sys_state, 0.2),
     mavlink2.MAVLINK_MSG_ID_ATTITUDE_QUATERNION: (attitude_quaternion, 0.02),
     mavlink2.MAVLINK_MSG_ID_ODOMETRY: (odometry, 1.0 / 30.0),
+    mavlink2.MAVLINK_MSG_ID_HIGHRES_IMU: (highres_imu, 0.0),  # only on request
     mavlink2.MAVLINK_MSG_ID_BATTERY_STATUS: (battery_status, 2.0),
     mavlink2.MAVLINK_MSG_ID_ESTIMATOR_STATUS: (estimator_status, 1.0),
     mavlink2.MAVLINK_MSG_ID_TIMESYNC: (timesync, 0.1),

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 from uam_control.settings.parameter_set import ParameterSet, Text, choice, integer, number, switch
@@ -45,6 +46,17 @@ class BridgeParameters(ParameterSet):
     kill_confirmation: float = number(
         3.0, "time within which the second call of /mission/kill must come", "s", 0.5, 30.0
     )
+    imu_source: str = choice(
+        "topic",
+        "IMU of the estimator: topic, from another node; autopilot: this node requests it from the "
+        "autopilot and publishes it",
+        ("topic", "autopilot"),
+    )
+    imu_clock: str = choice(
+        "system",
+        "clock of the stamps of the autopilot's IMU: system, or topic: /clock of a simulator",
+        ("system", "topic"),
+    )
     stale_after: float = number(
         0.1, "time without a command after which commands count as lost", "s", 0.01, 5.0
     )
@@ -65,8 +77,10 @@ def open_links(
     options: BridgeParameters,
     sequence: OffboardSequence,
     mapping: RateThrustParameters,
+    imu_rate: float = 0.0,
+    clock: Callable[[], float] | None = None,
 ) -> Links:
-    """Declare the parameters of the links, and open the links.
+    """Declare the parameters of the links, and open the links; imu_rate, clock: see OffboardLink.
 
     Raises PortError, ParameterError, FaultError in one line.
     """
@@ -130,5 +144,5 @@ def open_links(
     if watching:
         codec = Codec(system, mavlink2.MAV_COMP_ID_ONBOARD_COMPUTER, signing)
         transport = station = GroundStation(watching, transport, codec)
-    link = OffboardLink(transport, sequence, mapping, system, signing)
+    link = OffboardLink(transport, sequence, mapping, system, signing, imu_rate, clock)
     return Links(link, station, faulty, late)

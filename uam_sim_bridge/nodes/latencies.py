@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from uam_control.stamps import nanoseconds
 from uam_sim_bridge.nodes.plant_options import Statistics
 
 DEADLINE_TICKS = 3  # [control periods] 12 ms, about a rotor's time constant
@@ -18,6 +19,7 @@ class Latencies:
     def tick(self, stamp: int | None, published: int, setpoints: dict[int, int]) -> None:
         """Register a tick's sample, None for none, and the setpoints that have arrived.
 
+        An IMU with drift, and the autopilot's, have stamps beside those of the plant's ticks.
         published: wall time [ns]; setpoints: stamp of the sample answered [ns] → wall time [ns].
         """
         numbers = self._statistics
@@ -25,7 +27,8 @@ class Latencies:
             self._unanswered[stamp] = published
             numbers.answerable_ticks += 1
         for answered, sent in setpoints.items():
-            begun = self._unanswered.pop(answered, None)
+            period = nanoseconds(self._period)
+            begun = self._unanswered.pop(round(answered / period) * period, None)
             if begun is None:
                 continue
             latency = (sent - begun) * 1e-9

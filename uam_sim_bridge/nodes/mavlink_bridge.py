@@ -53,6 +53,13 @@ from uam_sim_bridge.mavlink.offboard.thrust_identification import (
 )
 from uam_sim_bridge.mavlink.protocol.vision import VisionPose
 from uam_sim_bridge.mavlink.telemetry.parameter_check import adopted, differences
+from uam_sim_bridge.nodes.autopilot_imu_topic import (
+    WAKE_UP as IMU_WAKE_UP,
+)
+from uam_sim_bridge.nodes.autopilot_imu_topic import (
+    AutopilotImuTopic,
+    CompanionClock,
+)
 from uam_sim_bridge.nodes.autopilot_topics import AutopilotTopics
 from uam_sim_bridge.nodes.bridge_link import BridgeParameters, open_links
 from uam_sim_bridge.nodes.fault_topic import FaultTopic
@@ -94,7 +101,12 @@ class MavlinkBridgeNode(UamNode):
         thrust = NodeParameters(self, ThrustIdentificationParameters, derived=derived)
 
         options, sequence = self._options, OffboardSequence(offboard)
-        links = open_links(self, options, sequence, mapping.current)
+        own_imu, self._imu = (), None
+        if options.imu_source == "autopilot":
+            clock = CompanionClock(self, options.imu_clock == "topic")
+            own_imu = 1.0 / vehicle.control_period, clock.now
+            self.wake_up = IMU_WAKE_UP
+        links = open_links(self, options, sequence, mapping.current, *own_imu)
         self.link, self._station, self._faulty = links.autopilot, links.station, links.faulty
         self._late = links.late
         sets = BridgeSets(mapping.current, hold, thrust.current, vision, setpoint)
@@ -103,6 +115,8 @@ class MavlinkBridgeNode(UamNode):
             sets, vehicle, self.link, sequence, fresh, self.warn, options.dry_run
         )
         thrust.apply = self.stage.identification.configure
+        if own_imu:
+            self._imu = AutopilotImuTopic(self, self.link, clock)
         self._fault_topic = FaultTopic(self) if self._faulty else None
         self._adopted: tuple[str, ...] = ()
         self._commanded = 0  # stamp [ns] of the last tick with commands
@@ -261,6 +275,8 @@ class MavlinkBridgeNode(UamNode):
     def settle(self) -> None:
         """Run ticks with complete inputs, and ticks without commands after `stale_after`."""
         super().settle()
+        if self._imu is not None:
+            self._imu.serve(self.stamp if self.ticks else None)
         state = self._join.last_seen[topics.STATE.name]
         if self.ticks == 0 or state is None or state <= self.stamp:
             return
@@ -302,6 +318,7 @@ class MavlinkBridgeNode(UamNode):
             "level hold": self.stage.source.holding,
             "adopted": "; ".join(self._adopted),
             **report(link),
+            **({} if self._imu is None else self._imu.values()),
             "thrust factor [1]": f"{self.stage.map.thrust_factor:.4f}",
         }
         summary = "; ".join((sequence.phase.value, *notes))

@@ -7,6 +7,8 @@ lockstep  At every control tick the plant waits for the setpoint that the bridge
           tick's IMU sample, for joint efforts and magnet, and for the autopilot's motor commands.
           It also waits for a recorder that is far behind, so that no message is lost.
           Every wait has a limit in wall time; then the node reports which node did not answer.
+          With the autopilot's IMU (`publish_imu: false`) the autopilot gets its sample first, and
+          passes it on. Ticks before the first setpoint run at the pace of the wall clock.
           While a lost node is restarted, ticks run at the pace of the wall clock without its
           answers, until all answers have been in time for IN_TIME ticks (`restart.py`).
 realtime  Ticks begin at absolute deadlines of the wall clock, one control period apart; after a
@@ -98,7 +100,8 @@ class Simulator:
         self._reset_due = False
         node.create_service(Trigger, "~/reset", self._on_reset)
         _warm_up(make_plant(*start, Schedule(), options.plant))
-        self.sensors, self.truth = Sensors(node, described), TruthTopics(node, described)
+        self.sensors = Sensors(node, described, options.publish_imu)
+        self.truth = TruthTopics(node, described)
         servo_mode = vehicle.numbers["servos"]["mode"]
         self.answers = Answers(node, described, declared.rightful, servo_mode)
         self.connections = Connections(node)
@@ -190,6 +193,8 @@ class Simulator:
     def _waiting_for(self) -> list[str]:
         recorded, foreign = self.options.recorded, self._foreign
         wires = wiring.with_foreign(self.node, self._own_names)
+        if not self.options.publish_imu:
+            wires = wiring.with_autopilot_imu(wires)
         waiting = wiring.missing(self.node, recorded, wires)
         if not waiting:  # all publishers and subscriptions exist: are they connected?
             namespace = self.node.get_namespace()
@@ -226,10 +231,14 @@ class Simulator:
                 self._wait_until(self._deadline(begin))
                 self._measure()
                 self._receive_hil(0.0)
-            else:
+            elif self.options.publish_imu:
                 self._wait_for_answers()
                 self._send_hil(samples, truth)
                 self._receive_hil()
+            else:
+                self._send_hil(samples, truth)
+                self._receive_hil()
+                self._wait_for_answers()
             if self._faulty:
                 answers = self.answers
                 self._faulty.mission_at(answers.mission_stamp * 1e-9, answers.mission.time)
@@ -315,8 +324,14 @@ class Simulator:
                 f"nothing recorded since {self.connections.recorded_until():g} s"
                 "; the recorder is silent"
             )
-        if self._stamp is None or self._stop.raised:
+        if self._stop.raised:
             return
+        if self._stamp is None:
+            if self.options.publish_imu:
+                return
+            if not self.answers.begun:
+                self._spin_until(self._begun + self.plant.period)
+                return
         patience = Patience(self.options.answer_timeout)
         while missing := self.answers.missing(self._stamp):
             self._setpoint_is_there = "setpoint" not in missing
@@ -331,6 +346,11 @@ class Simulator:
                 self._log.warning(f"{self._no_answer(missing)}; time goes on without it")
                 self._restart.begin(math.inf)
         self._restart.tick(complete=not missing)
+
+    def _spin_until(self, end: float) -> None:
+        """Serve messages until the wall time `end` [s]."""
+        while (left := end - time.monotonic()) > 0.0 and not self._stop.raised:
+            self.executor.spin_once(left)
 
     def _recorder_has_caught_up(self, lag: float, patience: float) -> bool:
         """Wait until the recorder is at most `lag` [s] behind; return False after `patience`.
@@ -364,7 +384,8 @@ class Simulator:
 
     def _measure(self) -> None:
         """Measure the latency of this tick, and of ticks whose setpoints have arrived."""
-        self._latencies.tick(self._stamp, self._published, self.answers.setpoints)
+        stamp = self._stamp if self.options.publish_imu else self.node.stamp
+        self._latencies.tick(stamp, self._published, self.answers.setpoints)
         self.answers.setpoints.clear()
 
     def report(self) -> Statistics:

@@ -56,6 +56,9 @@ class PlantParameters(ParameterSet):
         "lockstep: each tick waits for all answers; realtime: ticks of the wall clock",
         ("lockstep", "realtime"),
     )
+    publish_imu: bool = switch(
+        True, "publish the companion's IMU; false: mavlink_bridge publishes the autopilot's"
+    )
     hil_port: int = integer(4560, "TCP port at which the autopilot connects", 1, 65535)
     autopilot_always_answers: bool = switch(
         True, "true for the stand-in; false for PX4, which is silent at boot"

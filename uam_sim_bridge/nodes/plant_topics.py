@@ -50,9 +50,11 @@ class Outlets:
 class Sensors(Outlets):
     """Publishes /clock and the sensor samples."""
 
-    def __init__(self, node: Node, vehicle: VehicleDescription):
-        super().__init__(node, (topics.CLOCK, topics.IMU, topics.JOINTS, topics.MOCAP))
-        self._clock, self._imu, self._joints, self._mocap = self.outlets.values()
+    def __init__(self, node: Node, vehicle: VehicleDescription, publish_imu: bool):
+        """publish_imu: whether the companion has an IMU of its own."""
+        imu = (topics.IMU,) if publish_imu else ()
+        super().__init__(node, (topics.CLOCK, topics.JOINTS, topics.MOCAP, *imu))
+        self._clock, self._joints, self._mocap, *self._imu = self.outlets.values()
         self._clock_writer = Template(Clock())
         self._imu_writer, self._mocap_writer = ImuWriter(frame(node, topics.BODY)), PoseWriter()
         self._joint_writer = JointStateWriter(vehicle.joint_names)
@@ -63,7 +65,9 @@ class Sensors(Outlets):
         self._clock.publish(self._clock_writer.stamped(stamp))
 
     def publish(self, samples: Samples) -> int | None:
-        """Publish the samples of this tick; return the stamp [ns] of the tick, None without IMU.
+        """Publish the samples of this tick; return the stamp [ns] of the tick.
+
+        None where no IMU sample of this node starts it.
 
         The IMU's is published last: it starts the estimator's tick. The stamp of the tick is the
         IMU's without jitter, a multiple of the control period.
@@ -76,12 +80,12 @@ class Sensors(Outlets):
             writer = self._joint_writer
             writer.position[:], writer.velocity[:], writer.effort[:] = alpha, alpha_dot, torque
             self._joints.publish(writer.stamped(nanoseconds(time)))
-        if samples.imu is None:
+        if samples.imu is None or not self._imu:
             return None
         time, gyro, force = samples.imu
         stamp = nanoseconds(time)
         for _ in range(samples.imu_copies):
-            self._imu.publish(self._imu_writer.fill(stamp, gyro, force))
+            self._imu[0].publish(self._imu_writer.fill(stamp, gyro, force))
         return round(stamp / self._period) * self._period
 
 
@@ -174,7 +178,7 @@ class Answers:
         }
 
         self.guards = node.sole_publishers = {
-            inlet: SolePublisher(node, inlet, rightful.of(name), lambda: self._setpoint_stamp >= 0)
+            inlet: SolePublisher(node, inlet, rightful.of(name), lambda: self.begun)
             for name, inlet in self.inlets.items()
             if name in PUBLISHERS
         }
@@ -183,11 +187,22 @@ class Answers:
         """Begin a tick: clear the set of received answers."""
         self._arrived.clear()
 
-    def missing(self, stamp: int) -> frozenset[str]:
-        """Return the missing answers to the tick of `stamp` [ns]."""
+    def missing(self, stamp: int | None) -> frozenset[str]:
+        """Return the missing answers to the tick of `stamp` [ns].
+
+        stamp: None if the autopilot's IMU starts the ticks, by its own clock; a setpoint since
+        `begin` is then the answer.
+        """
+        if stamp is None:
+            return frozenset({"arm", "magnet", "setpoint"} - self._arrived)
         lacking = {"arm", "magnet"} - self._arrived
         answered = self._setpoint_stamp >= stamp - self._tolerance
         return frozenset(lacking if answered else lacking | {"setpoint"})
+
+    @property
+    def begun(self) -> bool:
+        """Whether a setpoint has arrived."""
+        return self._setpoint_stamp >= 0
 
     def take(self) -> None:
         """Take every message in the queues, without waiting."""
@@ -202,6 +217,7 @@ class Answers:
         except BadMessage as error:
             self._refuse(topics.SETPOINT, error)
             return
+        self._arrived.add("setpoint")
         self.arrivals[topics.SETPOINT.name] = time.monotonic()
         if info is not None:
             self.setpoints[self._setpoint_stamp] = info["source_timestamp"]

@@ -9,7 +9,7 @@ import numpy as np
 from uam_control.coordinates import ARM, ATTITUDE, POSITION
 from uam_control.maths.rotations import tilt, wrap_angle
 from uam_lab.flight.direct.flight import DirectFlight
-from uam_lab.flight.flight_settings import FlightSettings
+from uam_lab.flight.flight_settings import AUTOPILOT_IMU, FlightSettings
 from uam_lab.flight.observer import FlightStatus, Observer
 from uam_lab.processes.interrupts import StopRequest
 from uam_lab.results.outcome import Outcome, transitions
@@ -31,6 +31,7 @@ def fly(
         settings.seed,
         settings.faults,
         settings.plant,
+        settings.imu == AUTOPILOT_IMU,
     )
     folder.write_parameters({node: vars(values) for node, values in settings.profile.sets.items()})
     begin = time.monotonic()

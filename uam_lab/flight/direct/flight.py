@@ -49,9 +49,11 @@ class DirectFlight:
         seed: int,
         faults: Schedule | None = None,
         plant: str = DEFAULT_PLANT,
+        autopilot_imu: bool = False,
     ) -> None:
         """payload_mass [kg]; faults: those that `faults.feasibility.check` lets pass; plant: see
-        `plant_class`."""
+        `plant_class`; autopilot_imu: the estimator has the autopilot's IMU, a tick late."""
+        self._autopilot_imu = autopilot_imu
         sets = profile.sets
         vehicle = vehicle.changed(servo_mode(profile))
         started = (vehicle, payload_mass, seed, scenario.arm_start)
@@ -144,7 +146,8 @@ class DirectFlight:
 
         As the plant's node does, nothing is delivered before every kind of sensor has.
         """
-        mocap, joints, imu = samples.mocap, samples.joints, samples.imu
+        mocap, joints = samples.mocap, samples.joints
+        imu = self.autopilot.imu() if self._autopilot_imu else samples.imu
         self._complete = self._complete or None not in (mocap, joints, imu)
         if not self._complete:
             return None, None, None

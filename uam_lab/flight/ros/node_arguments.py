@@ -10,10 +10,11 @@ from uam_control.mission.time_limit import time_limit
 from uam_control.profiles.profile import servo_mode
 from uam_lab.cockpit import page_address
 from uam_lab.flight.conclude import settings_facts
-from uam_lab.flight.flight_settings import BUILTIN, FlightSettings
+from uam_lab.flight.flight_settings import AUTOPILOT_IMU, BUILTIN, FlightSettings
 from uam_lab.flight.node_options import EVERY_NODE
 from uam_lab.recording import log_facts
 from uam_lab.results.result_folder import ResultFolder, as_json, versions
+from uam_msgs_py.messages import topics
 from uam_msgs_py.node import wiring
 from uam_sim_bridge.faults import LINK, PLANT
 from uam_sim_bridge.plant.effects.network_delay import SetpointDelay
@@ -67,6 +68,7 @@ def parameters(
         "seed": settings.seed,
         "arm_start": list(settings.scenario.arm_start),
         "clock": settings.clock,
+        "publish_imu": settings.imu != AUTOPILOT_IMU,
         "hil_port": ports.simulator_tcp,
         "autopilot_always_answers": settings.autopilot == BUILTIN,
         "linger": 0.0 if settings.autopilot == BUILTIN else PX4_LINGER,
@@ -91,6 +93,8 @@ def parameters(
         "faults": settings.faults.only(LINK).to_text(),
         "network_delay": _network_delay(settings),
         "dry_run": settings.dry_run,
+        "imu_source": settings.imu,
+        "imu_clock": "topic",
     }
     if users_autopilot(settings):
         sections[wiring.BRIDGE]["autopilot"] = settings.autopilot
@@ -161,6 +165,8 @@ def common_remappings(settings: FlightSettings) -> list[str]:
 def publishers(settings: FlightSettings) -> str:
     """Return the parameter `publishers` of every node: the simulator's topics are its own."""
     pairs = {wiring.PLANT: wiring.PLANT} | settings.own_names
+    if settings.imu == AUTOPILOT_IMU:
+        pairs[topics.IMU.name] = wiring.BRIDGE
     return ",".join(f"{node}={name}" for node, name in pairs.items())
 
 

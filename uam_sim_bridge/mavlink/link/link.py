@@ -1,12 +1,14 @@
 """The bridge's side of the link to the autopilot: heartbeats, commands, texts, parameters, time.
 
 `OffboardLink` works on any `Transport`. All times are times of control ticks; there are no timers
-on wall time.
+on wall time. TIMESYNC alone may have another clock: where the autopilot's IMU starts the ticks,
+their times follow from TIMESYNC.
 """
 
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 
 from uam_sim_bridge.mavlink.offboard.sequence import (
     COMMANDS,
@@ -21,6 +23,8 @@ from uam_sim_bridge.mavlink.protocol.modes import MavCmd, MavResult, Mode
 from uam_sim_bridge.mavlink.protocol.signing import Signing
 from uam_sim_bridge.mavlink.protocol.vision import VisionPose
 from uam_sim_bridge.mavlink.protocol.wire import Codec, Framer, Message, TextAssembler, mavlink2
+from uam_sim_bridge.mavlink.telemetry.autopilot_imu import NUMBER as HIGHRES_IMU
+from uam_sim_bridge.mavlink.telemetry.autopilot_imu import AutopilotImu
 from uam_sim_bridge.mavlink.telemetry.events import EventReader
 from uam_sim_bridge.mavlink.telemetry.link_statistics import LinkStatistics
 from uam_sim_bridge.mavlink.telemetry.parameter_check import ParameterWatch
@@ -39,7 +43,7 @@ class OffboardLink:
     `armed`, `mode`, `intended`, `failsafe`, `landed`: latest report; `armed_since` [s] or None:
     tick of the first report that it is armed; `values`: its parameters (of WATCHED) by name;
     `ignored`: number of messages from other systems or for other receivers; `vitals`: battery,
-    estimator and sensors; `reboots`: number of restarts.
+    estimator and sensors; `reboots`: number of restarts; `imu`: its IMU, if it is requested.
     """
 
     def __init__(
@@ -49,7 +53,12 @@ class OffboardLink:
         mapping: RateThrustParameters,
         target_system: int = 1,
         signing: Signing | None = None,
+        imu_rate: float = 0.0,
+        clock: Callable[[], float] | None = None,
     ) -> None:
+        """imu_rate [Hz]: of the autopilot's IMU, 0: not requested; clock: the companion's [s], to
+        which stamps of that IMU are converted, None: the times of the ticks."""
+        self._clock = clock
         self.sequence = sequence
         self.mode, self.armed, self.landed = Mode.UNKNOWN, False, True
         self.intended, self.failsafe = Mode.UNKNOWN, False
@@ -57,7 +66,8 @@ class OffboardLink:
         self.ignored = self.reboots = 0
         self.vitals = Vitals()
         self.time_sync = TimeSync()
-        self.streams = StreamCheck()
+        self.imu = AutopilotImu(self.time_sync) if imu_rate else None
+        self.streams = StreamCheck({HIGHRES_IMU: imu_rate} if imu_rate else None)
         self.statistics = LinkStatistics()
         self._reboot = RebootDetector()
         self._events = EventReader()
@@ -223,9 +233,16 @@ class OffboardLink:
         elif kind == "PARAM_VALUE":
             self._parameters.take(m)
         elif kind == "TIMESYNC" and m.tc1 == 0:
-            self._send(mavlink2.MAVLink_timesync_message(nanoseconds(time), m.ts1))
+            now = nanoseconds(self._synchronised(time))
+            self._send(mavlink2.MAVLink_timesync_message(now, m.ts1))
+        elif kind == "HIGHRES_IMU" and self.imu is not None:
+            self.imu.take(m)
         else:
             self.vitals.take(kind, m)
+
+    def _synchronised(self, time: float) -> float:
+        """Return the time [s] of the clock that TIMESYNC relates; time: of the tick."""
+        return time if self._clock is None else self._clock()
 
     def _watch_clock(self, time: float, kind: str, m: Message) -> None:
         """Pass the autopilot's time to the reboot detection and the time synchronisation."""
@@ -239,7 +256,7 @@ class OffboardLink:
             return
         restarted = self._reboot.time_since_boot(since_boot)
         if not restarted and kind == "TIMESYNC" and m.tc1 != 0:
-            restarted = self.time_sync.answer(time, m.tc1, m.ts1)
+            restarted = self.time_sync.answer(self._synchronised(time), m.tc1, m.ts1)
         if restarted:
             self.reboots += 1
             self.time_sync.restart()
@@ -294,7 +311,7 @@ class OffboardLink:
         )
 
     def _request_telemetry(self, time: float) -> None:
-        ts1 = self.time_sync.request(time)
+        ts1 = self.time_sync.request(self._synchronised(time))
         if ts1 is not None:
             self._send(mavlink2.MAVLink_timesync_message(0, ts1))
         stream = self.streams.request(time)

@@ -8,6 +8,7 @@ therefore only counted.
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 
 from uam_sim_bridge.mavlink.protocol.modes import MavResult, result_word
 from uam_sim_bridge.mavlink.protocol.wire import mavlink2
@@ -38,17 +39,19 @@ class StreamCheck:
     too slow or was refused.
     """
 
-    def __init__(self) -> None:
+    def __init__(self, further: Mapping[int, float] | None = None) -> None:
+        """further: streams besides RATES, message id → desired rate [Hz]."""
+        self._desired = RATES | dict(further or {})
         self.restart()
 
     def restart(self) -> None:
         """Request all streams again, for a new or rebooted autopilot."""
         self.warnings: tuple[str, ...] = ()
         self.rates: dict[int, float] = {}
-        self._queue = [number for number in RATES if number not in ONLY_COUNTED] + [*ON_CHANGE]
-        self._attempts = dict.fromkeys((*RATES, *ON_CHANGE), 0)
+        self._queue = [n for n in self._desired if n not in ONLY_COUNTED] + [*ON_CHANGE]
+        self._attempts = dict.fromkeys((*self._desired, *ON_CHANGE), 0)
         self._refused: dict[int, str] = {}
-        self._counts = dict.fromkeys(RATES, 0)
+        self._counts = dict.fromkeys(self._desired, 0)
         self._pending: int | None = None
         self._requested_at = -math.inf
         self._window: float | None = None  # s, start of the window; None during requests
@@ -79,7 +82,7 @@ class StreamCheck:
         number = self._queue.pop(0)
         self._attempts[number] += 1
         self._pending, self._requested_at = number, time
-        return number, 1e6 / (RATES | ON_CHANGE)[number]
+        return number, 1e6 / (self._desired | ON_CHANGE)[number]
 
     def _judge(self, time: float) -> None:
         if self._window is None:
@@ -91,7 +94,7 @@ class StreamCheck:
         }
         slow = [
             number
-            for number, rate in RATES.items()
+            for number, rate in self._desired.items()
             if self.rates[number] < ENOUGH * rate or number in self._refused
         ]
         self.warnings = tuple(self._words(number) for number in slow)
@@ -106,11 +109,11 @@ class StreamCheck:
 
     def _begin(self, time: float) -> None:
         self._window = time
-        self._counts = dict.fromkeys(RATES, 0)
+        self._counts = dict.fromkeys(self._desired, 0)
 
     def _words(self, number: int) -> str:
         name = mavlink2.mavlink_map[number].msgname
-        rate, desired = self.rates[number], RATES[number]
+        rate, desired = self.rates[number], self._desired[number]
         received = f"received at {rate:.1f} Hz" if rate > 0.0 else "not received"
         refused = self._refused.get(number)
         request = (

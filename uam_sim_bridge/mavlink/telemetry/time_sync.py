@@ -2,8 +2,8 @@
 
 A request carries the companion's time; the answer repeats it and adds the autopilot's time. The
 autopilot is assumed to read its clock at the middle of the round trip, so the error is at most half
-of it: short round trips get a higher weight. All times are tick times, which gives round trips a
-resolution of one tick.
+of it: short round trips get a higher weight. Times are those of the companion's clock; where that
+is the clock of the ticks, round trips have a resolution of one tick.
 """
 
 from __future__ import annotations
@@ -52,6 +52,15 @@ class TimeSync:
         """
         newest = list(self._recent)[-_NEWEST:]
         return min(newest) if len(newest) == _NEWEST else None
+
+    def companion(self, stamp: int) -> int | None:
+        """Return a stamp of the autopilot [ns] in the companion's clock [ns].
+
+        None before _NEWEST answers: the first one alone may be a slow one.
+        """
+        if self.offset is None or self.quickest is None:
+            return None
+        return stamp - round(self.offset * 1e9)
 
     def request(self, time: float) -> int | None:
         """Return ts1 [ns] of the request due at `time` [s]; None if none is due."""
