@@ -49,12 +49,12 @@ OTHERS = [
 ]
 
 
-@pytest.mark.parametrize("topic, data", OWN)
+@pytest.mark.parametrize("topic, data", OWN, ids=range(len(OWN)))
 def test_its_own_messages_are_kept_as_they_are(topic, data):
     assert own_part(topic, "/uav1")(data) is data
 
 
-@pytest.mark.parametrize("topic, data", OTHERS)
+@pytest.mark.parametrize("topic, data", OTHERS, ids=range(len(OTHERS)))
 def test_those_of_others_are_left_out(topic, data):
     assert own_part(topic, "/uav1")(data) is None
 

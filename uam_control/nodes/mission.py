@@ -167,7 +167,7 @@ class MissionNode(UamNode):
         output, errors = self._mission.output, self._errors.newest()
         return MissionStatus(
             output.phase,
-            output.time,
+            self._stage.time,
             errors.position,
             errors.attitude,
             errors.arm,

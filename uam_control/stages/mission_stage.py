@@ -21,8 +21,9 @@ class MissionStage:
     """Computes the reference one tick ahead, so that it is ready when the state arrives.
 
     Between `begin` and `advance`, `output` is the mission's output at this tick, see
-    `MissionOutput`, `flying` is whether the controllers fly its reference, and `reference`
-    (3, 6 + n) is what they fly, see `ahead`. `ahead` [ns]: the stamp of the newest reference.
+    `MissionOutput`, `flying` is whether the controllers fly its reference, `reference`
+    (3, 6 + n) what they fly, see `ahead`, and `time` the mission time [s]. `ahead` [ns]: the stamp
+    of the newest reference.
     """
 
     def __init__(self, mission: Mission, timing: Timing) -> None:
@@ -30,7 +31,7 @@ class MissionStage:
         self.period = timing.period
         self.inputs = SupervisorInputs(self.period / SECOND)
         self.flying = False
-        self.reference = self.output.reference
+        self.reference, self.time = self.output.reference, self.output.time
         self.ahead = self._last = -1  # [ns]; _last: the tick before
         self._armed_since: float | None = None
         self._reports: deque[tuple[int, bool, int | None, float, Authority]] = deque()
@@ -70,15 +71,13 @@ class MissionStage:
                 self.inputs.inputs.autopilot(reported / SECOND, round_trip)
         self._readings = self.inputs.tick(stamp)
         last, self._last = self._last, stamp
-        if stamp == self.ahead:
-            self.reference = self.output.reference
-            return False
-        if serves(self.ahead, last, stamp, self.period):
-            self.reference = carried(self.output.reference, stamp - self.ahead)
-            return False
-        self.advance(stamp - self.period, state)
-        self.reference = self.output.reference
-        return True
+        anew = stamp != self.ahead and not serves(self.ahead, last, stamp, self.period)
+        if anew:
+            self.advance(stamp - self.period, state)
+        output, step = self.output, stamp - self.ahead
+        self.reference = carried(output.reference, step) if step else output.reference
+        self.time = output.time + step / SECOND if output.time >= 0.0 else output.time
+        return anew
 
     def _begin_anew(self) -> None:
         """Forget the flight: stamps went back, the simulation is a new one."""

@@ -169,7 +169,7 @@ def fly_mission(tick: ControlTick) -> bool:
     else:
         s.reference[:, ARM] = mission.reference[:, ARM]
     s.flying, s.magnet = mission.flying, output.magnet
-    s.time, s.phase = output.time, output.phase
+    s.time, s.phase = mission.time, output.phase
     told = output.arm, output.magnet, output.state is State.FAILSAFE, output.regains
     if told != tick._told:
         tick._told = told
