@@ -8,11 +8,13 @@ import numpy as np
 import pytest
 from bridge_rig import MODULE, PERIOD, WEIGHT
 from free_port import free_port
-from sensor_msgs.msg import JointState
+from rosgraph_msgs.msg import Clock
+from sensor_msgs.msg import Imu, JointState
 from std_msgs.msg import Bool
 
 from uam_msgs_py.messages import topics
-from uam_msgs_py.messages.serialized import Serialized
+from uam_msgs_py.messages.convert import read_imu
+from uam_msgs_py.messages.serialized import Serialized, Template
 from uam_msgs_py.messages.status import AutopilotState, MissionStatus
 from uam_sim_bridge.mavlink.protocol.wire import mavlink2
 
@@ -44,6 +46,31 @@ def test_bad_parameters_are_refused_in_one_line(start, arguments, complaint):
     assert node.process.wait(60) == 2
     errors = [line for line in node.output.splitlines() if line.startswith("mavlink_bridge: ")]
     assert len(errors) == 1 and complaint in errors[0] and "Traceback" not in node.output
+
+
+def test_the_autopilots_imu_is_published_before_and_with_the_ticks(make_rig, probe):
+    clock, samples = probe.publisher(topics.CLOCK), probe.collect(topics.IMU)
+    rig = make_rig("-p", "imu_source:=autopilot", "-p", "imu_clock:=topic")
+    probe.until_connected("mavlink_bridge", [clock], [topics.IMU])
+    writer = Template(Clock())
+
+    def served():
+        clock.publish(writer.stamped(round(rig.body.time * 1e9) + 1000 * PERIOD))
+        rig.autopilot_tick()
+        rig.count += 1
+        return len(samples) > 20
+
+    probe.until(served, "samples before the first tick")
+    assert Serialized(Imu, samples[-1]).layout.frame == "base_link"
+    stamp, gyro, force = read_imu(samples[-1])
+    # the clock of the test stands still between two ticks: TIMESYNC is right to some of them
+    assert stamp == pytest.approx(round(rig.body.time * 1e9) + 1000 * PERIOD, abs=5 * PERIOD)
+    np.testing.assert_allclose(gyro, rig.body.gyro, atol=1e-6)
+    np.testing.assert_allclose(force, rig.body.accel, atol=1e-5)
+    before = len(samples)
+    for _ in range(20):
+        rig.tick()
+    probe.until(lambda: len(samples) >= before + 20, "samples with the ticks")
 
 
 def test_from_the_ground_to_hover_and_back(make_rig):

@@ -52,7 +52,7 @@ class AutopilotImuTopic:
             return
         self._link.poll(now)
         if tick is None:
-            self._link.tick(now)
+            self._link.maintain(now)
         for stamp, gyro, force in self._link.imu.samples():
             self._count += 1
             self._publisher.publish(self._writer.fill(stamp, gyro, force))

@@ -142,8 +142,8 @@ class OffboardLink:
                     self._handle(time, message)
         self.statistics.tick(time)
 
-    def tick(self, time: float) -> None:
-        """Send heartbeat, mode and arming requests, and telemetry requests due at `time` [s]."""
+    def maintain(self, time: float) -> bool:
+        """Send heartbeat and telemetry requests due at `time` [s]; return `connected`."""
         if time - self._heartbeat_out >= HEARTBEAT_PERIOD - 1e-9:
             self._heartbeat_out = time
             self._send(
@@ -162,6 +162,11 @@ class OffboardLink:
         self._was_connected = connected
         if connected:
             self._request_telemetry(time)
+        return connected
+
+    def tick(self, time: float) -> None:
+        """Send what `maintain` sends, and mode and arming requests due at `time` [s]."""
+        connected = self.maintain(time)
         delivered = self.time_sync.delivered
         seen = Reported(connected, self.armed, self.mode, self.intended, self.failsafe, delivered)
         request = self.sequence.update(time, seen)

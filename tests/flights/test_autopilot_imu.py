@@ -1,0 +1,66 @@
+"""The estimator runs from the autopilot's IMU: direct with jitter of its stamps, over MAVLink."""
+
+import json
+
+import numpy as np
+import pytest
+from flight_warnings import last_values, warnings
+
+from uam_control.mission import load_scenario
+from uam_control.profiles.profile import load_profile
+from uam_lab.flight.direct.flight import DirectFlight
+from uam_lab.results import metrics
+from uam_sim_bridge.plant import Vehicle
+
+RMS = ("position_m", "attitude_deg", "arm_deg")
+JITTER = 0.001  # [s] as TIMESYNC over a slow link
+
+
+class Jittered:
+    """The samples of an autopilot's IMU with jitter of the stamps, 1 % repeated and 1 % missing."""
+
+    def __init__(self, imu):
+        self._imu, self._random, self._last = imu, np.random.default_rng(5), None
+
+    def __call__(self):
+        late, repeated, missing = self._random.random(3)
+        sample = self._imu()
+        if sample is None or missing < 0.01:
+            return None
+        if repeated < 0.01 and self._last is not None:
+            return self._last
+        time, gyro, force = sample
+        self._last = time + JITTER * (2.0 * late - 1.0), gyro, force
+        return self._last
+
+
+def flown(autopilot_imu, jittered=False):
+    scenario = load_scenario("pick_and_place")
+    flight = DirectFlight(
+        scenario, load_profile("s500"), Vehicle.load(), 0.2, 1, autopilot_imu=autopilot_imu
+    )
+    if jittered:
+        flight.autopilot.imu = Jittered(flight.autopilot.imu)
+    flight.run()
+    return flight, metrics.errors(flight.recording.series())
+
+
+def test_the_mission_is_completed_with_jitter_as_with_the_companions_imu():
+    _, nominal = flown(autopilot_imu=False)
+    flight, errors = flown(autopilot_imu=True, jittered=True)
+    assert flight.mission.output.done and not flight.mission.output.abort_reason
+    ticks = flight.control.estimator.ticks
+    assert ticks.missing > 50 and ticks.repeated > 50
+    for name in RMS:
+        assert errors[name] == pytest.approx(nominal[name], rel=0.2)
+
+
+@pytest.mark.slow
+def test_over_mavlink_no_other_imu_is_needed(fly, short_scenario):
+    flight = fly("--scenario", str(short_scenario), "--seed", "3", "--imu", "autopilot")
+    assert flight.wait() == 0, flight.said + flight.complained
+    assert json.loads((flight.out / "metrics.json").read_text())["mission_completed"]
+    sent = int(last_values(flight.out, "mavlink_bridge")["IMU samples"])
+    ticks = int(last_values(flight.out, "state_estimator")["ticks"])
+    assert sent > 1500 and ticks > 0.98 * sent
+    assert warnings(flight.out) == ([], [])
