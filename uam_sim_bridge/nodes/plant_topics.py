@@ -133,9 +133,9 @@ SUSPECTS = {
 class Answers:
     """Answers of the nodes to a tick: setpoint sent, servo commands, magnet; state of the mission.
 
-    `arm_command` (n,), see `Servos`, and `magnet` hold until the next valid message.
-    `setpoints`: stamp [ns] → wall time [ns] of the bridge's publication; filled only by `take`, cleared after the
-    measurement of the latency.
+    `arm_command` (n,), see `Servos`, and `magnet` hold until the next valid message. `setpoints`:
+    stamp [ns] → wall time [ns] of the bridge's publication; filled only by `take`, cleared after
+    the measurement of the latency.
     """
 
     def __init__(
