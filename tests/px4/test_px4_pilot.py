@@ -46,7 +46,7 @@ def resume():
 
 
 @pytest.mark.parametrize("at", PHASES)
-@pytest.mark.parametrize("mode", BACK)
+@pytest.mark.parametrize("mode", BACK, ids=lambda mode: mode.name)
 def test_a_mode_of_the_pilot_stays_until_the_command(take_over, mode, at):
     flight, pilot = take_over(at, mode)
     flight.until_phase("released")

@@ -56,7 +56,9 @@ def test_bounds_are_kept(start):
     jerk = min(float(np.linalg.norm(start[3])), J / 2.0)
     run_out = 0.15 * jerk * stop.length / 2.5
     least = max(A, float(np.linalg.norm(start[2]))) + run_out
-    found = np.array([stop.at(time) for time in np.linspace(0.0, stop.length, 100)])
+    times = np.linspace(0.0, stop.length, 100)
+    found = np.array([stop.at(time) for time in times])
+    np.testing.assert_allclose(stop.values(times), found[:, 0], atol=1e-9)
     norms = np.linalg.norm(found, axis=2)
     assert np.max(norms[:, 2]) <= least + 1e-9
     assert np.max(norms[:, 3]) <= J + 1e-9

@@ -64,6 +64,10 @@ class Stop:
         """Return value, rate, acceleration, jerk and snap (5, k) at `time` [s] from the start."""
         return sum(part.at(time) for part in self._parts)
 
+    def values(self, times: np.ndarray) -> np.ndarray:
+        """Return the values (m, k) at times (m,) [s] from the start."""
+        return sum(part.values(times) for part in self._parts)
+
 
 class _Polynomial:
     """A polynomial of time / length with its derivatives; constant after its length."""
@@ -83,6 +87,11 @@ class _Polynomial:
         if time >= self._length:
             values[CHI_DOT:] = 0.0
         return values
+
+    def values(self, times: np.ndarray) -> np.ndarray:
+        """Return the values (m, k) at times (m,) [s]."""
+        u = np.clip(times / self._length, 0.0, 1.0)
+        return u[:, None] ** np.arange(len(self._orders[0])) @ self._orders[0]
 
 
 class Braking:
@@ -149,7 +158,7 @@ def _above(low: float, start: np.ndarray, acceleration: float, jerk: float) -> S
     shorter = 1.0
     while True:
         stop = Stop(start, acceleration, jerk, shorter)
-        times = np.linspace(0.0, stop.length, 20)
-        if stop.length <= SHORTEST or min(float(stop.at(t)[CHI, 0]) for t in times) >= low:
+        lowest = np.min(stop.values(np.linspace(0.0, stop.length, 20)))
+        if stop.length <= SHORTEST or lowest >= low:
             return stop
         shorter *= 0.8

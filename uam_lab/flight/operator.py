@@ -101,10 +101,11 @@ class Operator:
 
     def _call(self, service: str) -> tuple[bool, str]:
         client = self._node.create_client(Trigger, service)
+        name = self._node.resolve_service_name(service)
         try:
-            self._until(client.service_is_ready, f"no service {service}")
+            self._until(client.service_is_ready, f"no service {name}")
             future = client.call_async(Trigger.Request())
-            self._until(future.done, f"no answer of {service}")
+            self._until(future.done, f"no answer of {name}")
             answer = future.result()
             return answer.success, answer.message
         finally:
