@@ -212,3 +212,46 @@ def test_the_servos_of_torque_commands_get_the_torque():
     tau = controller.update(state, reference, desired, True, 0.004)
     np.testing.assert_array_equal(controller.command, tau)
     np.testing.assert_allclose(controller.command, [-3.0, -3.0])
+
+
+def test_integral_action_by_hand():
+    """gain 2, e = 0.5 m for 3 ticks of 0.1 s: 0.3 m/s^2, times the inertia 2 kg; then its limit."""
+    controller, (state, reference, _) = position(integral_gain=[2.0, 0.0, 0.0]), vehicle()
+    without = position()
+    state[0, 0] = 0.5
+    for _ in range(3):
+        tau = controller.update(state, reference, True, 0.1)[0]
+        plain = without.update(state, reference, True, 0.1)[0]
+    assert tau - plain == pytest.approx(-2.0 * 0.3)
+    controller = position(integral_gain=[2.0, 0.0, 0.0], integral_limit=0.15)
+    for _ in range(3):
+        tau = controller.update(state, reference, True, 0.1)[0]
+    assert tau - plain == pytest.approx(-2.0 * 0.15)
+    controller.reset_adaptation()
+    tau = controller.update(state, reference, True, 1e-9)[0]
+    assert tau == pytest.approx(plain, abs=1e-8)
+
+
+def test_the_horizontal_force_is_for_the_mass_that_the_integral_holds_up():
+    """Weight 10 N at 5 m/s^2; an integral of -0.5 m/s^2 is a mass 10 % larger."""
+    controller, (state, reference, _) = position(integral_gain=[0.0, 0.0, 5.0]), vehicle()
+    state[0, 2], reference[2, 0] = -1.0, 1.0
+    controller.update(state, reference, True, 0.1)
+    state[0, 2] = 0.0
+    tau = controller.update(state, reference, True, 0.1)
+    np.testing.assert_allclose(tau, [2.0 * 1.1, 0.0, 10.0 + 2.0 * 0.5])
+
+
+def test_drag_is_fed_forward_for_the_desired_velocity():
+    controller, (state, reference, _) = position(drag_feedforward=[0.1, 0.0, 0.0]), vehicle()
+    reference[1, 0] = state[1, 0] = 3.0
+    assert controller.update(state, reference, True, 0.1)[0] == pytest.approx(2.0 * 0.1 * 3.0)
+
+
+def test_the_autopilot_integrates_the_slow_part_of_the_feedforward():
+    """After t = ln 2 / corner, half of a constant Omega_d_dot is left to the autopilot."""
+    washed = torque(AttitudeController, 3, feedforward_washout=[2.0, 0.0, 0.0])
+    state, reference, attitude = vehicle()
+    attitude[2, :2] = 1.0
+    tau = washed.update(state, reference, attitude, True, math.log(2.0) / 2.0)
+    assert tau[0] == pytest.approx(tau[1] / 2.0)

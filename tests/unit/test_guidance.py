@@ -45,7 +45,7 @@ def assert_smooth(references):
     np.testing.assert_allclose(
         (references[2:, 1] - references[:-2, 1]) / (2 * DT), middle[:, 2], atol=0.12
     )
-    for part, rate, acceleration in ((slice(0, 6), 0.7, 1.2), (slice(6, 8), 1.0, 3.0)):
+    for part, rate, acceleration in ((slice(0, 6), 0.8, 1.2), (slice(6, 8), 1.0, 3.0)):
         assert np.max(np.abs(middle[:, 1, part])) < rate
         assert np.max(np.abs(middle[:, 2, part])) < acceleration
 

@@ -393,7 +393,7 @@ def test_resume_asks_once_per_command_and_the_scenario_goes_on():
     flight.authority, pose = Authority(), flight.state[0].copy()
     output = flight.step()
     assert output.state is State.HOLDING and output.flying
-    np.testing.assert_allclose(output.reference[0, :6], pose[:6], atol=1e-6)
+    np.testing.assert_allclose(output.reference[0, :6], pose[:6], atol=1e-5)
     assert flight.step().state is State.FLYING
     output = flight.until(lambda o: o.done, limit=200.0)
     assert output.phase == "landed" and not output.abort_reason

@@ -118,7 +118,7 @@ def test_a_vehicle_in_motion_begins_with_its_attitude_rates_and_no_torque(euler,
     state, reference, filtered = np.zeros((3, 8)), np.zeros((3, 8)), AttitudeReference(cutoff=2.0)
     state[0, 3:6], state[1, 3:6] = euler, rates
     filtered.reset(euler[2])
-    filtered.begin(state)
+    filtered.begin(state, np.zeros((3, 8)))
     roll, pitch, _ = euler
     yaw_rate = (math.sin(roll) * rates[1] + math.cos(roll) * rates[2]) / math.cos(pitch)
     reference[0, 5], reference[1, 5] = euler[2], yaw_rate
@@ -132,3 +132,15 @@ def test_a_vehicle_in_motion_begins_with_its_attitude_rates_and_no_torque(euler,
         value = filtered.update(np.array(tau), reference, 0.01)
     axis = matrix_from_euler(value[0])[:, 2]
     np.testing.assert_allclose(axis, np.array(tau) / np.linalg.norm(tau), atol=1e-6)
+
+
+def test_the_attitude_of_the_reference_passes_without_the_filter():
+    """tau_p along the reference's own force: no correction, only the reference."""
+    attitude, reference = AttitudeReference(1.0), np.zeros((3, 8))
+    reference[:, 4] = 0.3, 0.5, -2.0
+    tau_p = np.array([math.sin(0.3), 0.0, math.cos(0.3)]) * 20.0
+    attitude.reset(0.0)
+    for _ in range(3):
+        value = attitude.update(tau_p, reference, 0.004)
+    np.testing.assert_allclose(value[:, 1], [0.3, 0.5, -2.0], atol=1e-12)
+    np.testing.assert_allclose(value[:, [0, 2]], 0.0, atol=1e-12)

@@ -148,7 +148,7 @@ class PositionController(Controller):
             return self._tau
         if not self._flying:
             self._flying = True
-            if np.any(reference[CHI_DOT:, POSITION]):  # else from the ground, or at rest
+            if np.any(reference[CHI_DOT, POSITION]):  # else from the ground, or at rest
                 self._attitude.begin(state, reference)
         p = self.parameters
         tau = self._law_output(state, reference, self._attitude.value, True, dt)
