@@ -34,6 +34,7 @@ test: setup      ## the tests but the slow ones; options: make test ARGS="tests/
 	$(PYTEST) $(ALONE))
 
 slow: setup      ## the slow tests: whole missions, browser, PX4 if it is there; a quarter of an hour
+	@$(BIN)/python -m pip install --quiet --disable-pip-version-check -e ".[browser]"
 	@$(BIN)/python -m pytest -m slow tests
 
 mutants: setup   ## do the unit tests notice small errors? half an hour; make mutants ARGS="laws/"
@@ -48,6 +49,7 @@ clean:           ## remove what setup, tests and colcon made; results/ stays
 	find . -name __pycache__ -type d -prune -exec rm -rf {} +
 
 # Where ROS 2 is already there (a sourced apt installation) its own rclpy is used, not the wheels.
+# --no-compile: Python compiles a module when it is first imported, and most never are.
 $(STAMP): $(INSTALLED_FROM)
 	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11))' 2>/dev/null || { \
 	  echo "setup: Python 3.11 or newer is needed and $(PYTHON) is not; try make PYTHON=python3.12 $(MAKECMDGOALS)" >&2; exit 2; }
@@ -55,6 +57,6 @@ $(STAMP): $(INSTALLED_FROM)
 	  echo "setup: $(PYTHON) -m venv failed; on Debian and Ubuntu: apt install python3-venv" >&2; exit 2; }
 	@extras=ros,test; $(BIN)/python -c 'import rclpy' 2>/dev/null && test -n "$$ROS_DISTRO" && extras=test; \
 	  echo "setup: installing uam[$$extras] into $(VENV), once (a few minutes)"; \
-	  $(BIN)/python -m pip install --quiet --disable-pip-version-check -e ".[$$extras]" || { \
+	  $(BIN)/python -m pip install --quiet --disable-pip-version-check --no-compile -e ".[$$extras]" || { \
 	  echo "setup: the installation failed; the lines above say why" >&2; exit 2; }
 	@touch $@

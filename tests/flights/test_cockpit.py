@@ -6,7 +6,6 @@ from io import BytesIO
 import numpy as np
 import pytest
 from PIL import Image
-from playwright.sync_api import expect, sync_playwright
 from rcl_interfaces.srv import GetParameters
 from rclpy.executors import SingleThreadedExecutor
 from websockets.exceptions import InvalidStatus
@@ -15,6 +14,10 @@ from websockets.sync.client import connect
 from uam_lab.processes.guest import Guest
 from uam_lab.processes.node_environment import transport_environment
 from uam_msgs_py.node.node_parameters import plain
+
+# extra `browser`; make slow installs it
+from_playwright = pytest.importorskip("playwright.sync_api")
+expect = from_playwright.expect
 
 PATIENCE = 60_000  # [ms] only a failing test waits that long
 BROWSERS = ("chromium", "chromium-browser", "google-chrome", "google-chrome-stable")
@@ -44,7 +47,7 @@ def flight(fly):
 @pytest.fixture
 def page(flight):
     """The page in a browser."""
-    with sync_playwright() as playwright:
+    with from_playwright.sync_playwright() as playwright:
         browser = playwright.chromium.launch(executable_path=BROWSER, args=SWITCHES)
         page = browser.new_page(viewport={"width": 1440, "height": 900})
         page.set_default_timeout(PATIENCE)

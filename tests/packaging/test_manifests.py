@@ -18,12 +18,13 @@ KEYS = {
     **{name: f"python3-{name}" for name in ("packaging", "psutil", "rich", "setproctitle")},
     **{name: f"python3-{name}-pip" for name in ("mujoco", "pymavlink")},
     "websockets": "python3-websockets",
+    "mcap": "mcap-ros2-support",  # there is no key for mcap alone, which this one brings
     "serial": "python3-serial",
     "PIL": "python3-pil",
     "yaml": "python3-yaml",
 }
 # rosdep has no key for these: docs/install.md installs them by pip
-WITHOUT_KEY = {"imageio_ffmpeg", "mcap", "optuna", "pyarrow", "viser"}
+WITHOUT_KEY = {"imageio_ffmpeg", "optuna", "pyarrow", "viser"}
 # imported only where they are installed
 OPTIONAL = {"pandas", "OpenGL", "ament_index_python"}
 
