@@ -8,13 +8,14 @@ import sys
 
 from uam_lab import CommandRefused, Flight
 
-TOUR = [(0.5, 0.0, 1.0, 0.0), (0.5, 0.5, 1.2, 90.0), (0.0, 0.5, 1.0, 180.0), (0.0, 0.0, 1.0, 0.0)]
+TOUR = [(0.5, 0.0, 1.0, 0.0), (0.5, 0.5, 1.2, 45.0), (0.0, 0.5, 1.0, 90.0), (0.0, 0.0, 1.0, 45.0)]
+FAST = {"goal_speed": 0.6, "goal_yaw_rate": 1.0}  # [m/s], [rad/s]: the largest on the way
 
 
 def main():
     """Fly the tour; print each goal, and where the vehicle was when it held there."""
     out = sys.argv[1] if len(sys.argv) > 1 else "results/tour"
-    with Flight(scenario="hover", out=out) as flight:
+    with Flight(scenario="hover", parameters={"mission": FAST}, out=out) as flight:
         flight.wait_for("hover")
         for x, y, z, degrees in TOUR:  # [m, ENU], [deg]
             print(f"({x}, {y}, {z}):", flight.goto(x, y, z, math.radians(degrees)))

@@ -7,7 +7,7 @@ import sys
 
 import numpy as np
 
-from uam_control.maths import rotations
+from uam_control.maths import rotations as so3
 from uam_lab import Flight
 from uam_sim_bridge.plant import Plant, Samples, Truth
 
@@ -40,24 +40,21 @@ class OwnSimulator(Plant):
         thrust = vehicle.rotor.thrust_max * (f * u * u + (1.0 - f) * u)
         self.thrust = 0.8 * self.thrust + 0.2 * thrust  # the rotors' lag
         self.force = np.array([0.0, 0.0, self.thrust.sum() / vehicle.mass])
-        self.v = self.v + h * (rotations.matrix_from_quaternion(self.q) @ self.force - UP)
+        self.v = self.v + h * (so3.matrix_from_quaternion(self.q) @ self.force - UP)
         self.w = self.w + h * (self.torques @ self.thrust) / INERTIA
         if self.p[2] <= 0.0 and self.v[2] <= 0.0:  # the ground holds the vehicle
             self.v, self.w, self.force = np.zeros(3), np.zeros(3), UP
-        turned = rotations.quaternion_from_rotation_vector(h * self.w)
-        self.q = rotations.quaternion_multiply(self.q, turned)
+        self.q = so3.quaternion_multiply(self.q, so3.quaternion_from_rotation_vector(h * self.w))
         self.p, self.tick = self.p + h * self.v, self.tick + 1
 
     def truth(self):
-        angles = rotations.euler_from_quaternion(self.q)
-        chi = [[*self.p, *angles, *self.arm], [*self.v, *self.w, *self.still]]
-        state = np.array([*chi, np.zeros_like(chi[0])])
+        chi = [*self.p, *so3.euler_from_quaternion(self.q), *self.arm]
+        state = np.array([chi, [*self.v, *self.w, *self.still], np.zeros_like(chi)])
         payload = np.full(3, np.nan), np.full(4, np.nan)
         return Truth(state, self.q, *payload, 0.0, 0.0, np.zeros_like(self.thrust), self.thrust)
 
 
 if __name__ == "__main__":
-    folder, engine, scenario = sys.argv[1:]
-    plant = "own_simulator:OwnSimulator"
-    with Flight(plant=plant, engine=engine, scenario=scenario, out=folder) as flight:
-        print(flight.wait().metrics["rms"])
+    out, engine, scene = sys.argv[1:]
+    with Flight(plant="own_simulator:OwnSimulator", engine=engine, scenario=scene, out=out) as own:
+        print(own.wait().metrics["rms"])

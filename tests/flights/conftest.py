@@ -1,9 +1,20 @@
 """Whole flights through the command line, as a user starts them."""
 
+import os
+import subprocess
+import sys
+from dataclasses import dataclass
 from pathlib import Path
 
 import pytest
 from whole_flight import SHORT, Flight
+
+from uam_lab.processes.node_environment import transport_environment
+from uam_sim_bridge.ports import Reservation
+
+IMPOSTOR = Path(__file__).parents[1] / "impostor.py"
+# modules whose tests share a flight of their own
+GROUPED = {"test_direct_flight", "test_fault_flights", "test_imu_stamps", "test_new_law"}
 
 
 @pytest.fixture(scope="session")
@@ -28,18 +39,53 @@ def fly(tmp_path):
         flight.end()
 
 
-@pytest.fixture(scope="session")
-def two_flights(tmp_path_factory, short_scenario):
-    """Two lockstep flights with one seed, flown at the same time; both have ended.
+@dataclass(frozen=True)
+class SharedFlights:
+    """Flights with one seed that have ended, each with the same scenario.
 
-    The first one has a report.
+    single: in a ROS domain of its own, with a report. uav1, uav2: two vehicles in one domain, each
+    in its namespace; uav1 flew among impostors (tests/impostor.py).
     """
-    folder = tmp_path_factory.mktemp("twins")
+
+    single: Flight
+    uav1: Flight
+    uav2: Flight
+    domain: int  # of uav1 and uav2
+
+
+@pytest.fixture(scope="session")
+def shared_flights(tmp_path_factory, short_scenario):
+    """Lockstep flights, flown at the same time."""
+    folder = tmp_path_factory.mktemp("shared")
     options = ("--scenario", str(short_scenario), "--seed", "3")
-    flights = [Flight(folder / name, *options, report=name == "a") for name in ("a", "b")]
-    statuses = [flight.wait() for flight in flights]
-    for flight, status in zip(flights, statuses, strict=True):
-        assert status == 0, flight.said + flight.complained
-    yield flights
-    for flight in flights:
-        flight.end()
+    with Reservation() as reserved:
+        domain = reserved.ports.domain
+        surroundings = {**os.environ, **transport_environment(), "ROS_DOMAIN_ID": str(domain)}
+        impostors = subprocess.Popen([sys.executable, IMPOSTOR, "uav1"], env=surroundings)
+        vehicles = {
+            name: (*options, "--domain", str(domain), "--namespace", name)
+            for name in ("uav1", "uav2")
+        }
+        flights = {"single": Flight(folder / "single", *options, report=True)}
+        flights |= {name: Flight(folder / name, *given) for name, given in vehicles.items()}
+        try:
+            statuses = {name: flight.wait() for name, flight in flights.items()}
+            assert impostors.poll() is None
+        finally:
+            impostors.kill()
+            impostors.wait()
+            for flight in flights.values():
+                flight.end()
+    for name, flight in flights.items():
+        assert statuses[name] == 0, flight.said + flight.complained
+    return SharedFlights(**flights, domain=domain)
+
+
+def pytest_collection_modifyitems(items):
+    """Give tests that share flights one worker (--dist loadgroup), and begin with the longest."""
+    for item in items:
+        if "shared_flights" in item.fixturenames:
+            item.add_marker(pytest.mark.xdist_group("shared flights"))
+        elif item.module.__name__.rpartition(".")[2] in GROUPED:
+            item.add_marker(pytest.mark.xdist_group(item.module.__name__))
+    items.sort(key=lambda item: "shared_flights" not in item.fixturenames)

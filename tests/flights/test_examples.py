@@ -8,6 +8,8 @@ import sys
 import pytest
 from whole_flight import PATIENCE, ROOT
 
+from uam_lab import Flight
+
 EXAMPLES = ROOT / "examples"
 
 
@@ -30,37 +32,29 @@ def beside(tmp_path):
         process.wait()
 
 
-def test_a_controller_of_ones_own_flies_and_its_log_is_read(fly, short_scenario, beside):
-    flight = fly("--scenario", str(short_scenario), "--without", "arm_controller")
+def test_a_controller_and_a_mission_of_ones_own_fly_and_the_log_is_read(fly, beside):
+    flight = fly("--scenario", "hover", "--without", "arm_controller", "--without", "mission")
     beside("own_controller.py", flight)
-    assert flight.wait() == 0, flight.said + flight.complained
-    assert "arm_controller" not in {file.stem for file in (flight.out / "logs").glob("*.log")}
-    found = json.loads((flight.out / "metrics.json").read_text())
-    assert found["mission_completed"]
-
-    pytest.importorskip("pandas")
-    read = [sys.executable, EXAMPLES / "read_log.py", flight.out / "log.mcap"]
-    done = subprocess.run(read, capture_output=True, text=True, timeout=PATIENCE, check=False)
-    assert done.returncode == 0, done.stderr
-    rms = {words[0]: float(words[1]) for words in map(str.split, done.stdout.splitlines()[2:])}
-    assert set(rms) == {"x", "y", "z", "yaw", "alpha_1", "alpha_2"}
-    assert rms["z"] < 0.1 and rms["alpha_1"] < 5.0 and rms["alpha_2"] < 5.0, done.stdout
-
-
-def test_a_mission_of_ones_own_flies(fly, beside):
-    flight = fly("--scenario", "hover", "--without", "mission")
     beside("own_mission.py", flight)
     assert flight.wait() == 0, flight.said + flight.complained
-    assert "mission" not in {file.stem for file in (flight.out / "logs").glob("*.log")}
+    started = {file.stem for file in (flight.out / "logs").glob("*.log")}
+    assert not started & {"arm_controller", "mission"} and "position_controller" in started
     found = json.loads((flight.out / "metrics.json").read_text())
     assert found["mission_completed"] and found["abort_reason"] in (None, "")
     assert 8.0 < found["duration_s"] < 9.0 and found["rms"]["position_m"][2] < 0.1
 
+    pytest.importorskip("pandas")
+    rms = {
+        words[0]: float(words[1])
+        for words in map(str.split, run("read_log.py", flight.out / "log.mcap").splitlines()[2:])
+    }
+    assert set(rms) == {"x", "y", "z", "yaw", "alpha_1", "alpha_2"}
+    assert rms["z"] < 0.1 and rms["alpha_1"] < 5.0 and rms["alpha_2"] < 5.0, rms
 
-def test_the_scenario_of_ones_own_is_flown(fly):
-    flight = fly("--scenario", str(EXAMPLES / "own_scenario.yaml"), "--engine", "direct")
-    assert flight.wait() == 0, flight.said + flight.complained
-    found = json.loads((flight.out / "metrics.json").read_text())
+
+def test_the_scenario_of_ones_own_is_flown(tmp_path):
+    with Flight(scenario=EXAMPLES / "own_scenario.yaml", engine="direct", out=tmp_path) as flight:
+        found = flight.wait().metrics
     assert found["mission_completed"] and found["scenario"] == "own_scenario"
 
 
@@ -82,7 +76,6 @@ def test_a_gain_is_swept(tmp_path):
     assert len(errors) == 3, "each gain has errors of its own"
 
 
-@pytest.mark.slow
 def test_two_vehicles_fly_at_once(tmp_path, short_scenario):
     said = run("two_vehicles.py", tmp_path, short_scenario)
     assert "follower: arming" in said
@@ -91,7 +84,7 @@ def test_two_vehicles_fly_at_once(tmp_path, short_scenario):
     assert one != other
 
 
-@pytest.mark.parametrize("engine", ["direct", "ros"])
+@pytest.mark.parametrize("engine", [pytest.param("direct", marks=pytest.mark.slow), "ros"])
 def test_the_simulator_of_ones_own_flies(engine, tmp_path, short_scenario):
     said = run("own_simulator.py", tmp_path, engine, short_scenario)
     found = json.loads((tmp_path / "metrics.json").read_text())
@@ -99,7 +92,6 @@ def test_the_simulator_of_ones_own_flies(engine, tmp_path, short_scenario):
     assert max(found["max"]["arm_deg"]) == 0.0, "its arm stands still"
 
 
-@pytest.mark.slow
 def test_a_tour_of_goals_is_flown(tmp_path):
     said = run("goto_tour.py", tmp_path)
     assert said.count("accepted") == said.count("there at") == 4
@@ -108,7 +100,6 @@ def test_a_tour_of_goals_is_flown(tmp_path):
     assert max(off) < 20.0, "[mm]"
 
 
-@pytest.mark.slow
 def test_the_planner_of_ones_own_flies_a_circle(tmp_path):
     said = run("own_planner.py", tmp_path)
     west, east = (float(word) for word in said.split("circle: ")[1].split()[:3:2])

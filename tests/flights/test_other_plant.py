@@ -11,7 +11,8 @@ from uam_lab.results import timeseries
 PLANT = "rigid_body_plant:RigidBodyPlant"
 
 
-@pytest.mark.parametrize("engine", ["direct", "ros"])
+# over ROS as examples/own_simulator.py
+@pytest.mark.parametrize("engine", ["direct", pytest.param("ros", marks=pytest.mark.slow)])
 def test_a_plant_of_ones_own_hovers(engine, short_scenario, tmp_path, monkeypatch):
     paths = (str(ROOT / "tests"), os.environ.get("PYTHONPATH", ""))
     monkeypatch.setenv("PYTHONPATH", os.pathsep.join(filter(None, paths)))

@@ -28,8 +28,8 @@ class Log:
 
 
 @pytest.fixture(scope="module")
-def log(two_flights):
-    return Log(two_flights[0].out / "log.mcap")
+def log(shared_flights):
+    return Log(shared_flights.single.out / "log.mcap")
 
 
 def test_what_is_shown_is_recorded_with_its_schema(log):

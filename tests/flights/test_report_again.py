@@ -26,8 +26,8 @@ def alone(flight, folder, part=1.0):
     return folder
 
 
-def test_the_log_alone_gives_the_same_table_metrics_and_page(two_flights, tmp_path, few_figures):
-    out, again = two_flights[0].out, alone(two_flights[0], tmp_path / "again")
+def test_the_log_alone_gives_the_same_table_metrics_and_page(shared_flights, tmp_path, few_figures):
+    out, again = shared_flights.single.out, alone(shared_flights.single, tmp_path / "again")
     assert main.main(["report", str(again), "--no-pictures"]) == 0
     before, after = (timeseries.read(f / "timeseries.parquet") for f in (out, again))
     assert before.values.tobytes() == after.values.tobytes()
@@ -41,8 +41,8 @@ def test_the_log_alone_gives_the_same_table_metrics_and_page(two_flights, tmp_pa
     assert "Mission completed" in page and "--seed 3" in page
 
 
-def test_a_truncated_log_gives_a_partial_report(two_flights, tmp_path):
-    cut = alone(two_flights[0], tmp_path / "cut", 0.6)
+def test_a_truncated_log_gives_a_partial_report(shared_flights, tmp_path):
+    cut = alone(shared_flights.single, tmp_path / "cut", 0.6)
     metrics = rebuild(cut, tmp_path / "out")
     assert not metrics["mission_completed"]
     info = json.loads((tmp_path / "out/info.json").read_text())
@@ -51,15 +51,15 @@ def test_a_truncated_log_gives_a_partial_report(two_flights, tmp_path):
         "partial: the recording ends with the flight (the log ends before the mission was over)"
     ]
     assert [file.name for file in cut.iterdir()] == ["log.mcap"], "unchanged"
-    whole = timeseries.read(two_flights[0].out / "timeseries.parquet")
+    whole = timeseries.read(shared_flights.single.out / "timeseries.parquet")
     part = timeseries.read(tmp_path / "out/timeseries.parquet")
     assert 500 < len(part) < len(whole)
 
 
-def test_two_flights_overlaid(two_flights, tmp_path, few_figures, capsys):
-    cut = alone(two_flights[1], tmp_path / "cut", 0.6)
+def test_two_flights_overlaid(shared_flights, tmp_path, few_figures, capsys):
+    cut = alone(shared_flights.uav2, tmp_path / "cut", 0.6)
     out = tmp_path / "both"
-    assert main.main(["report", str(two_flights[0].out), str(cut), "--out", str(out)]) == 0
+    assert main.main(["report", str(shared_flights.single.out), str(cut), "--out", str(out)]) == 0
     page = (out / "report.html").read_text()
     assert "2 flights" in page and page.count("<td>cut</td>") == 3
     assert page.count("data:image/png") == 2

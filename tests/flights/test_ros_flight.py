@@ -31,8 +31,8 @@ def metrics(flight):
     return json.loads((flight.out / "metrics.json").read_text())
 
 
-def test_the_mission_is_completed_and_said_so(two_flights):
-    flight = two_flights[0]
+def test_the_mission_is_completed_and_said_so(shared_flights):
+    flight = shared_flights.single
     found = metrics(flight)
     assert found["mission_completed"] and found["abort_reason"] is None
     assert found["engine"] == "ros" and found["clock"] == "lockstep" and found["seed"] == 3
@@ -45,35 +45,38 @@ def test_the_mission_is_completed_and_said_so(two_flights):
     assert flown.sets == load_profile("s500").sets
 
 
-def test_one_seed_gives_one_flight(two_flights):
-    first, second = (metrics(flight) for flight in two_flights)
+def test_one_seed_gives_one_flight(shared_flights):
+    flights = shared_flights.single, shared_flights.uav2
+    first, second = (metrics(flight) for flight in flights)
     for figures in (first, second):
         for key in WALL:
             figures.pop(key)
     assert first == second
-    a, b = (timeseries.read(flight.out / "timeseries.parquet") for flight in two_flights)
+    a, b = (timeseries.read(flight.out / "timeseries.parquet") for flight in flights)
     assert a.values.tobytes() == b.values.tobytes()
     assert a.phases.tolist() == b.phases.tolist()
 
 
-def test_flights_side_by_side_use_different_domains_and_ports(two_flights):
-    domains = [flight.said.split("ROS domain ")[1].split(",")[0] for flight in two_flights]
-    assert domains[0] != domains[1]
+def test_flights_side_by_side_use_different_domains_and_ports(shared_flights):
+    flights = shared_flights.single, shared_flights.uav1, shared_flights.uav2
+    domains = [int(flight.said.split("ROS domain ")[1].split(",")[0]) for flight in flights]
+    assert domains[0] != domains[1] == domains[2] == shared_flights.domain
+    assert len({flight.instance for flight in flights}) == 3
 
 
-def test_the_direct_engine_flies_the_same(two_flights, short_scenario):
+def test_the_direct_engine_flies_the_same(shared_flights, short_scenario):
     requested = settings(scenario=str(short_scenario), seed=3)
     direct = DirectFlight(requested.scenario, requested.profile, Vehicle.load(), 0.0, seed=3)
     expected = errors(direct.run().series())
-    found = metrics(two_flights[0])["rms"]
+    found = metrics(shared_flights.single)["rms"]
     # What is left is the single precision of MAVLink's setpoints and motor commands, which contact
     # with the ground makes larger.
     for group, figures in expected.items():
         assert found[group] == pytest.approx(figures, rel=0.02), group
 
 
-def test_every_tick_is_in_the_table(two_flights):
-    series = timeseries.read(two_flights[0].out / "timeseries.parquet")
+def test_every_tick_is_in_the_table(shared_flights):
+    series = timeseries.read(shared_flights.single.out / "timeseries.parquet")
     steps = [round(1e6 * step) for step in (series.time[1:] - series.time[:-1])]
     assert set(steps) == {4000}
     assert series.time[0] < 0.0 and 0.0 in series.time
@@ -89,8 +92,8 @@ def test_every_tick_is_in_the_table(two_flights):
     assert np.isnan(flown[:, ~others]).all()
 
 
-def test_the_log_opens_with_the_public_readers_and_is_whole(two_flights):
-    flight = two_flights[0]
+def test_the_log_opens_with_the_public_readers_and_is_whole(shared_flights):
+    flight = shared_flights.single
     with (flight.out / "log.mcap").open("rb") as file:
         reader = make_reader(file, decoder_factories=[DecoderFactory()])
         summary = reader.get_summary()
@@ -119,9 +122,9 @@ def test_the_log_opens_with_the_public_readers_and_is_whole(two_flights):
     assert 0.0 < found["/uam/setpoint"].twist.linear.z < 1.0
 
 
-def test_the_result_folder_is_a_bag_for_rosbags(two_flights):
+def test_the_result_folder_is_a_bag_for_rosbags(shared_flights):
     """Folder and file; every message of every type is deserialised."""
-    flight = two_flights[0]
+    flight = shared_flights.single
     for bag in (flight.out, flight.out / "log.mcap"):
         with AnyReader([bag]) as reader:
             counted = Counter()
@@ -132,9 +135,9 @@ def test_the_result_folder_is_a_bag_for_rosbags(two_flights):
         assert counted == listed and counted["/uam/state"] > 1000
 
 
-def test_rates_and_frames_are_those_of_the_interface_table(two_flights):
+def test_rates_and_frames_are_those_of_the_interface_table(shared_flights):
     """docs/interfaces.md is made from these CONTENTS."""
-    with AnyReader([two_flights[0].out]) as reader:
+    with AnyReader([shared_flights.single.out]) as reader:
         span = (reader.end_time - reader.start_time) * 1e-9
         counts = {c.topic: c.msgcount for c in reader.connections}
         frames = {}
@@ -154,9 +157,9 @@ def test_rates_and_frames_are_those_of_the_interface_table(two_flights):
         assert frames[topic.name] == CONTENTS[topic].frame
 
 
-def test_messages_without_a_stamp_lie_at_their_tick(two_flights):
+def test_messages_without_a_stamp_lie_at_their_tick(shared_flights):
     """Efforts are published while /clock shows the tick that they answer."""
-    with (two_flights[0].out / "log.mcap").open("rb") as file:
+    with (shared_flights.single.out / "log.mcap").open("rb") as file:
         times = {"/clock": [], "/arm_effort_controller/commands": []}
         for _, channel, message in make_reader(file).iter_messages(topics=list(times)):
             times[channel.topic].append(message.log_time)
@@ -164,8 +167,8 @@ def test_messages_without_a_stamp_lie_at_their_tick(two_flights):
     assert efforts == times["/clock"][-len(efforts) :]
 
 
-def test_reading_the_log_again_gives_the_table(two_flights, short_scenario):
-    out = two_flights[0].out
+def test_reading_the_log_again_gives_the_table(shared_flights, short_scenario):
+    out = shared_flights.single.out
     again = read_flight(out / "log.mcap", load_scenario(str(short_scenario)))
     assert again.done and again.abort_reason == ""
     table = timeseries.read(out / "timeseries.parquet")

@@ -23,6 +23,7 @@ class Workspace:
 
     folder: Path
     environment: dict[str, str]
+    linked: bool  # with --symlink-install
 
     @property
     def prefix(self) -> Path:
@@ -78,4 +79,5 @@ def workspace(request, tmp_path_factory) -> Workspace:
         check=True,
     )
     pairs = (entry.partition("=") for entry in sourced.stdout.split("\0") if "=" in entry)
-    return Workspace(folder, {name: value for name, _, value in pairs})
+    environment = {name: value for name, _, value in pairs}
+    return Workspace(folder, environment, linked=request.param == "symlink")
