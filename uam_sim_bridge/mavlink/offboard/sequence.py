@@ -118,16 +118,14 @@ class OffboardParameters(ParameterSet):
 class OffboardSequence:
     """The state machine.
 
-    `phase`; `armed_stamp` [s]: first time at which this flight was armed, None before; `reasons`:
-    the autopilot's answers to refused requests, with advice, newest last; `released_to`: who has
-    control in RELEASED, else ""; `let_go`: set by the owner when the autopilot must run its own
-    failsafe; OFFBOARD is then requested no more.
+    `phase`; `reasons`: the autopilot's answers to refused requests, with advice, newest last;
+    `released_to`: who has control in RELEASED, else ""; `let_go`: set by the owner when the
+    autopilot must run its own failsafe; OFFBOARD is then requested no more.
     """
 
     def __init__(self, parameters: OffboardParameters | None = None) -> None:
         self.parameters = (parameters or OffboardParameters()).validated()
         self.phase = Phase.WAITING
-        self.armed_stamp: float | None = None
         self.reasons: tuple[str, ...] = ()
         self.released_to = ""
         self.let_go = False
@@ -230,7 +228,7 @@ class OffboardSequence:
             return self._ask(time, Phase.OFFBOARD, Request.OFFBOARD)
         if not seen.armed:
             return self._ask(time, Phase.ARMING, Request.ARM)
-        self._fly(time)
+        self._fly()
         return None
 
     def rebooted(self, time: float) -> None:
@@ -290,9 +288,7 @@ class OffboardSequence:
             self.phase = Phase.STREAMING
         return None
 
-    def _fly(self, time: float) -> None:
-        if self.phase is not Phase.RELEASED:
-            self.armed_stamp = time
+    def _fly(self) -> None:
         self.phase, self._attempts, self.reasons = Phase.FLYING, 0, ()
         self.released_to, self._in_flight, self._regain_requests = "", True, 0
 
@@ -324,7 +320,7 @@ class OffboardSequence:
             self.phase = Phase.FAILED
             return None
         if seen.mode is Mode.OFFBOARD:
-            self._fly(time)
+            self._fly()
             return None
         if seen.intended not in (Mode.OFFBOARD, Mode.UNKNOWN):
             self._lost_link = False  # a person has chosen a mode since
