@@ -51,6 +51,13 @@ def test_a_manifest_has_exactly_the_dependencies_of_its_code(package):
     assert sorted(depends(MANIFESTS[package])) == sorted(KEYS.get(name, name) for name in needed)
 
 
+def test_two_packages_need_each_other_so_colcon_has_one():
+    """Without this circle they could be colcon packages of their own."""
+    assert "uam_msgs_py" in depends(MANIFESTS["uam_control"])
+    assert "uam_control" in depends(MANIFESTS["uam_msgs_py"])
+    assert [file.parent for file in ROOT.glob("*/package.xml")] == []
+
+
 def test_the_manifest_of_the_workspace_package_has_them_all():
     """`rosdep install --from-paths` reads only this one: the others lie within its folder."""
     every = {key for manifest in MANIFESTS.values() for key in depends(manifest)}

@@ -8,10 +8,14 @@ import shlex
 from pathlib import Path
 
 import pytest
+from pid_law import PidLaw
 
+from uam_control.laws import catalogue
 from uam_lab.cli.main import parser
+from uam_lab.compare import plan
 
-TEXT = (Path(__file__).resolve().parents[2] / "docs/commands.md").read_text()
+ROOT = Path(__file__).resolve().parents[2]
+TEXT = (ROOT / "docs/commands.md").read_text()
 SECTIONS = dict(re.findall(r"^## uam (\w+)\n(.*?)(?=^## )", TEXT, re.M | re.S))
 
 
@@ -38,3 +42,20 @@ def test_the_examples_of_a_command_parse(name):
     assert found
     for line in found:
         parser().parse_args(shlex.split(line))
+
+
+@pytest.mark.parametrize(
+    "file", [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md"))], ids=lambda file: file.name
+)
+def test_every_command_of_a_code_block_parses(file, monkeypatch):
+    """As `uam ...` or `.venv/bin/uam ...`, behind variables of the environment."""
+    for table in (catalogue.LAWS, plan.ROWS):  # the law of docs/extending.md, which adds it
+        monkeypatch.setitem(table, "pid", PidLaw)
+    blocks = re.findall(r"^ *```\w*\n(.*?)^ *```", file.read_text(), re.M | re.S)
+    lines = "\n".join(blocks).replace("\\\n", " ").splitlines()
+    for line in lines:
+        found = re.match(
+            r"\s*(?:\w+=\S+ )*(?:\.venv/bin/)?uam ([a-z]+(?: .*?)?)(?:\s+#.*| {2,}.*)?$", line
+        )
+        if found and found[1].split()[0] in commands():
+            parser().parse_args(shlex.split(found[1]))
