@@ -21,17 +21,14 @@ setup: $(STAMP)  ## virtual environment, dependencies and the project in .venv
 fly: setup       ## fly the pick-and-place mission; options: make fly ARGS="--controller asmc1"
 	@$(BIN)/uam fly $(ARGS)
 
-# Flights that fail on purpose are flown alone: they look at what is left on the machine. And those
-# that share two flights, flown at once, in one process.
-ALONE := $(patsubst %,tests/flights/test_%.py,ros_failures ros_flight recorded_scene report_again)
+# Nodes mostly wait for each other, so three files of tests/nodes run at once.
 PYTEST = $(BIN)/python -m pytest -m "not slow"
 
 test: setup      ## the tests but the slow ones; options: make test ARGS="tests/unit -x"
 	@$(if $(ARGS),$(BIN)/python -m pytest $(ARGS),\
 	$(PYTEST) -n 2 --dist loadfile tests/unit && \
-	$(PYTEST) -n 2 --dist loadfile tests/nodes tests/packaging && \
-	$(PYTEST) -n 2 --maxschedchunk 1 tests/flights tests/px4 $(ALONE:%=--ignore=%) && \
-	$(PYTEST) $(ALONE))
+	$(PYTEST) -n 3 --dist loadfile tests/nodes tests/packaging && \
+	$(PYTEST) -n 2 --dist loadgroup tests/flights tests/px4)
 
 slow: setup      ## the slow tests: whole missions, browser, PX4 if it is there; a quarter of an hour
 	@$(BIN)/python -m pip install --quiet --disable-pip-version-check -e ".[browser]"
