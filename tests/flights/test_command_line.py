@@ -15,7 +15,7 @@ position_controller:
 """
 
 OPTIONS = [
-    (["--scenario", "loop"], "unknown scenario 'loop'; there are: ", "hover, pick_and_place"),
+    (["--scenario", "loop"], "unknown scenario 'loop'; there are: ", ", pick_and_place, "),
     (["--scenario", "no.csv"], "scenario file no.csv does not exist", ""),
     (["--profile", "mine"], "unknown profile 'mine'; there are: ", "s500"),
     (["--controller", "pid"], "unknown controller 'pid'; there are: modular", ""),
@@ -45,10 +45,14 @@ TRAJECTORIES = [
     (f"{CSV_HEAD}\n{ROW.format(t=1)}\n{ROW.format(t=0.5)}\n", "line 3 column t", "increase"),
     (
         f"{CSV_HEAD},alpha_1\n{ROW.format(t=0)},0\n",
-        "line 1: alpha_1",
-        "s500_arm has: alpha_1",
+        "line 1: column alpha_2",
+        "is missing beside alpha_1",
     ),
-    (f"{CSV_HEAD},alpha_1,alpha_2,alpha_3\n", "column alpha_3", "s500_arm has: alpha_1"),
+    (
+        f"{CSV_HEAD},alpha_1,alpha_2,alpha_3\n",
+        "column 'alpha_3' is unknown",
+        "dyaw,alpha_1,alpha_2",
+    ),
 ]
 PROFILES = [
     ("position_controller: [1, 2\n", "line 2 column 1: not valid YAML", ""),

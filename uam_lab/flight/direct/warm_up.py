@@ -9,8 +9,11 @@ from __future__ import annotations
 import sys
 from collections.abc import Callable, Iterable, Iterator
 
+import numpy as np
+
 from uam_control.laws.catalogue import LAWS
 from uam_control.mission import load_scenario
+from uam_control.mission.polynomials import Polynomials
 from uam_control.mission.scenario import standing
 from uam_control.mission.trajectory import empty_motion
 from uam_control.profiles.profile import default_profile
@@ -56,6 +59,7 @@ def warm_up(laws: Iterable[str] = tuple(LAWS)) -> None:
         flight = DirectFlight(scenario, profile, vehicle, 0.0, seed=1, faults=faults)
         for _ in range(TICKS):
             flight.tick()
+    Polynomials(np.array([0.0, 1.0]), np.zeros((1, 6, 4))).rows(np.zeros(2))
     curve = load_scenario("circle")
     curve.trajectory(standing(curve.arm_start)).write(4.0, empty_motion(len(curve.arm_start)))
     companion.warm_up()  # the stand-in's descent, which a flight without failures does not call
