@@ -30,6 +30,7 @@ from uam_control.mission.braking import Braking
 from uam_control.mission.flatness import write_attitude
 from uam_control.mission.mission_parameters import MissionParameters
 from uam_control.mission.plans import BASE, PEAK, RAMP, Plan, still
+from uam_control.mission.polynomials import hermite
 from uam_control.mission.quintics import quintic, quintic_at
 from uam_control.mission.route import SINK
 from uam_control.mission.trajectory import Trajectory, empty_motion
@@ -115,6 +116,27 @@ class Segment:
         motion[CHI_DOT:, arrived] = 0.0
 
 
+class WayBack:
+    """Offset from the path that decays to zero, with no step in value, rate, acceleration or jerk.
+
+    `end` [s]: stamp at which it is zero. PEAK, HARDEST: from rest, largest rate and acceleration,
+    times length / way and length^2 / way.
+    """
+
+    PEAK, HARDEST = 35.0 / 16.0, 7.5132
+
+    def __init__(self, stamp: float, offset: np.ndarray, length: float) -> None:
+        """Begin at `stamp` [s] with offset (5, 6 + n); end at rest after `length` [s]."""
+        rows = np.zeros((SNAP, 2, offset.shape[1]))
+        rows[:, 0] = offset[:SNAP]
+        self._stamp, self.end = stamp, stamp + length
+        self._curve = hermite(np.array([0.0, length]), rows)
+
+    def write(self, stamp: float, motion: np.ndarray) -> None:
+        """Write the offset (5, 6 + n) at `stamp` [s]."""
+        self._curve.write(stamp - self._stamp, motion)
+
+
 class Guidance:
     """Writes the reference of a flight; the mission calls `stop`, `go_on`, `descend` and `rest`.
 
@@ -146,7 +168,7 @@ class Guidance:
         self._rates = 1.0, 0.0, 0.0, 0.0  # derivatives of the scenario time
         self._path = np.zeros_like(self.motion)
         self._arm: Segment | None = None  # in place of the path's, while holding
-        self._away: Segment | None = None  # offset from the path, on the way back to it
+        self._away: WayBack | None = None  # offset from the path, on the way back to it
         self._brake: Braking | None = None  # in place of the path, after a release
         self._return_at = math.inf  # stamp [s] at which the brake is over and the return begins
         self._go_on_at = math.inf  # stamp [s] at which the arm is back and the path continues
@@ -374,12 +396,12 @@ class Guidance:
         way, speed = (float(np.linalg.norm(offset[row, POSITION])) for row in (CHI, CHI_DOT))
         length = max(
             p.stop_time,
-            PEAK * way / p.travel_speed,
+            WayBack.PEAK * way / p.travel_speed,
+            math.sqrt(WayBack.HARDEST * way / p.stop_acceleration),
             2.0 * RAMP * speed / p.stop_acceleration,
-            PEAK * abs(float(offset[CHI, YAW])) / p.turn_rate,
+            WayBack.PEAK * abs(float(offset[CHI, YAW])) / p.turn_rate,
         )
-        goal = np.zeros_like(offset[CHI])
-        self._away = Segment(stamp, offset, goal, np.full_like(goal, length))
+        self._away = WayBack(stamp, offset, length)
 
     def _at_rest(self, stow: bool) -> tuple[np.ndarray, np.ndarray]:
         """Return goal and duration [s] of each coordinate to rest; stow: the arm to `stowed`."""
