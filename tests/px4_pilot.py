@@ -27,7 +27,8 @@ LOW_BATTERY = {
 class Pilot:
     """Sends sticks in their middle; chooses a mode, or drains the battery, `at` s after arming.
 
-    `modes`: (time since arming [s], mode) of every change; `acted` [s] or None.
+    `modes`: (time since arming [s], mode) of every change, as PX4 reports them to a ground station:
+    once a second; `acted` [s] or None.
     """
 
     def __init__(self, system: int, at: float, mode: Mode | None) -> None:
@@ -88,19 +89,19 @@ class Pilot:
             return
         mode = Mode.from_custom_mode(message.custom_mode)
         if not self.modes or self.modes[-1][1] is not mode:
-            self.modes.append((self._since, mode))
+            self.modes.append((self.since, mode))
 
     @property
-    def _since(self) -> float:
+    def since(self) -> float:
         """Time since arming [s], negative before."""
         return -1.0 if self._armed is None or self._now is None else self._now - self._armed
 
     def _act(self) -> None:
         offboard = self.modes and self.modes[-1][1] is Mode.OFFBOARD
         due = self._at if self.acted is None else self.acted + AGAIN
-        if not offboard or self._since < due or self._since > self._at + 5 * AGAIN:
+        if not offboard or self.since < due or self.since > self._at + 5 * AGAIN:
             return
-        self.acted = self._since if self.acted is None else self.acted
+        self.acted = self.since if self.acted is None else self.acted
         if self._mode is None:
             for name, value in LOW_BATTERY.items():
                 self._set(name, value)
