@@ -15,7 +15,7 @@ from uam_control.supervision import (
 from uam_control.supervision.checks import Checks
 from uam_control.vehicle import load_description
 
-S500 = SupervisionParameters.from_mapping(load_description().node_parameters()["mission"], 2)
+S500 = SupervisionParameters.among(load_description().node_parameters()["mission"], 2)
 ARM_START = (0.0, 1.5)
 KNOWN = {"mocap_age": 0.01, "joint_age": 0.01, "controller_age": 0.01, "autopilot_age": 0.1}
 

@@ -32,7 +32,7 @@ from uam_control.vehicle import load_description
 
 DOCS = Path(__file__).resolve().parents[2] / "docs" / "supervision.md"
 
-S500 = SupervisionParameters.from_mapping(load_description().node_parameters()["mission"], 2)
+S500 = SupervisionParameters.among(load_description().node_parameters()["mission"], 2)
 
 
 def mermaid() -> str:

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 import yaml
 
+from uam_control.grasp.kinematics import magnet_position
 from uam_control.mission import load_scenario
 from uam_control.profiles.profile import default_profile
 from uam_control.settings import configuration
@@ -122,11 +123,22 @@ def test_what_is_missing_is_named(key):
     ],
 )
 def test_what_contradicts_the_mjcf_is_refused_in_one_line(change, message):
-
-    described = describe(changed(change), S500.file)
+    numbers = changed(change)
+    del numbers["arm"]  # its number of links would be refused first
+    described = describe(numbers, S500.file)
     with pytest.raises(VehicleError) as error:
         MujocoPlant(Vehicle.of(described), 0.0, 1)
     assert message in str(error.value) and "\n" not in str(error.value)
+
+
+@pytest.mark.parametrize("name", ["s500_arm", "s500_arm3", "hexa_arm"])
+def test_the_arm_reaches_as_far_as_in_the_mjcf(name):
+    vehicle = Vehicle.load(name)
+    arm, angles = vehicle.description.arm, np.linspace(0.3, 0.8, len(vehicle.description.joints))
+    plant = MujocoPlant(vehicle, 0.2, 1, tuple(angles))
+    chi = np.concatenate([plant.data.qpos[:3], np.zeros(3), angles])
+    face = plant.data.site_xpos[plant.model.site("magnet_face").id]
+    assert magnet_position(chi, arm.mount, arm.links, arm.magnet) == pytest.approx(face, abs=1e-6)
 
 
 def test_a_range_of_the_mjcf_may_repeat_but_not_contradict(tmp_path):

@@ -5,14 +5,26 @@ from __future__ import annotations
 
 import math
 from collections import deque
-from dataclasses import dataclass
 
 import numpy as np
 
 from uam_control.coordinates import ALPHA, ARM, ATTITUDE, CHI, CHI_DOT, YAW, Z
+from uam_control.grasp import Grasp, GraspDecision
 from uam_control.mission.feasibility import Feasibility, in_words
 from uam_control.mission.guidance import Guidance
+from uam_control.mission.mission_output import (
+    ABORTED,
+    DRY_RUN,
+    GOAL,
+    HOLD,
+    LAND,
+    LANDED,
+    RELEASED,
+    WAITING,
+    MissionOutput,
+)
 from uam_control.mission.mission_parameters import MissionParameters, StartParameters
+from uam_control.mission.payload_watch import PayloadWatch
 from uam_control.mission.plans import GoalPose, PlanRefused, Points, check
 from uam_control.mission.scenario import Scenario
 from uam_control.mission.trajectory import empty_reference
@@ -32,34 +44,7 @@ from uam_control.supervision import (
 )
 from uam_control.vehicle import VehicleDescription
 
-# phases in addition to those of a scenario
-WAITING, HOLD, LAND, LANDED, ABORTED = "waiting", "hold", "land", "landed", "aborted"
-RELEASED, DRY_RUN, GOAL = "released", "dry run", "goal"
-PHASES = (WAITING, HOLD, LAND, LANDED, ABORTED, RELEASED, DRY_RUN, GOAL)
 _OLDEST = 0.02  # [s] largest age of a state; the time between two steps is longer after a gap
-
-
-@dataclass
-class MissionOutput:
-    """Output of the mission at one tick.
-
-    reference (3, 6 + n), reused by the next step; flying: position and attitude are controlled;
-    time [s]: since take-off, negative before; arm: desired arming of the autopilot; regains: number
-    of commands so far to regain a released vehicle; state, cause: of the supervisor; abort_reason:
-    why the scenario was aborted, "" if not.
-    """
-
-    reference: np.ndarray
-    flying: bool = False
-    time: float = -1.0
-    phase: str = WAITING
-    magnet: bool = False
-    arm: bool = False
-    regains: int = 0
-    done: bool = False
-    abort_reason: str = ""
-    state: State = State.GROUNDED
-    cause: str = ""
 
 
 class Mission:
@@ -98,6 +83,8 @@ class Mission:
         self._parameters = parameters
         self._requests: deque[tuple[OperatorCommand, GoalPose | Points | None]] = deque()
         self._guidance: Guidance | None = None
+        self._watch: PayloadWatch | None = None
+        self._over = ""  # why the mission lands before its end
         self._takeoff = self._ground = 0.0
         self._half_down = math.inf  # stamp [s] from which a descent may detect touchdown
         self._at_rest_since: float | None = None
@@ -169,11 +156,26 @@ class Mission:
             self._check_reference(parameters)
         if self._guidance is not None:
             self._guidance.configure(parameters)
+        if self._watch is not None:
+            self._watch.configure(parameters)
 
     @property
     def changes(self) -> list[StateTransition]:
         """Return all transitions so far, in order."""
         return self._supervisor.changes
+
+    @property
+    def grasps(self) -> list[GraspDecision]:
+        """Return all decisions about the payload so far, in order."""
+        return self._watch.decisions if self._watch is not None else []
+
+    @property
+    def delay(self) -> float:
+        """Return the time [s] by which the scenario's clock is behind, by holds and grasps."""
+        guidance, output = self._guidance, self.output
+        if guidance is None or output.state is State.DISARMED:
+            return 0.0
+        return max(0.0, output.time - guidance.scenario_time)
 
     @property
     def beyond(self) -> str:
@@ -201,6 +203,7 @@ class Mission:
         if output.state is not State.DISARMED:
             if guidance is not None:
                 guidance.advance(stamp)
+                self._watch.advance(stamp)
             seen = self._observe(stamp, state, armed_since, readings or Readings())
             seen.authority, self._seen = authority or Authority(), seen
             command, goal = self._requests.popleft() if self._requests else (None, None)
@@ -219,6 +222,7 @@ class Mission:
                 elif event is Event.RESUME:
                     guidance.go_on(stamp)
             self._follow(stamp, decision)
+            self._watch_payload(stamp, seen)
             if output.state is State.GROUNDED and not output.arm:
                 self._wait(state)
             if output.state is State.FAILSAFE and self._end is None:
@@ -318,6 +322,7 @@ class Mission:
         low = state[CHI, Z] < self._ground + p.touchdown_height
         seen.on_ground = bool(low and abs(state[CHI_DOT, Z]) < p.touchdown_speed)
         landing, time = self.scenario.landing, guidance.scenario_time
+        seen.end_mission = self._over
         seen.landing_due = time >= landing.at and not guidance.planned
         seen.off_path, seen.arrived = guidance.planned, guidance.arrived(stamp)
         if time >= landing.at + 0.5 * landing.duration or stamp >= self._half_down:
@@ -325,6 +330,18 @@ class Mission:
         late = landing.at + landing.duration + p.touchdown_timeout
         seen.overdue = time > late or stamp > guidance.end + p.touchdown_timeout
         return seen
+
+    def _watch_payload(self, stamp: float, seen: Observation) -> None:
+        """Step the executive of the grasps while the scenario is flown."""
+        output, watch = self.output, self._watch
+        if watch is None:
+            return
+        if output.state is not State.FLYING or self._guidance.planned:
+            watch.interrupt()
+            return
+        self._over = self._over or watch.step(stamp, seen.state, seen.readings)
+        if watch.decisions:
+            _, output.grasp, output.attempt, output.grasp_text = watch.decisions[-1]
 
     def _at_rest(self, stamp: float, on_ground: bool) -> bool:
         """Return whether the vehicle has been on the ground for touchdown_time."""
@@ -389,6 +406,7 @@ class Mission:
             self._parameters,
             self.scenario.landing.at + self.scenario.landing.duration,
         )
+        self._watch = PayloadWatch(self.scenario, self._guidance, self._parameters)
         self._guidance.advance(stamp)
         self._guidance.write(stamp)
         self.output.time = 0.0
@@ -413,10 +431,10 @@ class Mission:
 
     def _magnet_on(self, decision: Decision) -> bool:
         """Return the overriding value until the scenario switches, else the scenario's value."""
-        desired = self._scenario_magnet()
+        desired = self._scenario_magnet() or (self._watch is not None and self._watch.grip)
         if self._magnet is not None:
             on, before = self._magnet
             if desired == before:
                 return on
             self._magnet = None
-        return desired and decision.keep_magnet
+        return desired and decision.keep_magnet and self.output.grasp is not Grasp.GIVEN_UP

@@ -7,7 +7,7 @@ of the controllers never jumps.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 import numpy as np
 
@@ -137,6 +137,10 @@ class WayBack:
         self._curve.write(stamp - self._stamp, motion)
 
 
+def _unshifted(motion: np.ndarray) -> None:
+    """Leave a motion (5, 6 + n) as it is."""
+
+
 class Guidance:
     """Writes the reference of a flight; the mission calls `stop`, `go_on`, `descend` and `rest`.
 
@@ -174,6 +178,7 @@ class Guidance:
         self._go_on_at = math.inf  # stamp [s] at which the arm is back and the path continues
         self._plans: dict[bool, Plan] = {}  # in place of the path; True: of the base, False: arm
         self._last: Segment | None = None  # in place of the path, until the end of the flight
+        self.shift: Callable[[np.ndarray], None] = _unshifted  # of the path, see `Shift.add`
 
     def configure(self, parameters: MissionParameters) -> None:
         """Use `parameters` (validated) from the next manoeuvre on."""
@@ -232,6 +237,24 @@ class Guidance:
             p.attitude_acceleration_max,
             self.reference,
         )
+
+    def pace(self, stamp: float, rate: float) -> None:
+        """Change the rate [1] of the scenario's clock: 1 on, 0 stop, -1 back along the path.
+
+        No effect while the path is left, or about to go on after a stop.
+        """
+        going_on = self._go_on_at != math.inf or self._away is not None
+        if rate != self._clock.goal and not self._plans and not going_on:
+            self._clock.change(stamp, rate, self._ramp_length())
+
+    def replace(self, trajectory: Trajectory) -> None:
+        """Follow `trajectory` from now on; it must equal the present one at the scenario time."""
+        self._trajectory = trajectory
+
+    @property
+    def trajectory(self) -> Trajectory:
+        """Return the path as a function of the scenario time."""
+        return self._trajectory
 
     @property
     def planned(self) -> bool:
@@ -377,6 +400,11 @@ class Guidance:
     def _write_path(self, path: np.ndarray) -> None:
         """Write the path (5, 6 + n) at the scenario time, by the chain rule for its clock."""
         self._trajectory.write(self.scenario_time, path)
+        self._scale(path)
+        self.shift(path)
+
+    def _scale(self, path: np.ndarray) -> None:
+        """Apply the derivatives of the scenario's clock to the path (5, 6 + n)."""
         one, two, three, four = self._rates
         if one == 1.0 and two == three == four == 0.0:
             return

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from uam_control.grasp import GraspParameters
 from uam_control.settings.parameter_set import ParameterSet, number, switch, vector
 from uam_control.supervision import SupervisionParameters
 from uam_control.vehicle import GRAVITY
@@ -82,9 +83,15 @@ class FlatnessParameters(ParameterSet):
 
 @dataclass(frozen=True)
 class MissionParameters(
-    FeasibilityLimits, PlanLimits, BrakeLimits, FlatnessParameters, SupervisionParameters
+    GraspParameters,
+    FeasibilityLimits,
+    PlanLimits,
+    BrakeLimits,
+    FlatnessParameters,
+    SupervisionParameters,
 ):
-    """Times and limits of start, take-off, touchdown, plans, braking, and of the supervisor."""
+    """Times and limits of start, take-off, touchdown, plans, braking, grasps, and of the
+    supervisor."""
 
     start_speed: float = number(0.3, "largest speed at the start", "m/s", 0.01, 5.0)
     start_arm_error: float = number(

@@ -7,6 +7,7 @@ from diagnostic_msgs.msg import DiagnosticArray
 from std_msgs.msg import Bool
 
 from uam_control.coordinates import ARM
+from uam_control.grasp import Grasp
 from uam_control.laws.catalogue import DEFAULT
 from uam_control.mission import (
     Feasibility,
@@ -150,11 +151,14 @@ class MissionNode(UamNode):
             self._arm = output.arm
             self._arming.publish(Bool(data=bool(output.arm)))
         magnet, regains = bool(output.magnet), output.regains
-        now = (output.phase, output.done, output.state, output.cause, magnet, regains)
+        decisions = len(self._mission.grasps)
+        now = (output.phase, output.done, output.state, output.cause, magnet, regains, decisions)
         if now == self._published and 0 < self._due - stamp <= STATUS_PERIOD:
             return
         if now[:4] != self._published[:4]:
             self._log()
+        if decisions and now[-1:] != self._published[-1:]:
+            self._log_grasp()
         self._published, self._due = now, stamp + STATUS_PERIOD
         self._status.publish(self.status.to_message(stamp))
         self._publish_path(stamp)
@@ -180,6 +184,11 @@ class MissionNode(UamNode):
             tilt=errors.tilt,
             answers=self._planners.answers,
             answer=self._planners.answer,
+            grasp=output.grasp.value,
+            attempt=output.attempt,
+            decisions=len(self._mission.grasps),
+            grasp_text=output.grasp_text,
+            delay=self._mission.delay,
         )
 
     def _publish_path(self, stamp: int) -> None:
@@ -204,6 +213,14 @@ class MissionNode(UamNode):
         else:
             self.get_logger().info(text)
 
+    def _log_grasp(self) -> None:
+        output = self._mission.output
+        text = f"payload {output.grasp.value}, approach {output.attempt}: {output.grasp_text}"
+        if output.grasp in (Grasp.GIVEN_UP, Grasp.LOST, Grasp.STUCK):
+            self.get_logger().warning(text)
+        else:
+            self.get_logger().info(text)
+
     def diagnose(self) -> tuple[bytes, str, dict[str, object]]:
         output, beyond = self._mission.output, self._mission.beyond
         odd = output.state in (State.HOLDING, State.RELEASED)
@@ -216,6 +233,7 @@ class MissionNode(UamNode):
             "state": output.state.value,
             "cause": output.cause,
             "beyond a limit": beyond,
+            "payload": f"{output.grasp.value} {output.grasp_text}".strip(),
             "answer to the last goal or trajectory": self._planners.answer,
         }
         return level, summary, values

@@ -33,6 +33,8 @@ class MissionInputs:
         self._node = node
         self._supervisor, self._inputs = supervisor, supervisor.inputs
         self._keep(topics.MOCAP, self._on_mocap)
+        self._keep(topics.PAYLOAD, self._on_payload)
+        self._keep(topics.THRUST, self._on_thrust, stamp_of)
         self._keep(topics.JOINTS, self._on_joints)
         self._keep(topics.AUTOPILOT_BATTERY, self._on_battery)
         node.listen(topics.ARM_TEMPERATURE, self._on_temperature, required=False)
@@ -62,6 +64,15 @@ class MissionInputs:
     def _on_mocap(self, data: bytes) -> None:
         stamp, *pose = read_pose(data)  # refuses a pose that the estimator cannot use
         self._inputs.mocap(stamp / SECOND, *pose)
+
+    def _on_payload(self, data: bytes) -> None:
+        stamp, position, _ = read_pose(data)
+        self._inputs.payload(stamp / SECOND, position)
+
+    def _on_thrust(self, data: bytes) -> None:
+        _, _, values = read_values(data, "effort")
+        if len(values):
+            self._inputs.lift(float(values[0]))
 
     def _on_joints(self, data: bytes) -> None:
         stamp, names, effort = read_values(data, "effort")

@@ -142,9 +142,12 @@ class ParameterSet:
         }
 
     @classmethod
-    def among(cls, values: Mapping[str, Any]) -> Self:
-        """Return a validated set of those `values` that belong to it; ignore the others."""
-        return cls.from_mapping({k: v for k, v in values.items() if k in cls.specs()})
+    def among(cls, values: Mapping[str, Any], axes: int = 0) -> Self:
+        """Return a validated set of those `values` that belong to it; ignore the others.
+
+        axes: number of entries of a per-axis vector.
+        """
+        return cls.from_mapping({k: v for k, v in values.items() if k in cls.specs()}, axes)
 
     def validated(self, axes: int = 0) -> Self:
         """Return this set with floats and tuples of floats; raise ParameterError if one is invalid.

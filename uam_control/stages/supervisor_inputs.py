@@ -45,6 +45,10 @@ class SupervisorInputs:
         """Read a pose of `stamp` [ns]: position (3,) [m, ENU], quaternion (4,) [w x y z]."""
         self.inputs.mocap(stamp / SECOND, position, quaternion)
 
+    def payload(self, stamp: int, position: np.ndarray, quaternion: np.ndarray) -> None:
+        """Read a pose of the payload's grip point, as `mocap` does."""
+        self.inputs.payload(stamp / SECOND, position)
+
     def joints(
         self, stamp: int, alpha: np.ndarray, alpha_dot: np.ndarray, effort: np.ndarray
     ) -> None:

@@ -29,6 +29,7 @@ class Inputs:
         """Forget all values: stamps of a new simulation follow."""
         self._readings = Readings()
         self._mocap = self._joints = self._autopilot = math.nan  # stamps [s]
+        self._payload = math.nan  # stamp [s]
         self._moved = math.nan  # stamp [s] of the first pose like the newest
         self._repeats = Repeats()
         self._temperatures: dict[str, float] = {}
@@ -53,6 +54,15 @@ class Inputs:
         """Store joint readings at `stamp` [s]; effort (n,): measured torques [N m]."""
         self._joints = stamp
         self._readings.joint_effort = np.array(effort, dtype=float)
+
+    def payload(self, stamp: float, position: np.ndarray) -> None:
+        """Store the grip point (3,) [m, world] of the payload, exposed at `stamp` [s]."""
+        self._payload = stamp
+        self._readings.payload_position[:] = position
+
+    def lift(self, thrust: float) -> None:
+        """Store the filtered collective thrust [N]."""
+        self._readings.lift = thrust
 
     def temperature(self, joint: str, degrees: float) -> None:
         """Store the temperature [deg C] of a joint's servo."""
@@ -101,6 +111,7 @@ class Inputs:
         readings.mocap_still = stamp - self._moved
         readings.joint_age = stamp - self._joints
         readings.autopilot_age = stamp - self._autopilot
+        readings.payload_age = stamp - self._payload
         readings.controller_age = stamp - self._oldest
         readings.pose_controller_age = stamp - self._oldest_of_pose
         return readings

@@ -46,7 +46,8 @@ class Readings:
     bridge last reported a connection to the autopilot; round_trip [s]: of the autopilot's link.
     missed_ticks: within the last second. temperature: of the hottest servo [deg C]. joint_effort
     (n,): measured [N m], empty where not known. gains (3,): largest adapted gain of position,
-    attitude, arm.
+    attitude, arm. payload_position (3,) [m]: grip point of the payload, by its newest mocap pose;
+    payload_age [s]: of that pose. lift [N]: filtered collective thrust.
     """
 
     battery: float = math.nan
@@ -62,6 +63,9 @@ class Readings:
     mocap_still: float = math.nan
     round_trip: float = math.nan
     mocap_position: np.ndarray = field(default_factory=lambda: np.full(3, math.nan))
+    payload_position: np.ndarray = field(default_factory=lambda: np.full(3, math.nan))
+    payload_age: float = math.nan
+    lift: float = math.nan
 
 
 @dataclass
@@ -72,7 +76,8 @@ class Observation:
     armed: by the autopilot's report. authority: who has control. ready: the mission allows the
     take-off. landing_due: the scenario's landing has begun. on_ground: low and slow now; touchdown:
     on the ground for touchdown_time; overdue: no touchdown in the allowed time. off_path: a goal or
-    trajectory replaces the scenario's path; arrived: its end is reached.
+    trajectory replaces the scenario's path; arrived: its end is reached. end_mission: why the
+    mission lands before its end, "" if it does not.
     """
 
     state: np.ndarray
@@ -87,4 +92,5 @@ class Observation:
     overdue: bool = False
     off_path: bool = False
     arrived: bool = False
+    end_mission: str = ""
     readings: Readings = field(default_factory=Readings)

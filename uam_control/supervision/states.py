@@ -46,6 +46,7 @@ class Event(Enum):
     REGAINED = "OFFBOARD is back"
     REGAINED_ON_GROUND = "OFFBOARD is back, on the ground"
     GIVEN_UP = "aborted before take-off"
+    MISSION_OVER = "the mission ends early"
     HOLD = "hold by command"
     RESUME = "resume by command"
     GOAL = "goal by command"
@@ -83,6 +84,7 @@ TRANSITIONS = (
     Transition(_S.FLYING, _E.GOAL, _S.FLYING),
     Transition(_S.FLYING, _E.RESUME, _S.FLYING),
     Transition(_S.FLYING, _E.LAND_LIMIT, _S.LANDING),
+    Transition(_S.FLYING, _E.MISSION_OVER, _S.LANDING),
     Transition(_S.FLYING, _E.LAND, _S.LANDING),
     Transition(_S.FLYING, _E.LANDING_DUE, _S.LANDING),
     Transition(_S.FLYING, _E.HARD_LIMIT, _S.FAILSAFE),

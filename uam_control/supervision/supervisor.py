@@ -110,7 +110,7 @@ class Supervisor:
     def _as_usual(self, seen: Observation) -> bool:
         """Return whether a tick without finding and command needs no event: flying, no landing."""
         flying = self.state is State.FLYING and seen.armed
-        due = seen.landing_due or seen.arrived
+        due = seen.landing_due or seen.arrived or seen.end_mission
         return flying and not due and not seen.authority.released_to
 
     @property
@@ -225,6 +225,8 @@ class Supervisor:
                 yield Event.RESUME, Event.RESUME.value
             if self._arm and seen.ready and self._checks.quiet:
                 yield _planned(Event.READY)
+        if seen.end_mission:
+            yield Event.MISSION_OVER, seen.end_mission
         if seen.landing_due:
             yield _planned(Event.LANDING_DUE)
         if seen.arrived:

@@ -86,13 +86,24 @@ class Joint:
 
 
 @dataclass(frozen=True)
+class Arm:
+    """Geometry of an arm that turns about the body's y axis: mount (3,) [m, FLU], links (n,) [m],
+    the last one to the magnet's pivot, magnet [m]: pivot to face."""
+
+    mount: tuple[float, float, float]
+    links: tuple[float, ...]
+    magnet: float
+
+
+@dataclass(frozen=True)
 class VehicleDescription:
     """The content of the file config/vehicle/NAME.yaml.
 
     file: that file; model: its MJCF file. mass: with arm, without payload [kg]; gravity [m/s^2];
     control_period [s]. profiles: parameter files by control law, see `profile`; autopilot:
     the file of config/autopilot with the autopilot's gains; autopilot_gains: its content, by
-    PX4's names. numbers: the whole file, including the values that only the plant reads.
+    PX4's names. arm: None if the file has no such section. numbers: the whole file, including the
+    values that only the plant reads.
     """
 
     name: str
@@ -105,6 +116,7 @@ class VehicleDescription:
     rotors: tuple[Rotor, ...]
     servo: Servo
     joints: tuple[Joint, ...]
+    arm: Arm | None
     profiles: dict[str, str]
     autopilot: str
     autopilot_gains: dict[str, float]
@@ -193,6 +205,7 @@ class VehicleDescription:
                     _rounded_down(min(-joint.low, joint.high)) for joint in self.joints
                 ],
                 "joint_effort_hold": [self.servo.effort_limit] * len(self.joints),
+                **self._arm_parameters(),
             },
             "mavlink_bridge": {
                 "rotor_thrust_max": self.rotor_thrust,
@@ -209,6 +222,12 @@ class VehicleDescription:
         gains = self.autopilot_gains
         pairs = [(gains.get(f"MC_{axis}RATE_I", 0.0), gains[f"MC_{axis}RATE_P"]) for axis in AXES]
         return [round(integral / proportional, 6) for integral, proportional in pairs]
+
+    def _arm_parameters(self) -> dict[str, Any]:
+        if self.arm is None:
+            return {}
+        mount, links = list(self.arm.mount), list(self.arm.links)
+        return {"arm_mount": mount, "arm_links": links, "magnet_length": self.arm.magnet}
 
 
 def _rounded_down(angle: float) -> float:

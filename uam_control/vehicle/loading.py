@@ -11,6 +11,7 @@ from uam_control.settings.section import Section, read_section
 from uam_control.vehicle.description import (
     AXES,
     SERVO_MODES,
+    Arm,
     Joint,
     Rotor,
     RotorModel,
@@ -56,6 +57,7 @@ def describe(document: dict[str, Any], file: Path) -> VehicleDescription:
         rotors=tuple(_rotor(entry) for entry in rotor.entries("layout")),
         servo=Servo(*map(servo.positive, ("stall_torque", "no_load_speed", "effort_limit"))),
         joints=tuple(_joint(entry) for entry in top.entries("joints")),
+        arm=_arm(top, len(top.entries("joints"))),
         profiles={law: profiles.text(law) for law in profiles.values},
         autopilot=top.text("autopilot"),
         autopilot_gains=_autopilot_gains(top),
@@ -110,6 +112,13 @@ def _joint(entry: Section) -> Joint:
             f"{entry.where}.stowed_deg: {entry.values['stowed_deg']} is outside the joint's range"
         )
     return Joint(entry.text("name"), low, high, stowed)
+
+
+def _arm(top: Section, joints: int) -> Arm | None:
+    if "arm" not in top.values:
+        return None
+    arm = top.section("arm")
+    return Arm(arm.numbers("mount", 3), arm.numbers("links", joints), arm.positive("magnet"))
 
 
 def _check_names(described: VehicleDescription) -> None:

@@ -19,7 +19,7 @@ from uam_lab.flight.flight_settings import ONLOOKERS, FlightSettings
 from uam_lab.flight.observer import Observer
 from uam_lab.processes.interrupts import Interrupts
 from uam_lab.results import metrics
-from uam_lab.results.outcome import Outcome, transitions
+from uam_lab.results.outcome import Outcome, grasp_decisions, transitions
 from uam_lab.results.result_folder import ResultFolder
 from uam_lab.results.timeseries import Series
 from uam_sim_bridge.faults import PROCESS, Schedule
@@ -108,6 +108,7 @@ def fly(trial: Trial) -> Outcome:
         abort_reason=flight.mission.output.abort_reason,
         failure=flight.ended_by,
         transitions=transitions(flight.mission.changes),
+        grasps=grasp_decisions(flight.mission.grasps, flight.mission.changes),
         faults=flight.fault_records,
     )
 
@@ -146,6 +147,7 @@ def figures_of(trial: Trial, outcome: Outcome, abort_reason: str) -> dict[str, A
         "landing_point": scenario.landing_point,
         "abort_reason": abort_reason,
         "transitions": outcome.transitions,
+        "grasps": outcome.grasps,
         "faults": outcome.faults,
     }
     return metrics.compute(outcome.series, info)

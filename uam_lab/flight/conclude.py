@@ -68,6 +68,7 @@ def complete(
         "missed_ticks": outcome.missed_ticks,
         "parameter_changes": outcome.parameter_changes,
         "transitions": outcome.transitions,
+        "grasps": outcome.grasps,
         "faults": outcome.faults,
     }
     write_json(folder.info, info)

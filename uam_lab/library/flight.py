@@ -12,7 +12,7 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from uam_control.mission.flight_sequence import PHASES
+from uam_control.mission.mission_output import PHASES
 from uam_control.profiles.profile import load_profile
 from uam_control.settings import configuration
 from uam_control.supervision import State

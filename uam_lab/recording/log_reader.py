@@ -20,13 +20,13 @@ from rclpy.serialization import deserialize_message
 
 from uam_control.coordinates import ALPHA, ARM, ATTITUDE, ROLL
 from uam_control.mission import Scenario
-from uam_control.mission.flight_sequence import ABORTED, LANDED, WAITING
+from uam_control.mission.mission_output import ABORTED, LANDED, WAITING
 from uam_control.supervision import State
 from uam_lab.recording import fault_records as fault_log
 from uam_lab.recording.logged_topics import ADAPTATION, SECOND, Log, StampedRows
 from uam_lab.recording.mcap_reader import UnreadableLog
 from uam_lab.results import timeseries
-from uam_lab.results.outcome import transition
+from uam_lab.results.outcome import grasp_decision, transition
 from uam_lab.results.timeseries import SUBSYSTEMS, Columns, FlightTable, Series, gain_columns
 from uam_msgs_py.messages import topics
 from uam_msgs_py.messages.parameter_changes import ParameterChange
@@ -74,13 +74,14 @@ class References:
 @dataclass(frozen=True)
 class LoggedFlight:
     """Content of a log. series: table of the ticks; done: the mission ended; abort_reason: of the
-    mission; parameter_changes, transitions, faults: in order; wall_s: wall time [s]."""
+    mission; parameter_changes, transitions, grasps, faults: in order; wall_s: wall time [s]."""
 
     series: Series
     done: bool
     abort_reason: str
     parameter_changes: list[dict[str, Any]]
     transitions: list[dict[str, Any]]
+    grasps: list[dict[str, Any]]
     faults: list[dict[str, Any]]
     wall_s: float
 
@@ -134,7 +135,9 @@ def read_flight(
     wall = log.wall_seconds(topics.TRUTH_STATE)
     faults = fault_log.records(log.messages(topics.FAULTS), takeoff)
     series = recording.series(info)
-    return LoggedFlight(series, end is not None, abort_reason, changes, states, faults, wall)
+    decided = grasps(statuses, takeoff)
+    ended = end is not None
+    return LoggedFlight(series, ended, abort_reason, changes, states, decided, faults, wall)
 
 
 def _last_of_all(last: int, truth: np.ndarray) -> int:
@@ -223,6 +226,16 @@ def transitions(
     return found
 
 
+def grasps(statuses: Sequence[tuple[int, MissionStatus]], takeoff: int) -> list[dict[str, Any]]:
+    """Return the decisions about the payload, see `outcome.grasp_decision`."""
+    found = []
+    for (_, before), (stamp, now) in pairwise(statuses):
+        if now.decisions != before.decisions and now.decisions:
+            time = (stamp - takeoff) / SECOND
+            found.append(grasp_decision(time, now.grasp, now.attempt, now.grasp_text))
+    return found
+
+
 def phases(
     ticks: np.ndarray,
     time: np.ndarray,
@@ -237,6 +250,7 @@ def phases(
     """
     left = any(
         status.state in (State.HOLDING.value, State.RELEASED.value)
+        or status.delay > 0.0
         or (status.state == State.LANDING.value and status.abort_reason)
         for _, status in statuses
     )

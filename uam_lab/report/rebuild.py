@@ -50,6 +50,7 @@ def rebuild(directory: Path, out: Path, scenario: str | None = None) -> dict[str
         notes=[note for note in before.get("notes") or [] if not note.startswith(PARTIAL)],
         parameter_changes=flight.parameter_changes,
         transitions=flight.transitions,
+        grasps=flight.grasps,
         faults=flight.faults,
     )
     if not flight.done:

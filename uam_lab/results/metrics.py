@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 
 from uam_control.coordinates import ARM, ATTITUDE, POSITION
+from uam_control.grasp import Grasp
 from uam_lab.results import phase_errors
 from uam_lab.results.timeseries import SUBSYSTEMS, Series
 
@@ -66,7 +67,8 @@ def compute(
     """Return the content of metrics.json.
 
     info: PASSED_ON, `wall_s`, `abort_reason` ("" or None without an abort); optionally
-    `transitions` (of the supervisor, see `outcome.transition`), `faults`, `drop_point` [x, y] and
+    `transitions` (of the supervisor, see `outcome.transition`), `grasps` (see
+    `outcome.grasp_decision`), `faults`, `drop_point` [x, y] and
     `landing_point` [x, y] (default the take-off point) [m], `missed_ticks`.
     latency_s: sensor-to-setpoint latency per tick [s], used when `clock` is "realtime".
     """
@@ -80,6 +82,7 @@ def compute(
         abort_reason=info.get("abort_reason") or "",
         payload=payload,
         criteria=criteria,
+        grasps=info.get("grasps") or [],
     )
     duration = _span(series.time[series.flown])
     wall = info.get("wall_s")
@@ -94,6 +97,7 @@ def compute(
         "shortfalls": shortfalls,
         "abort_reason": info.get("abort_reason") or None,
         "transitions": info.get("transitions") or [],
+        "grasp": grasp_facts(info.get("grasps") or []),
         "payload_lifted": payload.lifted,
         "payload_lifted_at_s": payload.lifted_at_s,
         "payload_lift_height_m": payload.lift_height_m,
@@ -207,6 +211,7 @@ def what_is_missing(
     abort_reason: str,
     payload: Payload,
     criteria: Criteria,
+    grasps: Sequence[Mapping[str, Any]] = (),
 ) -> list[str]:
     """Return the unmet criteria of a completed mission, one line each."""
     if abort_reason:
@@ -218,7 +223,10 @@ def what_is_missing(
         missing.append("not landed")
     elif landing_error_m is None or not landing_error_m <= criteria.landing_m:
         missing.append(f"landed {landing_error_m:.2f} m from the landing point")
-    if payload.lifted is False:
+    given_up = grasp_facts(grasps)["state"] == Grasp.GIVEN_UP.value
+    if given_up and not payload.lifted:
+        missing.append(f"payload {grasps[-1]['text']}")
+    elif payload.lifted is False:
         missing.append(f"payload not lifted (rose {payload.lift_height_m:.3f} m)")
     elif payload.place_error_m is not None:
         if not payload.place_error_m <= criteria.place_m:
@@ -226,6 +234,15 @@ def what_is_missing(
         elif not payload.at_rest:
             missing.append("payload still moving at the end")
     return missing
+
+
+def grasp_facts(grasps: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
+    """Return last state, number of approaches and decisions of the grasps; see `outcome`."""
+    return {
+        "state": grasps[-1]["grasp"] if grasps else "",
+        "approaches": max((one["attempt"] for one in grasps), default=0),
+        "decisions": list(grasps),
+    }
 
 
 def latency_figures(latency_s: Sequence[float] | np.ndarray | None) -> dict[str, float | None]:

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
+from uam_control.grasp import GraspDecision
 from uam_control.supervision import State, StateTransition
 from uam_lab.results.timeseries import Series
 
@@ -25,6 +26,19 @@ def transitions(changes: Sequence[StateTransition]) -> list[dict[str, Any]]:
     return [transition(c.stamp - begin, c.source.value, c.target.value, c.cause) for c in changes]
 
 
+def grasp_decision(time: float, grasp: str, attempt: int, text: str) -> dict[str, Any]:
+    """Return one decision about the payload for metrics.json; time: mission time [s]."""
+    return {"time_s": round(time, 6), "grasp": grasp, "attempt": attempt, "text": text}
+
+
+def grasp_decisions(
+    decisions: Sequence[GraspDecision], changes: Sequence[StateTransition]
+) -> list[dict[str, Any]]:
+    """Return the decisions about the payload in mission time; changes: of the supervisor."""
+    begin = next((one.stamp for one in changes if one.target is State.TAKING_OFF), 0.0)
+    return [grasp_decision(d.stamp - begin, d.grasp.value, d.attempt, d.text) for d in decisions]
+
+
 @dataclass
 class Outcome:
     """Result that an engine returns.
@@ -32,7 +46,8 @@ class Outcome:
     series: None without a recorded control tick. wall_s: wall time from first to last tick.
     abort_reason: reason of the mission's abort. failure: technical reason of the flight's end, one
     line; details: last lines of the node's log. latency_s (ticks,), missed_ticks: realtime only.
-    parameter_changes: see `log_reader.parameter_changes`; transitions: see `transition`; faults:
+    parameter_changes: see `log_reader.parameter_changes`; transitions: see `transition`;
+    grasps: see `grasp_decision`; faults:
     see `faults.timeline.record`.
     """
 
@@ -47,6 +62,7 @@ class Outcome:
     notes: list[str] = field(default_factory=list)
     parameter_changes: list[dict[str, Any]] = field(default_factory=list)
     transitions: list[dict[str, Any]] = field(default_factory=list)
+    grasps: list[dict[str, Any]] = field(default_factory=list)
     faults: list[dict[str, Any]] = field(default_factory=list)
 
     @property

@@ -140,7 +140,10 @@ class MissionStatus(_Status):
     cause: the supervisor's state (uam_control.supervision.State) and the reason for it. regains:
     number of commands so far to regain a released vehicle. tilt [rad]: angle between the vertical
     axes of body and world. answers: number of goals and trajectories answered so far, answer: the
-    newest, "topic: accepted ..." or "topic: refused ...".
+    newest, "topic: accepted ..." or "topic: refused ...". grasp: state of the grasp
+    (uam_control.grasp.Grasp); attempt: number of the approach; decisions: number of decisions about
+    the payload so far, grasp_text: the newest. delay [s]: of the scenario's clock by holds and
+    grasps.
     """
 
     phase: str = "waiting"
@@ -157,9 +160,17 @@ class MissionStatus(_Status):
     tilt: float = 0.0
     answers: int = 0
     answer: str = ""
+    grasp: str = ""
+    attempt: int = 0
+    decisions: int = 0
+    grasp_text: str = ""
+    delay: float = 0.0
 
     NAME = "mission"
-    LATER = ("state", "cause", "regains", "tilt", "answers", "answer")
+    LATER = (
+        *("state", "cause", "regains", "tilt", "answers", "answer"),
+        *("grasp", "attempt", "decisions", "grasp_text", "delay"),
+    )
 
     @property
     def level(self) -> bytes:

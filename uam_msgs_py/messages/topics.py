@@ -75,6 +75,12 @@ CLOCK = Topic("clock", Clock, _qos(1, reliable=False), "simulation time")
 IMU = Topic("imu/data", Imu, SENSOR_DATA, "body rates and specific force, FLU, 250 Hz")
 JOINTS = Topic("joint_states", JointState, SENSOR_DATA, "alpha_1, alpha_2, 250 Hz")
 MOCAP = Topic("vrpn_mocap/uam/pose", PoseStamped, SENSOR_DATA, "motion capture, world, 120 Hz")
+PAYLOAD = Topic(
+    "vrpn_mocap/payload/pose",
+    PoseStamped,
+    SENSOR_DATA,
+    "motion capture of the payload: its grip point, the middle of its upper side",
+)
 
 # Control, once per tick, stamped with the IMU sample that the tick belongs to
 STATE = Topic("uam/state", JointTrajectory, RELIABLE, "estimated chi, chi_dot, chi_ddot")
@@ -98,7 +104,10 @@ SETPOINT = Topic(
     "uam/setpoint", TwistStamped, RELIABLE, "body rates FLU and thrust 0..1 (linear.z) as sent"
 )
 THRUST = Topic(
-    "uam/thrust", JointState, RELIABLE, "factor: true / assumed thrust as identified, 10 Hz"
+    "uam/thrust",
+    JointState,
+    RELIABLE,
+    "factor: true / assumed thrust as identified; effort: low-pass of the thrust [N], 10 Hz",
 )
 POSITION_ADAPTATION = Topic(
     "uam/position/adaptation", JointState, RELIABLE, "the gains of the law, by its names, 50 Hz"

@@ -60,6 +60,8 @@ WIRES = (
     Wire(topics.POSITION_ADAPTATION, POSITION, (MISSION,), optional=True),
     Wire(topics.ATTITUDE_ADAPTATION, ATTITUDE, (MISSION,), optional=True),
     Wire(topics.ARM_ADAPTATION, ARM, (MISSION,), optional=True),
+    Wire(topics.THRUST, BRIDGE, (MISSION,), optional=True),
+    Wire(topics.PAYLOAD, PLANT, (MISSION,), optional=True),
     # only recorded
     Wire(topics.CLOCK, PLANT),
     Wire(topics.TRUTH_STATE, PLANT),
@@ -67,7 +69,6 @@ WIRES = (
     Wire(topics.TRUTH_ROTORS, PLANT),
     Wire(topics.TRUTH_MAGNET, PLANT),
     Wire(topics.ARM_COMMAND, ARM),
-    Wire(topics.THRUST, BRIDGE),
 )
 
 

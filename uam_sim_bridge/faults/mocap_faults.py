@@ -31,6 +31,9 @@ class PoseFault(PlantFault):
 class MocapDropout(PoseFault):
     """No motion-capture poses arrive."""
 
+    def sense(self, samples: Samples, now: Occurrence) -> None:
+        samples.mocap = samples.payload = None
+
     def altered(self, pose: Pose, now: Occurrence) -> Pose | None:
         return None
 
@@ -56,6 +59,11 @@ class MocapJump(PoseFault):
         turn = quaternion_from_rotation_vector(np.array([0.0, 0.0, self.yaw]))
         offset = np.array([self.x, self.y, self.z])
         return stamp, position + offset, quaternion_multiply(turn, quaternion)
+
+    def sense(self, samples: Samples, now: Occurrence) -> None:
+        super().sense(samples, now)
+        if samples.payload is not None:
+            samples.payload = self.altered(samples.payload, now)
 
 
 class MocapSwap(PoseFault):

@@ -67,7 +67,6 @@ from uam_sim_bridge.stages.bridge_stage import BridgeSets, BridgeStage
 from uam_sim_bridge.stages.vision_pacing import VisionParameters
 
 NAME = "mavlink_bridge"
-THRUST_PERIOD = 100_000_000  # ns between two reports of the thrust factor
 LATENCY = 0.05  # s, latency of sensors: a state or pose may be `stale_after` + LATENCY old
 WATCH_PERIOD = 0.02  # s, period of the real-time watchdog and of its setpoints
 
@@ -230,8 +229,9 @@ class MavlinkBridgeNode(UamNode):
                 position.reference,
             )
         self._end_tick(stamp)
-        if stamp // THRUST_PERIOD != self.stamp // THRUST_PERIOD:
+        if self.stage.lift_due:
             self._factor_writer.position[0] = self.stage.factor
+            self._factor_writer.effort[0] = self.stage.lift
             self._thrust.publish(self._factor_writer.stamped(stamp))
         self._setpoint.publish(self._writer.fill(stamp, *sent(setpoint)))
         self.done_tick(stamp, begun)

@@ -53,10 +53,12 @@ class Sensors(Outlets):
     def __init__(self, node: Node, vehicle: VehicleDescription, publish_imu: bool):
         """publish_imu: whether the companion has an IMU of its own."""
         imu = (topics.IMU,) if publish_imu else ()
-        super().__init__(node, (topics.CLOCK, topics.JOINTS, topics.MOCAP, *imu))
-        self._clock, self._joints, self._mocap, *self._imu = self.outlets.values()
+        chosen = topics.CLOCK, topics.JOINTS, topics.MOCAP, topics.PAYLOAD, *imu
+        super().__init__(node, chosen)
+        self._clock, self._joints, self._mocap, self._payload, *self._imu = self.outlets.values()
         self._clock_writer = Template(Clock())
         self._imu_writer, self._mocap_writer = ImuWriter(frame(node, topics.BODY)), PoseWriter()
+        self._payload_writer = PoseWriter()
         self._joint_writer = JointStateWriter(vehicle.joint_names)
         self._period = nanoseconds(vehicle.control_period)
 
@@ -75,6 +77,9 @@ class Sensors(Outlets):
         if samples.mocap is not None:
             time, position, quaternion = samples.mocap
             self._mocap.publish(self._mocap_writer.fill(nanoseconds(time), position, quaternion))
+        if samples.payload is not None:
+            time, *pose = samples.payload
+            self._payload.publish(self._payload_writer.fill(nanoseconds(time), *pose))
         if samples.joints is not None:
             time, alpha, alpha_dot, torque = samples.joints
             writer = self._joint_writer

@@ -9,7 +9,7 @@ import numpy as np
 
 from uam_control.coordinates import ALPHA, CHI, CHI_DDOT, CHI_DOT, ROLL, X
 from uam_control.maths.compiled import jit
-from uam_control.maths.rotations import euler_from_quaternion
+from uam_control.maths.rotations import euler_from_quaternion, matrix_from_quaternion
 from uam_control.vehicle import VehicleError
 from uam_sim_bridge.plant.actuators import Rotors, Servos, joint_step, rotor_step
 from uam_sim_bridge.plant.effects.acting_effects import ActingEffects
@@ -46,13 +46,15 @@ class MujocoPlant(Plant):
         self._lay_out(payload_mass, arm_start or vehicle.description.stowed)
 
         scale = numbers["sensors"]["noise_scale"]
-        imu_noise, mocap_noise, gusts = generators(seed, 3)
+        imu_noise, mocap_noise, gusts, payload_noise = generators(seed, 4)
         sensors = numbers["sensors"]
         self._imu = Imu(sensors["imu"], scale, imu_noise)
         self._mocap = Mocap(sensors["mocap"], scale, mocap_noise)
+        self._tracks_payload = sensors["mocap"].get("payload", False)
+        self._payload_mocap = Mocap(sensors["mocap"], scale, payload_noise)
         self._encoders = Encoders(sensors["joints"])
-        self._imu_delay, self._mocap_delay, self._joints_delay = (
-            Delay(sensors[name]["latency_ticks"]) for name in ("imu", "mocap", "joints")
+        self._imu_delay, self._mocap_delay, self._joints_delay, self._payload_delay = (
+            Delay(sensors[name]["latency_ticks"]) for name in ("imu", "mocap", "joints", "mocap")
         )
         self._command_delay = Delay(numbers["servos"]["command_latency_ticks"])
 
@@ -101,6 +103,8 @@ class MujocoPlant(Plant):
         payload_q = joint(PAYLOAD).qposadr[0]
         self._payload_pose = data.qpos[payload_q : payload_q + 7]
         self._payload_position = self._payload_pose[0:3]
+        plate = self.model.geom("payload_plate")
+        self._payload_top = float(plate.pos[2] + plate.size[2])
         sensed = self.model.sensor("specific_force").adr[0]
         self._sensed_force = data.sensordata[sensed : sensed + 3]
         self._thrust_control = self._controls(described.rotor_names)
@@ -156,9 +160,11 @@ class MujocoPlant(Plant):
             gyro, force = effects.imu(gyro, force)
         hil = (time, gyro, force)
         joints = (time, *self._encoders.sample(self._alpha, self._alpha_dot))
-        mocap, late = None, 0
+        mocap, payload, late = None, None, 0
         if self._mocap.due(time):
             mocap = (time, *self._mocap.sample(self._position, self._quaternion))
+            if self._tracks_payload:
+                payload = (time, *self._payload_mocap.sample(*self._grip_pose()))
             if effects is not None:
                 mocap, late = effects.pose(mocap)
         return Samples(
@@ -166,7 +172,14 @@ class MujocoPlant(Plant):
             self._joints_delay(tick, (*joints, self.servos.torque.copy())),
             self._mocap_delay(tick, mocap, late),
             hil,
+            payload=self._payload_delay(tick, payload, late),
         )
+
+    def _grip_pose(self) -> tuple[np.ndarray, np.ndarray]:
+        """Return position (3,) [m] of the middle of the payload's upper side, and quaternion."""
+        quaternion = self._payload_pose[3:]
+        up = matrix_from_quaternion(quaternion)[:, 2]
+        return self._payload_position + self._payload_top * up, quaternion
 
     def step(self, motor_commands: np.ndarray, arm_command: np.ndarray, magnet: bool) -> None:
         """See `Plant.step`."""

@@ -27,7 +27,8 @@ class Samples:
     imu: (stamp, gyro (3,) [rad/s], specific force (3,) [m/s^2]), FLU, of the companion computer.
     joints: (stamp, alpha (n,) [rad], alpha_dot (n,) [rad/s], torque (n,) [N m]). mocap: (stamp,
     position (3,) [m, ENU], quaternion (4,) [w x y z], FLU → ENU). hil: as imu, without delay, for
-    the autopilot's own sensors. imu_copies: messages with this IMU sample.
+    the autopilot's own sensors. imu_copies: messages with this IMU sample. payload: as mocap, of
+    the payload's grip point, the middle of its upper side.
     """
 
     imu: tuple | None
@@ -35,6 +36,7 @@ class Samples:
     mocap: tuple | None
     hil: tuple
     imu_copies: int = 1
+    payload: tuple | None = None
 
 
 @dataclass

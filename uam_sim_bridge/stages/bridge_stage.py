@@ -63,11 +63,17 @@ class BridgeSets:
         )
 
 
+LIFT_PERIOD = 100_000_000  # [ns] between two reports of thrust factor and lift
+LIFT_CUTOFF = 1.0  # [Hz]
+LONGEST_STEP = 0.05  # [s] of the low-pass; a longer gap has no setpoints
+
+
 class BridgeStage:
     """The bridge between control laws and autopilot. All stamps in [ns].
 
-    `factor`: thrust factor used for the last setpoint; `report`: the report of the autopilot due
-    after the last tick, None if none is due.
+    `factor`: thrust factor used for the last setpoint; `lift` [N]: low-pass of the collective by
+    that factor, at LIFT_CUTOFF; `lift_due`: whether factor and lift are reported; `report`: the
+    report of the autopilot due after the last tick, None if none is due.
     """
 
     def __init__(
@@ -95,6 +101,8 @@ class BridgeStage:
         self._situation = Situation(armed=False, landed=True, let_go=False)
         self.report: AutopilotReport | None = None
         self.factor = 1.0
+        self.lift, self.lift_due = 0.0, False
+        self._last = 0  # stamp [ns] of the last tick
 
     def mocap(self, stamp: int, position: np.ndarray, quaternion: np.ndarray) -> None:
         """Handle a pose: position (3,) [m, ENU], quaternion (4,) [w x y z], FLU → ENU.
@@ -172,6 +180,7 @@ class BridgeStage:
             self.map.assumed_thrust(thrust),
             flying and situation.armed and not situation.let_go and math.isfinite(thrust),
         )
+        self._note_lift(stamp, self.factor * self.map.assumed_thrust(thrust))
         return setpoint
 
     def _sampled(self, now: float, setpoint: Setpoint, flying: bool) -> Setpoint:
@@ -182,6 +191,14 @@ class BridgeStage:
         if self._hold.due(now) or self._kept is None:
             self._kept = setpoint
         return self._kept
+
+    def _note_lift(self, stamp: int, collective: float) -> None:
+        """Filter the collective [N] of the tick `stamp` [ns]."""
+        step = min(max(stamp - self._last, 0) / SECOND, LONGEST_STEP)
+        gain = 1.0 - math.exp(-2.0 * math.pi * LIFT_CUTOFF * step)
+        self.lift += gain * (collective - self.lift)
+        self.lift_due = stamp // LIFT_PERIOD != self._last // LIFT_PERIOD
+        self._last = stamp
 
     def without(self, stamp: int) -> Setpoint:
         """Send the setpoint of a tick without valid commands, and return it."""

@@ -51,6 +51,7 @@ class Signals:
     mocap: Pose | None = None
     joints: Joints | None = None
     imu: Imu | None = None
+    payload: Pose | None = None
     stamp: int = -1  # [ns] of the IMU sample; names the tick
     # mission
     flying: bool = False  # whether position and attitude are controlled
@@ -110,7 +111,11 @@ class ControlTick:
         self._told: tuple | None = None  # what the bridge has of the mission
 
     def tick(
-        self, mocap: Pose | None = None, joints: Joints | None = None, imu: Imu | None = None
+        self,
+        mocap: Pose | None = None,
+        joints: Joints | None = None,
+        imu: Imu | None = None,
+        payload: Pose | None = None,
     ) -> bool:
         """Run one tick with the samples that have arrived; all stamps in [ns].
 
@@ -119,6 +124,7 @@ class ControlTick:
         """
         signals = self.signals
         signals.mocap, signals.joints, signals.imu = mocap, joints, imu
+        signals.payload = payload
         for _, stage in self.stages:
             if not stage(self):
                 return False
@@ -134,13 +140,15 @@ Stage = Callable[[ControlTick], bool]  # returns whether the tick goes on
 
 
 def listen(tick: ControlTick) -> bool:
-    """mocap, joints → the supervisor's inputs; mocap → the autopilot's estimator."""
+    """mocap, joints, payload → the supervisor's inputs; mocap → the autopilot's estimator."""
     s, inputs = tick.signals, tick.mission.inputs
     if s.mocap is not None:
         inputs.keep("mocap", inputs.mocap, s.mocap)
         tick.bridge.mocap(*s.mocap)
     if s.joints is not None:
         inputs.keep("joints", inputs.joints, s.joints)
+    if s.payload is not None:
+        inputs.keep("payload", inputs.payload, s.payload)
     return True
 
 
@@ -217,6 +225,9 @@ def send_setpoint(tick: ControlTick) -> bool:
         s.stamp, s.state, s.flying, s.tau_p, tau_q, s.attitude_reference, reference
     )
     s.thrust_factor, report = bridge.factor, bridge.report
+    if bridge.lift_due:
+        inputs = tick.mission.inputs
+        inputs.keep("lift", inputs.inputs.lift, (bridge.lift,), s.stamp)
     if report is not None:
         authority = Authority(report.released_to, report.landed, report.mode.lands)
         tick.mission.autopilot(

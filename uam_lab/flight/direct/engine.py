@@ -12,7 +12,7 @@ from uam_lab.flight.direct.flight import DirectFlight
 from uam_lab.flight.flight_settings import AUTOPILOT_IMU, FlightSettings
 from uam_lab.flight.observer import FlightStatus, Observer
 from uam_lab.processes.interrupts import StopRequest
-from uam_lab.results.outcome import Outcome, transitions
+from uam_lab.results.outcome import Outcome, grasp_decisions, transitions
 from uam_lab.results.result_folder import ResultFolder
 from uam_sim_bridge.plant import Vehicle
 
@@ -47,6 +47,7 @@ def fly(
         failure=flight.ended_by,
         interrupted=stop.raised and not output.done,
         transitions=transitions(flight.mission.changes),
+        grasps=grasp_decisions(flight.mission.grasps, flight.mission.changes),
         faults=flight.fault_records,
     )
 

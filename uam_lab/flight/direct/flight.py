@@ -141,20 +141,23 @@ class DirectFlight:
             self._record_blind()
         plant.step(motors, signals.arm_command, signals.magnet)
 
-    def _delivered(self, samples: Samples) -> tuple[Pose | None, Joints | None, Imu | None]:
+    def _delivered(
+        self, samples: Samples
+    ) -> tuple[Pose | None, Joints | None, Imu | None, Pose | None]:
         """What the stages get of `samples`, with stamps [ns].
 
         As the plant's node does, nothing is delivered before every kind of sensor has.
         """
-        mocap, joints = samples.mocap, samples.joints
+        mocap, joints, payload = samples.mocap, samples.joints, samples.payload
         imu = self.autopilot.imu() if self._autopilot_imu else samples.imu
         self._complete = self._complete or None not in (mocap, joints, imu)
         if not self._complete:
-            return None, None, None
+            return None, None, None, None
         return (
             mocap and (nanoseconds(mocap[0]), *mocap[1:]),
             joints and (nanoseconds(joints[0]), *joints[1:]),
             imu and (nanoseconds(imu[0]), *imu[1:]),
+            payload and (nanoseconds(payload[0]), *payload[1:]),
         )
 
     def _record(self, signals: Signals) -> None:

@@ -45,7 +45,7 @@ def read_outcome(
         return outcome
     outcome.series, outcome.abort_reason = flight.series, flight.abort_reason
     outcome.parameter_changes, outcome.transitions = flight.parameter_changes, flight.transitions
-    outcome.faults = flight.faults
+    outcome.grasps, outcome.faults = flight.grasps, flight.faults
     if not flight.done and not outcome.partial:
         ended = recorder.get("ended") or numbers.get("ended_by")
         outcome.failure = ended or "the mission did not end"

@@ -1,0 +1,244 @@
+"""The executive of grasp and release against a payload on a stand, in steps of 20 ms."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+
+import numpy as np
+import pytest
+
+from uam_control.coordinates import MOTION_ROWS
+from uam_control.grasp import Grasp, GraspExecutive, GraspParameters, Sight, grasp_windows
+from uam_control.grasp.evidence import Load, by_mass, by_pose, identified_mass
+from uam_control.grasp.kinematics import lever, magnet_position
+from uam_control.grasp.sight import RunningMean
+from uam_control.mission import load_scenario
+
+P = GraspParameters()
+PLACE = np.array([-0.789, 0.0, 0.7675])
+STEP = 0.02
+
+
+def test_the_window_of_the_papers_mission():
+    scenario = load_scenario("pick_and_place")
+    (window,) = grasp_windows(scenario.moves, scenario.magnet)
+    assert window[:5] == (30.0, 35.0, 37.5, 70.0, 71.0)
+    assert window.dip == pytest.approx(0.06)
+
+
+@pytest.mark.parametrize("name", ["hover", "arm_motions"])
+def test_a_flight_without_magnet_has_no_window(name):
+    scenario = load_scenario(name)
+    assert grasp_windows(scenario.moves, scenario.magnet) == ()
+
+
+def test_magnet_position_by_hand():
+    """(45, 45) deg: 0.1 sin 45 + 0.14 forward, 0.1 cos 45 down; the face hangs 0.03 below."""
+    chi = np.array([-1.0, 0.0, 0.94, 0.0, 0.0, 0.0, math.pi / 4, math.pi / 4])
+    at = magnet_position(chi, (0.0, 0.0, -0.073), (0.1, 0.14), 0.03)
+    down = 0.1 * math.sqrt(0.5)
+    assert at == pytest.approx([-1.0 + down + 0.14, 0.0, 0.94 - 0.073 - down - 0.03])
+    assert lever(chi, (0.1, 0.14)) == pytest.approx(down + 0.14)
+    chi[5] = math.pi / 2  # heading north: the arm points along y
+    at = magnet_position(chi, (0.0, 0.0, -0.073), (0.1, 0.14), 0.03)
+    assert at[:2] == pytest.approx([-1.0, down + 0.14])
+
+
+def test_force_and_torque_identify_the_mass():
+    before, lever_arm = Load(21.6, 0.5), 0.2
+    now = Load(21.6 + 0.2 * 9.81, 0.5 + 0.2 * 9.81 * lever_arm)
+    assert identified_mass(before, now, lever_arm) == pytest.approx(0.2)
+    assert identified_mass(before, Load(now.lift), lever_arm) == pytest.approx(0.2)
+    assert math.isnan(identified_mass(Load(), Load(), lever_arm))
+
+
+@pytest.mark.parametrize(
+    ("mass", "expected", "held"),
+    [(0.2, 0.2, True), (0.01, 0.2, False), (0.01, 0.05, None), (math.nan, 0.2, None)],
+)
+def test_a_payload_that_may_be_lighter_than_the_limit_has_no_verdict(mass, expected, held):
+    assert by_mass(mass, expected, P).held is held
+
+
+@pytest.mark.parametrize(
+    ("rise", "apart", "held"),
+    [(0.06, 0.0, True), (0.0, 0.0, None), (0.06, 0.02, True), (0.0, 0.06, False)],
+)
+def test_the_pose_decides_by_rise_and_distance(rise, apart, held):
+    payload = PLACE + [0.0, 0.0, rise]
+    sight = Sight(0.0, 37.0, payload + [0.0, 0.0, apart], payload=payload)
+    assert by_pose(sight, PLACE, 0.06, P).held is held
+
+
+def test_a_running_mean_has_the_mean_and_the_deviation_of_its_values():
+    mean, random = RunningMean(), np.random.default_rng(1)
+    for k in range(2000):
+        mean.add(STEP * k, np.array([1.0, random.normal(0.0, 0.5)]))
+    assert mean.mean == pytest.approx([1.0, 0.0], abs=0.3)
+    assert mean.deviation == pytest.approx([0.0, 0.5], abs=0.2)
+    mean.add(40.0, np.array([math.nan, 0.0]))
+    assert mean.span(41.0) == -math.inf
+
+
+class Flight:
+    """A vehicle that follows the mission's path exactly, and a payload on its stand.
+
+    grips(attempt) -> whether the magnet takes the payload; shift: of the payload on its stand.
+    """
+
+    def __init__(self, grips, offset=(0.0, 0.0), tracked=True, mass=0.2, **parameters):
+        scenario = load_scenario("pick_and_place")
+        self.windows = grasp_windows(scenario.moves, scenario.magnet)
+        self.path = scenario.trajectory(np.array([0.0, 0.0, 0.28, 0.0, 0.0, 0.0, 0.0, 1.57]))
+        self.scenario, self.grips, self.mass = scenario, grips, mass
+        self.executive = GraspExecutive(
+            self.windows, mass, dataclasses.replace(P, **parameters).validated(2)
+        )
+        self.time, self.stamp, self.shift = 28.0, 128.0, np.zeros(3)
+        self.payload = PLACE + [*offset, 0.0]
+        self.tracked, self.carried, self.taken = tracked, False, True
+        self.noise = lambda: np.zeros(3)
+        self.error = np.zeros(3)
+
+    def magnet(self):
+        motion = np.zeros((MOTION_ROWS, 8))
+        self.path.write(self.time, motion)
+        chi = motion[0]
+        chi[:3] += self.shift + self.error + self.noise()
+        return magnet_position(chi, (0.0, 0.0, -0.073), (0.1, 0.14), 0.03)
+
+    def step(self):
+        on = self.scenario.magnet_on(self.time) or self.executive.directive.grip
+        magnet = self.magnet()
+        near = np.linalg.norm(magnet - self.payload) < 0.01
+        if on and not self.carried and near and self.grips(self.executive.attempts):
+            self.carried = True
+        if self.carried and on:
+            self.payload = magnet.copy()
+        elif self.carried:
+            self.carried, self.payload[2] = False, 0.05
+        payload = self.payload if self.tracked else np.full(3, np.nan)
+        load = self.mass * 9.81 * self.carried
+        directive = self.executive.step(
+            Sight(
+                self.stamp,
+                self.time,
+                magnet,
+                error=self.error.copy(),
+                payload=payload.copy(),
+                lift=21.6 + load,
+                effort=0.5 + 0.2 * load,
+                lever=0.2,
+            )
+        )
+        self.shift = self.shift + 0.05 * (directive.shift - self.shift)
+        self.time += STEP * directive.pace
+        self.stamp += STEP
+        return directive
+
+    def until(self, time=75.0, limit=400.0):
+        begin = self.stamp
+        while self.time < time:
+            self.step()
+            assert self.stamp - begin < limit, self.executive.decisions
+        return [decision.grasp for decision in self.executive.decisions]
+
+
+def test_a_good_grasp_costs_no_time():
+    flight = Flight(lambda attempt: True)
+    assert flight.until() == [Grasp.APPROACHED, Grasp.HELD, Grasp.RELEASED]
+    assert flight.stamp - 128.0 == pytest.approx(75.0 - 28.0, abs=2 * STEP)
+    assert not flight.executive.directive.shift.any()
+
+
+def test_a_payload_beside_its_place_is_met():
+    flight = Flight(lambda attempt: True, offset=(0.015, -0.01))
+    assert flight.until(36.0)[-1] is Grasp.APPROACHED
+    assert np.hypot(*(flight.magnet() - flight.payload)[:2]) < 0.003
+    assert flight.until()[-1] is Grasp.RELEASED
+
+
+def test_a_missed_payload_is_approached_again():
+    flight = Flight(lambda attempt: attempt == 2)
+    assert flight.until()[-2:] == [Grasp.HELD, Grasp.RELEASED]
+    assert flight.executive.decisions[-1].attempt == 2
+
+
+def test_after_the_allowed_approaches_it_is_given_up_where_it_is():
+    flight = Flight(lambda attempt: False)
+    assert flight.until()[-1] is Grasp.GIVEN_UP
+    last = flight.executive.decisions[-1]
+    assert last.text == "given up, 3 approaches; payload at (-0.79, 0.00, 0.77) m"
+    assert last.attempt == 3
+    assert flight.executive.directive.without_descent == flight.windows[0]
+
+
+def test_a_payload_that_has_fallen_is_not_approached_again():
+    flight = Flight(lambda attempt: False)
+    flight.until(33.0)
+    flight.payload = np.array([-0.6, 0.1, 0.04])
+    assert flight.until()[-1] is Grasp.GIVEN_UP
+    assert "fallen from its place; payload at (-0.60, 0.10, 0.04) m" in (
+        flight.executive.decisions[-1].text
+    )
+    assert flight.executive.decisions[-1].attempt == 1
+
+
+def test_given_up_may_land():
+    flight = Flight(lambda attempt: False, grasp_given_up="land", grasp_attempts=1)
+    while not flight.step().land:
+        assert flight.stamp < 300.0
+    assert flight.executive.directive.land.startswith("given up, 1 approaches")
+
+
+def test_an_absent_payload_costs_no_time():
+    flight = Flight(lambda attempt: False)
+    flight.payload = np.array([5.0, 5.0, 0.04])
+    assert flight.until() == [Grasp.ABSENT]
+    assert flight.stamp - 128.0 == pytest.approx(75.0 - 28.0, abs=2 * STEP)
+
+
+def test_without_mocap_of_the_payload_the_mass_decides():
+    flight = Flight(lambda attempt: True, tracked=False)
+    assert flight.until() == [Grasp.APPROACHED, Grasp.HELD, Grasp.RELEASED]
+    assert "identified mass 0.19 kg" in flight.executive.decisions[1].text
+    flight = Flight(lambda attempt: False, tracked=False)
+    assert flight.until()[-1] is Grasp.GIVEN_UP
+
+
+def test_a_light_payload_without_mocap_is_carried_unverified():
+    flight = Flight(lambda attempt: True, tracked=False, mass=0.03)
+    assert Grasp.UNVERIFIED in flight.until()
+
+
+def test_a_lost_payload_is_noticed_and_located():
+    flight = Flight(lambda attempt: True)
+    flight.until(50.0)
+    flight.carried, flight.grips = False, lambda attempt: False
+    flight.payload = np.array([0.1, 0.0, 0.04])
+    flight.until(50.5)
+    last = flight.executive.decisions[-1]
+    assert last.grasp is Grasp.LOST and "(0.10, 0.00, 0.04) m" in last.text
+
+
+def test_a_contact_is_left_upwards():
+    flight = Flight(lambda attempt: False)
+    flight.until(36.0)
+    flight.error = np.array([0.12, 0.0, 0.0])
+    for _ in range(20):
+        directive = flight.step()
+    assert directive.pace == 0.0 and directive.shift[2] == pytest.approx(P.contact_climb)
+    assert "contact near the stand" in flight.executive.decisions[-1].text
+    flight.error[:] = 0.0
+    for _ in range(40):
+        directive = flight.step()
+    assert directive.pace == -1.0
+
+
+def test_a_restless_vehicle_does_not_descend():
+    flight = Flight(lambda attempt: True)
+    flight.noise = lambda: 0.03 * np.sin(9.0 * flight.stamp) * np.array([1.0, 1.0, 0.0])
+    decisions = flight.until()
+    assert decisions[-1] is Grasp.GIVEN_UP
+    assert all("no descent" in one.text for one in flight.executive.decisions[:-1])

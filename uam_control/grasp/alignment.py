@@ -1,0 +1,99 @@
+"""Alignment of the magnet above the payload, before a descent.
+
+The correction contains the place of the payload and the mean attitude and joint errors, which no
+other part corrects. It leaves out the position error: the position law corrects it, and a second
+correction of the same error would follow every gust.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from uam_control.grasp.grasp_parameters import GraspParameters
+from uam_control.grasp.sight import RunningMean, Sight
+
+SPAN = 0.5  # [s] shortest time over which an alignment is judged
+PAUSE = 2.0  # [s] between two corrections
+SHALLOW, DEEP = 0.1, 2.5  # of press_depth: allowed depths of the planned contact
+WORTH = 0.002  # [m] smallest correction
+
+
+class Alignment:
+    """Mean distance of the magnet from the payload, and the corrections of the path.
+
+    Without a tracked payload the distance is the position error: the payload is where the scenario
+    has it. A tracked payload also gives the depth of the planned contact.
+    """
+
+    def __init__(self) -> None:
+        self._distance, self._constant = RunningMean(), RunningMean()
+        self._stamp = 0.0
+        self._corrected: float | None = None  # stamp [s] of the last correction
+        self._tracked = False
+
+    def restart(self) -> None:
+        """Forget all values."""
+        self._distance.restart()
+        self._constant.restart()
+        self._corrected = None
+
+    def add(self, sight: Sight, dip: float) -> None:
+        """Add a sight; dip [m]: height of the descent that follows."""
+        if sight.tracked != self._tracked:
+            self.restart()
+            self._tracked = sight.tracked
+        self._stamp = sight.stamp
+        if sight.tracked:
+            away = sight.magnet - sight.payload - [0.0, 0.0, dip]
+            self._constant.add(sight.stamp, away - sight.error)
+        else:
+            away = sight.error * [1.0, 1.0, 0.0]
+        self._distance.add(sight.stamp, away)
+
+    @property
+    def known(self) -> bool:
+        """Whether the distance was measured for long enough."""
+        return self._distance.span(self._stamp) >= SPAN
+
+    @property
+    def distance(self) -> float:
+        """Mean horizontal distance [m]."""
+        return float(np.hypot(*self._distance.mean[:2]))
+
+    @property
+    def swing(self) -> float:
+        """Standard deviation [m] of the horizontal distance."""
+        return float(np.hypot(*self._distance.deviation[:2]))
+
+    def good(self, p: GraspParameters, factor: float = 1.0) -> bool:
+        """Return whether the descent may begin; factor: on the horizontal tolerances."""
+        if not self.known:
+            return False
+        z = self._constant.mean[2] if self._tracked else 0.0
+        level = not self._tracked or -DEEP * p.press_depth <= z <= -SHALLOW * p.press_depth
+        near = self.distance <= factor * p.align_tolerance
+        return near and self.swing <= factor * p.align_swing and (level or factor > 1.0)
+
+    @property
+    def text(self) -> str:
+        """The distance as text."""
+        of = "payload" if self._tracked else "path"
+        return f"{1e3 * self.distance:.0f} mm off the {of}, swing {1e3 * self.swing:.0f} mm"
+
+    def near(self, distance: float) -> bool:
+        """Return whether the payload is within `distance` [m], and that is known."""
+        return self.known and self.distance <= distance
+
+    def correction(self, shift: np.ndarray, p: GraspParameters, worth: float = WORTH) -> np.ndarray:
+        """Return the new shift (3,) [m] of the path in place of `shift` (3,).
+
+        It is the same if no correction is due, or the correction is below `worth` [m].
+        """
+        settled = self._corrected is None or self._stamp - self._corrected >= PAUSE
+        if not (self._tracked and settled and self.known):
+            return shift
+        away = self._constant.mean + [0.0, 0.0, p.press_depth]
+        if float(np.max(np.abs(away))) < worth:
+            return shift
+        self._corrected = self._stamp
+        return np.clip(shift - away, -p.align_range, p.align_range)

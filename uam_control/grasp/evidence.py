@@ -1,0 +1,89 @@
+"""Evidence that the magnet holds the payload.
+
+The motion capture of the payload decides where it is available: it measures the fact itself, for
+any mass. Without it the mass decides, identified twice: from the vertical force of the position law
+and from the torque of the arm's first joint, each against its value before the descent. Both are
+fused by their variances.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from uam_control.grasp.grasp_parameters import GraspParameters
+from uam_control.grasp.sight import Sight
+
+GRAVITY = 9.81  # [m/s^2] to express a force as a mass
+LIFT_DEVIATION = 0.03  # [kg] of the mass from the force: vertical gusts during a lift
+TORQUE_DEVIATION = 0.08  # [N m] of the torque: dry friction of a joint
+SHARE = 0.5  # of the climb that the payload must follow
+
+
+class Evidence(NamedTuple):
+    """held: None without a verdict; text: the measured values."""
+
+    held: bool | None
+    text: str
+
+
+class Load(NamedTuple):
+    """Means of force of the position law [N] and torque of the first joint [N m]."""
+
+    lift: float = math.nan
+    effort: float = math.nan
+
+
+def place(point: np.ndarray) -> str:
+    """Return a point (3,) [m] as text."""
+    return "({:.2f}, {:.2f}, {:.2f}) m".format(*point)
+
+
+def by_pose(sight: Sight, stood: np.ndarray, climb: float, p: GraspParameters) -> Evidence:
+    """Return the evidence of the payload's pose.
+
+    stood (3,) [m]: the grip point before the grasp; climb [m]: of the magnet since then.
+    """
+    if not sight.tracked:
+        return Evidence(None, "payload not tracked")
+    apart = float(np.linalg.norm(sight.payload - sight.magnet))
+    if apart > p.held_distance:
+        return Evidence(False, f"{1e3 * apart:.0f} mm from the payload at {place(sight.payload)}")
+    rise = float(sight.payload[2] - stood[2])
+    text = f"payload {1e3 * rise:.0f} mm above its place"
+    return Evidence(True if rise >= SHARE * climb else None, text)
+
+
+def identified_mass(before: Load, now: Load, lever: float) -> float:
+    """Return the mass [kg] that the magnet carries, NaN if unknown; lever [m]: see `Sight`."""
+    masses = [(now.lift - before.lift) / GRAVITY]
+    weights = [1.0 / LIFT_DEVIATION**2]
+    if lever != 0.0:
+        masses.append((now.effort - before.effort) / (GRAVITY * lever))
+        weights.append((GRAVITY * lever / TORQUE_DEVIATION) ** 2)
+    known = [(m, w) for m, w in zip(masses, weights, strict=True) if math.isfinite(m)]
+    if not known:
+        return math.nan
+    return sum(m * w for m, w in known) / sum(w for _, w in known)
+
+
+def by_mass(mass: float, expected: float, p: GraspParameters) -> Evidence:
+    """Return the evidence of the identified mass [kg].
+
+    expected [kg]: of the scenario's payload. A payload that may be lighter than the limit has no
+    verdict.
+    """
+    if math.isnan(mass):
+        return Evidence(None, "mass not identified")
+    text = f"identified mass {mass:.2f} kg"
+    if mass >= p.held_mass:
+        return Evidence(True, text)
+    return Evidence(False if expected >= 2.0 * p.held_mass else None, text)
+
+
+def fused(sight: Sight, pose: Evidence, mass: Evidence) -> Evidence:
+    """Return the verdict of the pose for a tracked payload, else that of the mass; both texts."""
+    held = pose.held if sight.tracked else mass.held
+    return Evidence(held, f"{pose.text}, {mass.text}")

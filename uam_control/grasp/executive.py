@@ -1,0 +1,355 @@
+"""Executive of grasp and release: it verifies, tries again, gives up, and notices a loss.
+
+It acts on the scenario by three means only: the pace of its clock (1 on, 0 stop, -1 back), a shift
+of its path, and a path without the descent. A retreat runs the scenario back, so that the vehicle
+leaves payload and stand upwards on the way on which it came.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from enum import Enum
+
+import numpy as np
+
+from uam_control.grasp.alignment import Alignment
+from uam_control.grasp.decisions import Grasp, GraspDecision
+from uam_control.grasp.evidence import (
+    Evidence,
+    Load,
+    by_mass,
+    by_pose,
+    fused,
+    identified_mass,
+    place,
+)
+from uam_control.grasp.grasp_parameters import GraspParameters
+from uam_control.grasp.sight import RunningMean, Sight
+from uam_control.grasp.windows import GraspWindow
+
+BEFORE = 2.0  # [s] before the descent from which on values are taken
+FALLEN = 0.05  # [m] below its place from which on a payload counts as fallen from its stand
+REACH = 0.003  # [m] height above the payload below which the magnet has contact
+LEAST_CLIMB = 0.02  # [m] on which the evidence of a lift is based
+NEAR = 0.015  # [m] height above the payload below which a miss breaks off the descent
+BESIDE = 0.5  # [m] horizontal distance from the stand within which a contact is one with it
+CONTACT_AFTER = 0.2  # [s]
+LATE = 2.0  # factor on the tolerances of the alignment after align_timeout
+CALM = 0.5  # of contact_error, below which a contact is over
+
+
+class Step(Enum):
+    """What the executive does."""
+
+    IDLE = "no payload near"
+    APPROACH = "before the descent"
+    ALIGN = "waits above the payload"
+    DESCEND = "descends"
+    LIFT = "magnet on, climbs"
+    VERIFY = "waits for evidence"
+    RETREAT = "back to the start of the descent"
+    CLIMB = "leaves a contact upwards"
+    CARRY = "carries"
+    RELEASE = "magnet off"
+
+
+@dataclass
+class Directive:
+    """Output: pace of the scenario's clock; shift (3,) [m] of its path; grip: magnet on before the
+    scenario has it on; without_descent: the window whose descent is left out, None for none; land:
+    reason to land, "" for none."""
+
+    pace: float = 1.0
+    shift: np.ndarray = field(default_factory=lambda: np.zeros(3))
+    grip: bool = False
+    without_descent: GraspWindow | None = None
+    land: str = ""
+
+
+class GraspExecutive:
+    """Watches the grasps of one flight; `decisions`: all so far; `grasp`: newest state."""
+
+    def __init__(
+        self, windows: Sequence[GraspWindow], expected: float, parameters: GraspParameters
+    ) -> None:
+        """windows: see `grasp_windows`; expected [kg]: the scenario's payload."""
+        self.parameters = parameters
+        self.directive = Directive()
+        self.decisions: list[GraspDecision] = []
+        self.grasp = Grasp.NONE
+        self._windows, self._expected = list(windows), expected
+        self._step, self._since = Step.IDLE, 0.0
+        self._attempt = 0
+        self._alignment = Alignment()
+        self._load, self._before = RunningMean(), Load()
+        self._stood = np.full(3, math.nan)  # grip point of the standing payload
+        self._start = np.zeros(3)  # magnet at the begin of the descent
+        self._top = 0.0  # [m] height of the magnet at the grip
+        self._against: float | None = None  # stamp [s] from which evidence is against the grasp
+        self._contact: float | None = None  # stamp [s] from which the arm has contact
+        self._steps: dict[Step, Callable[[Sight, GraspWindow], None]] = {
+            Step.APPROACH: self._approach,
+            Step.ALIGN: self._align,
+            Step.DESCEND: self._descend,
+            Step.LIFT: self._lift,
+            Step.VERIFY: self._verify,
+            Step.RETREAT: self._retreat,
+            Step.CLIMB: self._climb,
+            Step.CARRY: self._carry,
+            Step.RELEASE: self._release,
+        }
+
+    @property
+    def attempts(self) -> int:
+        """Number of approaches so far."""
+        return self._attempt
+
+    def due(self, time: float) -> bool:
+        """Return whether a window is near at scenario time [s]."""
+        return bool(self._windows) and time >= self._windows[0].descent - BEFORE
+
+    def step(self, sight: Sight) -> Directive:
+        """Return the directive after `sight`; call it while the scenario is flown."""
+        if not self._windows:
+            return self.directive
+        window = self._windows[0]
+        if self._step is Step.IDLE:
+            self._go(Step.APPROACH, sight)
+        self._load.add(sight.stamp, np.array([sight.lift, sight.effort]))
+        self._steps[self._step](sight, window)
+        return self.directive
+
+    def interrupt(self) -> None:
+        """Forget running values: the scenario is not flown now."""
+        self._alignment.restart()
+        self._load.restart()
+        self._against = self._contact = None
+
+    def _go(self, step: Step, sight: Sight, pace: float = 1.0) -> None:
+        self._step, self._since = step, sight.stamp
+        self._against = self._contact = None
+        self.directive.pace = pace
+        self.directive.grip = self.directive.grip and step in (Step.DESCEND, Step.LIFT)
+
+    def _decide(self, sight: Sight, grasp: Grasp, text: str) -> None:
+        self.grasp = grasp
+        self.decisions.append(GraspDecision(sight.stamp, grasp, self._attempt, text))
+
+    def _waited(self, sight: Sight) -> float:
+        return sight.stamp - self._since
+
+    def _approach(self, sight: Sight, window: GraspWindow) -> None:
+        self._alignment.add(sight, window.dip)
+        p, alignment = self.parameters, self._alignment
+        if sight.time < window.descent:
+            if alignment.near(p.align_range):
+                shift = self.directive.shift
+                self.directive.shift = alignment.correction(shift, p, p.align_tolerance)
+            return
+        self._stood, self._start = sight.payload.copy(), sight.magnet.copy()
+        if sight.tracked and alignment.known and alignment.distance > p.align_range:
+            self._attempt = 1
+            where = place(sight.payload)
+            self._decide(sight, Grasp.ABSENT, f"no payload below; payload at {where}")
+            self._end()
+        elif alignment.good(p):
+            self._begin_descent(sight)
+        else:
+            self._go(Step.ALIGN, sight, pace=0.0)
+
+    def _align(self, sight: Sight, window: GraspWindow) -> None:
+        p, alignment = self.parameters, self._alignment
+        alignment.add(sight, window.dip)
+        late = self._waited(sight) >= p.align_timeout
+        if alignment.good(p) or (late and alignment.good(p, LATE)):
+            self._begin_descent(sight)
+        elif late and alignment.known:
+            self._attempt += 1
+            self._decide(sight, Grasp.APPROACHED, f"no descent, {alignment.text}")
+            self._again_or_give_up(sight, window)
+        else:
+            self.directive.shift = alignment.correction(self.directive.shift, p)
+
+    def _begin_descent(self, sight: Sight) -> None:
+        self._attempt += 1
+        self._stood, self._start = sight.payload.copy(), sight.magnet.copy()
+        self._before = Load(*self._load.mean) if len(self._load.mean) else Load()
+        self._decide(sight, Grasp.APPROACHED, f"descent, {self._alignment.text}")
+        self._go(Step.DESCEND, sight)
+
+    def _descend(self, sight: Sight, window: GraspWindow) -> None:
+        p = self.parameters
+        if self._touches(sight):
+            self._leave_contact(sight)
+        elif sight.tracked and self._misses(sight, p.descent_miss):
+            self._go_back(sight, f"broken off, {by_pose(sight, self._stood, 0.0, p).text}")
+        elif sight.tracked and not self.directive.grip:
+            self.directive.grip = self._reaches(sight)
+        if self._step is Step.DESCEND and sight.time >= window.grip:
+            self._top = float(sight.magnet[2])
+            self._go(Step.LIFT, sight)
+
+    def _reaches(self, sight: Sight) -> bool:
+        """Return whether to switch the magnet on before its time: in contact, but moving."""
+        away = sight.magnet - sight.payload
+        restless = self._attempt > 1 or np.hypot(*away[:2]) > self.parameters.align_tolerance
+        return bool(away[2] < REACH and restless)
+
+    def _misses(self, sight: Sight, allowed: float) -> bool:
+        """Return whether the magnet is low and beside the payload, or the payload has fallen."""
+        away = sight.payload - sight.magnet
+        beside = bool(np.hypot(*away[:2]) > allowed)
+        low = sight.magnet[2] - self._stood[2] < NEAR
+        fallen = bool(self._stood[2] - sight.payload[2] > FALLEN)
+        return fallen or (low and self._for(sight, beside, CONTACT_AFTER))
+
+    def _for(self, sight: Sight, condition: bool, span: float) -> bool:
+        """Return whether `condition` has been true for `span` [s]."""
+        if not condition:
+            self._against = None
+            return False
+        if self._against is None:
+            self._against = sight.stamp
+        return sight.stamp - self._against >= span
+
+    def _evidence(self, sight: Sight) -> Evidence:
+        p, now = self.parameters, Load(*self._load.mean) if len(self._load.mean) else Load()
+        climb = max(float(sight.magnet[2] - self._top), LEAST_CLIMB)
+        mass = identified_mass(self._before, now, sight.lever)
+        return fused(sight, by_pose(sight, self._stood, climb, p), by_mass(mass, self._expected, p))
+
+    def _lift(self, sight: Sight, window: GraspWindow) -> None:
+        if self._touches(sight):
+            self._leave_contact(sight)
+            return
+        pose = by_pose(sight, self._stood, 0.0, self.parameters)
+        if pose.held is False and self._for(sight, True, CONTACT_AFTER):
+            self._go_back(sight, f"not held, {pose.text}")
+        elif sight.time >= window.lifted:
+            self._go(Step.VERIFY, sight)
+            self._verify(sight, window)
+
+    def _verify(self, sight: Sight, window: GraspWindow) -> None:
+        evidence = self._evidence(sight)
+        if evidence.held and self._load.span(sight.stamp) > 0.0:
+            self._begin_carry(sight, Grasp.HELD, evidence.text)
+        elif evidence.held is False and sight.tracked:
+            self._go_back(sight, f"not held, {evidence.text}")
+        elif self._waited(sight) < self.parameters.lift_timeout:
+            self.directive.pace = 0.0
+        elif evidence.held is False or sight.tracked:
+            self._go_back(sight, f"not held, {evidence.text}")
+        else:
+            self._begin_carry(sight, Grasp.UNVERIFIED, evidence.text)
+
+    def _begin_carry(self, sight: Sight, grasp: Grasp, text: str) -> None:
+        self._decide(sight, grasp, text)
+        self._go(Step.CARRY, sight)
+        self.directive.shift = np.zeros(3)
+
+    def _go_back(self, sight: Sight, text: str) -> None:
+        self._decide(sight, Grasp.APPROACHED, text)
+        self._go(Step.RETREAT, sight, pace=-1.0)
+
+    def _retreat(self, sight: Sight, window: GraspWindow) -> None:
+        if sight.time <= window.descent:
+            self._again_or_give_up(sight, window)
+
+    def _again_or_give_up(self, sight: Sight, window: GraspWindow) -> None:
+        """Align once more, or leave the payload where it is."""
+        p, reason = self.parameters, ""
+        self._alignment.restart()
+        if sight.tracked and self._stood[2] - sight.payload[2] > FALLEN:
+            reason = "fallen from its place"
+        elif sight.tracked and np.hypot(*(sight.payload - self._start)[:2]) > 2.0 * p.align_range:
+            reason = "out of reach"
+        elif self._attempt >= p.grasp_attempts:
+            reason = f"{self._attempt} approaches"
+        if not reason:
+            self._go(Step.ALIGN, sight, pace=0.0)
+            return
+        where = f"; payload at {place(sight.payload)}" if sight.tracked else ""
+        self._decide(sight, Grasp.GIVEN_UP, f"given up, {reason}{where}")
+        self.directive = Directive(without_descent=window)
+        if p.grasp_given_up == "land":
+            self.directive.land = self.decisions[-1].text
+        self._end()
+
+    def _end(self) -> None:
+        """Leave the window."""
+        self._windows.pop(0)
+        self._step, self._attempt = Step.IDLE, 0
+        self._alignment.restart()
+
+    def _touches(self, sight: Sight) -> bool:
+        """Return whether the arm has had contact with the stand for CONTACT_AFTER."""
+        error = float(np.hypot(*sight.error[:2]))
+        if error <= self.parameters.contact_error:
+            self._contact = None
+            return False
+        if self._contact is None:
+            self._contact = sight.stamp
+        return sight.stamp - self._contact >= CONTACT_AFTER
+
+    def _leave_contact(self, sight: Sight) -> None:
+        error = float(np.hypot(*sight.error[:2]))
+        text = f"contact near the stand, position error {error:.2f} m: climbs"
+        self._decide(sight, self.grasp, text)
+        self._go(Step.CLIMB, sight, pace=0.0)
+        self.directive.shift = self.directive.shift + [0.0, 0.0, self.parameters.contact_climb]
+
+    def _climb(self, sight: Sight, window: GraspWindow) -> None:
+        p = self.parameters
+        calm = float(np.linalg.norm(sight.error)) < CALM * p.contact_error
+        if self._waited(sight) < p.align_timeout and not self._for(sight, calm, CALM):
+            return
+        if self.grasp in (Grasp.HELD, Grasp.UNVERIFIED):
+            self._go(Step.CARRY, sight)
+        else:
+            self._go(Step.RETREAT, sight, pace=-1.0)
+
+    def _carry(self, sight: Sight, window: GraspWindow) -> None:
+        p = self.parameters
+        if sight.time >= window.release:
+            self._go(Step.RELEASE, sight)
+            return
+        beside = np.hypot(*(sight.magnet - self._start)[:2]) < BESIDE
+        if beside and self._touches(sight):
+            self._leave_contact(sight)
+            return
+        if not beside:
+            self.directive.shift = np.zeros(3)
+        if self.grasp not in (Grasp.HELD, Grasp.UNVERIFIED):
+            return
+        evidence = self._against_carry(sight)
+        if self._for(sight, evidence.held is False, p.lost_after):
+            self._decide(sight, Grasp.LOST, f"lost in flight, {evidence.text}")
+            if p.payload_lost == "land":
+                self.directive.land = self.decisions[-1].text
+
+    def _against_carry(self, sight: Sight) -> Evidence:
+        """Return the evidence during the carry: the pose alone; the arm moves."""
+        return by_pose(sight, self._stood, 0.0, self.parameters)
+
+    def _release(self, sight: Sight, window: GraspWindow) -> None:
+        p = self.parameters
+        pose = by_pose(sight, self._stood, 0.0, p)
+        if self.grasp not in (Grasp.HELD, Grasp.UNVERIFIED):
+            self._end()
+        elif pose.held is False:
+            if sight.time >= window.departure or self.directive.pace == 0.0:
+                self._decide(sight, Grasp.RELEASED, f"released, payload at {place(sight.payload)}")
+                self.directive.pace = 1.0
+                self._end()
+        elif sight.time >= window.departure:
+            self.directive.pace = 0.0
+            if not sight.tracked:
+                self.directive.pace = 1.0
+                self._decide(sight, Grasp.RELEASED, "magnet off, not verified")
+                self._end()
+            elif self._waited(sight) >= p.release_timeout + window.departure - window.release:
+                self.directive.pace = 1.0
+                self._decide(sight, Grasp.STUCK, f"not released, {pose.text}")
+                self._end()

@@ -1,0 +1,72 @@
+"""Inputs of the grasp executive at one of its steps, and their running means."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+
+import numpy as np
+
+MEMORY = 0.8  # [s] time constant of the means
+
+
+@dataclass
+class Sight:
+    """What a vehicle can measure for a grasp.
+
+    stamp [s]; time [s]: of the scenario; magnet (3,) [m, world]: face, from the estimate; error
+    (3,) [m]: position - reference; payload (3,) [m, world]: grip point from its mocap pose; lift
+    [N]: filtered collective thrust; effort [N m]: measured torque of the first joint; lever [m]:
+    horizontal distance of the magnet from that joint. NaN: unknown.
+    """
+
+    stamp: float
+    time: float
+    magnet: np.ndarray
+    error: np.ndarray = field(default_factory=lambda: np.zeros(3))
+    payload: np.ndarray = field(default_factory=lambda: np.full(3, math.nan))
+    lift: float = math.nan
+    effort: float = math.nan
+    lever: float = 0.0
+
+    @property
+    def tracked(self) -> bool:
+        """Whether the payload's pose is known."""
+        return bool(np.isfinite(self.payload).all())
+
+
+class RunningMean:
+    """Exponential mean and standard deviation of a vector, with the time constant MEMORY."""
+
+    def __init__(self) -> None:
+        self._stamp = -math.inf
+        self.mean = np.zeros(0)
+        self._square = np.zeros(0)
+        self._begun = math.inf
+
+    @property
+    def deviation(self) -> np.ndarray:
+        """Standard deviation per entry."""
+        return np.sqrt(np.maximum(self._square - self.mean**2, 0.0))
+
+    def span(self, stamp: float) -> float:
+        """Return the time [s] over which values were taken, at `stamp` [s]."""
+        return stamp - self._begun
+
+    def restart(self) -> None:
+        """Forget all values."""
+        self._begun = math.inf
+
+    def add(self, stamp: float, value: np.ndarray) -> None:
+        """Add value (n,) at `stamp` [s]; values that are not finite restart the mean."""
+        if not np.isfinite(value).all():
+            self.restart()
+            return
+        if self._begun == math.inf:
+            self._begun, self.mean, self._square = stamp, value.copy(), value**2
+        else:  # a plain mean at first, so that the first value weighs no more than the others
+            step = stamp - self._stamp
+            gain = step / min(MEMORY, stamp - self._begun + step)
+            self.mean = self.mean + gain * (value - self.mean)
+            self._square = self._square + gain * (value**2 - self._square)
+        self._stamp = stamp

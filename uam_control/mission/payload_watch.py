@@ -1,0 +1,115 @@
+"""Connects the grasp executive with a flight: its inputs, and its effect on the path."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from uam_control.coordinates import ALPHA, CHI, POSITION, Z
+from uam_control.grasp import GraspDecision, GraspExecutive, GraspWindow, Sight, grasp_windows
+from uam_control.grasp.kinematics import lever, magnet_position
+from uam_control.mission.guidance import Guidance
+from uam_control.mission.mission_parameters import MissionParameters
+from uam_control.mission.scenario import Scenario
+from uam_control.mission.shift import Shift
+from uam_control.mission.trajectory import Move, Moves, Trajectory
+from uam_control.supervision import Readings
+
+PERIOD = 0.02  # [s] between two steps of the executive
+
+
+class WithoutDescent:
+    """A trajectory that stays at the height of a window's begin until the end of its climb."""
+
+    def __init__(self, trajectory: Trajectory, window: GraspWindow, like: np.ndarray) -> None:
+        """like (5, 6 + n): a motion of the same size."""
+        self._inner, self._window = trajectory, window
+        self._level = np.zeros_like(like)
+        ends = []
+        for time in (window.descent, window.lifted):
+            trajectory.write(time, self._level)
+            ends.append(self._level[CHI].copy())
+        move = Move("z", window.descent, window.lifted, float(ends[1][Z]))
+        self._between = Moves(ends[0], [move])
+
+    def write(self, time: float, motion: np.ndarray) -> None:
+        """Write the motion (5, 6 + n); see `Trajectory.write`."""
+        self._inner.write(time, motion)
+        if self._window.descent < time < self._window.lifted:
+            self._between.write(time, self._level)
+            motion[:, Z] = self._level[:, Z]
+
+
+class PayloadWatch:
+    """The executive of a flight, stepped 50 times a second while the scenario is flown."""
+
+    def __init__(
+        self, scenario: Scenario, guidance: Guidance, parameters: MissionParameters
+    ) -> None:
+        windows = grasp_windows(scenario.moves, scenario.magnet)
+        self.executive = GraspExecutive(windows, scenario.payload_mass, parameters)
+        self._guidance, self._parameters = guidance, parameters
+        self._shift = Shift()
+        guidance.shift = self._shift.add
+        self._stepped = -math.inf  # stamp [s]
+        self._left_out: GraspWindow | None = None
+
+    @property
+    def decisions(self) -> list[GraspDecision]:
+        """Return the decisions so far."""
+        return self.executive.decisions
+
+    def configure(self, parameters: MissionParameters) -> None:
+        """Use `parameters` (validated) from the next step on."""
+        self._parameters = self.executive.parameters = parameters
+
+    def advance(self, stamp: float) -> None:
+        """Set the shift of the path for `stamp` [s]; call it before the guidance writes."""
+        self._shift.advance(stamp)
+
+    @property
+    def grip(self) -> bool:
+        """Whether the magnet is on before the scenario switches it on."""
+        return self.executive.directive.grip
+
+    def interrupt(self) -> None:
+        """The scenario is not flown at this tick."""
+        self.executive.interrupt()
+
+    def step(self, stamp: float, state: np.ndarray, readings: Readings) -> str:
+        """Step the executive at `stamp` [s] if it is due; apply its directive.
+
+        state (3, 6 + n). Returns the reason to end the mission, "" without one.
+        """
+        executive, guidance = self.executive, self._guidance
+        due = executive.due(guidance.scenario_time) and np.isfinite(state[CHI]).all()
+        if not due or stamp - self._stepped < PERIOD - 1e-6:
+            return ""
+        self._stepped = stamp
+        directive = executive.step(self._sight(stamp, state, readings))
+        guidance.pace(stamp, directive.pace)
+        self._shift.aim(stamp, directive.shift)
+        window = directive.without_descent
+        if window is not None and window is not self._left_out:
+            self._left_out = window
+            guidance.replace(WithoutDescent(guidance.trajectory, window, guidance.motion))
+        return directive.land
+
+    def _sight(self, stamp: float, state: np.ndarray, readings: Readings) -> Sight:
+        p, chi = self._parameters, state[CHI]
+        known = len(p.arm_links) == len(chi) - ALPHA
+        links = p.arm_links if known else np.zeros(len(chi) - ALPHA)
+        sight = Sight(
+            stamp,
+            self._guidance.scenario_time,
+            magnet_position(chi, p.arm_mount, links, p.magnet_length),
+            error=chi[POSITION] - self._guidance.reference[CHI, POSITION],
+            lift=readings.lift,
+            lever=lever(chi, links),
+        )
+        if known and readings.payload_age <= p.payload_age:
+            sight.payload = readings.payload_position.copy()
+        if len(readings.joint_effort):
+            sight.effort = float(readings.joint_effort[0])
+        return sight
