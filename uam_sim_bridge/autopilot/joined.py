@@ -63,6 +63,7 @@ class JoinedAutopilot:
         self._incoming: deque[tuple[float, _Received]] = deque()
         self.round_trip: float | None = None
         self._now = -math.inf  # [s] tick of the last `poll`
+        self._period = math.inf  # [s] between two of them, the shortest
         self.time = 0.0
         self._received_at = -math.inf
         self._sample: tuple[float, np.ndarray, np.ndarray] | None = None
@@ -78,10 +79,11 @@ class JoinedAutopilot:
     def poll(self, time: float) -> None:
         """Deliver delayed messages; receive the autopilot's messages since the last call.
 
-        `round_trip` is that of a message of this tick: its delays, and one tick for the answer.
+        `round_trip` is that of a message of this tick: its delays, and one tick for the answer. A
+        gap between two ticks is no round trip.
         """
-        period, self._now = time - self._now, time
-        late_to, late_from = self.late_to(), self.late_from()
+        self._period, self._now = min(self._period, time - self._now), time
+        late_to, late_from, period = self.late_to(), self.late_from(), self._period
         self.round_trip = period + late_to + late_from if math.isfinite(period) else None
         while self._outgoing and self._outgoing[0][0] <= time + 1e-9:
             self._outgoing.popleft()[1]()
