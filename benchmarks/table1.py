@@ -2,7 +2,7 @@
 
     .venv/bin/python benchmarks/table1.py                   # as flown, and one change at a time
     .venv/bin/python benchmarks/table1.py --only flown --seeds 20
-    .venv/bin/python benchmarks/table1.py --only flown --plant-preset laboratory --throttle 0.064
+    .venv/bin/python benchmarks/table1.py --only baselines  # their published gains are unknown
     .venv/bin/python benchmarks/table1.py --only search     # every combination of assumptions
     .venv/bin/python benchmarks/table1.py --only flown --engine ros --seeds 2
 
@@ -22,7 +22,6 @@ from table1_flights import flights, picture, table
 
 from uam_lab.campaign.pool import cores, fly_all
 from uam_lab.campaign.trial import Trial
-from uam_sim_bridge.plant.effects import presets
 
 PAYLOAD = 0.2  # [kg], the paper's
 SHOWN = 6  # rows of the search
@@ -31,14 +30,13 @@ SHOWN = 6  # rows of the search
 def fly(rows, options) -> list[table.Flown]:
     """Fly every row with every seed."""
     seeds = range(1, options.seeds + 1)
-    effects = presets.read(options.plant_preset)
     trials = [
         Trial(
             row.label,
             row.profile,
             PAYLOAD,
             seed,
-            vehicle_changes=presets.added(row.vehicle, effects),
+            vehicle_changes=row.vehicle,
             engine=options.engine,
         )
         for row in rows
@@ -59,15 +57,17 @@ def fly(rows, options) -> list[table.Flown]:
 
 
 def flown(options) -> str:
-    """Return the table of the profile itself and of the baselines in the same reading."""
-    found = fly([flights.as_flown(options.throttle), *flights.baselines()], options)
-    labels = [
-        f"Table I {found[0].row.label}",
-        *(f"{one.row.label} (reconstruction)" for one in found[1:]),
-    ]
-    labelled = list(zip(labels, found, strict=True))
-    picture.draw(labelled, options.out / "flown.svg")
+    """Return the table of the profile itself, and of throttle scales fitted to the plant."""
+    found = fly([flights.as_flown(), *flights.fitted()], options)
+    labelled = [(one.row.label, one) for one in found]
+    picture.draw(labelled, options.out / "table1.svg")
     return table.beside_the_paper(labelled)
+
+
+def baselines(options) -> str:
+    """Return the table of the reconstructed baselines in the same reading."""
+    found = fly(flights.baselines(), options)
+    return table.beside_the_paper([(f"{one.row.label} (reconstruction)", one) for one in found])
 
 
 def sensitivity(options) -> str:
@@ -80,7 +80,7 @@ def search(options) -> str:
     return table.best(fly(flights.search(), options), SHOWN)
 
 
-PARTS = {"flown": flown, "sensitivity": sensitivity, "search": search}
+PARTS = {"flown": flown, "sensitivity": sensitivity, "search": search, "baselines": baselines}
 
 
 def main() -> int:
@@ -91,10 +91,6 @@ def main() -> int:
     option = parser.add_argument
     text = "part to fly (default: flown and sensitivity); may be repeated"
     option("--only", action="append", choices=tuple(PARTS), help=text)
-    text = "effects of the plant (default: calm); may be repeated"
-    option("--plant-preset", action="append", default=[], help=text)
-    text = "throttle_per_newton of the first row, in place of the profile's"
-    option("--throttle", type=float, metavar="1/N", help=text)
     option("--seeds", type=int, default=3, help="seeds 1..N (default %(default)s)")
     option("--engine", choices=("direct", "ros"), default="direct", help="(default %(default)s)")
     option("--jobs", type=int, default=cores(), help="processes (default: one per core)")

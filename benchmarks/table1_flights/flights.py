@@ -11,6 +11,7 @@ from typing import Any
 import yaml
 
 from uam_control.profiles.profile import Profile, load_profile, profile_of
+from uam_sim_bridge.plant.effects import presets
 
 AS_FLOWN = "paper_table1_as_flown"
 ASSUMPTIONS = Path(__file__).with_name("assumptions.yaml")
@@ -20,7 +21,8 @@ VEHICLE = "vehicle"
 FORMS = ("theory", "table", "sliding")
 BANDWIDTHS = (12.0, 32.0)  # [rad/s] of the estimator's position
 NOISES = (1.0, 3.0, 6.0)
-HOVER = 0.0606  # [1/N]
+HOVER = 0.0606  # [1/N] of the calm plant
+LABORATORY = 0.064  # [1/N] of the preset `laboratory`, whose battery is not full
 
 
 @dataclass(frozen=True)
@@ -42,12 +44,20 @@ def changed(changes: dict[str, dict[str, Any]], *names: str) -> Profile:
     return profile_of(sections, Path(f"{profile.name}_changed.yaml"), profile.vehicle)
 
 
-def as_flown(throttle: float | None = None) -> Row:
-    """Return the row of the profile itself; throttle: None for its throttle_per_newton."""
-    if throttle is None:
-        return Row("", "as flown", load_profile(AS_FLOWN))
-    profile = changed({BRIDGE: {"throttle_per_newton": throttle}})
-    return Row("", f"as flown, {throttle:g} per N", profile)
+def as_flown() -> Row:
+    """Return the row of the profile itself."""
+    return Row("", "as flown, calm", load_profile(AS_FLOWN))
+
+
+def fitted() -> list[Row]:
+    """Return rows with the throttle scale fitted to the plant, as a laboratory does."""
+    calm, lab = (changed({BRIDGE: {"throttle_per_newton": scale}}) for scale in (HOVER, LABORATORY))
+    effects = presets.added({}, presets.read(["laboratory"]))
+    return [
+        Row("", f"{HOVER:g} per N, calm", calm),
+        Row("", f"{HOVER:g} per N, calm, noise x 3", calm, {"sensors.noise_scale": 3.0}),
+        Row("", f"{LABORATORY:g} per N, laboratory", lab, effects),
+    ]
 
 
 def sensitivity() -> list[Row]:
