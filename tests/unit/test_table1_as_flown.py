@@ -62,3 +62,7 @@ def test_every_reading_changes_one_assumption_of_a_valid_profile():
     for row in rows:
         assert row.profile.sections != own.sections or row.vehicle
         Vehicle.load().changed(row.vehicle)  # the entries exist
+
+
+def test_the_mission_is_feasible_with_its_unit_mass():
+    assert settings(profile=NAME, engine="direct").profile.name == NAME
