@@ -1,4 +1,4 @@
-"""The supervisor: its transitions, its limits, and properties for arbitrary inputs."""
+"""The supervisor: its transitions and its limits."""
 
 from __future__ import annotations
 
@@ -8,31 +8,25 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
-from hypothesis.stateful import RuleBasedStateMachine, invariant, rule
+from supervised import S500, flying, observation, watch, with_state
 
 from uam_control.settings.parameter_set import ParameterError
 from uam_control.supervision import (
-    Authority,
     Event,
     Guide,
     Inputs,
-    Observation,
     OperatorCommand,
     Readings,
     State,
-    SupervisionParameters,
     Supervisor,
 )
 from uam_control.supervision.checks import CHECKS, Checks, measure, read
 from uam_control.supervision.monitor import Level, Monitor
 from uam_control.supervision.states import TARGETS, TRANSITIONS
-from uam_control.vehicle import load_description
 
 DOCS = Path(__file__).resolve().parents[2] / "docs" / "supervision.md"
-
-S500 = SupervisionParameters.among(load_description().node_parameters()["mission"], 2)
 
 
 def mermaid() -> str:
@@ -138,39 +132,6 @@ def test_a_short_excess_and_an_unknown_value_have_no_effect():
     assert set(run(monitor, [5.0, 0.1] * 20)) == {Level.FINE}
     assert not any(run(Monitor(), [-math.inf] * 20))
     assert run(Monitor(), [math.nan] * 3)[-1] is Level.LAND
-
-
-def observation(**changes):
-    """Return an observation without tracking error, 1 m above the start."""
-    state, reference = np.zeros((3, 8)), np.zeros((3, 8))
-    state[0, 2] = reference[0, 2] = 1.0
-    seen = Observation(state, reference, 0.0, armed=True, ready=True)
-    for name, value in changes.items():
-        setattr(seen, name, value)
-    return seen
-
-
-def flying(**parameters):
-    """A supervisor after take-off, and the time of its steps."""
-    made = Supervisor(dataclasses.replace(S500, **parameters).validated(2))
-    made.start()
-    for stamp in (0.0, 0.01):
-        made.step(stamp, observation())
-    assert made.state is State.FLYING
-    return made
-
-
-def watch(supervisor, seen, seconds, begin=1.0):
-    """Step for a while; return the last decision."""
-    for k in range(round(seconds / 0.01) + 1):
-        decision = supervisor.step(begin + 0.01 * k, seen)
-    return decision
-
-
-def with_state(entry, value):
-    seen = observation()
-    seen.state[entry] = value
-    return seen
 
 
 @pytest.mark.parametrize(
@@ -395,260 +356,3 @@ def test_inputs_compute_ages_by_stamps_and_count_missed_ticks_of_a_second():
     for tick in range(300):
         readings = inputs.at(1.028 + 0.004 * tick)
     assert readings.missed_ticks == 0.0
-
-
-PILOT = Authority("the pilot, in POSITION")
-AIRBORNE = (State.FLYING, State.HOLDING, State.LANDING)
-
-
-@pytest.mark.parametrize(
-    "command", [None, OperatorCommand.HOLD, OperatorCommand.LAND], ids=["flying", "hold", "land"]
-)
-def test_any_state_in_the_air_is_released_in_the_same_tick(command):
-    supervisor = flying()
-    supervisor.step(1.0, observation(), command)
-    assert supervisor.state in AIRBORNE
-    decision = supervisor.step(1.004, observation(authority=PILOT))
-    assert decision.state is State.RELEASED and decision.guide is Guide.NOTHING and decision.arm
-    assert decision.cause == "the pilot, in POSITION, has control"
-    assert decision.keep_magnet and decision.regains == 0
-    assert not decision.stow  # a pilot flies on: the arm stays
-    landing = Authority("the pilot, in LAND", lands=True)
-    assert supervisor.step(1.008, observation(authority=landing)).stow
-
-
-def test_the_take_off_is_released_too():
-    supervisor = Supervisor(S500)
-    supervisor.start()
-    low = observation()
-    low.state[0, 2] = 0.1
-    assert supervisor.step(0.0, low).state is State.TAKING_OFF
-    low.authority = PILOT
-    assert supervisor.step(0.01, low).state is State.RELEASED
-
-
-def test_arm_and_magnet_of_a_released_vehicle_follow_the_policy():
-    supervisor = flying(arm_released="stay", magnet_released="release")
-    decision = supervisor.step(1.0, observation(authority=PILOT))
-    assert not decision.stow and not decision.keep_magnet
-
-
-def test_the_cause_says_who_has_control_now():
-    supervisor = flying()
-    supervisor.step(1.0, observation(authority=Authority("the autopilot's failsafe, in LAND")))
-    decision = supervisor.step(1.1, observation(authority=PILOT))
-    assert decision.cause == "the pilot, in POSITION, has control"
-    assert len([c for c in supervisor.changes if c.target is State.RELEASED]) == 1
-
-
-@pytest.mark.parametrize(
-    "seen",
-    [
-        with_state((0, 0), 9.0),
-        with_state((0, 3), 2.0),
-        with_state((0, 2), math.nan),
-        observation(readings=Readings(mocap_age=9.0)),
-        observation(readings=Readings(battery=0.01)),
-        observation(touchdown=True, overdue=True, landing_due=True),
-    ],
-    ids=["far", "tilted", "not finite", "no mocap", "battery", "landing"],
-)
-def test_no_limit_takes_a_released_vehicle_from_the_pilot(seen):
-    supervisor = flying()
-    seen.authority = PILOT
-    decision = watch(supervisor, seen, 10.0)
-    assert decision.state is State.RELEASED and decision.arm and decision.regains == 0
-    seen.authority = Authority()
-
-
-@pytest.mark.parametrize(
-    ("changes", "state"),
-    [
-        ({}, State.HOLDING),
-        ({"on_ground": True}, State.DISARMED),
-        ({"authority": Authority(landed=True)}, State.DISARMED),
-        ({"armed": False}, State.DISARMED),
-    ],
-)
-def test_the_end_of_a_release(changes, state):
-    supervisor = flying()
-    watch(supervisor, observation(authority=PILOT), 1.0)
-    decision = watch(supervisor, observation(**changes), 1.0, 3.0)
-    assert decision.state is state and decision.arm is (state is State.HOLDING)
-
-
-def test_resume_of_a_released_vehicle_counts_and_then_the_scenario_goes_on():
-    supervisor, seen = flying(), observation(authority=PILOT)
-    watch(supervisor, seen, 1.0)
-    decision = supervisor.step(3.0, seen, OperatorCommand.RESUME)
-    assert decision.state is State.RELEASED and decision.regains == 1
-    assert watch(supervisor, seen, 1.0, 3.1).regains == 1
-    assert supervisor.step(5.0, observation()).state is State.HOLDING
-    assert supervisor.step(5.1, observation()).state is State.FLYING
-
-
-def test_a_second_release_forgets_the_resume():
-    supervisor, seen = flying(), observation(authority=PILOT)
-    watch(supervisor, seen, 1.0)
-    supervisor.step(3.0, seen, OperatorCommand.RESUME)
-    supervisor.step(3.1, observation())
-    assert supervisor.step(3.2, seen).state is State.RELEASED
-    assert watch(supervisor, observation(), 20.0, 4.0).state is State.HOLDING
-
-
-@pytest.mark.parametrize(
-    ("command", "changes", "refusal"),
-    [
-        (OperatorCommand.RESUME, {"on_ground": True}, "on the ground: disarm, then start"),
-        (OperatorCommand.RESUME, {"authority": PILOT._replace(landed=True)}, "on the ground"),
-        (OperatorCommand.HOLD, {}, "the pilot, in POSITION has control"),
-        (OperatorCommand.LAND, {}, "the pilot, in POSITION has control"),
-        (OperatorCommand.DISARM, {}, "the pilot, in POSITION has control"),
-        (OperatorCommand.DISARM, {"on_ground": True}, "the pilot, in POSITION has control"),
-    ],
-)
-def test_commands_to_a_released_vehicle_that_are_refused(command, changes, refusal):
-    supervisor = flying()
-    seen = observation(**({"authority": PILOT} | changes))
-    watch(supervisor, seen, 1.0)
-    assert supervisor.refusal(command, seen).startswith(refusal)
-    assert supervisor.step(3.0, seen, command).regains == 0
-
-
-def test_resume_beyond_a_limit_is_refused():
-    supervisor, tilted = flying(), with_state((0, 3), 0.9)
-    tilted.authority = PILOT
-    watch(supervisor, tilted, 1.0)
-    assert supervisor.refusal(OperatorCommand.RESUME, tilted) == "tilt 0.90 rad exceeds 0.8 rad"
-    assert supervisor.step(3.0, tilted, OperatorCommand.RESUME).regains == 0
-
-
-def test_a_vehicle_that_somebody_else_arms_ends_the_start():
-    supervisor = Supervisor(S500)
-    assert watch(supervisor, observation(authority=PILOT), 1.0).state is State.GROUNDED
-    supervisor.start()
-    decision = supervisor.step(3.0, observation(authority=PILOT))
-    assert decision.state is State.DISARMED and not decision.arm
-    assert decision.cause == "the pilot, in POSITION, has control"
-
-
-def test_nothing_is_armed_before_the_start():
-    supervisor = Supervisor(S500)
-    assert not watch(supervisor, observation(armed=False), 5.0).arm
-    assert supervisor.state is State.GROUNDED
-    supervisor.start()
-    assert supervisor.decision.arm
-    supervisor.give_up(10.0, "no answer")
-    supervisor.start()
-    assert not supervisor.decision.arm and supervisor.state is State.DISARMED
-
-
-NUMBERS = st.floats(-1e3, 1e3) | st.sampled_from([math.nan, math.inf, -math.inf, 0.0])
-READINGS = st.builds(
-    Readings, *[NUMBERS] * 6,
-    st.builds(np.array, st.tuples(NUMBERS, NUMBERS)),
-    st.builds(np.array, st.tuples(NUMBERS, NUMBERS, NUMBERS)),
-    autopilot_age=NUMBERS,
-    mocap_still=NUMBERS,
-    round_trip=NUMBERS,
-    mocap_position=st.builds(np.array, st.tuples(NUMBERS, NUMBERS, NUMBERS)),
-)  # fmt: skip
-
-
-class AnySequence(RuleBasedStateMachine):
-    """The supervisor's properties hold for any sequence of inputs."""
-
-    # while somebody else has control
-    WITHOUT_CONTROL = (State.GROUNDED, State.RELEASED, State.FAILSAFE, State.DISARMED)
-
-    def __init__(self):
-        super().__init__()
-        self.supervisor = Supervisor(S500)
-        self.seen = observation(ready=False)
-        self.stamp = 0.0
-        self.decision = self.supervisor.decision
-        self.before = State.GROUNDED
-
-    def step(self, stamp, command=None):
-        self.before = self.supervisor.state
-        armed, changes = self.decision.arm, len(self.supervisor.changes)
-        self.decision = self.supervisor.step(stamp, self.seen, command)
-        assert armed or not self.decision.arm  # never arms by itself
-        if self.seen.authority.released_to:
-            assert self.decision.state in self.WITHOUT_CONTROL
-        if self.before is State.FAILSAFE and self.decision.state is not State.FAILSAFE:
-            assert command is OperatorCommand.DISARM
-        new = self.supervisor.changes[changes:]
-        assert len(new) <= 1
-        for change in new:
-            assert TARGETS[change.source, change.event] is change.target
-            assert change.source is not State.DISARMED and change.cause
-            assert not math.isnan(change.stamp)
-            if change.target is State.DISARMED:
-                seen = self.seen
-                on_ground = seen.on_ground or seen.touchdown or seen.authority.landed
-                # a start that somebody else has overtaken ends; his vehicle is left alone
-                overtaken = change.event is Event.GIVEN_UP and seen.authority.released_to
-                by_command = command is OperatorCommand.DISARM
-                assert on_ground or not seen.armed or by_command or overtaken
-
-    @rule(seconds=st.sampled_from([0.004, 0.05, 0.6, 2.0]), ticks=st.integers(1, 20))
-    def time_passes(self, seconds, ticks):
-        for _ in range(ticks):
-            self.stamp += seconds
-            self.step(self.stamp)
-
-    @rule(stamp=NUMBERS)
-    def a_strange_stamp(self, stamp):
-        self.step(stamp)
-        if math.isfinite(stamp):
-            self.stamp = max(self.stamp, stamp)
-
-    @rule()
-    def the_start(self):
-        self.supervisor.start()
-        self.decision = self.supervisor.decision
-
-    @rule(who=st.sampled_from(["", "", "the pilot, in HOLD"]), landed=st.booleans())
-    def control(self, who, landed):
-        self.seen.authority = Authority(who, landed)
-
-    @rule(command=st.sampled_from(OperatorCommand))
-    def a_command(self, command):
-        self.stamp += 0.004
-        refusal = self.supervisor.refusal(command, self.seen)
-        self.step(self.stamp, command)
-        assert isinstance(refusal, str) and "\n" not in refusal
-
-    @rule(row=st.integers(0, 2), column=st.integers(0, 7), value=NUMBERS)
-    def an_estimate(self, row, column, value):
-        self.seen.state[row, column] = value
-
-    @rule()
-    def all_well(self):
-        self.seen = observation(readings=Readings())
-
-    @rule(readings=READINGS)
-    def other_readings(self, readings):
-        self.seen.readings = readings
-
-    @rule(
-        name=st.sampled_from(
-            ["armed", "ready", "landing_due", "on_ground", "touchdown", "overdue"]
-        ),
-        on=st.booleans(),
-    )
-    def the_mission_says(self, name, on):
-        setattr(self.seen, name, on)
-
-    @invariant()
-    def what_the_state_means(self):
-        decision = self.decision
-        idle = (State.GROUNDED, State.RELEASED, State.FAILSAFE, State.DISARMED)
-        assert (decision.guide is Guide.NOTHING) is (decision.state in idle)
-        assert decision.arm or decision.state in (State.GROUNDED, State.DISARMED, State.FAILSAFE)
-        assert decision.state is not State.DISARMED or not (decision.arm or decision.keep_magnet)
-
-
-TestAnySequence = AnySequence.TestCase
-TestAnySequence.settings = settings(max_examples=60, stateful_step_count=40, deadline=None)

@@ -1,0 +1,45 @@
+"""A supervisor in flight, for tests: observations, steps, decisions."""
+
+from __future__ import annotations
+
+import dataclasses
+
+import numpy as np
+
+from uam_control.supervision import Observation, State, SupervisionParameters, Supervisor
+from uam_control.vehicle import load_description
+
+S500 = SupervisionParameters.among(load_description().node_parameters()["mission"], 2)
+
+
+def observation(**changes):
+    """Return an observation without tracking error, 1 m above the start."""
+    state, reference = np.zeros((3, 8)), np.zeros((3, 8))
+    state[0, 2] = reference[0, 2] = 1.0
+    seen = Observation(state, reference, 0.0, armed=True, ready=True)
+    for name, value in changes.items():
+        setattr(seen, name, value)
+    return seen
+
+
+def flying(**parameters):
+    """A supervisor after take-off, and the time of its steps."""
+    made = Supervisor(dataclasses.replace(S500, **parameters).validated(2))
+    made.start()
+    for stamp in (0.0, 0.01):
+        made.step(stamp, observation())
+    assert made.state is State.FLYING
+    return made
+
+
+def watch(supervisor, seen, seconds, begin=1.0):
+    """Step for a while; return the last decision."""
+    for k in range(round(seconds / 0.01) + 1):
+        decision = supervisor.step(begin + 0.01 * k, seen)
+    return decision
+
+
+def with_state(entry, value):
+    seen = observation()
+    seen.state[entry] = value
+    return seen
