@@ -103,6 +103,9 @@ def test_a_failure_is_an_exception_with_its_reason(short_scenario, tmp_path, mon
     with pytest.raises(FlightFailed, match="no progress for 0.1 s") as failed, flight:
         flight.wait()
     assert failed.value.result is flight.result and not flight.result.completed
+    text = "\n".join(flight.messages)
+    assert text.count("processes in ROS domain") == 2, "it is started once more"
+    assert "no progress for 0.1 s" in text and "starting again" in text
     with pytest.raises(FlightError, match="nothing was recorded"):
         _ = flight.result["time"]
 

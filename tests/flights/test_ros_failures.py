@@ -6,18 +6,11 @@ import signal
 import time
 
 import pytest
-from rich.console import Console
 from whole_flight import assert_nothing_left, lock_is_held, wait_until_gone
 
 from uam_lab.doctor.finding import Verdict
 from uam_lab.doctor.ros import room
-from uam_lab.flight.flight_settings import settings
-from uam_lab.flight.progress import Progress
-from uam_lab.flight.ros import engine as ros_engine
-from uam_lab.flight.ros import node_arguments as ros_parameters
-from uam_lab.processes.interrupts import StopRequest
 from uam_lab.results import timeseries
-from uam_lab.results.result_folder import ResultFolder
 
 
 def kept(flight):
@@ -123,15 +116,3 @@ def test_no_node_survives_a_killed_orchestrator(fly, short_scenario):
     wait_until_gone(list(nodes.values()))
     assert flight.out.joinpath("logs/mujoco_sim.json").exists(), "the nodes ended in good order"
     lock_is_held(flight.instance)  # at most by another flight: none is left behind
-
-
-def test_who_does_not_find_the_others_is_started_once_more(short_scenario, tmp_path, monkeypatch):
-    monkeypatch.setattr(ros_parameters, "START_TIMEOUT", 0.1)
-    with (tmp_path / "said").open("w+") as said, Progress(Console(file=said, width=400)) as shown:
-        requested = settings(scenario=str(short_scenario))
-        flown = ros_engine.fly(requested, ResultFolder(tmp_path), shown, StopRequest())
-        said.seek(0)
-        text = said.read()
-    assert text.count("processes in ROS domain") == 2
-    assert "no progress for 0.1 s" in text and "starting again" in text
-    assert "no progress for 0.1 s" in flown.failure and flown.series is None
