@@ -4,6 +4,7 @@ import csv
 import json
 
 import numpy as np
+import pytest
 
 from uam_control.profiles.profile import load_profile
 from uam_lab.campaign.variations import common, draw, ranges
@@ -29,8 +30,12 @@ def test_what_failures_have_in_common_is_found():
     assert name == "wind" and lost > 4.0 > kept and distance > 1.0
 
 
-def test_most_random_flights_are_flown_to_the_end(tmp_path, capsys):
-    assert main(["campaign", "--flights", str(FLIGHTS), "--out", str(tmp_path)]) == 0
+@pytest.mark.parametrize(
+    "scenario", ["hover", pytest.param("pick_and_place", marks=pytest.mark.slow)]
+)
+def test_most_random_flights_are_flown_to_the_end(scenario, tmp_path, capsys):
+    command = ["campaign", "--scenario", scenario, "--out", str(tmp_path)]
+    assert main([*command, "--flights", str(FLIGHTS)]) == 0
     found = json.loads((tmp_path / "campaign.json").read_text())
     assert found["flights"] == FLIGHTS and found["outcomes"]["lost"] == 0
     completed = found["outcomes"]["completed"]
@@ -44,8 +49,8 @@ def test_most_random_flights_are_flown_to_the_end(tmp_path, capsys):
     whole = (tmp_path / "flights.csv").read_bytes()
     kept = tmp_path / "flown.jsonl"
     kept.write_text(kept.read_text()[:-9])  # as after a kill while the last one was written
-    assert main(["campaign", "--flights", str(FLIGHTS), "--out", str(tmp_path)]) == 0
+    assert main([*command, "--flights", str(FLIGHTS)]) == 0
     assert f"continuing after {FLIGHTS - 1} earlier flights" in capsys.readouterr().out
     assert (tmp_path / "flights.csv").read_bytes() == whole
-    assert main(["campaign", "--seed", "2", "--out", str(tmp_path)]) == 2
+    assert main([*command, "--seed", "2"]) == 2
     assert "give another --out" in capsys.readouterr().err
