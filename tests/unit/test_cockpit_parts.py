@@ -13,7 +13,7 @@ from uam_control.supervision import PreflightCheck
 from uam_lab.cockpit import page_address
 from uam_lab.cockpit.buttons import BUTTONS
 from uam_lab.cockpit.entry import axes, bounds, reach, text_of, value_of
-from uam_lab.cockpit.headline import headline
+from uam_lab.cockpit.headline import _facts, headline
 from uam_lab.cockpit.remote_parameters import About
 from uam_lab.cockpit.urdf_shapes import shapes
 from uam_lab.cockpit.vehicle_health import (
@@ -171,10 +171,15 @@ def test_the_pre_arm_report_is_shown_on_the_ground():
 
 
 def test_the_delays_are_shown_with_their_limits():
-    health = Health(silent_after=3.0, round_trip_limit=0.03, period=0.004)
-    health.set_mission(MissionStatus("carry", 3.0))
+    health = Health(silent_after=3.0, period=0.004)
+    health.set_mission(MissionStatus("carry", 3.0, setpoint_delay=0.0212, delay_margin=0.03))
     health.autopilot = AutopilotState(True, "OFFBOARD", True, 0, round_trip=0.0241)
-    assert "24.1 of 30 ms" in shown(health) and "per tick" not in shown(health)
+    assert "24.1 ms there and back" in shown(health) and "per tick" not in shown(health)
+    assert "21.2 of 30 ms margin" in shown(health)
+    facts = {name: level for name, level, _ in _facts(health, LIMITS)}
+    assert facts["setpoint delay"] == CAUTION
+    health.delay_shares = (0.1, 0.7)
+    assert {name: level for name, level, _ in _facts(health, LIMITS)}["setpoint delay"] == BAD
     for node in CHAIN:
         health.diagnose(reported(node, OK, "running", **{"tick max [ms]": "0.45"}))
     assert health.latency == pytest.approx(0.0018) and "1.8 of 4 ms per tick" in shown(health)

@@ -9,6 +9,7 @@ import pytest
 
 from uam_control.estimation import EstimatorParameters, StateEstimator
 from uam_control.estimation.estimator import assemble
+from uam_control.stages.estimator_stage import PoseAge
 
 LEVEL, WEIGHT, NOTHING = np.array([1.0, 0.0, 0.0, 0.0]), np.array([0.0, 0.0, 9.81]), np.zeros(3)
 HALF = math.sqrt(0.5)
@@ -151,3 +152,18 @@ def test_new_parameters_are_those_of_the_next_sample():
         far.imu(0.04 * k, NOTHING, WEIGHT)
         far.mocap(0.04 * k, np.array([1e-6 * k + 5.0 * (k == 39), 0.0, 0.0]), LEVEL)
     assert far.refused_poses == 0  # 5 m off, 7 m are allowed
+
+
+def test_age_of_poses_at_their_arrival():
+    age = PoseAge()
+    age.tick(4_000_000)
+    assert age.mean is None and age.largest == 0
+    for tick in range(2, 400):
+        if tick % 2 == 0:
+            age.pose((tick - 2) * 4_000_000 - (1_000_000 if tick == 100 else 0))
+        age.tick(tick * 4_000_000)
+    assert age.mean == pytest.approx(8e6, abs=5e3)
+    assert age.largest == 9_000_000
+    age.restart()
+    age.tick(2_000_000_000)  # without a new pose
+    assert age.largest == 0

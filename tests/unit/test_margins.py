@@ -8,10 +8,12 @@ import pytest
 from uam_control.estimation import EstimatorParameters, StateEstimator
 from uam_control.estimation.filters import low_pass_step
 from uam_control.profiles.profile import default_profile
+from uam_lab.cli.margins import verdict
 from uam_lab.margins.linear import IN, Block, delay, join, linearise
 from uam_lab.margins.loops import analyse, step_response
 from uam_lab.margins.margins import common_delay, margins
 from uam_lab.margins.plant_model import plant_model, rotor_model, zero_order_hold
+from uam_lab.margins.pose_delay import pose_delay, remaining
 from uam_lab.margins.stack_model import stack_model
 from uam_sim_bridge.plant import Vehicle
 from uam_sim_bridge.plant.actuators import Rotors
@@ -205,3 +207,17 @@ def test_analysis_of_the_profile(vehicle):
     assert time[-1] == pytest.approx(6.0 - stack.period)
     assert value[-1] == pytest.approx(1.0, abs=0.05)
     assert later.loops["roll"][1].phase < found.loops["roll"][1].phase
+
+
+def test_poses_may_be_older_for_a_slower_observer():
+    slow, fast = (EstimatorParameters(position_bandwidth=w) for w in (12.0, 30.0))
+    assert remaining(slow, 0.012, 0.004, 120.0) < 0.01
+    assert remaining(fast, 0.024, 0.004, 120.0) > 1.0
+    assert 0.1 < pose_delay(slow, 0.004, 120.0) < 0.25
+    assert pose_delay(fast, 0.004, 120.0) < 0.02
+
+
+def test_the_margin_of_the_profile_is_judged():
+    assert verdict(0.06, 0.06) == "as computed"
+    assert "too large" in verdict(0.07, 0.06)
+    assert "smaller than necessary" in verdict(0.03, 0.06)

@@ -38,7 +38,7 @@ def test_a_mission_in_flight_begins_anew_on_the_ground():
         stage.inputs.inputs.joints(stamp / SECOND, np.zeros(2))
         for subsystem in ("position", "attitude", "arm"):
             stage.inputs.inputs.gains(stamp / SECOND, subsystem, ["K0"], np.zeros(1))
-        stage.autopilot(stamp, True, armed_since, None, Authority())
+        stage.autopilot(stamp, True, armed_since, None, None, Authority())
         stage.begin(stamp, state)
         stage.advance(stamp, state)
         state[:2] = np.where(mission.output.flying, mission.output.reference[:2], state[:2])

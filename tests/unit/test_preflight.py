@@ -50,7 +50,7 @@ def test_all_green_without_a_fault():
         ("a controller", {"readings": {"controller_age": np.nan}}),
         ("autopilot", {"readings": {"autopilot_age": np.nan}}),
         ("autopilot", {"readings": {"autopilot_age": 0.8}}),
-        ("autopilot's link", {"readings": {"round_trip": 0.031}}),
+        ("setpoint delay", {"readings": {"round_trip": 0.041}}),
         ("battery", {"readings": {"battery": 0.05}}),
         ("servo temperature", {"readings": {"temperature": 99.0}}),
         ("control ticks", {"readings": {"missed_ticks": 200.0}}),

@@ -108,12 +108,13 @@ def test_each_tick_has_one_reference_carried_to_its_stamp(step):
 
 def test_a_report_of_the_autopilot_counts_from_the_next_tick_on():
     stage, state = mission_stage(), np.zeros((3, 8))
-    stage.autopilot(0, True, 0, 0.01, Authority("the pilot, in HOLD"))
+    stage.autopilot(0, True, 0, 0.01, 0.02, Authority("the pilot, in HOLD"))
     stage.begin(0, state)
     assert np.isnan(stage.inputs.readings.autopilot_age)
     stage.begin(PERIOD, state)
     assert stage.inputs.readings.autopilot_age == 0.004
     assert stage.inputs.readings.round_trip == 0.01
+    assert stage.inputs.readings.loop_delay == 0.02
     stage.advance(PERIOD, state)
     checks = {check.name: check for check in stage.mission.preflight()}
     assert not checks["control"].passed and checks["control"].value == "the pilot, in HOLD"

@@ -22,7 +22,7 @@ from uam_control.supervision import (
     State,
     Supervisor,
 )
-from uam_control.supervision.checks import CHECKS, Checks, measure, read
+from uam_control.supervision.checks import CHECKS, LATE, Checks, measure, read
 from uam_control.supervision.monitor import Level, Monitor
 from uam_control.supervision.states import TARGETS, TRANSITIONS
 
@@ -76,7 +76,7 @@ def test_every_check_has_a_value():
     measure(seen.state, seen.reference, three, 0.0, 0.0, np.zeros((2, 3)), two, values)
     assert np.isnan(values).sum() == 11
     read(Readings(), two, three, values)
-    assert not np.isnan(values).any()
+    assert np.flatnonzero(np.isnan(values)).tolist() == [LATE]  # by `Checks.update`
     checks = Checks(S500)
     assert checks.update(0.0, seen, True) is None
 
@@ -159,14 +159,14 @@ def test_a_short_excess_and_an_unknown_value_have_no_effect():
             "no message of the autopilot for 0.80 s, 0.75 s allowed",
         ),
         (
-            observation(readings=Readings(round_trip=0.038)),
+            observation(readings=Readings(round_trip=0.038, loop_delay=0.048)),
             State.LANDING,
-            "autopilot's link takes 0.038 s there and back, 0.03 s allowed",
+            "setpoint delay 0.042 s exceeds 0.04 s of the loops' margin",
         ),
         (
-            observation(readings=Readings(round_trip=0.068)),
+            observation(readings=Readings(round_trip=0.228)),
             State.FAILSAFE,
-            "autopilot's link takes 0.068 s there and back, 0.05 s allowed",
+            "setpoint delay 0.114 s exceeds 0.05 s of the loops' margin",
         ),
         (
             observation(readings=Readings(temperature=71)),
@@ -338,7 +338,7 @@ def test_inputs_compute_ages_by_stamps_and_count_missed_ticks_of_a_second():
     assert math.isnan(inputs.at(1.0).mocap_age) and math.isnan(inputs.at(1.0).autopilot_age)
     inputs.mocap(0.5, np.ones(3), np.ones(4))
     inputs.mocap(0.99, np.ones(3), np.ones(4))
-    inputs.autopilot(0.5, 0.02)
+    inputs.autopilot(0.5, 0.02, 0.03)
     inputs.joints(1.0, np.array([0.1, 0.2]))
     inputs.gains(0.0, "arm", ["K0", "zeta", "rho"], np.array([-3.0, 0.1, 99.0]))
     inputs.gains(0.0, "position", ["D0", "s_norm"], np.array([5.0, 9.0]))
@@ -349,7 +349,7 @@ def test_inputs_compute_ages_by_stamps_and_count_missed_ticks_of_a_second():
     assert readings.mocap_still == pytest.approx(0.52)
     assert readings.missed_ticks == 4.0
     assert readings.temperature == 61.0 and readings.autopilot_age == pytest.approx(0.52)
-    assert readings.round_trip == 0.02
+    assert (readings.round_trip, readings.loop_delay) == (0.02, 0.03)
     assert readings.controller_age == pytest.approx(1.02)
     assert readings.gains[2] == 3.0 and np.isnan(readings.gains[:2]).all()
     assert inputs.at(1.024).missed_ticks == 4.0

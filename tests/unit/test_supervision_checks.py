@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from uam_control.supervision import Observation, Readings, SupervisionParameters
-from uam_control.supervision.checks import CHECKS, Checks, measure, read
+from uam_control.supervision.checks import CHECKS, LATE, Checks, measure, read
 from uam_control.supervision.monitor import Level
 
 A, B = math.atan2(0.6, 0.8), math.atan2(0.8, 0.6)  # of the 3-4-5 triangle
@@ -87,17 +87,18 @@ def test_readings_have_their_places():
     values = np.full(19, 77.0)
     readings = Readings(
         battery=0.5, mocap_age=9.0, mocap_still=10.0, joint_age=11.0, controller_age=12.0,
-        autopilot_age=13.0, round_trip=14.0, missed_ticks=15.0, temperature=16.0,
+        autopilot_age=13.0, missed_ticks=15.0, temperature=16.0,
         joint_effort=np.array([1.0, -6.0, 2.0]), gains=np.array([3.0, math.nan, 1.0]),
     )  # fmt: skip
     read(readings, np.array([2.0, 4.0, 8.0]), np.array([2.0, 1.0, 0.25]), values)
     np.testing.assert_array_equal(values[:8], 77.0)
     # effort: 6/4; gains: 1/.25, the unknown one left out
-    np.testing.assert_array_equal(values[8:], [-0.5, 9, 10, 11, 12, 13, 14, 15, 16, 1.5, 4.0])
+    np.testing.assert_array_equal(values[8:], [-0.5, 9, 10, 11, 12, 13, 77, 15, 16, 1.5, 4.0])
 
 
 def test_what_is_unknown_is_below_every_limit():
     values = np.zeros(19)
+    values[LATE] = -math.inf  # by `Checks.update`
     read(Readings(), np.ones(2), np.ones(3), values)
     np.testing.assert_array_equal(values[8:], -math.inf)
 
@@ -111,8 +112,8 @@ AT_ONCE = SupervisionParameters(
     joint_effort_hold=(2.0, 4.0), temperature_hold=50.0, temperature_land=60.0,
     battery_land=0.25, mocap_age_hold=0.125, mocap_age_failsafe=0.5, mocap_distance_hold=0.25,
     joint_age_hold=0.375, controller_age_hold=0.625, autopilot_age_land=0.875,
-    round_trip_land=0.0625, round_trip_failsafe=0.1875, missed_ticks_hold=10.0,
-    missed_ticks_failsafe=20.0, gain_hold=(10.0, 20.0, 30.0),
+    delay_margin=0.125, delay_nominal=0.0, delay_land=0.5, delay_failsafe=1.5,
+    missed_ticks_hold=10.0, missed_ticks_failsafe=20.0, gain_hold=(10.0, 20.0, 30.0),
     hold_after=0.0, land_after=0.0, failsafe_after=0.0, clear_after=1.0, hysteresis=0.5,
 )  # fmt: skip
 
@@ -150,8 +151,9 @@ LIMITS = [
     ("joint angles", HOLD, lambda x: seen(joint_age=x), 0.375),
     ("controllers", HOLD, lambda x: seen(controller_age=x), 0.625),
     ("autopilot", LAND, lambda x: seen(autopilot_age=x), 0.875),
-    ("autopilot's link", LAND, lambda x: seen(round_trip=x), 0.0625),
-    ("autopilot's link", FAILSAFE, lambda x: seen(round_trip=x), 0.1875),
+    ("setpoint delay", LAND, lambda x: seen(loop_delay=x), 0.0625),
+    ("setpoint delay", FAILSAFE, lambda x: seen(loop_delay=x), 0.1875),
+    ("setpoint delay", LAND, lambda x: seen(round_trip=2.0 * x), 0.0625),
     ("control ticks", HOLD, lambda x: seen(missed_ticks=x), 10.0),
     ("control ticks", FAILSAFE, lambda x: seen(missed_ticks=x), 20.0),
     ("servo temperature", HOLD, lambda x: seen(temperature=x), 50.0),

@@ -178,6 +178,11 @@ class Mission:
         return max(0.0, output.time - guidance.scenario_time)
 
     @property
+    def setpoint_delay(self) -> float:
+        """Return how much later than in the profile's model the setpoints act [s], or NaN."""
+        return self._supervisor.setpoint_delay
+
+    @property
     def beyond(self) -> str:
         """Return the cause of the worst exceeded limit, "" without one."""
         return self._supervisor.beyond

@@ -1,5 +1,6 @@
 """Node: mission. state + autopilot → reference, magnet, arming."""
 
+import math
 import time
 
 import numpy as np
@@ -27,6 +28,7 @@ from uam_control.stages.mission_stage import MissionStage
 from uam_control.stages.timing import Timing
 from uam_control.stamps import SECOND
 from uam_control.supervision import Authority, State
+from uam_control.supervision.setpoint_delay import margin_left
 from uam_control.vehicle import VehicleDescription
 from uam_msgs_py.messages import topics
 from uam_msgs_py.messages.control import ReferenceWriter, read_state
@@ -111,7 +113,9 @@ class MissionNode(UamNode):
         stamp, state = AutopilotState.from_message(message)
         since = state.armed_since if state.armed else None
         authority = Authority(state.released_to, state.landed, state.lands)
-        self._stage.autopilot(stamp, state.connected, since, state.round_trip, authority)
+        self._stage.autopilot(
+            stamp, state.connected, since, state.round_trip, state.loop_delay, authority
+        )
 
     def _on_state(self, data: bytes) -> None:
         self._states.put(read_state(data))
@@ -169,6 +173,7 @@ class MissionNode(UamNode):
     def status(self) -> MissionStatus:
         """Phase, errors and state of the mission at the newest tick."""
         output, errors = self._mission.output, self._errors.newest()
+        late = self._mission.setpoint_delay
         return MissionStatus(
             output.phase,
             self._stage.time,
@@ -189,6 +194,8 @@ class MissionNode(UamNode):
             decisions=len(self._mission.grasps),
             grasp_text=output.grasp_text,
             delay=self._mission.delay,
+            setpoint_delay=None if math.isnan(late) else late,
+            delay_margin=self.parameter_set.current.delay_margin,
         )
 
     def _publish_path(self, stamp: int) -> None:
@@ -224,16 +231,23 @@ class MissionNode(UamNode):
     def diagnose(self) -> tuple[bytes, str, dict[str, object]]:
         output, beyond = self._mission.output, self._mission.beyond
         odd = output.state in (State.HOLDING, State.RELEASED)
-        level = WARN if beyond or odd else OK
+        limits, delay = self.parameter_set.current, self._mission.setpoint_delay
+        late = ""
+        if delay > limits.delay_warn * limits.delay_margin:
+            share = 100.0 * margin_left(delay, limits)
+            late = f"setpoints {1e3 * delay:.0f} ms late: {share:.0f} % of the delay margin left"
+        level = WARN if beyond or odd or late else OK
         if output.abort_reason:
             level = ERROR
-        summary = output.abort_reason or beyond or output.phase
+        summary = output.abort_reason or beyond or late or output.phase
         values = {
             "mission time [s]": output.time,
             "state": output.state.value,
             "cause": output.cause,
             "beyond a limit": beyond,
             "payload": f"{output.grasp.value} {output.grasp_text}".strip(),
+            "setpoint delay [ms]": "" if math.isnan(delay) else f"{1e3 * delay:.1f}",
+            "delay margin [ms]": f"{1e3 * limits.delay_margin:.1f}",
             "answer to the last goal or trajectory": self._planners.answer,
         }
         return level, summary, values

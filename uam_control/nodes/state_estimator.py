@@ -114,12 +114,15 @@ class StateEstimatorNode(UamNode):
     def diagnose(self) -> tuple[bytes, str, dict[str, object]]:
         refused = self._stage.estimator.refused_poses
         fresh, self._refused_before = refused - self._refused_before, refused
-        ticks = self._stage.ticks
+        ticks, age = self._stage.ticks, self._stage.pose_age
         values: dict[str, object] = {
             "poses refused": refused,
             "IMU samples repeated": ticks.repeated,
             "IMU samples missing": ticks.missing,
+            "pose age at arrival, mean [ms]": "" if age.mean is None else f"{1e-6 * age.mean:.1f}",
+            "pose age at arrival, max [ms]": f"{1e-6 * age.largest:.1f}",
         }
+        age.restart()
         if fresh:
             return WARN, f"{fresh} new poses refused: too far from the estimate", values
         return OK, "running", values

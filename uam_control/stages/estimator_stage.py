@@ -8,18 +8,49 @@ from uam_control.estimation import EstimatorParameters, StateEstimator
 from uam_control.stages.tick_stamps import TickStamps
 from uam_control.stamps import SECOND
 
+MEMORY = 100  # poses
+
+
+class PoseAge:
+    """Age of poses at their arrival: stamp of the tick in which one arrives − its exposure.
+
+    `mean` [ns]: low-pass over MEMORY poses, None before the first; `largest` [ns]: since `restart`.
+    """
+
+    def __init__(self) -> None:
+        self.mean: float | None = None
+        self.largest = 0
+        self._arrived: int | None = None
+
+    def pose(self, exposed: int) -> None:
+        """Take the stamp [ns] of a pose that has arrived."""
+        self._arrived = exposed
+
+    def tick(self, stamp: int) -> None:
+        """Take the stamp [ns] of a tick."""
+        if self._arrived is None:
+            return
+        age, self._arrived = stamp - self._arrived, None
+        self.mean = age if self.mean is None else self.mean + (age - self.mean) / MEMORY
+        self.largest = max(self.largest, age)
+
+    def restart(self) -> None:
+        """Begin a new period of `largest`."""
+        self.largest = 0
+
 
 class EstimatorStage:
     """Takes samples as they arrive and returns the state at each IMU sample.
 
     All stamps are in [ns]. The IMU sample starts a tick; the other samples of the tick come before.
-    `ticks`: the stamps of the ticks, see `TickStamps`.
+    `ticks`: the stamps of the ticks, see `TickStamps`; `pose_age`: of the poses at their arrival.
     """
 
     def __init__(self, parameters: EstimatorParameters, joints: int, period: float) -> None:
         """joints: number of joints of the arm; period [s]: of the control ticks."""
         self.estimator = StateEstimator(parameters, joints)
         self.ticks = TickStamps(round(period * SECOND))
+        self.pose_age = PoseAge()
         self._waiting = True  # for the first sample of an input
 
     @property
@@ -29,6 +60,7 @@ class EstimatorStage:
 
     def mocap(self, stamp: int, position: np.ndarray, quaternion: np.ndarray) -> None:
         """Take a pose: position (3,) [m, ENU], unit quaternion (4,) [w x y z], FLU → ENU."""
+        self.pose_age.pose(stamp)
         self.estimator.mocap(stamp / SECOND, position, quaternion)
 
     def joints(self, stamp: int, alpha: np.ndarray, alpha_dot: np.ndarray) -> None:
@@ -48,6 +80,8 @@ class EstimatorStage:
                 return None
             raise ValueError(f"IMU stamp {stamp} ns does not follow {self.stamp} ns")
         estimator = self.estimator
-        estimator.imu(self.ticks.next(stamp) / SECOND, gyro, force)
+        tick = self.ticks.next(stamp)
+        self.pose_age.tick(tick)
+        estimator.imu(tick / SECOND, gyro, force)
         self._waiting = self._waiting and bool(estimator.waiting_for)
         return None if self._waiting else estimator.update()

@@ -34,7 +34,7 @@ class MissionStage:
         self.reference, self.time = self.output.reference, self.output.time
         self.ahead = self._last = -1  # [ns]; _last: the tick before
         self._armed_since: float | None = None
-        self._reports: deque[tuple[int, bool, int | None, float, Authority]] = deque()
+        self._reports: deque[tuple[int, bool, int | None, tuple[float, ...], Authority]] = deque()
         self._authority = Authority()
         self._readings = Readings()
         self._flown = -REPORT_DELAY  # [ns] newest reference that the mission has flown
@@ -45,16 +45,18 @@ class MissionStage:
         connected: bool,
         armed_since: int | None,
         round_trip: float | None,
+        loop_delay: float | None,
         authority: Authority,
     ) -> None:
         """Take the bridge's report of the tick `stamp` [ns]; it is used from the next tick on.
 
         armed_since [ns]: the first tick at which the autopilot was reported armed, None while it is
-        not armed; round_trip [s]: response time of the autopilot, None if not measured;
+        not armed; round_trip [s]: response time of the autopilot, loop_delay [s]: from a setpoint
+        to the gyro's response, each None if not measured;
         authority: who has control.
         """
-        trip = math.nan if round_trip is None else round_trip
-        self._reports.append((stamp, connected, armed_since, trip, authority))
+        delays = tuple(math.nan if one is None else one for one in (round_trip, loop_delay))
+        self._reports.append((stamp, connected, armed_since, delays, authority))
 
     def begin(self, stamp: int, state: np.ndarray) -> bool:
         """Start the tick `stamp` [ns] with its state (3, 6 + n), see `coordinates`.
@@ -65,10 +67,10 @@ class MissionStage:
         if stamp < self.ahead - NEW_TIME:
             self._begin_anew()
         while self._reports and self._reports[0][0] < stamp:
-            reported, connected, since, round_trip, self._authority = self._reports.popleft()
+            reported, connected, since, delays, self._authority = self._reports.popleft()
             self._armed_since = None if since is None else since / SECOND
             if connected:
-                self.inputs.inputs.autopilot(reported / SECOND, round_trip)
+                self.inputs.inputs.autopilot(reported / SECOND, *delays)
         self._readings = self.inputs.tick(stamp)
         last, self._last = self._last, stamp
         anew = stamp != self.ahead and not serves(self.ahead, last, stamp, self.period)

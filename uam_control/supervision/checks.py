@@ -17,17 +17,19 @@ from uam_control.maths.compiled import jit
 from uam_control.maths.rotations import tilt
 from uam_control.supervision.monitor import Level, Monitor
 from uam_control.supervision.observation import Observation, Readings
+from uam_control.supervision.setpoint_delay import setpoint_delay
 from uam_control.supervision.supervision_parameters import SupervisionParameters
 
 NONE = math.inf
-CONTROLLERS = "controllers"
+CONTROLLERS, SETPOINT_DELAY = "controllers", "setpoint delay"
 LATEST = 0.25  # s, largest age of a pose for which the estimate is extrapolated back to its stamp
 
 
 class Check(NamedTuple):
     """A monitored quantity: its name, the text of a cause, and its limits.
 
-    hold, land, failsafe: name of a parameter, or a number. in_flight: checked only while airborne.
+    hold, land, failsafe: name of a parameter or of a limit in s that follows from parameters, or a
+    number. in_flight: checked only while airborne.
     sign: -1 if a smaller value is worse. failsafe_after: name of the parameter with the time beyond
     the limit before failsafe. reading: the value's name in `Readings`.
     """
@@ -46,7 +48,8 @@ class Check(NamedTuple):
     def unit(self) -> str:
         """The unit of the limits, "" for a ratio."""
         named = [limit for limit in (self.hold, self.land) if isinstance(limit, str)]
-        return SupervisionParameters.specs()[named[0]].unit if named else ""
+        specs = SupervisionParameters.specs()
+        return (specs[named[0]].unit if named[0] in specs else "s") if named else ""
 
 
 # in the order of the values of `measure` and `read`
@@ -79,8 +82,8 @@ CHECKS = (
           "controller_age_hold", reading="controller_age"),
     Check("autopilot", "no message of the {name} for {value:.2f} s, {limit:g} s allowed",
           land="autopilot_age_land", reading="autopilot_age"),
-    Check("autopilot's link", "{name} takes {value:.3f} s there and back, {limit:g} s allowed",
-          land="round_trip_land", failsafe="round_trip_failsafe", reading="round_trip"),
+    Check(SETPOINT_DELAY, "{name} {value:.3f} s exceeds {limit:.3g} s of the loops' margin",
+          land="setpoint_delay_land", failsafe="setpoint_delay_failsafe"),
     Check("control ticks", "{value:.0f} {name} missed within a second, {limit:g} allowed",
           "missed_ticks_hold", failsafe="missed_ticks_failsafe", reading="missed_ticks"),
     Check("servo temperature", "{name} {value:.0f} deg C exceeds {limit:g} deg C",
@@ -88,6 +91,7 @@ CHECKS = (
     Check("joint torque", "{name} at {value:.2f} of its limit", 1.0),
     Check("adapted gain", "{name} at {value:.2f} of its limit", 1.0),
 )  # fmt: skip
+LATE = [check.name for check in CHECKS].index(SETPOINT_DELAY)
 _ROWS = [i for i, check in enumerate(CHECKS) if check.reading]
 _SIGNS = np.array([CHECKS[i].sign for i in _ROWS])
 _readings = attrgetter(*(CHECKS[i].reading for i in _ROWS))
@@ -104,8 +108,8 @@ class ExceededLimit(NamedTuple):
 class Checks:
     """The monitors of all quantities.
 
-    `finding`: the worst exceeded limit, None without one; `quiet`: no value is beyond a limit, not
-    even for a short time.
+    `setpoint_delay` [s]: of the last tick, NaN if unknown; `finding`: the worst exceeded limit,
+    None without one; `quiet`: no value is beyond a limit, not even for a short time.
     """
 
     def __init__(self, parameters: SupervisionParameters) -> None:
@@ -113,6 +117,7 @@ class Checks:
         self.quiet = True
         self._values = np.zeros(len(CHECKS))
         self.finding: ExceededLimit | None = None
+        self.setpoint_delay = math.nan
         self.configure(parameters)
 
     def configure(self, parameters: SupervisionParameters) -> None:
@@ -149,6 +154,8 @@ class Checks:
             values,
         )
         read(readings, self._efforts, self._gains, values)
+        self.setpoint_delay = late = setpoint_delay(readings, self._parameters, in_flight)
+        values[LATE] = -math.inf if math.isnan(late) else late
         if self.quiet and _below(values, self._calm):
             return None
         p, worst = self._parameters, None

@@ -74,13 +74,16 @@ class Inputs:
         """Store the state of charge 0..1; NaN if unknown."""
         self._readings.battery = left
 
-    def autopilot(self, stamp: float, round_trip: float) -> None:
+    def autopilot(
+        self, stamp: float, round_trip: float = math.nan, loop_delay: float = math.nan
+    ) -> None:
         """Store that the bridge was connected to the autopilot at `stamp` [s].
 
-        round_trip [s]: of the link, NaN if unknown.
+        round_trip [s]: of the link; loop_delay [s]: from a setpoint to the gyro's response; NaN if
+        unknown.
         """
         self._autopilot = stamp
-        self._readings.round_trip = round_trip
+        self._readings.round_trip, self._readings.loop_delay = round_trip, loop_delay
 
     def gains(self, stamp: float, subsystem: str, names: Sequence[str], values: np.ndarray) -> None:
         """Store the adapted gains of one of SUBSYSTEMS at `stamp` [s]: names (n), values (n,)."""

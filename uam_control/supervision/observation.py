@@ -43,7 +43,8 @@ class Readings:
     mocap_still [s]: since the last change of the pose; mocap_position (3,) [m]: of the newest pose;
     controller_age [s]: of the newest gains of each controller, the largest age;
     pose_controller_age [s]: the same without the arm controller. autopilot_age [s]: since the
-    bridge last reported a connection to the autopilot; round_trip [s]: of the autopilot's link.
+    bridge last reported a connection to the autopilot; round_trip [s]: of the autopilot's link;
+    loop_delay [s]: from a setpoint to the gyro's response.
     missed_ticks: within the last second. temperature: of the hottest servo [deg C]. joint_effort
     (n,): measured [N m], empty where not known. gains (3,): largest adapted gain of position,
     attitude, arm. payload_position (3,) [m]: grip point of the payload, by its newest mocap pose;
@@ -62,6 +63,7 @@ class Readings:
     autopilot_age: float = math.nan
     mocap_still: float = math.nan
     round_trip: float = math.nan
+    loop_delay: float = math.nan
     mocap_position: np.ndarray = field(default_factory=lambda: np.full(3, math.nan))
     payload_position: np.ndarray = field(default_factory=lambda: np.full(3, math.nan))
     payload_age: float = math.nan

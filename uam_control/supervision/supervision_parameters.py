@@ -63,9 +63,18 @@ class SupervisionLimits(ParameterSet):
     autopilot_age_land: float = _land(
         0.75, "time without a message of autopilot or bridge", "s", 0.3, 60.0
     )
-    round_trip_land: float = _land(0.03, "round trip of the autopilot's link", "s", 0.005, 10.0)
-    round_trip_failsafe: float = _failsafe(
-        0.05, "round trip of the autopilot's link", "s", 0.005, 10.0
+    # delay of the setpoints against the margin of the profile, see setpoint_delay.py
+    delay_margin: float = number(
+        0.05, "delay of the setpoints at which the loops oscillate: uam margins", "s", 0.001, 10.0
+    )
+    delay_nominal: float = number(
+        0.006, "loop delay of a link without delay, part of every profile", "s", 0.0, 1.0
+    )
+    delay_warn: float = number(0.6, "share of delay_margin that causes a warning", "1", 0.05, 1.0)
+    delay_land: float = _land(0.8, "share of delay_margin", "1", 0.05, 10.0)
+    delay_failsafe: float = _failsafe(1.0, "share of delay_margin", "1", 0.05, 100.0)
+    delay_share_of_round_trip: float = number(
+        1.0, "share of the round trip that counts as delay before take-off", "1", 0.0, 1.0
     )
     missed_ticks_hold: float = _hold(125.0, "control ticks missed within a second", "1", 1.0, 1e4)
     missed_ticks_failsafe: float = _failsafe(
@@ -76,6 +85,16 @@ class SupervisionLimits(ParameterSet):
         "largest adapted gain K0..K3, zeta of position, attitude, arm that starts a hold",
         "1", 1e-3, 1e9, 3,
     )  # fmt: skip
+
+    @property
+    def setpoint_delay_land(self) -> float:
+        """Delay of the setpoints [s] that starts a landing."""
+        return self.delay_land * self.delay_margin
+
+    @property
+    def setpoint_delay_failsafe(self) -> float:
+        """Delay of the setpoints [s] that starts the failsafe."""
+        return self.delay_failsafe * self.delay_margin
 
     def check_together(self) -> None:
         """Check that limits increase with the reaction and that the box is not empty.

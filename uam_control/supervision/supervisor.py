@@ -14,7 +14,7 @@ from enum import Enum
 from typing import NamedTuple
 
 from uam_control.coordinates import CHI, Z
-from uam_control.supervision.checks import Checks
+from uam_control.supervision.checks import SETPOINT_DELAY, Checks
 from uam_control.supervision.holds import Holds
 from uam_control.supervision.monitor import Level
 from uam_control.supervision.observation import Authority, Observation, OperatorCommand
@@ -152,6 +152,11 @@ class Supervisor:
         return ""
 
     @property
+    def setpoint_delay(self) -> float:
+        """Return the delay of the setpoints [s] at the last tick, NaN if unknown."""
+        return self._checks.setpoint_delay
+
+    @property
     def beyond(self) -> str:
         """Return the cause of the worst exceeded limit, "" without one."""
         finding = self._checks.finding
@@ -200,6 +205,9 @@ class Supervisor:
             grounded = seen.on_ground or seen.authority.landed
             event = Event.REGAINED_ON_GROUND if grounded else Event.REGAINED
             yield event, event.value
+        late = finding is not None and finding.name == SETPOINT_DELAY
+        if late and self._arm and self.state is State.GROUNDED:
+            yield Event.GIVEN_UP, cause  # waiting does not make a link faster
         if level is Level.FAILSAFE:
             if seen.on_ground:
                 yield Event.HARD_LIMIT_ON_GROUND, cause

@@ -50,6 +50,11 @@ class RotorModel:
     radius: float
 
     @property
+    def lag(self) -> float:
+        """Time constant [s] of small fast changes of the speed: mean of the rates up and down."""
+        return 2.0 / (1.0 / self.lag_up + 1.0 / self.lag_down)
+
+    @property
     def thrust_max(self) -> float:
         """Largest thrust of one rotor [N]."""
         return self.thrust_coefficient * self.speed_max**2

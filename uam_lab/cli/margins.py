@@ -16,6 +16,7 @@ from uam_lab.flight.flight_settings import SettingsError
 from uam_lab.results.result_folder import make_folder
 
 STABLE, UNSTABLE = 0, 1
+TOLERANCE = 1.05  # ratio of the profile's delay_margin to the computed one
 EXAMPLES = """\
 examples:
   uam margins                              default profile: without payload and with 0.2 kg
@@ -60,6 +61,7 @@ def run(options: argparse.Namespace) -> int:
     """Compute, print and write the margins; return the exit status."""
     from uam_lab.margins import gains, report
     from uam_lab.margins.cases import cases_of
+    from uam_lab.margins.pose_delay import pose_delay
     from uam_lab.report.rebuild import series_of
     from uam_sim_bridge.plant import Vehicle
 
@@ -87,7 +89,14 @@ def run(options: argparse.Namespace) -> int:
     ticks = round(1e-3 * options.delay / described.control_period)
     out = make_folder(options.out, "margins")
     cases = cases_of(profile, vehicle, payloads, flown, options.arm, ticks)
+    mocap = described.numbers["sensors"]["mocap"]
+    period = described.control_period
+    oldest = pose_delay(profile.sets["state_estimator"], period, mocap["rate"])
+    left = oldest - mocap["latency_ticks"] * period
+    stated = profile.sets["mission"].delay_margin
     facts = {
+        "mocap_delay_s": left,
+        "delay_margin_of_the_profile_s": stated,
         "profile": profile.name,
         "vehicle": described.name,
         "added_delay_s": ticks * described.control_period,
@@ -97,5 +106,19 @@ def run(options: argparse.Namespace) -> int:
     report.write(out, cases, facts)
     print(f"{profile.name} on {described.name}, hover, linear")
     print(report.table(cases))
+    print(
+        f"Poses of the motion capture may come {1e3 * left:.0f} ms later, then the estimate swings."
+    )
+    computed = report.smallest_delay(cases)[0]
+    print(f"The supervisor has delay_margin: {stated:g} ({verdict(stated, computed)}).")
     print(f"results  {out}")
     return STABLE if all(case.analysis.stable for case in cases) else UNSTABLE
+
+
+def verdict(stated: float, computed: float) -> str:
+    """Return how the profile's delay_margin [s] compares with the computed margin [s]."""
+    if stated > TOLERANCE * computed:
+        return f"too large: computed {computed:.4f} s"
+    if stated < computed / TOLERANCE / TOLERANCE:
+        return f"smaller than necessary: computed {computed:.4f} s"
+    return "as computed"

@@ -136,6 +136,9 @@ def _status(operator: Operator, _: argparse.Namespace) -> int:
         f"arm {math.degrees(mission.arm_error):.2f} deg",
         "tilt": f"{math.degrees(mission.tilt):.2f} deg",
     }
+    if mission.setpoint_delay is not None and mission.delay_margin is not None:
+        late, margin = 1e3 * mission.setpoint_delay, 1e3 * mission.delay_margin
+        rows["delay"] = f"setpoints {late:.1f} ms late, margin {margin:.1f} ms"
     if mission.abort_reason:
         rows["aborted"] = mission.abort_reason
     if autopilot.reasons:

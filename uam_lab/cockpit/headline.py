@@ -85,11 +85,14 @@ def _control(autopilot: AutopilotState) -> tuple[str, str]:
 
 def _delays(health: Health) -> Iterator[Row]:
     """Yield the measured delays of the loop, with their limits."""
-    trip = health.autopilot.round_trip if health.autopilot is not None else None
-    limit, latency, period = health.round_trip_limit, health.latency, health.period
-    if trip is not None and math.isfinite(limit):
-        level = grade(trip, WARY * limit, limit)
-        yield "link delay", level, f"{1e3 * trip:.1f} of {1e3 * limit:.0f} ms (round trip)"
+    autopilot, mission = health.autopilot, health.mission
+    latency, period = health.latency, health.period
+    if mission is not None and mission.setpoint_delay is not None and mission.delay_margin:
+        late, margin = mission.setpoint_delay, mission.delay_margin
+        level = grade(late, *(share * margin for share in health.delay_shares))
+        yield "setpoint delay", level, f"{1e3 * late:.1f} of {1e3 * margin:.0f} ms margin"
+    if autopilot is not None and autopilot.round_trip is not None:
+        yield "link", GOOD, f"{1e3 * autopilot.round_trip:.1f} ms there and back"
     if math.isfinite(latency) and math.isfinite(period):
         level = grade(latency, WARY * period, period)
         yield "computing", level, f"{1e3 * latency:.1f} of {1e3 * period:.0f} ms per tick"

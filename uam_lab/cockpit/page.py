@@ -175,7 +175,8 @@ class Page:
         """Take the limits that the headline shows from the parameters of a node."""
         if node == "mission":
             health = self._health
-            health.round_trip_limit = values.get("round_trip_land", health.round_trip_limit)
+            known = zip(("delay_warn", "delay_land"), health.delay_shares, strict=True)
+            health.delay_shares = tuple(values.get(name, old) for name, old in known)
 
     def spare(self, sparing: bool) -> None:
         """Do without the charts of each tick, or show them again."""

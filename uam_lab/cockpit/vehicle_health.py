@@ -11,6 +11,7 @@ from diagnostic_msgs.msg import DiagnosticArray
 
 from uam_control.coordinates import ARM, ATTITUDE, POSITION
 from uam_control.supervision import PreflightCheck, State
+from uam_control.supervision.supervision_parameters import SupervisionLimits
 from uam_msgs_py.messages.status import ERROR, OK, STALE, WARN, AutopilotState, MissionStatus
 from uam_msgs_py.node.namespace import unlabelled
 
@@ -30,6 +31,10 @@ class NodeHealth:
     heard: float
 
 
+# of the delay margin, until the mission's parameters are known
+SHARES = (SupervisionLimits.delay_warn, SupervisionLimits.delay_land)
+
+
 @dataclass
 class Health:
     """Last received states; a node counts as lost after `silent_after` [s] wall time."""
@@ -47,7 +52,8 @@ class Health:
     errors: tuple[float, float, float] = (math.nan,) * 3  # norms: [m], [rad], [rad]
     preflight: list[PreflightCheck] = field(default_factory=list)
     ticks: dict[str, float] = field(default_factory=dict)  # node → longest of the last second [s]
-    round_trip_limit: float = math.nan  # [s] at which the mission lands
+    # shares of the delay margin at which the mission warns and lands
+    delay_shares: tuple[float, ...] = SHARES
     period: float = math.nan  # [s] of control
     sparing: bool = False  # whether the page leaves out charts, as processor time is short
     _tracked: bool = False  # whether the errors come from /uam/tracking/error

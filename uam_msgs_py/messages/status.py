@@ -96,7 +96,8 @@ class AutopilotState(_Status):
 
     armed_since: stamp [ns] of the first tick at which it was reported armed, None while disarmed.
     reasons: why it is not armed or has left OFFBOARD, joined by "; ". round_trip [s]: shortest of
-    the last second, None if unknown. released_to: who has control in place of the companion, "" if
+    the last second; loop_delay [s]: from a body-rate setpoint to the gyro's response; None if
+    unknown. released_to: who has control in place of the companion, "" if
     nobody has. landed: by the autopilot's land detector. lands: its mode lands the
     vehicle by itself.
     """
@@ -110,9 +111,10 @@ class AutopilotState(_Status):
     released_to: str = ""
     landed: bool = False
     lands: bool = False
+    loop_delay: float | None = None
 
     NAME = "autopilot"
-    LATER = ("round_trip", "released_to", "landed", "lands")
+    LATER = ("round_trip", "released_to", "landed", "lands", "loop_delay")
 
     @property
     def level(self) -> bytes:
@@ -143,7 +145,8 @@ class MissionStatus(_Status):
     newest, "topic: accepted ..." or "topic: refused ...". grasp: state of the grasp
     (uam_control.grasp.Grasp); attempt: number of the approach; decisions: number of decisions about
     the payload so far, grasp_text: the newest. delay [s]: of the scenario's clock by holds and
-    grasps.
+    grasps. setpoint_delay [s]: how much later than in the profile's model setpoints
+    act, None if unknown; delay_margin [s]: at which the loops oscillate.
     """
 
     phase: str = "waiting"
@@ -165,11 +168,14 @@ class MissionStatus(_Status):
     decisions: int = 0
     grasp_text: str = ""
     delay: float = 0.0
+    setpoint_delay: float | None = None
+    delay_margin: float | None = None
 
     NAME = "mission"
     LATER = (
         *("state", "cause", "regains", "tilt", "answers", "answer"),
         *("grasp", "attempt", "decisions", "grasp_text", "delay"),
+        *("setpoint_delay", "delay_margin"),
     )
 
     @property

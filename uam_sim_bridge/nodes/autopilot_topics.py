@@ -51,6 +51,7 @@ class AutopilotTopics:
             report.released_to,
             report.landed,
             report.mode.lands,
+            report.loop_delay,
         )
         self._state.publish(state.to_message(stamp))
 

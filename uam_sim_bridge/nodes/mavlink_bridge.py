@@ -42,6 +42,7 @@ from uam_msgs_py.node.namespace import frame
 from uam_msgs_py.node.node_parameters import NodeParameters
 from uam_sim_bridge.mavlink.link.link_report import faults, report
 from uam_sim_bridge.mavlink.offboard.hold import HoldParameters
+from uam_sim_bridge.mavlink.offboard.loop_delay import LoopDelay
 from uam_sim_bridge.mavlink.offboard.sequence import OffboardParameters, OffboardSequence
 from uam_sim_bridge.mavlink.offboard.setpoint import RateThrustMap, RateThrustParameters
 from uam_sim_bridge.mavlink.offboard.setpoint_source import Setpoint, sent
@@ -319,6 +320,8 @@ class MavlinkBridgeNode(UamNode):
             "adopted": "; ".join(self._adopted),
             **report(link),
             **({} if self._imu is None else self._imu.values()),
+            "loop delay [ms]": _text(1e3 * self.stage.loop_delay.value, ".1f"),
+            "loop delay, explained [1]": f"{self.stage.loop_delay.explained:.2f}",
             "thrust factor [1]": f"{self.stage.map.thrust_factor:.4f}",
         }
         summary = "; ".join((sequence.phase.value, *notes))
@@ -332,8 +335,14 @@ class MavlinkBridgeNode(UamNode):
         spare.assumed_thrust(0.5)
         for setpoint in SETPOINTS.values():
             setpoint(Desired(zero, np.zeros((3, 3)), 0.5))
+        LoopDelay(self._vehicle.rotor.lag, self._vehicle.control_period).update(0.0, zero, zero)
         steady_force(state, 0.1, 1.0, self._vehicle.gravity)
         VisionPose(0.0, zero, level, 1.0, 1.0).message()
+
+
+def _text(value: float, form: str) -> str:
+    """Return the value as text, "" if it is unknown."""
+    return "" if math.isnan(value) else format(value, form)
 
 
 def _plain(value: float | tuple[float, ...]) -> float | list[float]:

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import math
 from typing import NamedTuple
 
 from uam_control.stamps import SECOND, nanoseconds
+from uam_sim_bridge.mavlink.offboard.loop_delay import LoopDelay
 from uam_sim_bridge.mavlink.offboard.sequence import OffboardSequence, Phase
 from uam_sim_bridge.mavlink.protocol.modes import Mode
 from uam_sim_bridge.stages.autopilot_port import AutopilotPort
@@ -17,7 +19,7 @@ class AutopilotReport(NamedTuple):
 
     reasons: against arming, or for leaving OFFBOARD; released_to: who has control in place of the
     companion, "" if nobody has; landed: by the autopilot's land detector; armed_since [ns]: first
-    tick with an armed autopilot, None while disarmed; round_trip [s]: None if unknown.
+    tick with an armed autopilot, None while disarmed; round_trip, loop_delay [s]: None if unknown.
     """
 
     connected: bool
@@ -29,17 +31,21 @@ class AutopilotReport(NamedTuple):
     landed: bool = False
     armed_since: int | None = None
     round_trip: float | None = None
+    loop_delay: float | None = None
 
     def differs(self, other: AutopilotReport | None) -> bool:
-        """Whether a field other than `armed_since` and `round_trip` differs from `other`."""
+        """Whether a field other than `armed_since` and the delays differs from `other`."""
         return other is None or self[:7] != other[:7]
 
 
 class AutopilotReports:
     """Makes the reports when they are due. `last`: the newest one."""
 
-    def __init__(self, autopilot: AutopilotPort, sequence: OffboardSequence) -> None:
+    def __init__(
+        self, autopilot: AutopilotPort, sequence: OffboardSequence, loop_delay: LoopDelay
+    ) -> None:
         self._autopilot, self._sequence = autopilot, sequence
+        self._loop_delay = loop_delay
         self._due = -1  # [ns]
         self._reported: tuple | None = None  # what a change of brings a report
         self.last: AutopilotReport | None = None
@@ -53,9 +59,12 @@ class AutopilotReports:
         what = *state, phase, reasons, sequence.released_to, autopilot.landed
         if what == self._reported and stamp < self._due:
             return None
-        since = autopilot.armed_since
+        since, delay = autopilot.armed_since, self._loop_delay.value
         self._due, self._reported = stamp + REPORT_PERIOD, what
         self.last = AutopilotReport(
-            *what, None if since is None else nanoseconds(since), autopilot.round_trip
+            *what,
+            None if since is None else nanoseconds(since),
+            autopilot.round_trip,
+            None if math.isnan(delay) else delay,
         )
         return self.last

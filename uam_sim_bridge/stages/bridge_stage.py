@@ -16,15 +16,18 @@ from typing import Any, Self
 import numpy as np
 
 from uam_control.control.sample_hold import SampleHold
+from uam_control.coordinates import ATTITUDE, CHI_DOT
 from uam_control.stamps import SECOND
 from uam_control.vehicle import VehicleDescription
 from uam_sim_bridge.mavlink.offboard.hold import HoldParameters
+from uam_sim_bridge.mavlink.offboard.loop_delay import LoopDelay
 from uam_sim_bridge.mavlink.offboard.sequence import OffboardSequence
 from uam_sim_bridge.mavlink.offboard.setpoint import RateThrustMap, RateThrustParameters
 from uam_sim_bridge.mavlink.offboard.setpoint_source import (
     Setpoint,
     SetpointSource,
     Situation,
+    sent,
     silent,
 )
 from uam_sim_bridge.mavlink.offboard.setpoints.catalogue import SetpointParameters
@@ -95,7 +98,8 @@ class BridgeStage:
         self.source = SetpointSource(self.map, sets.hold, sets.setpoint.type, fresh, say)
         self._vision = VisionPacing(sets.vision)
         self._hold, self._kept = SampleHold(sets.setpoint.setpoint_rate), None
-        self._reports = AutopilotReports(autopilot, sequence)
+        self.loop_delay = LoopDelay(vehicle.rotor.lag, vehicle.control_period)
+        self._reports = AutopilotReports(autopilot, sequence, self.loop_delay)
         self._orders: deque[tuple[int, bool, int]] = deque()  # stamp [ns], failsafe, regains
         self._regains = 0
         self._situation = Situation(armed=False, landed=True, let_go=False)
@@ -170,6 +174,10 @@ class BridgeStage:
             now, state, flying, tau_p, tau_q, attitude, situation, reference
         )
         setpoint = self._sampled(now, setpoint, flying)
+        if flying and situation.armed and setpoint is not None and not self.source.holding:
+            self.loop_delay.update(now, sent(setpoint)[0], state[CHI_DOT, ATTITUDE])
+        else:
+            self.loop_delay.pause()
         self._send(now, setpoint)
         self.report = self._reports.due(stamp)
         thrust, self.factor = setpoint.thrust if setpoint else 0.0, self.map.thrust_factor
@@ -203,6 +211,7 @@ class BridgeStage:
     def without(self, stamp: int) -> Setpoint:
         """Send the setpoint of a tick without valid commands, and return it."""
         now, self._kept = stamp / SECOND, None
+        self.loop_delay.pause()
         setpoint = self.source.without(now, self._situation)
         self._send(now, setpoint)
         self.report = self._reports.due(stamp)

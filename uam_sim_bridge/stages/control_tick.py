@@ -231,7 +231,12 @@ def send_setpoint(tick: ControlTick) -> bool:
     if report is not None:
         authority = Authority(report.released_to, report.landed, report.mode.lands)
         tick.mission.autopilot(
-            s.stamp, report.connected, report.armed_since, report.round_trip, authority
+            s.stamp,
+            report.connected,
+            report.armed_since,
+            report.round_trip,
+            report.loop_delay,
+            authority,
         )
     return True
 
