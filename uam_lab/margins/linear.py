@@ -152,17 +152,24 @@ def linearise(
         for _ in range(3):
             state = run(state, at + sign * STEP * np.arange(1.0, len(at) + 1.0))[len(outputs) :]
             changed |= state != rest
-    states = np.flatnonzero(changed)
-    directions = [(rest, column) for column in STEP * np.eye(len(at))]
+    states = np.flatnonzero(changed & np.isfinite(rest))
+
+    def slope(at_state: np.ndarray, at_input: np.ndarray) -> np.ndarray:
+        """Return the change of outputs and next state (p + n,) along a change of both."""
+        difference = run(rest + at_state, at + at_input) - run(rest - at_state, at - at_input)
+        return difference / (2.0 * STEP)
+
+    no_state, no_input = np.zeros(len(rest)), np.zeros(len(at))
+    with np.errstate(invalid="ignore"):  # arrays that are no states may be infinite
+        by_input = [slope(no_state, change) for change in STEP * np.eye(len(at))]
+        by_state = []
+        for index in states:
+            change = no_state.copy()
+            change[index] = STEP
+            by_state.append(slope(change, no_input))
     size = len(outputs) + len(rest)
-    by_input = np.empty((size, len(at)))
-    for i, (state, change) in enumerate(directions):
-        by_input[:, i] = (run(state, at + change) - run(state, at - change)) / (2.0 * STEP)
-    by_state = np.empty((size, len(states)))
-    for i, index in enumerate(states):
-        change = np.zeros(len(rest))
-        change[index] = STEP
-        by_state[:, i] = (run(rest + change, at) - run(rest - change, at)) / (2.0 * STEP)
+    by_input = np.reshape(by_input, (len(at), size)).T
+    by_state = np.reshape(by_state, (len(states), size)).T
     _write(arrays, rest)
     rows, count = len(outputs) + states, len(outputs)
     return Block(
