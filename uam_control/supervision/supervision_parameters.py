@@ -68,7 +68,7 @@ class SupervisionLimits(ParameterSet):
         0.05, "delay of the setpoints at which the loops oscillate: uam margins", "s", 0.001, 10.0
     )
     delay_nominal: float = number(
-        0.006, "loop delay of a link without delay, part of every profile", "s", 0.0, 1.0
+        0.007, "loop delay of a link without delay, part of every profile", "s", 0.0, 1.0
     )
     delay_warn: float = number(0.6, "share of delay_margin that causes a warning", "1", 0.05, 1.0)
     delay_land: float = _land(0.8, "share of delay_margin", "1", 0.05, 10.0)

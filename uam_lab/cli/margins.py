@@ -106,9 +106,7 @@ def run(options: argparse.Namespace) -> int:
     report.write(out, cases, facts)
     print(f"{profile.name} on {described.name}, hover, linear")
     print(report.table(cases))
-    print(
-        f"Poses of the motion capture may come {1e3 * left:.0f} ms later, then the estimate swings."
-    )
+    print(f"Poses may come {1e3 * left:.0f} ms later, then the estimate oscillates.")
     computed = report.smallest_delay(cases)[0]
     print(f"The supervisor has delay_margin: {stated:g} ({verdict(stated, computed)}).")
     print(f"results  {out}")
