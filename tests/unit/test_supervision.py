@@ -161,7 +161,7 @@ def test_a_short_excess_and_an_unknown_value_have_no_effect():
         (
             observation(readings=Readings(round_trip=0.038, loop_delay=0.048)),
             State.LANDING,
-            "setpoint delay 0.042 s exceeds 0.04 s of the loops' margin",
+            "setpoint delay 0.041 s exceeds 0.04 s of the loops' margin",
         ),
         (
             observation(readings=Readings(round_trip=0.228)),

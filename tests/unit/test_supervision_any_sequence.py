@@ -29,6 +29,7 @@ READINGS = st.builds(
     autopilot_age=NUMBERS,
     mocap_still=NUMBERS,
     round_trip=NUMBERS,
+    loop_delay=NUMBERS,
     mocap_position=st.builds(np.array, st.tuples(NUMBERS, NUMBERS, NUMBERS)),
 )  # fmt: skip
 
