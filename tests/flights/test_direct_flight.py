@@ -12,6 +12,7 @@ from uam_control.profiles.profile import load_profile
 from uam_lab.flight.direct.flight import DirectFlight
 from uam_lab.results.metrics import compute
 from uam_sim_bridge.plant import Vehicle
+from uam_sim_bridge.plant.effects import presets
 
 DROP_POINT = [0.789, 0.0]
 
@@ -129,3 +130,20 @@ def test_attitude_setpoints_complete_the_mission():
     series = a_flight.recording.series()
     assert np.isnan(series.block("setpoint.rate_")[series.flown]).all()
     assert series["setpoint.thrust"][series.flown].min() > 0.3
+
+
+def test_the_short_mission_is_flown_on_the_plant_of_a_laboratory():
+    effects = presets.read([presets.LABORATORY])
+    flown = flight("quick_pick", effects=effects)
+    flown.run()
+    assert flown.mission.output.abort_reason is None
+    assert metrics(flown)["payload_lifted"]
+
+
+def test_px4s_own_position_control_flies_the_lemniscate_late_but_safely():
+    flown = flight("lemniscate", ["s500", "px4_position"], payload=0.0)
+    series = flown.run().series()
+    assert flown.mission.output.abort_reason is None
+    error = series.block("truth.")[:, :3] - series.block("reference.")[:, :3]
+    rmse = np.sqrt(np.mean(np.sum(error[series.in_phase("trajectory")] ** 2, axis=1)))
+    assert 0.06 < rmse < 0.2  # PX4's cascade lags; the law: 0.002 m
