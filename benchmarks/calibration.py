@@ -62,7 +62,8 @@ def main() -> None:
                     time, after, shift, path = figures(series)
                     print(
                         f"| `{name}` | `{scenario}` | {plant} | {seed} | {time:.3f} m | "
-                        f"{after:.3f} m by {1e3 * shift:.0f} ms | {path:.3f} m | {PUBLISHED[scenario]} m |",
+                        f"{after:.3f} m by {1e3 * shift:.0f} ms | {path:.3f} m | "
+                        f"{PUBLISHED[scenario]} m |",
                         flush=True,
                     )
 

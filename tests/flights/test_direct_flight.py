@@ -136,14 +136,14 @@ def test_the_short_mission_is_flown_on_the_plant_of_a_laboratory():
     effects = presets.read([presets.LABORATORY])
     flown = flight("quick_pick", effects=effects)
     flown.run()
-    assert flown.mission.output.abort_reason is None
+    assert not flown.mission.output.abort_reason
     assert metrics(flown)["payload_lifted"]
 
 
 def test_px4s_own_position_control_flies_the_lemniscate_late_but_safely():
     flown = flight("lemniscate", ["s500", "px4_position"], payload=0.0)
     series = flown.run().series()
-    assert flown.mission.output.abort_reason is None
+    assert not flown.mission.output.abort_reason
     error = series.block("truth.")[:, :3] - series.block("reference.")[:, :3]
     rmse = np.sqrt(np.mean(np.sum(error[series.in_phase("trajectory")] ** 2, axis=1)))
     assert 0.06 < rmse < 0.2  # PX4's cascade lags; the law: 0.002 m
