@@ -63,6 +63,7 @@ class Forks:
 
     def start(self, module: str, arguments: list[str], log: Path) -> Forked:
         """Run main() of `module` with the environment and the folder of this process."""
+        log.touch()  # the test may read it before the node has opened it
         request = [module, arguments, str(log), dict(os.environ), os.getcwd()]
         self._lines.write(json.dumps(request) + "\n")
         self._lines.flush()
