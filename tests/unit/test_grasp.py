@@ -108,11 +108,15 @@ class Flight:
         chi[:3] += self.shift + self.error + self.noise()
         return magnet_position(chi, (0.0, 0.0, -0.073), (0.1, 0.14), 0.03)
 
+    def attempt(self):
+        decisions = self.executive.decisions
+        return decisions[-1].attempt if decisions else 0
+
     def step(self):
         on = self.scenario.magnet_on(self.time) or self.executive.directive.grip
         magnet = self.magnet()
         near = np.linalg.norm(magnet - self.payload) < 0.01
-        if on and not self.carried and near and self.grips(self.executive.attempts):
+        if on and not self.carried and near and self.grips(self.attempt()):
             self.carried = True
         if self.carried and on:
             self.payload = magnet.copy()

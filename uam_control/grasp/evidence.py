@@ -22,6 +22,9 @@ TORQUE_DEVIATION = 0.08  # [N m] of the torque: dry friction of a joint
 SHARE = 0.5  # of the climb that the payload must follow
 
 
+REACH = 0.003  # [m] height above the payload below which the magnet has contact
+
+
 class Evidence(NamedTuple):
     """held: None without a verdict; text: the measured values."""
 
@@ -87,3 +90,9 @@ def fused(sight: Sight, pose: Evidence, mass: Evidence) -> Evidence:
     """Return the verdict of the pose for a tracked payload, else that of the mass; both texts."""
     held = pose.held if sight.tracked else mass.held
     return Evidence(held, f"{pose.text}, {mass.text}")
+
+
+def touches_beside(sight: Sight, distance: float) -> bool:
+    """Return whether the magnet touches a payload, at least `distance` [m] beside its middle."""
+    away = sight.magnet - sight.payload
+    return bool(away[2] < REACH and np.hypot(*away[:2]) >= distance)

@@ -9,13 +9,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
-from enum import Enum
 
 import numpy as np
 
 from uam_control.grasp.alignment import Alignment
 from uam_control.grasp.decisions import Grasp, GraspDecision
+from uam_control.grasp.directive import Directive, Step
 from uam_control.grasp.evidence import (
     Evidence,
     Load,
@@ -24,48 +23,20 @@ from uam_control.grasp.evidence import (
     fused,
     identified_mass,
     place,
+    touches_beside,
 )
 from uam_control.grasp.grasp_parameters import GraspParameters
-from uam_control.grasp.sight import RunningMean, Sight
+from uam_control.grasp.sight import Lasting, RunningMean, Sight
 from uam_control.grasp.windows import GraspWindow
 
 BEFORE = 2.0  # [s] before the descent from which on values are taken
 FALLEN = 0.05  # [m] below its place from which on a payload counts as fallen from its stand
-REACH = 0.003  # [m] height above the payload below which the magnet has contact
 LEAST_CLIMB = 0.02  # [m] on which the evidence of a lift is based
 NEAR = 0.015  # [m] height above the payload below which a miss breaks off the descent
 BESIDE = 0.5  # [m] horizontal distance from the stand within which a contact is one with it
-CONTACT_AFTER = 0.2  # [s]
+CONTACT_AFTER = MISSED_AFTER = 0.2  # [s]
 LATE = 2.0  # factor on the tolerances of the alignment after align_timeout
-CALM = 0.5  # of contact_error, below which a contact is over
-
-
-class Step(Enum):
-    """What the executive does."""
-
-    IDLE = "no payload near"
-    APPROACH = "before the descent"
-    ALIGN = "waits above the payload"
-    DESCEND = "descends"
-    LIFT = "magnet on, climbs"
-    VERIFY = "waits for evidence"
-    RETREAT = "back to the start of the descent"
-    CLIMB = "leaves a contact upwards"
-    CARRY = "carries"
-    RELEASE = "magnet off"
-
-
-@dataclass
-class Directive:
-    """Output: pace of the scenario's clock; shift (3,) [m] of its path; grip: magnet on before the
-    scenario has it on; without_descent: the window whose descent is left out, None for none; land:
-    reason to land, "" for none."""
-
-    pace: float = 1.0
-    shift: np.ndarray = field(default_factory=lambda: np.zeros(3))
-    grip: bool = False
-    without_descent: GraspWindow | None = None
-    land: str = ""
+CALM, CALM_FOR = 0.5, 0.5  # of contact_error, and [s] below it, after which a contact is over
 
 
 class GraspExecutive:
@@ -87,8 +58,7 @@ class GraspExecutive:
         self._stood = np.full(3, math.nan)  # grip point of the standing payload
         self._start = np.zeros(3)  # magnet at the begin of the descent
         self._top = 0.0  # [m] height of the magnet at the grip
-        self._against: float | None = None  # stamp [s] from which evidence is against the grasp
-        self._contact: float | None = None  # stamp [s] from which the arm has contact
+        self._lasting, self._contact = Lasting(), Lasting()  # of a condition; of a contact
         self._steps: dict[Step, Callable[[Sight, GraspWindow], None]] = {
             Step.APPROACH: self._approach,
             Step.ALIGN: self._align,
@@ -100,11 +70,6 @@ class GraspExecutive:
             Step.CARRY: self._carry,
             Step.RELEASE: self._release,
         }
-
-    @property
-    def attempts(self) -> int:
-        """Number of approaches so far."""
-        return self._attempt
 
     def due(self, time: float) -> bool:
         """Return whether a window is near at scenario time [s]."""
@@ -123,13 +88,13 @@ class GraspExecutive:
 
     def interrupt(self) -> None:
         """Forget running values: the scenario is not flown now."""
-        self._alignment.restart()
-        self._load.restart()
-        self._against = self._contact = None
+        for one in (self._alignment, self._load, self._lasting, self._contact):
+            one.restart()
 
     def _go(self, step: Step, sight: Sight, pace: float = 1.0) -> None:
         self._step, self._since = step, sight.stamp
-        self._against = self._contact = None
+        self._lasting.restart()
+        self._contact.restart()
         self.directive.pace = pace
         self.directive.grip = self.directive.grip and step in (Step.DESCEND, Step.LIFT)
 
@@ -175,7 +140,7 @@ class GraspExecutive:
     def _begin_descent(self, sight: Sight) -> None:
         self._attempt += 1
         self._stood, self._start = sight.payload.copy(), sight.magnet.copy()
-        self._before = Load(*self._load.mean) if len(self._load.mean) else Load()
+        self._before = self._present_load()
         self._decide(sight, Grasp.APPROACHED, f"descent, {self._alignment.text}")
         self._go(Step.DESCEND, sight)
 
@@ -186,16 +151,15 @@ class GraspExecutive:
         elif sight.tracked and self._misses(sight, p.descent_miss):
             self._go_back(sight, f"broken off, {by_pose(sight, self._stood, 0.0, p).text}")
         elif sight.tracked and not self.directive.grip:
-            self.directive.grip = self._reaches(sight)
+            self.directive.grip = touches_beside(sight, self._grip_tolerance)
         if self._step is Step.DESCEND and sight.time >= window.grip:
             self._top = float(sight.magnet[2])
             self._go(Step.LIFT, sight)
 
-    def _reaches(self, sight: Sight) -> bool:
-        """Return whether to switch the magnet on before its time: in contact, but moving."""
-        away = sight.magnet - sight.payload
-        restless = self._attempt > 1 or np.hypot(*away[:2]) > self.parameters.align_tolerance
-        return bool(away[2] < REACH and restless)
+    @property
+    def _grip_tolerance(self) -> float:
+        """Distance [m] beside the payload from which the magnet is on at contact."""
+        return self.parameters.align_tolerance if self._attempt == 1 else 0.0
 
     def _misses(self, sight: Sight, allowed: float) -> bool:
         """Return whether the magnet is low and beside the payload, or the payload has fallen."""
@@ -203,19 +167,13 @@ class GraspExecutive:
         beside = bool(np.hypot(*away[:2]) > allowed)
         low = sight.magnet[2] - self._stood[2] < NEAR
         fallen = bool(self._stood[2] - sight.payload[2] > FALLEN)
-        return fallen or (low and self._for(sight, beside, CONTACT_AFTER))
+        return fallen or self._lasting(sight.stamp, bool(low and beside)) >= MISSED_AFTER
 
-    def _for(self, sight: Sight, condition: bool, span: float) -> bool:
-        """Return whether `condition` has been true for `span` [s]."""
-        if not condition:
-            self._against = None
-            return False
-        if self._against is None:
-            self._against = sight.stamp
-        return sight.stamp - self._against >= span
+    def _present_load(self) -> Load:
+        return Load(*self._load.mean) if len(self._load.mean) else Load()
 
     def _evidence(self, sight: Sight) -> Evidence:
-        p, now = self.parameters, Load(*self._load.mean) if len(self._load.mean) else Load()
+        p, now = self.parameters, self._present_load()
         climb = max(float(sight.magnet[2] - self._top), LEAST_CLIMB)
         mass = identified_mass(self._before, now, sight.lever)
         return fused(sight, by_pose(sight, self._stood, climb, p), by_mass(mass, self._expected, p))
@@ -225,7 +183,7 @@ class GraspExecutive:
             self._leave_contact(sight)
             return
         pose = by_pose(sight, self._stood, 0.0, self.parameters)
-        if pose.held is False and self._for(sight, True, CONTACT_AFTER):
+        if self._lasting(sight.stamp, pose.held is False) >= MISSED_AFTER:
             self._go_back(sight, f"not held, {pose.text}")
         elif sight.time >= window.lifted:
             self._go(Step.VERIFY, sight)
@@ -285,13 +243,8 @@ class GraspExecutive:
 
     def _touches(self, sight: Sight) -> bool:
         """Return whether the arm has had contact with the stand for CONTACT_AFTER."""
-        error = float(np.hypot(*sight.error[:2]))
-        if error <= self.parameters.contact_error:
-            self._contact = None
-            return False
-        if self._contact is None:
-            self._contact = sight.stamp
-        return sight.stamp - self._contact >= CONTACT_AFTER
+        beyond = float(np.hypot(*sight.error[:2])) > self.parameters.contact_error
+        return self._contact(sight.stamp, beyond) >= CONTACT_AFTER
 
     def _leave_contact(self, sight: Sight) -> None:
         error = float(np.hypot(*sight.error[:2]))
@@ -303,7 +256,8 @@ class GraspExecutive:
     def _climb(self, sight: Sight, window: GraspWindow) -> None:
         p = self.parameters
         calm = float(np.linalg.norm(sight.error)) < CALM * p.contact_error
-        if self._waited(sight) < p.align_timeout and not self._for(sight, calm, CALM):
+        lasts = self._lasting(sight.stamp, calm)
+        if self._waited(sight) < p.align_timeout and lasts < CALM_FOR:
             return
         if self.grasp in (Grasp.HELD, Grasp.UNVERIFIED):
             self._go(Step.CARRY, sight)
@@ -323,15 +277,11 @@ class GraspExecutive:
             self.directive.shift = np.zeros(3)
         if self.grasp not in (Grasp.HELD, Grasp.UNVERIFIED):
             return
-        evidence = self._against_carry(sight)
-        if self._for(sight, evidence.held is False, p.lost_after):
+        evidence = by_pose(sight, self._stood, 0.0, p)  # without the mass: the arm moves
+        if self._lasting(sight.stamp, evidence.held is False) >= p.lost_after:
             self._decide(sight, Grasp.LOST, f"lost in flight, {evidence.text}")
             if p.payload_lost == "land":
                 self.directive.land = self.decisions[-1].text
-
-    def _against_carry(self, sight: Sight) -> Evidence:
-        """Return the evidence during the carry: the pose alone; the arm moves."""
-        return by_pose(sight, self._stood, 0.0, self.parameters)
 
     def _release(self, sight: Sight, window: GraspWindow) -> None:
         p = self.parameters

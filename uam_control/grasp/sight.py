@@ -70,3 +70,19 @@ class RunningMean:
             self.mean = self.mean + gain * (value - self.mean)
             self._square = self._square + gain * (value**2 - self._square)
         self._stamp = stamp
+
+
+class Lasting:
+    """Time since a condition became true."""
+
+    def __init__(self) -> None:
+        self._since = math.inf
+
+    def restart(self) -> None:
+        """Forget the condition."""
+        self._since = math.inf
+
+    def __call__(self, stamp: float, condition: bool) -> float:
+        """Return for how long [s] `condition` is true at `stamp` [s]; -inf if it is false."""
+        self._since = min(self._since, stamp) if condition else math.inf
+        return stamp - self._since

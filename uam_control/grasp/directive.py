@@ -1,0 +1,38 @@
+"""Steps of the grasp executive, and its output."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from enum import Enum
+
+import numpy as np
+
+from uam_control.grasp.windows import GraspWindow
+
+
+class Step(Enum):
+    """What the executive does."""
+
+    IDLE = "no payload near"
+    APPROACH = "before the descent"
+    ALIGN = "waits above the payload"
+    DESCEND = "descends"
+    LIFT = "magnet on, climbs"
+    VERIFY = "waits for evidence"
+    RETREAT = "back to the start of the descent"
+    CLIMB = "leaves a contact upwards"
+    CARRY = "carries"
+    RELEASE = "magnet off"
+
+
+@dataclass
+class Directive:
+    """Output: pace of the scenario's clock; shift (3,) [m] of its path; grip: magnet on before the
+    scenario has it on; without_descent: the window whose descent is left out, None for none; land:
+    reason to land, "" for none."""
+
+    pace: float = 1.0
+    shift: np.ndarray = field(default_factory=lambda: np.zeros(3))
+    grip: bool = False
+    without_descent: GraspWindow | None = None
+    land: str = ""
