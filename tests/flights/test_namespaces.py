@@ -31,7 +31,10 @@ def test_the_log_of_a_vehicle_has_its_own_topics_and_frames(shared_flights):
         assert topics - SHARED == {one for one in topics if one.startswith(f"/{name}/")}
         assert f"/{name}/clock" in topics and SHARED <= topics
         with (flight.out / "log.mcap").open("rb") as file:
-            for _, channel, message in make_reader(file).iter_messages(topics=["/tf"]):
-                assert channel.topic == "/tf"
-                own = f"{name}/base_link".encode() in message.data
-                assert own != (f"{other}/base_link".encode() in message.data)
+            seen = set()
+            for _, channel, message in make_reader(file).iter_messages(topics=sorted(SHARED)):
+                seen.add(channel.topic)
+                own = f"{name}.{{}}" if channel.topic == "/rosout" else f"{name}/{{}}"
+                assert own.format("").encode() in message.data, channel.topic
+                assert f"{other}/".encode() not in message.data, channel.topic
+            assert seen == SHARED
