@@ -10,6 +10,7 @@ from uam_lab.flight.observer import FlightStatus, Observer
 from uam_lab.flight.ros import node_arguments
 from uam_lab.library.history import History
 from uam_lab.results.result_folder import ResultFolderError
+from uam_sim_bridge.faults import FaultError
 
 
 @pytest.mark.parametrize(
@@ -28,6 +29,8 @@ from uam_lab.results.result_folder import ResultFolderError
         ({"remappings": {"uam/state": "uam/reference"}}, "that is the topic uam/reference"),
         ({"remappings": {"uam/state": "x", "/imu/data": "/x"}}, "that is the topic uam/state"),
         ({"remappings": {"mission": {"goal_pose": "path"}}}, "that is the topic path"),
+        ({"imu": "mine"}, "unknown imu 'mine'; there are: topic, autopilot"),
+        ({"imu": "autopilot", "autopilot": "udp:127.0.0.1:14580"}, "needs --clock realtime"),
         ({"without": ["mission=my planner"]}, "'my planner' is no name of a node"),
         ({"without": ["scene=mine"]}, "unknown node to fly without 'scene'"),
     ],
@@ -36,6 +39,13 @@ def test_wrong_options_are_refused_in_one_line(options, why):
     with pytest.raises(SettingsError) as refused:
         Flight(**options)
     assert why in str(refused.value) and "\n" not in str(refused.value)
+
+
+@pytest.mark.parametrize("fault", ["imu_stamps@1", "imu_dropout@1+1", "imu_bias@1:unit=companion"])
+def test_faults_of_an_imu_that_is_not_used_are_refused(fault):
+    Flight(faults=[fault])
+    with pytest.raises(FaultError, match="the estimator has the autopilot's"):
+        Flight(faults=[fault], imu="autopilot")
 
 
 def test_a_parameter_is_checked_like_a_profile():

@@ -27,6 +27,7 @@ from uam_msgs_py.node.namespace import normal
 from uam_sim_bridge.faults import FaultError, Schedule, feasibility, read_schedule
 from uam_sim_bridge.faults.actuator_faults import ServoWeak
 from uam_sim_bridge.faults.faulty_plant import check_engine
+from uam_sim_bridge.faults.imu_faults import of_the_companion
 from uam_sim_bridge.faults.process_faults import DiscoveryLoss
 from uam_sim_bridge.mavlink.transport.transport import ALLOWED, LinkUrl, parse_url
 from uam_sim_bridge.plant.effects import presets
@@ -294,6 +295,12 @@ def check_feasible(flight: FlightSettings, faults: Schedule) -> None:
         raise FaultError(
             f"{ServoWeak.NAME}: scales torque commands, but profile {flight.profile.name} sends "
             "goal positions (setpoint of arm_controller)"
+        )
+    unused = [one.fault for one in faults.faults if of_the_companion(one.fault)]
+    if unused and flight.imu == AUTOPILOT_IMU:
+        raise FaultError(
+            f"{unused[0].NAME}: changes the companion's IMU, but the estimator has the autopilot's "
+            "(--imu autopilot)"
         )
     feasibility.check(faults, flight.engine, absent, refused, flight.vehicle)
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from uam_control.settings.parameter_set import choice, number
-from uam_sim_bridge.faults.fault import Occurrence, PlantFault
+from uam_sim_bridge.faults.fault import Fault, Occurrence, PlantFault
 from uam_sim_bridge.plant import Samples
 
 COMPANION, AUTOPILOT, BOTH = "companion", "autopilot", "both"
@@ -82,6 +82,11 @@ class ImuStamps(PlantFault):
         stamp, gyro, force = samples.imu
         samples.imu = stamp + self.jitter * (2.0 * late - 1.0), gyro, force
         samples.imu_copies += bool(repeated < self.repeated)
+
+
+def of_the_companion(fault: Fault) -> bool:
+    """Return whether a fault changes only the companion's IMU."""
+    return isinstance(fault, ImuStamps) or getattr(fault, "unit", "") == COMPANION
 
 
 class EncoderStuck(PlantFault):
