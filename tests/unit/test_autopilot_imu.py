@@ -7,6 +7,7 @@ from uam_sim_bridge.autopilot.core import Autopilot
 from uam_sim_bridge.autopilot.telemetry import Telemetry
 from uam_sim_bridge.mavlink.protocol.wire import Codec, mavlink2
 from uam_sim_bridge.mavlink.telemetry.autopilot_imu import FRESH, AutopilotImu
+from uam_sim_bridge.mavlink.telemetry.clock_map import SLEW, ClockMap
 from uam_sim_bridge.mavlink.telemetry.time_sync import TimeSync, nanoseconds
 
 BOOT = 1_700_000_000.25  # [s] companion's clock when the autopilot's began
@@ -74,7 +75,7 @@ def test_a_sample_that_cannot_be_used_is_counted(bad):
 
 def test_unequal_ways_shift_the_stamps_by_half_their_difference():
     sync = synchronised([(0.003, 0.001)] * 5)
-    assert sync.companion(0) == pytest.approx((BOOT - 0.001) * 1e9, abs=1000)
+    assert ClockMap(sync).companion(0) == pytest.approx((BOOT - 0.001) * 1e9, abs=1000)
 
 
 def test_stamps_wander_less_than_the_delays_and_follow_a_drift():
@@ -82,8 +83,19 @@ def test_stamps_wander_less_than_the_delays_and_follow_a_drift():
     delays = [(0.0005 + d, 0.0005 + e) for d, e in random.exponential(0.002, (300, 2))]
     sync = synchronised(delays, drift=20e-6)
     uptime = 5.0 + 0.2 * 300
-    stamp = sync.companion(nanoseconds(uptime * (1.0 + 20e-6)))
+    stamp = ClockMap(sync).companion(nanoseconds(uptime * (1.0 + 20e-6)))
     assert stamp == pytest.approx((BOOT + uptime) * 1e9, abs=0.5e6)
+
+
+def test_a_better_answer_lets_no_stamp_go_back():
+    sync = synchronised([(0.06, 0.0)] * 5)
+    clocks = ClockMap(sync)
+    stamps = [clocks.companion(0)]
+    sync.offset -= 0.03  # the error of the slow answers
+    stamps += [clocks.companion(4_000_000 * k) for k in range(1, 1000)]
+    steps = np.diff(stamps)
+    assert steps.min() >= 4_000_000 - SLEW and steps.max() <= 4_000_000 + SLEW
+    assert stamps[-1] == 4_000_000 * 999 - round(sync.offset * 1e9)
 
 
 def test_the_stand_in_sends_its_sample_on_request_only():

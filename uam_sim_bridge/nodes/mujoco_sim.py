@@ -68,6 +68,7 @@ LAST_WAIT = 3.0  # [s] longest wait for the recorder after the last tick
 RECORDER_LAG = 2.0  # [s] the recorder reports its progress each second; its queue is 4 times longer
 LATCHED_WAIT = 0.5  # [s] of wall time, in which a latched message arrives
 AFTER_OTHERS = 1.0  # [s] the status of a mission is at most half a second older than its last tick
+IMU_WAIT, IMU_MISSING = 0.5, 5  # [s], [ticks] for which a sample of the autopilot's IMU may be lost
 SERVICE_TICKS = 25  # [ticks] between two calls of the parameter services in real time
 
 
@@ -120,6 +121,7 @@ class Simulator:
         self._setpoint_is_there = False  # usually the last answer to arrive
         self._complete = False  # every kind of sensor has delivered a sample
         self._stamp: int | None = None  # of this tick's IMU sample [ns]
+        self._unanswered = 0  # ticks in a row without an answer
         self._published = 0  # wall time [ns] of its publication
         self._restart = Restart(options.answer_timeout)
         self._begun = 0.0  # wall time [s] at which this tick began
@@ -340,11 +342,14 @@ class Simulator:
             self._restart.look(self.answers.restarts)
             if self._stop.raised or (self._restart.going_on and left <= 0.0):
                 break
+            if self._stamp is None and left < -IMU_WAIT and self._unanswered < IMU_MISSING:
+                break  # a sample of the autopilot's IMU may be lost or refused
             if patience.over:
                 if self.options.end_with_mission:
                     raise PlantStopped(self._no_answer(missing))
                 self._log.warning(f"{self._no_answer(missing)}; time goes on without it")
                 self._restart.begin(math.inf)
+        self._unanswered = self._unanswered + 1 if missing else 0
         self._restart.tick(complete=not missing)
 
     def _spin_until(self, end: float) -> None:

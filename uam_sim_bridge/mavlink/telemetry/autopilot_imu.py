@@ -14,6 +14,7 @@ import numpy as np
 
 from uam_sim_bridge.mavlink.protocol.frames import swap_body
 from uam_sim_bridge.mavlink.protocol.wire import Message, mavlink2
+from uam_sim_bridge.mavlink.telemetry.clock_map import ClockMap
 from uam_sim_bridge.mavlink.telemetry.time_sync import TimeSync
 
 NUMBER = mavlink2.MAVLINK_MSG_ID_HIGHRES_IMU
@@ -36,8 +37,8 @@ class AutopilotImu:
     """
 
     def __init__(self, sync: TimeSync) -> None:
-        """sync: relates the two clocks, see `TimeSync.companion`."""
-        self._sync = sync
+        """sync: relates the two clocks, see `ClockMap`."""
+        self._clocks = ClockMap(sync)
         self._samples: deque[ImuSample] = deque(maxlen=STORED)
         self.refused = 0
 
@@ -49,7 +50,7 @@ class AutopilotImu:
         if not fresh or not math.isfinite(gyro.sum() + force.sum()):
             self.refused += 1
             return
-        stamp = self._sync.companion(1000 * m.time_usec)
+        stamp = self._clocks.companion(1000 * m.time_usec)
         if stamp is not None:
             self._samples.append(ImuSample(stamp, swap_body(gyro), swap_body(force)))
 

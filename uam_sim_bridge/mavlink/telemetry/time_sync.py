@@ -53,15 +53,6 @@ class TimeSync:
         newest = list(self._recent)[-_NEWEST:]
         return min(newest) if len(newest) == _NEWEST else None
 
-    def companion(self, stamp: int) -> int | None:
-        """Return a stamp of the autopilot [ns] in the companion's clock [ns].
-
-        None before _NEWEST answers: the first one alone may be a slow one.
-        """
-        if self.offset is None or self.quickest is None:
-            return None
-        return stamp - round(self.offset * 1e9)
-
     def request(self, time: float) -> int | None:
         """Return ts1 [ns] of the request due at `time` [s]; None if none is due."""
         if time - self._last < PERIOD - 1e-9:
