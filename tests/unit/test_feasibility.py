@@ -55,7 +55,8 @@ class Motion:
         self.function = function
 
     def write(self, time, reference):
-        reference[:] = self.function(time)
+        reference[:] = 0.0
+        reference[:3] = self.function(time)
 
 
 def rows(**columns):
