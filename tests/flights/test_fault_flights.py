@@ -192,3 +192,25 @@ def test_a_fault_that_cannot_be_flown_is_refused_in_one_line(tmp_path, capsys, m
         err = capsys.readouterr().err
         assert message in err and err.count("\n") == 1
     assert not any(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize("late", ["mavlink_delay@start:delay=0.03,direction=to_autopilot",
+                                  "mavlink_delay@hover+0.5:delay=0.03",
+                                  "mocap_latency@start:delay=0.03,jitter=0.008"])  # fmt: skip
+def test_thirty_milliseconds_are_within_the_margin(late):
+    _, _, figures = flown(late)
+    assert figures["mission_completed"], figures["shortfalls"]
+
+
+def test_a_link_slower_than_the_margin_is_refused_on_the_ground():
+    flight, series, figures = flown("mavlink_delay@start:delay=0.1,direction=to_autopilot")
+    assert "setpoint delay 0.104 s exceeds" in flight.mission.output.abort_reason
+    assert not series.flown.any() and not figures["mission_completed"]
+
+
+def test_a_link_that_becomes_slower_than_the_margin_is_left_before_the_vehicle_swings():
+    flight, series, _ = flown("mavlink_delay@hover+1:delay=0.2,direction=to_autopilot")
+    assert "setpoint delay" in flight.mission.output.abort_reason
+    left = series.time < 6.0  # in the autopilot's hands after that
+    tilt = np.hypot(series["truth.roll"][left], series["truth.pitch"][left])
+    assert tilt.max() < 0.1 and (flight.mission.changes[-1].event is Event.HARD_LIMIT)
