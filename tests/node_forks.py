@@ -30,7 +30,7 @@ class Forked:
         self._forks.receive(0.0)
         return self._forks.statuses.get(self.pid)
 
-    def wait(self, timeout: float) -> int:
+    def wait(self, timeout: float = 60.0) -> int:
         """Return the exit status; raise TimeoutExpired after `timeout` [s]."""
         end = time.monotonic() + timeout
         while self.poll() is None:

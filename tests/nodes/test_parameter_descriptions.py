@@ -24,6 +24,7 @@ WHOLE = {
         "recovery_attempts",
     },
     wiring.PLANT: {"seed", "hil_port"},
+    wiring.MISSION: {"grasp_attempts"},
     wiring.COCKPIT: {"port"},
 }
 
@@ -88,7 +89,7 @@ REFUSED = [
     (wiring.PLANT, "hil_port:=70000", "hil_port: 70000 is outside 1 to 65535"),
     (wiring.PLANT, "payload_mass:=-1.0", "payload_mass: -1.0 is outside 0 to 2 kg"),
     (wiring.PLANT, "clock:=sundial", "clock: 'sundial' is not one of lockstep, realtime"),
-    (wiring.PLANT, "foreign:=5", "foreign: 5 is no text; allowed: names with commas"),
+    (wiring.PLANT, "foreign:=5", "foreign: 5 is no text; allowed: NODE=NAME with commas"),
     (wiring.PLANT, "arm_start:=[0.1]", "arm_start: a list of 2 numbers expected"),
     (wiring.BRIDGE, "local_port:=0", "local_port: 0 is outside 1 to 65535"),
     (wiring.BRIDGE, "autopilot_system:=true", "autopilot_system: True is no integer"),
