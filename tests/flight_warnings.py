@@ -20,6 +20,16 @@ def warnings(folder):
     return reported, logged
 
 
+def staying(folder, apart=()):
+    """Return node → text of those whose last report is a warning or error; apart: texts to omit."""
+    last = {name: (level, text) for _, name, level, text in statuses(folder)}
+    return {
+        name: text
+        for name, (level, text) in last.items()
+        if level in (1, 2) and not any(words in text for words in (AT_THE_END, *apart))
+    }
+
+
 def statuses(folder):
     """Return (time, node, level, text) of all reports on /diagnostics, in order."""
     return [(time, s.name, s.level, s.message) for time, s in _reports(folder)]

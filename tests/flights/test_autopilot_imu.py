@@ -4,7 +4,7 @@ import json
 
 import numpy as np
 import pytest
-from flight_warnings import last_values, warnings
+from flight_warnings import last_values, staying
 
 from uam_control.mission import load_scenario
 from uam_control.profiles.profile import load_profile
@@ -63,4 +63,4 @@ def test_over_mavlink_no_other_imu_is_needed(fly, short_scenario):
     sent = int(last_values(flight.out, "mavlink_bridge")["IMU samples"])
     ticks = int(last_values(flight.out, "state_estimator")["ticks"])
     assert sent > 1500 and ticks > 0.98 * sent
-    assert warnings(flight.out) == ([], [])
+    assert staying(flight.out) == {}  # while the nodes start, ticks may be dropped

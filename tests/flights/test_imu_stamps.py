@@ -3,7 +3,7 @@
 import json
 
 import pytest
-from flight_warnings import last_values, statuses, warnings
+from flight_warnings import last_values, staying, warnings
 
 from uam_control.mission import load_scenario
 from uam_control.profiles.profile import load_profile
@@ -69,13 +69,5 @@ def test_in_real_time_no_warning_stays(fly, short_scenario):
     flight = fly(*options, "--fault", fault(0.001))
     assert completed(flight)
     assert int(last_values(flight.out, "state_estimator")["IMU samples missing"]) > 0
-    last = {}
-    for _, name, level, text in statuses(flight.out):
-        last[name] = level, text
-    speed = ("ticks missed", "ticks dropped", "round trip", "disarming")
-    staying = {
-        name: text
-        for name, (level, text) in last.items()
-        if level in (1, 2) and not any(words in text for words in speed)
-    }
-    assert staying == {}
+    speed = ("ticks missed", "ticks dropped", "round trip")
+    assert staying(flight.out, apart=speed) == {}
