@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import socket
 import struct
 import threading
@@ -25,17 +26,17 @@ LOW_BATTERY = {
 
 
 class Pilot:
-    """Sends sticks in their middle; chooses a mode, or drains the battery, `at` s after arming.
+    """Sends sticks in their middle; from `act` on chooses a mode, or drains the battery.
 
     `modes`: (time since arming [s], mode) of every change, as PX4 reports them to a ground station:
     once a second; `acted` [s] or None.
     """
 
-    def __init__(self, system: int, at: float, mode: Mode | None) -> None:
+    def __init__(self, system: int, mode: Mode | None) -> None:
         """system: of PX4; mode: None for the battery."""
         self.modes: list[tuple[float, Mode]] = []
         self.acted: float | None = None
-        self._system, self._at, self._mode = system, at, mode
+        self._system, self._at, self._mode = system, math.inf, mode
         self._codec = Codec(255, mavlink2.MAV_COMP_ID_MISSIONPLANNER)
         self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
         self._socket.bind(("127.0.0.1", PORT))
@@ -50,6 +51,10 @@ class Pilot:
     def since_acted(self) -> list[Mode]:
         """The modes since the pilot acted, in order."""
         return [mode for when, mode in self.modes if self.acted is not None and when >= self.acted]
+
+    def act(self, after: float) -> None:
+        """Choose the mode in `after` [s]."""
+        self._at = self.since + after
 
     def close(self) -> None:
         """Switch the radio off."""

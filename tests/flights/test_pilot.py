@@ -20,9 +20,10 @@ from uam_control.supervision import OperatorCommand, State
 from uam_lab.flight.direct.flight import DirectFlight
 from uam_sim_bridge.mavlink.protocol.modes import Mode
 
-# quick_pick [s] mission time; the magnet is energised at 8.2 s
-TAKE_OFF, APPROACH, PICK, CARRY, LANDING = PHASES = 1.0, 4.0, 7.5, 11.0, 18.5
-GRASP = 8.2
+# phases of quick_pick, and the time [s] in the phase at which somebody takes over
+TAKE_OFF, APPROACH, PICK, CARRY, LANDING = PHASES = "take-off", "approach", "pick", "carry", "land"
+AT = {TAKE_OFF: 1.0, APPROACH: 2.0, PICK: 1.5, CARRY: 2.5, LANDING: 1.5}
+GRASPED = 20.0  # [s] after which the magnet is on at the latest
 SHORTLY = 0.3  # [s] of RETURN near home, where it descends at once
 BACK_HOME = {TAKE_OFF: SHORTLY, APPROACH: 1.0, PICK: 1.0, CARRY: SHORTLY, LANDING: SHORTLY}
 PUSHED = 0.12  # of the sticks, 1.2 m/s
@@ -161,8 +162,7 @@ def position(case: Case) -> None:
 
 def back_home(case: Case) -> None:
     """RETURN, handed back in motion."""
-    at = min(BACK_HOME, key=lambda phase: abs(phase - case.flight.mission.output.time))
-    case.take_over(Mode.RETURN, BACK_HOME[at])
+    case.take_over(Mode.RETURN, BACK_HOME[case.flight.mission.output.phase])
     case.resume()
 
 
@@ -222,7 +222,8 @@ def own_switch(case: Case) -> None:
 
 def grasp(case: Case) -> None:
     """In the tick of the grasp: the magnet stays on, the payload is carried after the command."""
-    case.fly(2.0, lambda: case.flight.control.signals.magnet)
+    case.fly(GRASPED, lambda: case.flight.control.signals.magnet)
+    assert case.flight.control.signals.magnet
     case.begin = case.flight.plant.time
     hold(case)
 
@@ -245,11 +246,17 @@ def _fly(flight: DirectFlight, do: Callable[[Case], None], sender) -> None:
     sender.send(case.end())
 
 
-def outcomes(at: float, cases: Iterable[Callable[[Case], None]]) -> dict[str, Outcome]:
-    """Fly the nominal mission up to `at` [s], then each case in a fork."""
-    flight = wired_flight()
-    while flight.mission.output.time < at:
+def outcomes(at: str, cases: Iterable[Callable[[Case], None]]) -> dict[str, Outcome]:
+    """Fly the nominal mission into the phase `at`, then each case in a fork."""
+    flight, output = wired_flight(), None
+    while output is None or output.phase != at:
         flight.tick()
+        output = flight.mission.output
+        assert not output.done
+    end = flight.plant.time + AT[at]
+    while flight.plant.time < end:
+        flight.tick()
+    assert output.phase == at
     forked, started = multiprocessing.get_context("fork"), {}
     for do in cases:
         receiver, sender = forked.Pipe(duplex=False)

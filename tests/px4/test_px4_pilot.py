@@ -12,7 +12,7 @@ from whole_flight import ROOT, Flight
 from uam_sim_bridge.mavlink.protocol.modes import Mode
 
 INSTANCE = 31
-TAKE_OFF, APPROACH, PICK, CARRY, LANDING = PHASES = 1.5, 4.5, 8.0, 11.5, 18.5  # [s] after arming
+PHASES = "take-off", "approach", "pick", "carry", "land"
 # [s] until the command; at home RETURN lands
 HELD = {Mode.HOLD: 4.0, Mode.POSITION: 4.0, Mode.RETURN: 1.2}
 
@@ -27,11 +27,15 @@ def take_over(tmp_path):
     """Start quick_pick with a pilot who acts; both end with the test."""
     started = []
 
-    def start(at, mode):
+    def start(phase, mode):
         options = "--autopilot", "px4", "--scenario", "quick_pick", "--instance", str(INSTANCE)
         flight = Flight(tmp_path / "flight", *options)
-        started.append((flight, Pilot(INSTANCE + 1, at, mode)))
-        return started[-1]
+        pilot = Pilot(INSTANCE + 1, mode)
+        started.append((flight, pilot))
+        flight.until_phase(phase)
+        pilot.act(after=1.0)
+        flight.until_phase("released")
+        return flight, pilot
 
     yield start
     for flight, pilot in started:
@@ -46,11 +50,10 @@ def resume():
     return done.returncode, done.stdout + done.stderr
 
 
-@pytest.mark.parametrize("at", PHASES)
+@pytest.mark.parametrize("phase", PHASES)
 @pytest.mark.parametrize("mode", HELD, ids=lambda mode: mode.name)
-def test_a_mode_of_the_pilot_stays_until_the_command(take_over, mode, at):
-    flight, pilot = take_over(at, mode)
-    flight.until_phase("released")
+def test_a_mode_of_the_pilot_stays_until_the_command(take_over, mode, phase):
+    flight, pilot = take_over(phase, mode)
     held = HELD[mode]
     flight.until(lambda: pilot.acted and pilot.since > pilot.acted + held, f"{mode.name} is held")
     assert pilot.since_acted == [mode], "not before the command"
@@ -62,11 +65,10 @@ def test_a_mode_of_the_pilot_stays_until_the_command(take_over, mode, at):
     assert metrics["mission_completed"] or mode is Mode.RETURN
 
 
-@pytest.mark.parametrize("at", PHASES)
+@pytest.mark.parametrize("phase", PHASES)
 @pytest.mark.parametrize("mode", [Mode.LAND, None], ids=["LAND", "battery"])
-def test_a_landing_of_the_pilot_or_of_the_batterys_failsafe_is_not_overridden(take_over, mode, at):
-    flight, pilot = take_over(at, mode)
-    flight.until_phase("released")
+def test_a_landing_by_pilot_or_battery_is_not_overridden(take_over, mode, phase):
+    flight, pilot = take_over(phase, mode)
     assert flight.wait() != 0, "the mission is not completed"
     # PX4 shows OFFBOARD again once it has disarmed
     flown = [found for found in pilot.since_acted if found is not Mode.OFFBOARD]
