@@ -239,6 +239,27 @@ def test_it_comes_to_rest_where_the_velocity_leads_before_it_goes_on():
     np.testing.assert_allclose(held[-1, 0, :3], rest[0, :3], atol=1e-4)
 
 
+@settings(deadline=None, max_examples=10, phases=NO_SHRINKING)
+@given(FLOWN, st.floats(0.5, 80.0), st.floats(0.05, 3.0))
+def test_the_way_back_leads_straight_to_the_path(flown, at, held):
+    """From the rest of the brake to the path at rest: in between, and nowhere else."""
+    guide, state = guidance(), state_of(flown)
+    back = release(guide, at, state, held)
+    guide.advance(100.0 + back)
+    guide.stay(100.0 + back, state, START[2])
+    guide.go_on(100.0 + back)
+    way, stamp = [], 100.0 + back
+    while guide._away is not None or not way:
+        stamp += DT
+        guide.advance(stamp)
+        guide.write(stamp)
+        if guide._away is not None:
+            way.append(guide.reference[0, :3].copy())
+        assert stamp < 200.0 + back
+    low, high = np.minimum(way[0], way[-1]), np.maximum(way[0], way[-1])
+    assert np.all(np.array(way) > low - 0.01) and np.all(np.array(way) < high + 0.01)
+
+
 def test_a_fast_vehicle_lands_from_its_brake_within_the_brakes_acceleration():
     """3 m/s and the command to land: at rest after 2 * 1.5 * 3 / 2 = 4.5 s, 6.75 m on."""
     guide, state = guidance(), state_of((0.0, 0.0, 1.4, 0.0, 3.0, 0.0, 0.0))

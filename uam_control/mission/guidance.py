@@ -117,7 +117,9 @@ class Segment:
 
 
 class WayBack:
-    """Offset from the path that decays to zero, with no step in value, rate, acceleration or jerk.
+    """Offset from the path that decays to zero, with no step in value, rate or acceleration.
+
+    From rest the jerk has no step either.
 
     `end` [s]: stamp at which it is zero. PEAK, HARDEST: from rest, largest rate and acceleration,
     times length / way and length^2 / way.
@@ -128,7 +130,7 @@ class WayBack:
     def __init__(self, stamp: float, offset: np.ndarray, length: float) -> None:
         """Begin at `stamp` [s] with offset (5, 6 + n); end at rest after `length` [s]."""
         rows = np.zeros((SNAP, 2, offset.shape[1]))
-        rows[:, 0] = offset[:SNAP]
+        rows[:JERK, 0] = offset[:JERK]  # a jerk at the start would grow with the cube of the length
         self._stamp, self.end = stamp, stamp + length
         self._curve = hermite(np.array([0.0, length]), rows)
 
@@ -243,7 +245,7 @@ class Guidance:
 
         No effect while the path is left, or about to go on after a stop.
         """
-        going_on = self._go_on_at != math.inf or self._away is not None
+        going_on = self._go_on_at != math.inf or self._away is not None or self._brake is not None
         if rate != self._clock.goal and not self._plans and not going_on:
             self._clock.change(stamp, rate, self._ramp_length())
 
@@ -347,14 +349,18 @@ class Guidance:
 
         A brake comes to rest first.
         """
-        if self._brake is not None and stamp < self._brake.end:
-            self._return_at = self._brake.end
-            return
+        if self._brake is not None:
+            rest = max(self._brake.end, self._clock.settled)
+            if stamp < rest:
+                self._return_at = rest
+                return
         self._go_on_at, self._return_at = max(stamp, self._clock.settled), math.inf
         if self._brake is not None or self._plans.pop(True, None) is not None:
-            self._brake = None
             path = self._on_path()
             offset = self.motion - path
+            if self._brake is not None:  # at rest, as the path; small rates grow on a long way
+                offset[CHI_DOT:] = 0.0
+            self._brake = None
             offset[CHI, YAW] = wrap_angle(offset[CHI, YAW])
             offset[:, ARM] = 0.0
             self._return(stamp, offset)
