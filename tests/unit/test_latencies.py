@@ -12,10 +12,11 @@ def test_setpoints_are_judged_by_the_sample_that_they_answer():
     numbers = Statistics("realtime")
     latencies = Latencies(numbers, PERIOD)
     latencies.tick(None, 0, {})  # no sample yet, nothing to answer
-    latencies.tick(1, 0, {})
-    latencies.tick(2, 4 * MS, {1: 2 * MS})
-    latencies.tick(3, 8 * MS, {2: 9 * MS, 99: 0})  # late; and one that answers no sample of ours
-    latencies.tick(4, 12 * MS, {3: 21 * MS})  # beyond three periods
+    latencies.tick(4 * MS, 0, {})
+    latencies.tick(8 * MS, 4 * MS, {4 * MS: 2 * MS})
+    # late, its stamp with jitter; and one that answers no sample of ours
+    latencies.tick(12 * MS, 8 * MS, {8 * MS + 1000: 9 * MS, 396 * MS: 0})
+    latencies.tick(16 * MS, 12 * MS, {12 * MS: 21 * MS})  # beyond three periods
     assert list(numbers.latency_s) == pytest.approx([0.002, 0.005, 0.013])
     assert (numbers.answerable_ticks, numbers.late_ticks, numbers.missed_ticks) == (4, 2, 1)
 

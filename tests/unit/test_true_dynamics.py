@@ -97,7 +97,8 @@ def test_recorded_accelerations_with_payload(direct_flight):
     residual, found, time = balance(direct_flight, 0.2)
     held = time[found.carrying]
     assert 35.0 < held[0] < 37.0  # the stand carries a part of the weight until the lift
-    assert held[-1] == pytest.approx(70.0, abs=0.05)
+    # the mission waits a moment until the grasp is verified; the magnet is off later by it
+    assert held[-1] == pytest.approx(70.0, abs=0.3)
     carried = residual[found.carrying & (time > held[0] + 0.5)]
     assert np.sqrt(np.mean(carried[:, :3] ** 2, axis=0)).max() < 0.02  # [N], payload 1.96 N
     assert np.sqrt(np.mean(carried[:, 3:] ** 2, axis=0)).max() < 0.01  # [N m]

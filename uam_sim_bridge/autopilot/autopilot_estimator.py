@@ -134,6 +134,7 @@ class Estimator:
         self._vision_down = np.array([0.0, 0.0, 1.0])
         self._force = np.zeros(3)
         self._past = np.zeros((HISTORY, _SPEED))  # attitude and position of the last samples
+        self._past[:, 0] = 1.0  # level before the first sample
         self._stamps = np.full(HISTORY, -math.inf)  # [s]
         self._newest = 0
         self._bias = np.zeros(3)
