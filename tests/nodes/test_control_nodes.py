@@ -113,7 +113,7 @@ def test_every_parameter_has_meaning_unit_and_range(start, probe):
     assert nu.description.endswith("[1/s]")
     assert nu.additional_constraints == "each 1e-06 to 10000 1/s"
     assert varpi.floating_point_range[0].to_value == pytest.approx(1e6)
-    assert form.additional_constraints == "one of: theory, table"
+    assert form.additional_constraints == "one of: theory, table, sliding"
 
 
 def test_the_law_is_fixed_and_its_own_parameters_are_tunable(start, probe):
