@@ -239,9 +239,10 @@ def test_a_profile_is_accepted_by_all_nodes_or_by_none(start, probe, switch, tmp
     )
     changed = switch.switch(load_profile("s500", str(file)))
     assert changed["position_controller"] == {"thrust_max": (36.0, 30.0)}
+    assert changed["mission"] == {"reference_thrust": (36.0, 30.0)}  # follows thrust_max
     assert set(changed["arm_controller"]) == {"varpi", "nu"}
     assert get(probe, "arm_controller", "varpi") == [0.9]
-    probe.until(lambda: len(changes) == 2, "both changes")
+    probe.until(lambda: len(changes) == 3, "the three changes")
     with pytest.raises(SwitchRefused, match="active law modular cannot change to asmc1 in flight"):
         switch.switch(load_profile("asmc1"))
 
