@@ -10,7 +10,7 @@ import pytest
 
 from uam_control.coordinates import MOTION_ROWS
 from uam_control.grasp import Grasp, GraspExecutive, GraspParameters, Sight, grasp_windows
-from uam_control.grasp.evidence import Load, by_mass, by_pose, identified_mass
+from uam_control.grasp.evidence import Load, by_mass, by_travel, identified_mass
 from uam_control.grasp.kinematics import lever, magnet_position
 from uam_control.grasp.sight import RunningMean
 from uam_control.mission import load_scenario
@@ -62,13 +62,45 @@ def test_a_payload_that_may_be_lighter_than_the_limit_has_no_verdict(mass, expec
 
 
 @pytest.mark.parametrize(
-    ("rise", "apart", "held"),
-    [(0.06, 0.0, True), (0.0, 0.0, None), (0.06, 0.02, True), (0.0, 0.06, False)],
+    ("travel", "moved", "held"),
+    [
+        ((0.0, 0.0, 0.06), (0.0, 0.0, 0.06), True),
+        ((0.0, 0.0, 0.06), (0.0, 0.0, 0.04), True),
+        ((0.0, 0.0, 0.04), (0.0, 0.0, 0.0), None),
+        ((0.0, 0.0, 0.06), (0.0, 0.0, 0.0), False),
+        ((0.12, 0.0, 0.008), (0.12, 0.0, 0.008), True),  # the arm turns during the climb
+        ((0.12, 0.0, -0.06), (0.12, 0.0, -0.06), True),
+        ((0.12, 0.0, -0.06), (0.0, 0.0, 0.0), False),
+        ((0.0, 0.0, 0.0), (0.0, 0.0, 0.0), None),
+        ((0.0, 0.0, 0.06), (0.0, 0.0, math.nan), None),
+    ],
 )
-def test_the_pose_decides_by_rise_and_distance(rise, apart, held):
-    payload = PLACE + [0.0, 0.0, rise]
-    sight = Sight(0.0, 37.0, payload + [0.0, 0.0, apart], payload=payload)
-    assert by_pose(sight, PLACE, 0.06, P).held is held
+def test_the_pose_decides_by_distance_and_travel_in_any_direction(travel, moved, held):
+    sight = Sight(0.0, 37.0, PLACE + travel, payload=PLACE + moved)
+    assert by_travel(sight, PLACE, PLACE, P).held is held
+
+
+@pytest.mark.parametrize("name", ["pick_and_place", "quick_pick"])
+def test_a_payload_at_the_magnet_is_held_at_once_in_every_scenario(name):
+    flight = Flight(lambda attempt: True, scenario=name)
+    (window,) = flight.windows
+    assert flight.until(window.release + 2.0) == [Grasp.APPROACHED, Grasp.HELD, Grasp.RELEASED]
+    descent, held = flight.executive.decisions[:2]
+    assert held.stamp - descent.stamp <= window.lifted - window.descent + 0.1
+    assert "payload moved" in held.text
+
+
+@pytest.mark.parametrize("name", ["pick_and_place", "quick_pick"])
+def test_a_payload_that_stays_is_given_up_in_every_scenario(name):
+    flight = Flight(lambda attempt: False, scenario=name)
+    assert flight.until(flight.windows[0].release)[-1] is Grasp.GIVEN_UP
+
+
+def test_the_weight_decides_if_the_place_before_the_grasp_is_unknown():
+    flight = Flight(lambda attempt: True, tracked=False)
+    flight.until(36.0)
+    flight.tracked = True
+    assert flight.until()[1:] == [Grasp.HELD, Grasp.RELEASED]
 
 
 def test_a_running_mean_has_the_mean_and_the_deviation_of_its_values():
@@ -87,15 +119,24 @@ class Flight:
     grips(attempt) -> whether the magnet takes the payload; shift: of the payload on its stand.
     """
 
-    def __init__(self, grips, offset=(0.0, 0.0), tracked=True, mass=0.2, **parameters):
-        scenario = load_scenario("pick_and_place")
+    def __init__(
+        self,
+        grips,
+        offset=(0.0, 0.0),
+        tracked=True,
+        mass=0.2,
+        scenario="pick_and_place",
+        **parameters,
+    ):
+        scenario = load_scenario(scenario)
         self.windows = grasp_windows(scenario.moves, scenario.magnet)
         self.path = scenario.trajectory(np.array([0.0, 0.0, 0.28, 0.0, 0.0, 0.0, 0.0, 1.57]))
         self.scenario, self.grips, self.mass = scenario, grips, mass
         self.executive = GraspExecutive(
             self.windows, mass, dataclasses.replace(P, **parameters).validated(2)
         )
-        self.time, self.stamp, self.shift = 28.0, 128.0, np.zeros(3)
+        self.time = self.windows[0].descent - 2.0
+        self.stamp, self.shift = 100.0 + self.time, np.zeros(3)
         self.payload = PLACE + [*offset, 0.0]
         self.tracked, self.carried, self.taken = tracked, False, True
         self.noise = lambda: np.zeros(3)

@@ -19,8 +19,8 @@ from uam_control.grasp.sight import Sight
 GRAVITY = 9.81  # [m/s^2] to express a force as a mass
 LIFT_DEVIATION = 0.03  # [kg] of the mass from the force: vertical gusts during a lift
 TORQUE_DEVIATION = 0.08  # [N m] of the torque: dry friction of a joint
-SHARE = 0.5  # of the climb that the payload must follow
-
+SHARE = 0.5  # of the magnet's travel that the payload must follow
+LEAST_TRAVEL = 0.02  # [m] on which that is based at least
 
 REACH = 0.003  # [m] height above the payload below which the magnet has contact
 
@@ -44,19 +44,34 @@ def place(point: np.ndarray) -> str:
     return "({:.2f}, {:.2f}, {:.2f}) m".format(*point)
 
 
-def by_pose(sight: Sight, stood: np.ndarray, climb: float, p: GraspParameters) -> Evidence:
-    """Return the evidence of the payload's pose.
-
-    stood (3,) [m]: the grip point before the grasp; climb [m]: of the magnet since then.
-    """
+def by_pose(sight: Sight, p: GraspParameters) -> Evidence:
+    """Return the evidence of the payload's distance from the magnet; it cannot tell held."""
     if not sight.tracked:
         return Evidence(None, "payload not tracked")
     apart = float(np.linalg.norm(sight.payload - sight.magnet))
     if apart > p.held_distance:
         return Evidence(False, f"{1e3 * apart:.0f} mm from the payload at {place(sight.payload)}")
-    rise = float(sight.payload[2] - stood[2])
-    text = f"payload {1e3 * rise:.0f} mm above its place"
-    return Evidence(True if rise >= SHARE * climb else None, text)
+    return Evidence(None, f"payload {1e3 * apart:.0f} mm from the magnet")
+
+
+def by_travel(
+    sight: Sight, magnet: np.ndarray, payload: np.ndarray, p: GraspParameters
+) -> Evidence:
+    """Return the evidence of the payload's pose: near the magnet, and moved with it.
+
+    magnet, payload (3,) [m]: face and grip point when the magnet came on. The direction does not
+    matter: an arm that turns meanwhile may lower the magnet as much as the vehicle climbs.
+    """
+    near = by_pose(sight, p)
+    if near.held is False or not sight.tracked:
+        return near
+    travel, moved = sight.magnet - magnet, sight.payload - payload
+    length = float(np.linalg.norm(travel))
+    along = float(moved @ travel) / max(length, 1e-9)
+    if math.isnan(along):
+        return near
+    text = f"payload moved {1e3 * along:.0f} mm of the magnet's {1e3 * length:.0f} mm"
+    return Evidence(True if along >= SHARE * max(length, LEAST_TRAVEL) else None, text)
 
 
 def identified_mass(before: Load, now: Load, lever: float) -> float:

@@ -20,6 +20,7 @@ from uam_control.grasp.evidence import (
     Load,
     by_mass,
     by_pose,
+    by_travel,
     fused,
     identified_mass,
     place,
@@ -31,7 +32,6 @@ from uam_control.grasp.windows import GraspWindow
 
 BEFORE = 2.0  # [s] before the descent from which on values are taken
 FALLEN = 0.05  # [m] below its place from which on a payload counts as fallen from its stand
-LEAST_CLIMB = 0.02  # [m] on which the evidence of a lift is based
 NEAR = 0.015  # [m] height above the payload below which a miss breaks off the descent
 BESIDE = 0.5  # [m] horizontal distance from the stand within which a contact is one with it
 CONTACT_AFTER = MISSED_AFTER = 0.2  # [s]
@@ -57,7 +57,7 @@ class GraspExecutive:
         self._load, self._before = RunningMean(), Load()
         self._stood = np.full(3, math.nan)  # grip point of the standing payload
         self._start = np.zeros(3)  # magnet at the begin of the descent
-        self._top = 0.0  # [m] height of the magnet at the grip
+        self._gripped = np.full((2, 3), math.nan)  # magnet and payload at the grip
         self._lasting, self._contact = Lasting(), Lasting()  # of a condition; of a contact
         self._steps: dict[Step, Callable[[Sight, GraspWindow], None]] = {
             Step.APPROACH: self._approach,
@@ -149,11 +149,11 @@ class GraspExecutive:
         if self._touches(sight):
             self._leave_contact(sight)
         elif sight.tracked and self._misses(sight, p.descent_miss):
-            self._go_back(sight, f"broken off, {by_pose(sight, self._stood, 0.0, p).text}")
+            self._go_back(sight, f"broken off, {by_pose(sight, p).text}")
         elif sight.tracked and not self.directive.grip:
             self.directive.grip = touches_beside(sight, self._grip_tolerance)
         if self._step is Step.DESCEND and sight.time >= window.grip:
-            self._top = float(sight.magnet[2])
+            self._gripped[:] = sight.magnet, sight.payload
             self._go(Step.LIFT, sight)
 
     @property
@@ -172,17 +172,19 @@ class GraspExecutive:
     def _present_load(self) -> Load:
         return Load(*self._load.mean) if len(self._load.mean) else Load()
 
+    def _mass(self, sight: Sight) -> Evidence:
+        mass = identified_mass(self._before, self._present_load(), sight.lever)
+        return by_mass(mass, self._expected, self.parameters)
+
     def _evidence(self, sight: Sight) -> Evidence:
-        p, now = self.parameters, self._present_load()
-        climb = max(float(sight.magnet[2] - self._top), LEAST_CLIMB)
-        mass = identified_mass(self._before, now, sight.lever)
-        return fused(sight, by_pose(sight, self._stood, climb, p), by_mass(mass, self._expected, p))
+        pose = by_travel(sight, *self._gripped, self.parameters)
+        return fused(sight, pose, self._mass(sight))
 
     def _lift(self, sight: Sight, window: GraspWindow) -> None:
         if self._touches(sight):
             self._leave_contact(sight)
             return
-        pose = by_pose(sight, self._stood, 0.0, self.parameters)
+        pose = by_pose(sight, self.parameters)
         if self._lasting(sight.stamp, pose.held is False) >= MISSED_AFTER:
             self._go_back(sight, f"not held, {pose.text}")
         elif sight.time >= window.lifted:
@@ -197,6 +199,8 @@ class GraspExecutive:
             self._go_back(sight, f"not held, {evidence.text}")
         elif self._waited(sight) < self.parameters.lift_timeout:
             self.directive.pace = 0.0
+        elif sight.tracked and self._mass(sight).held:  # near the magnet, and its weight is there
+            self._begin_carry(sight, Grasp.HELD, evidence.text)
         elif evidence.held is False or sight.tracked:
             self._go_back(sight, f"not held, {evidence.text}")
         else:
@@ -277,7 +281,7 @@ class GraspExecutive:
             self.directive.shift = np.zeros(3)
         if self.grasp not in (Grasp.HELD, Grasp.UNVERIFIED):
             return
-        evidence = by_pose(sight, self._stood, 0.0, p)  # without the mass: the arm moves
+        evidence = by_pose(sight, p)  # without the mass: the arm moves
         if self._lasting(sight.stamp, evidence.held is False) >= p.lost_after:
             self._decide(sight, Grasp.LOST, f"lost in flight, {evidence.text}")
             if p.payload_lost == "land":
@@ -285,7 +289,7 @@ class GraspExecutive:
 
     def _release(self, sight: Sight, window: GraspWindow) -> None:
         p = self.parameters
-        pose = by_pose(sight, self._stood, 0.0, p)
+        pose = by_pose(sight, p)
         if self.grasp not in (Grasp.HELD, Grasp.UNVERIFIED):
             self._end()
         elif pose.held is False:
