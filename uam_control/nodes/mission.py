@@ -2,11 +2,13 @@
 
 import math
 import time
+from dataclasses import replace
 
 import numpy as np
 from diagnostic_msgs.msg import DiagnosticArray
 from std_msgs.msg import Bool
 
+from uam_control.control.output_limits import PositionLimits
 from uam_control.coordinates import ARM
 from uam_control.grasp import Grasp
 from uam_control.laws.catalogue import DEFAULT
@@ -23,7 +25,7 @@ from uam_control.nodes.mission_errors import TrackingErrors
 from uam_control.nodes.mission_inputs import MissionInputs
 from uam_control.nodes.mission_services import offer
 from uam_control.nodes.planner_inputs import PlannerInputs
-from uam_control.profiles.profile import default_profile, reference_limits
+from uam_control.profiles.profile import Profile, default_profile, reference_limits
 from uam_control.stages.mission_stage import MissionStage
 from uam_control.stages.timing import Timing
 from uam_control.stamps import SECOND
@@ -38,9 +40,11 @@ from uam_msgs_py.messages.preflight import preflight_message
 from uam_msgs_py.messages.status import ERROR, OK, WARN, AutopilotState, MissionStatus
 from uam_msgs_py.node.base_node import UamNode, run
 from uam_msgs_py.node.joins import Backlog
+from uam_msgs_py.node.namespace import neighbour_section
 from uam_msgs_py.node.node_parameters import NodeParameters
 
 NAME = "mission"
+POSITION_CONTROLLER = "position_controller"
 STATUS_PERIOD = 500_000_000  # [ns]
 PATH_STEP = 0.25  # [s] between two poses of the path
 
@@ -56,9 +60,7 @@ class MissionNode(UamNode):
         super().__init__(NAME)
         vehicle = described_vehicle(self)
         profile = default_profile(DEFAULT, vehicle)
-        derived = vehicle.node_parameters()[NAME] | reference_limits(
-            profile.sets["position_controller"]
-        )
+        derived = vehicle.node_parameters()[NAME] | self._reference_limits(profile)
         axes = vehicle.coordinates[ARM]
         self.parameter_set = NodeParameters(
             self, MissionParameters, axes, profile.section(NAME), derived
@@ -93,6 +95,13 @@ class MissionNode(UamNode):
         self._planners = PlannerInputs(
             self, self._mission, vehicle.joint_names, self._publish_answer
         )
+
+    def _reference_limits(self, profile: Profile) -> dict[str, float]:
+        """Return those of the position controller: of the parameter file, or of `profile`."""
+        default = profile.sets[POSITION_CONTROLLER]
+        given = neighbour_section(self, POSITION_CONTROLLER)
+        limits = {name: given[name] for name in PositionLimits.specs() if name in given}
+        return reference_limits(replace(default, **limits))
 
     def _scenario(self, vehicle: VehicleDescription) -> Scenario:
         """Return the scenario; with the parameter `retime` slowed down until it is feasible."""

@@ -75,15 +75,30 @@ def adopt_sections(node: Node) -> None:
         return
     from rclpy.parameter import Parameter
 
-    found: dict[str, Any] = {}
-    for flag, value in zip(sys.argv, sys.argv[1:], strict=False):
-        if flag == "--params-file":
-            document = yaml_file.read(Path(value), ParameterError)
-            for name in (node.get_name(), f"/{node.get_name()}"):
-                body = document.get(name) if isinstance(document, dict) else None
-                if isinstance(body, dict):
-                    found |= body.get("ros__parameters") or {}
+    found = _in_files(node.get_name(), f"/{node.get_name()}")
     overrides = node._parameter_overrides
     for name, value in found.items():
         if name not in overrides:
             overrides[name] = Parameter(name, value=value)
+
+
+def neighbour_section(node: Node, name: str) -> dict[str, Any]:
+    """Return what the parameter files of `node` say for node `name` of the same vehicle.
+
+    ROS gives a node only its own section. Raises ParameterError.
+    """
+    bare = _in_files(name, f"/{name}")
+    return bare | _in_files(expanded(node.get_namespace(), name))
+
+
+def _in_files(*names: str) -> dict[str, Any]:
+    """Return the parameters of the sections `names` in the files of the command line."""
+    found: dict[str, Any] = {}
+    for flag, value in zip(sys.argv, sys.argv[1:], strict=False):
+        if flag == "--params-file":
+            document = yaml_file.read(Path(value), ParameterError)
+            for name in names:
+                body = document.get(name) if isinstance(document, dict) else None
+                if isinstance(body, dict):
+                    found |= body.get("ros__parameters") or {}
+    return found
