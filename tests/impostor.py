@@ -3,7 +3,7 @@
     python tests/impostor.py <namespace>
 
 ROS_DOMAIN_ID and the transport come from the environment. Each node `impostor_<n>` sends messages
-that would tumble the vehicle, 100 times a second, until the process is ended.
+that would tumble the vehicle, 20 times a second, until the process is ended.
 """
 
 import sys
@@ -31,7 +31,7 @@ LOOP = (
     *(topics.POSITION_COMMAND, topics.ATTITUDE_COMMAND, topics.ARM_COMMAND, topics.ARM_EFFORT),
     *(topics.SETPOINT, topics.MAGNET, topics.ARMING),
 )
-PERIOD = 0.01  # s
+PERIOD = 0.05  # s
 JOINTS = ["alpha_1", "alpha_2"]
 
 
