@@ -1,18 +1,13 @@
 """Whole flights through the command line, as a user starts them."""
 
-import os
-import subprocess
-import sys
 from dataclasses import dataclass
 from pathlib import Path
 
 import pytest
 from whole_flight import SHORT, Flight
 
-from uam_lab.processes.node_environment import transport_environment
 from uam_sim_bridge.ports import Reservation
 
-IMPOSTOR = Path(__file__).parents[1] / "impostor.py"
 # modules whose tests share a flight of their own
 GROUPED = {"test_direct_flight", "test_fault_flights", "test_imu_stamps", "test_new_law"}
 
@@ -44,7 +39,7 @@ class SharedFlights:
     """Flights with one seed that have ended, each with the same scenario.
 
     single: in a ROS domain of its own, with a report. uav1, uav2: two vehicles in one domain, each
-    in its namespace; uav1 flew among impostors (tests/impostor.py).
+    in its namespace.
     """
 
     single: Flight
@@ -60,8 +55,6 @@ def shared_flights(tmp_path_factory, short_scenario):
     options = ("--scenario", str(short_scenario), "--seed", "3")
     with Reservation() as reserved:
         domain = reserved.ports.domain
-        surroundings = {**os.environ, **transport_environment(), "ROS_DOMAIN_ID": str(domain)}
-        impostors = subprocess.Popen([sys.executable, IMPOSTOR, "uav1"], env=surroundings)
         vehicles = {
             name: (*options, "--domain", str(domain), "--namespace", name)
             for name in ("uav1", "uav2")
@@ -70,10 +63,7 @@ def shared_flights(tmp_path_factory, short_scenario):
         flights |= {name: Flight(folder / name, *given) for name, given in vehicles.items()}
         try:
             statuses = {name: flight.wait() for name, flight in flights.items()}
-            assert impostors.poll() is None
         finally:
-            impostors.kill()
-            impostors.wait()
             for flight in flights.values():
                 flight.end()
     for name, flight in flights.items():

@@ -1,26 +1,59 @@
 """Second publishers on every topic of the control loop: the flight is unaffected, each is named."""
 
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
 from impostor import LOOP, name_of
 from mcap.reader import make_reader
 from mcap_ros2.decoder import DecoderFactory
+from whole_flight import Flight
 
+from uam_lab.processes.node_environment import transport_environment
 from uam_lab.results import timeseries
 from uam_msgs_py.messages.status import ERROR
+from uam_sim_bridge.ports import Reservation
+
+# A starved process loses messages among those of the impostors: the flight needs a quiet machine.
+pytestmark = pytest.mark.slow
+IMPOSTOR = Path(__file__).parents[1] / "impostor.py"
 
 # nobody in the flight listens to it but the recorder
 ONLY_RECORDED = "/uam/arm/command"
 
 
-def test_the_flight_is_that_without_impostors(shared_flights):
+@pytest.fixture(scope="module")
+def among_impostors(tmp_path_factory, short_scenario):
+    """The flight `single` of shared_flights once more, in a namespace, among impostors."""
+    with Reservation() as reserved:
+        domain = str(reserved.ports.domain)
+        surroundings = {**os.environ, **transport_environment(), "ROS_DOMAIN_ID": domain}
+        impostors = subprocess.Popen([sys.executable, IMPOSTOR, "uav1"], env=surroundings)
+        options = ("--scenario", str(short_scenario), "--seed", "3", "--domain", domain)
+        flight = Flight(tmp_path_factory.mktemp("impostors"), *options, "--namespace", "uav1")
+        try:
+            status = flight.wait()
+            assert impostors.poll() is None
+        finally:
+            impostors.kill()
+            impostors.wait()
+            flight.end()
+    assert status == 0, flight.said + flight.complained
+    return flight
+
+
+def test_the_flight_is_that_without_impostors(among_impostors, shared_flights):
     series, single = (
         timeseries.read(flight.out / "timeseries.parquet")
-        for flight in (shared_flights.uav1, shared_flights.single)
+        for flight in (among_impostors, shared_flights.single)
     )
     assert series.values.tobytes() == single.values.tobytes()
 
 
-def test_each_impostor_is_named_with_the_rightful_node(shared_flights):
-    disturbed = shared_flights.uav1
+def test_each_impostor_is_named_with_the_rightful_node(among_impostors):
+    disturbed = among_impostors
     errors = []
     with (disturbed.out / "log.mcap").open("rb") as file:
         reader = make_reader(file, decoder_factories=[DecoderFactory()])
