@@ -6,7 +6,7 @@ import signal
 import time
 
 import pytest
-from whole_flight import assert_nothing_left, lock_is_held, wait_until_gone
+from whole_flight import assert_nothing_left, wait_for_lock, wait_until_gone
 
 from uam_lab.doctor.finding import Verdict
 from uam_lab.doctor.ros import room
@@ -115,4 +115,4 @@ def test_no_node_survives_a_killed_orchestrator(fly, short_scenario):
     flight.wait()
     wait_until_gone(list(nodes.values()))
     assert flight.out.joinpath("logs/mujoco_sim.json").exists(), "the nodes ended in good order"
-    lock_is_held(flight.instance)  # at most by another flight: none is left behind
+    wait_for_lock(flight.instance)  # at most by another flight: none is left behind

@@ -32,7 +32,7 @@ FLIGHTS = [
     ("s500_arm3", "circle_arm3"),
     ("s500_arm3", "arm3_motions"),
 ]
-LIMITS = {"position_m": 0.02, "attitude_deg": 0.5, "arm_deg": 1.5}  # RMS of every axis
+LIMITS = {"position_m": 0.02, "attitude_deg": 0.6, "arm_deg": 1.5}  # RMS of every axis
 
 
 def fly(name, scenario, **mission):

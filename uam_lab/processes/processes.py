@@ -5,6 +5,7 @@ stops the children in order. The output of a child goes to <logs>/<name>.log. Th
 the session, because schedulers share processor time between sessions first. See also `child`.
 """
 
+import contextlib
 import os
 import re
 import signal
@@ -75,7 +76,8 @@ class NodeProcess:
     def send_signal(self, number: int) -> None:
         """Send a signal if it runs."""
         if self.status is None:
-            os.kill(self.process.pid, number)
+            with contextlib.suppress(ProcessLookupError):  # it may end at this moment
+                os.kill(self.process.pid, number)
 
 
 class Processes:
