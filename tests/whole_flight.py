@@ -120,18 +120,6 @@ def lock_is_held(instance: int) -> bool:
     raise AssertionError(f"{file} was left behind")
 
 
-def wait_for_lock(instance: int, patience: float = 30.0) -> bool:
-    """As `lock_is_held`, but the last process of a flight has `patience` [s] to remove the file."""
-    until = time.monotonic() + patience
-    while True:
-        try:
-            return lock_is_held(instance)
-        except AssertionError:
-            if time.monotonic() > until:
-                raise
-            time.sleep(0.2)
-
-
 def wait_until_gone(pids: list[int], seconds: float = 20.0) -> None:
     """Wait until none of the processes exists; fail after `seconds`."""
     deadline = time.monotonic() + seconds
