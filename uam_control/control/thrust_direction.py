@@ -26,6 +26,7 @@ from uam_control.coordinates import (
     Z,
 )
 from uam_control.maths.compiled import jit
+from uam_control.maths.rotations import body_rates, thrust_attitude
 
 ANGLE, RATE = range(2)  # columns of the filter
 LEAD_TIME = 0.5  # [s] in which the lead decays by a factor e
@@ -98,11 +99,7 @@ def attitude_reference_step(
     """
     yaw, yaw_rate = reference[CHI, YAW], reference[CHI_DOT, YAW]
     yaw_acceleration = reference[CHI_DDOT, YAW]
-    cy, sy = math.cos(yaw), math.sin(yaw)
-    # eq. (4a), pos, solved for roll and pitch: the third column of eq. (3), rot_matrix, along tau_p
-    norm = math.sqrt(tau_p[X] ** 2 + tau_p[Y] ** 2 + tau_p[Z] ** 2)
-    desired_roll = math.asin(max(-1.0, min(1.0, (sy * tau_p[X] - cy * tau_p[Y]) / norm)))
-    desired_pitch = math.atan2(cy * tau_p[X] + sy * tau_p[Y], tau_p[Z])
+    desired_roll, desired_pitch = thrust_attitude(tau_p, yaw)
     correction_roll = desired_roll - reference[CHI, ROLL]
     correction_pitch = desired_pitch - reference[CHI, PITCH]
 
@@ -135,10 +132,10 @@ def attitude_reference_step(
     pitch_rate = reference[CHI_DOT, PITCH] + filtered[Y, RATE]
     value[CHI, X], value[CHI, Y], value[CHI, Z] = roll, pitch, yaw
     cr, sr, cp, sp = math.cos(roll), math.sin(roll), math.cos(pitch), math.sin(pitch)
-    # body rates of Z-Y-X Euler rates, and their derivative
-    value[CHI_DOT, X] = roll_rate - sp * yaw_rate
-    value[CHI_DOT, Y] = cr * pitch_rate + sr * cp * yaw_rate
-    value[CHI_DOT, Z] = -sr * pitch_rate + cr * cp * yaw_rate
+    value[CHI_DOT, X], value[CHI_DOT, Y], value[CHI_DOT, Z] = body_rates(
+        roll, pitch, roll_rate, pitch_rate, yaw_rate
+    )
+    # their derivative
     value[CHI_DDOT, X] = accelerations[X] - sp * yaw_acceleration - cp * pitch_rate * yaw_rate
     value[CHI_DDOT, Y] = (
         cr * accelerations[Y]

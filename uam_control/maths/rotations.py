@@ -33,6 +33,29 @@ def matrix_from_euler(euler: np.ndarray) -> np.ndarray:
 
 
 @jit
+def thrust_attitude(force: np.ndarray, yaw: float) -> tuple[float, float]:
+    """Return roll and pitch [rad] at yaw [rad] whose body z axis is along force (3,) [N, world].
+
+    Eq. (4a), pos: the third column of eq. (3), rot_matrix, along the force, solved for the angles.
+    """
+    x, y, z = force[0], force[1], force[2]
+    cy, sy = math.cos(yaw), math.sin(yaw)
+    size = max(math.sqrt(x**2 + y**2 + z**2), 1e-9)
+    roll = math.asin(max(-1.0, min(1.0, (sy * x - cy * y) / size)))
+    return roll, math.atan2(cy * x + sy * y, z)
+
+
+@jit
+def body_rates(
+    roll: float, pitch: float, roll_rate: float, pitch_rate: float, yaw_rate: float
+) -> tuple[float, float, float]:
+    """Return the body rates [rad/s, FLU] of Z-Y-X Euler angles [rad] and their rates [rad/s]."""
+    cr, sr, cp, sp = math.cos(roll), math.sin(roll), math.cos(pitch), math.sin(pitch)
+    about_y = cr * pitch_rate + sr * cp * yaw_rate
+    return roll_rate - sp * yaw_rate, about_y, -sr * pitch_rate + cr * cp * yaw_rate
+
+
+@jit
 def rotate(matrix: np.ndarray, v: np.ndarray) -> np.ndarray:
     """Return matrix (3, 3) times v (3,), of any unit; for R_B^W: body → world."""
     out = np.empty(3)

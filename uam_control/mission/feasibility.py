@@ -14,6 +14,7 @@ from typing import NamedTuple
 import numpy as np
 
 from uam_control.coordinates import ALPHA, ARM, CHI, CHI_DDOT, CHI_DOT, POSITION, YAW, Z
+from uam_control.maths.rotations import body_rates, matrix_from_euler, thrust_attitude
 from uam_control.mission.mission_parameters import MissionParameters
 from uam_control.mission.polynomials import Polynomials
 from uam_control.mission.scenario import Scenario, ScenarioError, standing
@@ -174,9 +175,9 @@ class Feasibility:
         up = np.array([0.0, 0.0, self.vehicle.gravity])
         force = mass[:, None] * (acceleration + up) + drag * velocity
         yaw = rows[CHI, :, YAW]
-        roll, pitch = _attitude(force, yaw)
-        rates = _body_rates(roll, pitch, np.gradient(roll, times), np.gradient(pitch, times),
-                            rows[CHI_DOT, :, YAW])  # fmt: skip
+        roll, pitch = np.array([thrust_attitude(*one) for one in zip(force, yaw, strict=True)]).T
+        turns = np.gradient(roll, times), np.gradient(pitch, times), rows[CHI_DOT, :, YAW]
+        rates = np.array([body_rates(*one) for one in zip(roll, pitch, *turns, strict=True)])
         thrust = np.linalg.norm(force, axis=1)
         return Demand(
             times,
@@ -202,7 +203,8 @@ class Feasibility:
             arm = ArmModel.of(self.vehicle)
         except VehicleError:
             return np.full((len(times), chi.shape[1] - ALPHA), np.nan)
-        rotation = _matrices(roll, pitch, chi[:, YAW])
+        euler = np.column_stack([roll, pitch, chi[:, YAW]])
+        rotation = np.array([matrix_from_euler(one) for one in euler])
         gravity = self.vehicle.gravity
         return arm.torques(times, chi[:, POSITION], rotation, chi[:, ARM], gravity, carried)
 
@@ -220,42 +222,3 @@ def _rows(trajectory: Trajectory, times: np.ndarray, joints: int) -> np.ndarray:
     for time, motion in zip(times.tolist(), found, strict=True):
         trajectory.write(time, motion)
     return found.swapaxes(0, 1)[: CHI_DDOT + 1]
-
-
-def _attitude(force: np.ndarray, yaw: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return roll and pitch (m,) [rad] whose body z axis is along force (m, 3) [N, world]."""
-    cosine, sine = np.cos(yaw), np.sin(yaw)
-    x, y, z = force.T
-    size = np.maximum(np.linalg.norm(force, axis=1), 1e-9)
-    roll = np.arcsin(np.clip((sine * x - cosine * y) / size, -1.0, 1.0))
-    return roll, np.arctan2(cosine * x + sine * y, z)
-
-
-def _body_rates(
-    roll: np.ndarray,
-    pitch: np.ndarray,
-    roll_rate: np.ndarray,
-    pitch_rate: np.ndarray,
-    yaw_rate: np.ndarray,
-) -> np.ndarray:
-    """Return the body rates (m, 3) [rad/s, FLU] of Euler angles [rad] and their rates, (m,)."""
-    cr, sr, cp, sp = np.cos(roll), np.sin(roll), np.cos(pitch), np.sin(pitch)
-    return np.column_stack(
-        [
-            roll_rate - sp * yaw_rate,
-            cr * pitch_rate + sr * cp * yaw_rate,
-            -sr * pitch_rate + cr * cp * yaw_rate,
-        ]
-    )
-
-
-def _matrices(roll: np.ndarray, pitch: np.ndarray, yaw: np.ndarray) -> np.ndarray:
-    """Return R_B^W (m, 3, 3) of Euler angles (m,) [rad]."""
-    cr, sr, cp, sp = np.cos(roll), np.sin(roll), np.cos(pitch), np.sin(pitch)
-    cy, sy = np.cos(yaw), np.sin(yaw)
-    rows = (
-        (cy * cp, cy * sp * sr - sy * cr, cy * sp * cr + sy * sr),
-        (sy * cp, sy * sp * sr + cy * cr, sy * sp * cr - cy * sr),
-        (-sp, sr * cp, cp * cr),
-    )
-    return np.moveaxis(np.array(rows), 2, 0)
