@@ -148,14 +148,19 @@ def hold(case: Case) -> None:
     case.resume()
 
 
-def position(case: Case) -> None:
-    """Handed back at 1.2 m/s."""
+def fly_away(case: Case) -> None:
+    """The pilot takes over in POSITION and flies at 1.2 m/s."""
     case.pushed = 0.0
     case.fly(0.1)
     case.begin = case.flight.plant.time
     case.take_over(Mode.POSITION, 1.0)
     case.pushed = PUSHED
     case.fly(1.5)
+
+
+def position(case: Case) -> None:
+    """Handed back at 1.2 m/s."""
+    fly_away(case)
     case.resume()
     case.pushed = 0.0
 
@@ -205,12 +210,7 @@ def twice(case: Case) -> None:
 
 def own_switch(case: Case) -> None:
     """The pilot's own switch gives control back: the vehicle brakes and waits for the command."""
-    case.pushed = 0.0
-    case.fly(0.1)
-    case.begin = case.flight.plant.time
-    case.take_over(Mode.POSITION, 1.0)
-    case.pushed = PUSHED
-    case.fly(1.5)
+    fly_away(case)
     case.count()
     case.ground.choose(Mode.OFFBOARD)
     case.watch()

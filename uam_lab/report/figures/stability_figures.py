@@ -63,9 +63,7 @@ def coupling(flights: Sequence[DrawnFlight]) -> Figure | None:
     if found is None:
         return None
     joints = found.supply.tau.shape[1] - ALPHA
-    figure, axes = panels.grid(
-        "Coupling force and its compensation", 3 + math.ceil(joints / 2), 2, 1.45
-    )
+    figure, axes = panels.grid("Coupling and its compensation", 3 + math.ceil(joints / 2), 2, 1.45)
     figure.subplots_adjust(wspace=0.26)  # small torques have long labels
     supply = found.supply
     drawn = (
@@ -91,9 +89,9 @@ def coupling(flights: Sequence[DrawnFlight]) -> Figure | None:
         axis.margins(y=0.12)
     handles = [
         style.key("true coupling", COUPLING, 1.4),
-        style.key("adaptive term", ADAPTIVE, 1.4),
+        style.key("adaptive", ADAPTIVE, 1.4),
         style.key("feedback Λξ", FEEDBACK),
-        style.key("integral action", INTEGRAL),
+        style.key("integral", INTEGRAL),
         style.key("actuators − τ", ACTUATORS),
     ]
     panels.finish(figure, axes, flights, handles)
