@@ -82,6 +82,10 @@ class Vehicle:
                 return
         raise AssertionError(f"still {self.status}")
 
+    def until(self, reached):
+        """Wait until `reached(status)`: the status of a tick may come after its magnet."""
+        self.probe.until(lambda: reached(self.status), "a status")
+
     @property
     def status(self) -> MissionStatus:
         return MissionStatus.from_message(self.reported[-1])[1]

@@ -27,7 +27,7 @@ def test_a_start_is_refused_with_the_checks_that_fail(vehicle):
     vehicle.fly(2)
     accepted, answer = vehicle.ask("start")
     assert not accepted and "arm: 1.57 rad" in answer
-    assert vehicle.status.cause == "waiting for the start"
+    vehicle.until(lambda status: status.cause == "waiting for the start")
 
 
 def test_hold_resume_land_and_disarm_are_answered_and_executed(vehicle):

@@ -99,7 +99,7 @@ def test_goals_and_trajectories_are_answered_and_flown(vehicle):
     text = answer(vehicle, topics.GOAL_POSE, goal(0.3, 0.0, 1.0, 0.3))
     assert text.startswith("accepted: at the end in ")
     vehicle.fly(2)
-    assert vehicle.status.phase == "goal"
+    vehicle.until(lambda status: status.phase == "goal")
     vehicle.until_state("holding")
     np.testing.assert_allclose(vehicle.state[0, [0, 1, 2, 5]], [0.3, 0.0, 1.0, 0.3], atol=1e-9)
     end = vehicle.path[-1].poses[-1].pose.position
