@@ -14,7 +14,7 @@ attitude they equal the Euler rates. chi_ddot[POSITION] is the acceleration in t
 
 A motion is a planned reference with two more rows, (5, 6 + n): jerk and snap, the third and fourth
 derivatives. The base's desired attitude, body rates and their derivatives follow from them
-(`mission/flatness.py`).
+(`mission/motion/flatness.py`).
 
 Compiled functions use the indices, for example state[CHI, ROLL]; numba compiles them as constants.
 """

@@ -13,7 +13,7 @@ import numpy as np
 from uam_control.control.controllers import ArmController, AttitudeController, PositionController
 from uam_control.coordinates import ARM, ATTITUDE, CHI, POSITION
 from uam_control.laws.catalogue import DEFAULT
-from uam_control.mission.trajectory import empty_reference
+from uam_control.mission.motion.trajectory import empty_reference
 from uam_control.profiles.profile import load_profile
 from uam_control.vehicle import load_description
 from uam_sim_bridge.mavlink.hil.hil_server import HilParameters, HilServer

@@ -10,7 +10,7 @@ from whole_flight import SHORT
 
 from uam_control.laws.modular import ModularLaw
 from uam_control.mission import load_scenario
-from uam_control.mission.trajectory import empty_motion
+from uam_control.mission.motion.trajectory import empty_motion
 from uam_control.profiles.profile import load_profile
 from uam_lab.flight.direct.flight import DirectFlight
 from uam_lab.results import metrics, result_folder

@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from uam_control.maths.rotations import quaternion_from_euler, quaternion_multiply
-from uam_sim_bridge.autopilot.attitude_control import attitude_gains, attitude_rates
+from uam_sim_bridge.autopilot.loops.attitude_control import attitude_gains, attitude_rates
 from uam_sim_bridge.autopilot.params import DEFINITIONS, Parameters
 
 UPRIGHT = np.array([1.0, 0.0, 0.0, 0.0])

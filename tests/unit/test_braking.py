@@ -11,7 +11,7 @@ from uam_control.control.controllers import AttitudeController, PositionControll
 from uam_control.coordinates import ATTITUDE, CHI, CHI_DDOT, CHI_DOT, POSITION, YAW, Z
 from uam_control.maths.rotations import matrix_from_euler
 from uam_control.mission import MissionParameters
-from uam_control.mission.braking import SHORTEST, Braking, Stop, present_motion
+from uam_control.mission.motion.braking import SHORTEST, Braking, Stop, present_motion
 from uam_control.profiles.profile import load_profile
 from uam_control.vehicle import GRAVITY
 

@@ -6,7 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from uam_control.mission import ScenarioError, load_scenario
-from uam_control.mission.fitted_spline import Misfit, Samples, fitted
+from uam_control.mission.scenarios.fitted_spline import Misfit, Samples, fitted
 
 HEADER = "t,px,py,pz,yaw,vx,vy,vz,ax,ay,az,dyaw"
 ROW = "{t},0,0,1,0,0,0,0,0,0,0,0"

@@ -7,8 +7,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from uam_control.mission import curves
-from uam_control.mission.minimum_snap import minimum_snap, shares
+from uam_control.mission.scenarios import curves
+from uam_control.mission.scenarios.minimum_snap import minimum_snap, shares
 
 MIDDLE = np.array([0.5, -0.5, 1.2, 0.0, 0.0, 0.25, 0.0, 1.5])
 
@@ -113,7 +113,7 @@ def test_minimum_snap_has_less_snap_than_a_neighbour():
         return np.mean(path.rows(np.linspace(1e-6, 4.0 - 1e-6, 4001))[4] ** 2)
 
     # against a curve through the same points at the same times, made of two stops
-    from uam_control.mission.polynomials import joined
+    from uam_control.mission.motion.polynomials import joined
 
     stops = joined([minimum_snap(np.array([0.0, 2.0]), points[i : i + 2]) for i in (0, 1)])
     stopped = np.mean(stops.rows(np.linspace(1e-6, 4.0 - 1e-6, 4001))[4] ** 2)

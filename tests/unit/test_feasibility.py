@@ -15,7 +15,7 @@ from uam_control.mission import (
     load_scenario,
 )
 from uam_control.mission.feasibility import in_words
-from uam_control.mission.scenario_options import SLOWEST
+from uam_control.mission.scenarios.scenario_options import SLOWEST
 from uam_control.profiles.profile import load_profile
 from uam_control.vehicle import VehicleError, load_description
 from uam_control.vehicle.arm_model import ArmModel

@@ -7,8 +7,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from uam_control.mission.flatness import write_attitude
-from uam_control.mission.polynomials import Polynomials
+from uam_control.mission.motion.flatness import write_attitude
+from uam_control.mission.motion.polynomials import Polynomials
 
 NO_DRAG, G, FREE = np.zeros(3), 9.81, 1e6
 COEFFICIENT = st.floats(-2.0, 2.0)

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from uam_control.mission import MissionParameters, load_scenario
 from uam_control.mission.guidance import Guidance, PathClock, Segment
-from uam_control.mission.trajectory import empty_motion
+from uam_control.mission.motion.trajectory import empty_motion
 
 START = np.array([0.0, 0.0, 0.28, 0.0, 0.0, 0.0, 0.0, np.pi / 2])
 DT = 0.01

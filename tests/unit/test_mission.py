@@ -14,7 +14,7 @@ from uam_control.mission import (
     StartParameters,
     load_scenario,
 )
-from uam_control.mission.trajectory import Move, Moves, empty_motion
+from uam_control.mission.motion.trajectory import Move, Moves, empty_motion
 from uam_control.supervision import Authority, OperatorCommand, Readings, State
 
 START = np.array([0.0, 0.0, 0.28, 0.0, 0.0, 0.0, 0.0, np.pi / 2])

@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from uam_control.mission.polynomials import (
+from uam_control.mission.motion.polynomials import (
     PEAK_ACCELERATION,
     PEAK_RATE,
     ROWS,

@@ -9,8 +9,12 @@ from uam_control.vehicle import load_description
 from uam_sim_bridge.autopilot.autopilot_estimator import GRAVITY, Estimator, age_of
 from uam_sim_bridge.autopilot.companion import Companion
 from uam_sim_bridge.autopilot.core import Autopilot
+from uam_sim_bridge.autopilot.loops.position_control import (
+    PositionControl,
+    attitude_of,
+    limit_across,
+)
 from uam_sim_bridge.autopilot.params import Parameters
-from uam_sim_bridge.autopilot.position_control import PositionControl, attitude_of, limit_across
 from uam_sim_bridge.mavlink.offboard.setpoints.desired import Desired, level
 from uam_sim_bridge.mavlink.offboard.setpoints.position import position_setpoint
 from uam_sim_bridge.mavlink.protocol.position_target import FLOWN_MASKS, PositionTarget

@@ -6,8 +6,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from uam_control.mission import ScenarioError, ScenarioOptions, load_scenario
-from uam_control.mission.polynomials import Polynomials
-from uam_control.mission.scenario import standing
+from uam_control.mission.motion.polynomials import Polynomials
+from uam_control.mission.scenarios.scenario import standing
 from uam_control.settings import configuration
 
 CIRCLE = "{kind: circle, radius: 1.0, speed: 2.0, laps: 4, height: 1.2, ramp: 3.0}"

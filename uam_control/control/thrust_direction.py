@@ -1,10 +1,10 @@
 """The desired attitude, which points the thrust along tau_p, and its filter.
 
 tau_p = R_B^W U, U = [0 0 u_1], eq. (4a), pos, determines roll and pitch for a given yaw. They are
-the angles that the reference has by its own acceleration (`mission/flatness.py`) plus a correction
-from the feedback. The reference's angles and their derivatives are exact and pass unchanged. The
-correction contains the noise of the position loop; a critically damped second-order filter gives it
-with two derivatives, without differentiating the noise.
+the angles that the reference has by its own acceleration (`mission/motion/flatness.py`) plus a
+correction from the feedback. The reference's angles and their derivatives are exact and pass
+unchanged. The correction contains the noise of the position loop; a critically damped second-order
+filter gives it with two derivatives, without differentiating the noise.
 """
 
 from __future__ import annotations

@@ -16,10 +16,10 @@ import numpy as np
 from uam_control.coordinates import ALPHA, ARM, CHI, CHI_DDOT, CHI_DOT, POSITION, YAW, Z
 from uam_control.maths.rotations import body_rates, matrix_from_euler, thrust_attitude
 from uam_control.mission.mission_parameters import MissionParameters
-from uam_control.mission.polynomials import Polynomials
-from uam_control.mission.scenario import Scenario, ScenarioError, standing
-from uam_control.mission.scenario_options import SLOWEST
-from uam_control.mission.trajectory import Trajectory, empty_motion
+from uam_control.mission.motion.polynomials import Polynomials
+from uam_control.mission.motion.trajectory import Trajectory, empty_motion
+from uam_control.mission.scenarios.scenario import Scenario, ScenarioError, standing
+from uam_control.mission.scenarios.scenario_options import SLOWEST
 from uam_control.vehicle import VehicleDescription, VehicleError
 from uam_control.vehicle.arm_model import ArmModel
 

@@ -24,10 +24,10 @@ from uam_control.mission.mission_output import (
     MissionOutput,
 )
 from uam_control.mission.mission_parameters import MissionParameters, StartParameters
+from uam_control.mission.motion.trajectory import empty_reference
 from uam_control.mission.payload_watch import PayloadWatch
 from uam_control.mission.plans import GoalPose, PlanRefused, Points, check
-from uam_control.mission.scenario import Scenario
-from uam_control.mission.trajectory import empty_reference
+from uam_control.mission.scenarios.scenario import Scenario
 from uam_control.supervision import (
     Authority,
     Decision,

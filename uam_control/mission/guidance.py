@@ -26,14 +26,14 @@ from uam_control.coordinates import (
     Z,
 )
 from uam_control.maths.rotations import wrap_angle
-from uam_control.mission.braking import Braking
-from uam_control.mission.flatness import write_attitude
 from uam_control.mission.mission_parameters import MissionParameters
+from uam_control.mission.motion.braking import Braking
+from uam_control.mission.motion.flatness import write_attitude
+from uam_control.mission.motion.polynomials import hermite
+from uam_control.mission.motion.quintics import quintic, quintic_at
+from uam_control.mission.motion.trajectory import Trajectory, empty_motion
 from uam_control.mission.plans import BASE, PEAK, RAMP, Plan, still
-from uam_control.mission.polynomials import hermite
-from uam_control.mission.quintics import quintic, quintic_at
-from uam_control.mission.route import SINK
-from uam_control.mission.trajectory import Trajectory, empty_motion
+from uam_control.mission.scenarios.route import SINK
 
 
 class PathClock:

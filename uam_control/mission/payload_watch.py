@@ -11,9 +11,9 @@ from uam_control.grasp import GraspDecision, GraspExecutive, GraspWindow, Sight,
 from uam_control.grasp.kinematics import lever, magnet_position
 from uam_control.mission.guidance import Guidance
 from uam_control.mission.mission_parameters import MissionParameters
-from uam_control.mission.scenario import Scenario
+from uam_control.mission.motion.trajectory import Move, Moves, Trajectory
+from uam_control.mission.scenarios.scenario import Scenario
 from uam_control.mission.shift import Shift
-from uam_control.mission.trajectory import Move, Moves, Trajectory
 from uam_control.supervision import Readings
 
 PERIOD = 0.02  # [s] between two steps of the executive

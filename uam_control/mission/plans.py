@@ -23,7 +23,7 @@ from uam_control.coordinates import (
 )
 from uam_control.maths.rotations import wrap_angle
 from uam_control.mission.mission_parameters import MissionParameters
-from uam_control.mission.quintics import quintic, quintic_at
+from uam_control.mission.motion.quintics import quintic, quintic_at
 
 BASE = slice(0, ALPHA)  # columns of a reference that a base plan writes
 PEAK = 1.875  # largest rate of a quintic from rest to rest, times its mean rate

@@ -14,7 +14,7 @@ from visualization_msgs.msg import Marker, MarkerArray
 
 from uam_control.coordinates import ALPHA, CHI, POSITION
 from uam_control.mission import Scenario
-from uam_control.mission.trajectory import empty_motion
+from uam_control.mission.motion.trajectory import empty_motion
 from uam_msgs_py.messages.ros_time import set_stamp
 from uam_msgs_py.messages.status import MissionStatus
 from uam_msgs_py.messages.topics import BODY, WORLD

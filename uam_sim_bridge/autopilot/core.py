@@ -14,18 +14,17 @@ import numpy as np
 
 from uam_control.maths.compiled import jit
 from uam_control.vehicle import load_description
-from uam_sim_bridge.autopilot.allocation import allocate, unallocated_torque
-from uam_sim_bridge.autopilot.attitude_control import attitude_gains, attitude_rates
 from uam_sim_bridge.autopilot.autopilot_estimator import ATTITUDE as ESTIMATED_ATTITUDE
 from uam_sim_bridge.autopilot.autopilot_estimator import POSITION, VELOCITY, Estimator
 from uam_sim_bridge.autopilot.battery import SimulatedBattery
 from uam_sim_bridge.autopilot.commander import Commander
-from uam_sim_bridge.autopilot.descent import Descent
 from uam_sim_bridge.autopilot.landing import LandDetector
-from uam_sim_bridge.autopilot.params import Parameters
-from uam_sim_bridge.autopilot.position_control import PositionControl
-from uam_sim_bridge.autopilot.position_modes import MODES, PositionModes
-from uam_sim_bridge.autopilot.rate_control import (
+from uam_sim_bridge.autopilot.loops.allocation import allocate, unallocated_torque
+from uam_sim_bridge.autopilot.loops.attitude_control import attitude_gains, attitude_rates
+from uam_sim_bridge.autopilot.loops.descent import Descent
+from uam_sim_bridge.autopilot.loops.position_control import PositionControl
+from uam_sim_bridge.autopilot.loops.position_modes import MODES, PositionModes
+from uam_sim_bridge.autopilot.loops.rate_control import (
     INTEGRAL,
     TORQUE,
     UNALLOCATED,
@@ -34,7 +33,8 @@ from uam_sim_bridge.autopilot.rate_control import (
     rate_torque,
     reset_filters,
 )
-from uam_sim_bridge.autopilot.rate_control import RATES as FILTERED
+from uam_sim_bridge.autopilot.loops.rate_control import RATES as FILTERED
+from uam_sim_bridge.autopilot.params import Parameters
 from uam_sim_bridge.mavlink.offboard.rotor_geometry import normalised_mixer
 from uam_sim_bridge.mavlink.offboard.thrust_curve import inverse_curve
 from uam_sim_bridge.mavlink.protocol.attitude_target import (

@@ -13,9 +13,9 @@ import numpy as np
 
 from uam_control.laws.catalogue import LAWS
 from uam_control.mission import load_scenario
-from uam_control.mission.polynomials import Polynomials
-from uam_control.mission.scenario import standing
-from uam_control.mission.trajectory import empty_motion
+from uam_control.mission.motion.polynomials import Polynomials
+from uam_control.mission.motion.trajectory import empty_motion
+from uam_control.mission.scenarios.scenario import standing
 from uam_control.profiles.profile import default_profile
 from uam_lab.flight.direct.flight import DirectFlight
 from uam_sim_bridge.autopilot import companion

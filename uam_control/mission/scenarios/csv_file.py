@@ -22,11 +22,11 @@ from pathlib import Path
 import numpy as np
 
 from uam_control.coordinates import YAW, Z, arm_coordinates
-from uam_control.mission.fitted_spline import Misfit, Samples, fitted
-from uam_control.mission.polynomials import Polynomials
-from uam_control.mission.route import Route, with_ramps
-from uam_control.mission.scenario import Landing, Scenario, ScenarioError, standing
-from uam_control.mission.scenario_options import AS_SCENARIO, RETURN, ScenarioOptions
+from uam_control.mission.motion.polynomials import Polynomials
+from uam_control.mission.scenarios.fitted_spline import Misfit, Samples, fitted
+from uam_control.mission.scenarios.route import Route, with_ramps
+from uam_control.mission.scenarios.scenario import Landing, Scenario, ScenarioError, standing
+from uam_control.mission.scenarios.scenario_options import AS_SCENARIO, RETURN, ScenarioOptions
 from uam_control.vehicle import VehicleDescription
 
 AXES = "xyz"

@@ -16,7 +16,7 @@ from scipy.interpolate import BSpline
 from scipy.sparse import csc_matrix, diags, vstack
 from scipy.sparse.linalg import spsolve
 
-from uam_control.mission.polynomials import Polynomials
+from uam_control.mission.motion.polynomials import Polynomials
 
 DEGREE = 7
 COARSEST = 0.2  # [s] distance of the knots in the first attempt, or that of the samples

@@ -11,7 +11,7 @@ import math
 
 import numpy as np
 
-from uam_control.mission.polynomials import Polynomials
+from uam_control.mission.motion.polynomials import Polynomials
 
 ORDER = 8  # coefficients of a polynomial
 CONTINUOUS = range(1, ORDER - 1)  # derivatives that are continuous at an inner point

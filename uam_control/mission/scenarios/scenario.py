@@ -7,10 +7,10 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from uam_control.coordinates import CHI, Z, coordinates
-from uam_control.mission.polynomials import Polynomials, joined
-from uam_control.mission.route import PAUSE, SINK, Leg, Route
-from uam_control.mission.scenario_options import LAND
-from uam_control.mission.trajectory import Move, Moves, Trajectory
+from uam_control.mission.motion.polynomials import Polynomials, joined
+from uam_control.mission.motion.trajectory import Move, Moves, Trajectory
+from uam_control.mission.scenarios.route import PAUSE, SINK, Leg, Route
+from uam_control.mission.scenarios.scenario_options import LAND
 
 STANDING = 0.285  # [m] height of the origin on the ground, before the take-off has measured it
 

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from uam_control.coordinates import POSITION, YAW
-from uam_control.mission.polynomials import ROWS, Polynomials, hermite
+from uam_control.mission.motion.polynomials import ROWS, Polynomials, hermite
 
 KNOT = 0.1  # [rad] of theta and [s], largest distance of two knots
 TURN = 2.0 * math.pi

@@ -19,7 +19,7 @@ import numpy as np
 
 from uam_control.coordinates import ARM, CHI_DDOT, CHI_DOT, POSITION, YAW, Z
 from uam_control.maths.rotations import wrap_angle
-from uam_control.mission.polynomials import (
+from uam_control.mission.motion.polynomials import (
     PEAK_ACCELERATION,
     PEAK_RATE,
     Polynomials,
@@ -28,7 +28,7 @@ from uam_control.mission.polynomials import (
     rest_to_rest,
     reversed_in_time,
 )
-from uam_control.mission.scenario_options import RETURN, ScenarioOptions
+from uam_control.mission.scenarios.scenario_options import RETURN, ScenarioOptions
 
 TAKEOFF, LANDING = 3.0, 5.0  # [s] shortest
 SHORTEST = 1.0  # [s] of another part

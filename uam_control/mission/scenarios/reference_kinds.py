@@ -8,11 +8,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from uam_control.coordinates import ALPHA, ARM, CHI_DOT, POSITION, YAW, Z, arm_coordinates
-from uam_control.mission import curves
-from uam_control.mission.curves import Harmonic
-from uam_control.mission.minimum_snap import minimum_snap, shares
-from uam_control.mission.polynomials import Polynomials
-from uam_control.mission.route import RUN_OUT, RUN_UP, TRAJECTORY, Leg
+from uam_control.mission.motion.polynomials import Polynomials
+from uam_control.mission.scenarios import curves
+from uam_control.mission.scenarios.curves import Harmonic
+from uam_control.mission.scenarios.minimum_snap import minimum_snap, shares
+from uam_control.mission.scenarios.route import RUN_OUT, RUN_UP, TRAJECTORY, Leg
 from uam_control.settings.section import Section
 
 TANGENT = "tangent"

@@ -9,12 +9,17 @@ from pathlib import Path
 import numpy as np
 
 from uam_control.coordinates import BASE_COORDINATES, arm_coordinates
-from uam_control.mission.csv_file import from_csv
-from uam_control.mission.reference_kinds import Middle, legs
-from uam_control.mission.route import Route
-from uam_control.mission.scenario import Landing, Scenario, ScenarioError, standing
-from uam_control.mission.scenario_options import AS_SCENARIO, LAND, RETURN, ScenarioOptions
-from uam_control.mission.trajectory import Move
+from uam_control.mission.motion.trajectory import Move
+from uam_control.mission.scenarios.csv_file import from_csv
+from uam_control.mission.scenarios.reference_kinds import Middle, legs
+from uam_control.mission.scenarios.route import Route
+from uam_control.mission.scenarios.scenario import Landing, Scenario, ScenarioError, standing
+from uam_control.mission.scenarios.scenario_options import (
+    AS_SCENARIO,
+    LAND,
+    RETURN,
+    ScenarioOptions,
+)
 from uam_control.settings import configuration
 from uam_control.settings.section import Section, read_section
 from uam_control.vehicle import VehicleDescription, load_description

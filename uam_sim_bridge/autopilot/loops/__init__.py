@@ -1,0 +1,1 @@
+"""Control loops of the stand-in: position, attitude, body rates, allocation, descent."""
