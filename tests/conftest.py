@@ -1,5 +1,6 @@
 """Settings of all tests."""
 
+import signal
 import sys
 from pathlib import Path
 
@@ -12,3 +13,8 @@ settings.load_profile("uam")
 # helper modules that several test folders import, and what the benchmarks are made of
 TESTS = Path(__file__).parent
 sys.path[:0] = [str(TESTS), str(TESTS.parent / "benchmarks")]
+
+# A shell starts a job in the background with SIGINT ignored, and so would be every process that the
+# tests start and interrupt.
+if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
+    signal.signal(signal.SIGINT, signal.default_int_handler)

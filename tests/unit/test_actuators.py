@@ -109,3 +109,20 @@ def test_a_servo_in_position_control_stays_until_the_first_goal():
     servos = Servos(SERVOS | {"mode": "position"}, np.array([0.5, -0.5]))
     servos.take(np.array([np.nan, -0.25]))
     np.testing.assert_array_equal(servos.command, [0.5, -0.25])
+
+
+def test_the_lags_of_rotors_are_scaled_one_by_one():
+    rotors, output = Rotors(ROTORS, STEP), np.zeros(3)
+    rotors.scale_lags(np.array([2.0, 1.0, 0.5]))
+    rotors.step(np.ones(3), output)
+    # of 100 rad/s: 1 - sqrt(1/2), a half, three quarters
+    np.testing.assert_allclose(rotors.speed, [100.0 - math.sqrt(5000.0), 50.0, 75.0])
+
+
+def test_the_position_loop_counts_whole_turns():
+    """Two turns apart are 8192 counts: 300 of 885 units per count would round otherwise."""
+    numbers = SERVOS | {"mode": "position", "position_p_gain": 1, "pwm_limit": 885}
+    servos, output = Servos(numbers, np.zeros(1)), np.zeros(1)
+    servos.take(np.array([4.0 * math.pi]))
+    servos.step(np.zeros(1), np.zeros(1), output)
+    np.testing.assert_allclose(output, 3.0 * 8192 / 128 / 885)

@@ -8,7 +8,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from uam_control.control.output_limits import PositionLimits, limit_force, limit_torque
+from uam_control.control.output_limits import (
+    PositionLimits,
+    integrate,
+    limit_force,
+    limit_torque,
+    wash_out,
+)
 from uam_control.settings.parameter_set import ParameterError
 
 A = math.atan2(0.6, 0.8)  # tan A = .75
@@ -49,3 +55,23 @@ def test_a_least_thrust_above_the_largest_is_refused():
     assert same.validated() == same
     with pytest.raises(ParameterError, match="thrust_min: 7.5 N is above thrust_max, 7 N"):
         replace(same, thrust_min=7.5).validated()
+
+
+def test_wash_out_by_hand():
+    """Half of the difference to the slow part goes into it in ln 2 of time; corner 0: nothing."""
+    feedforward, slow = np.array([8.0, 4.0]), np.array([2.0, 0.0])
+    wash_out(feedforward, np.array([2.0, 0.0]), math.log(2.0) / 2.0, slow)
+    np.testing.assert_allclose(slow, [5.0, 0.0])
+    np.testing.assert_allclose(feedforward, [3.0, 4.0])
+
+
+def test_integral_by_hand():
+    integral = np.array([0.1, 0.2, 0.0])
+    integrate(np.array([0.5, -1.0, 4.0]), np.array([2.0, 4.0, 1.0]), 1.0, False, 0.5, integral)
+    np.testing.assert_allclose(integral, [0.1 + 0.5, -1.0, 1.0])  # .2 - 2 and 0 + 2 are beyond
+
+
+def test_a_saturated_integral_only_shrinks():
+    integral = np.array([0.5, 0.5, 0.5])
+    integrate(np.array([1.0, -1.0, 0.0]), np.ones(3), 0.4, True, 0.25, integral)
+    np.testing.assert_allclose(integral, [0.5, 0.25, 0.4])  # the last is above a new limit

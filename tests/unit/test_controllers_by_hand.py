@@ -255,3 +255,53 @@ def test_the_autopilot_integrates_the_slow_part_of_the_feedforward():
     attitude[2, :2] = 1.0
     tau = washed.update(state, reference, attitude, True, math.log(2.0) / 2.0)
     assert tau[0] == pytest.approx(tau[1] / 2.0)
+
+
+def test_without_a_weight_the_integral_scales_nothing():
+    for mass, factor in ((0.0, 1.0), (0.5, 1.1)):
+        changes = {"gravity_feedforward_mass": mass, "thrust_min": 0.1}
+        controller = position(integral_gain=[0.0, 0.0, 5.0], **changes)
+        state, reference, _ = vehicle()
+        state[0, 2], reference[2, 0] = -1.0, 1.0
+        controller.update(state, reference, True, 0.1)  # integral -.5, of 5 m/s^2
+        state[0, 2] = 0.0
+        tau = controller.update(state, reference, True, 0.1)
+        np.testing.assert_allclose(tau, [2.0 * factor, 0.0, 5.0 * mass + 1.0])
+
+
+def test_a_flight_that_begins_in_motion_begins_with_the_attitude_of_the_vehicle():
+    """Once: later ticks filter. After the ground it begins anew; at rest it begins level."""
+    state, reference, _ = vehicle()
+    state[0, 3] = 0.2
+    for moving, first in ((3.0, 0.2), (0.0, 0.0)):
+        controller = position()
+        reference[1, 0] = state[1, 0] = moving
+        for _ in range(2):
+            controller.update(state, reference, True, 1e-6)
+            roll = controller.attitude_reference[0, 0]
+            assert roll == pytest.approx(first, abs=1e-6)
+            state[0, 3] = 0.5
+            controller.update(state, reference, True, 1e-6)
+            assert controller.attitude_reference[0, 0] == pytest.approx(roll, abs=1e-5)
+            state[0, 3] = 0.2
+            controller.update(state, reference, False, 1e-6)
+
+
+def test_on_the_ground_the_washout_starts_afresh():
+    washed = torque(AttitudeController, 3, feedforward_washout=[2.0] * 3)
+    state, reference, attitude = vehicle()
+    attitude[2] = 1.0
+    first = washed.update(state, reference, attitude, True, 0.3).copy()
+    washed.update(state, reference, attitude, False, 0.3)
+    np.testing.assert_array_equal(washed.update(state, reference, attitude, True, 0.3), first)
+
+
+def test_the_periods_of_goal_positions_begin_with_the_first_tick():
+    controller = torque(ArmController, 2, setpoint="position", goal_rate=2.5)  # 100 ticks
+    state, reference, desired = vehicle()
+    new = []
+    for tick in range(1, 202):
+        reference[0, 6:] = tick
+        controller.update(state, reference, desired, False, 0.004)
+        new.append(controller.command[0] == tick)
+    assert [tick for tick, is_new in enumerate(new, 1) if is_new] == [1, 100, 200]

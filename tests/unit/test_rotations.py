@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 
 import numpy as np
+import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -151,3 +152,22 @@ def test_wrapped_angle_is_the_same_direction(angle):
     np.testing.assert_allclose(
         [np.cos(wrapped), np.sin(wrapped)], [np.cos(angle), np.sin(angle)], atol=1e-9
     )
+
+
+def test_the_attitude_of_a_force_by_hand():
+    # yaw A: the force's share to the right is .6*4.36 + .8*.48 = 3 of 5, forward 3.2 to 2.4 up
+    force = np.array([4.36, -0.48, 2.4])
+    for size in (1.0, 1e-3, 100.0):
+        np.testing.assert_allclose(r.thrust_attitude(size * force, A), [A, B], atol=1e-14)
+    assert r.thrust_attitude(np.zeros(3), A) == (0.0, 0.0)
+
+
+def test_body_rates_of_euler_rates_by_hand():
+    # sin roll .6, cos roll .8, sin pitch .8, cos pitch .6
+    found = r.body_rates(A, B, 1.0, 2.0, 3.0)
+    np.testing.assert_allclose(found, [1.0 - 2.4, 1.6 + 1.08, -1.2 + 1.44])
+
+
+def test_tilt_by_hand():
+    assert r.tilt(np.array([A, B, 9.0])) == pytest.approx(math.acos(0.48))
+    assert r.tilt(np.array([A, math.pi - B, 9.0])) == pytest.approx(math.acos(-0.48))

@@ -34,3 +34,10 @@ def test_a_clock_that_begins_anew_gives_a_new_command():
     hold = SampleHold(10.0)
     assert hold.due(5.0) and not hold.due(5.05)
     assert hold.due(0.0)
+
+
+def test_a_rate_below_one_hertz():
+    hold = SampleHold(0.5)
+    assert [hold.due(time) for time in (0.0, 1.0, 1.996, 2.0, 3.9, 4.0)] == [
+        True, False, False, True, False, True,
+    ]  # fmt: skip

@@ -105,3 +105,19 @@ def test_encoders_count(sign):
     # an eighth of a turn is .785: 1.27, 2.55 and .38 of them are 1, 3 and 0
     np.testing.assert_allclose(angle, sign * math.pi / 4.0 * np.array([1.0, 3.0, 0.0]))
     np.testing.assert_allclose(velocity, sign * np.array([0.5, 0.0, 1.25]))
+
+
+def test_a_sample_may_be_later_than_usual_and_none_overtakes_it():
+    line = Delay(2)
+    given = [(0, ("a",), 3), (1, ("b",), 0), (3, None, 0), (5, None, 0), (5, None, 0)]
+    assert [line(*one) for one in given] == [None, None, None, ("a",), ("b",)]
+
+
+def test_mocap_of_a_plant_that_begins_later_keeps_its_rate_from_there():
+    mocap = Mocap(MOCAP, 1.0, Counting())
+    # 10.1 is more than a period behind the first pose; 0.25 exactly one is not
+    assert [mocap.due(t) for t in (10.1, 10.2, 10.35, 10.5, 10.6)] == [
+        True, False, True, False, True,
+    ]  # fmt: skip
+    mocap = Mocap(MOCAP, 1.0, Counting())
+    assert [mocap.due(t) for t in (0.25, 0.25, 0.5)] == [True, True, True]

@@ -61,7 +61,7 @@ def test_proportional_path_of_the_autopilot_gives_the_torque_back(r, p, y, wx, w
 def test_a_throttle_per_newton_replaces_the_thrust_curve():
     values = {"throttle_per_newton": 0.06, "thrust_max": 12.0}
     m = RateThrustMap(RateThrustParameters.of(VEHICLE, values | {"thr_mdl_fac": 0.0}))
-    tau_p, tilted = np.array([2.0, -3.0, 6.0]), np.array([0.5, -0.4, 1.0])
+    tau_p, tilted = np.array([3.0, -2.0, 6.0]), np.array([0.5, -0.4, 1.0])
     for attitude in (ZERO, tilted):  # the norm is 7 N for every attitude
         assert m.map(tau_p, ZERO, attitude, ZERO)[1] == pytest.approx(0.42)
     m.thrust_factor = 0.5  # of the thrust curve, which does not act
@@ -105,6 +105,7 @@ def test_battery_and_thrust_factor_scale_what_full_thrust_is():
     assert thrust == pytest.approx(2.2 * 9.81 / (4 * 10.34 * 0.6))
     assert rates == pytest.approx(plain / 0.75)
     assert m.assumed_thrust(0.5) == pytest.approx(0.5 * 4 * 10.34 * 0.8)  # without the factor
+    assert m.scaled(0.25, 1.5) == pytest.approx(0.375)  # the motors' curve is a straight line
 
 
 @pytest.mark.parametrize("factor", [0.0, -0.5, math.nan, math.inf, -math.inf])

@@ -144,3 +144,21 @@ def test_the_attitude_of_the_reference_passes_without_the_filter():
         value = attitude.update(tau_p, reference, 0.004)
     np.testing.assert_allclose(value[:, 1], [0.3, 0.5, -2.0], atol=1e-12)
     np.testing.assert_allclose(value[:, [0, 2]], 0.0, atol=1e-12)
+
+
+def test_near_a_quarter_turn_of_pitch_the_euler_rates_stay_bounded():
+    """cos pitch = .05 counts as .1: the roll rate of a yaw rate of 2 is 2 sin pitch / .1."""
+    attitude, state = AttitudeReference(1.0), np.zeros((3, 8))
+    pitch = math.acos(0.05)
+    state[0, 4], state[1, 5] = pitch, 2.0
+    attitude.begin(state, np.zeros((3, 8)))
+    value = attitude.update(np.array([0.0, 0.0, 9.0]), np.zeros((3, 8)), 0.0)
+    assert value[1, 0] == pytest.approx(20.0 * math.sin(pitch))
+
+
+def test_the_correction_is_what_the_reference_lacks_of_the_direction():
+    reference, filtered, value = np.zeros((3, 8)), np.zeros((2, 2)), np.zeros((3, 3))
+    reference[0, 3:6] = A, B, A  # the attitude of TAU
+    attitude_reference_step(TAU, reference, ONE, 0.5, filtered, np.zeros(2), value)
+    np.testing.assert_allclose(filtered, 0.0, atol=1e-14)
+    np.testing.assert_allclose(value[0], [A, B, A])

@@ -183,4 +183,4 @@ def tilt(euler: np.ndarray) -> float:
 
     euler: (3,) roll, pitch, yaw [rad].
     """
-    return math.acos(max(-1.0, min(1.0, math.cos(euler[0]) * math.cos(euler[1]))))
+    return math.acos(math.cos(euler[0]) * math.cos(euler[1]))
