@@ -66,3 +66,15 @@ def test_steps_of_the_jerk_are_bounded_and_free_fall_is_level():
     assert found[1, 1] == 8.0 and found[2, 0] == 40.0
     motion[2, 2] = -G
     np.testing.assert_array_equal(attitude(motion), 0.0)
+    motion[2, 2] = 0.0009 * G - G  # less than a thousandth of the weight is free fall, too
+    np.testing.assert_array_equal(attitude(motion), 0.0)
+    motion[2, 2] = 0.0011 * G - G
+    assert attitude(motion)[1, 1] != 0.0
+
+
+def test_by_hand_a_vertical_jerk_turns_the_vehicle_that_leans():
+    """3 m/s^2 to the right, 4 m/s^2 upwards and a jerk of 1: roll = atan(3 / (4 + t))."""
+    motion = np.zeros((5, 8))
+    motion[2, 1:3], motion[3, 2] = (-3.0, 4.0 - G), 1.0
+    roll = attitude(motion)[:, 0]
+    np.testing.assert_allclose(roll, [math.atan(0.75), -3.0 / 25.0, 2.0 * 3.0 * 4.0 / 625.0])
