@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from uam_sim_bridge.autopilot import rate_control as rc
+from uam_sim_bridge.autopilot.loops import rate_control as rc
 
 DT = 0.004
 NO_FILTER = rc.filter_coefficients(250.0, 0.0, 0.0, 0.0)
