@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from uam_control.control.arm_load import arm_load
 from uam_control.control.output_limits import (
     ArmLimits,
     AttitudeLimits,
@@ -21,7 +22,7 @@ from uam_control.control.output_limits import (
 )
 from uam_control.control.sample_hold import SampleHold
 from uam_control.control.thrust_direction import AttitudeReference
-from uam_control.coordinates import ALPHA, ARM, ATTITUDE, CHI, CHI_DOT, POSITION, YAW, X, Z
+from uam_control.coordinates import ALPHA, ARM, ATTITUDE, CHI, CHI_DOT, PITCH, POSITION, YAW, X, Z
 from uam_control.laws import catalogue
 from uam_control.laws.errors import FEEDFORWARD, E, tracking_errors
 from uam_control.laws.law_parameters import LawParameters
@@ -90,10 +91,10 @@ class Controller:
         tracking_errors(
             state, reference, attitude_reference, flying, self._printed, self._errors, self._norms
         )
-        self._adjust(dt)
+        self._adjust(reference, dt)
         return self.law.update(*self._own, self._norms, self.saturated, dt)
 
-    def _adjust(self, dt: float) -> None:
+    def _adjust(self, reference: np.ndarray, dt: float) -> None:
         """Change the errors of this tick before the law uses them."""
 
     def _idle(self) -> None:
@@ -205,8 +206,12 @@ class TorqueController(Controller):
             self._tau[:] = 0.0
             return self._tau
         tau = self._law_output(state, reference, attitude_reference, flying, dt)
+        self._add(tau, reference, dt)
         self.saturated = limit_torque(tau, self._torque_max, self._tau)
         return self._tau
+
+    def _add(self, tau: np.ndarray, reference: np.ndarray, dt: float) -> None:
+        """Add to the law's torque tau (n,) [N m], in place."""
 
 
 class AttitudeController(TorqueController):
@@ -221,14 +226,19 @@ class AttitudeController(TorqueController):
     def __init__(self, parameters: AttitudeLimits) -> None:
         super().__init__(parameters)
         self._slow = np.zeros(3)  # [rad/s^2] part of the feedforward that the autopilot integrates
-        self._washout = np.array(parameters.feedforward_washout)
+        self.set_parameters(parameters)
 
     def set_parameters(self, parameters: AttitudeLimits) -> None:
         """See `Controller.set_parameters`."""
         super().set_parameters(parameters)
         self._washout = np.array(parameters.feedforward_washout)
+        self._arm, self._joints = parameters.load_record(), np.zeros(len(parameters.link_masses))
 
-    def _adjust(self, dt: float) -> None:
+    def _adjust(self, reference: np.ndarray, dt: float) -> None:
+        p = self.parameters
+        if p.arm_feedforward:
+            moment = arm_load(self._arm[0], reference, self._joints)
+            self._errors[FEEDFORWARD, PITCH] += moment / p.inertia[1]
         wash_out(self._errors[FEEDFORWARD, ATTITUDE], self._washout, dt, self._slow)
 
     def _idle(self) -> None:
@@ -249,6 +259,9 @@ class ArmController(TorqueController):
     def __init__(self, parameters: ArmLimits) -> None:
         super().__init__(parameters)
         self._hold, self._time = SampleHold(parameters.goal_rate), 0.0
+        self._integral = np.zeros(len(self._tau))  # [rad/s^2] integral of integral_gain e
+        self._load = np.zeros(len(self._tau))  # [N m]
+        self.set_parameters(parameters)
         to_goals = parameters.setpoint == POSITION_SERVO
         # goals do not exist before the first tick
         self.command = np.full(len(self._tau), np.nan) if to_goals else self._tau
@@ -257,6 +270,24 @@ class ArmController(TorqueController):
         """See `Controller.set_parameters`."""
         super().set_parameters(parameters)
         self._hold.rate = parameters.goal_rate
+        self._arm, self._inertia = parameters.load_record(), np.array(parameters.inertia)
+        self._integral_gain = np.array(parameters.integral_gain)
+
+    def reset_adaptation(self) -> None:
+        """See `Controller.reset_adaptation`; the integral is set to zero, too."""
+        super().reset_adaptation()
+        self._integral[:] = 0.0
+
+    def _add(self, tau: np.ndarray, reference: np.ndarray, dt: float) -> None:
+        p = self.parameters
+        integrate(
+            self._own[E], self._integral_gain, p.integral_limit, self.saturated, dt, self._integral
+        )
+        tau -= self._inertia * self._integral
+        if p.arm_feedforward:
+            # the law has already Mbar chi_d_ddot
+            arm_load(self._arm[0], reference, self._load)
+            tau += self._load - self._inertia * self._own[FEEDFORWARD]
 
     def update(
         self,

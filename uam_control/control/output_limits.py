@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from uam_control.control.arm_load import ArmLoadParameters
 from uam_control.maths.compiled import jit
 from uam_control.settings.parameter_set import (
     TINY,
@@ -65,8 +66,15 @@ class TorqueLimits(ParameterSet):
 
 
 @dataclass(frozen=True)
-class ArmLimits(TorqueLimits):
-    """Limits of tau_alpha, and what the servos are given."""
+class ArmLimits(TorqueLimits, ArmLoadParameters):
+    """Limits of tau_alpha, what is added to it, and what the servos are given."""
+
+    integral_gain: tuple = vector(
+        (0.0,), "integral action on e, 0 = none, as printed", "1/s^3", 0.0, 1e5
+    )
+    integral_limit: float = number(
+        100.0, "largest acceleration of the integral action, per joint", "rad/s^2", 0.0, 1e4
+    )
 
     setpoint: str = choice(
         CURRENT_SERVO,
@@ -86,8 +94,8 @@ class ArmLimits(TorqueLimits):
 
 
 @dataclass(frozen=True)
-class AttitudeLimits(TorqueLimits):
-    """Limits of tau_q, and what its feedforward leaves to the autopilot's rate loop."""
+class AttitudeLimits(TorqueLimits, ArmLoadParameters):
+    """Limits of tau_q, the arm's moment, and what is left to the autopilot's rate loop."""
 
     feedforward_washout: tuple = vector(
         (0.0, 0.0, 0.0),
@@ -154,9 +162,9 @@ def wash_out(feedforward: np.ndarray, corner: np.ndarray, dt: float, slow: np.nd
 def integrate(
     e: np.ndarray, gain: np.ndarray, limit: float, saturated: bool, dt: float, integral: np.ndarray
 ) -> None:
-    """Advance integral (3,) [m/s^2] of gain e by dt [s], in place, within ±limit [m/s^2].
+    """Advance integral (n,) of gain e by dt [s], in place, within ±limit.
 
-    e (3,): tracking error [m]; gain (3,) [1/s^3]. While saturated it does not grow.
+    e (n,): tracking error [m or rad]; gain (n,) [1/s^3]; integral and limit [m/s^2 or rad/s^2]. While saturated it does not grow.
     """
     for i in range(len(e)):
         following = integral[i] + gain[i] * e[i] * dt

@@ -14,6 +14,7 @@ import numpy as np
 
 TINY = 1e-9
 HUGE = 1e6
+ANY_LENGTH = -1  # of a vector
 
 
 class ParameterError(ValueError):
@@ -24,8 +25,8 @@ class ParameterError(ValueError):
 class Bound:
     """Meaning, unit and range of a numeric parameter.
 
-    length: None for one number, else the number of entries; 0: one entry per axis of the subsystem.
-    whole: an integer. optional: the list may be empty.
+    length: None for one number, else the number of entries; 0: one entry per axis of the subsystem;
+    ANY_LENGTH: as many as are given. whole: an integer. optional: the list may be empty.
     """
 
     description: str
@@ -91,7 +92,7 @@ def vector(
     length: int = 0,
     optional: bool = False,
 ) -> Any:
-    """Declare a field of `length` numbers (0: one per axis), each within [low, high].
+    """Declare a field of `length` numbers, see `Bound`, each within [low, high].
 
     A per-axis default has one entry, used for every axis; () means that there is no default, or
     the empty list if the field is optional.
@@ -193,8 +194,11 @@ def _number(name: str, value: Any, spec: Bound, axes: int) -> float | tuple[floa
         raise ParameterError(f"{name}: {value!r} is not numeric; allowed: {allowed}")
     numbers = numbers.astype(float)
     shape = () if spec.length is None else (spec.length or axes,)
+    if spec.length == ANY_LENGTH and numbers.ndim == 1:
+        shape = numbers.shape
     if numbers.shape != shape:
         required = "one number" if spec.length is None else f"a list of {shape[0]} numbers"
+        required = "a list of numbers" if spec.length == ANY_LENGTH else required
         raise ParameterError(f"{name}: {required} expected, got {value!r}; each {allowed}")
     if not np.all((numbers >= spec.low) & (numbers <= spec.high)):  # refuses NaN too
         raise ParameterError(f"{name}: {value!r} is outside {allowed}")

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 from xml.etree import ElementTree
 
 import numpy as np
@@ -16,6 +17,7 @@ from uam_control.vehicle.loading import VehicleError
 
 TIP = "magnet"  # body that carries the payload
 FACE = "magnet_face"  # its site, where the payload hangs
+STRAIGHT = 1e-3  # [m] and [1] by which a planar arm may differ
 
 
 @dataclass(frozen=True)
@@ -49,6 +51,26 @@ class ArmModel:
     def of(cls, vehicle: VehicleDescription) -> ArmModel:
         """Read the arm of a vehicle. Raises VehicleError if its MJCF has another form."""
         return _Reader(vehicle).arm()
+
+    def planar(self, gravity: float) -> dict[str, Any]:
+        """Return the parameters of `ArmLoadParameters`; {} for an arm that is not planar.
+
+        Planar: all axes are the body's -y, and at zero every link hangs straight down.
+        """
+        lengths = [*(link.offset for link in self.links[1:]), self.tip]
+        straight = [*lengths, *(link.centre for link in self.links)]
+        turned = [link.axis - (0.0, -1.0, 0.0) for link in self.links]
+        if np.any(np.abs([*turned, *(part * (1.0, 1.0, 0.0) for part in straight)]) > STRAIGHT):
+            return {}
+        return {
+            "link_masses": [round(link.mass, 6) for link in self.links],
+            "link_centres": [round(-float(link.centre[2]), 6) for link in self.links],
+            "link_lengths": [round(-float(part[2]), 6) for part in lengths],
+            "arm_gravity": gravity,
+            "joint_armature": self.armature,
+            "joint_damping": self.damping,
+            "joint_friction": self.friction,
+        }
 
     def torques(
         self,
@@ -170,7 +192,9 @@ class _Reader:
         for child in body.findall("body"):
             if not any(joint.get("name") in self._names for joint in child.findall("joint")):
                 mass, centre = self._mass(child)
-                moment += mass * (centre + _vector(child.get("pos", "0 0 0")))
+                # the weight of what swings acts at its pivot
+                place = _vector(child.get("pos", "0 0 0"))
+                moment += mass * (place if child.find("joint") is not None else place + centre)
                 total += mass
         return total, moment / total if total else moment
 

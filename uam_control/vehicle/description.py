@@ -202,7 +202,8 @@ class VehicleDescription:
                 "gravity_feedforward_mass": self.mass,
                 "drag_feedforward": drag,
             },
-            "attitude_controller": {"feedforward_washout": self._integral_ratios()},
+            "attitude_controller": {"feedforward_washout": self._integral_ratios()} | self._load(),
+            "arm_controller": self._load(),
             "mission": {
                 "gravity": self.gravity,
                 "drag": drag,
@@ -227,6 +228,18 @@ class VehicleDescription:
         gains = self.autopilot_gains
         pairs = [(gains.get(f"MC_{axis}RATE_I", 0.0), gains[f"MC_{axis}RATE_P"]) for axis in AXES]
         return [round(integral / proportional, 6) for integral, proportional in pairs]
+
+    def _load(self) -> dict[str, Any]:
+        """Return the parameters of the arm's load; {} for an arm that is not planar."""
+        # these modules need this one
+        from uam_control.vehicle.arm_model import ArmModel
+        from uam_control.vehicle.loading import VehicleError
+
+        try:
+            arm = ArmModel.of(self)
+        except VehicleError:
+            return {}
+        return arm.planar(self.gravity)
 
     def _arm_parameters(self) -> dict[str, Any]:
         if self.arm is None:
