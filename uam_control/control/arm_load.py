@@ -47,9 +47,7 @@ class ArmLoadParameters(ParameterSet):
         (), "joint to the next joint, or to the payload", "m", 0.0, 2.0, ANY_LENGTH, True
     )
     arm_gravity: float = number(GRAVITY, "acceleration of gravity", "m/s^2", 0.0, 30.0)
-    joint_armature: float = number(
-        0.0, "reflected inertia of a joint's motor", "kg m^2", 0.0, 10.0
-    )
+    joint_armature: float = number(0.0, "reflected inertia of a joint's motor", "kg m^2", 0.0, 10.0)
     joint_damping: float = number(0.0, "viscous friction of a joint", "N m s/rad", 0.0, 10.0)
     joint_friction: float = number(0.0, "dry friction of a joint", "N m", 0.0, 10.0)
 

@@ -164,7 +164,8 @@ def integrate(
 ) -> None:
     """Advance integral (n,) of gain e by dt [s], in place, within ±limit.
 
-    e (n,): tracking error [m or rad]; gain (n,) [1/s^3]; integral and limit [m/s^2 or rad/s^2]. While saturated it does not grow.
+    e (n,): tracking error [m or rad]; gain (n,) [1/s^3]; integral and limit [m/s^2 or rad/s^2].
+    While saturated it does not grow.
     """
     for i in range(len(e)):
         following = integral[i] + gain[i] * e[i] * dt
