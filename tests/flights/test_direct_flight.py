@@ -136,9 +136,6 @@ def test_attitude_setpoints_complete_the_mission():
     assert series["setpoint.thrust"][series.flown].min() > 0.3
 
 
-@pytest.mark.xfail(
-    reason="the measured delay, 63 ms, exceeds the margin at the grasp", strict=False
-)
 def test_the_short_mission_is_flown_on_the_plant_of_a_laboratory():
     effects = presets.read([presets.LABORATORY])
     flown = flight("quick_pick", effects=effects)

@@ -22,14 +22,16 @@ from uam_lab.flight.direct.flight import DirectFlight
 from uam_lab.results import metrics
 from uam_sim_bridge.faults import read_schedule
 from uam_sim_bridge.plant import Vehicle
+from uam_sim_bridge.plant.effects import presets
 
 SCENARIO = load_scenario("hover")
 
 
-def flown(*texts, seed=1):
-    """A hover with faults: flight, series, metrics."""
+def flown(*texts, seed=1, plant="calm"):
+    """A hover with faults: flight, series, metrics. plant: name of a preset."""
     faults = read_schedule(texts, SCENARIO, seed)
-    flight = DirectFlight(SCENARIO, load_profile("s500"), Vehicle.load(), 0.0, seed, faults)
+    vehicle = Vehicle.load().changed(presets.added({}, presets.read([plant])))
+    flight = DirectFlight(SCENARIO, load_profile("s500"), vehicle, 0.0, seed, faults)
     flight.run()
     series = flight.recording.series()
     reason = flight.mission.output.abort_reason or flight.ended_by
@@ -214,3 +216,23 @@ def test_a_link_that_becomes_slower_than_the_margin_is_left_before_the_vehicle_s
     left = series.time < 6.0  # in the autopilot's hands after that
     tilt = np.hypot(series["truth.roll"][left], series["truth.pitch"][left])
     assert tilt.max() < 0.1 and (flight.mission.changes[-1].event is Event.HARD_LIMIT)
+
+
+@pytest.mark.parametrize("plant", ["calm", "laboratory"])
+def test_a_delay_that_begins_in_flight_is_measured_and_left_beyond_the_margin(plant):
+    # TIMESYNC shows half of either, so that only the loop delay can start a reaction
+    flight, series, figures = flown(
+        "mavlink_delay@hover+0.5:delay=0.04,direction=to_autopilot", plant=plant
+    )
+    assert figures["mission_completed"], figures["shortfalls"]
+    margin = load_profile("s500").sets["mission"].delay_margin
+    late = flight.control.bridge.loop_delay.value
+    assert late > 0.6 * margin  # a warning: delay_warn
+
+    flight, series, figures = flown(
+        "mavlink_delay@hover+0.5:delay=0.07,direction=to_autopilot", plant=plant
+    )
+    assert "measured setpoint delay" in flight.mission.output.abort_reason
+    assert classify(series, figures) == "failsafe" and series["truth.z"].max() < 1.1
+    tilt = np.hypot(series["truth.roll"], series["truth.pitch"])
+    assert tilt[series.flown].max() < 0.1

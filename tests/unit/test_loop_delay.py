@@ -6,18 +6,29 @@ import numpy as np
 import pytest
 
 from uam_control.supervision import Readings, SupervisionParameters
-from uam_control.supervision.setpoint_delay import margin_left, setpoint_delay
+from uam_control.supervision.setpoint_delay import by_link, by_loop, larger, margin_left
 from uam_sim_bridge.mavlink.offboard.loop_delay import DELAYS, LoopDelay
 
 PERIOD, LAG = 0.004, 0.017
 
 
-class Loop:
-    """omega_dot = 20 lag(omega_sp(t - T) - omega), with gyro noise; omega_sp: noise and a sine."""
+def nothing(time, rates):
+    return np.zeros(3)
 
-    def __init__(self, ticks, excitation=0.3, noise=0.003, seed=1):
+
+class Loop:
+    """omega_dot = gain lag(omega_sp(t - T) - omega) + disturbance(t, omega), with gyro noise.
+
+    omega_sp: low-passed noise, and `feedback` times the measured rates, as a law has it.
+    """
+
+    def __init__(
+        self, ticks, excitation=0.3, noise=0.003, seed=1, gain=20.0, feedback=0.0,
+        disturbance=nothing,
+    ):  # fmt: skip
         self.random = np.random.default_rng(seed)
         self.ticks, self.excitation, self.noise = ticks, excitation, noise
+        self.gain, self.feedback, self.disturbance = gain, feedback, disturbance
         self.sent = [np.zeros(3)] * (ticks + 1)
         self.rates, self.slope, self.slow = np.zeros(3), np.zeros(3), np.zeros(3)
         self.tick = 0
@@ -26,12 +37,13 @@ class Loop:
         """Return the setpoint that is sent and the measured rates of the next tick."""
         self.tick += 1
         self.slow += 0.05 * (self.excitation * self.random.standard_normal(3) * 4.0 - self.slow)
-        setpoint = self.slow.copy()
-        self.sent = [*self.sent[1:], setpoint]
         measured = self.rates + self.noise * self.random.standard_normal(3)
+        setpoint = self.slow + self.feedback * measured
+        self.sent = [*self.sent[1:], setpoint]
         keep = math.exp(-PERIOD / LAG)
-        self.slope = keep * self.slope + (1.0 - keep) * 20.0 * (self.sent[0] - self.rates)
-        self.rates = self.rates + PERIOD * self.slope
+        self.slope = keep * self.slope + (1.0 - keep) * self.gain * (self.sent[0] - self.rates)
+        other = self.disturbance(self.tick * PERIOD, self.rates)
+        self.rates = self.rates + PERIOD * (self.slope + other)
         return setpoint, measured
 
 
@@ -98,19 +110,96 @@ def test_a_body_that_turns_the_other_way_gives_no_value():
     assert math.isnan(meter.value)
 
 
+def values(loop, seconds):
+    """Every value [s] of a flight, and those of its last two thirds."""
+    meter = LoopDelay(LAG, PERIOD)
+    found = [meter.update(k * PERIOD, *loop.step()) for k in range(round(seconds / PERIOD))]
+    return np.array(found), np.array(found[len(found) // 3 :])
+
+
+def trembling_arm(time, rates):
+    """As recorded on the plant of a laboratory: 12.5 Hz about the pitch axis, 0.5 rad/s RMS."""
+    return np.array([0.0, 55.0 * math.sin(2.0 * math.pi * 12.5 * time), 0.0])
+
+
+def contact(time, rates):
+    """The arm on a stand from 3 s to 6 s: blows at 5 Hz, friction about both axes."""
+    if not 3.0 <= time < 6.0:
+        return np.zeros(3)
+    blow = 8.0 if (time * 5.0) % 1.0 < 0.1 else 0.0
+    return np.array([-4.0 * rates[0], blow - 15.0 * rates[1], 0.0])
+
+
+def propellers(time, rates):
+    return 40.0 * np.sin(2.0 * math.pi * np.array([78.0, 91.0, 78.0]) * time)
+
+
+def swinging_payload(time, rates):
+    return np.array([0.4, 1.2, 0.0]) * math.sin(2.0 * math.pi * 1.3 * time)
+
+
+DISTURBED = {
+    "the arm trembles": {"disturbance": trembling_arm, "feedback": 0.8},
+    "contact": {"disturbance": contact},
+    "propellers": {"disturbance": propellers, "noise": 0.03},
+    "a payload swings": {"disturbance": swinging_payload, "feedback": 0.3},
+    "heavy": {"gain": 12.0},
+    "light": {"gain": 34.0},
+}
+
+
+@pytest.mark.parametrize("what", DISTURBED)
+@pytest.mark.parametrize("late", [0.0, 0.010, 0.020, 0.030, 0.050])
+def test_whatever_shakes_the_vehicle_the_value_is_right_or_unknown(what, late):
+    ticks = math.ceil(late / PERIOD)
+    found, _ = values(Loop(ticks, **DISTURBED[what]), 9.0)
+    known = found[np.isfinite(found)]
+    assert len(known) > 0.5 * len(found)
+    np.testing.assert_allclose(known, (ticks + 1) * PERIOD, atol=0.006)
+
+
+def test_without_a_setpoint_that_moves_the_vehicle_nothing_else_gives_a_value():
+    for what in ("the arm trembles", "propellers"):
+        found, _ = values(Loop(3, excitation=0.0, **DISTURBED[what]), 6.0)
+        assert np.isnan(found).all(), what
+
+
+def test_axes_that_contradict_each_other_give_no_value():
+    late, early = Loop(12, seed=3), Loop(3, seed=4)
+    meter = LoopDelay(LAG, PERIOD)
+    for k in range(1000):
+        (one, roll), (other, pitch) = late.step(), early.step()
+        meter.update(
+            k * PERIOD, np.array([one[0], other[1], 0.0]), np.array([roll[0], pitch[1], 0.0])
+        )
+    assert math.isnan(meter.value) and meter.explained > 0.9
+
+
+@pytest.mark.parametrize("gain", [2.0, 120.0])
+def test_a_gain_that_no_rate_loop_has_gives_no_value(gain):
+    # a body that answers at once or hardly: the fit is good, but not one of a rate loop
+    meter, loop = LoopDelay(LAG, PERIOD), Loop(3, gain=gain)
+    for k in range(1500):
+        meter.update(k * PERIOD, *loop.step())
+    assert math.isnan(meter.value)
+
+
 LIMITS = SupervisionParameters(
     delay_margin=0.05, delay_nominal=0.006, joint_angle_hold=(1.0,), joint_effort_hold=(1.0,)
 )
 
 
 def test_delay_of_the_setpoints():
-    both = Readings(round_trip=0.02, loop_delay=0.026)
-    assert setpoint_delay(both, LIMITS, True) == pytest.approx(0.02)  # measured, less the nominal
-    assert setpoint_delay(both, LIMITS, False) == pytest.approx(0.02)  # the whole round trip
-    late = Readings(round_trip=0.1, loop_delay=0.026)
-    assert setpoint_delay(late, LIMITS, True) == pytest.approx(0.05)  # half of the round trip
-    assert setpoint_delay(Readings(round_trip=0.03), LIMITS, True) == pytest.approx(0.015)
-    assert setpoint_delay(Readings(loop_delay=0.03), LIMITS, True) == pytest.approx(0.024)
-    assert math.isnan(setpoint_delay(Readings(), LIMITS, True))
-    assert setpoint_delay(Readings(loop_delay=0.001), LIMITS, True) == 0.0
+    readings = Readings(round_trip=0.02, loop_delay=0.026)
+    assert by_loop(readings, LIMITS) == pytest.approx(0.02)  # measured, less the nominal
+    assert by_link(readings, LIMITS, True) == pytest.approx(0.01)  # half of the round trip
+    assert by_link(readings, LIMITS, False) == pytest.approx(0.02)  # the whole round trip
+    assert by_loop(Readings(loop_delay=0.001), LIMITS) == 0.0
+    assert math.isnan(by_loop(Readings(), LIMITS)) and math.isnan(by_link(Readings(), LIMITS, True))
     assert margin_left(0.02, LIMITS) == pytest.approx(0.6)
+
+
+def test_the_larger_delay_counts_and_an_unknown_one_does_not():
+    assert larger(0.01, 0.02) == larger(0.02, 0.01) == 0.02
+    assert larger(0.01, math.nan) == larger(math.nan, 0.01) == 0.01
+    assert math.isnan(larger(math.nan, math.nan))

@@ -22,7 +22,7 @@ from uam_control.supervision import (
     State,
     Supervisor,
 )
-from uam_control.supervision.checks import CHECKS, LATE, Checks, measure, read
+from uam_control.supervision.checks import CHECKS, LATE, LATE_LOOP, Checks, measure, read
 from uam_control.supervision.monitor import Level, Monitor
 from uam_control.supervision.states import TARGETS, TRANSITIONS
 
@@ -74,9 +74,9 @@ def test_failsafe_ends_only_by_command_and_motors_go_off_on_the_ground():
 def test_every_check_has_a_value():
     values, seen, two, three = np.full(len(CHECKS), np.nan), observation(), np.ones(2), np.ones(3)
     measure(seen.state, seen.reference, three, 0.0, 0.0, np.zeros((2, 3)), two, values)
-    assert np.isnan(values).sum() == 11
+    assert np.isnan(values).sum() == 12
     read(Readings(), two, three, values)
-    assert np.flatnonzero(np.isnan(values)).tolist() == [LATE]  # by `Checks.update`
+    assert np.flatnonzero(np.isnan(values)).tolist() == [LATE, LATE_LOOP]  # by `Checks.update`
     checks = Checks(S500)
     assert checks.update(0.0, seen, True) is None
 
@@ -159,7 +159,7 @@ def test_a_short_excess_and_an_unknown_value_have_no_effect():
             "no message of the autopilot for 0.80 s, 0.75 s allowed",
         ),
         (
-            observation(readings=Readings(round_trip=0.038, loop_delay=0.048)),
+            observation(readings=Readings(round_trip=0.082)),
             State.LANDING,
             "setpoint delay 0.041 s exceeds 0.04 s of the loops' margin",
         ),

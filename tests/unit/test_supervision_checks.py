@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from uam_control.supervision import Observation, Readings, SupervisionParameters
-from uam_control.supervision.checks import CHECKS, LATE, Checks, measure, read
+from uam_control.supervision.checks import CHECKS, LATE, LATE_LOOP, Checks, measure, read
 from uam_control.supervision.monitor import Level
 
 A, B = math.atan2(0.6, 0.8), math.atan2(0.8, 0.6)  # of the 3-4-5 triangle
@@ -18,7 +18,7 @@ BOX = np.array([[-5.0, -6.0, 0.0], [5.0, 6.0, 4.0]])
 
 def measured(state, reference=None, mocap=(math.nan,) * 3, age=math.nan, ground=0.0, joints=None):
     """What `measure` writes into the first eight values; those behind stay."""
-    values = np.full(19, 77.0)
+    values = np.full(len(CHECKS), 77.0)
     reference = np.zeros(state.shape) if reference is None else reference
     limits = np.ones(state.shape[1] - 6) if joints is None else np.array(joints)
     measure(state, reference, np.array(mocap), age, ground, BOX, limits, values)
@@ -84,7 +84,7 @@ def test_of_a_state_that_is_not_finite_nothing_else_is_said(where, bad):
 
 
 def test_readings_have_their_places():
-    values = np.full(19, 77.0)
+    values = np.full(len(CHECKS), 77.0)
     readings = Readings(
         battery=0.5, mocap_age=9.0, mocap_still=10.0, joint_age=11.0, controller_age=12.0,
         autopilot_age=13.0, missed_ticks=15.0, temperature=16.0,
@@ -93,12 +93,12 @@ def test_readings_have_their_places():
     read(readings, np.array([2.0, 4.0, 8.0]), np.array([2.0, 1.0, 0.25]), values)
     np.testing.assert_array_equal(values[:8], 77.0)
     # effort: 6/4; gains: 1/.25, the unknown one left out
-    np.testing.assert_array_equal(values[8:], [-0.5, 9, 10, 11, 12, 13, 77, 15, 16, 1.5, 4.0])
+    np.testing.assert_array_equal(values[8:], [-0.5, 9, 10, 11, 12, 13, 77, 15, 16, 1.5, 4.0, 77])
 
 
 def test_what_is_unknown_is_below_every_limit():
-    values = np.zeros(19)
-    values[LATE] = -math.inf  # by `Checks.update`
+    values = np.zeros(len(CHECKS))
+    values[[LATE, LATE_LOOP]] = -math.inf  # by `Checks.update`
     read(Readings(), np.ones(2), np.ones(3), values)
     np.testing.assert_array_equal(values[8:], -math.inf)
 
@@ -114,7 +114,8 @@ AT_ONCE = SupervisionParameters(
     joint_age_hold=0.375, controller_age_hold=0.625, autopilot_age_land=0.875,
     delay_margin=0.125, delay_nominal=0.0, delay_land=0.5, delay_failsafe=1.5,
     missed_ticks_hold=10.0, missed_ticks_failsafe=20.0, gain_hold=(10.0, 20.0, 30.0),
-    hold_after=0.0, land_after=0.0, failsafe_after=0.0, clear_after=1.0, hysteresis=0.5,
+    hold_after=0.0, land_after=0.0, failsafe_after=0.0, delay_after=0.0,
+    clear_after=1.0, hysteresis=0.5,
 )  # fmt: skip
 
 
@@ -151,8 +152,8 @@ LIMITS = [
     ("joint angles", HOLD, lambda x: seen(joint_age=x), 0.375),
     ("controllers", HOLD, lambda x: seen(controller_age=x), 0.625),
     ("autopilot", LAND, lambda x: seen(autopilot_age=x), 0.875),
-    ("setpoint delay", LAND, lambda x: seen(loop_delay=x), 0.0625),
-    ("setpoint delay", FAILSAFE, lambda x: seen(loop_delay=x), 0.1875),
+    ("loop delay", LAND, lambda x: seen(loop_delay=x), 0.0625),
+    ("loop delay", FAILSAFE, lambda x: seen(loop_delay=x), 0.1875),
     ("setpoint delay", LAND, lambda x: seen(round_trip=2.0 * x), 0.0625),
     ("control ticks", HOLD, lambda x: seen(missed_ticks=x), 10.0),
     ("control ticks", FAILSAFE, lambda x: seen(missed_ticks=x), 20.0),
@@ -216,6 +217,26 @@ def test_a_limit_must_be_exceeded_for_the_time_of_its_level(times, level, at, be
     assert early is None or early.level < level
     assert not checks.quiet  # a limit is exceeded, if not yet for long enough
     assert checks.update(0.5, look, True)[::2] == (level, at)
+
+
+@pytest.mark.parametrize(("beyond", "level"), [(0.1, LAND), (0.2, FAILSAFE)])
+def test_a_measured_delay_needs_evidence_without_a_gap(beyond, level):
+    checks = Checks(replace(AT_ONCE, delay_after=1.0))
+    late, unknown = seen(loop_delay=beyond), seen()
+    assert checks.update(0.0, late, True) is None
+    assert checks.update(0.9, late, True) is None
+    assert checks.update(0.95, unknown, True) is None
+    assert checks.update(1.0, late, True) is None  # it begins anew
+    assert checks.update(1.99, late, True) is None
+    assert checks.update(2.0, late, True)[::2] == (level, "loop delay")
+    # the round trip is no fit: it counts at once
+    assert Checks(replace(AT_ONCE, delay_after=1.0)).update(
+        0.0, seen(round_trip=2.0 * beyond), True
+    )[::2] == (level, "setpoint delay")
+
+
+def test_a_measured_delay_counts_in_flight_only():
+    assert Checks(AT_ONCE).update(0.0, seen(loop_delay=1.0), False) is None
 
 
 @pytest.mark.parametrize("look", [
@@ -291,4 +312,4 @@ def test_other_limits_are_those_of_the_next_tick():
 
 
 def test_every_quantity_is_named_once():
-    assert len({check.name for check in CHECKS}) == len(CHECKS) == 19
+    assert len({check.name for check in CHECKS}) == len(CHECKS) == 20

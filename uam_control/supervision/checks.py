@@ -17,11 +17,11 @@ from uam_control.maths.compiled import jit
 from uam_control.maths.rotations import tilt
 from uam_control.supervision.monitor import Level, Monitor
 from uam_control.supervision.observation import Observation, Readings
-from uam_control.supervision.setpoint_delay import setpoint_delay
+from uam_control.supervision.setpoint_delay import by_link, by_loop, larger
 from uam_control.supervision.supervision_parameters import SupervisionParameters
 
 NONE = math.inf
-CONTROLLERS, SETPOINT_DELAY = "controllers", "setpoint delay"
+CONTROLLERS, SETPOINT_DELAY, LOOP_DELAY = "controllers", "setpoint delay", "loop delay"
 LATEST = 0.25  # s, largest age of a pose for which the estimate is extrapolated back to its stamp
 
 
@@ -30,8 +30,8 @@ class Check(NamedTuple):
 
     hold, land, failsafe: name of a parameter or of a limit in s that follows from parameters, or a
     number. in_flight: checked only while airborne.
-    sign: -1 if a smaller value is worse. failsafe_after: name of the parameter with the time beyond
-    the limit before failsafe. reading: the value's name in `Readings`.
+    sign: -1 if a smaller value is worse. land_after, failsafe_after: names of the parameters with
+    the time beyond the limit before the reaction. reading: the value's name in `Readings`.
     """
 
     name: str
@@ -41,6 +41,7 @@ class Check(NamedTuple):
     failsafe: str | float = NONE
     in_flight: bool = False
     sign: int = 1
+    land_after: str = "land_after"
     failsafe_after: str = "failsafe_after"
     reading: str = ""
 
@@ -90,8 +91,13 @@ CHECKS = (
           "temperature_hold", "temperature_land", reading="temperature"),
     Check("joint torque", "{name} at {value:.2f} of its limit", 1.0),
     Check("adapted gain", "{name} at {value:.2f} of its limit", 1.0),
+    Check(LOOP_DELAY, "measured setpoint delay {value:.3f} s exceeds {limit:.3g} s of the loops' "
+          "margin", land="setpoint_delay_land", failsafe="setpoint_delay_failsafe",
+          in_flight=True, land_after="delay_after", failsafe_after="delay_after"),
 )  # fmt: skip
-LATE = [check.name for check in CHECKS].index(SETPOINT_DELAY)
+LATE, LATE_LOOP = (
+    [check.name for check in CHECKS].index(it) for it in (SETPOINT_DELAY, LOOP_DELAY)
+)
 _ROWS = [i for i, check in enumerate(CHECKS) if check.reading]
 _SIGNS = np.array([CHECKS[i].sign for i in _ROWS])
 _readings = attrgetter(*(CHECKS[i].reading for i in _ROWS))
@@ -128,7 +134,8 @@ class Checks:
             for check in CHECKS
         )
         self._after = tuple(
-            (p.hold_after, p.land_after, getattr(p, check.failsafe_after)) for check in CHECKS
+            (p.hold_after, getattr(p, check.land_after), getattr(p, check.failsafe_after))
+            for check in CHECKS
         )
         # below these values no monitor changes, unless a limit was exceeded before
         first = [min(limits) for limits in self._limits]
@@ -154,8 +161,10 @@ class Checks:
             values,
         )
         read(readings, self._efforts, self._gains, values)
-        self.setpoint_delay = late = setpoint_delay(readings, self._parameters, in_flight)
-        values[LATE] = -math.inf if math.isnan(late) else late
+        link = by_link(readings, self._parameters, in_flight)
+        loop = by_loop(readings, self._parameters) if in_flight else math.nan
+        values[LATE], values[LATE_LOOP] = _known(link), _known(loop)
+        self.setpoint_delay = larger(link, loop)
         if self.quiet and _below(values, self._calm):
             return None
         p, worst = self._parameters, None
@@ -180,6 +189,11 @@ class Checks:
         for check, value, limits in zip(CHECKS, self._values.tolist(), self._limits, strict=True):
             if not check.in_flight:
                 yield check, value, min(limits)
+
+
+def _known(value: float) -> float:
+    """Return the value; -inf, which passes every check, for an unknown one."""
+    return -math.inf if math.isnan(value) else value
 
 
 def _limit(parameters: SupervisionParameters, check: Check, limit: str | float) -> float:

@@ -1,10 +1,12 @@
 """How much later than in the profile's model the setpoints act, from what is measured.
 
 Before take-off: `delay_share_of_round_trip` of the round trip, as all of it may be on the way to
-the autopilot. In flight: the larger of the measured loop delay beyond `delay_nominal` and half of
-the round trip.
+the autopilot. In flight: the larger of half of the round trip and of the measured loop delay beyond
+`delay_nominal`. The supervisor checks both apart: the round trip is a clock's difference, the loop
+delay a fit, for which it needs `delay_after` of evidence.
 
-The loop delay is unknown while the vehicle hardly moves. A loop that begins to oscillate moves.
+The loop delay is unknown while the vehicle hardly moves, and while something else moves it. A loop
+that begins to oscillate moves.
 """
 
 from __future__ import annotations
@@ -17,14 +19,20 @@ from uam_control.supervision.supervision_parameters import SupervisionLimits
 SYMMETRIC = 0.5  # share of the round trip that is on the way to the autopilot, if both are alike
 
 
-def setpoint_delay(readings: Readings, limits: SupervisionLimits, in_flight: bool) -> float:
-    """Return the delay of the setpoints [s], NaN if unknown."""
-    share = SYMMETRIC if in_flight else limits.delay_share_of_round_trip
-    by_link = share * readings.round_trip
-    if not in_flight or math.isnan(readings.loop_delay):
-        return by_link
-    late = max(readings.loop_delay - limits.delay_nominal, 0.0)
-    return late if math.isnan(by_link) else max(late, by_link)
+def by_link(readings: Readings, limits: SupervisionLimits, in_flight: bool) -> float:
+    """Return the delay [s] that the round trip shows, NaN if unknown."""
+    return (SYMMETRIC if in_flight else limits.delay_share_of_round_trip) * readings.round_trip
+
+
+def by_loop(readings: Readings, limits: SupervisionLimits) -> float:
+    """Return the delay [s] that the loop delay shows, NaN if unknown; it counts in flight."""
+    late = readings.loop_delay - limits.delay_nominal
+    return 0.0 if late < 0.0 else late
+
+
+def larger(link: float, loop: float) -> float:
+    """Return the larger of two delays [s]; NaN only if both are unknown."""
+    return loop if math.isnan(link) or loop > link else link
 
 
 def margin_left(delay: float, limits: SupervisionLimits) -> float:

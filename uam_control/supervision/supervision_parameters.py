@@ -123,6 +123,9 @@ class Reactions(ParameterSet):
     hold_after: float = number(0.5, "time beyond a limit before a hold", "s", 0.0, 10.0)
     land_after: float = number(0.3, "time beyond a limit before a landing", "s", 0.0, 10.0)
     failsafe_after: float = number(0.1, "time beyond a limit before the failsafe", "s", 0.0, 10.0)
+    delay_after: float = number(
+        1.0, "time of a measured loop delay beyond a limit before its reaction", "s", 0.0, 10.0
+    )
     clear_after: float = number(
         1.0, "time within a limit, less the hysteresis, before it counts as clear", "s", 0.0, 60.0
     )
