@@ -214,6 +214,23 @@ def test_a_late_pose_is_compared_with_the_estimate_of_its_time():
     assert abs(error(True)) < 2e-3
 
 
+@pytest.mark.parametrize("late", [0.02, 0.08, 0.18])
+def test_late_poses_correct_the_estimate_once(late):
+    # at rest, with a velocity that is wrong by 0.3 m/s at first; poses of 125 Hz
+    filter_, down = Estimator(), np.array([0.0, 0.0, -GRAVITY])
+    errors = []
+    for tick in range(1500):
+        time = tick * 0.004
+        if tick == 100:
+            filter_.estimate[7:] = 0.3
+        filter_.predict(time, np.zeros(3), down, 0.004)
+        if tick % 2 == 0:
+            filter_.vision(time, np.zeros(3), LEVEL, late)
+        errors.append(np.abs(filter_.estimate[4:]).max())
+    assert max(errors) < 0.4
+    assert errors[-1] < 0.01
+
+
 def test_a_stamp_of_another_clock_gives_no_age():
     assert age_of(1.0, 1.03) == pytest.approx(0.03)
     assert age_of(5.0, 1.0) == age_of(0.0, 1.0) == 0.0

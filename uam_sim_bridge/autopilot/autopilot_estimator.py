@@ -160,10 +160,12 @@ class Estimator:
         """Correct by a pose that arrives at `time` [s]; the first after a gap sets the estimate.
 
         position (3,) [m, NED]; quaternion (4,) [w x y z], FRD → NED; age [s]: the pose is compared
-        with the estimate at time - age, as PX4's EKF2 fuses at its delayed horizon.
+        with the estimate at time - age, as PX4's EKF2 fuses at its delayed horizon. The estimates
+        since then are corrected, too: the next late pose shows what is left, not the same again.
         """
+        exposed, before = time - age, self.estimate[_PLACE:].copy()
         if age > 0.0:
-            position, quaternion = self._moved_on(time - age, position, quaternion)
+            position, quaternion = self._moved_on(exposed, position, quaternion)
         gap = time - self._vision_time
         self._vision_time = time
         self._vision_down = matrix_from_quaternion(quaternion)[2].copy()
@@ -176,6 +178,12 @@ class Estimator:
             return
         self._vision_count += 1
         correct(position, quaternion, gap, self.estimate, self._bias)
+        if age > 0.0:
+            moved, faster = np.split(self.estimate[_PLACE:] - before, 2)
+            since = np.maximum(self._stamps - exposed, 0.0)
+            late = self._stamps >= exposed
+            self._past[late, _PLACE:] += moved + since[late, None] * faster
+            self.estimate[POSITION] += age * faster
 
     def _moved_on(
         self, exposed: float, position: np.ndarray, quaternion: np.ndarray
