@@ -113,6 +113,8 @@ class MujocoPlant(Plant):
         self._magnet_gain = self.model.actuator(MAGNET).gainprm[0]
         self._magnet_control = self._controls((MAGNET,))
         self._face = data.site_xpos[self.model.site("magnet_face").id]
+        # of the same instant as the face: qpos is a physics step later
+        self._payload_centre = data.xpos[self.model.body(PAYLOAD).id]
         self._payload_axes = data.xmat[self.model.body(PAYLOAD).id]
         gap_scale = self.vehicle.numbers["magnet"]["gap_scale"]
         self._magnet_constants = magnet_constants(self.model, gap_scale)
@@ -197,7 +199,7 @@ class MujocoPlant(Plant):
             self._force_on_base,
             magnet,
             self._face,
-            self._payload_position,
+            self._payload_centre,
             self._payload_axes,
             self._magnet_constants,
             self._magnet_control,
