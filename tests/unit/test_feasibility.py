@@ -114,9 +114,10 @@ def test_a_steady_circle_turns_the_thrust_about_the_vertical():
 def test_joint_torques_of_a_still_arm_are_those_of_its_weight():
     still = Motion(lambda t: rows(alpha_1=(math.pi / 2, 0, 0)))  # both links horizontal, forward
     demand = checked().along(still, TIMES, np.full(len(TIMES), 0.2))
-    # link 1: 0.177 kg at 74.5 mm; link 2: 0.16 kg at 100 + 113 mm; payload at 270 mm from joint 1
-    first = 9.81 * (0.177 * 0.0745 + 0.16 * 0.213 + 0.2 * 0.270)
-    second = 9.81 * (0.16 * 0.113 + 0.2 * 0.170)
+    # link 1: 0.177 kg at 74.5 mm; link 2: 0.09 kg at 75 mm and the magnet, 0.07 kg, at its pivot,
+    # 140 mm, both 100 mm further; payload at 270 mm from joint 1
+    first = 9.81 * (0.177 * 0.0745 + 0.09 * 0.175 + 0.07 * 0.240 + 0.2 * 0.270)
+    second = 9.81 * (0.09 * 0.075 + 0.07 * 0.140 + 0.2 * 0.170)
     np.testing.assert_allclose(demand.joint_torques[100], [first, second], rtol=2e-3)
 
 

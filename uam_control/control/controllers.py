@@ -22,7 +22,7 @@ from uam_control.control.output_limits import (
 )
 from uam_control.control.sample_hold import SampleHold
 from uam_control.control.thrust_direction import AttitudeReference
-from uam_control.coordinates import ALPHA, ARM, ATTITUDE, CHI, CHI_DOT, PITCH, POSITION, YAW, X, Z
+from uam_control.coordinates import ALPHA, ARM, ATTITUDE, CHI, CHI_DOT, PITCH, POSITION, YAW, Z
 from uam_control.laws import catalogue
 from uam_control.laws.errors import FEEDFORWARD, E, tracking_errors
 from uam_control.laws.law_parameters import LawParameters
@@ -156,10 +156,11 @@ class PositionController(Controller):
         integrate(
             self._own[E], self._integral_gain, p.integral_limit, self.saturated, dt, self._integral
         )
-        tau += self._drag * reference[CHI_DOT, POSITION] - self._inertia * self._integral
+        tau += self._drag * reference[CHI_DOT, POSITION]
         if p.gravity_feedforward_mass > 0.0:
-            # what the integral holds up is weight: the horizontal force is for the same mass
-            tau[X:Z] *= 1.0 - self._integral[Z] / p.gravity
+            # what the integral holds up is weight: the force is for the same mass
+            tau *= 1.0 - self._integral[Z] / p.gravity
+        tau -= self._inertia * self._integral
         self.saturated = limit_force(
             tau,
             p.gravity_feedforward_mass * p.gravity,
