@@ -76,7 +76,7 @@ def is_discovery_port(port: int) -> bool:
     return port % 2 == 0
 
 
-class Flight(NamedTuple):
+class RunningFlight(NamedTuple):
     """A flight of `uam fly` that runs; namespace: of its nodes, as `/uav1`."""
 
     instance: int
@@ -231,7 +231,7 @@ class Reservation:
         self.release()
 
 
-def flights(folder: Path | None = None) -> list[Flight]:
+def flights(folder: Path | None = None) -> list[RunningFlight]:
     """Return the running flights of this user, by instance; folder: see `lock_file`."""
     found = []
     for instance in instances_in_use(folder):
@@ -239,13 +239,13 @@ def flights(folder: Path | None = None) -> list[Flight]:
             domain, namespace = lock_file(folder, instance).read_text().split()
         except (OSError, ValueError):  # it has just ended, or has not written it yet
             domain, namespace = ports_of(instance).domain, "/"
-        found.append(Flight(instance, int(domain), namespace))
+        found.append(RunningFlight(instance, int(domain), namespace))
     return found
 
 
 def flight_of(
     instance: int | None, namespace: str = "", folder: Path | None = None
-) -> Flight | None:
+) -> RunningFlight | None:
     """Return the flight `instance`, else that in `namespace`, else the only one that runs.
 
     namespace: in the form of ROS, "" for any. Returns None without a running flight: the
@@ -253,7 +253,7 @@ def flight_of(
     """
     running = flights(folder)
     if instance is not None:
-        missing = Flight(instance, ports_of(instance).domain, namespace or "/")
+        missing = RunningFlight(instance, ports_of(instance).domain, namespace or "/")
         return next((one for one in running if one.instance == instance), missing)
     possible = [one for one in running if namespace in ("", one.namespace)]
     if len(possible) > 1:

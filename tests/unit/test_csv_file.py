@@ -6,7 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from uam_control.mission import ScenarioError, load_scenario
-from uam_control.mission.scenarios.fitted_spline import Misfit, Samples, fitted
+from uam_control.mission.scenarios.fitted_spline import CurveSamples, Misfit, fitted
 
 HEADER = "t,px,py,pz,yaw,vx,vy,vz,ax,ay,az,dyaw"
 ROW = "{t},0,0,1,0,0,0,0,0,0,0,0"
@@ -185,7 +185,7 @@ def test_every_sample_is_met(steps, rate, given_rows):
     times = np.append(0.0, np.cumsum(steps))
     table = circle(times, rate)
     rows = [table[:, 1:4], table[:, 5:8], table[:, 8:11]]
-    group = Samples(*rows[: given_rows + 1])
+    group = CurveSamples(*rows[: given_rows + 1])
     try:
         (path,) = fitted(times, [group], 1e-3)
     except Misfit:

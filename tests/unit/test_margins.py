@@ -9,7 +9,7 @@ from uam_control.estimation import EstimatorParameters, StateEstimator
 from uam_control.estimation.filters import low_pass_step
 from uam_control.profiles.profile import default_profile
 from uam_lab.cli.margins import verdict
-from uam_lab.margins.linear import IN, Block, delay, join, linearise
+from uam_lab.margins.linear import IN, LinearBlock, delay, join, linearise
 from uam_lab.margins.loops import analyse, step_response
 from uam_lab.margins.margins import common_delay, margins
 from uam_lab.margins.plant_model import plant_model, rotor_model, zero_order_hold
@@ -64,8 +64,10 @@ def test_join_closes_and_opens_a_loop():
     """x+ = x + u, u = -k x one tick later: z^2 - z + k = 0."""
     k = 0.2
     one = np.ones((1, 1))
-    plant = Block(one, one, one, 0.0 * one, ("u",), ("x",))
-    law = Block(np.zeros((0, 0)), np.zeros((0, 1)), np.zeros((1, 0)), -k * one, ("seen",), ("u",))
+    plant = LinearBlock(one, one, one, 0.0 * one, ("u",), ("x",))
+    law = LinearBlock(
+        np.zeros((0, 0)), np.zeros((0, 1)), np.zeros((1, 0)), -k * one, ("seen",), ("u",)
+    )
     blocks = [plant, delay(["x"], ["seen"], 1), law]
     closed = join(blocks, added=["u"])
     assert closed.inputs == (IN + "u",)

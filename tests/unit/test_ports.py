@@ -73,7 +73,7 @@ def test_a_flight_is_found_by_instance_and_by_namespace(tmp_path):
         assert first.ports.domain == second.ports.domain == 7
         assert first.ports.simulator_tcp != second.ports.simulator_tcp
         number = second.ports.instance
-        expected = ports.Flight(number, 7, "/uav2")
+        expected = ports.RunningFlight(number, 7, "/uav2")
         assert ports.flight_of(number, folder=tmp_path) == expected
         assert ports.flight_of(None, "/uav2", folder=tmp_path) == expected
         with pytest.raises(PortError, match=f"choose one by .*{number}: /uav2"):

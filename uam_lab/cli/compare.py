@@ -100,7 +100,7 @@ def run(options: argparse.Namespace) -> int:
         others = fly_all(
             extra, jobs, progress=lambda done, result: show(len(trials) + done, result)
         )
-    modular = modularity.Evidence.of(proposed, kept, others)
+    modular = modularity.ModularityEvidence.of(proposed, kept, others)
     facts = {
         "command": command_line(),
         "engine": options.engine,

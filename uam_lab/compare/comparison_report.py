@@ -12,7 +12,7 @@ from matplotlib.figure import Figure
 
 from uam_lab.campaign.trial import Trial, TrialResult
 from uam_lab.compare import plan, tables
-from uam_lab.compare.modularity import Evidence
+from uam_lab.compare.modularity import ModularityEvidence
 from uam_lab.report.figures import figures, style
 from uam_lab.report.figures.panels import DrawnFlight
 from uam_lab.results import templates, timeseries
@@ -59,7 +59,7 @@ def write(
     out: Path,
     trials: Sequence[Trial],
     results: Sequence[TrialResult],
-    modular: Evidence,
+    modular: ModularityEvidence,
     facts: Mapping[str, Any],
 ) -> Written:
     """Write flights.csv, comparison.json, tables.md, figures/ and report.html to `out`."""

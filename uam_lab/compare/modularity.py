@@ -97,14 +97,16 @@ def _replay(profile: Profile, series: Series, period: float) -> dict[str, np.nda
 
 
 @dataclass(frozen=True)
-class Evidence:
+class ModularityEvidence:
     """Results of the replays and of the flights."""
 
     flights: tuple[TrialResult, ...]
     replays: tuple[Untouched, ...]
 
     @classmethod
-    def of(cls, profile: Profile, series: Path, flights: Sequence[TrialResult]) -> Evidence:
+    def of(
+        cls, profile: Profile, series: Path, flights: Sequence[TrialResult]
+    ) -> ModularityEvidence:
         """Return the evidence from the recorded flight `series` and the results of `trials`."""
         flight = timeseries.read(series)
         period = float(np.median(np.diff(flight.time)))

@@ -19,7 +19,7 @@ MODULES = "uam_"  # packages whose objects are searched for arrays
 
 
 @dataclass(frozen=True)
-class Block:
+class LinearBlock:
     """A linear system with m inputs, p outputs and n states; the time step is that of the model.
 
     a (n, n), b (n, m), c (p, n), d (p, m); inputs (m), outputs (p): names of the signals.
@@ -40,12 +40,12 @@ class Block:
             parts.append(self.c @ solved + self.d)
         return np.concatenate(parts)
 
-    def only(self, inputs: Sequence[str], outputs: Sequence[str]) -> Block:
+    def only(self, inputs: Sequence[str], outputs: Sequence[str]) -> LinearBlock:
         """Return the block with these inputs and outputs, in this order."""
         m = [self.inputs.index(name) for name in inputs]
         p = [self.outputs.index(name) for name in outputs]
         b, c, d = self.b[:, m], self.c[p], self.d[np.ix_(p, m)]
-        return Block(self.a, b, c, d, tuple(inputs), tuple(outputs))
+        return LinearBlock(self.a, b, c, d, tuple(inputs), tuple(outputs))
 
     def simulate(self, inputs: np.ndarray) -> np.ndarray:
         """Return the outputs (steps, p) for inputs (steps, m), from rest."""
@@ -55,7 +55,7 @@ class Block:
             state = self.a @ state + self.b @ u
         return found
 
-    def reduced(self) -> Block:
+    def reduced(self) -> LinearBlock:
         """Return the block without states that influence neither an output nor another state."""
         block = self
         while True:
@@ -63,20 +63,20 @@ class Block:
             if seen.all():
                 return block
             a, b, c = block.a[np.ix_(seen, seen)], block.b[seen], block.c[:, seen]
-            block = Block(a, b, c, block.d, block.inputs, block.outputs)
+            block = LinearBlock(a, b, c, block.d, block.inputs, block.outputs)
 
 
-def delay(inputs: Sequence[str], outputs: Sequence[str], ticks: int) -> Block:
+def delay(inputs: Sequence[str], outputs: Sequence[str], ticks: int) -> LinearBlock:
     """Return the block that delays each of `inputs` by `ticks` and names it as in `outputs`."""
     width, size = len(inputs), ticks * len(inputs)
     a, b = np.eye(size, k=-width), np.eye(size, width)
     c, d = np.eye(size)[size - width :] if ticks else np.zeros((width, 0)), np.zeros((width, width))
-    return Block(a, b, c, d if ticks else np.eye(width), tuple(inputs), tuple(outputs))
+    return LinearBlock(a, b, c, d if ticks else np.eye(width), tuple(inputs), tuple(outputs))
 
 
 def join(
-    blocks: Iterable[Block], opened: Collection[str] = (), added: Collection[str] = ()
-) -> Block:
+    blocks: Iterable[LinearBlock], opened: Collection[str] = (), added: Collection[str] = ()
+) -> LinearBlock:
     """Connect each input with the output of the same name; return the whole as a block.
 
     opened: signals that are cut: the output stays, the inputs of that name get IN + name instead.
@@ -102,7 +102,7 @@ def join(
     a, b, c, d = (_diagonal([getattr(block, part) for block in blocks]) for part in "abcd")
     loop = np.linalg.inv(np.eye(len(inputs)) - feedback @ d)
     of_state, of_input = loop @ feedback @ c, loop @ outside
-    return Block(
+    return LinearBlock(
         a + b @ of_state,
         b @ of_input,
         c + d @ of_state,
@@ -128,7 +128,7 @@ def linearise(
     inputs: Sequence[str],
     outputs: Sequence[str],
     at: np.ndarray | None = None,
-) -> Block:
+) -> LinearBlock:
     """Return the block of `step`: inputs (m,) → outputs (p,), by central differences.
 
     objects: what keeps the state between two steps; every float array that can be reached from them
@@ -172,7 +172,7 @@ def linearise(
     by_state = np.reshape(by_state, (len(states), size)).T
     _write(arrays, rest)
     rows, count = len(outputs) + states, len(outputs)
-    return Block(
+    return LinearBlock(
         by_state[rows],
         by_input[rows],
         by_state[:count],

@@ -19,7 +19,7 @@ from typing import NamedTuple
 import numpy as np
 
 from uam_control.coordinates import ARM, POSITION
-from uam_lab.margins.linear import IN, Block, join
+from uam_lab.margins.linear import IN, LinearBlock, join
 from uam_lab.margins.margins import TINY, Margins, common_delay, margins
 from uam_lab.margins.stack_model import RATES, THRUST, Stack
 
@@ -39,7 +39,7 @@ class Loop:
     signals: tuple[str, ...]
 
 
-class Mode(NamedTuple):
+class GrowingMode(NamedTuple):
     """A mode of the closed system: growth [1/s], negative if it decays, at a frequency [rad/s]."""
 
     growth: float
@@ -58,8 +58,8 @@ class Analysis:
     omega: np.ndarray
     loops: dict[str, tuple[np.ndarray, Margins]]
     setpoint_delay: float
-    mode: Mode
-    closed: Block
+    mode: GrowingMode
+    closed: LinearBlock
 
     @property
     def stable(self) -> bool:
@@ -107,10 +107,10 @@ def analyse(stack: Stack) -> Analysis:
     )
 
 
-def fastest_mode(stack: Stack) -> Mode:
+def fastest_mode(stack: Stack) -> GrowingMode:
     """Return the mode of the closed system that grows fastest, or decays slowest."""
     pole = max(np.linalg.eigvals(join(stack.blocks).a), key=abs)
-    return Mode(
+    return GrowingMode(
         math.log(max(abs(pole), TINY)) / stack.period, abs(cmath.phase(pole)) / stack.period
     )
 

@@ -18,7 +18,7 @@ import numpy as np
 
 from uam_control.coordinates import ARM
 from uam_lab.analysis.dynamics import Body
-from uam_lab.margins.linear import Block, delay, join
+from uam_lab.margins.linear import LinearBlock, delay, join
 from uam_sim_bridge.plant import Vehicle
 from uam_sim_bridge.plant.actuators import Rotors
 
@@ -39,7 +39,7 @@ class Hover:
 
 def plant_model(
     vehicle: Vehicle, payload_mass: float, arm: Sequence[float], dry: bool = True
-) -> tuple[Block, Hover]:
+) -> tuple[LinearBlock, Hover]:
     """Return the plant's block for one control period, and the operating point.
 
     payload_mass [kg], rigid on the magnet; arm (n,): joint angles [rad]; dry: whether the joints
@@ -72,7 +72,7 @@ def plant_model(
     acting, sent = (tuple(f"{one}.{j}" for j in names[ARM]) for one in ("acting", "effort"))
     outputs = (*(f"true.{name}" for name in names), *(f"true.{name}_dot" for name in names))
     d = np.zeros((len(outputs), rotors + joints))
-    physics = Block(held, stepped, seen, d, (*motors, *acting), outputs)
+    physics = LinearBlock(held, stepped, seen, d, (*motors, *acting), outputs)
     bus = delay(sent, acting, numbers["servos"]["command_latency_ticks"])
     return join([physics, bus]), Hover(weight, command)
 

@@ -15,7 +15,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from uam_control.coordinates import ARM, ATTITUDE, POSITION
-from uam_lab.margins.loops import GROWTH, Analysis, Mode, step_response
+from uam_lab.margins.loops import GROWTH, Analysis, GrowingMode, step_response
 from uam_lab.margins.stack_model import Stack
 from uam_lab.report.figures import style
 from uam_lab.results.atomic import write_text
@@ -40,7 +40,7 @@ class Case:
     stack: Stack
     analysis: Analysis
     rho: dict[str, float]
-    sliding: Mode
+    sliding: GrowingMode
 
 
 def smallest_delay(cases: Sequence[Case]) -> tuple[float, str]:
@@ -172,7 +172,7 @@ def _finish(figure: Figure, cases: Sequence[Case], title: str) -> None:
     style.title(figure, title)
 
 
-def _mode(mode: Mode) -> str:
+def _mode(mode: GrowingMode) -> str:
     if mode.growth < GROWTH:
         return "stable"
     return f"UNSTABLE ({mode.growth:+.2g} 1/s at {mode.frequency:.3g} rad/s)"

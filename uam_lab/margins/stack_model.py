@@ -21,7 +21,7 @@ from uam_control.coordinates import ARM, ATTITUDE, CHI, CHI_DDOT, CHI_DOT, Z
 from uam_control.mission import load_scenario
 from uam_control.profiles.profile import CONTROLLERS, Profile
 from uam_lab.flight.direct.flight import DirectFlight
-from uam_lab.margins.linear import Block, delay, linearise
+from uam_lab.margins.linear import LinearBlock, delay, linearise
 from uam_lab.margins.plant_model import Hover, plant_model
 from uam_sim_bridge.mavlink.protocol.frames import swap_body
 from uam_sim_bridge.plant import Vehicle
@@ -36,7 +36,7 @@ Gains = Mapping[str, np.ndarray]  # subsystem → adapted gains, the first value
 class Stack:
     """All blocks of vehicle and stack; period [s] of the ticks; names of chi's coordinates."""
 
-    blocks: tuple[Block, ...]
+    blocks: tuple[LinearBlock, ...]
     period: float
     coordinates: tuple[str, ...]
 
@@ -81,7 +81,7 @@ def _of(stage: str, names: Sequence[str]) -> tuple[str, ...]:
     return tuple(f"{stage}.{name}" for name in names)
 
 
-def _joints(flight: DirectFlight, names: Sequence[str], latency: int) -> tuple[Block, ...]:
+def _joints(flight: DirectFlight, names: Sequence[str], latency: int) -> tuple[LinearBlock, ...]:
     """Return latency and observer of the joints: true.<joint> → state.<joint>, with rates."""
     estimator, n = flight.control.estimator.estimator, len(names)
     both = (*names, *(f"{name}_dot" for name in names))
@@ -99,7 +99,7 @@ def _joints(flight: DirectFlight, names: Sequence[str], latency: int) -> tuple[B
     return delay(_of("true", both), _of("read", both), latency), block
 
 
-def _laws(flight: DirectFlight, names: Sequence[str], hover: Hover, gains: Gains) -> Block:
+def _laws(flight: DirectFlight, names: Sequence[str], hover: Hover, gains: Gains) -> LinearBlock:
     """Return the three laws and the map: state → setpoint, effort."""
     control, signals, size = flight.control, flight.control.signals, len(names)
     signals.flying, weight = True, hover.weight
@@ -131,7 +131,7 @@ def _laws(flight: DirectFlight, names: Sequence[str], hover: Hover, gains: Gains
     return linearise(step, laws, inputs, outputs)
 
 
-def _autopilot(flight: DirectFlight, hover: Hover) -> Block:
+def _autopilot(flight: DirectFlight, hover: Hover) -> LinearBlock:
     """Return the autopilot's rate loop: arrived setpoint, gyro → motor commands."""
     autopilot, period = flight.autopilot.autopilot, flight.plant.period
     rates, thrust = flight.control.bridge.map.map(

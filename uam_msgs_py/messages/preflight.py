@@ -11,7 +11,7 @@ from uam_msgs_py.messages.ros_time import set_stamp
 from uam_msgs_py.messages.status import ERROR, OK
 
 
-class Check(Protocol):
+class ReportedCheck(Protocol):
     """A line of the report, see `uam_control.supervision.PreflightCheck`."""
 
     name: str
@@ -20,7 +20,7 @@ class Check(Protocol):
     passed: bool
 
 
-def preflight_message(stamp: int, checks: Iterable[Check]) -> DiagnosticArray:
+def preflight_message(stamp: int, checks: Iterable[ReportedCheck]) -> DiagnosticArray:
     """Return the message; stamp [ns]."""
     array = DiagnosticArray(
         status=[

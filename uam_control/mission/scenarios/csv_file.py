@@ -23,7 +23,7 @@ import numpy as np
 
 from uam_control.coordinates import YAW, Z, arm_coordinates
 from uam_control.mission.motion.polynomials import Polynomials
-from uam_control.mission.scenarios.fitted_spline import Misfit, Samples, fitted
+from uam_control.mission.scenarios.fitted_spline import CurveSamples, Misfit, fitted
 from uam_control.mission.scenarios.route import Route, with_ramps
 from uam_control.mission.scenarios.scenario import Landing, Scenario, ScenarioError, standing
 from uam_control.mission.scenarios.scenario_options import AS_SCENARIO, RETURN, ScenarioOptions
@@ -194,7 +194,11 @@ def _path(
     else:
         angles = np.tile(vehicle.stowed, (len(times), 1))
     columns = ("px", "yaw" if table.columns("quaternion") is None else "qw", names[0])
-    groups = (Samples(position, velocity, acceleration), Samples(yaw, turning), Samples(angles))
+    groups = (
+        CurveSamples(position, velocity, acceleration),
+        CurveSamples(yaw, turning),
+        CurveSamples(angles),
+    )
     try:
         base, heading, arm = fitted(times, groups, PASSES_WITHIN)
     except Misfit as error:

@@ -33,7 +33,7 @@ class Misfit(ValueError):
         self.group, self.row, self.distance = group, row, distance
 
 
-class Samples(NamedTuple):
+class CurveSamples(NamedTuple):
     """Values (m, n) at m times; rates, accelerations (m, n): None if not given."""
 
     values: np.ndarray
@@ -41,7 +41,9 @@ class Samples(NamedTuple):
     accelerations: np.ndarray | None = None
 
 
-def fitted(times: np.ndarray, groups: Sequence[Samples], tolerance: float) -> list[Polynomials]:
+def fitted(
+    times: np.ndarray, groups: Sequence[CurveSamples], tolerance: float
+) -> list[Polynomials]:
     """Return a spline per group through its values, all with the same knots.
 
     times (m,) [s], increasing; tolerance: of every value. Raises Misfit.
@@ -69,7 +71,7 @@ def _knots(times: np.ndarray, intervals: int) -> np.ndarray:
     return np.concatenate([[times[0]] * DEGREE, inner, [times[-1]] * DEGREE])
 
 
-def _solved(times: np.ndarray, given: Samples, knots: np.ndarray) -> BSpline:
+def _solved(times: np.ndarray, given: CurveSamples, knots: np.ndarray) -> BSpline:
     inner = knots[DEGREE:-DEGREE]
     between = 0.5 * (inner[:-1] + inner[1:])
     rows, right = [], []
