@@ -192,3 +192,14 @@ def test_every_sample_is_met(steps, rate, given_rows):
         pytest.fail("a smooth curve is met")
     inside = path.rows(np.clip(times, 1e-9, times[-1] - 1e-9))
     assert np.abs(inside[0] - table[:, 1:4]).max() <= 1.1e-3
+
+
+@pytest.mark.parametrize("times", [(0.0, 0.7), (0.0, 0.5, 0.7), (0.0, 0.5, 0.5625, 0.59375)])
+def test_between_few_samples_the_curve_goes_straight_on(times):
+    """Of a line: as many samples as leave the rates of a spline open."""
+    times = np.array(times)
+    (path,) = fitted(times, [CurveSamples(np.stack([2.0 * times, 1.0 - times], 1))], 1e-3)
+    within = np.linspace(0.0, times[-1], 50)
+    found = path.rows(within)
+    np.testing.assert_allclose(found[0], np.stack([2.0 * within, 1.0 - within], 1), atol=1e-5)
+    np.testing.assert_allclose(found[2], 0.0, atol=1e-2)

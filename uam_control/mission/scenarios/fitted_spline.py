@@ -22,7 +22,10 @@ DEGREE = 7
 COARSEST = 0.2  # [s] distance of the knots in the first attempt, or that of the samples
 ATTEMPTS = 5  # each with knots at half the distance
 # A unit of misfit in rate, acceleration and snap weighs as much as these in value [s, s^2, s^4].
-RATE, ACCELERATION, SNAP = 1e-2, 1e-3, 1e-8
+RATE, ACCELERATION, SNAP = 1e-2, 1e-3, 5e-9
+LEAST_ACCELERATION = (
+    1e-6  # [s^2] of acceleration itself: decides where fewer than four samples do not
+)
 
 
 class Misfit(ValueError):
@@ -73,15 +76,18 @@ def _knots(times: np.ndarray, intervals: int) -> np.ndarray:
 
 def _solved(times: np.ndarray, given: CurveSamples, knots: np.ndarray) -> BSpline:
     inner = knots[DEGREE:-DEGREE]
-    between = 0.5 * (inner[:-1] + inner[1:])
+    # four places per interval: snap is a cubic there, so together they leave only cubics open
+    places = (np.arange(4) + 0.5) / 4.0
+    between = (inner[:-1, None] + np.diff(inner)[:, None] * places).ravel()
     rows, right = [], []
     for order, (samples, weight) in enumerate(zip(given, (1.0, RATE, ACCELERATION), strict=True)):
         if samples is not None:
             rows.append(weight * _basis(times, knots, order))
             right.append(weight * samples)
     size = given.values.shape[1]
-    rows.append(SNAP * _basis(between, knots, 4))  # so that few samples also have one solution
-    right.append(np.zeros((len(between), size)))
+    for order, weight in ((4, SNAP), (2, LEAST_ACCELERATION)):  # few samples have one solution, too
+        rows.append(weight * _basis(between, knots, order))
+        right.append(np.zeros((len(between), size)))
     matrix, target = vstack(rows).tocsc(), np.concatenate(right)
     solution = spsolve((matrix.T @ matrix).tocsc(), matrix.T @ target)
     return BSpline(knots, solution.reshape(-1, size), DEGREE)
