@@ -141,6 +141,7 @@ class Flight:
         self.tracked, self.carried, self.taken = tracked, False, True
         self.noise = lambda: np.zeros(3)
         self.error = np.zeros(3)
+        self.gust = lambda time: 0.0  # [N]
 
     def magnet(self):
         motion = np.zeros((MOTION_ROWS, 8))
@@ -172,7 +173,7 @@ class Flight:
                 magnet,
                 error=self.error.copy(),
                 payload=payload.copy(),
-                lift=21.6 + load,
+                lift=21.6 + load + self.gust(self.stamp),
                 effort=0.5 + 0.2 * load,
                 lever=0.2,
             )
@@ -247,9 +248,16 @@ def test_an_absent_payload_costs_no_time():
 def test_without_mocap_of_the_payload_the_mass_decides():
     flight = Flight(lambda attempt: True, tracked=False)
     assert flight.until() == [Grasp.APPROACHED, Grasp.HELD, Grasp.RELEASED]
-    assert "identified mass 0.19 kg" in flight.executive.decisions[1].text
+    assert "identified mass 0.20 kg" in flight.executive.decisions[1].text
     flight = Flight(lambda attempt: False, tracked=False)
     assert flight.until()[-1] is Grasp.GIVEN_UP
+
+
+def test_a_gust_is_no_payload():
+    flight = Flight(lambda attempt: False, tracked=False)
+    waiting = 100.0 + flight.windows[0].lifted + 1.0
+    flight.gust = lambda stamp: 2.5 if waiting < stamp < waiting + 0.3 else 0.0
+    assert Grasp.HELD not in flight.until()
 
 
 def test_a_light_payload_without_mocap_is_carried_unverified():

@@ -36,6 +36,7 @@ NEAR = 0.015  # [m] height above the payload below which a miss breaks off the d
 BESIDE = 0.5  # [m] horizontal distance from the stand within which a contact is one with it
 CONTACT_AFTER = MISSED_AFTER = 0.2  # [s]
 LATE = 2.0  # factor on the tolerances of the alignment after align_timeout
+WEIGHED_FOR = 0.5  # [s] for which an identified mass alone must show the payload: no transient
 CALM, CALM_FOR = 0.5, 0.5  # of contact_error, and [s] below it, after which a contact is over
 
 
@@ -193,7 +194,9 @@ class GraspExecutive:
 
     def _verify(self, sight: Sight, window: GraspWindow) -> None:
         evidence = self._evidence(sight)
-        if evidence.held and self._load.span(sight.stamp) > 0.0:
+        lasts = self._lasting(sight.stamp, bool(evidence.held))
+        lasted = lasts >= (0.0 if sight.tracked else WEIGHED_FOR)
+        if evidence.held and lasted and self._load.span(sight.stamp) > 0.0:
             self._begin_carry(sight, Grasp.HELD, evidence.text)
         elif evidence.held is False and sight.tracked:
             self._go_back(sight, f"not held, {evidence.text}")

@@ -6,13 +6,13 @@ description for the user, and its name is that of the class: `MotorLoss` is `mot
 
 from __future__ import annotations
 
-import re
 from dataclasses import asdict, dataclass
 from typing import Any, ClassVar, dataclass_transform
 
 import numpy as np
 
-from uam_control.settings.parameter_set import ParameterSet, choice, number
+from uam_control.settings.named_set import NamedSet
+from uam_control.settings.parameter_set import choice, number
 from uam_sim_bridge.plant import Disturbance, Samples
 
 PLANT, LINK, PROCESS = "plant", "MAVLink", "process"
@@ -23,18 +23,10 @@ class FaultError(ValueError):
 
 
 @dataclass_transform(frozen_default=True, field_specifiers=(number, choice))
-class Fault(ParameterSet):
-    """Base of all faults. NAME, ABOUT: for the user; PLACE: PLANT, LINK or PROCESS."""
+class Fault(NamedSet):
+    """Base of all faults. PLACE: PLANT, LINK or PROCESS."""
 
-    NAME: ClassVar[str]
-    ABOUT: ClassVar[str]
     PLACE: ClassVar[str] = ""
-
-    def __init_subclass__(cls) -> None:
-        cls.NAME = re.sub(r"(?<=[a-z])(?=[A-Z])", "_", cls.__name__).lower()
-        about = " ".join((cls.__doc__ or "").split()).rstrip(".")
-        cls.ABOUT = about[:1].lower() + about[1:]
-        dataclass(frozen=True)(cls)
 
     @property
     def values(self) -> dict[str, Any]:

@@ -8,7 +8,6 @@ in config/plant/; a parameter has no default.
 from __future__ import annotations
 
 import math
-import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, ClassVar, dataclass_transform
@@ -16,7 +15,8 @@ from typing import Any, ClassVar, dataclass_transform
 import mujoco
 import numpy as np
 
-from uam_control.settings.parameter_set import Bound, ParameterSet, number
+from uam_control.settings.named_set import NamedSet
+from uam_control.settings.parameter_set import Bound, number
 from uam_sim_bridge.plant.actuators import Rotors
 from uam_sim_bridge.plant.vehicle import Vehicle
 
@@ -88,18 +88,10 @@ HOOKS = ("tick", "joints", "imu", "pose", "lateness")
 
 
 @dataclass_transform(frozen_default=True, field_specifiers=(size,))
-class Effect(ParameterSet):
-    """Base of all effects. NAME, ABOUT: for the user; SOURCE: where model and numbers are from."""
+class Effect(NamedSet):
+    """Base of all effects. SOURCE: where model and numbers are from."""
 
-    NAME: ClassVar[str]
-    ABOUT: ClassVar[str]
     SOURCE: ClassVar[str] = ""
-
-    def __init_subclass__(cls) -> None:
-        cls.NAME = re.sub(r"(?<=[a-z])(?=[A-Z])", "_", cls.__name__).lower()
-        about = " ".join((cls.__doc__ or "").split()).rstrip(".")
-        cls.ABOUT = about[:1].lower() + about[1:]
-        dataclass(frozen=True)(cls)
 
     def begin(self, bench: Bench, noise: np.random.Generator) -> Acting | None:
         """Return the object that acts in a flight; None if the effect acts only here.
