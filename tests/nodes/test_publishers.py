@@ -1,5 +1,7 @@
 """Who may publish, over ROS: early impostors, configured names, messages that cannot be used."""
 
+import signal
+
 import numpy as np
 import pytest
 from rclpy.node import Node
@@ -15,6 +17,7 @@ from uam_msgs_py.node.connections import READERS, Connections
 PERIOD = 4_000_000
 NAMES = coordinates(2)
 LEVEL = np.array([1.0, 0.0, 0.0, 0.0])
+IMPOSTORS = 300  # messages while the node is stopped
 MODULE = "uam_control.nodes.mission"
 
 
@@ -98,6 +101,27 @@ def test_an_impostor_before_the_rightful_node_is_refused_and_named(start, probe,
         probe.until(lambda n=before: len(magnet) > n, "an answer")
         before += 1
     assert len(magnet) == before
+
+
+def test_messages_of_an_impostor_do_not_replace_those_of_the_rightful_node(
+    start, probe, node_named
+):
+    """A starved process reads late: both publishers' messages share its queue."""
+    magnet = probe.collect(topics.MAGNET)
+    mission = start(MODULE, publishers="")
+    rightful = States(node_named("state_estimator"), probe)
+    impostor = States(probe.node, probe)
+    probe.until_connected("mission", [rightful.out, impostor.out], [topics.MAGNET])
+    rightful.until(lambda: magnet, "the rightful node is obeyed")
+    probe.until(lambda: len(magnet) >= rightful.stamp // PERIOD, "all are answered")
+    impostor.stamp, answered = rightful.stamp, len(magnet)
+    mission.process.send_signal(signal.SIGSTOP)
+    rightful.send()
+    for _ in range(IMPOSTORS):
+        impostor.send()
+    mission.process.send_signal(signal.SIGCONT)
+    probe.until(lambda: len(magnet) > answered, "an answer to the rightful node")
+    assert len(magnet) == answered + 1
 
 
 def test_a_configured_node_is_the_rightful_one(start, probe, node_named):

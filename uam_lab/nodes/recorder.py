@@ -66,7 +66,7 @@ def _health(
     values[connections.RECORDED_UNTIL] = recording.until
     namespace = node.get_namespace()
     values |= polls.report("poll") | ages(recording.inlets, recording.arrivals, namespace)
-    values |= connections.of({}, recording.inlets, namespace)
+    values |= connections.of(node, {}, recording.inlets)
     now = node.get_clock().now().nanoseconds
     values["foreign publishers"] = "; ".join(recording.foreign)
     level = ERROR if recording.ended else WARN if lost else OK

@@ -37,8 +37,11 @@ def _qos(depth: int, reliable: bool = True, latched: bool = False) -> QoSProfile
     )
 
 
-# 128 ms at control rate: a process that stalls for less loses no message
-DEPTH = 32
+DEPTH = 32  # of a publisher: 128 ms at control rate
+# Of a subscription: the messages of all publishers share it. A process that stalls for 1.6 s at
+# control rate loses no message; beside an impostor at control rate, for 0.8 s. Fast DDS stores no
+# more (max_samples_per_instance).
+READING_DEPTH = 400
 SENSOR_DATA = _qos(DEPTH, reliable=False)  # rclpy.qos.qos_profile_sensor_data, but deeper
 RELIABLE = _qos(DEPTH)
 NEWEST = _qos(4, reliable=False)  # for readers that poll and use only the newest message
@@ -65,8 +68,15 @@ class Topic:
 
         Best effort for messages of every tick: the next message replaces a lost one, and thousands
         of acknowledgements per second are saved. Other subscribers may request reliable delivery.
+        Deeper than the publisher's where there should be one publisher: messages of a second one,
+        which are refused after they are taken, must not replace messages of the rightful one.
         """
-        return SENSOR_DATA if self.qos is RELIABLE and self is not DIAGNOSTICS else self.qos
+        qos = SENSOR_DATA if self.qos is RELIABLE and self is not DIAGNOSTICS else self.qos
+        if not self.one_publisher:
+            return qos
+        return QoSProfile(
+            depth=READING_DEPTH, reliability=qos.reliability, durability=qos.durability
+        )
 
 
 CLOCK = Topic("clock", Clock, _qos(1, reliable=False), "simulation time")

@@ -215,7 +215,7 @@ class UamNode(TunableNode):
         }
         namespace = self.get_namespace()
         common |= ages(self._counts, self._arrivals, namespace)
-        common |= connections.of(self._outlets, self._inlets, namespace)
+        common |= connections.of(self, self._outlets, self._inlets)
         stamp = self.stamp or self.get_clock().now().nanoseconds
         self._diagnostics.publish(diagnostic(stamp, label(self), level, summary, common | values))
 

@@ -15,26 +15,34 @@ from rclpy.subscription import Subscription
 from uam_msgs_py.messages import topics
 from uam_msgs_py.node.namespace import expanded, prefix
 
+NAMELESS = "_NODE_NAME_UNKNOWN_"  # of the middleware, before it has a node's name
 READERS, WRITERS = "readers of ", "writers of "
 RECORDER, RECORDED_UNTIL = "recorder", "recorded until [s]"
 
 
 def of(
-    outlets: Mapping[str, Publisher], inlets: Mapping[str, Subscription], namespace: str
+    node: Node, outlets: Mapping[str, Publisher], inlets: Mapping[str, Subscription]
 ) -> dict[str, int]:
-    """Return the diagnostic values: for each topic of a node, its number of connected ends.
-
-    namespace: of the node.
-    """
+    """Return the diagnostic values: for each topic of `node`, its number of connected ends."""
     counts = {
         READERS: {name: outlet.get_subscription_count() for name, outlet in outlets.items()},
-        WRITERS: {name: inlet.get_publisher_count() for name, inlet in inlets.items()},
+        WRITERS: {name: _writers(node, inlet) for name, inlet in inlets.items()},
     }
     return {
-        kind + expanded(namespace, name): count
+        kind + expanded(node.get_namespace(), name): count
         for kind, found in counts.items()
         for name, count in found.items()
     }
+
+
+def _writers(node: Node, inlet: Subscription) -> int:
+    """Return the number of connected publishers whose node name is known in the node's graph.
+
+    The name may arrive after the connection; until then `SolePublisher` refuses the messages.
+    """
+    ends = node.get_publishers_info_by_topic(inlet.topic_name)
+    named = sum(end.node_name != NAMELESS for end in ends)
+    return min(inlet.get_publisher_count(), named)
 
 
 class Connections:

@@ -18,6 +18,7 @@ from rclpy.node import Node
 from rclpy.serialization import deserialize_message
 from rclpy.subscription import Subscription
 
+from uam_msgs_py.node.connections import NAMELESS
 from uam_msgs_py.node.rightful import Rightful, full_name
 from uam_msgs_py.node.taking import Taker
 
@@ -25,7 +26,6 @@ LOOK_PERIOD = 0.02  # [s] wall time between two looks at the graph
 NAME_WAIT = 0.1  # [s] for the node name of a new publisher, which may arrive after its messages
 SILENT = 250_000_000  # [ns] wall time after which a publisher of the same name takes over
 UNKNOWN = "unknown node"
-NAMELESS = "_NODE_NAME_UNKNOWN_"  # of the middleware, before it has the name
 
 
 class SolePublisher:

@@ -199,8 +199,8 @@ class Simulator:
             wires = wiring.with_autopilot_imu(wires)
         waiting = wiring.missing(self.node, recorded, wires)
         if not waiting:  # all publishers and subscriptions exist: are they connected?
-            namespace = self.node.get_namespace()
-            plant = of(self.sensors.outlets | self.truth.outlets, self.answers.inlets, namespace)
+            outlets = self.sensors.outlets | self.truth.outlets
+            plant = of(self.node, outlets, self.answers.inlets)
             waiting = list(
                 wiring.unconnected(
                     self.connections,
@@ -208,7 +208,7 @@ class Simulator:
                     recorded,
                     wires,
                     foreign,
-                    namespace,
+                    self.node.get_namespace(),
                     wiring.publishers(self.node),
                 )
             )
