@@ -1,9 +1,10 @@
 """Braking: a reference that begins in the vehicle's present motion and comes to rest.
 
 Each group of coordinates is the sum of two polynomials of time. The fade takes the acceleration and
-the jerk of the start to zero: its acceleration is a cubic. The brake takes the rate that is left to
-zero: its rate is a quintic. Both have the least degree for which value, rate, acceleration and jerk
-are continuous, at the start, between the parts, and at rest.
+the jerk of the start to zero: its acceleration is a quintic. The brake takes the rate that is left
+to zero: its rate is a septic. Both have the least degree for which value, rate, acceleration, jerk
+and snap are continuous between the parts and at rest, and the snap is zero at the start: the snap
+is the angular acceleration of the body, so the torque has no step.
 """
 
 from __future__ import annotations
@@ -22,9 +23,9 @@ SHORTEST = 0.3  # [s] of a fade, and of the stop of a sinking vehicle near the g
 MOST_ACROSS, MOST_UP = 7.0, 3.0  # [m/s^2] largest acceleration at the start: 35 deg of tilt, 0.3 g
 ACROSS = slice(X, Z)
 # The fade's jerk keeps half of the bound for any jerk at the start up to it: sup over s of
-# 6 s (1 - s) |a| / (T J) + |1 - 4 s + 3 s^2| is 1 for T = 3 / sqrt(2) |a| / J.
-_FADE = 3.0 / math.sqrt(2.0)
-_PEAK, _STEEPEST = 1.875, 5.7735  # of the brake's quintic: acceleration T / v and jerk T^2 / v
+# 30 s^2 (1 - s)^2 |a| / (T J) + |(1 - s)^2 (1 + 2 s - 15 s^2)| is 1 for T = 3.6465 |a| / J.
+_FADE = 3.6465
+_PEAK, _STEEPEST = 2.1875, 7.5133  # of the brake's septic: acceleration T / v and jerk T^2 / v
 # A brake at least this much longer than the fade grows more slowly than the fade decays, so their
 # sum stays below the larger of the two accelerations.
 _LONGER = 2.5
@@ -34,7 +35,7 @@ class Stop:
     """Motion of k coordinates from value, rate, acceleration and jerk to rest.
 
     The norm of the jerk stays within `jerk`; that of the acceleration within `acceleration`, or
-    within that of the start plus 0.15 of the jerk's run-out, where this is larger. `length` [s].
+    within that of the start plus 0.2 of the jerk's run-out, where this is larger. `length` [s].
     """
 
     def __init__(
@@ -49,14 +50,15 @@ class Stop:
         share = jerk / 2.0
         j = j * min(1.0, share / max(float(np.linalg.norm(j)), 1e-9))
         fade = shorter * max(SHORTEST, _FADE * float(np.linalg.norm(a)) / share)
-        gained = fade * (a / 2.0 + j * fade / 12.0)  # rate at the end of the fade
+        gained = fade * (a / 2.0 + j * fade / 10.0)  # rate at the end of the fade
         speed = float(np.linalg.norm(rate + gained))
         quick = max(_PEAK * speed / acceleration, math.sqrt(_STEEPEST * speed / share))
         brake = max(shorter * quick, _LONGER * fade)
         zero, a, j = np.zeros_like(value), a * fade**2, j * fade**3
-        first = [zero, -gained * fade, a / 2, j / 6, -a / 4 - j / 6, a / 10 + j / 20]
+        faded = [zero, -a / 2 - 0.3 * j, a / 2 + j * (4 / 15), -a / 7 - j / 14]
+        first = [zero, -gained * fade, a / 2, j / 6, *faded]
         v = (rate + gained) * brake
-        second = [value, v, zero, zero, -2.5 * v, 3.0 * v, -v]
+        second = [value, v, zero, zero, zero, -7.0 * v, 14.0 * v, -10.0 * v, 2.5 * v]
         self._parts = (_Polynomial(first, fade), _Polynomial(second, brake))
         self.length = brake
 
