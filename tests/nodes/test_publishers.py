@@ -10,6 +10,7 @@ from uam_control.coordinates import coordinates
 from uam_msgs_py.messages import topics
 from uam_msgs_py.messages.control import read_reference
 from uam_msgs_py.messages.convert import PoseWriter
+from uam_msgs_py.messages.layouts import stamp_of
 from uam_msgs_py.messages.status import ERROR
 from uam_msgs_py.messages.trajectories import TrajectoryWriter
 from uam_msgs_py.node.connections import READERS, Connections
@@ -107,21 +108,21 @@ def test_messages_of_an_impostor_do_not_replace_those_of_the_rightful_node(
     start, probe, node_named
 ):
     """A starved process reads late: both publishers' messages share its queue."""
-    magnet = probe.collect(topics.MAGNET)
+    references = probe.collect(topics.REFERENCE)
     mission = start(MODULE, publishers="")
     rightful = States(node_named("state_estimator"), probe)
     impostor = States(probe.node, probe)
-    probe.until_connected("mission", [rightful.out, impostor.out], [topics.MAGNET])
-    rightful.until(lambda: magnet, "the rightful node is obeyed")
-    probe.until(lambda: len(magnet) >= rightful.stamp // PERIOD, "all are answered")
-    impostor.stamp, answered = rightful.stamp, len(magnet)
+    probe.until_connected("mission", [rightful.out, impostor.out], [topics.REFERENCE])
+    rightful.until(lambda: references, "the rightful node is obeyed")
+    impostor.stamp = rightful.stamp
     mission.process.send_signal(signal.SIGSTOP)
     rightful.send()
     for _ in range(IMPOSTORS):
         impostor.send()
     mission.process.send_signal(signal.SIGCONT)
-    probe.until(lambda: len(magnet) > answered, "an answer to the rightful node")
-    assert len(magnet) == answered + 1
+    # a reference is for the tick after that of its state
+    probe.until(lambda: stamp_of(references[-1]) > rightful.stamp, "an answer to the rightful node")
+    assert stamp_of(references[-1]) == rightful.stamp + PERIOD
 
 
 def test_a_configured_node_is_the_rightful_one(start, probe, node_named):
