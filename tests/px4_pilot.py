@@ -14,6 +14,7 @@ from uam_sim_bridge.mavlink.protocol.wire import Codec, Framer, mavlink2
 PORT = 14550  # of PX4's ground station, whatever its instance
 BEAT = 0.03  # [s] wall time between two MANUAL_CONTROL; PX4 counts them lost after COM_RC_LOSS_T
 ORIGIN = 473566100, 85461800, 408000  # latitude, longitude [1e-7 deg], altitude [mm]
+PATIENCE = 100.0  # [s] wall time
 AGAIN = 0.3  # [s] after which a choice that had no effect is repeated
 LOW_BATTERY = {
     "COM_LOW_BAT_ACT": 2,
@@ -55,6 +56,13 @@ class Pilot:
     def act(self, after: float) -> None:
         """Choose the mode in `after` [s]."""
         self._at = self.since + after
+
+    def wait(self, seconds: float) -> None:
+        """Wait until the pilot acted that long ago [s], by PX4's clock."""
+        end = time.monotonic() + PATIENCE
+        while self.acted is None or self.since < self.acted + seconds:
+            assert time.monotonic() < end, "PX4's clock stands still"
+            time.sleep(0.01)
 
     def close(self) -> None:
         """Switch the radio off."""
