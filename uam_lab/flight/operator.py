@@ -17,7 +17,7 @@ from uam_msgs_py.messages import topics
 from uam_msgs_py.messages.preflight import read_preflight
 from uam_msgs_py.messages.status import AutopilotState, MissionStatus
 
-PATIENCE = 5.0  # [s] wall time to find the flight, and the same for its answer
+PATIENCE = 12.0  # [s] wall time to find the flight on a busy machine, and as long for its answer
 
 
 class NoFlight(RuntimeError):
