@@ -121,6 +121,18 @@ def test_joint_torques_of_a_still_arm_are_those_of_its_weight():
     np.testing.assert_allclose(demand.joint_torques[100], [first, second], rtol=2e-3)
 
 
+def test_the_magnet_must_hold_the_payloads_apparent_weight():
+    """0.2 kg at 10 m/s^2 upwards weigh 3.96 N; a magnet of 3 N is refused."""
+    up = Motion(lambda t: rows(z=(5.0 * t * t, 10.0 * t, 10.0)))
+    demand = checked().along(up, TIMES, np.full(len(TIMES), 0.2))
+    np.testing.assert_allclose(demand.magnet_force[5:-5], 0.2 * 19.81, rtol=1e-3)
+    found = checked().exceeded(demand)
+    assert "force on the magnet" not in in_words(found)
+    numbers = PROFILE.vehicle.numbers | {"magnet": {"holding_force": 3.0, "gap_scale": 0.003}}
+    weak = Feasibility(replace(PROFILE.vehicle, numbers=numbers), OPEN, 0.2)
+    assert "force on the magnet 3.96 N exceeds 3 N" in in_words(weak.exceeded(demand))
+
+
 @pytest.mark.parametrize("name", ["s500_arm", "s500_arm3", "hexa_arm"])
 def test_the_arm_model_has_the_masses_of_the_plants_model(name):
     vehicle = load_description(name)

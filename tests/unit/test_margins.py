@@ -1,6 +1,7 @@
 """Margins worked by hand, blocks and their connection, and the model of the stack."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -8,6 +9,7 @@ import pytest
 from uam_control.estimation import EstimatorParameters, StateEstimator
 from uam_control.estimation.filters import low_pass_step
 from uam_control.profiles.profile import default_profile
+from uam_control.vehicle import load_description
 from uam_lab.cli.margins import verdict
 from uam_lab.margins.linear import IN, LinearBlock, delay, join, linearise
 from uam_lab.margins.loops import analyse, step_response
@@ -219,6 +221,31 @@ def test_poses_may_be_older_for_a_slower_observer():
     assert remaining(fast, 0.024, 0.004, 120.0) > 1.0
     assert 0.1 < pose_delay(slow, 0.004, 120.0) < 0.25
     assert pose_delay(fast, 0.004, 120.0) < 0.02
+
+
+@pytest.mark.parametrize("name", ["s500_arm", "hexa_arm", "s500_arm3"])
+def test_the_supervisor_has_the_computed_margin(name):
+    described = load_description(name)
+    profile, vehicle = default_profile("modular", described), Vehicle.of(described)
+    cases = [analyse(stack_model(profile, vehicle, payload)) for payload in (0.0, 0.2)]
+    computed = min(case.setpoint_delay for case in cases)
+    assert verdict(profile.sets["mission"].delay_margin, computed) == "as computed"
+    # servos and joint readings may be late, too
+    joints = [name for name in described.coordinates if name.startswith("alpha")]
+    assert min(case.loops[joint][1].delay for case in cases for joint in joints) > 0.030
+
+
+def test_a_prediction_gives_roll_and_pitch_phase_and_leaves_yaw(vehicle):
+    """It acts on the rate of e_q: a zero at 1 / prediction, 15 degrees at 9 rad/s for 30 ms."""
+    profile = default_profile("modular", vehicle.description)
+    ahead = replace(profile.sets["attitude_controller"], prediction=0.03)
+    predicting = replace(profile, sets=profile.sets | {"attitude_controller": ahead})
+    before, after = (
+        analyse(stack_model(p, vehicle, late_setpoints=8)) for p in (profile, predicting)
+    )
+    for name in ("roll", "pitch"):
+        assert 10.0 < after.loops[name][1].phase - before.loops[name][1].phase < 20.0
+    assert after.loops["yaw"][1].delay == pytest.approx(before.loops["yaw"][1].delay, abs=5e-4)
 
 
 def test_the_margin_of_the_profile_is_judged():

@@ -135,6 +135,22 @@ def test_the_plate_is_where_the_model_has_it():
     np.testing.assert_allclose(magnet_constants(VEHICLE.compile(0.2), 0.003), GAP)
 
 
+@pytest.mark.parametrize("speed", [0.0, 10.0])
+def test_a_payload_that_moves_with_the_magnet_is_held_as_one_at_rest(speed):
+    """Face and payload are compared at one instant: 2 ms at 10 m/s would be a gap of 20 mm."""
+    plant = MujocoPlant(VEHICLE, 0.2, seed=1)
+    model, data = plant.model, plant.data
+    first, speeds = model.joint("payload").qposadr[0], model.joint("payload").dofadr[0]
+    data.qpos[2] += 3.0
+    mujoco.mj_forward(model, data)
+    data.qpos[first : first + 3] = data.site("magnet_face").xpos - (0.0, 0.0, 0.0199)
+    data.qvel[2] = data.qvel[speeds + 2] = speed
+    mujoco.mj_forward(model, data)
+    for _ in range(2):
+        plant.step(np.full(4, 0.5), np.zeros(2), True)
+    assert plant.truth().magnet_force > 0.9 * NUMBERS["magnet"]["holding_force"]
+
+
 def test_the_magnet_stands_on_the_stand_but_does_not_hold_on_to_it():
     plant = MujocoPlant(VEHICLE, 0.0, seed=1)
     model, data = plant.model, plant.data

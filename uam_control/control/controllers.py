@@ -18,6 +18,7 @@ from uam_control.control.output_limits import (
     integrate,
     limit_force,
     limit_torque,
+    predict_attitude,
     wash_out,
 )
 from uam_control.control.sample_hold import SampleHold
@@ -237,6 +238,8 @@ class AttitudeController(TorqueController):
 
     def _adjust(self, reference: np.ndarray, dt: float) -> None:
         p = self.parameters
+        if p.prediction > 0.0:
+            predict_attitude(self._errors, p.prediction)
         if p.arm_feedforward:
             moment = arm_load(self._arm[0], reference, self._joints)
             self._errors[FEEDFORWARD, PITCH] += moment / p.inertia[1]

@@ -8,6 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from uam_control.control.arm_load import ArmLoadParameters
+from uam_control.coordinates import ALPHA, ROLL, YAW
+from uam_control.laws.errors import E_DOT, FEEDFORWARD, E
 from uam_control.maths.compiled import jit
 from uam_control.settings.parameter_set import (
     TINY,
@@ -97,6 +99,13 @@ class ArmLimits(TorqueLimits, ArmLoadParameters):
 class AttitudeLimits(TorqueLimits, ArmLoadParameters):
     """Limits of tau_q, the arm's moment, and what is left to the autopilot's rate loop."""
 
+    prediction: float = number(
+        0.0,
+        "time ahead for which tau_q is computed: delay from a setpoint to its effect, 0 = none",
+        "s",
+        0.0,
+        0.1,
+    )
     feedforward_washout: tuple = vector(
         (0.0, 0.0, 0.0),
         "high-pass on Omega_d_dot: I/P of the autopilot's rate loop, 0 = none",
@@ -156,6 +165,20 @@ def wash_out(feedforward: np.ndarray, corner: np.ndarray, dt: float, slow: np.nd
     for i in range(len(feedforward)):
         slow[i] += (1.0 - math.exp(-corner[i] * dt)) * (feedforward[i] - slow[i])
         feedforward[i] -= slow[i]
+
+
+@jit
+def predict_attitude(errors: np.ndarray, ahead: float) -> None:
+    """Carry the attitude's columns of errors (3, 6 + n) on by `ahead` [s], in place.
+
+    The desired body rates move with their feedforward, e_q of roll and pitch with its rate. The
+    measured body rates stay: they cancel in the setpoint. e_q of yaw stays: the rotors' slow moment
+    about yaw leaves no room for more gain on its rate (docs/margins.md).
+    """
+    for i in range(ROLL, ALPHA):
+        if i < YAW:
+            errors[E, i] += ahead * errors[E_DOT, i]
+        errors[E_DOT, i] -= ahead * errors[FEEDFORWARD, i]
 
 
 @jit

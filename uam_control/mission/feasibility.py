@@ -57,8 +57,8 @@ class Demand(NamedTuple):
     """What a reference needs at times (m,) [s] of mission time.
 
     position (m, 3) [m]; speed (m,) [m/s]; thrust (m,) [N]; tilt (m,) [rad]; body_rates (m, 3)
-    [rad/s, FLU]; angles (m, n) [rad]; joint_rates (m, n) [rad/s]; joint_torques (m, n) [N m], NaN
-    if the arm's masses are unknown.
+    [rad/s, FLU]; angles (m, n) [rad]; joint_rates (m, n) [rad/s]; joint_torques (m, n) [N m] and
+    magnet_force (m,) [N], the payload's apparent weight, NaN if the arm's masses are unknown.
     """
 
     times: np.ndarray
@@ -70,6 +70,7 @@ class Demand(NamedTuple):
     angles: np.ndarray
     joint_rates: np.ndarray
     joint_torques: np.ndarray
+    magnet_force: np.ndarray
 
 
 @dataclass(frozen=True)
@@ -108,6 +109,8 @@ class Feasibility:
                 (f"joint {i + 1} rate", rate, servo.no_load_speed, "rad/s"),
                 (f"joint {i + 1} torque", torque, p.joint_effort_hold[i], "N m"),
             ]
+        holding = self.vehicle.numbers["magnet"]["holding_force"]
+        upper.append(("force on the magnet", demand.magnet_force, holding, "N"))
         place = demand.position.T
         upper += [("xyz"[i], place[i], high[i], "m") for i in range(3)]
         lower = [("xyz"[i], place[i], low[i], "m") for i in range(3)]
@@ -188,25 +191,29 @@ class Feasibility:
             rates,
             rows[CHI, :, ARM],
             rows[CHI_DOT, :, ARM],
-            self._joint_torques(times, rows[CHI], roll, pitch, carried),
+            *self._arm_loads(times, rows[CHI], roll, pitch, carried),
         )
 
-    def _joint_torques(
+    def _arm_loads(
         self,
         times: np.ndarray,
         chi: np.ndarray,
         roll: np.ndarray,
         pitch: np.ndarray,
         carried: np.ndarray,
-    ) -> np.ndarray:
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """Return the joint torques (m, n) [N m] and the force on the magnet (m,) [N]."""
         try:
             arm = ArmModel.of(self.vehicle)
         except VehicleError:
-            return np.full((len(times), chi.shape[1] - ALPHA), np.nan)
+            return np.full((len(times), chi.shape[1] - ALPHA), np.nan), np.full(len(times), np.nan)
         euler = np.column_stack([roll, pitch, chi[:, YAW]])
         rotation = np.array([matrix_from_euler(one) for one in euler])
         gravity = self.vehicle.gravity
-        return arm.torques(times, chi[:, POSITION], rotation, chi[:, ARM], gravity, carried)
+        motion = times, chi[:, POSITION], rotation, chi[:, ARM]
+        lift = arm.payload_acceleration(*motion) + np.array([0.0, 0.0, gravity])
+        pull = carried * np.linalg.norm(lift, axis=1)
+        return arm.torques(*motion, gravity, carried), pull
 
 
 def in_words(excesses: list[Excess]) -> str:

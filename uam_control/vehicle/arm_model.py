@@ -86,16 +86,8 @@ class ArmModel:
         times (m,) [s], equidistant; position (m, 3) [m, world] and rotation (m, 3, 3) [body to
         world] of the base; angles (m, n) [rad]; gravity [m/s^2]; payload (m,): carried mass [kg].
         """
-        origins, axes, centres = [], [], []
-        place, frame = position, rotation
-        for i, link in enumerate(self.links):
-            place = place + frame @ link.offset
-            origins.append(place)
-            axes.append(frame @ link.axis)
-            frame = frame @ _about(link.axis, angles[:, i])
-            centres.append(place + frame @ link.centre)
+        origins, axes, centres = self._places(position, rotation, angles)
         masses = [np.full(len(times), link.mass) for link in self.links]
-        centres.append(place + frame @ self.tip)
         masses.append(payload)
         up = np.array([0.0, 0.0, gravity])
         forces = [
@@ -116,6 +108,31 @@ class ArmModel:
             )
             found[:, i] = np.einsum("ij,ij->i", moment, axes[i])
         return found + own
+
+    def payload_acceleration(
+        self, times: np.ndarray, position: np.ndarray, rotation: np.ndarray, angles: np.ndarray
+    ) -> np.ndarray:
+        """Return the acceleration (m, 3) [m/s^2, world] of the payload; see `torques`."""
+        payload = self._places(position, rotation, angles)[2][-1]
+        return _derived(_derived(payload, times), times)
+
+    def _places(
+        self, position: np.ndarray, rotation: np.ndarray, angles: np.ndarray
+    ) -> tuple[list[np.ndarray], ...]:
+        """Return joints [m], their axes [1], and centres of the links and the payload [m].
+
+        Lists of (m, 3) in the world frame; arguments: see `torques`.
+        """
+        origins, axes, centres = [], [], []
+        place, frame = position, rotation
+        for i, link in enumerate(self.links):
+            place = place + frame @ link.offset
+            origins.append(place)
+            axes.append(frame @ link.axis)
+            frame = frame @ _about(link.axis, angles[:, i])
+            centres.append(place + frame @ link.centre)
+        centres.append(place + frame @ self.tip)
+        return origins, axes, centres
 
 
 def _derived(values: np.ndarray, times: np.ndarray) -> np.ndarray:
