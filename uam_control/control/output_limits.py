@@ -21,6 +21,8 @@ from uam_control.settings.parameter_set import (
 )
 from uam_control.vehicle import CURRENT_SERVO, GRAVITY, SERVO_MODES
 
+RESERVE = 0.2  # of thrust_max, for the horizontal force if the vertical one takes all; costs 2 %
+
 
 @dataclass(frozen=True)
 class PositionLimits(ParameterSet):
@@ -128,11 +130,14 @@ def limit_force(
     """Write tau + weight e3 within the limits to limited (3,); return whether a limit acted.
 
     tau: (3,) of eq. (8a), tau_p [N, ENU]; weight, thrust_min, thrust_max [N]; tilt_max [rad].
-    The vertical part has priority: the vehicle keeps its altitude, the horizontal part is reduced.
+    The vertical part has priority: the vehicle keeps its altitude, the horizontal part is reduced,
+    but not below RESERVE. A vehicle too weak for its payload then sinks, and does not drift away.
     """
     upward = tau[2] + weight
-    limited[2] = min(max(upward, thrust_min), thrust_max)
     horizontal = math.sqrt(tau[0] * tau[0] + tau[1] * tau[1])
+    kept = min(horizontal, RESERVE * thrust_max)
+    highest = math.sqrt(thrust_max * thrust_max - kept * kept)
+    limited[2] = max(min(upward, highest), thrust_min)
     room = min(
         limited[2] * math.tan(tilt_max),
         math.sqrt(max(thrust_max * thrust_max - limited[2] * limited[2], 0.0)),
