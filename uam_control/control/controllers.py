@@ -15,15 +15,15 @@ from uam_control.control.output_limits import (
     AttitudeLimits,
     PositionLimits,
     TorqueLimits,
-    integrate,
+    complete_effort,
+    complete_force,
+    lead_attitude,
     limit_force,
     limit_torque,
-    predict_attitude,
-    wash_out,
 )
 from uam_control.control.sample_hold import SampleHold
 from uam_control.control.thrust_direction import AttitudeReference
-from uam_control.coordinates import ALPHA, ARM, ATTITUDE, CHI, CHI_DOT, PITCH, POSITION, YAW, Z
+from uam_control.coordinates import ALPHA, ARM, ATTITUDE, CHI, CHI_DOT, POSITION, YAW
 from uam_control.laws import catalogue
 from uam_control.laws.errors import FEEDFORWARD, E, tracking_errors
 from uam_control.laws.law_parameters import LawParameters
@@ -79,24 +79,22 @@ class Controller:
         """Rows e, e_dot, chi_d_ddot (3, 6 + n) of the last tick; see `tracking_errors`."""
         return self._errors
 
-    def _law_output(
+    def _track(
         self,
         state: np.ndarray,
         reference: np.ndarray,
         attitude_reference: np.ndarray,
         flying: bool,
-        dt: float,
-    ) -> np.ndarray:
+    ) -> None:
+        """Write the errors of this tick."""
         if state.shape != self._errors.shape:
             self._allocate(state.shape)
         tracking_errors(
             state, reference, attitude_reference, flying, self._printed, self._errors, self._norms
         )
-        self._adjust(reference, dt)
-        return self.law.update(*self._own, self._norms, self.saturated, dt)
 
-    def _adjust(self, reference: np.ndarray, dt: float) -> None:
-        """Change the errors of this tick before the law uses them."""
+    def _law_output(self, dt: float) -> np.ndarray:
+        return self.law.update(*self._own, self._norms, self.saturated, dt)
 
     def _idle(self) -> None:
         self.law.reset()
@@ -153,15 +151,21 @@ class PositionController(Controller):
             if np.any(reference[CHI_DOT, POSITION]):  # else from the ground, or at rest
                 self._attitude.begin(state, reference)
         p = self.parameters
-        tau = self._law_output(state, reference, self._attitude.value, True, dt)
-        integrate(
-            self._own[E], self._integral_gain, p.integral_limit, self.saturated, dt, self._integral
+        self._track(state, reference, self._attitude.value, True)
+        tau = self._law_output(dt)
+        complete_force(
+            reference[CHI_DOT, POSITION],
+            self._own[E],
+            self._drag,
+            self._inertia,
+            self._integral_gain,
+            p.integral_limit,
+            p.gravity if p.gravity_feedforward_mass > 0.0 else 0.0,
+            self.saturated,
+            dt,
+            self._integral,
+            tau,
         )
-        tau += self._drag * reference[CHI_DOT, POSITION]
-        if p.gravity_feedforward_mass > 0.0:
-            # what the integral holds up is weight: the force is for the same mass
-            tau *= 1.0 - self._integral[Z] / p.gravity
-        tau -= self._inertia * self._integral
         self.saturated = limit_force(
             tau,
             p.gravity_feedforward_mass * p.gravity,
@@ -207,13 +211,14 @@ class TorqueController(Controller):
             self._idle()
             self._tau[:] = 0.0
             return self._tau
-        tau = self._law_output(state, reference, attitude_reference, flying, dt)
-        self._add(tau, reference, dt)
+        self._track(state, reference, attitude_reference, flying)
+        tau = self._torque(reference, dt)
         self.saturated = limit_torque(tau, self._torque_max, self._tau)
         return self._tau
 
-    def _add(self, tau: np.ndarray, reference: np.ndarray, dt: float) -> None:
-        """Add to the law's torque tau (n,) [N m], in place."""
+    def _torque(self, reference: np.ndarray, dt: float) -> np.ndarray:
+        """Return the torque (n,) [N m] before its limits; the errors are those of this tick."""
+        raise NotImplementedError
 
 
 class AttitudeController(TorqueController):
@@ -236,14 +241,12 @@ class AttitudeController(TorqueController):
         self._washout = np.array(parameters.feedforward_washout)
         self._arm, self._joints = parameters.load_record(), np.zeros(len(parameters.link_masses))
 
-    def _adjust(self, reference: np.ndarray, dt: float) -> None:
-        p = self.parameters
-        if p.prediction > 0.0:
-            predict_attitude(self._errors, p.prediction)
+    def _torque(self, reference: np.ndarray, dt: float) -> np.ndarray:
+        p, pitch = self.parameters, 0.0
         if p.arm_feedforward:
-            moment = arm_load(self._arm[0], reference, self._joints)
-            self._errors[FEEDFORWARD, PITCH] += moment / p.inertia[1]
-        wash_out(self._errors[FEEDFORWARD, ATTITUDE], self._washout, dt, self._slow)
+            pitch = arm_load(self._arm[0], reference, self._joints) / p.inertia[1]
+        lead_attitude(self._errors, p.prediction, pitch, self._washout, dt, self._slow)
+        return self._law_output(dt)
 
     def _idle(self) -> None:
         super()._idle()
@@ -282,16 +285,24 @@ class ArmController(TorqueController):
         super().reset_adaptation()
         self._integral[:] = 0.0
 
-    def _add(self, tau: np.ndarray, reference: np.ndarray, dt: float) -> None:
-        p = self.parameters
-        integrate(
-            self._own[E], self._integral_gain, p.integral_limit, self.saturated, dt, self._integral
-        )
-        tau -= self._inertia * self._integral
+    def _torque(self, reference: np.ndarray, dt: float) -> np.ndarray:
+        tau, p = self._law_output(dt), self.parameters
         if p.arm_feedforward:
-            # the law has already Mbar chi_d_ddot
             arm_load(self._arm[0], reference, self._load)
-            tau += self._load - self._inertia * self._own[FEEDFORWARD]
+        complete_effort(
+            self._own[FEEDFORWARD],
+            self._own[E],
+            self._load,
+            p.arm_feedforward,
+            self._inertia,
+            self._integral_gain,
+            p.integral_limit,
+            self.saturated,
+            dt,
+            self._integral,
+            tau,
+        )
+        return tau
 
     def update(
         self,

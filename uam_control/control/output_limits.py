@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from uam_control.control.arm_load import ArmLoadParameters
-from uam_control.coordinates import ALPHA, ROLL, YAW
+from uam_control.coordinates import ALPHA, PITCH, ROLL, YAW, Z
 from uam_control.laws.errors import E_DOT, FEEDFORWARD, E
 from uam_control.maths.compiled import jit
 from uam_control.settings.parameter_set import (
@@ -173,8 +173,18 @@ def wash_out(feedforward: np.ndarray, corner: np.ndarray, dt: float, slow: np.nd
 
 
 @jit
-def predict_attitude(errors: np.ndarray, ahead: float) -> None:
-    """Carry the attitude's columns of errors (3, 6 + n) on by `ahead` [s], in place.
+def lead_attitude(
+    errors: np.ndarray,
+    ahead: float,
+    pitch: float,
+    corner: np.ndarray,
+    dt: float,
+    slow: np.ndarray,
+) -> None:
+    """Carry the attitude's columns of errors (3, 6 + n) on by `ahead` [s], add the arm's moment.
+
+    pitch [rad/s^2]: the moment per inertia, added to the feedforward; corner (3,), dt, slow (3,):
+    of the high-pass on it, see `wash_out`.
 
     The desired body rates move with their feedforward, e_q of roll and pitch with its rate. The
     measured body rates stay: they cancel in the setpoint. e_q of yaw stays: the rotors' slow moment
@@ -184,6 +194,8 @@ def predict_attitude(errors: np.ndarray, ahead: float) -> None:
         if i < YAW:
             errors[E, i] += ahead * errors[E_DOT, i]
         errors[E_DOT, i] -= ahead * errors[FEEDFORWARD, i]
+    errors[FEEDFORWARD, PITCH] += pitch
+    wash_out(errors[FEEDFORWARD, ROLL:ALPHA], corner, dt, slow)
 
 
 @jit
@@ -199,3 +211,56 @@ def integrate(
         following = integral[i] + gain[i] * e[i] * dt
         if not (saturated and abs(following) > abs(integral[i])):
             integral[i] = min(limit, max(-limit, following))
+
+
+@jit
+def complete_force(
+    velocity_d: np.ndarray,
+    e: np.ndarray,
+    drag: np.ndarray,
+    inertia: np.ndarray,
+    gain: np.ndarray,
+    limit: float,
+    gravity: float,
+    saturated: bool,
+    dt: float,
+    integral: np.ndarray,
+    tau: np.ndarray,
+) -> None:
+    """Add drag and integral action to the law's force tau (3,) [N, ENU], in place.
+
+    velocity_d (3,) [m/s]; drag (3,) [N s/m]; inertia (3,) [kg]; gravity [m/s^2]: what the integral
+    holds up is weight, so the force is for that mass, too; 0 for none of it. e, gain, limit,
+    saturated, dt, integral: see `integrate`.
+    """
+    integrate(e, gain, limit, saturated, dt, integral)
+    heavier = 1.0 - integral[Z] / gravity if gravity > 0.0 else 1.0
+    for i in range(len(tau)):
+        tau[i] = (tau[i] + drag[i] * velocity_d[i]) * heavier - inertia[i] * integral[i]
+
+
+@jit
+def complete_effort(
+    acceleration_d: np.ndarray,
+    e: np.ndarray,
+    load: np.ndarray,
+    loaded: bool,
+    inertia: np.ndarray,
+    gain: np.ndarray,
+    limit: float,
+    saturated: bool,
+    dt: float,
+    integral: np.ndarray,
+    tau: np.ndarray,
+) -> None:
+    """Add integral action and known load to the law's torques tau (n,) [N m], in place.
+
+    load (n,) [N m]: used if `loaded`, in place of the law's feedforward, which is inertia (n,)
+    [kg m^2] times acceleration_d (n,) [rad/s^2]. e, gain, limit, saturated, dt, integral: see
+    `integrate`.
+    """
+    integrate(e, gain, limit, saturated, dt, integral)
+    for i in range(len(tau)):
+        tau[i] -= inertia[i] * integral[i]
+        if loaded:
+            tau[i] += load[i] - inertia[i] * acceleration_d[i]
