@@ -7,9 +7,9 @@ import dataclasses
 import numpy as np
 
 from uam_control.supervision import Observation, State, SupervisionParameters, Supervisor
-from uam_control.vehicle import load_description
+from uam_control.vehicle import derived_parameters, load_description
 
-S500 = SupervisionParameters.among(load_description().node_parameters()["mission"], 2)
+S500 = SupervisionParameters.among(derived_parameters(load_description())["mission"], 2)
 
 
 def observation(**changes):

@@ -11,14 +11,14 @@ from uam_control.control.controllers import ArmController, AttitudeController
 from uam_control.maths.rotations import matrix_from_euler
 from uam_control.profiles.profile import load_profile
 from uam_control.settings.parameter_set import ParameterError
-from uam_control.vehicle import load_description
+from uam_control.vehicle import derived_parameters, load_description
 from uam_control.vehicle.arm_model import ArmModel
 
 PERIOD = 0.004
 
 
 def parameters(vehicle="s500_arm", **changes):
-    derived = load_description(vehicle).node_parameters()["arm_controller"]
+    derived = derived_parameters(load_description(vehicle))["arm_controller"]
     return ArmLoadParameters.from_mapping(derived | changes)
 
 

@@ -5,7 +5,7 @@ import yaml
 
 from uam_control.settings.configuration import path
 from uam_control.settings.parameter_set import ParameterSet
-from uam_control.vehicle import load_description
+from uam_control.vehicle import derived_parameters, load_description
 from uam_sim_bridge.autopilot.params import Parameters
 from uam_sim_bridge.mavlink.offboard.hold import HoldParameters
 from uam_sim_bridge.mavlink.offboard.sequence import OffboardParameters
@@ -16,7 +16,7 @@ from uam_sim_bridge.mavlink.telemetry.parameter_check import WATCHED, difference
 
 BRIDGE = yaml.safe_load(path("bridge/bridge.yaml").read_text())["mavlink_bridge"]["ros__parameters"]
 VEHICLE = load_description()
-DERIVED = VEHICLE.node_parameters()["mavlink_bridge"]
+DERIVED = derived_parameters(VEHICLE)["mavlink_bridge"]
 
 
 @pytest.mark.parametrize(

@@ -9,7 +9,7 @@ from uam_control.stages.mission_stage import MissionStage
 from uam_control.stages.timing import Timing
 from uam_control.stamps import NEW_TIME, SECOND
 from uam_control.supervision import Authority, State
-from uam_control.vehicle import load_description
+from uam_control.vehicle import derived_parameters, load_description
 from uam_msgs_py.node.joins import StampJoin
 
 
@@ -27,7 +27,9 @@ def test_a_join_begins_anew_with_the_stamps_of_a_new_simulation():
 
 
 def test_a_mission_in_flight_begins_anew_on_the_ground():
-    parameters = MissionParameters.from_mapping(load_description().node_parameters()["mission"], 2)
+    parameters = MissionParameters.from_mapping(
+        derived_parameters(load_description())["mission"], 2
+    )
     mission = Mission(load_scenario("hover"), parameters, StartParameters(auto_start=False))
     stage = MissionStage(mission, Timing())
     state = np.zeros((3, 8))

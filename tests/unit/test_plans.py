@@ -13,9 +13,9 @@ from uam_control.coordinates import ARM, CHI, YAW
 from uam_control.mission import Mission, MissionParameters, load_scenario
 from uam_control.mission.plans import BASE, GoalPose, PlanRefused, Points, check, still
 from uam_control.supervision import OperatorCommand, Readings, State
-from uam_control.vehicle import load_description
+from uam_control.vehicle import derived_parameters, load_description
 
-P = MissionParameters.from_mapping(load_description().node_parameters()["mission"], 2)
+P = MissionParameters.from_mapping(derived_parameters(load_description())["mission"], 2)
 COORDINATE = st.floats(-1.0, 1.0)
 
 

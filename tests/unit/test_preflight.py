@@ -13,9 +13,9 @@ from uam_control.supervision import (
     preflight,
 )
 from uam_control.supervision.checks import Checks
-from uam_control.vehicle import load_description
+from uam_control.vehicle import derived_parameters, load_description
 
-S500 = SupervisionParameters.among(load_description().node_parameters()["mission"], 2)
+S500 = SupervisionParameters.among(derived_parameters(load_description())["mission"], 2)
 ARM_START = (0.0, 1.5)
 KNOWN = {"mocap_age": 0.01, "joint_age": 0.01, "controller_age": 0.01, "autopilot_age": 0.1}
 

@@ -13,7 +13,7 @@ from uam_control.mission import load_scenario
 from uam_control.profiles.profile import default_profile
 from uam_control.settings import configuration
 from uam_control.settings.configuration import ConfigurationError
-from uam_control.vehicle import VehicleError, load_description
+from uam_control.vehicle import VehicleError, derived_parameters, load_description
 from uam_control.vehicle.loading import describe
 from uam_lab.analysis import dynamics, supply
 from uam_lab.results.timeseries import Series, columns_of
@@ -54,7 +54,7 @@ def test_the_autopilot_of_the_s500():
 
 
 def test_the_nodes_of_the_s500():
-    nodes = S500.node_parameters()
+    nodes = derived_parameters(S500)
     # 110 and 120 deg are 1.9199 and 2.0944 rad
     assert nodes["mission"]["joint_angle_hold"] == [1.9, 2.05]
     assert nodes["mission"]["joint_effort_hold"] == [2.8, 2.8]

@@ -16,6 +16,7 @@ from uam_control.profiles.profile import default_profile, parameter_set
 from uam_control.stages.ahead import carried, serves
 from uam_control.stages.law_stages import LawStage
 from uam_control.stages.timing import Timing
+from uam_control.vehicle import derived_parameters
 from uam_msgs_py.messages import topics
 from uam_msgs_py.messages.control import (
     NO_COMMAND,
@@ -52,7 +53,7 @@ class ControllerNode(UamNode):
         kind, axes = parameter_set(name, {"law": law}, self.vehicle)
         # for parameters that no parameter file gives
         defaults = default_profile(law, self.vehicle).section(name)
-        derived = self.vehicle.node_parameters().get(name)
+        derived = derived_parameters(self.vehicle).get(name)
         self.parameter_set = NodeParameters(self, kind, axes, defaults, derived)
         timing = NodeParameters(self, Timing, read_only=True).current
         self.controller = controller(self.parameter_set.current)

@@ -31,7 +31,7 @@ from uam_control.stages.timing import Timing
 from uam_control.stamps import SECOND
 from uam_control.supervision import Authority, State
 from uam_control.supervision.setpoint_delay import margin_left
-from uam_control.vehicle import VehicleDescription
+from uam_control.vehicle import VehicleDescription, derived_parameters
 from uam_msgs_py.messages import topics
 from uam_msgs_py.messages.control import ReferenceWriter, read_state
 from uam_msgs_py.messages.convert import SWITCH
@@ -60,7 +60,7 @@ class MissionNode(UamNode):
         super().__init__(NAME)
         vehicle = described_vehicle(self)
         profile = default_profile(DEFAULT, vehicle)
-        derived = vehicle.node_parameters()[NAME] | self._reference_limits(profile)
+        derived = derived_parameters(vehicle)[NAME] | self._reference_limits(profile)
         axes = vehicle.coordinates[ARM]
         self.parameter_set = NodeParameters(
             self, MissionParameters, axes, profile.section(NAME), derived

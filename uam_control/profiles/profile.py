@@ -30,7 +30,7 @@ from uam_control.mission import MissionParameters, ScenarioOptions
 from uam_control.settings import configuration
 from uam_control.settings.parameter_file import ProfileError, read_sections
 from uam_control.settings.parameter_set import ParameterError, ParameterSet
-from uam_control.vehicle import VehicleDescription, load_description
+from uam_control.vehicle import VehicleDescription, derived_parameters, load_description
 
 # controller → (parameters of its limits, its part of chi)
 CONTROLLERS: dict[str, tuple[type[ParameterSet], slice]] = {
@@ -188,7 +188,7 @@ def profile_of(
     file: named in the profile and in errors; vehicle: see `load_profile`.
     """
     sets, vehicle = {}, vehicle or load_description()
-    derived = vehicle.node_parameters()
+    derived = derived_parameters(vehicle)
     for node in NODES:
         aside = FLIGHT_OWN.get(node, ())
         values = {k: v for k, v in sections.get(node, {}).items() if k not in aside}

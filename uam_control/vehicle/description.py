@@ -5,7 +5,6 @@ Frames: FLU body frame (x forward, y left, z up). PX4's parameters are FRD (y ri
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -17,7 +16,6 @@ from uam_control.settings import configuration
 
 AXES = ("ROLL", "PITCH", "YAW")  # of PX4's rate loop, MC_*RATE_P
 GRAVITY = 9.81  # [m/s^2] of parameter sets that no vehicle's description fills
-ANGLE_STEP = 0.05  # [rad] the supervisor's limits: joint ranges, rounded down to this step
 
 
 @dataclass(frozen=True)
@@ -191,62 +189,3 @@ class VehicleDescription:
                 f"CA_ROTOR{i}_KM": float(km),
             }
         return values
-
-    def node_parameters(self) -> dict[str, dict[str, Any]]:
-        """Return the node parameters derived from the vehicle; a profile can replace them."""
-        drag = [round(drag / self.mass, 6) for drag in self.numbers["air"]["drag"]]
-        return {
-            "state_estimator": {"gravity": self.gravity},
-            "position_controller": {
-                "gravity": self.gravity,
-                "gravity_feedforward_mass": self.mass,
-                "drag_feedforward": drag,
-            },
-            "attitude_controller": {"feedforward_washout": self._integral_ratios()} | self._load(),
-            "arm_controller": self._load(),
-            "mission": {
-                "gravity": self.gravity,
-                "drag": drag,
-                "joint_angle_hold": [
-                    _rounded_down(min(-joint.low, joint.high)) for joint in self.joints
-                ],
-                "joint_effort_hold": [self.servo.effort_limit] * len(self.joints),
-                **self._arm_parameters(),
-            },
-            "mavlink_bridge": {
-                "rotor_thrust_max": self.rotor_thrust,
-                "motor_curve_factor": self.rotor.curve_factor,
-                "thr_mdl_fac": self.rotor.curve_factor,
-                "identification_mass": self.mass,
-                "rate_p": [self.autopilot_gains[f"MC_{axis}RATE_P"] for axis in AXES],
-                "rate_k": [self.autopilot_gains.get(f"MC_{axis}RATE_K", 1.0) for axis in AXES],
-            },
-        }
-
-    def _integral_ratios(self) -> list[float]:
-        """Return I/P of the autopilot's rate loop about roll, pitch, yaw [1/s]."""
-        gains = self.autopilot_gains
-        pairs = [(gains.get(f"MC_{axis}RATE_I", 0.0), gains[f"MC_{axis}RATE_P"]) for axis in AXES]
-        return [round(integral / proportional, 6) for integral, proportional in pairs]
-
-    def _load(self) -> dict[str, Any]:
-        """Return the parameters of the arm's load; {} for an arm that is not planar."""
-        # these modules need this one
-        from uam_control.vehicle.arm_model import ArmModel
-        from uam_control.vehicle.loading import VehicleError
-
-        try:
-            arm = ArmModel.of(self)
-        except VehicleError:
-            return {}
-        return arm.planar(self.gravity)
-
-    def _arm_parameters(self) -> dict[str, Any]:
-        if self.arm is None:
-            return {}
-        mount, links = list(self.arm.mount), list(self.arm.links)
-        return {"arm_mount": mount, "arm_links": links, "magnet_length": self.arm.magnet}
-
-
-def _rounded_down(angle: float) -> float:
-    return round(math.floor(angle / ANGLE_STEP) * ANGLE_STEP, 9)

@@ -26,6 +26,7 @@ from uam_control.nodes.described import described_vehicle
 from uam_control.settings.parameter_set import ParameterError
 from uam_control.stamps import SECOND
 from uam_control.supervision import State
+from uam_control.vehicle import derived_parameters
 from uam_msgs_py.messages import topics
 from uam_msgs_py.messages.control import (
     PositionCommand,
@@ -90,7 +91,7 @@ class MavlinkBridgeNode(UamNode):
     def __init__(self) -> None:
         super().__init__(NAME)
         vehicle = self._vehicle = described_vehicle(self)
-        derived = vehicle.node_parameters()[NAME]
+        derived = derived_parameters(vehicle)[NAME]
         mapping = NodeParameters(self, RateThrustParameters, derived=derived)
         mapping.apply = self._configure
         self._options = NodeParameters(self, BridgeParameters, read_only=True).current

@@ -41,7 +41,7 @@ import numpy as np
 
 from uam_control.maths.compiled import jit
 from uam_control.settings.parameter_set import ParameterSet, number, vector
-from uam_control.vehicle import VehicleDescription, load_description
+from uam_control.vehicle import VehicleDescription, derived_parameters, load_description
 from uam_sim_bridge.mavlink.offboard.rotor_geometry import torque_scale
 from uam_sim_bridge.mavlink.offboard.thrust_curve import (
     command_of_thrust,
@@ -117,7 +117,7 @@ class RateThrustParameters(ParameterSet):
     @classmethod
     def of(cls, vehicle: VehicleDescription, values: Mapping[str, Any] | None = None) -> Self:
         """Return the validated set of a vehicle, with those of `values` that belong to the set."""
-        return cls.among(vehicle.node_parameters()["mavlink_bridge"] | dict(values or {}))
+        return cls.among(derived_parameters(vehicle)["mavlink_bridge"] | dict(values or {}))
 
     def torque_scale(self, vehicle: VehicleDescription) -> np.ndarray:
         """Return the torque (3,) [N m, FLU] of a normalised torque of 1 about roll, pitch, yaw."""

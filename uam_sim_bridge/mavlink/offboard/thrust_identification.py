@@ -36,7 +36,7 @@ import numpy as np
 from uam_control.coordinates import CHI, CHI_DDOT, PITCH, ROLL, YAW, X, Y, Z
 from uam_control.maths.compiled import jit
 from uam_control.settings.parameter_set import ParameterSet, choice, number
-from uam_control.vehicle import VehicleDescription, load_description
+from uam_control.vehicle import VehicleDescription, derived_parameters, load_description
 
 USABLE = (0.1, 0.9)  # normalised thrust: outside, the allocation reduces it in favour of torques
 LONGEST_GAP = 0.1  # s between two ticks; after a longer gap the lag filter starts again
@@ -107,7 +107,7 @@ class ThrustIdentificationParameters(ParameterSet):
     @classmethod
     def of(cls, vehicle: VehicleDescription, values: Mapping[str, Any] | None = None) -> Self:
         """Return the validated set of a vehicle, with those of `values` that belong to the set."""
-        return cls.among(vehicle.node_parameters()["mavlink_bridge"] | dict(values or {}))
+        return cls.among(derived_parameters(vehicle)["mavlink_bridge"] | dict(values or {}))
 
     def validated(self, axes: int = 0) -> Self:
         """See `ParameterSet.validated`; accepts YAML's `on` and `off`, read as true and false."""
