@@ -20,6 +20,7 @@ from uam_control.profiles.profile import default_profile
 from uam_lab.flight.direct.flight import DirectFlight
 from uam_sim_bridge.autopilot import companion
 from uam_sim_bridge.faults.schedule import read_schedule
+from uam_sim_bridge.mavlink.protocol.vision import VisionPose
 from uam_sim_bridge.plant import Vehicle
 from uam_sim_bridge.plant.effects import presets
 
@@ -62,4 +63,5 @@ def warm_up(laws: Iterable[str] = tuple(LAWS)) -> None:
     Polynomials(np.array([0.0, 1.0]), np.zeros((1, 6, 4))).rows(np.zeros(2))
     curve = load_scenario("circle")
     curve.trajectory(standing(curve.arm_start)).write(4.0, empty_motion(len(curve.arm_start)))
+    VisionPose(0.0, np.zeros(3), np.array([1.0, 0.0, 0.0, 0.0]), 0.0, 0.0).message()
     companion.warm_up()  # the stand-in's descent, which a flight without failures does not call
