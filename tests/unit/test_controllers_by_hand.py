@@ -17,6 +17,7 @@ from uam_control.control.output_limits import ArmLimits, AttitudeLimits, Positio
 from uam_control.laws.asmc1 import Asmc1Parameters
 from uam_control.laws.modular import ModularParameters
 from uam_control.profiles.profile import controller_parameters
+from uam_control.stages.law_stages import MeasuredDelay
 
 A = math.atan2(0.6, 0.8)  # sine .6, cosine .8
 LAW = {
@@ -305,3 +306,42 @@ def test_the_periods_of_goal_positions_begin_with_the_first_tick():
         controller.update(state, reference, desired, False, 0.004)
         new.append(controller.command[0] == tick)
     assert [tick for tick, is_new in enumerate(new, 1) if is_new] == [1, 100, 200]
+
+
+def test_a_prediction_carries_desired_rates_and_the_errors_of_roll_and_pitch():
+    """ASMC-1 with Lambda = 3: tau = 2 (chi_d_ddot - 3 e_dot); the desired rates grow by 4."""
+    for ahead, roll in ((0.0, 2.0 * 4.0), (0.1, 2.0 * (4.0 + 3.0 * 0.4))):
+        controller = torque(AttitudeController, 3, prediction=ahead)
+        state, reference, attitude = vehicle()
+        attitude[2] = 4.0
+        tau = controller.update(state, reference, attitude, True, 0.004)
+        np.testing.assert_allclose(tau, [roll] * 3)
+    controller = torque(AttitudeController, 3, prediction=0.1)
+    state, reference, attitude = vehicle()
+    state[1, 3:6] = 1.0
+    controller.update(state, reference, attitude, True, 0.004)
+    np.testing.assert_allclose(controller.errors[0, 3:6], [0.1, 0.1, 0.0])
+
+
+def test_the_measured_loop_delay_beyond_that_of_the_link_is_predicted():
+    controller = torque(
+        AttitudeController, 3, prediction=0.01, prediction_measured=True, prediction_nominal=0.007
+    )
+    delays = MeasuredDelay(controller)
+    state, reference, attitude = vehicle()
+    state[1, 3] = 1.0
+
+    def ahead(stamp):
+        delays.apply(stamp)
+        controller.update(state, reference, attitude, True, 0.004)
+        return controller.errors[0, 3]
+
+    delays.report(1_000_000_000, 0.027)
+    delays.report(2_000_000_000, None)
+    assert ahead(1_100_000_000) == pytest.approx(0.01)  # not arrived yet
+    assert ahead(1_200_000_000) == pytest.approx(0.03)
+    assert ahead(2_200_000_000) == pytest.approx(0.01)  # unknown
+    delays.report(3_000_000_000, 1.0)
+    assert ahead(4_000_000_000) == pytest.approx(0.1)  # the largest
+    delays.report(4_000_000_000, 0.001)
+    assert ahead(5_000_000_000) == pytest.approx(0.01)  # less than that of the link

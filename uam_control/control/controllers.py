@@ -7,10 +7,13 @@ limits and weight are the same for all laws. No code here uses ROS.
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 
 from uam_control.control.arm_load import arm_load
 from uam_control.control.output_limits import (
+    LONGEST_PREDICTION,
     ArmLimits,
     AttitudeLimits,
     PositionLimits,
@@ -232,6 +235,7 @@ class AttitudeController(TorqueController):
 
     def __init__(self, parameters: AttitudeLimits) -> None:
         super().__init__(parameters)
+        self._measured = math.nan  # [s] loop delay
         self._slow = np.zeros(3)  # [rad/s^2] part of the feedforward that the autopilot integrates
         self.set_parameters(parameters)
 
@@ -240,12 +244,24 @@ class AttitudeController(TorqueController):
         super().set_parameters(parameters)
         self._washout = np.array(parameters.feedforward_washout)
         self._arm, self._joints = parameters.load_record(), np.zeros(len(parameters.link_masses))
+        self.measured(self._measured)
+
+    def measured(self, loop_delay: float) -> None:
+        """Use the measured `loop_delay` [s], from a setpoint to the gyro's response; NaN: unknown.
+
+        It counts with `prediction_measured`.
+        """
+        p, self._measured = self.parameters, loop_delay
+        self._ahead = p.prediction
+        if p.prediction_measured and math.isfinite(loop_delay):
+            beyond = max(0.0, loop_delay - p.prediction_nominal)
+            self._ahead = min(LONGEST_PREDICTION, p.prediction + beyond)
 
     def _torque(self, reference: np.ndarray, dt: float) -> np.ndarray:
         p, pitch = self.parameters, 0.0
         if p.arm_feedforward:
             pitch = arm_load(self._arm[0], reference, self._joints) / p.inertia[1]
-        lead_attitude(self._errors, p.prediction, pitch, self._washout, dt, self._slow)
+        lead_attitude(self._errors, self._ahead, pitch, self._washout, dt, self._slow)
         return self._law_output(dt)
 
     def _idle(self) -> None:

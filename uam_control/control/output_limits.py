@@ -17,11 +17,15 @@ from uam_control.settings.parameter_set import (
     ParameterSet,
     choice,
     number,
+    switch,
     vector,
 )
 from uam_control.vehicle import CURRENT_SERVO, GRAVITY, SERVO_MODES
 
 RESERVE = 0.2  # of thrust_max, for the horizontal force if the vertical one takes all; costs 2 %
+
+
+LONGEST_PREDICTION = 0.1  # [s]
 
 
 @dataclass(frozen=True)
@@ -106,7 +110,13 @@ class AttitudeLimits(TorqueLimits, ArmLoadParameters):
         "time ahead for which tau_q is computed: delay from a setpoint to its effect, 0 = none",
         "s",
         0.0,
-        0.1,
+        LONGEST_PREDICTION,
+    )
+    prediction_measured: bool = switch(
+        False, "the measured loop delay beyond prediction_nominal is added to prediction"
+    )
+    prediction_nominal: float = number(
+        0.007, "loop delay of a link without delay, as delay_nominal of the mission", "s", 0.0, 1.0
     )
     feedforward_washout: tuple = vector(
         (0.0, 0.0, 0.0),

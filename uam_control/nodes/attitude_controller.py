@@ -1,11 +1,19 @@
 """Node: attitude law. state + reference + desired attitude of the position law → tau_q."""
 
 import numpy as np
+from diagnostic_msgs.msg import DiagnosticArray
 
 from uam_control.control.controllers import AttitudeController
 from uam_control.nodes.controller_node import ControllerNode
+from uam_control.stages.law_stages import MeasuredDelay
 from uam_msgs_py.messages import topics
-from uam_msgs_py.messages.control import ATTITUDE_NAMES, Reference, TorqueWriter
+from uam_msgs_py.messages.control import (
+    ATTITUDE_NAMES,
+    PositionCommand,
+    Reference,
+    TorqueWriter,
+)
+from uam_msgs_py.messages.status import AutopilotState
 from uam_msgs_py.node.base_node import run
 from uam_msgs_py.node.namespace import frame
 
@@ -18,8 +26,24 @@ class AttitudeControllerNode(ControllerNode):
     def __init__(self):
         last = topics.POSITION_COMMAND
         super().__init__(NAME, AttitudeController, topics.ATTITUDE_ADAPTATION, last)
+        self._measured = MeasuredDelay(self.controller)
+        self.listen(topics.AUTOPILOT_STATE, self._on_autopilot, required=False)
         self._command = self.publisher(topics.ATTITUDE_COMMAND)
         self._writer = TorqueWriter(ATTITUDE_NAMES, frame(self, topics.BODY))
+
+    def _on_autopilot(self, message: DiagnosticArray) -> None:
+        stamp, report = AutopilotState.from_message(message)
+        self._measured.report(stamp, report.loop_delay)
+
+    def _joined(
+        self,
+        stamp: int,
+        state: np.ndarray,
+        reference: Reference,
+        position: PositionCommand | None = None,
+    ) -> None:
+        self._measured.apply(stamp)
+        super()._joined(stamp, state, reference, position)
 
     def send(self, stamp: int, tau: np.ndarray, reference: Reference, flying: bool) -> None:
         self._command.publish(self._writer.fill(stamp, tau) if flying else self._writer.idle(stamp))

@@ -2,13 +2,39 @@
 
 from __future__ import annotations
 
+import math
+from collections import deque
+
 import numpy as np
 
-from uam_control.control.controllers import Controller
+from uam_control.control.controllers import AttitudeController, Controller
 from uam_control.stages.timing import Timing
 from uam_control.stamps import SECOND
 
+REPORT_DELAY = 200_000_000  # [ns] after which a report of a tick has arrived at every stage
 GAINS_PERIOD = 20_000_000  # [ns] between two publications of the adapted gains
+
+
+class MeasuredDelay:
+    """The loop delay that the bridge reports, for the attitude law of a later tick.
+
+    A report is used when it has arrived in every engine, REPORT_DELAY after its stamp.
+    """
+
+    def __init__(self, controller: AttitudeController) -> None:
+        self._controller = controller
+        self._reports: deque[tuple[int, float]] = deque()
+
+    def report(self, stamp: int, loop_delay: float | None) -> None:
+        """Take the report of the tick `stamp` [ns]; loop_delay [s], None: unknown."""
+        if self._reports and stamp < self._reports[-1][0]:  # a new simulation
+            self._reports.clear()
+        self._reports.append((stamp, math.nan if loop_delay is None else loop_delay))
+
+    def apply(self, stamp: int) -> None:
+        """Give the controller the newest report that has arrived at the tick `stamp` [ns]."""
+        while self._reports and self._reports[0][0] <= stamp - REPORT_DELAY:
+            self._controller.measured(self._reports.popleft()[1])
 
 
 class LawStage:

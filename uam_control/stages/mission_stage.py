@@ -9,12 +9,11 @@ import numpy as np
 
 from uam_control.mission import Mission
 from uam_control.stages.ahead import carried, serves
+from uam_control.stages.law_stages import REPORT_DELAY
 from uam_control.stages.supervisor_inputs import SupervisorInputs
 from uam_control.stages.timing import Timing
 from uam_control.stamps import NEW_TIME, SECOND
 from uam_control.supervision import Authority, Readings, State
-
-REPORT_DELAY = 200_000_000  # [ns] after which the status of a tick has arrived at every stage
 
 
 class MissionStage:

@@ -55,7 +55,7 @@ WIRES = (
     Wire(topics.ARM_EFFORT, ARM, (PLANT,)),
     Wire(topics.ARM_GOALS, ARM, (PLANT,), optional=True),
     Wire(topics.SETPOINT, BRIDGE, (PLANT,)),
-    Wire(topics.AUTOPILOT_STATE, BRIDGE, (MISSION,)),
+    Wire(topics.AUTOPILOT_STATE, BRIDGE, (MISSION, ATTITUDE)),
     Wire(topics.AUTOPILOT_BATTERY, BRIDGE, (MISSION,), optional=True),
     Wire(topics.POSITION_ADAPTATION, POSITION, (MISSION,), optional=True),
     Wire(topics.ATTITUDE_ADAPTATION, ATTITUDE, (MISSION,), optional=True),

@@ -17,7 +17,7 @@ from uam_control.coordinates import ARM, POSITION, coordinates
 from uam_control.mission import Mission, Scenario, StartParameters
 from uam_control.settings.parameter_set import ParameterSet
 from uam_control.stages.estimator_stage import EstimatorStage
-from uam_control.stages.law_stages import LawStage
+from uam_control.stages.law_stages import LawStage, MeasuredDelay
 from uam_control.stages.mission_stage import MissionStage
 from uam_control.stages.timing import Timing
 from uam_control.stamps import SECOND
@@ -99,6 +99,7 @@ class ControlTick:
         self.mission = MissionStage(mission, timing)
         self.position = LawStage(PositionController(sets["position_controller"]), timing)
         self.attitude = LawStage(AttitudeController(sets["attitude_controller"]), timing)
+        self.measured_delay = MeasuredDelay(self.attitude.controller)
         self.arm = LawStage(ArmController(sets["arm_controller"]), timing)
         self.bridge = bridge
         self.level = np.zeros((3, 3))  # attitude reference while there is none
@@ -199,6 +200,7 @@ def control_position(tick: ControlTick) -> bool:
 def control_attitude(tick: ControlTick) -> bool:
     """state, reference, attitude reference → tau_q."""
     s, stage = tick.signals, tick.attitude
+    tick.measured_delay.apply(s.stamp)
     s.tau_q = stage.update(s.stamp, s.state, s.reference, s.attitude_reference, s.flying)
     if stage.gains_due:
         _keep_gains(tick, "attitude", stage)
@@ -238,6 +240,7 @@ def send_setpoint(tick: ControlTick) -> bool:
             report.loop_delay,
             authority,
         )
+        tick.measured_delay.report(s.stamp, report.loop_delay)
     return True
 
 
