@@ -21,14 +21,10 @@ setup: $(STAMP)  ## virtual environment, dependencies and the project in .venv
 fly: setup       ## fly the pick-and-place mission; options: make fly ARGS="--controller asmc1"
 	@$(BIN)/uam fly $(ARGS)
 
-# Nodes mostly wait for each other, so three files of tests/nodes run at once.
-PYTEST = $(BIN)/python -m pytest -m "not slow"
-
+# Nodes mostly wait for each other, so three tests run at once on two cores. Groups: tests/conftest.py.
 test: setup      ## the tests but the slow ones; options: make test ARGS="tests/unit -x"
-	@$(if $(ARGS),$(BIN)/python -m pytest $(ARGS),\
-	$(PYTEST) -n 2 --dist loadfile tests/unit && \
-	$(PYTEST) -n 3 --dist loadfile tests/nodes tests/packaging && \
-	$(PYTEST) -n 2 --dist loadgroup tests/flights tests/px4)
+	@$(BIN)/python -m pytest $(if $(ARGS),$(ARGS),-m "not slow" -n 3 --dist loadgroup \
+	--no-loadscope-reorder tests/unit tests/nodes tests/packaging tests/flights tests/px4)
 
 slow: setup      ## the slow tests: whole missions, browser, PX4 if it is there; a quarter of an hour
 	@$(BIN)/python -m pip install --quiet --disable-pip-version-check -e ".[browser]"

@@ -4,6 +4,7 @@ import signal
 import sys
 from pathlib import Path
 
+import pytest
 from hypothesis import settings
 
 # The first call of a compiled function takes seconds; a run must not depend on chance.
@@ -18,3 +19,11 @@ sys.path[:0] = [str(TESTS), str(TESTS.parent / "benchmarks")]
 # tests start and interrupt.
 if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
     signal.signal(signal.SIGINT, signal.default_int_handler)
+
+
+@pytest.hookimpl(tryfirst=True)  # before xdist reads the groups
+def pytest_collection_modifyitems(items):
+    """Give the tests of a file one worker (--dist loadgroup); flights are apart, or as they say."""
+    for item in items:
+        if "flights" not in item.path.relative_to(TESTS).parts:
+            item.add_marker(pytest.mark.xdist_group(str(item.path)))
