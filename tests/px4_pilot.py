@@ -53,9 +53,9 @@ class Pilot:
         """The modes since the pilot acted, in order."""
         return [mode for when, mode in self.modes if self.acted is not None and when >= self.acted]
 
-    def act(self, after: float) -> None:
-        """Choose the mode in `after` [s]."""
-        self._at = self.since + after
+    def act(self) -> None:
+        """Choose the mode."""
+        self._at = self.since
 
     def wait(self, seconds: float) -> None:
         """Wait until the pilot acted that long ago [s], by PX4's clock."""
@@ -112,7 +112,8 @@ class Pilot:
     def _act(self) -> None:
         offboard = self.modes and self.modes[-1][1] is Mode.OFFBOARD
         due = self._at if self.acted is None else self.acted + AGAIN
-        if not offboard or self.since < due or self.since > self._at + 5 * AGAIN:
+        taken = any(mode is not Mode.OFFBOARD for mode in self.since_acted)
+        if not offboard or taken or self.since < due or self.since > self._at + 5 * AGAIN:
             return
         self.acted = self.since if self.acted is None else self.acted
         if self._mode is None:

@@ -39,8 +39,9 @@ def flown(folder, phase, mode):
             flight.wait_for(TAKE_OFF, PATIENCE)
             with pytest.raises(CommandRefused):
                 flight.resume()  # now the client is connected: the next command takes no time
-            flight.wait_for(lambda status: status.phase == phase, PATIENCE)
-            pilot.act(after=1.0)
+            begun = flight.wait_for(lambda status: status.phase == phase, PATIENCE).time
+            flight.wait_for(lambda status: status.time >= max(begun, 0.0) + 1.0, PATIENCE)
+            pilot.act()
             flight.wait_for("released", PATIENCE)
             if mode in HELD:
                 pilot.wait(HELD[mode])
