@@ -52,7 +52,7 @@ examples:
 
 A trajectory has the columns t,px,py,pz and any of yaw | qw,qx,qy,qz; vx,vy,vz; ax,ay,az; dyaw;
 alpha_1,alpha_2 (SI, ENU). A scenario that exceeds a limit of the vehicle is refused.
-Exit status: 0 mission completed, 1 flown but not completed, 2 wrong use.
+Exit status: 0 mission or dry run completed, 1 flown but not completed, 2 wrong use.
 """
 
 

@@ -48,7 +48,10 @@ def read_outcome(
     outcome.grasps, outcome.faults = flight.grasps, flight.faults
     if not flight.done and not outcome.partial:
         ended = recorder.get("ended") or numbers.get("ended_by")
-        outcome.failure = ended or "the mission did not end"
+        if settings.dry_run and ended and not recorder.get("ended"):
+            outcome.abort_reason = f"dry run, {ended}: nothing was armed"
+        else:
+            outcome.failure = ended or "the mission did not end"
     return outcome
 
 
