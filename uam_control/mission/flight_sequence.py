@@ -28,6 +28,7 @@ from uam_control.mission.motion.trajectory import empty_reference
 from uam_control.mission.payload_watch import PayloadWatch
 from uam_control.mission.plans import GoalPose, PlanRefused, Points, check
 from uam_control.mission.scenarios.scenario import Scenario
+from uam_control.mission.standing import Standing
 from uam_control.supervision import (
     Authority,
     Decision,
@@ -91,7 +92,7 @@ class Mission:
         self._failsafe_since = math.inf
         self._end: float | None = None
         self._magnet: tuple[bool, bool] | None = None  # overriding value, scenario's value then
-        self._stowing = False  # whether the arm of a released vehicle is being stowed
+        self._standing: Standing | None = None  # while the arm of a released vehicle is stowed
         self._pose: np.ndarray | None = None  # (6 + n,) reference of a dry run
 
     def start(self) -> tuple[bool, str]:
@@ -363,13 +364,22 @@ class Mission:
         if decision.state is not output.state:
             before, output.state = output.state, decision.state
             self._enter(stamp, before, decision)
-        if decision.state is State.RELEASED and decision.stow and not self._stowing:
-            self._guidance.stop(stamp, decision.stow)
-        self._stowing = decision.state is State.RELEASED and decision.stow
+        self._stow_released(stamp, decision.state is State.RELEASED and decision.stow)
         output.cause, output.arm, output.regains = decision.cause, decision.arm, decision.regains
         output.flying = decision.guide is not Guide.NOTHING
         output.phase = self._phase(decision)
         output.magnet = self._magnet_on(decision)
+
+    def _stow_released(self, stamp: float, stow: bool) -> None:
+        """Stow the arm of a released vehicle; a vehicle that stands is not levered up with it."""
+        state, standing = self._seen.state, self._standing
+        if not stow:
+            self._standing = None
+        elif standing is None:
+            self._standing = Standing()
+            self._guidance.stop(stamp, stow)
+        elif standing.update(float(state[CHI_DOT, Z])):
+            self._guidance.move_arm(stamp, state[CHI, ARM] if standing.value else None)
 
     def _enter(self, stamp: float, before: State, decision: Decision) -> None:
         state, guidance = decision.state, self._guidance

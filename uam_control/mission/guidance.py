@@ -341,8 +341,12 @@ class Guidance:
             self._plans.clear()
             self._arm = self._arm_segment(stamp, self._at_rest(stow=False)[0][ARM])
         if stow:
-            self._arm = self._arm_segment(stamp, self._stowed)
-            self._plans.pop(False, None)
+            self.move_arm(stamp)
+
+    def move_arm(self, stamp: float, angles: np.ndarray | None = None) -> None:
+        """Move the arm to `angles` [rad] from `stamp` [s] on; None: stow it."""
+        self._arm = self._arm_segment(stamp, self._stowed if angles is None else angles)
+        self._plans.pop(False, None)
 
     def go_on(self, stamp: float) -> None:
         """Continue on the path once the stop is complete and the arm is back at its path angles.
