@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from uam_control.profiles.profile import load_profile
-from uam_lab.campaign.variations import common, draw, ranges
+from uam_lab.campaign.variations import VariationError, chosen, common, draw, ranges
 from uam_lab.cli.main import main
 
 FLIGHTS = 4
@@ -21,6 +21,15 @@ def test_a_draw_repeats_and_a_longer_one_begins_alike():
     assert draw(profile, 1, seed=6)[0].values != few[0].values
     for name, (low, high) in ranges().items():
         assert all(low <= d.values[name] <= high for d in many), name
+
+
+def test_single_draws_are_chosen_by_number():
+    draws = draw(load_profile("s500"), 5, 1)
+    assert [one.trial.seed for one in chosen(draws, "4,0,4")] == [100_000, 100_004]
+    assert len(chosen(draws, "")) == 5
+    for wrong in ("5", "-1", "1;2", "1,"):
+        with pytest.raises(VariationError, match="numbers of 0 to 4 expected"):
+            chosen(draws, wrong)
 
 
 def test_what_failures_have_in_common_is_found():

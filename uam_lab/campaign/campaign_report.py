@@ -12,7 +12,7 @@ from matplotlib.figure import Figure
 from uam_control.coordinates import BASE_COORDINATES, POSITION
 from uam_lab.campaign.fault_outcome import COMPLETED, OUTCOMES, counts
 from uam_lab.campaign.trial import TrialResult
-from uam_lab.campaign.variations import Draw, common
+from uam_lab.campaign.variations import PER_SEED, Draw, common
 from uam_lab.report.figures import style
 from uam_lab.results.atomic import write_rows, write_text
 from uam_lab.results.result_folder import versions, write_json
@@ -39,8 +39,13 @@ def write(
         out / "flights.csv",
         ["flight", *draws[0].values, *(f"rms {n}" for n in names), "outcome", "why"],
         (
-            [i, *(f"{x:.4g}" for x in (*draw.values.values(), *r.rms)), r.outcome, r.why]
-            for i, (draw, r) in enumerate(zip(draws, results, strict=True))
+            [
+                draw.trial.seed % PER_SEED,
+                *(f"{x:.4g}" for x in (*draw.values.values(), *r.rms)),
+                r.outcome,
+                r.why,
+            ]
+            for draw, r in zip(draws, results, strict=True)
         ),
     )
     outcomes = counts(r.outcome for r in results)

@@ -17,6 +17,7 @@ from uam_sim_bridge.plant.effects import presets
 from uam_sim_bridge.plant.effects.presets import Effects
 
 NAMES = ("payload", "payload_offset", "wind", "gust", "noise", "mass", "inertia", "efficiency")
+PER_SEED = 100_000  # numbers of flights apart from each other: seed of flight i is seed * this + i
 DELAYS = ("setpoint_delay", "setpoint_jitter", "mocap_delay", "mocap_jitter")  # optional, [s]
 
 
@@ -62,11 +63,24 @@ def draw(
 
     effects: of the plant, in every flight.
     """
-    allowed, numbers = allowed or ranges(), [seed * 100_000 + i for i in range(count)]
+    allowed, numbers = allowed or ranges(), [seed * PER_SEED + i for i in range(count)]
     return [
         _one(profile, scenario, np.random.default_rng([seed, i]), number, allowed, effects or {})
         for i, number in enumerate(numbers)
     ]
+
+
+def chosen(draws: Sequence[Draw], numbers: str) -> list[Draw]:
+    """Return the draws of these numbers, as "3,14", counted from 0; all for "".
+
+    Raises VariationError for another text or a number beyond the draws.
+    """
+    if not numbers:
+        return list(draws)
+    wanted = numbers.split(",")
+    if not all(one.isdecimal() and int(one) < len(draws) for one in wanted):
+        raise VariationError(f"--draws {numbers}: numbers of 0 to {len(draws) - 1} expected: 3,14")
+    return [draws[number] for number in sorted({int(one) for one in wanted})]
 
 
 def _one(

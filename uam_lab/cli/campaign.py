@@ -19,6 +19,7 @@ examples:
   uam campaign                             1,000 flights of the flying profile
   uam campaign --flights 100 --profile asmc2
   uam campaign --flights 100 --vehicle mine.yaml
+  uam campaign --draws 181,389             two of the 1,000 flights
   uam campaign --ranges delays             late setpoints and poses as well, up to 30 ms
   uam campaign --plant-preset laboratory
   uam campaign --out robust                stop with Ctrl-C; the same command continues
@@ -42,6 +43,7 @@ def add(commands: argparse._SubParsersAction) -> None:
         EXAMPLES,
     )
     command.option("--flights", "N", "", 1000, type=count)
+    command.option("--draws", "I,I,...", "only these flights, counted from 0 (default: all)", "")
     command.vehicle()
     command.scenario()
     command.profile()
@@ -56,7 +58,7 @@ def run(options: argparse.Namespace) -> int:
     """Fly, then write the results; return the exit status."""
     from uam_lab.campaign import campaign_report
     from uam_lab.campaign.flown import Flown
-    from uam_lab.campaign.variations import draw, ranges
+    from uam_lab.campaign.variations import chosen, draw, ranges
 
     vehicle = load_description(options.vehicle)
     load_scenario(options.scenario, vehicle)  # an invalid one is refused before any flight
@@ -65,6 +67,7 @@ def run(options: argparse.Namespace) -> int:
     effects = chosen_effects(options)
     out = make_folder(options.out, "campaign")
     draws = draw(profile, options.flights, options.seed, allowed, options.scenario, effects)
+    draws = chosen(draws, options.draws)
     settings = (options.seed, allowed, profile.sets, profile.bridge())
     flown = Flown(out, (*settings, vehicle.numbers, options.scenario, effects))
     trials = [one.trial for one in draws if one.trial.seed not in flown.results]
