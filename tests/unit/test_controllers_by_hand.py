@@ -308,14 +308,14 @@ def test_the_periods_of_goal_positions_begin_with_the_first_tick():
     assert [tick for tick, is_new in enumerate(new, 1) if is_new] == [1, 100, 200]
 
 
-def test_a_prediction_carries_desired_rates_and_the_errors_of_roll_and_pitch():
+def test_a_prediction_carries_desired_rates_and_errors_of_roll_and_pitch():
     """ASMC-1 with Lambda = 3: tau = 2 (chi_d_ddot - 3 e_dot); the desired rates grow by 4."""
     for ahead, roll in ((0.0, 2.0 * 4.0), (0.1, 2.0 * (4.0 + 3.0 * 0.4))):
         controller = torque(AttitudeController, 3, prediction=ahead)
         state, reference, attitude = vehicle()
         attitude[2] = 4.0
         tau = controller.update(state, reference, attitude, True, 0.004)
-        np.testing.assert_allclose(tau, [roll] * 3)
+        np.testing.assert_allclose(tau, [roll, roll, 8.0])
     controller = torque(AttitudeController, 3, prediction=0.1)
     state, reference, attitude = vehicle()
     state[1, 3:6] = 1.0

@@ -196,13 +196,12 @@ def lead_attitude(
     pitch [rad/s^2]: the moment per inertia, added to the feedforward; corner (3,), dt, slow (3,):
     of the high-pass on it, see `wash_out`.
 
-    The desired body rates move with their feedforward, e_q of roll and pitch with its rate. The
-    measured body rates stay: they cancel in the setpoint. e_q of yaw stays: the rotors' slow moment
-    about yaw leaves no room for more gain on its rate (docs/margins.md).
+    The desired body rates of roll and pitch move with their feedforward, e_q with its rate. The
+    measured body rates stay: they cancel in the setpoint. Yaw stays as it is: the rotors' weak
+    moment about yaw leaves no room for more gain on its rate (docs/margins.md).
     """
-    for i in range(ROLL, ALPHA):
-        if i < YAW:
-            errors[E, i] += ahead * errors[E_DOT, i]
+    for i in range(ROLL, YAW):
+        errors[E, i] += ahead * errors[E_DOT, i]
         errors[E_DOT, i] -= ahead * errors[FEEDFORWARD, i]
     errors[FEEDFORWARD, PITCH] += pitch
     wash_out(errors[FEEDFORWARD, ROLL:ALPHA], corner, dt, slow)
