@@ -18,7 +18,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from uam_control.coordinates import ALPHA
+from uam_control.coordinates import ALPHA, Z
 from uam_lab.analysis.dynamics import Dynamics
 from uam_lab.analysis.supply import COLUMNS_OF, NODE_OF, Supply
 
@@ -41,11 +41,17 @@ class Coupling:
 
 def along(dynamics: Dynamics, acceleration: np.ndarray, supply: Supply, sets: dict) -> Coupling:
     """Return H, d and sigma from the true dynamics, the true chi_ddot (m, 8) and tau."""
-    inertia = nominal_inertia(sets)
-    required = dynamics.required(acceleration)
-    plant = required - inertia * acceleration - supply.weight
-    rest = supply.tau - required
-    return Coupling(plant, rest, -(plant + rest) / inertia)
+    plant = coupling_force(dynamics, acceleration, sets)
+    rest = supply.tau - dynamics.required(acceleration)
+    return Coupling(plant, rest, -(plant + rest) / nominal_inertia(sets))
+
+
+def coupling_force(dynamics: Dynamics, acceleration: np.ndarray, sets: dict) -> np.ndarray:
+    """Return H (m, 6 + n), for the true chi_ddot (m, 6 + n)."""
+    plant = dynamics.required(acceleration) - nominal_inertia(sets) * acceleration
+    limits = sets[NODE_OF["position"]]
+    plant[:, Z] -= limits.gravity_feedforward_mass * limits.gravity
+    return plant
 
 
 def nominal_inertia(sets: dict) -> np.ndarray:

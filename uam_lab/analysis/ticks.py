@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from uam_control.laws.modular import ModularLaw
@@ -20,15 +22,20 @@ def in_the_air(series: Series, frequency: float = FREQUENCY) -> np.ndarray:
 
     Rows on the ground are left out: the paper's model has no ground contact.
     """
+    names = ModularLaw.gain_names(AXES)
+    gains = [series.values[:, gain_columns(s, names, series.columns)] for s in SUBSYSTEMS]
+    return airborne(series, frequency, gains)
+
+
+def airborne(
+    series: Series, frequency: float = FREQUENCY, further: Sequence[np.ndarray] = ()
+) -> np.ndarray:
+    """Return the rows of `in_the_air` for any law; further: blocks (ticks, ..) without gaps, too"""
     if len(series) < FEWEST or not series.flown.any():
         return np.zeros(0, dtype=int)
     flown = series.flown & (series["truth.z"] > series["truth.z"][0] + CLEARANCE)
-    names = ModularLaw.gain_names(AXES)
-    gains = np.hstack(
-        [series.values[:, gain_columns(s, names, series.columns)] for s in SUBSYSTEMS]
-    )
     complete = np.logical_and.reduce(
-        [np.isfinite(block).all(axis=1) for block in (*map(series.block, NEEDED), gains)]
+        [np.isfinite(block).all(axis=1) for block in (*map(series.block, NEEDED), *further)]
     )
     rows = np.flatnonzero(flown & complete)
     return rows[:: max(1, round(1.0 / (frequency * period(series))))]

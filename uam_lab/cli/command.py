@@ -21,6 +21,7 @@ from uam_lab.flight.flight_settings import SettingsError
 from uam_lab.recording.mcap_reader import UnreadableLog
 from uam_lab.results.result_folder import ResultFolderError
 from uam_lab.results.timeseries import UnreadableFlight
+from uam_lab.study.description import StudyError
 from uam_lab.tuning.space import TuningError
 from uam_msgs_py.node.namespace import normal
 from uam_sim_bridge.faults import FaultError
@@ -36,7 +37,7 @@ WRONG_USE, INTERRUPTED = 2, 130  # exit status
 USER_ERRORS = (
     *(ConfigurationError, ProfileError, ScenarioError, VehicleError, SettingsError, PortError),
     *(Px4Error, FaultError, PlantError, TuningError, TrialFailed, VariationError),
-    *(ResultFolderError, UnreadableFlight, UnreadableLog),
+    *(ResultFolderError, UnreadableFlight, UnreadableLog, StudyError),
 )
 
 

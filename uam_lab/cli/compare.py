@@ -12,14 +12,16 @@ from uam_control.settings.configuration import ConfigurationError
 from uam_control.vehicle import VehicleDescription, load_description
 from uam_lab.campaign.pool import fly_all
 from uam_lab.campaign.trial import TrialResult
+from uam_lab.cli import study
 from uam_lab.cli.command import Command, chosen_effects, count, jobs_of, number
 from uam_lab.cli.counting import Counting
 from uam_lab.compare import plan
 from uam_lab.flight.conclude import command_line
-from uam_lab.flight.flight_settings import ENGINES, require_ros
+from uam_lab.flight.flight_settings import ENGINES, SettingsError, require_ros
 from uam_lab.results.result_folder import make_folder
 from uam_sim_bridge.plant.vehicle import PAYLOAD_MAX
 
+SEEDS = 5
 EXAMPLES = """\
 examples:
   uam compare                          every controller, payloads 0.1 0.2 0.3 kg, 5 seeds
@@ -28,6 +30,8 @@ examples:
   uam compare --profile mine=mine.yaml     with one more row, for the profile mine.yaml
   uam compare --plant-preset laboratory    on a plant with the effects of a laboratory
   uam compare --vehicle mine.yaml --scenario hover --rows proposed frozen
+  uam compare --study adaptation       what adaptation buys: docs/adaptation.md
+  uam compare --study adaptation --part arm --out mine    one part; a stopped study continues
 
 Results in --out: report.html, tables.md, flights.csv, comparison.json, figures/. The baselines are
 reconstructions (docs/law.md). The same command gives the same tables.
@@ -47,7 +51,7 @@ def add(commands: argparse._SubParsersAction) -> None:
     )
     command.vehicle()
     command.scenario()
-    command.option("--seeds", "N", "seeds 1..N", 5, type=count)
+    command.option("--seeds", "N", "seeds 1..N (default 5; with --study the study's)", type=count)
     mass = number("mass", "kg", 0.0, PAYLOAD_MAX)
     text = f"payloads (default {' '.join(map(str, plan.PAYLOADS))})"
     command.option("--payload-mass", "KG", text, type=mass, nargs="+")
@@ -56,6 +60,14 @@ def add(commands: argparse._SubParsersAction) -> None:
     command.option("--rows", "NAME", text, nargs="+", choices=tuple(plan.ROWS))
     command.repeated("--profile", "LABEL=FILE", "an additional row")
     command.plant()
+    studies = ", ".join(configuration.names("studies", (".yaml",)))
+    text = f"fly a study instead, with its own rows and flights: {studies}, or a file"
+    command.option("--study", "NAME|FILE", text)
+    text = f"parts of the study: {', '.join(study.PARTS)} (default: all)"
+    command.option("--part", "NAME", text, nargs="+", choices=study.PARTS)
+    command.switch("--design", "only find the strengths of the study that its margins allow")
+    text = "only search the adaptation's numbers of the study, N evaluations per law"
+    command.option("--tune", "N", text, type=count)
     command.jobs(with_ros=True)
     command.out()
 
@@ -70,6 +82,10 @@ def _further(text: str, vehicle: VehicleDescription) -> plan.ComparedController:
 
 def run(options: argparse.Namespace) -> int:
     """Fly, then write the results; return the exit status."""
+    if options.study:
+        return study.run(options)
+    if options.part or options.design or options.tune:
+        raise SettingsError("--part, --design, --tune: only with --study")
     from uam_lab.compare import comparison_report, modularity
 
     if options.engine == "ros":
@@ -84,7 +100,7 @@ def run(options: argparse.Namespace) -> int:
     effects = chosen_effects(options)
     out = make_folder(options.out, "compare")
     (out / "flights").mkdir(exist_ok=True)
-    seeds = tuple(range(1, options.seeds + 1))
+    seeds = tuple(range(1, (options.seeds or SEEDS) + 1))
     flights = plan.Flights(vehicle, options.scenario, payloads, seeds, options.engine, effects)
     trials = plan.trials(rows, flights, out / "flights")
     proposed = default_profile(catalogue.DEFAULT, vehicle)

@@ -18,6 +18,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from uam_control.coordinates import ARM, ATTITUDE, CHI, CHI_DDOT, CHI_DOT, Z
+from uam_control.laws.asmc1 import Asmc1Parameters
 from uam_control.mission import load_scenario
 from uam_control.profiles.profile import CONTROLLERS, Profile
 from uam_lab.flight.direct.flight import DirectFlight
@@ -56,9 +57,11 @@ def stack_model(
     late_setpoints [ticks]: more delay of the setpoints on their way to the autopilot;
     dry: see `plant_model`.
     """
+    # Adaptation is slow, and its gains are given. That of ASMC-1 is the integral of s: linear.
     sets = profile.sets | {
-        node: replace(profile.sets[node], adapt=False) for node in CONTROLLERS
-    }  # adaptation is slow, and its gains are given
+        node: replace(found := profile.sets[node], adapt=found.law == Asmc1Parameters.law)
+        for node in CONTROLLERS
+    }
     described, numbers = vehicle.description, vehicle.numbers
     scenario = load_scenario("hover", described)
     flight = DirectFlight(scenario, replace(profile, sets=sets), vehicle, 0.0, seed=1)

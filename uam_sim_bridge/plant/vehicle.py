@@ -27,6 +27,7 @@ PAYLOAD_MAX = 2.0  # [kg] more than the rotors can carry
 BASE, PAYLOAD, MAGNET = "base", "payload", "magnet"  # bodies of the MJCF
 SWING = "magnet_swing"  # the joint of the magnet's pivot, without a sensor
 MASS_TOLERANCE = 1e-3  # relative
+LOAD_BELOW = 0.0505  # [m] `variation.tip_mass` below the magnet's pivot: where a payload hangs
 
 
 @dataclass
@@ -176,11 +177,24 @@ class Vehicle:
             )
 
     def _vary(self, model: mujoco.MjModel) -> None:
-        """Scale masses and inertias of vehicle and arm by `variation`."""
+        """Change masses, inertias and centres of mass as `variation` says."""
         variation = self.numbers["variation"]
-        if variation["mass"] == 1.0 and variation["inertia"] == 1.0:
+        offset, load = variation.get("base_offset", (0.0, 0.0)), variation.get("tip_mass", 0.0)
+        if variation["mass"] == variation["inertia"] == 1.0 and not (any(offset) or load):
             return
         own = np.arange(model.nbody) != model.body(PAYLOAD).id
         model.body_mass[own] *= variation["mass"]
         model.body_inertia[own] *= variation["mass"] * variation["inertia"]
+        model.body_ipos[model.body(BASE).id][:2] += offset
+        if load:
+            _add_point_mass(model, model.body(MAGNET).id, load, LOAD_BELOW)
         mujoco.mj_setConst(model, mujoco.MjData(model))
+
+
+def _add_point_mass(model: mujoco.MjModel, body: int, mass: float, below: float) -> None:
+    """Add a point mass [kg] to a body, `below` its origin [m], on the vertical axis of its mass."""
+    own, height = model.body_mass[body], model.body_ipos[body][2]
+    distance = height + below
+    model.body_mass[body] = own + mass
+    model.body_ipos[body][2] = height - distance * mass / (own + mass)
+    model.body_inertia[body][:2] += own * mass / (own + mass) * distance**2

@@ -1,0 +1,206 @@
+"""A study: equal feedback and margins by construction, shares, cost, kept results."""
+
+import json
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from uam_control.laws import catalogue
+from uam_control.laws.law import LawInputs
+from uam_lab.results.timeseries import SUBSYSTEMS
+from uam_lab.study import design, kept, report
+from uam_lab.study.description import StudyError, load_study
+from uam_lab.study.flights import FLOWN, StudyResult
+from uam_lab.study.run import Runner
+from uam_lab.study.search import cost
+from uam_sim_bridge.plant import Vehicle
+
+STEP = 1e-6
+LAWS = (
+    "PD",
+    "proposed",
+    "ASMC-1 (reconstructed)",
+    "ASMC-2 (reconstructed)",
+    "PD to the same margin",
+)
+
+
+@pytest.fixture(scope="module")
+def study():
+    return load_study("adaptation")
+
+
+def slopes(p, gains):
+    """Change of tau by e and by e_dot of each axis alone, at zero error with these gains."""
+    law = catalogue.law(p.law)(p)
+    n = len(p.inertia)
+    memory = np.zeros_like(law.adaptation)
+    memory[: len(gains)] = gains
+
+    def tau(e, e_dot):
+        inputs = LawInputs(e, e_dot, np.zeros(n), np.zeros(3), False, True, 0.004)
+        out = np.zeros(n)
+        type(law).step(p.record(), inputs, memory.copy(), out)
+        return out
+
+    zero = np.zeros(n)
+    by_e = [(tau(d, zero) - tau(-d, zero))[i] / (2 * STEP) for i, d in enumerate(STEP * np.eye(n))]
+    by_rate = [
+        (tau(zero, d) - tau(zero, -d))[i] / (2 * STEP) for i, d in enumerate(STEP * np.eye(n))
+    ]
+    return -np.array(by_e), -np.array(by_rate)
+
+
+@pytest.mark.parametrize("label", LAWS[:4])
+@pytest.mark.parametrize("subsystem", SUBSYSTEMS)
+def test_every_law_has_the_same_feedback_at_zero_adaptation(study, label, subsystem):
+    row = next(one for one in study.rows if one.label == label)
+    made = design.profile(study, row, study.document["strengths"])
+    p = made.sets[f"{subsystem}_controller"]
+    w = np.array(study.document["feedback"][subsystem]["bandwidth"])
+    inertia = np.array(study.document["feedback"][subsystem]["inertia"])
+    by_e, by_rate = slopes(p, [])
+    np.testing.assert_allclose(by_e, inertia * w**2, rtol=1e-6)
+    np.testing.assert_allclose(by_rate, inertia * 2.0 * w, rtol=1e-6)
+
+
+@pytest.mark.parametrize("subsystem", SUBSYSTEMS)
+def test_pd_to_the_same_margin_has_the_gains_of_the_law_at_its_ceilings(study, subsystem):
+    strength = study.document["strengths"]
+    made = {
+        one.label: design.profile(study, one, strength)
+        for one in study.rows
+        if one.label in ("proposed", "PD to the same margin")
+    }
+    gains = design.largest_gains(made["proposed"])[subsystem]
+    node = f"{subsystem}_controller"
+    full = slopes(made["proposed"].sets[node], gains)
+    stiff = slopes(made["PD to the same margin"].sets[node], [])
+    np.testing.assert_allclose(full, stiff, rtol=1e-5)
+    w = np.array(study.document["feedback"][subsystem]["bandwidth"])
+    inertia = np.array(study.document["feedback"][subsystem]["inertia"])
+    g = strength["modular"][subsystem]
+    np.testing.assert_allclose(stiff[0], (1.0 + g) * inertia * w**2, rtol=1e-6)
+
+
+def test_the_strengths_leave_the_stated_margins(study):
+    from uam_lab.study.run import margins
+
+    labels = ("PD", "proposed", "PD to the same margin", "ASMC-1 (reconstructed)")
+    rows = [one for one in study.rows if one.label in labels]
+    found = {one.row: one for one in margins(study, rows)}
+    least = 1.0 - study.document["spend"]
+    assert found["PD"].share == pytest.approx(1.0)
+    for label in labels[1:]:
+        assert 0.98 * least < found[label].share < 1.2 * least
+    assert found["proposed"].delay == pytest.approx(found["PD to the same margin"].delay, rel=1e-3)
+
+
+def test_no_integrator_but_the_laws_own(study):
+    row = next(one for one in study.rows if one.label == "proposed")
+    made = design.profile(study, row, study.document["strengths"])
+    gains = made.vehicle.autopilot_parameters()
+    assert [gains[f"MC_{axis}RATE_I"] for axis in ("ROLL", "PITCH", "YAW")] == [0.0, 0.0, 0.0]
+    assert made.sets["attitude_controller"].feedforward_washout == (0.0, 0.0, 0.0)
+    assert made.sets["position_controller"].integral_gain == (0.0, 0.0, 0.0)
+    assert made.bridge()["thrust_identification"] == "off"
+
+
+def test_load_at_the_tip_and_offset_of_the_base():
+    plain = Vehicle.load().compile(0.0)
+    changes = {"variation.tip_mass": 0.3, "variation.base_offset": [0.01, -0.02]}
+    model = Vehicle.load().changed(changes).compile(0.0)
+    base, magnet = plain.body("base").id, plain.body("magnet").id
+    assert model.body_subtreemass[base] - plain.body_subtreemass[base] == pytest.approx(0.3)
+    shift = model.body_ipos[base] - plain.body_ipos[base]
+    np.testing.assert_allclose(shift, [0.01, -0.02, 0.0], atol=1e-12)
+    # first moment about the pivot: m z + 0.3 kg x 0.0505 m
+    moment = plain.body_mass[magnet] * plain.body_ipos[magnet][2] - 0.3 * 0.0505
+    assert model.body_mass[magnet] * model.body_ipos[magnet][2] == pytest.approx(moment)
+    # moment of inertia about the pivot: that of the magnet + m d^2 of the load
+    about = [m.body_inertia[magnet][0] + m.body_mass[magnet] * m.body_ipos[magnet][2] ** 2
+             for m in (plain, model)]  # fmt: skip
+    assert about[1] - about[0] == pytest.approx(0.3 * 0.0505**2)
+
+
+def result(row, condition, errors, adaptive, outcome=FLOWN, seed=1):
+    shares = {
+        name: {"adaptive": adaptive, "feedback": 0.5, "actuators": None} for name in SUBSYSTEMS
+    }
+    return StudyResult(row, condition, seed, errors, outcome, shares)
+
+
+def test_cost_by_hand():
+    flown = result("a", "nominal", (0.1, 3.0, 2.4), 0.0)  # 2, 1, 2
+    cut = result("a", "hard", (0.1, 3.0, 2.4), 0.0, "landed")
+    assert cost([flown], [0.05, 3.0, 1.2], 20.0) == pytest.approx(5.0 / 3.0)
+    assert cost([flown, cut], [0.05, 3.0, 1.2], 20.0) == pytest.approx((5.0 / 3.0 + 20.0) / 2.0)
+    lost = result("a", "hard", (float("nan"),) * 3, 0.0)
+    assert cost([lost], [0.05, 3.0, 1.2], 20.0) == 20.0
+
+
+def test_sentences_count_what_adaptation_carries_and_where_it_wins(study):
+    small = replace(study, rows=study.rows[:3], conditions=study.conditions[:2])
+    first, second = (one.label for one in small.conditions)
+    results = [
+        result("proposed", first, (0.02, 2.0, 1.0), 0.6),
+        result("proposed", second, (0.02, 2.0, 1.0), 0.2),
+        result("PD", first, (0.04, 2.0, 0.5), 0.0),
+        result("PD", second, (0.04, 4.0, 0.5), 0.0, "lost"),
+    ]
+    said = report.sentences(small, results)
+    assert "position: adaptation of the proposed law carries 20 to 60 %" in said[0]
+    assert "more than half in 1 of 2 conditions" in said[0]
+    pd = next(one for one in said if "that of PD:" in one)
+    # the second condition has a lost flight, so only the first counts
+    assert "position × 0.50 (smaller in 1 of 1)" in pd and "arm × 2.00 (smaller in 0 of 1)" in pd
+    assert "PD: 1 of 2 flights not flown to the end." in said
+
+
+@pytest.mark.parametrize(
+    ("change", "text"),
+    [
+        ({"spend": 1.5}, "spend: 1.5 is outside 0 to 1"),
+        ({"rows": {"a": {"law": "pid"}}}, "a: law 'pid'"),
+        ({"rows": {"a": {"law": "modular", "frozen": "half"}}}, "a: frozen 'half'"),
+        ({"extra": 1}, "extra: missing, or no entry of a study"),
+    ],
+)
+def test_a_wrong_study_is_refused_in_one_line(study, tmp_path, change, text):
+    file = tmp_path / "mine.yaml"
+    file.write_text(json.dumps(study.document | change))
+    with pytest.raises(StudyError, match=text.replace("(", "\\(")) as error:
+        load_study(str(file))
+    assert "\n" not in str(error.value)
+
+
+def test_the_same_study_gives_the_same_numbers_and_continues(study, tmp_path):
+    """One short flight, twice: equal to the last digit; then without flying."""
+    document = study.document | {
+        "rows": {"proposed": study.document["rows"]["proposed"]},
+        "conditions": {},
+        "scenario": {
+            "phases": [{"from": 0, "name": "take-off"}, {"from": 1.5, "name": "trajectory"}],
+            "moves": [{"coordinate": "z", "from": 0, "until": 1.5, "to": 0.5}],
+            "landing": {"at": 2.5, "duration": 2.0},
+        },
+        "judged": ["trajectory"],
+    }
+    file = tmp_path / "tiny.yaml"
+    file.write_text(json.dumps(document))
+    tiny = load_study(str(file))
+    folders = [tmp_path / "a", tmp_path / "b"]
+    for folder in folders:
+        folder.mkdir()
+    first, second = (Runner(tiny, folder, 1, 1).varied() for folder in folders)
+    assert first == second and first[0].outcome == FLOWN
+    assert first[0].shares["position"]["adaptive"] > 0.0
+    again = Runner(tiny, folders[0], 1, 1, fly=no_flight).varied()
+    assert again == first
+
+
+def no_flight(planned, jobs, out):
+    """Return the kept results; a flight fails the test."""
+    assert all(kept.mark(one) in (out / kept.FILE).read_text() for one in planned)
+    return kept.fly(planned, jobs, out, lambda done, one: pytest.fail("flown again"))

@@ -1,0 +1,97 @@
+"""What the adapted gains of any law contribute to its tau, and their share of the coupling.
+
+`supply` splits tau of the modular law into the terms of the paper. Here the adaptive term of each
+law is tau with its recorded gains minus tau without them.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from uam_control.laws import catalogue
+from uam_control.laws.law import LawInputs
+from uam_lab.analysis import coupling, dynamics, supply, ticks, tracking
+from uam_lab.analysis.supply import COLUMNS_OF, NODE_OF
+from uam_lab.results.timeseries import SUBSYSTEMS, Series, gain_columns
+from uam_sim_bridge.plant import Vehicle
+
+
+def shares(
+    series: Series, sets: dict, vehicle: Vehicle, phases: tuple[str, ...] = ()
+) -> dict[str, dict[str, Any]]:
+    """Return subsystem → share of the true coupling that each term carries, <term, H> / <H, H>.
+
+    Terms: adaptive; feedback: that of the law without its gains; actuators: what the actuators do
+    beyond tau (None for the arm, whose torque is not recorded); integral of the position. rms: of H
+    over all axes [N or N m]. sets: parameter sets by node; phases: the ticks used, () for all in
+    the air. {} with too few ticks.
+    """
+    rows = ticks.airborne(series)
+    if phases:
+        rows = rows[np.any([series.in_phase(name)[rows] for name in phases], axis=0)]
+    if len(rows) < ticks.FEWEST:
+        return {}
+    printed = sets[NODE_OF["attitude"]].error_rate_form == "printed"
+    estimate = tracking.along(series, rows, "estimate", printed)
+    body = dynamics.Body(vehicle)
+    true = dynamics.along(series, rows, vehicle, 0.0)
+    acceleration = series.block("truth.")[rows, 2 * series.columns.size :]
+    plant = coupling.coupling_force(true, acceleration, sets)
+    wrench = supply.rotor_wrench(series, rows, body)
+    integral = supply.integral_action(series, sets[NODE_OF["position"]])[rows]
+    found = {}
+    for name in SUBSYSTEMS:
+        columns, p = COLUMNS_OF[name], sets[NODE_OF[name]]
+        with_gains, without = terms(series, rows, name, p, estimate)
+        force = plant[:, columns]
+        inertia = np.array(p.inertia)
+        met = {
+            "adaptive": with_gains - without,
+            "feedback": without - inertia * estimate.acceleration_d[:, columns],
+            "actuators": None,
+            "integral": integral if name == "position" else None,
+        }
+        tau = series.block({"position": "tau_p.", "attitude": "tau_q."}.get(name, "tau_alpha."))
+        if name != "arm":
+            met["actuators"] = wrench[:, columns] - tau[rows]
+        power = float(np.sum(force**2))
+        found[name] = {"rms": float(np.sqrt(power / len(rows)))}
+        for term, value in met.items():
+            share = None if value is None or not power else float(np.sum(value * force)) / power
+            found[name][term] = share
+    return found
+
+
+def terms(
+    series: Series, rows: np.ndarray, subsystem: str, p: Any, estimate: tracking.Tracking
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return tau (m, n) with the recorded gains, and without them; before limits and weight.
+
+    p: parameter set of the subsystem. ||chi_ddot|| enters the recorded rho of the modular law.
+    """
+    law = catalogue.law(p.law)(p)
+    columns = COLUMNS_OF[subsystem]
+    names = law.gain_names(len(p.inertia))
+    recorded = series.values[rows][:, gain_columns(subsystem, names, series.columns)]
+    record, n = p.record(), len(p.inertia)
+    found = np.zeros((2, len(rows), n))
+    for k in range(len(rows)):
+        inputs = LawInputs(
+            estimate.e[k, columns].copy(),
+            estimate.e_dot[k, columns].copy(),
+            estimate.acceleration_d[k, columns].copy(),
+            np.array([estimate.xi[k], 0.0, estimate.rate[k]]),
+            False,
+            True,
+            0.0,
+        )
+        for which, gains in enumerate((recorded[k], np.zeros(len(names)))):
+            memory = np.zeros(len(names) + law.memory)
+            memory[: len(names)] = gains
+            if p.law == catalogue.DEFAULT:  # rho as recorded stands for all its gains
+                memory[:5] = 0.0
+                memory[0] = gains[names.index("rho")]
+            type(law).step(record, inputs, memory, found[which, k])
+    return found[0], found[1]

@@ -1,0 +1,118 @@
+"""`uam compare --study`: laws of equal feedback and margin over varied flights."""
+
+from __future__ import annotations
+
+import argparse
+import json
+from collections.abc import Sequence
+from pathlib import Path
+
+from uam_lab.cli.command import jobs_of
+from uam_lab.cli.counting import Counting
+from uam_lab.flight.conclude import command_line
+from uam_lab.results.atomic import write_rows, write_text
+from uam_lab.results.result_folder import make_folder, versions, write_json
+from uam_lab.study import kept
+from uam_lab.study.description import Study, load_study
+from uam_lab.study.flights import StudyFlight, StudyResult
+
+PARTS = ("margins", "varied", "law", "arm")
+TUNING = "tuning.json"  # of `--tune`: law → costs of the evaluations, best numbers
+
+
+def run(options: argparse.Namespace) -> int:
+    """Design, tune or fly the study; return the exit status."""
+    from uam_lab.study import design
+
+    study = load_study(options.study)
+    out = make_folder(options.out, "study", study.name)
+    if options.design:
+        found = design.strengths(study, lambda text: print(text, flush=True))
+        write_json(out / "strengths.json", found)
+        print(f"strengths  {json.dumps(found)}\nresults    {out}")
+        return 0
+    if options.tune:
+        return _tune(study, options.tune, out)
+    return _fly(study, options, out)
+
+
+def _flier(planned: Sequence[StudyFlight], jobs: int, out: Path) -> list[StudyResult]:
+    """Fly with a progress bar."""
+    with Counting("study", len(planned)) as counting:
+        return kept.fly(
+            planned,
+            jobs,
+            out,
+            lambda done, r: counting.show(done, f"{r.row}, {r.condition}, seed {r.seed}"),
+        )
+
+
+def _tune(study: Study, evaluations: int, out: Path) -> int:
+    from uam_lab.study import figures
+    from uam_lab.study.search import search
+
+    done = {}
+    for law in study.document["ranges"]:
+        found = search(
+            study,
+            law,
+            study.document["strengths"],
+            evaluations,
+            out / "scenarios",
+            lambda text: print(text, flush=True),
+        )
+        done[law] = {"costs": found.costs, "best": found.best}
+        write_json(out / TUNING, done)
+    with figures.style.styled():
+        costs = {law: one["costs"] for law, one in done.items()}
+        figures.save(figures.tuning(costs), out / "tuning.png")
+    for law, one in done.items():
+        print(f"{law}: cost {one['costs'][0]:.4g} to {min(one['costs']):.4g}: {one['best']}")
+    print(f"results  {out}")
+    return 0
+
+
+def _fly(study: Study, options: argparse.Namespace, out: Path) -> int:
+    from uam_lab.results.timeseries import SUBSYSTEMS
+    from uam_lab.study import figures, report
+    from uam_lab.study.run import PROPOSED, SHOWN, Runner, margins
+
+    parts = tuple(options.part or PARTS)
+    texts, said, drawn, flown = [], [], {}, []
+    if "margins" in parts:
+        rows = [row for row in study.rows if row.law and not row.profiles]
+        texts.append(report.margin_table(margins(study, rows)))
+    runner = Runner(study, out, jobs_of(options), options.seeds or study.document["seeds"], _flier)
+    if "varied" in parts:
+        results = runner.varied()
+        flown += results
+        said = report.sentences(study, results)
+        texts += [report.error_table(study, results, name) for name in SUBSYSTEMS]
+        texts += [report.share_table(study, results, name) for name in SHOWN]
+        texts.append(report.shares_by_condition(study, results, PROPOSED))
+        drawn["errors"] = figures.errors(study, results)
+        drawn["shares"] = figures.shares(study, results, SHOWN[0])
+    for name, fly in (("law", runner.law_sweep), ("arm", runner.arm_sweep)):
+        if name in parts:
+            swept = fly()
+            flown += [one.result for one in swept]
+            texts.append(report.sweep_table(swept, {"law": "varied", "arm": "row"}[name]))
+            drawn[name] = getattr(figures, name)(swept)
+    with figures.style.styled():
+        for name, figure in drawn.items():
+            figures.save(figure, out / f"{name}.png")
+    text = "\n\n".join([*texts, "\n".join(f"- {one}" for one in said)]).strip() + "\n"
+    made = f"\nStudy {study.name}, vehicle {study.vehicle.name}. Made by `{command_line()}`.\n"
+    write_text(out / "tables.md", text + made)
+    write_rows(
+        out / "flights.csv",
+        ("row", "condition", "seed", "position_m", "attitude_deg", "arm_deg", "outcome"),
+        ([r.row, r.condition, r.seed, *(f"{e:.6g}" for e in r.errors), r.outcome] for r in flown),
+    )
+    write_json(
+        out / "study.json",
+        {"command": command_line(), "versions": versions(), "study": study.document},
+    )
+    print(text)
+    print(f"results  {out}")
+    return 0

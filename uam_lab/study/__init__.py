@@ -1,0 +1,1 @@
+"""A study of `uam compare --study`: laws of equal feedback and margin over varied flights."""

@@ -1,0 +1,177 @@
+"""The parts of a study, in order: margins of each row, varied flights, the law's own numbers."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+
+from uam_control.profiles.profile import Profile
+from uam_lab.campaign.trial import Trial
+from uam_lab.study import design, kept
+from uam_lab.study.description import NOMINAL, Condition, Row, Study
+from uam_lab.study.flights import StudyFlight, StudyResult, flights
+
+PROPOSED = "proposed"
+STIFF = "PD to the same margin"
+SHOWN = (NOMINAL, "hard")  # conditions of the law's sweep
+
+
+@dataclass(frozen=True)
+class Margin:
+    """Smallest margins of a row with its largest gains, over the loads: delay [s] and distance of
+    L from -1, per loop; share: of those of the plain feedback."""
+
+    row: str
+    delay: dict[str, float]
+    distance: dict[str, float]
+    share: float
+
+
+@dataclass(frozen=True)
+class Swept:
+    """One flight of a sweep: what was varied, its value, the delay margins with largest gains [s]
+    of arm and setpoints, the result."""
+
+    what: str
+    value: float
+    arm_delay: float
+    setpoint_delay: float
+    result: StudyResult
+
+
+def margins(study: Study, rows: Sequence[Row]) -> list[Margin]:
+    """Return the margins of the rows that have the study's feedback."""
+    strength, loads = study.document["strengths"], study.document["margin_loads"]
+    plain_row = Row("", design.MODULAR, "zero")
+    plain = {m: design.loop_margins(design.profile(study, plain_row, {}), m) for m in loads}
+    found = []
+    for row in rows:
+        made = design.profile(study, row, strength)
+        at = {m: design.loop_margins(made, m, design.largest_gains(made)) for m in loads}
+        found.append(
+            Margin(
+                row.label,
+                {k: min(one.delay[k] for one in at.values()) for k in plain[loads[0]].delay},
+                {k: min(one.distance[k] for one in at.values()) for k in plain[loads[0]].distance},
+                min(at[m].share_of(plain[m]) for m in loads),
+            )
+        )
+    return found
+
+
+class Runner:
+    """Flies the parts of a study into a folder; results of earlier runs are used again."""
+
+    def __init__(
+        self,
+        study: Study,
+        out: Path,
+        jobs: int,
+        seeds: int,
+        fly: Callable[[Sequence[StudyFlight], int, Path], list[StudyResult]] = kept.fly,
+    ) -> None:
+        """fly: flies planned flights with so many jobs, results kept in the folder."""
+        self.study, self._out, self._jobs, self._all = study, out, jobs, fly
+        self.seeds = tuple(range(1, seeds + 1))
+        self.strength = study.document["strengths"]
+
+    def _fly(self, planned: list[StudyFlight]) -> list[StudyResult]:
+        return self._all(planned, self._jobs, self._out)
+
+    def _planned(
+        self, made: dict[str, Profile], conditions: Sequence[Condition], delay: float = 0.0
+    ) -> list[StudyFlight]:
+        folder = self._out / "scenarios"
+        return flights(self.study, made, conditions, self.seeds, folder, delay)
+
+    def varied(self) -> list[StudyResult]:
+        """Fly every row in every condition."""
+        study = self.study
+        nominal = [study.condition(NOMINAL)]
+        first = self._fly(
+            flights(
+                study,
+                {PROPOSED: self._made(PROPOSED)},
+                nominal,
+                [1],
+                self._out / "scenarios",
+            )
+        )[0]
+        gains = {name: np.array(values[:5]) for name, values in first.gains.items()}
+        made = {row.label: design.profile(study, row, self.strength, gains) for row in study.rows}
+        return self._fly(self._planned(made, study.conditions))
+
+    def _made(self, label: str, study: Study | None = None) -> Profile:
+        study = study or self.study
+        row = next(one for one in study.rows if one.label == label)
+        return design.profile(study, row, self.strength)
+
+    def law_sweep(self) -> list[Swept]:
+        """Vary the boundary layer, nu and the delay of the setpoints, one at a time.
+
+        The ceilings of K stay as they are: a thinner layer is a larger gain.
+        """
+        study, entry = self.study, self.study.document["law_sweep"]
+        shown = [study.condition(label) for label in SHOWN]
+        planned, values = [], []
+        for what in ("layer", "nu", "delay"):
+            for value in entry[what]:
+                made = self._changed(what, float(value))
+                delay = 1e-3 * value if what == "delay" else 0.0
+                label = f"{what} {value:g}"
+                some = flights(study, {label: made}, shown, [1], self._out / "scenarios", delay)
+                margin = design.loop_margins(made, 0.0, design.largest_gains(made))
+                planned += some
+                values += [(what, float(value), margin)] * len(some)
+        return [
+            Swept(what, value, *_delays(margin), result)
+            for (what, value, margin), result in zip(values, self._fly(planned), strict=True)
+        ]
+
+    def _changed(self, what: str, factor: float) -> Profile:
+        """Return the proposed row with layer or nu times a factor, everything else as it is."""
+        made = self._made(PROPOSED)
+        if what == "delay":
+            return made
+        sections = {node: dict(values) for node, values in made.sections.items()}
+        for node in (f"{name}_controller" for name in design.SUBSYSTEMS):
+            section = sections[node]
+            if what == "layer":
+                section["varpi"] = section["varpi"] * factor
+            else:
+                section["nu"] = [factor * nu for nu in section["nu"]]
+        return design.profile_of(sections, made.file, made.vehicle)
+
+    def arm_sweep(self) -> list[Swept]:
+        """Vary the arm's bandwidth, in the paper's mission, with and without adaptation."""
+        study, entry = self.study, self.study.document["arm_sweep"]
+        planned, values = [], []
+        for label in (PROPOSED, STIFF, "ASMC-1 (reconstructed)"):
+            for factor in entry["bandwidth"]:
+                document = study.document["feedback"]
+                arm = document["arm"] | {
+                    "bandwidth": [factor * w for w in document["arm"]["bandwidth"]]
+                }
+                changed = replace(
+                    study, document=study.document | {"feedback": document | {"arm": arm}}
+                )
+                made = self._made(label, changed)
+                margin = design.loop_margins(made, 0.0, design.largest_gains(made))
+                name = f"{label}, arm x {factor:g}"
+                trial = Trial(name, made, entry["payload"], 1, entry["scenario"])
+                planned.append(StudyFlight(name, entry["scenario"], trial))
+                values.append((label, float(factor), margin))
+        return [
+            Swept(what, value, *_delays(margin), result)
+            for (what, value, margin), result in zip(values, self._fly(planned), strict=True)
+        ]
+
+
+def _delays(margin: design.LoopMargins) -> tuple[float, float]:
+    if not margin.stable:
+        return 0.0, 0.0
+    arm = min(v for k, v in margin.delay.items() if k.startswith("alpha"))
+    return arm, margin.delay["setpoints"]

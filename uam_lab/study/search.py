@@ -1,0 +1,74 @@
+"""Search of the adaptation's own numbers, with the same budget for every law."""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import optuna
+
+from uam_lab.study import design
+from uam_lab.study.description import Row, Study
+from uam_lab.study.flights import StudyResult, flights, measure
+
+DIGITS = 3  # significant digits of a value
+
+
+@dataclass(frozen=True)
+class Search:
+    """The search of one law. costs: of every evaluation, in order; best: its numbers."""
+
+    law: str
+    costs: tuple[float, ...]
+    best: dict[str, float]
+
+
+def cost(results: list[StudyResult], aim: list[float], failed: float) -> float:
+    """Return the mean cost of flights: the mean of error / aim; `failed` if cut short."""
+    found = []
+    for result in results:
+        ratio = float(np.mean(np.array(result.errors) / np.array(aim)))
+        usable = result.flown and np.isfinite(ratio)
+        found.append(min(ratio, failed) if usable else failed)
+    return float(np.mean(found))
+
+
+def search(
+    study: Study,
+    law: str,
+    strength: dict[str, dict[str, float]],
+    evaluations: int,
+    folder: Path,
+    progress: Callable[[str], None],
+) -> Search:
+    """Search with TPE over the study's flights for tuning; the first evaluation is the study's own.
+
+    Repeatable: one process, fixed seed.
+    """
+    optuna.logging.set_verbosity(optuna.logging.ERROR)
+    warnings.filterwarnings("ignore", category=optuna.exceptions.ExperimentalWarning)
+    entry = study.document["tuning"]
+    conditions = [study.condition(label) for label in entry["conditions"]]
+    ranges, start = study.document["ranges"][law], study.document["adaptation"][law]
+    costs: list[float] = []
+
+    def evaluate(trial: optuna.Trial) -> float:
+        values = {
+            name: float(f"{trial.suggest_float(name, low, high, log=True):.{DIGITS}g}")
+            for name, (low, high) in ranges.items()
+        }
+        made = design.profile(study.with_adaptation(law, values), Row(law, law), strength)
+        flown = flights(study, {law: made}, conditions, [entry["seed"]], folder)
+        costs.append(cost([measure(one) for one in flown], entry["aim"], entry["failed"]))
+        progress(f"{law}: evaluation {len(costs)} of {evaluations}, best {min(costs):.4g}")
+        return costs[-1]
+
+    sampler = optuna.samplers.TPESampler(seed=1, multivariate=True, n_startup_trials=6)
+    optimiser = optuna.create_study(sampler=sampler)
+    optimiser.enqueue_trial(dict(start))
+    optimiser.optimize(evaluate, n_trials=evaluations)
+    best = {k: float(f"{v:.{DIGITS}g}") for k, v in optimiser.best_params.items()}
+    return Search(law, tuple(costs), best)
