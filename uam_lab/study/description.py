@@ -16,18 +16,10 @@ from uam_lab.results.timeseries import SUBSYSTEMS
 NOMINAL = "nominal"
 FROZEN = ("", "zero", "margin", "converged")
 KEYS = (
-    *(
-        "vehicle",
-        "profile",
-        "autopilot",
-        "changes",
-        "feedback",
-        "spend",
-        "margin_loads",
-        "scenario",
-    ),
-    *("judged", "nominal", "seeds", "rows", "conditions", "factors", "nominal_values"),
-    *("strengths", "adaptation", "ranges", "tuning", "law_sweep", "arm_sweep"),
+    *("vehicle", "autopilot", "shared", "law_parameters", "modular_parameters", "feedback"),
+    *("spend", "margin_loads", "strengths", "scenario", "judged", "nominal", "seeds", "rows"),
+    *("conditions", "factors", "nominal_values", "adaptation", "ranges", "tuning"),
+    *("law_sweep", "arm_sweep"),
 )
 
 

@@ -8,14 +8,13 @@ from pathlib import Path
 
 import numpy as np
 
-from uam_control.profiles.profile import Profile
+from uam_control.profiles.profile import Profile, load_profile
 from uam_lab.campaign.trial import Trial
 from uam_lab.study import design, kept
 from uam_lab.study.description import NOMINAL, Condition, Row, Study
 from uam_lab.study.flights import StudyFlight, StudyResult, flights
 
 PROPOSED = "proposed"
-STIFF = "PD to the same margin"
 SHOWN = (NOMINAL, "hard")  # conditions of the law's sweep
 
 
@@ -146,28 +145,39 @@ class Runner:
         return design.profile_of(sections, made.file, made.vehicle)
 
     def arm_sweep(self) -> list[Swept]:
-        """Vary the arm's bandwidth, in the paper's mission, with and without adaptation."""
+        """Vary the arm's bandwidth in a mission; position and attitude are those of a profile."""
         study, entry = self.study, self.study.document["arm_sweep"]
-        planned, values = [], []
-        for label in (PROPOSED, STIFF, "ASMC-1 (reconstructed)"):
+        base = load_profile(entry["profile"], vehicle=study.vehicle)
+        made = [(f"{entry['profile']} as it is", 1.0, base)]
+        for label in entry["rows"]:
             for factor in entry["bandwidth"]:
-                document = study.document["feedback"]
-                arm = document["arm"] | {
-                    "bandwidth": [factor * w for w in document["arm"]["bandwidth"]]
-                }
-                changed = replace(
-                    study, document=study.document | {"feedback": document | {"arm": arm}}
-                )
-                made = self._made(label, changed)
-                margin = design.loop_margins(made, 0.0, design.largest_gains(made))
-                name = f"{label}, arm x {factor:g}"
-                trial = Trial(name, made, entry["payload"], 1, entry["scenario"])
-                planned.append(StudyFlight(name, entry["scenario"], trial))
-                values.append((label, float(factor), margin))
+                arm = self._made(label, _faster_arm(study, factor)).sections["arm_controller"]
+                sections = base.sections | {"arm_controller": arm}
+                changed = design.profile_of(sections, base.file, base.vehicle)
+                made.append((label, float(factor), changed))
+        planned = []
+        for label, factor, one in made:
+            name = f"{label}, arm x {factor:g}"
+            trial = Trial(name, one, entry["payload"], 1, entry["scenario"])
+            planned.append(StudyFlight(name, entry["scenario"], trial))
+        found = zip(made, self._fly(planned), strict=True)
         return [
-            Swept(what, value, *_delays(margin), result)
-            for (what, value, margin), result in zip(values, self._fly(planned), strict=True)
+            Swept(label, factor, *_delays(design.loop_margins(one, 0.0, _arm_gains(one))), result)
+            for (label, factor, one), result in found
         ]
+
+
+def _faster_arm(study: Study, factor: float) -> Study:
+    """Return the study with the bandwidth of the arm's feedback times a factor."""
+    feedback = study.document["feedback"]
+    arm = feedback["arm"] | {"bandwidth": [factor * w for w in feedback["arm"]["bandwidth"]]}
+    document = study.document | {"feedback": feedback | {"arm": arm}}
+    return replace(study, document=document)
+
+
+def _arm_gains(made: Profile) -> dict[str, np.ndarray]:
+    """Return the arm's largest gains; those of position and attitude stay at their start."""
+    return {name: g for name, g in design.largest_gains(made).items() if name == "arm"}
 
 
 def _delays(margin: design.LoopMargins) -> tuple[float, float]:
