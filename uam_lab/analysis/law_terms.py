@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from uam_control.coordinates import Z
 from uam_control.laws import catalogue
 from uam_control.laws.law import LawInputs
 from uam_lab.analysis import coupling, dynamics, supply, ticks, tracking
@@ -17,16 +18,24 @@ from uam_lab.analysis.supply import COLUMNS_OF, NODE_OF
 from uam_lab.results.timeseries import SUBSYSTEMS, Series, gain_columns
 from uam_sim_bridge.plant import Vehicle
 
+TAU = {"position": "tau_p.", "attitude": "tau_q.", "arm": "tau_alpha."}
+
 
 def shares(
-    series: Series, sets: dict, vehicle: Vehicle, phases: tuple[str, ...] = ()
+    series: Series,
+    sets: dict,
+    vehicle: Vehicle,
+    payload_mass: float = 0.0,
+    phases: tuple[str, ...] = (),
 ) -> dict[str, dict[str, Any]]:
     """Return subsystem → share of the true coupling that each term carries, <term, H> / <H, H>.
 
-    Terms: adaptive; feedback: that of the law without its gains; actuators: what the actuators do
-    beyond tau (None for the arm, whose torque is not recorded); integral of the position. rms: of H
-    over all axes [N or N m]. sets: parameter sets by node; phases: the ticks used, () for all in
-    the air. {} with too few ticks.
+    Terms: adaptive; feedback: that of the law without its gains; added: what the controller adds to
+    the law (integral action, known loads, limits); actuators: what they do beyond tau (None for the
+    arm, whose torque is not recorded). rms: of H over all axes [N or N m].
+
+    sets: parameter sets by node; payload_mass [kg]; phases: the ticks used, () for all in the air.
+    {} with too few ticks.
     """
     rows = ticks.airborne(series)
     if phases:
@@ -36,26 +45,27 @@ def shares(
     printed = sets[NODE_OF["attitude"]].error_rate_form == "printed"
     estimate = tracking.along(series, rows, "estimate", printed)
     body = dynamics.Body(vehicle)
-    true = dynamics.along(series, rows, vehicle, 0.0)
+    true = dynamics.along(series, rows, vehicle, payload_mass)
     acceleration = series.block("truth.")[rows, 2 * series.columns.size :]
     plant = coupling.coupling_force(true, acceleration, sets)
     wrench = supply.rotor_wrench(series, rows, body)
-    integral = supply.integral_action(series, sets[NODE_OF["position"]])[rows]
     found = {}
     for name in SUBSYSTEMS:
         columns, p = COLUMNS_OF[name], sets[NODE_OF[name]]
         with_gains, without = terms(series, rows, name, p, estimate)
         force = plant[:, columns]
         inertia = np.array(p.inertia)
+        tau = series.block(TAU[name])[rows]
+        if name == "position":
+            tau[:, Z] -= p.gravity_feedforward_mass * p.gravity
         met = {
             "adaptive": with_gains - without,
             "feedback": without - inertia * estimate.acceleration_d[:, columns],
+            "added": tau - with_gains,
             "actuators": None,
-            "integral": integral if name == "position" else None,
         }
-        tau = series.block({"position": "tau_p.", "attitude": "tau_q."}.get(name, "tau_alpha."))
         if name != "arm":
-            met["actuators"] = wrench[:, columns] - tau[rows]
+            met["actuators"] = wrench[:, columns] - series.block(TAU[name])[rows]
         power = float(np.sum(force**2))
         found[name] = {"rms": float(np.sqrt(power / len(rows)))}
         for term, value in met.items():

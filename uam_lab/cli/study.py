@@ -51,8 +51,11 @@ def _tune(study: Study, evaluations: int, out: Path) -> int:
     from uam_lab.study import figures
     from uam_lab.study.search import search
 
-    done = {}
+    file = out / TUNING
+    done = json.loads(file.read_text()) if file.exists() else {}
     for law in study.document["ranges"]:
+        if len(done.get(law, {}).get("costs", ())) == evaluations:
+            continue  # of a search that was stopped
         found = search(
             study,
             law,
@@ -62,7 +65,7 @@ def _tune(study: Study, evaluations: int, out: Path) -> int:
             lambda text: print(text, flush=True),
         )
         done[law] = {"costs": found.costs, "best": found.best}
-        write_json(out / TUNING, done)
+        write_json(file, done)
     with figures.style.styled():
         costs = {law: one["costs"] for law, one in done.items()}
         figures.save(figures.tuning(costs), out / "tuning.png")

@@ -65,7 +65,7 @@ def shares(study: Study, results: Sequence[StudyResult], condition: str) -> Figu
     figure = Figure(figsize=(style.WIDTH, 4.0))
     axes = figure.subplots(1, 3, sharey=True)
     terms = (("adaptive", "adaptation of the law"), ("feedback", "feedback"))
-    terms += (("actuators", "autopilot and motors"), ("integral", "integral action"))
+    terms += (("actuators", "autopilot and motors"), ("added", "integral action, known loads"))
     rows = list(reversed(study.rows))
     for axis, subsystem in zip(axes, SUBSYSTEMS, strict=True):
         for place, row in enumerate(rows):

@@ -122,7 +122,7 @@ def measure(flight: StudyFlight) -> StudyResult:
         trial.seed,
         errors_of(series, rows, not by_position),
         ended,
-        law_terms.shares(series, trial.profile.sets, vehicle, flight.judged),
+        law_terms.shares(series, trial.profile.sets, vehicle, trial.payload_mass, flight.judged),
         _gains(series, rows),
     )
 

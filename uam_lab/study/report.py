@@ -66,11 +66,11 @@ def share_table(study: Study, results: Sequence[StudyResult], condition: str) ->
         cells = []
         for subsystem in SUBSYSTEMS:
             found = [r.shares[subsystem] for r in of(results, row.label, condition) if r.shares]
-            for term in ("adaptive", "feedback", "actuators"):
+            for term in ("adaptive", "feedback", "added", "actuators"):
                 values = [one[term] for one in found if one[term] is not None]
                 cells.append(f"{100.0 * np.mean(values):.0f}" if values else "")
         rows.append([row.label, *cells])
-    terms = ("adaptation", "feedback", "autopilot")
+    terms = ("adaptation", "feedback", "added", "autopilot")
     head = [f"share of the coupling [%], {condition}"]
     head += [f"{subsystem}: {term}" for subsystem in SUBSYSTEMS for term in terms]
     return markdown_table(head, rows)

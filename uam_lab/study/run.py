@@ -15,7 +15,7 @@ from uam_lab.study.description import NOMINAL, Condition, Row, Study
 from uam_lab.study.flights import StudyFlight, StudyResult, flights
 
 PROPOSED = "proposed"
-SHOWN = (NOMINAL, "hard")  # conditions of the law's sweep
+SHOWN = (NOMINAL, "hard")  # conditions whose shares are shown in full
 
 
 @dataclass(frozen=True)
@@ -114,7 +114,7 @@ class Runner:
         The ceilings of K stay as they are: a thinner layer is a larger gain.
         """
         study, entry = self.study, self.study.document["law_sweep"]
-        shown = [study.condition(label) for label in SHOWN]
+        shown = [study.condition(label) for label in entry["conditions"]]
         planned, values = [], []
         for what in ("layer", "nu", "delay"):
             for value in entry[what]:

@@ -15,6 +15,7 @@ from uam_lab.study.description import Row, Study
 from uam_lab.study.flights import StudyResult, flights, measure
 
 DIGITS = 3  # significant digits of a value
+STEP = 0.1  # initial step around the study's own numbers, as a share of the logarithmic range
 
 
 @dataclass(frozen=True)
@@ -44,15 +45,15 @@ def search(
     folder: Path,
     progress: Callable[[str], None],
 ) -> Search:
-    """Search with TPE over the study's flights for tuning; the first evaluation is the study's own.
+    """Search with CMA-ES over the study's flights for tuning, from its start, evaluated first.
 
     Repeatable: one process, fixed seed.
     """
     optuna.logging.set_verbosity(optuna.logging.ERROR)
-    warnings.filterwarnings("ignore", category=optuna.exceptions.ExperimentalWarning)
+    warnings.filterwarnings("ignore", module="optuna")
     entry = study.document["tuning"]
     conditions = [study.condition(label) for label in entry["conditions"]]
-    ranges, start = study.document["ranges"][law], study.document["adaptation"][law]
+    ranges, start = study.document["ranges"][law], entry["start"][law]
     costs: list[float] = []
 
     def evaluate(trial: optuna.Trial) -> float:
@@ -66,7 +67,9 @@ def search(
         progress(f"{law}: evaluation {len(costs)} of {evaluations}, best {min(costs):.4g}")
         return costs[-1]
 
-    sampler = optuna.samplers.TPESampler(seed=1, multivariate=True, n_startup_trials=6)
+    sampler = optuna.samplers.CmaEsSampler(
+        x0=dict(start), sigma0=STEP, seed=1, warn_independent_sampling=False
+    )
     optimiser = optuna.create_study(sampler=sampler)
     optimiser.enqueue_trial(dict(start))
     optimiser.optimize(evaluate, n_trials=evaluations)
