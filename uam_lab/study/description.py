@@ -30,7 +30,8 @@ class StudyError(ValueError):
 @dataclass(frozen=True)
 class Row:
     """One controller. law: "" for `profiles` alone; frozen: one of FROZEN; own_autopilot: the
-    autopilot's own gains instead of the study's; common: one rate of adaptation for all subsystems.
+    autopilot's own gains instead of the study's; common: one rate of adaptation for all subsystems;
+    conditions: those that it flies, () for all.
     """
 
     label: str
@@ -39,6 +40,7 @@ class Row:
     profiles: tuple[str, ...] = ()
     own_autopilot: bool = False
     common: bool = False
+    conditions: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -98,6 +100,10 @@ def load_study(name_or_file: str) -> Study:
     _check(file, document)
     rows = tuple(_row(file, label, entry) for label, entry in document["rows"].items())
     base = document["nominal"]
+    known = {NOMINAL, *document["conditions"]}
+    for row in rows:
+        if strange := sorted(set(row.conditions) - known):
+            raise StudyError(f"{file}: {row.label}: no condition '{strange[0]}'")
     conditions = (
         _condition(NOMINAL, base, {}),
         *(_condition(label, base, entry) for label, entry in document["conditions"].items()),
@@ -121,6 +127,7 @@ def _row(file: Path, label: str, entry: dict[str, Any]) -> Row:
         profiles,
         entry.get("autopilot") == "own",
         bool(entry.get("common", False)),
+        tuple(entry.get("conditions", ())),
     )
 
 

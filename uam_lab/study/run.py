@@ -100,8 +100,14 @@ class Runner:
             )
         )[0]
         gains = {name: np.array(values[:5]) for name, values in first.gains.items()}
-        made = {row.label: design.profile(study, row, self.strength, gains) for row in study.rows}
-        return self._fly(self._planned(made, study.conditions))
+        planned = []
+        for row in study.rows:
+            made = {row.label: design.profile(study, row, self.strength, gains)}
+            chosen = [
+                one for one in study.conditions if not row.conditions or one.label in row.conditions
+            ]
+            planned += self._planned(made, chosen)
+        return self._fly(planned)
 
     def _made(self, label: str, study: Study | None = None) -> Profile:
         study = study or self.study
