@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 import json
 from collections.abc import Sequence
+from functools import partial
 from pathlib import Path
 
 from uam_lab.cli.command import jobs_of
@@ -93,17 +94,17 @@ def _fly(study: Study, options: argparse.Namespace, out: Path) -> int:
         texts += [report.error_table(study, results, name) for name in SUBSYSTEMS]
         texts += [report.share_table(study, results, name) for name in SHOWN]
         texts.append(report.shares_by_condition(study, results, PROPOSED))
-        drawn["errors"] = figures.errors(study, results)
-        drawn["shares"] = figures.shares(study, results, SHOWN[0])
+        drawn["errors"] = lambda: figures.errors(study, results)
+        drawn["shares"] = lambda: figures.shares(study, results, SHOWN[0])
     for name, fly in (("law", runner.law_sweep), ("arm", runner.arm_sweep)):
         if name in parts:
             swept = fly()
             flown += [one.result for one in swept]
             texts.append(report.sweep_table(swept, {"law": "varied", "arm": "row"}[name]))
-            drawn[name] = getattr(figures, name)(swept)
+            drawn[name] = partial(getattr(figures, name), swept)
     with figures.style.styled():
-        for name, figure in drawn.items():
-            figures.save(figure, out / f"{name}.png")
+        for name, draw in drawn.items():
+            figures.save(draw(), out / f"{name}.png")
     text = "\n\n".join([*texts, "\n".join(f"- {one}" for one in said)]).strip() + "\n"
     made = f"\nStudy {study.name}, vehicle {study.vehicle.name}. Made by `{command_line()}`.\n"
     write_text(out / "tables.md", text + made)

@@ -18,7 +18,14 @@ from uam_lab.study.run import Swept
 
 matplotlib.use("Agg")
 
-COLOURS = (*style.FLIGHTS, "#c2512f", "#57a773", "#0b3c6f")
+COLOURS = (
+    *style.FLIGHTS[:2],
+    style.FLIGHTS[2],
+    style.INK,
+    *style.FLIGHTS[3:],
+    "#57a773",
+    "#0b3c6f",
+)
 DASHES = ("-", (0, (4, 1.5)), (0, (1, 1.2)))
 LABELS = ("position [m]", "attitude [deg]", "arm [deg]")
 HALF = 0.6  # [deg] half of the paper's arm columns, rounded
@@ -41,7 +48,7 @@ def errors(study: Study, results: Sequence[StudyResult]) -> Figure:
                 y = np.array([mean(one, part) for one in own])
                 if np.isnan(y).all():
                     continue
-                colour, dash = COLOURS[number % len(COLOURS)], DASHES[number // 4]
+                colour, dash = COLOURS[number % len(COLOURS)], DASHES[number % len(DASHES)]
                 x = [value for value, _ in points]
                 axis.plot(x, y, color=colour, linestyle=dash, marker=".", markersize=5)
                 bad = [not all(r.flown for r in one) for one in own]
@@ -51,11 +58,11 @@ def errors(study: Study, results: Sequence[StudyResult]) -> Figure:
                 axis.set_ylabel(LABELS[part])
         axes[2, column].set_xlabel(text)
     handles = [
-        style.key(row.label, COLOURS[i % len(COLOURS)], dashes=DASHES[i // 4])
+        style.key(row.label, COLOURS[i % len(COLOURS)], dashes=DASHES[i % len(DASHES)])
         for i, row in enumerate(study.rows)
     ]
     figure.legend(handles=handles, loc="lower center", ncols=3)
-    figure.subplots_adjust(left=0.065, right=0.99, top=0.93, bottom=0.19, wspace=0.08, hspace=0.1)
+    figure.subplots_adjust(left=0.085, right=0.99, top=0.93, bottom=0.19, wspace=0.08, hspace=0.1)
     style.title(figure, "RMS errors, one factor varied at a time (x: not flown to the end)")
     return figure
 
@@ -69,7 +76,8 @@ def shares(study: Study, results: Sequence[StudyResult], condition: str) -> Figu
     rows = list(reversed(study.rows))
     for axis, subsystem in zip(axes, SUBSYSTEMS, strict=True):
         for place, row in enumerate(rows):
-            found = [r.shares[subsystem] for r in of(results, row.label, condition) if r.shares]
+            own = of(results, row.label, condition)
+            found = [r.shares[subsystem] for r in own if subsystem in r.shares]
             positive = negative = 0.0
             for number, (term, _) in enumerate(terms):
                 values = [one[term] for one in found if one[term] is not None]
@@ -83,7 +91,7 @@ def shares(study: Study, results: Sequence[StudyResult], condition: str) -> Figu
     axes[0].set_yticks(range(len(rows)), [row.label for row in rows])
     handles = [style.key(text, style.FLIGHTS[i], 6.0) for i, (_, text) in enumerate(terms)]
     figure.legend(handles=handles, loc="lower center", ncols=4)
-    figure.subplots_adjust(left=0.25, right=0.985, top=0.84, bottom=0.22, wspace=0.08)
+    figure.subplots_adjust(left=0.3, right=0.985, top=0.84, bottom=0.22, wspace=0.08)
     style.title(figure, f"Who carries the coupling: flight {condition}")
     return figure
 

@@ -116,13 +116,18 @@ def measure(flight: StudyFlight) -> StudyResult:
     rows = judged_rows(series, flight.judged)
     by_position = trial.profile.section("mavlink_bridge").get("setpoint") == PX4
     vehicle = Vehicle.of(trial.profile.vehicle).changed(trial.vehicle_changes)
+    shares = law_terms.shares(
+        series, trial.profile.sets, vehicle, trial.payload_mass, flight.judged
+    )
+    if by_position:  # nothing acts on the outputs of the other two laws
+        shares = {name: found for name, found in shares.items() if name == "arm"}
     return StudyResult(
         flight.row,
         flight.condition,
         trial.seed,
         errors_of(series, rows, not by_position),
         ended,
-        law_terms.shares(series, trial.profile.sets, vehicle, trial.payload_mass, flight.judged),
+        shares,
         _gains(series, rows),
     )
 

@@ -65,7 +65,8 @@ def share_table(study: Study, results: Sequence[StudyResult], condition: str) ->
     for row in study.rows:
         cells = []
         for subsystem in SUBSYSTEMS:
-            found = [r.shares[subsystem] for r in of(results, row.label, condition) if r.shares]
+            own = of(results, row.label, condition)
+            found = [r.shares[subsystem] for r in own if subsystem in r.shares]
             for term in ("adaptive", "feedback", "added", "actuators"):
                 values = [one[term] for one in found if one[term] is not None]
                 cells.append(f"{100.0 * np.mean(values):.0f}" if values else "")
