@@ -134,7 +134,7 @@ def law(found: Sequence[Swept]) -> Figure:
     axes[0, 0].legend(loc="best")
     keys = [style.key("arm", style.FLIGHTS[2]), style.key("setpoints", style.FLIGHTS[3])]
     axes[3, 0].legend(handles=keys, loc="best")
-    figure.subplots_adjust(left=0.08, right=0.985, top=0.94, bottom=0.07, wspace=0.08, hspace=0.12)
+    figure.subplots_adjust(left=0.1, right=0.985, top=0.94, bottom=0.07, wspace=0.08, hspace=0.12)
     style.title(figure, "The proposed law: boundary layer, nu, delay (x: not flown to the end)")
     return figure
 
