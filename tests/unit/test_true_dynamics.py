@@ -113,11 +113,12 @@ def test_terms_of_the_law_add_up_to_the_recorded_tau(direct_flight):
     terms = supply.along(direct_flight, rows, estimate, sets, Body(VEHICLE))
     p = sets["position_controller"]
     law = np.array(p.inertia) * estimate.acceleration_d[:, :3]
-    law += (terms.feedback + terms.adaptive + terms.integral)[:, :3]
+    law += (terms.feedback + terms.adaptive)[:, :3]
     velocity = direct_flight.block("reference.")[rows, 8:11]
     law += p.gravity_feedforward_mass * np.array(p.drag_feedforward) * velocity
-    # the horizontal force is for the mass that the integral holds up
-    law[:, :2] *= 1.0 + terms.integral[:, 2:3] / p.inertia[2] / p.gravity
+    # the force is for the mass that the integral holds up
+    law *= 1.0 + terms.integral[:, 2:3] / p.inertia[2] / p.gravity
+    law += terms.integral[:, :3]
     law += terms.weight[:, :3]
     np.testing.assert_allclose(law, terms.tau[:, :3], atol=1e-6)
     others = terms.feedforward + terms.feedback + terms.adaptive + terms.weight + terms.integral

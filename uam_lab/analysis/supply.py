@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from uam_control.control.output_limits import PositionLimits, integrate
+from uam_control.control.output_limits import ArmLimits, PositionLimits, integrate
 from uam_control.coordinates import ARM, ATTITUDE, POSITION, Z
 from uam_control.maths.rotations import matrix_from_euler
 from uam_lab.analysis.dynamics import Body
@@ -25,11 +25,11 @@ class Supply:
     tau = feedforward + feedback + adaptive + weight + integral.
     """
 
-    feedforward: np.ndarray  # Mbar chi_d_ddot, drag, washout: what depends on the reference; limits
+    feedforward: np.ndarray  # Mbar chi_d_ddot, drag, washout, the arm's known load; limits
     feedback: np.ndarray  # -Mbar Lambda xi
     adaptive: np.ndarray  # -Mbar dtau
     weight: np.ndarray  # gravity_feedforward_mass g e3
-    integral: np.ndarray  # -Mbar times the integral action of the position
+    integral: np.ndarray  # -Mbar times the integral action of position and arm
     tau: np.ndarray  # as recorded, after its limits
     applied: np.ndarray  # force and torque of the rotors; tau for the arm (no recorded torque)
 
@@ -53,25 +53,30 @@ def along(series: Series, rows: np.ndarray, estimate: Tracking, sets: dict, body
     weight[:, Z] = limits.gravity_feedforward_mass * limits.gravity
     blocks = [series.block(f"{tau}.")[rows] for tau in ("tau_p", "tau_q", "tau_alpha")]
     recorded = np.hstack(blocks)
-    integral[:, POSITION] = integral_action(series, limits)[rows]
+    for name in ("position", "arm"):
+        action = integral_action(series, sets[NODE_OF[name]], COLUMNS_OF[name])
+        integral[:, COLUMNS_OF[name]] = action[rows]
     feedforward = recorded - feedback - adaptive - weight - integral
     applied = np.hstack([rotor_wrench(series, rows, body), blocks[2]])
     return Supply(feedforward, feedback, adaptive, weight, integral, recorded, applied)
 
 
-def integral_action(series: Series, p: PositionLimits) -> np.ndarray:
-    """Return the force (ticks, 3) [N, ENU] of the integral action, from the recorded errors.
+def integral_action(series: Series, p: PositionLimits | ArmLimits, columns: slice) -> np.ndarray:
+    """Return the force (ticks, 3) [N, ENU] or torque (ticks, n) [N m] of the integral action.
 
-    It is integrated as in flight, at every tick; ticks of saturation count as the others.
+    From the recorded errors of `columns`. It is integrated as in flight, at every tick at which the
+    law runs; ticks of saturation count as the others.
     """
-    force, integral = np.zeros((len(series), 3)), np.zeros(3)
     gain, inertia = np.array(p.integral_gain), np.array(p.inertia)
+    force, integral = np.zeros((len(series), len(gain))), np.zeros(len(gain))
     if not gain.any():
         return force
-    e = (series.block("estimate.") - series.block("reference."))[:, POSITION]
-    flown = np.any(series.block("tau_p.") != 0.0, axis=1)
+    e = (series.block("estimate.") - series.block("reference."))[:, columns]
+    runs = np.isfinite(e).all(axis=1)
+    if columns == POSITION:
+        runs &= np.any(series.block("tau_p.") != 0.0, axis=1)
     steps = np.diff(series["time"], prepend=series["time"][0])
-    for k in np.flatnonzero(flown & np.isfinite(e).all(axis=1)):
+    for k in np.flatnonzero(runs):
         integrate(e[k], gain, p.integral_limit, False, steps[k], integral)
         force[k] = -inertia * integral
     return force
