@@ -8,6 +8,7 @@ from whole_flight import SHORT, Flight
 
 from uam_sim_bridge.ports import Reservation
 
+HERE = Path(__file__).parent
 # modules whose tests share a flight of their own
 GROUPED = {"test_direct_flight", "test_fault_flights", "test_imu_stamps", "test_new_law"}
 
@@ -71,11 +72,14 @@ def shared_flights(tmp_path_factory, short_scenario):
     return SharedFlights(**flights, domain=domain)
 
 
+@pytest.hookimpl(tryfirst=True)  # before xdist reads the groups
 def pytest_collection_modifyitems(items):
-    """Give tests that share flights one worker (--dist loadgroup), and begin with the longest."""
+    """Give tests that share flights one worker (--dist loadgroup); of all flights they are first."""
     for item in items:
         if "shared_flights" in item.fixturenames:
             item.add_marker(pytest.mark.xdist_group("shared flights"))
         elif item.module.__name__.rpartition(".")[2] in GROUPED:
             item.add_marker(pytest.mark.xdist_group(item.module.__name__))
-    items.sort(key=lambda item: "shared_flights" not in item.fixturenames)
+    ours = [item for item in items if item.path.is_relative_to(HERE)]
+    others = [item for item in items if not item.path.is_relative_to(HERE)]
+    items[:] = others + sorted(ours, key=lambda item: "shared_flights" not in item.fixturenames)
