@@ -74,7 +74,7 @@ def shared_flights(tmp_path_factory, short_scenario):
 
 @pytest.hookimpl(tryfirst=True)  # before xdist reads the groups
 def pytest_collection_modifyitems(items):
-    """Give tests that share flights one worker (--dist loadgroup); of all flights they are first."""
+    """Give tests that share flights one worker (--dist loadgroup); they are the first flights."""
     for item in items:
         if "shared_flights" in item.fixturenames:
             item.add_marker(pytest.mark.xdist_group("shared flights"))

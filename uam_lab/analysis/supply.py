@@ -71,7 +71,8 @@ def integral_action(series: Series, p: PositionLimits | ArmLimits, columns: slic
     force, integral = np.zeros((len(series), len(gain))), np.zeros(len(gain))
     if not gain.any():
         return force
-    e = (series.block("estimate.") - series.block("reference."))[:, columns]
+    estimate, reference = series.block("estimate."), series.block("reference.")
+    e = (estimate - reference)[:, : series.columns.size][:, columns]  # of chi
     runs = np.isfinite(e).all(axis=1)
     if columns == POSITION:
         runs &= np.any(series.block("tau_p.") != 0.0, axis=1)
