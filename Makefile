@@ -21,9 +21,9 @@ setup: $(STAMP)  ## virtual environment, dependencies and the project in .venv
 fly: setup       ## fly the pick-and-place mission; options: make fly ARGS="--controller asmc1"
 	@$(BIN)/uam fly $(ARGS)
 
-# Nodes mostly wait for each other, so three tests run at once on two cores. Groups: tests/conftest.py.
+# Nodes mostly wait for each other, so four tests run at once on two cores. Groups: tests/conftest.py.
 test: setup      ## the tests but the slow ones; options: make test ARGS="tests/unit -x"
-	@$(BIN)/python -m pytest $(if $(ARGS),$(ARGS),-m "not slow" -n 3 --dist loadgroup \
+	@$(BIN)/python -m pytest $(if $(ARGS),$(ARGS),-m "not slow" -n 4 --dist loadgroup \
 	--no-loadscope-reorder tests/unit tests/nodes tests/packaging tests/flights tests/px4)
 
 slow: setup      ## the slow tests: whole missions, browser, PX4 if it is there; a quarter of an hour

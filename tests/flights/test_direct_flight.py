@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import re
 
 import numpy as np
 import pytest
@@ -91,7 +92,9 @@ def test_a_magnet_weaker_than_the_payload_lifts_nothing():
     assert height.max() < height[0] + 0.005
     assert height[-1] > 0.7  # given up where it stands, after three approaches
     last = a_flight.mission.grasps[-1]
-    assert last.text == "given up, 3 approaches; payload at (-0.79, -0.00, 0.77) m"
+    assert re.fullmatch(
+        r"given up, 3 approaches; payload at \(-0\.79, -?0\.00, 0\.77\) m", last.text
+    )
     assert a_flight.mission.output.phase == "landed"
 
 
