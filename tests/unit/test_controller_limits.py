@@ -10,6 +10,7 @@ import pytest
 
 from uam_control.control.output_limits import (
     PositionLimits,
+    complete_effort,
     integrate,
     limit_force,
     limit_torque,
@@ -77,3 +78,17 @@ def test_a_saturated_integral_only_shrinks():
     integral = np.array([0.5, 0.5, 0.5])
     integrate(np.array([1.0, -1.0, 0.0]), np.ones(3), 0.4, True, 0.25, integral)
     np.testing.assert_allclose(integral, [0.5, 0.25, 0.4])  # the last is above a new limit
+
+
+@pytest.mark.parametrize(
+    ("loaded", "expected"), [(False, 10.0 - 1.0), (True, 10.0 - 1.0 + 3.0 - 8.0)]
+)
+def test_the_known_load_takes_the_place_of_the_feedforward(loaded, expected):
+    """inertia 2, integral 0.5 (e = 0); load 3 instead of 2 * 4."""
+    tau, integral = np.array([10.0]), np.array([0.5])
+    one, inertia = np.ones(1), np.array([2.0])
+    load, acceleration = np.array([3.0]), np.array([4.0])
+    complete_effort(
+        acceleration, 0.0 * one, load, loaded, inertia, one, 9.0, False, 0.1, integral, tau
+    )
+    np.testing.assert_allclose(tau, expected)
