@@ -14,8 +14,6 @@ from uam_sim_bridge.autopilot.params import DEFINITIONS
 from uam_sim_bridge.px4 import px4_parameters as parameters
 from uam_sim_bridge.px4.px4_installation import VARIABLE, Px4Error, Px4Installation
 
-PATIENCE = 300.0  # [s] only a failing test, or a very busy machine, waits that long
-
 SCRIPT = """#!/bin/sh
 env | grep ^PX4_ > seen
 mkdir -p log/today && echo first > log/today/1.ulg && sleep 0.05 && echo second > log/today/2.ulg
@@ -120,15 +118,15 @@ def test_nothing_is_left_but_the_logs(build, tmp_path, signum):
     assert f"arguments -i 7 -d {build / 'etc'}" in _until(output.read_text)
     px4 = psutil.Process(process.pid).children()
     process.send_signal(signum)
-    process.wait(PATIENCE)
-    assert psutil.wait_procs(px4, timeout=PATIENCE)[1] == []
+    process.wait(10)
+    assert psutil.wait_procs(px4, timeout=20.0)[1] == []
     if signum != signal.SIGKILL:
         assert process.returncode == 0 and not folder.exists()
         assert log.read_text() == "first\n"
         assert (tmp_path / "flight-2.ulg").read_text() == "second\n"
 
 
-def _until(found, patience=PATIENCE):
+def _until(found, patience=20.0):
     end = time.monotonic() + patience
     while not (value := found()):
         assert time.monotonic() < end
