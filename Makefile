@@ -30,7 +30,7 @@ slow: setup      ## the slow tests: whole missions, browser, PX4 if it is there;
 	@$(BIN)/python -m pip install --quiet --disable-pip-version-check -e ".[browser]"
 	@$(BIN)/python -m pytest -m slow tests
 
-mutants: setup   ## do the unit tests notice small errors? half an hour; make mutants ARGS="laws/"
+mutants: setup   ## do the unit tests notice small errors? ten minutes; make mutants ARGS="laws/"
 	@$(BIN)/python -m pip install --quiet --disable-pip-version-check -e ".[mutation]"
 	@$(BIN)/python benchmarks/mutants.py $(ARGS)
 

@@ -1,5 +1,7 @@
 """Node: attitude law. state + reference + desired attitude of the position law → tau_q."""
 
+from typing import Any
+
 import numpy as np
 from diagnostic_msgs.msg import DiagnosticArray
 
@@ -7,12 +9,7 @@ from uam_control.control.controllers import AttitudeController
 from uam_control.nodes.controller_node import ControllerNode
 from uam_control.stages.law_stages import MeasuredDelay
 from uam_msgs_py.messages import topics
-from uam_msgs_py.messages.control import (
-    ATTITUDE_NAMES,
-    PositionCommand,
-    Reference,
-    TorqueWriter,
-)
+from uam_msgs_py.messages.control import ATTITUDE_NAMES, Reference, TorqueWriter
 from uam_msgs_py.messages.status import AutopilotState
 from uam_msgs_py.node.base_node import run
 from uam_msgs_py.node.namespace import frame
@@ -35,15 +32,9 @@ class AttitudeControllerNode(ControllerNode):
         stamp, report = AutopilotState.from_message(message)
         self._measured.report(stamp, report.loop_delay)
 
-    def _joined(
-        self,
-        stamp: int,
-        state: np.ndarray,
-        reference: Reference,
-        position: PositionCommand | None = None,
-    ) -> None:
+    def _joined(self, stamp: int, *inputs: Any) -> None:
         self._measured.apply(stamp)
-        super()._joined(stamp, state, reference, position)
+        super()._joined(stamp, *inputs)
 
     def send(self, stamp: int, tau: np.ndarray, reference: Reference, flying: bool) -> None:
         self._command.publish(self._writer.fill(stamp, tau) if flying else self._writer.idle(stamp))
