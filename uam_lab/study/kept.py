@@ -23,8 +23,9 @@ def fly(
     """Fly those that the folder `out` has no result of; return all, in the order of `flights`."""
     known = _read(out / FILE)
     marks = [mark(flight) for flight in flights]
-    missing = [f for f, name in zip(flights, marks, strict=True) if name not in known]
-    names = {(f.row, f.condition, f.trial.seed): mark(f) for f in missing}
+    lacking = [(f, name) for f, name in zip(flights, marks, strict=True) if name not in known]
+    missing = [f for f, _ in lacking]
+    names = {(f.row, f.condition, f.trial.seed): name for f, name in lacking}
 
     def keep(done: int, result: StudyResult) -> None:
         name = names[result.row, result.condition, result.seed]
