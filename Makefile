@@ -5,6 +5,9 @@ VENV := .venv
 BIN := $(VENV)/bin
 STAMP := $(VENV)/.setup-done
 ARGS ?=
+# Set-up leaves the libraries uncompiled. Where Python may not write, each process would compile them
+# again: seconds of each start.
+unexport PYTHONDONTWRITEBYTECODE
 
 # What an installation is made of. The code itself is installed editable and needs no re-run.
 INSTALLED_FROM := pyproject.toml package.xml Makefile $(shell find ros -type f)

@@ -18,7 +18,6 @@ from uam_lab.flight.progress import Progress
 from uam_lab.library.flight import Flight
 from uam_lab.library.flight_result import FlightFailed
 from uam_lab.processes.interrupts import Interrupts
-from uam_lab.report.build import build_report
 from uam_lab.report.page.console import reporting, summary
 from uam_sim_bridge.faults.schedule import late
 from uam_sim_bridge.mavlink.transport.transport import ALLOWED
@@ -191,6 +190,10 @@ def fly(settings: FlightSettings, video: bool, report: bool) -> int:
     outcome, metrics = result.outcome, result.metrics
     if metrics is not None:
         if report:
+            from uam_lab.report.build import (
+                build_report,
+            )  # a second, not to be lost before a flight
+
             # after Ctrl-C it has figures, but no rendered pictures, which take long
             with reporting(console) as show:
                 made = build_report(

@@ -3,28 +3,28 @@
 from __future__ import annotations
 
 import argparse
+import importlib
 import sys
 from collections.abc import Sequence
 
-from uam_lab.cli import (
-    campaign,
-    compare,
-    doctor,
-    faults,
-    fly,
-    margins,
-    operate,
-    profile,
-    report,
-    tune,
-    view,
-)
 from uam_lab.cli.command import INTERRUPTED, USER_ERRORS, WRONG_USE
 
-# each has add(subparsers), which sets `run`: arguments → exit status
-COMMANDS = (
-    *(fly, operate, view, profile, report, compare, tune, campaign, faults, margins, doctor),
-)
+# Subcommands and their modules; each module has add(subparsers), which sets `run`: arguments → exit
+# status. Only the module of the chosen command is imported: all of them take seconds.
+OPERATE = ("start", "hold", "resume", "land", "disarm", "kill", "goto", "status", "preflight")
+COMMANDS = {
+    "fly": "fly",
+    **dict.fromkeys(OPERATE, "operate"),
+    "view": "view",
+    "profile": "profile",
+    "report": "report",
+    "compare": "compare",
+    "tune": "tune",
+    "campaign": "campaign",
+    "faults": "faults",
+    "margins": "margins",
+    "doctor": "doctor",
+}
 
 
 class OneLineParser(argparse.ArgumentParser):
@@ -35,22 +35,24 @@ class OneLineParser(argparse.ArgumentParser):
         self.exit(WRONG_USE, f"{self.prog}: {message} (see {self.prog} --help)\n")
 
 
-def parser() -> argparse.ArgumentParser:
-    """Return the parser of `uam` with all subcommands."""
+def parser(command: str = "") -> argparse.ArgumentParser:
+    """Return the parser of `uam`, with the module of this subcommand; with all if there is none."""
     top = OneLineParser(
         prog="uam",
         description="Flight control for aerial manipulators, and flights of it in simulation.",
         epilog="uam <command> --help explains a command.",
     )
     commands = top.add_subparsers(dest="command", metavar="<command>", required=True)
-    for command in COMMANDS:
-        command.add(commands)
+    modules = [COMMANDS[command]] if command in COMMANDS else dict.fromkeys(COMMANDS.values())
+    for module in modules:
+        importlib.import_module(f"uam_lab.cli.{module}").add(commands)
     return top
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command line; return the exit status."""
-    options, unknown = parser().parse_known_args(arguments)
+    given = sys.argv[1:] if arguments is None else arguments
+    options, unknown = parser(*given[:1]).parse_known_args(given)
     if unknown:
         said = f"unrecognized arguments: {' '.join(unknown)}"
         print(f"uam {options.command}: {said} (see uam {options.command} --help)", file=sys.stderr)

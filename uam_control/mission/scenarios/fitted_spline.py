@@ -9,23 +9,24 @@ interpolation through all of them (quintic Hermite) has jumps in the jerk. This 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
-from scipy.interpolate import BSpline
-from scipy.sparse import csc_matrix, diags, vstack
-from scipy.sparse.linalg import spsolve
 
 from uam_control.mission.motion.polynomials import Polynomials
+
+if TYPE_CHECKING:
+    from scipy.interpolate import BSpline
+    from scipy.sparse import csc_matrix
+
+# scipy is imported where it is used: that takes most of a second, and few processes read a file
 
 DEGREE = 7
 COARSEST = 0.2  # [s] distance of the knots in the first attempt, or that of the samples
 ATTEMPTS = 5  # each with knots at half the distance
 # A unit of misfit in rate, acceleration and snap weighs as much as these in value [s, s^2, s^4].
 RATE, ACCELERATION, SNAP = 1e-2, 1e-3, 5e-9
-LEAST_ACCELERATION = (
-    1e-6  # [s^2] of acceleration itself: decides where fewer than four samples do not
-)
+LEAST_ACCELERATION = 1e-6  # [s^2] of acceleration itself: decides where under four samples do not
 
 
 class Misfit(ValueError):
@@ -75,6 +76,10 @@ def _knots(times: np.ndarray, intervals: int) -> np.ndarray:
 
 
 def _solved(times: np.ndarray, given: CurveSamples, knots: np.ndarray) -> BSpline:
+    from scipy.interpolate import BSpline
+    from scipy.sparse import vstack
+    from scipy.sparse.linalg import spsolve
+
     inner = knots[DEGREE:-DEGREE]
     # four places per interval: snap is a cubic there, so together they leave only cubics open
     places = (np.arange(4) + 0.5) / 4.0
@@ -95,6 +100,9 @@ def _solved(times: np.ndarray, given: CurveSamples, knots: np.ndarray) -> BSplin
 
 def _basis(times: np.ndarray, knots: np.ndarray, order: int) -> csc_matrix:
     """Return the matrix from the coefficients to derivative `order` at the times."""
+    from scipy.interpolate import BSpline
+    from scipy.sparse import diags
+
     change, degree = None, DEGREE
     for _ in range(order):
         width = degree / (knots[degree + 1 : -1] - knots[1 : -degree - 1])
