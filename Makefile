@@ -26,8 +26,9 @@ fly: setup       ## fly the pick-and-place mission; options: make fly ARGS="--co
 
 # Nodes mostly wait for each other, so four tests run at once on two cores. Groups: tests/conftest.py.
 test: setup      ## the tests but the slow ones; options: make test ARGS="tests/unit -x"
+	@$(BIN)/python -m uam_lab.flight.direct.warm_up
 	@$(BIN)/python -m pytest $(if $(ARGS),$(ARGS),-m "not slow" -n 4 --dist loadgroup \
-	--no-loadscope-reorder tests/unit tests/nodes tests/packaging tests/flights tests/px4)
+	--no-loadscope-reorder tests)
 
 slow: setup      ## the slow tests: whole missions, browser, PX4 if it is there; a quarter of an hour
 	@$(BIN)/python -m pip install --quiet --disable-pip-version-check -e ".[browser]"

@@ -21,9 +21,15 @@ if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
     signal.signal(signal.SIGINT, signal.default_int_handler)
 
 
+# The tests that take longest begin first: workers then end at the same time.
+ORDER = ("px4", "packaging", "flights", "nodes", "unit")
+
+
 @pytest.hookimpl(tryfirst=True)  # before xdist reads the groups
 def pytest_collection_modifyitems(items):
     """Give the tests of a file one worker (--dist loadgroup); flights are apart, or as they say."""
-    for item in items:
-        if "flights" not in item.path.relative_to(TESTS).parts:
+    folders = {item: item.path.relative_to(TESTS).parts[0] for item in items}
+    for item, folder in folders.items():
+        if folder != "flights":
             item.add_marker(pytest.mark.xdist_group(str(item.path)))
+    items.sort(key=lambda item: ORDER.index(folders[item]))

@@ -85,7 +85,7 @@ def test_same_seed_same_flight_other_seed_other_noise():
 
 
 def test_a_magnet_weaker_than_the_payload_lifts_nothing():
-    a_flight = flight()
+    a_flight = flight("quick_pick")
     a_flight.plant.model.actuator("magnet").gainprm[0] = 1.0  # N, the payload weighs 1.96 N
     a_flight.run()
     height = a_flight.recording.series()["payload.z"]

@@ -12,7 +12,12 @@ from uam_lab.results import metrics
 from uam_sim_bridge.faults import read_schedule
 from uam_sim_bridge.plant import Vehicle
 
-JITTERS = (0.0002, 0.001)  # [s]
+# scenario, jitter [s]
+FLIGHTS = [
+    ("quick_pick", 0.001),
+    pytest.param("pick_and_place", 0.0002, marks=pytest.mark.slow),
+    pytest.param("pick_and_place", 0.001, marks=pytest.mark.slow),
+]
 RMS = ("position_m", "attitude_deg", "arm_deg")
 
 
@@ -23,29 +28,29 @@ def fault(jitter):
 
 @pytest.fixture(scope="module")
 def flown():
-    """direct(jitter) → (flight, metrics); 0: without the fault."""
+    """direct(scenario, jitter) → (flight, metrics); 0: without the fault."""
     known = {}
 
-    def direct(jitter):
-        if jitter not in known:
-            scenario = load_scenario("pick_and_place")
+    def direct(name, jitter):
+        if (name, jitter) not in known:
+            scenario = load_scenario(name)
             faults = read_schedule((fault(jitter),) if jitter else (), scenario, 1)
             plant = Vehicle.load()
             flight = DirectFlight(scenario, load_profile("s500"), plant, 0.2, 1, faults)
             flight.run()
-            known[jitter] = flight, metrics.errors(flight.recording.series())
-        return known[jitter]
+            known[name, jitter] = flight, metrics.errors(flight.recording.series())
+        return known[name, jitter]
 
     return direct
 
 
-@pytest.mark.parametrize("jitter", JITTERS)
-def test_the_mission_is_flown_as_without_jitter(flown, jitter):
-    flight, errors = flown(jitter)
+@pytest.mark.parametrize(("scenario", "jitter"), FLIGHTS)
+def test_the_mission_is_flown_as_without_jitter(flown, scenario, jitter):
+    flight, errors = flown(scenario, jitter)
     assert flight.mission.output.done and not flight.mission.output.abort_reason
     states = [change.target.name for change in flight.mission.changes]
     assert states == ["TAKING_OFF", "FLYING", "LANDING", "DISARMED"]
-    _, nominal = flown(0)
+    _, nominal = flown(scenario, 0)
     for name in RMS:
         assert errors[name] == pytest.approx(nominal[name], rel=0.2)
 

@@ -66,13 +66,11 @@ def test_it_flies_in_the_direct_engine(name, scenario):
     assert rotors == len(flight.plant.vehicle.description.rotors)
     for group, limit in LIMITS.items():
         assert max(found["rms"][group]) < limit, (group, found["rms"])
-
-
-def test_motions_reach_every_joint_of_three():
-    series = fly("s500_arm3", "arm3_motions").recording.series()
-    moved = [np.ptp(series[f"truth.alpha_{i}"]) for i in (1, 2, 3)]
-    # 40 to -40, 90 to 30 and 60 to -60 degrees
-    assert np.degrees(moved) == pytest.approx([80.0, 60.0, 120.0], abs=4.0)
+    if scenario == "arm3_motions":
+        series = flight.recording.series()
+        moved = [np.ptp(series[f"truth.alpha_{i}"]) for i in (1, 2, 3)]
+        # 40 to -40, 90 to 30 and 60 to -60 degrees
+        assert np.degrees(moved) == pytest.approx([80.0, 60.0, 120.0], abs=4.0)
 
 
 def test_the_third_joint_is_supervised():
@@ -117,6 +115,7 @@ def test_a_campaign_flies_the_joints_of_the_vehicle(tmp_path, capsys):
     assert main([*command, "--seed", "2", "--out", str(tmp_path)]) == 2, "other flights"
 
 
+@pytest.mark.slow
 def test_a_comparison_flies_the_joints_of_the_vehicle(tmp_path):
     command = ["compare", "--vehicle", "s500_arm3", "--scenario", "hover", "--rows", "proposed"]
     one = ["--seeds", "1", "--payload-mass", "0"]

@@ -33,6 +33,7 @@ NO_TILT_LIMIT = 1.5  # its tangent is 14
     ((0.0, 0.0, 200.0), 100.0, A, (0.0, 0.0, 100.0), True),
     ((0.0, 0.0, -50.0), 100.0, A, (0.0, 0.0, 2.0), True),
     ((0.5, 0.0, -3.0), 100.0, A, (0.5, 0.0, 2.0), False),  # 2 N desired, the least
+    ((3.0, 4.0, 10.0), 2.0, NO_TILT_LIMIT, (0.0, 0.0, 2.0), True),  # the least is the largest
 ])  # fmt: skip
 def test_force_by_hand(tau, thrust_max, tilt_max, expected, cut):
     """With a weight of 5 N and 2 N upwards at least."""

@@ -345,3 +345,41 @@ def test_the_measured_loop_delay_beyond_that_of_the_link_is_predicted():
     assert ahead(4_000_000_000) == pytest.approx(0.1)  # the largest
     delays.report(4_000_000_000, 0.001)
     assert ahead(5_000_000_000) == pytest.approx(0.01)  # less than that of the link
+    controller.set_parameters(replace(controller.parameters, prediction_measured=False))
+    delays.report(5_000_000_000, 0.027)
+    assert ahead(6_000_000_000) == pytest.approx(0.01)
+
+
+def forward_arm():
+    """One link of 1 kg at 1 m, which points forward at rest; gravity 10 m/s^2."""
+    values = {"link_masses": [1.0], "link_centres": [1.0], "link_lengths": [1.0]}
+    state = np.zeros((3, 7))
+    state[0, 6] = math.pi / 2.0
+    return state, values | {"arm_gravity": 10.0, "arm_feedforward": True}
+
+
+def test_the_moment_of_the_arm_is_added_to_pitch():
+    """-10 N m about y, of each inertia; the washout of ln 2 takes half of it."""
+    state, arm = forward_arm()
+    for washout, expected in ((0.0, -10.0), (math.log(2.0) / 0.1, -5.0)):
+        controller = torque(
+            AttitudeController, 3, inertia=[1.0, 2.0, 4.0], feedforward_washout=[washout] * 3, **arm
+        )
+        tau = controller.update(state, state, np.zeros((3, 3)), True, 0.1)
+        np.testing.assert_allclose(tau, [0.0, expected, 0.0], atol=1e-12)
+
+
+def test_arm_torque_is_law_load_and_integral():
+    """10 N m of weight; gain 4, e = 0.5 rad for two ticks of 0.1 s: 0.4 rad/s^2 of 2 kg m^2."""
+    reference, arm = forward_arm()
+    controller = torque(ArmController, 1, integral_gain=[4.0], **arm)
+    state = reference.copy()
+    state[0, 6] += 0.5
+    # with Lambda = 3 and no gain on s, the law is the feedforward alone, which the load replaces
+    reference[2, 6] = 1.0
+    for integral in (0.2, 0.4):
+        tau = controller.update(state, reference, np.zeros((3, 3)), True, 0.1)
+        np.testing.assert_allclose(tau, 10.0 + 1.0 - 2.0 * integral)  # 1 kg m^2 by 1 rad/s^2
+    controller.reset_adaptation()
+    tau = controller.update(state, reference, np.zeros((3, 3)), True, 1e-9)
+    np.testing.assert_allclose(tau, 11.0, atol=1e-6)

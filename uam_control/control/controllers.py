@@ -50,7 +50,6 @@ class Controller:
         self.saturated = False
         self._allocate((3, ALPHA))
         self._norms = np.zeros(3)
-        self._printed = parameters.error_rate_form == "printed"
 
     @property
     def parameters(self) -> LawParameters:
@@ -189,7 +188,6 @@ class TorqueController(Controller):
     def __init__(self, parameters: TorqueLimits) -> None:
         super().__init__(parameters)
         self._tau = np.zeros(len(parameters.torque_max))
-        self._torque_max = np.array(parameters.torque_max)
 
     def set_parameters(self, parameters: TorqueLimits) -> None:
         """See `Controller.set_parameters`."""

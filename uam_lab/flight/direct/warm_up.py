@@ -65,3 +65,7 @@ def warm_up(laws: Iterable[str] = tuple(LAWS)) -> None:
     curve.trajectory(standing(curve.arm_start)).write(4.0, empty_motion(len(curve.arm_start)))
     VisionPose(0.0, np.zeros(3), np.array([1.0, 0.0, 0.0, 0.0]), 0.0, 0.0).message()
     companion.warm_up()  # the stand-in's descent, which a flight without failures does not call
+
+
+if __name__ == "__main__":
+    prepare(print)
