@@ -1,9 +1,9 @@
-"""Your own planner: a node computes a circle and sends it as a trajectory of the base.
+"""Your own planner: it computes a circle and sends it as a trajectory of the base.
 
     python examples/own_planner.py results/planner
 
 The mission checks the trajectory against its limits before it replaces what is flown. The same
-messages may come from any other process (docs/planners.md).
+message may come from any other process, on the topic base_trajectory (docs/planners.md).
 """
 
 import math
@@ -15,7 +15,7 @@ from trajectory_msgs.msg import MultiDOFJointTrajectory, MultiDOFJointTrajectory
 
 from uam_lab import Flight
 
-RADIUS, ROUND, STEP = 0.4, 6.0, 0.25  # [m], [s], [s]
+RADIUS, ROUND, STEP = 0.3, 5.0, 0.25  # [m], [s], [s]
 
 
 def circle(height: float) -> MultiDOFJointTrajectory:
@@ -40,11 +40,8 @@ def main():
     out = sys.argv[1] if len(sys.argv) > 1 else "results/planner"
     with Flight(scenario="hover", out=out) as flight:
         flight.wait_for("hover")
-        with flight.node("planner") as guest:
-            planner = guest.node.create_publisher(MultiDOFJointTrajectory, "base_trajectory", 10)
-            flight.wait_for(lambda status: planner.get_subscription_count() > 0, timeout=30.0)
-            planner.publish(circle(1.0))
-            flight.wait_for("goal", timeout=30.0)
+        print(flight.plan(circle(1.0)))
+        flight.wait_for("goal")
         flight.wait_for("holding")
         flight.land()
         result = flight.wait()

@@ -22,7 +22,7 @@ if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
 
 
 # The tests that take longest begin first: workers then end at the same time.
-ORDER = ("px4", "packaging", "flights", "nodes", "unit")
+ORDER = ("px4", "packaging", "nodes", "flights", "unit")
 
 
 @pytest.hookimpl(tryfirst=True)  # before xdist reads the groups

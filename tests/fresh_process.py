@@ -47,6 +47,7 @@ class FreshProcess:
 
 def _serve(folder: str, name: str, pipe: Connection) -> None:
     sys.path.insert(0, folder)
+    sys.dont_write_bytecode = True  # two versions of a file within a second look alike to Python
     module = importlib.import_module(name)
     pipe.send("ready")
     while True:

@@ -57,7 +57,7 @@ class Forks:
         command = [sys.executable, __file__, str(theirs.fileno())]
         self._process = subprocess.Popen(command, pass_fds=[theirs.fileno()])
         theirs.close()
-        self._socket, self._lines = ours, ours.makefile("rw")
+        self._socket, self._unread = ours, b""
         self.statuses: dict[int, int] = {}
         self._started: int | None = None
 
@@ -65,26 +65,27 @@ class Forks:
         """Run main() of `module` with the environment and the folder of this process."""
         log.touch()  # the test may read it before the node has opened it
         request = [module, arguments, str(log), dict(os.environ), os.getcwd()]
-        self._lines.write(json.dumps(request) + "\n")
-        self._lines.flush()
+        self._socket.sendall(json.dumps(request).encode() + b"\n")
         while self._started is None:
             self.receive(60.0)
         pid, self._started = self._started, None
         return Forked(self, pid)
 
     def receive(self, timeout: float) -> None:
-        """Read one answer, if there is one within `timeout` [s]."""
+        """Read the answers that have come within `timeout` [s], two ends at once among them."""
         if not select.select([self._socket], [], [], timeout)[0]:
             return
-        answer = json.loads(self._lines.readline())
-        if len(answer) == 1:
-            (self._started,) = answer
-        else:
-            self.statuses[answer[0]] = answer[1]
+        received = self._socket.recv(65536)
+        assert received, "the process that forks has ended"
+        *lines, self._unread = (self._unread + received).split(b"\n")
+        for answer in map(json.loads, lines):
+            if len(answer) == 1:
+                (self._started,) = answer
+            else:
+                self.statuses[answer[0]] = answer[1]
 
     def close(self) -> None:
         """End the process that forks."""
-        self._lines.close()
         self._socket.close()
         self._process.wait()
 

@@ -44,16 +44,18 @@ def landed_softly(a_flight):
 
 
 def test_a_mission_that_is_held_with_the_payload_and_resumed_is_completed():
-    made = flight()
-    until(made, lambda o: o.time > 50.0)
+    made = flight("quick_pick")
+    until(made, lambda o: o.phase == "carry")
+    until(made, lambda o, begun=made.mission.output.time: o.time > begun + 1.0)
     assert made.mission.request(OperatorCommand.HOLD)[0]
-    until(made, lambda o: o.time > 53.0)
+    held_at = made.mission.output.time
+    until(made, lambda o: o.time > held_at + 4.0)
     series = made.recording.series()
-    held = series.row_at(52.0)
+    held = series.row_at(held_at + 3.0)
     assert np.max(np.abs(series["truth.x_dot"][held:])) < 0.02 and made.mission.output.magnet
     assert made.mission.request(OperatorCommand.RESUME)[0]
     until(made, lambda o: o.done)
-    assert made.mission.output.time > 90.0
+    assert made.mission.output.time > 23.0
     point = made.mission.scenario.drop_point
     result = compute(
         made.recording.series(), {"payload_mass_kg": 0.2, "drop_point": point, "abort_reason": ""}
@@ -63,8 +65,8 @@ def test_a_mission_that_is_held_with_the_payload_and_resumed_is_completed():
 
 
 def test_a_command_to_land_is_followed_where_the_vehicle_is_with_the_payload_released():
-    made = flight(magnet_landing="release")
-    until(made, lambda o: o.time > 45.0)
+    made = flight("quick_pick", magnet_landing="release")
+    until(made, lambda o: o.time > 10.5)
     x = made.recording.series()["truth.x"][-1]
     assert made.mission.request(OperatorCommand.LAND)[0]
     output = until(made, lambda o: o.done)
@@ -111,8 +113,8 @@ def test_motors_that_are_switched_off_by_the_autopilot_end_it():
 
 def test_holds_whose_cause_is_gone_end_and_the_mission_is_completed():
     """IMU and mocap are gone for 0.5 s in transit, mocap is gone for 0.8 s during the pick."""
-    profile, scenario = load_profile("s500"), load_scenario("pick_and_place")
-    given = ("imu_dropout@15+0.5", "mocap_dropout@15+0.5", "mocap_dropout@31+0.8")
+    profile, scenario = load_profile("s500"), load_scenario("quick_pick")
+    given = ("imu_dropout@4+0.5", "mocap_dropout@4+0.5", "mocap_dropout@7+0.8")
     faults = read_schedule(given, scenario, 1)
     made = DirectFlight(scenario, profile, Vehicle.load(), 0.2, seed=1, faults=faults)
     output = until(made, lambda o: o.done)

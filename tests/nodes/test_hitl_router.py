@@ -94,11 +94,14 @@ class Bench:
         )
         self.body = Quadrotor()
         self.ticks = self.answered = 0
+        self._began = time.monotonic()
         assert self.hil.accept(PATIENCE), self.router.output
         self.router.until_logged("connected to the simulator")
 
     def tick(self, thrust=0.0):
         body, link = self.body, self.link
+        # not faster than a simulator does: the line carries so many messages a second
+        time.sleep(max(0.0, self._began + body.time - time.monotonic()))
         self.ticks += 1
         link.poll(body.time)
         link.tick(body.time)

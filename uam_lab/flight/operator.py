@@ -17,6 +17,8 @@ from uam_msgs_py.messages import topics
 from uam_msgs_py.messages.preflight import read_preflight
 from uam_msgs_py.messages.status import AutopilotState, MissionStatus
 
+PLANNERS = (topics.GOAL_POSE, topics.BASE_TRAJECTORY, topics.ARM_TRAJECTORY)
+AGAIN = 2.0  # [s] wall time without an answer after which a plan is sent again
 PATIENCE = 12.0  # [s] wall time to find the flight on a busy machine, and as long for its answer
 
 
@@ -60,16 +62,24 @@ class Operator:
         position.x, position.y, position.z = float(x), float(y), float(z)
         known = not math.isnan(yaw)  # zeros: no orientation
         turn.w, turn.z = (math.cos(yaw / 2.0), math.sin(yaw / 2.0)) if known else (0.0, 0.0)
-        return self.plan(topics.GOAL_POSE, goal)
+        return self.plan(goal)
 
-    def plan(self, topic: topics.Topic, message: Any) -> tuple[bool, str]:
-        """Send a goal or trajectory on one of the mission's topics for planners; see `goto`."""
-        before = self.mission().answers
+    def plan(self, message: Any) -> tuple[bool, str]:
+        """Send a goal or trajectory on the mission's topic of its type; see `goto`."""
+        topic = next(one for one in PLANNERS if isinstance(message, one.type))
+        before, sent = self.mission().answers, -math.inf
         publisher = self._node.create_publisher(topic.type, topic.name, topic.qos)
+
+        def answered() -> bool:
+            """Send again while the mission's end of the connection is perhaps not there yet."""
+            nonlocal sent
+            if publisher.get_subscription_count() and time.monotonic() - sent > AGAIN:
+                publisher.publish(message)
+                sent = time.monotonic()
+            return self.mission().answers > before
+
         try:
-            self._until(lambda: publisher.get_subscription_count() > 0, "no mission listens")
-            publisher.publish(message)
-            self._until(lambda: self.mission().answers > before, "no answer of the mission")
+            self._until(answered, "no answer of the mission")
         finally:
             self._node.destroy_publisher(publisher)
         _, _, answer = self.mission().answer.partition(": ")

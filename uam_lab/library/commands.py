@@ -59,6 +59,10 @@ class Commands:
         heading = math.nan if yaw is None else yaw
         return _accepted(self.call(lambda operator: operator.goto(x, y, z, heading)))
 
+    def plan(self, message: Any) -> str:
+        """Send a goal or a trajectory; return the answer."""
+        return _accepted(self.call(lambda operator: operator.plan(message)))
+
     def change(self, desired: Mapping[str, Mapping[str, Any]]) -> Changes:
         """Set parameters, all or none."""
         return self._change(lambda switch: switch.change(desired))

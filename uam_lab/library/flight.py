@@ -278,6 +278,13 @@ class Flight:
         """Fly to a position [m, ENU] and hold it; yaw [rad], None: keep the heading."""
         return self._commands().goto(x, y, z, yaw)
 
+    def plan(self, message: Any) -> str:
+        """Fly a PoseStamped, or a MultiDOFJointTrajectory of the base, or a JointTrajectory.
+
+        Returns the mission's answer. Raises CommandRefused with its reason (docs/planners.md).
+        """
+        return self._commands().plan(message)
+
     def set_parameters(self, node: str | Mapping[str, Mapping[str, Any]], **values: Any) -> Changes:
         """Set parameters of a node in flight, or of several: node → name → value.
 
