@@ -30,6 +30,8 @@ def pytest_collection_modifyitems(items):
     """Give the tests of a file one worker (--dist loadgroup); flights are apart, or as they say."""
     folders = {item: item.path.relative_to(TESTS).parts[0] for item in items}
     for item, folder in folders.items():
-        if folder != "flights":
+        if "direct_flight" in item.fixturenames:  # flown once, takes longer than its tests
+            item.add_marker(pytest.mark.xdist_group("direct flight"))
+        elif folder != "flights":
             item.add_marker(pytest.mark.xdist_group(str(item.path)))
     items.sort(key=lambda item: ORDER.index(folders[item]))

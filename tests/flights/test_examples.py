@@ -103,4 +103,4 @@ def test_a_tour_of_goals_is_flown(tmp_path):
 def test_the_planner_of_ones_own_flies_a_circle(tmp_path):
     said = run("own_planner.py", tmp_path)
     west, east = (float(word) for word in said.split("circle: ")[1].split()[:3:2])
-    assert abs(west + 0.3) < 0.03 and abs(east - 0.3) < 0.03
+    assert abs(west + 0.3) < 0.05 and abs(east - 0.3) < 0.05

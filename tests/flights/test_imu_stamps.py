@@ -60,6 +60,7 @@ def completed(flight):
     return json.loads((flight.out / "metrics.json").read_text())["mission_completed"]
 
 
+@pytest.mark.slow
 def test_over_ros_no_warning_stays(fly, short_scenario):
     flight = fly("--scenario", str(short_scenario), "--seed", "3", "--fault", fault(0.001))
     assert completed(flight)

@@ -144,6 +144,5 @@ def test_a_warm_up_leaves_nothing_of_the_nodes_to_compile():
     for module in ros_nodes.MODULES.values():
         importlib.import_module(module)
     assert list(warm_up.compiled_functions())
-    if warm_up.is_cold():
-        warm_up.warm_up()
+    warm_up.prepare()
     assert not warm_up.is_cold()

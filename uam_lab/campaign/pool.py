@@ -11,7 +11,7 @@ from collections.abc import Callable, Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
 
 from uam_lab.campaign.trial import Trial, TrialResult, measure
-from uam_lab.flight.direct.warm_up import is_cold, warm_up
+from uam_lab.flight.direct.warm_up import prepare
 from uam_lab.processes.child import SINGLE_THREAD
 
 
@@ -31,8 +31,7 @@ def fly_all(
     work: importable function from trial to result. progress: called with the number of finished
     flights and the newest result.
     """
-    if is_cold():
-        warm_up()
+    prepare()
     results: list[TrialResult | None] = [None] * len(trials)
     others = multiprocessing.active_children()
     with _executor(jobs) as executor:

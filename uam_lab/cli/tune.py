@@ -19,7 +19,7 @@ from uam_lab.cli.command import (
 )
 from uam_lab.cli.counting import Counting
 from uam_lab.flight.conclude import command_line
-from uam_lab.flight.direct.warm_up import is_cold, warm_up
+from uam_lab.flight.direct.warm_up import prepare
 from uam_lab.results.result_folder import make_folder
 from uam_lab.tuning.space import TuningError, load_space
 
@@ -88,9 +88,7 @@ def run(options: argparse.Namespace) -> int:
     task = Task(
         space, options.study or space.name, storage, options.evaluations, options.seed, options.step
     )
-    if is_cold():
-        print("compiling the control path (once)")
-        warm_up()
+    prepare(print)
     status = 0
     signal.signal(signal.SIGTERM, signal.default_int_handler)  # as Ctrl-C
     try:

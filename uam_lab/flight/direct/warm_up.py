@@ -6,11 +6,13 @@ all of them are there and up to date, nothing is compiled.
 
 from __future__ import annotations
 
+import multiprocessing
 import sys
 from collections.abc import Callable, Iterable, Iterator
 
 import numpy as np
 
+from uam_control.laws import catalogue
 from uam_control.laws.catalogue import LAWS
 from uam_control.mission import load_scenario
 from uam_control.mission.motion.polynomials import Polynomials
@@ -47,19 +49,41 @@ def prepare(say: Callable[[str], None] = lambda text: None) -> None:
     """Compile the control path unless it is compiled; say: called before that takes its time."""
     if is_cold():
         say("compiling the control path (once)")
-        warm_up()
+        # the nodes of the vehicle here, beside them what stands in for it, on another core
+        beside = multiprocessing.get_context("spawn").Process(target=_stand_in, daemon=True)
+        beside.start()
+        warm_up([catalogue.DEFAULT])
+        beside.join()
+        warm_up(LAWS)
 
 
-def warm_up(laws: Iterable[str] = tuple(LAWS)) -> None:
+def warm_up(laws: Iterable[str]) -> None:
     """Fly a few seconds in the direct engine with each law: it runs every function of the nodes."""
+    for law in laws:
+        flight = _flight(law)
+        for _ in range(TICKS):
+            flight.tick()
+    _others()
+
+
+def _flight(law: str) -> DirectFlight:
     scenario = load_scenario("hover")
     vehicle = Vehicle.load().changed({"effects": presets.laboratory()})
     faults = read_schedule([LATE_POSES], scenario, seed=1)
-    for law in laws:
-        profile = default_profile(law)
-        flight = DirectFlight(scenario, profile, vehicle, 0.0, seed=1, faults=faults)
-        for _ in range(TICKS):
-            flight.tick()
+    return DirectFlight(scenario, default_profile(law), vehicle, 0.0, seed=1, faults=faults)
+
+
+def _stand_in() -> None:
+    """Run plant and autopilot without a controller, then what no flight calls."""
+    flight = _flight(catalogue.DEFAULT)
+    arm = np.zeros(len(flight.plant.vehicle.description.joints))
+    for _ in range(TICKS // 10):
+        motors = flight.autopilot.update(*flight.plant.sense().hil)
+        flight.plant.step(motors, arm, True)
+    _others()
+
+
+def _others() -> None:
     Polynomials(np.array([0.0, 1.0]), np.zeros((1, 6, 4))).rows(np.zeros(2))
     curve = load_scenario("circle")
     curve.trajectory(standing(curve.arm_start)).write(4.0, empty_motion(len(curve.arm_start)))
