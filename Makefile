@@ -13,7 +13,7 @@ unexport PYTHONDONTWRITEBYTECODE
 INSTALLED_FROM := pyproject.toml package.xml Makefile $(shell find ros -type f)
 
 .DEFAULT_GOAL := help
-.PHONY: help setup fly test slow mutants lint clean
+.PHONY: help setup fly test long slow mutants lint clean
 
 help:            ## this list
 	@sed -n 's/^\([a-z]*\):.*##/  make \1\t/p' Makefile
@@ -25,10 +25,13 @@ fly: setup       ## fly the pick-and-place mission; options: make fly ARGS="--co
 	@$(BIN)/uam fly $(ARGS)
 
 # Nodes mostly wait for each other, so four tests run at once on two cores. Groups: tests/conftest.py.
-test: setup      ## the tests but the slow ones; options: make test ARGS="tests/unit -x"
+AT_ONCE := -n 4 --dist loadgroup --no-loadscope-reorder
+test: setup      ## all but the long and the slow tests; options: make test ARGS="tests/unit -x"
 	@$(BIN)/python -m uam_lab.flight.direct.warm_up
-	@$(BIN)/python -m pytest $(if $(ARGS),$(ARGS),-m "not slow" -n 4 --dist loadgroup \
-	--no-loadscope-reorder tests)
+	@$(BIN)/python -m pytest $(if $(ARGS),$(ARGS),-m "not slow and not long" $(AT_ONCE) tests)
+
+long: setup      ## further flights, examples among them; CI runs these, too
+	@$(BIN)/python -m pytest -m long $(AT_ONCE) tests
 
 slow: setup      ## the slow tests: whole missions, browser, PX4 if it is there; a quarter of an hour
 	@$(BIN)/python -m pip install --quiet --disable-pip-version-check -e ".[browser]"

@@ -1,4 +1,4 @@
-"""Start nodes by fork of a process that has imported them: an import takes a second each time.
+"""Start nodes by fork of a process that has imported them and loaded the compiled functions.
 
 `Forks` is the test's end; this file run as a program is the process that forks. One line of JSON
 each way: a request to start a node, the id of its process, the exit status at its end.
@@ -92,6 +92,9 @@ class Forks:
 
 def serve(connection: socket.socket) -> list | None:
     """Import and fork for each request: return it in the child; None in the parent at the end."""
+    importlib.import_module(
+        "uam_lab.flight.ros.forker"
+    )  # what the nodes of a flight are forked from
     lines = connection.makefile("rw")
     wake, woken = os.pipe2(os.O_NONBLOCK | os.O_CLOEXEC)
     signal.set_wakeup_fd(woken)

@@ -32,6 +32,7 @@ def beside(tmp_path):
         process.wait()
 
 
+@pytest.mark.long
 def test_a_controller_and_a_mission_of_ones_own_fly_and_the_log_is_read(fly, beside):
     flight = fly("--scenario", "hover", "--without", "arm_controller", "--without", "mission")
     beside("own_controller.py", flight)
@@ -76,6 +77,7 @@ def test_a_gain_is_swept(tmp_path):
     assert len(errors) == 3, "each gain has errors of its own"
 
 
+@pytest.mark.long
 def test_two_vehicles_fly_at_once(tmp_path, short_scenario):
     said = run("two_vehicles.py", tmp_path, short_scenario)
     assert "follower: arming" in said
@@ -84,7 +86,7 @@ def test_two_vehicles_fly_at_once(tmp_path, short_scenario):
     assert one != other
 
 
-@pytest.mark.parametrize("engine", [pytest.param("direct", marks=pytest.mark.slow), "ros"])
+@pytest.mark.parametrize("engine", [pytest.param("direct", marks=pytest.mark.long), "ros"])
 def test_the_simulator_of_ones_own_flies(engine, tmp_path, short_scenario):
     said = run("own_simulator.py", tmp_path, engine, short_scenario)
     found = json.loads((tmp_path / "metrics.json").read_text())
@@ -92,6 +94,7 @@ def test_the_simulator_of_ones_own_flies(engine, tmp_path, short_scenario):
     assert max(found["max"]["arm_deg"]) == 0.0, "its arm stands still"
 
 
+@pytest.mark.long
 def test_a_tour_of_goals_is_flown(tmp_path):
     said = run("goto_tour.py", tmp_path)
     assert said.count("accepted") == said.count("there at") == 3
@@ -100,6 +103,7 @@ def test_a_tour_of_goals_is_flown(tmp_path):
     assert max(off) < 20.0, "[mm]"
 
 
+@pytest.mark.long
 def test_the_planner_of_ones_own_flies_a_circle(tmp_path):
     said = run("own_planner.py", tmp_path)
     west, east = (float(word) for word in said.split("circle: ")[1].split()[:3:2])

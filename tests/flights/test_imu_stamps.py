@@ -15,8 +15,8 @@ from uam_sim_bridge.plant import Vehicle
 # scenario, jitter [s]
 FLIGHTS = [
     ("quick_pick", 0.001),
-    pytest.param("pick_and_place", 0.0002, marks=pytest.mark.slow),
-    pytest.param("pick_and_place", 0.001, marks=pytest.mark.slow),
+    pytest.param("pick_and_place", 0.0002, marks=pytest.mark.long),
+    pytest.param("pick_and_place", 0.001, marks=pytest.mark.long),
 ]
 RMS = ("position_m", "attitude_deg", "arm_deg")
 
@@ -60,7 +60,7 @@ def completed(flight):
     return json.loads((flight.out / "metrics.json").read_text())["mission_completed"]
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_over_ros_no_warning_stays(fly, short_scenario):
     flight = fly("--scenario", str(short_scenario), "--seed", "3", "--fault", fault(0.001))
     assert completed(flight)

@@ -74,7 +74,7 @@ def test_commands_parameters_and_phases_of_a_flight(tmp_path, capfd):
     assert capfd.readouterr() == ("", "")
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_several_at_once_with_asyncio(short_scenario, tmp_path):
     async def one(seed):
         out = tmp_path / str(seed)
@@ -90,6 +90,7 @@ def test_several_at_once_with_asyncio(short_scenario, tmp_path):
     assert not np.array_equal(first["estimate.x"], second["estimate.x"])
 
 
+@pytest.mark.long
 def test_a_block_that_is_left_stops_its_flight(short_scenario, tmp_path):
     with Flight(scenario=short_scenario, out=tmp_path) as flight:
         flight.wait_for("take-off", 60.0)

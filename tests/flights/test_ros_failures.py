@@ -98,7 +98,7 @@ def test_ctrl_c_keeps_what_was_flown(fly, short_scenario):
     assert "partial" in (flight.out / "report.html").read_text()
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_ctrl_c_before_the_first_tick_leaves_nothing(fly, short_scenario):
     flight = fly("--scenario", str(short_scenario))
     flight.until(lambda: "processes in ROS domain" in flight.said, "started")

@@ -115,7 +115,7 @@ def test_a_campaign_flies_the_joints_of_the_vehicle(tmp_path, capsys):
     assert main([*command, "--seed", "2", "--out", str(tmp_path)]) == 2, "other flights"
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_a_comparison_flies_the_joints_of_the_vehicle(tmp_path):
     command = ["compare", "--vehicle", "s500_arm3", "--scenario", "hover", "--rows", "proposed"]
     one = ["--seeds", "1", "--payload-mass", "0"]
