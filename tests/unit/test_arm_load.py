@@ -98,11 +98,33 @@ def test_the_moment_is_that_of_the_forces_on_the_links():
     assert torques[0] == pytest.approx(-moment)  # the arm turns about -y
 
 
+def test_the_moment_of_two_links_in_an_accelerated_level_base():
+    """1 kg at 0.5 m of 1 m, then 2 kg at 1 m: r x m (a + g) with a = (3, 0, 0), at rest."""
+    values = {
+        "link_masses": [1.0, 2.0], "link_centres": [0.5, 1.0], "link_lengths": [1.0, 1.0],
+        "arm_gravity": 10.0,
+    }  # fmt: skip
+    reference = np.zeros((3, 8))
+    reference[0, 6:], reference[2, 0] = (0.3, 0.4), 3.0
+    torques = np.zeros(2)
+    moment = arm_load(ArmLoadParameters.from_mapping(values).load_record()[0], reference, torques)
+    elbow = np.array([math.sin(0.3), 0.0, -math.cos(0.3)])
+    tip = elbow + [math.sin(0.7), 0.0, -math.cos(0.7)]
+    force = np.array([3.0, 0.0, 10.0])
+    expected = np.cross(0.5 * elbow, force) + np.cross(tip, 2.0 * force)
+    assert moment == pytest.approx(expected[1])
+    np.testing.assert_allclose(torques, [-moment, -np.cross(tip - elbow, 2.0 * force)[1]])
+
+
 def test_it_needs_the_links():
     with pytest.raises(ParameterError, match="needs link_masses"):
         ArmLoadParameters.from_mapping({"arm_feedforward": True})
     with pytest.raises(ParameterError, match="lists of one length"):
         ArmLoadParameters.from_mapping({"link_masses": [1.0], "link_centres": [0.1, 0.2]})
+    with pytest.raises(ParameterError, match="lists of one length"):
+        ArmLoadParameters.from_mapping(
+            {"link_masses": [1.0], "link_centres": [0.1], "link_lengths": [0.1, 0.2]}
+        )
 
 
 def commands(profile, **changes):

@@ -11,6 +11,7 @@ import pytest
 from uam_control.control.output_limits import (
     PositionLimits,
     complete_effort,
+    complete_force,
     integrate,
     limit_force,
     limit_torque,
@@ -93,3 +94,15 @@ def test_the_known_load_takes_the_place_of_the_feedforward(loaded, expected):
         acceleration, 0.0 * one, load, loaded, inertia, one, 9.0, False, 0.1, integral, tau
     )
     np.testing.assert_allclose(tau, expected)
+
+
+@pytest.mark.parametrize(("gravity", "heavier"), [(0.5, 1.5), (0.0, 1.0)])
+def test_an_integral_of_a_quarter_holds_up_half_of_a_weight_at_half_a_unit_of_gravity(
+    gravity, heavier
+):
+    """inertia 2, integral -0.25; drag of 0.5 at 2 m/s."""
+    tau, integral = np.array([1.0, 0.0, 3.0]), np.array([0.0, 0.0, -0.25])
+    none, inertia = np.zeros(3), np.full(3, 2.0)
+    velocity, drag = np.array([2.0, 0.0, 0.0]), np.array([0.5, 0.0, 0.0])
+    complete_force(velocity, none, drag, inertia, none, 9.0, gravity, False, 0.1, integral, tau)
+    np.testing.assert_allclose(tau, [2.0 * heavier, 0.0, 3.0 * heavier + 0.5])

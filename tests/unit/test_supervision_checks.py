@@ -239,6 +239,12 @@ def test_a_measured_delay_counts_in_flight_only():
     assert Checks(AT_ONCE).update(0.0, seen(loop_delay=1.0), False) is None
 
 
+def test_what_means_nothing_on_the_ground_is_not_in_the_report_before_arming():
+    names = {check.name for check, _, _ in Checks(AT_ONCE).on_ground()}
+    left_out = {"position error", "altitude", "motion capture", "mocap pose", "loop delay"}
+    assert not names & left_out and {"tilt", "battery", "setpoint delay"} < names
+
+
 @pytest.mark.parametrize("look", [
     seen([((0, 0), 0.75)]),
     seen(mocap_position=np.array([0.0, 0.5, 1.0]), mocap_age=0.0),
