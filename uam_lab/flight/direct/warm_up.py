@@ -6,7 +6,7 @@ all of them are there and up to date, nothing is compiled.
 
 from __future__ import annotations
 
-import multiprocessing
+import subprocess
 import sys
 from collections.abc import Callable, Iterable, Iterator
 
@@ -27,6 +27,7 @@ from uam_sim_bridge.plant import Vehicle
 from uam_sim_bridge.plant.effects import presets
 
 PACKAGES = ("uam_control", "uam_sim_bridge", "uam_lab")
+STAND_IN = "--stand-in"  # option of this module as a program
 TICKS = 1000  # 4 s: the vehicle is armed and in the air by then, and every function has run
 LATE_POSES = "mocap_latency@0+1:delay=0.05"  # the estimator corrects earlier predictions, too
 
@@ -50,10 +51,13 @@ def prepare(say: Callable[[str], None] = lambda text: None) -> None:
     if is_cold():
         say("compiling the control path (once)")
         # the nodes of the vehicle here, beside them what stands in for it, on another core
-        beside = multiprocessing.get_context("spawn").Process(target=_stand_in, daemon=True)
-        beside.start()
-        warm_up([catalogue.DEFAULT])
-        beside.join()
+        command = [sys.executable, "-m", "uam_lab.flight.direct.warm_up", STAND_IN]
+        with subprocess.Popen(command, stderr=subprocess.DEVNULL) as beside:
+            try:
+                warm_up([catalogue.DEFAULT])
+            except BaseException:
+                beside.terminate()
+                raise
         warm_up(LAWS)
 
 
@@ -92,4 +96,7 @@ def _others() -> None:
 
 
 if __name__ == "__main__":
-    prepare(print)
+    if STAND_IN in sys.argv:
+        _stand_in()
+    else:
+        prepare(print)
