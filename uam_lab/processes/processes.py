@@ -31,7 +31,7 @@ class NodeFailed(RuntimeError):
         own_words = self.last_lines[-1] if self.last_lines else ""
         # prefix of a node's last line, or of a line that it logs by rclpy
         why = re.sub(rf"^({name}: |\[\w+\] \[[\d.]+\] \[{name}\]: )", "", own_words)
-        said = f": {why}" if why != own_words else ""
+        said = f": {why}" if status >= 0 and why != own_words else ""  # a killed one gave none
         super().__init__(f"{name} {describe(status)}{said}")
 
 
