@@ -58,7 +58,7 @@ def test_the_mission_is_completed_with_jitter_as_with_the_companions_imu(name):
         assert errors[name] == pytest.approx(nominal[name], rel=0.2)
 
 
-@pytest.mark.long
+@pytest.mark.slow
 def test_over_mavlink_no_other_imu_is_needed(fly, short_scenario):
     flight = fly("--scenario", str(short_scenario), "--seed", "3", "--imu", "autopilot")
     assert flight.wait() == 0, flight.said + flight.complained
