@@ -15,7 +15,7 @@ from trajectory_msgs.msg import MultiDOFJointTrajectory, MultiDOFJointTrajectory
 
 from uam_lab import Flight
 
-RADIUS, ROUND, STEP = 0.3, 5.0, 0.25  # [m], [s], [s]
+RADIUS, ROUND, STEP = 0.4, 6.0, 0.25  # [m], [s], [s]
 
 
 def circle(height: float) -> MultiDOFJointTrajectory:

@@ -10,7 +10,7 @@ from uam_control.profiles.profile import load_profile
 from uam_lab.campaign.variations import VariationError, chosen, common, draw, ranges
 from uam_lab.cli.main import main
 
-FLIGHTS = 3
+FLIGHTS = 4
 
 
 def test_a_draw_repeats_and_a_longer_one_begins_alike():

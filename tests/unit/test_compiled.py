@@ -18,14 +18,14 @@ from uam_lab.flight.direct.flight import DirectFlight
 from uam_sim_bridge.plant import Vehicle
 sets = load_scenario("pick_and_place"), load_profile({profile!r}), Vehicle.load()
 flight = DirectFlight(*sets, 0.2, 1)
-while flight.mission.output.time < 0.6:
+while flight.mission.output.time < 1.5:
     flight.tick()
 print(json.dumps(flight.recording.values[flight.recording.count - 1].tolist()))
 """
 
 
 def flown(profile: str, without_numba: bool) -> list:
-    """The last row of a flight up to 0.6 s after the take-off began."""
+    """The last row of the first seconds of a flight."""
     program = PROGRAM.format(profile=profile, without_numba=without_numba)
     done = subprocess.run(
         [sys.executable, "-c", program], capture_output=True, text=True, check=True

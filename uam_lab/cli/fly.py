@@ -190,9 +190,8 @@ def fly(settings: FlightSettings, video: bool, report: bool) -> int:
     outcome, metrics = result.outcome, result.metrics
     if metrics is not None:
         if report:
-            from uam_lab.report.build import (
-                build_report,
-            )  # a second, not to be lost before a flight
+            # not before the flight: this import takes a second
+            from uam_lab.report.build import build_report
 
             # after Ctrl-C it has figures, but no rendered pictures, which take long
             with reporting(console) as show:

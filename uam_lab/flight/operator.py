@@ -66,7 +66,10 @@ class Operator:
 
     def plan(self, message: Any) -> tuple[bool, str]:
         """Send a goal or trajectory on the mission's topic of its type; see `goto`."""
-        topic = next(one for one in PLANNERS if isinstance(message, one.type))
+        topic = next((one for one in PLANNERS if isinstance(message, one.type)), None)
+        if topic is None:
+            kinds = ", ".join(one.type.__name__ for one in PLANNERS)
+            raise TypeError(f"{type(message).__name__} is no plan: {kinds} expected")
         before, sent = self.mission().answers, -math.inf
         publisher = self._node.create_publisher(topic.type, topic.name, topic.qos)
 

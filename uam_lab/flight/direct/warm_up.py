@@ -58,7 +58,7 @@ def prepare(say: Callable[[str], None] = lambda text: None) -> None:
             except BaseException:
                 beside.terminate()
                 raise
-        warm_up(LAWS)
+        warm_up(law for law in LAWS if law != catalogue.DEFAULT)
 
 
 def warm_up(laws: Iterable[str]) -> None:
