@@ -1,6 +1,7 @@
 """Flights from Python: `uam_lab.Flight`."""
 
 import asyncio
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -99,14 +100,16 @@ def test_a_block_that_is_left_stops_its_flight(short_scenario, tmp_path):
 
 
 def test_a_failure_is_an_exception_with_its_reason(short_scenario, tmp_path, monkeypatch):
-    monkeypatch.setattr(node_arguments, "START_TIMEOUT", 0.1)
+    monkeypatch.setattr(node_arguments, "START_TIMEOUT", 0.5)
     flight = Flight(scenario=short_scenario, out=tmp_path)
-    with pytest.raises(FlightFailed, match="no progress for 0.1 s") as failed, flight:
+    apart = {"position_controller": {"uam/state": "nowhere"}}  # it never gets its input
+    flight.settings = replace(flight.settings, remappings=apart)
+    with pytest.raises(FlightFailed, match="no progress for 0.5 s") as failed, flight:
         flight.wait()
     assert failed.value.result is flight.result and not flight.result.completed
     text = "\n".join(flight.messages)
     assert text.count("processes in ROS domain") == 2, "it is started once more"
-    assert "no progress for 0.1 s" in text and "starting again" in text
+    assert "no progress for 0.5 s" in text and "starting again" in text
     with pytest.raises(FlightError, match="nothing was recorded"):
         _ = flight.result["time"]
 

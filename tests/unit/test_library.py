@@ -23,6 +23,7 @@ from uam_sim_bridge.faults import FaultError
         ({"parameters": {"scene": {"frame_rate": 5.0}}, "engine": "direct"}, "has no scene"),
         ({"remappings": {"goal_pose": "goal"}, "engine": "direct"}, "has no topics"),
         ({"remappings": {"goal_pose": ""}}, "two names"),
+        ({"remappings": {"mission:uam/state": "x"}}, "two names"),
         ({"remappings": {"pilot": {"a": "b"}}}, "unknown node 'pilot'"),
         ({"remappings": {"mission": {"/uam/state": "x"}}}, "uam/state of mission alone would cut"),
         ({"remappings": {"scene": {"/diagnostics": "x"}}}, "diagnostics of scene alone would cut"),

@@ -70,7 +70,7 @@ def remappings(
         else:
             found.setdefault(EVERY_NODE, {})[key] = value
     for old, new in (pair for names in found.values() for pair in names.items()):
-        if not all(isinstance(name, str) and name and ":=" not in name for name in (old, new)):
+        if not all(isinstance(name, str) and name and ":" not in name for name in (old, new)):
             raise SettingsError(
                 f"remapping {old!r} → {new!r}: two names of topics or services expected"
             )
