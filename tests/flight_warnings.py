@@ -41,6 +41,16 @@ def last_values(folder, node):
     return {pair.key: pair.value for pair in last.values}
 
 
+def stamps(folder, topic):
+    """Return the stamps [s] of a topic's messages, in order."""
+    with AnyReader([folder]) as reader:
+        headers = [
+            reader.deserialize(data, connection.msgtype).header
+            for connection, _, data in reader.messages(_of(reader, topic))
+        ]
+    return [header.stamp.sec + 1e-9 * header.stamp.nanosec for header in headers]
+
+
 def _reports(folder):
     with AnyReader([folder]) as reader:
         for connection, time, data in reader.messages(_of(reader, "/diagnostics")):

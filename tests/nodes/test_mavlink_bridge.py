@@ -71,6 +71,15 @@ def test_the_autopilots_imu_is_published_before_and_with_the_ticks(make_rig, pro
     for _ in range(20):
         rig.tick()
     probe.until(lambda: len(samples) >= before + 20, "samples with the ticks")
+    rig.received.clear()
+
+    def requested():
+        """Only /clock goes on, as after a reboot: samples need requests, ticks need samples."""
+        clock.publish(writer.stamped(round(rig.body.time * 1e9) + 1000 * PERIOD))
+        rig.autopilot_tick()
+        return {"HEARTBEAT", "TIMESYNC"} <= rig.kinds()
+
+    probe.until(requested, "requests without ticks")
 
 
 def test_from_the_ground_to_hover_and_back(make_rig):

@@ -93,3 +93,20 @@ def test_answers_to_others_are_ignored():
     offset = sync.offset
     sync.answer(1.0, 10**15, ts1)  # the same answer twice
     assert sync.offset == offset
+
+
+def test_an_answer_in_the_tick_of_its_request_is_no_step_back():
+    sync = TimeSync()
+    for tick in range(1, 2001):  # a busy companion reads its clock once for both
+        stamp = tick * 200_000_000 + 493_750
+        ts1 = sync.request(stamp / 1e9)
+        assert not sync.answer(stamp / 1e9, ts1 + 1_500_000, ts1)
+        assert sync.offset == pytest.approx(0.0015, abs=1e-6), tick
+    assert sync.quickest == pytest.approx(0.001)
+
+
+def test_a_new_simulation_discards_the_estimate():
+    sync = TimeSync()
+    run(sync, 2.0, 50.0, offset=1.0, delay=0.004)
+    ts1 = sync.request(52.2)
+    assert not sync.answer(0.4, 10**9, ts1) and sync.offset is None

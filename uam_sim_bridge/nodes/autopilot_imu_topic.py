@@ -12,6 +12,7 @@ from uam_msgs_py.node.base_node import UamNode
 from uam_msgs_py.node.namespace import frame
 from uam_sim_bridge.mavlink.link.link import OffboardLink
 
+SILENT = 0.1  # [s] after the newest tick from which this serves the link
 WAKE_UP = 0.001  # [s] of wall time between two looks at the link: no other message announces it
 
 
@@ -44,14 +45,17 @@ class AutopilotImuTopic:
     def serve(self, tick: int | None) -> None:
         """Receive from the link and publish; tick [ns]: the newest, None before the first.
 
-        Later the ticks send heartbeats and requests. The first tick needs a sample, and a sample
-        needs those.
+        The ticks send heartbeats and requests. Without ticks this does: a tick needs a sample, and
+        a sample needs those, before the first tick and after a reboot of the autopilot.
         """
-        now = self._clock.now() if tick is None else tick / SECOND
+        now = self._clock.now()
+        ticking = tick is not None and now - tick / SECOND < SILENT
+        if ticking:
+            now = tick / SECOND
         if now <= 0.0:
             return
         self._link.poll(now)
-        if tick is None:
+        if not ticking:
             self._link.maintain(now)
         for stamp, gyro, force in self._link.imu.samples():
             self._count += 1

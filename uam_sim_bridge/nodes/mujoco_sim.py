@@ -68,7 +68,9 @@ LAST_WAIT = 3.0  # [s] longest wait for the recorder after the last tick
 RECORDER_LAG = 2.0  # [s] the recorder reports its progress each second; its queue is 4 times longer
 LATCHED_WAIT = 0.5  # [s] of wall time, in which a latched message arrives
 AFTER_OTHERS = 1.0  # [s] the status of a mission is at most half a second older than its last tick
-IMU_WAIT, IMU_MISSING = 0.5, 5  # [s], [ticks] for which a sample of the autopilot's IMU may be lost
+# [s], [ticks]: single samples of the autopilot's IMU may be lost. After these ticks time goes on at
+# the pace of the wall clock: without it the bridge could not relate the clocks again.
+IMU_WAIT, IMU_MISSING = 2.0, 3
 SERVICE_TICKS = 25  # [ticks] between two calls of the parameter services in real time
 
 
@@ -122,6 +124,7 @@ class Simulator:
         self._complete = False  # every kind of sensor has delivered a sample
         self._stamp: int | None = None  # of this tick's IMU sample [ns]
         self._unanswered = 0  # ticks in a row without an answer
+        self._patience = Patience(options.answer_timeout)
         self._published = 0  # wall time [ns] of its publication
         self._restart = Restart(options.answer_timeout)
         self._begun = 0.0  # wall time [s] at which this tick began
@@ -334,17 +337,22 @@ class Simulator:
             if not self.answers.begun:
                 self._spin_until(self._begun + self.plant.period)
                 return
-        patience = Patience(self.options.answer_timeout)
+        own_imu = self._stamp is not None
+        if own_imu or not self._unanswered:
+            self._patience = Patience(self.options.answer_timeout)
+        slack = 0.0 if self._unanswered >= IMU_MISSING and not own_imu else IMU_WAIT
         while missing := self.answers.missing(self._stamp):
             self._setpoint_is_there = "setpoint" not in missing
             left = self._begun + self.plant.period - time.monotonic()
-            self.executor.spin_once(max(0.0, left) if self._restart.going_on else 0.1)
+            hurried = self._restart.going_on or not slack
+            self.executor.spin_once(max(0.0, left) if hurried else 0.1)
             self._restart.look(self.answers.restarts)
             if self._stop.raised or (self._restart.going_on and left <= 0.0):
                 break
-            if self._stamp is None and left < -IMU_WAIT and self._unanswered < IMU_MISSING:
-                break  # a sample of the autopilot's IMU may be lost or refused
-            if patience.over:
+            over = self._patience.over
+            if not own_imu and left < -slack and not over:
+                break  # samples of the autopilot's IMU may be lost or refused
+            if over:
                 if self.options.end_with_mission:
                     raise PlantStopped(self._no_answer(missing))
                 self._log.warning(f"{self._no_answer(missing)}; time goes on without it")

@@ -72,11 +72,13 @@ class TimeSync:
             return False
         self._requested.remove(ts1)
         self.delivered = ts1 * 1e-9
-        round_trip = time - ts1 * 1e-9
-        if round_trip < 0.0:  # the companion's clock went back: a new simulation
+        asked = ts1 * 1e-9
+        if time < asked - BACKWARDS:  # the companion's clock went back: a new simulation
             self.restart()
             return False
-        offset = tc1 * 1e-9 - (ts1 * 1e-9 + time) / 2.0
+        time = max(time, asked)  # an answer in the tick of its request is early by rounding
+        round_trip = time - asked
+        offset = tc1 * 1e-9 - (asked + time) / 2.0
         if self.offset is not None and abs(offset - self.offset) > JUMP + round_trip / 2.0:
             self._jumps += 1
             if self._jumps < JUMPS_TO_RESET:
