@@ -19,7 +19,6 @@ class Latencies:
     def tick(self, stamp: int | None, published: int, setpoints: dict[int, int]) -> None:
         """Register a tick's sample, None for none, and the setpoints that have arrived.
 
-        An IMU with drift, and the autopilot's, have stamps beside those of the plant's ticks.
         published: wall time [ns]; setpoints: stamp of the sample answered [ns] → wall time [ns].
         """
         numbers = self._statistics
@@ -27,14 +26,24 @@ class Latencies:
             self._unanswered[stamp] = published
             numbers.answerable_ticks += 1
         for answered, sent in setpoints.items():
-            period = nanoseconds(self._period)
-            begun = self._unanswered.pop(round(answered / period) * period, None)
-            if begun is None:
+            sample = self._answered(answered)
+            if sample is None:
                 continue
-            latency = (sent - begun) * 1e-9
+            latency = (sent - self._unanswered.pop(sample)) * 1e-9
             numbers.latency_s.append(latency)
             numbers.late_ticks += latency > self._period
             numbers.missed_ticks += latency > DEADLINE_TICKS * self._period
+
+    def _answered(self, stamp: int) -> int | None:
+        """Return the unanswered sample nearest to `stamp` [ns], less than one period from it.
+
+        An IMU with drift, and the autopilot's, have stamps beside those of the plant's ticks.
+        """
+        period = nanoseconds(self._period)
+        before = stamp // period * period
+        near = [s for s in (before, before + period) if s in self._unanswered]
+        near = [s for s in near if abs(s - stamp) < period]
+        return min(near, key=lambda s: abs(s - stamp), default=None)
 
     def conclude(self, now: int) -> None:
         """Count unanswered samples as missed if their deadline is over at `now` [ns]."""
