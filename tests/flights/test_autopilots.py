@@ -88,6 +88,7 @@ def test_a_flight_controller_on_a_serial_line_flies_the_simulated_vehicle(
             "realtime",
             "--autopilot",
             f"serial:{line.near}:921600",
+            "--arm",
         )
         assert flight.wait() in (0, 1), flight.said + flight.complained
         found = json.loads((flight.out / "metrics.json").read_text())
