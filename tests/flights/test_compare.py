@@ -36,7 +36,7 @@ def test_a_comparison_is_written_and_repeats(tmp_path, capsys):
     assert row["flights"] == row["completed"] == 1 and row["lost"] == 0
     assert "equal bit for bit" in first["claims"][-1]
     assert first["seeds"] == [1] and first["payloads_kg"] == [0.2] and first["engine"] == "direct"
-    assert "500 evaluations" in first["budgets"]["proposed"]
+    assert "docs/tuning.md" in first["budgets"]["proposed"]
     for name in ("position_errors", "rms", "gains"):
         assert (tmp_path / "a" / "figures" / f"{name}.png").stat().st_size > 0
     assert "proposed" in (tmp_path / "a" / "report.html").read_text()
