@@ -79,7 +79,7 @@ def test_a_node_that_hangs_is_named_and_killed(fly, short_scenario):
     nodes = flight.children()
     os.kill(nodes["arm_controller"], signal.SIGSTOP)
     assert flight.wait() == 1
-    assert "no effort for t = " in flight.complained
+    assert "no arm command for t = " in flight.complained
     assert "arm_controller is silent" in flight.complained
     assert "did not stop and were killed: arm_controller" in flight.said
     assert_nothing_left(flight, list(nodes.values()))

@@ -399,6 +399,25 @@ def test_resume_asks_once_per_command_and_the_scenario_goes_on():
     assert output.phase == "landed" and not output.abort_reason
 
 
+@pytest.mark.parametrize(
+    "place, speed, said",
+    [
+        ([4.0, 0.0, 1.0], [-3.0, 0.0, 0.0], ""),
+        ([3.0, 0.0, 1.0], [3.0, 0.0, 0.0], "in x before it stops: slow down"),
+        ([0.0, -5.4, 1.0], [0.0, 0.0, 0.0], "leave the geofence by 0.4 m in y"),
+        ([0.0, 0.0, 5.5], [0.0, 0.0, 2.0], "in z"),
+    ],
+)
+def test_control_is_not_taken_where_the_vehicle_would_leave_the_geofence(place, speed, said):
+    """Box of the default: 5 m to each side, 6 m high."""
+    flight = released()
+    flight.state[0, :3], flight.state[1, :3] = place, speed
+    flight.step()
+    accepted, answer = flight.mission.request(OperatorCommand.RESUME)
+    assert accepted == (not said) and said in answer
+    assert flight.step().state is State.RELEASED and flight.step().regains == accepted
+
+
 def test_the_pilots_switch_alone_is_a_hold_that_waits():
     flight = released()
     flight.authority = Authority()

@@ -24,6 +24,7 @@ from uam_control.mission.mission_output import (
     MissionOutput,
 )
 from uam_control.mission.mission_parameters import MissionParameters, StartParameters
+from uam_control.mission.motion.braking import Braking
 from uam_control.mission.motion.trajectory import empty_reference
 from uam_control.mission.payload_watch import PayloadWatch
 from uam_control.mission.plans import GoalPose, PlanRefused, Points, check
@@ -256,10 +257,31 @@ class Mission:
         if self._seen is None:
             return False, "no state of the vehicle yet"
         refusal = self._supervisor.refusal(command, self._seen)
+        if not refusal and command is OperatorCommand.RESUME:
+            refusal = self._stops_outside()
         if refusal:
             return False, f"refused: {refusal}"
         self._requests.append((command, None))
         return True, command.value.value
+
+    def _stops_outside(self) -> str:
+        """Say by how much a released vehicle would leave the geofence before it stops; "" if not.
+
+        Control stays with the pilot then: taken over there, the vehicle would only land.
+        """
+        state, p = self._seen.state, self._parameters
+        if self.output.state is not State.RELEASED or not np.all(np.isfinite(state[CHI])):
+            return ""
+        places = Braking(self._stamp, state, p, self._ground).places()
+        low, high = np.array(p.geofence_low), np.array(p.geofence_high)
+        beyond = np.maximum(low - places, places - high).max(axis=0)
+        axis = int(np.argmax(beyond))
+        if beyond[axis] <= 0.0:
+            return ""
+        return (
+            f"the vehicle would leave the geofence by {beyond[axis]:.1f} m in {'xyz'[axis]} before "
+            "it stops: slow down, or fly back first"
+        )
 
     def plan(self, goal: GoalPose | Points) -> tuple[bool, str]:
         """Check a goal or trajectory; queue it for the next step if it can be flown.

@@ -54,7 +54,14 @@ from uam_sim_bridge.nodes.fault_topic import FaultTopic
 from uam_sim_bridge.nodes.latencies import Latencies
 from uam_sim_bridge.nodes.plant_health import PlantHealth
 from uam_sim_bridge.nodes.plant_options import NOT_READY, Options, Statistics, declare
-from uam_sim_bridge.nodes.plant_topics import SUSPECTS, Answers, Sensors, TruthTopics, nanoseconds
+from uam_sim_bridge.nodes.plant_topics import (
+    SETPOINT,
+    SUSPECTS,
+    Answers,
+    Sensors,
+    TruthTopics,
+    nanoseconds,
+)
 from uam_sim_bridge.nodes.restart import Restart
 from uam_sim_bridge.patience import Patience
 from uam_sim_bridge.plant import Plant, Samples, Truth, Vehicle
@@ -342,7 +349,7 @@ class Simulator:
             self._patience = Patience(self.options.answer_timeout)
         slack = 0.0 if self._unanswered >= IMU_MISSING and not own_imu else IMU_WAIT
         while missing := self.answers.missing(self._stamp):
-            self._setpoint_is_there = "setpoint" not in missing
+            self._setpoint_is_there = SETPOINT not in missing
             left = self._begun + self.plant.period - time.monotonic()
             hurried = self._restart.going_on or not slack
             self.executor.spin_once(max(0.0, left) if hurried else 0.1)

@@ -125,13 +125,14 @@ class TruthTopics(Outlets):
         self._magnet.publish(writer.stamped(stamp))
 
 
+SETPOINT, ARM, MAGNET = "setpoint", "arm command", "magnet command"  # the answers, in messages
 # The node named when answers are missing: the last one that all of them depend on.
 SUSPECTS = {
-    frozenset({"setpoint", "arm", "magnet"}): "state_estimator",
-    frozenset({"setpoint", "arm"}): "position_controller or mission",
-    frozenset({"setpoint"}): "attitude_controller or mavlink_bridge",
-    frozenset({"arm"}): "arm_controller",
-    frozenset({"magnet"}): "mission",
+    frozenset({SETPOINT, ARM, MAGNET}): "state_estimator",
+    frozenset({SETPOINT, ARM}): "position_controller or mission",
+    frozenset({SETPOINT}): "attitude_controller or mavlink_bridge",
+    frozenset({ARM}): "arm_controller",
+    frozenset({MAGNET}): "mission",
 }
 
 
@@ -199,10 +200,10 @@ class Answers:
         `begin` is then the answer.
         """
         if stamp is None:
-            return frozenset({"arm", "magnet", "setpoint"} - self._arrived)
-        lacking = {"arm", "magnet"} - self._arrived
+            return frozenset({ARM, MAGNET, SETPOINT} - self._arrived)
+        lacking = {ARM, MAGNET} - self._arrived
         answered = self._setpoint_stamp >= stamp - self._tolerance
-        return frozenset(lacking if answered else lacking | {"setpoint"})
+        return frozenset(lacking if answered else lacking | {SETPOINT})
 
     @property
     def begun(self) -> bool:
@@ -222,14 +223,14 @@ class Answers:
         except BadMessage as error:
             self._refuse(topics.SETPOINT, error)
             return
-        self._arrived.add("setpoint")
+        self._arrived.add(SETPOINT)
         self.arrivals[topics.SETPOINT.name] = time.monotonic()
         if info is not None:
             self.setpoints[self._setpoint_stamp] = info["source_timestamp"]
 
     def _on_arm(self, topic: topics.Topic, data: bytes, info: dict | None = None) -> None:
         if topic is self._arm_topic:
-            self._arrived.add("arm")
+            self._arrived.add(ARM)
         try:
             command = read_joint_command(data, self._names)
         except BadMessage as error:
@@ -240,7 +241,7 @@ class Answers:
             self.arrivals[topic.name] = time.monotonic()
 
     def _on_magnet(self, data: bytes, info: dict | None = None) -> None:
-        self._arrived.add("magnet")
+        self._arrived.add(MAGNET)
         try:
             self.magnet = read_switch(data)
         except BadMessage as error:

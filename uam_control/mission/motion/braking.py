@@ -18,6 +18,7 @@ from uam_control.maths.rotations import matrix_from_euler
 from uam_control.mission.mission_parameters import MissionParameters
 from uam_control.vehicle import GRAVITY
 
+PLACES = 20  # on the way to rest, for the check of the geofence
 DERIVATIVES = 5  # value, rate, acceleration, jerk, snap
 SHORTEST = 0.3  # [s] of a fade, and of the stop of a sinking vehicle near the ground
 MOST_ACROSS, MOST_UP = 7.0, 3.0  # [m/s^2] largest acceleration at the start: 35 deg of tilt, 0.3 g
@@ -119,6 +120,11 @@ class Braking:
             (slice(YAW, YAW + 1), Stop(start[:, YAW : YAW + 1], *yaw_bounds)),
         )
         self.end = stamp + max(stop.length for _, stop in self._stops)
+
+    def places(self) -> np.ndarray:
+        """Return positions [m] (m, 3) on the way to rest, the first and the last included."""
+        times = np.linspace(0.0, self.end - self._stamp, PLACES)
+        return np.hstack([stop.values(times) for _, stop in self._stops[:2]])
 
     def write(self, stamp: float, reference: np.ndarray) -> None:
         """Write the base's columns of reference (3 to 5, 6 + n): its derivatives at `stamp` [s]."""
