@@ -78,7 +78,7 @@ def test_a_flight_waits_for_a_silent_controller(fly):
     loss = "discovery_loss@approach+0+24:node=arm_controller"
     flight = fly("--scenario", "pick_and_place", "--clock", "realtime", "--fault", loss)
     flight.wait()
-    assert "fault discovery_loss of arm_controller is over" in flight.said
+    assert "fault discovery_loss of arm_controller ends at" in flight.said
     figures = json.loads((flight.out / "metrics.json").read_text())
     passed = [(one["to"], one["cause"]) for one in figures["transitions"]]
     held = [cause for to, cause in passed if to == "holding"]
