@@ -1,5 +1,6 @@
 """A restarted node receives the parameters that were changed in flight."""
 
+import pytest
 import rclpy
 from rclpy.node import Node
 from rclpy.parameter import Parameter
@@ -15,7 +16,8 @@ class Silent:
         return None
 
 
-def test_the_newest_accepted_values_come_back_as_ros_arguments():
+@pytest.mark.parametrize("namespace", ["/", "/uav1"])
+def test_the_newest_accepted_values_come_back_as_ros_arguments(namespace, tmp_path):
     changed = ChangedParameters(Silent())
     assert changed.arguments("arm_controller") == []
     for values, reason in (
@@ -27,7 +29,17 @@ def test_the_newest_accepted_values_come_back_as_ros_arguments():
         changed.note(ParameterChange("arm_controller", "set_parameters", values, reason))
     changed.note(ParameterChange("mission", "set_parameters", {"tilt_hold": (0.8, 0.7)}))
     context = rclpy.Context()
-    rclpy.init(args=["--ros-args", *changed.arguments("arm_controller")], context=context)
+    file = tmp_path / "parameters.yaml"
+    file.write_text("arm_controller: {ros__parameters: {rho_0: 5.0, law: asmc1}}")
+    arguments = [
+        "--ros-args",
+        "-p",
+        "of_every_node:=x",
+        "--params-file",
+        str(file),
+    ]  # as a flight's
+    arguments += ["-r", f"__ns:={namespace}", *changed.arguments("arm_controller")]
+    rclpy.init(args=arguments, context=context)
     node = Node(
         "arm_controller", context=context, automatically_declare_parameters_from_overrides=True
     )

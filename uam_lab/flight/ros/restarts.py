@@ -33,11 +33,16 @@ class ChangedParameters:
             self._newest.setdefault(change.node, {}).update(values)
 
     def arguments(self, node: str) -> list[str]:
-        """Return the ROS arguments with a node's newest values, to append to its arguments."""
-        found = self._newest.get(node, {})
-        return [
-            text for name, value in found.items() for text in ("-p", f"{name}:={json.dumps(value)}")
+        """Return the ROS arguments with a node's newest values, to append to its arguments.
+
+        Each value is given twice: that of a named node goes before the node's section of a
+        parameter file, but ROS applies it only without a namespace.
+        """
+        values = self._newest.get(node, {}).items()
+        pairs = [
+            f"{to}{name}:={json.dumps(new)}" for name, new in values for to in ("", f"{node}:")
         ]
+        return [text for pair in pairs for text in ("-p", pair)]
 
 
 class RestartTopic:
