@@ -322,3 +322,24 @@ def test_arming_is_requested_in_offboard_only_and_never_in_a_flight(events):
                     assert before not in (Phase.FLYING, Phase.RELEASED, Phase.FAILED)
                 if request is Request.DISARM:
                     assert before not in (Phase.RELEASED, Phase.STREAMING, Phase.FAILED)
+
+
+@pytest.mark.parametrize("mode", OTHERS)
+def test_a_pilot_who_takes_off_again_after_the_landing_is_not_disarmed(mode):
+    flight = Ticks()
+    flight.sequence.set_desired(False)
+    assert flight.run(0.1, OFFBOARD) == [Request.DISARM]  # refused: not landed yet
+    seen = Reported(True, True, mode, mode)
+    assert flight.run(60.0, seen) == [] and flight.sequence.phase is Phase.RELEASED
+    assert "has control" in flight.sequence.reasons[-1]
+    assert set(flight.run(1.0, OFFBOARD)) == {Request.DISARM}  # given back after the mission
+    flight.run(0.1, Reported(True, False, Mode.HOLD))
+    assert flight.sequence.phase is Phase.DISARMED and flight.sequence.in_control == "nobody"
+
+
+def test_the_motors_of_the_autopilots_own_failsafe_are_stopped_after_it():
+    flight = Ticks()
+    flight.sequence.let_go = True
+    flight.run(1.0, FAILSAFE)
+    flight.sequence.set_desired(False)
+    assert Request.DISARM in flight.run(1.0, FAILSAFE)

@@ -207,7 +207,7 @@ class OffboardSequence:
             self._stream_start = time
         left = self._left_offboard(time, seen.mode)
         if not self._desired:
-            return self._stay_disarmed(time, seen.armed)
+            return self._stay_disarmed(time, seen, left)
         if self.phase is Phase.FLYING:
             return self._keep_flying(time, seen, left or self._offboard_since is None)
         if self.phase is Phase.RELEASED:
@@ -271,10 +271,18 @@ class OffboardSequence:
             self._offboard_since = None
         return left
 
-    def _stay_disarmed(self, time: float, armed: bool) -> Request | None:
-        """Disarm a vehicle that this sequence has armed; one that somebody else armed stays."""
+    def _stay_disarmed(self, time: float, seen: Reported, left: bool) -> Request | None:
+        """Disarm a vehicle that this sequence has armed; one that somebody else armed stays.
+
+        So does one that a person took over after the landing: it may take off again.
+        """
         ours = self.phase in (Phase.OFFBOARD, Phase.ARMING, Phase.FLYING, Phase.DISARMING)
-        if armed and ours:
+        armed = seen.armed
+        if armed and left and self.phase in (Phase.FLYING, Phase.DISARMING) and not self.let_go:
+            self._release(time, seen)
+        elif armed and self.phase is Phase.RELEASED and seen.mode is Mode.OFFBOARD:
+            return self._ask(time, Phase.DISARMING, Request.DISARM)
+        elif armed and ours:
             return self._ask(time, Phase.DISARMING, Request.DISARM)
         if not armed and self.phase in (
             Phase.DISARMING,
