@@ -13,6 +13,7 @@ from uam_control.mission import ScenarioError
 from uam_control.profiles.profile import Profile, ProfileError, default_profile, load_profile
 from uam_control.settings import configuration
 from uam_control.settings.configuration import ConfigurationError
+from uam_control.settings.parameter_set import ParameterError
 from uam_control.vehicle import DEFAULT_VEHICLE, VehicleDescription, VehicleError
 from uam_lab.campaign.pool import cores
 from uam_lab.campaign.trial import TrialFailed
@@ -24,6 +25,7 @@ from uam_lab.results.timeseries import UnreadableFlight
 from uam_lab.study.description import StudyError
 from uam_lab.tuning.space import TuningError
 from uam_msgs_py.node.namespace import normal
+from uam_sim_bridge.drivers.mocap.frame import MocapError
 from uam_sim_bridge.faults import FaultError
 from uam_sim_bridge.plant.effects import presets
 from uam_sim_bridge.plant.effects.catalogue import EFFECTS
@@ -38,6 +40,7 @@ USER_ERRORS = (
     *(ConfigurationError, ProfileError, ScenarioError, VehicleError, SettingsError, PortError),
     *(Px4Error, FaultError, PlantError, TuningError, TrialFailed, VariationError),
     *(ResultFolderError, UnreadableFlight, UnreadableLog, StudyError),
+    *(MocapError, ParameterError),
 )
 
 

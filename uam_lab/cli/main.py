@@ -24,6 +24,7 @@ COMMANDS = {
     "faults": "faults",
     "margins": "margins",
     "doctor": "doctor",
+    "calibrate-mocap": "calibrate_mocap",
 }
 
 

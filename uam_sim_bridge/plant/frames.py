@@ -7,7 +7,11 @@ from dataclasses import dataclass
 import mujoco
 import numpy as np
 
-from uam_control.maths.rotations import quaternion_from_rotation_vector, quaternion_multiply
+from uam_control.maths.rotations import (
+    matrix_from_quaternion,
+    quaternion_from_rotation_vector,
+    quaternion_multiply,
+)
 from uam_sim_bridge.plant.urdf import BASE_LINK, carried
 from uam_sim_bridge.plant.vehicle import BASE
 
@@ -72,3 +76,19 @@ def hanging(pitch: float, alpha: np.ndarray) -> float:
     pitch [rad] of the vehicle; alpha (n,) [rad], positive in the opposite direction of pitch.
     """
     return float(pitch - alpha.sum())
+
+
+def standing_height(model: mujoco.MjModel) -> float:
+    """Return the height [m] of base_link above the floor on the landing gear.
+
+    From the boxes around the colliding shapes of the base.
+    """
+    base, lowest = model.body(BASE).id, 0.0
+    for i in range(model.ngeom):
+        if model.geom_bodyid[i] != base or not (model.geom_contype[i] or model.geom_conaffinity[i]):
+            continue
+        turn = matrix_from_quaternion(model.geom_quat[i])
+        centre, half = model.geom_aabb[i, :3], model.geom_aabb[i, 3:]
+        below = model.geom_pos[i, 2] + turn[2] @ centre - np.abs(turn[2]) @ half
+        lowest = min(lowest, float(below))
+    return -lowest

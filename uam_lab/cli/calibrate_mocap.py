@@ -1,0 +1,174 @@
+"""`uam calibrate-mocap`: the tracker's axes and the body's pivot, from two places on the floor."""
+
+from __future__ import annotations
+
+import argparse
+import math
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from uam_control.vehicle import load_description
+from uam_lab.cli.command import Command, number
+from uam_sim_bridge.drivers.mocap.mocap_parameters import (
+    LIBRARY,
+    NATNET,
+    SYSTEMS,
+    MocapParameters,
+    open_source,
+)
+
+if TYPE_CHECKING:
+    from uam_sim_bridge.drivers.mocap.calibration import Calibration
+    from uam_sim_bridge.drivers.mocap.measurement import TimedPose
+
+LEVEL, AHEAD = "first place", "second place"
+STEPS = {
+    LEVEL: "1. Put the vehicle level on the floor, with at least 0.5 m free in front of its nose.",
+    AHEAD: "2. Push it straight ahead, nose first, by 0.5 m or more (1 m is better). Do not turn it.",
+}
+DEFAULTS = MocapParameters()
+EXAMPLES = """\
+examples:
+  uam calibrate-mocap --server 192.168.1.5 --body uam --out my_lab_mocap.yaml
+  uam calibrate-mocap --server 192.168.1.5 --up z            Motive set to Z up
+  uam calibrate-mocap --server 192.168.1.5 --pivot 0.03 0    pivot 3 cm in front of base_link
+  uam calibrate-mocap --server 192.168.1.7 --source motioncapture --system vicon --up z
+  uam calibrate-mocap --server 192.168.1.5 --save raw.csv    keep the measured poses
+  uam calibrate-mocap --log raw.csv                          from recorded poses
+
+The command asks for two places: level on the floor, then again after a straight move nose first.
+It refuses measurements without sense (moved, tilted, turned, too short a way) and writes the file
+for the parameter `calibration` of mocap_driver. docs/mocap_hardware.md. Exit status: 0 written,
+2 refused.
+"""
+
+
+def add(commands: argparse._SubParsersAction) -> None:
+    """Add the subcommand to the command line."""
+    command = Command(
+        commands,
+        "calibrate-mocap",
+        run,
+        "axes of the motion capture system and pivot of the vehicle's body",
+        "Measure how a motion capture system's axes and rigid body lie to the world (ENU) and the "
+        "vehicle (FLU), guided, from two places on the floor.",
+        EXAMPLES,
+    )
+    command.option("--server", "HOST", "computer of the system", DEFAULTS.server)
+    command.option("--body", "NAME", "rigid body of the vehicle", DEFAULTS.body)
+    command.choice("--source", (NATNET, LIBRARY), NATNET, "as the parameter of mocap_driver")
+    command.choice("--system", SYSTEMS, DEFAULTS.system, f"with --source {LIBRARY}")
+    text = "command port of Motive"
+    command.option("--port", "N", text, DEFAULTS.command_port, type=int)
+    command.option("--local", "ADDRESS", "own address in its network (default: as routed)", "")
+    command.choice("--up", ("y", "z"), "y", "the system's axis that points up")
+    text = "angle about up, from the system's axes to the world's"
+    command.option("--heading", "DEG", text, 0.0, type=number("heading", "deg", -360.0, 360.0))
+    text = "pivot of the rigid body from base_link, forward and left"
+    place = number("distance", "m", -0.5, 0.5)
+    command.option("--pivot", ("X", "Y"), text, [0.0, 0.0], type=place, nargs=2)
+    command.vehicle()
+    text = "base_link above the floor (default: from the vehicle's model)"
+    command.option("--height", "M", text, type=number("height", "m", 0.0, 2.0))
+    text = "duration of a measurement"
+    command.option("--duration", "S", text, 3.0, type=number("duration", "s", 1.0, 60.0))
+    command.option("--log", "CSV", "recorded poses instead of the running system", type=Path)
+    command.option("--save", "CSV", "write the measured poses", type=Path)
+    command.option("--out", "FILE", "", Path("mocap_calibration.yaml"), type=Path)
+
+
+def run(options: argparse.Namespace) -> int:
+    """Measure, compute and write the calibration; return the exit status."""
+    from uam_sim_bridge.drivers.mocap import calibration, measurement
+    from uam_sim_bridge.drivers.mocap.fit import fit
+
+    standing = options.height if options.height is not None else _standing(options.vehicle)
+    found = _recorded(options) if options.log else _measured(options)
+    level, ahead = (measurement.still(poses, what) for what, poses in found.items())
+    heading = math.radians(options.heading)
+    made = fit(level, ahead, options.up, heading, standing, options.pivot)
+    calibration.write(made, options.out)
+    _say(made, options)
+    return 0
+
+
+def _standing(vehicle: str) -> float:
+    """Return the height [m] of base_link above the floor; raises VehicleError."""
+    from uam_sim_bridge.plant import Vehicle
+    from uam_sim_bridge.plant.frames import standing_height
+
+    return standing_height(Vehicle.of(load_description(vehicle)).compile(0.0))
+
+
+def _recorded(options: argparse.Namespace) -> dict[str, list[TimedPose]]:
+    """Return the first and the last place of a recording at which the vehicle stands still."""
+    from uam_sim_bridge.drivers.mocap import raw_log
+    from uam_sim_bridge.drivers.mocap.frame import MocapError
+    from uam_sim_bridge.drivers.mocap.measurement import places
+
+    found = places(raw_log.read(options.log), min(1.0, options.duration))
+    if len(found) < 2:
+        raise MocapError(
+            f"{options.log}: {len(found)} places where the vehicle stands still, 2 are needed"
+        )
+    return {LEVEL: list(found[0]), AHEAD: list(found[-1])}
+
+
+def _measured(options: argparse.Namespace) -> dict[str, list[TimedPose]]:
+    """Guide through the two places and measure at each."""
+    from uam_sim_bridge.drivers.mocap import live, measurement, raw_log
+
+    parameters = MocapParameters.from_mapping(
+        {
+            "source": options.source,
+            "system": options.system,
+            "server": options.server,
+            "command_port": options.port,
+            "local": options.local,
+            "body": options.body,
+        }
+    )
+    source = open_source(parameters)
+    found: dict[str, list[TimedPose]] = {}
+    try:
+        live.until_known(source, options.body)
+        print(f"measures '{options.body}' of {source.description}")
+        for what, step in STEPS.items():
+            _confirm(step)
+            found[what] = live.measure(source, options.body, options.duration)
+            place = measurement.still(found[what], what)
+            print(
+                f"   {place.count} poses, spread {1e3 * place.spread:.2f} mm, "
+                f"{math.degrees(place.wobble):.2f} deg"
+            )
+    finally:
+        source.close()
+        if options.save and found:
+            raw_log.write(options.save, [pose for poses in found.values() for pose in poses])
+    return found
+
+
+def _confirm(step: str) -> None:
+    """Wait until the person confirms a step."""
+    from uam_sim_bridge.drivers.mocap.frame import MocapError
+
+    try:
+        input(f"{step}\n   Take your hands off, then press Enter. ")
+    except EOFError:
+        raise MocapError("a person must confirm each step; or use --log") from None
+
+
+def _say(made: Calibration, options: argparse.Namespace) -> None:
+    """Print the residuals and what to do next."""
+    m = made.measured
+    print(
+        f"moved {m['distance_m']:.2f} m; between the places: {m['height_difference_m']:+.4f} m "
+        f"higher, tilted {m['tilt_difference_deg']:.2f} deg, turned "
+        f"{m['heading_difference_deg']:+.2f} deg"
+    )
+    print(
+        f"rigid body tilted {m['body_tilt_deg']:.1f} deg against the vehicle; pivot "
+        f"{made.pivot[2]:+.3f} m above base_link"
+    )
+    print(f"written  {options.out}")
+    print(f"use it   mocap_driver with calibration: {options.out}")

@@ -1,0 +1,1 @@
+"""Emulated hardware with the real protocols, for tests and rehearsals."""

@@ -1,0 +1,1 @@
+"""A motion capture server that speaks NatNet."""

@@ -1,0 +1,83 @@
+"""Node: a motion capture system → /vrpn_mocap/uam/pose and /vrpn_mocap/payload/pose.
+
+The node waits for packets in place of messages: it has no inputs, and a pose must not wait for a
+timer. A body that is lost leaves its topic silent; the diagnostics say why.
+"""
+
+from __future__ import annotations
+
+import time
+
+from rclpy.clock import Clock, ClockType
+
+from uam_control.settings.configuration import ConfigurationError
+from uam_control.settings.parameter_set import ParameterError
+from uam_msgs_py.messages import topics
+from uam_msgs_py.messages.convert import PoseWriter
+from uam_msgs_py.messages.status import ERROR, OK, WARN
+from uam_msgs_py.node.base_node import UamNode, run
+from uam_msgs_py.node.node_parameters import NodeParameters
+from uam_sim_bridge.drivers.mocap import calibration
+from uam_sim_bridge.drivers.mocap.driver import Level, MocapDriver
+from uam_sim_bridge.drivers.mocap.mocap_parameters import MocapParameters, open_source
+
+NAME = "mocap_driver"
+WAIT = 0.02  # [s] for a packet, then services and timers are served
+SAY_PERIOD = 0.1  # [s]
+LEVELS = {Level.OK: OK, Level.WARN: WARN, Level.ERROR: ERROR}
+
+
+class MocapDriverNode(UamNode):
+    """Publishes the poses with the stamps of their exposures, in the system's clock."""
+
+    wake_up = 0.0  # `settle` waits
+
+    def __init__(self) -> None:
+        super().__init__(NAME)
+        parameters = NodeParameters(self, MocapParameters, read_only=True).current
+        try:
+            calibrated = calibration.load(parameters.calibration)
+        except ConfigurationError as error:
+            raise ParameterError(f"calibration: {error}") from None
+        self._source = open_source(parameters)
+        self._driver = MocapDriver(parameters, calibrated, self._source)
+        self._driver.check_names()
+        self._writer = PoseWriter()
+        self._vehicle = self.publisher(topics.MOCAP)
+        self._payload = self.publisher(topics.PAYLOAD) if parameters.payload else None
+        self._said = ""
+        steady = Clock(clock_type=ClockType.STEADY_TIME)
+        self.create_timer(SAY_PERIOD, self._say, clock=steady)
+
+    def settle(self) -> None:
+        """Publish the poses that arrive within WAIT."""
+        begun = time.perf_counter()
+        for pose in self._driver.receive(WAIT):
+            publisher = self._payload if pose.payload else self._vehicle
+            publisher.publish(self._writer.fill(pose.stamp, pose.position, pose.quaternion))
+            if not pose.payload:
+                self.done_tick(pose.stamp, begun)
+
+    def _say(self) -> None:
+        """Log a change of the health once."""
+        level, text = self._driver.health()
+        if text != self._said:
+            self._said = text
+            log = self.get_logger()
+            {Level.OK: log.info, Level.WARN: log.warning, Level.ERROR: log.error}[level](text)
+
+    def diagnose(self) -> tuple[bytes, str, dict[str, object]]:
+        """Return the level, one line, and latency, losses and clocks."""
+        level, text = self._driver.health()
+        return LEVELS[level], text, self._driver.values()
+
+    def destroy_node(self) -> None:
+        """Close the connection, then the node."""
+        if hasattr(self, "_source"):
+            self._source.close()
+        super().destroy_node()
+
+
+def main() -> int:
+    """Run the node; return its exit status."""
+    return run(MocapDriverNode, NAME)
