@@ -56,9 +56,7 @@ def test_the_truth_is_found_wherever_the_vehicle_stands_and_the_body_was_made(
     seen = body.seen(*flown)
     position, turned = found.convert(BodyPose(np.array(seen[0]), np.roll(np.array(seen[1]), 1)))
     about_up = quaternion_from_euler(np.array([0.0, 0.0, world]))
-    np.testing.assert_allclose(
-        position, matrix_from_quaternion(about_up) @ flown[0], atol=1e-6
-    )
+    np.testing.assert_allclose(position, matrix_from_quaternion(about_up) @ flown[0], atol=1e-6)
     assert angle_between(turned, quaternion_multiply(about_up, flown[1])) < 1e-6
 
 
@@ -155,8 +153,8 @@ def test_a_recording_is_written_and_read_back(tmp_path_factory, seed):
     poses = recorded(body, standing((1, 2), 0.3), 20, 1.7e9, NOISE, seed=seed)
     file = tmp_path_factory.getbasetemp() / "raw.csv"
     raw_log.write(file, poses)
-    for (time, one), (read_time, read) in zip(poses, raw_log.read(file), strict=True):
-        assert read_time == pytest.approx(time, abs=1e-6)
+    for (stamp, one), (read_stamp, read) in zip(poses, raw_log.read(file), strict=True):
+        assert read_stamp == pytest.approx(stamp, abs=1e-6)
         np.testing.assert_allclose(read.position, one.position, atol=1e-8)
         np.testing.assert_allclose(read.quaternion, one.quaternion, atol=1e-8)
 

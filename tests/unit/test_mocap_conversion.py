@@ -42,7 +42,12 @@ def same_rotation(a, b):
 
 @pytest.mark.parametrize(
     ("tracker", "world"),
-    [((1, 0, 0), (1, 0, 0)), ((0, 1, 0), (0, 0, 1)), ((0, 0, 1), (0, -1, 0)), ((1, 2, 3), (1, -3, 2))],
+    [
+        ((1, 0, 0), (1, 0, 0)),
+        ((0, 1, 0), (0, 0, 1)),
+        ((0, 0, 1), (0, -1, 0)),
+        ((1, 2, 3), (1, -3, 2)),
+    ],
 )
 def test_motives_y_is_up_and_its_z_points_to_the_right_of_x(tracker, world):
     position, turned = Y_UP.convert(pose(tracker))

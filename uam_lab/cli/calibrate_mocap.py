@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 LEVEL, AHEAD = "first place", "second place"
 STEPS = {
     LEVEL: "1. Put the vehicle level on the floor, with at least 0.5 m free in front of its nose.",
-    AHEAD: "2. Push it straight ahead, nose first, by 0.5 m or more (1 m is better). Do not turn it.",
+    AHEAD: "2. Push it straight ahead, nose first, by 0.5 m or more; 1 m is better.",
 }
 DEFAULTS = MocapParameters()
 EXAMPLES = """\

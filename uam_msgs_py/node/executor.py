@@ -92,7 +92,10 @@ class LeanExecutor:
         messages.clear_entities()
         for handle in inputs:
             messages.add_subscription(handle)
-        messages.wait(int(min(timeout, left) * 1e9))
+        if inputs:
+            messages.wait(int(min(timeout, left) * 1e9))
+        else:  # a driver, which waits for its device in `settle`
+            time.sleep(min(timeout, left))
         for handle, kind, raw, callback in self._subscriptions:
             while (taken := handle.take_message(kind, raw)) is not None:
                 callback(taken[0])

@@ -16,7 +16,7 @@ from uam_msgs_py.messages import topics
 from uam_msgs_py.messages.convert import PoseWriter
 from uam_msgs_py.messages.status import ERROR, OK, WARN
 from uam_msgs_py.node.base_node import UamNode, run
-from uam_msgs_py.node.node_parameters import NodeParameters
+from uam_msgs_py.node.node_parameters import NodeParameters, refuse_unknown
 from uam_sim_bridge.drivers.mocap import calibration
 from uam_sim_bridge.drivers.mocap.driver import Level, MocapDriver
 from uam_sim_bridge.drivers.mocap.mocap_parameters import MocapParameters, open_source
@@ -39,6 +39,7 @@ class MocapDriverNode(UamNode):
             calibrated = calibration.load(parameters.calibration)
         except ConfigurationError as error:
             raise ParameterError(f"calibration: {error}") from None
+        refuse_unknown(self)  # before the system is asked
         self._source = open_source(parameters)
         self._driver = MocapDriver(parameters, calibrated, self._source)
         self._driver.check_names()
@@ -61,10 +62,15 @@ class MocapDriverNode(UamNode):
     def _say(self) -> None:
         """Log a change of the health once."""
         level, text = self._driver.health()
-        if text != self._said:
-            self._said = text
-            log = self.get_logger()
-            {Level.OK: log.info, Level.WARN: log.warning, Level.ERROR: log.error}[level](text)
+        if text == self._said:
+            return
+        self._said = text
+        if level is Level.OK:
+            self.get_logger().info(text)
+        elif level is Level.WARN:
+            self.get_logger().warning(text)
+        else:
+            self.get_logger().error(text)
 
     def diagnose(self) -> tuple[bytes, str, dict[str, object]]:
         """Return the level, one line, and latency, losses and clocks."""

@@ -118,9 +118,9 @@ def text(calibration: Calibration) -> str:
         return f"[{', '.join(f'{value + 0.0:.{digits}f}' for value in values)}]"
 
     lines = [
-        "# Motion capture: tracker's axes and rigid body -> world ENU and body FLU; docs/mocap_hardware.md",
+        "# Motion capture: tracker's axes and rigid body -> ENU and FLU; docs/mocap_hardware.md",
         f"up: {c.up}  # axis of the tracker's world that points up",
-        f"heading_deg: {math.degrees(c.heading):.6g}  # [deg] about up, from the tracker's axes to the world's",
+        f"heading_deg: {math.degrees(c.heading):.6g}  # [deg] about up, tracker -> world",
         f"origin: {row(c.origin, 5)}  # [m, ENU] subtracted from positions",
         f"body: {row(c.body, 9)}  # w x y z, rotation FLU -> axes of the rigid body",
         f"pivot: {row(c.pivot, 5)}  # [m, FLU] pivot of the rigid body, from base_link",

@@ -17,7 +17,7 @@ from uam_sim_bridge.drivers.mocap.frame import Frame, MocapError, MocapSource
 from uam_sim_bridge.drivers.mocap.frame_count import FrameCount
 from uam_sim_bridge.drivers.mocap.mocap_parameters import MocapParameters
 
-START_TIME = 2.0  # [s] for a server that is there to send the list of its bodies
+START_TIME = 3.0  # [s] for a server that is there to send the list of its bodies
 WINDOW = 240  # frames of the latency that is reported
 LATEST = SECOND  # [ns] a pose that is older was stamped by a clock that was set
 
@@ -147,7 +147,10 @@ class MocapDriver:
             return Level.ERROR, f"no frames from {source.description}; is it paused?"
         body = self._parameters.body
         if now - self._last_pose[body] > limit:
-            return Level.ERROR, f"body '{body}' is not tracked: markers hidden or outside the volume"
+            return (
+                Level.ERROR,
+                f"body '{body}' is not tracked: markers hidden or out of sight",
+            )
         if self._nominal:
             return Level.WARN, (
                 f"calibration {self._parameters.calibration} is nominal, not measured: "

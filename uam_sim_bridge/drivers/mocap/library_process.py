@@ -1,6 +1,6 @@
 """Process of `LibrarySource`: prints one line of JSON per frame of the package `motioncapture`.
 
-    [arrival in ns, {"body": [x, y, z, qw, qx, qy, qz], ...}]
+[arrival in ns, {"body": [x, y, z, qw, qx, qy, qz], ...}]
 """
 
 from __future__ import annotations

@@ -39,5 +39,5 @@ def measure(source: MocapSource, body: str, duration: float) -> list[TimedPose]:
     if not frames:
         raise MocapError(f"no frames from {source.description}; is it paused?")
     if not found:
-        raise MocapError(f"body '{body}' is not tracked: markers hidden or outside the volume")
+        raise MocapError(f"body '{body}' is not tracked: markers hidden or out of sight")
     return found

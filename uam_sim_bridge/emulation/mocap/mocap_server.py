@@ -71,7 +71,7 @@ class MocapServer:
         if version not in packets.VERSIONS:
             raise ValueError(f"version {version}; allowed: {packets.VERSIONS}")
         self.disturbances = disturbances or Disturbances()
-        self._bodies = {number: body for number, body in enumerate(bodies, 1)}
+        self._bodies = dict(enumerate(bodies, 1))
         self._first = {n: body.name for n, body in self._bodies.items()}  # those of `poses`
         self._poses, self._period, self._version = poses, 1.0 / rate, version
         self._multicast, self._address = multicast, address
@@ -185,9 +185,9 @@ class MocapServer:
         """Make the frame of an exposure at `now` [s], host's clock, and plan its transmission."""
         poses = self._poses(now)
         with self._lock:
-            self._number += 1
             if self._paused:
                 return
+            self._number += 1
             for number, body in self._bodies.items():
                 pose = None if body.name in self._hidden else poses.get(self._first[number])
                 if pose is None:
