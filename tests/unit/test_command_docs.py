@@ -16,7 +16,7 @@ from uam_lab.compare import plan
 
 ROOT = Path(__file__).resolve().parents[2]
 TEXT = (ROOT / "docs/commands.md").read_text()
-SECTIONS = dict(re.findall(r"^## uam (\w+)\n(.*?)(?=^## )", TEXT, re.M | re.S))
+SECTIONS = dict(re.findall(r"^## uam ([\w-]+)\n(.*?)(?=^## )", TEXT, re.M | re.S))
 
 
 def commands() -> dict[str, argparse.ArgumentParser]:
@@ -55,7 +55,7 @@ def test_every_command_of_a_code_block_parses(file, monkeypatch):
     lines = "\n".join(blocks).replace("\\\n", " ").splitlines()
     for line in lines:
         found = re.match(
-            r"\s*(?:\w+=\S+ )*(?:\.venv/bin/)?uam ([a-z]+(?: .*?)?)(?:\s+#.*| {2,}.*)?$", line
+            r"\s*(?:\w+=\S+ )*(?:\.venv/bin/)?uam ([a-z-]+(?: .*?)?)(?:\s+#.*| {2,}.*)?$", line
         )
         if found and found[1].split()[0] in commands():
             parser().parse_args(shlex.split(found[1]))

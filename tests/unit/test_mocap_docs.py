@@ -1,0 +1,50 @@
+"""docs/mocap_hardware.md: its picture is drawn, its limits and parameters are those of the code."""
+
+import importlib.util
+import math
+from pathlib import Path
+
+import yaml
+
+from uam_control.settings import configuration
+from uam_control.settings.parameter_file import read_sections
+from uam_sim_bridge.drivers.mocap import fit, measurement
+from uam_sim_bridge.drivers.mocap.calibration import ENTRIES
+from uam_sim_bridge.drivers.mocap.library_source import SYSTEMS
+from uam_sim_bridge.drivers.mocap.mocap_parameters import MocapParameters
+
+ROOT = Path(__file__).resolve().parents[2]
+PAGE = (ROOT / "docs/mocap_hardware.md").read_text()
+
+
+def test_the_file_of_the_configuration_has_the_defaults():
+    values = read_sections(configuration.path("hardware/mocap.yaml"))["mocap_driver"]
+    assert values == MocapParameters().to_mapping()
+
+
+def test_the_nominal_calibrations_have_the_entries_of_the_page():
+    for file in (ROOT / "config/mocap").glob("*.yaml"):
+        assert set(yaml.safe_load(file.read_text())) == ENTRIES - {"measured"}
+    assert all(f"| `{entry}` |" in PAGE for entry in ENTRIES)
+
+
+def test_the_page_names_every_system_and_the_limits_of_the_code():
+    assert all(f"`{system}`" in PAGE for system in SYSTEMS if system != "mock")
+    limits = (
+        f"{1e3 * measurement.MOVED:g} mm, {math.degrees(measurement.TURNED):g}°",
+        f"at least {fit.SHORTEST:g} m",
+        f"{1e2 * fit.STEEPEST:g} cm: a floor",
+        f"{math.degrees(fit.TILT):g}°, {math.degrees(fit.TURN):g}°",
+        f"level | {math.degrees(fit.DEFINED_TILT):g}° |",
+        f"−{-fit.LOWEST:g} to {fit.HIGHEST:g} m",
+    )
+    for limit in limits:
+        assert limit in PAGE, limit
+
+
+def test_the_picture_is_drawn(tmp_path):
+    spec = importlib.util.spec_from_file_location("draw_mocap", ROOT / "docs/draw_mocap.py")
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    module.draw(tmp_path / "frames.png")
+    assert (tmp_path / "frames.png").stat().st_size > 10_000

@@ -1,1 +1,0 @@
-"""The electromagnet on a GPIO line, and what a switch does without commands."""
