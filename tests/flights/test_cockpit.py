@@ -86,7 +86,7 @@ def test_a_browser_sees_and_steers_a_flight_and_strangers_do_not(flight, page):
     expect(page.locator("#uam-errors")).to_contain_text("cm")
     expect(page.get_by_text("OFFBOARD, armed")).to_be_visible()
     expect(page.get_by_text("companion")).to_be_visible()
-    expect(page.get_by_text("(round trip)")).to_be_visible()
+    expect(page.get_by_text("ms there and back")).to_be_visible()
     page.get_by_role("button", name="Kill").click()
     expect(page.get_by_text("a vehicle in the air falls. Kill?")).to_be_visible()
     page.get_by_role("button", name="Cancel").click()
