@@ -33,10 +33,32 @@ pytestmark = [
 ]
 
 
+def to_and_fro(seconds: int) -> str:
+    """A scenario of this length: a browser may take its time."""
+    moves = [
+        f"  - {{coordinate: x, from: {t}, until: {t + 4}, to: {0.8 * (t % 8 < 4)}}}"
+        for t in range(4, seconds, 4)
+    ]
+    return "\n".join(
+        [
+            "description: To and fro, for the test of the cockpit.",
+            "phases:",
+            "  - {from: 0, name: take-off}",
+            "  - {from: 4, name: to and fro}",
+            f"  - {{from: {seconds + 4}, name: land}}",
+            "moves:",
+            "  - {coordinate: z, from: 0, until: 3, to: 1.0}",
+            *moves,
+            f"landing: {{at: {seconds + 4}, duration: 4}}",
+        ]
+    )
+
+
 @pytest.fixture
-def flight(fly):
-    """A mission under way, with a cockpit."""
-    flight = fly("--view")
+def flight(fly, tmp_path):
+    """A flight under way, with a cockpit."""
+    (tmp_path / "long.yaml").write_text(to_and_fro(800))
+    flight = fly("--view", "--scenario", str(tmp_path / "long.yaml"))
     flight.until(lambda: "ROS domain" in flight.said, "started")
     flight.address = flight.said.split("cockpit: ")[1].split()[0]
     flight.domain = int(flight.said.split("ROS domain ")[1].split(",")[0])
@@ -82,7 +104,7 @@ def test_a_browser_sees_and_steers_a_flight_and_strangers_do_not(flight, page):
             page.wait_for_timeout(250)
         pytest.fail(f"{what}: not in time\n{page.inner_text('body')}")
 
-    expect(page.locator("#uam-state")).to_contain_text("APPROACH", timeout=PATIENCE)
+    expect(page.locator("#uam-state")).to_contain_text("TO AND FRO", timeout=PATIENCE)
     expect(page.locator("#uam-errors")).to_contain_text("cm")
     expect(page.get_by_text("OFFBOARD, armed")).to_be_visible()
     expect(page.get_by_text("companion")).to_be_visible()
