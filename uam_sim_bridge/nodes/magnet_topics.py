@@ -7,7 +7,6 @@ from collections.abc import Callable
 from std_msgs.msg import Bool
 
 from uam_msgs_py.messages import topics
-from uam_msgs_py.messages.convert import read_switch
 from uam_msgs_py.node.base_node import UamNode
 from uam_sim_bridge.drivers.magnet.switching import MagnetSwitching, SwitchingParameters
 
@@ -28,8 +27,8 @@ class MagnetTopics:
         self._published: bool | None = None
         self._due = 0.0
 
-    def _on_command(self, data: bytes) -> None:
-        self.switching.command(self._now(), read_switch(data))
+    def _on_command(self, message: Bool) -> None:
+        self.switching.command(self._now(), bool(message.data))
 
     def publish(self, time: float, state: bool | None) -> None:
         """Publish the state when it changes, and once per STATE_PERIOD; None: it is unknown."""
