@@ -28,7 +28,7 @@ WITHOUT_KEY = {"imageio_ffmpeg", "optuna", "pyarrow", "viser"}
 # of the extra `hardware`, imported where a device is chosen; rosdep has no key for them either
 WITHOUT_KEY |= {"gpiod", "motioncapture", "natnet"}
 # imported only where they are installed
-OPTIONAL = {"pandas", "OpenGL", "ament_index_python"}
+OPTIONAL = {"pandas", "OpenGL", "ament_index_python", "dynamixel_sdk"}
 
 
 def imported(package):

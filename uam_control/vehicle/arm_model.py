@@ -109,6 +109,16 @@ class ArmModel:
             found[:, i] = np.einsum("ij,ij->i", moment, axes[i])
         return found + own
 
+    def holding_torques(self, angles: np.ndarray, gravity: float, payload: float) -> np.ndarray:
+        """Return the joint torques (n,) [N m] that hold the arm of a level base.
+
+        angles (n,) [rad]; gravity [m/s^2]; payload [kg] at the tip.
+        """
+        still = np.repeat(np.asarray(angles, dtype=float)[None], 3, axis=0)
+        base, level = np.zeros((3, 3)), np.repeat(np.eye(3)[None], 3, axis=0)
+        times, carried = np.arange(3.0), np.full(3, payload)
+        return self.torques(times, base, level, still, gravity, carried)[1]
+
     def payload_acceleration(
         self, times: np.ndarray, position: np.ndarray, rotation: np.ndarray, angles: np.ndarray
     ) -> np.ndarray:

@@ -25,6 +25,7 @@ from uam_lab.results.timeseries import UnreadableFlight
 from uam_lab.study.description import StudyError
 from uam_lab.tuning.space import TuningError
 from uam_msgs_py.node.namespace import normal
+from uam_sim_bridge.drivers.dynamixel.chain import DEFAULT_HARDWARE, ArmError
 from uam_sim_bridge.drivers.mocap.frame import MocapError
 from uam_sim_bridge.faults import FaultError
 from uam_sim_bridge.plant.effects import presets
@@ -40,7 +41,7 @@ USER_ERRORS = (
     *(ConfigurationError, ProfileError, ScenarioError, VehicleError, SettingsError, PortError),
     *(Px4Error, FaultError, PlantError, TuningError, TrialFailed, VariationError),
     *(ResultFolderError, UnreadableFlight, UnreadableLog, StudyError),
-    *(MocapError, ParameterError),
+    *(ArmError, MocapError, ParameterError),
 )
 
 
@@ -94,6 +95,16 @@ class Command:
         vehicles = ", ".join(configuration.names("vehicle", (".yaml",)))
         text = f"{vehicles}, or the description of one: docs/your_vehicle.md"
         self.option("--vehicle", "NAME|FILE", text, DEFAULT_VEHICLE)
+
+    def arm_hardware(self) -> None:
+        """Add --hardware, --device and --answer-timeout, of an arm."""
+        files = ", ".join(configuration.names("hardware", (".yaml",)))
+        text = f"{files}, or a file: docs/arm_hardware.md"
+        self.option("--hardware", "NAME|FILE", text, DEFAULT_HARDWARE)
+        self.option("--device", "PATH", "serial device in place of the hardware file's", "")
+        text = "longest wait for an answer of a servo"
+        wait = number("time", "s", 0.0005, 5.0)
+        self.option("--answer-timeout", "S", text, 0.05, type=wait)
 
     def scenario(self) -> None:
         """Add --scenario."""

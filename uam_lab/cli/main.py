@@ -23,6 +23,8 @@ COMMANDS = {
     "campaign": "campaign",
     "faults": "faults",
     "margins": "margins",
+    "arm": "arm",
+    "identify-joint": "identify_joint",
     "doctor": "doctor",
     "calibrate-mocap": "calibrate_mocap",
 }

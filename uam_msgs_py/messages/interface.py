@@ -45,9 +45,6 @@ CONTENTS = {
     topics.ARM_EFFORT: Content(JOINT_SPACE, "N m", TICK),
     topics.ARM_GOALS: Content(JOINT_SPACE, "rad", f"{TICK}, in place of the efforts"),
     topics.MAGNET: Content("", "on or off", TICK),
-    topics.MAGNET_STATE: Content(
-        "", "on or off", f"{SLOW} and on change", "magnet_driver or mavlink_bridge", "recorder"
-    ),
     topics.SETPOINT: Content(BODY, "rad/s, thrust 0..1", TICK),
     topics.THRUST: Content("", "1, N", "10 Hz"),
     topics.POSITION_ADAPTATION: Content("", "of each gain", GAINS),
@@ -56,7 +53,7 @@ CONTENTS = {
     topics.ARMING: Content("", "yes or no", ON_CHANGE),
     topics.AUTOPILOT_STATE: Content("", "text", "5 Hz and on change"),
     topics.AUTOPILOT_BATTERY: Content("", "V, A, 0..1", SLOW),
-    topics.ARM_TEMPERATURE: Content("", "°C", SLOW, "the servos' driver", "mission"),
+    topics.ARM_TEMPERATURE: Content("", "°C", SLOW, "arm_driver", "mission"),
     topics.MISSION_STATUS: Content("", "text", "2 Hz and on change"),
     topics.PREFLIGHT: Content("", "text", "2 Hz before a flight", "mission", "cockpit, uam"),
     topics.GOAL_POSE: Content(WORLD, "m, quaternion", ON_CHANGE, PLANNERS, "mission"),

@@ -1,0 +1,149 @@
+"""`uam arm`: are these the described servos, and does their bus carry the control rate?"""
+
+from __future__ import annotations
+
+import argparse
+import dataclasses
+import math
+import time
+from collections.abc import Callable
+
+from rich.console import Console
+from rich.table import Table
+
+from uam_control.vehicle import load_description
+from uam_lab.cli.command import Command
+from uam_sim_bridge.drivers.dynamixel import control_table as names
+from uam_sim_bridge.drivers.dynamixel.chain import (
+    SPEEDS,
+    ArmChain,
+    ArmError,
+    hardware_file,
+    load_chain,
+)
+from uam_sim_bridge.drivers.dynamixel.control_table import model_name
+from uam_sim_bridge.drivers.dynamixel.driver import NEEDED_LATENCY, ArmDriver
+from uam_sim_bridge.drivers.dynamixel.hardware_errors import advice
+from uam_sim_bridge.drivers.dynamixel.parameters import ArmDriverParameters
+from uam_sim_bridge.drivers.dynamixel.servo_bus import ServoBus
+from uam_sim_bridge.drivers.dynamixel.startup import tried
+
+AS_DESCRIBED, OTHERWISE = 0, 1
+EXAMPLES = """\
+examples:
+  uam arm                                  the servos of the default file in config/hardware
+  uam arm --hardware my_lab.yaml           those of your file
+  uam arm --hardware my_lab.yaml --write-settings     write what differs
+  uam arm --device /dev/ttyUSB1 --scan     ids and models at every baud rate
+  uam arm --budget                         time budget of the bus; no servos needed
+
+Torque stays off. Exit status: 0 as described, 1 not, 2 wrong use or no device.
+"""
+
+
+def add(commands: argparse._SubParsersAction) -> None:
+    """Add the subcommand to the command line."""
+    command = Command(
+        commands,
+        "arm",
+        run,
+        "check the servos of the arm and the budget of their bus",
+        "Compare the Dynamixel servos on the bus with the hardware file, and print their state.",
+        EXAMPLES,
+    )
+    command.arm_hardware()
+    command.vehicle()
+    command.switch("--write-settings", "write operating mode, return delay and current limit")
+    command.switch("--scan", "list ids and models at every baud rate, whatever is described")
+    command.switch("--budget", "print the time budget of the bus; no servos needed")
+
+
+def run(options: argparse.Namespace) -> int:
+    """Run the command; return the exit status."""
+    if options.scan:
+        return scan(described(options), options.answer_timeout)
+    driver = driver_of(options, write_settings=options.write_settings)
+    if options.budget:
+        if driver.latency_timer is None:
+            driver.latency_timer = NEEDED_LATENCY
+            print(f"no latency timer of {driver.chain.device} found: 1 ms assumed")
+        print(driver.budget.table(driver.rate))
+        return AS_DESCRIBED
+    try:
+        driver.start()
+        rows = [state(driver, i) for i in range(len(driver.chain.servos))]
+    except ArmError as error:
+        print(str(error).replace("; ", "\n"))
+        return OTHERWISE
+    finally:
+        driver.bus.close()  # and not `stop`, which would end a torque that holds the arm
+    table = Table(
+        *("joint", "id", "model", "firmware", "angle [deg]", "deg C", "V", "hardware error")
+    )
+    for row in rows:
+        table.add_row(*row)
+    Console().print(table)
+    print(driver.budget.table(driver.rate))
+    for remark in driver.remarks:
+        print(remark)
+    return AS_DESCRIBED
+
+
+def described(options: argparse.Namespace) -> ArmChain:
+    """Return the chain of the options. Raises ArmError, ConfigurationError, VehicleError."""
+    chain = load_chain(hardware_file(options.hardware), load_description(options.vehicle))
+    return dataclasses.replace(chain, device=options.device) if options.device else chain
+
+
+def driver_of(
+    options: argparse.Namespace,
+    clock: Callable[[], float] = time.monotonic,
+    **parameters: object,
+) -> ArmDriver:
+    """Return the driver of the options, not started; clock: seconds; parameters: of the driver."""
+    vehicle = load_description(options.vehicle)
+    values = {"answer_timeout": options.answer_timeout} | parameters
+    servos = vehicle.numbers["servos"]
+    return ArmDriver(
+        described(options),
+        ArmDriverParameters.from_mapping(values),
+        servos["mode"],
+        vehicle.control_period,
+        servos["position_p_gain"],
+        clock,
+    )
+
+
+def state(driver: ArmDriver, i: int) -> tuple[str, ...]:
+    """Return the cells of servo i."""
+    servo, angle = driver.chain.servos[i], driver.start_angles[i]
+    firmware, heat, voltage = (
+        tried(driver.bus.read, servo.id, servo.table[name])
+        for name in (names.FIRMWARE, names.PRESENT_TEMPERATURE, names.PRESENT_VOLTAGE)
+    )
+    return (
+        servo.joint,
+        str(servo.id),
+        servo.table.model,
+        str(firmware),
+        f"{math.degrees(angle):.1f}",
+        str(heat),
+        f"{voltage * names.VOLTAGE_UNIT:.1f}",
+        advice(driver.health[i].error) or "none",
+    )
+
+
+def scan(chain: ArmChain, wait: float) -> int:
+    """Print ids and models at every baud rate. Raises BusLost."""
+    bus, found = ServoBus(chain.device, SPEEDS[0], wait), 0
+    try:
+        for speed in SPEEDS:
+            bus.set_baud_rate(speed)
+            for servo, (number, firmware) in bus.scan().items():
+                print(f"{speed} baud: id {servo}, {model_name(number)}, firmware {firmware}")
+                found += 1
+    finally:
+        bus.close()
+    if not found:
+        print(f"{chain.device}: no servo answers: supply, cable, Protocol 2.0?")
+    return AS_DESCRIBED if found else OTHERWISE

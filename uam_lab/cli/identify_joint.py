@@ -1,0 +1,182 @@
+"""`uam identify-joint`: torque constant and friction of one joint, from a motion of it."""
+
+from __future__ import annotations
+
+import argparse
+import math
+import time
+from collections.abc import Callable
+
+import numpy as np
+
+from uam_control.vehicle import load_description
+from uam_lab.cli.arm import driver_of
+from uam_lab.cli.command import Command, number
+from uam_sim_bridge.drivers.dynamixel.chain import ArmError
+from uam_sim_bridge.drivers.dynamixel.excitation import ExcitationParameters
+from uam_sim_bridge.drivers.dynamixel.friction_fit import FrictionFit
+
+DONE, NOT_DONE = 0, 1
+GRID = 181  # angles at which the weight is computed
+CLOCK = time.monotonic  # [s]
+EXAMPLES = """\
+examples:
+  uam identify-joint alpha_2 --hardware my_lab.yaml --load 0.2
+  uam identify-joint alpha_1 --hardware my_lab.yaml --centre 30 --amplitude 30
+  uam identify-joint alpha_2 --duration 40 --yes      without the question
+
+Propellers off, vehicle level and fixed, hands away: the joint moves. A load at the magnet makes
+the torque constant visible (its weight is the reference). Results in --out: identification.yaml
+(to paste into the hardware file), friction.png, samples.csv. Ctrl-C ends it with torque off.
+Exit status: 0 identified, 1 aborted or not identifiable, 2 wrong use or no device.
+"""
+
+
+def add(commands: argparse._SubParsersAction) -> None:
+    """Add the subcommand to the command line."""
+    command = Command(
+        commands,
+        "identify-joint",
+        run,
+        "identify torque constant and friction of one joint",
+        "Move one joint of the arm, the others held, and fit torque constant, Coulomb and viscous "
+        "friction.",
+        EXAMPLES,
+    )
+    command.option("joint", "JOINT", "name of the joint, as alpha_2")
+    command.arm_hardware()
+    command.vehicle()
+    specs, default = ExcitationParameters.specs(), ExcitationParameters()
+    for flag, metavar, name in (
+        ("--amplitude", "DEG", "amplitude_deg"),
+        ("--duration", "S", "duration"),
+        ("--effort-max", "NM", "effort_max"),
+    ):
+        spec = specs[name]
+        kind = number(name, spec.unit, spec.low, spec.high)
+        command.option(flag, metavar, spec.description, getattr(default, name), type=kind)
+    angle = number("angle", "deg", -360.0, 360.0)
+    text = "centre of the motion (default: nearest to the present angle)"
+    command.option("--centre", "DEG", text, type=angle)
+    mass = number("mass", "kg", 0.0, 5.0)
+    command.option("--load", "KG", "mass that hangs at the magnet", 0.0, type=mass)
+    command.switch("--yes", "do not ask before the joint moves")
+    command.out()
+
+
+def run(options: argparse.Namespace) -> int:
+    """Run the experiment; return the exit status."""
+    from uam_lab.report.figures.joint_friction import draw
+    from uam_lab.results.result_folder import make_folder
+    from uam_sim_bridge.drivers.dynamixel.excitation import Aborted, centre_of, excite
+    from uam_sim_bridge.drivers.dynamixel.friction_fit import FitError, fit_friction
+
+    driver = driver_of(options, CLOCK)
+    names = driver.chain.joint_names
+    if options.joint not in names:
+        raise ArmError(f"no joint '{options.joint}'; there are: {', '.join(names)}")
+    if driver.in_position_mode:
+        raise ArmError("the vehicle's servos.mode is position; identification needs current")
+    joint = names.index(options.joint)
+    p = ExcitationParameters.from_mapping(
+        {
+            "amplitude_deg": options.amplitude,
+            "duration": options.duration,
+            "effort_max": options.effort_max,
+        }
+    )
+    try:
+        driver.start()
+        for remark in driver.remarks:
+            print(remark)
+        angles = np.array(driver.start_angles)
+        given = angles[joint] if options.centre is None else math.radians(options.centre)
+        centre = centre_of(driver, joint, given, p)
+        if not options.yes and not confirmed(options.joint, angles[joint], centre, p):
+            print("not confirmed: nothing moved")
+            return NOT_DONE
+        weight = weight_of(options, angles, joint)
+        record = excite(driver, joint, centre, weight, p, pacing(driver.rate))
+        loads = np.array([weight(one)[joint] for one in record.position[:, joint]])
+        fit = fit_friction(record, joint, loads)
+    except (Aborted, FitError) as error:
+        print(f"not identified: {error}")
+        return NOT_DONE
+    finally:
+        driver.stop()
+    out = make_folder(options.out, "identify", options.joint)
+    text = pasted(options.joint, driver.chain.servos[joint].torque_scale, fit)
+    (out / "identification.yaml").write_text(text)
+    columns = (record.times, record.position[:, joint], record.effort[:, joint], loads)
+    head = "time_s,angle_rad,effort_nm,weight_nm"
+    np.savetxt(out / "samples.csv", np.column_stack(columns), "%.6f", ",", header=head, comments="")
+    draw(out / "friction.png", options.joint, fit)
+    print(text, end="")
+    print(f"residual {fit.residual:.4f} N m, inertia {fit.inertia:.4f} kg m^2")
+    if not fit.scale_known:
+        print("torque_scale is unchanged: the weight is too small to show it; hang a --load")
+    print(f"results  {out}")
+    return DONE
+
+
+def confirmed(joint: str, angle: float, centre: float, p: ExcitationParameters) -> bool:
+    """Ask whether the joint may move; angle, centre [rad]."""
+    total = p.duration + 2.0 * p.approach
+    print(
+        f"{joint} moves from {math.degrees(angle):.0f} deg to {math.degrees(centre):.0f} deg and "
+        f"then {p.amplitude_deg:g} deg to either side, {total:.0f} s in all; at most "
+        f"{p.effort_max:g} N m.\nPropellers off, vehicle level and fixed, hands away. "
+    )
+    try:
+        return input("Type yes to begin: ").strip().lower() == "yes"
+    except EOFError:
+        return False
+
+
+def weight_of(
+    options: argparse.Namespace, angles: np.ndarray, joint: int
+) -> Callable[[float], np.ndarray]:
+    """Return the function: angle [rad] of the joint → holding torques (n,) [N m].
+
+    angles (n,) [rad]: of the others.
+    """
+    from uam_control.vehicle.arm_model import ArmModel
+
+    vehicle = load_description(options.vehicle)
+    model, limits = ArmModel.of(vehicle), vehicle.joints[joint]
+    grid = np.linspace(limits.low, limits.high, GRID)
+    poses = np.repeat(angles[None], GRID, axis=0)
+    poses[:, joint] = grid
+    torques = np.array(
+        [model.holding_torques(pose, vehicle.gravity, options.load) for pose in poses]
+    )
+
+    def weight(angle: float) -> np.ndarray:
+        return np.array([np.interp(angle, grid, column) for column in torques.T])
+
+    return weight
+
+
+def pacing(rate: float) -> Callable[[], float]:
+    """Return a function that waits for the next cycle of `rate` [Hz] and returns the time [s]."""
+    due = time.monotonic()
+
+    def pace() -> float:
+        nonlocal due
+        due = max(due + 1.0 / rate, time.monotonic())
+        time.sleep(max(0.0, due - time.monotonic()))
+        return time.monotonic()
+
+    return pace
+
+
+def pasted(joint: str, scale: float, fit: FrictionFit) -> str:
+    """Return the result as YAML for the hardware file; scale: of the file until now."""
+    known = f"+- {scale * fit.scale_deviation:.3f}" if fit.scale_known else "not identified"
+    coulomb, viscous = max(0.0, fit.coulomb), max(0.0, fit.viscous)
+    return (
+        f"    - joint: {joint}   # identified {time.strftime('%Y-%m-%d')}\n"
+        f"      torque_scale: {scale * fit.scale:.4f}   # {known}\n"
+        f"      coulomb: {coulomb:.4f}        # +- {fit.coulomb_deviation:.4f} N m\n"
+        f"      viscous: {viscous:.4f}        # +- {fit.viscous_deviation:.4f} N m s/rad\n"
+    )

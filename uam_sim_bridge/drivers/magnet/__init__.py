@@ -1,1 +1,0 @@
-"""The electromagnet: what its switch does without commands, and a GPIO line."""

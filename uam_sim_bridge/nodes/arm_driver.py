@@ -1,0 +1,207 @@
+"""Node: the arm's servos on a Dynamixel bus; replaces the simulator's joints on a vehicle.
+
+/joint_states out at the control rate; joint efforts or goal positions in, as the vehicle's servos
+are driven. A thread of its own exchanges goals and states with the servos at absolute deadlines of
+the wall clock, so that a busy node does not delay the bus.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+import threading
+import time
+
+from sensor_msgs.msg import Temperature
+from std_srvs.srv import Trigger
+
+from uam_control.coordinates import ALPHA, CHI_DOT
+from uam_control.nodes.described import described_vehicle
+from uam_control.settings.configuration import ConfigurationError
+from uam_control.settings.parameter_set import ParameterError, Text
+from uam_control.stamps import SECOND
+from uam_control.vehicle import VehicleDescription
+from uam_msgs_py.messages import topics
+from uam_msgs_py.messages.control import read_reference
+from uam_msgs_py.messages.convert import JointStateWriter, read_joint_command
+from uam_msgs_py.messages.ros_time import set_stamp
+from uam_msgs_py.messages.status import ERROR, OK, WARN
+from uam_msgs_py.node.base_node import UamNode, run
+from uam_msgs_py.node.node_parameters import NodeParameters, declared_text, refuse_unknown
+from uam_sim_bridge.drivers.dynamixel.chain import (
+    DEFAULT_HARDWARE,
+    ArmChain,
+    hardware_file,
+    load_chain,
+)
+from uam_sim_bridge.drivers.dynamixel.driver import ArmDriver, Reading
+from uam_sim_bridge.drivers.dynamixel.parameters import ArmDriverParameters
+
+NAME = "arm_driver"
+SLOWEST = 0.95  # share of the rate below which the bus counts as too slow
+
+
+class ArmDriverNode(UamNode):
+    """Publishes the joints as read, and drives them by the newest command.
+
+    `failure`: why the node ends, "" while it runs.
+    """
+
+    def __init__(self):
+        super().__init__(NAME)
+        self._thread: threading.Thread | None = None
+        vehicle = described_vehicle(self)
+        self._names = list(vehicle.joint_names)
+        about = Text("devices of the vehicle", "name of a file in config/hardware, or a file")
+        hardware = declared_text(self, "hardware", DEFAULT_HARDWARE, about)
+        about = Text("serial device in place of the hardware file's", "a path; empty: the file's")
+        device = declared_text(self, "device", "", about)
+        parameters = NodeParameters(self, ArmDriverParameters, read_only=True).current
+        refuse_unknown(self)  # before the bus, which may be absent
+        chain = _described_chain(hardware, device, vehicle)
+        servos = vehicle.numbers["servos"]
+        self.driver = ArmDriver(
+            chain,
+            parameters,
+            servos["mode"],
+            vehicle.control_period,
+            servos["position_p_gain"],
+        )
+        self.failure = ""
+        self._velocity = None  # (n,) [rad/s] desired
+        self._writer = JointStateWriter(self._names)
+        self._joints = self.publisher(topics.JOINTS)
+        self._temperature = self.publisher(topics.ARM_TEMPERATURE)
+        if self.driver.in_position_mode:
+            self.listen(topics.ARM_GOALS, self._on_goals)
+        else:
+            self.listen(topics.ARM_EFFORT, self._on_effort)
+        if parameters.friction_compensation:
+            self.listen(topics.REFERENCE, self._on_reference)
+        self.create_service(Trigger, "~/reboot", self._on_reboot)
+        self.driver.start()
+        for remark in self.driver.remarks:
+            self.get_logger().warning(remark)
+        budget = self.driver.budget
+        self.get_logger().info(
+            f"{len(self._names)} servos on {chain.device}: {self.driver.rate:g} Hz, bus load "
+            f"{100 * budget.load(self.driver.rate):.0f} %, up to {budget.rate:.0f} Hz"
+        )
+        self._ending = threading.Event()
+        self._thread = threading.Thread(target=self._exchange, name="servo bus")
+        self._thread.start()
+
+    def _on_effort(self, data: bytes) -> None:
+        self.driver.command_effort(read_joint_command(data, self._names), self._velocity)
+
+    def _on_goals(self, data: bytes) -> None:
+        self.driver.command_position(read_joint_command(data, self._names))
+
+    def _on_reference(self, data: bytes) -> None:
+        self._velocity = read_reference(data)[1].values[CHI_DOT, ALPHA:].copy()
+
+    def _on_reboot(self, _: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
+        done = self.driver.reboot()
+        response.success = bool(done) and not any("not rebooted" in line for line in done)
+        response.message = "; ".join(done) or "no servo has a hardware error"
+        self.get_logger().info(f"command reboot: {response.message}")
+        return response
+
+    def _exchange(self) -> None:
+        """Run the cycles until the node ends; an error that nothing handles ends the node."""
+        try:
+            period = 1.0 / self.driver.rate
+            due = time.monotonic()
+            while not self._ending.is_set():
+                begun = time.perf_counter()
+                reading = self.driver.cycle()
+                if reading is not None:
+                    self._publish(reading, begun)
+                due += period
+                left = due - time.monotonic()
+                if left > 0.0:
+                    time.sleep(left)
+                else:
+                    due = time.monotonic()  # no burst after a stall
+        except Exception as error:
+            self.failure = f"{type(error).__name__}: {error}"
+
+    def _publish(self, reading: Reading, begun: float) -> None:
+        age = round((time.monotonic() - reading.time) * SECOND)
+        stamp = self.get_clock().now().nanoseconds - age
+        writer = self._writer
+        writer.position[:], writer.velocity[:] = reading.position, reading.velocity
+        writer.effort[:] = reading.effort
+        self._joints.publish(writer.stamped(stamp))
+        self.done_tick(stamp, begun)
+
+    def diagnose(self) -> tuple[bytes, str, dict[str, object]]:
+        driver = self.driver
+        self._publish_temperatures()
+        rate, busy, longest = driver.meter.report()
+        values: dict[str, object] = {
+            "device": driver.chain.device,
+            "bus rate [Hz]": f"{rate:.1f}",
+            "bus rate possible [Hz]": f"{driver.budget.rate:.0f}",
+            "cycle, budget [ms]": f"{1e3 * driver.budget.cycle:.2f}",
+            "cycle, mean [ms]": f"{1e3 * busy:.2f}",
+            "cycle, max [ms]": f"{1e3 * longest:.2f}",
+            "latency timer [ms]": (
+                "" if driver.latency_timer is None else f"{1e3 * driver.latency_timer:g}"
+            ),
+            "commands at the current limit": driver.saturated,
+            "remarks at the start": "; ".join(driver.remarks),
+        }
+        for one in driver.health:
+            values |= {
+                f"{one.joint} temperature [deg C]": f"{one.temperature:.0f}",
+                f"{one.joint} voltage [V]": f"{one.voltage:.1f}",
+                f"{one.joint} torque": "on" if one.torque_on else "off",
+                f"{one.joint} error": one.problem,
+                f"{one.joint} missed reads": one.misses,
+                f"{one.joint} restarts": one.restarts,
+                f"{one.joint} watchdog trips": one.trips,
+            }
+        if driver.problems:
+            return ERROR, "; ".join(driver.problems), values
+        if math.isfinite(rate) and rate < SLOWEST * driver.rate:
+            return WARN, f"bus at {rate:.0f} Hz, {driver.rate:g} Hz is needed", values
+        if driver.stale:
+            return WARN, "no command within effort_timeout: zero torque", values
+        return OK, "running", values
+
+    def _publish_temperatures(self) -> None:
+        """Publish what the supervisor limits, once a second; a lost servo has none."""
+        now = self.get_clock().now().nanoseconds
+        for one in self.driver.health:
+            if math.isfinite(one.temperature) and not one.lost:
+                message = Temperature(temperature=one.temperature)
+                message.header.frame_id = one.joint
+                set_stamp(message.header.stamp, now)
+                self._temperature.publish(message)
+
+    def destroy_node(self) -> None:
+        """End the thread, and the servos as configured."""
+        if self._thread is not None:
+            self._ending.set()
+            self._thread.join()
+        if hasattr(self, "driver"):
+            self.driver.stop()
+        super().destroy_node()
+
+
+def _described_chain(hardware: str, device: str, vehicle: VehicleDescription) -> ArmChain:
+    """Return the chain of a hardware file, on its own or another device.
+
+    Raises ParameterError, ArmError.
+    """
+    try:
+        chain = load_chain(hardware_file(hardware), vehicle)
+    except ConfigurationError as error:
+        raise ParameterError(f"hardware: {error}") from None
+    return dataclasses.replace(chain, device=device) if device else chain
+
+
+def main() -> int:
+    """Run the node; return its exit status."""
+    return run(ArmDriverNode, NAME)
