@@ -22,6 +22,7 @@ WHOLE = {
         "signing_link_id",
         "attempts",
         "recovery_attempts",
+        "magnet_output",
     },
     wiring.PLANT: {"seed", "hil_port"},
     wiring.MISSION: {"grasp_attempts"},

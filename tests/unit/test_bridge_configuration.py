@@ -7,6 +7,8 @@ from uam_control.settings.configuration import path
 from uam_control.settings.parameter_set import ParameterSet
 from uam_control.vehicle import derived_parameters, load_description
 from uam_sim_bridge.autopilot.params import Parameters
+from uam_sim_bridge.drivers.magnet.switching import SwitchingParameters
+from uam_sim_bridge.mavlink.offboard.autopilot_magnet import AutopilotMagnetParameters
 from uam_sim_bridge.mavlink.offboard.hold import HoldParameters
 from uam_sim_bridge.mavlink.offboard.sequence import OffboardParameters
 from uam_sim_bridge.mavlink.offboard.setpoint import RateThrustParameters
@@ -27,6 +29,8 @@ DERIVED = derived_parameters(VEHICLE)["mavlink_bridge"]
         HoldParameters,
         SetpointParameters,
         ThrustIdentificationParameters,
+        AutopilotMagnetParameters,
+        SwitchingParameters,
     ],
 )
 def test_the_file_holds_the_defaults(kind: type[ParameterSet]):

@@ -45,6 +45,9 @@ CONTENTS = {
     topics.ARM_EFFORT: Content(JOINT_SPACE, "N m", TICK),
     topics.ARM_GOALS: Content(JOINT_SPACE, "rad", f"{TICK}, in place of the efforts"),
     topics.MAGNET: Content("", "on or off", TICK),
+    topics.MAGNET_STATE: Content(
+        "", "on or off", f"{SLOW} and on change", "magnet_driver or mavlink_bridge", "recorder"
+    ),
     topics.SETPOINT: Content(BODY, "rad/s, thrust 0..1", TICK),
     topics.THRUST: Content("", "1, N", "10 Hz"),
     topics.POSITION_ADAPTATION: Content("", "of each gain", GAINS),

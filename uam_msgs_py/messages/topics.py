@@ -110,6 +110,14 @@ ARM_GOALS = Topic(
     "goal positions [rad], with setpoint: position of the arm controller",
 )
 MAGNET = Topic("uam/magnet", Bool, RELIABLE, "magnet on")
+MAGNET_STATE = Topic(
+    "uam/magnet/state",
+    Bool,
+    LATCHED,
+    "magnet as its driver has switched it: acknowledged by the autopilot or read back from the "
+    "line; not simulated",
+    one_publisher=False,
+)
 SETPOINT = Topic(
     "uam/setpoint", TwistStamped, RELIABLE, "body rates FLU and thrust 0..1 (linear.z) as sent"
 )

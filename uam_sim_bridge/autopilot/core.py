@@ -52,6 +52,7 @@ from uam_sim_bridge.mavlink.protocol.modes import (
 from uam_sim_bridge.mavlink.protocol.position_target import PositionTarget
 
 FARTHEST_VISION = 1e5  # m
+ACTUATORS = 6  # of DO_SET_ACTUATOR
 SHORTEST_STEP, LONGEST_STEP = 0.000125, 0.02  # s, bounds of the time step (PX4)
 
 
@@ -143,6 +144,8 @@ class Autopilot:
         self._yaw_rate = 0.0  # [rad/s] about the world's z axis, down
         self._memory = np.zeros((7, 3))
         self._time: float | None = None
+        self.actuators = np.full(ACTUATORS, np.nan)  # set by DO_SET_ACTUATOR; NaN: disarmed value
+        self.gripper: dict[int, bool] = {}  # number → whether DO_GRIPPER has closed it
         self.imu = np.zeros(3), np.zeros(3)  # newest sample: gyro, specific force, as in `update`
         self._sample_rate = sample_rate
         self._configure()
@@ -206,7 +209,10 @@ class Autopilot:
         self.commander.sticks(time, sticks, self.estimator.aided(time))
 
     def command(self, time: float, command: int, parameters: tuple[float, ...]) -> MavResult:
-        """Handle DO_SET_MODE or ARM_DISARM with COMMAND_LONG's parameters; others: UNSUPPORTED."""
+        """Handle a command with COMMAND_LONG's seven parameters.
+
+        DO_SET_MODE, ARM_DISARM, DO_SET_ACTUATOR, DO_GRIPPER; others: UNSUPPORTED.
+        """
         first, second = parameters[0], parameters[1]
         if command == MavCmd.ARM_DISARM:
             force = second == FORCE
@@ -228,6 +234,15 @@ class Autopilot:
             except ValueError:
                 return MavResult.DENIED
             return self.commander.request_mode(time, mode, self.estimator.aided(time))
+        if command == MavCmd.DO_SET_ACTUATOR:
+            if not parameters[ACTUATORS]:  # index of the set; PX4 accepts others and ignores them
+                self.actuators[:] = parameters[:ACTUATORS]
+            return MavResult.ACCEPTED
+        if command == MavCmd.DO_GRIPPER and math.isfinite(first):
+            if second not in (0.0, 1.0):
+                return MavResult.DENIED
+            self.gripper[int(first)] = second == 1.0
+            return MavResult.ACCEPTED
         return MavResult.UNSUPPORTED
 
     def update(self, time: float, gyro: np.ndarray, accel: np.ndarray) -> np.ndarray:

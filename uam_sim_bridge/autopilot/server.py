@@ -94,8 +94,11 @@ class Server:
         motors = self._autopilot.update(time, self._gyro, self._accel)
         self._udp.send(self._companion.tick(time))
         mode = _CUSTOM_MODE | (_ARMED if self._autopilot.status.armed else 0)
+        controls = [*motors.tolist(), *[0.0] * (CONTROLS - len(motors))]
+        actuators = np.nan_to_num(self._autopilot.actuators).tolist()
+        controls[CONTROLS - len(actuators) :] = actuators
         answer = mavlink2.MAVLink_hil_actuator_controls_message(
-            m.time_usec, [*motors.tolist(), *[0.0] * (CONTROLS - len(motors))], mode, _LOCKSTEP
+            m.time_usec, controls, mode, _LOCKSTEP
         )
         try:
             self._simulator.sendall(self._codec.encode(answer))

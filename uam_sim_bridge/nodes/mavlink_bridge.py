@@ -64,6 +64,7 @@ from uam_sim_bridge.nodes.autopilot_imu_topic import (
 )
 from uam_sim_bridge.nodes.autopilot_topics import AutopilotTopics
 from uam_sim_bridge.nodes.bridge_link import BridgeParameters, open_links
+from uam_sim_bridge.nodes.bridge_magnet import bridge_magnet
 from uam_sim_bridge.nodes.fault_topic import FaultTopic
 from uam_sim_bridge.stages.bridge_stage import BridgeSets, BridgeStage
 from uam_sim_bridge.stages.vision_pacing import VisionParameters
@@ -118,6 +119,7 @@ class MavlinkBridgeNode(UamNode):
         thrust.apply = self.stage.identification.configure
         if own_imu:
             self._imu = AutopilotImuTopic(self, self.link, clock)
+        self._magnet = bridge_magnet(self, self.link)
         self._fault_topic = FaultTopic(self) if self._faulty else None
         self._adopted: tuple[str, ...] = ()
         self._commanded = 0  # stamp [ns] of the last tick with commands
@@ -152,6 +154,8 @@ class MavlinkBridgeNode(UamNode):
     def destroy_node(self) -> None:
         """Close the link, then the node."""
         if hasattr(self, "link"):
+            if getattr(self, "_magnet", None) is not None:
+                self._magnet.end(self.stamp / SECOND)
             self.link.close()
         super().destroy_node()
 
@@ -245,6 +249,8 @@ class MavlinkBridgeNode(UamNode):
         if self._faulty and self._fault_topic:
             self._fault_topic.publish(stamp, self._faulty.update(stamp / SECOND))
         self.stage.hear(stamp)
+        if self._magnet is not None:
+            self._magnet.update(stamp / SECOND)
 
     def _end_tick(self, stamp: int) -> None:
         """End a tick: forward to the ground station, publish the autopilot's state."""
@@ -305,7 +311,9 @@ class MavlinkBridgeNode(UamNode):
 
     def diagnose(self) -> tuple[bytes, str, dict[str, object]]:
         link, sequence = self.link, self.stage.sequence
+        magnet = self._magnet
         notes = (*sequence.reasons, *faults(link), *link.warnings)
+        notes += () if magnet is None else magnet.problems()
         values = {
             "sequence": sequence.phase.value,
             "in control": sequence.in_control,
@@ -321,6 +329,7 @@ class MavlinkBridgeNode(UamNode):
             "adopted": "; ".join(self._adopted),
             **report(link),
             **({} if self._imu is None else self._imu.values()),
+            **({} if magnet is None else magnet.values()),
             "loop delay [ms]": _text(1e3 * self.stage.loop_delay.value, ".1f"),
             "loop delay, explained [1]": f"{self.stage.loop_delay.explained:.2f}",
             "thrust factor [1]": f"{self.stage.map.thrust_factor:.4f}",

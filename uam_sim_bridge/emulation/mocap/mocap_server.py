@@ -4,12 +4,14 @@
         server.occlude("uam")
 
 `poses(time)` returns name → (position (3,) [m, ENU], quaternion (4,) FLU → ENU) of the vehicle at
-`time` [s] of the host's clock, time.time(); a body without a pose is not tracked.
+`time` [s] of the host's clock, time.time(); a body without a pose is not tracked. Without `poses`
+the owner, a simulation, hands them over by `expose`.
 """
 
 from __future__ import annotations
 
 import heapq
+import math
 import random
 import select
 import socket
@@ -53,7 +55,7 @@ class MocapServer:
     def __init__(
         self,
         bodies: Sequence[TrackedBody],
-        poses: Poses,
+        poses: Poses | None = None,
         rate: float = 120.0,
         version: tuple[int, int] = (3, 1),
         multicast: bool = False,
@@ -93,6 +95,9 @@ class MocapServer:
         self._seen: dict[int, packets.WireBody] = {}  # as Motive, which repeats the last pose
         self._due: list[tuple[float, int, bytes]] = []  # host's time [s], order, packet
         self._order = 0
+        self._exposed = -math.inf  # [s] host's time of the last exposure by `expose`
+        self._wake, self._woken = socket.socketpair()
+        self._wake.setblocking(False)
         self._ended = threading.Event()
         self._thread = threading.Thread(target=self._run, daemon=True)
 
@@ -112,8 +117,8 @@ class MocapServer:
         self._ended.set()
         if self._thread.ident is not None:
             self._thread.join()
-        self._commands.close()
-        self._outgoing.close()
+        for one in (self._commands, self._outgoing, self._wake, self._woken):
+            one.close()
 
     def occlude(self, name: str, hidden: bool = True) -> None:
         """Hide the markers of a body, or show them again."""
@@ -140,24 +145,44 @@ class MocapServer:
         with self._lock:
             self._paused = paused
 
+    def expose(self, host: float, poses: Mapping[str, tuple[np.ndarray, np.ndarray]]) -> bool:
+        """Expose at `host` [s], host's clock, if the rate allows it; return whether it does.
+
+        For a simulation that calls this at each of its ticks, in its own thread.
+        """
+        if host - self._exposed < self._period - 1e-6:
+            return False
+        # keeps the mean rate where ticks and exposures are no multiples of each other
+        late = host - self._exposed - self._period
+        self._exposed = host - (late if late < self._period else 0.0)
+        self._expose(host, poses)
+        try:
+            self._wake.send(b"\0")
+        except BlockingIOError:  # it is awake
+            pass
+        return True
+
     def server_time(self, host: float) -> float:
         """Return the server's clock [s] at the host's time [s]."""
         offset, drift = self._clock
         return (host + offset) * (1.0 + drift)
 
     def _run(self) -> None:
-        due = time.time()
+        due = math.inf if self._poses is None else time.time()
         while not self._ended.is_set():
             now = time.time()
             if now >= due:
                 due = max(due + self._period, now - self._period)
-                self._expose(now)
+                self._expose(now, self._poses(now))
             with self._lock:
                 self._send_due(now)
             soonest = min(due, self._due[0][0] if self._due else due)
             wait = min(max(soonest - time.time(), 0.0), LONGEST_WAIT)
-            if select.select([self._commands], [], [], wait)[0]:
+            ready = select.select([self._commands, self._woken], [], [], wait)[0]
+            if self._commands in ready:
                 self._answer()
+            if self._woken in ready:
+                self._woken.recv(4096)
 
     def _answer(self) -> None:
         """Answer a request of a client."""
@@ -181,9 +206,8 @@ class MocapServer:
             answer = packets.packet(packets.UNRECOGNIZED, b"")
         self._commands.sendto(answer, client)
 
-    def _expose(self, now: float) -> None:
+    def _expose(self, now: float, poses: Mapping[str, tuple[np.ndarray, np.ndarray]]) -> None:
         """Make the frame of an exposure at `now` [s], host's clock, and plan its transmission."""
-        poses = self._poses(now)
         with self._lock:
             if self._paused:
                 return

@@ -10,6 +10,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 
+from uam_sim_bridge.mavlink.offboard.autopilot_magnet import AutopilotMagnet
 from uam_sim_bridge.mavlink.offboard.sequence import (
     COMMANDS,
     HEARTBEAT_TIMEOUT,
@@ -43,7 +44,8 @@ class OffboardLink:
     `armed`, `mode`, `intended`, `failsafe`, `landed`: latest report; `armed_since` [s] or None:
     tick of the first report that it is armed; `values`: its parameters (of WATCHED) by name;
     `ignored`: number of messages from other systems or for other receivers; `vitals`: battery,
-    estimator and sensors; `reboots`: number of restarts; `imu`: its IMU, if it is requested.
+    estimator and sensors; `reboots`: number of restarts; `imu`: its IMU, if it is requested;
+    `magnet`: on one of its outputs, if the owner sets it.
     """
 
     def __init__(
@@ -67,6 +69,7 @@ class OffboardLink:
         self.vitals = Vitals()
         self.time_sync = TimeSync()
         self.imu = AutopilotImu(self.time_sync) if imu_rate else None
+        self.magnet: AutopilotMagnet | None = None
         self.streams = StreamCheck({HIGHRES_IMU: imu_rate} if imu_rate else None)
         self.statistics = LinkStatistics()
         self._reboot = RebootDetector()
@@ -172,6 +175,15 @@ class OffboardLink:
         request = self.sequence.update(time, seen)
         if request is not None:
             self._request(request)
+        if connected:
+            self.send_magnet(time)
+
+    def send_magnet(self, time: float) -> None:
+        """Send the command of the magnet that is due at `time` [s]."""
+        due = None if self.magnet is None else self.magnet.due(time)
+        if due is not None:
+            command, parameters = due
+            self._command(command, *parameters)
 
     def kill(self) -> None:
         """Request at once that the motors stop; the ticks repeat it while the vehicle is armed."""
@@ -271,6 +283,8 @@ class OffboardLink:
     def _restart_requests(self) -> None:
         """Request streams and parameters again: the autopilot has connected or rebooted."""
         self.statistics.restart()
+        if self.magnet is not None:
+            self.magnet.restart()
         self.streams.restart()
         self._pending.clear()
         self._parameters.restart()
@@ -285,6 +299,8 @@ class OffboardLink:
     def _acknowledged(self, time: float, command: int, result: int) -> None:
         if command == MavCmd.SET_MESSAGE_INTERVAL:
             self.streams.answer(result)
+            return
+        if self.magnet is not None and self.magnet.answer(time, command, result):
             return
         request = self._pending.pop(command, None)
         if request is None:

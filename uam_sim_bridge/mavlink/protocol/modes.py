@@ -49,6 +49,7 @@ class MavResult(IntEnum):
     DENIED = 2
     UNSUPPORTED = 3
     FAILED = 4
+    IN_PROGRESS = 5
 
 
 def result_word(result: int) -> str:
@@ -73,6 +74,8 @@ class MavCmd(IntEnum):
     """MAV_CMD: the values in use."""
 
     DO_SET_MODE = 176
+    DO_SET_ACTUATOR = 187
+    DO_GRIPPER = 211
     ARM_DISARM = 400
     RUN_PREARM_CHECKS = 401
     SET_MESSAGE_INTERVAL = 511

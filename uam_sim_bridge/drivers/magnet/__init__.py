@@ -1,0 +1,1 @@
+"""The electromagnet: what its switch does without commands, and a GPIO line."""

@@ -1,0 +1,1 @@
+"""A GPIO line without hardware."""

@@ -1,0 +1,85 @@
+"""Node: /uam/magnet → a GPIO line, with its state on /uam/magnet/state.
+
+For a magnet on an output of the autopilot see the parameter `magnet` of `mavlink_bridge`.
+"""
+
+from __future__ import annotations
+
+import time
+from pathlib import Path
+
+from uam_control.settings.parameter_set import ParameterError
+from uam_msgs_py.messages.status import ERROR, OK, WARN
+from uam_msgs_py.node.base_node import UamNode, run
+from uam_msgs_py.node.node_parameters import NodeParameters, refuse_unknown
+from uam_sim_bridge.drivers.magnet.gpio_line import GpioLine, Line
+from uam_sim_bridge.drivers.magnet.magnet_driver import LineParameters, MagnetDriver
+from uam_sim_bridge.drivers.magnet.switching import SwitchingParameters
+from uam_sim_bridge.emulation.gpio.file_line import FileLine
+from uam_sim_bridge.nodes.magnet_topics import MagnetTopics
+
+NAME = "magnet_driver"
+SIMULATED = "simulated:"  # chip: the rest is a file
+READ_PERIOD = 0.1  # [s] between two looks at the line without a command
+
+
+class MagnetDriverNode(UamNode):
+    """Switches the line at each command, and reads it back."""
+
+    wake_up = READ_PERIOD
+
+    def __init__(self) -> None:
+        super().__init__(NAME)
+        line = NodeParameters(self, LineParameters, read_only=True).current
+        switching = NodeParameters(self, SwitchingParameters, read_only=True).current
+        self._topics = MagnetTopics(self, switching, time.monotonic)
+        refuse_unknown(self)  # before the line is switched
+        self._driver = MagnetDriver(open_line(line))
+        self._chip = line.chip
+        self._said = ""
+
+    def settle(self) -> None:
+        """Switch as commanded; called after each command and each READ_PERIOD."""
+        begun, now = time.perf_counter(), time.monotonic()
+        before = self._driver.switched
+        self._driver.update(self._topics.switching.desired(now))
+        self._topics.publish(now, self._driver.state)
+        if self._driver.switched != before:
+            self.done_tick(self.get_clock().now().nanoseconds, begun)
+        problem = self._driver.problem or self._topics.problem(now)
+        if problem and problem != self._said:
+            self.get_logger().error(problem)
+        self._said = problem
+
+    def diagnose(self) -> tuple[bytes, str, dict[str, object]]:
+        """Return the level, the state, and how often the line was switched."""
+        driver, now = self._driver, time.monotonic()
+        values = {"line": self._chip, "state": driver.state, "switched": driver.switched}
+        if driver.problem:
+            return ERROR, driver.problem, values
+        if lost := self._topics.problem(now):
+            return WARN, lost, values
+        return OK, "magnet on" if driver.state else "magnet off", values
+
+    def destroy_node(self) -> None:
+        """Leave the magnet as `magnet_at_exit` says, then close the line and the node."""
+        if hasattr(self, "_driver"):
+            self._driver.end(self._topics.switching.at_exit())
+        super().destroy_node()
+
+
+def open_line(parameters: LineParameters) -> Line:
+    """Open the line, switched off; raises MagnetError, ParameterError."""
+    chip, inverted = parameters.chip, parameters.active_low
+    if not chip.startswith(SIMULATED):
+        return GpioLine(chip, parameters.line, inverted)
+    file = chip.removeprefix(SIMULATED)
+    try:
+        return FileLine(Path(file), inverted)
+    except OSError as error:
+        raise ParameterError(f"chip: {file}: {error.strerror or error}") from None
+
+
+def main() -> int:
+    """Run the node; return its exit status."""
+    return run(MagnetDriverNode, NAME)
