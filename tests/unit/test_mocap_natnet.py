@@ -310,7 +310,8 @@ def test_an_address_that_cannot_be_is_refused_in_one_line(server, local, reason)
 
 def test_a_source_without_stamps_assumes_a_latency():
     class Stampless:
-        connected, names, bad, sessions, description = True, ("uam",), 0, 1, "a source"
+        connected, names, bad, sessions = True, ("uam",), 0, 1
+        description, failure = "a source", ""
 
     driver = MocapDriver(MocapParameters(assumed_latency=0.02), MEASURED, Stampless())
     pose = BodyPose(np.array(MOTIVE), np.array([1.0, 0, 0, 0]))

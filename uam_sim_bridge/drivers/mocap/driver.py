@@ -137,10 +137,15 @@ class MocapDriver:
         """Return the level and one line."""
         now, limit = time.monotonic(), self._parameters.silent_after
         source = self._source
+        why = source.failure
         if not source.connected:
-            why = getattr(source, "failure", "")
             more = f" ({why})" if why else "; is it on, and does it stream?"
             return Level.ERROR, f"no answer of {source.description}{more}"
+        if source.names is None and why:
+            return Level.ERROR, (
+                f"the list of bodies of {source.description} cannot be read: {why}; "
+                "stream rigid bodies only"
+            )
         if missing := self._missing():
             return Level.ERROR, missing
         if now - self._last_frame > limit:

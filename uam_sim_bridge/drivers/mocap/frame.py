@@ -41,7 +41,8 @@ class MocapSource(Protocol):
 
     `connected`: whether the server has answered; `names`: of the rigid bodies that it knows, None
     before its list arrives; `bad`: packets that cannot be read; `sessions`: number of connections
-    so far; `description`: what it is connected to, for messages.
+    so far; `description`: what it is connected to, and `failure`: what is wrong with it, "" for
+    nothing, both for messages.
     """
 
     connected: bool
@@ -49,6 +50,7 @@ class MocapSource(Protocol):
     bad: int
     sessions: int
     description: str
+    failure: str
 
     def frames(self, timeout: float) -> list[Frame]:
         """Return the frames that have arrived; wait at most `timeout` [s] for the first."""

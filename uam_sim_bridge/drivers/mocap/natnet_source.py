@@ -19,22 +19,20 @@ from uam_sim_bridge.drivers.mocap import natnet_messages as messages
 from uam_sim_bridge.drivers.mocap.frame import BodyPose, Frame, MocapError
 
 try:
-    from natnet.data_descriptions import DataDescriptions
-    from natnet.data_frame import DataFrame
-    from natnet.packet_buffer import PacketBuffer
     from natnet.version import Version
+
+    from uam_sim_bridge.drivers.mocap.natnet_reader import UNREADABLE, read_frame, read_models
 except ImportError:
-    DataFrame = None
+    Version = None
 
 CONNECT_PERIOD = 0.5  # [s] between two attempts
 LIST_PERIOD = 1.0  # [s] between two requests of the list of bodies, and two keep-alives
+LIST_RETRY = 0.1  # [s] the same while there is no valid list
 SILENCE = 1.5  # [s] without a packet of the server after which it is asked again
 LARGEST = 65535  # bytes of a datagram
 RECEIVE_BUFFER = 1 << 20  # bytes
 STAMPED = 35  # SO_TIMESTAMPNS of Linux: the kernel stamps each datagram at its arrival
 _STAMP = struct.Struct("@ll")  # struct timespec
-# what a damaged packet raises in the package's readers
-BAD_PACKET = (struct.error, UnicodeDecodeError, ValueError, OverflowError, MemoryError)
 NEVER = -math.inf
 
 
@@ -47,7 +45,7 @@ class NatNetSource:
         local: address of this computer in the tracker's network; "": as routed to the server.
         Raises MocapError.
         """
-        if DataFrame is None:
+        if Version is None:
             raise MocapError("source natnet needs the package natnet: pip install uam[hardware]")
         try:
             self._server = socket.gethostbyname(server), port
@@ -63,6 +61,7 @@ class NatNetSource:
         self._asked = self._listed = NEVER  # time.monotonic() [s]
         self._heard = NEVER
         self.bad = self.sessions = 0
+        self.failure = ""  # why the list of bodies cannot be read
 
     @property
     def connected(self) -> bool:
@@ -110,7 +109,7 @@ class NatNetSource:
             if now - self._asked >= CONNECT_PERIOD:
                 self._asked = now
                 self._send(messages.CONNECT)
-        elif now - self._listed >= LIST_PERIOD:
+        elif now - self._listed >= (LIST_RETRY if self._names is None else LIST_PERIOD):
             self._listed = now
             self._send(messages.REQUEST_MODEL_DEFINITIONS)
             if not self._info.multicast:
@@ -144,10 +143,18 @@ class NatNetSource:
                     found.append(frame)
             elif message == messages.MODEL_DEFINITIONS:
                 self._heard = time.monotonic()
-                listed = DataDescriptions.read_from_buffer(PacketBuffer(content), self._version)
-                self._names = {one.id_num: one.name for one in listed.rigid_bodies}
-        except BAD_PACKET:
+                self._take_models(content)
+        except UNREADABLE:
             self.bad += 1
+
+    def _take_models(self, content: bytes) -> None:
+        """Read the list of bodies; the old one stays valid if this one cannot be read."""
+        try:
+            listed = read_models(content, self._version)
+        except UNREADABLE as error:
+            self.failure = str(error).splitlines()[0] if str(error) else type(error).__name__
+            raise
+        self._names, self.failure = {one.id_num: one.name for one in listed.rigid_bodies}, ""
 
     def _join(self, info: messages.ServerInfo) -> None:
         """Begin a session: open the data socket if frames come by multicast."""
@@ -160,16 +167,16 @@ class NatNetSource:
             self._data = _datagrams(info.group, info.data_port)
             member = socket.inet_aton(info.group) + socket.inet_aton(self._local)
             self._data.setsockopt(socket.IPPROTO_IP, socket.IP_ADD_MEMBERSHIP, member)
-        self._info, self._version = info, Version(*info.version)
+        self._info, self._version, self._names = info, Version(*info.version), None
         self.sessions += 1
         self._listed = NEVER
         self._maintain()
 
     def _frame(self, content: bytes, arrival: int) -> Frame | None:
         """Read a frame; None before the list of bodies has arrived."""
-        data = DataFrame.read_from_buffer(PacketBuffer(content), self._version)
-        if data.suffix.tracked_models_changed:
-            self._listed = NEVER
+        data = read_frame(content, self._version)
+        if data.suffix.tracked_models_changed:  # numbers may belong to other bodies now
+            self._names, self._listed = None, NEVER
         if self._names is None:
             return None
         bodies: dict[str, BodyPose | None] = dict.fromkeys(self._names.values())
