@@ -4,6 +4,7 @@ import struct
 
 import numpy as np
 import pytest
+from memory_transport import Memory
 
 from uam_control.vehicle import load_description
 from uam_sim_bridge.autopilot.companion import Companion
@@ -27,25 +28,6 @@ from uam_sim_bridge.mavlink.telemetry.streams import ON_CHANGE, ONLY_COUNTED, RA
 DOWN = np.array([0.0, 0.0, -9.81])
 LEVEL = np.array([1.0, 0.0, 0.0, 0.0])
 ARM = (MavCmd.ARM_DISARM, 1.0)
-
-
-class Memory:
-    """A transport of two lists: `to_autopilot`, `to_link`."""
-
-    stream, connected, dropped = False, True, 0
-
-    def __init__(self):
-        self.to_autopilot, self.to_link = [], []
-
-    def send(self, data):
-        self.to_autopilot.append(data)
-
-    def receive(self):
-        arrived, self.to_link = self.to_link, []
-        return arrived
-
-    def close(self):
-        pass
 
 
 class Rig:

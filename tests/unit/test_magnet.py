@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from memory_transport import Memory
 
 from uam_control.settings import configuration
 from uam_control.settings.parameter_file import read_sections
@@ -167,13 +168,11 @@ def test_what_is_acknowledged_is_what_the_autopilot_has(steps):
     assert magnet.settled and autopilot == 1.0
 
 
-class Wire:
+class Wire(Memory):
     """Bridge's link and the stand-in's companion side, joined in memory, with real frames."""
 
-    stream, connected, dropped = False, True, 0
-
     def __init__(self, parameters):
-        self.to_autopilot, self.to_link = [], []
+        super().__init__()
         sequence = OffboardSequence(OffboardParameters())
         self.link = OffboardLink(self, sequence, RateThrustParameters.of(load_description()))
         self.link.magnet = AutopilotMagnet(parameters)
@@ -184,16 +183,6 @@ class Wire:
         self.autopilot, self.began = Autopilot(), getattr(self, "ticks", 0)
         self.companion, self.codec = Companion(self.autopilot), Codec(1, 1)
         self.framer = Framer(Codec(1, 1))
-
-    def send(self, data):
-        self.to_autopilot.append(data)
-
-    def receive(self):
-        arrived, self.to_link = self.to_link, []
-        return arrived
-
-    def close(self):
-        pass
 
     def run(self, seconds):
         for _ in range(round(seconds / 0.02)):
