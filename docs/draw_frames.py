@@ -11,6 +11,7 @@ matplotlib.use("Agg")
 import numpy as np
 from matplotlib import pyplot as plt
 from matplotlib.axes import Axes
+from matplotlib.figure import Figure
 from matplotlib.patches import Arc
 
 PICTURE = Path(__file__).parent / "images" / "frames.png"
@@ -81,6 +82,15 @@ def arm(axes: Axes) -> None:
     )
 
 
+def save(figure: Figure, file: Path) -> None:
+    """Write a picture of drawings without scales."""
+    for axes in figure.axes:
+        axes.axis("off")
+    figure.tight_layout()
+    figure.savefig(file, dpi=90)
+    plt.close(figure)
+
+
 def draw(file: Path) -> None:
     """Write the picture."""
     figure, (left, right) = plt.subplots(1, 2, figsize=(10.5, 4.4), width_ratios=(1.25, 1.0))
@@ -90,11 +100,7 @@ def draw(file: Path) -> None:
     left.set(xlim=(-1.1, 4.3), ylim=(-1.1, 2.1), aspect="equal")
     arm(right)
     right.set(xlim=(-1.6, 2.4), ylim=(-2.2, 1.1), aspect="equal")
-    for axes in (left, right):
-        axes.axis("off")
-    figure.tight_layout()
-    figure.savefig(file, dpi=90)
-    plt.close(figure)
+    save(figure, file)
 
 
 if __name__ == "__main__":

@@ -5,34 +5,13 @@ from __future__ import annotations
 import sys
 from pathlib import Path
 
-import matplotlib
-
-matplotlib.use("Agg")
 import numpy as np
+from draw_frames import BLUE, GREEN, GREY, RED, arrow, save, tripod
 from matplotlib import pyplot as plt
 from matplotlib.axes import Axes
 from matplotlib.patches import Circle
 
 PICTURE = Path(__file__).parent / "images" / "mocap_frames.png"
-RED, GREEN, BLUE, GREY = "#c0392b", "#1e8449", "#21618c", "#777777"
-COLOURS = {"x": RED, "y": GREEN, "z": BLUE}
-
-
-def arrow(axes: Axes, start: tuple, way: tuple, name: str, color: str = "") -> None:
-    """Draw an arrow from start by way, with its name beyond the tip."""
-    color = color or COLOURS[name.lstrip("−")[0].lower()]
-    end = start[0] + way[0], start[1] + way[1]
-    axes.annotate("", end, start, arrowprops={"arrowstyle": "-|>", "color": color, "lw": 2})
-    tip = np.add(start, np.multiply(way, 1.0 + 0.16 / np.hypot(*way)))
-    axes.text(*tip, name, color=color, ha="center", va="center", fontsize=11, weight="bold")
-
-
-def tripod(axes: Axes, at: tuple, title: str, names: tuple[str, str, str]) -> None:
-    """Draw three axes: to the right, into the page (drawn obliquely), and up; −: out of it."""
-    for way, name in zip(((0.9, 0.0), (0.5, 0.4), (0.0, 0.9)), names, strict=True):
-        sign, label = (-1.0, name[1:]) if name.startswith("−") else (1.0, name)
-        arrow(axes, at, tuple(sign * np.array(way)), label)
-    axes.text(at[0] + 0.1, at[1] - 0.95, title, ha="center", fontsize=10, color=GREY)
 
 
 def vehicle(axes: Axes, at: tuple, heading: float, strength: float) -> None:
@@ -52,14 +31,14 @@ def places(axes: Axes) -> None:
     first, second = np.array([0.0, 0.0]), 1.9 * nose
     vehicle(axes, tuple(first), heading, 0.45)
     vehicle(axes, tuple(second), heading, 1.0)
-    arrow(axes, tuple(first + 0.45 * nose), tuple(0.95 * nose), "", "black")
+    arrow(axes, tuple(first + 0.45 * nose), tuple(0.95 * nose), "black", "")
     axes.text(0.15, 0.95, "straight ahead,\n0.5 m or more", fontsize=9.5)
     axes.text(0.0, -0.75, "first place, level", ha="center", fontsize=10, color=GREY)
     axes.text(
         second[0] + 0.3, second[1] - 0.75, "second place", ha="center", fontsize=10, color=GREY
     )
-    arrow(axes, tuple(second), tuple(0.75 * nose), "x nose")
-    arrow(axes, tuple(second), tuple(0.6 * np.array([-nose[1], nose[0]])), "y")
+    arrow(axes, tuple(second), tuple(0.75 * nose), RED, "x nose")
+    arrow(axes, tuple(second), tuple(0.6 * np.array([-nose[1], nose[0]])), GREEN, "y")
 
 
 def side(axes: Axes) -> None:
@@ -73,8 +52,8 @@ def side(axes: Axes) -> None:
         axes.plot(at[:1], at[1:], "o", color=GREY, ms=9)
         axes.plot([at[0], at[0]], [0.7, at[1]], color=GREY, lw=1)
     pivot = np.mean(markers, axis=0)
-    arrow(axes, (0.0, 0.7), (0.75, 0.0), "x")
-    arrow(axes, (0.0, 0.7), (0.0, 0.8), "z")
+    arrow(axes, (0.0, 0.7), (0.75, 0.0), RED, "x")
+    arrow(axes, (0.0, 0.7), (0.0, 0.8), BLUE, "z")
     axes.plot(*pivot, "D", color=GREEN, ms=8)
     axes.text(pivot[0] + 0.12, pivot[1] + 0.02, "pivot", color=GREEN, fontsize=10)
     axes.plot(0.0, 0.7, "s", color="black", ms=8)
@@ -90,20 +69,16 @@ def draw(file: Path) -> None:
     figure, (first, second, third) = plt.subplots(
         1, 3, figsize=(13.0, 3.6), width_ratios=(1.25, 1.0, 1.2)
     )
-    tripod(first, (0.0, 0.0), "Motive, Y up\n(its default)", ("x", "−z", "y"))
+    tripod(first, (0.0, 0.0), "Motive, Y up", ("x", "-z", "y"))
     tripod(first, (2.0, 0.0), "Motive, Z up", ("x", "y", "z"))
     tripod(first, (4.0, 0.0), "world, ENU", ("x", "y", "z"))
-    first.text(2.0, 1.55, "Y up: (x, y, z) → (x, −z, y)", ha="center", fontsize=10.5)
+    first.text(2.0, 1.55, "Y up, the default: (x, y, z) → (x, −z, y)", ha="center", fontsize=10.5)
     first.set(xlim=(-0.9, 5.1), ylim=(-1.2, 1.8), aspect="equal")
     side(second)
     second.set(xlim=(-1.6, 1.6), ylim=(-0.5, 1.8), aspect="equal")
     places(third)
     third.set(xlim=(-0.8, 3.0), ylim=(-1.0, 2.0), aspect="equal")
-    for axes in (first, second, third):
-        axes.axis("off")
-    figure.tight_layout()
-    figure.savefig(file, dpi=90)
-    plt.close(figure)
+    save(figure, file)
 
 
 if __name__ == "__main__":

@@ -42,7 +42,8 @@ def test_the_page_names_every_system_and_the_limits_of_the_code():
         assert limit in PAGE, limit
 
 
-def test_the_picture_is_drawn(tmp_path):
+def test_the_picture_is_drawn(tmp_path, monkeypatch):
+    monkeypatch.syspath_prepend(ROOT / "docs")  # it shares the strokes of draw_frames
     spec = importlib.util.spec_from_file_location("draw_mocap", ROOT / "docs/draw_mocap.py")
     module = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(module)
