@@ -277,12 +277,11 @@ class OffboardSequence:
         So does one that a person took over after the landing: it may take off again.
         """
         ours = self.phase in (Phase.OFFBOARD, Phase.ARMING, Phase.FLYING, Phase.DISARMING)
+        given_back = self.phase is Phase.RELEASED and seen.mode is Mode.OFFBOARD
         armed = seen.armed
         if armed and left and self.phase in (Phase.FLYING, Phase.DISARMING) and not self.let_go:
             self._release(time, seen)
-        elif armed and self.phase is Phase.RELEASED and seen.mode is Mode.OFFBOARD:
-            return self._ask(time, Phase.DISARMING, Request.DISARM)
-        elif armed and ours:
+        elif armed and (ours or given_back):
             return self._ask(time, Phase.DISARMING, Request.DISARM)
         if not armed and self.phase in (
             Phase.DISARMING,
