@@ -110,8 +110,8 @@ class ArmRig:
 
 
 def described(device="line", **changes):
-    """The chain of config/hardware/s500_arm.yaml, every servo with `changes`."""
-    chain = load_chain(hardware_file("s500_arm"), load_description())
+    """The chain of config/lab/s500_lab.yaml, every servo with `changes`."""
+    chain = load_chain(hardware_file("s500_lab"), load_description())
     servos = tuple(dataclasses.replace(servo, **changes) for servo in chain.servos)
     return dataclasses.replace(chain, device=device, servos=servos)
 

@@ -1,4 +1,4 @@
-"""The described chain: conversions, and mistakes of the hardware file named in one line."""
+"""The described chain: conversions, and mistakes of the lab file named in one line."""
 
 import dataclasses
 import math
@@ -21,8 +21,8 @@ SERVO = described().servos[0]
 
 
 def document(**changes):
-    """The hardware file with changes of the first servo or, by arm__NAME, of the section."""
-    found = yaml.safe_load(hardware_file("s500_arm").read_text())
+    """The lab file with changes of the first servo or, by arm__NAME, of the section."""
+    found = yaml.safe_load(hardware_file("s500_lab").read_text())
     for name, value in changes.items():
         where = found["arm"] if name.startswith("arm__") else found["arm"]["servos"][0]
         name = name.removeprefix("arm__")

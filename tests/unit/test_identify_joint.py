@@ -245,5 +245,5 @@ def test_the_command_refuses_in_one_line(capsys):
     assert "no joint 'elbow'; there are: alpha_1, alpha_2" in capsys.readouterr().err
     assert main(["identify-joint", "alpha_1", "--device", "/dev/ttyNONE", "--yes"]) == 2
     assert capsys.readouterr().err == "uam identify-joint: /dev/ttyNONE: does not exist\n"
-    assert main(["identify-joint", "alpha_1", "--hardware", "none"]) == 2
-    assert "unknown hardware 'none'" in capsys.readouterr().err
+    assert main(["identify-joint", "alpha_1", "--config", "none"]) == 2
+    assert "unknown lab 'none'" in capsys.readouterr().err

@@ -10,8 +10,6 @@ from hypothesis import given
 from hypothesis import strategies as st
 from memory_transport import Memory
 
-from uam_control.settings import configuration
-from uam_control.settings.parameter_file import read_sections
 from uam_control.settings.parameter_set import ParameterError
 from uam_control.vehicle import load_description
 from uam_sim_bridge.autopilot.companion import Companion
@@ -19,7 +17,7 @@ from uam_sim_bridge.autopilot.core import Autopilot
 from uam_sim_bridge.autopilot.server import CONTROLS, Server
 from uam_sim_bridge.drivers.magnet import gpio_line
 from uam_sim_bridge.drivers.magnet.gpio_line import GpioLine, MagnetError
-from uam_sim_bridge.drivers.magnet.magnet_driver import LineParameters, MagnetDriver
+from uam_sim_bridge.drivers.magnet.magnet_driver import MagnetDriver
 from uam_sim_bridge.drivers.magnet.switching import MagnetSwitching, SwitchingParameters
 from uam_sim_bridge.emulation.gpio.file_line import FileLine
 from uam_sim_bridge.mavlink.link.link import OffboardLink
@@ -68,11 +66,6 @@ def test_at_the_exit_it_is_left_as_stated(rule, left):
     assert rules.at_exit() == left
     rules.command(1.0, False)
     assert not rules.at_exit()
-
-
-def test_the_files_of_the_configuration_have_the_defaults():
-    values = read_sections(configuration.path("hardware/magnet.yaml"))["magnet_driver"]
-    assert values == LineParameters().to_mapping() | SwitchingParameters().to_mapping()
 
 
 def test_on_and_off_must_differ():

@@ -6,20 +6,12 @@ from pathlib import Path
 
 import yaml
 
-from uam_control.settings import configuration
-from uam_control.settings.parameter_file import read_sections
 from uam_sim_bridge.drivers.mocap import fit, measurement
 from uam_sim_bridge.drivers.mocap.calibration import ENTRIES
 from uam_sim_bridge.drivers.mocap.library_source import SYSTEMS
-from uam_sim_bridge.drivers.mocap.mocap_parameters import MocapParameters
 
 ROOT = Path(__file__).resolve().parents[2]
 PAGE = (ROOT / "docs/mocap_hardware.md").read_text()
-
-
-def test_the_file_of_the_configuration_has_the_defaults():
-    values = read_sections(configuration.path("hardware/mocap.yaml"))["mocap_driver"]
-    assert values == MocapParameters().to_mapping()
 
 
 def test_the_nominal_calibrations_have_the_entries_of_the_page():

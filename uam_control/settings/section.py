@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Collection
 from pathlib import Path
 from typing import Any
 
@@ -27,9 +28,21 @@ class Section:
         """Return the error that the entry `key` is wrong; text: what is wrong, what is allowed."""
         return self._error(f"{self._name(key)}: {text}")
 
+    def only(self, allowed: Collection[str]) -> None:
+        """Refuse an entry whose key is not in `allowed`."""
+        for key in self.values:
+            if key not in allowed:
+                raise self.error(key, f"unknown; allowed: {', '.join(allowed)}")
+
+    def entry(self, key: str) -> Any:
+        """Return the entry `key` as it is in the file."""
+        if key not in self.values:
+            raise self._error(f"{self._name(key)} is missing")
+        return self.values[key]
+
     def section(self, key: str) -> Section:
         """Return the entry `key`, a mapping."""
-        value = self._entry(key)
+        value = self.entry(key)
         if not isinstance(value, dict) or not value:
             raise self._error(f"{self._name(key)}: a mapping expected, got {value!r}")
         return Section(value, self._name(key), self._error)
@@ -38,7 +51,7 @@ class Section:
         """Return the entry `key`, a list of one mapping or more; optional: [] if it is missing."""
         if optional and not self.values.get(key):
             return []
-        value = self._entry(key)
+        value = self.entry(key)
         if not isinstance(value, list) or not value:
             raise self._error(f"{self._name(key)}: a list of mappings expected, got {value!r}")
         found = []
@@ -50,21 +63,21 @@ class Section:
 
     def text(self, key: str) -> str:
         """Return the entry `key`, a text that is not empty."""
-        value = self._entry(key)
+        value = self.entry(key)
         if not isinstance(value, str) or not value:
             raise self._error(f"{self._name(key)}: a name expected, got {value!r}")
         return value
 
     def switch(self, key: str) -> bool:
         """Return the entry `key`, true or false."""
-        value = self._entry(key)
+        value = self.entry(key)
         if not isinstance(value, bool):
             raise self._error(f"{self._name(key)}: true or false expected, got {value!r}")
         return value
 
     def number(self, key: str) -> float:
         """Return the entry `key`, a finite number."""
-        return self._checked(key, self._entry(key))
+        return self._checked(key, self.entry(key))
 
     def positive(self, key: str) -> float:
         """Return the entry `key`, a finite number above 0."""
@@ -75,11 +88,11 @@ class Section:
 
     def numbers(self, key: str, count: int) -> tuple[float, ...]:
         """Return the entry `key`, a list of `count` finite numbers."""
-        return self._listed(key, self._entry(key), count)
+        return self._listed(key, self.entry(key), count)
 
     def rows(self, key: str, count: int) -> tuple[tuple[float, ...], ...]:
         """Return the entry `key`, a list of lists of `count` finite numbers each."""
-        value = self._entry(key)
+        value = self.entry(key)
         if not isinstance(value, list) or not value:
             raise self._error(f"{self._name(key)}: a list of lists of numbers expected: {value!r}")
         return tuple(self._listed(f"{key}[{i}]", row, count) for i, row in enumerate(value))
@@ -88,11 +101,6 @@ class Section:
         if not isinstance(value, list) or len(value) != count:
             raise self._error(f"{self._name(key)}: a list of {count} numbers expected: {value!r}")
         return tuple(self._checked(key, item) for item in value)
-
-    def _entry(self, key: str) -> Any:
-        if key not in self.values:
-            raise self._error(f"{self._name(key)} is missing")
-        return self.values[key]
 
     def _checked(self, key: str, value: Any) -> float:
         if isinstance(value, bool) or not isinstance(value, int | float):

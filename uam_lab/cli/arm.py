@@ -11,15 +11,14 @@ from collections.abc import Callable
 from rich.console import Console
 from rich.table import Table
 
-from uam_control.vehicle import load_description
+from uam_control.vehicle import VehicleDescription
 from uam_lab.cli.command import Command
+from uam_lab.vehicle.lab_file import lab_arm, lab_path, lab_vehicle, read_lab
 from uam_sim_bridge.drivers.dynamixel import control_table as names
 from uam_sim_bridge.drivers.dynamixel.chain import (
     SPEEDS,
     ArmChain,
     ArmError,
-    hardware_file,
-    load_chain,
 )
 from uam_sim_bridge.drivers.dynamixel.control_table import model_name
 from uam_sim_bridge.drivers.dynamixel.driver import NEEDED_LATENCY, ArmDriver
@@ -31,9 +30,8 @@ from uam_sim_bridge.drivers.dynamixel.startup import tried
 AS_DESCRIBED, OTHERWISE = 0, 1
 EXAMPLES = """\
 examples:
-  uam arm                                  the servos of the default file in config/hardware
-  uam arm --hardware my_lab.yaml           those of your file
-  uam arm --hardware my_lab.yaml --write-settings     write what differs
+  uam arm --config my_lab.yaml             the servos of your lab file
+  uam arm --config my_lab.yaml --write-settings       write what differs
   uam arm --device /dev/ttyUSB1 --scan     ids and models at every baud rate
   uam arm --budget                         time budget of the bus; no servos needed
 
@@ -48,11 +46,10 @@ def add(commands: argparse._SubParsersAction) -> None:
         "arm",
         run,
         "check the servos of the arm and the budget of their bus",
-        "Compare the Dynamixel servos on the bus with the hardware file, and print their state.",
+        "Compare the Dynamixel servos on the bus with the lab file, and print their state.",
         EXAMPLES,
     )
     command.arm_hardware()
-    command.vehicle()
     command.switch("--write-settings", "write operating mode, return delay and current limit")
     command.switch("--scan", "list ids and models at every baud rate, whatever is described")
     command.switch("--budget", "print the time budget of the bus; no servos needed")
@@ -61,7 +58,7 @@ def add(commands: argparse._SubParsersAction) -> None:
 def run(options: argparse.Namespace) -> int:
     """Run the command; return the exit status."""
     if options.scan:
-        return scan(described(options), options.answer_timeout)
+        return scan(described(options)[1], options.answer_timeout)
     driver = driver_of(options, write_settings=options.write_settings)
     if options.budget:
         if driver.latency_timer is None:
@@ -89,10 +86,12 @@ def run(options: argparse.Namespace) -> int:
     return AS_DESCRIBED
 
 
-def described(options: argparse.Namespace) -> ArmChain:
-    """Return the chain of the options. Raises ArmError, ConfigurationError, VehicleError."""
-    chain = load_chain(hardware_file(options.hardware), load_description(options.vehicle))
-    return dataclasses.replace(chain, device=options.device) if options.device else chain
+def described(options: argparse.Namespace) -> tuple[VehicleDescription, ArmChain]:
+    """Return vehicle and chain of the lab file. Raises LabError, ConfigurationError."""
+    lab = read_lab(lab_path(options.config))
+    vehicle = lab_vehicle(lab)
+    chain, _ = lab_arm(lab, vehicle)
+    return vehicle, dataclasses.replace(chain, device=options.device) if options.device else chain
 
 
 def driver_of(
@@ -101,11 +100,11 @@ def driver_of(
     **parameters: object,
 ) -> ArmDriver:
     """Return the driver of the options, not started; clock: seconds; parameters: of the driver."""
-    vehicle = load_description(options.vehicle)
+    vehicle, chain = described(options)
     values = {"answer_timeout": options.answer_timeout} | parameters
     servos = vehicle.numbers["servos"]
     return ArmDriver(
-        described(options),
+        chain,
         ArmDriverParameters.from_mapping(values),
         servos["mode"],
         vehicle.control_period,

@@ -7,8 +7,10 @@ import math
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from uam_control.vehicle import load_description
+from uam_control.vehicle import DEFAULT_VEHICLE, VehicleDescription, load_description
 from uam_lab.cli.command import Command, number
+from uam_lab.vehicle.lab import LabError
+from uam_lab.vehicle.lab_file import lab_mocap, lab_path, lab_vehicle, read_lab
 from uam_sim_bridge.drivers.mocap.mocap_parameters import (
     LIBRARY,
     NATNET,
@@ -29,7 +31,8 @@ STEPS = {
 DEFAULTS = MocapParameters()
 EXAMPLES = """\
 examples:
-  uam calibrate-mocap --server 192.168.1.5 --body uam --out my_lab_mocap.yaml
+  uam calibrate-mocap --config my_lab.yaml --out my_lab_mocap.yaml
+  uam calibrate-mocap --server 192.168.1.5 --body uam        without a lab file
   uam calibrate-mocap --server 192.168.1.5 --up z            Motive set to Z up
   uam calibrate-mocap --server 192.168.1.5 --pivot 0.03 0    pivot 3 cm in front of base_link
   uam calibrate-mocap --server 192.168.1.7 --source motioncapture --system vicon --up z
@@ -38,8 +41,8 @@ examples:
 
 The command asks for two places: level on the floor, then again after a straight move nose first.
 It refuses measurements without sense (moved, tilted, turned, too short a way) and writes the file
-for the parameter `calibration` of mocap_driver. docs/mocap_hardware.md. Exit status: 0 written,
-2 refused.
+that the section `mocap` of the lab file names as its calibration. docs/mocap_hardware.md. Exit
+status: 0 written, 2 refused.
 """
 
 
@@ -54,20 +57,25 @@ def add(commands: argparse._SubParsersAction) -> None:
         "vehicle (FLU), guided, from two places on the floor.",
         EXAMPLES,
     )
-    command.option("--server", "HOST", "computer of the system", DEFAULTS.server)
-    command.option("--body", "NAME", "rigid body of the vehicle", DEFAULTS.body)
-    command.choice("--source", (NATNET, LIBRARY), NATNET, "as the parameter of mocap_driver")
-    command.choice("--system", SYSTEMS, DEFAULTS.system, f"with --source {LIBRARY}")
-    text = "command port of Motive"
-    command.option("--port", "N", text, DEFAULTS.command_port, type=int)
-    command.option("--local", "ADDRESS", "own address in its network (default: as routed)", "")
+    command.config()
+    for flag, metavar, name, text, how in (
+        ("--server", "HOST", "server", "computer of the system", {}),
+        ("--body", "NAME", "body", "rigid body of the vehicle", {}),
+        ("--source", None, "source", "as of mocap_driver", {"choices": (NATNET, LIBRARY)}),
+        ("--system", None, "system", f"with --source {LIBRARY}", {"choices": SYSTEMS}),
+        ("--port", "N", "command_port", "command port of Motive", {"type": int}),
+        ("--local", "ADDRESS", "local", "own address in its network", {}),
+    ):
+        shown = getattr(DEFAULTS, name) or "as routed"
+        text = f"{text} (default: the lab file's, {shown} without)"
+        command.option(flag, metavar or "|".join(how["choices"]), text, dest=name, **how)
     command.choice("--up", ("y", "z"), "y", "the system's axis that points up")
     text = "angle about up, from the system's axes to the world's"
     command.option("--heading", "DEG", text, 0.0, type=number("heading", "deg", -360.0, 360.0))
     text = "pivot of the rigid body from base_link, forward and left"
     place = number("distance", "m", -0.5, 0.5)
     command.option("--pivot", ("X", "Y"), text, [0.0, 0.0], type=place, nargs=2)
-    command.vehicle()
+    command.vehicle(None)
     text = "base_link above the floor (default: from the vehicle's model)"
     command.option("--height", "M", text, type=number("height", "m", 0.0, 2.0))
     text = "duration of a measurement"
@@ -82,7 +90,7 @@ def run(options: argparse.Namespace) -> int:
     from uam_sim_bridge.drivers.mocap import calibration, measurement
     from uam_sim_bridge.drivers.mocap.fit import fit
 
-    standing = options.height if options.height is not None else _standing(options.vehicle)
+    standing = options.height if options.height is not None else _standing(_vehicle(options))
     found = _recorded(options) if options.log else _measured(options)
     level, ahead = (measurement.still(poses, what) for what, poses in found.items())
     heading = math.radians(options.heading)
@@ -92,12 +100,19 @@ def run(options: argparse.Namespace) -> int:
     return 0
 
 
-def _standing(vehicle: str) -> float:
+def _vehicle(options: argparse.Namespace) -> VehicleDescription:
+    """Return the vehicle of --vehicle, of the lab file, or the default one."""
+    if options.vehicle is None and options.config:
+        return lab_vehicle(read_lab(lab_path(options.config)))
+    return load_description(options.vehicle or DEFAULT_VEHICLE)
+
+
+def _standing(vehicle: VehicleDescription) -> float:
     """Return the height [m] of base_link above the floor; raises VehicleError."""
     from uam_sim_bridge.plant import Vehicle
     from uam_sim_bridge.plant.frames import standing_height
 
-    return standing_height(Vehicle.of(load_description(vehicle)).compile(0.0))
+    return standing_height(Vehicle.of(vehicle).compile(0.0))
 
 
 def _recorded(options: argparse.Namespace) -> dict[str, list[TimedPose]]:
@@ -114,28 +129,33 @@ def _recorded(options: argparse.Namespace) -> dict[str, list[TimedPose]]:
     return {LEVEL: list(found[0]), AHEAD: list(found[-1])}
 
 
+def _parameters(options: argparse.Namespace) -> MocapParameters:
+    """Return those of the lab file, or the defaults, with the given options in their place."""
+    known: MocapParameters | None = DEFAULTS
+    if options.config:
+        known = lab_mocap(read_lab(lab_path(options.config)))
+        if known is None:
+            raise LabError(f"{options.config}: mocap: topic: the poses are another driver's")
+    names = ("source", "system", "server", "command_port", "local", "body")
+    given = {name: getattr(options, name) for name in names}
+    changes = {name: value for name, value in given.items() if value is not None}
+    return MocapParameters.from_mapping(known.to_mapping() | changes)
+
+
 def _measured(options: argparse.Namespace) -> dict[str, list[TimedPose]]:
     """Guide through the two places and measure at each."""
     from uam_sim_bridge.drivers.mocap import live, measurement, raw_log
 
-    parameters = MocapParameters.from_mapping(
-        {
-            "source": options.source,
-            "system": options.system,
-            "server": options.server,
-            "command_port": options.port,
-            "local": options.local,
-            "body": options.body,
-        }
-    )
+    parameters = _parameters(options)
+    body = parameters.body
     source = open_source(parameters)
     found: dict[str, list[TimedPose]] = {}
     try:
-        live.until_known(source, options.body)
-        print(f"measures '{options.body}' of {source.description}")
+        live.until_known(source, body)
+        print(f"measures '{body}' of {source.description}")
         for what, step in STEPS.items():
             _confirm(step)
-            found[what] = live.measure(source, options.body, options.duration)
+            found[what] = live.measure(source, body, options.duration)
             place = measurement.still(found[what], what)
             print(
                 f"   {place.count} poses, spread {1e3 * place.spread:.2f} mm, "
@@ -171,4 +191,4 @@ def _say(made: Calibration, options: argparse.Namespace) -> None:
         f"{made.pivot[2]:+.3f} m above base_link"
     )
     print(f"written  {options.out}")
-    print(f"use it   mocap_driver with calibration: {options.out}")
+    print(f"use it   in the lab file: mocap: {{calibration: {options.out}}}")

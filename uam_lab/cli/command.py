@@ -24,8 +24,10 @@ from uam_lab.results.result_folder import ResultFolderError
 from uam_lab.results.timeseries import UnreadableFlight
 from uam_lab.study.description import StudyError
 from uam_lab.tuning.space import TuningError
+from uam_lab.vehicle.lab import LabError
+from uam_lab.vehicle.lab_file import FOLDER, TEMPLATE
 from uam_msgs_py.node.namespace import normal
-from uam_sim_bridge.drivers.dynamixel.chain import DEFAULT_HARDWARE, ArmError
+from uam_sim_bridge.drivers.dynamixel.chain import ArmError
 from uam_sim_bridge.drivers.mocap.frame import MocapError
 from uam_sim_bridge.faults import FaultError
 from uam_sim_bridge.plant.effects import presets
@@ -41,7 +43,7 @@ USER_ERRORS = (
     *(ConfigurationError, ProfileError, ScenarioError, VehicleError, SettingsError, PortError),
     *(Px4Error, FaultError, PlantError, TuningError, TrialFailed, VariationError),
     *(ResultFolderError, UnreadableFlight, UnreadableLog, StudyError),
-    *(ArmError, MocapError, ParameterError),
+    *(ArmError, MocapError, ParameterError, LabError),
 )
 
 
@@ -90,18 +92,24 @@ class Command:
         """Add an option whose value is one of `choices`."""
         self.option(flag, "|".join(choices), text, default, choices=choices)
 
-    def vehicle(self) -> None:
-        """Add --vehicle."""
+    def vehicle(self, default: str | None = DEFAULT_VEHICLE) -> None:
+        """Add --vehicle; default None: the lab file's."""
         vehicles = ", ".join(configuration.names("vehicle", (".yaml",)))
         text = f"{vehicles}, or the description of one: docs/your_vehicle.md"
-        self.option("--vehicle", "NAME|FILE", text, DEFAULT_VEHICLE)
+        if default is None:
+            text += f" (default: the lab file's, {DEFAULT_VEHICLE} without)"
+        self.option("--vehicle", "NAME|FILE", text, default)
+
+    def config(self, default: str | None = None) -> None:
+        """Add --config, the lab file."""
+        files = ", ".join(configuration.names(FOLDER, (".yaml",)))
+        text = f"lab file: {files}, or a file of yours, from uam vehicle --example"
+        self.option("--config", "NAME|FILE", text, default)
 
     def arm_hardware(self) -> None:
-        """Add --hardware, --device and --answer-timeout, of an arm."""
-        files = ", ".join(configuration.names("hardware", (".yaml",)))
-        text = f"{files}, or a file: docs/arm_hardware.md"
-        self.option("--hardware", "NAME|FILE", text, DEFAULT_HARDWARE)
-        self.option("--device", "PATH", "serial device in place of the hardware file's", "")
+        """Add --config, --device and --answer-timeout, of an arm."""
+        self.config(TEMPLATE)
+        self.option("--device", "PATH", "serial device in place of the lab file's", "")
         text = "longest wait for an answer of a servo"
         wait = number("time", "s", 0.0005, 5.0)
         self.option("--answer-timeout", "S", text, 0.05, type=wait)

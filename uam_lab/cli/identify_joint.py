@@ -9,8 +9,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from uam_control.vehicle import load_description
-from uam_lab.cli.arm import driver_of
+from uam_lab.cli.arm import described, driver_of
 from uam_lab.cli.command import Command, number
 from uam_sim_bridge.drivers.dynamixel.chain import ArmError
 from uam_sim_bridge.drivers.dynamixel.excitation import ExcitationParameters
@@ -21,13 +20,13 @@ GRID = 181  # angles at which the weight is computed
 CLOCK = time.monotonic  # [s]
 EXAMPLES = """\
 examples:
-  uam identify-joint alpha_2 --hardware my_lab.yaml --load 0.2
-  uam identify-joint alpha_1 --hardware my_lab.yaml --centre 30 --amplitude 30
+  uam identify-joint alpha_2 --config my_lab.yaml --load 0.2
+  uam identify-joint alpha_1 --config my_lab.yaml --centre 30 --amplitude 30
   uam identify-joint alpha_2 --duration 40 --yes      without the question
 
 Propellers off, vehicle level and fixed, hands away: the joint moves. A load at the magnet makes
 the torque constant visible (its weight is the reference). Results in --out: identification.yaml
-(to paste into the hardware file), friction.png, samples.csv. Ctrl-C ends it with torque off.
+(to paste into the lab file), friction.png, samples.csv. Ctrl-C ends it with torque off.
 Exit status: 0 identified, 1 aborted or not identifiable, 2 wrong use or no device.
 """
 
@@ -45,7 +44,6 @@ def add(commands: argparse._SubParsersAction) -> None:
     )
     command.option("joint", "JOINT", "name of the joint, as alpha_2")
     command.arm_hardware()
-    command.vehicle()
     specs, default = ExcitationParameters.specs(), ExcitationParameters()
     for flag, metavar, name in (
         ("--amplitude", "DEG", "amplitude_deg"),
@@ -142,7 +140,7 @@ def weight_of(
     """
     from uam_control.vehicle.arm_model import ArmModel
 
-    vehicle = load_description(options.vehicle)
+    vehicle, _ = described(options)
     model, limits = ArmModel.of(vehicle), vehicle.joints[joint]
     grid = np.linspace(limits.low, limits.high, GRID)
     poses = np.repeat(angles[None], GRID, axis=0)
@@ -171,7 +169,7 @@ def pacing(rate: float) -> Callable[[], float]:
 
 
 def pasted(joint: str, scale: float, fit: FrictionFit) -> str:
-    """Return the result as YAML for the hardware file; scale: of the file until now."""
+    """Return the result as YAML for the lab file; scale: of the file until now."""
     known = f"+- {scale * fit.scale_deviation:.3f}" if fit.scale_known else "not identified"
     coulomb, viscous = max(0.0, fit.coulomb), max(0.0, fit.viscous)
     return (

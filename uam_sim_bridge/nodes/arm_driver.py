@@ -52,9 +52,12 @@ class ArmDriverNode(UamNode):
         self._thread: threading.Thread | None = None
         vehicle = described_vehicle(self)
         self._names = list(vehicle.joint_names)
-        about = Text("devices of the vehicle", "name of a file in config/hardware, or a file")
+        about = Text(
+            "devices of the vehicle",
+            "lab file with the section arm: name of a file in config/lab, or a file",
+        )
         hardware = declared_text(self, "hardware", DEFAULT_HARDWARE, about)
-        about = Text("serial device in place of the hardware file's", "a path; empty: the file's")
+        about = Text("serial device in place of the lab file's", "a path; empty: the file's")
         device = declared_text(self, "device", "", about)
         parameters = NodeParameters(self, ArmDriverParameters, read_only=True).current
         refuse_unknown(self)  # before the bus, which may be absent
@@ -191,7 +194,7 @@ class ArmDriverNode(UamNode):
 
 
 def _described_chain(hardware: str, device: str, vehicle: VehicleDescription) -> ArmChain:
-    """Return the chain of a hardware file, on its own or another device.
+    """Return the chain of a lab file, on its own or another device.
 
     Raises ParameterError, ArmError.
     """

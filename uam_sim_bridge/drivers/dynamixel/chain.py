@@ -1,4 +1,4 @@
-"""The chain of servos as described: section `arm` of a hardware file and the vehicle's joints."""
+"""The chain of servos as described: section `arm` of a lab file and the vehicle's joints."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from pathlib import Path
 
 from uam_control.settings import configuration
 from uam_control.settings.section import Section, read_section
-from uam_control.vehicle import DEFAULT_VEHICLE, Joint, VehicleDescription
+from uam_control.vehicle import Joint, VehicleDescription
 from uam_sim_bridge.drivers.dynamixel import control_table as names
 from uam_sim_bridge.drivers.dynamixel.control_table import (
     ControlTable,
@@ -16,7 +16,12 @@ from uam_sim_bridge.drivers.dynamixel.control_table import (
     control_table,
 )
 
-DEFAULT_HARDWARE = DEFAULT_VEHICLE  # config/hardware has a file of its name
+DEFAULT_HARDWARE = "s500_lab"  # in config/lab
+CHAIN = ("device", "baud_rate", "return_delay_us", "servos")
+SERVO = (
+    *("joint", "id", "model", "direction", "zero", "gear", "current_limit", "torque_scale"),
+    *("coulomb", "viscous", "range_deg", "torque_per_current", "current_unit"),
+)
 LAST_ID = 252
 # of the SDK's PortHandler and of the register Baud Rate
 SPEEDS = (9600, 57600, 115200, 1000000, 2000000, 3000000, 4000000)
@@ -124,18 +129,35 @@ class ArmChain:
 
 
 def hardware_file(name_or_file: str) -> Path:
-    """Return the file of config/hardware, or the file. Raises ConfigurationError."""
-    return configuration.named("hardware", name_or_file, suffixes=(".yaml",))
+    """Return the file of config/lab, or the file. Raises ConfigurationError."""
+    return configuration.named("lab", name_or_file, suffixes=(".yaml",))
+
+
+def chain_file(file: Path) -> Path:
+    """Return the file with the section `arm` of a lab file: itself, or the one that it names.
+
+    Raises ArmError in one line.
+    """
+    top = read_section(file, ArmError)
+    named = top.entry("arm")
+    if not isinstance(named, str):
+        return file
+    beside = file.parent / Path(named).expanduser()
+    try:
+        return beside if beside.is_file() else hardware_file(named)
+    except configuration.ConfigurationError as error:
+        raise top.error("arm", str(error)) from None
 
 
 def load_chain(file: Path, vehicle: VehicleDescription) -> ArmChain:
-    """Return the chain of the section `arm` of a hardware file. Raises ArmError in one line."""
-    return describe_chain(read_section(file, ArmError), vehicle)
+    """Return the chain that a lab file describes. Raises ArmError."""
+    return describe_chain(read_section(chain_file(file), ArmError), vehicle)
 
 
 def describe_chain(top: Section, vehicle: VehicleDescription) -> ArmChain:
     """Return the checked chain in the section `arm` of `top`. Raises ArmError."""
     arm = top.section("arm")
+    arm.only(CHAIN)
     entries = {entry.text("joint"): entry for entry in arm.entries("servos")}
     joints = vehicle.joint_names
     if sorted(entries) != sorted(joints) or len(arm.entries("servos")) != len(joints):
@@ -155,6 +177,7 @@ def describe_chain(top: Section, vehicle: VehicleDescription) -> ArmChain:
 
 
 def _servo(entry: Section, joint: Joint, vehicle: VehicleDescription) -> ServoDescription:
+    entry.only(SERVO)
     try:
         table = control_table(entry.text("model"))
         for name in (names.GOAL_CURRENT, names.PRESENT_CURRENT, names.BUS_WATCHDOG):

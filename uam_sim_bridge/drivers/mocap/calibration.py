@@ -91,9 +91,7 @@ def load(name_or_file: str) -> Calibration:
     """Read a calibration of config/mocap or of a file; raises MocapError, ConfigurationError."""
     file = configuration.named(FOLDER, name_or_file)
     section = read_section(file, MocapError)
-    for name in section.values:
-        if name not in ENTRIES:
-            raise section.error(name, f"unknown; allowed: {', '.join(sorted(ENTRIES))}")
+    section.only(sorted(ENTRIES))
     up = section.text("up")
     if up not in UPRIGHT:
         raise section.error("up", f"'{up}' is not one of {', '.join(UPRIGHT)}")

@@ -1,0 +1,175 @@
+"""The lab file: what it describes, and every mistake named in one line."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import pytest
+import yaml
+from hypothesis import given
+from hypothesis import strategies as st
+
+from uam_control.settings import configuration
+from uam_lab.vehicle.lab import LabError, Room
+from uam_lab.vehicle.lab_file import REQUIRED, load_lab, template
+from uam_lab.vehicle.lab_settings import settings_of
+from uam_sim_bridge.drivers.magnet.magnet_driver import LineParameters
+from uam_sim_bridge.drivers.magnet.switching import SwitchingParameters
+from uam_sim_bridge.drivers.mocap.mocap_parameters import MocapParameters
+
+MISSING = object()
+GRIPPER = {"through": "autopilot", "magnet": "gripper", "magnet_output": 2}
+
+
+def written(folder: Path, **changes: Any) -> Path:
+    """A copy of the template; changes: section__entry=value, MISSING removes the entry."""
+    document = yaml.safe_load(template())
+    for name, value in changes.items():
+        where, (*sections, key) = document, name.split("__")
+        for section in sections:
+            where = where[section]
+        where.pop(key) if value is MISSING else where.update({key: value})
+    file = folder / "my_lab.yaml"
+    file.write_text(yaml.safe_dump(document))
+    return file
+
+
+def refusal(file: Path) -> str:
+    """The text of the refusal: one line that names the file."""
+    with pytest.raises(LabError) as refused:
+        load_lab(file)
+    text = str(refused.value)
+    assert "\n" not in text and "my_lab.yaml" in text
+    return text
+
+
+def test_the_template_is_a_lab_with_the_defaults_of_the_drivers():
+    lab = load_lab("s500_lab")
+    assert lab.vehicle.name == "s500_arm" and lab.arm.joint_names == lab.vehicle.joint_names
+    assert lab.room == Room((-2.0, -2.0, -0.1), (2.0, 2.0, 2.5))
+    assert lab.mocap == replace(MocapParameters(), server="192.168.1.5")
+    assert (lab.magnet.line, lab.magnet.switching) == (LineParameters(), SwitchingParameters())
+    assert lab.arm_file == lab.file and lab.nodes == {} and lab.imu == "autopilot"
+
+
+def test_the_template_shows_every_entry():
+    """Whoever copies it sees what there is."""
+    document = yaml.safe_load(template())
+    assert set(document["mocap"]) == set(MocapParameters.specs())
+    shown = set(LineParameters.specs()) | set(SwitchingParameters.specs()) | {"through"}
+    assert set(document["magnet"]) == shown
+
+
+def test_the_room_is_the_supervisors_geofence_and_nothing_starts_by_itself(tmp_path):
+    lab = load_lab(written(tmp_path, room__x=[-1.5, 3.0], nodes={"mission": {"battery_land": 0.3}}))
+    flown = settings_of(lab)
+    mission = flown.profile.sets["mission"]
+    assert (mission.geofence_low, mission.geofence_high) == ((-1.5, -2.0, -0.1), (3.0, 2.0, 2.5))
+    assert mission.battery_land == 0.3
+    assert not flown.auto_start and flown.clock == "realtime" and flown.imu == "autopilot"
+
+
+def test_an_autopilot_of_this_computer_does_not_start_by_itself_either(tmp_path):
+    assert not settings_of(load_lab(written(tmp_path, autopilot="udp:127.0.0.1:14580"))).auto_start
+
+
+@pytest.mark.parametrize("section", REQUIRED)
+def test_a_missing_section_is_named_with_the_required_ones(tmp_path, section):
+    text = refusal(written(tmp_path, **{section: MISSING}))
+    assert f"{section}: missing; required are: {', '.join(REQUIRED)}" in text
+
+
+@pytest.mark.parametrize(
+    ("changes", "said"),
+    [
+        ({"wind": 3}, "wind: unknown; allowed: vehicle, scenario,"),
+        ({"vehicle": "glider"}, "vehicle: unknown vehicle 'glider'; there are: hexa_arm"),
+        ({"scenario": "dance"}, "dance"),
+        ({"profile": ["fast"]}, "profile: no profiles/fast.yaml in the configuration"),
+        ({"profile": [3]}, "profile: a name, a file, or a list of them expected, got [3]"),
+        ({"profile": "px4_position_servos"}, "px4_position_servos"),
+        ({"autopilot": "builtin"}, "autopilot: 'builtin' is no link; allowed: udp:HOST:PORT"),
+        ({"autopilot": "serial:/dev/ttyS0"}, "autopilot: "),
+        ({"imu": "both"}, "imu: 'both' is not one of autopilot, topic"),
+        ({"room__x": [2.0, -2.0]}, "room.x: 2 is not below -2: [smallest, largest] expected"),
+        ({"room__z": [0.0]}, "room.z: a list of 2 numbers expected"),
+        ({"room__h": 2.0}, "room.h: unknown; allowed: x, y, z"),
+        ({"room__z": [-0.1, 0.8]}, "scenario hover: z 1 m exceeds 0.8 m"),
+        ({"mocap__bodi": "uam"}, "mocap: bodi: unknown; allowed: source, system,"),
+        ({"mocap__calibration": "none.yaml"}, "mocap: mocap file none.yaml does not exist"),
+        ({"mocap__command_port": 0}, "mocap: command_port: 0 is outside 1 to 65535"),
+        ({"arm__serial": "/dev/x"}, "arm.serial: unknown; allowed: device, baud_rate"),
+        ({"arm": "no_arm"}, "unknown lab 'no_arm'"),
+        ({"arm": {}}, "arm: a mapping expected"),
+        ({"magnet__through": "wifi"}, "magnet.through: 'wifi' is not one of gpio, autopilot, none"),
+        ({"magnet": {"through": "none", "line": 3}}, "magnet.line: unknown; allowed: through"),
+        ({"magnet": {"through": "autopilot"}}, "magnet.magnet: actuator or gripper expected"),
+        ({"magnet__line": 2.5}, "magnet: line: 2.5 is no integer; allowed: 0 to 1023"),
+        ({"cockpit__port": 99999}, "cockpit.port: 99999 is not a whole number from 0 to 65535"),
+        ({"cockpit__host": "x"}, "cockpit.host: unknown; allowed: address, port"),
+        ({"nodes": {"mujoco_sim": {"seed": 3}}}, "nodes.mujoco_sim: unknown; allowed: position_"),
+        ({"nodes": {"mission": {"geofence_low": [0, 0, 0]}}}, "follows from the section room"),
+        ({"nodes": {"mission": {"batery": 1.0}}}, "mission: batery: unknown"),
+        ({"nodes": {"mavlink_bridge": {"gcs": ""}}}, "gcs follows from the other options"),
+        ({"nodes": {"arm_driver": {"rate": -1.0}}}, "nodes.arm_driver: rate: -1.0 is outside"),
+        ({"nodes": [1]}, "nodes: node: {name: value} expected, got [1]"),
+    ],
+)
+def test_a_mistake_is_refused_in_one_line(tmp_path, changes, said):
+    assert said in refusal(written(tmp_path, **changes))
+
+
+def test_a_joint_that_the_vehicle_has_not_is_refused(tmp_path):
+    servos = yaml.safe_load(template())["arm"]["servos"]
+    servos[1]["joint"] = "elbow"
+    text = refusal(written(tmp_path, arm__servos=servos))
+    assert "arm.servos: joints alpha_1, elbow; the vehicle has alpha_1, alpha_2" in text
+
+
+def test_a_profile_that_drives_the_servos_otherwise_is_refused(tmp_path):
+    (tmp_path / "goals.yaml").write_text(
+        "arm_controller: {ros__parameters: {setpoint: position}}\n"
+    )
+    text = refusal(written(tmp_path, profile=["s500", "goals.yaml"]))
+    assert "drives the servos by position, the vehicle's are current" in text
+
+
+def test_files_beside_the_lab_file_are_found_from_everywhere(tmp_path):
+    nominal = configuration.path("mocap/motive_z_up.yaml").read_text()
+    (tmp_path / "measured.yaml").write_text(nominal)
+    arm = yaml.safe_load(template())["arm"] | {"device": "/dev/arm"}
+    (tmp_path / "arm.yaml").write_text(yaml.safe_dump({"arm": arm}))
+    file = written(tmp_path, mocap__calibration="measured.yaml", arm="arm.yaml")
+    lab = load_lab(file)
+    assert lab.mocap.calibration == str(tmp_path / "measured.yaml")
+    assert lab.arm.device == "/dev/arm" and lab.arm_file == tmp_path / "arm.yaml"
+
+
+def test_other_drivers_may_publish_the_poses_and_the_imu(tmp_path):
+    lab = load_lab(written(tmp_path, mocap="topic", imu="topic"))
+    assert lab.mocap is None and settings_of(lab).imu == "topic"
+
+
+def test_the_magnet_of_the_autopilot(tmp_path):
+    lab = load_lab(written(tmp_path, magnet=GRIPPER | {"magnet_at_exit": "hold"}))
+    assert (lab.magnet.output.magnet, lab.magnet.output.magnet_output) == ("gripper", 2)
+    assert lab.magnet.switching.magnet_at_exit == "hold"
+
+
+@given(
+    st.dictionaries(
+        st.sampled_from([*REQUIRED, "nodes", "out", "profile", "cockpit"]),
+        st.none() | st.booleans() | st.floats() | st.text(max_size=5) | st.lists(st.integers()),
+        min_size=1,
+        max_size=3,
+    )
+)
+def test_nonsense_is_refused_in_one_line_or_read(tmp_path_factory, changes):
+    file = tmp_path_factory.mktemp("lab") / "my_lab.yaml"
+    file.write_text(yaml.safe_dump(yaml.safe_load(template()) | changes))
+    try:
+        load_lab(file)
+    except LabError as error:
+        assert "\n" not in str(error)
