@@ -14,6 +14,7 @@ from std_msgs.msg import Bool
 
 from uam_msgs_py.messages import topics
 from uam_msgs_py.messages.convert import read_imu
+from uam_msgs_py.messages.parameter_comparison import ParameterComparison
 from uam_msgs_py.messages.serialized import Serialized, Template
 from uam_msgs_py.messages.status import AutopilotState, MissionStatus
 from uam_sim_bridge.mavlink.protocol.wire import mavlink2
@@ -38,6 +39,7 @@ def test_alone_it_waits_and_stops(start):
         (["-p", "autopilot:=serial:/dev/nothing:57600"], "No such file"),
         (["-p", "autopilot:=14550"], "autopilot: 14550 is no text"),
         (["-p", "autopilot:=udp:127.0.0.1:9", "-p", "gcs:=tcp:localhost:5760"], "udp:HOST:PORT"),
+        (["-p", "required_parameters:=boat"], "no px4/boat.yaml"),
         (["-p", "signing_key:=no/such/file"], "signing key: not 64 hex digits"),
     ],
 )
@@ -120,6 +122,29 @@ def test_mapping_parameters_of_the_autopilot_are_compared(make_rig):
     for _ in range(100):
         rig.tick()
     rig.node.until_logged("MC_ROLLRATE_P is 0.3 on the autopilot, the bridge assumes 0.15")
+
+
+def test_required_parameters_are_compared_and_reported(make_rig, probe, tmp_path):
+    rules = tmp_path / "mine.yaml"
+    rules.write_text(
+        "needed:\n  COM_LOW_BAT_ACT: {one_of: [2, 3], why: the battery}\n"
+        "  COM_OF_LOSS_T: {least: 0.5, most: 1.0, why: the stream}\n"
+    )
+    rig = make_rig("-p", f"required_parameters:={rules}")
+
+    def reported():
+        rig.tick()
+        found = ParameterComparison.from_message(rig.states[-1]) if rig.states else None
+        return found is not None and found.complete
+
+    probe.until(reported, "a complete comparison")
+    found = ParameterComparison.from_message(rig.states[-1])
+    assert [(one.name, one.found, one.required) for one in found.differences] == [
+        ("COM_LOW_BAT_ACT", 0.0, "2 or 3")
+    ]
+    assert found.read == found.required == 2 and not found.passed
+    assert "PARAM_SET" not in rig.kinds()
+    rig.node.until_logged("COM_LOW_BAT_ACT is 0, 2 or 3 required: the battery")
 
 
 def test_the_thrust_factor_is_identified_published_and_constant_while_the_magnet_is_on(

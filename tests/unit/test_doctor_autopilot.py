@@ -1,6 +1,7 @@
 """uam doctor: the autopilot at a MAVLink link, simulated with real sockets."""
 
 import socket
+import struct
 import threading
 
 import pytest
@@ -8,7 +9,8 @@ import pytest
 from uam_lab.doctor import autopilot
 from uam_lab.doctor.finding import Verdict
 from uam_sim_bridge.mavlink.protocol.modes import Mode
-from uam_sim_bridge.mavlink.protocol.wire import Codec, Framer, mavlink2
+from uam_sim_bridge.mavlink.protocol.wire import Codec, Framer, clean_text, mavlink2
+from uam_sim_bridge.mavlink.telemetry.required_parameters import VEHICLE, RequiredParameters
 from uam_sim_bridge.px4.px4_installation import VARIABLE
 
 OK, WARN, FAIL = Verdict
@@ -62,6 +64,11 @@ def stand_in():
         one.close()
 
 
+def first(findings):
+    """Return the first finding, that about the autopilot itself."""
+    return next(iter(findings))
+
+
 def heartbeat(kind=mavlink2.MAV_AUTOPILOT_PX4, base_mode=1, mode=Mode.HOLD):
     return mavlink2.MAVLink_heartbeat_message(
         mavlink2.MAV_TYPE_QUADROTOR, kind, base_mode, mode.custom_mode, 4, 3
@@ -81,7 +88,7 @@ def px4(message):
 
 
 def test_an_autopilot_is_named_with_system_type_mode_and_firmware(stand_in):
-    found = autopilot.link(stand_in(px4).url, PATIENCE)
+    found = first(autopilot.link(stand_in(px4).url, PATIENCE))
     assert found.verdict is OK
     for word in ("system 3", "px4", "quadrotor", "mode HOLD", "disarmed", "firmware 1.16.2"):
         assert word in found.found
@@ -91,30 +98,30 @@ def test_without_a_version_the_rest_is_said(stand_in):
     def answer(message):
         return [heartbeat(base_mode=129)] if message.get_type() == "HEARTBEAT" else []
 
-    found = autopilot.link(stand_in(answer).url, PATIENCE)
+    found = first(autopilot.link(stand_in(answer).url, PATIENCE))
     assert found.verdict is WARN and "firmware version not sent" in found.found
     assert "ARMED" in found.found
 
 
 def test_another_autopilot_is_a_warning(stand_in):
     ardupilot = heartbeat(kind=mavlink2.MAV_AUTOPILOT_ARDUPILOTMEGA)
-    found = autopilot.link(stand_in(lambda _: [ardupilot]).url, PATIENCE)
+    found = first(autopilot.link(stand_in(lambda _: [ardupilot]).url, PATIENCE))
     assert found.verdict is WARN and "ardupilotmega" in found.found
 
 
 def test_silence_other_messages_and_noise_are_distinguished(stand_in):
-    found = autopilot.link(stand_in(lambda _: []).url, 0.3)
+    found = first(autopilot.link(stand_in(lambda _: []).url, 0.3))
     assert found.verdict is FAIL and "nothing within 0.3 s" in found.found
     text = mavlink2.MAVLink_statustext_message(6, b"camera")
-    found = autopilot.link(stand_in(lambda _: [text]).url, 2.0)
+    found = first(autopilot.link(stand_in(lambda _: [text]).url, 2.0))
     assert found.verdict is FAIL and "STATUSTEXT" in found.found
-    found = autopilot.link(stand_in(lambda _: [], raw=b"login: ").url, 2.0)
+    found = first(autopilot.link(stand_in(lambda _: [], raw=b"login: ").url, 2.0))
     assert found.verdict is FAIL and "bytes, but no MAVLink" in found.found
     assert "baud" in found.advice
 
 
 def test_a_link_that_cannot_be_opened_fails():
-    found = autopilot.link("serial:/dev/no-such-device:57600")
+    found = first(autopilot.link("serial:/dev/no-such-device:57600"))
     assert found.verdict is FAIL and "no-such-device" in found.found
 
 
@@ -142,3 +149,40 @@ def test_px4_in_software_is_there_or_not(tmp_path, monkeypatch):
     (tmp_path / "etc" / "init.d-posix" / "rcS").touch()
     found = autopilot.px4()
     assert found.verdict is OK and str(tmp_path) in found.found
+
+
+PARAMETERS = {
+    "CBRK_SUPPLY_CHK": (894281, mavlink2.MAV_PARAM_TYPE_INT32),
+    "COM_LOW_BAT_ACT": (3, mavlink2.MAV_PARAM_TYPE_INT32),
+    "COM_OF_LOSS_T": (0.5, mavlink2.MAV_PARAM_TYPE_REAL32),
+}
+
+
+def test_parameters_of_a_vehicle_are_compared(stand_in):
+    requested = []
+
+    def answer(message):
+        if message.get_type() != "PARAM_REQUEST_READ":
+            yield from px4(message)
+            return
+        name = clean_text(message.param_id)
+        requested.append(name)
+        if name in PARAMETERS and requested.count(name) > 1:  # the first answer is lost
+            value, kind = PARAMETERS[name]
+            if kind == mavlink2.MAV_PARAM_TYPE_INT32:
+                value = struct.unpack("<f", struct.pack("<i", value))[0]
+            yield mavlink2.MAVLink_param_value_message(name.encode(), value, kind, 900, 7)
+
+    found = list(autopilot.link(stand_in(answer).url, PATIENCE, 3.0))
+    rows = {finding.check: finding for finding in found[1:]}
+    assert list(rows) == list(RequiredParameters.read(VEHICLE))
+    assert rows["CBRK_SUPPLY_CHK"].verdict is WARN
+    assert rows["CBRK_SUPPLY_CHK"].found.startswith("894281, 0 required")
+    assert rows["COM_LOW_BAT_ACT"].verdict is OK and rows["COM_OF_LOSS_T"].verdict is OK
+    assert rows["SYS_HITL"].verdict is WARN and "not answered" in rows["SYS_HITL"].found
+
+
+def test_another_autopilots_parameters_are_not_read(stand_in):
+    ardupilot = heartbeat(kind=mavlink2.MAV_AUTOPILOT_ARDUPILOTMEGA)
+    found = list(autopilot.link(stand_in(lambda _: [ardupilot]).url, PATIENCE))
+    assert [finding.check for finding in found] == ["autopilot"]

@@ -31,7 +31,8 @@ def add(commands: argparse._SubParsersAction) -> None:
         "doctor",
         run,
         "check installation, ports, rendering and autopilot link, with advice",
-        "Check installation, ROS, ports, rendering, autopilot link and machine.",
+        "Check installation, ROS, ports, rendering, autopilot link and machine. With --autopilot,\n"
+        "compare a PX4's parameters with those that a vehicle needs (config/px4/vehicle.yaml).",
         EXAMPLES,
     )
     command.option("--autopilot", "URL", f"check an autopilot there: {ALLOWED}", "")
@@ -71,8 +72,8 @@ def _print(console: Console, finding: Finding) -> None:
     """Print one line with the finding and, if it is not OK, one line with advice."""
     line = Text.assemble(
         (f"  {finding.verdict.value:<5}", STYLES[finding.verdict]),
-        f"{finding.check:<14}{finding.found}",
+        f"{finding.check:<16} {finding.found}",
     )
     console.print(line, soft_wrap=True)
     if finding.advice:
-        console.print(Text(f"{'':21}→ {finding.advice}", style="dim"), soft_wrap=True)
+        console.print(Text(f"{'':24}→ {finding.advice}", style="dim"), soft_wrap=True)

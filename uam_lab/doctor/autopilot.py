@@ -7,9 +7,11 @@ import time
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 
+from uam_lab.doctor import vehicle_parameters
 from uam_lab.doctor.finding import Finding, fail, ok, warn
 from uam_sim_bridge.mavlink.protocol.modes import MavCmd, Mode
 from uam_sim_bridge.mavlink.protocol.wire import Codec, Framer, Message, mavlink2
+from uam_sim_bridge.mavlink.telemetry.required_parameters import VEHICLE, RequiredParameters
 from uam_sim_bridge.mavlink.transport.transport import Transport, open_transport
 from uam_sim_bridge.ports import PortError
 from uam_sim_bridge.px4.px4_installation import VARIABLE, Px4Error, Px4Installation
@@ -36,7 +38,7 @@ def checks(url: str = "") -> Iterator[Finding]:
     """Yield the findings about PX4 in software and, with `url`, about the autopilot there."""
     yield px4()
     if url:
-        yield link(url)
+        yield from link(url)
 
 
 def px4(directory: str | None = None) -> Finding:
@@ -52,24 +54,41 @@ def px4(directory: str | None = None) -> Finding:
         )
 
 
-def link(url: str, patience: float = PATIENCE) -> Finding:
-    """Check for an autopilot at `url`, for at most `patience` [s]."""
+def link(
+    url: str, patience: float = PATIENCE, parameters: float = vehicle_parameters.PATIENCE
+) -> Iterator[Finding]:
+    """Check for an autopilot at `url`, for at most `patience` [s], and yield the finding.
+
+    If it is a PX4, yield one finding per parameter that a vehicle needs; parameters [s]: without a
+    further answer.
+    """
     try:
         transport = open_transport(url)
     except PortError as error:
-        return fail("autopilot", str(error), "give another URL, or end the program that uses it")
+        yield fail("autopilot", str(error), "give another URL, or end the program that uses it")
+        return
     try:
         heard = listen(transport, patience)
+        if heard.heartbeat is None:
+            yield _silent(url, heard, patience)
+            return
+        yield describe(url, heard)
+        if heard.heartbeat.autopilot == mavlink2.MAV_AUTOPILOT_PX4:
+            rules = RequiredParameters.read(VEHICLE)
+            names = list(rules)
+            values = vehicle_parameters.read(transport, _codec(), heard.system, names, parameters)
+            yield from vehicle_parameters.findings(values, rules)
     finally:
         transport.close()
-    if heard.heartbeat is None:
-        return _silent(url, heard, patience)
-    return describe(url, heard)
+
+
+def _codec() -> Codec:
+    return Codec(OWN_SYSTEM, mavlink2.MAV_COMP_ID_ONBOARD_COMPUTER)
 
 
 def listen(transport: Transport, patience: float) -> Heard:
     """Send heartbeats, wait for the heartbeat of an autopilot, then request its version."""
-    codec = Codec(OWN_SYSTEM, mavlink2.MAV_COMP_ID_ONBOARD_COMPUTER)
+    codec = _codec()
     framer, heard = Framer(codec), Heard()
     end, beat = time.monotonic() + patience, 0.0
     while (now := time.monotonic()) < end and heard.version is None:

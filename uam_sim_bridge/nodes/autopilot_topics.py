@@ -7,10 +7,12 @@ import math
 from sensor_msgs.msg import BatteryState
 
 from uam_msgs_py.messages import topics
+from uam_msgs_py.messages.parameter_comparison import ParameterComparison, ParameterDifference
 from uam_msgs_py.messages.ros_time import set_stamp
 from uam_msgs_py.messages.status import AutopilotState
 from uam_msgs_py.node.base_node import UamNode
 from uam_sim_bridge.mavlink.link.link import OffboardLink
+from uam_sim_bridge.mavlink.telemetry.parameter_check import ParameterWatch
 from uam_sim_bridge.mavlink.telemetry.vitals import Battery
 from uam_sim_bridge.stages.autopilot_report import AutopilotReport
 
@@ -53,7 +55,10 @@ class AutopilotTopics:
             report.mode.lands,
             report.loop_delay,
         )
-        self._state.publish(state.to_message(stamp))
+        message = state.to_message(stamp)
+        if self._link.parameters.required:
+            message.status = [*message.status, comparison(self._link.parameters).to_status()]
+        self._state.publish(message)
 
     def _publish_battery(self, stamp: int) -> None:
         battery = self._link.vitals.battery
@@ -67,6 +72,16 @@ class AutopilotTopics:
             if warning not in self._warned:
                 self._logger.warning(warning)
         self._warned = warnings
+
+
+def comparison(watch: ParameterWatch) -> ParameterComparison:
+    """Return the comparison of the autopilot's parameters with the required ones."""
+    return ParameterComparison(
+        sum(name in watch.values for name in watch.required),
+        len(watch.required),
+        watch.complete,
+        tuple(ParameterDifference(*difference) for difference in watch.differences),
+    )
 
 
 def battery_message(stamp: int, battery: Battery) -> BatteryState:

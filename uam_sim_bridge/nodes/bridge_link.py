@@ -14,10 +14,16 @@ from uam_sim_bridge.mavlink.offboard.sequence import OffboardSequence
 from uam_sim_bridge.mavlink.offboard.setpoint import RateThrustParameters
 from uam_sim_bridge.mavlink.protocol.signing import Signing
 from uam_sim_bridge.mavlink.protocol.wire import Codec, mavlink2
+from uam_sim_bridge.mavlink.telemetry.required_parameters import VEHICLE, RequiredParameters
 from uam_sim_bridge.mavlink.transport.faulty_transport import FaultyTransport
 from uam_sim_bridge.mavlink.transport.forwarding import GroundStation
 from uam_sim_bridge.mavlink.transport.late_transport import LateTransport
-from uam_sim_bridge.mavlink.transport.transport import Transport, UdpTransport, open_transport
+from uam_sim_bridge.mavlink.transport.transport import (
+    Transport,
+    UdpTransport,
+    open_transport,
+    parse_url,
+)
 from uam_sim_bridge.plant.effects.network_delay import SetpointDelay
 
 
@@ -60,6 +66,9 @@ class BridgeParameters(ParameterSet):
     stale_after: float = number(
         0.1, "time without a command after which commands count as lost", "s", 0.01, 5.0
     )
+
+
+AUTO, NONE = "auto", "none"  # values of required_parameters
 
 
 @dataclass(frozen=True)
@@ -111,6 +120,19 @@ def open_links(
         secret=True,
     )
     signing = Signing.from_text(key, options.signing_link_id)
+    required = _required(
+        declared_text(
+            node,
+            "required_parameters",
+            AUTO,
+            Text(
+                "parameters of the autopilot to compare and report; none is written",
+                f"a list of config/px4, as {VEHICLE}, or a YAML file; {NONE}; {AUTO}: {VEHICLE} on "
+                f"a serial line or for another host, else {NONE}",
+            ),
+        ),
+        url,
+    )
     planned = declared_text(
         node,
         "faults",
@@ -144,5 +166,13 @@ def open_links(
     if watching:
         codec = Codec(system, mavlink2.MAV_COMP_ID_ONBOARD_COMPUTER, signing)
         transport = station = GroundStation(watching, transport, codec)
-    link = OffboardLink(transport, sequence, mapping, system, signing, imu_rate, clock)
+    link = OffboardLink(transport, sequence, mapping, system, signing, imu_rate, clock, required)
     return Links(link, station, faulty, late)
+
+
+def _required(given: str, url: str) -> RequiredParameters | None:
+    """Return the required parameters that the bridge's parameter names, None for none."""
+    name = given
+    if given == AUTO:
+        name = VEHICLE if url and parse_url(url).real else NONE
+    return None if name == NONE else RequiredParameters.read(name)

@@ -29,6 +29,8 @@ from uam_sim_bridge.mavlink.telemetry.autopilot_imu import AutopilotImu
 from uam_sim_bridge.mavlink.telemetry.events import EventReader
 from uam_sim_bridge.mavlink.telemetry.link_statistics import LinkStatistics
 from uam_sim_bridge.mavlink.telemetry.parameter_check import ParameterWatch
+from uam_sim_bridge.mavlink.telemetry.parameter_reader import request as parameter_request
+from uam_sim_bridge.mavlink.telemetry.required_parameters import RequiredParameters
 from uam_sim_bridge.mavlink.telemetry.streams import StreamCheck
 from uam_sim_bridge.mavlink.telemetry.time_sync import RebootDetector, TimeSync, nanoseconds
 from uam_sim_bridge.mavlink.telemetry.vitals import Vitals
@@ -42,10 +44,11 @@ class OffboardLink:
     """State of the autopilot from its messages, and the messages to it.
 
     `armed`, `mode`, `intended`, `failsafe`, `landed`: latest report; `armed_since` [s] or None:
-    tick of the first report that it is armed; `values`: its parameters (of WATCHED) by name;
-    `ignored`: number of messages from other systems or for other receivers; `vitals`: battery,
-    estimator and sensors; `reboots`: number of restarts; `imu`: its IMU, if it is requested;
-    `magnet`: on one of its outputs, if the owner sets it.
+    tick of the first report that it is armed; `values`: its parameters (of WATCHED, and
+    required ones) by name; `parameters`: their comparison; `ignored`: number of messages from
+    other systems or for other receivers; `vitals`: battery, estimator and sensors; `reboots`:
+    number of restarts; `imu`: its IMU, if it is requested; `magnet`: on one of its outputs, if
+    the owner sets it.
     """
 
     def __init__(
@@ -57,9 +60,11 @@ class OffboardLink:
         signing: Signing | None = None,
         imu_rate: float = 0.0,
         clock: Callable[[], float] | None = None,
+        required: RequiredParameters | None = None,
     ) -> None:
         """imu_rate [Hz]: of the autopilot's IMU, 0: not requested; clock: the companion's [s], to
-        which stamps of that IMU are converted, None: the times of the ticks."""
+        which stamps of that IMU are converted, None: the times of the ticks; required: parameters
+        to compare."""
         self._clock = clock
         self.sequence = sequence
         self.mode, self.armed, self.landed = Mode.UNKNOWN, False, True
@@ -74,8 +79,8 @@ class OffboardLink:
         self.statistics = LinkStatistics()
         self._reboot = RebootDetector()
         self._events = EventReader()
-        self._parameters = ParameterWatch(mapping)
-        self.values = self._parameters.values
+        self.parameters = ParameterWatch(mapping, required)
+        self.values = self.parameters.values
         self._transport = transport
         self._target = target_system
         self._codec = Codec(target_system, mavlink2.MAV_COMP_ID_ONBOARD_COMPUTER, signing)
@@ -87,17 +92,17 @@ class OffboardLink:
 
     def set_mapping(self, mapping: RateThrustParameters) -> None:
         """Compare the autopilot's parameters with this mapping from now on."""
-        self._parameters.set_mapping(mapping)
+        self.parameters.set_mapping(mapping)
 
     @property
     def warnings(self) -> tuple[str, ...]:
         """Return one line per problem with the autopilot's parameters and streams."""
-        return self._parameters.warnings + self.streams.warnings
+        return self.parameters.warnings + self.streams.warnings
 
     @property
     def mapping_read(self) -> bool:
         """Return whether every parameter that the mapping assumes has been received."""
-        return self._parameters.mapping_read
+        return self.parameters.mapping_read
 
     @property
     def bad_bytes(self) -> int:
@@ -248,7 +253,7 @@ class OffboardLink:
             if event is not None:
                 self.sequence.text(*event)
         elif kind == "PARAM_VALUE":
-            self._parameters.take(m)
+            self.parameters.take(m)
         elif kind == "TIMESYNC" and m.tc1 == 0:
             now = nanoseconds(self._synchronised(time))
             self._send(mavlink2.MAVLink_timesync_message(now, m.ts1))
@@ -287,7 +292,7 @@ class OffboardLink:
             self.magnet.restart()
         self.streams.restart()
         self._pending.clear()
-        self._parameters.restart()
+        self.parameters.restart()
 
     def _take_state(self, time: float, mode: Mode, armed: bool) -> None:
         if armed and not self.armed:
@@ -338,9 +343,5 @@ class OffboardLink:
         stream = self.streams.request(time)
         if stream is not None:
             self._command(MavCmd.SET_MESSAGE_INTERVAL, *stream)
-        for name in self._parameters.due(time):
-            self._send(
-                mavlink2.MAVLink_param_request_read_message(
-                    self._target, mavlink2.MAV_COMP_ID_AUTOPILOT1, name.encode(), -1
-                )
-            )
+        for name in self.parameters.due(time):
+            self._send(parameter_request(name, self._target))

@@ -1,18 +1,15 @@
-"""Requests the autopilot's parameters, compares them with the bridge's mapping, or adopts them.
-
-PX4 sends an integer parameter as four bytes in the float field of PARAM_VALUE; param_type gives
-the type.
-"""
+"""Compares the autopilot's parameters with the bridge's mapping, or adopts them."""
 
 from __future__ import annotations
 
 import math
-import struct
 from collections.abc import Iterable, Iterator
 from dataclasses import replace
 
 from uam_sim_bridge.mavlink.offboard.setpoint import RateThrustParameters
-from uam_sim_bridge.mavlink.protocol.wire import Message, clean_text, mavlink2
+from uam_sim_bridge.mavlink.protocol.wire import Message
+from uam_sim_bridge.mavlink.telemetry.parameter_reader import ATTEMPTS, ParameterReader
+from uam_sim_bridge.mavlink.telemetry.required_parameters import Difference, RequiredParameters
 
 _AXES = ("ROLLRATE", "PITCHRATE", "YAWRATE")
 # parameters read from the autopilot; those that the mapping does not use are only recorded
@@ -21,21 +18,7 @@ WATCHED = (
     "THR_MDL_FAC", "MPC_THR_HOVER", "COM_OF_LOSS_T",
 )  # fmt: skip
 _TOLERANCE = 1e-4  # relative: MAVLink carries 32-bit numbers
-RETRY, ATTEMPTS = 0.5, 10  # s between requests, number of requests
 HICCUP = 0.5  # s, longest normal gap in the setpoint stream (busy computer or link)
-_INTEGERS = {
-    mavlink2.MAV_PARAM_TYPE_UINT8: "<Bxxx", mavlink2.MAV_PARAM_TYPE_INT8: "<bxxx",
-    mavlink2.MAV_PARAM_TYPE_UINT16: "<Hxx", mavlink2.MAV_PARAM_TYPE_INT16: "<hxx",
-    mavlink2.MAV_PARAM_TYPE_UINT32: "<I", mavlink2.MAV_PARAM_TYPE_INT32: "<i",
-}  # fmt: skip
-
-
-def value_of(message: Message) -> float:
-    """Return the value of a PARAM_VALUE, for float and integer parameters."""
-    layout = _INTEGERS.get(message.param_type)
-    if layout is None:
-        return message.param_value
-    return float(struct.unpack(layout, struct.pack("<f", message.param_value))[0])
 
 
 def expected(mapping: RateThrustParameters) -> dict[str, float]:
@@ -102,18 +85,24 @@ def unanswered(names: Iterable[str], attempts: int) -> Iterator[str]:
 
 
 class ParameterWatch:
-    """`values`: received parameters (of WATCHED) by name; `warnings`: one line per problem."""
+    """Reads the parameters of WATCHED and those required, and compares them.
 
-    def __init__(self, mapping: RateThrustParameters) -> None:
-        self.values: dict[str, float] = {}
+    `values`: received parameters by name; `warnings`: one line per problem.
+    """
+
+    def __init__(
+        self, mapping: RateThrustParameters, required: RequiredParameters | None = None
+    ) -> None:
         self.warnings: tuple[str, ...] = ()
+        self.required = RequiredParameters() if required is None else required
+        self._reader = ParameterReader((*WATCHED, *self.required))
+        self.values = self._reader.values
         self._mapping = mapping
-        self.restart()
+        self._compare()
 
     def restart(self) -> None:
         """Discard all values and request them again."""
-        self.values.clear()
-        self._requested, self._attempts = -math.inf, 0
+        self._reader.restart()
         self._compare()
 
     def set_mapping(self, mapping: RateThrustParameters) -> None:
@@ -126,37 +115,37 @@ class ParameterWatch:
         """Return whether every parameter that the mapping assumes has been received."""
         return all(name in self.values for name in expected(self._mapping))
 
+    @property
+    def complete(self) -> bool:
+        """Return whether nothing is waited for: all received, or ATTEMPTS requests in vain."""
+        return self._reader.complete
+
+    @property
+    def differences(self) -> tuple[Difference, ...]:
+        """Return the differences from the required parameters; unanswered ones once complete."""
+        return self.required.differences(self.values, unanswered=self.complete)
+
     def take(self, message: Message) -> None:
-        """Store the value of a PARAM_VALUE; parameters outside WATCHED are ignored."""
-        name = clean_text(message.param_id)
-        if name in WATCHED:
-            self.values[name] = value_of(message)
+        """Store the value of a PARAM_VALUE; other parameters are ignored."""
+        if self._reader.take(message):
             self._compare()
 
     def due(self, time: float) -> list[str]:
         """Return the names to request at the tick `time` [s].
 
-        After ATTEMPTS requests the list is empty and `warnings` names the missing parameters.
+        After ATTEMPTS requests of each the list is empty and `warnings` names the missing ones.
         """
-        if time - self._requested < RETRY or self._attempts > ATTEMPTS:
-            return []
-        missing = self._missing
-        if not missing:
-            return []
-        self._requested = time
-        self._attempts += 1
-        if self._attempts > ATTEMPTS:  # RETRY has passed since the last request
+        before = self._reader.given_up
+        names = self._reader.due(time)
+        if self._reader.given_up is not before:
             self._compare()
-            return []
-        return missing
-
-    @property
-    def _missing(self) -> list[str]:
-        return [name for name in WATCHED if name not in self.values]
+        return names
 
     def _compare(self) -> None:
+        given_up = self._reader.missing if self._reader.given_up else ()
         self.warnings = (
             *differences(self._mapping, self.values),
             *stream_loss(self.values),
-            *unanswered(self._missing if self._attempts > ATTEMPTS else [], ATTEMPTS),
+            *unanswered((name for name in given_up if name not in self.required), ATTEMPTS),
+            *(difference.text for difference in self.differences),
         )

@@ -1,0 +1,82 @@
+"""Reads parameters of the autopilot by name: which to request when, and the values received.
+
+PX4 sends an integer parameter as four bytes in the float field of PARAM_VALUE; param_type gives
+the type.
+"""
+
+from __future__ import annotations
+
+import math
+import struct
+from collections.abc import Iterable
+
+from uam_sim_bridge.mavlink.protocol.wire import Message, clean_text, mavlink2
+
+RETRY, ATTEMPTS = 0.5, 10  # s between requests, number of requests of each parameter
+BATCH = 16  # parameters requested at once: a slow line carries them beside the setpoints
+_INTEGERS = {
+    mavlink2.MAV_PARAM_TYPE_UINT8: "<Bxxx", mavlink2.MAV_PARAM_TYPE_INT8: "<bxxx",
+    mavlink2.MAV_PARAM_TYPE_UINT16: "<Hxx", mavlink2.MAV_PARAM_TYPE_INT16: "<hxx",
+    mavlink2.MAV_PARAM_TYPE_UINT32: "<I", mavlink2.MAV_PARAM_TYPE_INT32: "<i",
+}  # fmt: skip
+
+
+def value_of(message: Message) -> float:
+    """Return the value of a PARAM_VALUE, for float and integer parameters."""
+    layout = _INTEGERS.get(message.param_type)
+    if layout is None:
+        return message.param_value
+    return float(struct.unpack(layout, struct.pack("<f", message.param_value))[0])
+
+
+class ParameterReader:
+    """`values`: received parameters by name; `given_up`: ATTEMPTS requests of the rest failed."""
+
+    def __init__(self, names: Iterable[str]) -> None:
+        self.names = tuple(dict.fromkeys(names))
+        self.values: dict[str, float] = {}
+        self.restart()
+
+    def restart(self) -> None:
+        """Discard all values and request them again."""
+        self.values.clear()
+        self.given_up = False
+        self._requested = -math.inf
+        self._attempts = dict.fromkeys(self.names, 0)
+
+    @property
+    def missing(self) -> list[str]:
+        """Return the names without a value."""
+        return [name for name in self.names if name not in self.values]
+
+    @property
+    def complete(self) -> bool:
+        """Return whether nothing is waited for: all received, or given up."""
+        return self.given_up or not self.missing
+
+    def take(self, message: Message) -> str:
+        """Store the value of a PARAM_VALUE and return its name; "" for other parameters."""
+        name = clean_text(message.param_id)
+        if name not in self._attempts:
+            return ""
+        self.values[name] = value_of(message)
+        return name
+
+    def due(self, time: float) -> list[str]:
+        """Return the names to request at `time` [s], at most BATCH, the least requested first."""
+        if time - self._requested < RETRY or self.complete:
+            return []
+        self._requested = time
+        waiting = [name for name in self.missing if self._attempts[name] < ATTEMPTS]
+        self.given_up = not waiting  # RETRY has passed since the last request
+        batch = sorted(waiting, key=self._attempts.__getitem__)[:BATCH]
+        for name in batch:
+            self._attempts[name] += 1
+        return batch
+
+
+def request(name: str, system: int) -> Message:
+    """Return the message that requests a parameter of the autopilot `system`."""
+    return mavlink2.MAVLink_param_request_read_message(
+        system, mavlink2.MAV_COMP_ID_AUTOPILOT1, name.encode(), -1
+    )
