@@ -53,6 +53,22 @@ def test_the_estimator_refuses_a_stamp_that_does_not_follow():
         stage.imu(0, REST, WEIGHT)
 
 
+def test_the_bias_of_the_imu_is_found_in_the_body_frame_and_due_every_20_ms():
+    stage = EstimatorStage(EstimatorParameters(), joints=2, period=0.004)
+    stage.joints(0, np.zeros(2), np.zeros(2))
+    nose_left = np.array([0.5**0.5, 0.0, 0.0, 0.5**0.5])  # yaw of 90 deg
+    bias, due = np.array([0.4, 0.0, 0.0]), []
+    for stamp in range(0, 3000 * MS, PERIOD):
+        stage.mocap(stamp, 1e-9 * stamp * np.ones(3), nose_left)  # no pose repeats: 1 m/s
+        stage.imu(stamp, REST, WEIGHT + bias)
+        if stage.bias_due:
+            due.append(stamp)
+    gyro, accelerometer = stage.estimator.imu_bias
+    np.testing.assert_allclose(accelerometer, bias, atol=0.01)
+    np.testing.assert_allclose(gyro, 0.0, atol=1e-6)
+    assert set(np.diff(due)) == {20 * MS}
+
+
 def test_the_newest_message_is_read_every_20_ms():
     inputs, read = SupervisorInputs(0.004), []
     for stamp in range(0, 48 * MS, PERIOD):

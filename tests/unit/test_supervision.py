@@ -74,7 +74,7 @@ def test_failsafe_ends_only_by_command_and_motors_go_off_on_the_ground():
 def test_every_check_has_a_value():
     values, seen, two, three = np.full(len(CHECKS), np.nan), observation(), np.ones(2), np.ones(3)
     measure(seen.state, seen.reference, three, 0.0, 0.0, np.zeros((2, 3)), two, values)
-    assert np.isnan(values).sum() == 12
+    assert np.isnan(values).sum() == 13
     read(Readings(), two, three, values)
     assert np.flatnonzero(np.isnan(values)).tolist() == [LATE, LATE_LOOP]  # by `Checks.update`
     checks = Checks(S500)
@@ -331,6 +331,29 @@ def test_arm_and_magnet_follow_the_policy(keep):
     assert decision.stow and decision.keep_magnet is (keep == "keep")
     decision = supervisor.step(1.1, observation(), OperatorCommand.LAND)
     assert not decision.stow and decision.keep_magnet
+
+
+def test_a_constant_bias_is_no_contradiction_but_a_fast_change_is():
+    inputs, bias = Inputs(0.004), np.array([0.6, 0.0, 0.8])  # norm 1 m/s^2
+    assert math.isnan(inputs.at(0.0).contradiction)
+    for tick in range(500):
+        inputs.accelerometer_bias(0.02 * tick, bias)
+    assert inputs.at(10.0).contradiction == pytest.approx(0.0, abs=1e-12)
+    inputs.accelerometer_bias(10.0, bias + [0.0, 1.5, 2.0])  # by 2.5 m/s^2
+    assert inputs.at(10.0).contradiction == pytest.approx(2.5)
+    # the mean has followed by 0.02 s / 5 s of 2.5 m/s^2
+    inputs.accelerometer_bias(10.02, bias + [0.0, 1.5, 2.0])
+    assert inputs.at(10.02).contradiction == pytest.approx(2.5 * (1.0 - 0.004), rel=1e-3)
+
+
+@given(st.floats(0.2, 2.0))
+def test_the_start_of_the_estimate_counts_little_after_two_seconds(size):
+    """The estimated bias grows to its value within a second; a take-off comes later."""
+    inputs, bias = Inputs(0.004), size * np.array([1.0, 0.0, 0.0])
+    for tick in range(150):
+        stamp = 0.02 * tick
+        inputs.accelerometer_bias(stamp, min(stamp / 0.5, 1.0) * bias)
+    assert inputs.at(3.0).contradiction < 0.1 * size
 
 
 def test_inputs_compute_ages_by_stamps_and_count_missed_ticks_of_a_second():

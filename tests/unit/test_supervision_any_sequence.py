@@ -28,6 +28,7 @@ READINGS = st.builds(
     st.builds(np.array, st.tuples(NUMBERS, NUMBERS, NUMBERS)),
     autopilot_age=NUMBERS,
     mocap_still=NUMBERS,
+    contradiction=NUMBERS,
     round_trip=NUMBERS,
     loop_delay=NUMBERS,
     mocap_position=st.builds(np.array, st.tuples(NUMBERS, NUMBERS, NUMBERS)),

@@ -15,7 +15,7 @@ from uam_control.coordinates import ALPHA, ARM, CHI, CHI_DDOT, CHI_DOT, ROLL, X
 from uam_control.estimation.filters import derivative_step, joint_step, low_pass_step
 from uam_control.estimation.pose_filter import PoseFilter
 from uam_control.maths.compiled import jit
-from uam_control.maths.rotations import euler_from_quaternion
+from uam_control.maths.rotations import euler_from_quaternion, matrix_from_quaternion
 from uam_control.settings.parameter_set import ParameterSet, number
 from uam_control.vehicle import GRAVITY
 
@@ -101,6 +101,13 @@ class StateEstimator:
     def quaternion(self) -> np.ndarray:
         """Return the attitude quaternion (4,), body → world [w x y z]."""
         return self._pose.quaternion
+
+    @property
+    def imu_bias(self) -> tuple[np.ndarray, np.ndarray]:
+        """Return the estimated biases (3,) of gyroscope [rad/s] and accelerometer [m/s^2], FLU."""
+        pose = self._pose
+        to_body = matrix_from_quaternion(pose.quaternion).T
+        return pose.gyro_bias.copy(), to_body @ pose.accelerometer_bias
 
     def mocap(self, stamp: float, position: np.ndarray, quaternion: np.ndarray) -> None:
         """Process a pose exposed at `stamp` [s].

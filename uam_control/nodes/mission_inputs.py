@@ -12,7 +12,7 @@ from sensor_msgs.msg import BatteryState, Temperature
 from uam_control.stages.supervisor_inputs import SupervisorInputs
 from uam_control.stamps import SECOND
 from uam_msgs_py.messages import topics
-from uam_msgs_py.messages.convert import read_pose, read_values
+from uam_msgs_py.messages.convert import read_imu, read_pose, read_values
 from uam_msgs_py.messages.layouts import BadMessage, stamp_of
 from uam_msgs_py.messages.serialized import check_names
 from uam_msgs_py.node.base_node import UamNode
@@ -35,6 +35,7 @@ class MissionInputs:
         self._keep(topics.MOCAP, self._on_mocap)
         self._keep(topics.PAYLOAD, self._on_payload)
         self._keep(topics.THRUST, self._on_thrust, stamp_of)
+        self._keep(topics.IMU_BIAS, self._on_imu_bias, stamp_of)
         self._keep(topics.JOINTS, self._on_joints)
         self._keep(topics.AUTOPILOT_BATTERY, self._on_battery)
         node.listen(topics.ARM_TEMPERATURE, self._on_temperature, required=False)
@@ -73,6 +74,10 @@ class MissionInputs:
         _, _, values = read_values(data, "effort")
         if len(values):
             self._inputs.lift(float(values[0]))
+
+    def _on_imu_bias(self, data: bytes) -> None:
+        stamp, _, accelerometer = read_imu(data)
+        self._inputs.accelerometer_bias(stamp / SECOND, accelerometer)
 
     def _on_joints(self, data: bytes) -> None:
         stamp, names, effort = read_values(data, "effort")

@@ -13,7 +13,7 @@ from uam_control.settings.parameter_set import ParameterSet, number
 from uam_control.stages.estimator_stage import EstimatorStage
 from uam_control.stamps import NEW_TIME, SECOND
 from uam_msgs_py.messages import topics
-from uam_msgs_py.messages.convert import read_imu, read_joints, read_pose
+from uam_msgs_py.messages.convert import ImuWriter, read_imu, read_joints, read_pose
 from uam_msgs_py.messages.navigation import odometry_message
 from uam_msgs_py.messages.status import OK, WARN
 from uam_msgs_py.messages.trajectories import TrajectoryWriter
@@ -52,7 +52,9 @@ class StateEstimatorNode(UamNode):
         self._state = self.publisher(topics.STATE)
         self._writer = TrajectoryWriter(vehicle.coordinates)
         self._odometry = self.publisher(topics.ODOMETRY)
+        self._bias = self.publisher(topics.IMU_BIAS)
         self._body = frame(self, topics.BODY)
+        self._bias_writer = ImuWriter(self._body)
         rate = NodeParameters(self, OdometryParameters, read_only=True).current.odometry_rate
         self._odometry_period = round(SECOND / rate)  # [ns]
         self._odometry_at = 0  # [ns] stamp of the last odometry
@@ -62,7 +64,7 @@ class StateEstimatorNode(UamNode):
         self.listen(topics.IMU, self._on_imu)
         self.triggers = (topics.IMU.name,)
         self._refused_before = 0  # number of refused poses at the last report
-        self._updates = Backlog()
+        self._updates, self._biases = Backlog(), Backlog()
 
     def _on_mocap(self, data: bytes) -> None:
         self._stage.mocap(*read_pose(data))
@@ -87,6 +89,8 @@ class StateEstimatorNode(UamNode):
         stamp = self._stage.stamp
         # one output per sample: the filters need every sample
         self._updates.put((stamp, self._writer.fill(stamp, state), begun))
+        if self._stage.bias_due:
+            self._biases.put(self._bias_writer.fill(stamp, *self._stage.estimator.imu_bias))
         if not 0 <= stamp - self._odometry_at < self._odometry_period:
             self._odometry_at = stamp - stamp % self._odometry_period
             if self._odometry.get_subscription_count():
@@ -107,6 +111,8 @@ class StateEstimatorNode(UamNode):
         for stamp, data, begun in self._updates.take():
             self._state.publish(data)
             self.done_tick(stamp, begun)
+        for data in self._biases.take():
+            self._bias.publish(data)
         if self._to_publish is not None:  # after the state, for which the controllers wait
             self._odometry.publish(odometry_message(*self._to_publish, self._body))
             self._to_publish = None

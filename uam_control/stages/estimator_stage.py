@@ -9,6 +9,7 @@ from uam_control.stages.tick_stamps import TickStamps
 from uam_control.stamps import SECOND
 
 MEMORY = 100  # poses
+BIAS_PERIOD = 20_000_000  # [ns] between two publications of the estimated biases
 
 
 class PoseAge:
@@ -43,7 +44,8 @@ class EstimatorStage:
     """Takes samples as they arrive and returns the state at each IMU sample.
 
     All stamps are in [ns]. The IMU sample starts a tick; the other samples of the tick come before.
-    `ticks`: the stamps of the ticks, see `TickStamps`; `pose_age`: of the poses at their arrival.
+    `ticks`: the stamps of the ticks, see `TickStamps`; `pose_age`: of the poses at their arrival;
+    `bias_due`: whether to publish the estimated biases of the IMU after this tick.
     """
 
     def __init__(self, parameters: EstimatorParameters, joints: int, period: float) -> None:
@@ -51,6 +53,7 @@ class EstimatorStage:
         self.estimator = StateEstimator(parameters, joints)
         self.ticks = TickStamps(round(period * SECOND))
         self.pose_age = PoseAge()
+        self.bias_due = False
         self._waiting = True  # for the first sample of an input
 
     @property
@@ -80,7 +83,8 @@ class EstimatorStage:
                 return None
             raise ValueError(f"IMU stamp {stamp} ns does not follow {self.stamp} ns")
         estimator = self.estimator
-        tick = self.ticks.next(stamp)
+        last, tick = self.stamp, self.ticks.next(stamp)
+        self.bias_due = tick // BIAS_PERIOD != last // BIAS_PERIOD
         self.pose_age.tick(tick)
         estimator.imu(tick / SECOND, gyro, force)
         self._waiting = self._waiting and bool(estimator.waiting_for)

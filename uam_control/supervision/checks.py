@@ -94,6 +94,9 @@ CHECKS = (
     Check(LOOP_DELAY, "measured setpoint delay {value:.3f} s exceeds {limit:.3g} s of the loops' "
           "margin", land="setpoint_delay_land", failsafe="setpoint_delay_failsafe",
           in_flight=True, land_after="delay_after", failsafe_after="delay_after"),
+    Check("motion capture and IMU", "{name} contradict each other by {value:.1f} m/s^2, {limit:g} "
+          "m/s^2 allowed", failsafe="contradiction_failsafe", in_flight=True,
+          reading="contradiction"),
 )  # fmt: skip
 LATE, LATE_LOOP = (
     [check.name for check in CHECKS].index(it) for it in (SETPOINT_DELAY, LOOP_DELAY)

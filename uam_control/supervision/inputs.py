@@ -12,6 +12,7 @@ from uam_control.estimation.repeats import Repeats
 from uam_control.supervision.observation import Readings
 
 POSE = ("position", "attitude")  # controllers without which the vehicle does not follow its path
+BIAS_MEMORY = 5.0  # [s] over which the bias is averaged, to which the newest one is compared
 WATCHED = ("K", "zeta")  # prefixes of the names of gains with a limit
 SUBSYSTEMS = (*POSE, "arm")
 
@@ -32,6 +33,8 @@ class Inputs:
         self._payload = math.nan  # stamp [s]
         self._moved = math.nan  # stamp [s] of the first pose like the newest
         self._repeats = Repeats()
+        # stamps [s] of first and newest bias, mean (3,) [m/s^2]
+        self._bias: tuple[float, float, np.ndarray] | None = None
         self._temperatures: dict[str, float] = {}
         self._oldest = self._oldest_of_pose = math.nan  # [s] stamps of gains
         self._of_pose: dict[str, float] = {}
@@ -59,6 +62,17 @@ class Inputs:
         """Store the grip point (3,) [m, world] of the payload, exposed at `stamp` [s]."""
         self._payload = stamp
         self._readings.payload_position[:] = position
+
+    def accelerometer_bias(self, stamp: float, bias: np.ndarray) -> None:
+        """Store the estimated bias (3,) [m/s^2, FLU] of the accelerometer at `stamp` [s].
+
+        A real bias changes slowly. The estimate changes fast where motion capture and IMU
+        contradict each other: exchanged axes, a wrong body.
+        """
+        first, last, mean = self._bias or (stamp, stamp, np.array(bias, dtype=float))
+        step, memory = max(stamp - last, 0.0), min(max(stamp - first, 1e-3), BIAS_MEMORY)
+        self._bias = first, stamp, mean + min(step / memory, 1.0) * (bias - mean)
+        self._readings.contradiction = math.dist(bias, mean)
 
     def lift(self, thrust: float) -> None:
         """Store the filtered collective thrust [N]."""

@@ -48,7 +48,8 @@ class Readings:
     missed_ticks: within the last second. temperature: of the hottest servo [deg C]. joint_effort
     (n,): measured [N m], empty where not known. gains (3,): largest adapted gain of position,
     attitude, arm. payload_position (3,) [m]: grip point of the payload, by its newest mocap pose;
-    payload_age [s]: of that pose. lift [N]: filtered collective thrust.
+    payload_age [s]: of that pose. lift [N]: filtered collective thrust. contradiction [m/s^2]: of
+    motion capture and IMU, the fast change of the accelerometer's estimated bias.
     """
 
     battery: float = math.nan
@@ -68,6 +69,7 @@ class Readings:
     payload_position: np.ndarray = field(default_factory=lambda: np.full(3, math.nan))
     payload_age: float = math.nan
     lift: float = math.nan
+    contradiction: float = math.nan
 
 
 @dataclass

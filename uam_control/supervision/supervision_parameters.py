@@ -58,6 +58,9 @@ class SupervisionLimits(ParameterSet):
     mocap_distance_hold: float = _hold(
         0.15, "distance of the mocap pose from the estimate", "m", 0.05, 1000.0
     )
+    contradiction_failsafe: float = _failsafe(
+        1.0, "fast change of the accelerometer's estimated bias", "m/s^2", 0.1, 1000.0
+    )
     joint_age_hold: float = _hold(0.25, "age of the joint angles", "s", 0.02, 10.0)
     controller_age_hold: float = _hold(0.25, "age of a controller's newest gains", "s", 0.05, 10.0)
     autopilot_age_land: float = _land(

@@ -94,6 +94,9 @@ PAYLOAD = Topic(
 
 # Control, once per tick, stamped with the IMU sample that the tick belongs to
 STATE = Topic("uam/state", JointTrajectory, RELIABLE, "estimated chi, chi_dot, chi_ddot")
+IMU_BIAS = Topic(
+    "uam/imu_bias", Imu, RELIABLE, "estimated biases of gyroscope and accelerometer, FLU, 50 Hz"
+)
 REFERENCE = Topic(
     "uam/reference", JointTrajectory, RELIABLE, "chi_d ... of the controlled coordinates"
 )

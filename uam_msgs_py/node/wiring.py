@@ -62,6 +62,7 @@ WIRES = (
     Wire(topics.ARM_ADAPTATION, ARM, (MISSION,), optional=True),
     Wire(topics.THRUST, BRIDGE, (MISSION,), optional=True),
     Wire(topics.PAYLOAD, PLANT, (MISSION,), optional=True),
+    Wire(topics.IMU_BIAS, ESTIMATOR, (MISSION,), optional=True),
     # only recorded
     Wire(topics.CLOCK, PLANT),
     Wire(topics.TRUTH_STATE, PLANT),

@@ -164,6 +164,10 @@ def estimate(tick: ControlTick) -> bool:
     if state is None:
         return False
     s.stamp, s.state = estimator.stamp, state
+    if estimator.bias_due:
+        inputs = tick.mission.inputs
+        message = s.stamp / SECOND, estimator.estimator.imu_bias[1]
+        inputs.keep("IMU bias", inputs.inputs.accelerometer_bias, message, s.stamp)
     return True
 
 
