@@ -66,6 +66,13 @@ def test_a_gap_of_the_imu_is_flown_with_the_last_commands(nominal):
     assert len(series) == pytest.approx(len(nominal[1]), abs=300)
 
 
+def test_exchanged_axes_of_the_motion_capture_end_in_a_level_descent():
+    flight, series, figures = flown("mocap_swap@take-off+1.5:axes=xy")
+    assert classify(series, figures) == "failsafe"
+    assert "contradict" in flight.mission.output.abort_reason
+    assert np.hypot(series["truth.x"], series["truth.y"])[-1] < 2.0
+
+
 def test_a_flight_without_a_motor_is_lost():
     _, series, figures = flown("motor_loss@hover+1:remaining=0")
     assert not figures["mission_completed"]
