@@ -88,12 +88,15 @@ def test_readings_have_their_places():
     readings = Readings(
         battery=0.5, mocap_age=9.0, mocap_still=10.0, joint_age=11.0, controller_age=12.0,
         autopilot_age=13.0, missed_ticks=15.0, temperature=16.0,
-        contradiction=19.0, joint_effort=np.array([1.0, -6.0, 2.0]), gains=np.array([3.0, math.nan, 1.0]),
+        contradiction=19.0,
+        joint_effort=np.array([1.0, -6.0, 2.0]), gains=np.array([3.0, math.nan, 1.0]),
     )  # fmt: skip
     read(readings, np.array([2.0, 4.0, 8.0]), np.array([2.0, 1.0, 0.25]), values)
     np.testing.assert_array_equal(values[:8], 77.0)
     # effort: 6/4; gains: 1/.25, the unknown one left out
-    np.testing.assert_array_equal(values[8:], [-0.5, 9, 10, 11, 12, 13, 77, 15, 16, 1.5, 4.0, 77, 19])
+    np.testing.assert_array_equal(
+        values[8:], [-0.5, 9, 10, 11, 12, 13, 77, 15, 16, 1.5, 4.0, 77, 19]
+    )
 
 
 def test_what_is_unknown_is_below_every_limit():
@@ -111,7 +114,8 @@ AT_ONCE = SupervisionParameters(
     geofence_land=0.5, geofence_failsafe=3.0, joint_angle_hold=(1.0, 2.0),
     joint_effort_hold=(2.0, 4.0), temperature_hold=50.0, temperature_land=60.0,
     battery_land=0.25, mocap_age_hold=0.125, mocap_age_failsafe=0.5, mocap_distance_hold=0.25,
-    contradiction_failsafe=1.5, joint_age_hold=0.375, controller_age_hold=0.625, autopilot_age_land=0.875,
+    contradiction_failsafe=1.5,
+    joint_age_hold=0.375, controller_age_hold=0.625, autopilot_age_land=0.875,
     delay_margin=0.125, delay_nominal=0.0, delay_land=0.5, delay_failsafe=1.5,
     missed_ticks_hold=10.0, missed_ticks_failsafe=20.0, gain_hold=(10.0, 20.0, 30.0),
     hold_after=0.0, land_after=0.0, failsafe_after=0.0, delay_after=0.0,

@@ -1,15 +1,21 @@
 """The tuner's search space, cost and file, and a short search."""
 
 import dataclasses
+import math
+from itertools import pairwise
 
 import numpy as np
+import optuna
 import pytest
 import yaml
+from hypothesis import given
+from hypothesis import strategies as st
 
 from uam_control.profiles.profile import load_profile
 from uam_control.settings import configuration
 from uam_lab.campaign.trial import TrialResult
 from uam_lab.cli.main import main
+from uam_lab.tuning import front
 from uam_lab.tuning.space import Cost, TuningError, load_space
 
 COST = Cost(
@@ -126,6 +132,44 @@ def test_a_search_finds_goes_on_and_leaves_a_profile_that_loads(tmp_path, capsys
     assert len(set(costs)) == 3 and all(0.0 < cost < 100.0 for cost in costs)
     best = load_profile(str(out / "best.yaml"))
     assert best.sets["arm_controller"].varpi > 0.0
+    assert (out / "search.png").stat().st_size > 0
+
+
+def trials(*values):
+    return [optuna.trial.create_trial(values=pair) for pair in values]
+
+
+def test_the_front_by_hand():
+    # the third is surpassed by the second, the fourth by the first
+    all_of_them = trials((1.0, 0.05), (0.5, 0.02), (2.0, 0.01), (1.0, 0.04))
+    found = front.front(all_of_them)
+    assert [one.values for one in found] == [[0.5, 0.02], [1.0, 0.05]]
+    # 20 ms ln(10 / 0.5) + 30 ms ln(10 / 1)
+    expected = 20.0 * math.log(20.0) + 30.0 * math.log(10.0)
+    assert front.area(all_of_them) == pytest.approx(expected)
+    assert front.chosen(all_of_them, 0.03).values == [1.0, 0.05]
+    assert front.chosen(all_of_them, 0.01).values == [0.5, 0.02]
+    assert front.chosen(all_of_them, 0.2).values == [1.0, 0.05]  # none has enough
+
+
+@given(st.lists(st.tuples(st.floats(0.01, 100.0), st.floats(0.0, 0.2)), min_size=1, max_size=12))
+def test_the_area_of_the_front_never_falls_and_no_trial_surpasses_the_front(values):
+    all_of_them = trials(*values)
+    areas = front.hypervolumes(all_of_them)
+    assert all(after >= before - 1e-9 for before, after in pairwise([0.0, *areas]))
+    assert areas[-1] == pytest.approx(front.area(all_of_them))
+    best = front.front(all_of_them)
+    for cost, margin in values:
+        assert any(one.values[0] <= cost and one.values[1] >= margin for one in best)
+
+
+def test_a_search_with_two_objectives_draws_its_front(tmp_path, capsys):
+    space, out = write(tmp_path, delay_margin={"at_least": 0.05}), tmp_path / "out"
+    command = ["tune", "--space", space, "--jobs", "1", "--evaluations", "2", "--out", str(out)]
+    assert main(command) == 0
+    assert "delay margin 59.9 ms" in capsys.readouterr().out  # of the flying profile
+    header, *rows = (out / "evaluations.csv").read_text().splitlines()
+    assert header.startswith("evaluation,cost,delay_margin_s,") and len(rows) == 2
     assert (out / "search.png").stat().st_size > 0
 
 

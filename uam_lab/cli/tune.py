@@ -29,6 +29,7 @@ examples:
   uam tune --controller asmc1 --evaluations 100
   uam tune --out results/tune-mine           continue a stopped search
   uam tune --space mine.yaml --profile best.yaml
+  uam tune --controller late_links --evaluations 300     cost and delay margin, with their front
   uam tune --vehicle mine.yaml
   uam tune --study arm --storage mysql://user@host/optuna    on several machines with one study:
                                              the same command on each
@@ -46,8 +47,8 @@ def add(commands: argparse._SubParsersAction) -> None:
         "tune",
         run,
         "search a controller's parameters over whole flights",
-        "Search a controller's parameters with CMA-ES over whole flights of the direct "
-        "engine, with several payloads and seeds.",
+        "Search a controller's parameters over whole flights of the direct engine, with several "
+        "payloads and seeds: for the least cost, or for least cost and largest delay margin.",
         EXAMPLES,
     )
     text = f"space of config/tuning: {', '.join(configuration.names('tuning'))}"
@@ -95,7 +96,8 @@ def run(options: argparse.Namespace) -> int:
         with Counting("tune", options.evaluations) as counting:
 
             def show(done: int, best: float | None) -> None:
-                counting.show(done, "" if best is None else f"best cost {best:.4g}")
+                text = "best cost" if space.delay_margin is None else "area of the front [ms]"
+                counting.show(done, "" if best is None else f"{text} {best:.4g}")
 
             search(task, jobs_of(options), show)
     except KeyboardInterrupt:
@@ -107,16 +109,13 @@ def run(options: argparse.Namespace) -> int:
             file=sys.stderr,
         )
     study = open_study(task)
-    if not any(trial.value is not None for trial in study.trials):
+    if not any(trial.values for trial in study.trials):
         return status or 1
     search_results.write_best(out / "best.yaml", space, study, command_line())
     search_results.write_evaluations(out / "evaluations.csv", space, study)
     search_results.plot(out / "search.png", space, study)
-    best = study.best_trial
-    print(
-        f"best      evaluation {best.number}, cost {best.value:.4g}; start "
-        f"{study.trials[0].value:.4g}"
-    )
+    best, told = search_results.best_of(space, study), search_results.in_words
+    print(f"best      evaluation {best.number}, {told(best)}; start: {told(study.trials[0])}")
     print(f"profile   {out / 'best.yaml'}   (uam fly --profile {out / 'best.yaml'})")
     print(f"plot      {out / 'search.png'}")
     return status

@@ -1,5 +1,8 @@
 """The search: an Optuna study, evaluated by several processes or machines.
 
+One objective, the cost of the flights, is searched with CMA-ES; cost and delay margin together with
+the tree-structured Parzen estimator, which has several objectives.
+
 The study is stored in a journal file in the result folder, or in the database of `--storage`, which
 several machines can use. The storage contains every evaluation, so a stopped search can continue.
 """
@@ -19,6 +22,7 @@ from optuna.trial import TrialState
 
 from uam_lab.campaign.pool import prepare_worker
 from uam_lab.campaign.trial import measure
+from uam_lab.tuning.front import delay_margin, hypervolumes
 from uam_lab.tuning.space import Space, TuningError
 
 POLL = 1.0  # [s]
@@ -55,13 +59,19 @@ def open_study(task: Task) -> optuna.Study:
     warnings.filterwarnings("ignore", category=FutureWarning, module="optuna")
     space = task.space
     start = {knob.name: knob.value(space.start) for knob in space.knobs}
-    sampler = optuna.samplers.CmaEsSampler(
-        x0=start, sigma0=task.step, seed=task.seed, warn_independent_sampling=False
-    )
+    if space.delay_margin is None:
+        directions = ["minimize"]
+        sampler = optuna.samplers.CmaEsSampler(
+            x0=start, sigma0=task.step, seed=task.seed, warn_independent_sampling=False
+        )
+    else:
+        directions = ["minimize", "maximize"]
+        sampler = optuna.samplers.TPESampler(seed=task.seed, multivariate=True, constant_liar=True)
     study = optuna.create_study(
         storage=open_storage(task.storage),
         study_name=task.study,
         sampler=sampler,
+        directions=directions,
         load_if_exists=True,
     )
     if not study.trials:
@@ -69,14 +79,18 @@ def open_study(task: Task) -> optuna.Study:
     return study
 
 
-def evaluate(space: Space, trial: optuna.Trial, best: float | None) -> float:
-    """Fly one candidate; return the mean cost of its flights. A bad candidate is pruned early."""
+def evaluate(space: Space, trial: optuna.Trial, best: float | None) -> float | tuple[float, float]:
+    """Fly one candidate; return the mean cost of its flights, with its delay margin if searched.
+
+    best: least cost so far; a bad candidate is pruned early. None: all flights are flown.
+    """
     values = {
         knob.name: trial.suggest_float(knob.name, knob.low, knob.high, log=True)
         for knob in space.knobs
     }
     costs: list[float] = []
-    trials = space.trials(space.profile(values))
+    profile = space.profile(values)
+    trials = space.trials(profile)
     for number, flight in enumerate(trials):
         result = measure(flight)
         costs.append(space.cost.of(result))
@@ -85,7 +99,8 @@ def evaluate(space: Space, trial: optuna.Trial, best: float | None) -> float:
         if hopeless and number + 1 < len(trials):
             # estimate for the sampler: mean so far, plus 10 % per flight not flown
             return sum(costs) / len(costs) * (1.0 + 0.1 * (len(trials) - len(costs)))
-    return sum(costs) / len(costs)
+    cost = sum(costs) / len(costs)
+    return cost if space.delay_margin is None else (cost, delay_margin(profile))
 
 
 def work(task: Task, number: int) -> None:
@@ -93,12 +108,17 @@ def work(task: Task, number: int) -> None:
     prepare_worker()
     study = open_study(Task(**{**vars(task), "seed": task.seed + number}))
     study.optimize(
-        lambda trial: evaluate(task.space, trial, _best(study)),
+        lambda trial: evaluate(
+            task.space, trial, _progress(study) if task.space.delay_margin is None else None
+        ),
         callbacks=[optuna.study.MaxTrialsCallback(task.evaluations, states=DONE)],
     )
 
 
-def _best(study: optuna.Study) -> float | None:
+def _progress(study: optuna.Study) -> float | None:
+    """Return the least cost so far, or the volume that the front of two objectives dominates."""
+    if len(study.directions) > 1:
+        return next(reversed(hypervolumes(study.get_trials(deepcopy=False, states=DONE))), None)
     try:
         return study.best_value
     except ValueError:
@@ -108,7 +128,8 @@ def _best(study: optuna.Study) -> float | None:
 def search(task: Task, jobs: int, progress: Callable[[int, float | None], None]) -> optuna.Study:
     """Extend the study with `jobs` processes until it has task.evaluations; return it.
 
-    progress: called about once per second with the number of evaluations and the best cost. Raises
+    progress: called about once per second with the number of evaluations and the best cost, or with
+    the volume of the front. Raises
     TuningError if a worker fails, KeyboardInterrupt on Ctrl-C; the study keeps its evaluations.
     """
     study = open_study(task)
@@ -119,7 +140,7 @@ def search(task: Task, jobs: int, progress: Callable[[int, float | None], None])
             worker.start()
     try:
         while any(worker.is_alive() for worker in workers):
-            progress(_done(study), _best(study))
+            progress(_done(study), _progress(study))
             time.sleep(POLL)
             failed = [worker for worker in workers if worker.exitcode]
             if failed:
@@ -129,7 +150,7 @@ def search(task: Task, jobs: int, progress: Callable[[int, float | None], None])
             if worker.is_alive():
                 worker.terminate()
                 worker.join()
-    progress(_done(study), _best(study))
+    progress(_done(study), _progress(study))
     return study
 
 

@@ -2,31 +2,48 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 
 import matplotlib
 import numpy as np
 import optuna
 import yaml
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from optuna.trial import FrozenTrial
 
 from uam_lab.report.figures import style
 from uam_lab.results.atomic import write_rows, write_text
+from uam_lab.tuning.front import chosen, front, hypervolumes
 from uam_lab.tuning.search import DONE
 from uam_lab.tuning.space import Space
 
 matplotlib.use("Agg")
 
 
+def best_of(space: Space, study: optuna.Study) -> FrozenTrial:
+    """Return the best evaluation: of least cost, with the margin that the space asks for."""
+    if space.delay_margin is None:
+        return study.best_trial
+    return chosen(study.get_trials(deepcopy=False, states=DONE), space.delay_margin)
+
+
+def in_words(trial: FrozenTrial) -> str:
+    """Return cost and, if it is an objective, delay margin of an evaluation."""
+    cost, *margin = trial.values
+    return f"cost {cost:.4g}" + "".join(f", delay margin {1e3 * one:.1f} ms" for one in margin)
+
+
 def write_best(file: Path, space: Space, study: optuna.Study, command: str) -> None:
     """Write the best profile, with its origin as comment at the beginning."""
-    best = study.best_trial
+    best = best_of(space, study)
     profile = space.profile(best.params, file.stem)
     evaluations = len(study.get_trials(deepcopy=False, states=DONE))
     head = [
         f"Found by: {command}",
-        f"Study {study.study_name}: evaluation {best.number} of {evaluations}, cost "
-        f"{best.value:.4g} (start {study.trials[0].value:.4g}), from profile {space.start.name}.",
+        f"Study {study.study_name}: evaluation {best.number} of {evaluations}, {in_words(best)} "
+        f"(start: {in_words(study.trials[0])}), from profile {space.start.name}.",
         f"Vehicle: {space.start.vehicle.name}.",
         "Flights of an evaluation: "
         + "; ".join(
@@ -41,15 +58,15 @@ def write_best(file: Path, space: Space, study: optuna.Study, command: str) -> N
 
 
 def write_evaluations(file: Path, space: Space, study: optuna.Study) -> None:
-    """Write one row per evaluation: number, cost, values of the knobs."""
+    """Write one row per evaluation: number, objectives, values of the knobs."""
     names = [knob.name for knob in space.knobs]
     write_rows(
         file,
-        ["evaluation", "cost", *names],
+        ["evaluation", *("cost", "delay_margin_s")[: len(study.directions)], *names],
         (
             [
                 trial.number,
-                f"{trial.value:.6g}",
+                *(f"{value:.6g}" for value in trial.values),
                 *(f"{trial.params.get(name, np.nan):.6g}" for name in names),
             ]
             for trial in study.get_trials(deepcopy=False, states=DONE)
@@ -58,31 +75,61 @@ def write_evaluations(file: Path, space: Space, study: optuna.Study) -> None:
 
 
 def plot(file: Path, space: Space, study: optuna.Study) -> None:
-    """Draw the cost of every evaluation, the best cost so far, and the values of each knob."""
+    """Draw the objectives of every evaluation, the progress, and the values of each knob."""
     trials = study.get_trials(deepcopy=False, states=DONE)
-    costs = np.array([trial.value for trial in trials])
+    costs, best = np.array([trial.values[0] for trial in trials]), best_of(space, study)
     columns = 4
     rows = -(-len(space.knobs) // columns)
     with style.styled():
         figure = Figure(figsize=(style.WIDTH, 2.8 + 1.25 * rows), layout="constrained")
         top, bottom = figure.subfigures(2, 1, height_ratios=(2.8, 1.25 * rows))
-        axis = top.subplots()
-        numbers = np.arange(len(costs))
-        axis.plot(numbers, costs, ".", color=style.FLIGHTS[0], alpha=0.5, label="evaluation")
-        best_so_far = np.minimum.accumulate(costs)
-        axis.step(numbers, best_so_far, where="post", color=style.INK, label="best so far")
-        axis.set(yscale="log", xlabel="evaluation", ylabel="cost")
-        axis.set_title(
-            f"Search {study.study_name}, {space.start.vehicle.name}: {len(costs)} evaluations, "
-            f"best {costs.min():.3g}, start {costs[0]:.3g}",
-            loc="left",
+        if space.delay_margin is None:
+            _draw_costs(top.subplots(), costs)
+        else:
+            curve, plane = top.subplots(1, 2)
+            _draw_hypervolume(curve, trials)
+            _draw_front(plane, trials, best, space.delay_margin)
+        figure.suptitle(
+            f"Search {study.study_name}, {space.start.vehicle.name}: {len(costs)} evaluations; "
+            f"best: {in_words(best)}; start: {in_words(trials[0])}",
+            fontsize=8,
         )
-        axis.legend(loc="upper right")
         for knob, small in zip(space.knobs, bottom.subplots(rows, columns).flat, strict=False):
             values = [trial.params[knob.name] for trial in trials]
             small.scatter(values, costs, s=4, color=style.FLIGHTS[0], alpha=0.4)
-            small.axvline(study.best_trial.params[knob.name], color=style.INK, linewidth=0.8)
+            small.axvline(best.params[knob.name], color=style.INK, linewidth=0.8)
             small.set(xscale="log", yscale="log", xlim=(knob.low, knob.high))
             small.set_title(knob.name.replace("_controller", ""), fontsize=6.5, loc="left")
             small.tick_params(labelsize=5.5, which="both")
         style.save(figure, file)
+
+
+def _draw_costs(axis: Axes, costs: np.ndarray) -> None:
+    numbers = np.arange(len(costs))
+    axis.plot(numbers, costs, ".", color=style.FLIGHTS[0], alpha=0.5, label="evaluation")
+    best_so_far = np.minimum.accumulate(costs)
+    axis.step(numbers, best_so_far, where="post", color=style.INK, label="best so far")
+    axis.set(yscale="log", xlabel="evaluation", ylabel="cost")
+    axis.legend(loc="upper right")
+
+
+def _draw_hypervolume(axis: Axes, trials: Sequence[FrozenTrial]) -> None:
+    axis.step(np.arange(len(trials)), hypervolumes(trials), where="post", color=style.INK)
+    axis.set(xlabel="evaluation", ylabel="area under the front [ms]")
+
+
+def _draw_front(
+    axis: Axes, trials: Sequence[FrozenTrial], best: FrozenTrial, at_least: float
+) -> None:
+    """Draw cost and margin of every evaluation; the front, the best and the start stand out."""
+
+    def points(shown: Sequence[FrozenTrial]) -> tuple[list[float], list[float]]:
+        return [one.values[0] for one in shown], [1e3 * one.values[1] for one in shown]
+
+    axis.plot(*points(trials), ".", color=style.FLIGHTS[0], alpha=0.4, label="evaluation")
+    axis.step(*points(front(trials)), where="post", color=style.INK, label="front")
+    axis.plot(*points([trials[0]]), "s", color=style.FLIGHTS[1], label="start")
+    axis.plot(*points([best]), "D", color=style.FLIGHTS[2], label="best")
+    axis.axhline(1e3 * at_least, color=style.MUTED, linewidth=0.8, linestyle="--")
+    axis.set(xscale="log", xlabel="cost", ylabel="delay margin [ms]")
+    axis.legend(loc="lower right")

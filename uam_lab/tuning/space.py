@@ -84,13 +84,18 @@ class Cost:
 
 @dataclass(frozen=True)
 class Space:
-    """A search: start profile, knobs, flights of an evaluation, cost."""
+    """A search: start profile, knobs, flights of an evaluation, cost.
+
+    delay_margin [s]: None for the cost alone; else the delay margin of the setpoint path is a
+    second objective, and the best profile is that of least cost with at least this margin.
+    """
 
     name: str
     start: Profile
     knobs: tuple[Knob, ...]
     flights: tuple[dict[str, Any], ...]
     cost: Cost
+    delay_margin: float | None = None
 
     def profile(self, values: Mapping[str, float], name: str = "candidate") -> Profile:
         """Return the start profile with the knobs at `values` (by name). Raises ProfileError."""
@@ -162,7 +167,9 @@ def load_space(
             }
             for flight in document["flights"]
         )
-        space = Space(file.stem, start, knobs, flights, Cost(**cost))
+        margin = document.get("delay_margin")
+        least = None if margin is None else float(margin["at_least"])
+        space = Space(file.stem, start, knobs, flights, Cost(**cost), least)
     except (KeyError, TypeError) as error:
         raise TuningError(f"{name_or_file}: {error.args[0]} is missing or not allowed") from None
     names = start.vehicle.coordinates
