@@ -31,13 +31,17 @@ from uam_msgs_py.node.node_parameters import NodeParameters, declared_text, refu
 from uam_sim_bridge.drivers.dynamixel.chain import (
     DEFAULT_HARDWARE,
     ArmChain,
+    ArmError,
     hardware_file,
     load_chain,
 )
 from uam_sim_bridge.drivers.dynamixel.driver import ArmDriver, Reading
 from uam_sim_bridge.drivers.dynamixel.parameters import ArmDriverParameters
+from uam_sim_bridge.drivers.dynamixel.servo_bus import BusLost
+from uam_sim_bridge.nodes.late_device import LateDevice
 
 NAME = "arm_driver"
+ABSENT_WAIT = 0.1  # [s] between two looks for an absent bus
 SLOWEST = 0.95  # share of the rate below which the bus counts as too slow
 
 
@@ -60,16 +64,29 @@ class ArmDriverNode(UamNode):
         about = Text("serial device in place of the lab file's", "a path; empty: the file's")
         device = declared_text(self, "device", "", about)
         parameters = NodeParameters(self, ArmDriverParameters, read_only=True).current
-        refuse_unknown(self)  # before the bus, which may be absent
         chain = _described_chain(hardware, device, vehicle)
         servos = vehicle.numbers["servos"]
-        self.driver = ArmDriver(
-            chain,
-            parameters,
-            servos["mode"],
-            vehicle.control_period,
-            servos["position_p_gain"],
-        )
+
+        def unopened() -> ArmDriver:
+            return ArmDriver(
+                chain,
+                parameters,
+                servos["mode"],
+                vehicle.control_period,
+                servos["position_p_gain"],
+            )
+
+        def started() -> ArmDriver:
+            driver = unopened()
+            try:
+                driver.start()
+            except (ArmError, BusLost):
+                driver.bus.close()
+                raise
+            return driver
+
+        self.driver = unopened()
+        self._bus = LateDevice(self, started, (ArmError, BusLost))
         self.failure = ""
         self._velocity = None  # (n,) [rad/s] desired
         self._writer = JointStateWriter(self._names)
@@ -82,17 +99,29 @@ class ArmDriverNode(UamNode):
         if parameters.friction_compensation:
             self.listen(topics.REFERENCE, self._on_reference)
         self.create_service(Trigger, "~/reboot", self._on_reboot)
-        self.driver.start()
-        for remark in self.driver.remarks:
-            self.get_logger().warning(remark)
-        budget = self.driver.budget
-        self.get_logger().info(
-            f"{len(self._names)} servos on {chain.device}: {self.driver.rate:g} Hz, bus load "
-            f"{100 * budget.load(self.driver.rate):.0f} %, up to {budget.rate:.0f} Hz"
-        )
+        refuse_unknown(self)  # before the bus, which may be absent
+        self._bus.begin()
+        if not self._bus.waits:
+            self._take_bus()
         self._ending = threading.Event()
         self._thread = threading.Thread(target=self._exchange, name="servo bus")
         self._thread.start()
+
+    def _take_bus(self) -> bool:
+        """Use the bus once it is there; return whether it is."""
+        driver = self._bus.attempt()
+        if driver is None:
+            return False
+        if driver is not self.driver:
+            self.driver = driver
+            for remark in driver.remarks:
+                self.get_logger().warning(remark)
+            budget = driver.budget
+            self.get_logger().info(
+                f"{len(self._names)} servos on {driver.chain.device}: {driver.rate:g} Hz, bus load "
+                f"{100 * budget.load(driver.rate):.0f} %, up to {budget.rate:.0f} Hz"
+            )
+        return True
 
     def _on_effort(self, data: bytes) -> None:
         self.driver.command_effort(read_joint_command(data, self._names), self._velocity)
@@ -104,6 +133,9 @@ class ArmDriverNode(UamNode):
         self._velocity = read_reference(data)[1].values[CHI_DOT, ALPHA:].copy()
 
     def _on_reboot(self, _: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
+        if self._bus.problem:
+            response.success, response.message = False, self._bus.problem
+            return response
         done = self.driver.reboot()
         response.success = bool(done) and not any("not rebooted" in line for line in done)
         response.message = "; ".join(done) or "no servo has a hardware error"
@@ -114,6 +146,9 @@ class ArmDriverNode(UamNode):
         """Run the cycles until the node ends; an error that nothing handles ends the node."""
         try:
             period = 1.0 / self.driver.rate
+            while not self._take_bus():
+                if self._ending.wait(ABSENT_WAIT):
+                    return
             due = time.monotonic()
             while not self._ending.is_set():
                 begun = time.perf_counter()
@@ -165,6 +200,8 @@ class ArmDriverNode(UamNode):
                 f"{one.joint} restarts": one.restarts,
                 f"{one.joint} watchdog trips": one.trips,
             }
+        if self._bus.problem:
+            return ERROR, self._bus.problem, values
         if driver.problems:
             return ERROR, "; ".join(driver.problems), values
         if math.isfinite(rate) and rate < SLOWEST * driver.rate:

@@ -6,7 +6,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 from uam_control.settings.parameter_set import ParameterSet, Text, choice, integer, number, switch
-from uam_msgs_py.node.node_parameters import declared_text
+from uam_msgs_py.node.node_parameters import NodeParameters, declared_text
 from uam_msgs_py.node.tunable import TunableNode
 from uam_sim_bridge.faults import LINK, Schedule
 from uam_sim_bridge.mavlink.link.link import OffboardLink
@@ -24,6 +24,7 @@ from uam_sim_bridge.mavlink.transport.transport import (
     open_transport,
     parse_url,
 )
+from uam_sim_bridge.nodes.late_device import DeviceWait
 from uam_sim_bridge.plant.effects.network_delay import SetpointDelay
 
 
@@ -154,8 +155,9 @@ def open_links(
     )
     delay = SetpointDelay.from_text(network)
     transport: Transport
+    waits = NodeParameters(node, DeviceWait, read_only=True).current.wait_for_device
     if url:
-        transport = open_transport(url)
+        transport = open_transport(url, absent=waits)
     else:
         transport = UdpTransport(options.local_port, (host, options.autopilot_port))
     faulty = station = late = None

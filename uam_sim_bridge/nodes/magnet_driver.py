@@ -12,10 +12,11 @@ from uam_control.settings.parameter_set import ParameterError
 from uam_msgs_py.messages.status import ERROR, OK, WARN
 from uam_msgs_py.node.base_node import UamNode, run
 from uam_msgs_py.node.node_parameters import NodeParameters, refuse_unknown
-from uam_sim_bridge.drivers.magnet.gpio_line import GpioLine, Line
+from uam_sim_bridge.drivers.magnet.gpio_line import GpioLine, Line, MagnetError
 from uam_sim_bridge.drivers.magnet.magnet_driver import LineParameters, MagnetDriver
 from uam_sim_bridge.drivers.magnet.switching import SwitchingParameters
 from uam_sim_bridge.emulation.gpio.file_line import FileLine
+from uam_sim_bridge.nodes.late_device import LateDevice
 from uam_sim_bridge.nodes.magnet_topics import MagnetTopics
 
 NAME = "magnet_driver"
@@ -33,27 +34,35 @@ class MagnetDriverNode(UamNode):
         line = NodeParameters(self, LineParameters, read_only=True).current
         switching = NodeParameters(self, SwitchingParameters, read_only=True).current
         self._topics = MagnetTopics(self, switching, time.monotonic)
+        self._line = LateDevice(
+            self, lambda: MagnetDriver(open_line(line)), (MagnetError, ParameterError)
+        )
         refuse_unknown(self)  # before the line is switched
-        self._driver = MagnetDriver(open_line(line))
+        self._line.begin()
         self._chip = line.chip
         self._said = ""
 
     def settle(self) -> None:
         """Switch as commanded; called after each command and each READ_PERIOD."""
         begun, now = time.perf_counter(), time.monotonic()
-        before = self._driver.switched
-        self._driver.update(self._topics.switching.desired(now))
-        self._topics.publish(now, self._driver.state)
-        if self._driver.switched != before:
+        driver = self._line.attempt()
+        if driver is None:
+            return
+        before = driver.switched
+        driver.update(self._topics.switching.desired(now))
+        self._topics.publish(now, driver.state)
+        if driver.switched != before:
             self.done_tick(self.get_clock().now().nanoseconds, begun)
-        problem = self._driver.problem or self._topics.problem(now)
+        problem = driver.problem or self._topics.problem(now)
         if problem and problem != self._said:
             self.get_logger().error(problem)
         self._said = problem
 
     def diagnose(self) -> tuple[bytes, str, dict[str, object]]:
         """Return the level, the state, and how often the line was switched."""
-        driver, now = self._driver, time.monotonic()
+        driver, now = self._line.device, time.monotonic()
+        if driver is None:
+            return ERROR, self._line.problem, {"line": self._chip}
         values = {"line": self._chip, "state": driver.state, "switched": driver.switched}
         if driver.problem:
             return ERROR, driver.problem, values
@@ -63,8 +72,9 @@ class MagnetDriverNode(UamNode):
 
     def destroy_node(self) -> None:
         """Leave the magnet as `magnet_at_exit` says, then close the line and the node."""
-        if hasattr(self, "_driver"):
-            self._driver.end(self._topics.switching.at_exit())
+        line = getattr(self, "_line", None)
+        if line is not None and line.device is not None:
+            line.device.end(self._topics.switching.at_exit())
         super().destroy_node()
 
 

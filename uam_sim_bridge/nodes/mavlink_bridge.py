@@ -296,8 +296,16 @@ class MavlinkBridgeNode(UamNode):
             self.done_tick(state, time.perf_counter())
 
     def _watch(self) -> None:
-        """Run ticks without commands in real time when states stop arriving."""
+        """Run ticks without commands in real time when states stop arriving.
+
+        Before the first tick of a vehicle only the link is served: the autopilot may be there
+        before the sensors.
+        """
         silence = time.monotonic() - self._last_tick
+        if self.ticks == 0 and self._imu is None and self._options.imu_clock == "system":
+            now = time.time()
+            self.link.poll(now)
+            self.link.maintain(now)
         if self.ticks == 0 or silence < self._options.stale_after:
             return
         self._go_without(self.stamp + round(silence * SECOND))
@@ -322,6 +330,7 @@ class MavlinkBridgeNode(UamNode):
             "landed": link.landed,
             "messages of other systems": link.ignored,
             "refused": link.refused,
+            "heartbeat": link.alive,
             "link open": link.open,
             "frames dropped": link.dropped,
             "ground station held back": self._station.held_back if self._station else None,

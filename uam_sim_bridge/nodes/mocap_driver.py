@@ -19,7 +19,9 @@ from uam_msgs_py.node.base_node import UamNode, run
 from uam_msgs_py.node.node_parameters import NodeParameters, refuse_unknown
 from uam_sim_bridge.drivers.mocap import calibration
 from uam_sim_bridge.drivers.mocap.driver import Level, MocapDriver
+from uam_sim_bridge.drivers.mocap.frame import MocapError
 from uam_sim_bridge.drivers.mocap.mocap_parameters import MocapParameters, open_source
+from uam_sim_bridge.nodes.late_device import LateDevice
 
 NAME = "mocap_driver"
 WAIT = 0.02  # [s] for a packet, then services and timers are served
@@ -39,10 +41,15 @@ class MocapDriverNode(UamNode):
             calibrated = calibration.load(parameters.calibration)
         except ConfigurationError as error:
             raise ParameterError(f"calibration: {error}") from None
+
+        def opened() -> MocapDriver:
+            return MocapDriver(parameters, calibrated, open_source(parameters))
+
+        self._system = LateDevice(self, opened, (MocapError,))
         refuse_unknown(self)  # before the system is asked
-        self._source = open_source(parameters)
-        self._driver = MocapDriver(parameters, calibrated, self._source)
-        self._driver.check_names()
+        self._system.begin()
+        if not self._system.waits:
+            self._system.device.check_names()
         self._writer = PoseWriter()
         self._vehicle = self.publisher(topics.MOCAP)
         self._payload = self.publisher(topics.PAYLOAD) if parameters.payload else None
@@ -52,8 +59,12 @@ class MocapDriverNode(UamNode):
 
     def settle(self) -> None:
         """Publish the poses that arrive within WAIT."""
+        driver = self._system.attempt()
+        if driver is None:
+            time.sleep(WAIT)
+            return
         begun = time.perf_counter()
-        for pose in self._driver.receive(WAIT):
+        for pose in driver.receive(WAIT):
             publisher = self._payload if pose.payload else self._vehicle
             publisher.publish(self._writer.fill(pose.stamp, pose.position, pose.quaternion))
             if not pose.payload:
@@ -61,7 +72,9 @@ class MocapDriverNode(UamNode):
 
     def _say(self) -> None:
         """Log a change of the health once."""
-        level, text = self._driver.health()
+        if self._system.device is None:  # logged by the attempt
+            return
+        level, text = self._system.device.health()
         if text == self._said:
             return
         self._said = text
@@ -74,13 +87,17 @@ class MocapDriverNode(UamNode):
 
     def diagnose(self) -> tuple[bytes, str, dict[str, object]]:
         """Return the level, one line, and latency, losses and clocks."""
-        level, text = self._driver.health()
-        return LEVELS[level], text, self._driver.values()
+        driver = self._system.device
+        if driver is None:
+            return ERROR, self._system.problem, {}
+        level, text = driver.health()
+        return LEVELS[level], text, driver.values()
 
     def destroy_node(self) -> None:
         """Close the connection, then the node."""
-        if hasattr(self, "_source"):
-            self._source.close()
+        system = getattr(self, "_system", None)
+        if system is not None and system.device is not None:
+            system.device.close()
         super().destroy_node()
 
 

@@ -76,6 +76,10 @@ class MocapDriver:
         if self._parameters.source == "natnet" and (missing := self._missing()):
             raise MocapError(missing)
 
+    def close(self) -> None:
+        """Close the source."""
+        self._source.close()
+
     def receive(self, timeout: float) -> list[StampedPose]:
         """Return the poses that have arrived; wait at most `timeout` [s] for a packet."""
         return [pose for frame in self._source.frames(timeout) for pose in self.take(frame)]

@@ -138,6 +138,11 @@ class OffboardLink:
         """Return whether a heartbeat arrived in the last HEARTBEAT_TIMEOUT before `time` [s]."""
         return time - self._heartbeat_in < HEARTBEAT_TIMEOUT
 
+    @property
+    def alive(self) -> bool:
+        """Whether the autopilot was connected at the last `maintain`."""
+        return self._was_connected
+
     def poll(self, time: float) -> None:
         """Process all received messages at the tick `time` [s]."""
         for data in self._transport.receive():

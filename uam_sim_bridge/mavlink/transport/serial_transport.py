@@ -20,8 +20,17 @@ BITS_PER_BYTE = 10  # start, eight data bits, stop
 class SerialTransport(StreamTransport):
     """A serial device, opened exclusively; opened again after it was unplugged."""
 
-    def __init__(self, device: str, baud: int, clock: Callable[[], float] = time.monotonic) -> None:
-        """Open `device` at `baud` [bit/s]; raises PortError in one line if that fails."""
+    def __init__(
+        self,
+        device: str,
+        baud: int,
+        clock: Callable[[], float] = time.monotonic,
+        absent: bool = False,
+    ) -> None:
+        """Open `device` at `baud` [bit/s]; raises PortError in one line if that fails.
+
+        absent: the device may be plugged in later, as after a loss.
+        """
         super().__init__(clock)
         self._device, self._baud = device, baud
         self.bytes_per_second = baud / BITS_PER_BYTE
@@ -29,6 +38,9 @@ class SerialTransport(StreamTransport):
         try:
             self.connected = self._open(0.0)
         except (OSError, ValueError, OverflowError) as error:
+            if absent and isinstance(error, OSError):
+                self._shut()
+                return
             raise PortError(f"serial device {device} at {baud} baud: {_reason(error)}") from None
 
     def _open(self, now: float) -> bool:

@@ -115,15 +115,16 @@ def parse_url(url: str) -> LinkUrl:
     return LinkUrl(kind, parts[0], *map(int, parts[1:]))
 
 
-def open_transport(url: str, read_limit: int = READ_LIMIT) -> Transport:
+def open_transport(url: str, read_limit: int = READ_LIMIT, absent: bool = False) -> Transport:
     """Open the link of `url`.
 
-    read_limit: bytes read per `receive` of a UDP link. Raises PortError in one line if the URL is
+    read_limit: bytes read per `receive` of a UDP link; absent: a serial device may be plugged in
+    later. Raises PortError in one line if the URL is
     not of the table above or the link cannot be opened.
     """
     link = parse_url(url)
     if link.kind == "serial":
-        return SerialTransport(link.place, link.number)
+        return SerialTransport(link.place, link.number, absent=absent)
     if link.kind == "tcp":
         return TcpTransport((link.place, link.number))
     return UdpTransport(link.local, (link.place, link.number), read_limit)
