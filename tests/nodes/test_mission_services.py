@@ -91,3 +91,16 @@ def test_a_failsafe_is_published_before_its_idle_reference(vehicle):
     later = [(stamp, one.flying) for stamp, one in references if stamp >= failed]
     assert [flying for _, flying in later[:40]] == [True] * 40
     assert not later[-1][1]
+
+
+def test_states_that_stop_in_flight_hand_over_to_the_autopilots_failsafe(start, probe):
+    arguments = ("-p", "scenario:=hover", "-p", "state_timeout:=3.0")
+    node = start("uam_control.nodes.mission", "--ros-args", *arguments)
+    made = Vehicle(probe)
+    made.node = node
+    made.fly(1)
+    take_off(made)
+    made.until(lambda status: status.state == "failsafe")
+    assert made.status.cause.startswith("no state of the estimator for 3.")
+    made.fly(1)  # a state that comes back changes nothing
+    assert made.status.state == "failsafe"

@@ -25,6 +25,11 @@ def commands() -> dict[str, argparse.ArgumentParser]:
     return found.choices
 
 
+def words(line: str) -> list[str]:
+    """The words of a command, without the redirection of its output."""
+    return shlex.split(re.split(r" [>|] ", line)[0])
+
+
 def test_there_is_a_section_for_every_command():
     assert set(SECTIONS) == set(commands())
 
@@ -41,7 +46,7 @@ def test_the_examples_of_a_command_parse(name):
     found = re.findall(rf"^(?:\w+=\S+ )?uam ({name}.*?)(?: {{2,}}#.*)?$", SECTIONS[name], re.M)
     assert found
     for line in found:
-        parser().parse_args(shlex.split(line))
+        parser().parse_args(words(line))
 
 
 @pytest.mark.parametrize(
@@ -58,4 +63,4 @@ def test_every_command_of_a_code_block_parses(file, monkeypatch):
             r"\s*(?:\w+=\S+ )*(?:\.venv/bin/)?uam ([a-z-]+(?: .*?)?)(?:\s+#.*| {2,}.*)?$", line
         )
         if found and found[1].split()[0] in commands():
-            parser().parse_args(shlex.split(found[1]))
+            parser().parse_args(words(found[1]))

@@ -1,5 +1,7 @@
 """uam doctor: verdicts, all groups of checks, and the command line."""
 
+import contextlib
+import dataclasses
 import json
 import os
 import signal
@@ -9,12 +11,17 @@ import time
 from importlib import metadata
 
 import pytest
+from arm_rig import BAUD, STOWED
 
 from uam_lab.cli import doctor as command
 from uam_lab.cli.main import main
-from uam_lab.doctor import installation, run
+from uam_lab.doctor import devices, installation, run
 from uam_lab.doctor.check_process import TOO_LATE, CheckProcess
 from uam_lab.doctor.finding import Verdict, fail, ok, warn
+from uam_lab.vehicle.lab_file import load_lab
+from uam_sim_bridge.drivers.dynamixel.driver import ArmDriver
+from uam_sim_bridge.drivers.dynamixel.parameters import ArmDriverParameters
+from uam_sim_bridge.emulation.dynamixel import EmulatedBus, EmulatedServo, StillShaft
 
 OK, WARN, FAIL = Verdict
 
@@ -36,7 +43,7 @@ def test_a_finding_is_one_line_whatever_it_quotes():
 )
 def test_exit_status_text_and_json(capsys, monkeypatch, findings, status):
     examined = [("machine", finding) for finding in findings]
-    monkeypatch.setattr(command, "examine", lambda url: iter(examined))
+    monkeypatch.setattr(command, "examine", lambda *_: iter(examined))
     assert main(["doctor"]) == status
     text = capsys.readouterr().out
     assert all(f"{finding.verdict.value}" in text for finding in findings)
@@ -108,7 +115,7 @@ def test_an_interrupt_is_one_line(tmp_path):
     program = (
         "import time\n"
         "from uam_lab.cli import doctor, main\n"
-        "def examine(url):\n"
+        "def examine(url, lab):\n"
         "    print('begun', flush=True)\n"
         "    time.sleep(60)\n"
         "    yield\n"
@@ -122,3 +129,30 @@ def test_an_interrupt_is_one_line(tmp_path):
     running.send_signal(signal.SIGINT)
     _, err = running.communicate(timeout=60.0)
     assert running.returncode == 130 and err == "uam doctor: interrupted\n"
+
+
+def test_the_devices_of_a_lab_file_are_looked_for(tmp_path):
+    lab = load_lab("s500_lab")
+    arm = dataclasses.replace(lab.arm, device=str(tmp_path / "ttyARM"))
+    line = dataclasses.replace(lab.magnet.line, chip=str(tmp_path / "chip"))
+    magnet = dataclasses.replace(lab.magnet, line=line)
+    lab = dataclasses.replace(lab, mocap=None, arm=arm, magnet=magnet)
+    found = {one.check: one for one in devices.checks(lab)}
+    assert [one.verdict for one in found.values()] == [FAIL, FAIL]
+    assert (
+        found["arm"].found.endswith("ttyARM: does not exist") and "uam arm" in found["arm"].advice
+    )
+    assert found["magnet"].found.endswith("chip: does not exist")
+    (tmp_path / "chip").touch()
+    servos = [EmulatedServo(i + 1, StillShaft(a), baud_rate=BAUD) for i, a in enumerate(STOWED)]
+    with contextlib.closing(EmulatedBus(servos, link=tmp_path / "ttyARM")):
+        other, _ = devices.checks(lab)
+        driver = ArmDriver(lab.arm, ArmDriverParameters(answer_timeout=0.05))
+        driver.start()  # writes the settings of a new servo
+        driver.bus.close()
+        found = {one.check: one for one in devices.checks(lab)}
+    assert other.verdict is FAIL and "Return Delay Time" in other.found
+    assert [one.verdict for one in found.values()] == [OK, OK]
+    assert "2 servos on" in found["arm"].found
+    assert not any(one.shaft.last.on for one in servos)
+    assert (tmp_path / "chip").read_text() == ""

@@ -6,7 +6,9 @@ import pytest
 pytest.importorskip("rclpy")
 
 from default_columns import COLUMNS
+from rclpy.serialization import serialize_message
 
+from uam_control.coordinates import coordinates
 from uam_control.laws.catalogue import LAWS
 from uam_control.mission import load_scenario
 from uam_control.profiles.profile import default_profile
@@ -17,9 +19,13 @@ from uam_lab.recording.mcap_reader import TopicLog, UnreadableLog
 from uam_lab.recording.message_definitions import schema
 from uam_lab.results.timeseries import gain_columns
 from uam_msgs_py.messages import topics
-from uam_msgs_py.messages.convert import JointStateWriter
+from uam_msgs_py.messages.control import ReferenceWriter
+from uam_msgs_py.messages.convert import JointStateWriter, PoseWriter, SetpointWriter
 from uam_msgs_py.messages.status import MissionStatus
+from uam_msgs_py.messages.trajectories import TrajectoryWriter
 from uam_msgs_py.node.namespace import expanded
+
+LEVEL = np.array([1.0, 0.0, 0.0, 0.0])
 
 
 @pytest.mark.parametrize("law", LAWS)
@@ -147,3 +153,59 @@ def test_transitions_are_reported_with_mission_time_and_cause():
         {"time_s": 0.0, "from": "grounded", "to": "taking off", "cause": "armed"},
         {"time_s": 2.25, "from": "taking off", "to": "holding", "cause": "tilt"},
     ]
+
+
+def vehicles_log(tmp_path):
+    """A log of 3 s: the vehicle stands, then hovers 1 cm above its reference."""
+    names = list(coordinates(2))
+    state, reference = TrajectoryWriter(names), ReferenceWriter(2)
+    chi, desired = np.zeros((3, 8)), np.zeros((3, 8))
+    chi[0, 2], desired[0, 2] = 1.01, 1.0
+    setpoint = SetpointWriter("base_link")
+    payload = PoseWriter()
+    log = BoundedLog(tmp_path / "log.mcap", 0.0)
+    kinds = {
+        topics.STATE: "trajectory_msgs/msg/JointTrajectory",
+        topics.REFERENCE: "trajectory_msgs/msg/JointTrajectory",
+        topics.SETPOINT: "geometry_msgs/msg/TwistStamped",
+        topics.PAYLOAD: "geometry_msgs/msg/PoseStamped",
+        topics.MISSION_STATUS: "diagnostic_msgs/msg/DiagnosticArray",
+    }
+    channels = {
+        topic: log.add_channel(f"/{topic.name}", kind, schema(kind), {})
+        for topic, kind in kinds.items()
+    }
+    begun = 1_700_000_000 * SECOND
+
+    def write(topic, stamp, message, late=0):
+        log.write(channels[topic], stamp, stamp + late, bytes(message), 0)
+
+    for k in range(750):
+        stamp = begun + k * 4_000_000
+        since = max(0, k - 250) * 4_000_000
+        write(topics.REFERENCE, stamp, bytes(reference.fill(stamp, desired, k >= 250, since)))
+        write(topics.STATE, stamp, bytes(state.fill(stamp, chi)))
+        late = 20_000_000 if k % 100 == 0 else 3_000_000
+        write(topics.SETPOINT, stamp, bytes(setpoint.fill(stamp, np.zeros(3), 0.5)), late)
+        write(topics.PAYLOAD, stamp, bytes(payload.fill(stamp, np.array([1.0, 2.0, 0.1]), LEVEL)))
+    for k, magnet in ((0, False), (500, True)):
+        stamp = begun + k * 4_000_000
+        message = MissionStatus("hover", magnet=magnet).to_message(stamp)
+        write(topics.MISSION_STATUS, stamp, serialize_message(message))
+    log.close()
+    return tmp_path / "log.mcap"
+
+
+def test_a_vehicles_log_has_the_estimate_in_place_of_the_truth(tmp_path):
+    flight = log_reader.read_flight(vehicles_log(tmp_path), load_scenario("hover"))
+    series = flight.series
+    assert flight.errors_of == "estimate" and not flight.done
+    assert len(series) == 749 and series.columns == COLUMNS
+    np.testing.assert_allclose(series["truth.z"], 1.01)
+    np.testing.assert_allclose(series["error.z"][series.flown], 0.01)
+    assert series.time[series.flown][0] == 0.0
+    assert np.isnan(series["rotor_1.thrust"]).all() and np.isnan(series["magnet.force"]).all()
+    np.testing.assert_allclose(series["payload.y"], 2.0)
+    np.testing.assert_array_equal(series["magnet.on"][[0, 499, 500]], [0.0, 0.0, 1.0])
+    assert np.median(flight.latency_s) == pytest.approx(0.003) and flight.missed == 8
+    assert flight.wall_s == pytest.approx(2.996)

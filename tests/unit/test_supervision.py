@@ -379,3 +379,17 @@ def test_inputs_compute_ages_by_stamps_and_count_missed_ticks_of_a_second():
     for tick in range(300):
         readings = inputs.at(1.028 + 0.004 * tick)
     assert readings.missed_ticks == 0.0
+
+
+@pytest.mark.parametrize("state", list(State))
+def test_states_that_stop_end_every_flight_in_failsafe_and_nothing_else(state):
+    supervisor = Supervisor(S500)
+    supervisor.state = state
+    flown = (State.TAKING_OFF, State.FLYING, State.HOLDING, State.LANDING)
+    decision = supervisor.lose_states("no state for 1 s")
+    assert supervisor.state is (State.FAILSAFE if state in flown else state)
+    assert [change.cause for change in supervisor.changes] == ["no state for 1 s"] * (
+        state in flown
+    )
+    if state in flown:
+        assert decision.guide is Guide.NOTHING

@@ -286,3 +286,19 @@ def test_closed_for_good(line):
     clock.now += 100.0
     assert not link.send(b"x") and link.receive() == []
     os.close(far)
+
+
+def test_a_serial_device_may_be_plugged_in_later(tmp_path, opened):
+    device, url = tmp_path / "ttyPX4", f"serial:{tmp_path / 'ttyPX4'}:921600"
+    with pytest.raises(PortError, match="No such file"):
+        open_transport(url)
+    link = open_transport(url, absent=True)
+    opened.append(link)
+    assert not link.connected and link.receive() == [] and not link.send(b"early")
+    own, far = os.openpty()
+    tty.setraw(far)
+    device.symlink_to(os.ttyname(far))
+    until(lambda: link.send(b"late"), "the device")
+    assert os.read(own, 16) == b"late"
+    os.close(own)
+    os.close(far)

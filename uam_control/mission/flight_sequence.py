@@ -249,6 +249,10 @@ class Mission:
         """End a flight before take-off at `stamp` [s]; no effect after take-off."""
         self._follow(stamp, self._supervisor.give_up(stamp, reason))
 
+    def lose_states(self, cause: str) -> None:
+        """Hand over to the autopilot's failsafe: states have stopped in flight."""
+        self._follow(self._stamp, self._supervisor.lose_states(cause))
+
     def request(self, command: OperatorCommand) -> tuple[bool, str]:
         """Queue a command for the next step.
 

@@ -2,10 +2,11 @@
 
 import math
 import time
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 from diagnostic_msgs.msg import DiagnosticArray
+from rclpy.clock import Clock, ClockType
 from std_msgs.msg import Bool
 
 from uam_control.control.output_limits import PositionLimits
@@ -26,6 +27,7 @@ from uam_control.nodes.mission_inputs import MissionInputs
 from uam_control.nodes.mission_services import offer
 from uam_control.nodes.planner_inputs import PlannerInputs
 from uam_control.profiles.profile import Profile, default_profile, reference_limits
+from uam_control.settings.parameter_set import ParameterSet, number
 from uam_control.stages.mission_stage import MissionStage
 from uam_control.stages.timing import Timing
 from uam_control.stamps import SECOND
@@ -47,6 +49,21 @@ NAME = "mission"
 POSITION_CONTROLLER = "position_controller"
 STATUS_PERIOD = 500_000_000  # [ns]
 PATH_STEP = 0.25  # [s] between two poses of the path
+WATCH_PERIOD = 0.05  # [s] of the watch on states
+
+
+@dataclass(frozen=True)
+class StateWatch(ParameterSet):
+    """The reaction to states that stop; it cannot change while the node runs."""
+
+    state_timeout: float = number(
+        0.0,
+        "time without a state in flight, on the wall clock, after which the autopilot's failsafe "
+        "acts, 0: none, as in simulation",
+        "s",
+        0.0,
+        10.0,
+    )
 
 
 class MissionNode(UamNode):
@@ -77,6 +94,11 @@ class MissionNode(UamNode):
         self._published: tuple = ()  # content of the last status
         self._due = 0  # stamp [ns] of the next status
         self._states = Backlog()
+        self._state_timeout = NodeParameters(self, StateWatch, read_only=True).current.state_timeout
+        self._state_at = math.inf  # [s] time.monotonic() of the newest state
+        if self._state_timeout:
+            steady = Clock(clock_type=ClockType.STEADY_TIME)
+            self.create_timer(WATCH_PERIOD, self._watch_states, clock=steady)
 
         self._reference = self.publisher(topics.REFERENCE)
         self._magnet = self.publisher(topics.MAGNET)
@@ -126,7 +148,17 @@ class MissionNode(UamNode):
             stamp, state.connected, since, state.round_trip, state.loop_delay, authority
         )
 
+    def _watch_states(self) -> None:
+        """Give up in flight when no state comes: without one, no tick checks any limit."""
+        silence = time.monotonic() - self._state_at
+        if silence < self._state_timeout:
+            return
+        self._state_at = math.inf
+        self._mission.lose_states(f"no state of the estimator for {silence:.2f} s: IMU lost?")
+        self._publish_status(self.stamp + round(silence * SECOND))
+
     def _on_state(self, data: bytes) -> None:
+        self._state_at = time.monotonic()
         self._states.put(read_state(data))
         if not self.deferred:
             self.settle()

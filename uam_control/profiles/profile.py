@@ -52,6 +52,7 @@ FLIGHT_OWN = {
     "state_estimator": ("vehicle", "odometry_rate", "publishers"),
     "mission": (
         *("control_period", "scenario", "vehicle", "auto_start", "dry_run", "publishers"),
+        "state_timeout",
         *ScenarioOptions.specs(),
     ),
 }

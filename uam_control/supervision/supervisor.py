@@ -124,6 +124,15 @@ class Supervisor:
             self._arm, self.cause = True, "waiting to take off"
             self.decision = self._decide()
 
+    def lose_states(self, cause: str) -> Decision:
+        """Give up in flight at the last stamp, because states have stopped; see `Event.HARD_LIMIT`.
+
+        No effect on the ground or in failsafe.
+        """
+        if self.state in AIRBORNE_STATES and (self.state, Event.HARD_LIMIT) in TARGETS:
+            self._go(Event.HARD_LIMIT, cause)
+        return self.decision
+
     def give_up(self, stamp: float, reason: str) -> Decision:
         """End a flight before take-off at `stamp` [s]; no effect after take-off."""
         if stamp > self._stamp:

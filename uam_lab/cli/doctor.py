@@ -10,6 +10,8 @@ from rich.text import Text
 from uam_lab.cli.command import Command
 from uam_lab.doctor.finding import Finding, Verdict
 from uam_lab.doctor.run import as_json, examine, worst
+from uam_lab.vehicle.lab import Lab
+from uam_lab.vehicle.lab_file import load_lab
 from uam_sim_bridge.mavlink.transport.transport import ALLOWED, parse_url
 
 FINE, BROKEN = 0, 1
@@ -18,6 +20,7 @@ EXAMPLES = """\
 examples:
   uam doctor                                    takes half a minute
   uam doctor --autopilot serial:/dev/ttyACM0:921600
+  uam doctor --config my_lab.yaml               the devices of a lab file, too; no torque
   uam doctor --json > doctor.json               for a bug report
 
 Exit status: 0 only OK and WARN: flights work; 1 at least one FAIL; 2 wrong use.
@@ -35,22 +38,26 @@ def add(commands: argparse._SubParsersAction) -> None:
         "compare a PX4's parameters with those that a vehicle needs (config/px4/vehicle.yaml).",
         EXAMPLES,
     )
-    command.option("--autopilot", "URL", f"check an autopilot there: {ALLOWED}", "")
+    command.config()
+    text = f"check an autopilot there: {ALLOWED} (default: the lab file's)"
+    command.option("--autopilot", "URL", text, "")
     command.switch("--json", "print JSON, for programs")
 
 
 def run(options: argparse.Namespace) -> int:
     """Run the command; return the exit status."""
-    if options.autopilot:
-        parse_url(options.autopilot)
-    return _show(options.autopilot, options.json)
+    lab = None if options.config is None else load_lab(options.config)
+    url = options.autopilot or (lab.autopilot if lab else "")
+    if url:
+        parse_url(url)
+    return _show(url, lab, options.json)
 
 
-def _show(url: str, machine_readable: bool) -> int:
+def _show(url: str, lab: Lab | None, machine_readable: bool) -> int:
     """Print each finding at once, or all as JSON; return the exit status."""
     console, found = Console(), []
     last = ""
-    for group, finding in examine(url):
+    for group, finding in examine(url, lab):
         found.append((group, finding))
         if machine_readable:
             continue

@@ -15,7 +15,7 @@ from uam_lab.flight import flight_settings
 from uam_lab.flight.conclude import command_line
 from uam_lab.flight.flight_settings import LOG_LIMIT, ONLOOKERS, REPLACEABLE, FlightSettings
 from uam_lab.flight.progress import Progress
-from uam_lab.library.flight import Flight
+from uam_lab.library.flight import Engine, Flight
 from uam_lab.library.flight_result import FlightFailed
 from uam_lab.processes.interrupts import Interrupts
 from uam_lab.report.page.console import reporting, summary
@@ -178,12 +178,21 @@ def run(options: argparse.Namespace) -> int:
     return fly(settings, video, report)
 
 
-def fly(settings: FlightSettings, video: bool, report: bool) -> int:
-    """Fly and report; return the exit status. Raises USER_ERRORS before the flight starts."""
+def fly(
+    settings: FlightSettings,
+    video: bool,
+    report: bool,
+    engine: Engine | None = None,
+    name: str = "fly",
+) -> int:
+    """Fly and report; return the exit status. Raises USER_ERRORS before the flight starts.
+
+    engine: None for that of the settings; name: of the command.
+    """
     landing = settings.scenario.landing
     console = Console()
     with Progress(console, landing.at + landing.duration) as progress, Interrupts() as stop:
-        flight = Flight.of(settings, progress, stop)
+        flight = Flight.of(settings, progress, stop, engine)
         with contextlib.suppress(FlightFailed), flight:
             flight.wait()
     result = flight.result
@@ -206,7 +215,7 @@ def fly(settings: FlightSettings, video: bool, report: bool) -> int:
     for note in outcome.notes:
         print(f"note: {note}")
     if outcome.failure:
-        print(f"uam fly: {outcome.failure}", file=sys.stderr)
+        print(f"uam {name}: {outcome.failure}", file=sys.stderr)
         for line in outcome.details:
             print(f"  | {line}", file=sys.stderr)
     if outcome.interrupted:

@@ -23,6 +23,7 @@ COMMANDS = {
     "campaign": "campaign",
     "faults": "faults",
     "margins": "margins",
+    "vehicle": "vehicle",
     "arm": "arm",
     "identify-joint": "identify_joint",
     "doctor": "doctor",

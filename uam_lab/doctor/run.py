@@ -7,19 +7,24 @@ from collections.abc import Callable, Iterable, Iterator
 from importlib import import_module
 
 from uam_lab.doctor.finding import Finding, Verdict, fail
+from uam_lab.vehicle.lab import Lab
 
 # in the order of the report; each module has checks()
 GROUPS = ("installation", "ros", "instances", "rendering", "autopilot", "machine", "leftovers")
 
 
-def examine(url: str = "") -> Iterator[tuple[str, Finding]]:
-    """Yield every finding with its group at once; url: link of an autopilot, if any."""
-    for group in GROUPS:
-        for finding in _guarded(group, (url,) if group == "autopilot" else ()):
+def examine(url: str = "", lab: Lab | None = None) -> Iterator[tuple[str, Finding]]:
+    """Yield every finding with its group at once.
+
+    url: link of an autopilot, if any; lab: whose devices are checked, if given.
+    """
+    arguments: dict[str, tuple[object, ...]] = {"autopilot": (url,), "devices": (lab,)}
+    for group in GROUPS if lab is None else (*GROUPS, "devices"):
+        for finding in _guarded(group, arguments.get(group, ())):
             yield group, finding
 
 
-def _guarded(group: str, arguments: tuple[str, ...]) -> Iterator[Finding]:
+def _guarded(group: str, arguments: tuple[object, ...]) -> Iterator[Finding]:
     """Yield the findings of a group; an unexpected error is also a finding."""
     try:
         checks: Callable[..., Iterable[Finding]]

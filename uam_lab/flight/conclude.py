@@ -71,6 +71,11 @@ def complete(
         "grasps": outcome.grasps,
         "faults": outcome.faults,
     }
+    if outcome.errors_of:
+        info["errors_of"] = outcome.errors_of
+        text = f"errors are {outcome.errors_of} − reference: a vehicle has no simulator's truth"
+        if text not in outcome.notes:
+            outcome.notes.append(text)
     write_json(folder.info, info)
     if outcome.series is None:
         return None

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 
@@ -13,7 +14,7 @@ class FlightStatus:
     [rad], [rad]; attitude: from the attitude that the position law desires. tilt: angle between
     the body's and the world's vertical axis [rad]. state, cause: of the supervisor, see
     `uam_control.supervision.State`. released_to: who has control instead of the companion, ""
-    if nobody has.
+    if nobody has. done: whether the mission has ended.
     """
 
     phase: str
@@ -27,6 +28,20 @@ class FlightStatus:
     state: str = ""
     cause: str = ""
     released_to: str = ""
+    done: bool = False
+
+
+STARTING = "its node starts"  # text of a device whose node has not reported yet
+
+
+@dataclass(frozen=True)
+class DeviceState:
+    """One device of a vehicle. text: what it is, or what is missing; advice: how to check it."""
+
+    name: str
+    present: bool
+    text: str
+    advice: str
 
 
 class Observer:
@@ -37,6 +52,9 @@ class Observer:
 
     def started(self, domain: int | None) -> None:
         """Receive that the flight has started; domain: of ROS, None with the direct engine."""
+
+    def bring_up(self, devices: Sequence[DeviceState]) -> None:
+        """Receive the state of a vehicle's devices."""
 
     def update(self, status: FlightStatus) -> None:
         """Receive a new status."""

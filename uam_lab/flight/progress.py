@@ -4,13 +4,15 @@ from __future__ import annotations
 
 import math
 import time
+from collections.abc import Iterable, Sequence
 
-from rich.console import Console
+from rich.console import Console, Group
 from rich.live import Live
 from rich.progress_bar import ProgressBar
 from rich.table import Table
+from rich.text import Text
 
-from uam_lab.flight.observer import FlightStatus, Observer
+from uam_lab.flight.observer import STARTING, DeviceState, FlightStatus, Observer
 
 PLAIN_INTERVAL = 10.0  # [s] of mission time between two plain lines within a phase
 
@@ -26,6 +28,8 @@ class Progress(Observer):
         self._shown: tuple[str, float, str] = ("", -math.inf, "")
         self._begin = time.monotonic()
         self._autopilot = ""
+        self._devices: dict[str, DeviceState] = {}
+        self._status: FlightStatus | None = None
 
     def __enter__(self) -> Progress:
         return self
@@ -37,17 +41,37 @@ class Progress(Observer):
         """Print one permanent line."""
         self.console.print(text, highlight=False, markup=False, soft_wrap=True)
 
+    def bring_up(self, devices: Sequence[DeviceState]) -> None:
+        """Show the devices: as a table until all are there, without a terminal each change."""
+        known, self._devices = self._devices, {one.name: one for one in devices}
+        if self.console.is_terminal:
+            self._show()
+            return
+        for one in devices:
+            before = known.get(one.name)
+            shown = before is not None and before.present == one.present
+            if one.text != STARTING and not (shown and (one.present or before.text == one.text)):
+                self.message(in_a_line(one))
+
     def update(self, status: FlightStatus) -> None:
         """Show the newest status."""
         if not self.console.is_terminal:
             self._plain(status)
             return
+        self._status = status
+        self._show()
+
+    def _show(self) -> None:
         if self._live is None:
             self._live = Live(
                 console=self.console, refresh_per_second=4, transient=True, redirect_stderr=False
             )
             self._live.start()
-        self._live.update(self._panel(status))
+        devices = self._devices.values()
+        parts = [device_table(devices)] if not all(one.present for one in devices) else []
+        if self._status is not None:
+            parts.append(self._panel(self._status))
+        self._live.update(Group(*parts))
 
     def finish(self) -> None:
         """Remove the live panel."""
@@ -97,6 +121,22 @@ class Progress(Observer):
             table.add_row("control", f"[bold yellow]{status.released_to}[/bold yellow]")
         table.add_row("real time", f"{status.real_time_factor:.2f}x", status.autopilot)
         return table
+
+
+def in_a_line(device: DeviceState) -> str:
+    """Return the state of a device, and how to check an absent one."""
+    if device.present:
+        return f"{device.name}: present: {device.text}"
+    return f"{device.name}: missing: {device.text}; check: {device.advice}"
+
+
+def device_table(devices: Iterable[DeviceState]) -> Table:
+    """Return the table of the devices."""
+    table = Table("device", "", "found", "check by", box=None, padding=(0, 2), header_style="dim")
+    for one in devices:
+        state = Text("present", "green") if one.present else Text("missing", "bold yellow")
+        table.add_row(one.name, state, Text(one.text), Text("" if one.present else one.advice))
+    return table
 
 
 def released(status: FlightStatus) -> str:

@@ -37,6 +37,7 @@ if TYPE_CHECKING:
 CONNECTED = 60.0  # [s] of wall time for the nodes to find each other before a command
 POLL = 0.05  # [s] between two looks of a waiting coroutine
 Kind = str | Condition
+Engine = Callable[[FlightSettings, ResultFolder, Observer, StopRequest], Outcome]
 
 
 class Flight:
@@ -65,17 +66,28 @@ class Flight:
 
     @classmethod
     def of(
-        cls, settings: FlightSettings, observer: Observer | None = None, stop: Any = None
+        cls,
+        settings: FlightSettings,
+        observer: Observer | None = None,
+        stop: Any = None,
+        engine: Engine | None = None,
     ) -> Flight:
-        """Return a flight with checked settings. stop: a StopRequest to end it."""
+        """Return a flight with checked settings.
+
+        stop: a StopRequest to end it; engine: None for that of the settings.
+        """
         flight = cls.__new__(cls)
-        flight._prepare(settings, observer, stop or StopRequest())
+        flight._prepare(settings, observer, stop or StopRequest(), engine)
         return flight
 
     def _prepare(
-        self, settings: FlightSettings, observer: Observer | None, stop: StopRequest
+        self,
+        settings: FlightSettings,
+        observer: Observer | None,
+        stop: StopRequest,
+        engine: Engine | None = None,
     ) -> None:
-        self.settings = settings
+        self.settings, self._engine = settings, engine
         self._history, self._stop = History(observer or Observer()), stop
         self._thread: threading.Thread | None = None
         self._folder: ResultFolder | None = None
@@ -126,9 +138,8 @@ class Flight:
         """Fly and evaluate, in the flight's thread."""
         folder = self._folder
         try:
-            outcome = _engine(self.settings.engine)(
-                self.settings, folder, self._history, self._stop
-            )
+            fly = self._engine or _engine(self.settings.engine)
+            outcome = fly(self.settings, folder, self._history, self._stop)
             metrics = conclude(self.settings, folder, outcome)
             self._result = FlightResult(folder.path, metrics, outcome)
         except BaseException as error:  # raised again in the caller's thread
@@ -396,7 +407,7 @@ class _Wait:
         return self._found
 
 
-def _engine(name: str) -> Callable[..., Outcome]:
+def _engine(name: str) -> Engine:
     """Return the engine's `fly`."""
     if name == "direct":
         from uam_lab.flight.direct.engine import fly as engine

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 
-from uam_lab.flight.observer import FlightStatus, Observer
+from uam_lab.flight.observer import DeviceState, FlightStatus, Observer
 from uam_lab.library.errors import NotInTime
 
 Condition = Callable[[FlightStatus], bool]
@@ -36,6 +36,10 @@ class History(Observer):
             self.running, self.domain = True, domain
             self._news.notify_all()
         self._further.started(domain)
+
+    def bring_up(self, devices: Sequence[DeviceState]) -> None:
+        """Pass on the state of the devices."""
+        self._further.bring_up(devices)
 
     def update(self, status: FlightStatus) -> None:
         """Store a status."""

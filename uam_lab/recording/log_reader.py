@@ -1,15 +1,16 @@
 """Converts the log.mcap of a flight to the table of its control ticks.
 
 A tick is a stamp of /uam/truth/state for which the mission had a reference. All other topics are
-joined to it by stamp. Without a message of the same stamp (gains come at 50 Hz; in real time
-messages may be lost) a tick has the last value before it, as in the receiving nodes.
+joined to it by stamp. A vehicle has no truth: then the estimate, /uam/state, stands in its columns.
+Without a message of the same stamp (gains come at 50 Hz; in real time messages may be lost) a tick
+has the last value before it, as in the receiving nodes.
 """
 
 from __future__ import annotations
 
 from bisect import bisect_right
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
@@ -22,6 +23,7 @@ from uam_control.coordinates import ALPHA, ARM, ATTITUDE, ROLL
 from uam_control.mission import Scenario
 from uam_control.mission.mission_output import ABORTED, LANDED, WAITING
 from uam_control.supervision import State
+from uam_control.vehicle import VehicleDescription, load_description
 from uam_lab.recording import fault_records as fault_log
 from uam_lab.recording.logged_topics import ADAPTATION, SECOND, Log, StampedRows
 from uam_lab.recording.mcap_reader import UnreadableLog
@@ -33,6 +35,8 @@ from uam_msgs_py.messages.parameter_changes import ParameterChange
 from uam_msgs_py.messages.status import MissionStatus
 
 SILENCE = 1e9  # [ns] without references after which the mission counts as lost
+MISSED = 0.012  # [s] of a tick on a vehicle: three control periods, as in simulation
+ESTIMATE = "estimate"
 STATE_ROWS = ("positions", "velocities", "accelerations")
 
 
@@ -74,7 +78,9 @@ class References:
 @dataclass(frozen=True)
 class LoggedFlight:
     """Content of a log. series: table of the ticks; done: the mission ended; abort_reason: of the
-    mission; parameter_changes, transitions, grasps, faults: in order; wall_s: wall time [s]."""
+    mission; parameter_changes, transitions, grasps, faults: in order; wall_s: wall time [s];
+    errors_of: ESTIMATE where the log has no truth, else ""; latency_s (m,), missed: of a log
+    without truth, see `latencies`."""
 
     series: Series
     done: bool
@@ -84,24 +90,36 @@ class LoggedFlight:
     grasps: list[dict[str, Any]]
     faults: list[dict[str, Any]]
     wall_s: float
+    errors_of: str = ""
+    latency_s: list[float] | None = None
+    missed: int | None = None
 
 
 def read_flight(
-    path: Path, scenario: Scenario, info: Mapping[str, Any] | None = None
+    path: Path,
+    scenario: Scenario,
+    info: Mapping[str, Any] | None = None,
+    vehicle: VehicleDescription | None = None,
 ) -> LoggedFlight:
     """Return the flight of `scenario` recorded in `path`.
 
-    Raises UnreadableLog if the file is no log or its flight did not start.
+    vehicle: of a log without the simulator's topics, None for the default one. Raises UnreadableLog
+    if the file is no log or its flight did not start.
     """
     log = Log.read(path)
     statuses = log.statuses()
     end = next((stamp for stamp, status in statuses if status.done), None)
     abort_reason = statuses[-1][1].abort_reason if statuses else ""
-    columns = timeseries.columns(
-        log.width(topics.TRUTH_STATE) - ALPHA, log.width(topics.TRUTH_ROTORS)
-    )
+    simulated = log.width(topics.TRUTH_STATE) > 0
+    if simulated:
+        columns = timeseries.columns(
+            log.width(topics.TRUTH_STATE) - ALPHA, log.width(topics.TRUTH_ROTORS)
+        )
+    else:
+        columns = timeseries.columns_of(vehicle or load_description())
+    states = topics.TRUTH_STATE if simulated else topics.STATE
     references = References(log, columns.size)
-    truth = log.samples(topics.TRUTH_STATE, STATE_ROWS, columns.size)
+    truth = log.samples(states, STATE_ROWS, columns.size)
     first, last = references.samples.stamps[[0, -1]]
     # The mission is one tick ahead: its last reference is for a tick without control. Ticks after
     # the mission's end depend on the time until the plant receives the end, so they are cut off.
@@ -124,20 +142,24 @@ def read_flight(
     _commands(log, ticks, recording)
     for subsystem in SUBSYSTEMS:
         adaptation(log, subsystem, ticks, values, columns)
-    _truth(log, ticks, recording)
+    if simulated:
+        _truth(log, ticks, recording)
+    else:
+        _measured(log, ticks, recording, statuses)
     for number, name in enumerate(phases(ticks, time, flying, scenario, statuses)):
         recording.phases[number] = recording.phase_names.setdefault(
             name, len(recording.phase_names)
         )
     recording.count = len(ticks)
     changes = parameter_changes(log, takeoff)
-    states = transitions(statuses, takeoff)
-    wall = log.wall_seconds(topics.TRUTH_STATE)
+    entered = transitions(statuses, takeoff)
+    wall = log.wall_seconds(states)
     faults = fault_log.records(log.messages(topics.FAULTS), takeoff)
     series = recording.series(info)
     decided = grasps(statuses, takeoff)
     ended = end is not None
-    return LoggedFlight(series, ended, abort_reason, changes, states, decided, faults, wall)
+    found = LoggedFlight(series, ended, abort_reason, changes, entered, decided, faults, wall)
+    return found if simulated else replace(found, errors_of=ESTIMATE, **latencies(log, ticks))
 
 
 def _last_of_all(last: int, truth: np.ndarray) -> int:
@@ -212,6 +234,37 @@ def _truth(log: Log, ticks: np.ndarray, table: FlightTable) -> None:
     values[:, columns.block("payload.")] = np.column_stack([position, w, x, y, z])
     magnet = log.samples(topics.TRUTH_MAGNET, ("position", "effort"), 2).at(ticks)
     values[:, columns.block("magnet.")] = magnet[:, [0, 2, 1]]
+
+
+def _measured(
+    log: Log,
+    ticks: np.ndarray,
+    table: FlightTable,
+    statuses: Sequence[tuple[int, MissionStatus]],
+) -> None:
+    """Fill in what a vehicle has in place of the simulator's data: the payload's poses, if any, and
+    the commanded magnet."""
+    values, columns = table.values, table.columns
+    position = log.samples(topics.PAYLOAD, ("position",), 3).at(ticks)
+    x, y, z, w = log.samples(topics.PAYLOAD, ("orientation",), 4).at(ticks).T
+    values[:, columns.block("payload.")] = np.column_stack([position, w, x, y, z])
+    stamps = np.array([stamp for stamp, _ in statuses], dtype=np.int64)
+    on = np.array([[float(status.magnet)] for _, status in statuses]).reshape(-1, 1)
+    values[:, columns["magnet.on"]] = StampedRows(stamps, on).at(ticks)[:, 0]
+
+
+def latencies(log: Log, ticks: np.ndarray) -> dict[str, Any]:
+    """Return `latency_s` (m,): stamp of a tick → its setpoint was published, on the wall clock [s],
+    and `missed`: the ticks without a setpoint within MISSED.
+
+    ticks (k,) [ns], of the wall clock.
+    """
+    stamps, published = log.published(topics.SETPOINT)
+    found = (published - stamps)[np.isin(stamps, ticks)] / SECOND
+    return {
+        "latency_s": found.tolist(),
+        "missed": len(ticks) - int(np.count_nonzero(found < MISSED)),
+    }
 
 
 def transitions(

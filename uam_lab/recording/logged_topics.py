@@ -26,7 +26,7 @@ TOPICS = (
     *(topics.TRUTH_STATE, topics.TRUTH_PAYLOAD, topics.TRUTH_ROTORS, topics.TRUTH_MAGNET),
     *(topics.STATE, topics.REFERENCE, topics.MISSION_STATUS, topics.CHANGES, topics.FAULTS),
     *(topics.POSITION_COMMAND, topics.ATTITUDE_COMMAND, topics.ARM_COMMAND),
-    *(topics.SETPOINT, topics.THRUST, *ADAPTATION.values()),
+    *(topics.SETPOINT, topics.THRUST, topics.PAYLOAD, *ADAPTATION.values()),
 )
 
 
@@ -63,17 +63,17 @@ class Log:
 
     @classmethod
     def read(cls, path: Path) -> Log:
-        """Read a log; its namespace is that of the true state's topic.
+        """Read a log; its namespace is that of the states' topics.
 
         Raises UnreadableLog, also for a log of several vehicles; OSError.
         """
         ends = tuple(f"/{topic.name}" for topic in TOPICS)
         found = read_log(path, lambda name: name.endswith(ends))
-        truth = f"/{topics.TRUTH_STATE.name}"
-        spaces = [name.removesuffix(truth) for name in found if name.endswith(truth)]
+        states = tuple(f"/{topic.name}" for topic in (topics.TRUTH_STATE, topics.STATE))
+        spaces = {name.removesuffix(one) for name in found for one in states if name.endswith(one)}
         if len(spaces) > 1:
             raise UnreadableLog(f"{path} has several vehicles: {', '.join(sorted(spaces))}")
-        return cls(found, spaces[0] if spaces else "/")
+        return cls(found, spaces.pop() if spaces else "/")
 
     def messages(self, topic: Topic) -> list[bytes]:
         """Return the serialized messages of a topic in file order; may be empty."""
@@ -88,6 +88,13 @@ class Log:
         """Return the wall time between first and last message of a topic [s]; 0 without any."""
         log = self._topics.get(topic)
         return (max(log.published) - min(log.published)) / SECOND if log and log.published else 0.0
+
+    def published(self, topic: Topic) -> tuple[np.ndarray, np.ndarray]:
+        """Return stamps (m,) [ns] and wall times of publication (m,) [ns] of a topic's messages."""
+        log, blocks = self._topics.get(topic), self.blocks(topic)
+        if log is None or not blocks:
+            return np.zeros(0, np.int64), np.zeros(0, np.int64)
+        return np.concatenate([one.stamps for one in blocks]), np.array(log.published)
 
     def blocks(self, topic: Topic) -> list[cdr.Block]:
         """Return the decoded messages of a topic; may be empty."""

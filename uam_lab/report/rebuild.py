@@ -9,7 +9,7 @@ from typing import Any
 
 from uam_control.mission import Scenario, load_scenario
 from uam_control.settings import configuration
-from uam_control.vehicle import DEFAULT_VEHICLE, load_description
+from uam_control.vehicle import DEFAULT_VEHICLE, VehicleDescription, load_description
 from uam_lab.flight.conclude import complete
 from uam_lab.recording import log_facts
 from uam_lab.recording.log_reader import read_flight
@@ -38,15 +38,16 @@ def rebuild(directory: Path, out: Path, scenario: str | None = None) -> dict[str
     before = _json(directory / "info.json")
     known = facts.info or before
     flown = _scenario(directory, facts, known, scenario)
-    flight = read_flight(log, flown)
+    flight = read_flight(log, flown, vehicle=_vehicle(known))
     numbers = _json(directory / "logs" / "mujoco_sim.json")
     realtime = known.get("clock") == "realtime"
     outcome = Outcome(
         series=flight.series,
         wall_s=numbers.get("wall_s") or before.get("wall_s") or flight.wall_s,
         abort_reason=flight.abort_reason,
-        latency_s=numbers.get("latency_s") if realtime else None,
-        missed_ticks=numbers.get("missed_ticks") if realtime else None,
+        latency_s=numbers.get("latency_s", flight.latency_s) if realtime else None,
+        missed_ticks=numbers.get("missed_ticks", flight.missed) if realtime else None,
+        errors_of=flight.errors_of,
         notes=[note for note in before.get("notes") or [] if not note.startswith(PARTIAL)],
         parameter_changes=flight.parameter_changes,
         transitions=flight.transitions,
@@ -73,7 +74,8 @@ def series_of(directory: Path) -> timeseries.Series:
         raise ResultFolderError(f"{directory} has neither {TABLE} nor {LOG}")
     facts = log_facts.read(log)
     known = facts.info or _json(directory / "info.json")
-    flight = read_flight(log, _scenario(directory, facts, known, None), known)
+    scenario = _scenario(directory, facts, known, None)
+    flight = read_flight(log, scenario, known, _vehicle(known))
     flight.series.info["parameter_changes"] = flight.parameter_changes
     flight.series.info["faults"] = flight.faults
     return flight.series
@@ -85,12 +87,17 @@ def _scenario(
     """Return the flown scenario: from the user, else from the log, else from info.json."""
     name = asked or (None if facts.scenario else known.get("scenario"))
     if name is not None:
-        vehicle = load_description(known.get("vehicle") or DEFAULT_VEHICLE)
+        vehicle = _vehicle(known)
         options = log_facts.options_of(known)
         return load_scenario(str(configuration.named("scenarios", name)), vehicle, options)
     if facts.scenario is None:
         raise ResultFolderError(f"{directory / LOG} contains no scenario: give --scenario")
     return facts.scenario
+
+
+def _vehicle(known: Mapping[str, Any]) -> VehicleDescription:
+    """Return the described vehicle of a flight. Raises VehicleError, ConfigurationError."""
+    return load_description(known.get("vehicle") or DEFAULT_VEHICLE)
 
 
 def _take_over(name: str, directory: Path, out: Path, texts: Mapping[str, str]) -> None:

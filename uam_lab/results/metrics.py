@@ -1,6 +1,7 @@
 """Metrics of a flight (metrics.json), computed from the recorded series and the facts beside it.
 
-Errors are truth minus reference. RMS and maximum run over the whole flight, from the take-off
+Errors are truth minus reference; on a vehicle, which has no truth, estimate minus reference
+(`errors_of`). RMS and maximum run over the whole flight, from the take-off
 command to the touchdown command (`Series.flown`); every control tick weighs the same.
 """
 
@@ -110,6 +111,8 @@ def compute(
         "trajectory": next((p for p in phases if p["phase"] == phase_errors.TRAJECTORY), None),
         "faults": info.get("faults") or [],
     }
+    if info.get("errors_of"):
+        metrics["errors_of"] = info["errors_of"]
     if info.get("clock") == "realtime":
         metrics["latency_ms"] = latency_figures(latency_s)
         metrics["missed_ticks"] = info.get("missed_ticks")

@@ -47,8 +47,8 @@ class Outcome:
     abort_reason: reason of the mission's abort. failure: technical reason of the flight's end, one
     line; details: last lines of the node's log. latency_s (ticks,), missed_ticks: realtime only.
     parameter_changes: see `log_reader.parameter_changes`; transitions: see `transition`;
-    grasps: see `grasp_decision`; faults:
-    see `faults.timeline.record`.
+    grasps: see `grasp_decision`; faults: see `faults.timeline.record`. errors_of: "" for errors
+    truth − reference, else what stands for the truth.
     """
 
     series: Series | None
@@ -64,6 +64,7 @@ class Outcome:
     transitions: list[dict[str, Any]] = field(default_factory=list)
     grasps: list[dict[str, Any]] = field(default_factory=list)
     faults: list[dict[str, Any]] = field(default_factory=list)
+    errors_of: str = ""
 
     @property
     def partial(self) -> bool:

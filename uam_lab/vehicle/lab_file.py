@@ -47,8 +47,7 @@ FOLDER, TEMPLATE = "lab", "s500_lab"
 REQUIRED = ("vehicle", "scenario", "autopilot", "imu", "room", "mocap", "arm", "magnet")
 OPTIONAL = ("profile", "cockpit", "nodes", "out")
 GEOFENCE = ("geofence_low", "geofence_high")
-MOCAP_DRIVER, ARM_DRIVER, MAGNET_DRIVER = "mocap_driver", "arm_driver", "magnet_driver"
-CHECKLIST = "checklist"
+ARM_DRIVER, CHECKLIST = "arm_driver", "checklist"
 TUNABLE = (*NODES, BRIDGE, ARM_DRIVER, CHECKLIST, "recorder", "cockpit")  # in `nodes`
 
 

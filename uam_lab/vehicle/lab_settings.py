@@ -11,7 +11,7 @@ from uam_lab.vehicle.lab import Lab
 SHARED = (*NODES, BRIDGE, "recorder", "cockpit")  # nodes that a flight in simulation has, too
 
 
-def settings_of(lab: Lab, command: str = "") -> FlightSettings:
+def settings_of(lab: Lab, command: str = "", dry_run: bool = False) -> FlightSettings:
     """Return the checked settings; the room is the supervisor's geofence.
 
     The scenario must be feasible within the room from a take-off at its origin. The mission waits
@@ -32,6 +32,7 @@ def settings_of(lab: Lab, command: str = "") -> FlightSettings:
         imu=lab.imu,
         autopilot=lab.autopilot,
         auto_start=False,
+        dry_run=dry_run,
         view=True,
         parameters=given,
         command=command,

@@ -53,13 +53,16 @@ class Connections:
     Diagnostics are sent once a second, so the counts may be a second old.
     """
 
-    def __init__(self, node: Node):
+    def __init__(self, node: Node, spun: bool = True):
+        """spun: `node` is spun; else its owner passes the messages by `note`."""
         self._values: dict[str, dict[str, str]] = {}
         self._namespace = node.get_namespace()
-        topic = topics.DIAGNOSTICS
-        node.create_subscription(topic.type, topic.name, self._note, topic.qos)
+        if spun:
+            topic = topics.DIAGNOSTICS
+            node.create_subscription(topic.type, topic.name, self.note, topic.qos)
 
-    def _note(self, message: DiagnosticArray) -> None:
+    def note(self, message: DiagnosticArray) -> None:
+        """Take a message of /diagnostics."""
         for status in message.status:
             self._values[status.name] = {pair.key: pair.value for pair in status.values}
 

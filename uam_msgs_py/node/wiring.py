@@ -21,6 +21,7 @@ from uam_msgs_py.node.namespace import expanded
 ESTIMATOR, MISSION = "state_estimator", "mission"
 POSITION, ATTITUDE, ARM = "position_controller", "attitude_controller", "arm_controller"
 BRIDGE, PLANT, RECORDER = "mavlink_bridge", "mujoco_sim", "recorder"
+MOCAP_DRIVER, ARM_DRIVER, MAGNET_DRIVER = "mocap_driver", "arm_driver", "magnet_driver"
 SCENE, COCKPIT = "scene", "cockpit"  # observers, in none of WIRES: a flight starts without them
 
 
@@ -103,6 +104,23 @@ def with_autopilot_imu(wires: Sequence[Wire]) -> Sequence[Wire]:
     """
     changed = {topics.IMU: {"publisher": BRIDGE}, topics.CLOCK: {"subscribers": (BRIDGE,)}}
     return [replace(wire, **changed.get(wire.topic, {})) for wire in wires]
+
+
+def on_vehicle(publishers: Mapping[str, str], subscribers: Mapping[str, str]) -> list[Wire]:
+    """Return WIRES of a vehicle, on which devices stand in place of the plant.
+
+    publishers, subscribers: topic of the plant → node that publishes it, or subscribes to it. A
+    topic that is not named has no such node.
+    """
+    found = []
+    for wire in WIRES:
+        name = wire.topic.name
+        if wire.publisher == PLANT and name not in publishers:
+            continue
+        listening = (subscribers.get(name) if one == PLANT else one for one in wire.subscribers)
+        publisher = publishers[name] if wire.publisher == PLANT else wire.publisher
+        found.append(replace(wire, publisher=publisher, subscribers=tuple(filter(None, listening))))
+    return found
 
 
 def _listeners(node: Node, topic: topics.Topic) -> set[str]:

@@ -58,7 +58,7 @@ class LateDevice(Generic[Device]):
         before = self.problem
         try:
             self.device, self.problem = self._make(), ""
-            self._node.get_logger().info("the device is there")
+            self._node.get_logger().info("the device is open")
         except self._errors as error:
             self.problem = str(error)
             if self.problem != before:

@@ -7,27 +7,24 @@ It releases all processes, ports and locks, also after an error.
 
 from __future__ import annotations
 
-import time
+from collections.abc import Iterator
 from pathlib import Path
 
 from uam_control.profiles.profile import CONTROLLERS
 from uam_lab.cockpit import page_address
 from uam_lab.flight.flight_settings import ONLOOKERS, FlightSettings
 from uam_lab.flight.observer import FlightStatus, Observer
-from uam_lab.flight.ros import node_arguments
+from uam_lab.flight.ros import node_arguments, supervise
 from uam_lab.flight.ros.logged_outcome import read_outcome
 from uam_lab.flight.ros.process_fault_injection import ProcessFaults
-from uam_lab.flight.ros.restarts import ChangedParameters, RestartTopic
 from uam_lab.flight.ros.status_listener import StatusListener
 from uam_lab.processes import child
 from uam_lab.processes.interrupts import StopRequest
-from uam_lab.processes.node_environment import environment, export_line
 from uam_lab.processes.process_table import await_orphans
 from uam_lab.processes.processes import NodeFailed, Processes
 from uam_lab.results.outcome import Outcome
 from uam_lab.results.result_folder import ResultFolder
 from uam_msgs_py.node import wiring
-from uam_msgs_py.node.rightful import PARAMETER as PUBLISHERS
 from uam_sim_bridge.faults import PROCESS
 from uam_sim_bridge.faults.timeline import FaultState
 from uam_sim_bridge.nodes.fault_topic import FaultTopic
@@ -36,8 +33,6 @@ from uam_sim_bridge.ports import Ports, Reservation
 
 AUTOPILOT = "autopilot"
 FORKER = "uam_lab.flight.ros.forker"
-RESTARTS = 3  # of each controller in a flight
-POLL = 0.05  # [s]
 
 
 def fly(
@@ -95,56 +90,31 @@ def _supervise(
     stop: StopRequest,
     last: list[FlightStatus],
 ) -> NodeFailed | None:
-    """Start all processes, watch them until the plant ends, stop them; return the failure.
+    """Run the processes until the plant ends; return the failure.
 
-    last: receives the newest status.
+    last: receives the newest status of a flight without a failure.
     """
-    logs = folder.path / "logs"
-    surroundings = environment(ports.domain, logs)
-    common = node_arguments.common_remappings(settings)
-    publishers = node_arguments.publishers(settings)
-    with Processes(logs, surroundings) as children:
-        children.hurry = lambda: stop.impatient
-        try:
-            _start(children, settings, folder, ports)
-            observer.message(
-                f"{len(children.names)} processes in ROS domain {ports.domain}, "
-                f"autopilot on TCP {ports.simulator_tcp}, UDP {ports.autopilot_udp}"
-            )
-            observer.message(f"for ros2 in another shell:\n{export_line(ports.domain)}")
-            for name in settings.foreign:
-                own = settings.own_names.get(name, name)
-                observer.message(f"waiting for {own}: start it with ROS_DOMAIN_ID={ports.domain}")
-            if not settings.auto_start and not settings.dry_run:
-                real = settings.link is not None and settings.link.real
-                why = ": a real autopilot arms by itself only with --arm" if real else ""
-                observer.message(f"waiting for uam start{why}")
-            with (
-                StatusListener(
-                    surroundings, ports.domain, settings.namespace, common, publishers
-                ) as listener,
-                _process_faults(settings, children, listener, observer) as faults,
-            ):
-                observer.started(ports.domain)
-                _watch(children, listener, observer, stop, faults)
-                last[:] = listener.newest
-        except NodeFailed as failure:
-            return failure
-        finally:
-            others = [name for name in children.names if name != wiring.RECORDER]
-            disobedient = children.stop(others) + children.stop([wiring.RECORDER])
-            if disobedient and not stop.impatient:
-                observer.message(f"did not stop and were killed: {', '.join(disobedient)}")
-    return None
+    failure, listener = supervise.run(
+        settings,
+        folder,
+        ports,
+        observer,
+        stop,
+        node_arguments.publishers(settings),
+        lambda children: _start(children, settings, folder, ports),
+        lambda children: _announcement(children, settings, ports),
+        lambda children, listener: SimulatedCourse(settings, children, listener, observer, stop),
+    )
+    if failure is None and listener is not None:
+        last[:] = listener.newest
+    return failure
 
 
 def _start(
     children: Processes, settings: FlightSettings, folder: ResultFolder, ports: Ports
 ) -> None:
-    # the nodes' output already contains their log messages; separate files would repeat them
-    arguments = ["--ros-args", "--disable-external-lib-logs"]
-    arguments += ["-p", f"{PUBLISHERS}:={node_arguments.publishers(settings)}"]
-    arguments += ["--params-file", str(folder.parameters), "-r", f"__ns:={settings.namespace}"]
+    publishers = node_arguments.publishers(settings)
+    arguments = supervise.ros_arguments(settings, folder, publishers)
     for name, module in node_arguments.modules(settings).items():
         children.start(
             name,
@@ -152,11 +122,55 @@ def _start(
             arguments + node_arguments.remappings(settings, name),
             may_end=name == wiring.PLANT,
             optional=name in ONLOOKERS,
-            again=RESTARTS if name in CONTROLLERS else 0,
+            again=supervise.RESTARTS if name in CONTROLLERS else 0,
         )
     module, own = node_arguments.autopilot(settings, folder, ports)
     if module:
         children.start(AUTOPILOT, module, own, may_end=True)
+
+
+def _announcement(children: Processes, settings: FlightSettings, ports: Ports) -> Iterator[str]:
+    yield (
+        f"{len(children.names)} processes in ROS domain {ports.domain}, "
+        f"autopilot on TCP {ports.simulator_tcp}, UDP {ports.autopilot_udp}"
+    )
+    for name in settings.foreign:
+        own = settings.own_names.get(name, name)
+        yield f"waiting for {own}: start it with ROS_DOMAIN_ID={ports.domain}"
+    if not settings.auto_start and not settings.dry_run:
+        real = settings.link is not None and settings.link.real
+        why = ": a real autopilot arms by itself only with --arm" if real else ""
+        yield f"waiting for uam start{why}"
+
+
+class SimulatedCourse:
+    """A flight in simulation: it goes on until the plant ends; faults of processes are injected."""
+
+    def __init__(
+        self,
+        settings: FlightSettings,
+        children: Processes,
+        listener: StatusListener,
+        observer: Observer,
+        stop: StopRequest,
+    ) -> None:
+        self._children, self._listener, self._stop = children, listener, stop
+        self._faults = _process_faults(settings, children, listener, observer)
+
+    def goes_on(self) -> bool:
+        """Begin and end the due faults; return whether the plant runs and nobody stops it."""
+        injected, mission_time = self._stop.injected, self._listener.mission_time
+        while not injected.empty():
+            self._faults.add(injected.get(), mission_time or 0.0)
+        self._faults.update(mission_time)
+        return self._children.running(wiring.PLANT) and not self._stop.raised
+
+    def __enter__(self) -> SimulatedCourse:
+        self._faults.__enter__()
+        return self
+
+    def __exit__(self, *exception) -> None:
+        self._faults.__exit__(*exception)
 
 
 def _process_faults(
@@ -174,32 +188,3 @@ def _process_faults(
         topics[0].publish(listener.stamp, [one])
 
     return ProcessFaults(children, schedule, announce)
-
-
-def _watch(
-    children: Processes,
-    listener: StatusListener,
-    observer: Observer,
-    stop: StopRequest,
-    faults: ProcessFaults,
-) -> None:
-    """Show the progress until the plant ends or the user stops it. Raises NodeFailed."""
-    restarts, changed = RestartTopic(listener.node), ChangedParameters(listener.node)
-    while children.running(wiring.PLANT) and not stop.raised:
-        changed.poll()
-        for lost in children.revive(changed.arguments):
-            text = f"{lost}; restarted"
-            observer.message(text)
-            restarts.publish(listener.stamp, lost.name, text)
-        children.check()
-        for failure in children.missed():
-            observer.message(f"{failure}; the flight continues without it")
-        for status in listener.poll():
-            observer.update(status)
-        while not stop.injected.empty():
-            faults.add(stop.injected.get(), listener.mission_time or 0.0)
-        faults.update(listener.mission_time)
-        time.sleep(POLL)
-    observer.finish()
-    if not stop.raised:
-        children.check()

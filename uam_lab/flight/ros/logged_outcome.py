@@ -39,13 +39,16 @@ def read_outcome(
         text = ", ".join(f"{count} of {topic}" for topic, count in lost.items())
         outcome.notes.append(f"the recorder lost messages: {text}")
     try:
-        flight = read_flight(folder.log, settings.scenario)
+        flight = read_flight(folder.log, settings.scenario, vehicle=settings.vehicle)
     except (UnreadableLog, OSError) as error:
         outcome.failure = outcome.failure or f"nothing recorded: {error}"
         return outcome
     outcome.series, outcome.abort_reason = flight.series, flight.abort_reason
     outcome.parameter_changes, outcome.transitions = flight.parameter_changes, flight.transitions
     outcome.grasps, outcome.faults = flight.grasps, flight.faults
+    if flight.errors_of:
+        outcome.errors_of, outcome.wall_s = flight.errors_of, flight.wall_s
+        outcome.latency_s, outcome.missed_ticks = flight.latency_s, flight.missed
     if not flight.done and not outcome.partial:
         ended = recorder.get("ended") or numbers.get("ended_by")
         if settings.dry_run and ended and not recorder.get("ended"):

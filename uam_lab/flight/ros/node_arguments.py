@@ -54,13 +54,7 @@ def parameters(
     settings: FlightSettings, folder: ResultFolder, ports: Ports
 ) -> dict[str, dict[str, Any]]:
     """Return the parameters of each node, from the profile and from the settings."""
-    sections = {node: values.to_mapping() for node, values in settings.profile.sets.items()}
-    sections[wiring.MISSION] |= {
-        "scenario": scenario_source(settings),
-        **settings.scenario_options.to_mapping(),
-        "auto_start": settings.auto_start,
-        "dry_run": settings.dry_run,
-    }
+    sections = flight_nodes(settings, folder)
     sections[wiring.PLANT] = {
         "vehicle_changes": json.dumps(settings.vehicle_changes | servo_mode(settings.profile)),
         "plant": settings.plant,
@@ -83,17 +77,13 @@ def parameters(
         "time_limit": _time_limit(settings),
         "statistics": str(folder.path / "logs" / "mujoco_sim.json"),
     }
-    sections[wiring.BRIDGE] = settings.profile.bridge() | {
-        "clock": settings.clock,
+    sections[wiring.BRIDGE] |= {
         "local_port": ports.offboard_udp,
         "autopilot_port": ports.autopilot_udp,
         # system id: as PX4 SITL numbers its instances; 1 for a flight controller
         "autopilot_system": 1 if in_the_loop(settings) else ports.instance + 1,
-        "gcs": settings.gcs,
         "faults": settings.faults.only(LINK).to_text(),
         "network_delay": _network_delay(settings),
-        "dry_run": settings.dry_run,
-        "imu_source": settings.imu,
         "imu_clock": "topic",
     }
     if users_autopilot(settings):
@@ -106,12 +96,40 @@ def parameters(
         sections[wiring.COCKPIT] = {
             "port": page_address.free_port(page_address.LOCAL, page_address.PORT)
         }
+    return complete(sections, settings)
+
+
+def flight_nodes(settings: FlightSettings, folder: ResultFolder) -> dict[str, dict[str, Any]]:
+    """Return the parameters of the nodes that fly in simulation and on a vehicle alike.
+
+    Those of their links and displays are missing.
+    """
+    sections = {node: values.to_mapping() for node, values in settings.profile.sets.items()}
+    sections[wiring.MISSION] |= {
+        "scenario": scenario_source(settings),
+        **settings.scenario_options.to_mapping(),
+        "auto_start": settings.auto_start,
+        "dry_run": settings.dry_run,
+    }
+    sections[wiring.BRIDGE] = settings.profile.bridge() | {
+        "clock": settings.clock,
+        "gcs": settings.gcs,
+        "dry_run": settings.dry_run,
+        "imu_source": settings.imu,
+    }
     sections[wiring.RECORDER] = {
         "file": str(folder.log),
         "statistics": str(folder.path / "logs" / "recorder.json"),
         "facts": str(folder.path / "logs" / FACTS),
         "size_limit": settings.log_limit,
     }
+    return sections
+
+
+def complete(
+    sections: dict[str, dict[str, Any]], settings: FlightSettings
+) -> dict[str, dict[str, Any]]:
+    """Return the sections with the parameters of nodes without a profile, and the vehicle."""
     for node, values in settings.parameters.items():
         if node in sections:
             sections[node] |= values

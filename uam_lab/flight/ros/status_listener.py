@@ -81,6 +81,7 @@ class StatusListener(Guest):
             state=mission.state,
             cause=mission.cause,
             released_to=state.released_to,
+            done=mission.done,
         )
 
     def _real_time_factor(self, simulated: float) -> float:

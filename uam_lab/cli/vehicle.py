@@ -1,0 +1,91 @@
+"""`uam vehicle`: bring a real vehicle up and fly it; no simulator."""
+
+from __future__ import annotations
+
+import argparse
+import dataclasses
+import getpass
+import shlex
+import sys
+from datetime import datetime
+from pathlib import Path
+
+from uam_control.settings import configuration
+from uam_lab.cli.command import Command
+from uam_lab.cli.fly import fly
+from uam_lab.flight.conclude import command_line
+from uam_lab.flight.node_options import SettingsError
+from uam_lab.results.result_folder import in_a_name, new_folder
+from uam_lab.vehicle.lab_file import load_lab, template
+from uam_lab.vehicle.lab_settings import settings_of
+
+UNIT = "systemd/uam-vehicle.service"
+DONE = 0
+EXAMPLES = """\
+examples:
+  uam vehicle --example > my_lab.yaml        the template of a lab file, with comments
+  uam vehicle --config my_lab.yaml           drivers, estimator, mission, controllers, bridge ...
+  uam vehicle --config my_lab.yaml --dry-run        all commands computed, none sent, nothing armed
+  uam vehicle --config my_lab.yaml --systemd | sudo tee /etc/systemd/system/uam-vehicle.service
+
+It names each device that is missing and how to check it, waits, and uses a device that is plugged
+in later. Nothing arms by itself: uam start in another shell, or the cockpit's button. Ctrl-C on the
+ground ends all nodes and keeps the log; in the air it commands a landing, a second one ends the
+nodes at once, and the autopilot's failsafe acts. docs/first_flight.md, docs/companion.md. Exit
+status: 0 mission or dry run completed, 1 flown but not completed, 2 wrong use, 130 ended by Ctrl-C.
+"""
+
+
+def add(commands: argparse._SubParsersAction) -> None:
+    """Add the subcommand to the command line."""
+    command = Command(
+        commands,
+        "vehicle",
+        run,
+        "bring a real vehicle up and fly it",
+        "Start the drivers and the nodes of a real vehicle, as its lab file describes it.",
+        EXAMPLES,
+    )
+    command.config()
+    command.switch("--dry-run", "compute all commands for the present pose; send none, arm nothing")
+    text = "result folder (default <out of the lab file>/<time>-<scenario>)"
+    command.option("--out", "DIR", text, type=Path)
+    text = "leave out the report; uam report makes it later"
+    command.switch("--no-report", text, "store_false", dest="report")
+    command.switch("--example", "print the template of a lab file, and end")
+    command.switch("--systemd", "print the unit that starts this at boot, and end")
+
+
+def run(options: argparse.Namespace) -> int:
+    """Run the command; return the exit status."""
+    if options.example:
+        print(template(), end="")
+        return DONE
+    if options.config is None:
+        raise SettingsError("--config LAB is missing; uam vehicle --example prints a template")
+    lab = load_lab(options.config)
+    if options.systemd:
+        print(unit(lab.file, Path.cwd()), end="")
+        return DONE
+    from uam_lab.vehicle.vehicle_engine import VehicleEngine  # needs ROS
+
+    settings = settings_of(lab, command_line(), options.dry_run)
+    out = options.out
+    if out is None:
+        stamp = datetime.now().strftime("%Y%m%d-%H%M%S")
+        out = new_folder(lab.out.expanduser(), f"{stamp}-{in_a_name(settings.scenario.name)}")
+    settings = dataclasses.replace(settings, out=out)
+    engine = VehicleEngine(lab).fly
+    return fly(settings, video=False, report=options.report, engine=engine, name="vehicle")
+
+
+def unit(lab: Path, folder: Path) -> str:
+    """Return the systemd unit that runs `uam vehicle` with this lab file in `folder`."""
+    command = f"{Path(sys.argv[0]).absolute()} vehicle --config {shlex.quote(str(lab.absolute()))}"
+    return (
+        configuration.path(UNIT)
+        .read_text()
+        .replace("@USER@", getpass.getuser())
+        .replace("@FOLDER@", str(folder))
+        .replace("@COMMAND@", command)
+    )

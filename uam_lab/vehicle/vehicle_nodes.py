@@ -1,0 +1,110 @@
+"""The nodes of a vehicle: modules, parameters, and who publishes what in place of the plant."""
+
+from __future__ import annotations
+
+import importlib.util
+from typing import Any
+
+from uam_control.vehicle import POSITION_SERVO
+from uam_lab.cockpit import page_address
+from uam_lab.flight.flight_settings import FlightSettings
+from uam_lab.flight.ros import node_arguments
+from uam_lab.results.result_folder import ResultFolder
+from uam_lab.vehicle.lab import AUTOPILOT, GPIO, Lab
+from uam_msgs_py.messages import topics
+from uam_msgs_py.node import wiring
+
+CHECKLIST, CHECKLIST_MODULE = "checklist", "uam_lab.nodes.checklist"
+DRIVERS = {
+    wiring.MOCAP_DRIVER: "uam_sim_bridge.nodes.mocap_driver",
+    wiring.ARM_DRIVER: "uam_sim_bridge.nodes.arm_driver",
+    wiring.MAGNET_DRIVER: "uam_sim_bridge.nodes.magnet_driver",
+}
+WAITS = {"wait_for_device": True}  # of a driver
+STATE_TIMEOUT = 1.0  # [s] without a state in flight, as `release_time` of the bridge
+
+
+def modules(lab: Lab) -> dict[str, str]:
+    """Return the nodes of a vehicle: executable → module, in the order of the start."""
+    absent = {wiring.PLANT, wiring.SCENE}
+    stack = {name: one for name, one in node_arguments.MODULES.items() if name not in absent}
+    drivers = dict(DRIVERS)
+    if lab.mocap is None:
+        del drivers[wiring.MOCAP_DRIVER]
+    if lab.magnet.through != GPIO:
+        del drivers[wiring.MAGNET_DRIVER]
+    recorder = {wiring.RECORDER: stack.pop(wiring.RECORDER)}
+    checklist = {CHECKLIST: CHECKLIST_MODULE} if with_checklist() else {}
+    return recorder | drivers | stack | checklist
+
+
+def with_checklist() -> bool:
+    """Return whether this installation has the node of the checklist."""
+    return importlib.util.find_spec(CHECKLIST_MODULE) is not None
+
+
+def parameters(
+    lab: Lab, settings: FlightSettings, folder: ResultFolder
+) -> dict[str, dict[str, Any]]:
+    """Return the parameters of each node of `modules`. Raises AddressError."""
+    sections = node_arguments.flight_nodes(settings, folder)
+    sections[wiring.RECORDER] |= {"simulated": False}
+    sections[wiring.MISSION] |= {"state_timeout": STATE_TIMEOUT}
+    sections[wiring.BRIDGE] |= WAITS | {"autopilot": lab.autopilot, "imu_clock": "system"}
+    if lab.magnet.through == AUTOPILOT:
+        sections[wiring.BRIDGE] |= lab.magnet.output.to_mapping() | _switching(lab)
+    host = lab.cockpit.address
+    port = page_address.free_port(host, lab.cockpit.port)
+    sections[wiring.COCKPIT] = {"host": host, "port": port}
+    sections[wiring.ARM_DRIVER] = WAITS | {
+        "hardware": str(lab.arm_file.absolute()),
+        "device": lab.arm.device,
+        "vehicle": settings.vehicle.source,
+    }
+    if lab.mocap is not None:
+        sections[wiring.MOCAP_DRIVER] = WAITS | lab.mocap.to_mapping()
+    if lab.magnet.through == GPIO:
+        sections[wiring.MAGNET_DRIVER] = WAITS | lab.magnet.line.to_mapping() | _switching(lab)
+    if with_checklist():
+        sections[CHECKLIST] = {}
+        sections[wiring.MISSION]["require_checklist"] = True
+    for node in (wiring.ARM_DRIVER, CHECKLIST):
+        if node in sections:
+            sections[node] |= lab.nodes.get(node, {})
+    return node_arguments.complete(sections, settings)
+
+
+def _switching(lab: Lab) -> dict[str, Any]:
+    return lab.magnet.switching.to_mapping()
+
+
+def sources(lab: Lab) -> dict[str, str]:
+    """Return topic of the plant → node that publishes it on this vehicle.
+
+    Topics that another driver of the user publishes are missing.
+    """
+    found = {topics.JOINTS.name: wiring.ARM_DRIVER}
+    if lab.imu == AUTOPILOT:
+        found[topics.IMU.name] = wiring.BRIDGE
+    if lab.mocap is not None:
+        found[topics.MOCAP.name] = wiring.MOCAP_DRIVER
+        if lab.mocap.payload:
+            found[topics.PAYLOAD.name] = wiring.MOCAP_DRIVER
+    return found
+
+
+def publishers(lab: Lab) -> str:
+    """Return the parameter `publishers` of every node."""
+    return ",".join(f"{topic}={node}" for topic, node in sources(lab).items())
+
+
+def wires(lab: Lab) -> list[wiring.Wire]:
+    """Return the connections between the nodes of a vehicle."""
+    goals = lab.vehicle.numbers["servos"]["mode"] == POSITION_SERVO
+    commands = topics.ARM_GOALS if goals else topics.ARM_EFFORT
+    subscribers = {commands.name: wiring.ARM_DRIVER}
+    if lab.magnet.through == GPIO:
+        subscribers[topics.MAGNET.name] = wiring.MAGNET_DRIVER
+    elif lab.magnet.through == AUTOPILOT:
+        subscribers[topics.MAGNET.name] = wiring.BRIDGE
+    return wiring.on_vehicle(sources(lab), subscribers)
