@@ -64,6 +64,16 @@ def test_a_bias_of_more_than_1_m_per_s2_ends_the_trust(bias, refused):
     assert answers(gate, [(2.0, 0.5)]) + answers(gate, [(2.25, 0.5)], bias) == [True, True]
 
 
+def test_biases_are_unsettled_for_a_second_after_a_gap_but_not_by_a_contradiction():
+    gate = PoseGate(0.4)
+    answers(gate, quarters(0.0, 2.0))
+    assert not gate.settled(1.0) and gate.settled(1.25)  # the start is the end of a gap
+    answers(gate, [(2.0, 0.0)], bias=1.5)
+    assert gate.settled(2.0)
+    gate.suspend(2.25)  # a gap of the IMU
+    assert not gate.settled(3.25) and gate.settled(3.5)
+
+
 def test_poses_are_refused_for_two_seconds_and_then_followed_for_more_than_one():
     gate = PoseGate(0.4)
     answers(gate, quarters(0.0, 2.0))

@@ -341,6 +341,7 @@ def test_a_constant_bias_is_no_contradiction_but_a_fast_change_is():
     assert inputs.at(10.0).contradiction == pytest.approx(0.0, abs=1e-12)
     inputs.accelerometer_bias(10.0, bias + [0.0, 1.5, 2.0])  # by 2.5 m/s^2
     assert inputs.at(10.0).contradiction == pytest.approx(2.5)
+    assert math.isnan(inputs.at(10.125).contradiction)  # too old
     # the mean has followed by 0.02 s / 5 s of 2.5 m/s^2
     inputs.accelerometer_bias(10.02, bias + [0.0, 1.5, 2.0])
     assert inputs.at(10.02).contradiction == pytest.approx(2.5 * (1.0 - 0.004), rel=1e-3)

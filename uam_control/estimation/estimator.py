@@ -103,6 +103,11 @@ class StateEstimator:
         return self._pose.quaternion
 
     @property
+    def settled(self) -> bool:
+        """Whether no gap of IMU or poses disturbs the estimated biases."""
+        return self._imu_stamp is not None and self._pose.gate.settled(self._imu_stamp)
+
+    @property
     def imu_bias(self) -> tuple[np.ndarray, np.ndarray]:
         """Return the estimated biases (3,) of gyroscope [rad/s] and accelerometer [m/s^2], FLU."""
         pose = self._pose

@@ -23,7 +23,7 @@ class PoseGate:
         """distance [m]: from the estimate, above which a pose is rejected."""
         self.distance = distance
         self.refused = 0
-        self._suspended = self._last = -math.inf  # stamps [s]
+        self._suspended = self._last = self._interrupted = -math.inf  # stamps [s]
         self._rejecting_since: float | None = None
 
     def __call__(self, stamp: float, distance: float, bias: float) -> bool:
@@ -32,8 +32,10 @@ class PoseGate:
         distance [m]: between the pose and the estimate at its stamp; bias [m/s^2]: norm of the
         estimated accelerometer bias.
         """
-        if stamp - self._last > GAP or (self._rejecting_since is None and bias > CONTRADICTED):
+        if stamp - self._last > GAP:
             self.suspend(stamp)
+        elif self._rejecting_since is None and bias > CONTRADICTED:
+            self._suspended = stamp
         self._last = stamp
         trusted = stamp - self._suspended > MEMORY
         if not (distance > self.distance and trusted):
@@ -50,4 +52,11 @@ class PoseGate:
 
     def suspend(self, stamp: float) -> None:
         """Reject no pose for MEMORY from `stamp` [s] on: the estimate may have a large error."""
-        self._suspended = stamp
+        self._suspended = self._interrupted = stamp
+
+    def settled(self, stamp: float) -> bool:
+        """Return whether the estimate at `stamp` [s] has recovered from the last interruption.
+
+        Until then the estimated biases change fast, by the return of the poses alone.
+        """
+        return stamp - self._interrupted > MEMORY
