@@ -16,6 +16,7 @@ from uam_control.settings import configuration
 from uam_control.settings.parameter_set import Bound, Choice
 from uam_lab.processes import thread_stop
 from uam_sim_bridge.faults import (
+    CABLE,
     FAULTS,
     LINK,
     PLANT,
@@ -82,7 +83,7 @@ def test_any_option_is_read_or_refused(text):
 def test_every_fault_is_found_by_its_name(name):
     found = one(f"{name}@20+3")
     assert (type(found.fault), found.at, found.duration) == (FAULTS[name], 20.0, 3.0)
-    assert FAULTS[name].ABOUT and FAULTS[name].PLACE in (PLANT, LINK, PROCESS)
+    assert FAULTS[name].ABOUT and FAULTS[name].PLACE in (PLANT, LINK, PROCESS, CABLE)
 
 
 @pytest.mark.parametrize(

@@ -13,7 +13,7 @@ from uam_control.vehicle import VehicleDescription
 from uam_lab.campaign.fault_outcome import Promise, read_promise
 from uam_sim_bridge.faults import FAULTS, Fault, FaultError, Schedule
 from uam_sim_bridge.faults.feasibility import needs_nodes
-from uam_sim_bridge.faults.schedule import beginnings, listed, timed
+from uam_sim_bridge.faults.schedule import FROM_START, START, beginnings, listed, timed
 
 NOMINAL = "no fault"
 KEYS = ("scenario", "moments", "faults")
@@ -32,18 +32,19 @@ class Cell:
 @dataclass(frozen=True)
 class Matrix:
     """Flights of a campaign. moments: mission times [s] by name; promises: one per row; left_out:
-    rows that the engine cannot fly."""
+    rows that the engine cannot fly; own_moments: of each row, () for all."""
 
     scenario: str
     moments: dict[str, float]
     faults: tuple[dict[str, Any], ...]
     promises: tuple[Promise | None, ...]
     left_out: tuple[str, ...] = ()
+    own_moments: tuple[tuple[str, ...], ...] = ()
 
     @property
     def rows(self) -> tuple[str, ...]:
         """Names of the rows."""
-        return tuple(label(entry) for entry in self.faults)
+        return tuple(dict.fromkeys(label(entry) for entry in self.faults))
 
     def cells(self, seed: int, repeat: int = 1) -> list[Cell]:
         """Return all flights, the one without a fault first; seed: of random faults.
@@ -51,9 +52,12 @@ class Matrix:
         repeat: number of flights per fault and moment.
         """
         found = [Cell(NOMINAL, "", Schedule(seed=seed))]
-        for entry, promised in zip(self.faults, self.promises, strict=True):
+        own = self.own_moments or ((),) * len(self.faults)
+        for entry, promised, chosen in zip(self.faults, self.promises, own, strict=True):
             for moment, at in self.moments.items():
-                one = timed({**entry, "at": at}, {}, moment)
+                if chosen and moment not in chosen:
+                    continue
+                one = timed({**entry, "at": START if at == FROM_START else at}, {}, moment)
                 found += [Cell(label(entry), moment, Schedule((one,), seed), promised)] * repeat
         return found
 
@@ -85,7 +89,7 @@ def read(
     name = scenario or str(document["scenario"])
     times = _moments(document["moments"], load_scenario(name, vehicle), str(file))
     entries = listed(document["faults"], str(file))
-    rows = [_checked(dict(entry), str(file)) for entry in entries]
+    rows = [_checked(dict(entry), str(file), times) for entry in entries]
     for given, known in ((only, FAULTS), (moments, times)):
         for one in given:
             if one not in known:
@@ -100,7 +104,8 @@ def read(
         raise FaultError(f"{file}: nothing to fly with the {engine} engine")
     chosen = {k: v for k, v in times.items() if not moments or k in moments}
     entries, promises = tuple(row.entry for row in kept), tuple(row.promise for row in kept)
-    return Matrix(name, chosen, entries, promises, tuple(out))
+    own = tuple(row.moments for row in kept)
+    return Matrix(name, chosen, entries, promises, tuple(out), own)
 
 
 def _document(file: Path) -> dict[str, Any]:
@@ -126,12 +131,16 @@ class _Row(NamedTuple):
     entry: dict[str, Any]
     fault: Fault
     promise: Promise | None
+    moments: tuple[str, ...]
 
 
-def _checked(entry: dict[str, Any], where: str) -> _Row:
+def _checked(entry: dict[str, Any], where: str, moments: Collection[str]) -> _Row:
     for key in ("at", "after"):
         if key in entry:
             raise FaultError(f"{where}: {key}: not allowed here, the moments give the time")
-    promised = entry.pop("promise", None)
+    promised, own = entry.pop("promise", None), entry.pop("moments", [])
+    if not isinstance(own, list) or not set(own) <= set(moments):
+        raise FaultError(f"{where}: moments: a list of {', '.join(moments)} expected, got {own!r}")
     fault = timed({**entry, "at": 0.0}, {}, where).fault
-    return _Row(entry, fault, None if promised is None else read_promise(promised, where))
+    promise = None if promised is None else read_promise(promised, where)
+    return _Row(entry, fault, promise, tuple(own))

@@ -15,7 +15,9 @@ from uam_lab.results.timeseries import Series
 from uam_sim_bridge.faults import FaultError
 
 COMPLETED, HELD, LANDED, FAILSAFE, LOST = "completed", "held", "landed", "failsafe", "lost"
+REFUSED = "refused"
 OUTCOMES = {
+    REFUSED: "the start was refused, nothing was armed (rehearsals only)",
     COMPLETED: "the mission was completed in spite of the fault",
     HELD: "in the air at the end, upright and at rest",
     LANDED: "the mission landed the vehicle softly, but was not completed",

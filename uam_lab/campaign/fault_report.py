@@ -18,6 +18,7 @@ from uam_lab.campaign.fault_outcome import (
     LANDED,
     LOST,
     OUTCOMES,
+    REFUSED,
     counts,
 )
 from uam_lab.campaign.fault_trial import FaultResult
@@ -27,6 +28,7 @@ from uam_lab.results.atomic import write_rows, write_text
 from uam_lab.results.result_folder import versions, write_json
 
 COLOURS = {
+    REFUSED: "#b9a7d6",
     COMPLETED: "#5aa469",
     HELD: "#8fb8de",
     LANDED: "#e3c567",
@@ -153,7 +155,7 @@ def markdown(matrix: Matrix, results: Sequence[FaultResult], vehicle: str, comma
     cells = grouped(results)
     table = templates.markdown_table(
         ["fault", *matrix.moments],
-        ([row, *(str(cells[row, moment]) for moment in matrix.moments)] for row in matrix.rows),
+        ([row, *(_text(cells, row, moment) for moment in matrix.moments)] for row in matrix.rows),
     )
     outcomes = "; ".join(f"{name}: {about}" for name, about in OUTCOMES.items())
     parts = [
@@ -175,12 +177,12 @@ def picture(matrix: Matrix, results: Sequence[FaultResult]) -> Figure:
     figure = Figure(figsize=(style.WIDTH, 1.3 + 0.27 * len(rows)), layout="constrained")
     axis = figure.subplots()
     axis.imshow(
-        [[to_rgb(COLOURS[cells[row, column].outcome]) for column in columns] for row in rows],
+        [[_colour(cells, row, column) for column in columns] for row in rows],
         aspect="auto",
     )
     for i, row in enumerate(rows):
         for j, column in enumerate(columns):
-            text = str(cells[row, column])
+            text = _text(cells, row, column)
             axis.text(j, i, text, ha="center", va="center", fontsize=7.5, color=style.INK)
     axis.set_xticks(range(len(columns)), columns)
     axis.set_yticks(range(len(rows)), rows)
@@ -192,6 +194,18 @@ def picture(matrix: Matrix, results: Sequence[FaultResult]) -> Figure:
     axis.tick_params(which="minor", length=0)
     axis.spines[:].set_visible(False)
     return figure
+
+
+Cells = dict[tuple[str, str], Group]
+
+
+def _text(cells: Cells, row: str, moment: str) -> str:
+    """Return the text of a cell, "" for one that was not flown."""
+    return str(cells[row, moment]) if (row, moment) in cells else ""
+
+
+def _colour(cells: Cells, row: str, moment: str) -> tuple[float, float, float]:
+    return to_rgb(COLOURS[cells[row, moment].outcome] if (row, moment) in cells else "white")
 
 
 def _shown(value: float) -> str:

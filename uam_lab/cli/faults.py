@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 import argparse
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING
 
 from uam_control.mission import load_scenario
 from uam_control.settings import configuration
-from uam_control.vehicle import load_description
+from uam_control.vehicle import VehicleDescription, load_description
 from uam_lab.campaign.pool import fly_all
 from uam_lab.campaign.trial import Trial
 from uam_lab.cli.command import Command, chosen_effects, count, given_profile, jobs_of
@@ -14,8 +17,14 @@ from uam_lab.cli.counting import Counting
 from uam_lab.flight.conclude import command_line
 from uam_lab.flight.flight_settings import CLOCKS, ENGINES, check_clock, require_ros
 from uam_lab.results.result_folder import make_folder
+from uam_lab.vehicle.lab_file import TEMPLATE
 from uam_sim_bridge.faults import fault_catalogue, feasibility
+from uam_sim_bridge.faults.feasibility import REHEARSAL
 from uam_sim_bridge.plant.effects import presets
+
+if TYPE_CHECKING:
+    from uam_lab.campaign.fault_matrix import Cell, Matrix
+    from uam_lab.campaign.fault_trial import FaultResult
 
 BROKEN = 1
 EXAMPLES = """\
@@ -26,6 +35,7 @@ examples:
   uam faults --matrix mine.yaml --profile asmc2
   uam faults --only motor_loss --vehicle mine.yaml
   uam faults --matrix processes --engine ros --clock realtime --repeat 3
+  uam faults --matrix cables --engine rehearsal --config my_lab.yaml
   uam fly --fault motor_loss@pick+1:remaining=0.7      one flight with its report
 
 Results in --out: report.html with the matrix in colours, summary.md, flights.csv, faults.json,
@@ -53,7 +63,8 @@ def add(commands: argparse._SubParsersAction) -> None:
     command.vehicle()
     command.profile()
     command.plant()
-    command.choice("--engine", ENGINES, "direct", "")
+    command.choice("--engine", (*ENGINES, REHEARSAL), "direct", "")
+    command.config(TEMPLATE)
     command.choice("--clock", CLOCKS, "lockstep", "of the ROS engine")
     command.seed("of all noise")
     command.jobs(with_ros=True)
@@ -66,10 +77,10 @@ def run(options: argparse.Namespace) -> int:
     if options.list:
         print(fault_catalogue.listing())
         return 0
-    from uam_lab.campaign import fault_matrix, fault_report, fault_trial
+    from uam_lab.campaign import fault_matrix, fault_trial
 
     check_clock(options.engine, options.clock)
-    if options.engine == "ros":
+    if options.engine != "direct":
         require_ros()
     vehicle = load_description(options.vehicle)
     profile = given_profile(options.profile, vehicle)
@@ -80,6 +91,8 @@ def run(options: argparse.Namespace) -> int:
     cells = matrix.cells(options.seed, options.repeat)
     for cell in cells:
         feasibility.check(cell.schedule, options.engine, vehicle=vehicle)
+    if options.engine == REHEARSAL:
+        return _rehearse(options, matrix, cells, vehicle)
     changes = presets.added({}, chosen_effects(options))
     trials = [
         fault_trial.FaultTrial(
@@ -106,6 +119,37 @@ def run(options: argparse.Namespace) -> int:
             counting.show(done, f"{one.fault}{moment}: {one.outcome}")
 
         results = fly_all(trials, jobs_of(options), fault_trial.measure, show)
+    return _written(out, matrix, results, vehicle)
+
+
+def _rehearse(
+    options: argparse.Namespace,
+    matrix: Matrix,
+    cells: Sequence[Cell],
+    vehicle: VehicleDescription,
+) -> int:
+    """Rehearse each cell with the lab file, one after the other; return the exit status."""
+    from uam_lab.campaign.rehearsed_trial import RehearsedTrial, measure
+
+    out = make_folder(options.out, "cables")
+    results = []
+    with Counting("cables", len(cells)) as counting:
+        for done, cell in enumerate(cells, 1):
+            trial = RehearsedTrial(
+                cell, options.config, matrix.scenario, options.seed, out / "broken"
+            )
+            results.append(one := measure(trial))
+            moment = f", {one.moment}" if one.moment else ""
+            counting.show(done, f"{one.fault}{moment}: {one.outcome}")
+    return _written(out, matrix, results, vehicle)
+
+
+def _written(
+    out: Path, matrix: Matrix, results: Sequence[FaultResult], vehicle: VehicleDescription
+) -> int:
+    """Write the report; return the exit status."""
+    from uam_lab.campaign import fault_report
+
     summary, page = fault_report.write(out, matrix, results, vehicle.name, command_line())
     print(summary)
     print(f"report   {page}")

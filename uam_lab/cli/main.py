@@ -14,6 +14,7 @@ from uam_lab.cli.command import INTERRUPTED, USER_ERRORS, WRONG_USE
 OPERATE = ("start", "hold", "resume", "land", "disarm", "kill", "goto", "status", "preflight")
 COMMANDS = {
     "fly": "fly",
+    "rehearse": "rehearse",
     **dict.fromkeys(OPERATE, "operate"),
     "view": "view",
     "profile": "profile",

@@ -6,7 +6,7 @@ ROS domain → parameter file → processes → devices → flight → stop in o
 from __future__ import annotations
 
 import shutil
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator
 
 from uam_control.profiles.profile import CONTROLLERS
 from uam_lab.cockpit import page_address
@@ -97,10 +97,13 @@ def start_nodes(
     settings: FlightSettings,
     folder: ResultFolder,
     publishers: str,
+    without: Collection[str] = (),
 ) -> None:
-    """Start the nodes of a vehicle; their parameters are in `folder`."""
+    """Start the nodes of a vehicle except `without`; their parameters are in `folder`."""
     arguments = supervise.ros_arguments(settings, folder, publishers)
     for name, module in vehicle_nodes.modules(lab).items():
+        if name in without:
+            continue
         again = supervise.RESTARTS if name in AGAIN else 0
         children.start(name, module, arguments, optional=name == COCKPIT, again=again)
 

@@ -6,7 +6,8 @@ received over UDP, and sends its own messages before HIL_ACTUATOR_CONTROLS. So a
 deterministic.
 
 With --serial, one line carries both, as on a flight controller in HITL mode; its other end is
-`uam_sim_bridge.mavlink.hil.router`.
+`uam_sim_bridge.mavlink.hil.router`. With --companion, a serial line replaces the UDP
+port alone, and the autopilot has a clock of its own.
 """
 
 from __future__ import annotations
@@ -26,8 +27,10 @@ from uam_control.vehicle import load_description
 from uam_sim_bridge.autopilot.autopilot_estimator import GRAVITY
 from uam_sim_bridge.autopilot.companion import Companion, warm_up
 from uam_sim_bridge.autopilot.core import Autopilot
+from uam_sim_bridge.autopilot.own_clock import OwnClock
 from uam_sim_bridge.autopilot.params import Parameters
-from uam_sim_bridge.autopilot.serial_line import SerialLine
+from uam_sim_bridge.autopilot.serial_line import CompanionLine, SerialLine
+from uam_sim_bridge.mavlink.hil.hil_server import CONTROLS
 from uam_sim_bridge.mavlink.hil.sitl_options import add_port_options, add_vehicle, fill_ports
 from uam_sim_bridge.mavlink.hil.sitl_ports import UdpPort, connect
 from uam_sim_bridge.mavlink.protocol.signing import Signing
@@ -37,7 +40,6 @@ _GYRO_AND_ACCELEROMETER = 0x3F  # HIL_SENSOR.fields_updated
 _LOCKSTEP = 1  # HIL_ACTUATOR_CONTROLS.flags
 _CUSTOM_MODE, _ARMED = 1, 128  # HIL_ACTUATOR_CONTROLS.mode
 _LATEST = 2**53  # µs, latest time: its nanoseconds still fit MAVLink's 64 bits
-CONTROLS = 16  # number of values of HIL_ACTUATOR_CONTROLS.controls
 _RATE_SAMPLES = 8  # number of intervals that measure the rate of HIL_SENSOR
 
 
@@ -48,9 +50,11 @@ class Server:
         self,
         autopilot: Autopilot,
         simulator: socket.socket | SerialLine,
-        udp: UdpPort | SerialLine,
+        udp: UdpPort | SerialLine | CompanionLine,
+        clock: OwnClock | None = None,
     ) -> None:
-        """simulator: source of HIL messages; udp: link to the companion; both may be one line."""
+        """simulator: source of HIL messages; udp: link to the companion; both may be one line;
+        clock: None for the simulator's."""
         p = autopilot.parameters
         self._codec = Codec(int(p["MAV_SYS_ID"]), int(p["MAV_COMP_ID"]))
         self._framer = Framer(self._codec)
@@ -58,7 +62,8 @@ class Server:
         self._companion = Companion(autopilot)
         self._simulator, self._udp = simulator, udp
         self._gyro, self._accel = np.zeros(3), np.array([0.0, 0.0, -GRAVITY])
-        self._microseconds = -1
+        self._microseconds = -1  # of the newest HIL_SENSOR
+        self._clock, self._time = clock, -1e-6  # [s] of the autopilot
         self._intervals: list[int] = []
 
     def run(self) -> None:
@@ -75,9 +80,9 @@ class Server:
                 if kind == "HIL_SENSOR":
                     self._sensor(message)
                 elif kind in ("VISION_POSITION_ESTIMATE", "ODOMETRY"):
-                    self._companion.handle(self._microseconds * 1e-6, message)
+                    self._companion.handle(self._time, message)
                 elif self._udp is self._simulator and self._microseconds >= 0:
-                    self._companion.handle(self._microseconds * 1e-6, message)
+                    self._companion.handle(self._time, message)
 
     def _sensor(self, m: Message) -> None:
         if m.id != 0 or not self._microseconds < m.time_usec <= _LATEST:
@@ -85,6 +90,9 @@ class Server:
         self._measure_rate(m.time_usec)
         self._microseconds = m.time_usec
         time = m.time_usec * 1e-6
+        if self._clock is not None:
+            time = self._clock.time(time)
+        self._time = time
         for message in self._udp.receive():
             self._companion.handle(time, message)
         values = (m.xgyro, m.ygyro, m.zgyro, m.xacc, m.yacc, m.zacc)
@@ -124,7 +132,8 @@ def parser() -> argparse.ArgumentParser:
         "  autopilot                         instance 0: simulator 4560, UDP 14580 -> 14540\n"
         "  autopilot --instance 3            every port + 3\n"
         "  autopilot --params my_frame.yaml  NAME: value lines, PX4's names\n"
-        "  autopilot --serial /dev/ttyUSB0:921600  at the far end of hitl_router's line\n",
+        "  autopilot --serial /dev/ttyUSB0:921600  at the far end of hitl_router's line\n"
+        "  autopilot --companion /dev/ttyUSB0:921600  TELEM2 on this line, simulator over TCP\n",
     )
     add_port_options(p)
     add_vehicle(p)
@@ -133,6 +142,12 @@ def parser() -> argparse.ArgumentParser:
         "--serial",
         metavar="DEVICE:BAUD",
         help="use this line instead of TCP and UDP, as in HITL",
+    )
+    p.add_argument(
+        "--companion",
+        metavar="DEVICE:BAUD",
+        help="use this line instead of UDP, as TELEM2, and a clock of its own; the simulator stays "
+        "on TCP",
     )
     p.add_argument(
         "--once",
@@ -164,6 +179,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     signal.signal(signal.SIGTERM, lambda *_: sys.exit(0))
     udp = link = None
     try:
+        if options.serial and options.companion:
+            raise ValueError("--serial carries the companion's messages, too: omit --companion")
         if options.serial and options.signing_key:
             raise ValueError("--signing-key is for UDP: omit it with --serial, which is not signed")
         autopilot = _autopilot(options)
@@ -179,7 +196,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
             Server(autopilot, link, udp).run()
             print("autopilot: the serial line is gone", flush=True)
             return 0
-        udp = UdpPort(options.mavlink_port, options.companion_port, codec)
+        if options.companion:
+            udp = CompanionLine(options.companion, codec)
+        else:
+            udp = UdpPort(options.mavlink_port, options.companion_port, codec)
         warm_up()
         wait = options.wait
         while True:
@@ -188,7 +208,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
                 f"autopilot: connected to the simulator at {options.sim_host}:{options.sim_port}",
                 flush=True,
             )
-            Server(autopilot, link, udp).run()
+            Server(autopilot, link, udp, OwnClock() if options.companion else None).run()
             print("autopilot: the simulator closed the link", flush=True)
             if options.once:
                 return 0

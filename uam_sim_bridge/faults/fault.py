@@ -15,7 +15,7 @@ from uam_control.settings.named_set import NamedSet
 from uam_control.settings.parameter_set import choice, number
 from uam_sim_bridge.plant import Disturbance, Samples
 
-PLANT, LINK, PROCESS = "plant", "MAVLink", "process"
+PLANT, LINK, PROCESS, CABLE = "plant", "MAVLink", "process", "cable"
 
 
 class FaultError(ValueError):
@@ -24,7 +24,7 @@ class FaultError(ValueError):
 
 @dataclass_transform(frozen_default=True, field_specifiers=(number, choice))
 class Fault(NamedSet):
-    """Base of all faults. PLACE: PLANT, LINK or PROCESS."""
+    """Base of all faults. PLACE: PLANT, LINK, PROCESS or CABLE."""
 
     PLACE: ClassVar[str] = ""
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from uam_control.settings.parameter_set import Bound, Choice, ParameterError
 from uam_sim_bridge.faults import (
     actuator_faults,
+    cable_faults,
     imu_faults,
     link_faults,
     mocap_faults,
@@ -12,12 +13,12 @@ from uam_sim_bridge.faults import (
 )
 from uam_sim_bridge.faults.fault import Fault, FaultError
 
-FAULTS: dict[str, type[Fault]] = {
-    kind.NAME: kind
-    for module in (mocap_faults, imu_faults, actuator_faults, link_faults, process_faults)
-    for kind in module.FAULTS
-}
-WHOLE = ("joint", "motor")  # parameters that must be whole numbers
+KINDS = (
+    *(mocap_faults, imu_faults, actuator_faults, link_faults, process_faults),
+    cable_faults,
+)
+FAULTS: dict[str, type[Fault]] = {kind.NAME: kind for module in KINDS for kind in module.FAULTS}
+WHOLE = ("joint", "motor", "other", "id")  # parameters that must be whole numbers
 
 
 def make(name: object, values: dict[str, object]) -> Fault:

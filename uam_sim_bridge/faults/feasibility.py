@@ -5,10 +5,12 @@ from __future__ import annotations
 from collections.abc import Collection, Mapping, Sequence
 
 from uam_control.vehicle import VehicleDescription, load_description
-from uam_sim_bridge.faults.fault import PROCESS, Fault, FaultError
+from uam_sim_bridge.faults.fault import CABLE, PROCESS, Fault, FaultError
 from uam_sim_bridge.faults.link_faults import LinkFault, MavlinkDelay
 from uam_sim_bridge.faults.process_faults import ProcessFault
 from uam_sim_bridge.faults.schedule import Schedule
+
+REHEARSAL = "rehearsal"  # an engine, beside ros and direct
 
 
 def check(
@@ -20,8 +22,8 @@ def check(
 ) -> None:
     """Raise FaultError for the first fault that is not possible in this flight.
 
-    engine: ros or direct; absent: processes that the flight does not start itself; refused: fault
-    name → reason why this machine does not allow it, "" if it does.
+    engine: ros, direct or REHEARSAL; absent: processes that the flight does not start itself;
+    refused: fault name → reason why this machine does not allow it, "" if it does.
     """
     for one in schedule.faults:
         fault = one.fault
@@ -30,6 +32,8 @@ def check(
                 raise FaultError(
                     f"{fault.NAME}: {what} {getattr(fault, what):g}: the vehicle has {len(parts)}"
                 )
+        if fault.PLACE == CABLE and engine != REHEARSAL:
+            raise FaultError(f"{fault.NAME}: only a rehearsal has cables: uam rehearse --cable")
         why = needs_nodes(fault) if engine == "direct" else ""
         if why:
             raise FaultError(f"{fault.NAME}: {why}: needs --engine ros")

@@ -69,7 +69,7 @@ class Schedule:
         return bool(self.faults)
 
     def only(self, place: str) -> Schedule:
-        """Return the faults that act on `place`: PLANT, LINK or PROCESS."""
+        """Return the faults that act on `place`: PLANT, LINK, PROCESS or CABLE."""
         chosen = tuple(one for one in self.faults if one.fault.PLACE == place)
         return Schedule(chosen, self.seed)
 

@@ -98,6 +98,7 @@ class MujocoPlant(Plant):
         self._alpha = data.qpos[arm_q : arm_q + self.joints]
         self._alpha_dot = data.qvel[arm_v : arm_v + self.joints]
         self._base_acceleration = data.qacc[base_v : base_v + 6]
+        self._push = data.qfrc_applied[base_v : base_v + 6]
         self._alpha_ddot = data.qacc[arm_v : arm_v + self.joints]
         self._swing = joint(SWING).qposadr[0]
         payload_q = joint(PAYLOAD).qposadr[0]
@@ -250,6 +251,10 @@ class MujocoPlant(Plant):
         self._wind_mean += change
         self._added_wind += change
         self._swing_rate = disturbance.payload_swing
+
+    def push(self, force: np.ndarray, torque: np.ndarray) -> None:
+        """See `Plant.push`."""
+        self._push[:3], self._push[3:] = force, torque
 
     def _held_by_magnet(self, magnet: bool) -> bool:
         """Close or open the hinge; return whether the magnet acts.

@@ -127,3 +127,10 @@ class Plant(ABC):
     def disturb(self, disturbance: Disturbance) -> None:
         """Apply `disturbance` until the next call."""
         raise NotImplementedError
+
+    def push(self, force: np.ndarray, torque: np.ndarray) -> None:
+        """Push the base until the next call: force (3,) [N, ENU], torque (3,) [N m, FLU].
+
+        For the hands of a rehearsal, at the base's origin.
+        """
+        raise NotImplementedError

@@ -32,6 +32,7 @@ from uam_sim_bridge.drivers.dynamixel.servo_bus import BusLost, NoAnswer, Refuse
 from uam_sim_bridge.drivers.dynamixel.upkeep import Upkeep
 
 STATE = (names.PRESENT_POSITION, names.PRESENT_VELOCITY, names.PRESENT_CURRENT)
+START_ANSWER = 0.3  # [s] for each answer before the first cycle: the computer is busy then
 NEEDED_LATENCY = 0.001  # [s] of the adapter's timer
 
 
@@ -118,7 +119,8 @@ class ArmDriver:
         Raises ArmError (wrong servos or settings, a servo that falls silent), BusLost.
         """
         try:
-            self._check()
+            with self.bus.patient(START_ANSWER):
+                self._check()
         except NoAnswer as error:
             raise ArmError(f"{self.chain.device}: {error}") from None
         self._open = True

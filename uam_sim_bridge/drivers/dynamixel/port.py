@@ -17,7 +17,7 @@ class PatientPort(PortHandler):
 
     def __init__(self, device: str, allowance: float) -> None:
         super().__init__(device)
-        self._allowance = 1e3 * allowance  # [ms] as in the SDK
+        self.allowance = allowance  # [s]
         self._sent = 0  # bytes since the last answer, which may still be on their way out
 
     def getCurrentTime(self) -> float:
@@ -27,7 +27,7 @@ class PatientPort(PortHandler):
     def setPacketTimeout(self, packet_length: int) -> None:
         """Begin to wait for an answer of `packet_length` bytes."""
         on_the_wire = self.tx_time_per_byte * (packet_length + self._sent)
-        self.setPacketTimeoutMillis(on_the_wire + self._allowance)
+        self.setPacketTimeoutMillis(on_the_wire + 1e3 * self.allowance)
         self._sent = 0
 
     def writePort(self, packet: list[int]) -> int:

@@ -75,6 +75,16 @@ class ServoBus:
         self._baud_rate = baud_rate
         self.open()
 
+    @contextmanager
+    def patient(self, allowance: float) -> Iterator[None]:
+        """Give each answer at least `allowance` [s] beside the time of its bytes."""
+        usual = self._port.allowance
+        self._port.allowance = max(usual, allowance)
+        try:
+            yield
+        finally:
+            self._port.allowance = usual
+
     def close(self) -> None:
         """Close the device."""
         if self._port.is_open:

@@ -14,6 +14,7 @@ import numpy as np
 from uam_sim_bridge.emulation.dynamixel import packets
 from uam_sim_bridge.emulation.dynamixel.packets import BROADCAST, Packet, PacketReader
 from uam_sim_bridge.emulation.dynamixel.servo import EmulatedServo
+from uam_sim_bridge.emulation.serial.bit_errors import disturbed
 
 PING_SLOT = 0.001  # [s] between answers to a broadcast ping
 
@@ -86,10 +87,7 @@ class ServoLine:
 
     def _disturbed(self, data: bytes) -> bytes:
         """Return `data` with bit errors."""
-        if not self.faults.bit_error_rate:
-            return data
-        flips = self._noise.random(8 * len(data)) < self.faults.bit_error_rate
-        return (np.frombuffer(data, np.uint8) ^ np.packbits(flips)).tobytes()
+        return disturbed(data, self.faults.bit_error_rate, self._noise)
 
     def _answers(self, packet: Packet, listening: list[EmulatedServo]) -> list[tuple[float, bytes]]:
         """Execute an instruction; return (delay [s], bytes) of each status packet."""

@@ -90,7 +90,7 @@ class MocapServer:
         self._clients: dict[tuple[str, int], float] = {}  # address → time.monotonic() [s]
         self._lock = threading.Lock()
         self._hidden: set[str] = set()
-        self._changed = self._paused = False
+        self._changed = self._paused = self._unplugged = False
         self._number = self.sent = 0
         self._seen: dict[int, packets.WireBody] = {}  # as Motive, which repeats the last pose
         self._due: list[tuple[float, int, bytes]] = []  # host's time [s], order, packet
@@ -145,6 +145,18 @@ class MocapServer:
         with self._lock:
             self._paused = paused
 
+    def unplug(self, unplugged: bool = True) -> None:
+        """Pull the network cable: no packet arrives or leaves."""
+        with self._lock:
+            self._unplugged = unplugged
+
+    @property
+    def state(self) -> tuple[tuple[str, ...], frozenset[str], bool, bool]:
+        """Return names of the bodies, the hidden ones, whether paused, whether unplugged."""
+        with self._lock:
+            names = tuple(body.name for body in self._bodies.values())
+            return names, frozenset(self._hidden), self._paused, self._unplugged
+
     def expose(self, host: float, poses: Mapping[str, tuple[np.ndarray, np.ndarray]]) -> bool:
         """Expose at `host` [s], host's clock, if the rate allows it; return whether it does.
 
@@ -190,7 +202,7 @@ class MocapServer:
             data, client = self._commands.recvfrom(65535)
         except OSError:  # a client that has gone
             return
-        if len(data) < 4:
+        if len(data) < 4 or self._unplugged:
             return
         self._clients[client] = time.monotonic()
         message = int.from_bytes(data[:2], "little")
@@ -246,6 +258,8 @@ class MocapServer:
     def _send_due(self, now: float) -> None:
         while self._due and self._due[0][0] <= now:
             data = heapq.heappop(self._due)[2]
+            if self._unplugged:
+                continue
             self.sent += 1
             if self._multicast:
                 self._outgoing.sendto(data, (GROUP, self.data_port))

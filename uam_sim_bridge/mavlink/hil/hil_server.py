@@ -22,6 +22,7 @@ from uam_sim_bridge.ports import PortError
 
 _IMU, _MAG, _BARO = 0x3F, 0x1C0, 0x1A00  # HIL_SENSOR.fields_updated
 _ARMED = 128
+CONTROLS = 16  # number of values of HIL_ACTUATOR_CONTROLS.controls
 _SLOW_PERIOD = 0.02  # s
 
 
@@ -44,9 +45,9 @@ class HilParameters(ParameterSet):
 class HilServer:
     """TCP server for one autopilot at a time.
 
-    `motors` (n,): newest motor commands 0..1 in PX4's order, zero while disarmed; `armed`: from
-    HIL_ACTUATOR_CONTROLS; `answered`: whether the last tick was answered; `missed`: number of
-    ticks without an answer after the first answer.
+    `motors` (n,): newest motor commands 0..1 in PX4's order, zero while disarmed; `controls` (16,):
+    all newest controls; `armed`: from HIL_ACTUATOR_CONTROLS; `answered`: whether the last tick was
+    answered; `missed`: number of ticks without an answer after the first answer.
     """
 
     def __init__(
@@ -61,6 +62,7 @@ class HilServer:
         port is in use."""
         self.parameters = (parameters or HilParameters()).validated()
         self.motors = np.zeros(motors)
+        self.controls = np.zeros(CONTROLS)
         self.armed = False
         self.answered = False
         self.missed = 0
@@ -179,7 +181,8 @@ class HilServer:
             if message.get_type() != "HIL_ACTUATOR_CONTROLS":
                 continue
             self.armed = bool(message.mode & _ARMED)
-            commands = np.array(message.controls[: len(self.motors)])
+            self.controls[:] = message.controls
+            commands = self.controls[: len(self.motors)]
             good = self.armed and bool(np.all(np.isfinite(commands)))
             self.motors[:] = np.clip(commands, 0.0, 1.0) if good else 0.0
             self.answered = self.answered or message.time_usec >= self._stamp
@@ -192,5 +195,5 @@ class HilServer:
         self._ever = self.answered = False
         self._framer = Framer(self._codec)
         self.armed = False
-        self.motors[:] = 0.0
+        self.motors[:] = self.controls[:] = 0.0
         return self.motors

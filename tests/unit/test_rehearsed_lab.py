@@ -1,0 +1,199 @@
+"""The rehearsed lab file, the figures of the devices, and the judgement of a rehearsal."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+import yaml
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
+
+from uam_lab.campaign.fault_matrix import Cell
+from uam_lab.campaign.fault_outcome import LOST, REFUSED, Promise
+from uam_lab.campaign.rehearsed_trial import judged, with_checklist
+from uam_lab.cli.main import main
+from uam_lab.rehearsal import device_figures, emulated_lab
+from uam_lab.rehearsal.rehearsed_outcome import REFUSED as REFUSAL
+from uam_lab.rehearsal.rehearsed_outcome import latencies
+from uam_lab.rehearsal.starter import list_passed, list_text, passed_items
+from uam_lab.results.outcome import Outcome
+from uam_lab.vehicle.lab import LabError
+from uam_lab.vehicle.lab_file import load_lab, template
+from uam_msgs_py.messages import topics
+from uam_sim_bridge.faults import Schedule
+from uam_sim_bridge.faults.schedule import timed
+
+REPLACED = {
+    ("arm", "device"),
+    ("autopilot",),
+    ("mocap", "server"),
+    ("mocap", "command_port"),
+    ("mocap", "local"),
+    ("magnet", "chip"),
+}
+
+
+def flat(value, path=()):
+    """Return the entries of a document by their path."""
+    if isinstance(value, dict):
+        return {k: v for key, one in value.items() for k, v in flat(one, (*path, key)).items()}
+    return {path: value}
+
+
+def given(folder: Path, **changes) -> Path:
+    document = yaml.safe_load(template())
+    for name, value in changes.items():
+        document[name] = document[name] | value if isinstance(value, dict) else value
+    file = folder / "my_lab.yaml"
+    file.write_text(yaml.safe_dump(document))
+    return file
+
+
+def test_only_the_names_of_devices_are_replaced(tmp_path):
+    lab = load_lab(
+        given(
+            tmp_path,
+            mocap={"local": "192.168.1.9", "payload": "box"},
+            cockpit={"address": "0.0.0.0"},
+        )
+    )
+    document = emulated_lab.emulated(lab, tmp_path / "devices", 40000)
+    rehearsed = emulated_lab.write(document, lab.file, tmp_path)
+    before, after = flat(yaml.safe_load(lab.file.read_text())), flat(document)
+    changed = {path for path in before.keys() | after.keys() if before.get(path) != after.get(path)}
+    # files are written in full, since the new file lies elsewhere
+    assert changed - {("vehicle",), ("mocap", "calibration"), ("profile",)} == REPLACED
+    assert rehearsed.autopilot == f"serial:{tmp_path}/devices/ttyTELEM2:921600"
+    assert rehearsed.arm.device == f"{tmp_path}/devices/ttyARM"
+    assert rehearsed.magnet.line.chip == f"simulated:{tmp_path}/devices/magnet"
+    assert (rehearsed.mocap.server, rehearsed.mocap.command_port) == ("127.0.0.1", 40000)
+    assert (rehearsed.mocap.body, rehearsed.mocap.payload) == ("uam", "box")
+    assert rehearsed.arm.servos == lab.arm.servos and rehearsed.room == lab.room
+    assert rehearsed.cockpit == lab.cockpit
+    assert rehearsed.scenario == lab.scenario and rehearsed.vehicle == lab.vehicle
+
+
+def test_files_beside_the_lab_file_are_found_from_the_result_folder(tmp_path):
+    folder, out = tmp_path / "lab", tmp_path / "results"
+    for each in (folder, out):
+        each.mkdir()
+    nominal = Path("config/mocap/motive_z_up.yaml").read_text()
+    (folder / "my_mocap.yaml").write_text(nominal)
+    arm = yaml.safe_load(template())["arm"]
+    (folder / "my_arm.yaml").write_text(yaml.safe_dump({"arm": arm | {"baud_rate": 2000000}}))
+    lab = load_lab(given(folder, arm="my_arm.yaml", mocap={"calibration": "my_mocap.yaml"}))
+    rehearsed = emulated_lab.write(emulated_lab.emulated(lab, out, 40000), lab.file, out)
+    assert rehearsed.arm.baud_rate == 2000000
+    assert Path(rehearsed.mocap.calibration).read_text() == nominal
+
+
+def test_another_kind_of_motion_capture_cannot_be_rehearsed(tmp_path):
+    lab = load_lab(given(tmp_path, mocap={"source": "motioncapture"}))
+    with pytest.raises(LabError, match="source: motioncapture: only natnet can be rehearsed"):
+        emulated_lab.emulated(lab, tmp_path, 40000)
+
+
+def report(name, **values):
+    pairs = [KeyValue(key=key, value=value) for key, value in values.items()]
+    return DiagnosticArray(status=[DiagnosticStatus(name=name, values=pairs)])
+
+
+def test_the_figures_of_the_devices():
+    bus = [{"bus rate [Hz]": rate, "cycle, max [ms]": "3.5"} for rate in ("249.0", "nan", "251.0")]
+    found = device_figures.of_reports(
+        device_figures.values_of(
+            [*(report("arm_driver", **one) for one in bus), report("mission", phase="land")]
+        )
+    )
+    assert found == {"bus_rate_hz": 249.0, "bus_cycle_max_ms": 3.5}
+    numbers = {"wall_s": 10.0, "serial_bytes": [90000, 210000], "late_ticks": 3, "lost_s": 0.0}
+    found |= device_figures.of_laboratory(numbers)
+    assert found["serial_to_autopilot_kbyte_s"] == 9.0
+    assert found["serial_from_autopilot_kbyte_s"] == 21.0
+    assert device_figures.lines(found)[0].startswith("servo bus  bus rate hz 249")
+    assert device_figures.of_laboratory({}) == {} and device_figures.lines({}) == []
+
+
+class FakeLog:
+    """Stamps and wall times of the two topics that count."""
+
+    def __init__(self, states, setpoints, sent):
+        self._times = {
+            topics.STATE: (np.array(states), np.array(states)),
+            topics.SETPOINT: (np.array(setpoints, np.int64), np.array(sent, np.int64)),
+        }
+
+    def published(self, topic):
+        return self._times[topic]
+
+
+def test_latencies_and_missed_ticks():
+    ms = 1_000_000
+    states = [4 * ms * k for k in range(1, 6)]
+    setpoints = [states[0], states[1], states[4]]  # two ticks without a setpoint
+    sent = [states[0] + 2 * ms, states[1] + 13 * ms, states[4] + 5 * ms]  # one is late
+    found, missed = latencies(FakeLog(states, setpoints, sent), 0.004)
+    assert found == pytest.approx([0.002, 0.013, 0.005]) and missed == 3
+    assert latencies(FakeLog(states, [], []), 0.004)[1] == 5
+
+
+def checklist(passed, failing, *items):
+    head = report("checklist", passed=passed, failing=failing, step="lift").status[0]
+    head.message = "open: lift"
+    others = [DiagnosticStatus(name=name, level=level) for name, level in items]
+    return DiagnosticArray(status=[head, *others])
+
+
+def test_the_starter_reads_the_lists():
+    message = checklist("False", "battery", ("poses", b"\x00"), ("battery", b"\x02"))
+    assert not list_passed(message) and list_text(message) == "open: lift: battery"
+    assert passed_items(message) == "poses" + "lift"
+    assert list_passed(checklist("True", ""))
+
+
+def cell(name, at, outcome):
+    one = timed({"fault": name, "at": at}, {}, "test")
+    return Cell(name, "m", Schedule((one,)), Promise((outcome,)))
+
+
+def test_a_refused_start_is_an_outcome_of_its_own():
+    wrong = cell("wrong_id", "start", REFUSED)
+    outcome = Outcome(series=None, failure=REFUSAL + "arm: no answer")
+    result = judged(wrong, outcome, None)
+    assert (result.outcome, result.kept) == (REFUSED, True) and "no answer" in result.why
+    broken = judged(wrong, Outcome(series=None, failure="mission was killed"), None)
+    assert (broken.outcome, broken.kept) == (LOST, False)
+    flight = cell("bus_unplugged", 3.0, "landed")
+    assert judged(flight, outcome, None).kept is False  # a refusal is no landing
+
+
+def test_the_lists_are_done_for_wiring_and_without_a_fault():
+    assert with_checklist(cell("wrong_id", "start", REFUSED))
+    assert not with_checklist(cell("bus_unplugged", 3.0, "landed"))
+    assert with_checklist(Cell("no fault", "", Schedule()))
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        (["--cable", "mocap_jump@3"], "mocap_jump: not of a cable: uam fly --fault"),
+        (["--cable", "wire@3"], "unknown fault 'wire'"),
+        (["--cable", "bus_unplugged@tea"], "no phase 'tea'"),
+        (["--cable", "wrong_id@start:joint=9"], "joint: 9.0 is outside 1 to 7"),
+        (["--config", "none"], "unknown lab 'none'; there are: s500_lab"),
+        (["--scenario", "none"], "unknown scenario"),
+    ],
+)
+def test_wrong_use_is_one_line(capsys, monkeypatch, tmp_path, options, message):
+    monkeypatch.chdir(tmp_path)
+    assert main(["rehearse", *options]) == 2
+    out, err = capsys.readouterr()
+    assert message in err and err.count("\n") == 1 and not out
+    assert not any(tmp_path.iterdir())
+
+
+def test_a_flight_without_emulated_devices_refuses_cables(capsys, monkeypatch, tmp_path):
+    monkeypatch.chdir(tmp_path)
+    assert main(["fly", "--engine", "direct", "--fault", "bus_unplugged@3"]) == 2
+    assert "only a rehearsal has cables: uam rehearse --cable" in capsys.readouterr().err

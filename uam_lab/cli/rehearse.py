@@ -1,0 +1,123 @@
+"""`uam rehearse`: fly a lab file with the vehicle's nodes on emulated devices."""
+
+from __future__ import annotations
+
+import argparse
+from dataclasses import replace
+
+from rich.console import Console
+
+from uam_lab.cli.command import INTERRUPTED, Command, chosen_effects, number
+from uam_lab.cli.fly import COMPLETED, NOT_COMPLETED
+from uam_lab.flight.conclude import command_line
+from uam_lab.flight.flight_settings import require_ros
+from uam_lab.flight.progress import Progress
+from uam_lab.processes.interrupts import Interrupts
+from uam_lab.report.page.console import reporting, summary
+from uam_lab.vehicle.lab_file import TEMPLATE, load_lab
+from uam_lab.vehicle.lab_settings import settings_of
+from uam_sim_bridge.faults import CABLE, FaultError, read_schedule
+from uam_sim_bridge.plant.effects import presets
+
+EXAMPLES = """\
+examples:
+  uam rehearse --config my_lab.yaml                  as uam vehicle, on emulated devices
+  uam rehearse --scenario pick_and_place             the template's laboratory
+  uam rehearse --cable bus_unplugged@carry+2         pull the arm's adapter, 2 s into the carry
+  uam rehearse --cable serial_bit_errors@start --no-report
+  uam rehearse --cable joints_swapped@start          a mistake of the wiring: the start is refused
+  uam faults --list                                  all faults; those of cables at the end
+
+The same nodes, drivers and lab file as uam vehicle; only the names of the devices are replaced
+(lab.yaml in the result folder). Faults: docs/rehearsal.md.
+Exit status: 0 mission completed, 1 not completed or refused, 2 wrong use.
+"""
+
+
+def add(commands: argparse._SubParsersAction) -> None:
+    """Add the subcommand to the command line."""
+    command = Command(
+        commands,
+        "rehearse",
+        run,
+        "fly a lab file on emulated devices",
+        "Fly a lab file with the vehicle's nodes: serial lines, sockets and GPIO are emulated.",
+        EXAMPLES,
+    )
+    command.config(TEMPLATE)
+    command.option("--scenario", "NAME|FILE", "in place of the lab file's")
+    command.repeated(
+        "--cable",
+        "SPEC|FILE",
+        "a fault of a cable or the wiring: NAME@PHASE[+AFTER[+DURATION]], NAME@SECONDS[+DURATION] "
+        "or NAME@start, then :parameter=value,...; uam faults --list shows all",
+        dest="cables",
+    )
+    command.plant()
+    mass = number("mass", "kg", 0.0)
+    command.option("--payload-mass", "KG", "default: the scenario's", type=mass)
+    command.seed("of all noise")
+    command.out("<scenario>-rehearsal")
+    command.switch(
+        "--no-video", "leave out the video, which takes longest", "store_false", dest="video"
+    )
+    text = "leave out the report with its video; uam report makes it later"
+    command.switch("--no-report", text, "store_false", dest="report")
+
+
+def run(options: argparse.Namespace) -> int:
+    """Rehearse and report; return the exit status."""
+    require_ros()
+    from uam_lab.rehearsal import device_figures
+    from uam_lab.rehearsal.flown_rehearsal import fly
+    from uam_lab.rehearsal.options import RehearsalOptions
+
+    lab = load_lab(options.config)
+    if options.scenario:
+        lab = replace(lab, scenario=options.scenario)
+    settings = settings_of(lab, command_line())
+    mass = settings.payload_mass if options.payload_mass is None else options.payload_mass
+    changes = presets.added({}, chosen_effects(options))
+    settings = replace(
+        settings, seed=options.seed, payload_mass=mass, out=options.out, vehicle_changes=changes
+    )
+    cables = read_schedule(options.cables, settings.scenario, options.seed)
+    for one in cables.faults:
+        if one.fault.PLACE != CABLE:
+            raise FaultError(f"{one.fault.NAME}: not of a cable: uam fly --fault")
+    settings = replace(settings, faults=cables)
+    rehearsal = RehearsalOptions(
+        seed=options.seed,
+        payload_mass=mass,
+        vehicle_changes=changes,
+        faults=cables,
+        arm_start=tuple(settings.scenario.arm_start),
+    )
+    console = Console()
+    landing = settings.scenario.landing
+    with Progress(console, landing.at + landing.duration) as progress, Interrupts() as stop:
+        folder, outcome, metrics = fly(lab, settings, rehearsal, progress, stop)
+    if metrics is not None:
+        if options.report:
+            from uam_lab.report.build import build_report
+
+            with reporting(console) as show:
+                pictures = not outcome.interrupted
+                made = build_report(folder, show, video=options.video, pictures=pictures)
+            if made.problem:
+                outcome.notes.append(made.problem)
+        console.print(summary(metrics, folder))
+    else:
+        print(f"results: {folder.path}")
+    for line in device_figures.lines(device_figures.saved(folder.path)):
+        print(line)
+    for note in outcome.notes:
+        print(f"note: {note}")
+    if outcome.failure:
+        print(f"uam rehearse: {outcome.failure}")
+        for line in outcome.details:
+            print(f"  | {line}")
+    if outcome.interrupted:
+        return INTERRUPTED
+    completed = metrics is not None and metrics["mission_completed"] and not outcome.failure
+    return COMPLETED if completed else NOT_COMPLETED

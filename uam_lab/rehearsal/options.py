@@ -1,0 +1,26 @@
+"""What a rehearsal has beside the lab file."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+from uam_sim_bridge.faults import Schedule
+
+
+@dataclass(frozen=True)
+class RehearsalOptions:
+    """seed: of all noise; payload_mass [kg]; vehicle_changes: of the plant, effects
+    too; faults: of cables.
+
+    arm_start (n,) [rad]: joint angles on the ground, () for stowed; checklist: whether the lists
+    are required and a person does them; time_limit [s], 0 for none.
+    """
+
+    seed: int = 1
+    payload_mass: float = 0.0
+    vehicle_changes: Mapping[str, object] = field(default_factory=dict)
+    faults: Schedule = Schedule()
+    arm_start: tuple[float, ...] = ()
+    checklist: bool = True
+    time_limit: float = 0.0

@@ -1,0 +1,82 @@
+"""Result of a rehearsal, from its log and the laboratory's statistics."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from uam_lab.flight.flight_settings import FlightSettings
+from uam_lab.processes.processes import NodeFailed
+from uam_lab.recording.log_reader import read_flight
+from uam_lab.recording.logged_topics import Log
+from uam_lab.recording.mcap_reader import UnreadableLog
+from uam_lab.rehearsal.laboratory_process import STATISTICS
+from uam_lab.results.outcome import Outcome
+from uam_lab.results.result_folder import ResultFolder
+from uam_msgs_py.messages import topics
+
+MISSED_TICKS = 3  # [control periods] from the sample to the setpoint, from which a tick is missed
+REFUSED = "start refused: "
+
+
+def read_outcome(
+    settings: FlightSettings,
+    folder: ResultFolder,
+    failure: NodeFailed | None,
+    refused: str,
+    interrupted: bool,
+) -> Outcome:
+    """Return the outcome of the rehearsal in `folder`.
+
+    failure: the failed node, if any; refused: why the mission was not started, "" if it was.
+    """
+    outcome = Outcome(series=None, interrupted=interrupted)
+    numbers = statistics(folder.path / "logs")
+    if refused:
+        outcome.failure = REFUSED + refused
+    elif failure is not None and not interrupted:
+        outcome.failure, outcome.details = str(failure), failure.last_lines
+    outcome.wall_s = float(numbers.get("wall_s", 0.0))
+    if lost := numbers.get("lost_s"):
+        outcome.notes.append(f"the plant could not keep real time: {lost:.2f} s lost")
+    try:
+        log = Log.read(folder.log)
+        flight = read_flight(folder.log, settings.scenario, vehicle=settings.vehicle)
+    except (UnreadableLog, OSError) as error:
+        outcome.failure = outcome.failure or f"nothing recorded: {error}"
+        return outcome
+    period = settings.vehicle.control_period
+    outcome.latency_s, outcome.missed_ticks = latencies(log, period)
+    outcome.series, outcome.abort_reason = flight.series, flight.abort_reason
+    outcome.parameter_changes, outcome.transitions = flight.parameter_changes, flight.transitions
+    outcome.grasps, outcome.faults = flight.grasps, flight.faults
+    if not flight.done and not outcome.partial:
+        outcome.failure = numbers.get("ended_by") or "the mission did not end"
+    return outcome
+
+
+def statistics(logs: Path) -> dict[str, Any]:
+    """Return what the laboratory wrote at its end, {} without it."""
+    try:
+        return json.loads((logs / STATISTICS).read_text())
+    except (OSError, ValueError):
+        return {}
+
+
+def latencies(log: Log, period: float) -> tuple[np.ndarray, int]:
+    """Return the times (m,) [s] from the IMU's samples to the sending of their setpoints.
+
+    And the number of missed ticks, sent later than MISSED_TICKS periods [s] or never. A tick has
+    the stamp of its sample; stamps and wall times are those of the same computer.
+    """
+    stamps, sent = log.published(topics.SETPOINT)
+    states, _ = log.published(topics.STATE)
+    if not len(stamps):
+        return np.zeros(0), len(states)
+    latency = 1e-9 * (sent - stamps)
+    within = states[(states >= stamps.min()) & (states <= stamps.max())]
+    never = len(np.setdiff1d(within, stamps))
+    return latency, int(np.sum(latency > MISSED_TICKS * period)) + never

@@ -1,0 +1,1 @@
+"""A serial line between two programs, without hardware."""

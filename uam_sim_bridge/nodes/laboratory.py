@@ -1,0 +1,271 @@
+"""Node: the laboratory of a rehearsal, one plant behind emulated devices on the wall clock.
+
+The vehicle's nodes meet it on its devices alone: pseudo-terminals, sockets and a simulated GPIO
+line. To ROS it publishes the truth for the report, and with `imu: topic` the companion's IMU as a
+driver of its own. It reads the mission's status for the times of faults, and the steps of the
+checklist, which its person does.
+"""
+
+from __future__ import annotations
+
+import gc
+import json
+import math
+import sys
+import time
+from dataclasses import asdict, dataclass, field
+from pathlib import Path
+
+import numpy as np
+import rclpy
+from diagnostic_msgs.msg import DiagnosticArray
+from rclpy.executors import SingleThreadedExecutor
+from rclpy.node import Node
+from rclpy.signals import SignalHandlerOptions
+from std_srvs.srv import Trigger
+
+from uam_control.coordinates import CHI
+from uam_control.mission.time_limit import DISARMED, Settled
+from uam_control.settings.parameter_set import ParameterError
+from uam_control.stamps import SECOND
+from uam_control.vehicle import VehicleDescription
+from uam_msgs_py.messages import topics
+from uam_msgs_py.messages.convert import ImuWriter
+from uam_msgs_py.messages.layouts import BadMessage
+from uam_msgs_py.messages.status import MissionStatus
+from uam_msgs_py.node import polling
+from uam_msgs_py.node.base_node import StopSignal, refuse
+from uam_msgs_py.node.namespace import frame
+from uam_msgs_py.node.node_parameters import refuse_unknown
+from uam_msgs_py.node.tunable import TunableNode
+from uam_sim_bridge.faults import CABLE, Schedule
+from uam_sim_bridge.nodes import laboratory_options
+from uam_sim_bridge.nodes.fault_topic import FaultTopic
+from uam_sim_bridge.nodes.laboratory_options import TOPIC, LaboratoryParameters
+from uam_sim_bridge.nodes.plant_topics import TruthTopics
+from uam_sim_bridge.plant import Vehicle
+from uam_sim_bridge.plant.sensors import Delay
+from uam_sim_bridge.rehearsal.cables import Cables
+from uam_sim_bridge.rehearsal.laboratory import Laboratory
+from uam_sim_bridge.rehearsal.paced_clock import PacedClock
+from uam_sim_bridge.rehearsal.person import Person
+
+CHECKLIST = topics.Topic(
+    "uam/checklist", DiagnosticArray, topics.LATCHED, "the lists before a flight"
+)
+NAME, IMU_DRIVER = "laboratory", "imu_driver"
+READY = "ready"  # file in the folder of the devices, when they are there
+LISTEN_TICKS, SERVE_TICKS = 5, 25  # [ticks] between two looks at topics, at services
+SWITCH = 0.0005  # [s] a thread of a device waits at most so long for the interpreter
+CONFIRM = "confirm"  # a step that needs it
+ASK_AGAIN = 2.0  # [s] between two confirmations of a step
+
+
+@dataclass
+class Statistics:
+    """Of a rehearsal, written at its end. lost_s: see PacedClock; steps: done by the person."""
+
+    ticks: int = 0
+    wall_s: float = 0.0
+    late_ticks: int = 0
+    lost_s: float = 0.0
+    armed: bool = False
+    ended_by: str = ""
+    serial_bytes: tuple[int, int] = (0, 0)
+    bus_packets: int = 0
+    bus_packets_damaged: int = 0
+    mocap_frames: int = 0
+    steps: list[str] = field(default_factory=list)
+
+
+class Rehearsal:
+    """Laboratory, its topics and its person, tick by tick."""
+
+    def __init__(
+        self, node: Node, vehicle: VehicleDescription, p: LaboratoryParameters, stop: StopSignal
+    ) -> None:
+        self._node, self._p, self._stop = node, p, stop
+        numbers = Vehicle.of(vehicle).changed(json.loads(p.vehicle_changes))
+        faults = Schedule.from_text(p.faults).only(CABLE)
+        folder = Path(p.folder)
+        folder.mkdir(parents=True, exist_ok=True)
+        self.lab = Laboratory(
+            numbers,
+            laboratory_options.devices(vehicle, p),
+            p.hil_port,
+            p.payload_mass,
+            p.seed,
+            p.arm_start,
+            faults,
+        )
+        self.statistics = Statistics()
+        self._cables = Cables(self.lab, faults)
+        self._cables.update(0.0)  # those at the start
+        self._fault_topic = FaultTopic(node) if faults else None
+        self._truth = TruthTopics(node, vehicle)
+        self._imu_node, self._imu = None, None
+        if p.imu == TOPIC:
+            self._imu_node = Node(IMU_DRIVER, namespace=node.get_namespace())
+            self._imu = self._imu_node.create_publisher(
+                topics.IMU.type, topics.IMU.name, topics.IMU.qos
+            )
+            self._imu_writer = ImuWriter(frame(node, topics.BODY))
+            self._imu_delay = Delay(numbers.numbers["sensors"]["imu"]["latency_ticks"])
+        self._mission_topic = polling.listen(node, topics.MISSION_STATUS)
+        self._checklist = polling.listen(node, CHECKLIST)
+        self._confirm = node.create_client(Trigger, "checklist/confirm")
+        self._executor = SingleThreadedExecutor()
+        self._executor.add_node(node)
+        self.clock = PacedClock(self.lab.plant.period)
+        self._mission = MissionStatus()
+        self._person = Person(vehicle.joint_names, self.lab.folded)
+        self._step, self._needs, self._asked = "", "", -math.inf
+        (folder / READY).write_text(f"{self.lab.mocap.port}\n")
+
+    def await_autopilot(self) -> None:
+        """Wait until the autopilot is connected, or a signal."""
+        while not self._stop.raised and not self.lab.hil.accept(0.1):
+            pass
+
+    def run(self) -> None:
+        """Run ticks until the mission is over, the time limit, or a signal."""
+        lab, clock, numbers = self.lab, self.clock, self.statistics
+        gc.collect()
+        gc.freeze()
+        clock.begin()
+        begin, end, settled = time.monotonic(), math.inf, Settled()
+        while not self._stop.raised and not numbers.ended_by:
+            clock.note(lab.plant.tick)
+            host = clock.host(lab.plant.tick)
+            self._tick(host)
+            now = lab.plant.time
+            numbers.armed = numbers.armed or lab.hil.armed
+            if self._mission.done and math.isinf(end):
+                end = now + self._p.linger
+            if now >= end:
+                numbers.ended_by = "mission"
+            elif settled.over(now, lab.hil.armed):
+                numbers.ended_by = DISARMED
+            elif 0.0 < self._p.time_limit <= now:
+                numbers.ended_by = f"time limit of {self._p.time_limit:g} s"
+        numbers.ended_by = numbers.ended_by or "interrupt"
+        numbers.wall_s = time.monotonic() - begin
+
+    def _tick(self, host: float) -> None:
+        """Sense, publish, wait for the end of the tick, and step; host: system's time [s]."""
+        lab, stamp = self.lab, round(host * SECOND)
+        changed = self._cables.update(lab.plant.time)
+        if changed and self._fault_topic:
+            self._fault_topic.publish(stamp, changed)
+        samples, truth = lab.sense(host)
+        lab.send_hil(samples, truth)
+        if self._imu is not None:
+            self._publish_imu(samples.hil, host)
+        motors = lab.hil.motors
+        self._truth.publish(stamp, truth, motors, lab.magnet)
+        tick = lab.plant.tick
+        if tick % LISTEN_TICKS == 0:
+            self._listen()
+            self._be_the_person(truth.state[CHI])
+        if tick % SERVE_TICKS == 0:
+            self._executor.spin_once(0.0)
+        if (left := self.clock.left(tick + 1)) > 0.0:
+            time.sleep(left)
+        if not lab.hil.connected:
+            lab.hil.accept(0.0)
+        lab.step(lab.receive_hil(), truth)
+
+    def _publish_imu(self, sample: tuple, host: float) -> None:
+        """Publish the companion's IMU sample of a tick at `host` [s]."""
+        shift = host - self.lab.plant.time
+        due = self._imu_delay(self.lab.plant.tick, sample)
+        if due is not None and self._cables.imu_plugged:
+            time_, gyro, force = due
+            stamp = round((time_ + shift) * SECOND)
+            self._imu.publish(self._imu_writer.fill(stamp, gyro, force))
+
+    def _listen(self) -> None:
+        """Take the mission's status and the step of the checklist."""
+        for message in polling.messages(self._mission_topic):
+            try:
+                stamp, self._mission = MissionStatus.from_message(message)
+            except BadMessage:
+                continue
+            shift = self.clock.host(0)
+            self._cables.timeline.mission_at(stamp / SECOND - shift, self._mission.time)
+        for message in polling.messages(self._checklist):
+            self._step, self._needs = value_of(message, "step"), value_of(message, "needs")
+
+    def _be_the_person(self, chi: np.ndarray) -> None:
+        if not self._p.person:
+            return
+        now = self.lab.plant.time
+        self.lab.grip = self._person.update(now, self._step, chi)
+        wishes = self._person.wishes_to_confirm and self._needs == CONFIRM
+        if wishes and now - self._asked > ASK_AGAIN:
+            self._asked = now
+            if self._confirm.service_is_ready():
+                self._confirm.call_async(Trigger.Request())
+
+    def report(self) -> dict[str, object]:
+        """Return the statistics so far, for JSON."""
+        lab, numbers = self.lab, self.statistics
+        numbers.ticks, numbers.late_ticks = lab.plant.tick, self.clock.late
+        numbers.lost_s = round(self.clock.lost, 6)
+        numbers.serial_bytes = tuple(lab.cable.carried)
+        numbers.bus_packets = lab.bus.line.instructions
+        numbers.bus_packets_damaged = lab.bus.line.damaged
+        numbers.mocap_frames = lab.mocap.sent
+        numbers.steps = self._person.done
+        return asdict(numbers)
+
+    def close(self) -> None:
+        """Close devices and nodes."""
+        self.lab.close()
+        self._executor.shutdown()
+        if self._imu_node is not None:
+            self._imu_node.destroy_node()
+
+
+def value_of(message: DiagnosticArray, key: str) -> str:
+    """Return a value of the list as a whole, its first status; "" for none."""
+    for status in message.status[:1]:
+        for pair in status.values:
+            if pair.key == key:
+                return pair.value
+    return ""
+
+
+def main() -> int:
+    """Run the laboratory; return its exit status.
+
+    0: the rehearsal is over or was asked to stop; 2: bad parameters, or a port in use, in one line.
+    """
+    stop = StopSignal()
+    sys.setswitchinterval(SWITCH)
+    rclpy.init(args=sys.argv, signal_handler_options=SignalHandlerOptions.NO)
+    node = TunableNode(NAME)
+    rehearsal = None
+    try:
+        vehicle, parameters = laboratory_options.declare(node)
+        refuse_unknown(node)
+        try:
+            rehearsal = Rehearsal(node, vehicle, parameters, stop)
+        except (ValueError, KeyError, OSError) as error:
+            return refuse(NAME, error)
+        rehearsal.await_autopilot()
+        rehearsal.run()
+        return 0
+    except ParameterError as error:
+        return refuse(NAME, error)
+    finally:
+        if rehearsal is not None:
+            if parameters.statistics:
+                Path(parameters.statistics).write_text(json.dumps(rehearsal.report()))
+            rehearsal.close()
+        node.destroy_node()
+        rclpy.try_shutdown()
+
+
+if __name__ == "__main__":
+    raise SystemExit(main())
