@@ -7,8 +7,10 @@ from std_msgs.msg import Header
 from vehicle_rig import Vehicle, take_off
 
 from uam_msgs_py.messages import topics
+from uam_msgs_py.messages.checklist import checklist_message
 from uam_msgs_py.messages.control import read_reference
-from uam_msgs_py.messages.status import MissionStatus
+from uam_msgs_py.messages.preflight import read_preflight
+from uam_msgs_py.messages.status import ChecklistState, MissionStatus
 
 
 @pytest.fixture
@@ -104,3 +106,35 @@ def test_states_that_stop_in_flight_hand_over_to_the_autopilots_failsafe(start, 
     assert made.status.cause.startswith("no state of the estimator for 3.")
     made.fly(1)  # a state that comes back changes nothing
     assert made.status.state == "failsafe"
+
+
+def test_a_required_checklist_refuses_the_start_until_it_has_passed(start, probe):
+    arguments = ("-p", "scenario:=hover", "-p", "require_checklist:=true")
+    start("uam_control.nodes.mission", "--ros-args", *arguments)
+    vehicle, reports = Vehicle(probe), probe.publisher(topics.CHECKLIST)
+    probe.until_connected("mission", [reports], [])
+
+    def report(**state):
+        """Send a report, and go on until the pre-arm report has it."""
+        sent = ChecklistState(**state)
+        words = "passed" if sent.passed else sent.failing
+
+        def known():
+            reports.publish(checklist_message(vehicle.stamp, sent, []))
+            vehicle.fly(10)
+            found = {line[0]: line[1] for m in seen for line in read_preflight(m)}
+            return found.get("checklist") == words
+
+        probe.until(known, f"the report {words}")
+
+    seen = probe.collect(topics.PREFLIGHT)
+    vehicle.tell()
+    vehicle.fly(50)
+    assert "checklist: no report (all items passed)" in vehicle.ask("start")[1]
+    report(failing="battery; tilt_roll", step="tilt_roll", commands=True)
+    assert vehicle.status.phase == "hand check"
+    assert read_reference(vehicle.references[-1])[1].flying
+    assert "refused: checklist: battery; tilt_roll (all items passed)" in vehicle.ask("start")[1]
+    report(passed=True)
+    assert not read_reference(vehicle.references[-1])[1].flying
+    assert vehicle.ask("start") == (True, "arming")

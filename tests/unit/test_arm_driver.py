@@ -425,3 +425,28 @@ def test_the_whole_driver_behind_a_device(tmp_path):
         until(lambda reading: reading is not None and not driver.problems)
         driver.stop()
         assert not any(shaft.last.on for shaft in shafts)
+
+
+def test_a_released_arm_has_no_torque_and_is_driven_again_afterwards():
+    rig = ArmRig().start()
+    rig.cycle(2, effort=[0.5, 0.5])
+    assert min(rig.currents) > 0.0
+    assert rig.driver.release(True) == ""
+    rig.cycle(3, effort=[0.5, 0.5])
+    assert rig.currents == [0.0, 0.0]
+    rig.driver.release(False)
+    rig.cycle(2, effort=[0.5, 0.5])
+    assert min(rig.currents) > 0.0
+
+
+def test_in_position_mode_a_released_arm_has_its_torque_off():
+    rig = ArmRig(mode="position").start()
+    rig.driver.command_position(np.array(STOWED))
+    rig.cycle(2)
+    assert rig.driver.release(True) == ""
+    rig.cycle(20)  # the slow reads see it, too
+    assert [shaft.last.on for shaft in rig.shafts] == [False, False]
+    assert not rig.driver.problems
+    rig.driver.release(False)
+    rig.cycle(2)
+    assert [shaft.last.on for shaft in rig.shafts] == [True, True]

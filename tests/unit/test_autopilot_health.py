@@ -11,6 +11,7 @@ from uam_sim_bridge.mavlink.protocol.wire import mavlink2
 from uam_sim_bridge.mavlink.telemetry.vitals import (
     ESTIMATOR_FLAGS,
     SENSORS,
+    Vitals,
     estimate_faults,
     from_battery_status,
     from_sys_status,
@@ -110,3 +111,16 @@ def test_flags_have_names():
     assert SENSORS[1] == "3d_gyro" and SENSORS[128] == "vision_position"
     assert unhealthy(1 | 2 | 128, 1 | 2 | 128, 1 | 2) == ("vision_position",)
     assert unhealthy(1, 1 | 2, 0) == ("3d_gyro",)
+
+
+def test_the_radio_is_received_where_it_is_there_and_healthy():
+    radio, gyro = mavlink2.MAV_SYS_STATUS_SENSOR_RC_RECEIVER, 1
+    vitals = Vitals()
+    assert vitals.radio is None
+    for there, healthy, received in ((gyro, gyro, False), (gyro | radio, gyro, False),
+                                     (gyro | radio, gyro | radio, True)):  # fmt: skip
+        message = mavlink2.MAVLink_sys_status_message(
+            there, there, healthy, 0, 65535, -1, -1, 0, 0, 0, 0, 0, 0
+        )
+        vitals.take("SYS_STATUS", message)
+        assert vitals.radio is received

@@ -2,6 +2,8 @@
 
 import math
 import socket
+from contextlib import nullcontext
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -12,6 +14,7 @@ from hypothesis import strategies as st
 from uam_control.supervision import PreflightCheck
 from uam_lab.cockpit import page_address
 from uam_lab.cockpit.buttons import BUTTONS
+from uam_lab.cockpit.checklist_panel import ChecklistPanel, checklist_html
 from uam_lab.cockpit.entry import axes, bounds, reach, text_of, value_of
 from uam_lab.cockpit.headline import _facts, headline
 from uam_lab.cockpit.remote_parameters import About
@@ -25,8 +28,16 @@ from uam_lab.cockpit.vehicle_health import (
     Health,
     grade,
 )
+from uam_msgs_py.messages.checklist import ChecklistItem, checklist_message
 from uam_msgs_py.messages.layouts import BadMessage
-from uam_msgs_py.messages.status import ERROR, OK, AutopilotState, MissionStatus, diagnostic
+from uam_msgs_py.messages.status import (
+    ERROR,
+    OK,
+    AutopilotState,
+    ChecklistState,
+    MissionStatus,
+    diagnostic,
+)
 from uam_msgs_py.messages.transforms import Transform, read_transforms, transforms_message
 from uam_sim_bridge.plant import Vehicle
 from uam_sim_bridge.plant.urdf import BASE_LINK, urdf
@@ -250,3 +261,57 @@ def test_the_next_port_is_taken_where_one_is_in_use():
         assert page_address.free_port(page_address.LOCAL, port) > port
     with pytest.raises(page_address.AddressError, match="cannot serve on 203.0.113.7"):
         page_address.free_port("203.0.113.7", 8080)
+
+
+def test_the_checklist_shows_the_step_and_what_is_open():
+    items = [
+        ChecklistItem("battery", "automatic", "passed", "90 %", "at least 60 %"),
+        ChecklistItem("radio", "automatic", "failed", "<not> received", "received"),
+        ChecklistItem("lift", "guided", "open", "", "up at least 0.2 m"),
+    ]
+    state = ChecklistState(False, "radio; lift", "lift", "motion", "Lift it.", "up +0.10 m")
+    shown = checklist_html(state, items)
+    assert 'data-step="lift"' in shown and "Lift it." in shown and "up +0.10 m" in shown
+    assert "&lt;not&gt; received" in shown and "battery" not in shown
+    assert "1 of 3 items have passed" in shown
+    assert "All items have passed." in checklist_html(ChecklistState(True), items[:1])
+
+
+class Clicked:
+    """Stands for viser's gui: stores what was added."""
+
+    def __init__(self):
+        self.content, self.disabled, self.acts, self.added = "", False, [], {}
+
+    def add_folder(self, label, order):
+        return nullcontext()
+
+    def add_html(self, content):
+        return self.added.setdefault("html", Clicked())
+
+    def add_button(self, label, icon):
+        return self.added.setdefault(label, Clicked())
+
+    def on_click(self, act):
+        self.acts.append(act)
+
+
+def test_the_buttons_of_the_checklist_call_its_services():
+    gui, called, said = Clicked(), [], []
+
+    def call(kind, name, request, answer):
+        called.append(name)
+        answer(None, f"{name}: no response")
+
+    services = SimpleNamespace(call=call)
+    panel = ChecklistPanel(gui, services, lambda act: act(), lambda *line: said.append(line))
+    assert not gui.added  # no checklist, no panel
+    for needs, disabled in (("motion", True), ("confirm", False)):
+        state = ChecklistState(False, "lift", "lift", needs)
+        panel.show(checklist_message(0, state, []))
+        assert gui.added["Confirm"].disabled is disabled
+        assert not gui.added["Repeat the step"].disabled
+    for label in ("Confirm", "Repeat the step"):
+        gui.added[label].acts[0](None)
+    assert called == ["checklist/confirm", "checklist/repeat"]
+    assert said[0] == (False, "checklist: checklist/confirm: no response")

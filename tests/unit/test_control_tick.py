@@ -210,3 +210,22 @@ def test_setpoints_in_flight_are_new_at_their_rate_and_are_sent_at_every_tick():
     rig.run(0.1, imu=False)
     rig.control.bridge.without(rig.stamp)  # the level hold is not held back
     assert tuple(rig.port.setpoints[-1][1].rates) != rates[-1]
+
+
+def test_in_the_hands_of_a_person_the_commands_are_computed_and_not_sent():
+    rig = Rig()
+    bridge = rig.control.bridge
+    state = np.zeros((3, 8))
+    inputs = state, True, np.array([0.0, 0.0, 21.6]), np.array([-0.2, 0.0, 0.0])
+    desired = np.zeros((3, 3)), np.zeros((3, 3))
+    for hands, armed, sent_thrust in (
+        (True, False, False),
+        (True, True, True),
+        (False, False, True),
+    ):
+        rig.stamp += PERIOD
+        bridge.hands, rig.port.armed = hands, armed
+        bridge.hear(rig.stamp)
+        setpoint = bridge.tick(rig.stamp, *inputs, *desired)
+        assert setpoint.thrust > 0.0 and setpoint.rates[0] < 0.0
+        assert (rig.port.setpoints[-1][1].thrust > 0.0) is sent_thrust

@@ -4,6 +4,7 @@ from uam_control.mission.feasibility import Feasibility, InfeasibleReference
 from uam_control.mission.flight_sequence import Mission
 from uam_control.mission.mission_output import MissionOutput
 from uam_control.mission.mission_parameters import MissionParameters, StartParameters
+from uam_control.mission.permission import ChecklistReport
 from uam_control.mission.scenarios.scenario import Scenario, ScenarioError
 from uam_control.mission.scenarios.scenario_files import load_scenario
 from uam_control.mission.scenarios.scenario_options import ScenarioOptions

@@ -16,6 +16,7 @@ from uam_control.mission.mission_output import (
     ABORTED,
     DRY_RUN,
     GOAL,
+    HAND_CHECK,
     HOLD,
     LAND,
     LANDED,
@@ -27,6 +28,7 @@ from uam_control.mission.mission_parameters import MissionParameters, StartParam
 from uam_control.mission.motion.braking import Braking
 from uam_control.mission.motion.trajectory import empty_reference
 from uam_control.mission.payload_watch import PayloadWatch
+from uam_control.mission.permission import ChecklistReport, Permission
 from uam_control.mission.plans import GoalPose, PlanRefused, Points, check
 from uam_control.mission.scenarios.scenario import Scenario
 from uam_control.mission.standing import Standing
@@ -72,6 +74,7 @@ class Mission:
         self._seen: Observation | None = None
         self._vehicle = vehicle
         self._feasible: tuple[PreflightCheck, ...] = ()
+        self._permission = Permission(self._start.require_checklist)
         self._begin(parameters)
         self._check_reference(parameters)
 
@@ -94,7 +97,7 @@ class Mission:
         self._end: float | None = None
         self._magnet: tuple[bool, bool] | None = None  # overriding value, scenario's value then
         self._standing: Standing | None = None  # while the arm of a released vehicle is stowed
-        self._pose: np.ndarray | None = None  # (6 + n,) reference of a dry run
+        self._pose: np.ndarray | None = None  # (6 + n,) reference of a dry run, or in hands
 
     def start(self) -> tuple[bool, str]:
         """Desire an armed autopilot from the next step on; the take-off follows.
@@ -121,6 +124,11 @@ class Mission:
         """Forget the flight and wait on the ground: for stamps of a new simulation."""
         self._begin(self._parameters)
         self._seen, self._stamp = None, 0.0
+        self._permission.take(None)
+
+    def checklist(self, report: ChecklistReport) -> None:
+        """Take the newest state of the checklist; it counts where it is required."""
+        self._permission.take(report)
 
     def preflight(self) -> tuple[PreflightCheck, ...]:
         """Return the pre-arm report of the newest step; () before the first one."""
@@ -134,7 +142,7 @@ class Mission:
             p.start_speed,
             p.start_arm_error,
         )
-        return report + self._feasible
+        return report + self._feasible + self._permission.lines(self._stamp)
 
     def _check_reference(self, parameters: MissionParameters) -> None:
         """Update the line of the pre-arm report about the whole reference."""
@@ -232,6 +240,8 @@ class Mission:
             self._watch_payload(stamp, seen)
             if output.state is State.GROUNDED and not output.arm:
                 self._wait(state)
+            elif output.state is State.GROUNDED and armed_since is None:
+                self._check_permission(stamp)
             if output.state is State.FAILSAFE and self._end is None:
                 deadline = self._failsafe_since + self._parameters.failsafe_timeout
                 if armed_since is None or stamp >= deadline:
@@ -331,6 +341,7 @@ class Mission:
         if self._start.auto_start and not self._start.dry_run and not self.not_ready:
             self._supervisor.start()
         if not self._start.dry_run:
+            self._follow_hands(state)
             return
         if self._pose is None and np.all(np.isfinite(state)):
             self._pose = state[CHI].copy()
@@ -338,6 +349,30 @@ class Mission:
         if self._pose is not None:
             output.reference[CHI, :ALPHA] = self._pose[:ALPHA]
             output.flying, output.phase = True, DRY_RUN
+
+    def _follow_hands(self, state: np.ndarray) -> None:
+        """Let the control laws work while the checklist looks at their commands.
+
+        The reference is the present position, level, with the heading of the beginning: the laws
+        then turn the vehicle back. state (3, 6 + n).
+        """
+        output = self.output
+        if not self._permission.commands(self._stamp) or not np.all(np.isfinite(state)):
+            if self._pose is not None:
+                self._pose = None
+                output.reference[CHI, :ALPHA] = 0.0
+            return
+        if self._pose is None:
+            self._pose = state[CHI].copy()
+        output.reference[CHI, :ALPHA] = state[CHI, :ALPHA]
+        output.reference[CHI, ATTITUDE] = 0.0, 0.0, self._pose[YAW]
+        output.flying, output.phase = True, HAND_CHECK
+
+    def _check_permission(self, stamp: float) -> None:
+        """End a flight that is not armed yet when the checklist takes its permission back."""
+        refusal = self._permission.refusal(stamp)
+        if refusal:
+            self.give_up(stamp, refusal)
 
     def _observe(
         self, stamp: float, state: np.ndarray, armed_since: float | None, readings: Readings

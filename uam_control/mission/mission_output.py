@@ -12,7 +12,8 @@ from uam_control.supervision import State
 # phases in addition to those of a scenario
 WAITING, HOLD, LAND, LANDED, ABORTED = "waiting", "hold", "land", "landed", "aborted"
 RELEASED, DRY_RUN, GOAL = "released", "dry run", "goal"
-PHASES = (WAITING, HOLD, LAND, LANDED, ABORTED, RELEASED, DRY_RUN, GOAL)
+HAND_CHECK = "hand check"  # a person tilts the disarmed vehicle, see docs/preflight.md
+PHASES = (WAITING, HOLD, LAND, LANDED, ABORTED, RELEASED, DRY_RUN, GOAL, HAND_CHECK)
 
 
 @dataclass

@@ -20,6 +20,9 @@ class StartParameters(ParameterSet):
     dry_run: bool = switch(
         False, "compute all commands for the present pose; never arm (set it for the bridge too)"
     )
+    require_checklist: bool = switch(
+        False, "start only when the checklist of a real vehicle has passed (/uam/checklist)"
+    )
 
 
 @dataclass(frozen=True)

@@ -14,6 +14,7 @@ from uam_control.coordinates import ARM
 from uam_control.grasp import Grasp
 from uam_control.laws.catalogue import DEFAULT
 from uam_control.mission import (
+    ChecklistReport,
     Feasibility,
     InfeasibleReference,
     Mission,
@@ -39,7 +40,14 @@ from uam_msgs_py.messages.control import ReferenceWriter, read_state
 from uam_msgs_py.messages.convert import SWITCH
 from uam_msgs_py.messages.navigation import path_message
 from uam_msgs_py.messages.preflight import preflight_message
-from uam_msgs_py.messages.status import ERROR, OK, WARN, AutopilotState, MissionStatus
+from uam_msgs_py.messages.status import (
+    ERROR,
+    OK,
+    WARN,
+    AutopilotState,
+    ChecklistState,
+    MissionStatus,
+)
 from uam_msgs_py.node.base_node import UamNode, run
 from uam_msgs_py.node.joins import Backlog
 from uam_msgs_py.node.namespace import neighbour_section
@@ -111,6 +119,8 @@ class MissionNode(UamNode):
         self._errors = TrackingErrors(self)
         MissionInputs(self, self._stage.inputs, vehicle.joint_names)
         self.listen(topics.AUTOPILOT_STATE, self._on_autopilot, required=False)
+        if start.require_checklist:
+            self.listen(topics.CHECKLIST, self._on_checklist, required=False)
         self.listen(topics.STATE, self._on_state)
         self.triggers = (topics.STATE.name,)
         offer(self, self._mission)
@@ -156,6 +166,11 @@ class MissionNode(UamNode):
         self._state_at = math.inf
         self._mission.lose_states(f"no state of the estimator for {silence:.2f} s: IMU lost?")
         self._publish_status(self.stamp + round(silence * SECOND))
+
+    def _on_checklist(self, message: DiagnosticArray) -> None:
+        stamp, state = ChecklistState.from_message(message)
+        report = ChecklistReport(stamp / SECOND, state.passed, state.failing, state.commands)
+        self._mission.checklist(report)
 
     def _on_state(self, data: bytes) -> None:
         self._state_at = time.monotonic()

@@ -53,6 +53,7 @@ FLIGHT_OWN = {
     "mission": (
         *("control_period", "scenario", "vehicle", "auto_start", "dry_run", "publishers"),
         "state_timeout",
+        "require_checklist",
         *ScenarioOptions.specs(),
     ),
 }

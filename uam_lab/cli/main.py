@@ -16,6 +16,7 @@ COMMANDS = {
     "fly": "fly",
     "rehearse": "rehearse",
     **dict.fromkeys(OPERATE, "operate"),
+    "checklist": "checklist",
     "view": "view",
     "profile": "profile",
     "report": "report",

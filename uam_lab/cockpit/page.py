@@ -15,6 +15,7 @@ import viser
 from uam_control.supervision import PreflightCheck
 from uam_lab.cockpit.buttons import CommandButtons
 from uam_lab.cockpit.charts import Charts
+from uam_lab.cockpit.checklist_panel import ChecklistPanel
 from uam_lab.cockpit.gains import NodeGains
 from uam_lab.cockpit.headline import headline
 from uam_lab.cockpit.remote_parameters import RemoteParameters
@@ -79,6 +80,7 @@ class Page:
         self._shown = ""
         with gui.add_folder("Commands"):
             self._commands = CommandButtons(gui, self._services, self._todo.put, self.say)
+        self._checklist = ChecklistPanel(gui, self._services, self._todo.put, self.say)
         self._follow = gui.add_checkbox("Camera follows the vehicle", False)
         self._answers = gui.add_markdown("")
         self._followed = np.zeros(3)
@@ -140,6 +142,8 @@ class Page:
             health.autopilot = AutopilotState.from_message(message)[1]
         elif topic is topics.PREFLIGHT:
             health.preflight = [PreflightCheck(*line) for line in read_preflight(message)]
+        elif topic is topics.CHECKLIST:
+            self._checklist.show(message)
         elif topic is topics.CHANGES:
             self._changed(ParameterChange.from_message(message)[1])
         elif topic is topics.DIAGNOSTICS:

@@ -22,6 +22,7 @@ EARLY = (
     topics.MISSION_STATUS,
     topics.AUTOPILOT_STATE,
     topics.PREFLIGHT,
+    topics.CHECKLIST,
     topics.DIAGNOSTICS,
     topics.CHANGES,
     topics.ROBOT_DESCRIPTION,

@@ -14,8 +14,9 @@ from std_srvs.srv import Trigger
 
 from uam_control.supervision import PreflightCheck
 from uam_msgs_py.messages import topics
+from uam_msgs_py.messages.checklist import ChecklistItem, read_items
 from uam_msgs_py.messages.preflight import read_preflight
-from uam_msgs_py.messages.status import AutopilotState, MissionStatus
+from uam_msgs_py.messages.status import AutopilotState, ChecklistState, MissionStatus
 
 PLANNERS = (topics.GOAL_POSE, topics.BASE_TRAJECTORY, topics.ARM_TRAJECTORY)
 AGAIN = 2.0  # [s] wall time without an answer after which a plan is sent again
@@ -34,7 +35,10 @@ class Operator:
         self._executor = SingleThreadedExecutor(context=node.context)
         self._executor.add_node(node)
         self._newest: dict[str, DiagnosticArray] = {}
-        for topic in (topics.MISSION_STATUS, topics.AUTOPILOT_STATE, topics.PREFLIGHT):
+        for topic in (
+            *(topics.MISSION_STATUS, topics.AUTOPILOT_STATE, topics.PREFLIGHT),
+            topics.CHECKLIST,
+        ):
             node.create_subscription(
                 topic.type, topic.name, lambda m, name=topic.name: self._take(name, m), topic.qos
             )
@@ -100,6 +104,21 @@ class Operator:
         """Return the newest pre-arm report. Raises NoFlight."""
         lines = read_preflight(self._latest(topics.PREFLIGHT))
         return [PreflightCheck(*line) for line in lines]
+
+    def checklist(self) -> tuple[ChecklistState, list[ChecklistItem]]:
+        """Return the newest state of the checklist, and its items. Raises NoFlight."""
+        message = self._latest(topics.CHECKLIST)
+        return ChecklistState.from_message(message)[1], read_items(message)
+
+    def checklist_command(self, name: str) -> tuple[bool, str]:
+        """Call a service of the checklist, confirm or repeat; returns as `command`."""
+        return self._call(f"checklist/{name}")
+
+    def look(self, seconds: float) -> None:
+        """Receive messages for `seconds` of wall time."""
+        end = time.monotonic() + seconds
+        while (left := end - time.monotonic()) > 0.0:
+            self._executor.spin_once(timeout_sec=left)
 
     def _take(self, name: str, message: DiagnosticArray) -> None:
         self._newest[name] = message

@@ -60,6 +60,9 @@ CONTENTS = {
     topics.ARM_TEMPERATURE: Content("", "°C", SLOW, "arm_driver", "mission"),
     topics.MISSION_STATUS: Content("", "text", "2 Hz and on change"),
     topics.PREFLIGHT: Content("", "text", "2 Hz before a flight", "mission", "cockpit, uam"),
+    topics.CHECKLIST: Content(
+        "", "text", "5 Hz before a flight", "checklist", "mission, cockpit, uam"
+    ),
     topics.GOAL_POSE: Content(WORLD, "m, quaternion", ON_CHANGE, PLANNERS, "mission"),
     topics.BASE_TRAJECTORY: Content(
         WORLD, "m, quaternion; /s; /s²", ON_CHANGE, PLANNERS, "mission"

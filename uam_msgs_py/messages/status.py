@@ -189,3 +189,62 @@ class MissionStatus(_Status):
     def summary(self) -> str:
         """Return the phase, or the reason of an abort."""
         return self.abort_reason or self.phase
+
+
+@dataclass(frozen=True)
+class ChecklistState(_Status):
+    """State of the checklist of a real vehicle; sent on change and five times a second.
+
+    passed: every item has; failing: names of the others, joined by "; ". step: what a person does
+    now, machine-readable, "" for nothing; needs: "motion", "confirm" or ""; instruction, seen: for
+    the person; failed: the step is tried again after a failure. commands: the mission computes
+    body rates for the vehicle in the hands of the person.
+    """
+
+    passed: bool = False
+    failing: str = ""
+    step: str = ""
+    needs: str = ""
+    instruction: str = ""
+    seen: str = ""
+    failed: bool = False
+    commands: bool = False
+
+    NAME = "checklist"
+
+    @property
+    def level(self) -> bytes:
+        """Return OK after all items have passed, ERROR after a failed step, else WARN."""
+        if self.passed:
+            return OK
+        return ERROR if self.failed else WARN
+
+    @property
+    def summary(self) -> str:
+        """Return the state in one line."""
+        return "all items passed" if self.passed else f"open: {self.failing}"
+
+
+@dataclass(frozen=True)
+class RadioState(_Status):
+    """What the autopilot reports of the pilot's radio; a further status of /uam/autopilot/state.
+
+    killed: its kill switch is engaged (HEARTBEAT: MAV_STATE_FLIGHT_TERMINATION); received: whether
+    the autopilot receives it (SYS_STATUS, RC receiver): "yes", "no" or "" for unknown.
+    """
+
+    killed: bool = False
+    received: str = ""
+
+    NAME = "radio"
+
+    @property
+    def level(self) -> bytes:
+        """Return WARN with an engaged kill switch or without the radio, else OK."""
+        return WARN if self.killed or self.received == "no" else OK
+
+    @property
+    def summary(self) -> str:
+        """Return the state in one line."""
+        known = {"yes": "received", "no": "not received"}.get(self.received, "unknown")
+        return f"{known}; kill switch engaged" if self.killed else known

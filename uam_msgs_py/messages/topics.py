@@ -163,6 +163,13 @@ PREFLIGHT = Topic(
     LATCHED,
     "pre-arm report, before a flight twice a second: one status per check",
 )
+CHECKLIST = Topic(
+    "uam/checklist",
+    DiagnosticArray,
+    LATCHED,
+    "checklist of a real vehicle: its state, see uam_msgs_py.messages.status.ChecklistState, and "
+    "one status per item; not simulated",
+)
 
 # For planners and standard tools
 PLANS = _qos(10)  # each message counts

@@ -26,7 +26,8 @@ from uam_msgs_py.node.node_parameters import declared_text
 
 PARAMETER, ANY = "publishers", "any"
 PUBLISHERS = {wire.topic.name: wire.publisher for wire in wiring.WIRES} | {
-    topics.PREFLIGHT.name: wiring.MISSION
+    topics.PREFLIGHT.name: wiring.MISSION,
+    topics.CHECKLIST.name: wiring.CHECKLIST,
 }
 ALLOWED = "NODE=NAME or TOPIC=NAME with commas between; NAME 'any': the first that sends"
 

@@ -23,6 +23,7 @@ POSITION, ATTITUDE, ARM = "position_controller", "attitude_controller", "arm_con
 BRIDGE, PLANT, RECORDER = "mavlink_bridge", "mujoco_sim", "recorder"
 MOCAP_DRIVER, ARM_DRIVER, MAGNET_DRIVER = "mocap_driver", "arm_driver", "magnet_driver"
 SCENE, COCKPIT = "scene", "cockpit"  # observers, in none of WIRES: a flight starts without them
+CHECKLIST = "checklist"  # of a real vehicle only
 
 
 @dataclass(frozen=True)

@@ -15,6 +15,7 @@ _NO_COVARIANCE = [_NAN] * 21
 _LANDED, _IN_AIR, _LANDING = 1, 2, 4  # MAV_LANDED_STATE
 _STANDBY, _ACTIVE, _CRITICAL = 3, 4, 5  # MAV_STATE
 _GYRO, _ACCELEROMETER, _VISION = 1, 2, 128  # MAV_SYS_STATUS_SENSOR
+_RADIO = mavlink2.MAV_SYS_STATUS_SENSOR_RC_RECEIVER
 _NO_VOLTAGE, _NO_TEMPERATURE = 65535, 32767  # MAVLink's values for "unknown"
 _AIDED = (
     mavlink2.ESTIMATOR_VELOCITY_HORIZ
@@ -51,9 +52,10 @@ def current_mode(autopilot: Autopilot, time: float) -> Message:
 
 
 def sys_status(autopilot: Autopilot, time: float) -> Message:
-    """SYS_STATUS: sensors and their health; nothing of the battery."""
-    there = _GYRO | _ACCELEROMETER | _VISION
-    healthy = there if autopilot.estimator.aided(time) else _GYRO | _ACCELEROMETER
+    """SYS_STATUS: sensors, radio and their health; nothing of the battery."""
+    own = _GYRO | _ACCELEROMETER | _RADIO
+    there = own | _VISION
+    healthy = there if autopilot.estimator.aided(time) else own
     return mavlink2.MAVLink_sys_status_message(
         there, there, healthy, 0, _NO_VOLTAGE, -1, -1, 0, 0, 0, 0, 0, 0
     )

@@ -12,8 +12,9 @@ import math
 import threading
 import time
 
+from diagnostic_msgs.msg import DiagnosticArray
 from sensor_msgs.msg import Temperature
-from std_srvs.srv import Trigger
+from std_srvs.srv import SetBool, Trigger
 
 from uam_control.coordinates import ALPHA, CHI_DOT
 from uam_control.nodes.described import described_vehicle
@@ -25,7 +26,7 @@ from uam_msgs_py.messages import topics
 from uam_msgs_py.messages.control import read_reference
 from uam_msgs_py.messages.convert import JointStateWriter, read_joint_command
 from uam_msgs_py.messages.ros_time import set_stamp
-from uam_msgs_py.messages.status import ERROR, OK, WARN
+from uam_msgs_py.messages.status import ERROR, OK, WARN, AutopilotState
 from uam_msgs_py.node.base_node import UamNode, run
 from uam_msgs_py.node.node_parameters import NodeParameters, declared_text, refuse_unknown
 from uam_sim_bridge.drivers.dynamixel.chain import (
@@ -98,7 +99,10 @@ class ArmDriverNode(UamNode):
             self.listen(topics.ARM_EFFORT, self._on_effort)
         if parameters.friction_compensation:
             self.listen(topics.REFERENCE, self._on_reference)
+        self._armed = False
+        self.listen(topics.AUTOPILOT_STATE, self._on_autopilot, required=False)
         self.create_service(Trigger, "~/reboot", self._on_reboot)
+        self.create_service(SetBool, "~/release", self._on_release)
         refuse_unknown(self)  # before the bus, which may be absent
         self._bus.begin()
         if not self._bus.waits:
@@ -140,6 +144,25 @@ class ArmDriverNode(UamNode):
         response.success = bool(done) and not any("not rebooted" in line for line in done)
         response.message = "; ".join(done) or "no servo has a hardware error"
         self.get_logger().info(f"command reboot: {response.message}")
+        return response
+
+    def _on_autopilot(self, message: DiagnosticArray) -> None:
+        self._armed = AutopilotState.from_message(message)[1].armed
+        if self._armed and self.driver.released:
+            self.driver.release(False)
+
+    def _on_release(self, request: SetBool.Request, response: SetBool.Response) -> SetBool.Response:
+        """Release the joints for the checklist, on a disarmed vehicle; or drive them again."""
+        if self._bus.problem:
+            response.success, response.message = False, self._bus.problem
+        elif request.data and self._armed:
+            response.success, response.message = False, "refused: the vehicle is armed"
+        else:
+            failed = self.driver.release(request.data)
+            response.success = not failed
+            done = "released: support the arm" if request.data else "driven again"
+            response.message = failed or done
+        self.get_logger().info(f"command release {request.data}: {response.message}")
         return response
 
     def _exchange(self) -> None:
@@ -206,6 +229,8 @@ class ArmDriverNode(UamNode):
             return ERROR, "; ".join(driver.problems), values
         if math.isfinite(rate) and rate < SLOWEST * driver.rate:
             return WARN, f"bus at {rate:.0f} Hz, {driver.rate:g} Hz is needed", values
+        if driver.released:
+            return WARN, "released: the joints have no torque", values
         if driver.stale:
             return WARN, "no command within effort_timeout: zero torque", values
         return OK, "running", values

@@ -9,7 +9,7 @@ from sensor_msgs.msg import BatteryState
 from uam_msgs_py.messages import topics
 from uam_msgs_py.messages.parameter_comparison import ParameterComparison, ParameterDifference
 from uam_msgs_py.messages.ros_time import set_stamp
-from uam_msgs_py.messages.status import AutopilotState
+from uam_msgs_py.messages.status import AutopilotState, RadioState
 from uam_msgs_py.node.base_node import UamNode
 from uam_sim_bridge.mavlink.link.link import OffboardLink
 from uam_sim_bridge.mavlink.telemetry.parameter_check import ParameterWatch
@@ -58,7 +58,12 @@ class AutopilotTopics:
         message = state.to_message(stamp)
         if self._link.parameters.required:
             message.status = [*message.status, comparison(self._link.parameters).to_status()]
+        message.status = [*message.status, *self._radio().to_message(stamp).status]
         self._state.publish(message)
+
+    def _radio(self) -> RadioState:
+        received = {None: "", True: "yes", False: "no"}[self._link.vitals.radio]
+        return RadioState(self._link.killed, received)
 
     def _publish_battery(self, stamp: int) -> None:
         battery = self._link.vitals.battery

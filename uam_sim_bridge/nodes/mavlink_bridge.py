@@ -22,6 +22,7 @@ from std_msgs.msg import Bool
 from std_srvs.srv import Trigger
 
 from uam_control.coordinates import ATTITUDE, CHI, CHI_DOT
+from uam_control.mission.mission_output import HAND_CHECK
 from uam_control.nodes.described import described_vehicle
 from uam_control.settings.parameter_set import ParameterError
 from uam_control.stamps import SECOND
@@ -189,6 +190,7 @@ class MavlinkBridgeNode(UamNode):
         stamp, status = MissionStatus.from_message(message)
         failsafe = status.state == State.FAILSAFE.value
         self.stage.mission(stamp, status.magnet, failsafe, status.regains)
+        self.stage.hands = status.phase == HAND_CHECK
         if self._faulty is not None:
             self._faulty.mission_at(stamp / SECOND, status.time)
 

@@ -74,6 +74,8 @@ LONGEST_STEP = 0.05  # [s] of the low-pass; a longer gap has no setpoints
 class BridgeStage:
     """The bridge between control laws and autopilot. All stamps in [ns].
 
+    `hands`: a person holds the disarmed vehicle and looks at the commands, see docs/preflight.md:
+    they are returned, and the autopilot gets none of them.
     `factor`: thrust factor used for the last setpoint; `lift` [N]: low-pass of the collective by
     that factor, at LIFT_CUTOFF; `lift_due`: whether factor and lift are reported; `report`: the
     report of the autopilot due after the last tick, None if none is due.
@@ -104,6 +106,7 @@ class BridgeStage:
         self._regains = 0
         self._situation = Situation(armed=False, landed=True, let_go=False)
         self.report: AutopilotReport | None = None
+        self.hands = False
         self.factor = 1.0
         self.lift, self.lift_due = 0.0, False
         self._last = 0  # stamp [ns] of the last tick
@@ -221,6 +224,8 @@ class BridgeStage:
     def _send(self, now: float, setpoint: Setpoint) -> None:
         """Send the messages due at `now` [s]: heartbeat and requests, vision, setpoint."""
         autopilot = self.autopilot
+        if self.hands and not self._situation.armed:
+            setpoint = self.source.without(now, self._situation)
         autopilot.tick(now)
         self._vision.send(autopilot)
         if setpoint is not None and self.sequence.streaming and not self._dry_run:

@@ -50,7 +50,8 @@ class ArmDriver:
     """Drives a chain of servos.
 
     `health` (n,): per servo, base to tip; `remarks`: of the start, one line each; `stale`: no
-    command within effort_timeout; `saturated`: commands cut to the current limit;
+    command within effort_timeout; `saturated`: commands cut to the current limit; `released`: the
+    joints can be moved by hand, see `release`;
     `device_problem`: of a lost device, one line; `start_angles` (n,): as read by `start` [rad].
     """
 
@@ -83,6 +84,7 @@ class ArmDriver:
         self.meter = CycleMeter()
         self.remarks, self.start_angles = list[str](), list[float]()
         self.device_problem, self.stale, self.saturated = "", True, 0
+        self.released = False
         self._fast, self._open = parameters.fast_sync_read, False
         self._lock = threading.RLock()
         self._command: Command | None = None
@@ -187,6 +189,24 @@ class ArmDriver:
             except BusLost as error:
                 return [str(error)]
 
+    def release(self, released: bool) -> str:
+        """Let the joints be moved by hand, or drive them again; return what failed, "" if nothing.
+
+        Current mode: zero current. Position mode: torque off, for the servo's own loop resists.
+        """
+        with self._lock:
+            self.released = released
+            if not (released and self.in_position_mode and self._open):
+                return ""
+            problems = []
+            for servo in self.chain.servos:
+                try:
+                    startup.tried(self.bus.write, servo.id, servo.table[names.TORQUE_ENABLE], 0)
+                except (NoAnswer, Refused, BusLost) as error:
+                    problems.append(f"{servo.label}: {error}")
+                self._upkeep.unprepared.add(servo.id)
+            return "; ".join(problems)
+
     def stop(self) -> None:
         """End as configured, torque off or holding, and close the device."""
         with self._lock:
@@ -225,7 +245,7 @@ class ArmDriver:
                     goals[servo.id] = goal
         else:
             register, goals = names.GOAL_CURRENT, dict.fromkeys((one.id for _, one in ready), 0)
-            if not (self.stale or self.lost or reading is None):
+            if not (self.stale or self.lost or self.released or reading is None):
                 for i, servo in ready:
                     goals[servo.id] = self._goal_current(servo, command, i, reading.position[i])
         if goals:
@@ -258,7 +278,7 @@ class ArmDriver:
         rows = []
         for i, servo in enumerate(self.chain.servos):
             counts, speed, current = self._decoded(servo, found[servo.id])
-            if servo.id in self._upkeep.unprepared:
+            if servo.id in self._upkeep.unprepared and not self.released:
                 self._upkeep.prepare(i, counts)
             angle = servo.angle(counts + self._upkeep.turns[i])
             rows.append((angle, servo.velocity(speed), servo.effort(current)))

@@ -48,7 +48,7 @@ class OffboardLink:
     required ones) by name; `parameters`: their comparison; `ignored`: number of messages from
     other systems or for other receivers; `vitals`: battery, estimator and sensors; `reboots`:
     number of restarts; `imu`: its IMU, if it is requested; `magnet`: on one of its outputs, if
-    the owner sets it.
+    the owner sets it; `killed`: the kill switch is engaged.
     """
 
     def __init__(
@@ -69,6 +69,7 @@ class OffboardLink:
         self.sequence = sequence
         self.mode, self.armed, self.landed = Mode.UNKNOWN, False, True
         self.intended, self.failsafe = Mode.UNKNOWN, False
+        self.killed = False
         self.armed_since: float | None = None
         self.ignored = self.reboots = 0
         self.vitals = Vitals()
@@ -234,6 +235,7 @@ class OffboardLink:
             if m.autopilot != mavlink2.MAV_AUTOPILOT_INVALID:
                 self._heartbeat_in = time
                 self.failsafe = m.system_status == mavlink2.MAV_STATE_CRITICAL
+                self.killed = m.system_status == mavlink2.MAV_STATE_FLIGHT_TERMINATION
                 self._take_state(
                     time,
                     Mode.from_custom_mode(m.custom_mode),

@@ -123,13 +123,14 @@ class Vitals:
     """Newest values; None before the first message.
 
     estimator_flags: ESTIMATOR_STATUS.flags; unhealthy: names of sensors; load: of the processor,
-    0..1.
+    0..1; radio: whether the pilot's radio is received.
     """
 
     battery: Battery | None = None
     estimator_flags: int | None = None
     unhealthy: tuple[str, ...] = ()
     load: float | None = None
+    radio: bool | None = None
 
     def take(self, kind: str, m: Message) -> None:
         """Store BATTERY_STATUS, SYS_STATUS or ESTIMATOR_STATUS; other messages are ignored."""
@@ -142,6 +143,8 @@ class Vitals:
                 m.onboard_control_sensors_health,
             )
             self.load = 1e-3 * m.load
+            there = m.onboard_control_sensors_present & m.onboard_control_sensors_health
+            self.radio = bool(there & mavlink2.MAV_SYS_STATUS_SENSOR_RC_RECEIVER)
             if self.battery is None or not self.battery.known:
                 self.battery = from_sys_status(m)
         elif kind == "ESTIMATOR_STATUS":

@@ -1,0 +1,75 @@
+"""The checklist in a diagnostic_msgs/DiagnosticArray: its state, then one status per item."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
+
+from uam_msgs_py.messages.status import ERROR, OK, STALE, ChecklistState
+
+PASSED, FAILED, OPEN = "passed", "failed", "open"
+LEVELS = {PASSED: OK, FAILED: ERROR, OPEN: STALE}
+
+
+@dataclass(frozen=True)
+class ChecklistItem:
+    """kind: "automatic" or "guided"; result: PASSED, FAILED or OPEN; time [s]: of the result, by
+    stamps, "" without one; confirmed: by the person."""
+
+    name: str
+    kind: str
+    result: str
+    value: str
+    limit: str
+    time: str = ""
+    confirmed: bool = False
+
+
+def checklist_message(
+    stamp: int, state: ChecklistState, items: Iterable[ChecklistItem]
+) -> DiagnosticArray:
+    """Return the message; stamp [ns]."""
+    message = state.to_message(stamp)
+    message.status = [*message.status, *map(_status, items)]
+    return message
+
+
+def _status(item: ChecklistItem) -> DiagnosticStatus:
+    values = {
+        "kind": item.kind,
+        "limit": item.limit,
+        "passed": str(item.result == PASSED),
+        "time": item.time,
+        "confirmed": str(item.confirmed),
+    }
+    return DiagnosticStatus(
+        level=LEVELS.get(item.result, STALE),
+        name=item.name,
+        hardware_id="uam",
+        message=item.value,
+        values=[KeyValue(key=key, value=value) for key, value in values.items()],
+    )
+
+
+def read_items(message: DiagnosticArray) -> list[ChecklistItem]:
+    """Return the items of a message."""
+    results = {level: result for result, level in LEVELS.items()}
+    found = []
+    for status in message.status:
+        if status.name == ChecklistState.NAME:
+            continue
+        texts = {pair.key: pair.value for pair in status.values}
+        found.append(
+            ChecklistItem(
+                status.name,
+                texts.get("kind", ""),
+                results.get(status.level, OPEN),
+                status.message,
+                texts.get("limit", ""),
+                texts.get("time", ""),
+                texts.get("confirmed") == "True",
+            )
+        )
+    return found
