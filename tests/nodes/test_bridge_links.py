@@ -1,11 +1,13 @@
 """The links of the bridge node: UDP, serial line, ground station, signing."""
 
+import contextlib
 import os
 import socket
 import tty
 
 import numpy as np
 import pytest
+from autopilot_on_a_line import AutopilotOnALine
 from bridge_rig import MODULE, WEIGHT
 
 from uam_msgs_py.messages import topics
@@ -129,3 +131,21 @@ def test_with_signing_only_signed_messages_are_accepted(make_rig, tmp_path):
 
     rig.probe.until(refused, "refusals under /diagnostics")
     assert key not in rig.node.output
+
+
+def test_on_a_vehicle_the_autopilot_is_found_before_any_state(start, probe, tmp_path):
+    """Also with another IMU: a heartbeat is seen although no tick has begun."""
+    reports = probe.collect(topics.DIAGNOSTICS)
+    device = tmp_path / "ttyPX4"
+    settings = (f"autopilot:=serial:{device}:921600", "clock:=realtime", "wait_for_device:=true")
+    start(MODULE, "--ros-args", *(word for one in settings for word in ("-p", one)))
+
+    def reported(**values):
+        found = [s for m in reports for s in m.status if s.name == "mavlink_bridge"]
+        newest = {pair.key: pair.value for pair in found[-1].values} if found else {}
+        return newest and all(newest[key.replace("_", " ")] == v for key, v in values.items())
+
+    probe.until(lambda: reported(link_open="False", heartbeat="False"), "a report without it")
+    with contextlib.closing(AutopilotOnALine(device)):
+        probe.until(lambda: reported(link_open="True", heartbeat="True"), "the heartbeat")
+    probe.until(lambda: reported(heartbeat="False"), "its loss")

@@ -54,6 +54,18 @@ class Bringup:
             assert time.monotonic() < deadline, f"not printed: {texts}\n{self.printed}"
             time.sleep(0.1)
 
+    def kill(self, name):
+        children = nodes(psutil.Process(self.process.pid).children(recursive=True))
+        (found,) = [process for process, node in children.items() if node == name]
+        found.kill()
+
+    def until_logged(self, out, node, text, times):
+        """Wait until the output of a node contains `text` so many times."""
+        log, deadline = out / f"logs/{node}.log", time.monotonic() + PATIENCE
+        while log.read_text().count(text) < times:
+            assert time.monotonic() < deadline, log.read_text()
+            time.sleep(0.1)
+
     def interrupt(self):
         self.process.send_signal(signal.SIGINT)
         return self.process.wait(PATIENCE)
@@ -107,6 +119,9 @@ def test_each_missing_device_is_named_and_used_once_it_is_there(laboratory, tmp_
         run.until("imu: present")
         # every input is there: the estimate begins, and the mission waits on the ground
         run.until("before take-off", "waiting")
+        run.kill("arm_driver")
+        run.until("arm_driver was killed by SIGKILL; restarted")
+        run.until_logged(out, "arm_driver", "2 servos on", 2)
         autopilot.close()
         run.until("imu: missing: no message on /imu/data for")
         assert run.interrupt() == 130, run.printed

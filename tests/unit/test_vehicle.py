@@ -14,7 +14,7 @@ from rich.console import Console
 
 from uam_lab.cli.main import main
 from uam_lab.flight.observer import STARTING, DeviceState, FlightStatus
-from uam_lab.flight.progress import Progress
+from uam_lab.flight.progress import Progress, device_table
 from uam_lab.processes.interrupts import StopRequest
 from uam_lab.results.result_folder import ResultFolder
 from uam_lab.vehicle import vehicle_nodes
@@ -143,10 +143,25 @@ def test_lines_without_a_terminal_say_each_change_once():
     progress = Progress(Console(file=shown, width=200))
     missing = DeviceState("arm", False, "/dev/ttyARM: does not exist", "uam arm")
     there = DeviceState("arm", True, "open", "uam arm")
-    for state in (replace(missing, text=STARTING), missing, missing, there, there, missing):
+    silent, still = (replace(missing, text=f"no answer for {age} s") for age in (2, 3))
+    starting, warm = replace(missing, text=STARTING), replace(there, text="bus at 218 Hz")
+    for state in (starting, missing, missing, there, warm, there, missing, silent, still):
         progress.bring_up([state])
     line = "arm: missing: /dev/ttyARM: does not exist; check: uam arm"
-    assert shown.getvalue().splitlines() == [line, "arm: present: open", line]
+    last = "arm: missing: no answer for 2 s; check: uam arm"
+    assert shown.getvalue().splitlines() == [line, "arm: present: open", line, last]
+
+
+def test_on_a_terminal_there_is_one_table_until_all_devices_are_there():
+    shown = StringIO()
+    console = Console(file=shown, width=120, force_terminal=True)
+    missing = DeviceState("arm", False, "/dev/ttyARM: does not exist", "uam arm")
+    with Progress(console) as progress:
+        progress.bring_up([missing, DeviceState("imu", True, "messages on /imu/data", "hz")])
+    for text in ("device", "check by", "missing", "/dev/ttyARM: does not exist", "uam arm"):
+        assert text in shown.getvalue()
+    assert "hz" not in shown.getvalue()  # nothing is to be checked
+    assert device_table([missing]).row_count == 1
 
 
 class Listener:

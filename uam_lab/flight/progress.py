@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 import time
 from collections.abc import Iterable, Sequence
 
@@ -50,7 +51,8 @@ class Progress(Observer):
         for one in devices:
             before = known.get(one.name)
             shown = before is not None and before.present == one.present
-            if one.text != STARTING and not (shown and (one.present or before.text == one.text)):
+            same = shown and (one.present or gist(before.text) == gist(one.text))
+            if one.text != STARTING and not same:
                 self.message(in_a_line(one))
 
     def update(self, status: FlightStatus) -> None:
@@ -121,6 +123,11 @@ class Progress(Observer):
             table.add_row("control", f"[bold yellow]{status.released_to}[/bold yellow]")
         table.add_row("real time", f"{status.real_time_factor:.2f}x", status.autopilot)
         return table
+
+
+def gist(text: str) -> str:
+    """Return the text without its numbers, of which some grow: ages, counts."""
+    return re.sub(r"\d+", "", text)
 
 
 def in_a_line(device: DeviceState) -> str:

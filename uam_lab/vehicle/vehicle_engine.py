@@ -31,7 +31,11 @@ from uam_msgs_py.node import wiring
 from uam_sim_bridge.ports import Ports, Reservation
 
 LAB_COPY = "lab.yaml"
-AGAIN = (*CONTROLLERS, *vehicle_nodes.DRIVERS)  # nodes that are restarted after a loss
+AGAIN = (
+    *CONTROLLERS,
+    *vehicle_nodes.DRIVERS,
+    vehicle_nodes.CHECKLIST,
+)  # nodes that are restarted after a loss
 NOTHING_FLOWN = "nothing was flown: the mission had no state of the estimator; the log is kept"
 
 

@@ -7,14 +7,16 @@ from typing import Any
 
 from uam_control.vehicle import POSITION_SERVO
 from uam_lab.cockpit import page_address
-from uam_lab.flight.flight_settings import FlightSettings
+from uam_lab.flight.flight_settings import ONLOOKERS, FlightSettings
 from uam_lab.flight.ros import node_arguments
 from uam_lab.results.result_folder import ResultFolder
 from uam_lab.vehicle.lab import AUTOPILOT, GPIO, Lab
 from uam_msgs_py.messages import topics
 from uam_msgs_py.node import wiring
+from uam_sim_bridge.mavlink.offboard.autopilot_magnet import NONE
 
 CHECKLIST, CHECKLIST_MODULE = "checklist", "uam_lab.nodes.checklist"
+CHECKLIST_RECORD = "checklist.json"  # in the result folder
 DRIVERS = {
     wiring.MOCAP_DRIVER: "uam_sim_bridge.nodes.mocap_driver",
     wiring.ARM_DRIVER: "uam_sim_bridge.nodes.arm_driver",
@@ -66,12 +68,25 @@ def parameters(
     if lab.magnet.through == GPIO:
         sections[wiring.MAGNET_DRIVER] = WAITS | lab.magnet.line.to_mapping() | _switching(lab)
     if with_checklist():
-        sections[CHECKLIST] = {}
+        sections[CHECKLIST] = _checklist(lab, settings, folder)
         sections[wiring.MISSION]["require_checklist"] = True
     for node in (wiring.ARM_DRIVER, CHECKLIST):
         if node in sections:
             sections[node] |= lab.nodes.get(node, {})
     return node_arguments.complete(sections, settings)
+
+
+def _checklist(lab: Lab, settings: FlightSettings, folder: ResultFolder) -> dict[str, Any]:
+    displays = (*ONLOOKERS, CHECKLIST)
+    return {
+        "nodes": ",".join(name for name in modules(lab) if name not in displays),
+        "record": str((folder.path / CHECKLIST_RECORD).absolute()),
+        "recordings": str(folder.path.absolute()),
+        "room_low": list(lab.room.low),
+        "room_high": list(lab.room.high),
+        "magnet": lab.magnet.through != NONE,
+        "vehicle": settings.vehicle.source,
+    }
 
 
 def _switching(lab: Lab) -> dict[str, Any]:
