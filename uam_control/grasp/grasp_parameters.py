@@ -11,6 +11,11 @@ from uam_control.settings.parameter_set import ParameterSet, choice, integer, nu
 class GraspParameters(ParameterSet):
     """Attempts, tolerances and times of grasp and release; geometry of the arm to the magnet."""
 
+    grasp_checks: str = choice(
+        "on",
+        "on: grasp and release are checked and repeated; off: path and magnet by the scenario's times",
+        ("on", "off"),
+    )
     grasp_attempts: int = integer(3, "approaches to the payload before it is given up", 1, 20)
     align_tolerance: float = number(
         0.008, "distance magnet - payload, horizontal mean, at which the descent begins", "m",

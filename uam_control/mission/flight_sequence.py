@@ -401,7 +401,7 @@ class Mission:
     def _watch_payload(self, stamp: float, seen: Observation) -> None:
         """Step the executive of the grasps while the scenario is flown."""
         output, watch = self.output, self._watch
-        if watch is None:
+        if watch is None or self._parameters.grasp_checks == "off":
             return
         if output.state is not State.FLYING or self._guidance.planned:
             watch.interrupt()
