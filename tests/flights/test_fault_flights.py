@@ -73,6 +73,18 @@ def test_exchanged_axes_of_the_motion_capture_end_in_a_level_descent():
     assert np.hypot(series["truth.x"], series["truth.y"])[-1] < 2.0
 
 
+def test_without_checks_of_the_grasp_the_mission_keeps_its_times(tmp_path):
+    file = tmp_path / "unchecked.yaml"
+    file.write_text("mission: {ros__parameters: {grasp_checks: 'off'}}")
+    scenario = load_scenario("quick_pick")
+    profile = load_profile("s500", str(file))
+    faults = read_schedule(["magnet_weak@0:remaining=0"], scenario, 1)
+    flight = DirectFlight(scenario, profile, Vehicle.load(), 0.2, 1, faults)
+    flight.run()
+    assert flight.mission.grasps == [] and flight.mission.delay == 0.0
+    assert flight.mission.output.phase == "landed"
+
+
 def test_a_flight_without_a_motor_is_lost():
     _, series, figures = flown("motor_loss@hover+1:remaining=0")
     assert not figures["mission_completed"]

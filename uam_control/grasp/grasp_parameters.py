@@ -13,7 +13,7 @@ class GraspParameters(ParameterSet):
 
     grasp_checks: str = choice(
         "on",
-        "on: grasp and release are checked and repeated; off: path and magnet by the scenario's times",
+        "on: grasp and release are checked and repeated; off: the scenario's times alone",
         ("on", "off"),
     )
     grasp_attempts: int = integer(3, "approaches to the payload before it is given up", 1, 20)
