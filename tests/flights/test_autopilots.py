@@ -1,49 +1,16 @@
 """Autopilots that the user has started: by UDP, and over a serial line (HITL)."""
 
 import json
-import os
-import select
 import subprocess
 import sys
-import threading
-import tty
 
 import pytest
+from serial_line import SerialLine
 
 from uam_lab.cli.main import main
 from uam_sim_bridge.ports import AUTOPILOT_UDP, Reservation
 
 AUTOPILOT = [sys.executable, "-m", "uam_sim_bridge.autopilot.server", "--once"]
-
-
-class SerialLine:
-    """Two pseudo-terminals joined end to end: `near` and `far` are what two programs open."""
-
-    def __init__(self):
-        pairs = [os.openpty() for _ in range(2)]
-        for _, slave in pairs:
-            tty.setraw(slave)
-        self._ends = pairs
-        self.near, self.far = (os.ttyname(slave) for _, slave in pairs)
-        self._stop, self._wake = os.pipe()
-        self._pump = threading.Thread(target=self._carry, daemon=True)
-        self._pump.start()
-
-    def _carry(self):
-        (one, _), (other, _) = self._ends
-        there = {one: other, other: one}
-        while True:
-            readable = select.select([one, other, self._stop], [], [])[0]
-            if self._stop in readable:
-                return
-            for end in readable:
-                os.write(there[end], os.read(end, 4096))
-
-    def close(self):
-        os.write(self._wake, b".")
-        self._pump.join()
-        for end in (*self._ends[0], *self._ends[1], self._stop, self._wake):
-            os.close(end)
 
 
 @pytest.fixture
@@ -76,14 +43,17 @@ def test_an_autopilot_that_the_user_has_started_flies_by_its_udp_link(fly, short
 
 @pytest.mark.slow
 def test_a_flight_controller_on_a_serial_line_flies_the_simulated_vehicle(
-    fly, short_scenario, started
+    fly, short_scenario, started, tmp_path
 ):
+    patient = tmp_path / "patient.yaml"  # the stand-in's clock is the simulation's
+    patient.write_text("mission:\n  ros__parameters:\n    slower_hold: 1.0\n")
     line = SerialLine()
     try:
         started("--serial", f"{line.far}:921600")
         flight = fly(
             "--scenario",
             str(short_scenario),
+            *("--profile", "s500", "--profile", str(patient)),
             "--clock",
             "realtime",
             "--autopilot",

@@ -1,10 +1,12 @@
 """The mission node: its services and the states that it publishes."""
 
+import time
+
 import pytest
 from diagnostic_msgs.msg import DiagnosticArray
 from sensor_msgs.msg import BatteryState, Temperature
 from std_msgs.msg import Header
-from vehicle_rig import Vehicle, take_off
+from vehicle_rig import PERIOD, Vehicle, take_off
 
 from uam_msgs_py.messages import topics
 from uam_msgs_py.messages.checklist import checklist_message
@@ -30,6 +32,25 @@ def test_a_start_is_refused_with_the_checks_that_fail(vehicle):
     accepted, answer = vehicle.ask("start")
     assert not accepted and "arm: 1.57 rad" in answer
     vehicle.until(lambda status: status.cause == "waiting for the start")
+
+
+def test_a_simulation_slower_than_the_autopilots_clock_refuses_the_start(start, probe):
+    module, arguments = "uam_control.nodes.mission", ("-p", "scenario:=hover")
+    node = start(module, "--ros-args", *arguments, "-p", "autopilot_has_clock:=true")
+    vehicle = Vehicle(probe)
+    vehicle.node = node
+
+    begun = time.monotonic()
+
+    def slow():
+        vehicle.fly(10)
+        time.sleep(0.04)  # at most half as fast as the wall clock
+        return time.monotonic() > begun + 1.5 and vehicle.stamp > 100 * PERIOD
+
+    probe.until(slow, "ticks for longer than the window of the measurement")
+    accepted, answer = vehicle.ask("start")
+    (told,) = [part for part in answer.split("; ") if "simulation: " in part]
+    assert not accepted and "unknown" not in told and "at most 0.1" in told
 
 
 def test_hold_resume_land_and_disarm_are_answered_and_executed(vehicle):

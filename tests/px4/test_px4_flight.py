@@ -1,6 +1,9 @@
 """A real PX4 flies the mission. Skipped, saying so, where none is pointed at (PX4_SITL_DIR)."""
 
 import json
+import re
+import tempfile
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -8,9 +11,12 @@ from px4_at_hand import NO_PX4, installation
 from rate_steps import LIMIT, compared, measure
 from whole_flight import Flight
 
+from uam_sim_bridge.mavlink.telemetry.required_parameters import RequiredParameters
+
 PLACED = 0.25  # [m]
 TIMES_THE_STAND_INS = 2.0
 PATIENCE = 900.0  # [s]
+TMP = Path(tempfile.gettempdir())
 
 
 pytestmark = [
@@ -69,3 +75,47 @@ def test_the_stand_in_answers_body_rate_steps_as_px4_does():
     found = compared(measure(None), measure(installation()))
     for axis, row in found.items():
         assert row["distance"] <= LIMIT, (axis, row)
+
+
+def left_in_temporary_folder():
+    """Return what flights with PX4 leave there if they do not clean up."""
+    return {str(file) for pattern in ("uam-px4-*", "px4_lock-*") for file in TMP.glob(pattern)}
+
+
+def test_parameters_are_read_back_equal_to_the_configuration(fly):
+    flight = fly("px4", "--autopilot", "px4", "--scenario", "hover", "--px4-param", "SDLOG_MODE=0")
+    assert metrics(flight)["mission_completed"]
+    logs = flight.out / "logs"
+    rules = RequiredParameters.read(str(logs / "px4_parameters.yaml"))
+    assert rules["COM_LOW_BAT_ACT"].met(0) and rules["SENS_IMU_MODE"].met(1)
+    assert rules["SDLOG_MODE"].met(0) and not rules["SDLOG_MODE"].met(1)
+    said = (logs / "mavlink_bridge.log").read_text()
+    (read,) = re.findall(r"(\d+) of (\d+) parameters read$", said, re.M)
+    optional = sum(rule.optional for rule in rules.values())
+    assert int(read[1]) == len(rules) and int(read[0]) >= len(rules) - optional
+    assert " required: " not in said and "set to" not in said
+    # a normal start and landing
+    for alarm in ("Heading estimate", "denied", "refused", "WARN"):
+        assert alarm not in said, said
+
+
+def test_a_bad_parameter_is_refused_before_the_flight(fly):
+    for parameter, complaint in (
+        ("COM_OF_LOST_T=1", "none of this name"),
+        ("COM_OF_LOSS_T=61", "allowed: 0 to 60"),
+    ):
+        flight = fly(parameter, "--autopilot", "px4", "--px4-param", parameter)
+        assert flight.wait(PATIENCE) == 2 and complaint in flight.complained
+
+
+def test_a_killed_px4_leaves_its_log_and_nothing_else(fly):
+    before = left_in_temporary_folder()
+    flight = fly(
+        *("killed", "--autopilot", "px4", "--scenario", "hover"),
+        *("--fault", "node_kill@4:node=autopilot"),
+    )
+    assert flight.wait(PATIENCE) == 1
+    assert "PX4 was ended by SIGKILL" in (flight.out / "logs" / "autopilot.log").read_text()
+    assert "autopilot" in flight.complained
+    assert (flight.out / "px4.ulg").read_bytes().startswith(b"ULog")
+    assert left_in_temporary_folder() <= before

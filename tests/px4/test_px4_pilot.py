@@ -34,6 +34,7 @@ def flown(folder, phase, mode):
     """
     answer, pilot = "", Pilot(INSTANCE + 1, mode)
     options = {"scenario": "quick_pick", "autopilot": "px4", "instance": INSTANCE}
+    options |= {"px4_params": ["COM_RC_IN_MODE=1"]}  # sticks by MANUAL_CONTROL
     try:
         with Flight(**options, out=folder) as flight:
             flight.wait_for(TAKE_OFF, PATIENCE)

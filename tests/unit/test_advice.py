@@ -5,7 +5,7 @@ import re
 import pytest
 
 from uam_sim_bridge.mavlink.offboard.advice import ADVICE, SEPARATOR, advice, with_advice
-from uam_sim_bridge.mavlink.offboard.sequence import OffboardSequence, Request
+from uam_sim_bridge.mavlink.offboard.sequence import OffboardParameters, OffboardSequence, Request
 from uam_sim_bridge.mavlink.protocol.modes import MavResult
 from uam_sim_bridge.mavlink.telemetry.events import CHECKS, OTHERS
 
@@ -92,7 +92,7 @@ def test_unknown_texts_stay_as_they_are():
 
 
 def test_the_sequences_reasons_carry_it():
-    s = OffboardSequence()
+    s = OffboardSequence(OffboardParameters(reason_delay=0.0))
     s.text(2, "Preflight Fail: ekf2 missing data\t")
     s.answer(Request.ARM, MavResult.TEMPORARILY_REJECTED)
     assert s.reasons[0] == (

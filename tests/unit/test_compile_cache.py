@@ -1,6 +1,8 @@
 """What is loaded from disk is the code of this function, for these arguments, as it is now."""
 
 import importlib
+import subprocess
+import sys
 from pathlib import Path
 
 import numba
@@ -146,3 +148,32 @@ def test_a_warm_up_leaves_nothing_of_the_nodes_to_compile():
     assert list(warm_up.compiled_functions())
     warm_up.prepare()
     assert not warm_up.is_cold()
+
+
+LATE_FLIGHT = """
+from uam_control.mission import load_scenario
+from uam_control.profiles.profile import default_profile
+from uam_lab.flight.direct import warm_up
+from uam_lab.flight.direct.flight import DirectFlight
+from uam_sim_bridge.faults.schedule import read_schedule
+from uam_sim_bridge.plant import Vehicle
+
+assert not warm_up.is_cold()
+scenario = load_scenario("quick_pick")
+late = read_schedule(["mocap_latency@0.5+1:delay=0.03", "mocap_dropout@2+0.3"], scenario, seed=2)
+flight = DirectFlight(scenario, default_profile("modular"), Vehicle.load(), 0.2, 2, late)
+for _ in range(1250):
+    flight.tick()
+used = [one for one in warm_up.compiled_functions() if one.stats.cache_hits]
+missed = [one.__name__ for one in warm_up.compiled_functions() if one.stats.cache_misses]
+print(len(used), missed)
+"""
+
+
+def test_a_flight_with_late_poses_in_a_later_process_compiles_nothing():
+    warm_up.prepare()
+    done = subprocess.run(
+        [sys.executable, "-c", LATE_FLIGHT], capture_output=True, text=True, check=True
+    )
+    used, missed = done.stdout.split(" ", 1)
+    assert int(used) > 20 and missed.strip() == "[]"

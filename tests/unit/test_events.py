@@ -125,6 +125,11 @@ def test_others():
     px4 = Autopilot()
     assert px4.send("something_new", INFO) is None
     severity, text = px4.send(0x01ABCDEF, CRITICAL)
-    assert severity == CRITICAL and "0x01abcdef" in text
+    assert severity == CRITICAL and "0x01abcdef, of unknown name" in text
+    assert px4.send("logger_storage_full", ERROR) == (
+        ERROR,
+        "event logger_storage_full: see PX4's log",
+    )
+    assert px4.send("logger_storage_full", INFO) is None
     assert px4.send(0x01ABCDEF, CRITICAL, again=True) is None
     assert px4.send("commander_rc_override", INFO)[0] == Severity.WARNING

@@ -9,7 +9,7 @@ from memory_transport import Memory
 from uam_control.vehicle import load_description
 from uam_sim_bridge.autopilot.companion import Companion
 from uam_sim_bridge.autopilot.core import Autopilot
-from uam_sim_bridge.mavlink.link.link import OffboardLink
+from uam_sim_bridge.mavlink.link.link import UNSIGNED, OffboardLink
 from uam_sim_bridge.mavlink.link.link_report import faults, report
 from uam_sim_bridge.mavlink.offboard.sequence import (
     OffboardParameters,
@@ -19,6 +19,7 @@ from uam_sim_bridge.mavlink.offboard.sequence import (
 from uam_sim_bridge.mavlink.offboard.setpoint import RateThrustParameters
 from uam_sim_bridge.mavlink.protocol.attitude_target import AttitudeTarget
 from uam_sim_bridge.mavlink.protocol.modes import MavCmd, MavResult, Mode
+from uam_sim_bridge.mavlink.protocol.signing import Signing
 from uam_sim_bridge.mavlink.protocol.wire import Codec, Framer, clean_text, mavlink2
 from uam_sim_bridge.mavlink.telemetry.event_messages import EventMessage
 from uam_sim_bridge.mavlink.telemetry.events import SUMMARY, event_id
@@ -387,6 +388,14 @@ def test_the_link_requests_the_reasons_of_a_refused_arming(rig):
         ),
     )
     rig.run(0.1)
+    assert "No valid attitude estimate" not in rig.reasons()  # it may pass
+    rig.run(6.0)
+    rig.send(
+        EventMessage(
+            0, 0, event_id("check_modes_attitude"), 0, 3, 2, struct.pack("<IB", 0xFFFFFFFF, 16)
+        )
+    )
+    rig.run(0.1)
     assert "No valid attitude estimate → hold the vehicle still" in rig.reasons()
 
 
@@ -440,3 +449,24 @@ def test_the_autopilots_imu_is_requested_and_stamped_with_the_companions_clock()
     rig.boot()
     rig.run(0.5)
     assert rig.link.reboots == 1
+
+
+@pytest.mark.parametrize("signs", [False, True])
+def test_an_autopilot_that_does_not_sign_is_refused_with_the_reason(signs):
+    key = Signing(bytes(32))
+    memory, sequence = Memory(), OffboardSequence()
+    mapping = RateThrustParameters.of(load_description())
+    link = OffboardLink(memory, sequence, mapping, signing=key)
+    codec = Codec(1, 1, key if signs else None)
+    beat = mavlink2.MAVLink_heartbeat_message(2, 12, 1, Mode.HOLD.custom_mode, 3, 3)
+    for tick in range(10):
+        memory.to_link.append(codec.encode(beat))
+        if signs:  # a forged one beside the true ones
+            memory.to_link.append(Codec(1, 1).encode(beat))
+        link.poll(0.1 * tick)
+        link.tick(0.1 * tick)
+    assert link.connected(0.9) is signs
+    assert (UNSIGNED in link.warnings) is not signs
+    assert [reason.startswith("the autopilot does not sign") for reason in sequence.reasons] == (
+        [] if signs else [True]
+    )

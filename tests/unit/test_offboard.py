@@ -57,6 +57,55 @@ def test_streams_but_requests_nothing_until_desired():
     assert s.streaming and s.phase is Phase.STREAMING
 
 
+HEADING = "Preflight Fail: heading estimate not stable"
+KILL = "Preflight Fail: Kill switch engaged"
+
+
+def test_what_a_normal_start_also_brings_is_a_reason_only_if_it_lasts():
+    s = OffboardSequence(OffboardParameters(stream_time=0.0, reason_delay=5.0, attempts=100))
+    s.set_desired(True)
+    for tick in range(1200):
+        now = 0.01 * tick
+        asked = s.update(now, Reported(True, False, Mode.OFFBOARD))
+        if asked is not None:
+            s.answer(asked, MavResult.TEMPORARILY_REJECTED)
+            s.text(2, HEADING)
+        if tick == 1:
+            s.text(2, KILL)
+        found = "; ".join(s.reasons)
+        assert (KILL in found) is (tick >= 1)  # not one of them: at once
+        if now < 5.0:
+            assert HEADING not in found and "arming refused" not in found
+        elif now >= 5.6:
+            assert HEADING in found and "arming refused (temporarily" in found
+    s.update(12.0, Reported(True, True, Mode.OFFBOARD))
+    assert s.phase is Phase.FLYING and s.reasons == ()
+    s.text(2, HEADING)  # in flight
+    assert HEADING in s.reasons[0]
+
+
+def test_no_offboard_signal_counts_from_the_stream_on():
+    s, text = OffboardSequence(OffboardParameters(stream_time=1.0)), "No offboard signal"
+    s.set_desired(True)
+    s.update(0.0, Reported(True, False, Mode.HOLD))
+    s.text(3, text)
+    assert s.phase is Phase.STREAMING and s.reasons == ()
+    s.update(1.1, Reported(True, False, Mode.HOLD))
+    s.text(3, text)
+    assert s.phase is Phase.OFFBOARD and text in s.reasons[0]
+
+
+def test_a_failure_says_what_might_have_passed():
+    s = OffboardSequence(OffboardParameters(stream_time=0.0, reason_delay=60.0, attempts=3))
+    s.set_desired(True)
+    for tick in range(300):
+        asked = s.update(0.01 * tick, Reported(True, False, Mode.OFFBOARD))
+        if asked is not None:
+            s.text(2, HEADING)
+    assert s.phase is Phase.FAILED
+    assert HEADING in s.reasons[0] and "no success after 3 requests" in s.reasons[-1]
+
+
 def test_gives_up_with_the_reasons():
     s = OffboardSequence(OffboardParameters(attempts=3))
     s.set_desired(True)

@@ -53,6 +53,19 @@ def test_others_are_refused_and_counted(sender):
     assert framer.stream(sender.encode(message())) == [] and refused(framer) == 3
 
 
+def test_an_autopilot_without_signing_is_recognised():
+    def beat(autopilot):
+        return mavlink2.MAVLink_heartbeat_message(2, autopilot, 1, 0, 3, 3)
+
+    codec = Codec(1, 191, Signing(KEY))
+    framer = Framer(codec)
+    assert framer.datagram(Codec(1, 1).encode(beat(mavlink2.MAV_AUTOPILOT_INVALID))) == []
+    assert framer.datagram(Codec(1, 1, Signing(KEY)).encode(beat(12))) != []
+    assert codec.unsigned is None
+    assert framer.datagram(Codec(1, 1).encode(beat(mavlink2.MAV_AUTOPILOT_PX4))) == []
+    assert codec.unsigned == mavlink2.MAV_AUTOPILOT_PX4
+
+
 def test_mavlink_1_cannot_be_signed_and_is_refused():
     _, framer = pair()
     mav = mavlink2.MAVLink(None, 1, 1)

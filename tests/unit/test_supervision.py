@@ -74,7 +74,7 @@ def test_failsafe_ends_only_by_command_and_motors_go_off_on_the_ground():
 def test_every_check_has_a_value():
     values, seen, two, three = np.full(len(CHECKS), np.nan), observation(), np.ones(2), np.ones(3)
     measure(seen.state, seen.reference, three, 0.0, 0.0, np.zeros((2, 3)), two, values)
-    assert np.isnan(values).sum() == 13
+    assert np.isnan(values).sum() == 14
     read(Readings(), two, three, values)
     assert np.flatnonzero(np.isnan(values)).tolist() == [LATE, LATE_LOOP]  # by `Checks.update`
     checks = Checks(S500)

@@ -88,14 +88,14 @@ def test_readings_have_their_places():
     readings = Readings(
         battery=0.5, mocap_age=9.0, mocap_still=10.0, joint_age=11.0, controller_age=12.0,
         autopilot_age=13.0, missed_ticks=15.0, temperature=16.0,
-        contradiction=19.0,
+        contradiction=19.0, slower=20.0,
         joint_effort=np.array([1.0, -6.0, 2.0]), gains=np.array([3.0, math.nan, 1.0]),
     )  # fmt: skip
     read(readings, np.array([2.0, 4.0, 8.0]), np.array([2.0, 1.0, 0.25]), values)
     np.testing.assert_array_equal(values[:8], 77.0)
     # effort: 6/4; gains: 1/.25, the unknown one left out
     np.testing.assert_array_equal(
-        values[8:], [-0.5, 9, 10, 11, 12, 13, 77, 15, 16, 1.5, 4.0, 77, 19]
+        values[8:], [-0.5, 9, 10, 11, 12, 13, 77, 15, 16, 1.5, 4.0, 77, 19, 20]
     )
 
 
@@ -117,7 +117,8 @@ AT_ONCE = SupervisionParameters(
     contradiction_failsafe=1.5,
     joint_age_hold=0.375, controller_age_hold=0.625, autopilot_age_land=0.875,
     delay_margin=0.125, delay_nominal=0.0, delay_land=0.5, delay_failsafe=1.5,
-    missed_ticks_hold=10.0, missed_ticks_failsafe=20.0, gain_hold=(10.0, 20.0, 30.0),
+    missed_ticks_hold=10.0, missed_ticks_failsafe=20.0, slower_hold=0.375,
+    gain_hold=(10.0, 20.0, 30.0),
     hold_after=0.0, land_after=0.0, failsafe_after=0.0, delay_after=0.0,
     clear_after=1.0, hysteresis=0.5,
 )  # fmt: skip
@@ -168,6 +169,7 @@ LIMITS = [
     ("adapted gain", HOLD, lambda x: seen(gains=np.array([0.0, 0.0, 30.0 * x])), 1.0),
     ("motion capture and IMU", FAILSAFE, lambda x: seen(contradiction=x), 1.5),
     ("battery", LAND, lambda x: seen(battery=-x), -0.25),
+    ("simulation", HOLD, lambda x: seen(slower=x), 0.375),
 ]  # fmt: skip
 
 
@@ -323,4 +325,4 @@ def test_other_limits_are_those_of_the_next_tick():
 
 
 def test_every_quantity_is_named_once():
-    assert len({check.name for check in CHECKS}) == len(CHECKS) == 21
+    assert len({check.name for check in CHECKS}) == len(CHECKS) == 22

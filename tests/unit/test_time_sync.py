@@ -79,6 +79,19 @@ def test_a_single_outlier_is_ignored():
     assert sync.offset == pytest.approx(1.0, abs=0.003)
 
 
+def test_a_simulation_that_falls_behind_the_autopilots_clock_is_no_reboot():
+    sync = TimeSync()
+    assert run(sync, 3.0, 1.0, offset=4.0, delay=0.004) == []
+    assert run(sync, 3.0, 4.0, offset=6.5, delay=0.004) == []  # the ticks stood still for 2.5 s
+    assert sync.offset == pytest.approx(6.5, abs=0.01)
+    # and all the time: 0.8 times as fast as the autopilot's clock
+    now = 7.0
+    for _ in range(200):
+        assert run(sync, 0.2, now, offset=6.5 + 0.25 * (now - 7.0), delay=0.004) == []
+        now += 0.2
+    assert run(sync, 2.0, now, offset=0.0, delay=0.004)  # its clock began anew
+
+
 def test_a_slow_answer_is_no_jump():
     sync = TimeSync()
     run(sync, 2.0, 0.0, offset=1.0, delay=0.0)

@@ -23,6 +23,11 @@ class StartParameters(ParameterSet):
     require_checklist: bool = switch(
         False, "start only when the checklist of a real vehicle has passed (/uam/checklist)"
     )
+    autopilot_has_clock: bool = switch(
+        False,
+        "an autopilot with its own clock flies a simulated vehicle (hardware in the loop): the "
+        "simulation must keep real time, see slower_hold",
+    )
 
 
 @dataclass(frozen=True)

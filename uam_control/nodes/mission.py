@@ -93,6 +93,7 @@ class MissionNode(UamNode):
         timing = NodeParameters(self, Timing, read_only=True).current
         scenario = self._scenario(vehicle)
         start = NodeParameters(self, StartParameters, read_only=True).current
+        self._has_clock = start.autopilot_has_clock
         self._mission = Mission(scenario, self.parameter_set.current, start, vehicle)
         self._stage = MissionStage(self._mission, timing)
         spare = Mission(self._mission.scenario, self.parameter_set.current)
@@ -101,6 +102,7 @@ class MissionNode(UamNode):
         self._arm: bool | None = None
         self._published: tuple = ()  # content of the last status
         self._due = 0  # stamp [ns] of the next status
+        self._held_back = False  # whether a limit prevents the take-off
         self._states = Backlog()
         self._state_timeout = NodeParameters(self, StateWatch, read_only=True).current.state_timeout
         self._state_at = math.inf  # [s] time.monotonic() of the newest state
@@ -184,6 +186,8 @@ class MissionNode(UamNode):
 
     def _tick(self, stamp: int, state: np.ndarray) -> None:
         begun, stage = time.perf_counter(), self._stage
+        if self._has_clock:
+            stage.inputs.inputs.wall_clock(stamp / SECOND, time.monotonic())
         if stage.begin(stamp, state):
             self._publish_reference()
         output = stage.output
@@ -211,6 +215,7 @@ class MissionNode(UamNode):
             self._arm = output.arm
             self._arming.publish(Bool(data=bool(output.arm)))
         magnet, regains = bool(output.magnet), output.regains
+        self._log_held_back()
         decisions = len(self._mission.grasps)
         now = (output.phase, output.done, output.state, output.cause, magnet, regains, decisions)
         if now == self._published and 0 < self._due - stamp <= STATUS_PERIOD:
@@ -276,6 +281,14 @@ class MissionNode(UamNode):
         else:
             self.get_logger().info(text)
 
+    def _log_held_back(self) -> None:
+        """Log once which limit prevents the take-off, and that it does no longer."""
+        beyond = self._mission.beyond if self._mission.output.state is State.GROUNDED else ""
+        if bool(beyond) is not self._held_back:
+            self._held_back = bool(beyond)
+            text = f"no take-off: {beyond}" if beyond else "no limit is exceeded any more"
+            self.get_logger().info(text)
+
     def _log_grasp(self) -> None:
         output = self._mission.output
         text = f"payload {output.grasp.value}, approach {output.attempt}: {output.grasp_text}"
@@ -288,7 +301,7 @@ class MissionNode(UamNode):
         output, beyond = self._mission.output, self._mission.beyond
         odd = output.state in (State.HOLDING, State.RELEASED)
         limits, delay = self.parameter_set.current, self._mission.setpoint_delay
-        late = ""
+        slower, late = self._stage.inputs.readings.slower, ""
         if delay > limits.delay_warn * limits.delay_margin:
             share = 100.0 * margin_left(delay, limits)
             late = f"setpoints {1e3 * delay:.0f} ms late: {share:.0f} % of the delay margin left"
@@ -304,6 +317,7 @@ class MissionNode(UamNode):
             "payload": f"{output.grasp.value} {output.grasp_text}".strip(),
             "setpoint delay [ms]": "" if math.isnan(delay) else f"{1e3 * delay:.1f}",
             "delay margin [ms]": f"{1e3 * limits.delay_margin:.1f}",
+            "real time factor": "" if math.isnan(slower) else f"{1.0 - slower:.2f}",
             "answer to the last goal or trajectory": self._planners.answer,
         }
         return level, summary, values

@@ -97,6 +97,8 @@ CHECKS = (
     Check("motion capture and IMU", "{name} contradict each other by {value:.1f} m/s^2, {limit:g} "
           "m/s^2 allowed", failsafe="contradiction_failsafe", in_flight=True,
           reading="contradiction"),
+    Check("simulation", "the {name} runs {value:.0%} slower than the wall clock, {limit:.0%} "
+          "allowed; the autopilot has its own clock", "slower_hold", reading="slower"),
 )  # fmt: skip
 LATE, LATE_LOOP = (
     [check.name for check in CHECKS].index(it) for it in (SETPOINT_DELAY, LOOP_DELAY)

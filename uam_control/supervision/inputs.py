@@ -10,6 +10,7 @@ import numpy as np
 
 from uam_control.estimation.repeats import Repeats
 from uam_control.supervision.observation import Readings
+from uam_control.supervision.pace import Pace
 
 POSE = ("position", "attitude")  # controllers without which the vehicle does not follow its path
 BIAS_VALID = 0.1  # [s] age above which a bias says nothing about a contradiction
@@ -43,6 +44,7 @@ class Inputs:
         self._last: float | None = None
         self._gaps: deque[tuple[float, int]] = deque()  # stamp [s], ticks missed before it
         self._watched: dict[tuple[str, ...], list[int]] = {}
+        self._pace = Pace()
 
     def mocap(self, stamp: float, position: np.ndarray, quaternion: np.ndarray) -> None:
         """Store a mocap pose exposed at `stamp` [s].
@@ -113,6 +115,11 @@ class Inputs:
         if subsystem in POSE:
             self._of_pose[subsystem] = stamp
             self._oldest_of_pose = min(self._of_pose.values())
+
+    def wall_clock(self, stamp: float, wall: float) -> None:
+        """Store the wall clock's time `wall` [s] of the tick `stamp` [s]."""
+        self._pace.tick(stamp, wall)
+        self._readings.slower = self._pace.slower
 
     def at(self, stamp: float) -> Readings:
         """Return the readings at the tick `stamp` [s]; the next call reuses the object."""

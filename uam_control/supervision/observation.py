@@ -49,7 +49,8 @@ class Readings:
     (n,): measured [N m], empty where not known. gains (3,): largest adapted gain of position,
     attitude, arm. payload_position (3,) [m]: grip point of the payload, by its newest mocap pose;
     payload_age [s]: of that pose. lift [N]: filtered collective thrust. contradiction [m/s^2]: of
-    motion capture and IMU, the fast change of the accelerometer's estimated bias.
+    motion capture and IMU, the fast change of the accelerometer's estimated bias. slower: than the
+    wall clock, 1 − real-time factor of a simulation.
     """
 
     battery: float = math.nan
@@ -70,6 +71,7 @@ class Readings:
     payload_age: float = math.nan
     lift: float = math.nan
     contradiction: float = math.nan
+    slower: float = math.nan
 
 
 @dataclass

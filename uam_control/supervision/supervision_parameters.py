@@ -83,6 +83,10 @@ class SupervisionLimits(ParameterSet):
     missed_ticks_failsafe: float = _failsafe(
         250.0, "control ticks missed within a second", "1", 1.0, 1e4
     )
+    # an autopilot with its own clock, see pace.py
+    slower_hold: float = _hold(
+        0.1, "share by which a simulation runs slower than the wall clock", "1", 0.0, 1.0
+    )
     gain_hold: tuple = vector(
         (100.0, 100.0, 1000.0),
         "largest adapted gain K0..K3, zeta of position, attitude, arm that starts a hold",

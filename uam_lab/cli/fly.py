@@ -20,6 +20,7 @@ from uam_lab.library.flight_result import FlightFailed
 from uam_lab.processes.interrupts import Interrupts
 from uam_lab.report.page.console import reporting, summary
 from uam_sim_bridge.faults.schedule import late
+from uam_sim_bridge.mavlink.hil.sitl_ports import HOST
 from uam_sim_bridge.mavlink.transport.transport import ALLOWED
 from uam_sim_bridge.plant.engines import DEFAULT_PLANT, PLANTS
 from uam_sim_bridge.ports import INSTANCES, LAST_DOMAIN
@@ -35,6 +36,7 @@ examples:
   uam fly --profile mine.yaml --engine direct
   uam fly --engine direct --no-report        recording and metrics only, in seconds
   uam fly --autopilot px4 --px4-dir ~/PX4-Autopilot/build/px4_sitl_default
+  uam fly --autopilot px4 --px4-param COM_OF_LOSS_T=1.0 --px4-param SDLOG_MODE=0
   uam fly --autopilot serial:/dev/ttyACM0:921600 --clock realtime --gcs udp:127.0.0.1:14550
   uam fly --dry-run                          all commands computed, none sent, nothing armed
   uam fly --view --clock realtime            monitor and tune in a browser
@@ -100,10 +102,21 @@ def add(commands: argparse._SubParsersAction) -> None:
     option("--autopilot", "builtin|px4|URL", text, "builtin")
     text = "PX4's build directory, with bin/px4 and etc/ (default: $PX4_SITL_DIR)"
     option("--px4-dir", "DIR", text)
+    command.repeated(
+        "--px4-param",
+        "NAME=VALUE",
+        "a parameter of PX4 in software, in place of config/'s; with --autopilot px4",
+        dest="px4_params",
+    )
     command.switch(
         "--arm", "arm and take off by itself also with a real autopilot (serial, another host)"
     )
     command.switch("--dry-run", "compute all commands for the present pose; send none, arm nothing")
+    text = (
+        "address of this machine at which the simulator waits for an autopilot that you start; "
+        "0.0.0.0: also from other machines, which is not secure"
+    )
+    option("--sim-address", "ADDRESS", text, HOST)
     option("--gcs", "URL", "ground station, as udp:127.0.0.1:14550 (default: none)", "")
     mass = number("mass", "kg", 0.0)
     option("--payload-mass", "KG", "default: the scenario's", type=mass)

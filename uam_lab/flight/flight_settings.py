@@ -29,11 +29,14 @@ from uam_sim_bridge.faults.actuator_faults import ServoWeak
 from uam_sim_bridge.faults.faulty_plant import check_engine
 from uam_sim_bridge.faults.imu_faults import of_the_companion
 from uam_sim_bridge.faults.process_faults import DiscoveryLoss
+from uam_sim_bridge.mavlink.hil.hil_server import open_only_here
+from uam_sim_bridge.mavlink.hil.sitl_ports import HOST
 from uam_sim_bridge.mavlink.transport.transport import ALLOWED, LinkUrl, parse_url
 from uam_sim_bridge.plant.effects import presets
 from uam_sim_bridge.plant.engines import DEFAULT_PLANT
 from uam_sim_bridge.plant.vehicle import PAYLOAD_MAX
 from uam_sim_bridge.ports import AUTOPILOT_UDP, INSTANCES, LAST_DOMAIN
+from uam_sim_bridge.px4 import px4_parameters
 from uam_sim_bridge.px4.px4_installation import Px4Installation
 
 ENGINES = ("ros", "direct")
@@ -82,6 +85,8 @@ class FlightSettings:
     imu: str = IMUS[0]
     autopilot: str = BUILTIN
     px4: Px4Installation | None = None  # for the autopilot PX4
+    px4_params: tuple[str, ...] = ()  # NAME=VALUE, for the autopilot PX4
+    sim_address: str = HOST  # at which the autopilot connects
     link: LinkUrl | None = None
     gcs: str = ""  # URL of a ground station
     seed: int = 1
@@ -126,6 +131,8 @@ def settings(
     effects: Sequence[str] = (),
     autopilot: str = BUILTIN,
     px4_dir: str | None = None,
+    px4_params: Sequence[str] = (),
+    sim_address: str = HOST,
     gcs: str = "",
     payload_mass: float | None = None,
     seed: int = 1,
@@ -180,7 +187,22 @@ def settings(
     if view and engine == "direct":
         raise SettingsError("the direct engine has no topics to show: --view needs --engine ros")
     px4 = Px4Installation.find(px4_dir) if autopilot == PX4 else None
+    if px4_params and px4 is None:
+        raise SettingsError(
+            "--px4-param needs --autopilot px4: this command writes no parameter of an autopilot "
+            "that you started"
+        )
+    if px4 is not None and (parameters or {}).get("mavlink_bridge", {}).get("signing_key"):
+        raise SettingsError(
+            "signing_key of mavlink_bridge: PX4 v1.16 has no MAVLink signing, the bridge would "
+            "refuse all its messages; leave it out"
+        )
+    px4_parameters.parse(px4_params, None if px4 is None else px4.ranges())
     link = None if autopilot in (BUILTIN, PX4) else _link(autopilot)
+    if not open_only_here(sim_address) and (link is None or link.kind == "serial"):
+        raise SettingsError(
+            "--sim-address needs an autopilot that you start: --autopilot udp:HOST:PORT or tcp:..."
+        )
     if link is not None and link.kind == "serial" and clock != "realtime":
         raise SettingsError(
             "a flight controller runs on its own clock: --autopilot serial:... "
@@ -251,6 +273,8 @@ def settings(
         imu=imu,
         autopilot=autopilot,
         px4=px4,
+        px4_params=tuple(px4_params),
+        sim_address=sim_address,
         link=link,
         gcs=gcs,
         seed=seed,

@@ -6,6 +6,7 @@ import json
 from pathlib import Path
 from typing import Any
 
+from uam_control.settings import configuration
 from uam_lab.rehearsal.emulated_lab import MAGNET_LINE, baud_of
 from uam_lab.rehearsal.options import RehearsalOptions
 from uam_lab.vehicle.lab import Lab
@@ -16,6 +17,7 @@ from uam_sim_bridge.rehearsal.laboratory import SERIAL_FAR
 LABORATORY, LABORATORY_MODULE = "laboratory", "uam_sim_bridge.nodes.laboratory"
 AUTOPILOT, STAND_IN = "autopilot", "uam_sim_bridge.autopilot.server"
 STATISTICS = "laboratory.json"
+PARAMETERS = "px4/rehearsed.yaml"  # of config/: as a real vehicle needs them
 AUTOPILOT_WAIT = 60.0  # [s] for which the autopilot waits for the simulator
 
 
@@ -57,5 +59,6 @@ def autopilot(lab: Lab, devices: Path, ports: Ports) -> tuple[str, list[str]]:
     """Return module and arguments of the autopilot; its companion is at the cable's far end."""
     line = f"{devices / SERIAL_FAR}:{baud_of(lab)}"
     place = ["--sim-port", str(ports.simulator_tcp), "--companion", line]
-    vehicle = ["--vehicle", lab.vehicle.source]
+    parameters = str(configuration.path(PARAMETERS))
+    vehicle = ["--vehicle", lab.vehicle.source, "--params", parameters]
     return STAND_IN, [*place, *vehicle, "--wait", str(AUTOPILOT_WAIT), "--once"]

@@ -6,7 +6,7 @@ import math
 from dataclasses import dataclass
 from pathlib import Path
 
-from uam_control.settings import yaml_file
+from uam_control.settings import configuration, yaml_file
 from uam_control.settings.parameter_set import ParameterError
 from uam_control.vehicle import VehicleDescription
 
@@ -115,6 +115,24 @@ DEFINITIONS: dict[str, Definition] = {
         )
     },
 }
+
+
+ANY = 1e9  # limit of a stored parameter
+
+
+def _stored() -> dict[str, Definition]:
+    """Return the parameters that the stand-in only stores, by name: those of config/px4."""
+    values = {}
+    for name in ("px4/stand_in.yaml", "px4/sitl.yaml"):
+        values |= yaml_file.read(configuration.path(name), ParameterError)
+    return {
+        name: Definition(value, -ANY, ANY, "", "stored without effect", isinstance(value, int))
+        for name, value in values.items()
+        if name not in DEFINITIONS
+    }
+
+
+DEFINITIONS |= _stored()
 
 
 class Parameters:

@@ -166,6 +166,8 @@ def parser() -> argparse.ArgumentParser:
 def _autopilot(options: argparse.Namespace) -> Autopilot:
     """Return the autopilot of the vehicle, as after power-on."""
     made = Autopilot(Parameters.of(load_description(options.vehicle), options.params))
+    if options.serial and not options.params:
+        made.set_parameter("SYS_HITL", 1)
     # as PX4 SITL; the highest instances exceed MAVLink's one byte
     made.set_parameter("MAV_SYS_ID", min(options.instance + 1, 250))
     return made

@@ -29,6 +29,7 @@ class AutopilotTopics:
         self._last: AutopilotReport | None = None
         self._battery_stamp = -BATTERY_PERIOD
         self._warned: tuple[str, ...] = ()
+        self._written, self._compared = 0, False
 
     def publish(self, stamp: int, report: AutopilotReport | None) -> None:
         """Publish and log at `stamp` [ns]; report: None if none is due."""
@@ -77,6 +78,13 @@ class AutopilotTopics:
             if warning not in self._warned:
                 self._logger.warning(warning)
         self._warned = warnings
+        watch = self._link.parameters
+        for text in watch.written[self._written :]:
+            self._logger.info(text)
+        self._written = len(watch.written)
+        if watch.required and watch.complete and not self._compared:
+            self._logger.info(comparison(watch).summary)
+        self._compared = watch.complete
 
 
 def comparison(watch: ParameterWatch) -> ParameterComparison:

@@ -47,6 +47,11 @@ class BridgeParameters(ParameterSet):
         "or adopt them before arming",
         ("warn", "adopt"),
     )
+    set_parameters: bool = switch(
+        False,
+        "write the required parameters with one allowed value to the autopilot before it is armed; "
+        "for an autopilot in software only",
+    )
     dry_run: bool = switch(
         False, "compute and publish setpoints; send the autopilot none, and never arm it"
     )
@@ -169,6 +174,7 @@ def open_links(
         codec = Codec(system, mavlink2.MAV_COMP_ID_ONBOARD_COMPUTER, signing)
         transport = station = GroundStation(watching, transport, codec)
     link = OffboardLink(transport, sequence, mapping, system, signing, imu_rate, clock, required)
+    link.parameters.writing = options.set_parameters
     return Links(link, station, faulty, late)
 
 

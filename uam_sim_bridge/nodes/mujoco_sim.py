@@ -12,7 +12,7 @@ lockstep  At every control tick the plant waits for the setpoint that the bridge
           While a lost node is restarted, ticks run at the pace of the wall clock without its
           answers, until all answers have been in time for IN_TIME ticks (`restart.py`).
 realtime  Ticks begin at absolute deadlines of the wall clock, one control period apart; after a
-          stall of the machine they run at most CATCH_UP times as fast. Without an answer by the
+          stall of the machine they run at most `catch_up` times as fast. Without an answer by the
           next deadline the last command holds. The latency of a tick is the time from the
           publication of its IMU sample to that of its setpoint. Beyond one control period the tick
           counts as late. Beyond some periods, or without a setpoint, it counts as missed
@@ -49,7 +49,7 @@ from uam_msgs_py.node.node_parameters import refuse_unknown
 from uam_msgs_py.node.tunable import TunableNode
 from uam_sim_bridge.faults import PLANT, Schedule
 from uam_sim_bridge.faults.faulty_plant import FaultyPlant, make_plant
-from uam_sim_bridge.mavlink.hil.hil_server import HilParameters, HilServer
+from uam_sim_bridge.mavlink.hil.hil_server import HilParameters, HilServer, open_only_here
 from uam_sim_bridge.nodes.fault_topic import FaultTopic
 from uam_sim_bridge.nodes.latencies import Latencies
 from uam_sim_bridge.nodes.plant_health import PlantHealth
@@ -68,8 +68,8 @@ from uam_sim_bridge.plant import Plant, Samples, Truth, Vehicle
 from uam_sim_bridge.plant.effects import presets
 
 NAME = "mujoco_sim"
+RESTART_PX4 = "; a PX4 does not connect again by itself: restart it"
 REPORT_INTERVAL = 5.0  # [s] between two log lines with the missing nodes
-CATCH_UP = 1.25  # [1] largest real-time factor after a stall of the machine
 FOREIGN_WAIT = 1.0  # [s] for discovery by foreign nodes, which do not report their connections
 LAST_WAIT = 3.0  # [s] longest wait for the recorder after the last tick
 RECORDER_LAG = 2.0  # [s] the recorder reports its progress each second; its queue is 4 times longer
@@ -121,7 +121,13 @@ class Simulator:
         waits = HilParameters(answer_timeout=patience)
         if options.autopilot_always_answers:
             waits = HilParameters(answer_timeout=patience, silent_timeout=patience)
-        self.hil = HilServer(options.hil_port, rotors, parameters=waits, seed=options.seed)
+        address = options.hil_address
+        self.hil = HilServer(options.hil_port, rotors, address, waits, options.seed)
+        if not open_only_here(address):
+            self._log.warning(
+                f"TCP port {options.hil_port} is open at {address}: every machine that reaches it "
+                "can take the autopilot's place, without a password"
+            )
         self.statistics = Statistics(options.clock)
         self.health = PlantHealth(node, self.answers, self.statistics)
         pairs = [entry.partition("=") for entry in options.foreign.split(",") if entry]
@@ -283,7 +289,7 @@ class Simulator:
         After a stall ticks run faster, but not in a burst: the other nodes could not follow.
         """
         on_time = begin + (self.plant.tick - self._first_tick + 1) * self.plant.period
-        return max(on_time, self._begun + self.plant.period / CATCH_UP)
+        return max(on_time, self._begun + self.plant.period / self.options.catch_up)
 
     def _begin_tick(self) -> tuple[Samples, Truth]:
         """Publish the samples and the truth of this tick, and return them."""
@@ -326,7 +332,8 @@ class Simulator:
 
     def _await_autopilot(self) -> None:
         """Wait for the autopilot to connect again; time stands still, services are served."""
-        self._log.warning(f"waiting for the autopilot on TCP port {self.options.hil_port}")
+        again = "" if self.options.autopilot_always_answers else RESTART_PX4
+        self._log.warning(f"waiting for the autopilot on TCP port {self.options.hil_port}{again}")
         while not self._stop.raised and not self.hil.accept(0.0):
             self.executor.spin_once(0.05)
 

@@ -22,9 +22,11 @@ from uam_control.settings.parameter_set import (
 from uam_control.vehicle import VehicleDescription
 from uam_msgs_py.node.node_parameters import NodeParameters
 from uam_msgs_py.node.rightful import RightfulNodes, rightful_nodes
+from uam_sim_bridge.mavlink.hil.sitl_ports import HOST
 from uam_sim_bridge.plant.engines import DEFAULT_PLANT, PLANTS
 from uam_sim_bridge.plant.vehicle import PAYLOAD_MAX
 
+CATCH_UP = 1.25  # [1] largest real-time factor after a stall of the machine
 NOT_READY = 3  # exit status: not every node has started, or not all are connected
 
 
@@ -56,10 +58,21 @@ class PlantParameters(ParameterSet):
         "lockstep: each tick waits for all answers; realtime: ticks of the wall clock",
         ("lockstep", "realtime"),
     )
+    catch_up: float = number(
+        CATCH_UP,
+        "real time: largest real-time factor after a stall of the machine; 1: what is lost stays "
+        "lost, for an autopilot with its own clock",
+        "1",
+        1.0,
+        10.0,
+    )
     publish_imu: bool = switch(
         True, "publish the companion's IMU; false: mavlink_bridge publishes the autopilot's"
     )
     hil_port: int = integer(4560, "TCP port at which the autopilot connects", 1, 65535)
+    hil_address: str = text(
+        HOST, "address of this machine at which the autopilot connects", "IPv4; 0.0.0.0: any"
+    )
     autopilot_always_answers: bool = switch(
         True, "true for the stand-in; false for PX4, which is silent at boot"
     )

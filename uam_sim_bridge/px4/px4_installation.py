@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import json
+import math
 import os
 from dataclasses import dataclass
 from pathlib import Path
+from typing import NamedTuple
 
 VARIABLE = "PX4_SITL_DIR"
 REQUIRED = (
@@ -12,11 +15,20 @@ REQUIRED = (
     "as build/px4_sitl_default after `make px4_sitl_default`"
 )
 _STARTUP = "etc/init.d-posix/rcS"
+_LISTED = "parameters.json"
 _IN_SOURCES = "build/px4_sitl_default"
 
 
 class Px4Error(ValueError):
     """PX4 cannot be run; the text is one line: what is wrong and what is required."""
+
+
+class Range(NamedTuple):
+    """Type and limits of a parameter in a build of PX4."""
+
+    integer: bool
+    low: float = -math.inf
+    high: float = math.inf
 
 
 @dataclass(frozen=True)
@@ -34,6 +46,19 @@ class Px4Installation:
     def etc(self) -> Path:
         """Return the directory of the start-up scripts."""
         return self.directory / "etc"
+
+    def ranges(self) -> dict[str, Range]:
+        """Return type and limits of each parameter of the build; {} if it does not list them."""
+        try:
+            listed = json.loads((self.directory / _LISTED).read_text())["parameters"]
+        except (OSError, ValueError, KeyError):
+            return {}
+        return {
+            entry["name"]: Range(
+                entry["type"] == "Int32", entry.get("min", -math.inf), entry.get("max", math.inf)
+            )
+            for entry in listed
+        }
 
     @classmethod
     def find(cls, directory: str | Path | None = None) -> Px4Installation:

@@ -134,6 +134,11 @@ def _announcement(children: Processes, settings: FlightSettings, ports: Ports) -
         f"{len(children.names)} processes in ROS domain {ports.domain}, "
         f"autopilot on TCP {ports.simulator_tcp}, UDP {ports.autopilot_udp}"
     )
+    if node_arguments.users_autopilot(settings):
+        yield (
+            "waiting for your autopilot; restart a PX4 that has served a flight: it does not "
+            "connect again (px4_sitl restarts it by itself)"
+        )
     for name in settings.foreign:
         own = settings.own_names.get(name, name)
         yield f"waiting for {own}: start it with ROS_DOMAIN_ID={ports.domain}"

@@ -17,8 +17,10 @@ from uam_lab.results.result_folder import ResultFolder, as_json, versions
 from uam_msgs_py.messages import topics
 from uam_msgs_py.node import wiring
 from uam_sim_bridge.faults import LINK, PLANT
+from uam_sim_bridge.nodes.plant_options import CATCH_UP
 from uam_sim_bridge.plant.effects.network_delay import SetpointDelay
 from uam_sim_bridge.ports import Ports
+from uam_sim_bridge.px4 import px4_parameters
 
 # Executable → module. Started and, at the end, stopped in this order, the recorder last.
 MODULES = {
@@ -38,6 +40,7 @@ HITL_ROUTER = "uam_sim_bridge.mavlink.hil.router"
 PX4_LOG = "px4.ulg"
 AUTOPILOT_WAIT = 60.0  # [s] for which the autopilot waits for the simulator
 FACTS = "facts.json"
+REQUIRED = "px4_parameters.yaml"
 # nodes that load the description of the vehicle
 DESCRIBED = {
     *(wiring.ESTIMATOR, wiring.MISSION, wiring.POSITION, wiring.ATTITUDE, wiring.ARM),
@@ -55,6 +58,7 @@ def parameters(
 ) -> dict[str, dict[str, Any]]:
     """Return the parameters of each node, from the profile and from the settings."""
     sections = flight_nodes(settings, folder)
+    sections[wiring.MISSION]["autopilot_has_clock"] = in_the_loop(settings)
     sections[wiring.PLANT] = {
         "vehicle_changes": json.dumps(settings.vehicle_changes | servo_mode(settings.profile)),
         "plant": settings.plant,
@@ -64,7 +68,10 @@ def parameters(
         "clock": settings.clock,
         "publish_imu": settings.imu != AUTOPILOT_IMU,
         "hil_port": ports.simulator_tcp,
+        "hil_address": settings.sim_address,
         "autopilot_always_answers": settings.autopilot == BUILTIN,
+        # an autopilot with its own clock must not see time that passes faster
+        "catch_up": 1.0 if in_the_loop(settings) else CATCH_UP,
         "linger": 0.0 if settings.autopilot == BUILTIN else PX4_LINGER,
         "recorded": True,
         "end_with_mission": True,
@@ -88,6 +95,8 @@ def parameters(
     }
     if users_autopilot(settings):
         sections[wiring.BRIDGE]["autopilot"] = settings.autopilot
+    if settings.autopilot != BUILTIN:
+        sections[wiring.BRIDGE] |= _px4_parameters(settings, folder)
     sections[wiring.SCENE] = {
         "scenario": scenario_source(settings),
         **settings.scenario_options.to_mapping(),
@@ -136,6 +145,20 @@ def complete(
     for node in DESCRIBED & sections.keys():
         sections[node]["vehicle"] = settings.vehicle.source
     return sections
+
+
+def _px4_parameters(settings: FlightSettings, folder: ResultFolder) -> dict[str, Any]:
+    """Write the list of the parameters that PX4 must have; return the bridge's parameters.
+
+    The bridge compares them. It writes only those of a PX4 that the flight starts.
+    """
+    own = settings.px4
+    values = px4_parameters.load(
+        settings.vehicle, None, settings.px4_params, None if own is None else own.ranges()
+    )
+    file = folder.path / "logs" / REQUIRED
+    file.write_text(px4_parameters.required(values, in_the_loop(settings)))
+    return {"required_parameters": str(file.absolute()), "set_parameters": own is not None}
 
 
 def _network_delay(settings: FlightSettings) -> str:
@@ -219,6 +242,8 @@ def autopilot(
     if settings.px4 is not None:
         log = folder.path / PX4_LOG
         own = ["--px4-dir", str(settings.px4.directory), "--log", str(log.absolute())]
+        own += ["--once"]
+        own += [word for text in settings.px4_params for word in ("--param", text)]
         return SITL, [*instance, *own, *vehicle]
     if users_autopilot(settings):
         return "", []

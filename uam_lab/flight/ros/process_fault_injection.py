@@ -7,6 +7,7 @@ stopped process.
 
 from __future__ import annotations
 
+import contextlib
 import os
 import signal
 import threading
@@ -14,6 +15,8 @@ import time
 from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
+
+import psutil
 
 from uam_lab.processes.processes import Processes
 from uam_lab.processes.thread_stop import StoppedThreads
@@ -25,6 +28,7 @@ from uam_sim_bridge.ports import is_discovery_port
 
 # threads of Fast DDS: one sends the announcements, one per UDP port receives
 EVENTS, PORT = "dds.ev.", "dds.udp."
+AUTOPILOT = "autopilot"
 
 
 def of_discovery(thread: str) -> bool:
@@ -33,6 +37,18 @@ def of_discovery(thread: str) -> bool:
     return thread.startswith(EVENTS) or (
         thread.startswith(PORT) and port.isdecimal() and is_discovery_port(int(port))
     )
+
+
+def program_of(name: str, pid: int) -> int:
+    """Return the process that does the work of the node `name` with process id `pid`.
+
+    For the autopilot it is PX4, if the node runs it as its child.
+    """
+    if name == AUTOPILOT:
+        with contextlib.suppress(psutil.Error):
+            for child in psutil.Process(pid).children():
+                return child.pid
+    return pid
 
 
 class ProcessFaults:
@@ -76,12 +92,13 @@ class ProcessFaults:
     def _begin(self, one: FaultState) -> None:
         fault = one.fault
         assert isinstance(fault, ProcessFault)
-        pid = self._children.pid(fault.node)
         if not self._children.running(fault.node):
             return
+        pid = program_of(fault.node, self._children.pid(fault.node))
         if isinstance(fault, NodeKill):
             self._children.let_end(fault.node)
-            os.kill(pid, signal.SIGKILL)
+            with contextlib.suppress(ProcessLookupError):
+                os.kill(pid, signal.SIGKILL)
             return
         if isinstance(fault, DiscoveryLoss):
             self._hindering[one.number] = StoppedThreads(pid, of_discovery)
@@ -135,6 +152,10 @@ class _Hindrance:
                 self._over.wait(wait)
 
     def _signal(self, number: signal.Signals) -> None:
-        """Send a signal if the child runs; its pid is then valid, as it was not waited for."""
+        """Send a signal if the child runs; its pid is then valid, as it was not waited for.
+
+        A program that the child runs may end a moment earlier.
+        """
         if self._running():
-            os.kill(self._pid, number)
+            with contextlib.suppress(ProcessLookupError):
+                os.kill(self._pid, number)

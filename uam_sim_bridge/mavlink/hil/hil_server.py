@@ -7,6 +7,7 @@ The wait is limited by `answer_timeout` if the autopilot answered the last tick,
 
 from __future__ import annotations
 
+import ipaddress
 import select
 import socket
 from dataclasses import dataclass
@@ -24,6 +25,19 @@ _IMU, _MAG, _BARO = 0x3F, 0x1C0, 0x1A00  # HIL_SENSOR.fields_updated
 _ARMED = 128
 CONTROLS = 16  # number of values of HIL_ACTUATOR_CONTROLS.controls
 _SLOW_PERIOD = 0.02  # s
+
+
+def open_only_here(address: str) -> bool:
+    """Return whether only programs of this machine can connect to a port at `address`.
+
+    Raises HilError if it is no IPv4 address.
+    """
+    try:
+        return ipaddress.IPv4Address(address).is_loopback
+    except ValueError:
+        raise HilError(
+            f"address '{address}' for the autopilot: an IPv4 address expected, as 127.0.0.1"
+        ) from None
 
 
 class HilError(PortError):
@@ -84,7 +98,7 @@ class HilServer:
             self._listener.close()
             reason = getattr(error, "strerror", None) or str(error)
             raise HilError(
-                f"TCP port {port} for the autopilot: {reason}; stop the program that "
+                f"TCP port {port} for the autopilot at {host}: {reason}; stop the program that "
                 "uses it or choose another instance"
             ) from None
 

@@ -20,7 +20,7 @@ from uam_sim_bridge.mavlink.offboard.sequence import (
 )
 from uam_sim_bridge.mavlink.offboard.setpoint import RateThrustParameters
 from uam_sim_bridge.mavlink.offboard.setpoints.desired import Target
-from uam_sim_bridge.mavlink.protocol.modes import MavCmd, MavResult, Mode
+from uam_sim_bridge.mavlink.protocol.modes import MavCmd, MavResult, Mode, Severity
 from uam_sim_bridge.mavlink.protocol.signing import Signing
 from uam_sim_bridge.mavlink.protocol.vision import VisionPose
 from uam_sim_bridge.mavlink.protocol.wire import Codec, Framer, Message, TextAssembler, mavlink2
@@ -30,6 +30,7 @@ from uam_sim_bridge.mavlink.telemetry.events import EventReader
 from uam_sim_bridge.mavlink.telemetry.link_statistics import LinkStatistics
 from uam_sim_bridge.mavlink.telemetry.parameter_check import ParameterWatch
 from uam_sim_bridge.mavlink.telemetry.parameter_reader import request as parameter_request
+from uam_sim_bridge.mavlink.telemetry.parameter_reader import setting as parameter_setting
 from uam_sim_bridge.mavlink.telemetry.required_parameters import RequiredParameters
 from uam_sim_bridge.mavlink.telemetry.streams import StreamCheck
 from uam_sim_bridge.mavlink.telemetry.time_sync import RebootDetector, TimeSync, nanoseconds
@@ -37,6 +38,10 @@ from uam_sim_bridge.mavlink.telemetry.vitals import Vitals
 from uam_sim_bridge.mavlink.transport.transport import Transport
 
 HEARTBEAT_PERIOD = 1.0  # s
+UNSIGNED = (
+    "the autopilot does not sign its messages, and signing_key is set: all are refused. PX4 v1.16 "
+    "has no MAVLink signing: start without signing_key, on a link that nobody else reaches"
+)
 EXPLAIN_PERIOD = 3.0  # s between two requests for the failed arming checks
 
 
@@ -90,6 +95,7 @@ class OffboardLink:
         self._pending: dict[int, Request] = {}
         self._heartbeat_in = self._heartbeat_out = self._explained = -math.inf
         self._was_connected = False  # at the last tick
+        self._told_unsigned = False
 
     def set_mapping(self, mapping: RateThrustParameters) -> None:
         """Compare the autopilot's parameters with this mapping from now on."""
@@ -98,7 +104,13 @@ class OffboardLink:
     @property
     def warnings(self) -> tuple[str, ...]:
         """Return one line per problem with the autopilot's parameters and streams."""
-        return self.parameters.warnings + self.streams.warnings
+        unsigned = (UNSIGNED,) if self._unsigned else ()
+        return unsigned + self.parameters.warnings + self.streams.warnings
+
+    @property
+    def _unsigned(self) -> bool:
+        """Whether the autopilot sends only unsigned messages, which this link refuses."""
+        return self._codec.unsigned is not None and self._heartbeat_in == -math.inf
 
     @property
     def mapping_read(self) -> bool:
@@ -180,6 +192,9 @@ class OffboardLink:
 
     def tick(self, time: float) -> None:
         """Send what `maintain` sends, and mode and arming requests due at `time` [s]."""
+        if self._unsigned and not self._told_unsigned:
+            self._told_unsigned = True
+            self.sequence.text(Severity.ERROR, UNSIGNED)
         connected = self.maintain(time)
         delivered = self.time_sync.delivered
         seen = Reported(connected, self.armed, self.mode, self.intended, self.failsafe, delivered)
@@ -352,3 +367,5 @@ class OffboardLink:
             self._command(MavCmd.SET_MESSAGE_INTERVAL, *stream)
         for name in self.parameters.due(time):
             self._send(parameter_request(name, self._target))
+        for name, value, kind in () if self.armed else self.parameters.to_write(time):
+            self._send(parameter_setting(name, value, kind, self._target))

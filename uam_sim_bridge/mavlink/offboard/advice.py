@@ -21,6 +21,24 @@ ADVICE: dict[str, str] = yaml_file.read(
 _COMPILED = tuple((re.compile(pattern, re.IGNORECASE), what) for pattern, what in ADVICE.items())
 
 
+_PASSING, _BEFORE_THE_STREAM = (
+    re.compile("|".join(patterns), re.IGNORECASE)
+    for patterns in (
+        yaml_file.read(configuration.path("px4/passing.yaml"), configuration.ConfigurationError)
+    ).values()
+)
+
+
+def passing(text: str, streaming: bool) -> bool:
+    """Return whether `text` also comes in a normal start or landing (config/px4/passing.yaml).
+
+    streaming: whether setpoints have been streamed long enough.
+    """
+    if not streaming and _BEFORE_THE_STREAM.search(text):
+        return True
+    return _PASSING.search(text) is not None
+
+
 def advice(text: str) -> str | None:
     """Return the advice for `text`; None if no pattern matches."""
     for pattern, what in _COMPILED:

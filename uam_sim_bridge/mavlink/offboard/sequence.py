@@ -28,7 +28,7 @@ from enum import Enum
 from typing import NamedTuple
 
 from uam_control.settings.parameter_set import ParameterSet, integer, number, switch
-from uam_sim_bridge.mavlink.offboard.advice import with_advice
+from uam_sim_bridge.mavlink.offboard.advice import passing, with_advice
 from uam_sim_bridge.mavlink.protocol.modes import (
     CUSTOM_MODE_ENABLED,
     FORCE,
@@ -110,9 +110,23 @@ class OffboardParameters(ParameterSet):
         "request OFFBOARD again after the autopilot's failsafe for a lost stream of setpoints; "
         "never against a mode that a person chose",
     )
+    reason_delay: float = number(
+        5.0,
+        "time for which a reason must last that the autopilot also gives in a normal start or "
+        "landing (config/px4/passing.yaml)",
+        "s",
+        0.0,
+        60.0,
+    )
     recovery_attempts: int = integer(
         6, "requests of return_after_lost_link in a whole flight", 0, 10000
     )
+
+
+_BEGIN_AND_END = (
+    *(Phase.WAITING, Phase.STREAMING, Phase.OFFBOARD, Phase.ARMING),
+    *(Phase.DISARMING, Phase.DISARMED),
+)
 
 
 class OffboardSequence:
@@ -142,6 +156,8 @@ class OffboardSequence:
         self._returns = 0  # requests of return_after_lost_link in this flight
         self._lost_link = False  # the autopilot left OFFBOARD because it had no setpoints
         self._killed = False
+        self._time = 0.0  # [s] of the last update
+        self._passing: dict[str, float] = {}  # reason that may pass → [s] since when
 
     @property
     def streaming(self) -> bool:
@@ -165,7 +181,7 @@ class OffboardSequence:
         if armed == self._desired:
             return
         self._desired = armed
-        self.reasons = ()
+        self._forget()
         self._attempts, self._asked = 0, -math.inf
         self._returns, self._regain_requests = 0, 0
         self._killed = self._killed and not armed
@@ -183,8 +199,7 @@ class OffboardSequence:
         The first request is sent even if the vehicle is reported disarmed: it may be arming.
         """
         self._killed, self._asked = True, -math.inf
-        self._reason("killed by command")
-        self.phase = Phase.FAILED
+        self._fail("killed by command")
 
     def streamed(self, time: float) -> None:
         """Note that a setpoint was sent at `time` [s]."""
@@ -192,6 +207,7 @@ class OffboardSequence:
 
     def update(self, time: float, seen: Reported) -> Request | None:
         """Advance to `time` [s] and return the request to send now, None for none."""
+        self._time = time
         if self._in_flight and time - min(self._streamed, seen.delivered) > LINK_GAP:
             self._stream_lost = time
         if self._killed:
@@ -218,8 +234,7 @@ class OffboardSequence:
             self._release(time, seen)
             return None
         if left:
-            self._reason(f"{seen.mode.name} was chosen before arming: start again")
-            self.phase = Phase.FAILED
+            self._fail(f"{seen.mode.name} was chosen before arming: start again")
             return None
         if time - self._stream_start < self.parameters.stream_time:
             self.phase = Phase.STREAMING
@@ -238,8 +253,7 @@ class OffboardSequence:
         """
         self._offboard_since = None
         if self._in_flight:  # the phase is FAILED if a heartbeat reported "disarmed" before
-            self._reason("the autopilot rebooted in flight")
-            self.phase = Phase.FAILED
+            self._fail("the autopilot rebooted in flight")
         elif self.phase in (Phase.STREAMING, Phase.OFFBOARD, Phase.ARMING):
             self._reason("the autopilot rebooted")
             self.phase, self._stream_start = Phase.STREAMING, time
@@ -248,12 +262,35 @@ class OffboardSequence:
         """Handle the result of COMMAND_ACK for a request; a refusal becomes a reason."""
         if result == MavResult.ACCEPTED:
             return
-        self._reason(f"{request.value} refused ({result_word(result)})")
+        self._lasting_reason(f"{request.value} refused ({result_word(result)})")
 
     def text(self, severity: int, text: str) -> None:
         """Handle a STATUSTEXT; warnings and worse become reasons."""
         if severity <= Severity.WARNING:
-            self._reason(text.strip())  # PX4 ends a text with a tab if an event has the same text
+            # PX4 ends a text with a tab if an event has the same text
+            self._lasting_reason(text.strip())
+
+    def _lasting_reason(self, text: str) -> None:
+        """Add a reason; one that may pass only if it has lasted for `reason_delay`."""
+        streaming = self.phase not in (Phase.WAITING, Phase.STREAMING)
+        if passing(text, streaming) and self.phase in _BEGIN_AND_END:
+            since = self._passing.setdefault(text, self._time)
+            if self._time - since < self.parameters.reason_delay:
+                return
+        self._reason(text)
+
+    def _forget(self) -> None:
+        """Discard all reasons: their cause is over."""
+        self.reasons = ()
+        self._passing.clear()
+
+    def _fail(self, text: str) -> None:
+        """End in FAILED with the reasons so far, also those that might have passed, and `text`."""
+        for earlier in self._passing:
+            self._reason(earlier)
+        self._passing.clear()
+        self._reason(text)
+        self.phase = Phase.FAILED
 
     def _reason(self, text: str) -> None:
         text = with_advice(text)
@@ -289,20 +326,21 @@ class OffboardSequence:
             Phase.RELEASED,
             Phase.FAILED,
         ):
-            self.phase, self.reasons, self._in_flight = Phase.DISARMED, (), False
+            self.phase, self._in_flight = Phase.DISARMED, False
+            self._forget()
             self.released_to, self._offboard_since = "", None
         elif not armed and self.phase is not Phase.DISARMED:
             self.phase = Phase.STREAMING
         return None
 
     def _fly(self) -> None:
-        self.phase, self._attempts, self.reasons = Phase.FLYING, 0, ()
+        self.phase, self._attempts = Phase.FLYING, 0
+        self._forget()
         self.released_to, self._in_flight, self._regain_requests = "", True, 0
 
     def _keep_flying(self, time: float, seen: Reported, left: bool) -> None:
         if not seen.armed:
-            self._reason("the autopilot disarmed in flight")
-            self.phase = Phase.FAILED
+            self._fail("the autopilot disarmed in flight")
         elif left and seen.mode is not Mode.OFFBOARD and not self.let_go:
             self._release(time, seen)
 
@@ -323,8 +361,7 @@ class OffboardSequence:
 
     def _stay_released(self, time: float, seen: Reported) -> Request | None:
         if not seen.armed:
-            self._reason(f"disarmed while released to {self.released_to}")
-            self.phase = Phase.FAILED
+            self._fail(f"disarmed while released to {self.released_to}")
             return None
         if seen.mode is Mode.OFFBOARD:
             self._fly()
@@ -370,8 +407,7 @@ class OffboardSequence:
             return None
         counted = phase not in (Phase.RELEASED, Phase.FAILED)  # those have budgets of their own
         if counted and self._attempts >= self.parameters.attempts:
-            self._reason(f"no success after {self._attempts} requests for {request.value}")
-            self.phase = Phase.FAILED
+            self._fail(f"no success after {self._attempts} requests for {request.value}")
             return None
         self._asked = time
         self._attempts += counted

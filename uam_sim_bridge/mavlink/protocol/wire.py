@@ -17,6 +17,7 @@ from uam_sim_bridge.mavlink.protocol.signing import Seal, Signing
 MARKER_1, MARKER_2 = 0xFE, 0xFD
 _OVERHEAD_1, _OVERHEAD_2, _SIGNATURE = 8, 12, 13
 _SIGNED = 1  # incompatibility flag
+_AUTOPILOT = 15  # index of HEARTBEAT.autopilot in a frame
 _MARKERS = re.compile(b"[\xfd\xfe]")
 
 # Messages that PX4 sends and pymavlink omits (work in progress in MAVLink): id → CRC_EXTRA. The
@@ -29,12 +30,14 @@ Message = mavlink2.MAVLink_message
 class Codec:
     """Encodes messages of one sender (system and component id) and decodes those of others.
 
-    With `signing` it signs every frame and decodes only frames with a valid signature.
+    With `signing` it signs every frame and decodes only frames with a valid signature. `unsigned`:
+    MAV_AUTOPILOT of the newest heartbeat refused because it has no signature, None without one.
     """
 
     def __init__(self, system: int, component: int, signing: Signing | None = None) -> None:
         self._mav = mavlink2.MAVLink(None, srcSystem=system, srcComponent=component)
         self._seal = None if signing is None else Seal(self._mav, signing)
+        self.unsigned: int | None = None
 
     @property
     def refused(self) -> int:
@@ -66,7 +69,17 @@ class Codec:
             pass
         if self._seal is not None:
             self._seal.settle(message is not None)
+            if message is None:
+                self._note_unsigned(frame)
         return None if isinstance(message, mavlink2.MAVLink_unknown) else message
+
+    def _note_unsigned(self, frame: bytes) -> None:
+        """Take the kind of autopilot from an unsigned heartbeat (MAVLink 2)."""
+        heartbeat = len(frame) > _AUTOPILOT and frame[0] == MARKER_2
+        if heartbeat and not frame[2] & _SIGNED and message_number(frame, 0) == 0:
+            kind = frame[_AUTOPILOT]
+            if kind != mavlink2.MAV_AUTOPILOT_INVALID:
+                self.unsigned = kind
 
 
 class Framer:

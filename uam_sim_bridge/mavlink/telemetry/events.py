@@ -1,8 +1,8 @@
 """Converts PX4's EVENT messages to text without the metadata file of a ground station.
 
 An EVENT carries a hash of the event's name and up to 40 bytes of arguments. config/px4/events.yaml
-lists the events about arming and about loss of OFFBOARD, with PX4's texts (v1.16.0). PX4 sends the
-arming checks as one report:
+lists the events about arming and about loss of OFFBOARD, with PX4's texts (v1.16.0), and the names
+of the others. PX4 sends the arming checks as one report:
 
     summary (which modes may be armed)  →  one event per failed check  →  health summary
 
@@ -45,7 +45,9 @@ def event_id(name: str) -> int:
     return value & 0xFFFFFF | _AUTOPILOT
 
 
-_NAMES = {event_id(name): name for name in (*CHECKS, *OTHERS, SUMMARY, HEALTH_SUMMARY)}
+_NAMES = {
+    event_id(name): name for name in (*_TEXTS["names"], *CHECKS, *OTHERS, SUMMARY, HEALTH_SUMMARY)
+}
 
 
 class EventReader:
@@ -74,7 +76,8 @@ class EventReader:
                 severity = min(severity, Severity.WARNING)
             return severity, _failsafe_text(text, struct.unpack_from("<" + layout, arguments))
         elif severity <= Severity.ERROR:
-            return severity, f"event {message.event:#010x} has no text here: see PX4's log"
+            known = f"event {name}" if name else f"event {message.event:#010x}, of unknown name"
+            return severity, f"{known}: see PX4's log"
         return None
 
     def _check(self, name: str, severity: int, arguments: bytes) -> tuple[int, str] | None:

@@ -8,7 +8,7 @@ from dataclasses import replace
 
 from uam_sim_bridge.mavlink.offboard.setpoint import RateThrustParameters
 from uam_sim_bridge.mavlink.protocol.wire import Message
-from uam_sim_bridge.mavlink.telemetry.parameter_reader import ATTEMPTS, ParameterReader
+from uam_sim_bridge.mavlink.telemetry.parameter_reader import ATTEMPTS, RETRY, ParameterReader
 from uam_sim_bridge.mavlink.telemetry.required_parameters import Difference, RequiredParameters
 
 _AXES = ("ROLLRATE", "PITCHRATE", "YAWRATE")
@@ -18,6 +18,7 @@ WATCHED = (
     "THR_MDL_FAC", "MPC_THR_HOVER", "COM_OF_LOSS_T",
 )  # fmt: skip
 _TOLERANCE = 1e-4  # relative: MAVLink carries 32-bit numbers
+WRITES = 3  # of each parameter that is set
 HICCUP = 0.5  # s, longest normal gap in the setpoint stream (busy computer or link)
 
 
@@ -87,7 +88,8 @@ def unanswered(names: Iterable[str], attempts: int) -> Iterator[str]:
 class ParameterWatch:
     """Reads the parameters of WATCHED and those required, and compares them.
 
-    `values`: received parameters by name; `warnings`: one line per problem.
+    `values`: received parameters by name; `warnings`: one line per problem; `writing`: whether
+    `to_write` returns parameters; `written`: one line per parameter that it has returned.
     """
 
     def __init__(
@@ -98,11 +100,15 @@ class ParameterWatch:
         self._reader = ParameterReader((*WATCHED, *self.required))
         self.values = self._reader.values
         self._mapping = mapping
+        self.writing, self.written = False, ()
+        self._writes: dict[str, int] = {}  # of parameters whose first value was not the required
+        self._write_due = -math.inf
         self._compare()
 
     def restart(self) -> None:
         """Discard all values and request them again."""
         self._reader.restart()
+        self._writes.clear()
         self._compare()
 
     def set_mapping(self, mapping: RateThrustParameters) -> None:
@@ -127,8 +133,17 @@ class ParameterWatch:
 
     def take(self, message: Message) -> None:
         """Store the value of a PARAM_VALUE; other parameters are ignored."""
-        if self._reader.take(message):
-            self._compare()
+        known = set(self.values)
+        name = self._reader.take(message)
+        if not name:
+            return
+        rule = self.required.get(name)
+        wrong = rule is not None and len(rule.values) == 1 and not rule.met(self.values[name])
+        if wrong and name not in known:
+            self._writes[name] = 0
+        else:  # the answer, or changed by somebody else, who keeps it
+            self._writes.pop(name, None)
+        self._compare()
 
     def due(self, time: float) -> list[str]:
         """Return the names to request at the tick `time` [s].
@@ -140,6 +155,26 @@ class ParameterWatch:
         if self._reader.given_up is not before:
             self._compare()
         return names
+
+    def to_write(self, time: float) -> list[tuple[str, float, int]]:
+        """Return name, value and MAV_PARAM_TYPE of the parameters to write at `time` [s].
+
+        Those with one required value whose first value differed, until an answer comes, at most
+        WRITES times each. What somebody else changes later stays as it is.
+        """
+        if not self.writing or time < self._write_due:
+            return []
+        self._write_due = time + RETRY
+        due = []
+        for name, count in self._writes.items():
+            (value,) = self.required[name].values
+            if count == 0:
+                found = self.values[name]
+                self.written += (f"{name} was {found:.9g}: set to {value:.9g}",)
+            if count < WRITES:
+                self._writes[name] = count + 1
+                due.append((name, value, self._reader.types[name]))
+        return due
 
     def _compare(self) -> None:
         given_up = self._reader.missing if self._reader.given_up else ()

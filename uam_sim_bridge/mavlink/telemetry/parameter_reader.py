@@ -29,12 +29,24 @@ def value_of(message: Message) -> float:
     return float(struct.unpack(layout, struct.pack("<f", message.param_value))[0])
 
 
+def setting(name: str, value: float, kind: int, system: int) -> Message:
+    """Return the PARAM_SET of a parameter of the autopilot `system`; kind: MAV_PARAM_TYPE."""
+    layout = _INTEGERS.get(kind)
+    if layout is not None:
+        value = struct.unpack("<f", struct.pack(layout, round(value)))[0]
+    return mavlink2.MAVLink_param_set_message(
+        system, mavlink2.MAV_COMP_ID_AUTOPILOT1, name.encode(), value, kind
+    )
+
+
 class ParameterReader:
-    """`values`: received parameters by name; `given_up`: ATTEMPTS requests of the rest failed."""
+    """`values`: received parameters by name; `types`: their MAV_PARAM_TYPE; `given_up`: ATTEMPTS
+    requests of the rest failed."""
 
     def __init__(self, names: Iterable[str]) -> None:
         self.names = tuple(dict.fromkeys(names))
         self.values: dict[str, float] = {}
+        self.types: dict[str, int] = {}
         self.restart()
 
     def restart(self) -> None:
@@ -60,6 +72,7 @@ class ParameterReader:
         if name not in self._attempts:
             return ""
         self.values[name] = value_of(message)
+        self.types[name] = message.param_type
         return name
 
     def due(self, time: float) -> list[str]:

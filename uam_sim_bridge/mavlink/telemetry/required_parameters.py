@@ -1,6 +1,7 @@
 """Values that the autopilot's parameters must have: rules from a file, and the differences.
 
-config/px4/vehicle.yaml: sections of `NAME: {rule, why}`. The rules: is, one_of, least, most, bits.
+config/px4/vehicle.yaml: sections of `NAME: {rule, why}`. The rules: is, one_of, least, most, bits;
+`optional: true` beside a rule: an autopilot without this parameter passes.
 """
 
 from __future__ import annotations
@@ -39,7 +40,8 @@ class Difference(NamedTuple):
 class Rule:
     """What a parameter must be, and why.
 
-    values: allowed ones, () for any; least, most: limits, both allowed; bits: all must be set.
+    values: allowed ones, () for any; least, most: limits, both allowed; bits: all must be set;
+    optional: an autopilot without this parameter passes.
     """
 
     why: str
@@ -47,6 +49,7 @@ class Rule:
     least: float = -math.inf
     most: float = math.inf
     bits: int = 0
+    optional: bool = False
 
     def met(self, value: float) -> bool:
         """Return whether the value meets the rule, to the accuracy of 32-bit numbers."""
@@ -106,11 +109,6 @@ class RequiredParameters(dict[str, Rule]):
                     raise ConfigurationError(f"{file}: {name}: {error}") from None
         return rules
 
-    @classmethod
-    def of(cls, values: Mapping[str, float], why: str) -> RequiredParameters:
-        """Return the rules that each parameter has exactly the value of `values`."""
-        return cls({name: Rule(why, values=(float(value),)) for name, value in values.items()})
-
     def differences(
         self, values: Mapping[str, float], unanswered: bool = True
     ) -> tuple[Difference, ...]:
@@ -121,7 +119,7 @@ class RequiredParameters(dict[str, Rule]):
         return tuple(
             Difference(name, values.get(name), rule.required, rule.why)
             for name, rule in self.items()
-            if (not rule.met(values[name]) if name in values else unanswered)
+            if (not rule.met(values[name]) if name in values else unanswered and not rule.optional)
         )
 
 
@@ -129,7 +127,10 @@ def _rule(entry: Any) -> Rule:
     """Return the rule of an entry of the file; raises ValueError."""
     if not isinstance(entry, dict) or not isinstance(entry.get("why"), str):
         raise ValueError("{rule, why: text} expected")
-    given = {key: value for key, value in entry.items() if key != "why"}
+    given = {key: value for key, value in entry.items() if key not in ("why", "optional")}
+    optional = entry.get("optional", False)
+    if not isinstance(optional, bool):
+        raise ValueError(f"optional: {optional!r}; true and false are allowed")
     allowed = f"rules are {', '.join(_RULES)}"
     if not given or not given.keys() <= set(_RULES):
         raise ValueError(f"{', '.join(map(str, given)) or 'no rule'}; {allowed}")
@@ -154,6 +155,7 @@ def _rule(entry: Any) -> Rule:
         given.get("least", -math.inf),
         given.get("most", math.inf),
         bits,
+        optional,
     )
     if rule.least > rule.most:
         raise ValueError(f"least {rule.least:g} is above most {rule.most:g}")

@@ -12,7 +12,7 @@ import math
 from collections import deque
 
 PERIOD = 0.2  # s between two requests
-JUMP = 0.1  # s of offset error beyond half the round trip: the autopilot's clock has jumped
+JUMP = 0.1  # s of offset error beyond half the round trip: one of the clocks has jumped
 JUMPS_TO_RESET = 2  # in a row: a single one may be a damaged answer
 _OUTSTANDING = 16  # newest requests whose answers are accepted
 _RECENT = 25  # answers, window of the shortest round trip for the weights
@@ -63,10 +63,11 @@ class TimeSync:
         return ts1
 
     def answer(self, time: float, tc1: int, ts1: int) -> bool:
-        """Process an answer received at `time` [s]; True if the autopilot's clock has jumped.
+        """Process an answer received at `time` [s]; True if the autopilot's clock has jumped back.
 
         tc1: autopilot's time [ns]; ts1: time of the request [ns]. Answers to other requests are
-        ignored.
+        ignored. A jump forward is no restart of the autopilot, whose clock then begins anew: the
+        ticks of a simulation fell behind an autopilot with its own clock.
         """
         if ts1 not in self._requested:
             return False
@@ -83,9 +84,10 @@ class TimeSync:
             self._jumps += 1
             if self._jumps < JUMPS_TO_RESET:
                 return False
+            back = offset < self.offset
             self.restart()
             self._take(offset, round_trip)
-            return True
+            return back
         self._jumps = 0
         self._take(offset, round_trip)
         return False
