@@ -5,11 +5,11 @@ import math
 import numpy as np
 import pytest
 from arm_rig import BAUD, STOWED
-from std_srvs.srv import Trigger
+from std_srvs.srv import SetBool, Trigger
 
 from uam_msgs_py.messages import topics
 from uam_msgs_py.messages.convert import JointCommandWriter, read_joints, read_values
-from uam_msgs_py.messages.status import ERROR, OK, WARN
+from uam_msgs_py.messages.status import ERROR, OK, WARN, AutopilotState
 from uam_sim_bridge.emulation.dynamixel import EmulatedBus, EmulatedServo, StillShaft
 
 MODULE = "uam_sim_bridge.nodes.arm_driver"
@@ -175,3 +175,30 @@ def test_goal_positions_for_servos_in_position_mode(probe, start, arm, tmp_path)
     probe.until(met, "the goals")
     assert [shaft.last.mode for shaft in rig.shafts] == [3, 3]
     assert math.isclose(rig.shafts[0].angle, STOWED[0])
+
+
+def test_joints_are_released_for_the_checklist_and_never_on_an_armed_vehicle(arm, probe):
+    rig = arm()
+    autopilot = probe.publisher(topics.AUTOPILOT_STATE)
+    effort, driven = [0.5, -0.3], [0.5 / 1.304, -0.3 / 1.304]
+
+    def release(on):
+        answer = probe.call(SetBool, "arm_driver/release", SetBool.Request(data=on))
+        return answer.success, answer.message
+
+    def arm_vehicle(armed):
+        autopilot.publish(AutopilotState(True, "OFFBOARD", armed).to_message(1))
+
+    rig.until_driven(effort, lambda: rig.draws(driven), "the efforts")
+    assert release(True) == (True, "released: support the arm")
+    rig.until_driven(effort, lambda: rig.draws([0.0, 0.0]), "no torque")
+    assert release(False) == (True, "driven again")
+    rig.until_driven(effort, lambda: rig.draws(driven), "the efforts again")
+    release(True)
+
+    def refused():
+        arm_vehicle(True)
+        return release(True) == (False, "refused: the vehicle is armed")
+
+    probe.until(refused, "the refusal")
+    rig.until_driven(effort, lambda: rig.draws(driven), "an armed vehicle drives its arm")
