@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 import pytest
-from held_vehicle import HeldVehicle, Wiring, perform
+from held_vehicle import HeldVehicle, Wiring, axis_vector, perform
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -231,3 +231,21 @@ def test_the_whole_list_with_a_person():
     assert done == [one.name for one in checklist.steps]
     confirmed = [one.name for one in checklist.steps if one.confirmed]
     assert confirmed == ["hands_on", "magnet_on", "magnet_off", "clear"]
+
+
+@FEW
+@given(seed=seeds, name=st.sampled_from(TURNS))
+def test_a_person_who_drifts_and_hesitates_does_not_fail_a_correct_vehicle(seed, name):
+    """The gyro's bias must not add up over the time in which nothing happens."""
+    vehicle, step = HeldVehicle(seed=seed, noise=1.0), steps()[name]
+    step.begin(vehicle.time)
+    vehicle.go(step, 0.8, turn=[0.0, 0.0, 0.04])  # slow enough to count as rest
+    vehicle.go(step, 0.8, turn=np.zeros(3))
+    vehicle.go(step, 25.0)
+    axis = TURNS.index(name)
+    for size in (0.3, -0.3) if axis < 2 else (0.5,):
+        vehicle.go(step, 2.5, turn=axis_vector(axis, size))
+        vehicle.go(step, 6.0)
+    vehicle.go(step, 2.0, turn=np.zeros(3))
+    vehicle.go(step, 1.0)
+    assert step.state is StepState.PASSED, (step.value, step.seen)

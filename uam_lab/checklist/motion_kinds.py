@@ -25,7 +25,6 @@ class Pose:
     attitude: np.ndarray
     gyro: np.ndarray
     force: np.ndarray
-    rate: np.ndarray
     joints: np.ndarray
     commanded: np.ndarray
 
@@ -43,7 +42,6 @@ class Pose:
             middle.attitude,
             middle.gyro,
             mean("force"),
-            mean("rate"),
             mean("joints"),
             np.median([one.commanded for one in samples], axis=0),
         )
@@ -62,18 +60,21 @@ class Turn:
         """Return the turn (3,) [rad] about roll, pitch and yaw axis since `begin`."""
         return rotation_vector(begin.attitude, now.attitude)
 
-    def checks(self, begin: Pose, kept: Pose, sign: int) -> Iterator[Finding]:
-        """Yield whether accelerometer, gyroscope and commands agree about the turn."""
+    def checks(self, begin: Pose, left: Sample, kept: Pose, sign: int) -> Iterator[Finding]:
+        """Yield whether accelerometer, gyroscope and commands agree about the turn.
+
+        left: the sample at which the pose before was left. The gyroscope is integrated from there,
+        so that its bias does not add up while nothing moves.
+        """
         limits, axis = self._limits, self._axis
-        turn = self.components(begin, kept)
-        size = abs(float(turn[axis]))
+        size = abs(float(self.components(begin, kept)[axis]))
         if axis < 2:
             before, after = (one / np.linalg.norm(one) for one in (begin.force, kept.force))
             tilted = up(kept.attitude) - up(begin.attitude)
             yield self._agreement("accelerometer", after - before, tilted, size)
-        drift = begin.rate * (kept.time - begin.time)
-        turned = rotation_vector(begin.gyro, kept.gyro) - drift
-        yield self._agreement("gyro", turned, turn, size)
+        turned = rotation_vector(left.gyro, kept.gyro)
+        turn = rotation_vector(left.attitude, kept.attitude)
+        yield self._agreement("gyro", turned, turn, float(np.linalg.norm(turn)))
         if not self._rates:
             return
         against = -sign * kept.commanded[axis]
@@ -105,7 +106,7 @@ class Shift:
         moved = now.position - begin.position
         return np.array([moved @ nose, nose[0] * moved[1] - nose[1] * moved[0], moved[2]])
 
-    def checks(self, begin: Pose, kept: Pose, sign: int) -> Iterator[Finding]:
+    def checks(self, begin: Pose, left: Sample, kept: Pose, sign: int) -> Iterator[Finding]:
         """Yield nothing: no other sensor measures the position."""
         yield from ()
 
@@ -122,6 +123,6 @@ class JointTurn:
         """Return the turns (n,) [rad] of all joints since `begin`."""
         return now.joints - begin.joints
 
-    def checks(self, begin: Pose, kept: Pose, sign: int) -> Iterator[Finding]:
+    def checks(self, begin: Pose, left: Sample, kept: Pose, sign: int) -> Iterator[Finding]:
         """Yield nothing: no other sensor measures the joints."""
         yield from ()

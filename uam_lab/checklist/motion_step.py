@@ -8,7 +8,7 @@ wrong direction fails as soon as it is kept.
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from enum import Enum
 from typing import Protocol
 
@@ -20,6 +20,7 @@ from uam_lab.checklist.motion_kinds import Pose
 from uam_lab.checklist.samples import Sample, Window, angle_between, rotation_vector, up
 from uam_lab.checklist.step import MOTION, Situation, Step, StepState
 
+STILL_THERE = 0.25  # share of the amplitude within which a pose is not left yet
 LEFT_BEHIND = 0.75  # share of the amplitude by which a kept pose is left before the next counts
 _UPWARD = np.array([0.0, 0.0, 1.0])
 
@@ -32,7 +33,7 @@ class Kind(Protocol):
 
     def components(self, begin: Pose, now: Sample | Pose) -> np.ndarray: ...
 
-    def checks(self, begin: Pose, kept: Pose, sign: int) -> Sequence[Finding]: ...
+    def checks(self, begin: Pose, left: Sample, kept: Pose, sign: int) -> Iterable[Finding]: ...
 
 
 class Stage(Enum):
@@ -71,6 +72,7 @@ class MotionStep(Step):
         self._stage, self._next = Stage.REST, 0
         self._begin: Pose | None = None
         self._from: np.ndarray | None = None  # components when the target became the next one
+        self._left: Sample | None = None  # newest sample that is still there
         self._since: float | None = None
         self._texts: list[str] = []
         self._path: deque[np.ndarray] = deque()  # components of the samples in the window
@@ -122,13 +124,15 @@ class MotionStep(Step):
         if unrest or tilt > self._limits.upright:
             return
         self._begin, self._stage = pose, Stage.MOVE
-        self._from = np.zeros(len(self._kind.labels))
+        self._from, self._left = np.zeros(len(self._kind.labels)), samples[-1]
         self.seen = "at rest"
 
     def _move(self, now: Situation) -> None:
         begin, axis = self._begin, self._axis
         moved = self._kind.components(begin, now.sample)
         self.seen = self._shown(moved)
+        if np.max(np.abs(moved - self._from)) < STILL_THERE * self._amplitude:
+            self._left = now.sample
         samples, path = self._followed(moved)
         if not samples or np.max(np.ptp(path, axis=0)) > self._still:
             return
@@ -139,7 +143,7 @@ class MotionStep(Step):
             return
         sign = self._targets[self._next][0]
         pose = Pose.of(samples)
-        found = [self._direction(kept, sign), *self._kind.checks(begin, pose, sign)]
+        found = [self._direction(kept, sign), *self._kind.checks(begin, self._left, pose, sign)]
         failed = [one for one in found if not one.passed]
         if failed:
             self._fail(now.time, "; ".join(one.text for one in failed))
