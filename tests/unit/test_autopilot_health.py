@@ -78,6 +78,15 @@ def test_the_stand_in_has_no_battery():
     assert not from_sys_status(sys_status(autopilot, 0.0)).known
 
 
+def test_a_charge_without_a_voltage_is_kept():
+    vitals, autopilot = Vitals(), Autopilot()
+    autopilot.set_parameter("SIM_BAT_ENABLE", 1)
+    autopilot.battery.update(0.0, False)
+    vitals.take("BATTERY_STATUS", battery_status(autopilot, 0.0))
+    vitals.take("SYS_STATUS", sys_status(autopilot, 0.0))
+    assert vitals.battery.left == 1.0
+
+
 def test_the_stand_in_reports_its_simulated_battery():
     autopilot = Autopilot()
     for name, value in {"SIM_BAT_ENABLE": 1, "SIM_BAT_DRAIN": 100, "SIM_BAT_MIN_PCT": 1}.items():

@@ -44,6 +44,7 @@ from uam_sim_bridge.ports import Ports, Reservation
 
 DEVICES, LOGS = "devices", "logs"  # in the result folder
 POLL = 0.05  # [s]
+SAY_PERIOD = 5.0  # [s] between two lines about the lists
 DEVICES_WAIT = 60.0  # [s] until the laboratory has its devices
 # items about the companion of the vehicle and the pilot's radio, which a rehearsal has not
 ABSENT = {"clock_synchronised": False, "performance_governor": False, "radio": False}
@@ -200,7 +201,7 @@ class RehearsalCourse:
         self._rehearsal, self._children = rehearsal, children
         self._vehicle, self._starter = rehearsal.vehicle_course(listener), rehearsal.starter()
         self._open = ExitStack()
-        self._said = ""
+        self._said, self._say_at = "", 0.0  # [s] time.monotonic()
 
     def __enter__(self) -> RehearsalCourse:
         self._open.enter_context(self._vehicle)
@@ -214,8 +215,9 @@ class RehearsalCourse:
         """Return whether the laboratory and the vehicle's flight go on."""
         starter, rehearsal = self._starter, self._rehearsal
         rehearsal.started, rehearsal.refused = starter.started, starter.refused
-        if starter.waits_for != self._said and not starter.started:
-            self._said = starter.waits_for
+        now = time.monotonic()
+        if starter.waits_for != self._said and not starter.started and now >= self._say_at:
+            self._said, self._say_at = starter.waits_for, now + SAY_PERIOD
             rehearsal.say(f"before the start: {self._said}")
         vehicle = self._vehicle.goes_on()
         return vehicle and not starter.refused and self._children.running(LABORATORY)

@@ -10,8 +10,9 @@ from diagnostic_msgs.msg import DiagnosticArray
 
 from uam_lab.flight.operator import NoFlight, Operator
 from uam_lab.processes.guest import Guest
+from uam_msgs_py.messages import topics
+from uam_msgs_py.messages.status import OK
 from uam_msgs_py.node import polling
-from uam_sim_bridge.nodes.laboratory import CHECKLIST
 
 LOOK = 0.2  # [s] between two looks
 AGAIN = 1.0  # [s] between two requests to start
@@ -46,17 +47,17 @@ class Starter(threading.Thread):
     def run(self) -> None:
         """Watch the lists, request the start."""
         with self._guest("uam_rehearse") as guest:
-            lists = polling.listen(guest.node, CHECKLIST)
+            lists = polling.listen(guest.node, topics.CHECKLIST)
             operator = Operator(guest.node)
-            passed, seen = not self._required, ""
+            passed, most = not self._required, -1
             progress, asked = time.monotonic(), 0.0
             while not self._ended.wait(LOOK) and not self.started:
                 now = time.monotonic()
                 for message in polling.messages(lists):
                     passed = passed or list_passed(message)
                     self.waits_for = list_text(message)
-                    if (items := passed_items(message)) != seen:
-                        seen, progress = items, now
+                    if (count := passed_items(message)) > most:  # not those that come and go
+                        most, progress = count, now
                 if now - progress > self._patience:
                     self.refused = self.waits_for
                     return
@@ -80,10 +81,9 @@ def list_text(message: DiagnosticArray) -> str:
     return f"{text}: {failing}" if failing and failing not in text else text
 
 
-def passed_items(message: DiagnosticArray) -> str:
-    """Return the passed items and the present step, to see progress."""
-    items = [one.name for one in message.status[1:] if one.level == b"\x00"]
-    return ", ".join(sorted(items)) + _value(message, "step")
+def passed_items(message: DiagnosticArray) -> int:
+    """Return the number of items that have passed."""
+    return sum(one.level == OK for one in message.status[1:])
 
 
 def _value(message: DiagnosticArray, key: str) -> str:

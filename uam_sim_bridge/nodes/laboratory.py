@@ -50,12 +50,10 @@ from uam_sim_bridge.rehearsal.laboratory import Laboratory
 from uam_sim_bridge.rehearsal.paced_clock import PacedClock
 from uam_sim_bridge.rehearsal.person import Person
 
-CHECKLIST = topics.Topic(
-    "uam/checklist", DiagnosticArray, topics.LATCHED, "the lists before a flight"
-)
 NAME, IMU_DRIVER = "laboratory", "imu_driver"
 READY = "ready"  # file in the folder of the devices, when they are there
-LISTEN_TICKS, SERVE_TICKS = 5, 25  # [ticks] between two looks at topics, at services
+# [ticks] between two messages of rotors, payload and magnet, and looks at topics; at services
+LISTEN_TICKS, SERVE_TICKS = 5, 25
 SWITCH = 0.0005  # [s] a thread of a device waits at most so long for the interpreter
 CONFIRM = "confirm"  # a step that needs it
 ASK_AGAIN = 2.0  # [s] between two confirmations of a step
@@ -100,7 +98,7 @@ class Rehearsal:
         )
         self.statistics = Statistics()
         self._cables = Cables(self.lab, faults)
-        self._cables.update(0.0)  # those at the start
+        self._changed = self._cables.update(0.0)  # faults at the start; published later
         self._fault_topic = FaultTopic(node) if faults else None
         self._truth = TruthTopics(node, vehicle)
         self._imu_node, self._imu = None, None
@@ -112,7 +110,7 @@ class Rehearsal:
             self._imu_writer = ImuWriter(frame(node, topics.BODY))
             self._imu_delay = Delay(numbers.numbers["sensors"]["imu"]["latency_ticks"])
         self._mission_topic = polling.listen(node, topics.MISSION_STATUS)
-        self._checklist = polling.listen(node, CHECKLIST)
+        self._checklist = polling.listen(node, topics.CHECKLIST)
         self._confirm = node.create_client(Trigger, "checklist/confirm")
         self._executor = SingleThreadedExecutor()
         self._executor.add_node(node)
@@ -154,17 +152,19 @@ class Rehearsal:
     def _tick(self, host: float) -> None:
         """Sense, publish, wait for the end of the tick, and step; host: system's time [s]."""
         lab, stamp = self.lab, round(host * SECOND)
-        changed = self._cables.update(lab.plant.time)
-        if changed and self._fault_topic:
-            self._fault_topic.publish(stamp, changed)
+        self._changed += self._cables.update(lab.plant.time)
+        if self._changed and self._fault_topic:
+            self._fault_topic.publish(stamp, self._changed)
+            self._changed = []
         samples, truth = lab.sense(host)
         lab.send_hil(samples, truth)
         if self._imu is not None:
             self._publish_imu(samples.hil, host)
-        motors = lab.hil.motors
-        self._truth.publish(stamp, truth, motors, lab.magnet)
         tick = lab.plant.tick
-        if tick % LISTEN_TICKS == 0:
+        if tick % LISTEN_TICKS:
+            self._truth.publish_state(stamp, truth)
+        else:
+            self._truth.publish(stamp, truth, lab.hil.motors, lab.magnet)
             self._listen()
             self._be_the_person(truth.state[CHI])
         if tick % SERVE_TICKS == 0:

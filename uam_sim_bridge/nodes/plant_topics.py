@@ -111,7 +111,7 @@ class TruthTopics(Outlets):
 
         motors (rotors,): last commands 0..1; magnet: last command.
         """
-        self._state.publish(self._state_writer.fill(stamp, truth.state))
+        self.publish_state(stamp, truth)
         self._payload.publish(
             self._payload_writer.fill(stamp, truth.payload_position, truth.payload_quaternion)
         )
@@ -123,6 +123,10 @@ class TruthTopics(Outlets):
         writer.position[:] = magnet, truth.magnet_swing
         writer.effort[0] = truth.magnet_force
         self._magnet.publish(writer.stamped(stamp))
+
+    def publish_state(self, stamp: int, truth: Truth) -> None:
+        """Publish the true state alone; `stamp` [ns]."""
+        self._state.publish(self._state_writer.fill(stamp, truth.state))
 
 
 SETPOINT, ARM, MAGNET = "setpoint", "arm command", "magnet command"  # the answers, in messages

@@ -161,7 +161,9 @@ class Laboratory:
         self.magnet = self._switched()
         command = self.shafts.command(self._in_position_mode)
         self._driven = self._driven or bool(np.any(np.nan_to_num(command)))
-        joints = self.grip.joints if self._driven else self.folded
+        joints = self.grip.joints
+        if joints is None and not self._driven:
+            joints = self.folded
         self._hand = hands.joint_torque(hands.Grip(joints=joints), truth.state)
         if self._in_position_mode:
             if joints is not None:

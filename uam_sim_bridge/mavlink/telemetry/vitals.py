@@ -145,7 +145,8 @@ class Vitals:
             self.load = 1e-3 * m.load
             there = m.onboard_control_sensors_present & m.onboard_control_sensors_health
             self.radio = bool(there & mavlink2.MAV_SYS_STATUS_SENSOR_RC_RECEIVER)
-            if self.battery is None or not self.battery.known:
+            battery = self.battery  # SYS_STATUS says less
+            if battery is None or not (battery.known or math.isfinite(battery.left)):
                 self.battery = from_sys_status(m)
         elif kind == "ESTIMATOR_STATUS":
             self.estimator_flags = m.flags
