@@ -116,6 +116,12 @@ def test_the_nodes_work_on_the_wall_clock_and_wait_for_their_devices(tmp_path):
         list(LAB.room.low), list(LAB.room.high),
     )  # fmt: skip
     assert sections["arm_driver"]["hardware"] == str(LAB.file)
+    assert mission["require_checklist"] is True
+    checklist = sections["checklist"]
+    assert checklist["room_high"] == list(LAB.room.high) and checklist["magnet"] is True
+    assert set(checklist["nodes"].split(",")) == set(vehicle_nodes.modules(LAB)) - {
+        *("checklist", "cockpit"),
+    }
 
 
 def test_the_connections_of_a_vehicle_have_no_plant():

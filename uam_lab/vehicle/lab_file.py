@@ -47,8 +47,8 @@ FOLDER, TEMPLATE = "lab", "s500_lab"
 REQUIRED = ("vehicle", "scenario", "autopilot", "imu", "room", "mocap", "arm", "magnet")
 OPTIONAL = ("profile", "cockpit", "nodes", "out")
 GEOFENCE = ("geofence_low", "geofence_high")
-ARM_DRIVER, CHECKLIST = "arm_driver", "checklist"
-TUNABLE = (*NODES, BRIDGE, ARM_DRIVER, CHECKLIST, "recorder", "cockpit")  # in `nodes`
+ARM_DRIVER = "arm_driver"
+TUNABLE = (*NODES, BRIDGE, ARM_DRIVER, "checklist", "recorder", "cockpit")  # in `nodes`
 
 
 def template() -> str:

@@ -114,4 +114,4 @@ def start_nodes(
 
 def _announcement(children: Processes, ports: Ports) -> Iterator[str]:
     yield f"{len(children.names)} nodes in ROS domain {ports.domain}; nothing arms by itself"
-    yield "waiting for uam start, or the cockpit's button"
+    yield "to fly: uam checklist, then uam start; or both in the cockpit"

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import importlib.util
 from typing import Any
 
 from uam_control.vehicle import POSITION_SERVO
@@ -15,7 +14,7 @@ from uam_msgs_py.messages import topics
 from uam_msgs_py.node import wiring
 from uam_sim_bridge.mavlink.offboard.autopilot_magnet import NONE
 
-CHECKLIST, CHECKLIST_MODULE = "checklist", "uam_lab.nodes.checklist"
+CHECKLIST = wiring.CHECKLIST
 CHECKLIST_RECORD = "checklist.json"  # in the result folder
 DRIVERS = {
     wiring.MOCAP_DRIVER: "uam_sim_bridge.nodes.mocap_driver",
@@ -36,13 +35,7 @@ def modules(lab: Lab) -> dict[str, str]:
     if lab.magnet.through != GPIO:
         del drivers[wiring.MAGNET_DRIVER]
     recorder = {wiring.RECORDER: stack.pop(wiring.RECORDER)}
-    checklist = {CHECKLIST: CHECKLIST_MODULE} if with_checklist() else {}
-    return recorder | drivers | stack | checklist
-
-
-def with_checklist() -> bool:
-    """Return whether this installation has the node of the checklist."""
-    return importlib.util.find_spec(CHECKLIST_MODULE) is not None
+    return recorder | drivers | stack | {CHECKLIST: "uam_lab.nodes.checklist"}
 
 
 def parameters(
@@ -67,12 +60,10 @@ def parameters(
         sections[wiring.MOCAP_DRIVER] = WAITS | lab.mocap.to_mapping()
     if lab.magnet.through == GPIO:
         sections[wiring.MAGNET_DRIVER] = WAITS | lab.magnet.line.to_mapping() | _switching(lab)
-    if with_checklist():
-        sections[CHECKLIST] = _checklist(lab, settings, folder)
-        sections[wiring.MISSION]["require_checklist"] = True
+    sections[CHECKLIST] = _checklist(lab, settings, folder)
+    sections[wiring.MISSION]["require_checklist"] = True
     for node in (wiring.ARM_DRIVER, CHECKLIST):
-        if node in sections:
-            sections[node] |= lab.nodes.get(node, {})
+        sections[node] |= lab.nodes.get(node, {})
     return node_arguments.complete(sections, settings)
 
 
