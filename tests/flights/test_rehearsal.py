@@ -46,7 +46,7 @@ def test_a_hover_through_all_devices(tmp_path):
     lab = yaml.safe_load((out / "lab.yaml").read_text())
     assert lab["autopilot"].startswith("serial:") and lab["mocap"]["server"] == "127.0.0.1"
     steps = json.loads((out / "logs/laboratory.json").read_text())["steps"]
-    assert {"tilt_roll", "joint:alpha_1", "clear"} <= set(steps)
+    assert {"hands_on", "clear"} <= set(steps)
     assert not any((out / "devices").glob("tty*"))
 
 

@@ -12,7 +12,7 @@ from uam_control.coordinates import coordinates
 from uam_control.laws.catalogue import LAWS
 from uam_control.mission import load_scenario
 from uam_control.profiles.profile import default_profile
-from uam_lab.recording import log_reader
+from uam_lab.recording import cdr, log_reader
 from uam_lab.recording.bounded_log import BoundedLog
 from uam_lab.recording.logged_topics import ADAPTATION, Log
 from uam_lab.recording.mcap_reader import TopicLog, UnreadableLog
@@ -209,3 +209,17 @@ def test_a_vehicles_log_has_the_estimate_in_place_of_the_truth(tmp_path):
     np.testing.assert_array_equal(series["magnet.on"][[0, 499, 500]], [0.0, 0.0, 1.0])
     assert np.median(flight.latency_s) == pytest.approx(0.003) and flight.missed == 8
     assert flight.wall_s == pytest.approx(2.996)
+
+
+class ReferencesOnly:
+    """A log with references alone: checks by hand from 1 s on, take-off at 5 s."""
+
+    def blocks(self, topic):
+        stamps = np.array([1, 2, 5, 6, 7], dtype=np.int64) * 1_000_000_000
+        fields = {row: np.zeros((5, 8)) for row in log_reader.STATE_ROWS}
+        fields["time_from_start"] = np.array([0, 0, 0, 1, 2], dtype=np.int64) * 1_000_000_000
+        return [cdr.Block(np.arange(5), stamps, [""] * 8, fields)]
+
+
+def test_checks_by_hand_before_the_flight_are_no_take_off():
+    assert log_reader.References(ReferencesOnly(), 8).takeoff == 5_000_000_000

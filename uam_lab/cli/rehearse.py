@@ -108,8 +108,8 @@ def run(options: argparse.Namespace) -> int:
                 outcome.notes.append(made.problem)
         console.print(summary(metrics, folder))
     else:
-        print(f"results: {folder.path}")
-    for line in device_figures.lines(device_figures.saved(folder.path)):
+        print(f"results: {folder}")
+    for line in device_figures.lines(device_figures.saved(folder)):
         print(line)
     for note in outcome.notes:
         print(f"note: {note}")

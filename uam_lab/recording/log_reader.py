@@ -59,7 +59,10 @@ class References:
             rows.append(values.reshape(len(values), -1))
             flying.append(np.full((len(values), 1), float(whole)))
             if whole:
-                self.takeoff = int(np.min(block.stamps - block.fields["time_from_start"]))
+                since = block.fields["time_from_start"]
+                flown = since > 0  # 0 also while a person tilts the vehicle by hand, before it
+                begun = block.stamps - since
+                self.takeoff = int(np.min(begun[flown] if flown.any() else begun))
         if not stamps:
             raise UnreadableLog("the log has no reference: the mission did not start")
         joined = np.hstack([np.vstack(rows), np.vstack(flying)])
@@ -135,7 +138,7 @@ def read_flight(
     state = log.samples(topics.STATE, STATE_ROWS, columns.size)
     values[:, columns.block("estimate.")] = state.at(ticks)
     reference = references.samples.at(ticks)
-    flying = reference[:, -1] > 0.5
+    flying = (reference[:, -1] > 0.5) & (time >= 0.0)  # without the checks by hand
     if flying.any():
         scenario = scenario.begun_at(reference[np.argmax(flying), : columns.size])
     values[:, columns.block("reference.")] = reference[:, :-1]
