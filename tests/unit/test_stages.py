@@ -67,6 +67,10 @@ def test_the_bias_of_the_imu_is_found_in_the_body_frame_and_due_every_20_ms():
     np.testing.assert_allclose(accelerometer, bias, atol=0.01)
     np.testing.assert_allclose(gyro, 0.0, atol=1e-6)
     assert set(np.diff(due)) == {20 * MS}
+    stage.estimator.set_parameters(EstimatorParameters(position_bandwidth=30.0))
+    for stamp in range(3000 * MS, 3100 * MS, PERIOD):
+        stage.imu(stamp, REST, WEIGHT + bias)
+        assert not stage.bias_due  # noise would cover it
 
 
 def test_the_newest_message_is_read_every_20_ms():

@@ -19,6 +19,8 @@ from uam_control.maths.rotations import euler_from_quaternion, matrix_from_quate
 from uam_control.settings.parameter_set import ParameterSet, number
 from uam_control.vehicle import GRAVITY
 
+# rad/s; the noise of the estimated bias grows with the cube of the bandwidth
+QUIET_BANDWIDTH = 24.0
 LONGEST_STEP = 0.05  # s, longest filter step; a longer gap means lost samples
 
 
@@ -103,9 +105,10 @@ class StateEstimator:
         return self._pose.quaternion
 
     @property
-    def settled(self) -> bool:
-        """Whether no gap of IMU or poses disturbs the estimated biases."""
-        return self._imu_stamp is not None and self._pose.gate.settled(self._imu_stamp)
+    def bias_known(self) -> bool:
+        """Whether neither a gap of IMU or poses nor noise covers the estimated biases."""
+        quiet = self.parameters.position_bandwidth <= QUIET_BANDWIDTH
+        return quiet and self._imu_stamp is not None and self._pose.gate.settled(self._imu_stamp)
 
     @property
     def imu_bias(self) -> tuple[np.ndarray, np.ndarray]:

@@ -45,8 +45,8 @@ class EstimatorStage:
 
     All stamps are in [ns]. The IMU sample starts a tick; the other samples of the tick come before.
     `ticks`: the stamps of the ticks, see `TickStamps`; `pose_age`: of the poses at their arrival;
-    `bias_due`: whether to publish the estimated biases of the IMU after this tick: not soon after a
-    gap of IMU or poses.
+    `bias_due`: whether to publish the estimated biases of the IMU after this tick, see
+    `StateEstimator.bias_known`.
     """
 
     def __init__(self, parameters: EstimatorParameters, joints: int, period: float) -> None:
@@ -85,7 +85,7 @@ class EstimatorStage:
             raise ValueError(f"IMU stamp {stamp} ns does not follow {self.stamp} ns")
         estimator = self.estimator
         last, tick = self.stamp, self.ticks.next(stamp)
-        self.bias_due = tick // BIAS_PERIOD != last // BIAS_PERIOD and estimator.settled
+        self.bias_due = tick // BIAS_PERIOD != last // BIAS_PERIOD and estimator.bias_known
         self.pose_age.tick(tick)
         estimator.imu(tick / SECOND, gyro, force)
         self._waiting = self._waiting and bool(estimator.waiting_for)
