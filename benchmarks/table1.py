@@ -20,8 +20,9 @@ from pathlib import Path
 import numpy as np
 from table1_flights import flights, picture, table
 
-from uam_lab.campaign.pool import cores, fly_all
+from uam_lab.campaign.flying import fly_all
 from uam_lab.campaign.trial import Trial
+from uam_lab.workers.place import Workplace, cores
 
 PAYLOAD = 0.2  # [kg], the paper's
 SHOWN = 6  # rows of the search
@@ -42,12 +43,11 @@ def fly(rows, options) -> list[table.Flown]:
         for row in rows
         for seed in seeds
     ]
-    jobs = 1 if options.engine == "ros" else options.jobs
 
     def show(done, result):
         print(f"\r{done} of {len(trials)} flights", end="", flush=True)
 
-    results = fly_all(trials, jobs, progress=show)
+    results = fly_all(trials, Workplace(options.jobs), progress=show)
     print()
     grouped = [results[i * len(seeds) : (i + 1) * len(seeds)] for i in range(len(rows))]
     return [

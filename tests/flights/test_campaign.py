@@ -2,47 +2,61 @@
 
 import csv
 import json
+import shlex
+import shutil
 
 import numpy as np
+import pyarrow.parquet as pq
 import pytest
+from distributed import LocalCluster
 
 from uam_control.profiles.profile import load_profile
-from uam_lab.campaign.variations import VariationError, chosen, common, draw, ranges
+from uam_control.settings import configuration
+from uam_lab.campaign.variations import Draws, VariationError, common, ranges
+from uam_lab.cli import fly as fly_command
 from uam_lab.cli.main import main
+from uam_lab.results.metrics import GROUPS
 
 FLIGHTS = 4
 
 
+def draws(total, seed):
+    """Random flights of the flying profile."""
+    return Draws(load_profile("s500"), total, seed, ranges())
+
+
 def test_a_draw_repeats_and_a_longer_one_begins_alike():
-    profile = load_profile("s500")
-    few, many = draw(profile, 3, seed=5), draw(profile, 6, seed=5)
-    assert [d.values for d in few] == [d.values for d in many[:3]]
-    assert [d.trial.vehicle_changes for d in few] == [d.trial.vehicle_changes for d in many[:3]]
-    assert draw(profile, 1, seed=6)[0].values != few[0].values
+    few, many = draws(3, 5), draws(6, 5)
+    assert [d.values for d in few] == [many[k].values for k in range(3)]
+    assert [d.trial.vehicle_changes for d in few] == [
+        many[k].trial.vehicle_changes for k in range(3)
+    ]
+    assert draws(1, 6)[0].values != few[0].values
+    assert all(tuple(d.values) == many.names for d in many)
     for name, (low, high) in ranges().items():
         assert all(low <= d.values[name] <= high for d in many), name
 
 
 def test_single_draws_are_chosen_by_number():
-    draws = draw(load_profile("s500"), 5, 1)
-    assert [one.trial.seed for one in chosen(draws, "4,0,4")] == [100_000, 100_004]
-    assert len(chosen(draws, "")) == 5
+    five = draws(5, 1)
+    assert five.chosen("4,0,4") == [0, 4] and five[4].trial.seed == 100_004
+    assert list(five.chosen("")) == [0, 1, 2, 3, 4]
     for wrong in ("5", "-1", "1;2", "1,"):
-        with pytest.raises(VariationError, match="numbers of 0 to 4 expected"):
-            chosen(draws, wrong)
+        with pytest.raises(VariationError, match="numbers of 0 to 4"):
+            five.chosen(wrong)
 
 
 def test_what_failures_have_in_common_is_found():
-    drawn = draw(load_profile("s500"), 40, seed=1)
-    failed = [d.values["wind"] > 4.0 for d in drawn]
-    name, lost, kept, distance = common(drawn, failed)[0]
+    forty = list(draws(40, 1))
+    values = {name: np.array([d.values[name] for d in forty]) for name in ("wind", "mass")}
+    name, lost, kept, distance = common(values, values["wind"] > 4.0)[0]
     assert name == "wind" and lost > 4.0 > kept and distance > 1.0
 
 
 @pytest.mark.parametrize(
     "scenario", ["hover", pytest.param("pick_and_place", marks=pytest.mark.slow)]
 )
-def test_most_random_flights_are_flown_to_the_end(scenario, tmp_path, capsys):
+def test_most_random_flights_are_flown_to_the_end(scenario, tmp_path, capsys, monkeypatch):
     command = ["campaign", "--scenario", scenario, "--out", str(tmp_path)]
     assert main([*command, "--flights", str(FLIGHTS)]) == 0
     found = json.loads((tmp_path / "campaign.json").read_text())
@@ -55,11 +69,55 @@ def test_most_random_flights_are_flown_to_the_end(scenario, tmp_path, capsys):
     assert all(np.isfinite(float(row["rms x"])) for row in rows)
     assert (tmp_path / "campaign.png").stat().st_size > 0
 
-    whole = (tmp_path / "flights.csv").read_bytes()
-    kept = tmp_path / "flown.jsonl"
-    kept.write_text(kept.read_text()[:-9])  # as after a kill while the last one was written
+    page = (tmp_path / "report.html").read_text()
+    worst = found["worst"][0]
+    assert len(found["worst"]) == FLIGHTS and page.count("--replay</code>") == FLIGHTS
+
+    whole = (tmp_path / "flights.parquet").read_bytes()
+    for file in ("flights.csv", "report.html"):
+        (tmp_path / file).unlink()
     assert main([*command, "--flights", str(FLIGHTS)]) == 0
-    assert f"continuing after {FLIGHTS - 1} earlier flights" in capsys.readouterr().out
-    assert (tmp_path / "flights.csv").read_bytes() == whole
+    assert f"continuing after {FLIGHTS} earlier flights" in capsys.readouterr().out
+    assert (tmp_path / "flights.parquet").read_bytes() == whole
     assert main([*command, "--seed", "2"]) == 2
     assert "give another --out" in capsys.readouterr().err
+
+    # the worst one again, by the command of the report; without its report and video
+    fly = fly_command.fly
+    monkeypatch.setattr(fly_command, "fly", lambda settings, **_: fly(settings, False, False))
+    again = shlex.split(worst["again"])[1:]
+    assert main([*again, "--out", str(tmp_path / "again")]) == (worst["outcome"] != "completed")
+    metrics = json.loads((tmp_path / "again/metrics.json").read_text())
+    row = pq.read_table(tmp_path / "flights.parquet").to_pylist()[worst["flight"]]
+    flown = [value for name, value in row.items() if name.startswith("rms.")]
+    assert flown == [value for key, _, _ in GROUPS for value in metrics["rms"][key]]
+
+
+def test_any_workers_give_the_same_table(tmp_path):
+    """One process, and two workers of a scheduler that are given everything but the sources."""
+    scenario = tmp_path / "mine.yaml"
+    shutil.copy(configuration.path("scenarios/hover.yaml"), scenario)
+    command = ["campaign", "--scenario", str(scenario), "--flights", "3", "--out"]
+    assert main([*command, str(tmp_path / "a"), "--jobs", "1"]) == 0
+    with LocalCluster(
+        n_workers=2,
+        threads_per_worker=1,
+        host="127.0.0.1",
+        dashboard_address=None,
+        silence_logs=50,
+    ) as cluster:
+        there = ["--scheduler", cluster.scheduler_address]
+        assert main([*command, str(tmp_path / "b"), *there]) == 0
+    tables = [(tmp_path / folder / "flights.parquet").read_bytes() for folder in "ab"]
+    assert tables[0] == tables[1]
+
+
+def test_replay_and_workers_are_refused_in_one_line(capsys):
+    for options, text in (
+        (["campaign", "--replay"], "--replay needs one flight"),
+        (["campaign", "--jobs", "2", "--scheduler", "tcp://x:1"], "--jobs is for this machine"),
+        (["faults", "--engine", "ros", "--jobs", "2"], "one flight at a time"),
+    ):
+        assert main(options) == 2
+        error = capsys.readouterr().err
+        assert text in error and error.count("\n") == 1

@@ -4,6 +4,7 @@ import json
 from dataclasses import replace
 
 import numpy as np
+import pyarrow.parquet as pq
 import pytest
 
 from uam_control.laws import catalogue
@@ -14,6 +15,7 @@ from uam_lab.study.description import StudyError, load_study
 from uam_lab.study.flights import FLOWN, StudyResult
 from uam_lab.study.run import Runner
 from uam_lab.study.search import cost
+from uam_lab.workers.place import Workplace
 from uam_sim_bridge.plant import Vehicle
 
 STEP = 1e-6
@@ -193,14 +195,15 @@ def test_the_same_study_gives_the_same_numbers_and_continues(study, tmp_path):
     folders = [tmp_path / "a", tmp_path / "b"]
     for folder in folders:
         folder.mkdir()
-    first, second = (Runner(tiny, folder, 1, 1).varied() for folder in folders)
+    first, second = (Runner(tiny, folder, Workplace(1), 1).varied() for folder in folders)
     assert first == second and first[0].outcome == FLOWN
     assert first[0].shares["position"]["adaptive"] > 0.0
-    again = Runner(tiny, folders[0], 1, 1, fly=no_flight).varied()
+    again = Runner(tiny, folders[0], Workplace(1), 1, fly=no_flight).varied()
     assert again == first
 
 
-def no_flight(planned, jobs, out):
+def no_flight(planned, place, out):
     """Return the kept results; a flight fails the test."""
-    assert all(kept.mark(one) in (out / kept.FILE).read_text() for one in planned)
-    return kept.fly(planned, jobs, out, lambda done, one: pytest.fail("flown again"))
+    marks = pq.read_table(out / kept.FILE)["mark"].to_pylist()
+    assert all(kept.mark(one) in marks for one in planned)
+    return kept.fly(planned, place, out, lambda done, one: pytest.fail("flown again"))

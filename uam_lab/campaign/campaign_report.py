@@ -1,138 +1,168 @@
-"""Results of `uam campaign`: every flight, success rate, and comparison of the failed flights."""
+"""Results of `uam campaign`: success rate, errors, slices by each drawn value, worst flights."""
 
 from __future__ import annotations
 
+import math
 from collections import Counter
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
+from dataclasses import asdict
 from pathlib import Path
+from typing import Any
 
-import numpy as np
-from matplotlib.figure import Figure
+import pyarrow as pa
 
 from uam_control.coordinates import BASE_COORDINATES, POSITION
-from uam_lab.campaign.fault_outcome import COMPLETED, OUTCOMES, counts
-from uam_lab.campaign.trial import TrialResult
-from uam_lab.campaign.variations import PER_SEED, Draw, common
+from uam_lab.campaign.campaign_figure import picture
+from uam_lab.campaign.campaign_table import CampaignTable
+from uam_lab.campaign.fault_outcome import COMPLETED, OUTCOMES
+from uam_lab.campaign.statistics import percentile, share, sliced
+from uam_lab.campaign.variations import common
 from uam_lab.report.figures import style
+from uam_lab.results import templates
 from uam_lab.results.atomic import write_rows, write_text
 from uam_lab.results.result_folder import versions, write_json
-from uam_lab.results.templates import markdown_table
 
 PERCENTILES = (50, 90, 99)
+WORST = 10  # flights that are listed
 
 
-def write(
-    out: Path,
-    draws: Sequence[Draw],
-    results: Sequence[TrialResult],
-    vehicle: str,
-    command: str,
-) -> str:
-    """Write flights.csv, campaign.json, campaign.png and summary.md; return the summary.
+def write(out: Path, table: pa.Table, vehicle: str, command: str, again: str) -> str:
+    """Write flights.csv, campaign.json, campaign.png, summary.md and report.html; return summary.
 
-    vehicle: its name.
+    table: of the flights; vehicle: its name; again: command that flies one flight again, to which
+    `--draws NUMBER --replay` is added.
     """
-    failed = [not result.completed for result in results]
-    rms = np.array([result.rms for result in results])
-    shared, names = common(draws, failed), results[0].coordinates
+    flights = CampaignTable(table)
+    shared = common(flights.drawn, flights.failed)
     write_rows(
         out / "flights.csv",
-        ["flight", *draws[0].values, *(f"rms {n}" for n in names), "outcome", "why"],
+        ["flight", *flights.drawn, *(f"rms {n}" for n in flights.names), "outcome", "why"],
         (
             [
-                draw.trial.seed % PER_SEED,
-                *(f"{x:.4g}" for x in (*draw.values.values(), *r.rms)),
-                r.outcome,
-                r.why,
+                number,
+                *(f"{column[row]:.4g}" for column in flights.drawn.values()),
+                *(f"{x:.4g}" for x in flights.rms[row]),
+                flights.outcome[row],
+                flights.why[row],
             ]
-            for draw, r in zip(draws, results, strict=True)
+            for row, number in enumerate(flights.numbers)
         ),
     )
-    outcomes = counts(r.outcome for r in results)
+    slices = {n: sliced(v, flights.failed, flights.error) for n, v in flights.drawn.items()}
+    worst = [_listed(flights, row, again) for row in flights.worst(WORST)]
+    percentiles = {str(p): [percentile(c, p) for c in flights.rms.T] for p in PERCENTILES}
     numbers = {
         "command": command,
         "vehicle": vehicle,
         "versions": versions(),
-        "flights": len(results),
-        "outcomes": outcomes,
-        "rms_percentiles": {str(p): np.percentile(rms, p, axis=0) for p in PERCENTILES},
-        "columns": names,
+        "flights": len(flights),
+        "outcomes": flights.outcomes,
+        "columns": flights.names,
+        "rms_percentiles": {p: [one[0] for one in row] for p, row in percentiles.items()},
+        "rms_percentiles_band": {p: [one[1:] for one in row] for p, row in percentiles.items()},
         "failures_have_in_common": shared,
+        "slices": {name: [asdict(one) for one in bins] for name, bins in slices.items()},
+        "worst": worst,
     }
     write_json(out / "campaign.json", numbers)
-    summary = "\n\n".join(
-        [*_summary(results, outcomes, shared, rms, vehicle), f"Made by `{command}`.\n"]
-    )
+    paragraphs = [*_summary(flights, shared, vehicle), _worst_table(worst)]
+    summary = "\n\n".join([*paragraphs, f"Made by `{command}`.\n"])
     write_text(out / "summary.md", summary)
     with style.styled():
-        style.save(_figure(draws, results, vehicle, rms), out / "campaign.png")
+        style.save(picture(flights, vehicle), out / "campaign.png")
+    page = templates.render(
+        "uam_lab.campaign",
+        "campaign.html.j2",
+        vehicle=vehicle,
+        sentence=_sentence(flights, vehicle),
+        names=flights.names,
+        percentiles=_percentile_rows(flights),
+        heads=PERCENTILES,
+        picture=templates.embedded(out / "campaign.png"),
+        slices=slices,
+        worst=worst,
+        outcomes=OUTCOMES,
+        command=command,
+    )
+    write_text(out / "report.html", page)
     return summary
 
 
+def _listed(flights: CampaignTable, row: int, again: str) -> dict[str, Any]:
+    number = int(flights.numbers[row])
+    return {
+        "flight": number,
+        "outcome": flights.outcome[row],
+        "position_rms_m": float(flights.error[row]),
+        "why": flights.why[row],
+        "drawn": {name: float(values[row]) for name, values in flights.drawn.items()},
+        "again": f"{again} --draws {number} --replay",
+    }
+
+
+def _sentence(flights: CampaignTable, vehicle: str) -> str:
+    count, outcomes = len(flights), flights.outcomes
+    done, low, high = (100.0 * x for x in share(outcomes[COMPLETED], count))
+    others = [f"{n} {outcome}" for outcome, n in outcomes.items() if n and outcome != COMPLETED]
+    return (
+        f"{vehicle}: {outcomes[COMPLETED]} of {count} flights completed the mission "
+        f"({done:.1f} %, 95 % band {low:.1f} to {high:.1f} %); {', '.join(others) or 'none lost'}."
+    )
+
+
+def _percentile_rows(flights: CampaignTable) -> list[list[str]]:
+    rows = []
+    for name, column in zip(flights.names, flights.rms.T, strict=True):
+        unit, digits = ("m", 3) if name in BASE_COORDINATES[POSITION] else ("deg", 2)
+        found = [percentile(column, p) for p in PERCENTILES]
+        rows.append([name, *(_with_band(one, digits, unit) for one in found)])
+    return rows
+
+
+def _with_band(found: tuple[float, float, float], digits: int, unit: str) -> str:
+    """Return a percentile in words; too few flights give no upper end of the band."""
+    middle, low, high = found
+    end = f"to {high:.{digits}f}" if math.isfinite(high) else "or more"
+    return f"{middle:.{digits}f} {unit} ({max(low, 0.0):.{digits}f} {end})"
+
+
 def _summary(
-    results: Sequence[TrialResult],
-    outcomes: Mapping[str, int],
-    shared: Sequence[tuple[str, float, float, float]],
-    rms: np.ndarray,
-    vehicle: str,
+    flights: CampaignTable, shared: Sequence[tuple[str, float, float, float]], vehicle: str
 ) -> Iterator[str]:
     """Yield the paragraphs; shared: see `common`."""
-    count, done = len(results), outcomes[COMPLETED]
-    others = {o: n for o, n in outcomes.items() if n and o != COMPLETED}
-    listed = ", ".join(f"{number} {outcome}" for outcome, number in others.items())
-    yield (
-        f"{vehicle}: {done} of {count} flights completed the mission "
-        f"({100.0 * done / count:.1f} %); {listed or 'none lost'}."
-    )
+    yield _sentence(flights, vehicle)
+    others = [o for o, n in flights.outcomes.items() if n and o != COMPLETED]
     if others:
         yield "\n".join(f"- {outcome}: {OUTCOMES[outcome]}" for outcome in others)
-    errors = []
-    for i, name in enumerate(results[0].coordinates):
-        unit, digits = ("m", 3) if name in BASE_COORDINATES[POSITION] else ("deg", 2)
-        figures = np.percentile(rms[:, i], PERCENTILES)
-        errors.append([name, *(f"{value:.{digits}f} {unit}" for value in figures)])
-    yield markdown_table(["RMS error", *(f"{p} % of flights below" for p in PERCENTILES)], errors)
+    head = ["RMS error", *(f"{p} % of flights below (95 % band)" for p in PERCENTILES)]
+    yield templates.markdown_table(head, _percentile_rows(flights))
     if not shared:
         return
     yield "Conditions of the flights that were not completed, the largest distance first:"
-    head = ("", "their mean", "mean of the others", "distance [standard deviations]")
-    yield markdown_table(head, ([n, f"{a:.3g}", f"{b:.3g}", f"{d:+.2f}"] for n, a, b, d in shared))
-    kinds = Counter(_kind(r.why) for r in results if not r.completed)
+    head = ["", "their mean", "mean of the others", "distance [standard deviations]"]
+    rows = ([n, f"{a:.3g}", f"{b:.3g}", f"{d:+.2f}"] for n, a, b, d in shared)
+    yield templates.markdown_table(head, rows)
+    failed = [why for why, bad in zip(flights.why, flights.failed, strict=True) if bad]
+    kinds = Counter(map(_kind, failed))
     yield "Reasons: " + "; ".join(f"{kind}: {kinds[kind]}" for kind in sorted(kinds)) + "."
+
+
+def _worst_table(worst: Sequence[dict[str, Any]]) -> str:
+    return templates.markdown_table(
+        ["worst flights", "outcome", "position RMS [m]", "with report and video"],
+        (
+            [
+                str(one["flight"]),
+                one["outcome"],
+                f"{one['position_rms_m']:.3g}",
+                f"`{one['again']}`",
+            ]
+            for one in worst
+        ),
+    )
 
 
 def _kind(why: str) -> str:
     """Return a reason without its numbers, so that similar ones are counted together."""
     words = [word for word in why.split(";")[0].split() if not any(c.isdigit() for c in word)]
     return " ".join(words)
-
-
-def _figure(
-    draws: Sequence[Draw], results: Sequence[TrialResult], vehicle: str, rms: np.ndarray
-) -> Figure:
-    """Draw the distribution of each RMS error and, below, each variation, completed or not."""
-    failed = np.array([not result.completed for result in results])
-    figure = Figure(figsize=(style.WIDTH, 5.6), layout="constrained")
-    top, bottom = figure.subfigures(2, 1, height_ratios=(1.0, 1.2))
-    axis = top.subplots()
-    axis.violinplot(np.log10(rms), showmedians=True, widths=0.85)
-    ticks = range(int(np.floor(np.log10(rms.min()))), int(np.ceil(np.log10(rms.max()))) + 1)
-    axis.set(
-        xticks=range(1, rms.shape[1] + 1),
-        xticklabels=results[0].coordinates,
-        ylabel="RMS error [m, deg]",
-        yticks=list(ticks),
-        yticklabels=[f"{10.0**k:g}" for k in ticks],
-    )
-    axis.set_title(
-        f"{vehicle}: {len(results)} random flights, {failed.sum()} not completed", loc="left"
-    )
-    names = list(draws[0].values)
-    error = np.linalg.norm(rms[:, POSITION], axis=1)
-    for name, small in zip(names, bottom.subplots(2, -(-len(names) // 2)).flat, strict=False):
-        values = np.array([draw.values[name] for draw in draws])
-        small.plot(values[~failed], error[~failed], ".", color=style.FLIGHTS[0], markersize=2)
-        small.plot(values[failed], error[failed], "x", color=style.DROP, markersize=4)
-        small.set(yscale="log", xlabel=name)
-    bottom.supylabel("position RMS [m]; × not completed", fontsize=8)
-    return figure

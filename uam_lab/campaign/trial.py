@@ -12,6 +12,7 @@ import numpy as np
 from uam_control.coordinates import ALPHA, coordinates
 from uam_control.mission import Scenario, load_scenario
 from uam_control.profiles.profile import Profile
+from uam_lab.campaign.carried import Carried
 from uam_lab.campaign.fault_outcome import COMPLETED, LOST, classify
 from uam_lab.flight.direct.flight import DirectFlight
 from uam_lab.flight.direct.warm_up import prepare
@@ -34,7 +35,8 @@ class TrialFailed(RuntimeError):
 class Trial:
     """One flight of the profile's vehicle.
 
-    label: its row in the tables; keep: file for its time series, if any.
+    label: its row in the tables; keep: file for its time series, if any; carried: for a worker
+    without this machine's files.
     """
 
     label: str
@@ -47,9 +49,12 @@ class Trial:
     faults: Schedule = Schedule()
     engine: str = "direct"
     clock: str = "lockstep"
+    carried: Carried | None = None
 
     def load_scenario(self) -> Scenario:
         """Return the scenario, for the vehicle. Raises ScenarioError."""
+        if self.carried is not None and self.carried.scenario is not None:
+            return self.carried.scenario
         return load_scenario(self.scenario, self.profile.vehicle)
 
 
@@ -114,7 +119,10 @@ def fly(trial: Trial) -> Outcome:
 
 
 def _fly_nodes(trial: Trial, scenario: Scenario) -> Outcome:
-    """Fly a trial with nodes, topics and MAVLink, as `uam fly` does."""
+    """Fly a trial with nodes, topics and MAVLink, as `uam fly` does.
+
+    Ctrl-C ends the flight in order and is then raised as KeyboardInterrupt.
+    """
     from uam_lab.flight.ros import engine
 
     needed = {one.fault.values["node"] for one in trial.faults.only(PROCESS).faults}
@@ -133,6 +141,8 @@ def _fly_nodes(trial: Trial, scenario: Scenario) -> Outcome:
     prepare()
     with tempfile.TemporaryDirectory(prefix="uam-flight-") as folder, Interrupts() as stop:
         outcome = engine.fly(settings, ResultFolder(Path(folder)), Observer(), stop)
+    if stop.raised:
+        raise KeyboardInterrupt
     if outcome.series is not None:
         outcome.series.info["controller"] = trial.label
     return outcome

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
@@ -51,36 +51,49 @@ def ranges(file: Path | None = None) -> dict[str, tuple[float, float]]:
         raise VariationError(f"{file}: [least, largest] expected for each entry") from None
 
 
-def draw(
-    profile: Profile,
-    count: int,
-    seed: int,
-    allowed: dict[str, tuple[float, float]] | None = None,
-    scenario: str = "pick_and_place",
-    effects: Effects | None = None,
-) -> list[Draw]:
-    """Return `count` random flights. Flight i depends on the seed and i, not on `count`.
+@dataclass(frozen=True)
+class Draws(Sequence[Draw]):
+    """Random flights, drawn when they are looked at. Flight i depends on the seed and i, not on
+    `total`.
 
-    effects: of the plant, in every flight.
+    ranges: name → lowest and highest value; effects: of the plant, in every flight.
     """
-    allowed, numbers = allowed or ranges(), [seed * PER_SEED + i for i in range(count)]
-    return [
-        _one(profile, scenario, np.random.default_rng([seed, i]), number, allowed, effects or {})
-        for i, number in enumerate(numbers)
-    ]
 
+    profile: Profile
+    total: int
+    seed: int
+    ranges: dict[str, tuple[float, float]]
+    scenario: str = "pick_and_place"
+    effects: Effects = field(default_factory=dict)
 
-def chosen(draws: Sequence[Draw], numbers: str) -> list[Draw]:
-    """Return the draws of these numbers, as "3,14", counted from 0; all for "".
+    def __len__(self) -> int:
+        """Return the number of flights."""
+        return self.total
 
-    Raises VariationError for another text or a number beyond the draws.
-    """
-    if not numbers:
-        return list(draws)
-    wanted = numbers.split(",")
-    if not all(one.isdecimal() and int(one) < len(draws) for one in wanted):
-        raise VariationError(f"--draws {numbers}: numbers of 0 to {len(draws) - 1} expected: 3,14")
-    return [draws[number] for number in sorted({int(one) for one in wanted})]
+    def __getitem__(self, number: int) -> Draw:
+        """Return flight `number`. Raises IndexError."""
+        if not 0 <= number < self.total:
+            raise IndexError(number)
+        random = np.random.default_rng([self.seed, number])
+        seed = self.seed * PER_SEED + number
+        return _one(self.profile, self.scenario, random, seed, self.ranges, self.effects)
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Names of the drawn values."""
+        return (*NAMES, *(name for name in DELAYS if name in self.ranges))
+
+    def chosen(self, numbers: str) -> Sequence[int]:
+        """Return these numbers of flights, as "3,14", counted from 0; all for "".
+
+        Raises VariationError for another text or a number beyond the draws.
+        """
+        if not numbers:
+            return range(self.total)
+        wanted = numbers.split(",")
+        if not all(one.isdecimal() and int(one) < self.total for one in wanted):
+            raise VariationError(f"--draws {numbers}: numbers of 0 to {self.total - 1}, as 3,14")
+        return sorted({int(one) for one in wanted})
 
 
 def _one(
@@ -122,18 +135,19 @@ def _one(
     return Draw(drawn, trial)
 
 
-def common(draws: Sequence[Draw], failed: Sequence[bool]) -> list[tuple[str, float, float, float]]:
+def common(
+    values: Mapping[str, np.ndarray], failed: np.ndarray
+) -> list[tuple[str, float, float, float]]:
     """Compare failed and other flights: (name, mean of the failed, of the others, distance).
 
-    distance: of the two means, in standard deviations over all flights; the largest comes first.
+    values: drawn value of each flight, by name; failed: mask. distance: of the two means, in
+    standard deviations over all flights; the largest comes first.
     """
-    failed = np.asarray(failed, dtype=bool)
     if not failed.any() or failed.all():
         return []
     found = []
-    for name in draws[0].values:
-        values = np.array([d.values[name] for d in draws])
-        spread = values.std()
-        lost, kept = float(values[failed].mean()), float(values[~failed].mean())
-        found.append((name, lost, kept, (lost - kept) / float(spread) if spread else 0.0))
+    for name, drawn in values.items():
+        spread = float(drawn.std())
+        lost, kept = float(drawn[failed].mean()), float(drawn[~failed].mean())
+        found.append((name, lost, kept, (lost - kept) / spread if spread else 0.0))
     return sorted(found, key=lambda entry: -abs(entry[3]))

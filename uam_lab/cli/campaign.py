@@ -3,31 +3,36 @@
 from __future__ import annotations
 
 import argparse
+import shlex
+from pathlib import Path
 
 from uam_control.mission import load_scenario
 from uam_control.settings import configuration
 from uam_control.vehicle import load_description
-from uam_lab.campaign.pool import fly_all
-from uam_lab.campaign.trial import TrialResult
-from uam_lab.cli.command import Command, chosen_effects, count, given_profile, jobs_of
+from uam_lab.campaign.trial import Trial, TrialResult
+from uam_lab.cli.command import Command, chosen_effects, count, given_profile, place_of
 from uam_lab.cli.counting import Counting
 from uam_lab.flight.conclude import command_line
+from uam_lab.flight.flight_settings import FlightSettings, SettingsError
 from uam_lab.results.result_folder import make_folder
 
+TABLE = "flights.parquet"
 EXAMPLES = """\
 examples:
   uam campaign                             1,000 flights of the flying profile
   uam campaign --flights 100 --profile asmc2
   uam campaign --flights 100 --vehicle mine.yaml
   uam campaign --draws 181,389             two of the 1,000 flights
+  uam campaign --draws 181 --replay        one of them again, with report and video
   uam campaign --ranges delays             late setpoints and poses as well, up to 30 ms
   uam campaign --plant-preset laboratory
   uam campaign --out robust                stop with Ctrl-C; the same command continues
+  uam campaign --flights 10000 --scheduler tcp://10.0.0.5:8786    on a cluster of yours
 
 Mass and position of the payload, wind, gusts, sensor noise, masses, inertias and motors are drawn
-from the ranges of config/campaign/robustness.yaml (--ranges). Results in --out: summary.md,
-flights.csv, campaign.json, campaign.png. The same seed gives the same flights; more --flights only
-add some.
+from the ranges of config/campaign/robustness.yaml (--ranges). Results in --out: report.html,
+summary.md, campaign.json, campaign.png, and every flight in flights.parquet and flights.csv. The
+same seed gives the same flights on any number of workers; more --flights only add some.
 """
 
 
@@ -44,44 +49,104 @@ def add(commands: argparse._SubParsersAction) -> None:
     )
     command.option("--flights", "N", "", 1000, type=count)
     command.option("--draws", "I,I,...", "only these flights, counted from 0 (default: all)", "")
+    command.switch("--replay", "fly the one flight of --draws as uam fly does: report and video")
     command.vehicle()
     command.scenario()
     command.profile()
     command.option("--ranges", "NAME|FILE", "values to draw: robustness, delays", "robustness")
     command.plant()
     command.seed("of the draw")
-    command.jobs()
+    command.workers()
     command.out()
 
 
 def run(options: argparse.Namespace) -> int:
     """Fly, then write the results; return the exit status."""
-    from uam_lab.campaign import campaign_report
-    from uam_lab.campaign.flown import Flown
-    from uam_lab.campaign.variations import chosen, draw, ranges
+    from uam_lab.campaign.variations import Draws, ranges
 
+    place = place_of(options)
     vehicle = load_description(options.vehicle)
     load_scenario(options.scenario, vehicle)  # an invalid one is refused before any flight
     profile = given_profile(options.profile, vehicle)
     allowed = ranges(configuration.named("campaign", options.ranges))
     effects = chosen_effects(options)
+    draws = Draws(profile, options.flights, options.seed, allowed, options.scenario, effects)
+    numbers = draws.chosen(options.draws)
+    if options.replay:
+        if len(numbers) != 1 or not options.draws:
+            raise SettingsError("--replay needs one flight: --draws I")
+        return _replay(draws[numbers[0]].trial, numbers[0], options.out)
+
+    from uam_lab.campaign import campaign_report, trial_rows
+    from uam_lab.campaign.flying import fly_into
+    from uam_lab.results.row_table import RowTable
+
     out = make_folder(options.out, "campaign")
-    draws = draw(profile, options.flights, options.seed, allowed, options.scenario, effects)
-    draws = chosen(draws, options.draws)
     settings = (options.seed, allowed, profile.sets, profile.bridge())
-    flown = Flown(out, (*settings, vehicle.numbers, options.scenario, effects))
-    trials = [one.trial for one in draws if one.trial.seed not in flown.results]
-    if flown.results:
-        print(f"campaign: continuing after {len(flown.results)} earlier flights", flush=True)
-    with Counting("campaign", len(draws)) as counting:
+    flown = RowTable(
+        out / TABLE,
+        trial_rows.schema(len(vehicle.joints), draws.names),
+        (*settings, vehicle.numbers, _content(options.scenario), effects),
+    )
+    before = sum(number in flown.keys for number in numbers)
+    if before:
+        print(f"campaign: continuing after {before} earlier flights", flush=True)
+    with Counting("campaign", len(numbers)) as counting:
+        bad = 0
 
         def show(done: int, result: TrialResult) -> None:
-            flown.add(result)
-            bad = sum(not one.completed for one in flown.results.values())
-            counting.show(len(draws) - len(trials) + done, f"{bad} not completed")
+            nonlocal bad
+            bad += not result.completed
+            counting.show(before + done, f"{bad} not completed")
 
-        fly_all(trials, jobs_of(options), progress=show)
-    results = [flown.results[one.trial.seed] for one in draws]
-    print(campaign_report.write(out, draws, results, vehicle.name, command_line()))
-    print(f"results  {out}")
+        fly_into(
+            flown,
+            ((number, draws[number].trial) for number in numbers if number not in flown.keys),
+            place,
+            lambda number, result: trial_rows.to_row(number, result, draws[number].values),
+            progress=show,
+        )
+    table = flown.compact()
+    if len(numbers) < table.num_rows:  # the folder has more flights than this command asks for
+        table = table.filter([number in numbers for number in table[trial_rows.NUMBER].to_pylist()])
+    print(campaign_report.write(out, table, vehicle.name, command_line(), _again(options)))
+    print(f"results  {out}\nreport   {out / 'report.html'}")
     return 0
+
+
+def _content(scenario: str) -> str:
+    """Return what identifies a scenario: its name, or the content of its file."""
+    return Path(scenario).read_text() if Path(scenario).is_file() else scenario
+
+
+def _replay(trial: Trial, number: int, out: Path | None) -> int:
+    """Fly a trial with log, report and video; return the exit status."""
+    from uam_lab.cli import fly
+
+    profile = trial.profile
+    settings = FlightSettings(
+        scenario=trial.load_scenario(),
+        profile=profile,
+        vehicle=profile.vehicle,
+        payload_mass=trial.payload_mass,
+        out=make_folder(None, "campaign", f"flight{number}") if out is None else out,
+        controller=next(iter(profile.laws().values())),
+        engine="direct",
+        seed=trial.seed,
+        scenario_source=trial.scenario,
+        vehicle_changes=trial.vehicle_changes,
+        faults=trial.faults,
+        command=command_line(),
+    )
+    return fly.fly(settings, video=True, report=True)
+
+
+def _again(options: argparse.Namespace) -> str:
+    """Return the command that flies flights of this campaign again."""
+    words = ["uam", "campaign", "--flights", str(options.flights), "--seed", str(options.seed)]
+    words += ["--vehicle", options.vehicle, "--scenario", options.scenario]
+    words += ["--ranges", options.ranges]
+    words += ["--profile", options.profile] if options.profile else []
+    words += [word for one in options.plant_preset for word in ("--plant-preset", one)]
+    words += [word for one in options.effects for word in ("--effect", one)]
+    return shlex.join(words)

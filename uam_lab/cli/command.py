@@ -15,17 +15,18 @@ from uam_control.settings import configuration
 from uam_control.settings.configuration import ConfigurationError
 from uam_control.settings.parameter_set import ParameterError
 from uam_control.vehicle import DEFAULT_VEHICLE, VehicleDescription, VehicleError
-from uam_lab.campaign.pool import cores
 from uam_lab.campaign.trial import TrialFailed
 from uam_lab.campaign.variations import VariationError
 from uam_lab.flight.flight_settings import SettingsError
 from uam_lab.recording.mcap_reader import UnreadableLog
 from uam_lab.results.result_folder import ResultFolderError
+from uam_lab.results.row_table import RowTableError
 from uam_lab.results.timeseries import UnreadableFlight
 from uam_lab.study.description import StudyError
 from uam_lab.tuning.space import TuningError
 from uam_lab.vehicle.lab import LabError
 from uam_lab.vehicle.lab_file import FOLDER, TEMPLATE
+from uam_lab.workers.place import WorkersError, Workplace, cores
 from uam_msgs_py.node.namespace import normal
 from uam_sim_bridge.drivers.dynamixel.chain import ArmError
 from uam_sim_bridge.drivers.mocap.frame import MocapError
@@ -43,7 +44,7 @@ USER_ERRORS = (
     *(ConfigurationError, ProfileError, ScenarioError, VehicleError, SettingsError, PortError),
     *(Px4Error, FaultError, PlantError, TuningError, TrialFailed, VariationError),
     *(ResultFolderError, UnreadableFlight, UnreadableLog, StudyError),
-    *(ArmError, MocapError, ParameterError, LabError),
+    *(ArmError, MocapError, ParameterError, LabError, WorkersError, RowTableError),
 )
 
 
@@ -141,11 +142,16 @@ class Command:
         """Add --seed."""
         self.option("--seed", "N", what, 1, type=seed)
 
-    def jobs(self, with_ros: bool = False) -> None:
-        """Add --jobs; with_ros: the command has --engine, see `jobs_of`."""
-        more = "; with --engine ros 1" if with_ros else ""
-        text = f"parallel processes (default: one per core, {cores()}{more})"
+    def workers(self, with_ros: bool = False) -> None:
+        """Add --jobs and --scheduler; with_ros: the command has --engine. See `place_of`."""
+        more = "; with --engine ros one flight at a time" if with_ros else ""
+        text = f"worker processes of this machine (default: one per core, {cores()}{more})"
         self.option("--jobs", "N", text, type=count)
+        text = (
+            "Dask scheduler whose workers fly, as tcp://host:8786, in place of processes of this "
+            "machine: docs/many_flights.md"
+        )
+        self.option("--scheduler", "ADDRESS", text, "")
 
     def out(self, folder: str = "") -> None:
         """Add --out; folder: name of the default folder without the time."""
@@ -194,9 +200,17 @@ def chosen_effects(options: argparse.Namespace) -> Effects:
     return presets.read(options.plant_preset, options.effects)
 
 
-def jobs_of(options: argparse.Namespace) -> int:
-    """Return the number of parallel processes: --jobs, else 1 with the ROS engine, else cores."""
-    return options.jobs or (1 if getattr(options, "engine", "") == "ros" else cores())
+def place_of(options: argparse.Namespace) -> Workplace:
+    """Return where the work is done: --jobs or --scheduler.
+
+    Raises SettingsError for both of them, or for several flights at once with --engine ros.
+    """
+    if options.scheduler and options.jobs:
+        raise SettingsError("--jobs is for this machine: the scheduler's workers are those it has")
+    engine = getattr(options, "engine", "direct")
+    if engine != "direct" and (options.scheduler or (options.jobs or 1) > 1):
+        raise SettingsError(f"--engine {engine} flies one flight at a time, on this machine")
+    return Workplace(options.jobs or cores(), options.scheduler)
 
 
 def count(text: str) -> int:

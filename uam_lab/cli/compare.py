@@ -10,10 +10,9 @@ from uam_control.profiles.profile import default_profile, load_profile
 from uam_control.settings import configuration
 from uam_control.settings.configuration import ConfigurationError
 from uam_control.vehicle import VehicleDescription, load_description
-from uam_lab.campaign.pool import fly_all
 from uam_lab.campaign.trial import TrialResult
 from uam_lab.cli import study
-from uam_lab.cli.command import Command, chosen_effects, count, jobs_of, number
+from uam_lab.cli.command import Command, chosen_effects, count, number, place_of
 from uam_lab.cli.counting import Counting
 from uam_lab.compare import plan
 from uam_lab.flight.conclude import command_line
@@ -26,6 +25,7 @@ EXAMPLES = """\
 examples:
   uam compare                          every controller, payloads 0.1 0.2 0.3 kg, 5 seeds
   uam compare --seeds 10 --jobs 4
+  uam compare --out mine               stop with Ctrl-C; the same command continues
   uam compare --engine ros --rows proposed --seeds 10    with the nodes, one flight at a time
   uam compare --profile mine=mine.yaml     with one more row, for the profile mine.yaml
   uam compare --plant-preset laboratory    on a plant with the effects of a laboratory
@@ -33,8 +33,8 @@ examples:
   uam compare --study adaptation       what adaptation buys: docs/adaptation.md
   uam compare --study adaptation --part arm --out mine    one part; a stopped study continues
 
-Results in --out: report.html, tables.md, flights.csv, comparison.json, figures/. The baselines are
-reconstructions (docs/law.md). The same command gives the same tables.
+Results in --out: report.html, tables.md, flights.csv, flights.parquet, comparison.json, figures/.
+The baselines are reconstructions (docs/law.md). The same command gives the same tables.
 """
 
 
@@ -68,7 +68,7 @@ def add(commands: argparse._SubParsersAction) -> None:
     command.switch("--design", "only find the strengths of the study that its margins allow")
     text = "only search the adaptation's numbers of the study, N evaluations per law"
     command.option("--tune", "N", text, type=count)
-    command.jobs(with_ros=True)
+    command.workers(with_ros=True)
     command.out()
 
 
@@ -86,11 +86,14 @@ def run(options: argparse.Namespace) -> int:
         return study.run(options)
     if options.part or options.design or options.tune:
         raise SettingsError("--part, --design, --tune: only with --study")
+    from uam_lab.campaign import trial_rows
+    from uam_lab.campaign.flying import fly_missing
     from uam_lab.compare import comparison_report, modularity
+    from uam_lab.results.row_table import RowTable
 
     if options.engine == "ros":
         require_ros()
-    jobs, payloads = jobs_of(options), tuple(options.payload_mass or plan.PAYLOADS)
+    place, payloads = place_of(options), tuple(options.payload_mass or plan.PAYLOADS)
     vehicle = load_description(options.vehicle)
     load_scenario(options.scenario, vehicle)  # an invalid one is refused before any flight
     rows = (
@@ -105,17 +108,21 @@ def run(options: argparse.Namespace) -> int:
     trials = plan.trials(rows, flights, out / "flights")
     proposed = default_profile(catalogue.DEFAULT, vehicle)
     kept = out / "flights" / "modularity.parquet"
-    extra = modularity.trials(proposed, flights, kept)
-    with Counting("compare", len(trials) + len(extra)) as counting:
+    # direct engine: these flights compare the laws only, which are the same in both engines
+    every = dict(enumerate([*trials, *modularity.trials(proposed, flights, kept)]))
+    flown = RowTable(
+        out / "flights.parquet",
+        trial_rows.schema(len(vehicle.joints)),
+        ([(row.label, row.profile.sets, row.profile.bridge()) for row in rows], flights),
+    )
+    with Counting("compare", len(every)) as counting:
 
         def show(done: int, result: TrialResult) -> None:
             counting.show(done, f"{result.label}, {result.payload_mass:g} kg, seed {result.seed}")
 
-        results = fly_all(trials, jobs, progress=show)
-        # direct engine: these flights compare the laws only, which are the same in both engines
-        others = fly_all(
-            extra, jobs, progress=lambda done, result: show(len(trials) + done, result)
-        )
+        found = fly_missing(flown, every, place, trial_rows.to_row, progress=show)
+    results = [trial_rows.from_row(row) for row in found.values()]
+    results, others = results[: len(trials)], results[len(trials) :]
     modular = modularity.ModularityEvidence.of(proposed, kept, others)
     facts = {
         "command": command_line(),

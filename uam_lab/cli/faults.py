@@ -10,9 +10,8 @@ from typing import TYPE_CHECKING
 from uam_control.mission import load_scenario
 from uam_control.settings import configuration
 from uam_control.vehicle import VehicleDescription, load_description
-from uam_lab.campaign.pool import fly_all
 from uam_lab.campaign.trial import Trial
-from uam_lab.cli.command import Command, chosen_effects, count, given_profile, jobs_of
+from uam_lab.cli.command import Command, chosen_effects, count, given_profile, place_of
 from uam_lab.cli.counting import Counting
 from uam_lab.flight.conclude import command_line
 from uam_lab.flight.flight_settings import CLOCKS, ENGINES, check_clock, require_ros
@@ -36,11 +35,12 @@ examples:
   uam faults --only motor_loss --vehicle mine.yaml
   uam faults --matrix processes --engine ros --clock realtime --repeat 3
   uam faults --matrix cables --engine rehearsal --config my_lab.yaml
+  uam faults --out matrix                    stop with Ctrl-C; the same command continues
   uam fly --fault motor_loss@pick+1:remaining=0.7      one flight with its report
 
-Results in --out: report.html with the matrix in colours, summary.md, flights.csv, faults.json,
-matrix.png. The same seed gives the same flights, except with process faults. Exit status: 0 all
-promises of the matrix kept, 1 a promise broken, 2 wrong use.
+Results in --out: report.html with the matrix in colours, summary.md, faults.json, matrix.png, every
+flight in flights.parquet and flights.csv. The same seed gives the same flights, except with process
+faults. Exit status: 0 all promises of the matrix kept, 1 a promise broken, 2 wrong use.
 """
 
 
@@ -67,7 +67,7 @@ def add(commands: argparse._SubParsersAction) -> None:
     command.config(TEMPLATE)
     command.choice("--clock", CLOCKS, "lockstep", "of the ROS engine")
     command.seed("of all noise")
-    command.jobs(with_ros=True)
+    command.workers(with_ros=True)
     command.option("--repeat", "N", "flights per fault and moment", 1, type=count)
     command.out()
 
@@ -77,8 +77,11 @@ def run(options: argparse.Namespace) -> int:
     if options.list:
         print(fault_catalogue.listing())
         return 0
-    from uam_lab.campaign import fault_matrix, fault_trial
+    from uam_lab.campaign import fault_matrix, fault_rows, fault_trial
+    from uam_lab.campaign.flying import fly_missing
+    from uam_lab.results.row_table import RowTable
 
+    place = place_of(options)
     check_clock(options.engine, options.clock)
     if options.engine != "direct":
         require_ros()
@@ -112,13 +115,22 @@ def run(options: argparse.Namespace) -> int:
         for cell in cells
     ]
     out = make_folder(options.out, "faults")
+    settings = (matrix, options.seed, options.repeat, options.engine, options.clock)
+    flown = RowTable(
+        out / "flights.parquet",
+        fault_rows.SCHEMA,
+        (*settings, profile.sets, profile.bridge(), vehicle.numbers, changes),
+    )
     with Counting("faults", len(trials)) as counting:
 
         def show(done: int, one: fault_trial.FaultResult) -> None:
             moment = f", {one.moment}" if one.moment else ""
             counting.show(done, f"{one.fault}{moment}: {one.outcome}")
 
-        results = fly_all(trials, jobs_of(options), fault_trial.measure, show)
+        rows = fly_missing(
+            flown, dict(enumerate(trials)), place, fault_rows.to_row, fault_trial.measure, show
+        )
+    results = [fault_rows.from_row(row) for row in rows.values()]
     return _written(out, matrix, results, vehicle)
 
 

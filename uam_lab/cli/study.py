@@ -8,14 +8,14 @@ from collections.abc import Sequence
 from functools import partial
 from pathlib import Path
 
-from uam_lab.cli.command import jobs_of
+from uam_lab.cli.command import place_of
 from uam_lab.cli.counting import Counting
 from uam_lab.flight.conclude import command_line
 from uam_lab.results.atomic import write_rows, write_text
 from uam_lab.results.result_folder import make_folder, versions, write_json
-from uam_lab.study import kept
 from uam_lab.study.description import Study, load_study
 from uam_lab.study.flights import StudyFlight, StudyResult
+from uam_lab.workers.place import Workplace
 
 PARTS = ("margins", "varied", "law", "arm")
 TUNING = "tuning.json"  # of `--tune`: law → costs of the evaluations, best numbers
@@ -37,12 +37,14 @@ def run(options: argparse.Namespace) -> int:
     return _fly(study, options, out)
 
 
-def _flier(planned: Sequence[StudyFlight], jobs: int, out: Path) -> list[StudyResult]:
+def _flier(planned: Sequence[StudyFlight], place: Workplace, out: Path) -> list[StudyResult]:
     """Fly with a progress bar."""
+    from uam_lab.study import kept
+
     with Counting("study", len(planned)) as counting:
         return kept.fly(
             planned,
-            jobs,
+            place,
             out,
             lambda done, r: counting.show(done, f"{r.row}, {r.condition}, seed {r.seed}"),
         )
@@ -86,7 +88,7 @@ def _fly(study: Study, options: argparse.Namespace, out: Path) -> int:
     if "margins" in parts:
         rows = [row for row in study.rows if row.law and not row.profiles]
         texts.append(report.margin_table(margins(study, rows)))
-    runner = Runner(study, out, jobs_of(options), options.seeds or study.document["seeds"], _flier)
+    runner = Runner(study, out, place_of(options), options.seeds or study.document["seeds"], _flier)
     if "varied" in parts:
         results = runner.varied()
         flown += results

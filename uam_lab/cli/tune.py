@@ -15,7 +15,7 @@ from uam_lab.cli.command import (
     chosen_effects,
     count,
     given_profile,
-    jobs_of,
+    place_of,
 )
 from uam_lab.cli.counting import Counting
 from uam_lab.flight.conclude import command_line
@@ -60,7 +60,7 @@ def add(commands: argparse._SubParsersAction) -> None:
     command.plant()
     text = "total number of evaluations of the study"
     command.option("--evaluations", "N", text, 200, type=count)
-    command.jobs()
+    command.workers()
     command.seed("of the optimiser; with --jobs 1 the search is repeatable")
     text = (
         "initial step around the start, as a fraction of the logarithmic range; "
@@ -85,7 +85,10 @@ def run(options: argparse.Namespace) -> int:
     if not 0.0 < options.step <= 0.5:  # before a folder is made
         raise TuningError(f"--step {options.step:g} is outside 0 to 0.5")
     out = make_folder(options.out, "tune", space.name)
-    storage = options.storage or str(out / "study.journal")
+    place = place_of(options)
+    if place.scheduler and not options.storage:
+        print("uam tune: with --scheduler the workers need to reach --storage", file=sys.stderr)
+    storage = options.storage or str((out / "study.journal").resolve())
     task = Task(
         space, options.study or space.name, storage, options.evaluations, options.seed, options.step
     )
@@ -99,7 +102,7 @@ def run(options: argparse.Namespace) -> int:
                 text = "best cost" if space.delay_margin is None else "area of the front [ms]"
                 counting.show(done, "" if best is None else f"{text} {best:.4g}")
 
-            search(task, jobs_of(options), show)
+            search(task, place, show)
     except KeyboardInterrupt:
         status = INTERRUPTED
         print(

@@ -1,42 +1,45 @@
-"""Results of a study's flights, kept in a file, so that an interrupted study continues."""
+"""Results of a study's flights, kept in a table, so that an interrupted study continues."""
 
 from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Callable, Sequence
-from dataclasses import asdict
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
+from typing import Any
 
-from uam_lab.campaign.pool import fly_all
+import pyarrow as pa
+
+from uam_lab.campaign.flying import fly_missing
+from uam_lab.results.row_table import RowTable
 from uam_lab.study.flights import StudyFlight, StudyResult, measure
+from uam_lab.workers.place import Workplace
 
-FILE = "flown.jsonl"
+FILE = "flown.parquet"
+ERRORS = ("position_m", "attitude_deg", "arm_deg")
+NESTED = ("shares", "gains")  # JSON in the table
+SCHEMA = pa.schema(
+    [
+        *(("mark", pa.string()), ("row", pa.string()), ("condition", pa.string())),
+        *(("seed", pa.int64()), ("outcome", pa.string())),
+        *((name, pa.float64()) for name in ERRORS),
+        *((name, pa.string()) for name in NESTED),
+    ]
+)
 
 
 def fly(
     flights: Sequence[StudyFlight],
-    jobs: int,
+    place: Workplace,
     out: Path,
     progress: Callable[[int, StudyResult], None] = lambda done, result: None,
 ) -> list[StudyResult]:
     """Fly those that the folder `out` has no result of; return all, in the order of `flights`."""
-    known = _read(out / FILE)
+    table = RowTable(out / FILE, SCHEMA, "study")
     marks = [mark(flight) for flight in flights]
-    lacking = [(f, name) for f, name in zip(flights, marks, strict=True) if name not in known]
-    missing = [f for f, _ in lacking]
-    names = {(f.row, f.condition, f.trial.seed): name for f, name in lacking}
-
-    def keep(done: int, result: StudyResult) -> None:
-        name = names[result.row, result.condition, result.seed]
-        known[name] = result
-        with (out / FILE).open("a") as file:
-            file.write(json.dumps({"flight": name, **asdict(result)}) + "\n")
-        progress(len(flights) - len(missing) + done, result)
-
-    if missing:
-        fly_all(missing, jobs, work=measure, progress=keep)
-    return [known[name] for name in marks]
+    trials = dict(zip(marks, flights, strict=True))
+    rows = fly_missing(table, trials, place, _to_row, measure, progress)
+    return [_from_row(rows[name]) for name in marks]
 
 
 def mark(flight: StudyFlight) -> str:
@@ -51,15 +54,18 @@ def mark(flight: StudyFlight) -> str:
     return hashlib.sha256(repr(inputs).encode()).hexdigest()[:16]
 
 
-def _read(file: Path) -> dict[str, StudyResult]:
-    found = {}
-    for line in file.read_text().splitlines() if file.exists() else ():
-        try:
-            values = json.loads(line)
-        except ValueError:  # an incomplete last line after a kill
-            continue
-        name = values.pop("flight")
-        values["errors"] = tuple(values["errors"])
-        values["gains"] = {key: tuple(gains) for key, gains in values["gains"].items()}
-        found[name] = StudyResult(**values)
-    return found
+def _to_row(key: str, result: StudyResult) -> dict[str, Any]:
+    return {
+        **{"mark": key, "row": result.row, "condition": result.condition},
+        **{"seed": result.seed, "outcome": result.outcome},
+        **dict(zip(ERRORS, result.errors, strict=True)),
+        **{name: json.dumps(getattr(result, name)) for name in NESTED},
+    }
+
+
+def _from_row(row: Mapping[str, Any]) -> StudyResult:
+    gains = {name: tuple(values) for name, values in json.loads(row["gains"]).items()}
+    errors = tuple(row[name] for name in ERRORS)
+    shares = json.loads(row["shares"])
+    named = (row["row"], row["condition"], row["seed"])
+    return StudyResult(*named, errors, row["outcome"], shares, gains)

@@ -13,6 +13,7 @@ from uam_lab.campaign.trial import Trial
 from uam_lab.study import design, kept
 from uam_lab.study.description import NOMINAL, Condition, Row, Study
 from uam_lab.study.flights import StudyFlight, StudyResult, flights
+from uam_lab.workers.place import Workplace
 
 PROPOSED = "proposed"
 SHOWN = (NOMINAL, "hard")  # conditions whose shares are shown in full
@@ -68,17 +69,17 @@ class Runner:
         self,
         study: Study,
         out: Path,
-        jobs: int,
+        place: Workplace,
         seeds: int,
-        fly: Callable[[Sequence[StudyFlight], int, Path], list[StudyResult]] = kept.fly,
+        fly: Callable[[Sequence[StudyFlight], Workplace, Path], list[StudyResult]] = kept.fly,
     ) -> None:
-        """fly: flies planned flights with so many jobs, results kept in the folder."""
-        self.study, self._out, self._jobs, self._all = study, out, jobs, fly
+        """fly: flies planned flights there, results kept in the folder."""
+        self.study, self._out, self._place, self._all = study, out, place, fly
         self.seeds = tuple(range(1, seeds + 1))
         self.strength = study.document["strengths"]
 
     def _fly(self, planned: list[StudyFlight]) -> list[StudyResult]:
-        return self._all(planned, self._jobs, self._out)
+        return self._all(planned, self._place, self._out)
 
     def _planned(
         self, made: dict[str, Profile], conditions: Sequence[Condition], delay: float = 0.0

@@ -1,4 +1,4 @@
-"""The search: an Optuna study, evaluated by several processes or machines.
+"""The search: an Optuna study, evaluated by several workers of this machine or of a cluster.
 
 One objective, the cost of the flights, is searched with CMA-ES; cost and delay margin together with
 the tree-structured Parzen estimator, which has several objectives.
@@ -9,23 +9,24 @@ several machines can use. The storage contains every evaluation, so a stopped se
 
 from __future__ import annotations
 
-import multiprocessing
-import time
+import itertools
 import warnings
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import partial
 
 import optuna
 from optuna.storages import JournalStorage, RDBStorage
 from optuna.storages.journal import JournalFileBackend
 from optuna.trial import TrialState
 
-from uam_lab.campaign.pool import prepare_worker
 from uam_lab.campaign.trial import measure
+from uam_lab.flight.direct.warm_up import prepare
 from uam_lab.tuning.front import delay_margin, hypervolumes
 from uam_lab.tuning.space import Space, TuningError
+from uam_lab.workers.place import Workplace
+from uam_lab.workers.workers import workers
 
-POLL = 1.0  # [s]
 STEP = 0.1  # initial step of CMA-ES around the start, as a fraction of the logarithmic range
 HOPELESS = 1.5  # a candidate is pruned when its cost exceeds this factor times the best cost
 DONE = (TrialState.COMPLETE, TrialState.PRUNED)
@@ -103,10 +104,9 @@ def evaluate(space: Space, trial: optuna.Trial, best: float | None) -> float | t
     return cost if space.delay_margin is None else (cost, delay_margin(profile))
 
 
-def work(task: Task, number: int) -> None:
-    """Evaluate candidates until the study has task.evaluations; main function of a worker."""
-    prepare_worker()
-    study = open_study(Task(**{**vars(task), "seed": task.seed + number}))
+def work(task: Task) -> None:
+    """Evaluate candidates until the study has task.evaluations; runs in each worker."""
+    study = open_study(task)
     study.optimize(
         lambda trial: evaluate(
             task.space, trial, _progress(study) if task.space.delay_margin is None else None
@@ -125,32 +125,31 @@ def _progress(study: optuna.Study) -> float | None:
         return None
 
 
-def search(task: Task, jobs: int, progress: Callable[[int, float | None], None]) -> optuna.Study:
-    """Extend the study with `jobs` processes until it has task.evaluations; return it.
+def search(
+    task: Task, place: Workplace, progress: Callable[[int, float | None], None]
+) -> optuna.Study:
+    """Extend the study until it has task.evaluations, each worker with its own seed; return it.
 
     progress: called about once per second with the number of evaluations and the best cost, or with
-    the volume of the front. Raises
-    TuningError if a worker fails, KeyboardInterrupt on Ctrl-C; the study keeps its evaluations.
+    the volume of the front. A worker that is lost or comes later continues the same study. Raises
+    WorkersError, KeyboardInterrupt on Ctrl-C, and what an evaluation raises; the study keeps its
+    evaluations.
     """
     study = open_study(task)
-    context = multiprocessing.get_context("spawn")
-    workers = [context.Process(target=work, args=(task, i), daemon=True) for i in range(jobs)]
+    seeds = itertools.count(task.seed)
+    tasks = itertools.takewhile(
+        lambda _: _done(study) < task.evaluations, (replace(task, seed=one) for one in seeds)
+    )
+
+    def show() -> None:
+        progress(_done(study), _progress(study))
+
     if _done(study) < task.evaluations:
-        for worker in workers:
-            worker.start()
-    try:
-        while any(worker.is_alive() for worker in workers):
-            progress(_done(study), _progress(study))
-            time.sleep(POLL)
-            failed = [worker for worker in workers if worker.exitcode]
-            if failed:
-                raise TuningError("a worker failed; see its error message above")
-    finally:
-        for worker in workers:
-            if worker.is_alive():
-                worker.terminate()
-                worker.join()
-    progress(_done(study), _progress(study))
+        prepare()
+        with workers(place, prepare, partial(print, flush=True)) as crew:
+            for _ in crew.completed(work, tasks, per_worker=1, idle=show):
+                show()
+    show()
     return study
 
 
