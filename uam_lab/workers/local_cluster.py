@@ -21,6 +21,8 @@ SETTINGS = {
     "distributed.nanny.pre-spawn-environ": SINGLE_THREAD,
     # an item survives lost workers; Dask's default gives it up after three
     "distributed.scheduler.allowed-failures": 1000,
+    # for a result that a lost worker had; Dask waits 30 s
+    "distributed.comm.timeouts.connect": "10s",
     # sampling every 10 ms in every worker
     "distributed.worker.profile.enabled": False,
     "distributed.admin.system-monitor.disk": False,

@@ -10,7 +10,7 @@ from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from typing import Any
 
-from distributed import Client, Future
+from distributed import CancelledError, Client, Future
 from distributed.scheduler import KilledWorker
 
 from uam_lab.workers import task
@@ -21,6 +21,7 @@ from uam_lab.workers.window import PER_WORKER, Window
 
 CONNECTING = 15.0  # [s] for the scheduler to answer
 GONE = 60.0  # [s] without the scheduler, after which the command ends
+RECEIVING = 20.0  # [s] for a result; after that its worker counts as lost
 POLL = 1.0  # [s] between two looks at the number of workers
 WAITING = 10.0  # [s] without a worker, after which the user is told
 
@@ -117,19 +118,15 @@ class _Run:
         self._threads = self._crew.threads()
         try:
             while True:
+                if self._client.status == "closed":
+                    raise WorkersError("the connection to the scheduler is lost")
                 for number, item in window.fill(self._threads):
                     self._submit(work, number, item)
                 if not window:
                     return
-                with contextlib.suppress(queue.Empty):
-                    number = self._finished.get(timeout=POLL)
-                    future = self._futures.pop(number)
-                    if future.status == "finished":
-                        result = future.result()
-                        window.done(number)
-                        yield number, result
-                    else:
-                        self._failed(future, window, number)
+                received = self._receive(window)
+                if received is not None:
+                    yield received
                 if time.monotonic() - self._looked >= POLL:
                     self._look()
                     idle()
@@ -153,18 +150,34 @@ class _Run:
         self._futures[number] = future
         future.add_done_callback(lambda _: self._finished.put(number))
 
-    def _failed(self, future: Future, window: Window, number: int) -> None:
-        """Have a lost item computed again; raise every other error."""
-        if future.status != "error":
-            raise WorkersError(f"the scheduler gave up a flight ({future.status})")
-        error = future.exception()
-        if isinstance(error, KilledWorker) and window.lost(number):
-            return
-        if isinstance(error, ModuleNotFoundError):
+    def _receive(self, window: Window) -> tuple[int, Any] | None:
+        """Return number and result of an item; None if there is none yet, or if it was lost."""
+        try:
+            number = self._finished.get(timeout=POLL)
+        except queue.Empty:
+            return None
+        future = self._futures.pop(number)
+        if future.status == "error":
+            self._failed(future.exception(), window, number)
+            return None
+        try:
+            result = future.result(RECEIVING)
+        except (TimeoutError, CancelledError):  # its worker was lost with it
+            future.cancel()
+            self._failed(None, window, number)
+            return None
+        window.done(number)
+        return number, result
+
+    def _failed(self, error: BaseException | None, window: Window, number: int) -> None:
+        """Have a lost item computed again; raise every other error. error: None if it was lost."""
+        if error is None or isinstance(error, KilledWorker):
+            if not window.lost(number):
+                raise WorkersError(f"{number}: every worker that began it was lost")
+        elif isinstance(error, ModuleNotFoundError):
             raise WorkersError(f"a worker cannot import {error.name}: install uam there") from error
-        if isinstance(error, KilledWorker):
-            raise WorkersError(f"{number}: every worker that began it was lost") from error
-        raise error
+        else:
+            raise error
 
     def _look(self) -> None:
         """Notice a change of the number of workers, and a lost scheduler."""
@@ -172,7 +185,7 @@ class _Run:
         if self._client.status == "running":
             self._alive = now
             self._threads = self._crew.threads()
-        elif self._client.status == "closed" or now - self._alive > GONE:
+        elif now - self._alive > GONE:
             raise WorkersError("the connection to the scheduler is lost")
         if self._threads:
             self._staffed, self._told = now, False
