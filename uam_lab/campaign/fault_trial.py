@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
@@ -9,6 +10,7 @@ from typing import Any
 from uam_lab.campaign.fault_matrix import Cell
 from uam_lab.campaign.fault_outcome import COMPLETED, LOST, classify, down_after
 from uam_lab.campaign.trial import Trial, figures_of, fly
+from uam_lab.results.outcome import Outcome
 
 
 @dataclass(frozen=True)
@@ -42,15 +44,22 @@ class FaultResult:
 
 def measure(flight: FaultTrial) -> FaultResult:
     """Fly a trial; return its result. Raises ConfigurationError, ScenarioError."""
-    cell, outcome = flight.cell, fly(flight.trial)
+    outcome = fly(flight.trial)
+    if outcome.series is None:
+        return judged(flight.cell, outcome, None)
+    return judged(flight.cell, outcome, figures_of(flight.trial, outcome, outcome.reason))
+
+
+def judged(cell: Cell, outcome: Outcome, figures: Mapping[str, Any] | None) -> FaultResult:
+    """Return the result of a flight; figures: its metrics, None without a recording."""
     series, promise = outcome.series, cell.promise
-    if series is None:
+    if series is None or figures is None:
         broken = None if promise is None else False
         return FaultResult(cell.fault, cell.moment, LOST, outcome.reason, 0.0, kept=broken)
-    figures = figures_of(flight.trial, outcome, outcome.reason)
     ending = classify(series, figures)
-    begun = min((one["begin_s"] for one in outcome.faults), default=None)
-    down = None if ending == COMPLETED or begun is None else down_after(series, begun)
+    begun = min((one["begin_s"] for one in outcome.faults), default=math.nan)
+    unknown = ending == COMPLETED or math.isnan(begun)
+    down = None if unknown else down_after(series, begun)
     return FaultResult(
         fault=cell.fault,
         moment=cell.moment,

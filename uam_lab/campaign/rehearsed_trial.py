@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-import math
 import shutil
 import tempfile
 from dataclasses import dataclass, replace
 from pathlib import Path
 
+from uam_lab.campaign import fault_trial
 from uam_lab.campaign.fault_matrix import Cell
-from uam_lab.campaign.fault_outcome import COMPLETED, LOST, REFUSED, classify, down_after
+from uam_lab.campaign.fault_outcome import LOST, REFUSED
 from uam_lab.campaign.fault_trial import FaultResult
 from uam_lab.flight.observer import Observer
 from uam_lab.processes.interrupts import Interrupts
@@ -64,27 +64,10 @@ def with_checklist(cell: Cell) -> bool:
 
 def judged(cell: Cell, outcome: Outcome, figures: dict | None) -> FaultResult:
     """Return the result of a rehearsal; figures: its metrics, None without a recording."""
+    if not outcome.failure.startswith(REFUSAL):
+        return fault_trial.judged(cell, outcome, figures)
     promise = cell.promise
-    if outcome.failure.startswith(REFUSAL):
-        flown = outcome.series is not None and bool(outcome.series.flown.any())
-        ending = LOST if flown else REFUSED
-        kept = None if promise is None else promise.kept(ending, None)
-        return FaultResult(cell.fault, cell.moment, ending, outcome.failure, 0.0, kept=kept)
-    if outcome.series is None or figures is None:
-        kept = None if promise is None else False
-        return FaultResult(cell.fault, cell.moment, LOST, outcome.reason, 0.0, kept=kept)
-    ending = classify(outcome.series, figures)
-    begun = min((one["begin_s"] for one in outcome.faults), default=math.nan)
-    unknown = ending == COMPLETED or math.isnan(begun)
-    down = None if unknown else down_after(outcome.series, begun)
-    return FaultResult(
-        fault=cell.fault,
-        moment=cell.moment,
-        outcome=ending,
-        why="; ".join(figures["shortfalls"]),
-        duration_s=figures["duration_s"],
-        down_after_s=down,
-        kept=None if promise is None else promise.kept(ending, down),
-        worst=figures["max"],
-        happened=tuple(outcome.faults),
-    )
+    flown = outcome.series is not None and bool(outcome.series.flown.any())
+    ending = LOST if flown else REFUSED
+    kept = None if promise is None else promise.kept(ending, None)
+    return FaultResult(cell.fault, cell.moment, ending, outcome.failure, 0.0, kept=kept)
