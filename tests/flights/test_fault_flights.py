@@ -151,6 +151,7 @@ def test_a_matrix_from_the_command_line(tmp_path, capsys):
     assert {p.name for p in out.iterdir()} == {
         "faults.json",
         "flights.csv",
+        "flights.parquet",
         "matrix.png",
         "report.html",
         "summary.md",

@@ -26,7 +26,7 @@ from uam_control.coordinates import ARM, ATTITUDE, POSITION
 from uam_control.estimation import EstimatorParameters
 from uam_control.laws import catalogue
 from uam_control.laws.law_parameters import LawParameters
-from uam_control.mission import MissionParameters, ScenarioOptions
+from uam_control.mission import MissionParameters, ScenarioOptions, StartParameters
 from uam_control.settings import configuration
 from uam_control.settings.parameter_file import ProfileError, read_sections
 from uam_control.settings.parameter_set import ParameterError, ParameterSet
@@ -51,9 +51,8 @@ FLIGHT_OWN = {
     **dict.fromkeys(CONTROLLERS, ("control_period", "vehicle", "publishers")),
     "state_estimator": ("vehicle", "odometry_rate", "publishers"),
     "mission": (
-        *("control_period", "scenario", "vehicle", "auto_start", "dry_run", "publishers"),
-        "state_timeout",
-        "require_checklist",
+        *("control_period", "scenario", "vehicle", "publishers", "state_timeout"),
+        *StartParameters.specs(),
         *ScenarioOptions.specs(),
     ),
 }

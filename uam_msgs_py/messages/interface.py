@@ -48,7 +48,7 @@ CONTENTS = {
     topics.MAGNET_STATE: Content(
         "", "on or off", f"{SLOW} and on change", "magnet_driver or mavlink_bridge", "recorder"
     ),
-    topics.IMU_BIAS: Content(BODY, "rad/s; m/s²", GAINS),
+    topics.IMU_BIAS: Content(BODY, "rad/s; m/s²", "50 Hz, not for a second after a gap"),
     topics.SETPOINT: Content(BODY, "rad/s, thrust 0..1", TICK),
     topics.THRUST: Content("", "1, N", "10 Hz"),
     topics.POSITION_ADAPTATION: Content("", "of each gain", GAINS),

@@ -79,12 +79,13 @@ AUTO, NONE = "auto", "none"  # values of required_parameters
 
 @dataclass(frozen=True)
 class Links:
-    """The open links; station, faulty, late: None if not configured."""
+    """The open links; station, faulty, late: None if not configured. waits: for a device."""
 
     autopilot: OffboardLink
     station: GroundStation | None
     faulty: FaultyTransport | None
     late: LateTransport | None
+    waits: bool
 
 
 def open_links(
@@ -175,7 +176,7 @@ def open_links(
         transport = station = GroundStation(watching, transport, codec)
     link = OffboardLink(transport, sequence, mapping, system, signing, imu_rate, clock, required)
     link.parameters.writing = options.set_parameters
-    return Links(link, station, faulty, late)
+    return Links(link, station, faulty, late, waits)
 
 
 def _required(given: str, url: str) -> RequiredParameters | None:

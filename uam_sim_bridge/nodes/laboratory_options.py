@@ -52,7 +52,7 @@ class LaboratoryParameters(ParameterSet):
     )
     folder: str = text("devices", "folder of the pseudo-terminals and of `ready`", "a folder")
     hardware: str = text(
-        "s500_arm", "servos of the bus", "name of a hardware file, or a file with the section arm"
+        "s500_lab", "servos of the bus", "name of a lab file, or a file with the section arm"
     )
     baud: int = integer(921600, "baud rate of the autopilot's line", 9600, 12_500_000)
     mocap_port: int = integer(1510, "its command port on 127.0.0.1", 0, 65535)

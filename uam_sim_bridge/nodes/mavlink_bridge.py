@@ -112,6 +112,7 @@ class MavlinkBridgeNode(UamNode):
         links = open_links(self, options, sequence, mapping.current, *own_imu)
         self.link, self._station, self._faulty = links.autopilot, links.station, links.faulty
         self._late = links.late
+        self._early = links.waits and not own_imu  # the link is served before the first tick
         sets = BridgeSets(mapping.current, hold, thrust.current, vision, setpoint)
         fresh = options.stale_after + LATENCY
         self.stage = BridgeStage(
@@ -300,11 +301,11 @@ class MavlinkBridgeNode(UamNode):
     def _watch(self) -> None:
         """Run ticks without commands in real time when states stop arriving.
 
-        Before the first tick of a vehicle only the link is served: the autopilot may be there
-        before the sensors.
+        With `wait_for_device` the link is served before the first tick, too: the autopilot of a
+        vehicle may be there before the sensors. Stamps are those of the system's clock then.
         """
         silence = time.monotonic() - self._last_tick
-        if self.ticks == 0 and self._imu is None and self._options.imu_clock == "system":
+        if self.ticks == 0 and self._early:
             now = time.time()
             self.link.poll(now)
             self.link.maintain(now)
