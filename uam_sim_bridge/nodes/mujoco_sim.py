@@ -12,8 +12,8 @@ lockstep  At every control tick the plant waits for the setpoint that the bridge
           While a lost node is restarted, ticks run at the pace of the wall clock without its
           answers, until all answers have been in time for IN_TIME ticks (`restart.py`).
 realtime  Ticks begin at absolute deadlines of the wall clock, one control period apart; after a
-          stall of the machine they run at most `catch_up` times as fast. Without an answer by the
-          next deadline the last command holds. The latency of a tick is the time from the
+          stall of the machine they run a quarter faster (`tick_deadlines.py`). Without an answer by
+          the next deadline the last command holds. The latency of a tick is the time from the
           publication of its IMU sample to that of its setpoint. Beyond one control period the tick
           counts as late. Beyond some periods, or without a setpoint, it counts as missed
           (`latencies.py`).
@@ -63,6 +63,7 @@ from uam_sim_bridge.nodes.plant_topics import (
     nanoseconds,
 )
 from uam_sim_bridge.nodes.restart import Restart
+from uam_sim_bridge.nodes.tick_deadlines import TickDeadlines
 from uam_sim_bridge.patience import Patience
 from uam_sim_bridge.plant import Plant, Samples, Truth, Vehicle
 from uam_sim_bridge.plant.effects import presets
@@ -141,6 +142,7 @@ class Simulator:
         self._published = 0  # wall time [ns] of its publication
         self._restart = Restart(options.answer_timeout)
         self._begun = 0.0  # wall time [s] at which this tick began
+        self._deadlines = TickDeadlines(self.plant.period, options.let_go)
         self._begun_at = 0.0  # and simulation time [s]
         self._latencies = Latencies(self.statistics, self.plant.period)
 
@@ -284,12 +286,9 @@ class Simulator:
         self._recorder_has_caught_up(0.0, LAST_WAIT)  # unread messages are lost when the node ends
 
     def _deadline(self, begin: float) -> float:
-        """Wall time [s] at which the next tick of a flight begun at `begin` begins.
-
-        After a stall ticks run faster, but not in a burst: the other nodes could not follow.
-        """
-        on_time = begin + (self.plant.tick - self._first_tick + 1) * self.plant.period
-        return max(on_time, self._begun + self.plant.period / self.options.catch_up)
+        """Wall time [s] at which the next tick of a flight begun at `begin` begins."""
+        ticks = self.plant.tick - self._first_tick + 1
+        return self._deadlines.next(begin, ticks, self._begun, time.monotonic())
 
     def _begin_tick(self) -> tuple[Samples, Truth]:
         """Publish the samples and the truth of this tick, and return them."""

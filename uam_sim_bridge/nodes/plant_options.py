@@ -26,7 +26,6 @@ from uam_sim_bridge.mavlink.hil.sitl_ports import HOST
 from uam_sim_bridge.plant.engines import DEFAULT_PLANT, PLANTS
 from uam_sim_bridge.plant.vehicle import PAYLOAD_MAX
 
-CATCH_UP = 1.25  # [1] largest real-time factor after a stall of the machine
 NOT_READY = 3  # exit status: not every node has started, or not all are connected
 
 
@@ -58,12 +57,12 @@ class PlantParameters(ParameterSet):
         "lockstep: each tick waits for all answers; realtime: ticks of the wall clock",
         ("lockstep", "realtime"),
     )
-    catch_up: float = number(
-        CATCH_UP,
-        "real time: largest real-time factor after a stall of the machine; 1: what is lost stays "
-        "lost, for an autopilot with its own clock",
-        "1",
-        1.0,
+    let_go: float = number(
+        0.0,
+        "real time: lateness from which time is let go, for an autopilot with its own clock; 0: "
+        "never, all of it is caught up",
+        "s",
+        0.0,
         10.0,
     )
     publish_imu: bool = switch(
