@@ -30,6 +30,7 @@ class FlightController:
         values = px4_parameters.load(load_description())
         kept = {name: value for name, value in values.items() if not name.startswith("SIM_")}
         kept |= {"SYS_HITL": 1, "MAV_SYS_ID": 1, "IMU_INTEG_RATE": 250, "SIM_BAT_ENABLE": 0}
+        kept |= {f"HIL_ACT_FUNC{motor}": 100 + motor for motor in range(1, 5)}
         scripts = folder / "scripts"
         scripts.mkdir(parents=True)
         # in place of PX4's scripts: no simulator at TCP, sensors and commander for HITL
@@ -42,6 +43,7 @@ class FlightController:
             + "unalias sensors commander\n"
             "sensors() { px4-sensors --instance $px4_instance start -h; }\n"
             "commander() { px4-commander --instance $px4_instance start -h; }\n"
+            "px4-pwm_out_sim --instance $px4_instance start -m hil\n"
         )
         (scripts / "px4-rc.mavlink").write_text(
             f"mavlink start -d {device} -b {BAUD} -m onboard -r {RATE}\n"

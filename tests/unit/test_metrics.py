@@ -50,6 +50,17 @@ def flight(phases=None, payload=True):
     return made
 
 
+def test_a_vehicle_that_stays_on_the_ground_has_not_completed_its_mission():
+    made = flight()
+    made.values[2:8, COLUMNS["reference.z"]] = [0.0, 0.5, 1.0, 1.0, 0.5, 0.0]
+    made.values[2:8, COLUMNS["truth.z"]] = [0.0, 0.01, 0.02, 0.01, 0.0, 0.0]
+    assert metrics.compute(made.series(), INFO)["shortfalls"] == ["never took off"]
+    made.values[4, COLUMNS["truth.z"]] = 0.9
+    assert metrics.compute(made.series(), INFO)["mission_completed"]
+    made.values[:, COLUMNS["truth.z"]] = np.nan  # a real vehicle
+    assert "never took off" not in metrics.compute(made.series(), INFO)["shortfalls"]
+
+
 def test_rms_and_maximum_run_over_the_flight_only():
     made = flight()
     made.values[:, COLUMNS["truth.y"]] = 0.0

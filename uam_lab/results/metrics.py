@@ -44,6 +44,7 @@ class Criteria:
     away_m: float = 0.05  # from the payload's start position, and above its lowest position
     held_s: float = 0.5  # minimum duration of both; a fall from the stand is shorter
     place_m: float = 0.15  # horizontal distance of the payload from the drop point
+    risen: float = 0.5  # share of the reference's rise, below which the vehicle never took off
     landing_m: float = 0.15  # horizontal distance of the vehicle from the landing point
     rest_m_s: float = 0.02  # speed below which the payload is at rest
 
@@ -77,7 +78,7 @@ def compute(
     payload = payload_facts(series, info.get("payload_mass_kg"), info.get("drop_point"), criteria)
     landing = landing_error(series, info.get("landing_point") or takeoff_point(series))
     shortfalls = what_is_missing(
-        flown=bool(series.flown.any()),
+        flown=left_the_ground(series, criteria),
         landed=bool(series.in_phase("landed").any()),
         landing_error_m=landing,
         abort_reason=info.get("abort_reason") or "",
@@ -195,6 +196,19 @@ def takeoff_point(series: Series) -> tuple[float, float]:
         return 0.0, 0.0
     row = int(np.argmax(series.flown))
     return float(series["reference.x"][row]), float(series["reference.y"][row])
+
+
+def left_the_ground(series: Series, criteria: Criteria) -> bool:
+    """Return whether the vehicle has risen, by `risen` of the rise of its reference.
+
+    Without a true height (a real vehicle) the flown phases count.
+    """
+    if not series.flown.any():
+        return False
+    true, desired = (series[name][series.flown] for name in ("truth.z", "reference.z"))
+    if not np.isfinite(true).all():
+        return True
+    return float(np.ptp(true)) >= criteria.risen * float(np.nanmax(desired) - desired[0])
 
 
 def landing_error(series: Series, point: Sequence[float]) -> float | None:
