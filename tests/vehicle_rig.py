@@ -88,6 +88,7 @@ class Vehicle:
 
     @property
     def status(self) -> MissionStatus:
+        self.probe.until(lambda: self.reported, "the first status")
         return MissionStatus.from_message(self.reported[-1])[1]
 
     def ask(self, name, on=None):
