@@ -17,11 +17,11 @@ from uam_sim_bridge.drivers.mocap.calibration import Calibration
 from uam_sim_bridge.drivers.mocap.frame import BodyPose
 from uam_sim_bridge.faults import CABLE, FAULTS, FaultError, Schedule
 from uam_sim_bridge.faults.schedule import timed
+from uam_sim_bridge.paced_clock import CATCH_UP, LATEST, PacedClock
 from uam_sim_bridge.plant import Vehicle
 from uam_sim_bridge.rehearsal.cables import Cables
 from uam_sim_bridge.rehearsal.hands import Grip, joint_torque, wrench
 from uam_sim_bridge.rehearsal.laboratory import Devices, Laboratory
-from uam_sim_bridge.rehearsal.paced_clock import CATCH_UP, LATEST, PacedClock
 from uam_sim_bridge.rehearsal.person import MOTIONS, Person, eased
 from uam_sim_bridge.rehearsal.tracked_room import RoomBody
 from uam_sim_bridge.rehearsal.wiring_mistakes import mistaken_chain

@@ -43,11 +43,11 @@ from uam_sim_bridge.nodes import laboratory_options
 from uam_sim_bridge.nodes.fault_topic import FaultTopic
 from uam_sim_bridge.nodes.laboratory_options import TOPIC, LaboratoryParameters
 from uam_sim_bridge.nodes.plant_topics import TruthTopics
+from uam_sim_bridge.paced_clock import PacedClock
 from uam_sim_bridge.plant import Vehicle
 from uam_sim_bridge.plant.sensors import Delay
 from uam_sim_bridge.rehearsal.cables import Cables
 from uam_sim_bridge.rehearsal.laboratory import Laboratory
-from uam_sim_bridge.rehearsal.paced_clock import PacedClock
 from uam_sim_bridge.rehearsal.person import Person
 
 NAME, IMU_DRIVER = "laboratory", "imu_driver"

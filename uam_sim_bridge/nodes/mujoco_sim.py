@@ -12,7 +12,7 @@ lockstep  At every control tick the plant waits for the setpoint that the bridge
           While a lost node is restarted, ticks run at the pace of the wall clock without its
           answers, until all answers have been in time for IN_TIME ticks (`restart.py`).
 realtime  Ticks begin at absolute deadlines of the wall clock, one control period apart; after a
-          stall of the machine they run a quarter faster (`tick_deadlines.py`). Without an answer by
+          stall of the machine they run a quarter faster (`paced_clock.py`). Without an answer by
           the next deadline the last command holds. The latency of a tick is the time from the
           publication of its IMU sample to that of its setpoint. Beyond one control period the tick
           counts as late. Beyond some periods, or without a setpoint, it counts as missed
@@ -63,13 +63,14 @@ from uam_sim_bridge.nodes.plant_topics import (
     nanoseconds,
 )
 from uam_sim_bridge.nodes.restart import Restart
-from uam_sim_bridge.nodes.tick_deadlines import TickDeadlines
+from uam_sim_bridge.paced_clock import PacedClock
 from uam_sim_bridge.patience import Patience
 from uam_sim_bridge.plant import Plant, Samples, Truth, Vehicle
 from uam_sim_bridge.plant.effects import presets
 
 NAME = "mujoco_sim"
 RESTART_PX4 = "; a PX4 does not connect again by itself: restart it"
+CATCH_UP = 1.25  # [1] largest real-time factor after a stall of the machine
 REPORT_INTERVAL = 5.0  # [s] between two log lines with the missing nodes
 FOREIGN_WAIT = 1.0  # [s] for discovery by foreign nodes, which do not report their connections
 LAST_WAIT = 3.0  # [s] longest wait for the recorder after the last tick
@@ -142,7 +143,8 @@ class Simulator:
         self._published = 0  # wall time [ns] of its publication
         self._restart = Restart(options.answer_timeout)
         self._begun = 0.0  # wall time [s] at which this tick began
-        self._deadlines = TickDeadlines(self.plant.period, options.let_go)
+        latest = options.let_go or math.inf
+        self._clock = PacedClock(self.plant.period, catch_up=CATCH_UP, latest=latest)
         self._begun_at = 0.0  # and simulation time [s]
         self._latencies = Latencies(self.statistics, self.plant.period)
 
@@ -241,6 +243,7 @@ class Simulator:
         gc.collect()
         gc.freeze()  # existing objects stay: later collections skip them
         begin, settled = time.monotonic(), Settled()
+        self._clock.begin()
         while not self._stop.raised:
             begun = time.perf_counter()
             if self._reset_due:
@@ -248,7 +251,7 @@ class Simulator:
             samples, truth = self._begin_tick()
             if realtime:
                 self._send_hil(samples, truth)
-                self._wait_until(self._deadline(begin))
+                self._wait_until(self._clock.deadline(self.plant.tick - self._first_tick + 1))
                 self._measure()
                 self._receive_hil(0.0)
             elif self.options.publish_imu:
@@ -285,15 +288,11 @@ class Simulator:
         self.statistics.wall_s = time.monotonic() - begin
         self._recorder_has_caught_up(0.0, LAST_WAIT)  # unread messages are lost when the node ends
 
-    def _deadline(self, begin: float) -> float:
-        """Wall time [s] at which the next tick of a flight begun at `begin` begins."""
-        ticks = self.plant.tick - self._first_tick + 1
-        return self._deadlines.next(begin, ticks, self._begun, time.monotonic())
-
     def _begin_tick(self) -> tuple[Samples, Truth]:
         """Publish the samples and the truth of this tick, and return them."""
         plant = self.plant
         self._begun, self._begun_at = time.monotonic(), plant.time
+        self._clock.note(plant.tick - self._first_tick)
         now = self.node.stamp = nanoseconds(plant.time)
         self.answers.begin()
         samples, truth = plant.sense(), plant.truth()

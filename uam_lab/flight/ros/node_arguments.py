@@ -17,6 +17,7 @@ from uam_lab.results.result_folder import ResultFolder, as_json, versions
 from uam_msgs_py.messages import topics
 from uam_msgs_py.node import wiring
 from uam_sim_bridge.faults import LINK, PLANT
+from uam_sim_bridge.paced_clock import LATEST
 from uam_sim_bridge.plant.effects.network_delay import SetpointDelay
 from uam_sim_bridge.ports import Ports
 from uam_sim_bridge.px4 import px4_parameters
@@ -46,7 +47,6 @@ DESCRIBED = {
     *(wiring.PLANT, wiring.BRIDGE, wiring.SCENE, wiring.COCKPIT),
 }
 PX4_LINGER = 4.0  # [s] simulated, after the mission, in which PX4 disarms and closes its log
-LET_GO = 0.02  # [s] lateness of a plant that an autopilot with its own clock does not notice
 DRY_RUN = 20.0  # [s] simulated, length of a dry run
 START_TIMEOUT = 20.0  # [s] without progress until every node is connected to the others
 OWN_START_TIMEOUT = 600.0  # [s] the same if the user starts a node by hand
@@ -71,7 +71,7 @@ def parameters(
         "hil_address": settings.sim_address,
         "autopilot_always_answers": settings.autopilot == BUILTIN,
         # an autopilot with its own clock must not see a long time that passes faster
-        "let_go": LET_GO if in_the_loop(settings) else 0.0,
+        "let_go": LATEST if in_the_loop(settings) else 0.0,
         "linger": 0.0 if settings.autopilot == BUILTIN else PX4_LINGER,
         "recorded": True,
         "end_with_mission": True,

@@ -1,8 +1,9 @@
 """Plant time against the wall clock: when a tick is due, and which wall time it has.
 
-A plant that is late runs at most CATCH_UP times as fast until it is on time again. One that is late
-by more than LATEST lets this time go: the world has then stood still for this time, and everything
-that is stamped stays as old as LATEST at most, as the clock of the autopilot (`OwnClock`) requires.
+A plant that is late runs a little faster until it is on time again, but not in a burst: the other
+nodes could not follow. One that is late by more than `latest` lets this time go: the world has then
+stood still for this time, and everything that is stamped stays as old as that at most, as an
+autopilot with a clock of its own requires.
 """
 
 from __future__ import annotations
@@ -10,9 +11,9 @@ from __future__ import annotations
 import time
 from collections.abc import Callable
 
-CATCH_UP = 2.0  # [1] fastest rate after a stall
+CATCH_UP = 2.0  # [1] fastest rate after a stall, of a rehearsal
 SHORTEST = 0.0005  # [s] a sleep takes longer than shorter ones
-LATEST = 0.02  # [s] lateness from which time is let go
+LATEST = 0.02  # [s] lateness that such an autopilot does not notice
 
 
 class PacedClock:
@@ -23,9 +24,13 @@ class PacedClock:
         period: float,
         steady: Callable[[], float] = time.monotonic,
         system: Callable[[], float] = time.time,
+        catch_up: float = CATCH_UP,
+        latest: float = LATEST,
     ) -> None:
-        """period [s] of a tick; steady, system: clocks [s]."""
+        """period [s] of a tick; steady, system: clocks [s]; catch_up [1]: fastest rate after a
+        stall; latest [s]: lateness from which time is let go."""
         self._period, self._steady, self._system = period, steady, system
+        self._shortest, self._latest = period / catch_up, latest
         self.lost, self.late, self.begun = 0.0, 0, 0
         self._origin = self._newest = steady()  # steady time of tick 0, of the newest tick
         self._offset = system() - self._origin  # system time − steady time
@@ -39,10 +44,13 @@ class PacedClock:
         """Return the system's time [s] at which `tick` is due."""
         return self._origin + tick * self._period + self._offset
 
+    def deadline(self, tick: int) -> float:
+        """Return the steady time [s] at which `tick` may begin."""
+        return max(self._origin + tick * self._period, self._newest + self._shortest)
+
     def left(self, tick: int) -> float:
         """Return the time [s] to sleep until `tick` may begin, 0 if it is due."""
-        due = self._origin + tick * self._period
-        left = max(due, self._newest + self._period / CATCH_UP) - self._steady()
+        left = self.deadline(tick) - self._steady()
         return left if left > SHORTEST else 0.0
 
     def note(self, tick: int) -> None:
@@ -51,6 +59,6 @@ class PacedClock:
         late = now - self._origin - tick * self._period
         self.begun += 1
         self.late += late > self._period
-        if late > LATEST:
+        if late > self._latest:
             self._origin += late
             self.lost += late
