@@ -13,9 +13,9 @@ from pathlib import Path
 import psutil
 
 from soaking.samples import Soak, usage
-from soaking.scenario import shuttle
 from uam_control.mission import load_scenario
 from uam_control.profiles.profile import load_profile
+from uam_lab.budget.shuttle import shuttle
 from uam_lab.flight.direct.flight import DirectFlight
 from uam_lab.processes.process_table import nodes
 from uam_lab.results.result_folder import new_folder

@@ -55,6 +55,8 @@ def test_diagnostics_name_missing_inputs(start, probe):
         ("mission", ["-p", "scenario:=nowhere"], "nowhere"),
         ("mission", ["--params-file", "no_such_file.yaml"], "no_such_file.yaml"),
         ("state_estimator", ["-p", "position_bandwidth:=fast"], "'fast' is not numeric"),
+        ("arm_controller", ["-p", "fifo_priority:=99"], "fifo_priority: 99 is outside 0 to 98"),
+        ("arm_controller", ["-p", "cores:='1023'"], "cores: 1023; this process may use"),
     ],
 )
 def test_bad_parameters_are_refused_in_one_line(start, name, arguments, complaint):

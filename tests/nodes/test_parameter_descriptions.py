@@ -28,6 +28,7 @@ WHOLE = {
     wiring.MISSION: {"grasp_attempts"},
     wiring.COCKPIT: {"port"},
 }
+EVERY_NODE = {"fifo_priority", "nice", "tick_times_kept"}
 
 
 def arguments(node, folder):
@@ -65,7 +66,7 @@ def test_every_parameter_is_described_and_ranged(start, probe, tmp_path, node):
     for name, (about, value) in found.items():
         assert about.description and about.additional_constraints, name
         number = value.type in (ParameterType.PARAMETER_INTEGER, ParameterType.PARAMETER_DOUBLE)
-        if name in WHOLE.get(node, ()):
+        if name in WHOLE.get(node, set()) | EVERY_NODE:
             (allowed,) = about.integer_range
             assert value.type == ParameterType.PARAMETER_INTEGER, name
             assert allowed.from_value <= value.integer_value <= allowed.to_value, name

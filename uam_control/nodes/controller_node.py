@@ -32,6 +32,7 @@ from uam_msgs_py.messages.topics import Topic
 from uam_msgs_py.node.base_node import UamNode
 from uam_msgs_py.node.joins import Ahead, StampJoin
 from uam_msgs_py.node.node_parameters import NodeParameters, given
+from uam_msgs_py.node.tick_times import DECODE, STAGE
 
 RESET, FREEZE = "reset_adaptation", "freeze_adaptation"  # services
 
@@ -89,9 +90,11 @@ class ControllerNode(UamNode):
         position: PositionCommand | None = None,
     ) -> None:
         begun = time.perf_counter()
+        self.times.lap(DECODE)
         flying = reference.flying and (position is None or position.flying)
         attitude = () if position is None else (position.attitude,)
         tau = self.stage.update(stamp, state, reference.values, *attitude, flying)
+        self.times.lap(STAGE)
         self.send(stamp, tau, reference, flying)
         if self.stage.gains_due:
             self._gains.position[:] = self.controller.adaptation

@@ -52,6 +52,7 @@ from uam_msgs_py.node.base_node import UamNode, run
 from uam_msgs_py.node.joins import Backlog
 from uam_msgs_py.node.namespace import neighbour_section
 from uam_msgs_py.node.node_parameters import NodeParameters
+from uam_msgs_py.node.tick_times import DECODE, ENCODE, STAGE
 
 NAME = "mission"
 POSITION_CONTROLLER = "position_controller"
@@ -186,9 +187,12 @@ class MissionNode(UamNode):
 
     def _tick(self, stamp: int, state: np.ndarray) -> None:
         begun, stage = time.perf_counter(), self._stage
+        self.times.lap(DECODE)
         if self._has_clock:
             stage.inputs.inputs.wall_clock(stamp / SECOND, time.monotonic())
-        if stage.begin(stamp, state):
+        changed = stage.begin(stamp, state)
+        self.times.lap(STAGE)
+        if changed:
             self._publish_reference()
         output = stage.output
         self._errors.tick(stamp, state, stage.reference, output.flying)
@@ -196,7 +200,9 @@ class MissionNode(UamNode):
             stamp
         )  # before the magnet, so that the status of a tick arrives before it
         self._magnet.publish(SWITCH[bool(output.magnet)])
+        self.times.lap(ENCODE)
         stage.advance(stamp, state)
+        self.times.lap(STAGE)
         self._publish_reference()
         self.done_tick(stamp, begun)
 

@@ -21,6 +21,7 @@ from uam_msgs_py.node.base_node import UamNode, run
 from uam_msgs_py.node.joins import Backlog
 from uam_msgs_py.node.namespace import frame
 from uam_msgs_py.node.node_parameters import NodeParameters
+from uam_msgs_py.node.tick_times import DECODE, STAGE
 
 NAME = "state_estimator"
 
@@ -79,11 +80,13 @@ class StateEstimatorNode(UamNode):
             self._begin_anew(stamp)
         self.take_waiting(self._mocap)
         self.take_waiting(self._joints)
+        self.times.lap(DECODE)
         try:
             state = self._stage.imu(stamp, gyro, force)
         except ValueError as error:
             self.warn(f"{error}; ignored", "imu")
             return
+        self.times.lap(STAGE)
         if state is None:
             return
         stamp = self._stage.stamp

@@ -30,6 +30,7 @@ from uam_control.mission import MissionParameters, ScenarioOptions, StartParamet
 from uam_control.settings import configuration
 from uam_control.settings.parameter_file import ProfileError, read_sections
 from uam_control.settings.parameter_set import ParameterError, ParameterSet
+from uam_control.settings.process_parameters import ProcessParameters, TickTimesParameters
 from uam_control.vehicle import VehicleDescription, derived_parameters, load_description
 
 # controller → (parameters of its limits, its part of chi)
@@ -41,17 +42,20 @@ CONTROLLERS: dict[str, tuple[type[ParameterSet], slice]] = {
 OTHERS = {"state_estimator": EstimatorParameters, "mission": MissionParameters}
 NODES = (*CONTROLLERS, *OTHERS)
 BRIDGE = "mavlink_bridge"
+# of the process of every node
+PROCESS = (*ProcessParameters.specs(), *TickTimesParameters.specs())
 BRIDGE_LINKS = (
     *("clock", "local_port", "autopilot_port", "autopilot_host", "autopilot_system"),
     *("autopilot", "gcs", "vehicle", "dry_run", "network_delay", "publishers"),
     *("imu_source", "imu_clock"),
+    *PROCESS,
 )
 # Parameters of a node that are not in a profile: they belong to one flight.
 FLIGHT_OWN = {
-    **dict.fromkeys(CONTROLLERS, ("control_period", "vehicle", "publishers")),
-    "state_estimator": ("vehicle", "odometry_rate", "publishers"),
+    **dict.fromkeys(CONTROLLERS, ("control_period", "vehicle", "publishers", *PROCESS)),
+    "state_estimator": ("vehicle", "odometry_rate", "publishers", *PROCESS),
     "mission": (
-        *("control_period", "scenario", "vehicle", "publishers", "state_timeout"),
+        *("control_period", "scenario", "vehicle", "publishers", "state_timeout", *PROCESS),
         *StartParameters.specs(),
         *ScenarioOptions.specs(),
     ),

@@ -153,6 +153,18 @@ class Command:
         )
         self.option("--scheduler", "ADDRESS", text, "")
 
+    def process(self) -> None:
+        """Add the options of the processes of the nodes that fly, for `chosen_process`."""
+        text = "real-time priority of the nodes that fly, SCHED_FIFO 1..98 (default: ordinary)"
+        self.option("--fifo", "PRIORITY", text, type=int, dest="fifo_priority")
+        text = "nice value of the nodes that fly, -20..19 (default: 0)"
+        self.option("--nice", "N", text, type=int)
+        self.option("--cores", "LIST", "cores of the nodes that fly, as 1,3 or 2-3 (default: all)")
+        text = "keep the memory of the nodes that fly from being swapped out"
+        self.switch("--lock-memory", text)
+        text = "time after a tick in which these nodes look for the next input without sleeping"
+        self.option("--busy-poll", "MS", text, type=number("time", "ms", 0.0, 100.0))
+
     def out(self, folder: str = "") -> None:
         """Add --out; folder: name of the default folder without the time."""
         text = f"result folder (default results/<time>-{folder or self._name})"
@@ -198,6 +210,14 @@ def chosen_effects(options: argparse.Namespace) -> Effects:
     Raises PlantError, ConfigurationError.
     """
     return presets.read(options.plant_preset, options.effects)
+
+
+def chosen_process(given: dict[str, Any]) -> dict[str, Any]:
+    """Remove the options of `Command.process` from `given`; return them as parameters."""
+    chosen = {name: given.pop(name) for name in ("fifo_priority", "nice", "cores", "lock_memory")}
+    if (busy := given.pop("busy_poll")) is not None:
+        chosen["busy_poll"] = 1e-3 * busy
+    return {name: value for name, value in chosen.items() if value not in (None, False)}
 
 
 def place_of(options: argparse.Namespace) -> Workplace:

@@ -10,7 +10,7 @@ from rich.console import Console
 
 from uam_control.laws import catalogue
 from uam_control.settings import configuration
-from uam_lab.cli.command import INTERRUPTED, Command, number
+from uam_lab.cli.command import INTERRUPTED, Command, chosen_process, number
 from uam_lab.flight import flight_settings
 from uam_lab.flight.conclude import command_line
 from uam_lab.flight.flight_settings import LOG_LIMIT, ONLOOKERS, REPLACEABLE, FlightSettings
@@ -41,6 +41,7 @@ examples:
   uam fly --dry-run                          all commands computed, none sent, nothing armed
   uam fly --view --clock realtime            monitor and tune in a browser
   uam fly --clock realtime                   paced by the wall clock, latency measured
+  uam fly --clock realtime --fifo 50 --lock-memory    the nodes ahead of other programs
   uam fly --namespace uav1 --domain 1        one of several vehicles in a ROS domain
   uam fly --without arm_controller           with your own arm controller: examples/
   uam fly --imu autopilot                    the estimator has the autopilot's IMU
@@ -165,6 +166,7 @@ def add(commands: argparse._SubParsersAction) -> None:
         "(default: the first free one)"
     )
     option("--instance", "N", text, type=int)
+    command.process()
     text = "namespace of all nodes, for several vehicles in one ROS domain (default: none)"
     option("--namespace", "NAME", text, "")
     text = f"ROS domain, 0..{LAST_DOMAIN} (default: that of the instance)"
@@ -174,6 +176,7 @@ def add(commands: argparse._SubParsersAction) -> None:
 def run(options: argparse.Namespace) -> int:
     """Run the command; return the exit status."""
     given = {name: value for name, value in vars(options).items() if name not in ("command", "run")}
+    given["process"] = chosen_process(given)
     delays = [
         1e-3 * given.pop(f"{what}_{kind}")
         for what in ("setpoint", "mocap")

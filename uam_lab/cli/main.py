@@ -25,6 +25,7 @@ COMMANDS = {
     "campaign": "campaign",
     "faults": "faults",
     "margins": "margins",
+    "budget": "budget",
     "vehicle": "vehicle",
     "arm": "arm",
     "identify-joint": "identify_joint",

@@ -14,6 +14,7 @@ from uam_control.mission import Feasibility, Scenario, ScenarioOptions, load_sce
 from uam_control.profiles.profile import Profile, default_profile, load_profile
 from uam_control.settings import configuration
 from uam_control.settings.parameter_set import ParameterError
+from uam_control.settings.process_parameters import ProcessParameters
 from uam_control.vehicle import (
     DEFAULT_VEHICLE,
     POSITION_SERVO,
@@ -23,6 +24,7 @@ from uam_control.vehicle import (
 from uam_lab.flight import node_options
 from uam_lab.flight.node_options import SettingsError
 from uam_lab.processes.node_environment import without_discovery
+from uam_msgs_py.node import process_options
 from uam_msgs_py.node.namespace import normal
 from uam_sim_bridge.faults import FaultError, Schedule, feasibility, read_schedule
 from uam_sim_bridge.faults.actuator_faults import ServoWeak
@@ -107,6 +109,8 @@ class FlightSettings:
     command: str = ""
     namespace: str = "/"
     domain: int | None = None
+    process: ProcessParameters = ProcessParameters()  # of the nodes that fly
+    tick_times: bool = False  # whether they measure their ticks
 
     @property
     def foreign(self) -> tuple[str, ...]:
@@ -151,6 +155,8 @@ def settings(
     command: str = "",
     namespace: str = "",
     domain: int | None = None,
+    process: Mapping[str, Any] | None = None,
+    tick_times: bool = False,
 ) -> FlightSettings:
     """Check the options and load scenario, profile and faults.
 
@@ -161,8 +167,10 @@ def settings(
     nodes, or node=name for an own node of another name; arm: begin by itself also with a real
     autopilot; auto_start False: wait for the command start. parameters: node → name → value, each
     replaces the profile's. remappings: topic or service → new name for every node, or node → such a
-    mapping. Raises SettingsError, ConfigurationError, ScenarioError (InfeasibleReference too),
-    ProfileError, Px4Error, PortError, PlantError, FaultError; each text is one line for the user.
+    mapping. process: parameters of `ProcessParameters` for the nodes that fly; tick_times: they
+    write the times of their ticks to logs/. Raises SettingsError, ConfigurationError, ScenarioError
+    (InfeasibleReference too), ProfileError, Px4Error, PortError, PlantError, FaultError; each text
+    is one line for the user.
     """
     _choice("controller", controller, catalogue.LAWS)
     _choice("engine", engine, ENGINES)
@@ -218,6 +226,7 @@ def settings(
         raise SettingsError(
             "the direct engine has no nodes: --namespace and --domain need --engine ros"
         )
+    processing = _process(process or {}, engine, tick_times)
     if gcs and (parse_url(gcs).kind != "udp" or engine == "direct"):
         raise SettingsError("--gcs must be udp:HOST:PORT and needs --engine ros")
     if not 0 <= seed < 2**31:
@@ -295,6 +304,8 @@ def settings(
         command=command,
         namespace=namespace,
         domain=domain,
+        process=processing,
+        tick_times=tick_times,
     )
     check_feasible(made, injected)
     return made
@@ -307,6 +318,20 @@ def _scenario_options(**given: Any) -> ScenarioOptions:
         return ScenarioOptions.from_mapping(known)
     except ParameterError as error:
         raise SettingsError(str(error)) from None
+
+
+def _process(given: Mapping[str, Any], engine: str, tick_times: bool) -> ProcessParameters:
+    """Return the options of the processes, which this system permits. Raises SettingsError."""
+    if (given or tick_times) and engine == "direct":
+        raise SettingsError(
+            "the direct engine has no nodes: options of their processes need --engine ros"
+        )
+    try:
+        options = ProcessParameters.from_mapping(dict(given))
+        process_options.try_out(options)
+    except ParameterError as error:
+        raise SettingsError(str(error)) from None
+    return options
 
 
 def check_feasible(flight: FlightSettings, faults: Schedule) -> None:

@@ -57,7 +57,8 @@ class Lab:
     profile: names or files, () for the vehicle's own; scenario: name or file; autopilot: URL of its
     link; imu: one of IMUS; mocap: None where another driver publishes the poses; arm: its servos,
     arm_file: the file with them; nodes: node → parameter → value, beside those of the sections;
-    out: folder of the result folders.
+    out: folder of the result folders; process: parameters of `ProcessParameters` of the nodes that
+    fly.
     """
 
     file: Path
@@ -74,3 +75,4 @@ class Lab:
     cockpit: Page = Page()
     nodes: dict[str, dict[str, Any]] = field(default_factory=dict)
     out: Path = OUT
+    process: dict[str, Any] = field(default_factory=dict)

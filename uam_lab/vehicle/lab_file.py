@@ -15,6 +15,7 @@ from uam_control.profiles.profile import BRIDGE, NODES, ProfileError, load_profi
 from uam_control.settings import configuration
 from uam_control.settings.configuration import ConfigurationError
 from uam_control.settings.parameter_set import ParameterError, ParameterSet
+from uam_control.settings.process_parameters import ProcessParameters
 from uam_control.settings.section import Section, read_section
 from uam_control.vehicle import VehicleDescription, VehicleError, load_description
 from uam_lab.flight.node_options import SettingsError
@@ -45,7 +46,7 @@ from uam_sim_bridge.ports import PortError
 
 FOLDER, TEMPLATE = "lab", "s500_lab"
 REQUIRED = ("vehicle", "scenario", "autopilot", "imu", "room", "mocap", "arm", "magnet")
-OPTIONAL = ("profile", "cockpit", "nodes", "out")
+OPTIONAL = ("profile", "cockpit", "nodes", "out", "process")
 GEOFENCE = ("geofence_low", "geofence_high")
 ARM_DRIVER = "arm_driver"
 TUNABLE = (*NODES, BRIDGE, ARM_DRIVER, "checklist", "recorder", "cockpit")  # in `nodes`
@@ -87,6 +88,7 @@ def load_lab(name_or_file: str | Path) -> Lab:
         cockpit=_cockpit(top),
         nodes=_nodes(top),
         out=Path(top.text("out")) if "out" in top.values else OUT,
+        process=_process(top),
     )
     _check_profile(top, lab)
     try:
@@ -211,6 +213,14 @@ def _nodes(top: Section) -> dict[str, dict[str, Any]]:
         elif node == ARM_DRIVER:
             _tried(nodes, node, lambda v=values: ArmDriverParameters.from_mapping(v.values))
     return {node: dict(values) for node, values in given.items()}
+
+
+def _process(top: Section) -> dict[str, Any]:
+    if "process" not in top.values:
+        return {}
+    values = dict(top.section("process").values)
+    _tried(top, "process", lambda: ProcessParameters.from_mapping(values))
+    return values
 
 
 def _check_profile(top: Section, lab: Lab) -> None:

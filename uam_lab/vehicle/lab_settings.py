@@ -35,5 +35,6 @@ def settings_of(lab: Lab, command: str = "", dry_run: bool = False) -> FlightSet
         dry_run=dry_run,
         view=True,
         parameters=given,
+        process=lab.process,
         command=command,
     )

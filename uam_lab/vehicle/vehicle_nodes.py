@@ -64,7 +64,7 @@ def parameters(
     sections[wiring.MISSION]["require_checklist"] = True
     for node in (wiring.ARM_DRIVER, CHECKLIST):
         sections[node] |= lab.nodes.get(node, {})
-    return node_arguments.complete(sections, settings)
+    return node_arguments.complete(sections, settings, folder)
 
 
 def _checklist(lab: Lab, settings: FlightSettings, folder: ResultFolder) -> dict[str, Any]:

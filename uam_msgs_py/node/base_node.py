@@ -1,6 +1,5 @@
 """Base class of all nodes: inputs, diagnostics, start and end of the process."""
 
-import gc
 import re
 import signal
 import sys
@@ -15,21 +14,24 @@ from rclpy.qos import QoSProfile
 from rclpy.signals import SignalHandlerOptions
 from rclpy.subscription import Subscription
 
+from uam_control.settings.process_parameters import ProcessParameters, TickTimesParameters
 from uam_msgs_py.messages import topics
 from uam_msgs_py.messages.layouts import BadMessage, stamp_of
 from uam_msgs_py.messages.serialized import stays_serialized, stays_stamped
 from uam_msgs_py.messages.status import ERROR, OK, STALE, WARN, diagnostic
 from uam_msgs_py.messages.topics import Topic
-from uam_msgs_py.node import connections, polling
+from uam_msgs_py.node import connections, polling, process_options
 from uam_msgs_py.node.executor import spin
+from uam_msgs_py.node.garbage import GarbageCollection
 from uam_msgs_py.node.health import LoopTime, ages
 from uam_msgs_py.node.joins import StampJoin
 from uam_msgs_py.node.namespace import expanded, label
-from uam_msgs_py.node.node_parameters import refuse_unknown
+from uam_msgs_py.node.node_parameters import NodeParameters, refuse_unknown
 from uam_msgs_py.node.refusals import Refusals
 from uam_msgs_py.node.rightful import PUBLISHERS, rightful_nodes
 from uam_msgs_py.node.sole_publisher import SolePublisher, complaints, publishers
 from uam_msgs_py.node.stamp_watch import StampWatch
+from uam_msgs_py.node.tick_times import tick_times
 from uam_msgs_py.node.tunable import TunableNode
 
 DIAGNOSTICS_PERIOD = 1.0  # s
@@ -48,6 +50,8 @@ class UamNode(TunableNode):
 
     def __init__(self, name: str):
         super().__init__(name)
+        self.process = NodeParameters(self, ProcessParameters, read_only=True).current
+        self.times = tick_times(NodeParameters(self, TickTimesParameters, read_only=True).current)
         self._required: dict[str, int] = {}
         self._counts: dict[str, int] = {}
         self._arrivals: dict[str, float] = {}  # time.monotonic() of each input's newest message
@@ -75,6 +79,7 @@ class UamNode(TunableNode):
     def publisher(self, topic: Topic) -> Publisher:
         """Return a publisher of `topic`."""
         made = self._outlets[topic.name] = self.create_publisher(topic.type, topic.name, topic.qos)
+        self.times.watch(made, topic)
         return made
 
     def listen(
@@ -168,6 +173,7 @@ class UamNode(TunableNode):
         self.stamp = stamp
         self.ticks += 1
         self._loop.add(begun)
+        self.times.tick(stamp)
 
     def _check_inputs(self) -> None:
         self._waiting = [
@@ -262,17 +268,21 @@ def run(make: Callable[[], UamNode], name: str) -> int:
         try:
             node = make()
             refuse_unknown(node)
+            process_options.apply(node.process)
         except (ValueError, OSError) as error:  # ParameterError, ProfileError, ScenarioError ...
             return refuse(name, error)
-        gc.collect()
-        gc.freeze()  # excludes the existing objects from collections in flight
-        spin(node, lambda: not stop.raised and not getattr(node, "failure", ""), node.wake_up)
-        failure = getattr(node, "failure", "")
-        if failure:
-            print(f"{name}: {failure}", file=sys.stderr, flush=True)
-        return 1 if failure else 0
+
+        def failure() -> str:
+            return getattr(node, "failure", "")
+
+        with GarbageCollection(node.process.collect_between_ticks) as garbage:
+            spin(node, lambda: not stop.raised and not failure(), node.wake_up, garbage.at_rest)
+        if failure():
+            print(f"{name}: {failure()}", file=sys.stderr, flush=True)
+        return 1 if failure() else 0
     finally:
         if node is not None:
+            node.times.close()
             node.destroy_node()
         rclpy.try_shutdown()
         stop.ignore()

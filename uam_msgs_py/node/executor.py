@@ -16,11 +16,12 @@ import time
 from collections.abc import Callable, Iterable
 
 from rclpy.executors import SingleThreadedExecutor
-from rclpy.impl.implementation_singleton import rclpy_implementation
 from rclpy.node import Node
 from rclpy.service import Service
 
-WaitSet = rclpy_implementation.WaitSet  # not part of rclpy's public API
+from uam_msgs_py.node.tick_times import DECODE, TAKE, NoTickTimes
+from uam_msgs_py.node.waiting import WaitSet, wait_for
+
 REST_PERIOD = 0.02  # s between two checks of services, timers, clients and events
 REST_STAMPS = round(REST_PERIOD * 1e9)  # ns of ticks: a simulation may run faster than wall time
 
@@ -37,6 +38,10 @@ class LeanExecutor:
     A wake-up costs more time than a tick. A node may therefore name the input that normally
     completes a tick (`triggers`): only this input wakes the node, and the others are read along. If
     a trigger arrived before another input of its tick (`stalled()`), any input wakes the node.
+
+    If the node has `process.busy_poll`, the loop looks for the input without sleeping for so long
+    after each tick: the thread then needs no wake-up by the system. Its `times` measure the edges
+    of the tick.
     """
 
     def __init__(
@@ -44,8 +49,12 @@ class LeanExecutor:
         node: Node,
         triggers: Iterable[str] | None = None,
         stalled: Callable[[], bool] | None = None,
+        at_rest: Callable[[], None] = lambda: None,
     ):
-        """triggers: names of topics; stalled: see class; None: those of the node."""
+        """triggers: names of topics; stalled: see class; None: those of the node.
+
+        at_rest: called between two ticks, fifty times a second.
+        """
         self._node = node
         self._trigger_names = set(getattr(node, "triggers", ()) if triggers is None else triggers)
         self._stalled = stalled or getattr(node, "stalled", lambda: False)
@@ -55,6 +64,10 @@ class LeanExecutor:
         if hasattr(node, "defer"):
             node.defer()
         self._next_check, self._checked_at = 0.0, 0
+        self._at_rest = at_rest
+        self._times = getattr(node, "times", NoTickTimes())
+        process = getattr(node, "process", None)
+        self._busy_poll = 0.0 if process is None else process.busy_poll
         self._gather()
 
     def _gather(self) -> None:
@@ -86,19 +99,20 @@ class LeanExecutor:
         stamp = getattr(self._node, "stamp", 0)
         if left <= 0.0 or stamp - self._checked_at >= REST_STAMPS:
             left = 0.0 if self._serve_others() else REST_PERIOD
+            self._at_rest()
             self._next_check, self._checked_at = time.monotonic() + left, stamp
+        times = self._times
+        times.rest()
+        # a driver has no inputs: it waits for its device in `settle`
         inputs = self._inputs if not self._triggers or self._stalled() else self._triggers
-        messages = self._messages
-        messages.clear_entities()
-        for handle in inputs:
-            messages.add_subscription(handle)
-        if inputs:
-            messages.wait(int(min(timeout, left) * 1e9))
-        else:  # a driver, which waits for its device in `settle`
-            time.sleep(min(timeout, left))
+        wait_for(self._messages, inputs, min(timeout, left), self._busy_poll)
+        times.woken()
         for handle, kind, raw, callback in self._subscriptions:
             while (taken := handle.take_message(kind, raw)) is not None:
+                times.lap(TAKE)
                 callback(taken[0])
+                times.lap(DECODE)
+        times.lap(TAKE)
         self._settle()
 
     def _serve_others(self) -> bool:
@@ -145,9 +159,17 @@ class LeanExecutor:
         self._rest.shutdown()
 
 
-def spin(node: Node, running: Callable[[], bool], wake_up: float = 0.1) -> None:
-    """Spin `node` until `running()` is false, checked after messages and each `wake_up` [s]."""
-    executor = LeanExecutor(node)
+def spin(
+    node: Node,
+    running: Callable[[], bool],
+    wake_up: float = 0.1,
+    at_rest: Callable[[], None] = lambda: None,
+) -> None:
+    """Spin `node` until `running()` is false, checked after messages and each `wake_up` [s].
+
+    at_rest: see LeanExecutor.
+    """
+    executor = LeanExecutor(node, at_rest=at_rest)
     try:
         while running() and node.context.ok():
             executor.spin_once(wake_up)

@@ -42,6 +42,7 @@ from uam_msgs_py.node.base_node import UamNode, run
 from uam_msgs_py.node.joins import StampJoin
 from uam_msgs_py.node.namespace import frame
 from uam_msgs_py.node.node_parameters import NodeParameters
+from uam_msgs_py.node.tick_times import DECODE, STAGE
 from uam_sim_bridge.mavlink.link.link_report import faults, report
 from uam_sim_bridge.mavlink.offboard.hold import HoldParameters
 from uam_sim_bridge.mavlink.offboard.loop_delay import LoopDelay
@@ -223,6 +224,7 @@ class MavlinkBridgeNode(UamNode):
         self.take_waiting(self._arming)
         self.take_waiting(self._mocap)
         self.take_waiting(self._mission)
+        self.times.lap(DECODE)
         self._begin_tick(stamp)
         self._adopt()
         if state is BAD or position is BAD or torque is BAD:
@@ -237,6 +239,7 @@ class MavlinkBridgeNode(UamNode):
                 position.attitude,
                 position.reference,
             )
+        self.times.lap(STAGE)
         self._end_tick(stamp)
         if self.stage.lift_due:
             self._factor_writer.position[0] = self.stage.factor

@@ -46,6 +46,7 @@ from uam_msgs_py.node.base_node import StopSignal, refuse
 from uam_msgs_py.node.connections import Connections, of
 from uam_msgs_py.node.executor import LeanExecutor
 from uam_msgs_py.node.node_parameters import refuse_unknown
+from uam_msgs_py.node.tick_times import tick_times
 from uam_msgs_py.node.tunable import TunableNode
 from uam_sim_bridge.faults import PLANT, Schedule
 from uam_sim_bridge.faults.faulty_plant import FaultyPlant, make_plant
@@ -112,7 +113,8 @@ class Simulator:
         self._reset_due = False
         node.create_service(Trigger, "~/reset", self._on_reset)
         _warm_up(make_plant(*start, Schedule(), options.plant))
-        self.sensors = Sensors(node, described, options.publish_imu)
+        self._times = tick_times(declared.tick_times)
+        self.sensors = Sensors(node, described, options.publish_imu, self._times)
         self.truth = TruthTopics(node, described)
         servo_mode = vehicle.numbers["servos"]["mode"]
         self.answers = Answers(node, described, declared.rightful, servo_mode)
@@ -303,7 +305,10 @@ class Simulator:
         # Earlier samples are not sent: how many of them it would receive is not reproducible.
         self._complete = self._complete or None not in (samples.imu, samples.joints, samples.mocap)
         self._published = time.time_ns()
+        self._times.woken()
         self._stamp = self.sensors.publish(samples) if self._complete else None
+        if self._stamp is not None:
+            self._times.tick(self._stamp)
         # No node waits for the truth: it is published while the estimator works.
         self.truth.publish(now, truth, self.hil.motors, self.answers.magnet)
         return samples, truth
@@ -423,6 +428,7 @@ class Simulator:
 
     def close(self) -> None:
         """Close the link to the autopilot."""
+        self._times.close()
         self.hil.close()
         self.executor.shutdown()
 

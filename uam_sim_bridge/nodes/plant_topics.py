@@ -31,13 +31,20 @@ from uam_msgs_py.node.namespace import frame
 from uam_msgs_py.node.refusals import Refusals
 from uam_msgs_py.node.rightful import PUBLISHERS, RightfulNodes
 from uam_msgs_py.node.sole_publisher import SolePublisher
+from uam_msgs_py.node.tick_times import NoTickTimes
 from uam_sim_bridge.plant import Samples, Truth
 
 
 class Outlets:
     """Publishers by topic, without event callbacks, which would slow each wait of the executor."""
 
-    def __init__(self, node: Node, chosen: tuple[topics.Topic, ...]):
+    def __init__(
+        self,
+        node: Node,
+        chosen: tuple[topics.Topic, ...],
+        times: NoTickTimes | None = None,
+    ):
+        """times: measures the publications."""
         events = PublisherEventCallbacks(use_default_callbacks=False)
         self.outlets: dict[str, Publisher] = {
             topic.name: node.create_publisher(
@@ -45,16 +52,20 @@ class Outlets:
             )
             for topic in chosen
         }
+        for topic in chosen if times else ():
+            times.watch(self.outlets[topic.name], topic)
 
 
 class Sensors(Outlets):
     """Publishes /clock and the sensor samples."""
 
-    def __init__(self, node: Node, vehicle: VehicleDescription, publish_imu: bool):
-        """publish_imu: whether the companion has an IMU of its own."""
+    def __init__(
+        self, node: Node, vehicle: VehicleDescription, publish_imu: bool, times: NoTickTimes
+    ):
+        """publish_imu: whether the companion has an IMU of its own; times: see Outlets."""
         imu = (topics.IMU,) if publish_imu else ()
         chosen = topics.CLOCK, topics.JOINTS, topics.MOCAP, topics.PAYLOAD, *imu
-        super().__init__(node, chosen)
+        super().__init__(node, chosen, times)
         self._clock, self._joints, self._mocap, self._payload, *self._imu = self.outlets.values()
         self._clock_writer = Template(Clock())
         self._imu_writer, self._mocap_writer = ImuWriter(frame(node, topics.BODY)), PoseWriter()

@@ -41,10 +41,17 @@ PX4_LOG = "px4.ulg"
 AUTOPILOT_WAIT = 60.0  # [s] for which the autopilot waits for the simulator
 FACTS = "facts.json"
 REQUIRED = "px4_parameters.yaml"
+TICK_TIMES = "tick_times"  # folder of logs/
+# nodes of the control tick
+FLYING = {
+    *(wiring.ESTIMATOR, wiring.MISSION, wiring.POSITION, wiring.ATTITUDE, wiring.ARM),
+    wiring.BRIDGE,
+}
+MEASURED = FLYING | {wiring.PLANT}  # nodes that can measure their ticks
 # nodes that load the description of the vehicle
 DESCRIBED = {
-    *(wiring.ESTIMATOR, wiring.MISSION, wiring.POSITION, wiring.ATTITUDE, wiring.ARM),
-    *(wiring.PLANT, wiring.BRIDGE, wiring.SCENE, wiring.COCKPIT),
+    *FLYING,
+    *(wiring.PLANT, wiring.SCENE, wiring.COCKPIT),
 }
 PX4_LINGER = 4.0  # [s] simulated, after the mission, in which PX4 disarms and closes its log
 DRY_RUN = 20.0  # [s] simulated, length of a dry run
@@ -105,7 +112,7 @@ def parameters(
         sections[wiring.COCKPIT] = {
             "port": page_address.free_port(page_address.LOCAL, page_address.PORT)
         }
-    return complete(sections, settings)
+    return complete(sections, settings, folder)
 
 
 def flight_nodes(settings: FlightSettings, folder: ResultFolder) -> dict[str, dict[str, Any]]:
@@ -136,14 +143,24 @@ def flight_nodes(settings: FlightSettings, folder: ResultFolder) -> dict[str, di
 
 
 def complete(
-    sections: dict[str, dict[str, Any]], settings: FlightSettings
+    sections: dict[str, dict[str, Any]], settings: FlightSettings, folder: ResultFolder
 ) -> dict[str, dict[str, Any]]:
-    """Return the sections with the parameters of nodes without a profile, and the vehicle."""
+    """Return the sections with the parameters of nodes without a profile, and the vehicle.
+
+    And with those of the processes.
+    """
     for node, values in settings.parameters.items():
         if node in sections:
             sections[node] |= values
     for node in DESCRIBED & sections.keys():
         sections[node]["vehicle"] = settings.vehicle.source
+    for node in FLYING & sections.keys():
+        sections[node] |= settings.process.changes()
+    if settings.tick_times:
+        place = folder.path / "logs" / TICK_TIMES
+        place.mkdir(exist_ok=True)
+        for node in MEASURED & sections.keys():
+            sections[node]["tick_times"] = str((place / f"{node}.npz").absolute())
     return sections
 
 

@@ -1,0 +1,75 @@
+"""A node that measures its ticks, on the cores that it may use."""
+
+import os
+from pathlib import Path
+
+import numpy as np
+
+from uam_control.coordinates import coordinates
+from uam_control.stamps import SECOND
+from uam_msgs_py.messages import topics
+from uam_msgs_py.messages.control import ReferenceWriter
+from uam_msgs_py.messages.trajectories import TrajectoryWriter
+from uam_msgs_py.node.tick_times import PARTS, read_tick_times
+
+MODULE, NAME = "uam_control.nodes.position_controller", "position_controller"
+PERIOD = SECOND // 250  # [ns]
+TICKS = 40
+
+
+def fly(probe, node) -> list[int]:
+    """Send TICKS ticks, each after the answer to the one before; return their stamps [ns]."""
+    state = TrajectoryWriter(coordinates(2))
+    reference, rows = ReferenceWriter(2), np.zeros((3, 8))
+    outlets = [probe.publisher(topic) for topic in (topics.REFERENCE, topics.STATE)]
+    answers = probe.collect(topics.POSITION_COMMAND)
+    probe.until_connected(NAME, outlets, [topics.POSITION_COMMAND])
+    stamps = []
+    for tick in range(1, TICKS + 1):
+        stamp = tick * PERIOD
+        outlets[0].publish(reference.fill(stamp, rows, True, 0))
+        outlets[1].publish(state.fill(stamp, rows))
+        probe.until(lambda tick=tick: len(answers) == tick, "answer")
+        stamps.append(stamp)
+    return stamps
+
+
+def test_its_ticks_are_written_at_the_end(start, probe, tmp_path):
+    file = tmp_path / "times.npz"
+    parameters = ["-p", f"tick_times:={file}", "-p", "tick_times_kept:=30"]
+    node = start(MODULE, "--ros-args", *parameters)
+    stamps = fly(probe, node)
+    assert node.interrupt() == 0
+    found = read_tick_times(file)
+    assert found["stamp"].tolist() == stamps[-30:]
+    spent = sum(found[part] for part in PARTS)
+    assert (spent == found["done"] - found["woken"]).all()
+    assert (found["woken"] < found["sending"]).all()
+    assert (found["sending"] < found["sent"]).all() and (found["sent"] <= found["done"]).all()
+    assert (found["done"][:-1] <= found["woken"][1:]).all()
+    for part in PARTS:
+        assert (found[part] > 0).all(), part
+
+
+def test_without_the_parameter_there_is_no_file(start, probe, tmp_path):
+    node = start(MODULE)
+    fly(probe, node)
+    assert node.interrupt() == 0
+    assert not list(Path(tmp_path).glob("*.npz"))
+
+
+def test_all_threads_have_the_chosen_cores(start, probe):
+    core = max(os.sched_getaffinity(0))
+    node = start(MODULE, "--ros-args", "-p", f"cores:='{core}'", "-p", "nice:=3")
+    fly(probe, node)
+    threads = [int(one.name) for one in Path(f"/proc/{node.process.pid}/task").iterdir()]
+    assert len(threads) > 1  # those of Fast DDS, too
+    for thread in threads:
+        assert os.sched_getaffinity(thread) == {core}
+        assert os.getpriority(os.PRIO_PROCESS, thread) == 3
+
+
+def test_a_node_that_polls_answers_every_tick(start, probe):
+    node = start(MODULE, "--ros-args", "-p", "busy_poll:=0.004")
+    assert len(fly(probe, node)) == TICKS
+    assert node.interrupt() == 0

@@ -1,0 +1,119 @@
+"""`uam budget`: where the time of a control tick goes."""
+
+from __future__ import annotations
+
+import argparse
+import time
+from dataclasses import replace
+from pathlib import Path
+
+from rich.console import Console
+
+from uam_control.mission import load_scenario
+from uam_lab.budget.shuttle import JOINTS, shuttle
+from uam_lab.cli.command import INTERRUPTED, Command, chosen_process, number
+from uam_lab.flight import flight_settings
+from uam_lab.flight.conclude import command_line
+from uam_lab.flight.flight_settings import CLOCKS, FlightSettings, require_ros
+from uam_lab.flight.progress import Progress
+from uam_lab.library.flight_result import FlightFailed
+from uam_lab.processes.interrupts import Interrupts
+from uam_lab.results.atomic import write_text
+from uam_lab.results.result_folder import make_folder
+
+MEASURED, NOT_COMPLETED = 0, 1
+SCENARIO = "shuttle.yaml"
+EXAMPLES = """\
+examples:
+  uam budget                               ten minutes in real time, every layout
+  uam budget --minutes 1 --layout separate
+  uam budget --scenario pick_and_place     another flight
+  uam budget --clock lockstep              what the nodes cost where nobody waits for the clock
+  uam budget --fifo 50 --lock-memory       with the options of uam fly for the processes
+  uam budget --cores 2-3 --busy-poll 4     the nodes on cores of their own, without sleeping
+
+It flies to and fro with a moving arm and measures every tick in every node. Results in --out:
+budget.png, summary.md, budget.json, and the folder of each flight. docs/tick_budget.md explains
+them. Nothing else should run on the machine.
+Exit status: 0 measured, 1 a flight was not completed, 2 wrong use.
+"""
+
+
+def add(commands: argparse._SubParsersAction) -> None:
+    """Add the subcommand to the command line."""
+    command = Command(
+        commands,
+        "budget",
+        run,
+        "where the time of a control tick goes",
+        "Fly with measured ticks: latency from the sensors to the setpoint, and where it goes.",
+        EXAMPLES,
+    )
+    minutes = number("time", "min", 0.5, 600.0)
+    command.option("--minutes", "MIN", "length of the flight", 10.0, type=minutes)
+    text = "in place of --minutes: a name of config/scenarios or a file"
+    command.option("--scenario", "NAME|FILE", text)
+    command.choice("--layout", ("all", "separate"), "all", "of the nodes")
+    command.choice("--clock", CLOCKS, "realtime", "as of uam fly")
+    command.vehicle()
+    command.seed("of all noise")
+    command.process()
+    command.out()
+
+
+def run(options: argparse.Namespace) -> int:
+    """Fly, print and write the budgets; return the exit status."""
+    require_ros()
+    from uam_lab.budget import flown, report
+
+    given = vars(options)
+    process = chosen_process(given)
+    layouts = flown.LAYOUTS if options.layout == "all" else (options.layout,)
+    settings = flight_settings.settings(
+        scenario=options.scenario or "hover",
+        vehicle=options.vehicle,
+        clock=options.clock,
+        seed=options.seed,
+        without=("scene",),
+        process=process,
+        tick_times=True,
+        command=command_line(),
+    )
+    out = make_folder(options.out, "budget")
+    if options.scenario is None:
+        settings = _to_and_fro(settings, out, options)
+    budgets, landing = [], settings.scenario.landing
+    console = Console()
+    for layout in layouts:
+        console.print(f"layout {layout}")
+        with Progress(console, landing.at + landing.duration) as progress, Interrupts() as stop:
+            flight = replace(settings, out=out / layout)
+            try:
+                budgets.append(flown.fly(layout, flight, progress, stop))
+            except FlightFailed as error:
+                print(f"uam budget: {layout}: {error}")
+        if stop.raised:
+            return INTERRUPTED
+    if not budgets:
+        return NOT_COMPLETED
+    facts = {
+        "command": command_line(),
+        "made": time.strftime("%Y-%m-%dT%H:%M:%S"),
+        "scenario": settings.scenario.name,
+        "vehicle": settings.vehicle.name,
+        "process": settings.process.changes(),
+    }
+    report.write(out, budgets, facts)
+    print(report.summary(budgets))
+    print(f"results  {out}")
+    whole = len(budgets) == len(layouts) and not any(one.failure for one in budgets)
+    return MEASURED if whole else NOT_COMPLETED
+
+
+def _to_and_fro(settings: FlightSettings, out: Path, options: argparse.Namespace) -> FlightSettings:
+    """Return the settings with a scenario of the length --minutes, written to `out`."""
+    file = out / SCENARIO
+    arm = list(settings.vehicle.joint_names) == JOINTS
+    write_text(file, shuttle(60.0 * options.minutes, arm))
+    scenario = load_scenario(str(file), settings.vehicle)
+    return replace(settings, scenario=scenario, scenario_source=str(file))

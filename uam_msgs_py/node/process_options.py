@@ -1,0 +1,94 @@
+"""Applies `ProcessParameters` to this process: scheduler, cores, locked memory.
+
+Each function raises ParameterError in one line with the way to allow what the system refuses. The
+scheduler and the cores are set for every thread: Fast DDS receives in threads of its own.
+"""
+
+from __future__ import annotations
+
+import ctypes
+import json
+import os
+import resource
+import subprocess
+import sys
+from collections.abc import Callable
+from pathlib import Path
+
+from uam_control.settings.parameter_set import ParameterError
+from uam_control.settings.process_parameters import ProcessParameters, cores_of
+
+LIMITS = "/etc/security/limits.d/99-uam.conf"
+MCL_CURRENT, MCL_FUTURE = 1, 2  # of sys/mman.h
+TASKS = Path("/proc/self/task")
+
+
+def apply(options: ProcessParameters) -> None:
+    """Apply the options to all threads of this process. Raises ParameterError."""
+    if cores := cores_of(options.cores):
+        _for_each_thread(
+            lambda thread: os.sched_setaffinity(thread, cores),
+            f"cores: {options.cores}; this process may use {_listed(os.sched_getaffinity(0))}",
+        )
+    if options.fifo_priority:
+        rule = os.sched_param(options.fifo_priority)
+        _for_each_thread(
+            lambda thread: os.sched_setscheduler(thread, os.SCHED_FIFO, rule),
+            f"fifo_priority: {options.fifo_priority} is not permitted; allow it: "
+            f"'@dialout - rtprio 80' in {LIMITS} and log in again, or CAP_SYS_NICE",
+        )
+    if options.nice:
+        _for_each_thread(
+            lambda thread: os.setpriority(os.PRIO_PROCESS, thread, options.nice),
+            f"nice: {options.nice} is not permitted; allow it: '@dialout - nice -20' in {LIMITS} "
+            "and log in again, or CAP_SYS_NICE",
+        )
+    if options.lock_memory:
+        _lock_memory()
+
+
+def _for_each_thread(change: Callable[[int], None], refusal: str) -> None:
+    for task in TASKS.iterdir():
+        try:
+            change(int(task.name))
+        except ProcessLookupError:  # the thread has ended
+            continue
+        except (OSError, ValueError) as error:
+            raise ParameterError(f"{refusal} ({getattr(error, 'strerror', error)})") from None
+
+
+def _lock_memory() -> None:
+    libc = ctypes.CDLL(None, use_errno=True)
+    if libc.mlockall(MCL_CURRENT | MCL_FUTURE) == 0:
+        return
+    limit = resource.getrlimit(resource.RLIMIT_MEMLOCK)[0]
+    raise ParameterError(
+        f"lock_memory: only {limit / 1e6:.0f} MB may be locked; allow it: "
+        f"'@dialout - memlock unlimited' in {LIMITS} and log in again, or CAP_IPC_LOCK "
+        f"({os.strerror(ctypes.get_errno())})"
+    )
+
+
+def try_out(options: ProcessParameters) -> None:
+    """Apply the options in a process of its own that ends at once. Raises ParameterError.
+
+    A flight is refused by this before it starts any node.
+    """
+    if options == ProcessParameters():
+        return
+    command = [sys.executable, "-m", __name__, json.dumps(options.to_mapping())]
+    tried = subprocess.run(command, capture_output=True, text=True, check=False)
+    if tried.returncode:
+        said = (tried.stderr or tried.stdout).strip().splitlines()
+        raise ParameterError(said[-1] if said else f"exit status {tried.returncode}")
+
+
+def _listed(cores: set[int]) -> str:
+    return ", ".join(map(str, sorted(cores)))
+
+
+if __name__ == "__main__":  # of `try_out`
+    try:
+        apply(ProcessParameters.from_mapping(json.loads(sys.argv[1])))
+    except ParameterError as error:
+        sys.exit(str(error))
