@@ -14,7 +14,7 @@ ROOT = Path(__file__).resolve().parents[2]
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
 NODES = set(PROJECT["scripts"]) - {"uam"}
 PACKAGES = {"uam_control", "uam_lab", "uam_sim_bridge"}  # uam_msgs_py has no executables
-HELPFUL = {"autopilot", "px4_sitl", "hitl_router"}  # command lines without ROS
+HELPFUL = {"autopilot", "px4_sitl", "px4_hitl", "hitl_router"}  # command lines without ROS
 PATIENCE = 240.0  # [s] only a failing test waits that long
 
 

@@ -209,6 +209,17 @@ def test_a_stream():
     assert stream.report(0.0) is None
 
 
+@given(st.integers(0, 2**32 - 1), st.sampled_from([0, 3, 7]))
+def test_frames_on_the_ticks_of_a_simulation_are_not_lost(seed, lost):
+    """120 Hz on ticks of 4 ms come 8 or 12 ms after each other; the driver's clock jitters."""
+    noise, stream = np.random.default_rng(seed), Stream()
+    stamps = np.floor(np.arange(240) / 120.0 / 0.004) * 0.004
+    absent = 20 + 30 * np.arange(lost)  # single ones
+    for stamp in np.delete(stamps, absent) + noise.uniform(-2e-4, 2e-4, 240 - lost):
+        stream.add(float(stamp))
+    assert stream.report(2.0).loss == pytest.approx(lost / 240, abs=5e-4)
+
+
 PASSING = (Finding("battery", "90 %", "at least 60 %", True), Finding("level", "0", "", True, True))
 FAILING = (replace(PASSING[0], passed=False), PASSING[1])
 

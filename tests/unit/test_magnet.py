@@ -23,6 +23,7 @@ from uam_sim_bridge.emulation.gpio.file_line import FileLine
 from uam_sim_bridge.mavlink.link.link import OffboardLink
 from uam_sim_bridge.mavlink.offboard.autopilot_magnet import (
     LATEST,
+    PROGRESS_REPEAT,
     REFUSED_REPEAT,
     REPEAT,
     SILENT_AFTER,
@@ -118,8 +119,19 @@ def test_in_progress_is_no_answer_yet():
     magnet.due(0.0)
     assert magnet.answer(0.1, MavCmd.DO_GRIPPER, MavResult.IN_PROGRESS)
     assert not magnet.settled
+    # PX4 refuses requests while its gripper moves, one second by default
+    assert not magnet.due(2.9) and magnet.problem == ""
     magnet.answer(0.5, MavCmd.DO_GRIPPER, MavResult.ACCEPTED)
     assert magnet.settled
+
+
+def test_after_a_gripper_that_never_ends_the_request_is_repeated():
+    magnet = AutopilotMagnet(GRIPPER)
+    magnet.due(0.0)
+    magnet.answer(0.1, MavCmd.DO_GRIPPER, MavResult.IN_PROGRESS)
+    assert not magnet.due(0.1 + 0.9 * PROGRESS_REPEAT) and magnet.due(0.2 + PROGRESS_REPEAT)
+    magnet.switch(3.5, True)  # another state is requested at once
+    assert magnet.due(3.5)
 
 
 def test_an_answer_to_the_state_before_does_not_count():

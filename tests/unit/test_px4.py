@@ -32,6 +32,26 @@ while true; do sleep 0.05; done
 """
 
 
+# the order of PX4's rcS; `alias` as in PX4's shell
+LOOP_SCRIPT = """#!/bin/bash
+note() { echo "$*" >> found; }
+param() { note "$*"; }
+mavlink() { note "mavlink $*"; }
+for name in px4-pwm_out_sim px4-sensors px4-commander; do
+    eval "$name() { note $name \\"\\$@\\"; }"
+done
+px4_instance=$2
+. px4-rc.simulator
+sensors start
+commander start
+. px4-rc.mavlink
+mkdir -p log && echo first > log/1.ulg
+echo "arguments $*"
+trap 'exit 0' INT
+while true; do sleep 0.05; done
+"""
+
+
 @pytest.fixture
 def build(tmp_path):
     """Return a directory with the files of a PX4 build."""
@@ -193,6 +213,56 @@ def test_nothing_is_left_but_the_logs(build, tmp_path, signum):
         assert not Path("/tmp/px4-sock-7").exists()
         assert log.read_text() == "first\n"
         assert (tmp_path / "flight-2.ulg").read_text() == "second\n"
+
+
+def test_in_the_loop_px4_starts_with_its_lines_and_without_a_simulator(build, tmp_path):
+    (build / "bin" / "px4").write_text(LOOP_SCRIPT)
+    (build / "px4_boardconfig.h").write_text("#define CONFIG_BOARD_NOLOCKSTEP 1\n")
+    log, output = tmp_path / "flight.ulg", tmp_path / "output"
+    command = [sys.executable, "-m", "uam_sim_bridge.px4.hitl", "-i", "9", "--log", str(log)]
+    lines = ["--companion", "/dev/pts/77:460800", "--usb", "/dev/pts/78", "--param", "SDLOG_MODE=4"]
+    with output.open("w") as out:
+        process = subprocess.Popen(
+            [*command, *lines, "--px4-dir", str(build)],
+            env=os.environ | {"TMPDIR": str(tmp_path)},
+            stdout=out,
+            stderr=out,
+        )
+    _until(lambda: "arguments" in output.read_text())
+    (folder,) = tmp_path.glob("uam-px4-*")
+    found = (folder / "found").read_text().splitlines()
+    assert "the original" not in found  # no simulator at a port
+    assert {"set SYS_HITL 1", "set MAV_SYS_ID 1", "set SDLOG_MODE 4"} <= set(found)
+    assert {"set PWM_MAIN_FUNC4 104", "set PWM_MAIN_FUNC11 301"} <= set(found)
+    assert "px4-pwm_out_sim --instance 9 start -m hil" in found
+    for program in ("px4-sensors", "px4-commander"):
+        assert f"{program} --instance 9 start -h" in found
+    links = [line for line in found if line.startswith("mavlink start")]
+    assert links == [
+        "mavlink start -d /dev/pts/77 -b 460800 -m onboard -r 36864",
+        "mavlink start -d /dev/pts/78 -b 921600 -m custom -r 73728",
+    ]
+    process.send_signal(signal.SIGINT)
+    assert process.wait(30) == 0 and log.read_text() == "first\n"
+    assert not list(tmp_path.glob("uam-px4-*"))
+
+
+@pytest.mark.parametrize(
+    ("board", "options", "complaint"),
+    [
+        ("#define CONFIG_A 1", ["--companion", "/dev/pts/7:921600"], "made with lockstep"),
+        ("#define CONFIG_BOARD_NOLOCKSTEP 1", ["--companion", "/dev/pts/7"], "a device and 9600"),
+    ],
+)
+def test_in_the_loop_a_wrong_build_or_line_is_refused(build, board, options, complaint):
+    (build / "px4_boardconfig.h").write_text(board)
+    done = subprocess.run(
+        [sys.executable, "-m", "uam_sim_bridge.px4.hitl", *options, "--px4-dir", str(build)],
+        capture_output=True,
+        text=True,
+        timeout=60,
+    )
+    assert done.returncode == 2 and complaint in done.stderr and done.stderr.count("\n") == 1
 
 
 @pytest.mark.parametrize("signum", [signal.SIGKILL, signal.SIGSEGV, signal.SIGTERM])

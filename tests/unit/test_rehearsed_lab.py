@@ -13,7 +13,8 @@ from uam_lab.campaign.fault_matrix import Cell
 from uam_lab.campaign.fault_outcome import LOST, REFUSED, Promise
 from uam_lab.campaign.rehearsed_trial import judged, with_checklist
 from uam_lab.cli.main import main
-from uam_lab.rehearsal import device_figures, emulated_lab
+from uam_lab.rehearsal import device_figures, emulated_lab, laboratory_process
+from uam_lab.rehearsal.options import RehearsalOptions
 from uam_lab.rehearsal.rehearsed_outcome import REFUSED as REFUSAL
 from uam_lab.rehearsal.rehearsed_outcome import latencies
 from uam_lab.rehearsal.starter import list_passed, list_text, passed_items
@@ -23,6 +24,10 @@ from uam_lab.vehicle.lab_file import load_lab, template
 from uam_msgs_py.messages import topics
 from uam_sim_bridge.faults import Schedule
 from uam_sim_bridge.faults.schedule import timed
+from uam_sim_bridge.mavlink.telemetry.required_parameters import RequiredParameters
+from uam_sim_bridge.ports import Ports
+from uam_sim_bridge.px4 import hitl, px4_parameters
+from uam_sim_bridge.px4.px4_installation import Px4Installation
 
 REPLACED = {
     ("arm", "device"),
@@ -92,6 +97,60 @@ def test_another_kind_of_motion_capture_cannot_be_rehearsed(tmp_path):
     lab = load_lab(given(tmp_path, mocap={"source": "motioncapture"}))
     with pytest.raises(LabError, match="source: motioncapture: only natnet can be rehearsed"):
         emulated_lab.emulated(lab, tmp_path, 40000)
+
+
+PORTS = Ports(3, 4, 4563, 14543, 14583)
+
+
+def words(arguments):
+    """Return option → the words after it."""
+    found, key = {}, ""
+    for word in arguments:
+        if word.startswith("--"):
+            key = word
+            found.setdefault(key, [])
+        else:
+            found[key].append(word)
+    return found
+
+
+def test_the_autopilot_is_the_stand_in_or_px4_on_both_of_its_lines(tmp_path):
+    lab = load_lab(given(tmp_path, autopilot="serial:/dev/ttyUSB9:460800"))
+    options, devices = RehearsalOptions(), tmp_path / "devices"
+    module, own = laboratory_process.autopilot(lab, options, devices, tmp_path, PORTS)
+    assert module == "uam_sim_bridge.autopilot.server" and words(own)["--sim-port"] == ["4563"]
+    assert words(own)["--companion"] == [f"{devices}/ttyAUTOPILOT:460800"]
+    options = RehearsalOptions(px4=Px4Installation(tmp_path), px4_params=("SDLOG_MODE=0",))
+    module, own = laboratory_process.autopilot(lab, options, devices, tmp_path, PORTS)
+    found = words(own)
+    assert module == "uam_sim_bridge.px4.hitl" and found["--instance"] == ["3"]
+    assert found["--companion"] == [f"{devices}/ttyAUTOPILOT:460800"]
+    assert found["--usb"] == [f"{devices}/ttyUSB"] and found["--px4-dir"] == [str(tmp_path)]
+    assert found["--param"] == ["SDLOG_MODE=0"] and found["--log"] == [f"{tmp_path}/px4.ulg"]
+    assert [Path(one).name for one in found["--params"]] == ["sitl.yaml", "rehearsed.yaml"]
+    settings = laboratory_process.parameters(lab, options, devices, tmp_path, PORTS)
+    assert settings["hil"] == "line"
+    # what PX4 gets is what the list of a vehicle requires, except that it is in the loop
+    values = px4_parameters.load(lab.vehicle, found["--params"], found["--param"])
+    required = laboratory_process.required_parameters(options.px4, tmp_path)
+    rules = RequiredParameters.read(required["required_parameters"])
+    assert set(rules) == set(RequiredParameters.read("vehicle"))
+    for name, value in hitl.loop_values(values, lab.vehicle).items():
+        assert name not in rules or name == "SDLOG_MODE" or rules[name].met(value), name
+    assert rules["SYS_HITL"].met(1) and not rules["SYS_HITL"].met(0)
+    assert laboratory_process.required_parameters(None, tmp_path) == {}
+
+
+def test_a_gripper_is_on_its_output(tmp_path):
+    magnet = {"through": "autopilot", "magnet": "gripper", "magnet_output": 2}
+    document = yaml.safe_load(template()) | {"magnet": magnet}
+    file = tmp_path / "lab.yaml"
+    file.write_text(yaml.safe_dump(document))
+    lab, options = load_lab(file), RehearsalOptions(px4=Px4Installation(tmp_path))
+    _, own = laboratory_process.autopilot(lab, options, tmp_path, tmp_path, PORTS)
+    assert words(own)["--param"] == ["PWM_MAIN_FUNC12=430"]
+    settings = laboratory_process.parameters(lab, options, tmp_path, tmp_path, PORTS)
+    assert (settings["magnet_on"], settings["magnet_off"], settings["magnet_output"]) == (1, -1, 2)
 
 
 def report(name, **values):

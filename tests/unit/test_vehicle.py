@@ -90,7 +90,7 @@ def test_a_magnet_at_the_autopilot_is_there_once_acknowledged():
     for value, present in (("", False), ("False", True), ("True", True)):
         found = states(GRIPPER, mavlink_bridge=Report(OK, "", {"magnet": value}))["magnet"]
         assert found.present is present
-    assert "PD_GRIPPER_EN" in found.advice
+    assert "PD_GRIPPER_TYPE 0" in found.advice
 
 
 def test_each_laboratory_has_its_drivers():

@@ -9,6 +9,9 @@ import numpy as np
 
 SPAN = 2.0  # [s] of stamps that are kept
 FEWEST = 5  # stamps
+# of a period: a step that is longer by this much has a sample missing. Less than one, for stamps
+# jitter; more than a half: frames on a simulation's ticks of 4 ms come 8 or 12 ms after each other
+LATE = 0.75
 
 
 @dataclass(frozen=True)
@@ -46,7 +49,7 @@ class Stream:
         period = float(np.median(steps))
         if period <= 0.0:
             return None
-        missing = float(np.sum(np.maximum(np.rint(steps / period) - 1.0, 0.0)))
+        missing = float(np.sum(np.maximum(np.floor(steps / period - LATE), 0.0)))
         silence = max(0.0, now - recent[-1])
         # a stream that has stopped loses its rate
         rate = (len(recent) - 1) / (recent[-1] - recent[0] + max(0.0, silence - 10.0 * period))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import os
 from dataclasses import replace
 
 from rich.console import Console
@@ -18,6 +19,8 @@ from uam_lab.vehicle.lab_file import TEMPLATE, load_lab
 from uam_lab.vehicle.lab_settings import settings_of
 from uam_sim_bridge.faults import CABLE, FaultError, read_schedule
 from uam_sim_bridge.plant.effects import presets
+from uam_sim_bridge.px4 import px4_parameters
+from uam_sim_bridge.px4.px4_installation import LOOP_VARIABLE, Px4Error, Px4Installation
 
 EXAMPLES = """\
 examples:
@@ -25,6 +28,7 @@ examples:
   uam rehearse --scenario pick_and_place             the template's laboratory
   uam rehearse --cable bus_unplugged@carry+2         pull the arm's adapter, 2 s into the carry
   uam rehearse --cable serial_bit_errors@start --no-report
+  uam rehearse --px4-dir ~/PX4-Autopilot/build/px4_sitl_nolockstep     a real PX4 in HITL
   uam rehearse --cable joints_swapped@start          a mistake of the wiring: the start is refused
   uam faults --list                                  all faults; those of cables at the end
 
@@ -53,6 +57,18 @@ def add(commands: argparse._SubParsersAction) -> None:
         "or NAME@start, then :parameter=value,...; uam faults --list shows all",
         dest="cables",
     )
+    command.option(
+        "--px4-dir",
+        "DIR",
+        "PX4 build without lockstep, which flies in HITL (default: $PX4_HITL_DIR, else the "
+        "stand-in flies)",
+    )
+    command.repeated(
+        "--px4-param",
+        "NAME=VALUE",
+        "a parameter of that PX4, in place of config/'s",
+        dest="px4_params",
+    )
     command.plant()
     mass = number("mass", "kg", 0.0)
     command.option("--payload-mass", "KG", "default: the scenario's", type=mass)
@@ -63,6 +79,17 @@ def add(commands: argparse._SubParsersAction) -> None:
     )
     text = "leave out the report with its video; uam report makes it later"
     command.switch("--no-report", text, "store_false", dest="report")
+
+
+def px4_of(directory: str | None, given: list[str]) -> Px4Installation | None:
+    """Return the PX4 that flies, None for the stand-in; given: its parameters. Raises Px4Error."""
+    if directory is None and not os.environ.get(LOOP_VARIABLE):
+        if given:
+            raise Px4Error("--px4-param needs --px4-dir: the stand-in has no parameter of PX4")
+        return None
+    found = Px4Installation.in_the_loop(directory)
+    px4_parameters.parse(given, found.ranges())
+    return found
 
 
 def run(options: argparse.Namespace) -> int:
@@ -86,12 +113,15 @@ def run(options: argparse.Namespace) -> int:
         if one.fault.PLACE != CABLE:
             raise FaultError(f"{one.fault.NAME}: not of a cable: uam fly --fault")
     settings = replace(settings, faults=cables)
+    px4 = px4_of(options.px4_dir, options.px4_params)
     rehearsal = RehearsalOptions(
         seed=options.seed,
         payload_mass=mass,
         vehicle_changes=changes,
         faults=cables,
         arm_start=tuple(settings.scenario.arm_start),
+        px4=px4,
+        px4_params=tuple(options.px4_params),
     )
     console = Console()
     landing = settings.scenario.landing

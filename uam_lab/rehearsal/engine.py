@@ -78,6 +78,8 @@ class RehearsalEngine:
             child.prepare([*modules.values(), LABORATORY_MODULE, FORKER])
             await_orphans(observer.message)
             sections = vehicle_nodes.parameters(lab, settings, folder)
+            required = laboratory_process.required_parameters(self._options.px4, logs)
+            sections[wiring.BRIDGE] = required | sections[wiring.BRIDGE]
             _prepare_checklist(sections, self._options.checklist)
             sections[LABORATORY] = laboratory_process.parameters(
                 lab, self._options, devices, logs, ports
@@ -167,7 +169,9 @@ class _Rehearsal:
             if self._stop.raised:
                 return False
             time.sleep(POLL)
-        module, own = laboratory_process.autopilot(self._lab, devices, self._ports)
+        module, own = laboratory_process.autopilot(
+            self._lab, self._options, devices, self._folder.path, self._ports
+        )
         children.start(AUTOPILOT, module, own, may_end=True)
         return True
 

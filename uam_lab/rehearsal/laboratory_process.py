@@ -1,4 +1,7 @@
-"""Parameters of the laboratory's process, and arguments of the autopilot's."""
+"""Parameters of the laboratory's process, and arguments of the autopilot's.
+
+The autopilot is the stand-in, or a PX4 in HITL with both of its lines as pseudo-terminals.
+"""
 
 from __future__ import annotations
 
@@ -6,18 +9,30 @@ import json
 from pathlib import Path
 from typing import Any
 
-from uam_control.settings import configuration
+import yaml
+
+from uam_control.settings import configuration, yaml_file
+from uam_control.settings.configuration import ConfigurationError
 from uam_lab.rehearsal.emulated_lab import MAGNET_LINE, baud_of
 from uam_lab.rehearsal.options import RehearsalOptions
 from uam_lab.vehicle.lab import Lab
 from uam_sim_bridge.faults import CABLE
+from uam_sim_bridge.mavlink.offboard.autopilot_magnet import GRIPPER
+from uam_sim_bridge.nodes.laboratory_options import LINE, TCP
 from uam_sim_bridge.ports import Ports
-from uam_sim_bridge.rehearsal.laboratory import SERIAL_FAR
+from uam_sim_bridge.px4 import px4_parameters
+from uam_sim_bridge.px4.hitl import gripper_parameter
+from uam_sim_bridge.px4.px4_installation import Px4Installation
+from uam_sim_bridge.rehearsal.laboratory import SERIAL_FAR, USB
 
 LABORATORY, LABORATORY_MODULE = "laboratory", "uam_sim_bridge.nodes.laboratory"
 AUTOPILOT, STAND_IN = "autopilot", "uam_sim_bridge.autopilot.server"
+PX4 = "uam_sim_bridge.px4.hitl"
 STATISTICS = "laboratory.json"
 PARAMETERS = "px4/rehearsed.yaml"  # of config/: as a real vehicle needs them
+REQUIRED, IN_THE_LOOP = "px4/vehicle.yaml", "px4_parameters.yaml"  # in config/, in the logs
+PX4_LOG = "px4.ulg"  # in the result folder
+GRIPPER_ON, GRIPPER_OFF = 1.0, -1.0  # outputs of a closed and an open gripper
 AUTOPILOT_WAIT = 60.0  # [s] for which the autopilot waits for the simulator
 
 
@@ -37,9 +52,10 @@ def parameters(
         "magnet": lab.magnet.through,
         "magnet_line": str(devices / MAGNET_LINE),
         "active_low": lab.magnet.line.active_low,
-        "magnet_output": lab.magnet.output.magnet_output,
+        **_magnet_output(lab),
         "imu": lab.imu,
         "hil_port": ports.simulator_tcp,
+        "hil": TCP if options.px4 is None else LINE,
         "faults": options.faults.only(CABLE).to_text(),
         "person": options.checklist,
         "time_limit": options.time_limit,
@@ -55,10 +71,48 @@ def parameters(
     return found
 
 
-def autopilot(lab: Lab, devices: Path, ports: Ports) -> tuple[str, list[str]]:
-    """Return module and arguments of the autopilot; its companion is at the cable's far end."""
+def _magnet_output(lab: Lab) -> dict[str, Any]:
+    """Return the parameters of the autopilot's output with the magnet."""
+    output = lab.magnet.output
+    on, off = output.magnet_on, output.magnet_off
+    if output.magnet == GRIPPER:
+        on, off = GRIPPER_ON, GRIPPER_OFF
+    return {"magnet_output": output.magnet_output, "magnet_on": on, "magnet_off": off}
+
+
+def autopilot(
+    lab: Lab, options: RehearsalOptions, devices: Path, folder: Path, ports: Ports
+) -> tuple[str, list[str]]:
+    """Return module and arguments of the autopilot; its companion is at the cable's far end.
+
+    devices: folder of the pseudo-terminals; folder: of the results.
+    """
     line = f"{devices / SERIAL_FAR}:{baud_of(lab)}"
-    place = ["--sim-port", str(ports.simulator_tcp), "--companion", line]
     parameters = str(configuration.path(PARAMETERS))
-    vehicle = ["--vehicle", lab.vehicle.source, "--params", parameters]
-    return STAND_IN, [*place, *vehicle, "--wait", str(AUTOPILOT_WAIT), "--once"]
+    vehicle = ["--vehicle", lab.vehicle.source, "--companion", line]
+    if options.px4 is None:
+        place = ["--sim-port", str(ports.simulator_tcp), "--wait", str(AUTOPILOT_WAIT), "--once"]
+        return STAND_IN, [*vehicle, "--params", parameters, *place]
+    log = folder / PX4_LOG
+    own = ["--px4-dir", str(options.px4.directory), "--log", str(log.absolute())]
+    own += ["--usb", str(devices / USB), "--instance", str(ports.instance)]
+    simulation = str(configuration.path(px4_parameters.SIMULATION))
+    given = list(options.px4_params)
+    if lab.magnet.output.magnet == GRIPPER:
+        given.insert(0, gripper_parameter(lab.magnet.output.magnet_output))
+    own += [word for text in given for word in ("--param", text)]
+    return PX4, [*vehicle, *own, "--params", simulation, parameters]
+
+
+def required_parameters(px4: Px4Installation | None, logs: Path) -> dict[str, Any]:
+    """Return the bridge's parameter of what the autopilot must have: a vehicle's list.
+
+    A PX4 in the loop has SYS_HITL 1, and nothing else otherwise. Raises ConfigurationError.
+    """
+    if px4 is None:
+        return {}
+    sections = yaml_file.read(configuration.path(REQUIRED), ConfigurationError)
+    sections["needed"]["SYS_HITL"] = {"is": 1, "why": "in the loop, in a rehearsal"}
+    file = logs / IN_THE_LOOP
+    file.write_text(yaml.safe_dump(sections, sort_keys=False))
+    return {"required_parameters": str(file.absolute())}

@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 from uam_sim_bridge.faults import Schedule
+from uam_sim_bridge.px4.px4_installation import Px4Installation
 
 
 @dataclass(frozen=True)
@@ -14,7 +15,8 @@ class RehearsalOptions:
     too; faults: of cables.
 
     arm_start (n,) [rad]: joint angles on the ground, () for stowed; checklist: whether the lists
-    are required and a person does them; time_limit [s], 0 for none.
+    are required and a person does them; time_limit [s], 0 for none; px4: a build without lockstep
+    that flies in the stand-in's place, px4_params: NAME=VALUE for it.
     """
 
     seed: int = 1
@@ -24,3 +26,5 @@ class RehearsalOptions:
     arm_start: tuple[float, ...] = ()
     checklist: bool = True
     time_limit: float = 0.0
+    px4: Px4Installation | None = None
+    px4_params: tuple[str, ...] = ()

@@ -79,7 +79,7 @@ def _magnet(lab: Lab) -> Device:
         output = f"Peripheral via Actuator Set {lab.magnet.output.magnet_output}"
         text = f"QGroundControl, Actuators: {output}"
     else:
-        text = "PX4: PD_GRIPPER_EN"
+        text = "QGroundControl, Actuators: Gripper; PX4: PD_GRIPPER_TYPE 0"
     return Device("magnet", text, _autopilots_magnet)
 
 

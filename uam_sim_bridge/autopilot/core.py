@@ -150,6 +150,15 @@ class Autopilot:
         self._sample_rate = sample_rate
         self._configure()
 
+    @property
+    def outputs(self) -> np.ndarray:
+        """The outputs of actuator set and grippers (6,), -1..1; 0: the disarmed value."""
+        values = np.nan_to_num(self.actuators)
+        for number, closed in self.gripper.items():
+            if 1 <= number <= ACTUATORS:
+                values[number - 1] = 1.0 if closed else -1.0
+        return values
+
     def set_parameter(self, name: str, value: float) -> None:
         """Change one parameter in flight; raises ParameterError, without a change, if refused."""
         old = self.parameters[name] if name in self.parameters.names else 0.0
@@ -236,7 +245,8 @@ class Autopilot:
             return self.commander.request_mode(time, mode, self.estimator.aided(time))
         if command == MavCmd.DO_SET_ACTUATOR:
             if not parameters[ACTUATORS]:  # index of the set; PX4 accepts others and ignores them
-                self.actuators[:] = parameters[:ACTUATORS]
+                given = np.array(parameters[:ACTUATORS])
+                self.actuators = np.where(np.isfinite(given), given, self.actuators)
             return MavResult.ACCEPTED
         if command == MavCmd.DO_GRIPPER and math.isfinite(first):
             if second not in (0.0, 1.0):

@@ -30,7 +30,7 @@ from uam_sim_bridge.autopilot.core import Autopilot
 from uam_sim_bridge.autopilot.own_clock import OwnClock
 from uam_sim_bridge.autopilot.params import Parameters
 from uam_sim_bridge.autopilot.serial_line import CompanionLine, SerialLine
-from uam_sim_bridge.mavlink.hil.hil_server import CONTROLS
+from uam_sim_bridge.mavlink.hil.hil_messages import CONTROLS
 from uam_sim_bridge.mavlink.hil.sitl_options import add_port_options, add_vehicle, fill_ports
 from uam_sim_bridge.mavlink.hil.sitl_ports import UdpPort, connect
 from uam_sim_bridge.mavlink.protocol.signing import Signing
@@ -103,7 +103,7 @@ class Server:
         self._udp.send(self._companion.tick(time))
         mode = _CUSTOM_MODE | (_ARMED if self._autopilot.status.armed else 0)
         controls = [*motors.tolist(), *[0.0] * (CONTROLS - len(motors))]
-        actuators = np.nan_to_num(self._autopilot.actuators).tolist()
+        actuators = self._autopilot.outputs.tolist()
         controls[CONTROLS - len(actuators) :] = actuators
         answer = mavlink2.MAVLink_hil_actuator_controls_message(
             m.time_usec, controls, mode, _LOCKSTEP

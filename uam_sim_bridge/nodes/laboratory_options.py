@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -13,43 +12,29 @@ from uam_control.nodes.described import described_vehicle
 from uam_control.settings.configuration import ConfigurationError
 from uam_control.settings.parameter_set import (
     ParameterError,
-    ParameterSet,
     choice,
     integer,
     number,
     switch,
     text,
-    vector,
 )
 from uam_control.vehicle import VehicleDescription
 from uam_msgs_py.node.node_parameters import NodeParameters
 from uam_msgs_py.node.rightful import rightful_nodes
 from uam_sim_bridge.drivers.dynamixel.chain import hardware_file, load_chain
 from uam_sim_bridge.drivers.mocap import calibration
-from uam_sim_bridge.plant.vehicle import PAYLOAD_MAX
+from uam_sim_bridge.nodes.simulated_options import SimulatedParameters
 from uam_sim_bridge.rehearsal.laboratory import Devices
 
 GPIO, AUTOPILOT, NONE = "gpio", "autopilot", "none"
 TOPIC = "topic"
+TCP, LINE = "tcp", "line"
 
 
 @dataclass(frozen=True)
-class LaboratoryParameters(ParameterSet):
+class LaboratoryParameters(SimulatedParameters):
     """What stands in the laboratory; fixed once the node runs."""
 
-    vehicle_changes: str = text(
-        "{}", "dotted entries of the vehicle's file to replace", 'JSON, as {"air.gust": 1.0}'
-    )
-    payload_mass: float = number(0.2, "mass of the payload, 0 for none", "kg", 0.0, PAYLOAD_MAX)
-    seed: int = integer(1, "seed of all noise", 0, 2**31 - 1)
-    arm_start: tuple = vector(
-        (),
-        "joint angles on the ground, empty = stowed as described",
-        "rad",
-        -math.pi,
-        math.pi,
-        optional=True,
-    )
     folder: str = text("devices", "folder of the pseudo-terminals and of `ready`", "a folder")
     hardware: str = text(
         "s500_lab", "servos of the bus", "name of a lab file, or a file with the section arm"
@@ -67,12 +52,19 @@ class LaboratoryParameters(ParameterSet):
     magnet_line: str = text("magnet", "file that is the simulated GPIO line", "a file")
     active_low: bool = switch(False, "whether a low level of the line switches on")
     magnet_output: int = integer(1, "actuator of the autopilot that switches", 1, 6)
+    magnet_on: float = number(1.0, "value of the actuator for on", "1", -1.0, 1.0)
+    magnet_off: float = number(-1.0, "value of the actuator for off", "1", -1.0, 1.0)
     imu: str = choice(
         AUTOPILOT,
         "the estimator's IMU: the autopilot's, or one of the companion",
         ("autopilot", TOPIC),
     )
-    hil_port: int = integer(4560, "TCP port at which the autopilot connects", 1, 65535)
+    hil: str = choice(
+        TCP,
+        "sensors and motors of the autopilot: tcp: at hil_port; line: a pseudo-terminal, as the "
+        "USB of a flight controller in HITL",
+        (TCP, LINE),
+    )
     faults: str = text(
         "", "faults of cables with their times", "JSON, see docs/faults.md; empty: none"
     )
@@ -83,7 +75,6 @@ class LaboratoryParameters(ParameterSet):
     time_limit: float = number(
         0.0, "time at which the rehearsal ends in any case, 0 = never", "s", 0.0, 1e6
     )
-    statistics: str = text("", "JSON file to write at the end", "a file; empty: none")
 
 
 def declare(node: Node) -> tuple[VehicleDescription, LaboratoryParameters]:
@@ -112,4 +103,7 @@ def devices(vehicle: VehicleDescription, p: LaboratoryParameters) -> Devices:
         magnet_line=Path(p.magnet_line) if p.magnet == GPIO else None,
         active_low=p.active_low,
         magnet_output=p.magnet_output,
+        magnet_on=p.magnet_on,
+        magnet_off=p.magnet_off,
+        usb=p.hil == LINE,
     )

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from array import array
 from dataclasses import asdict, dataclass, field, replace
 
@@ -11,47 +10,31 @@ from rclpy.node import Node
 from uam_control.coordinates import ARM
 from uam_control.nodes.described import described_vehicle
 from uam_control.settings.parameter_set import (
-    ParameterSet,
     choice,
-    integer,
     number,
     switch,
     text,
-    vector,
 )
 from uam_control.settings.process_parameters import TickTimesParameters
 from uam_control.vehicle import VehicleDescription
 from uam_msgs_py.node.node_parameters import NodeParameters
 from uam_msgs_py.node.rightful import RightfulNodes, rightful_nodes
 from uam_sim_bridge.mavlink.hil.sitl_ports import HOST
+from uam_sim_bridge.nodes.simulated_options import SimulatedParameters
 from uam_sim_bridge.plant.engines import DEFAULT_PLANT, PLANTS
-from uam_sim_bridge.plant.vehicle import PAYLOAD_MAX
 
 NOT_READY = 3  # exit status: not every node has started, or not all are connected
 
 
 @dataclass(frozen=True)
-class PlantParameters(ParameterSet):
+class PlantParameters(SimulatedParameters):
     """Parameters of the plant node; they cannot change while it runs."""
 
-    vehicle_changes: str = text(
-        "{}", "dotted entries of the vehicle's file to replace", 'JSON, as {"air.gust": 1.0}'
-    )
     plant: str = text(
         DEFAULT_PLANT, "physics engine", ", ".join(PLANTS) + ", or a class as module:Class"
     )
     plant_preset: str = text(
         "", "effects of the plant", "names or files of config/plant with commas; empty: calm"
-    )
-    payload_mass: float = number(0.2, "mass of the payload, 0 for none", "kg", 0.0, PAYLOAD_MAX)
-    seed: int = integer(1, "seed of all noise", 0, 2**31 - 1)
-    arm_start: tuple = vector(
-        (),
-        "joint angles on the ground, empty = stowed as described",
-        "rad",
-        -math.pi,
-        math.pi,
-        optional=True,
     )
     clock: str = choice(
         "lockstep",
@@ -69,7 +52,6 @@ class PlantParameters(ParameterSet):
     publish_imu: bool = switch(
         True, "publish the companion's IMU; false: mavlink_bridge publishes the autopilot's"
     )
-    hil_port: int = integer(4560, "TCP port at which the autopilot connects", 1, 65535)
     hil_address: str = text(
         HOST, "address of this machine at which the autopilot connects", "IPv4; 0.0.0.0: any"
     )
@@ -100,7 +82,6 @@ class PlantParameters(ParameterSet):
     time_limit: float = number(
         0.0, "simulation time at which the flight ends in any case, 0 = never", "s", 0.0, 1e6
     )
-    statistics: str = text("", "JSON file to write at the end", "a file; empty: none")
 
 
 @dataclass(frozen=True)

@@ -10,12 +10,14 @@ from pathlib import Path
 from typing import NamedTuple
 
 VARIABLE = "PX4_SITL_DIR"
+LOOP_VARIABLE = "PX4_HITL_DIR"  # a build without lockstep, for px4_hitl and uam rehearse
 REQUIRED = (
     f"--px4-dir DIR or {VARIABLE}: a PX4 build directory with bin/px4 and etc/, "
     "as build/px4_sitl_default after `make px4_sitl_default`"
 )
 _STARTUP = "etc/init.d-posix/rcS"
 _LISTED = "parameters.json"
+_BOARD, _OWN_CLOCK = "px4_boardconfig.h", "CONFIG_BOARD_NOLOCKSTEP 1"
 _IN_SOURCES = "build/px4_sitl_default"
 
 
@@ -59,6 +61,37 @@ class Px4Installation:
             )
             for entry in listed
         }
+
+    def require_own_clock(self) -> None:
+        """Raise Px4Error if PX4's clock is the simulator's: this build is made with lockstep.
+
+        A build that does not tell passes.
+        """
+        try:
+            own = _OWN_CLOCK in (self.directory / _BOARD).read_text()
+        except OSError:
+            return
+        if not own:
+            raise Px4Error(
+                f"{self.directory}: made with lockstep; in the loop PX4 has a clock of its own: "
+                "`make px4_sitl_nolockstep`"
+            )
+
+    @classmethod
+    def in_the_loop(cls, directory: str | Path | None = None) -> Px4Installation:
+        """Return the build without lockstep in `directory`; None: that of PX4_HITL_DIR.
+
+        Raises Px4Error.
+        """
+        given = directory or os.environ.get(LOOP_VARIABLE)
+        if not given:
+            raise Px4Error(
+                f"no PX4 build given: --px4-dir DIR or {LOOP_VARIABLE}, as "
+                "build/px4_sitl_nolockstep after `make px4_sitl_nolockstep`"
+            )
+        found = cls.find(given)
+        found.require_own_clock()
+        return found
 
     @classmethod
     def find(cls, directory: str | Path | None = None) -> Px4Installation:

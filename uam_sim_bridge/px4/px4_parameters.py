@@ -85,16 +85,20 @@ def start_script(values: Mapping[str, Value]) -> str:
     and before it starts the modules; the original sets more defaults. A value set earlier and equal
     to the firmware's default would be replaced by these defaults.
     """
-    lines = [f"param set {name} {value}" for name, value in values.items() if name != AIRFRAME]
     return "\n".join(
         [
             "#!/bin/sh",
             "# parameters of this flight, after the defaults of the start script",
             f". ${{R}}etc/init.d-posix/{STARTED_LATE}",
-            *lines,
+            *set_lines(values),
             "",
         ]
     )
+
+
+def set_lines(values: Mapping[str, Value]) -> list[str]:
+    """Return the lines of a start script that set the parameters, except the airframe."""
+    return [f"param set {name} {value}" for name, value in values.items() if name != AIRFRAME]
 
 
 def required(values: Mapping[str, Value], in_the_loop: bool = False) -> str:

@@ -10,15 +10,11 @@ it anew for the next simulator.
 from __future__ import annotations
 
 import argparse
-import ctypes
-import os
-import shutil
 import signal
-import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 import psutil
@@ -29,43 +25,39 @@ from uam_sim_bridge.mavlink.hil.sitl_options import add_instance, add_vehicle
 from uam_sim_bridge.mavlink.hil.sitl_ports import HOST
 from uam_sim_bridge.ports import SIMULATOR_TCP
 from uam_sim_bridge.px4 import px4_parameters as parameters
+from uam_sim_bridge.px4.process import (
+    FOLDERS,
+    Px4Process,
+    add_px4_options,
+    ended,
+    keep,
+    say_kept,
+)
 from uam_sim_bridge.px4.px4_installation import REQUIRED, Px4Error, Px4Installation
 
-PATIENCE = 2.0  # s between SIGINT and SIGKILL; PX4 cannot end while its clock is stopped
+NAME = "px4_sitl"
 POLL, LOOK = 0.05, 0.5  # s between two looks at PX4, and at its connection
-LOG_SUFFIX = ".ulg"
-_PR_SET_PDEATHSIG = 1  # Linux's <sys/prctl.h>
 
 
-class Sitl:
-    """A running PX4. A context manager: stops PX4 at the end of the `with` block."""
+class Sitl(Px4Process):
+    """PX4 in software at a simulator's port."""
 
     def __init__(
         self,
         installation: Px4Installation,
         instance: int,
-        values: dict[str, parameters.Value],
+        values: Mapping[str, parameters.Value],
         folder: Path,
         host: str = HOST,
     ) -> None:
-        """Start PX4; values: parameters by name; folder: working directory, existing and empty;
-        host: of the simulator."""
-        surroundings = {k: v for k, v in os.environ.items() if not k.startswith("PX4_")}
-        self._folder = folder
-        scripts = folder / "scripts"
-        scripts.mkdir()
-        (scripts / parameters.STARTED_LATE).write_text(parameters.start_script(values))
-        surroundings["PATH"] = os.pathsep.join((str(scripts), surroundings.get("PATH", os.defpath)))
-        # files that PX4 makes outside its working directory, and leaves if it is killed
-        self._files = [Path(f"/tmp/{name}-{instance}") for name in ("px4-sock", "px4_lock")]
-        self._foreign = [_identity(file) for file in self._files]
-        self.process = subprocess.Popen(
-            [str(installation.binary), "-i", str(instance), "-d", str(installation.etc)],
-            cwd=folder,
-            env=surroundings | parameters.environment(values) | {"PX4_SIM_HOSTNAME": host},
-            stdin=subprocess.DEVNULL,
-            process_group=0,
-            preexec_fn=_end_with_parent,
+        """values: parameters by name; folder: working directory, existing and empty; host: of the
+        simulator."""
+        super().__init__(
+            installation,
+            instance,
+            {parameters.STARTED_LATE: parameters.start_script(values)},
+            parameters.environment(values) | {"PX4_SIM_HOSTNAME": host},
+            folder,
         )
 
     def until_over(self, port: int | None) -> bool:
@@ -85,34 +77,6 @@ class Sitl:
             met = met or connected
         return False
 
-    def logs(self) -> list[Path]:
-        """Return PX4's log files, oldest first."""
-        found = self._folder.glob(f"log/**/*{LOG_SUFFIX}")
-        return sorted(found, key=lambda file: file.stat().st_mtime)
-
-    def stop(self) -> None:
-        """Send SIGINT, then SIGKILL: without a simulator PX4 does not end on SIGINT.
-
-        Then remove the files that PX4 has made outside its working directory.
-        """
-        if self.process.poll() is None:
-            os.killpg(self.process.pid, signal.SIGINT)
-            os.killpg(self.process.pid, signal.SIGCONT)  # a fault may have stopped it
-            try:
-                self.process.wait(PATIENCE)
-            except subprocess.TimeoutExpired:
-                os.killpg(self.process.pid, signal.SIGKILL)
-                self.process.wait()
-        for file, foreign in zip(self._files, self._foreign, strict=True):
-            if _identity(file) != foreign:
-                file.unlink(missing_ok=True)
-
-    def __enter__(self) -> Sitl:
-        return self
-
-    def __exit__(self, *exception) -> None:
-        self.stop()
-
 
 def _connected(pid: int, port: int) -> bool:
     """Return whether a process has an open connection to a TCP port."""
@@ -126,38 +90,10 @@ def _connected(pid: int, port: int) -> bool:
     )
 
 
-def _identity(file: Path) -> tuple[int, int] | None:
-    """Return inode and time of change of a file, None if it does not exist."""
-    try:
-        found = file.lstat()
-    except FileNotFoundError:
-        return None
-    return found.st_ino, found.st_mtime_ns
-
-
-def _end_with_parent() -> None:
-    """In the child process: end when the parent ends (Linux only)."""
-    if sys.platform == "linux":
-        ctypes.CDLL(None).prctl(_PR_SET_PDEATHSIG, signal.SIGKILL)
-
-
-def keep(logs: Sequence[Path], target: Path, first: int = 1) -> list[Path]:
-    """Move PX4's logs to `target`, `target`-2, ..., from number `first` on; return the new paths.
-
-    PX4 writes one log per arming.
-    """
-    kept = []
-    for number, log in enumerate(logs, first):
-        place = target if number == 1 else target.with_stem(f"{target.stem}-{number}")
-        shutil.move(log, place)
-        kept.append(place)
-    return kept
-
-
 def parser() -> argparse.ArgumentParser:
     """Return the parser of the command line."""
     p = argparse.ArgumentParser(
-        prog="px4_sitl",
+        prog=NAME,
         formatter_class=argparse.RawDescriptionHelpFormatter,
         description="Run PX4 SITL with this vehicle's parameters, in a fresh directory, until it\n"
         "is interrupted. It waits for a simulator at TCP 4560 + N: mujoco_sim.",
@@ -168,21 +104,8 @@ def parser() -> argparse.ArgumentParser:
         "  px4_sitl --param COM_OF_LOSS_T=1.0 --param SDLOG_MODE=0\n",
     )
     add_instance(p)
-    p.add_argument("--px4-dir", metavar="DIR", help=REQUIRED)
+    add_px4_options(p, REQUIRED)
     add_vehicle(p)
-    p.add_argument(
-        "--params",
-        metavar="FILE",
-        nargs="+",
-        help=f"parameters beside the vehicle's (default: {parameters.SIMULATION} of config/)",
-    )
-    p.add_argument(
-        "--param",
-        metavar="NAME=VALUE",
-        action="append",
-        default=[],
-        help="a parameter of PX4, in place of the files' (repeatable)",
-    )
     p.add_argument(
         "--sim-host", default=HOST, metavar="HOST", help="simulator (default %(default)s)"
     )
@@ -190,12 +113,6 @@ def parser() -> argparse.ArgumentParser:
         "--once",
         action="store_true",
         help="serve one simulator (default: start PX4 anew for the next one)",
-    )
-    p.add_argument(
-        "--log",
-        type=Path,
-        metavar="FILE",
-        help=f"save PX4's log as FILE{LOG_SUFFIX} (default: the log is deleted)",
     )
     return p
 
@@ -213,13 +130,13 @@ def main(arguments: Sequence[str] | None = None) -> int:
         vehicle = load_description(options.vehicle)
         values = parameters.load(vehicle, options.params, options.param, installation.ranges())
     except (Px4Error, ConfigurationError, VehicleError) as error:
-        print(f"px4_sitl: {error}", file=sys.stderr, flush=True)
+        print(f"{NAME}: {error}", file=sys.stderr, flush=True)
         return 2
     port = None if options.once else SIMULATOR_TCP + options.instance
     kept: list[Path] = []
     hung_up = True
     while hung_up:
-        with tempfile.TemporaryDirectory(prefix="uam-px4-") as folder:
+        with tempfile.TemporaryDirectory(prefix=FOLDERS) as folder:
             px4 = Sitl(installation, options.instance, values, Path(folder), options.sim_host)
             try:
                 with px4:
@@ -230,23 +147,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
             finally:
                 if options.log is not None:
                     kept += (new := keep(px4.logs(), options.log, len(kept) + 1))
-                    names = ", ".join(str(file) for file in new) or "PX4 wrote none"
-                    print(f"px4_sitl: log: {names}", flush=True)
+                    say_kept(NAME, new)
         if hung_up:
-            print("px4_sitl: the simulator hung up; PX4 starts anew for the next one", flush=True)
-    print(f"px4_sitl: PX4 {end_of(status)}", file=sys.stderr, flush=True)
-    if status < 0:
-        if -status != signal.SIGKILL:
-            signal.signal(-status, signal.SIG_DFL)
-        os.kill(os.getpid(), -status)
-    return status or 1
-
-
-def end_of(status: int) -> str:
-    """Return a return code of subprocess in words."""
-    if status >= 0:
-        return f"ended by itself with exit status {status}"
-    return f"was ended by {signal.Signals(-status).name}"
+            print(f"{NAME}: the simulator hung up; PX4 starts anew for the next one", flush=True)
+    return ended(NAME, status)
 
 
 if __name__ == "__main__":

@@ -1,6 +1,6 @@
 """The laboratory: a plant behind emulated devices, tick by tick. No ROS.
 
-    motors ◀─ HIL over TCP ─▶ autopilot ◀─ serial cable ─▶ bridge
+    motors ◀─ HIL over TCP or a line ─▶ autopilot ◀─ serial cable ─▶ bridge
     joints ◀─▶ emulated Dynamixel bus ◀─ pseudo-terminal ─▶ arm_driver
     poses ──▶ emulated NatNet server ──▶ mocap_driver
     magnet ◀── simulated GPIO line ◀── magnet_driver
@@ -30,6 +30,7 @@ from uam_sim_bridge.mavlink.hil.hil_server import HilServer
 from uam_sim_bridge.plant import Samples, Truth, Vehicle
 from uam_sim_bridge.plant.engines import plant_class
 from uam_sim_bridge.rehearsal import hands
+from uam_sim_bridge.rehearsal.hil_line import HilLine
 from uam_sim_bridge.rehearsal.tracked_room import RoomBody
 from uam_sim_bridge.rehearsal.wiring_mistakes import mistaken_chain, mistaken_room
 
@@ -40,7 +41,8 @@ OWN_DELAYS = {  # those that the emulated devices have
     "servos.command_latency_ticks": 0,
 }
 CONTROLS_OF_ACTUATORS = 6  # the last ones of HIL_ACTUATOR_CONTROLS
-BUS_DEVICE, SERIAL_NEAR, SERIAL_FAR = "ttyARM", "ttyTELEM2", "ttyAUTOPILOT"  # in the folder
+# in the folder; USB: sensors and motors of an autopilot in HITL
+BUS_DEVICE, SERIAL_NEAR, SERIAL_FAR, USB = "ttyARM", "ttyTELEM2", "ttyAUTOPILOT", "ttyUSB"
 
 
 @dataclass(frozen=True)
@@ -49,7 +51,8 @@ class Devices:
 
     folder: of the pseudo-terminals; chain: servos as described; baud: of the autopilot's line;
     body, payload: rigid bodies, payload "" for none; mocap_port: command port; magnet_line: file of
-    the GPIO line, None where the autopilot switches; magnet_output: actuator 1..6.
+    the GPIO line, None where the autopilot switches; magnet_output: actuator 1..6; magnet_on,
+    magnet_off: its values; usb: sensors and motors go over a line, not over TCP.
     """
 
     folder: Path
@@ -62,6 +65,9 @@ class Devices:
     magnet_line: Path | None
     active_low: bool = False
     magnet_output: int = 1
+    magnet_on: float = 1.0
+    magnet_off: float = -1.0
+    usb: bool = False
 
 
 class Laboratory:
@@ -119,7 +125,11 @@ class Laboratory:
             disturbances=Disturbances(latency=max(0.0005, latency * self.plant.period)),
             seed=seed,
         )
-        self.hil = HilServer(hil_port, len(self.description.rotors), seed=seed)
+        rotors = len(self.description.rotors)
+        if devices.usb:
+            self.hil: HilServer | HilLine = HilLine(devices.folder / USB, rotors, seed)
+        else:
+            self.hil = HilServer(hil_port, rotors, seed=seed)
         self.hil_plugged = self.magnet_plugged = True
         self.magnet = False
         self.mocap.start()
@@ -182,16 +192,18 @@ class Laboratory:
         """Return whether current flows through the magnet."""
         if not self.magnet_plugged:
             return False
-        line = self.devices.magnet_line
+        d = self.devices
+        line = d.magnet_line
         if line is None:
             first = len(self.hil.controls) - CONTROLS_OF_ACTUATORS
-            return bool(self.hil.controls[first + self.devices.magnet_output - 1] > 0.0)
+            value = self.hil.controls[first + d.magnet_output - 1]
+            return bool(abs(value - d.magnet_on) < abs(value - d.magnet_off))
         try:
             level = line.read_text() == "1"
         except OSError:
             return False
         inverted = any(one.fault.NAME == "magnet_inverted" for one in self.wiring.faults)
-        return (level is not self.devices.active_low) is not inverted
+        return (level is not d.active_low) is not inverted
 
     def close(self) -> None:
         """Close every device."""

@@ -1,4 +1,8 @@
-"""Instructions to the servos through the maker's library; results as values, errors in words."""
+"""Instructions to the servos through the maker's library; results as values, errors in words.
+
+An answer has no number that names its instruction. After a stall of the computer or of the adapter
+the answer to an instruction that was given up may come in place of the next one: see `Overdue`.
+"""
 
 from __future__ import annotations
 
@@ -6,11 +10,12 @@ import errno
 import os
 import termios
 from collections.abc import Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 
 import serial
 
 from uam_sim_bridge.drivers.dynamixel.control_table import Register, signed, unsigned
+from uam_sim_bridge.drivers.dynamixel.overdue import Instruction, Overdue
 from uam_sim_bridge.drivers.dynamixel.packet_handler import StuffingPacketHandler
 from uam_sim_bridge.drivers.dynamixel.port import PatientPort
 from uam_sim_bridge.drivers.dynamixel.sdk import (
@@ -20,6 +25,9 @@ from uam_sim_bridge.drivers.dynamixel.sdk import (
     GroupSyncWrite,
 )
 
+PING, READ, WRITE, REBOOT = 0x01, 0x02, 0x03, 0x08
+ERROR_AT = 8  # place of the error in a status packet; data and CRC follow
+EMPTY_STATUS = bytes(11)  # a status packet without data
 ALERT = 0x80  # error bit of a status packet: Hardware Error Status is not 0
 REFUSALS = {
     1: "the servo could not execute it",
@@ -62,6 +70,7 @@ class ServoBus:
         self.device, self._baud_rate = device, baud_rate
         self._port = port or PatientPort(device, allowance)
         self._sdk = StuffingPacketHandler()
+        self._overdue = Overdue()
         self.alerts: set[int] = set()
 
     def open(self) -> None:
@@ -95,10 +104,8 @@ class ServoBus:
 
     def ping(self, servo: int) -> int:
         """Return the model number of a servo. Raises NoAnswer, BusLost."""
-        with self._guarded():
-            number, result, error = self._sdk.ping(self._port, servo)
-        self._check(servo, result, error)
-        return number
+        data = self._ask(Instruction(servo, PING, b"", 3))  # model number and firmware
+        return int.from_bytes(data[:2], "little")
 
     def scan(self) -> dict[int, tuple[int, int]]:
         """Return id → (model number, firmware) of all servos; takes up to 1.5 s. Raises BusLost."""
@@ -108,14 +115,8 @@ class ServoBus:
 
     def read_bytes(self, servo: int, register: Register) -> bytes:
         """Return the bytes of a register. Raises NoAnswer, Refused, BusLost."""
-        with self._guarded():
-            data, result, error = self._sdk.readTxRx(
-                self._port, servo, register.address, register.size
-            )
-        self._check(servo, result, error)
-        if len(data) != register.size:
-            raise NoAnswer(f"id {servo}: an answer of {len(data)} bytes", damaged=True)
-        return bytes(data)
+        place = _bytes(register.address, 2) + _bytes(register.size, 2)
+        return self._ask(Instruction(servo, READ, place, register.size))
 
     def read(self, servo: int, register: Register) -> int:
         """Return the unsigned value of a register. Raises NoAnswer, Refused, BusLost."""
@@ -127,12 +128,8 @@ class ServoBus:
 
     def write(self, servo: int, register: Register, value: int) -> None:
         """Write a signed value and wait for the status. Raises NoAnswer, Refused, BusLost."""
-        data = list(_bytes(value, register.size))
-        with self._guarded():
-            result, error = self._sdk.writeTxRx(
-                self._port, servo, register.address, register.size, data
-            )
-        self._check(servo, result, error)
+        data = _bytes(register.address, 2) + _bytes(value, register.size)
+        self._ask(Instruction(servo, WRITE, data, 0))
 
     def sync_write(self, register: Register, values: Mapping[int, int]) -> None:
         """Write a signed value to each servo, without an answer. Raises BusLost."""
@@ -158,16 +155,55 @@ class ServoBus:
 
     def reboot(self, servo: int) -> None:
         """Restart a servo. Raises NoAnswer, BusLost."""
+        with suppress(Refused):
+            self._ask(Instruction(servo, REBOOT, b"", 0))
+        self.alerts.discard(servo)
+
+    def _ask(self, instruction: Instruction) -> bytes:
+        """Send an instruction to one servo; return the data of its answer.
+
+        Raises NoAnswer, Refused, BusLost.
+        """
         with self._guarded():
-            result, _ = self._sdk.reboot(self._port, servo)
-        self._check(servo, result, 0)
+            self._drop_late()
+            result = self._sdk.txPacket(self._port, instruction.packet())
+            self._port.setPacketTimeout(instruction.size + len(EMPTY_STATUS))
+            while result == COMM_SUCCESS:
+                packet, result = self._sdk.rxPacket(self._port, False)
+                if result != COMM_SUCCESS:
+                    break
+                servo, error, data = _parts(packet)
+                refused = bool(error & ~ALERT)
+                if self._overdue.answers(instruction, servo, data, refused):
+                    self._note(servo, error)
+                    if refused:
+                        code = error & ~ALERT
+                        reason = REFUSALS.get(code, f"error {code}")
+                        raise Refused(f"id {instruction.servo}: {reason}")
+                    return data
+        damaged = result == COMM_RX_CORRUPT
+        if not damaged or self._overdue:  # the damaged one may be an overdue one
+            self._overdue.add(instruction)
+        if damaged:
+            raise NoAnswer(f"id {instruction.servo}: the answer arrives damaged", damaged=True)
+        raise NoAnswer(f"id {instruction.servo}: no answer")
+
+    def _drop_late(self) -> None:
+        """Take the answers that have come since the last instruction was given up."""
+        while self._overdue:
+            self._port.setPacketTimeoutMillis(0.0)
+            packet, result = self._sdk.rxPacket(self._port, False)
+            if result != COMM_SUCCESS:
+                break
+            servo, _, data = _parts(packet)
+            self._overdue.arrived(servo, data)
 
     def _fast_answers(self, size: int, servos: set[int]) -> dict[int, bytes]:
         whole = (size + 4) * len(servos)  # error, id, data, CRC of each
-        data, result, _ = self._sdk.fastSyncReadRx(self._port, BROADCAST_ID, whole)
-        if result != COMM_SUCCESS or len(data) != whole:
+        packet, result = self._sdk.rxPacket(self._port, True)
+        if result != COMM_SUCCESS or packet[4] != BROADCAST_ID or len(packet) != ERROR_AT + whole:
             return {}
-        found = {}
+        data, found = packet[ERROR_AT:], {}
         for start in range(0, whole, size + 4):
             error, servo = data[start], data[start + 1]
             self._note(servo, error)
@@ -181,7 +217,7 @@ class ServoBus:
             packet, result = self._sdk.rxPacket(self._port, False)
             if result != COMM_SUCCESS:
                 break
-            servo, error, data = packet[4], packet[8], bytes(packet[9 : 9 + size])
+            servo, error, data = _parts(packet)
             self._note(servo, error)
             if servo in servos and not error & ~ALERT and len(data) == size:
                 found[servo] = data
@@ -189,15 +225,6 @@ class ServoBus:
 
     def _note(self, servo: int, error: int) -> None:
         (self.alerts.add if error & ALERT else self.alerts.discard)(servo)
-
-    def _check(self, servo: int, result: int, error: int) -> None:
-        if result == COMM_RX_CORRUPT:
-            raise NoAnswer(f"id {servo}: the answer arrives damaged", damaged=True)
-        if result != COMM_SUCCESS:
-            raise NoAnswer(f"id {servo}: no answer")
-        self._note(servo, error)
-        if code := error & ~ALERT:
-            raise Refused(f"id {servo}: {REFUSALS.get(code, f'error {code}')}")
 
     @contextmanager
     def _guarded(self) -> Iterator[None]:
@@ -211,6 +238,11 @@ class ServoBus:
             raise BusLost(f"{self.device}: {_reason(error)}") from None
         finally:
             self._port.is_using = False
+
+
+def _parts(packet: Sequence[int]) -> tuple[int, int, bytes]:
+    """Return id, error and data of a status packet."""
+    return packet[4], packet[ERROR_AT], bytes(packet[ERROR_AT + 1 : -2])
 
 
 def _bytes(value: int, size: int) -> bytes:

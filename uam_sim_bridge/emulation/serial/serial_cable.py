@@ -6,25 +6,18 @@ near end is a USB adapter: unplugged, its device is gone. A cut cable is silent,
 
 from __future__ import annotations
 
-import contextlib
-import os
-import pty
 import select
-import termios
-import threading
 import time
-import tty
 from collections import deque
-from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
 
 from uam_sim_bridge.emulation.serial.bit_errors import disturbed
+from uam_sim_bridge.emulation.serial.pseudo_terminal import DeviceThread, PseudoTerminal
 
 BITS_PER_BYTE = 10  # start, eight data bits, stop
 IDLE = 0.02  # [s] longest wait
-CHUNK = 4096  # bytes per read
 HELD = 65536  # bytes under way in one direction; a UART's sender would wait
 
 
@@ -77,13 +70,8 @@ class SerialCable:
         self.carried = [0, 0]  # bytes from the near and from the far end
         self._noise = np.random.default_rng(seed)
         self._wires = Wire(baud), Wire(baud)  # from the near end, from the far end
-        self._lock = threading.Lock()
-        self._stop, self._pause = threading.Event(), threading.Event()
-        self._ends: list[tuple[int, int] | None] = [None, None]  # master and slave
-        with self._changed():
-            for end in (0, 1):
-                self._create(end)
-        self._thread = threading.Thread(target=self._serve, name="serial cable", daemon=True)
+        self._thread = DeviceThread("serial cable", self._carry)
+        self._ends: list[PseudoTerminal | None] = [PseudoTerminal(near), PseudoTerminal(far)]
         self._thread.start()
 
     def __enter__(self) -> SerialCable:
@@ -94,65 +82,35 @@ class SerialCable:
 
     def unplug(self) -> None:
         """Remove the near device, as a pulled USB adapter."""
-        with self._changed():
+        with self._thread.changed():
             self._remove(0)
 
     def plug_in(self) -> None:
         """Create the near device again, under the same path."""
-        with self._changed():
+        with self._thread.changed():
             if self._ends[0] is None:
-                self._create(0)
+                self._ends[0] = PseudoTerminal(self.near)
 
     def close(self) -> None:
         """End the thread and remove the devices."""
-        self._stop.set()
-        self._thread.join()
-        with self._changed():
-            for end in (0, 1):
-                self._remove(end)
-
-    def _create(self, end: int) -> None:
-        master, slave = pty.openpty()
-        tty.setraw(slave)
-        os.set_blocking(master, False)
-        link = (self.near, self.far)[end]
-        link.unlink(missing_ok=True)
-        link.symlink_to(os.ttyname(slave))
-        self._ends[end] = master, slave
+        self._thread.end()
+        for end in (0, 1):
+            self._remove(end)
 
     def _remove(self, end: int) -> None:
-        pair = self._ends[end]
-        if pair is not None:
-            (self.near, self.far)[end].unlink(missing_ok=True)
-            for one in pair:
-                os.close(one)
+        terminal = self._ends[end]
+        if terminal is not None:
+            terminal.close()
         self._ends[end] = None
         for wire in self._wires:
             wire.clear()
 
-    @contextlib.contextmanager
-    def _changed(self) -> Iterator[None]:
-        """Keep the thread away from the devices while they are created or removed."""
-        self._pause.set()
-        with self._lock:
-            yield
-        self._pause.clear()
-
-    def _serve(self) -> None:
-        while not self._stop.is_set():
-            if self._pause.is_set():
-                time.sleep(0.001)
-                continue
-            with self._lock:
-                self._carry()
-
     def _carry(self) -> None:
         """Wait for bytes, and carry those that are due."""
-        masters = [pair[0] if pair else None for pair in self._ends]
         open_ends = [
-            master
-            for master, wire in zip(masters, self._wires, strict=True)
-            if master is not None and wire.held < HELD
+            terminal
+            for terminal, wire in zip(self._ends, self._wires, strict=True)
+            if terminal is not None and wire.held < HELD
         ]
         due = [wire.due for wire in self._wires if wire.due is not None]
         wait = min([IDLE, *(max(0.0, one - time.monotonic()) for one in due)])
@@ -160,25 +118,12 @@ class SerialCable:
         if not open_ends:
             time.sleep(wait)
         for end, wire in enumerate(self._wires):
-            if masters[end] in readable:
-                with contextlib.suppress(OSError):
-                    data = os.read(masters[end], CHUNK)
-                    self.carried[end] += len(data)
-                    if not self.cut and masters[1 - end] is not None:
-                        wire.put(
-                            disturbed(data, self.bit_error_rate, self._noise), time.monotonic()
-                        )
+            terminal, other = self._ends[end], self._ends[1 - end]
+            if terminal in readable:
+                data = terminal.read()
+                self.carried[end] += len(data)
+                if not self.cut and other is not None:
+                    wire.put(disturbed(data, self.bit_error_rate, self._noise), time.monotonic())
             arrived = wire.take(time.monotonic())
-            if arrived and masters[1 - end] is not None:
-                self._deliver(1 - end, arrived)
-
-    def _deliver(self, end: int, data: bytes) -> None:
-        """Write to an end; bytes that nobody reads are lost, as in a full UART."""
-        master, slave = self._ends[end]
-        try:
-            os.write(master, data)
-        except BlockingIOError:
-            with contextlib.suppress(termios.error):
-                termios.tcflush(slave, termios.TCIFLUSH)
-        except OSError:
-            pass
+            if arrived and other is not None:
+                other.write(arrived)

@@ -15,16 +15,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from uam_control.settings.parameter_set import ParameterSet, number
-from uam_sim_bridge.mavlink.hil.hil_sensors import TEMPERATURE, SlowSensors
-from uam_sim_bridge.mavlink.protocol.frames import swap_body, swap_quaternion
-from uam_sim_bridge.mavlink.protocol.wire import Codec, Framer, mavlink2
+from uam_sim_bridge.mavlink.hil.hil_messages import HilMessages
 from uam_sim_bridge.patience import SLICE, Patience
 from uam_sim_bridge.ports import PortError
-
-_IMU, _MAG, _BARO = 0x3F, 0x1C0, 0x1A00  # HIL_SENSOR.fields_updated
-_ARMED = 128
-CONTROLS = 16  # number of values of HIL_ACTUATOR_CONTROLS.controls
-_SLOW_PERIOD = 0.02  # s
 
 
 def open_only_here(address: str) -> bool:
@@ -56,12 +49,11 @@ class HilParameters(ParameterSet):
     )
 
 
-class HilServer:
+class HilServer(HilMessages):
     """TCP server for one autopilot at a time.
 
-    `motors` (n,): newest motor commands 0..1 in PX4's order, zero while disarmed; `controls` (16,):
-    all newest controls; `armed`: from HIL_ACTUATOR_CONTROLS; `answered`: whether the last tick was
-    answered; `missed`: number of ticks without an answer after the first answer.
+    `answered`: whether the last tick was answered; `missed`: number of ticks without an answer
+    after the first answer.
     """
 
     def __init__(
@@ -74,20 +66,11 @@ class HilServer:
     ) -> None:
         """Listen on TCP `port` for `motors` motors; seed: of the noise. Raises HilError if the
         port is in use."""
+        super().__init__(motors, seed)
         self.parameters = (parameters or HilParameters()).validated()
-        self.motors = np.zeros(motors)
-        self.controls = np.zeros(CONTROLS)
-        self.armed = False
         self.answered = False
         self.missed = 0
         self._ever = False
-        self._stamp = 0
-        self._codec = Codec(1, 200)
-        self._framer = Framer(self._codec)
-        self._slow = SlowSensors(seed)
-        self._slow_due = 0.0
-        self._mag = [0.0, 0.0, 0.0]
-        self._baro = (0.0, 0.0)
         self._link: socket.socket | None = None
         self._listener = socket.socket(socket.AF_INET, socket.SOCK_STREAM)
         self._listener.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
@@ -123,34 +106,13 @@ class HilServer:
         position: np.ndarray,
         quaternion: np.ndarray,
     ) -> None:
-        """Send the sensors of the tick at `time` [s].
-
-        gyro (3,) [rad/s, FLU]; accel (3,): specific force [m/s^2, FLU]; true position (3,)
-        [m, ENU] and quaternion (4,) FLU → ENU [w x y z], for magnetometer and barometer.
-        """
+        """Send the sensors of the tick at `time` [s]; arguments: see `sensors`."""
         if self._link is None:
             return
-        self._stamp, fields = round(time * 1e6), _IMU
-        if time + 1e-9 >= self._slow_due:
-            self._slow_due = time + _SLOW_PERIOD
-            fields |= _MAG | _BARO
-            self._mag = self._slow.magnetometer(swap_quaternion(quaternion))
-            self._baro = self._slow.barometer(float(position[2]))
-        message = mavlink2.MAVLink_hil_sensor_message(
-            self._stamp,
-            *swap_body(accel).tolist(),
-            *swap_body(gyro).tolist(),
-            *self._mag,
-            self._baro[0],
-            0.0,
-            self._baro[1],
-            TEMPERATURE,
-            fields,
-            0,
-        )
+        data = self.sensors(time, gyro, accel, position, quaternion)
         try:
             self._link.settimeout(self.parameters.answer_timeout)
-            self._link.sendall(self._codec.encode(message))
+            self._link.sendall(data)
             self._link.setblocking(False)
         except (ConnectionError, TimeoutError):
             self._stop()
@@ -191,15 +153,9 @@ class HilServer:
             return True
         except ConnectionError:
             return False
-        for message in self._framer.stream(data):
-            if message.get_type() != "HIL_ACTUATOR_CONTROLS":
-                continue
-            self.armed = bool(message.mode & _ARMED)
-            self.controls[:] = message.controls
-            commands = self.controls[: len(self.motors)]
-            good = self.armed and bool(np.all(np.isfinite(commands)))
-            self.motors[:] = np.clip(commands, 0.0, 1.0) if good else 0.0
-            self.answered = self.answered or message.time_usec >= self._stamp
+        for message in self.received(data):
+            if self.take(message):
+                self.answered = self.answered or message.time_usec >= self.stamp
         return bool(data)
 
     def _stop(self) -> np.ndarray:
@@ -207,7 +163,4 @@ class HilServer:
             self._link.close()
             self._link = None
         self._ever = self.answered = False
-        self._framer = Framer(self._codec)
-        self.armed = False
-        self.motors[:] = self.controls[:] = 0.0
-        return self.motors
+        return self.forget()

@@ -2,7 +2,8 @@
 
 PX4 v1.16 acknowledges every DO_SET_ACTUATOR: the answer says that the command arrived, not that an
 output is assigned (`Peripheral via Actuator Set`). DO_GRIPPER is answered by PX4's payload
-deliverer (PD_GRIPPER_EN); without it nobody answers.
+deliverer: in progress at once, accepted after PD_GRIPPER_TO; a request meanwhile is refused. With
+PD_GRIPPER_TYPE -1 every one fails.
 """
 
 from __future__ import annotations
@@ -25,6 +26,7 @@ ACTUATORS = 6  # of one DO_SET_ACTUATOR
 GRAB, RELEASE = 1.0, 0.0  # GRIPPER_ACTIONS
 REPEAT = 0.2  # [s] between two requests without an answer
 REFUSED_REPEAT = 1.0  # [s] after a refusal
+PROGRESS_REPEAT = 3.0  # [s] after "in progress": PD_GRIPPER_TO of PX4 is 1 s
 SILENT_AFTER = 5  # requests without an answer that are reported
 LATEST = 1.0  # [s] an answer comes within this time, or it is lost
 
@@ -122,6 +124,7 @@ class AutopilotMagnet:
         if command != self._command:
             return False
         if result == MavResult.IN_PROGRESS:  # the final answer follows
+            self._due, self._silent = max(self._due, time + PROGRESS_REPEAT), 0
             return True
         if self._unanswered:
             self._unanswered.popleft()

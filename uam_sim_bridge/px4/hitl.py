@@ -1,0 +1,153 @@
+"""Executable `px4_hitl`: PX4 in software as a flight controller in HITL, on serial lines.
+
+    TELEM2 ◀─ serial line ─▶ companion        setpoints, vision, telemetry
+    USB    ◀─ serial line ─▶ simulator        HIL_SENSOR in, HIL_ACTUATOR_CONTROLS out
+
+It needs a build without lockstep (`make px4_sitl_nolockstep`): PX4's clock is then its own, as on a
+flight controller. PX4's start scripts for the simulator and for MAVLink are replaced: sensors,
+commander and outputs start in HITL mode. Outputs 1 to N are the motors; 11 to 16 are the six of
+MAV_CMD_DO_SET_ACTUATOR.
+"""
+
+from __future__ import annotations
+
+import argparse
+import signal
+import sys
+import tempfile
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+
+from uam_control.settings.configuration import ConfigurationError
+from uam_control.vehicle import VehicleDescription, VehicleError, load_description
+from uam_sim_bridge.mavlink.hil.sitl_options import add_instance, add_vehicle
+from uam_sim_bridge.mavlink.transport.transport import parse_url
+from uam_sim_bridge.ports import PortError
+from uam_sim_bridge.px4 import px4_parameters as parameters
+from uam_sim_bridge.px4.process import (
+    FOLDERS,
+    Px4Process,
+    add_px4_options,
+    ended,
+    keep,
+    say_kept,
+)
+from uam_sim_bridge.px4.px4_installation import LOOP_VARIABLE, Px4Error, Px4Installation
+
+NAME = "px4_hitl"
+MAVLINK = "px4-rc.mavlink"  # PX4's script that starts the links
+USB_BAUD = 921600  # a USB device has none; PX4 asks for one
+SHARE = 0.8  # of a line's bytes that PX4 may send
+BITS_PER_BYTE = 10
+MOTOR, ACTUATOR_SET, GRIPPER = 100, 300, 430  # output functions: the last number before the first
+OUTPUTS_OF_SET, FIRST_OF_SET = 6, 11  # outputs 11 to 16
+OUTPUT = "PWM_MAIN_FUNC"  # of the outputs of a build for a computer; HIL_ACT_FUNC on a board
+
+
+def loop_values(
+    values: Mapping[str, parameters.Value], vehicle: VehicleDescription
+) -> dict[str, parameters.Value]:
+    """Return the parameters of PX4 in the loop: outputs, and no simulated battery unless given."""
+    motors = {f"{OUTPUT}{n}": MOTOR + n for n in range(1, len(vehicle.rotors) + 1)}
+    others = {f"{OUTPUT}{FIRST_OF_SET + n}": ACTUATOR_SET + 1 + n for n in range(OUTPUTS_OF_SET)}
+    defaults = {"SIM_BAT_ENABLE": 0, "IMU_INTEG_RATE": 250}
+    return motors | others | defaults | dict(values) | {"SYS_HITL": 1, parameters.SYSTEM: 1}
+
+
+def gripper_parameter(number: int) -> str:
+    """Return NAME=VALUE that puts gripper `number`, 1 to 6, on the output of that actuator."""
+    return f"{OUTPUT}{FIRST_OF_SET + number - 1}={GRIPPER}"
+
+
+def start_script(values: Mapping[str, parameters.Value]) -> str:
+    """Return the script in place of PX4's start of a simulator."""
+    return "\n".join(
+        [
+            "#!/bin/sh",
+            "# parameters of this flight; no simulator at a port; sensors and commander for HITL",
+            *parameters.set_lines(values),
+            "unalias sensors commander",
+            "sensors() { px4-sensors --instance $px4_instance start -h; }",
+            "commander() { px4-commander --instance $px4_instance start -h; }",
+            "px4-pwm_out_sim --instance $px4_instance start -m hil",
+            "",
+        ]
+    )
+
+
+def mavlink_script(companion: str, baud: int, usb: str = "") -> str:
+    """Return the script that starts the links; devices; usb "": the companion's carries both."""
+    rate = round(SHARE * baud / BITS_PER_BYTE)
+    lines = [f"mavlink start -d {companion} -b {baud} -m onboard -r {rate}"]
+    if usb:
+        rate = round(SHARE * USB_BAUD / BITS_PER_BYTE)
+        lines += [
+            f"mavlink start -d {usb} -b {USB_BAUD} -m custom -r {rate}",
+            f"mavlink stream -d {usb} -s GPS_GLOBAL_ORIGIN -r 1",
+        ]
+    return "\n".join(["#!/bin/sh", *lines, ""])
+
+
+def parser() -> argparse.ArgumentParser:
+    """Return the parser of the command line."""
+    p = argparse.ArgumentParser(
+        prog=NAME,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+        description="Run PX4 as a flight controller in HITL on serial lines, until interrupted.\n"
+        "The build has no lockstep: make px4_sitl_nolockstep.",
+        epilog="examples:\n"
+        "  px4_hitl --px4-dir build/px4_sitl_nolockstep --companion /dev/pts/3:921600\n"
+        "  px4_hitl --companion /dev/pts/3:921600 --usb /dev/pts/5   sensors on another line\n",
+    )
+    add_instance(p)
+    p.add_argument(
+        "--companion", required=True, metavar="DEVICE:BAUD", help="the companion's line, as TELEM2"
+    )
+    p.add_argument(
+        "--usb",
+        default="",
+        metavar="DEVICE",
+        help="line of the simulated sensors and motors (default: the companion's)",
+    )
+    add_px4_options(p, f"PX4 build without lockstep (default: ${LOOP_VARIABLE})")
+    add_vehicle(p)
+    return p
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run PX4 until interrupted; return the exit status.
+
+    0: interrupted; PX4's status if PX4 ended by itself; 2: no PX4 or wrong use. If a signal ended
+    PX4, the same signal ends this process.
+    """
+    options = parser().parse_args(arguments)
+    signal.signal(signal.SIGTERM, lambda *_: sys.exit(0))
+    try:
+        line = parse_url(f"serial:{options.companion}")
+        installation = Px4Installation.in_the_loop(options.px4_dir)
+        vehicle = load_description(options.vehicle)
+        given = parameters.load(vehicle, options.params, options.param, installation.ranges())
+    except (Px4Error, ConfigurationError, VehicleError, PortError) as error:
+        print(f"{NAME}: {error}", file=sys.stderr, flush=True)
+        return 2
+    values = loop_values(given, vehicle)
+    scripts = {
+        parameters.STARTED_LATE: start_script(values),
+        MAVLINK: mavlink_script(line.place, line.number, options.usb),
+    }
+    variables = parameters.environment(values)
+    with tempfile.TemporaryDirectory(prefix=FOLDERS) as folder:
+        px4 = Px4Process(installation, options.instance, scripts, variables, Path(folder))
+        try:
+            with px4:
+                status = px4.process.wait()
+        except KeyboardInterrupt:
+            return 0
+        finally:
+            if options.log is not None:
+                say_kept(NAME, keep(px4.logs(), options.log))
+    return ended(NAME, status)
+
+
+if __name__ == "__main__":
+    sys.exit(main())
