@@ -131,7 +131,8 @@ def test_the_matrix_of_the_configuration_has_every_fault_and_moment():
     assert list(direct.moments) == ["take-off", "transit", "with payload", "landing"]
     assert len(set(ros.rows)) == len(ros.rows)
     (one,) = fault_matrix.read(MATRIX, "direct", ["servo_jam"], ["landing"]).cells(3)[1:]
-    assert (one.schedule.faults[0].at, one.schedule.seed) == (83.5, 3)
+    assert one.schedule.faults[0].moment == {"at": "land", "after": 1.5}
+    assert one.schedule.seed == 3
 
 
 @pytest.mark.parametrize(

@@ -103,11 +103,33 @@ def test_every_parameter_has_a_range_that_is_kept(name, parameter):
 
 def test_a_phase_means_its_beginning():
     found = one("motor_loss@pick+1:motor=2,remaining=0.7")
-    assert (found.at, found.duration) == (31.0, math.inf)
+    assert (found.phase, found.at, found.duration) == ("pick", 1.0, math.inf)
     assert (found.fault.motor, found.fault.remaining) == (2.0, 0.7)
-    assert one("mocap_dropout@take-off").at == 0.0
+    assert one("mocap_dropout@take-off") == TimedFault(
+        FAULTS["mocap_dropout"](), 0.0, phase="take-off"
+    )
     found = one("mocap_dropout@land+0.5+2")
-    assert (found.at, found.duration) == (82.5, 2.0)
+    assert (found.phase, found.at, found.duration) == ("land", 0.5, 2.0)
+    schedule = Schedule((found,), 3)
+    assert Schedule.from_text(schedule.to_text()) == schedule
+
+
+@given(st.floats(0.0, 30.0), st.floats(0.0, 30.0), times)
+def test_a_fault_of_a_phase_follows_the_flight(wait, after, duration):
+    """The phase begins `wait` seconds later than planned; it comes a second time."""
+    takeoff, planned = 100.0, 6.0
+    line = Timeline(Schedule((TimedFault(FAULTS["mocap_dropout"](), after, duration, "pick"),)))
+    line.mission_at(takeoff, 0.0, "take-off")
+    assert not line.update(takeoff + planned + wait + after)  # the phase has not begun
+    line.mission_at(takeoff + planned + wait, planned, "pick")
+    line.mission_at(takeoff + planned + wait + after, planned, "pick")
+    before = takeoff + planned + wait + after - 1e-3
+    assert not line.update(before)
+    (begun,) = line.update(before + 2e-3)
+    assert begun.begin == pytest.approx(planned + wait + after, abs=2e-3)
+    line.mission_at(before + 1.0, planned, "pick")
+    line.update(before + 1e6)
+    assert begun.end is not None and len(line.records) == 1
 
 
 REFUSED = {
@@ -157,10 +179,10 @@ def test_faults_of_file_option_and_scenario_are_joined(tmp_path):
     own.write_text(text + "faults:\n  - {fault: wind_gust, at: hover}\n")
     flown = dataclasses.replace(load_scenario(str(own)), phases=SCENARIO.phases + ((99, "hover"),))
     found = read_schedule([str(file), "clock_jump@3"], flown, 1).faults
-    assert [(f.fault.NAME, f.at) for f in found] == [
-        ("wind_gust", 99.0),
-        ("servo_jam", 37.0),
-        ("clock_jump", 3.0),
+    assert [(f.fault.NAME, f.phase, f.at) for f in found] == [
+        ("wind_gust", "hover", 0.0),
+        ("servo_jam", "carry", 2.0),
+        ("clock_jump", "", 3.0),
     ]
     own.write_text(text + "faults: 3\n")
     with pytest.raises(ScenarioError, match="'faults' is not a list"):
@@ -210,9 +232,9 @@ def test_a_fault_lasts_from_its_time_to_its_end(at, duration, takeoff):
     line = Timeline(Schedule((TimedFault(FAULTS["mocap_dropout"](), at, duration),)))
     line.update(takeoff + at)
     assert line.records == []  # no mission time yet
-    line.mission_at(takeoff - 1.0, -1.0)
-    line.mission_at(takeoff + 0.25, 0.25)
-    line.mission_at(takeoff + 9.0, 1.0)  # after a hold, which stops the mission time
+    line.mission_at(takeoff - 1.0, -1.0, "take-off")
+    line.mission_at(takeoff + 0.25, 0.25, "take-off")
+    line.mission_at(takeoff + 9.0, 1.0, "take-off")  # after a hold, which stops the mission time
     step = max(0.5, (at + duration) / 200.0)
     for tick in range(int((at + duration) / step) + 3):
         line.update(takeoff + tick * step)
@@ -247,7 +269,7 @@ def test_a_fault_from_the_start_acts_before_take_off_and_lasts():
             "parameters": {"direction": "to_autopilot", "delay": 0.016, "jitter": 0.004},
         }
     ]
-    timeline.mission_at(10.0, 0.0)
+    timeline.mission_at(10.0, 0.0, "take-off")
     assert [one.fault.NAME for one in timeline.update(12.1)] == ["mavlink_cut"]
     assert [one.end is None for one in timeline.update(13.1)] == [False]
     assert timeline.all[0].active

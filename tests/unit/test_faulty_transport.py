@@ -43,7 +43,7 @@ class Line:
 def faulty(*texts):
     line = Line()
     transport = FaultyTransport(line, read_schedule(texts, SCENARIO, 1))
-    transport.mission_at(10.0, 0.0)
+    transport.mission_at(10.0, 0.0, "take-off")
     return line, transport
 
 
@@ -110,7 +110,7 @@ def test_the_direct_engine_skips_what_a_cut_or_corruption_loses():
     link = DirectLink(
         read_schedule(["mavlink_cut@1+1", "mavlink_corruption@3+1:share=0.5"], SCENARIO, 1)
     )
-    link.timeline.mission_at(0.0, 0.0)
+    link.timeline.mission_at(0.0, 0.0, "take-off")
     passed = {}
     for second in range(5):
         link.timeline.update(float(second))

@@ -97,36 +97,36 @@ def faults(children, *texts):
 
 def test_a_kill_is_no_failure_of_the_flight(children):
     with faults(children, "node_kill@3")[0] as made:
-        made.update(None)
-        made.update(2.9)
+        made.update(None, "transit")
+        made.update(2.9, "transit")
         assert children.running("arm_controller")
-        made.update(3.1)
+        made.update(3.1, "transit")
         until(lambda: not children.running("arm_controller"))
         children.check()
         (missed,) = children.missed()
         assert missed.status == -signal.SIGKILL
-        made.update(4.0)
+        made.update(4.0, "transit")
         assert children.running("mission")
 
 
 def test_a_stopped_process_continues_after_the_fault(children):
     made, changes, clock = faults(children, "node_stall@3+2:node=mission")
     with made:
-        made.update(3.0)
+        made.update(3.0, "transit")
         until(lambda: state(children, "mission") == "T")
         assert state(children, "arm_controller") != "T"
         clock[0] = 1.9
-        made.update(3.0)  # in lockstep the mission time does not advance meanwhile
+        made.update(3.0, "transit")  # in lockstep the mission time does not advance meanwhile
         assert changes == [(0, True)]
         clock[0] = 2.1
-        made.update(3.0)
+        made.update(3.0, "transit")
         until(lambda: state(children, "mission") != "T")
         assert changes == [(0, True), (0, False)]
 
 
 def test_no_process_remains_stopped_at_the_end(children):
     with faults(children, "node_stall@0:node=mission", "node_slow@0:stopped=0.9")[0] as made:
-        made.update(0.0)
+        made.update(0.0, "transit")
         until(lambda: state(children, "mission") == "T")
     until(lambda: "T" not in (state(children, "mission"), state(children, "arm_controller")))
     time.sleep(0.05)
@@ -135,7 +135,7 @@ def test_no_process_remains_stopped_at_the_end(children):
 
 def test_a_slow_process_is_stopped_for_a_fraction_of_the_time(children):
     with faults(children, "node_slow@0:stopped=0.8,cycle=0.05")[0] as made:
-        made.update(0.0)
+        made.update(0.0, "transit")
         seen = []
         for _ in range(200):
             seen.append(state(children, "arm_controller") == "T")
@@ -145,7 +145,7 @@ def test_a_slow_process_is_stopped_for_a_fraction_of_the_time(children):
 
 def test_only_discovery_threads_are_stopped_and_they_continue(node):
     with faults(node, "discovery_loss@1:node=mission")[0] as made:
-        made.update(1.0)
+        made.update(1.0, "transit")
         states = dict(threads(node, "mission"))
         assert states["dds.udp.7660"] == states["dds.ev.0"] == "t"
         assert states["dds.udp.7661"] != "t" and states["main"] != "t"
@@ -154,9 +154,9 @@ def test_only_discovery_threads_are_stopped_and_they_continue(node):
 
 def test_a_killed_process_with_stopped_threads_ends(node):
     with faults(node, "discovery_loss@1:node=mission")[0] as made:
-        made.update(1.0)
+        made.update(1.0, "transit")
         os.kill(node.pid("mission"), signal.SIGKILL)
-        until(lambda: made.update(1.1) or not node.running("mission"))
+        until(lambda: made.update(1.1, "transit") or not node.running("mission"))
 
 
 def test_a_fault_on_an_ended_process_is_no_error(children):
@@ -164,5 +164,5 @@ def test_a_fault_on_an_ended_process_is_no_error(children):
     until(lambda: not children.running("mission"))
     made, changes, _ = faults(children, "node_stall@0+1:node=mission")
     with made:
-        made.update(0.0)
+        made.update(0.0, "transit")
     assert changes == [(0, True)]

@@ -426,7 +426,7 @@ def test_each_cable_is_pulled_and_plugged_in_again(laboratory, name):
     lab = laboratory()
     at = {"fault": name, "at": 1.0, "duration": 2.0}
     cables = Cables(lab, Schedule((timed(at, {}, "test"),)))
-    cables.timeline.mission_at(0.0, 0.0)
+    cables.timeline.mission_at(0.0, 0.0, "take-off")
     assert cables.update(0.5) == []
     lab.mocap.expose(NOW, {"uam": (np.zeros(3), np.array([1.0, 0.0, 0.0, 0.0]))})
 
@@ -456,7 +456,7 @@ def test_a_hot_servo_stops_at_its_limit(laboratory):
     lab = laboratory()
     fault = {"fault": "servo_overheating", "at": 0.0, "rate": 1000.0}
     cables = Cables(lab, Schedule((timed(fault, {}, "test"),)))
-    cables.timeline.mission_at(0.0, 0.0)
+    cables.timeline.mission_at(0.0, 0.0, "take-off")
     servo = lab.servos[0]
     servo.set("Torque Enable", 1)
     for tick in range(100):

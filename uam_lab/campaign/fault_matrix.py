@@ -13,7 +13,7 @@ from uam_control.vehicle import VehicleDescription
 from uam_lab.campaign.fault_outcome import Promise, read_promise
 from uam_sim_bridge.faults import FAULTS, Fault, FaultError, Schedule
 from uam_sim_bridge.faults.feasibility import needs_nodes
-from uam_sim_bridge.faults.schedule import FROM_START, START, beginnings, listed, timed
+from uam_sim_bridge.faults.schedule import listed, timed
 
 NOMINAL = "no fault"
 KEYS = ("scenario", "moments", "faults")
@@ -31,11 +31,11 @@ class Cell:
 
 @dataclass(frozen=True)
 class Matrix:
-    """Flights of a campaign. moments: mission times [s] by name; promises: one per row; left_out:
-    rows that the engine cannot fly; own_moments: of each row, () for all."""
+    """Flights of a campaign. moments: entries with the times by name; promises: one per row;
+    left_out: rows that the engine cannot fly; own_moments: of each row, () for all."""
 
     scenario: str
-    moments: dict[str, float]
+    moments: dict[str, dict[str, Any]]
     faults: tuple[dict[str, Any], ...]
     promises: tuple[Promise | None, ...]
     left_out: tuple[str, ...] = ()
@@ -54,10 +54,10 @@ class Matrix:
         found = [Cell(NOMINAL, "", Schedule(seed=seed))]
         own = self.own_moments or ((),) * len(self.faults)
         for entry, promised, chosen in zip(self.faults, self.promises, own, strict=True):
-            for moment, at in self.moments.items():
+            for moment, when in self.moments.items():
                 if chosen and moment not in chosen:
                     continue
-                one = timed({**entry, "at": START if at == FROM_START else at}, {}, moment)
+                one = timed({**entry, **when}, None, moment)
                 found += [Cell(label(entry), moment, Schedule((one,), seed), promised)] * repeat
         return found
 
@@ -115,16 +115,14 @@ def _document(file: Path) -> dict[str, Any]:
     return document
 
 
-def _moments(given: Any, scenario: Scenario, where: str) -> dict[str, float]:
-    """Return the mission times [s] of the moments; they are written like times of faults."""
+def _moments(given: Any, scenario: Scenario, where: str) -> dict[str, dict[str, Any]]:
+    """Return the checked times of the moments; they are written like times of faults."""
     if not isinstance(given, dict) or not all(isinstance(v, dict) for v in given.values()):
         raise FaultError(f"{where}: moments: names with {{at: ..., after: ...}} each expected")
-    phases = beginnings(scenario)
     any_fault = next(iter(FAULTS))
-    return {
-        str(name): timed({**when, "fault": any_fault}, phases, f"{where}: moments: {name}").at
-        for name, when in given.items()
-    }
+    for name, when in given.items():
+        timed({**when, "fault": any_fault}, scenario.phase_names, f"{where}: moments: {name}")
+    return {str(name): when for name, when in given.items()}
 
 
 class _Row(NamedTuple):

@@ -66,10 +66,10 @@ class DirectFaults:
         if isinstance(plant, FaultyPlant):
             self._timelines.append(plant.timeline)
 
-    def update(self, stamp: float, time: float) -> None:
-        """Set the mission time `time` [s] of the control tick at `stamp` [s]."""
+    def update(self, stamp: float, time: float, phase: str) -> None:
+        """Set mission time [s] and phase of the control tick at `stamp` [s]."""
         for timeline in self._timelines:
-            timeline.mission_at(stamp, time)
+            timeline.mission_at(stamp, time, phase)
         self.link.timeline.update(stamp)
 
     @property

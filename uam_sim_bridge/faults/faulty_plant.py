@@ -78,9 +78,9 @@ class FaultyPlant(Plant):
         super().count_from(tick)
         self.inner.count_from(tick)
 
-    def mission_at(self, stamp: float, time: float) -> None:
+    def mission_at(self, stamp: float, time: float, phase: str) -> None:
         """See `Timeline.mission_at`."""
-        self.timeline.mission_at(stamp, time)
+        self.timeline.mission_at(stamp, time, phase)
 
     def sense(self) -> Samples:
         """Return the samples of the inner plant, changed by the active faults."""

@@ -10,15 +10,16 @@ The entry of a file (a list, or a mapping with the list `faults`) and of a scena
 
     - {fault: motor_loss, at: pick, after: 1, duration: 5, motor: 2, remaining: 0.7}
 
-A fault without a duration lasts until the end of the flight. A fault at `start` acts from the first
-tick on, also before take-off, and lasts.
+A fault at a phase begins AFTER seconds after that phase begins in the flight, however late that is;
+it does not occur if the phase does not. A fault without a duration lasts until the flight ends. A
+fault at `start` acts from the first tick on, also before take-off, and lasts.
 """
 
 from __future__ import annotations
 
 import json
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -43,19 +44,26 @@ SUFFIXES = (".yaml", ".yml")
 class TimedFault:
     """A fault from mission time `at` [s] for `duration` [s]; inf: until the end of the flight.
 
-    at FROM_START: from the first tick on.
+    at FROM_START: from the first tick on. phase: from its begin `at` counts; "": from take-off.
     """
 
     fault: Fault
     at: float
     duration: float = math.inf
+    phase: str = ""
 
     @property
     def entry(self) -> dict[str, Any]:
         """Return the fault as an entry of a file."""
         lasting = {} if math.isinf(self.duration) else {"duration": self.duration}
-        at = START if self.at == FROM_START else self.at
-        return {"fault": self.fault.NAME, "at": at, **lasting, **self.fault.values}
+        return {"fault": self.fault.NAME, **self.moment, **lasting, **self.fault.values}
+
+    @property
+    def moment(self) -> dict[str, Any]:
+        """Return when it begins, as in an entry."""
+        if self.phase:
+            return {"at": self.phase, "after": self.at}
+        return {"at": START if self.at == FROM_START else self.at}
 
 
 @dataclass(frozen=True)
@@ -93,7 +101,7 @@ class Schedule:
         except (ValueError, KeyError, TypeError):
             raise FaultError('faults: {"seed": N, "faults": [...]} expected, as JSON') from None
         where = "faults"
-        return cls(tuple(timed(entry, {}, where) for entry in listed(entries, where)), seed)
+        return cls(tuple(timed(entry, None, where) for entry in listed(entries, where)), seed)
 
 
 def late(setpoint: float, setpoint_jitter: float, mocap: float, mocap_jitter: float) -> list[str]:
@@ -117,7 +125,7 @@ def read_schedule(given: Sequence[str], scenario: Scenario, seed: int) -> Schedu
 
     Raises FaultError in one line.
     """
-    phases = beginnings(scenario)
+    phases = scenario.phase_names
     found = [
         timed(entry, phases, f"scenario {scenario.name}")
         for entry in listed(list(scenario.faults), f"scenario {scenario.name}")
@@ -128,14 +136,6 @@ def read_schedule(given: Sequence[str], scenario: Scenario, seed: int) -> Schedu
         else:
             found.append(timed(parse_spec(text), phases, f"fault '{text}'"))
     return Schedule(tuple(found), seed)
-
-
-def beginnings(scenario: Scenario) -> dict[str, float]:
-    """Return by phase name the mission time [s] at which the phase begins first."""
-    found: dict[str, float] = {}
-    for start, name in scenario.phases:
-        found.setdefault(name, start)
-    return found
 
 
 def from_file(file: Path) -> list[Mapping[str, Any]]:
@@ -175,25 +175,25 @@ def parse_spec(text: str) -> dict[str, Any]:
     return entry
 
 
-def timed(entry: Mapping[str, Any], phases: Mapping[str, float], where: str) -> TimedFault:
+def timed(entry: Mapping[str, Any], phases: Collection[str] | None, where: str) -> TimedFault:
     """Return the fault of an entry; raises FaultError with `where` in front.
 
-    phases: mission time [s] of each phase's begin.
+    phases: allowed names of phases; None: any.
     """
     values = {key: value for key, value in entry.items() if key not in KEYS}
     try:
         fault = make(entry.get("fault"), values)
-        at = entry.get("at")
+        at, phase = entry.get("at"), ""
         if at == START:
             if "after" in entry or "duration" in entry:
                 raise FaultError(f"at: {START}: such a fault lasts for the whole flight")
             at = FROM_START
         elif isinstance(at, str):
-            if at not in phases:
+            if phases is not None and at not in phases:
                 raise FaultError(
                     f"at: no phase '{at}' in the scenario, which has: " + ", ".join(phases)
                 )
-            at = phases[at] + _span(entry, "after", 0.0)
+            at, phase = _span(entry, "after", 0.0), at
         elif "after" in entry:
             raise FaultError("after: only together with a phase")
         else:
@@ -201,7 +201,7 @@ def timed(entry: Mapping[str, Any], phases: Mapping[str, float], where: str) -> 
         duration = _span(entry, "duration", math.inf)
     except FaultError as error:
         raise FaultError(f"{where}: {error}") from None
-    return TimedFault(fault, at, duration)
+    return TimedFault(fault, at, duration, phase)
 
 
 def _span(entry: Mapping[str, Any], key: str, default: float | None) -> float:

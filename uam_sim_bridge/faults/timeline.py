@@ -46,23 +46,44 @@ def record(name: str, begin: float, end: float | None, values: dict[str, Any]) -
     return {"fault": name, "begin_s": round(begin, 6), "end_s": over, "parameters": values}
 
 
+class PhaseTimes:
+    """Mission times at which the phases of a flight began; with them the begin of each fault."""
+
+    def __init__(self) -> None:
+        self._begun: dict[str, float] = {}
+
+    def at(self, phase: str, time: float) -> None:
+        """Say that the flight is in `phase` at mission time `time` [s]."""
+        self._begun.setdefault(phase, time)
+
+    def begin(self, planned: TimedFault) -> float:
+        """Return the mission time [s] at which a fault begins; inf: its phase has not begun."""
+        if not planned.phase:
+            return planned.at
+        return self._begun.get(planned.phase, math.inf) + planned.at
+
+
 class Timeline:
     """Begins and ends the faults of a schedule at their mission times.
 
-    The first mission status after take-off fixes the stamp of take-off. After that only the stamps
-    count: a hold, which stops the mission time, does not delay the faults.
+    The first mission status after take-off fixes the stamp of take-off, and the first one of a
+    phase its begin. Between them only the stamps count: a hold does not delay a fault.
     """
 
     def __init__(self, schedule: Schedule) -> None:
         self.all = [FaultState(one, number) for number, one in enumerate(schedule.faults)]
         self._takeoff: float | None = None
+        self._phases = PhaseTimes()
         self._pending = bool(self.all)
         self._at_start = any(one.planned.at == FROM_START for one in self.all)
 
-    def mission_at(self, stamp: float, time: float) -> None:
-        """Set the mission time `time` [s] at `stamp` [s]; time is negative before take-off."""
-        if self._takeoff is None and time >= 0.0:
+    def mission_at(self, stamp: float, time: float, phase: str) -> None:
+        """Set mission time [s] and phase at `stamp` [s]; the time is negative before take-off."""
+        if time < 0.0:
+            return
+        if self._takeoff is None:
             self._takeoff = stamp - time
+        self._phases.at(phase, stamp - self._takeoff)
 
     def time(self, stamp: float) -> float | None:
         """Return the mission time [s] at `stamp` [s]; None before take-off."""
@@ -75,8 +96,9 @@ class Timeline:
         now = FROM_START if self._takeoff is None else stamp - self._takeoff + TOLERANCE
         self._at_start, changed = False, []
         for one in self.all:
-            end = one.planned.at + one.planned.duration
-            if one.begin is None and now >= one.planned.at:
+            begin = self._phases.begin(one.planned)
+            end = begin + one.planned.duration
+            if one.begin is None and now >= begin:
                 one.begin = max(now - TOLERANCE, 0.0)
                 changed.append(one)
             elif one.active and now >= end:

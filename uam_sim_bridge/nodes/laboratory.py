@@ -192,7 +192,9 @@ class Rehearsal:
             except BadMessage:
                 continue
             shift = self.clock.host(0)
-            self._cables.timeline.mission_at(stamp / SECOND - shift, self._mission.time)
+            self._cables.timeline.mission_at(
+                stamp / SECOND - shift, self._mission.time, self._mission.phase
+            )
         for message in polling.messages(self._checklist):
             self._step, self._needs = value_of(message, "step"), value_of(message, "needs")
 

@@ -194,7 +194,7 @@ class MavlinkBridgeNode(UamNode):
         self.stage.mission(stamp, status.magnet, failsafe, status.regains)
         self.stage.hands = status.phase == HAND_CHECK
         if self._faulty is not None:
-            self._faulty.mission_at(stamp / SECOND, status.time)
+            self._faulty.mission_at(stamp / SECOND, status.time, status.phase)
 
     def _on_kill(self, _: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
         """Stop the motors at the second call within kill_confirmation."""

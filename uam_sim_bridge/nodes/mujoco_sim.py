@@ -265,8 +265,8 @@ class Simulator:
                 self._receive_hil()
                 self._wait_for_answers()
             if self._faulty:
-                answers = self.answers
-                self._faulty.mission_at(answers.mission_stamp * 1e-9, answers.mission.time)
+                stamp, mission = self.answers.mission_stamp * 1e-9, self.answers.mission
+                self._faulty.mission_at(stamp, mission.time, mission.phase)
             self.plant.step(self.hil.motors, self.answers.arm_command, self.answers.magnet)
             self.health.done_tick(begun, self.plant.time)
             if not self.options.end_with_mission:

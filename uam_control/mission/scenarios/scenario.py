@@ -105,6 +105,11 @@ class Scenario:
         found = {move.coordinate: move.to for move in sorted(self.moves, key=lambda m: m.start)}
         return (found["x"], found["y"]) if {"x", "y"} <= found.keys() else None
 
+    @property
+    def phase_names(self) -> tuple[str, ...]:
+        """Return the names of the phases, each once, in order."""
+        return tuple(dict.fromkeys(name for _, name in self.phases))
+
     def phase(self, time: float) -> str:
         """Return the name of the phase at mission time `time` [s] >= 0."""
         for start, name in reversed(self.phases):

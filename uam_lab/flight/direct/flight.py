@@ -203,7 +203,7 @@ class DirectFlight:
             record_blind(row, shot, self._places)
 
     def _update_faults(self, control: ControlTick) -> bool:
-        """Stage of a flight with faults: give plant and link the mission time."""
+        """Stage of a flight with faults: give plant and link the mission time and the phase."""
         signals = control.signals
-        self._faults.update(signals.stamp / SECOND, signals.time)
+        self._faults.update(signals.stamp / SECOND, signals.time, signals.phase)
         return True

@@ -167,7 +167,7 @@ class SimulatedCourse:
         injected, mission_time = self._stop.injected, self._listener.mission_time
         while not injected.empty():
             self._faults.add(injected.get(), mission_time or 0.0)
-        self._faults.update(mission_time)
+        self._faults.update(mission_time, self._listener.phase)
         return self._children.running(wiring.PLANT) and not self._stop.raised
 
     def __enter__(self) -> SimulatedCourse:

@@ -23,7 +23,7 @@ from uam_lab.processes.thread_stop import StoppedThreads
 from uam_sim_bridge.faults import Schedule
 from uam_sim_bridge.faults.process_faults import DiscoveryLoss, NodeKill, NodeSlow, ProcessFault
 from uam_sim_bridge.faults.schedule import TimedFault
-from uam_sim_bridge.faults.timeline import FaultState
+from uam_sim_bridge.faults.timeline import FaultState, PhaseTimes
 from uam_sim_bridge.ports import is_discovery_port
 
 # threads of Fast DDS: one sends the announcements, one per UDP port receives
@@ -64,21 +64,24 @@ class ProcessFaults:
         """schedule: process faults; announce: called when a fault begins or ends; clock: [s]."""
         self._children, self._announce, self._clock = children, announce, clock
         self._all = [FaultState(one, number) for number, one in enumerate(schedule.faults)]
+        self._phases = PhaseTimes()
         self._ends: dict[int, float] = {}  # by the clock
         self._hindering: dict[int, _Hindrance | StoppedThreads] = {}
 
     def add(self, planned: TimedFault, mission_time: float) -> None:
         """Begin a fault at the next update; its own begin does not count."""
-        due = replace(planned, at=mission_time)
+        due = replace(planned, at=mission_time, phase="")
         self._all.append(FaultState(due, len(self._all)))
 
-    def update(self, mission_time: float | None) -> None:
+    def update(self, mission_time: float | None, phase: str) -> None:
         """Begin the due faults and end the expired ones; mission_time [s], None: unknown."""
         now = self._clock()
+        if mission_time is not None:
+            self._phases.at(phase, mission_time)
         for hindrance in self._hindering.values():
             hindrance.look()
         for one in self._all:
-            due = mission_time is not None and mission_time >= one.planned.at
+            due = mission_time is not None and mission_time >= self._phases.begin(one.planned)
             if one.begin is None and due:
                 one.begin = mission_time
                 self._ends[one.number] = now + one.planned.duration

@@ -53,6 +53,7 @@ class StatusListener(Guest):
         self._last: tuple[float, float] | None = None  # simulated and wall time [s]
         self.newest: list[FlightStatus] = []  # at most one
         self.stamp, self.mission_time = 0, None  # [ns], [s] of the newest status after take-off
+        self.phase = ""  # of that status
 
     def poll(self) -> list[FlightStatus]:
         """Return the status messages received since the last call."""
@@ -66,7 +67,7 @@ class StatusListener(Guest):
     def _status(self, message: DiagnosticArray) -> FlightStatus:
         stamp, mission = MissionStatus.from_message(message)
         if mission.time >= 0.0:
-            self.stamp, self.mission_time = stamp, mission.time
+            self.stamp, self.mission_time, self.phase = stamp, mission.time, mission.phase
         state = self._state
         reasons = f": {state.reasons}" if state.reasons else ""
         return FlightStatus(

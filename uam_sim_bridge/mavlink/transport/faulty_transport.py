@@ -28,9 +28,9 @@ class FaultyTransport(WrappedTransport):
         self._outgoing: deque[tuple[float, bytes]] = deque()
         self._incoming: deque[tuple[float, bytes]] = deque()
 
-    def mission_at(self, stamp: float, time: float) -> None:
+    def mission_at(self, stamp: float, time: float, phase: str) -> None:
         """See `Timeline.mission_at`."""
-        self._timeline.mission_at(stamp, time)
+        self._timeline.mission_at(stamp, time, phase)
 
     def update(self, stamp: float) -> list[FaultState]:
         """Set the time to `stamp` [s], send delayed packets; return faults that began or ended."""
