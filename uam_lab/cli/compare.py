@@ -32,6 +32,7 @@ examples:
   uam compare --vehicle mine.yaml --scenario hover --rows proposed frozen
   uam compare --study adaptation       what adaptation buys: docs/adaptation.md
   uam compare --study adaptation --part arm --out mine    one part; a stopped study continues
+  uam compare --study adaptation --part varied --condition nominal hard --engine ros
 
 Results in --out: report.html, tables.md, flights.csv, flights.parquet, comparison.json, figures/.
 The baselines are reconstructions (docs/law.md). The same command gives the same tables.
@@ -65,6 +66,8 @@ def add(commands: argparse._SubParsersAction) -> None:
     command.option("--study", "NAME|FILE", text)
     text = f"parts of the study: {', '.join(study.PARTS)} (default: all)"
     command.option("--part", "NAME", text, nargs="+", choices=study.PARTS)
+    text = "conditions of the study (default: all)"
+    command.option("--condition", "LABEL", text, nargs="+")
     command.switch("--design", "only find the strengths of the study that its margins allow")
     text = "only search the adaptation's numbers of the study, N evaluations per law"
     command.option("--tune", "N", text, type=count)
@@ -84,8 +87,8 @@ def run(options: argparse.Namespace) -> int:
     """Fly, then write the results; return the exit status."""
     if options.study:
         return study.run(options)
-    if options.part or options.design or options.tune:
-        raise SettingsError("--part, --design, --tune: only with --study")
+    if options.part or options.condition or options.design or options.tune:
+        raise SettingsError("--part, --condition, --design, --tune: only with --study")
     from uam_lab.campaign import trial_rows
     from uam_lab.campaign.flying import fly_missing
     from uam_lab.compare import comparison_report, modularity

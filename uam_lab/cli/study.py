@@ -5,12 +5,14 @@ from __future__ import annotations
 import argparse
 import json
 from collections.abc import Sequence
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 
 from uam_lab.cli.command import place_of
 from uam_lab.cli.counting import Counting
 from uam_lab.flight.conclude import command_line
+from uam_lab.flight.flight_settings import SettingsError, require_ros
 from uam_lab.results.atomic import write_rows, write_text
 from uam_lab.results.result_folder import make_folder, versions, write_json
 from uam_lab.study.description import Study, load_study
@@ -26,6 +28,12 @@ def run(options: argparse.Namespace) -> int:
     from uam_lab.study import design
 
     study = load_study(options.study)
+    labels = [one.label for one in study.conditions]
+    for label in options.condition or ():
+        if label not in labels:
+            raise SettingsError(f"--condition '{label}': unknown; there are: {', '.join(labels)}")
+    if options.engine == "ros":
+        require_ros()
     out = make_folder(options.out, "study", study.name)
     if options.design:
         found = design.strengths(study, lambda text: print(text, flush=True))
@@ -88,16 +96,20 @@ def _fly(study: Study, options: argparse.Namespace, out: Path) -> int:
     if "margins" in parts:
         rows = [row for row in study.rows if row.law and not row.profiles]
         texts.append(report.margin_table(margins(study, rows)))
-    runner = Runner(study, out, place_of(options), options.seeds or study.document["seeds"], _flier)
+    seeds = options.seeds or study.document["seeds"]
+    runner = Runner(study, out, place_of(options), seeds, _flier, options.engine)
     if "varied" in parts:
-        results = runner.varied()
+        results = runner.varied(options.condition or ())
         flown += results
-        said = report.sentences(study, results)
-        texts += [report.error_table(study, results, name) for name in SUBSYSTEMS]
-        texts += [report.share_table(study, results, name) for name in SHOWN]
-        texts.append(report.shares_by_condition(study, results, PROPOSED))
+        flown_in = {one.condition for one in results}
+        shown = replace(study, conditions=tuple(c for c in study.conditions if c.label in flown_in))
+        said = report.sentences(shown, results)
+        texts += [report.error_table(shown, results, name) for name in SUBSYSTEMS]
+        texts += [report.share_table(shown, results, name) for name in SHOWN if name in flown_in]
+        texts.append(report.shares_by_condition(shown, results, PROPOSED))
         drawn["errors"] = lambda: figures.errors(study, results)
-        drawn["shares"] = lambda: figures.shares(study, results, SHOWN[0])
+        if SHOWN[0] in flown_in:
+            drawn["shares"] = lambda: figures.shares(study, results, SHOWN[0])
     for name, fly in (("law", runner.law_sweep), ("arm", runner.arm_sweep)):
         if name in parts:
             swept = fly()

@@ -48,7 +48,7 @@ def mark(flight: StudyFlight) -> str:
     inputs = (
         *(flight.row, flight.condition, flight.judged, trial.payload_mass, trial.seed),
         *(sorted(trial.vehicle_changes.items()), trial.faults, trial.profile.sections),
-        sorted(trial.profile.vehicle.autopilot_gains.items()),
+        *(sorted(trial.profile.vehicle.autopilot_gains.items()), trial.engine),
         Path(trial.scenario).read_text() if Path(trial.scenario).is_file() else trial.scenario,
     )
     return hashlib.sha256(repr(inputs).encode()).hexdigest()[:16]

@@ -72,14 +72,17 @@ class Runner:
         place: Workplace,
         seeds: int,
         fly: Callable[[Sequence[StudyFlight], Workplace, Path], list[StudyResult]] = kept.fly,
+        engine: str = "direct",
     ) -> None:
-        """fly: flies planned flights there, results kept in the folder."""
+        """fly: flies planned flights there, results kept in the folder; engine: of all flights."""
         self.study, self._out, self._place, self._all = study, out, place, fly
+        self._engine = engine
         self.seeds = tuple(range(1, seeds + 1))
         self.strength = study.document["strengths"]
 
     def _fly(self, planned: list[StudyFlight]) -> list[StudyResult]:
-        return self._all(planned, self._place, self._out)
+        chosen = [replace(one, trial=replace(one.trial, engine=self._engine)) for one in planned]
+        return self._all(chosen, self._place, self._out)
 
     def _planned(
         self, made: dict[str, Profile], conditions: Sequence[Condition], delay: float = 0.0
@@ -87,8 +90,8 @@ class Runner:
         folder = self._out / "scenarios"
         return flights(self.study, made, conditions, self.seeds, folder, delay)
 
-    def varied(self) -> list[StudyResult]:
-        """Fly every row in every condition."""
+    def varied(self, labels: Sequence[str] = ()) -> list[StudyResult]:
+        """Fly every row in every condition, or in those of these labels only."""
         study = self.study
         nominal = [study.condition(NOMINAL)]
         first = self._fly(
@@ -104,8 +107,9 @@ class Runner:
         planned = []
         for row in study.rows:
             made = {row.label: design.profile(study, row, self.strength, gains)}
+            allowed = (row.conditions, labels)
             chosen = [
-                one for one in study.conditions if not row.conditions or one.label in row.conditions
+                one for one in study.conditions if all(not a or one.label in a for a in allowed)
             ]
             planned += self._planned(made, chosen)
         return self._fly(planned)
