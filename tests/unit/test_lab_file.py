@@ -8,6 +8,7 @@ from typing import Any
 
 import pytest
 import yaml
+from arm_rig import LinePort
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -15,9 +16,13 @@ from uam_control.settings import configuration
 from uam_lab.vehicle.lab import LabError, Room
 from uam_lab.vehicle.lab_file import REQUIRED, load_lab, template
 from uam_lab.vehicle.lab_settings import settings_of
+from uam_sim_bridge.drivers.dynamixel.chain import ArmError
+from uam_sim_bridge.drivers.dynamixel.driver import ArmDriver
+from uam_sim_bridge.drivers.dynamixel.parameters import ArmDriverParameters
 from uam_sim_bridge.drivers.magnet.magnet_driver import LineParameters
 from uam_sim_bridge.drivers.magnet.switching import SwitchingParameters
 from uam_sim_bridge.drivers.mocap.mocap_parameters import MocapParameters
+from uam_sim_bridge.emulation.dynamixel import EmulatedServo, ServoLine, StillShaft
 
 MISSING = object()
 GRIPPER = {"through": "autopilot", "magnet": "gripper", "magnet_output": 2}
@@ -102,6 +107,15 @@ def test_a_missing_section_is_named_with_the_required_ones(tmp_path, section):
         ({"mocap__command_port": 0}, "mocap: command_port: 0 is outside 1 to 65535"),
         ({"arm__serial": "/dev/x"}, "arm.serial: unknown; allowed: device, baud_rate"),
         ({"arm": "no_arm"}, "unknown lab 'no_arm'"),
+        ({"arm__baud_rate": 4500000}, "arm.baud_rate: 4500000 is not one of 9600, 57600"),
+        ({"arm__baud_rate": "fast"}, "arm.baud_rate: a number expected, got 'fast'"),
+        ({"mocap__source": "vrpn"}, "mocap: source: 'vrpn' is not one of natnet, motioncapture"),
+        (
+            {"mocap__system": "kinect"},
+            "mocap: system: 'kinect' is not one of vicon, qualisys, vrpn",
+        ),
+        ({"mocap": "vrpn_mocap"}, "mocap: a mapping expected, got 'vrpn_mocap'"),
+        ({"magnet": GRIPPER | {"magnet_output": 7}}, "magnet_output: 7 is outside 1 to 6"),
         ({"arm": {}}, "arm: a mapping expected"),
         ({"magnet__through": "wifi"}, "magnet.through: 'wifi' is not one of gpio, autopilot, none"),
         ({"magnet": {"through": "none", "line": 3}}, "magnet.line: unknown; allowed: through"),
@@ -173,3 +187,55 @@ def test_nonsense_is_refused_in_one_line_or_read(tmp_path_factory, changes):
         load_lab(file)
     except LabError as error:
         assert "\n" not in str(error)
+
+
+# --- other arms than that of the template ------------------------------------------------------
+
+
+def arm_of(folder: Path, *servos: dict, **changes: Any) -> Path:
+    """A lab file with servos like the template's first one, each with its changes."""
+    first = yaml.safe_load(template())["arm"]["servos"][0]
+    return written(folder, arm__servos=[first | one for one in servos], **changes)
+
+
+def test_a_servo_of_another_current_unit_needs_its_own_constants(tmp_path):
+    small = [{"model": "xl330_m288", "joint": f"alpha_{i}", "id": i} for i in (1, 2)]
+    said = refusal(arm_of(tmp_path, *small))
+    assert "model: xl330_m288 counts 1 mA, current_unit is 2.69 mA" in said
+    own = {"current_unit": 0.001, "torque_per_current": 0.36, "current_limit": 1.4}
+    lab = load_lab(arm_of(tmp_path, *(one | own for one in small)))
+    assert [one.current_limit_counts for one in lab.arm.servos] == [1400, 1400]
+    assert lab.arm.servos[0].torque_constant == pytest.approx(0.36)
+
+
+@pytest.mark.parametrize(
+    ("vehicle", "ids", "baud_rate"),
+    [
+        ("s500_arm", (7, 11), 57600),
+        ("s500_arm3", (200, 3, 41), 4000000),
+        ("s500_arm", (0, 252), 2000000),
+    ],
+)
+def test_other_ids_baud_rates_and_three_joints_are_driven(tmp_path, vehicle, ids, baud_rate):
+    """The lab file's arm on an emulated line: other ids and rates than those of the template."""
+    servos = [{"joint": f"alpha_{i + 1}", "id": one} for i, one in enumerate(ids)]
+    changes = {"vehicle": vehicle, "profile": vehicle.removesuffix("_arm")}
+    lab = load_lab(arm_of(tmp_path, *servos, arm__baud_rate=baud_rate, **changes))
+    assert lab.arm.ids == ids and lab.arm.baud_rate == baud_rate
+    stowed = lab.vehicle.stowed
+    made = [
+        EmulatedServo(servo.id, StillShaft(angle), baud_rate=baud_rate)
+        for servo, angle in zip(lab.arm.servos, stowed, strict=True)
+    ]
+    line = ServoLine(made)
+    driver = ArmDriver(lab.arm, ArmDriverParameters(), port=LinePort(line))
+    driver.start()
+    assert driver.cycle().position == pytest.approx(stowed, abs=0.01)
+    made[-1].connected = False  # the last one's cable
+    for _ in range(10):
+        assert driver.cycle() is None
+    assert driver.health[-1].lost and not driver.health[0].lost
+    driver.stop()
+    others = ServoLine([EmulatedServo(1, StillShaft(0.0), baud_rate=1000000)])
+    with pytest.raises(ArmError, match=f"id {ids[0]}.*no answer at {baud_rate} baud"):
+        ArmDriver(lab.arm, ArmDriverParameters(), port=LinePort(others)).start()

@@ -18,7 +18,7 @@ from uam_lab.rehearsal.options import RehearsalOptions
 from uam_lab.vehicle.lab import Lab
 from uam_sim_bridge.faults import CABLE
 from uam_sim_bridge.mavlink.offboard.autopilot_magnet import GRIPPER
-from uam_sim_bridge.nodes.laboratory_options import LINE, TCP
+from uam_sim_bridge.nodes.laboratory_options import LINE, NATNET, TCP, TOPIC
 from uam_sim_bridge.ports import Ports
 from uam_sim_bridge.px4 import px4_parameters
 from uam_sim_bridge.px4.hitl import gripper_parameter
@@ -61,7 +61,10 @@ def parameters(
         "time_limit": options.time_limit,
         "statistics": str(logs / STATISTICS),
     }
-    if lab.mocap is not None:
+    found["poses"] = TOPIC if lab.mocap is None else NATNET
+    if lab.mocap is None:
+        found["mocap_port"] = 0  # nobody connects
+    else:
         found |= {
             "mocap_port": lab.mocap.command_port,
             "body": lab.mocap.body,

@@ -1,9 +1,9 @@
 """Node: the laboratory of a rehearsal, one plant behind emulated devices on the wall clock.
 
 The vehicle's nodes meet it on its devices alone: pseudo-terminals, sockets and a simulated GPIO
-line. To ROS it publishes the truth for the report, and with `imu: topic` the companion's IMU as a
-driver of its own. It reads the mission's status for the times of faults, and the steps of the
-checklist, which its person does.
+line. To ROS it publishes the truth for the report, and with `imu: topic` or `mocap: topic` this
+sensor as a driver of its own. It reads the mission's status for the times of faults, and the steps
+of the checklist, which its person does.
 """
 
 from __future__ import annotations
@@ -30,27 +30,25 @@ from uam_control.settings.parameter_set import ParameterError
 from uam_control.stamps import SECOND
 from uam_control.vehicle import VehicleDescription
 from uam_msgs_py.messages import topics
-from uam_msgs_py.messages.convert import ImuWriter
 from uam_msgs_py.messages.layouts import BadMessage
 from uam_msgs_py.messages.status import MissionStatus
 from uam_msgs_py.node import polling
 from uam_msgs_py.node.base_node import StopSignal, refuse
-from uam_msgs_py.node.namespace import frame
 from uam_msgs_py.node.node_parameters import refuse_unknown
 from uam_msgs_py.node.tunable import TunableNode
 from uam_sim_bridge.faults import CABLE, Schedule
 from uam_sim_bridge.nodes import laboratory_options
 from uam_sim_bridge.nodes.fault_topic import FaultTopic
 from uam_sim_bridge.nodes.laboratory_options import TOPIC, LaboratoryParameters
+from uam_sim_bridge.nodes.laboratory_topics import DriverTopic, imu_driver, pose_driver
 from uam_sim_bridge.nodes.plant_topics import TruthTopics
 from uam_sim_bridge.paced_clock import PacedClock
 from uam_sim_bridge.plant import Vehicle
-from uam_sim_bridge.plant.sensors import Delay
 from uam_sim_bridge.rehearsal.cables import Cables
 from uam_sim_bridge.rehearsal.laboratory import Laboratory
 from uam_sim_bridge.rehearsal.person import Person
 
-NAME, IMU_DRIVER = "laboratory", "imu_driver"
+NAME = "laboratory"
 READY = "ready"  # file in the folder of the devices, when they are there
 # [ticks] between two messages of rotors, payload and magnet, and looks at topics; at services
 LISTEN_TICKS, SERVE_TICKS = 5, 25
@@ -101,14 +99,13 @@ class Rehearsal:
         self._changed = self._cables.update(0.0)  # faults at the start; published later
         self._fault_topic = FaultTopic(node) if faults else None
         self._truth = TruthTopics(node, vehicle)
-        self._imu_node, self._imu = None, None
+        sensors = numbers.numbers["sensors"]
+        self._imu: DriverTopic | None = None
         if p.imu == TOPIC:
-            self._imu_node = Node(IMU_DRIVER, namespace=node.get_namespace())
-            self._imu = self._imu_node.create_publisher(
-                topics.IMU.type, topics.IMU.name, topics.IMU.qos
-            )
-            self._imu_writer = ImuWriter(frame(node, topics.BODY))
-            self._imu_delay = Delay(numbers.numbers["sensors"]["imu"]["latency_ticks"])
+            self._imu = imu_driver(node, sensors["imu"]["latency_ticks"])
+        self._poses: DriverTopic | None = None
+        if p.poses == TOPIC:
+            self._poses = pose_driver(node, sensors["mocap"]["latency_ticks"])
         self._mission_topic = polling.listen(node, topics.MISSION_STATUS)
         self._checklist = polling.listen(node, topics.CHECKLIST)
         self._confirm = node.create_client(Trigger, "checklist/confirm")
@@ -158,9 +155,11 @@ class Rehearsal:
             self._changed = []
         samples, truth = lab.sense(host)
         lab.send_hil(samples, truth)
+        tick, shift = lab.plant.tick, host - lab.plant.time
         if self._imu is not None:
-            self._publish_imu(samples.hil, host)
-        tick = lab.plant.tick
+            self._imu.publish(tick, samples.hil, shift, self._cables.imu_plugged)
+        if self._poses is not None:
+            self._poses.publish(tick, samples.mocap, shift, self._cables.poses_come)
         if tick % LISTEN_TICKS:
             self._truth.publish_state(stamp, truth)
         else:
@@ -174,15 +173,6 @@ class Rehearsal:
         if not lab.hil.connected:
             lab.hil.accept(0.0)
         lab.step(lab.receive_hil(), truth)
-
-    def _publish_imu(self, sample: tuple, host: float) -> None:
-        """Publish the companion's IMU sample of a tick at `host` [s]."""
-        shift = host - self.lab.plant.time
-        due = self._imu_delay(self.lab.plant.tick, sample)
-        if due is not None and self._cables.imu_plugged:
-            time_, gyro, force = due
-            stamp = round((time_ + shift) * SECOND)
-            self._imu.publish(self._imu_writer.fill(stamp, gyro, force))
 
     def _listen(self) -> None:
         """Take the mission's status and the step of the checklist."""
@@ -225,8 +215,9 @@ class Rehearsal:
         """Close devices and nodes."""
         self.lab.close()
         self._executor.shutdown()
-        if self._imu_node is not None:
-            self._imu_node.destroy_node()
+        for driver in (self._imu, self._poses):
+            if driver is not None:
+                driver.close()
 
 
 def value_of(message: DiagnosticArray, key: str) -> str:

@@ -28,7 +28,7 @@ from uam_sim_bridge.rehearsal.laboratory import Devices
 
 GPIO, AUTOPILOT, NONE = "gpio", "autopilot", "none"
 TOPIC = "topic"
-TCP, LINE = "tcp", "line"
+TCP, LINE, NATNET = "tcp", "line", "natnet"
 
 
 @dataclass(frozen=True)
@@ -41,6 +41,11 @@ class LaboratoryParameters(SimulatedParameters):
     )
     baud: int = integer(921600, "baud rate of the autopilot's line", 9600, 12_500_000)
     mocap_port: int = integer(1510, "its command port on 127.0.0.1", 0, 65535)
+    poses: str = choice(
+        NATNET,
+        "how the poses come: natnet, from the emulated server; topic, from a node of its own",
+        (NATNET, TOPIC),
+    )
     body: str = text("uam", "rigid body of the vehicle", "its name")
     payload: str = text("", "rigid body of the payload", "its name; empty: not tracked")
     calibration: str = text(

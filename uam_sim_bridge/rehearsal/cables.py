@@ -16,14 +16,15 @@ NORMAL_TEMPERATURE = 35.0  # [deg C]
 class Cables:
     """The faults of a rehearsal after its start; call `update` at each tick.
 
-    `imu_plugged`: whether the companion's own IMU is there; `records`: the faults that have begun.
+    `imu_plugged`: whether the companion's own IMU is there; `poses_come`: whether another's driver
+    of the motion capture has poses.
     """
 
     def __init__(self, laboratory: Laboratory, schedule: Schedule) -> None:
         """schedule: faults of cables; mistakes of the set-up are the laboratory's."""
         self._lab = laboratory
         self.timeline = Timeline(schedule)
-        self.imu_plugged = True
+        self.imu_plugged = self.poses_come = True
         self._hot: dict[int, kinds.ServoOverheating] = {}  # by number of the joint, from 0
 
     def update(self, stamp: float) -> list[FaultState]:
@@ -70,13 +71,16 @@ class Cables:
 
     def _mocap_unplugged(self, fault: CableFault, on: bool) -> None:
         self._lab.mocap.unplug(on)
+        self.poses_come = not on
 
     def _mocap_occluded(self, fault: CableFault, on: bool) -> None:
         self._lab.mocap.occlude(self._lab.devices.body, on)
+        self.poses_come = not on
 
     def _mocap_renamed(self, fault: CableFault, on: bool) -> None:
         names = self._lab.devices.body, f"{self._lab.devices.body}_2"
         self._lab.mocap.rename(*(names if on else names[::-1]))
+        self.poses_come = not on
 
     def _serial_unplugged(self, fault: CableFault, on: bool) -> None:
         (self._lab.cable.unplug if on else self._lab.cable.plug_in)()

@@ -25,6 +25,8 @@ SERVO = (
 LAST_ID = 252
 # of the SDK's PortHandler and of the register Baud Rate
 SPEEDS = (9600, 57600, 115200, 1000000, 2000000, 3000000, 4000000)
+UNIT, SMALL_UNIT = 0.00269, 0.001  # [A] of Goal Current and Present Current: e-manual
+SMALL = "330"  # XC330 and XL330 have the small unit
 CURRENT_REGISTER_MAX = 32767  # a signed register of two bytes
 
 
@@ -163,9 +165,9 @@ def describe_chain(top: Section, vehicle: VehicleDescription) -> ArmChain:
     if sorted(entries) != sorted(joints) or len(arm.entries("servos")) != len(joints):
         found = ", ".join(entry.text("joint") for entry in arm.entries("servos"))
         raise arm.error("servos", f"joints {found}; the vehicle has {', '.join(joints)}")
-    speed = _whole(arm, "baud_rate", 0, max(SPEEDS))
+    speed = arm.number("baud_rate")
     if speed not in SPEEDS:
-        raise arm.error("baud_rate", f"{speed} is not one of {', '.join(map(str, SPEEDS))}")
+        raise arm.error("baud_rate", f"{speed:.10g} is not one of {', '.join(map(str, SPEEDS))}")
     delay = _whole(arm, "return_delay_us", 0, 508)
     if delay % 2:
         raise arm.error("return_delay_us", f"{delay} is odd; the servos' unit is 2 us")
@@ -173,7 +175,7 @@ def describe_chain(top: Section, vehicle: VehicleDescription) -> ArmChain:
     ids = [servo.id for servo in servos]
     if len(set(ids)) < len(ids):
         raise arm.error("servos", f"ids {', '.join(map(str, ids))}: each servo needs its own")
-    return ArmChain(arm.text("device"), speed, 1e-6 * delay, servos)
+    return ArmChain(arm.text("device"), int(speed), 1e-6 * delay, servos)
 
 
 def _servo(entry: Section, joint: Joint, vehicle: VehicleDescription) -> ServoDescription:
@@ -189,6 +191,7 @@ def _servo(entry: Section, joint: Joint, vehicle: VehicleDescription) -> ServoDe
         raise entry.error("direction", "0 is not one of 1, -1")
     motor = Section(vehicle.numbers["servos"] | entry.values, entry.where, ArmError)
     unit, gear = motor.positive("current_unit"), entry.positive("gear")
+    _check_unit(entry, table, unit)
     limit, scale = entry.positive("current_limit"), entry.positive("torque_scale")
     if limit > unit * CURRENT_REGISTER_MAX:
         raise entry.error("current_limit", f"{limit:g} A is beyond the register")
@@ -220,6 +223,17 @@ def _servo(entry: Section, joint: Joint, vehicle: VehicleDescription) -> ServoDe
         viscous=friction[1],
         torque_scale=scale,
     )
+
+
+def _check_unit(entry: Section, table: ControlTable, unit: float) -> None:
+    """Refuse the current unit [A] of another series: every torque would be wrong by its ratio."""
+    own = SMALL_UNIT if SMALL in table.model else UNIT
+    if not 0.9 < unit / own < 1.1:
+        raise entry.error(
+            "model",
+            f"{table.model} counts {1e3 * own:g} mA, current_unit is {1e3 * unit:g} mA: give "
+            "current_unit [A] and torque_per_current [N m/A] of this servo",
+        )
 
 
 def _whole(section: Section, key: str, low: int, high: int) -> int:
