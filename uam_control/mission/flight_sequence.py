@@ -8,15 +8,15 @@ from collections import deque
 
 import numpy as np
 
-from uam_control.coordinates import ALPHA, ARM, ATTITUDE, CHI, CHI_DOT, YAW, Z
+from uam_control.coordinates import ARM, CHI, CHI_DOT, Z
 from uam_control.grasp import Grasp, GraspDecision
 from uam_control.mission.feasibility import Feasibility, in_words
+from uam_control.mission.ground_pose import GroundPose
 from uam_control.mission.guidance import Guidance
+from uam_control.mission.magnet_override import MagnetOverride
 from uam_control.mission.mission_output import (
     ABORTED,
-    DRY_RUN,
     GOAL,
-    HAND_CHECK,
     HOLD,
     LAND,
     LANDED,
@@ -32,6 +32,7 @@ from uam_control.mission.permission import ChecklistReport, Permission
 from uam_control.mission.plans import GoalPose, PlanRefused, Points, check
 from uam_control.mission.scenarios.scenario import Scenario
 from uam_control.mission.standing import Standing
+from uam_control.mission.touchdown import Touchdown
 from uam_control.supervision import (
     Authority,
     Decision,
@@ -91,13 +92,12 @@ class Mission:
         self._watch: PayloadWatch | None = None
         self._over = ""  # why the mission lands before its end
         self._takeoff = self._ground = 0.0
-        self._half_down = math.inf  # stamp [s] from which a descent may detect touchdown
-        self._at_rest_since: float | None = None
+        self._touchdown = Touchdown()
         self._failsafe_since = math.inf
         self._end: float | None = None
-        self._magnet: tuple[bool, bool] | None = None  # overriding value, scenario's value then
+        self._override = MagnetOverride()
         self._standing: Standing | None = None  # while the arm of a released vehicle is stowed
-        self._pose: np.ndarray | None = None  # (6 + n,) reference of a dry run, or in hands
+        self._ground_pose = GroundPose()
 
     def start(self) -> tuple[bool, str]:
         """Desire an armed autopilot from the next step on; the take-off follows.
@@ -332,7 +332,7 @@ class Mission:
         """Override the magnet until the scenario switches it next; returns as `request` does."""
         if self.output.state is State.DISARMED:
             return False, "refused: not while disarmed"
-        self._magnet = on, self._scenario_magnet()
+        self._override.give(on, self._scenario_magnet())
         return True, f"magnet {'on' if on else 'off'} until the scenario switches it next"
 
     def _wait(self, state: np.ndarray) -> None:
@@ -340,33 +340,11 @@ class Mission:
         output = self.output
         if self._start.auto_start and not self._start.dry_run and not self.not_ready:
             self._supervisor.start()
-        if not self._start.dry_run:
-            self._follow_hands(state)
-            return
-        if self._pose is None and np.all(np.isfinite(state)):
-            self._pose = state[CHI].copy()
-            self._pose[ATTITUDE] = 0.0, 0.0, state[CHI, YAW]
-        if self._pose is not None:
-            output.reference[CHI, :ALPHA] = self._pose[:ALPHA]
-            output.flying, output.phase = True, DRY_RUN
-
-    def _follow_hands(self, state: np.ndarray) -> None:
-        """Let the control laws work while the checklist looks at their commands.
-
-        The reference is the present position, level, with the heading of the beginning: the laws
-        then turn the vehicle back. state (3, 6 + n).
-        """
-        output = self.output
-        if not self._permission.commands(self._stamp) or not np.all(np.isfinite(state)):
-            if self._pose is not None:
-                self._pose = None
-                output.reference[CHI, :ALPHA] = 0.0
-            return
-        if self._pose is None:
-            self._pose = state[CHI].copy()
-        output.reference[CHI, :ALPHA] = state[CHI, :ALPHA]
-        output.reference[CHI, ATTITUDE] = 0.0, 0.0, self._pose[YAW]
-        output.flying, output.phase = True, HAND_CHECK
+        if self._start.dry_run:
+            self._ground_pose.dry_run(output, state)
+        else:
+            looks = self._permission.commands(self._stamp)
+            self._ground_pose.hand_check(output, state, looks)
 
     def _check_permission(self, stamp: float) -> None:
         """End a flight that is not armed yet when the checklist takes its permission back."""
@@ -386,14 +364,15 @@ class Mission:
             seen.ready = started and stamp >= armed_since + p.takeoff_delay
             seen.on_ground = True
             return seen
-        low = state[CHI, Z] < self._ground + p.touchdown_height
-        seen.on_ground = bool(low and abs(state[CHI_DOT, Z]) < p.touchdown_speed)
+        touchdown = self._touchdown
+        seen.on_ground = touchdown.on_ground(state, self._ground, p)
         landing, time = self.scenario.landing, guidance.scenario_time
         seen.end_mission = self._over
         seen.landing_due = time >= landing.at and not guidance.planned
         seen.off_path, seen.arrived = guidance.planned, guidance.arrived(stamp)
-        if time >= landing.at + 0.5 * landing.duration or stamp >= self._half_down:
-            seen.touchdown = self._at_rest(stamp, seen.on_ground)
+        half = landing.at + 0.5 * landing.duration
+        if time >= half or touchdown.late_in_descent(stamp):
+            seen.touchdown = touchdown.at_rest(stamp, seen.on_ground, p)
         late = landing.at + landing.duration + p.touchdown_timeout
         seen.overdue = time > late or stamp > guidance.end + p.touchdown_timeout
         return seen
@@ -409,15 +388,6 @@ class Mission:
         self._over = self._over or watch.step(stamp, seen.state, seen.readings)
         if watch.decisions:
             _, output.grasp, output.attempt, output.grasp_text = watch.decisions[-1]
-
-    def _at_rest(self, stamp: float, on_ground: bool) -> bool:
-        """Return whether the vehicle has been on the ground for touchdown_time."""
-        if not on_ground:
-            self._at_rest_since = None
-            return False
-        if self._at_rest_since is None:
-            self._at_rest_since = stamp
-        return stamp - self._at_rest_since >= self._parameters.touchdown_time
 
     def _follow(self, stamp: float, decision: Decision) -> None:
         """Apply the supervisor's decision."""
@@ -455,18 +425,18 @@ class Mission:
         elif state in (State.HOLDING, State.RELEASED):
             arrived = self.changes[-1].event is Event.ARRIVED
             guidance.stop(stamp, decision.stow and not arrived)
-            self._half_down = math.inf
+            self._touchdown.stay()
         elif self.changes[-1].event in (Event.CLEAR, Event.RESTARTED):
             guidance.go_on(stamp)
         elif decision.guide is Guide.DESCEND:
             guidance.descend(stamp, self._seen.state, self._ground, decision.stow)
-            self._half_down = 0.5 * (stamp + guidance.end)
+            self._touchdown.descend(stamp, guidance.end)
         elif state is State.FAILSAFE:
             guidance.rest(stamp, decision.stow)
             self._failsafe_since = stamp
         elif state is State.DISARMED:
             self._end = stamp + self._parameters.settle_time
-            self._magnet = None
+            self._override.forget()
 
     def _take_off(self, stamp: float) -> None:
         start = self._seen.state[0].copy()
@@ -508,9 +478,7 @@ class Mission:
     def _magnet_on(self, decision: Decision) -> bool:
         """Return the overriding value until the scenario switches, else the scenario's value."""
         desired = self._scenario_magnet() or (self._watch is not None and self._watch.grip)
-        if self._magnet is not None:
-            on, before = self._magnet
-            if desired == before:
-                return on
-            self._magnet = None
+        given = self._override.value(desired)
+        if given is not None:
+            return given
         return desired and decision.keep_magnet and self.output.grasp is not Grasp.GIVEN_UP

@@ -29,7 +29,7 @@ class DriverTopic:
         self._writer, self._delay = writer, Delay(latency)
 
     def publish(self, tick: int, sample: tuple | None, shift: float, plugged: bool = True) -> None:
-        """Publish the sample that is due at `tick`; sample: a new one, its time [s] of the plant first.
+        """Publish the sample that is due at `tick`; sample: a new one, time [s] of the plant first.
 
         shift [s]: from the plant's time to the system's; plugged: whether the sensor is there.
         """
