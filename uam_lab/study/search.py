@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 import optuna
 
+from uam_control.settings.configuration import ConfigurationError
 from uam_lab.study import design
 from uam_lab.study.description import Row, Study
 from uam_lab.study.flights import StudyResult, flights, measure
@@ -61,11 +62,17 @@ def search(
             name: float(f"{trial.suggest_float(name, low, high, log=True):.{DIGITS}g}")
             for name, (low, high) in ranges.items()
         }
-        made = design.profile(study.with_adaptation(law, values), Row(law, law), strength)
-        flown = flights(study, {law: made}, conditions, [entry["seed"]], folder)
-        costs.append(cost([measure(one) for one in flown], entry["aim"], entry["failed"]))
+        costs.append(measured(values))
         progress(f"{law}: evaluation {len(costs)} of {evaluations}, best {min(costs):.4g}")
         return costs[-1]
+
+    def measured(values: dict[str, float]) -> float:
+        try:
+            made = design.profile(study.with_adaptation(law, values), Row(law, law), strength)
+        except ConfigurationError:  # a parameter that follows from the values is out of its range
+            return float(entry["failed"])
+        flown = flights(study, {law: made}, conditions, [entry["seed"]], folder)
+        return cost([measure(one) for one in flown], entry["aim"], entry["failed"])
 
     sampler = optuna.samplers.CmaEsSampler(
         x0=dict(start), sigma0=STEP, seed=1, warn_independent_sampling=False
