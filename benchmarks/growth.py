@@ -22,7 +22,7 @@ from pathlib import Path
 
 from growing import curves, flights
 from growing.flights import NotFlown, Point
-from growing.vehicles import Flown, with_joints, with_rotors
+from growing.vehicles import with_joints, with_rotors
 
 from uam_lab.budget.flown import LAYOUTS
 from uam_lab.budget.shuttle import shuttle
@@ -77,23 +77,23 @@ def _points(
     for what in chosen:
         for layout in layouts:
             for size in SIZES[what]:
-                flown, counts = _flight(what, size, out / "vehicles")
+                vehicle, counts = _flight(what, size, out / "vehicles")
                 folder = new_folder(out / "flights", f"{what}_{size}_{layout}")
-                yield flights.through_nodes(what, size, layout, scenario, folder, flown, **counts)
+                yield flights.through_nodes(what, size, layout, scenario, folder, vehicle, **counts)
         if what in ("joints", "rotors"):
             for size in SIZES[what]:
-                flown, _ = _flight(what, size, out / "vehicles")
-                yield flights.direct(what, size, scenario, flown)
+                vehicle, _ = _flight(what, size, out / "vehicles")
+                yield flights.direct(what, size, scenario, vehicle)
 
 
-def _flight(what: str, size: int, folder: Path) -> tuple[Flown, dict[str, int]]:
+def _flight(what: str, size: int, folder: Path) -> tuple[str, dict[str, int]]:
     """Return the vehicle of a point, and what differs from one flight of one vehicle."""
     if what == "joints":
         return with_joints(size, folder), {}
     if what == "rotors":
         return with_rotors(size, folder), {}
     name = {"vehicles": "vehicles", "topics": "further_topics"}[what]
-    return Flown("s500_arm"), {name: size}
+    return "s500_arm", {name: size}
 
 
 if __name__ == "__main__":

@@ -15,9 +15,8 @@ import numpy as np
 import psutil
 
 from growing.further_recorder import recording
-from growing.vehicles import Flown
 from uam_control.mission import load_scenario
-from uam_control.profiles.profile import default_profile, load_profile
+from uam_control.profiles.profile import default_profile
 from uam_control.vehicle import load_description
 from uam_lab.budget.flown import CONTROL
 from uam_lab.flight.direct.flight import DirectFlight
@@ -57,11 +56,13 @@ def through_nodes(
     layout: str,
     scenario: Path,
     out: Path,
-    flown: Flown,
+    vehicle: str,
     vehicles: int = 1,
     further_topics: int = 0,
 ) -> Point:
-    """Fly once. scenario: file; out: folder of this point; further_topics: recorded a second time.
+    """Fly once. scenario: file; out: folder of this point; vehicle: name or file.
+
+    vehicles: how many at once; further_topics: recorded a second time.
 
     Raises NotFlown.
     """
@@ -76,9 +77,9 @@ def through_nodes(
             command = [sys.executable, "-m", "uam_lab.cli.main", "fly", "--no-report"]
             command += ["--scenario", str(scenario), "--without", "scene"]
             command += ["--instance", str(first + number), "--domain", str(domain)]
-            command += ["--vehicle", flown.vehicle, *_given("--profile", flown.profile)]
+            command += ["--vehicle", vehicle]
             command += ["--fused"] * (layout == "fused")
-            command += _given("--namespace", f"uav{number}" if vehicles > 1 else "")
+            command += ["--namespace", f"uav{number}"] * (vehicles > 1)
             command += ["--out", str(out / f"uav{number}")]
             output = stack.enter_context((out / f"uav{number}.txt").open("w"))
             running.append(subprocess.Popen(command, stdout=output, stderr=output))
@@ -90,10 +91,6 @@ def through_nodes(
         recorded = (out / f"uav{number}" / "log.mcap").stat().st_size / 1e6
         log += recorded / (plant["simulated_s"] / 60.0) / vehicles
     return Point(what, size, layout, pace, memory, log)
-
-
-def _given(option: str, value: str) -> list[str]:
-    return [option, value] if value else []
 
 
 def _plant(folder: Path, output: Path) -> dict:
@@ -129,18 +126,14 @@ def _own(process: psutil.Process) -> float:
     return (memory.rss - memory.shared) / 1e6
 
 
-def direct(what: str, size: int, scenario: Path, flown: Flown) -> Point:
+def direct(what: str, size: int, scenario: Path, vehicle: str) -> Point:
     """Fly once in the direct engine, in this process."""
-    described = load_description(flown.vehicle)
-    profile = (
-        load_profile(flown.profile, vehicle=described)
-        if flown.profile
-        else default_profile("modular", described)
-    )
-    loaded, vehicle = load_scenario(str(scenario), described), Vehicle.of(described)
+    described = load_description(vehicle)
+    profile, loaded = default_profile("modular", described), load_scenario(str(scenario), described)
+    given = (loaded, profile, Vehicle.of(described), 0.0)
     warm_up()
-    DirectFlight(loaded, profile, vehicle, 0.0, seed=1).tick()  # compiles what this vehicle needs
-    flight = DirectFlight(loaded, profile, vehicle, 0.0, seed=1)
+    DirectFlight(*given, seed=1).tick()  # compiles what this vehicle needs
+    flight = DirectFlight(*given, seed=1)
     begun = time.perf_counter()
     flight.run()
     pace = flight.plant.tick / (time.perf_counter() - begun)

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import math
 import shutil
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -25,18 +24,10 @@ TWO = ("alpha_1", "alpha_2")  # joints of the original
 STOWED = 90  # [deg] of the second joint
 
 
-@dataclass(frozen=True)
-class Flown:
-    """--vehicle and --profile of a flight; profile "": the vehicle's own."""
-
-    vehicle: str
-    profile: str = ""
-
-
-def with_joints(count: int, folder: Path) -> Flown:
-    """Return the S-500 with so many joints; files that config/ does not have go to `folder`."""
+def with_joints(count: int, folder: Path) -> str:
+    """Return --vehicle of an S-500 with so many joints; new files go to `folder`."""
     if count in (2, 3):
-        return Flown({2: "s500_arm", 3: "s500_arm3"}[count])
+        return {2: "s500_arm", 3: "s500_arm3"}[count]
     name = f"s500_arm{count}"
     _with_parts(folder)
     (folder / "parts" / f"arm_{count}r.xml").write_text(_arm(count))
@@ -53,13 +44,14 @@ def with_joints(count: int, folder: Path) -> Flown:
     for key, value in own.items():
         if isinstance(value, list) and len(value) == len(TWO):
             own[key] = [*value, *[value[-1]] * (count - len(value))]
-    return Flown(_write(folder / f"{name}.yaml", values), _write(folder / "joints.yaml", profile))
+    values["profiles"] = {"modular": _write(folder / f"{name}_profile.yaml", profile)}
+    return _write(folder / f"{name}.yaml", values)
 
 
-def with_rotors(count: int, folder: Path) -> Flown:
-    """Return a vehicle with so many rotors; files that config/ does not have go to `folder`."""
+def with_rotors(count: int, folder: Path) -> str:
+    """Return --vehicle of an airframe with so many rotors; new files go to `folder`."""
     if count in (4, 6):
-        return Flown({4: "s500_arm", 6: "hexa_arm"}[count])
+        return {4: "s500_arm", 6: "hexa_arm"}[count]
     name = f"multi{count}_arm"
     _with_parts(folder)
     model = configuration.path("vehicle/hexa_arm.xml").read_text()
@@ -71,8 +63,7 @@ def with_rotors(count: int, folder: Path) -> Flown:
     rotors["thrust_coefficient"] = float(rotors["thrust_coefficient"]) * share
     rotors["efficiency"] = [1.0] * count
     values["model"] = f"{name}.xml"
-    own = configuration.path("profiles/hexa.yaml")
-    return Flown(_write(folder / f"{name}.yaml", values), str(own))
+    return _write(folder / f"{name}.yaml", values)
 
 
 def _rotor(number: int, count: int) -> dict[str, Any]:

@@ -9,7 +9,7 @@ from growing.vehicles import with_joints, with_rotors
 
 from uam_control.coordinates import ARM, POSITION
 from uam_control.mission import load_scenario
-from uam_control.profiles.profile import default_profile, load_profile
+from uam_control.profiles.profile import default_profile
 from uam_control.vehicle import load_description
 from uam_lab.flight.direct.flight import DirectFlight
 from uam_msgs_py.messages import topics
@@ -18,14 +18,14 @@ from uam_sim_bridge.plant import Vehicle
 
 @pytest.mark.parametrize("count", [2, 3, 6])
 def test_a_vehicle_has_the_joints(tmp_path, count):
-    described = load_description(with_joints(count, tmp_path).vehicle)
+    described = load_description(with_joints(count, tmp_path))
     assert len(described.joint_names) == count
     assert sum(described.numbers["arm"]["links"]) == pytest.approx(0.24, abs=0.03)
 
 
 @pytest.mark.parametrize("count", [4, 6, 8])
 def test_a_vehicle_has_the_rotors_and_their_thrust(tmp_path, count):
-    described = load_description(with_rotors(count, tmp_path).vehicle)
+    described = load_description(with_rotors(count, tmp_path))
     assert len(described.rotors) == count
     if count == 8:
         hexacopter = load_description("hexa_arm")
@@ -35,9 +35,8 @@ def test_a_vehicle_has_the_rotors_and_their_thrust(tmp_path, count):
 
 @pytest.mark.parametrize("make, count", [(with_joints, 6), (with_rotors, 8)])
 def test_a_derived_vehicle_hovers(tmp_path, make, count):
-    flown = make(count, tmp_path)
-    described = load_description(flown.vehicle)
-    profile = load_profile(flown.profile, vehicle=described)
+    described = load_description(make(count, tmp_path))
+    profile = default_profile("modular", described)  # as the nodes do
     scenario = load_scenario("hover", described)
     flight = DirectFlight(scenario, profile, Vehicle.of(described), 0.0, seed=1)
     while flight.mission.output.time < 8.0:
@@ -46,11 +45,6 @@ def test_a_derived_vehicle_hovers(tmp_path, make, count):
     assert not flight.mission.output.abort_reason
     np.testing.assert_allclose(state[POSITION], [0.0, 0.0, 1.0], atol=0.05)
     assert len(state[ARM]) == len(described.joint_names)
-
-
-def test_a_vehicle_of_config_needs_no_profile(tmp_path):
-    assert with_joints(2, tmp_path).profile == "" and with_rotors(6, tmp_path).profile == ""
-    assert default_profile("modular", load_description("hexa_arm"))
 
 
 POINTS = [
