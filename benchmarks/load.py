@@ -34,6 +34,7 @@ def main() -> int:
         choices=[one.name for one in CONDITIONS],
         help="condition to fly besides the flight without load; may be repeated",
     )
+    option("--fused", action="store_true", help="control nodes in one process")
     option("--out", type=Path, default=Path("results/load"), help="(default %(default)s)")
     options = parser.parse_args()
     options.out.mkdir(parents=True, exist_ok=True)
@@ -43,7 +44,7 @@ def main() -> int:
     try:
         for condition in chosen:
             print(f"load: {condition.name}", flush=True)
-            found.append(flight.fly(condition, options.out))
+            found.append(flight.fly(condition, options.out, options.fused))
     except KeyboardInterrupt:
         print("load: interrupted", file=sys.stderr)
         return INTERRUPTED

@@ -2,6 +2,7 @@
 
     .venv/bin/python benchmarks/soak.py --minutes 60                          # nodes, real time
     .venv/bin/python benchmarks/soak.py --minutes 600 --clock lockstep        # as fast as possible
+    .venv/bin/python benchmarks/soak.py --minutes 600 --clock lockstep --fused    # one process
     .venv/bin/python benchmarks/soak.py --minutes 600 --engine direct         # missions in a row
 
 With nodes it is one flight to and fro with a moving arm; with the direct engine many missions in
@@ -37,6 +38,7 @@ def main() -> int:
         default="realtime",
         help="of the nodes (default %(default)s)",
     )
+    option("--fused", action="store_true", help="control nodes in one process")
     option("--log-limit", type=float, default=200.0, help="[MB] of the log (default %(default)g)")
     option("--out", type=Path, default=Path("results/soak"), help="(default %(default)s)")
     options = parser.parse_args()
@@ -48,7 +50,7 @@ def main() -> int:
     if options.engine == "direct":
         soak = watch.missions(duration)
     else:
-        soak = watch.flight(duration, options.clock, options.log_limit, options.out)
+        soak = watch.flight(duration, options.clock, options.log_limit, options.out, options.fused)
     verdicts = judgement.judge(soak)
     print(judgement.table(verdicts))
     for line in soak.notes:

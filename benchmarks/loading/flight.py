@@ -40,11 +40,12 @@ class Measured:
     causes: str
 
 
-def fly(condition: Condition, out: Path) -> Measured:
+def fly(condition: Condition, out: Path, fused: bool = False) -> Measured:
     """Fly in real time; the folder of the flight is in `out`."""
     folder = new_folder(out, in_a_name(condition.name))
     command = [sys.executable, "-m", "uam_lab.cli.main", "fly", "--scenario", SCENARIO]
     command += ["--clock", "realtime", "--no-video", "--instance", str(INSTANCE)]
+    command += ["--fused"] if fused else []
     with (
         under(condition, out, ports_of(INSTANCE).domain),
         (out / f"{folder.name}.txt").open("w") as output,

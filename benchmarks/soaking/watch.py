@@ -26,13 +26,14 @@ SPOKEN = 30  # samples between two lines of progress
 ORCHESTRATOR = "uam fly"
 
 
-def flight(duration: float, clock: str, log_limit: float, out: Path) -> Soak:
+def flight(duration: float, clock: str, log_limit: float, out: Path, fused: bool = False) -> Soak:
     """Fly once for `duration` [s] with all nodes; log_limit [MB]; results in `out`/flight."""
     scenario = out / "shuttle.yaml"
     scenario.write_text(shuttle(duration))
     log = out / "flight.txt"
     command = ["-m", "uam_lab.cli.main", "fly", "--scenario", str(scenario)]
     command += ["--clock", clock, "--no-video", "--log-limit", str(log_limit)]
+    command += ["--fused"] if fused else []
     folder = new_folder(out, "flight")
     with log.open("w") as output:
         run = subprocess.Popen(
@@ -41,7 +42,9 @@ def flight(duration: float, clock: str, log_limit: float, out: Path) -> Soak:
             stderr=output,
             process_group=0,  # Ctrl-C does not reach it; this process sends SIGINT once
         )
-    soak = Soak(f"{duration / 60.0:g} minutes through the nodes, {clock}", "wall time")
+    soak = Soak(
+        f"{duration / 60.0:g} minutes through the nodes, {clock}{', fused' * fused}", "wall time"
+    )
     while run.poll() is None:
         try:
             _look(soak, run, folder / "logs" / "mujoco_sim.json")

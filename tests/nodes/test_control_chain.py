@@ -1,4 +1,4 @@
-"""All control nodes, each in its process: the same numbers as the maths in one loop."""
+"""All control nodes, in processes of their own or in one: the numbers are those of the maths."""
 
 from dataclasses import replace
 
@@ -12,6 +12,7 @@ from uam_control.mission import Mission, StartParameters, load_scenario
 from uam_control.profiles.profile import load_profile
 from uam_control.stamps import SECOND
 from uam_control.supervision import Readings
+from uam_lab.flight.ros.node_arguments import FUSED
 from uam_msgs_py.messages import topics
 from uam_msgs_py.messages.control import (
     read_position_command,
@@ -25,6 +26,7 @@ from uam_msgs_py.messages.serialized import Serialized
 from uam_msgs_py.messages.status import AutopilotState, MissionStatus
 from uam_msgs_py.messages.trajectories import TrajectoryWriter
 from uam_msgs_py.node.connections import READERS, WRITERS, Connections
+from uam_msgs_py.node.wiring import BRIDGE
 
 COORDINATES = coordinates(2)
 JOINTS = arm_coordinates(2)
@@ -170,10 +172,22 @@ class Plant:
         )
 
 
-def test_the_nodes_compute_what_the_maths_does_bit_for_bit(start, probe):
+def start_separately(start):
     started = ("--ros-args", "-p", "auto_start:=true", "-p", f"start_speed:={SHAKEN}")
     for name in NODES:
         start(f"uam_control.nodes.{name}", *(started if name == "mission" else ()))
+
+
+def start_fused(start):
+    given = {"mission:auto_start": "true", "mission:start_speed": SHAKEN}
+    given["flight_controller:without"] = BRIDGE
+    words = (word for name, value in given.items() for word in ("-p", f"{name}:={value}"))
+    start(FUSED, "--ros-args", *words)
+
+
+@pytest.mark.parametrize("layout", [start_separately, start_fused])
+def test_the_nodes_compute_what_the_maths_does_bit_for_bit(start, probe, layout):
+    layout(start)
     plant = Plant(probe)
     plant.wait_for_connections()
     for number, sample in enumerate(samples()):

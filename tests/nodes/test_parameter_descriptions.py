@@ -8,7 +8,7 @@ from free_port import free_port
 from rcl_interfaces.msg import ParameterType
 from rcl_interfaces.srv import DescribeParameters, GetParameters, ListParameters
 
-from uam_lab.flight.ros.node_arguments import MODULES
+from uam_lab.flight.ros.node_arguments import FUSED, MODULES
 from uam_msgs_py.node import wiring
 
 # declared by rclpy itself
@@ -38,6 +38,7 @@ def arguments(node, folder):
         wiring.PLANT: {"hil_port": free_port(socket.SOCK_STREAM)},
         wiring.RECORDER: {"file": folder / "log.mcap"},
         wiring.COCKPIT: {"port": 0},
+        wiring.FLIGHT_CONTROLLER: {f"{wiring.BRIDGE}:local_port": free_port(socket.SOCK_DGRAM)},
     }.get(node, {})
     return ["--ros-args", *(w for name, value in own.items() for w in ("-p", f"{name}:={value}"))]
 
@@ -58,9 +59,12 @@ def described(probe, node):
     return dict(zip(names, pairs, strict=True))
 
 
-@pytest.mark.parametrize("node", MODULES)
+EVERY = {**MODULES, wiring.FLIGHT_CONTROLLER: FUSED}
+
+
+@pytest.mark.parametrize("node", EVERY)
 def test_every_parameter_is_described_and_ranged(start, probe, tmp_path, node):
-    running = start(MODULES[node], *arguments(node, tmp_path))
+    running = start(EVERY[node], *arguments(node, tmp_path))
     found = described(probe, node)
     assert found
     for name, (about, value) in found.items():
@@ -103,13 +107,14 @@ REFUSED = [
     (wiring.SCENE, "scenario:=3", "scenario: 3 is no text; allowed: name of a file in config"),
     (wiring.MISSION, "vehicle:=3", "vehicle: 3 is no text; allowed: name of a file in config"),
     (wiring.COCKPIT, "port:=-1", "port: -1 is outside 0 to 65535"),
+    (wiring.FLIGHT_CONTROLLER, "flight_controller:inner_rate:=-1.0", "inner_rate: -1.0 is outside"),
 ]
 
 
 @pytest.mark.parametrize("node, setting, reason", REFUSED)
 def test_a_bad_value_is_refused_in_one_line(start, tmp_path, monkeypatch, node, setting, reason):
     monkeypatch.chdir(tmp_path)  # nothing is recorded
-    running = start(MODULES[node], "--ros-args", "-p", setting)
+    running = start(EVERY[node], "--ros-args", "-p", setting)
     assert running.process.wait(60) == 2
     assert reason in running.output and running.output.count("\n") == 1, running.output
     assert not list(tmp_path.rglob("*.mcap"))

@@ -80,6 +80,15 @@ def test_an_autopilot_of_this_computer_does_not_start_by_itself_either(tmp_path)
     assert not settings_of(load_lab(written(tmp_path, autopilot="udp:127.0.0.1:14580"))).auto_start
 
 
+def test_the_layout_is_that_of_the_file(tmp_path):
+    lab = load_lab(
+        written(tmp_path, layout="fused", nodes={"flight_controller": {"inner_rate": 50.0}})
+    )
+    flown = settings_of(lab)
+    assert lab.fused and flown.fused and flown.parameters["flight_controller"]["inner_rate"] == 50.0
+    assert not load_lab(written(tmp_path, layout="separate")).fused
+
+
 @pytest.mark.parametrize("section", REQUIRED)
 def test_a_missing_section_is_named_with_the_required_ones(tmp_path, section):
     text = refusal(written(tmp_path, **{section: MISSING}))
@@ -98,6 +107,8 @@ def test_a_missing_section_is_named_with_the_required_ones(tmp_path, section):
         ({"autopilot": "builtin"}, "autopilot: 'builtin' is no link; allowed: udp:HOST:PORT"),
         ({"autopilot": "serial:/dev/ttyS0"}, "autopilot: "),
         ({"imu": "both"}, "imu: 'both' is not one of autopilot, topic"),
+        ({"layout": "one"}, "layout: 'one' is not one of separate, fused"),
+        ({"nodes": {"flight_controller": {"inner_rate": 50.0}}}, "only the fused layout has this"),
         ({"room__x": [2.0, -2.0]}, "room.x: 2 is not below -2: [smallest, largest] expected"),
         ({"room__z": [0.0]}, "room.z: a list of 2 numbers expected"),
         ({"room__h": 2.0}, "room.h: unknown; allowed: x, y, z"),

@@ -16,6 +16,7 @@ INFO = {
     "profile": "s500",
     "scenario": "pick_and_place",
     "engine": "direct",
+    "layout": None,
     "clock": "lockstep",
     "autopilot": "builtin",
     "seed": 3,

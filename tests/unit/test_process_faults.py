@@ -109,6 +109,21 @@ def test_a_kill_is_no_failure_of_the_flight(children):
         assert children.running("mission")
 
 
+def test_a_fault_of_a_node_is_one_of_its_process(tmp_path):
+    """In the fused layout; the process is not started again."""
+    with started(tmp_path, SLEEPER, "scene") as running:
+        running.start("flight_controller", "own_code", nodes=("mission", "arm_controller"))
+        assert running.process_of("arm_controller") == "flight_controller"
+        assert running.process_of("scene") == "scene"
+        with faults(running, "node_kill@3")[0] as made:
+            made.update(3.1, "transit")
+            until(lambda: not running.running("flight_controller"))
+            running.check()
+            (missed,) = running.missed()
+            assert missed.name == "flight_controller" and not running.revive()
+            assert running.running("scene")
+
+
 def test_a_stopped_process_continues_after_the_fault(children):
     made, changes, clock = faults(children, "node_stall@3+2:node=mission")
     with made:

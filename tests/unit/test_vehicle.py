@@ -124,6 +124,16 @@ def test_the_nodes_work_on_the_wall_clock_and_wait_for_their_devices(tmp_path):
     }
 
 
+def test_in_the_fused_layout_one_process_has_the_control_nodes(tmp_path):
+    lab = replace(LAB, fused=True)
+    sections = vehicle_nodes.parameters(lab, settings_of(lab), ResultFolder(tmp_path))
+    assert sections[wiring.FLIGHT_CONTROLLER] == {"without": ""}
+    own = set(vehicle_nodes.modules(lab)) - set(wiring.FUSED)
+    assert set(vehicle_nodes.processes(lab)) == own | {wiring.FLIGHT_CONTROLLER}
+    checked = sections["checklist"]["nodes"].split(",")
+    assert set(wiring.FUSED) <= set(checked), "each node reports by its own name"
+
+
 def test_the_connections_of_a_vehicle_have_no_plant():
     for lab in (LAB, GRIPPER, FOREIGN):
         started = set(vehicle_nodes.modules(lab))

@@ -11,6 +11,7 @@ from uam_msgs_py.messages import topics
 from uam_msgs_py.messages.control import Reference, TorqueWriter
 from uam_msgs_py.messages.convert import JointCommandWriter
 from uam_msgs_py.node.base_node import run
+from uam_msgs_py.node.local_delivery import LocalDelivery
 
 NAME = "arm_controller"
 
@@ -18,8 +19,9 @@ NAME = "arm_controller"
 class ArmControllerNode(ControllerNode):
     """Publishes the servos' commands, one message per state, on the ground as well."""
 
-    def __init__(self):
-        super().__init__(NAME, ArmController, topics.ARM_ADAPTATION, topics.POSITION_COMMAND)
+    def __init__(self, delivery: LocalDelivery | None = None):
+        last = topics.POSITION_COMMAND
+        super().__init__(NAME, ArmController, topics.ARM_ADAPTATION, last, delivery)
         names = list(self.vehicle.coordinates[ARM])
         to_goals = self.parameter_set.current.setpoint == POSITION_SERVO
         outlets = [self.publisher(topic) for topic in (topics.ARM_EFFORT, topics.ARM_GOALS)]

@@ -12,6 +12,7 @@ from uam_msgs_py.messages import topics
 from uam_msgs_py.messages.control import ATTITUDE_NAMES, Reference, TorqueWriter
 from uam_msgs_py.messages.status import AutopilotState
 from uam_msgs_py.node.base_node import run
+from uam_msgs_py.node.local_delivery import LocalDelivery
 from uam_msgs_py.node.namespace import frame
 
 NAME = "attitude_controller"
@@ -20,9 +21,9 @@ NAME = "attitude_controller"
 class AttitudeControllerNode(ControllerNode):
     """Publishes /uam/attitude/command, empty while not flying."""
 
-    def __init__(self):
+    def __init__(self, delivery: LocalDelivery | None = None):
         last = topics.POSITION_COMMAND
-        super().__init__(NAME, AttitudeController, topics.ATTITUDE_ADAPTATION, last)
+        super().__init__(NAME, AttitudeController, topics.ATTITUDE_ADAPTATION, last, delivery)
         self._measured = MeasuredDelay(self.controller)
         self.listen(topics.AUTOPILOT_STATE, self._on_autopilot, required=False)
         self._command = self.publisher(topics.ATTITUDE_COMMAND)

@@ -31,6 +31,7 @@ from uam_msgs_py.messages.parameter_changes import ParameterChange
 from uam_msgs_py.messages.topics import Topic
 from uam_msgs_py.node.base_node import UamNode
 from uam_msgs_py.node.joins import Ahead, StampJoin
+from uam_msgs_py.node.local_delivery import LocalDelivery
 from uam_msgs_py.node.node_parameters import NodeParameters, given
 from uam_msgs_py.node.tick_times import DECODE, STAGE
 
@@ -46,9 +47,16 @@ class ControllerNode(UamNode):
         topics.POSITION_COMMAND.name: read_position_command,
     }
 
-    def __init__(self, name: str, controller: type[Controller], adaptation: Topic, last: Topic):
+    def __init__(
+        self,
+        name: str,
+        controller: type[Controller],
+        adaptation: Topic,
+        last: Topic,
+        delivery: LocalDelivery | None = None,
+    ):
         """last: the topic whose message completes a tick; the reference arrives a tick ahead."""
-        super().__init__(name)
+        super().__init__(name, delivery)
         law = given(self).get("law", catalogue.DEFAULT)
         self.vehicle = described_vehicle(self)
         kind, axes = parameter_set(name, {"law": law}, self.vehicle)

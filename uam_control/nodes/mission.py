@@ -50,6 +50,7 @@ from uam_msgs_py.messages.status import (
 )
 from uam_msgs_py.node.base_node import UamNode, run
 from uam_msgs_py.node.joins import Backlog
+from uam_msgs_py.node.local_delivery import LocalDelivery
 from uam_msgs_py.node.namespace import neighbour_section
 from uam_msgs_py.node.node_parameters import NodeParameters
 from uam_msgs_py.node.tick_times import DECODE, ENCODE, STAGE
@@ -82,8 +83,8 @@ class MissionNode(UamNode):
     reference of its tick.
     """
 
-    def __init__(self):
-        super().__init__(NAME)
+    def __init__(self, delivery: LocalDelivery | None = None):
+        super().__init__(NAME, delivery)
         vehicle = described_vehicle(self)
         profile = default_profile(DEFAULT, vehicle)
         derived = derived_parameters(vehicle)[NAME] | self._reference_limits(profile)
@@ -105,6 +106,7 @@ class MissionNode(UamNode):
         self._due = 0  # stamp [ns] of the next status
         self._held_back = False  # whether a limit prevents the take-off
         self._states = Backlog()
+        self._begun: tuple[int, np.ndarray, float] | None = None  # tick: stamp, state, wall time
         self._state_timeout = NodeParameters(self, StateWatch, read_only=True).current.state_timeout
         self._state_at = math.inf  # [s] time.monotonic() of the newest state
         if self._state_timeout:
@@ -182,10 +184,17 @@ class MissionNode(UamNode):
             self.settle()
 
     def settle(self) -> None:
-        for stamp, state in self._states.take():
-            self._tick(stamp, state)
+        self.begin_ticks()
+        self.look_ahead()
 
-    def _tick(self, stamp: int, state: np.ndarray) -> None:
+    def begin_ticks(self) -> None:
+        """Begin the ticks of the states that have arrived; `look_ahead` ends the last one."""
+        for stamp, state in self._states.take():
+            self.look_ahead()
+            self._begin_tick(stamp, state)
+
+    def _begin_tick(self, stamp: int, state: np.ndarray) -> None:
+        """Publish status and magnet of the tick `stamp` [ns]."""
         begun, stage = time.perf_counter(), self._stage
         self.times.lap(DECODE)
         if self._has_clock:
@@ -201,7 +210,14 @@ class MissionNode(UamNode):
         )  # before the magnet, so that the status of a tick arrives before it
         self._magnet.publish(SWITCH[bool(output.magnet)])
         self.times.lap(ENCODE)
-        stage.advance(stamp, state)
+        self._begun = stamp, state, begun
+
+    def look_ahead(self) -> None:
+        """End the tick that has begun, if any: publish the reference of the next one."""
+        if self._begun is None:
+            return
+        (stamp, state, begun), self._begun = self._begun, None
+        self._stage.advance(stamp, state)
         self.times.lap(STAGE)
         self._publish_reference()
         self.done_tick(stamp, begun)

@@ -7,6 +7,7 @@ from uam_control.nodes.controller_node import ControllerNode
 from uam_msgs_py.messages import topics
 from uam_msgs_py.messages.control import PositionCommandWriter, Reference
 from uam_msgs_py.node.base_node import run
+from uam_msgs_py.node.local_delivery import LocalDelivery
 
 NAME = "position_controller"
 
@@ -14,8 +15,9 @@ NAME = "position_controller"
 class PositionControllerNode(ControllerNode):
     """Publishes /uam/position/command, empty while not flying."""
 
-    def __init__(self):
-        super().__init__(NAME, PositionController, topics.POSITION_ADAPTATION, topics.STATE)
+    def __init__(self, delivery: LocalDelivery | None = None):
+        last = topics.STATE
+        super().__init__(NAME, PositionController, topics.POSITION_ADAPTATION, last, delivery)
         self._command = self.publisher(topics.POSITION_COMMAND)
         self._writer = PositionCommandWriter()
 

@@ -19,6 +19,7 @@ from uam_msgs_py.messages.status import OK, WARN
 from uam_msgs_py.messages.trajectories import TrajectoryWriter
 from uam_msgs_py.node.base_node import UamNode, run
 from uam_msgs_py.node.joins import Backlog
+from uam_msgs_py.node.local_delivery import LocalDelivery
 from uam_msgs_py.node.namespace import frame
 from uam_msgs_py.node.node_parameters import NodeParameters
 from uam_msgs_py.node.tick_times import DECODE, STAGE
@@ -40,8 +41,8 @@ class StateEstimatorNode(UamNode):
     samples of the tick have then arrived, and a repeated flight uses the same samples.
     """
 
-    def __init__(self):
-        super().__init__(NAME)
+    def __init__(self, delivery: LocalDelivery | None = None):
+        super().__init__(NAME, delivery)
         vehicle = described_vehicle(self)
         self._names = list(vehicle.joint_names)
         section = default_profile(DEFAULT, vehicle).section(NAME)

@@ -44,6 +44,7 @@ examples:
   uam fly --clock realtime --fifo 50 --lock-memory    the nodes ahead of other programs
   uam fly --namespace uav1 --domain 1        one of several vehicles in a ROS domain
   uam fly --without arm_controller           with your own arm controller: examples/
+  uam fly --fused                            control nodes in one process: fewer cores
   uam fly --imu autopilot                    the estimator has the autopilot's IMU
   uam fly --payload-mass 0.3 --wind 2 0 0    heavier payload, 2 m/s from the west
   uam fly --setpoint-delay 16 --mocap-delay 8 --mocap-jitter 4    later by so many milliseconds
@@ -89,6 +90,13 @@ def add(commands: argparse._SubParsersAction) -> None:
     text = "largest acceleration there (default 1)"
     option("--transit-acceleration", "M/S2", text, type=number("acceleration", "m/s^2", 0.05, 5.0))
     option("--engine", "ros|direct", "nodes and sockets, or one loop without them", "ros")
+    command.switch(
+        "--fused",
+        "estimator, mission, controllers and bridge as one process, for few cores: "
+        "docs/architecture.md",
+    )
+    text = "with --fused: messages per second sent of the topics within it (default: all)"
+    option("--inner-rate", "HZ", text, type=number("rate", "Hz", 0.0, 1000.0))
     text = "simulated time, repeatable for the same seed; or the wall clock"
     option("--clock", "lockstep|realtime", text, "lockstep")
     text = "IMU of the estimator: the companion's, or the autopilot's over MAVLink"

@@ -27,6 +27,7 @@ def settings_facts(settings: FlightSettings) -> dict[str, Any]:
         "scenario": scenario.name,
         "scenario_options": settings.scenario_options.to_mapping(),
         "engine": settings.engine,
+        "layout": settings.layout if settings.engine == "ros" else None,
         "plant": settings.plant,
         "clock": settings.clock,
         "imu": settings.imu,

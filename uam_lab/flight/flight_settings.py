@@ -55,6 +55,7 @@ REPLACEABLE = (
     "arm_controller",
 )
 COCKPIT = "cockpit"
+LAYOUTS = {False: "separate nodes", True: "fused: control nodes in one process"}
 NODE_NAME = re.compile(r"[A-Za-z_]\w*", re.ASCII)
 LOG_LIMIT = 4000.0  # [MB] some four hours of flight
 ONLOOKERS = ("scene", COCKPIT)  # nodes that only display: their end does not end the flight
@@ -73,7 +74,7 @@ class FlightSettings:
     of the nodes without a profile, node → name → value.
     remappings: node, or EVERY_NODE → topic or service → new name. command: how the flight was
     requested, for its record. namespace: of all nodes, in the form of ROS; domain: ROS domain,
-    None for that of the instance.
+    None for that of the instance. fused: the control nodes are one process.
     """
 
     scenario: Scenario
@@ -111,6 +112,12 @@ class FlightSettings:
     domain: int | None = None
     process: ProcessParameters = ProcessParameters()  # of the nodes that fly
     tick_times: bool = False  # whether they measure their ticks
+    fused: bool = False
+
+    @property
+    def layout(self) -> str:
+        """Return the layout of the control nodes, for the records of the flight."""
+        return LAYOUTS[self.fused]
 
     @property
     def foreign(self) -> tuple[str, ...]:
@@ -157,6 +164,8 @@ def settings(
     domain: int | None = None,
     process: Mapping[str, Any] | None = None,
     tick_times: bool = False,
+    fused: bool = False,
+    inner_rate: float | None = None,
 ) -> FlightSettings:
     """Check the options and load scenario, profile and faults.
 
@@ -168,7 +177,9 @@ def settings(
     autopilot; auto_start False: wait for the command start. parameters: node → name → value, each
     replaces the profile's. remappings: topic or service → new name for every node, or node → such a
     mapping. process: parameters of `ProcessParameters` for the nodes that fly; tick_times: they
-    write the times of their ticks to logs/. Raises SettingsError, ConfigurationError, ScenarioError
+    write the times of their ticks to logs/; fused: the control nodes in one process; inner_rate
+    [Hz]: of the topics that only they need, see its node. Raises SettingsError,
+    ConfigurationError, ScenarioError
     (InfeasibleReference too), ProfileError, Px4Error, PortError, PlantError, FaultError; each text
     is one line for the user.
     """
@@ -227,6 +238,14 @@ def settings(
             "the direct engine has no nodes: --namespace and --domain need --engine ros"
         )
     processing = _process(process or {}, engine, tick_times)
+    if engine == "direct" and fused:
+        raise SettingsError("the direct engine has no nodes: --fused needs --engine ros")
+    if inner_rate is not None:
+        if not fused:
+            raise SettingsError("--inner-rate needs --fused: separate nodes need every message")
+        own = dict(parameters or {}).get(node_options.FLIGHT_CONTROLLER, {})
+        own = {node_options.FLIGHT_CONTROLLER: {**own, "inner_rate": inner_rate}}
+        parameters = {**(parameters or {}), **own}
     if gcs and (parse_url(gcs).kind != "udp" or engine == "direct"):
         raise SettingsError("--gcs must be udp:HOST:PORT and needs --engine ros")
     if not 0 <= seed < 2**31:
@@ -245,7 +264,7 @@ def settings(
         if given
         else default_profile(controller, described)
     )
-    flown, own = node_options.parameters(flown, parameters or {}, engine)
+    flown, own = node_options.parameters(flown, parameters or {}, engine, fused)
     for node, law in flown.laws().items():
         if law != controller:
             raise SettingsError(
@@ -306,6 +325,7 @@ def settings(
         domain=domain,
         process=processing,
         tick_times=tick_times,
+        fused=fused,
     )
     check_feasible(made, injected)
     return made

@@ -18,7 +18,8 @@ from uam_control.profiles.profile import (
 from uam_lab.results.metrics import plain
 
 # nodes whose parameters are in no profile
-OTHER_NODES = ("mujoco_sim", "scene", "recorder", "cockpit")
+FLIGHT_CONTROLLER = "flight_controller"
+OTHER_NODES = ("mujoco_sim", "scene", "recorder", "cockpit", FLIGHT_CONTROLLER)
 EVERY_NODE = ""
 
 
@@ -27,9 +28,11 @@ class SettingsError(ValueError):
 
 
 def parameters(
-    profile: Profile, given: Mapping[str, Mapping[str, Any]], engine: str
+    profile: Profile, given: Mapping[str, Mapping[str, Any]], engine: str, fused: bool = False
 ) -> tuple[Profile, dict[str, dict[str, Any]]]:
     """Return the profile with the parameters `given`, and those of nodes without a profile.
+
+    fused: the control nodes are one process, which alone has the node FLIGHT_CONTROLLER.
 
     Raises SettingsError, ProfileError.
     """
@@ -38,6 +41,8 @@ def parameters(
         _known_node(node, (*NODES, BRIDGE, *OTHER_NODES))
         if not isinstance(values, Mapping):
             raise SettingsError(f"parameters of {node}: name → value expected, not {values!r}")
+        if node == FLIGHT_CONTROLLER and not fused:
+            raise SettingsError(f"parameters of {node}: only the fused layout has this node")
         own = BRIDGE_LINKS if node == BRIDGE else FLIGHT_OWN.get(node, ())
         if fixed := [name for name in values if name in own]:
             raise SettingsError(f"{node}: {fixed[0]} follows from the other options of the flight")

@@ -67,6 +67,7 @@ class NodeProcess:
     may_end: bool = False  # its end is expected: after a stop or with the mission
     optional: bool = False  # the flight continues without it
     again: int = 0  # remaining number of restarts
+    nodes: tuple[str, ...] = ()  # its nodes, where they have other names
 
     @property
     def status(self) -> int | None:
@@ -98,18 +99,19 @@ class Processes:
         may_end: bool = False,
         optional: bool = False,
         again: int = 0,
+        nodes: tuple[str, ...] = (),
     ) -> NodeProcess:
         """Run `module.main()` as the process `name`.
 
         may_end: it ends by itself when finished; optional: its end is no failure of the flight, see
-        `missed`; again: number of restarts by `revive`.
+        `missed`; again: number of restarts by `revive`; nodes: of the process, see `process_of`.
         """
         log = self._logs / f"{name}.log"
 
         def run(further: Sequence[str]) -> BaseProcess:
             return fork(name, module, [*arguments, *further], log, self._environment)
 
-        child = NodeProcess(name, run([]), log, run, may_end, optional, again)
+        child = NodeProcess(name, run([]), log, run, may_end, optional, again, nodes)
         self._children[name] = child
         return child
 
@@ -117,6 +119,11 @@ class Processes:
     def names(self) -> list[str]:
         """Names of all started children, in order."""
         return list(self._children)
+
+    def process_of(self, node: str) -> str:
+        """Return the name of the process that has a node; the node's name if there is none."""
+        having = (child.name for child in self._children.values() if node in child.nodes)
+        return next(having, node)
 
     def pid(self, name: str) -> int:
         """Return the process id of a child."""

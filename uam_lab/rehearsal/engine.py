@@ -74,7 +74,7 @@ class RehearsalEngine:
             lab = emulated_lab.write(document, self._lab.file, folder.path)
             own = settings_of(lab, settings.command)
             settings = replace(settings, link=own.link, autopilot=own.autopilot)
-            modules = vehicle_nodes.modules(lab)
+            modules = vehicle_nodes.processes(lab)
             child.prepare([*modules.values(), LABORATORY_MODULE, FORKER])
             await_orphans(observer.message)
             sections = vehicle_nodes.parameters(lab, settings, folder)

@@ -30,6 +30,7 @@ PASSED_ON = (
     "profile",
     "scenario",
     "engine",
+    "layout",
     "clock",
     "autopilot",
     "seed",

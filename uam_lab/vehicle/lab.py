@@ -58,7 +58,7 @@ class Lab:
     link; imu: one of IMUS; mocap: None where another driver publishes the poses; arm: its servos,
     arm_file: the file with them; nodes: node → parameter → value, beside those of the sections;
     out: folder of the result folders; process: parameters of `ProcessParameters` of the nodes that
-    fly.
+    fly; fused: the control nodes are one process.
     """
 
     file: Path
@@ -76,3 +76,4 @@ class Lab:
     nodes: dict[str, dict[str, Any]] = field(default_factory=dict)
     out: Path = OUT
     process: dict[str, Any] = field(default_factory=dict)
+    fused: bool = False

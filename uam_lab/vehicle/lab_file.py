@@ -18,7 +18,7 @@ from uam_control.settings.parameter_set import ParameterError, ParameterSet
 from uam_control.settings.process_parameters import ProcessParameters
 from uam_control.settings.section import Section, read_section
 from uam_control.vehicle import VehicleDescription, VehicleError, load_description
-from uam_lab.flight.node_options import SettingsError
+from uam_lab.flight.node_options import FLIGHT_CONTROLLER, SettingsError
 from uam_lab.vehicle.lab import (
     AUTOPILOT,
     GPIO,
@@ -46,10 +46,12 @@ from uam_sim_bridge.ports import PortError
 
 FOLDER, TEMPLATE = "lab", "s500_lab"
 REQUIRED = ("vehicle", "scenario", "autopilot", "imu", "room", "mocap", "arm", "magnet")
-OPTIONAL = ("profile", "cockpit", "nodes", "out", "process")
+OPTIONAL = ("profile", "cockpit", "nodes", "out", "process", "layout")
+SEPARATE, FUSED = LAYOUTS = ("separate", "fused")
 GEOFENCE = ("geofence_low", "geofence_high")
 ARM_DRIVER = "arm_driver"
-TUNABLE = (*NODES, BRIDGE, ARM_DRIVER, "checklist", "recorder", "cockpit")  # in `nodes`
+# in `nodes`
+TUNABLE = (*NODES, BRIDGE, ARM_DRIVER, "checklist", "recorder", "cockpit", FLIGHT_CONTROLLER)
 
 
 def template() -> str:
@@ -89,6 +91,7 @@ def load_lab(name_or_file: str | Path) -> Lab:
         nodes=_nodes(top),
         out=Path(top.text("out")) if "out" in top.values else OUT,
         process=_process(top),
+        fused="layout" in top.values and _one_of(top, "layout", LAYOUTS) == FUSED,
     )
     _check_profile(top, lab)
     try:

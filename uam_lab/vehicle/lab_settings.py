@@ -6,9 +6,16 @@ from uam_control.laws import catalogue
 from uam_control.profiles.profile import BRIDGE, NODES, load_profile
 from uam_lab.flight import flight_settings
 from uam_lab.flight.flight_settings import FlightSettings
+from uam_lab.flight.node_options import FLIGHT_CONTROLLER
 from uam_lab.vehicle.lab import Lab
 
-SHARED = (*NODES, BRIDGE, "recorder", "cockpit")  # nodes that a flight in simulation has, too
+SHARED = (
+    *NODES,
+    BRIDGE,
+    "recorder",
+    "cockpit",
+    FLIGHT_CONTROLLER,
+)  # nodes that a flight in simulation has, too
 
 
 def settings_of(lab: Lab, command: str = "", dry_run: bool = False) -> FlightSettings:
@@ -37,4 +44,5 @@ def settings_of(lab: Lab, command: str = "", dry_run: bool = False) -> FlightSet
         parameters=given,
         process=lab.process,
         command=command,
+        fused=lab.fused,
     )

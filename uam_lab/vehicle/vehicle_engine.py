@@ -59,7 +59,7 @@ class VehicleEngine:
         with Reservation(
             None, own_autopilot=False, domain=settings.domain, namespace=settings.namespace
         ) as reservation:
-            child.prepare([*vehicle_nodes.modules(lab).values(), FORKER])
+            child.prepare([*vehicle_nodes.processes(lab).values(), FORKER])
             await_orphans(observer.message)
             ports = reservation.ports
             sections = vehicle_nodes.parameters(lab, settings, folder)
@@ -105,13 +105,14 @@ def start_nodes(
 ) -> None:
     """Start the nodes of a vehicle except `without`; their parameters are in `folder`."""
     arguments = supervise.ros_arguments(settings, folder, publishers)
-    for name, module in vehicle_nodes.modules(lab).items():
+    for name, module in vehicle_nodes.processes(lab).items():
         if name in without:
             continue
         again = supervise.RESTARTS if name in AGAIN else 0
-        children.start(name, module, arguments, optional=name == COCKPIT, again=again)
+        nodes = node_arguments.nodes_in(name, settings)
+        children.start(name, module, arguments, optional=name == COCKPIT, again=again, nodes=nodes)
 
 
 def _announcement(children: Processes, ports: Ports) -> Iterator[str]:
-    yield f"{len(children.names)} nodes in ROS domain {ports.domain}; nothing arms by itself"
+    yield f"{len(children.names)} processes in ROS domain {ports.domain}; nothing arms by itself"
     yield "to fly: uam checklist, then uam start; or both in the cockpit"

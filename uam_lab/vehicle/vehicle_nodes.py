@@ -38,6 +38,11 @@ def modules(lab: Lab) -> dict[str, str]:
     return recorder | drivers | stack | {CHECKLIST: "uam_lab.nodes.checklist"}
 
 
+def processes(lab: Lab) -> dict[str, str]:
+    """Return the processes of a vehicle, in the order of the start."""
+    return node_arguments.arranged(modules(lab), lab.fused)
+
+
 def parameters(
     lab: Lab, settings: FlightSettings, folder: ResultFolder
 ) -> dict[str, dict[str, Any]]:

@@ -20,6 +20,7 @@ from uam_control.coordinates import (
     coordinates,
 )
 from uam_msgs_py.messages.layouts import BadMessage
+from uam_msgs_py.messages.read_once import read_once
 from uam_msgs_py.messages.serialized import Serialized
 from uam_msgs_py.messages.trajectories import (
     CommandWriter,
@@ -47,6 +48,7 @@ def arm_alone(joints: int) -> TrajectoryReader:
     return TrajectoryReader(arm_coordinates(joints))
 
 
+@read_once
 def read_state(data: bytes) -> tuple[int, np.ndarray]:
     """Return (stamp [ns], chi, chi_dot, chi_ddot (3, 6 + n)); raises BadMessage."""
     message = Serialized(JointTrajectory, data)
@@ -76,6 +78,7 @@ class ReferenceWriter:
         return self._arm.fill(stamp, reference[:, ARM], mission_time)
 
 
+@read_once
 def read_reference(data: bytes) -> tuple[int, Reference]:
     """Return (stamp [ns], reference); raises BadMessage."""
     message = Serialized(JointTrajectory, data)
@@ -121,6 +124,7 @@ class PositionCommandWriter(CommandWriter):
         return self.stamped(stamp)
 
 
+@read_once
 def read_position_command(data: bytes) -> tuple[int, PositionCommand]:
     """Return (stamp [ns], command); raises BadMessage."""
     message = Serialized(JointTrajectory, data)

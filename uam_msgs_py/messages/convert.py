@@ -18,6 +18,7 @@ from sensor_msgs.msg import Imu, JointState
 from std_msgs.msg import Bool, Float64MultiArray
 
 from uam_msgs_py.messages.layouts import ENCAPSULATION, BadMessage
+from uam_msgs_py.messages.read_once import read_once
 from uam_msgs_py.messages.serialized import (
     Serialized,
     Template,
@@ -113,6 +114,7 @@ class PoseWriter(Template):
         return self.stamped(stamp)
 
 
+@read_once
 def read_pose(data: bytes, frame: str = WORLD) -> tuple[int, np.ndarray, np.ndarray]:
     """Return (stamp [ns], position (3,) [m], unit quaternion (4,) body → world [w x y z]).
 

@@ -4,11 +4,12 @@ import re
 import signal
 import sys
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import rclpy
 from rclpy.clock import Clock, ClockType
+from rclpy.event_handler import PublisherEventCallbacks, SubscriptionEventCallbacks
 from rclpy.publisher import Publisher
 from rclpy.qos import QoSProfile
 from rclpy.signals import SignalHandlerOptions
@@ -25,6 +26,7 @@ from uam_msgs_py.node.executor import spin
 from uam_msgs_py.node.garbage import GarbageCollection
 from uam_msgs_py.node.health import LoopTime, ages
 from uam_msgs_py.node.joins import StampJoin
+from uam_msgs_py.node.local_delivery import LocalDelivery, Outlet
 from uam_msgs_py.node.namespace import expanded, label
 from uam_msgs_py.node.node_parameters import NodeParameters, refuse_unknown
 from uam_msgs_py.node.refusals import Refusals
@@ -48,18 +50,20 @@ class UamNode(TunableNode):
 
     wake_up = 0.1  # s of wall time, longest wait for a trigger
 
-    def __init__(self, name: str):
+    def __init__(self, name: str, delivery: LocalDelivery | None = None):
+        """delivery: between the nodes of this process; None if there are no others."""
         super().__init__(name)
+        self._delivery = delivery
         self.process = NodeParameters(self, ProcessParameters, read_only=True).current
         self.times = tick_times(NodeParameters(self, TickTimesParameters, read_only=True).current)
         self._required: dict[str, int] = {}
         self._counts: dict[str, int] = {}
         self._arrivals: dict[str, float] = {}  # time.monotonic() of each input's newest message
         self._logged: dict[str, float] = {}
-        self._outlets: dict[str, Publisher] = {}
+        self._outlets: dict[str, Publisher | Outlet] = {}
         self._inlets: dict[str, Subscription] = {}
         self.sole_publishers: dict[Subscription, SolePublisher] = {}
-        self._rightful = rightful_nodes(self)
+        self.rightful = rightful_nodes(self)
         self._refusals = Refusals()
         self._stamps = StampWatch()
         self._complaints: list[str] = []  # at the last report
@@ -76,9 +80,16 @@ class UamNode(TunableNode):
         self.create_timer(LOG_PERIOD, self._check_inputs, clock=steady)
         self.create_timer(DIAGNOSTICS_PERIOD, self._report, clock=steady)
 
-    def publisher(self, topic: Topic) -> Publisher:
+    def publisher(self, topic: Topic) -> Publisher | Outlet:
         """Return a publisher of `topic`."""
-        made = self._outlets[topic.name] = self.create_publisher(topic.type, topic.name, topic.qos)
+        kind, name, qos = topic.type, topic.name, topic.qos
+        if self._delivery is None:
+            made = self.create_publisher(kind, name, qos)
+        else:
+            silent = PublisherEventCallbacks(use_default_callbacks=False)
+            publisher = self.create_publisher(kind, name, qos, event_callbacks=silent)
+            made = self._delivery.outlet(self, topic, publisher)
+        self._outlets[name] = made
         self.times.watch(made, topic)
         return made
 
@@ -112,14 +123,30 @@ class UamNode(TunableNode):
             counts[name] += 1
             arrivals[name] = time.monotonic()
 
-        raw = stays_serialized(topic.type)
-        made = self.create_subscription(topic.type, name, callback, qos or topic.reading, raw=raw)
-        self._inlets[name] = made
+        made = self._inlets[name] = self._subscription(topic, callback, qos or topic.reading)
         if name in PUBLISHERS:
-            rightful = self._rightful.of(name)
+            rightful = self.rightful.of(name)
             self.sole_publishers[made] = SolePublisher(self, made, rightful, lambda: self.ticks > 0)
         self._stamps.listen(name)
+        if self._delivery is not None:
+            self._delivery.note(self, name, made)
         return made
+
+    def _subscription(
+        self, topic: Topic, callback: Callable[[Any], None], qos: QoSProfile
+    ) -> Subscription:
+        kind, name, raw = topic.type, topic.name, stays_serialized(topic.type)
+        if self._delivery is None:
+            return self.create_subscription(kind, name, callback, qos, raw=raw)
+        return self.create_subscription(
+            kind,
+            name,
+            callback,
+            self._delivery.reading(self, topic, qos),
+            raw=raw,
+            callback_group=polling.Polled(),
+            event_callbacks=SubscriptionEventCallbacks(use_default_callbacks=False),
+        )
 
     def refuse(self, name: str, error: BadMessage) -> None:
         """Count a message of topic `name` that cannot be used; the next report names its sender."""
@@ -143,6 +170,9 @@ class UamNode(TunableNode):
         topics in another order. A node that acts on the last message of a tick calls this first for
         its other inputs.
         """
+        if self._delivery is not None:
+            self._delivery.take_waiting(subscription)
+            return
         for message in polling.messages(subscription, self.sole_publishers.get(subscription)):
             subscription.callback(message)
 
@@ -221,7 +251,8 @@ class UamNode(TunableNode):
         }
         namespace = self.get_namespace()
         common |= ages(self._counts, self._arrivals, namespace)
-        common |= connections.of(self, self._outlets, self._inlets)
+        uncounted = self._delivery.writers if self._delivery else None
+        common |= connections.of(self, self._outlets, self._inlets, uncounted)
         stamp = self.stamp or self.get_clock().now().nanoseconds
         self._diagnostics.publish(diagnostic(stamp, label(self), level, summary, common | values))
 
@@ -257,35 +288,57 @@ def run(make: Callable[[], UamNode], name: str) -> int:
     0: stopped by a signal; 1: failure of the node (text in its `failure`, if it has one); 2: bad
     parameters or arguments, with one line on stderr.
     """
+
+    def spin_it(
+        nodes: Sequence[UamNode], running: Callable[[], bool], at_rest: Callable[[], None]
+    ) -> None:
+        spin(nodes[0], running, nodes[0].wake_up, at_rest)
+
+    return run_together(lambda: [make()], name, spin_it)
+
+
+def run_together(
+    make: Callable[[], Sequence[UamNode]],
+    name: str,
+    spin_them: Callable[[Sequence[UamNode], Callable[[], bool], Callable[[], None]], None],
+) -> int:
+    """Create the nodes of a process and spin them as `run` does; name: of the executable.
+
+    spin_them(nodes, running, at_rest): spins until `running()` is false; at_rest: called between
+    two ticks, fifty times a second. The first node has the options of the process.
+    """
     stop = StopSignal()
     try:
         # no handlers of rclpy: the context must still send the node's last messages
         rclpy.init(args=sys.argv, signal_handler_options=SignalHandlerOptions.NO)
     except Exception as error:  # rclpy's own classes for a bad parameter file or argument
         return refuse(name, error)
-    node = None
+    nodes: Sequence[UamNode] = ()
     try:
         try:
-            node = make()
-            refuse_unknown(node)
-            process_options.apply(node.process)
+            nodes = make()
+            for node in nodes:
+                refuse_unknown(node, node.get_name() if len(nodes) > 1 else "")
+            process = nodes[0].process
+            process_options.apply(process)
         except (ValueError, OSError) as error:  # ParameterError, ProfileError, ScenarioError ...
             return refuse(name, error)
-
-        def failure() -> str:
-            return getattr(node, "failure", "")
-
-        with GarbageCollection(node.process.collect_between_ticks) as garbage:
-            spin(node, lambda: not stop.raised and not failure(), node.wake_up, garbage.at_rest)
-        if failure():
-            print(f"{name}: {failure()}", file=sys.stderr, flush=True)
-        return 1 if failure() else 0
+        with GarbageCollection(process.collect_between_ticks) as garbage:
+            spin_them(nodes, lambda: not stop.raised and not _failure_of(nodes), garbage.at_rest)
+        failure = _failure_of(nodes)
+        if failure:
+            print(f"{name}: {failure}", file=sys.stderr, flush=True)
+        return 1 if failure else 0
     finally:
-        if node is not None:
+        for node in nodes:
             node.times.close()
             node.destroy_node()
         rclpy.try_shutdown()
         stop.ignore()
+
+
+def _failure_of(nodes: Sequence[UamNode]) -> str:
+    return next((text for node in nodes if (text := getattr(node, "failure", ""))), "")
 
 
 def refuse(name: str, error: Exception) -> int:

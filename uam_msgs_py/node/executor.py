@@ -2,28 +2,20 @@
 
 For each callback rclpy's SingleThreadedExecutor collects all entities of the node and builds a
 wait set, a task and a coroutine. A control node's entities rarely change after its start, so
-`LeanExecutor` reuses one wait set of its subscriptions and calls their callbacks directly. It
-checks services, timers, clients and events only fifty times a second, of wall time or of tick
-time. It serves at most one service request per check, so that many requests do not delay a tick.
-Clients and events are passed to a SingleThreadedExecutor. Service requests are not: that executor
-would serve waiting messages first.
+`LeanExecutor` reuses one wait set of its subscriptions and calls their callbacks directly.
+`OtherEntities` serves the rest between two ticks.
 
 benchmarks/executor.py measures a tick. rclpy's EventsExecutor (experimental) costs as little, but
 has no point at which all received messages are delivered; `settle` needs one.
 """
 
-import time
 from collections.abc import Callable, Iterable
 
-from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
-from rclpy.service import Service
 
+from uam_msgs_py.node.other_entities import OtherEntities
 from uam_msgs_py.node.tick_times import DECODE, TAKE, NoTickTimes
 from uam_msgs_py.node.waiting import WaitSet, wait_for
-
-REST_PERIOD = 0.02  # s between two checks of services, timers, clients and events
-REST_STAMPS = round(REST_PERIOD * 1e9)  # ns of ticks: a simulation may run faster than wall time
 
 
 class LeanExecutor:
@@ -58,12 +50,10 @@ class LeanExecutor:
         self._node = node
         self._trigger_names = set(getattr(node, "triggers", ()) if triggers is None else triggers)
         self._stalled = stalled or getattr(node, "stalled", lambda: False)
-        self._rest = SingleThreadedExecutor(context=node.context)
-        self._rest.add_node(node)
+        self._rest = OtherEntities([node])
         self._settle = getattr(node, "settle", lambda: None)
         if hasattr(node, "defer"):
             node.defer()
-        self._next_check, self._checked_at = 0.0, 0
         self._at_rest = at_rest
         self._times = getattr(node, "times", NoTickTimes())
         process = getattr(node, "process", None)
@@ -71,8 +61,8 @@ class LeanExecutor:
         self._gather()
 
     def _gather(self) -> None:
-        """Collect the node's entities and create their wait sets."""
-        node, context = self._node, self._node.context.handle
+        """Collect the node's subscriptions and create their wait set."""
+        node = self._node
         names = {node.resolve_topic_name(name) for name in self._trigger_names}
         by_trigger = sorted(node.subscriptions, key=lambda s: s.topic_name in names)
         guards = getattr(node, "sole_publishers", {})
@@ -81,26 +71,20 @@ class LeanExecutor:
         ]
         self._triggers = [s.handle for s in by_trigger if s.topic_name in names]
         self._inputs = [s.handle for s in by_trigger]
-        self._services = [s.handle for s in node.services]
-        self._clients = [c.handle for c in node.clients]
-        self._timers = [t.handle for t in node.timers]
-        self._waitables = list(node.waitables)
-        events = sum(waitable.get_num_entities().num_events for waitable in self._waitables)
-        counts = (len(self._timers), len(self._clients), len(self._services), events)
-        self._messages = WaitSet(len(self._subscriptions), 0, 0, 0, 0, 0, context)
-        self._others = WaitSet(0, 0, *counts, context)
+        self._messages = WaitSet(len(self._subscriptions), 0, 0, 0, 0, 0, node.context.handle)
 
     def spin_once(self, timeout: float) -> None:
         """Serve all ready entities; wait for a message at most `timeout` [s].
 
         The wait is shorter if a check of services and timers is due.
         """
-        left = self._next_check - time.monotonic()
         stamp = getattr(self._node, "stamp", 0)
-        if left <= 0.0 or stamp - self._checked_at >= REST_STAMPS:
-            left = 0.0 if self._serve_others() else REST_PERIOD
+        left = self._rest.left(stamp)
+        if not left:
+            left, changed = self._rest.serve(stamp)
             self._at_rest()
-            self._next_check, self._checked_at = time.monotonic() + left, stamp
+            if changed:
+                self._gather()
         times = self._times
         times.rest()
         # a driver has no inputs: it waits for its device in `settle`
@@ -114,45 +98,6 @@ class LeanExecutor:
                 times.lap(DECODE)
         times.lap(TAKE)
         self._settle()
-
-    def _serve_others(self) -> bool:
-        """Serve ready services, clients, timers and events.
-
-        Returns whether a service, client or event was ready.
-        """
-        others = self._others
-        others.clear_entities()
-        for handle in self._services:
-            others.add_service(handle)
-        for handle in self._clients:
-            others.add_client(handle)
-        for handle in self._timers:
-            others.add_timer(handle)
-        for waitable in self._waitables:
-            waitable.add_to_wait_set(others)
-        others.wait(0)
-        services, timers = (set(others.get_ready_entities(kind)) for kind in ("service", "timer"))
-        handed = list(others.get_ready_entities("client"))
-        handed += [waitable for waitable in self._waitables if waitable.is_ready(others)]
-        for _ in handed:
-            self._rest.spin_once(timeout_sec=0)
-        for timer in (t for t in self._node.timers if t.handle.pointer in timers):
-            timer.handle.call_timer()
-            timer.callback()
-        request = next((s for s in self._node.services if s.handle.pointer in services), None)
-        if request is not None:
-            self._answer(request)
-        if handed or services:
-            self._gather()  # a service may change the entities, e.g. by setting use_sim_time
-        return bool(handed or services)
-
-    @staticmethod
-    def _answer(service: Service) -> None:
-        """Take one request and send the response."""
-        request, header = service.handle.service_take_request(service.srv_type.Request)
-        if header is not None:
-            response = service.callback(request, service.srv_type.Response())
-            service.send_response(response, header)
 
     def shutdown(self) -> None:
         """Shut down the inner executor."""

@@ -51,6 +51,16 @@ class Ahead(NamedTuple):
     later: Callable[[Any, int], Any] = lambda value, step: value
 
 
+class _Tick:
+    """The values of one stamp; missing: how many have not arrived."""
+
+    __slots__ = ("missing", "values")
+
+    def __init__(self, inputs: int):
+        self.values: list[Any] = [None] * inputs
+        self.missing = inputs
+
+
 class StampJoin:
     """Calls `fire(stamp, *values)` when all inputs have delivered their values for a stamp.
 
@@ -79,7 +89,7 @@ class StampJoin:
         self._index = {name: i for i, name in enumerate(inputs)}
         self._fire = fire
         self._depth = depth
-        self._open: dict[int, list[Any]] = {}
+        self._open: dict[int, _Tick] = {}
         self._last = -1
         self._backlog = Backlog()
         self.deferred = False
@@ -95,44 +105,46 @@ class StampJoin:
         if stamp <= self._last:
             self._dropped += 1
             return
-        values = self._open.get(stamp)
-        if values is None:
-            values = self._open[stamp] = [None] * len(self._index)
+        tick = self._open.get(stamp)
+        if tick is None:
+            tick = self._open[stamp] = _Tick(len(self._index))
             if len(self._open) > self._depth:
                 self._dropped += self._is_tick(self._open.pop(min(self._open)))
-        values[self._index[name]] = value
+        place = self._index[name]
+        tick.missing -= tick.values[place] is None
+        tick.values[place] = value
         self._fire_if_complete(stamp)
-        if self._index[name] == self._ahead:  # it may serve a tick of another stamp
-            for tick in sorted(self._open):
-                self._fire_if_complete(tick)
+        if place == self._ahead and len(self._open) > 1:  # it may serve a tick of another stamp
+            for other in sorted(self._open):
+                self._fire_if_complete(other)
 
     def _fire_if_complete(self, stamp: int) -> None:
-        values = self._open.get(stamp)
-        if values is None:
+        tick = self._open.get(stamp)
+        if tick is None:
             return
-        if any(value is None for value in values):
-            served = self._served(stamp, values)
+        if tick.missing:
+            served = self._served(stamp, tick)
             if served is None:
                 return
-            values[self._ahead] = served
+            tick.values[self._ahead] = served
         self._dropped += self._close(stamp) - 1  # all but this one
-        self._backlog.put((stamp, values))
+        self._backlog.put((stamp, tick.values))
         if not self.deferred:
             self.settle()
 
-    def _served(self, stamp: int, values: list[Any]) -> Any:
+    def _served(self, stamp: int, tick: _Tick) -> Any:
         """Take what the input `ahead` has for the tick `stamp` under another stamp, or None.
 
-        values: of the tick; None also if another input is missing.
+        None also if another input is missing.
         """
         early = self._early
-        if early is None or any(v is None for i, v in enumerate(values) if i != self._ahead):
+        if early is None or tick.missing > 1 or tick.values[self._ahead] is not None:
             return None
         ticks = [key for key, others in self._open.items() if self._is_tick(others)]
         before = max([self._last, *(key for key in ticks if key < stamp)])
         for key in self._open.keys() - ticks:
             if early.serves(key, before, stamp):
-                return early.later(self._open.pop(key)[self._ahead], stamp - key)
+                return early.later(self._open.pop(key).values[self._ahead], stamp - key)
         return None
 
     def _close(self, stamp: int) -> int:
@@ -141,9 +153,10 @@ class StampJoin:
         closed = [key for key in self._open if key <= stamp]
         return sum(self._is_tick(self._open.pop(old)) for old in closed)
 
-    def _is_tick(self, values: list[Any]) -> bool:
+    def _is_tick(self, tick: _Tick) -> bool:
         """Return whether more than the input of `ahead` has arrived."""
-        return any(v is not None for i, v in enumerate(values) if i != self._ahead)
+        early = self._ahead is not None and tick.values[self._ahead] is not None
+        return len(tick.values) - tick.missing > early
 
     def settle(self) -> None:
         """Fire the complete ticks of the backlog."""

@@ -158,10 +158,14 @@ def complete(kind: type[ParameterSet], given: dict[str, Any]) -> bool:
     return bool(given) and all(name in given for name in empty)
 
 
-def refuse_unknown(node: Node) -> None:
-    """Raise ParameterError for a name in the parameter file that the node has not declared."""
+def refuse_unknown(node: Node, shown: str = "") -> None:
+    """Raise ParameterError for a name in the parameter file that the node has not declared.
+
+    shown: name of the node in the text, where the process has several.
+    """
+    prefix = f"{shown}: " if shown else ""
     own = ("use_sim_time", "qos_overrides.", "start_type_description_service")
     for name in node._parameter_overrides:
         if not node.has_parameter(name) and not name.startswith(own):
             known = sorted(name for name in node._parameters if not name.startswith(own))
-            raise ParameterError(f"{name}: unknown; allowed: {', '.join(known)}")
+            raise ParameterError(f"{prefix}{name}: unknown; allowed: {', '.join(known)}")

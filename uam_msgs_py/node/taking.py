@@ -2,14 +2,25 @@
 
 rclpy's `take_message` reports stamps and sequence number of a message, but not `publisher_gid`.
 This module calls the same function of librcl. The structures are those of rmw/types.h and
-rcutils/types/uint8_array.h of ROS 2 Jazzy.
+rcutils/types/uint8_array.h of ROS 2 Jazzy. `identity` is that of a publisher of this process.
 """
 
 from __future__ import annotations
 
 import ctypes
-from ctypes import POINTER, c_bool, c_int, c_int64, c_size_t, c_uint8, c_uint64, c_void_p
+from ctypes import (
+    POINTER,
+    c_bool,
+    c_char_p,
+    c_int,
+    c_int64,
+    c_size_t,
+    c_uint8,
+    c_uint64,
+    c_void_p,
+)
 
+from rclpy.publisher import Publisher
 from rclpy.subscription import Subscription
 
 TAKEN = 0  # RCL_RET_OK
@@ -43,6 +54,10 @@ class _Info(ctypes.Structure):
     ]
 
 
+class _Gid(ctypes.Structure):
+    _fields_ = [("implementation", c_char_p), ("data", c_uint8 * GID_SIZE)]
+
+
 # rclpy has loaded both libraries; this opens them again by their names
 _rcl, _rcutils = ctypes.CDLL("librcl.so"), ctypes.CDLL("librcutils.so")
 _take = _rcl.rcl_take_serialized_message
@@ -50,6 +65,20 @@ _take.argtypes = [c_void_p, POINTER(_Bytes), POINTER(_Info), c_void_p]
 _take.restype = c_int
 _rcutils.rcutils_get_default_allocator.restype = _Allocator
 _rcutils.rcutils_uint8_array_fini.argtypes = [POINTER(_Bytes)]
+_rcl.rcl_publisher_get_rmw_handle.argtypes = [c_void_p]
+_rcl.rcl_publisher_get_rmw_handle.restype = c_void_p
+_get_gid = _rcl.rmw_get_gid_for_publisher  # of the middleware, which librcl has loaded
+_get_gid.argtypes = [c_void_p, POINTER(_Gid)]
+_get_gid.restype = c_int
+
+
+def identity(publisher: Publisher) -> bytes:
+    """Return what `Taker.gid` is for the messages of a publisher; b"" if it is not known."""
+    found = _Gid()
+    handle = _rcl.rcl_publisher_get_rmw_handle(publisher.handle.pointer)
+    if _get_gid(handle, ctypes.byref(found)) != TAKEN:
+        return b""
+    return bytes(found.data)
 
 
 class Taker:

@@ -1,1 +1,1 @@
-"""ROS 2 nodes of the simulation: plant and MAVLink bridge."""
+"""ROS 2 nodes of the simulation: plant, MAVLink bridge, drivers, and the fused control process."""

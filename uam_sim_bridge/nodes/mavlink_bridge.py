@@ -40,6 +40,7 @@ from uam_msgs_py.messages.layouts import BadMessage, stamp_of
 from uam_msgs_py.messages.status import OK, WARN, MissionStatus
 from uam_msgs_py.node.base_node import UamNode, run
 from uam_msgs_py.node.joins import StampJoin
+from uam_msgs_py.node.local_delivery import LocalDelivery
 from uam_msgs_py.node.namespace import frame
 from uam_msgs_py.node.node_parameters import NodeParameters
 from uam_msgs_py.node.tick_times import DECODE, STAGE
@@ -91,8 +92,8 @@ TorqueOrBad = tuple[np.ndarray | None] | Unusable
 class MavlinkBridgeNode(UamNode):
     """Publishes /uam/setpoint, /uam/thrust, /uam/autopilot/state and /uam/autopilot/battery."""
 
-    def __init__(self) -> None:
-        super().__init__(NAME)
+    def __init__(self, delivery: LocalDelivery | None = None) -> None:
+        super().__init__(NAME, delivery)
         vehicle = self._vehicle = described_vehicle(self)
         derived = derived_parameters(vehicle)[NAME]
         mapping = NodeParameters(self, RateThrustParameters, derived=derived)

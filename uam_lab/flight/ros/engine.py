@@ -119,10 +119,11 @@ def _start(
         children.start(
             name,
             module,
-            arguments + node_arguments.remappings(settings, name),
+            arguments + node_arguments.process_remappings(settings, name),
             may_end=name == wiring.PLANT,
             optional=name in ONLOOKERS,
             again=supervise.RESTARTS if name in CONTROLLERS else 0,
+            nodes=node_arguments.nodes_in(name, settings),
         )
     module, own = node_arguments.autopilot(settings, folder, ports)
     if module:
@@ -187,7 +188,10 @@ def _process_faults(
 
     def announce(one: FaultState) -> None:
         stage = f"begins at {one.begin:.2f} s" if one.active else f"ends at {one.end:.2f} s"
-        observer.message(f"fault {one.fault.NAME} of {one.fault.values['node']} {stage}")
+        node = one.fault.values["node"]
+        process = children.process_of(node)
+        affected = node if process == node else f"{node}, hence of the process {process},"
+        observer.message(f"fault {one.fault.NAME} of {affected} {stage}")
         if not topics:
             topics.append(FaultTopic(listener.node))
         topics[0].publish(listener.stamp, [one])

@@ -35,6 +35,7 @@ MODULES = {
     wiring.SCENE: "uam_lab.nodes.scene",
     wiring.COCKPIT: "uam_lab.nodes.cockpit",
 }
+FUSED = "uam_sim_bridge.nodes.flight_controller"  # module of the nodes wiring.FUSED in one process
 STAND_IN, SITL = "uam_sim_bridge.autopilot.server", "uam_sim_bridge.px4.sitl"
 HITL_ROUTER = "uam_sim_bridge.mavlink.hil.router"
 PX4_LOG = "px4.ulg"
@@ -42,12 +43,8 @@ AUTOPILOT_WAIT = 60.0  # [s] for which the autopilot waits for the simulator
 FACTS = "facts.json"
 REQUIRED = "px4_parameters.yaml"
 TICK_TIMES = "tick_times"  # folder of logs/
-# nodes of the control tick
-FLYING = {
-    *(wiring.ESTIMATOR, wiring.MISSION, wiring.POSITION, wiring.ATTITUDE, wiring.ARM),
-    wiring.BRIDGE,
-}
-MEASURED = FLYING | {wiring.PLANT}  # nodes that can measure their ticks
+FLYING = set(wiring.FUSED)  # nodes of the control tick
+MEASURED = FLYING | {wiring.PLANT, wiring.FLIGHT_CONTROLLER}  # nodes that can measure their ticks
 # nodes that load the description of the vehicle
 DESCRIBED = {
     *FLYING,
@@ -149,12 +146,18 @@ def complete(
 
     And with those of the processes.
     """
+    if settings.fused:
+        sections[wiring.FLIGHT_CONTROLLER] = {
+            "without": ",".join(name for name in wiring.FUSED if name in settings.without)
+        }
     for node, values in settings.parameters.items():
         if node in sections:
             sections[node] |= values
     for node in DESCRIBED & sections.keys():
         sections[node]["vehicle"] = settings.vehicle.source
-    for node in FLYING & sections.keys():
+    # in the fused layout they are those of its process
+    processes = {wiring.FLIGHT_CONTROLLER} if settings.fused else FLYING
+    for node in processes & sections.keys():
         sections[node] |= settings.process.changes()
     if settings.tick_times:
         place = folder.path / "logs" / TICK_TIMES
@@ -201,8 +204,48 @@ def scenario_source(settings: FlightSettings) -> str:
 
 
 def modules(settings: FlightSettings) -> dict[str, str]:
-    """Return the nodes of a flight: executable → module."""
-    return {name: module for name, module in MODULES.items() if name not in settings.without}
+    """Return the processes of a flight: executable → module."""
+    found = {name: module for name, module in MODULES.items() if name not in settings.without}
+    return arranged(found, settings.fused)
+
+
+def arranged(modules: dict[str, str], fused: bool) -> dict[str, str]:
+    """Return the processes of the nodes `modules`; fused: the control nodes are one process."""
+    if not fused:
+        return modules
+    found: dict[str, str] = {}
+    for name, module in modules.items():
+        if name in wiring.FUSED:
+            found[wiring.FLIGHT_CONTROLLER] = FUSED
+        else:
+            found[name] = module
+    return found
+
+
+def nodes_in(process: str, settings: FlightSettings) -> tuple[str, ...]:
+    """Return the nodes of a process that `modules` names."""
+    if process != wiring.FLIGHT_CONTROLLER:
+        return (process,)
+    return tuple(name for name in wiring.FUSED if name not in settings.without)
+
+
+def fused_line(settings: FlightSettings) -> str:
+    """Return the line for the user about the fused layout."""
+    process = wiring.FLIGHT_CONTROLLER
+    return f"fused: {', '.join(nodes_in(process, settings))} in the process {process}"
+
+
+def process_remappings(settings: FlightSettings, process: str) -> list[str]:
+    """Return the ROS arguments with the remappings of a process; those of its nodes come first."""
+    if process != wiring.FLIGHT_CONTROLLER:
+        return remappings(settings, process)
+    own = [
+        word
+        for node in (process, *nodes_in(process, settings))
+        for old, new in settings.remappings.get(node, {}).items()
+        for word in ("-r", f"{node}:{old}:={new}")
+    ]
+    return own + common_remappings(settings)
 
 
 def remappings(settings: FlightSettings, node: str) -> list[str]:

@@ -2,7 +2,7 @@
 
 The mission time comes from the mission's status, twice a second, so a fault starts up to half a
 simulated second late. Its duration is wall time, because in lockstep the flight waits for a
-stopped process.
+stopped process. A fault of a node affects its process, with all nodes in it.
 """
 
 from __future__ import annotations
@@ -95,11 +95,12 @@ class ProcessFaults:
     def _begin(self, one: FaultState) -> None:
         fault = one.fault
         assert isinstance(fault, ProcessFault)
-        if not self._children.running(fault.node):
+        process = self._children.process_of(fault.node)
+        if not self._children.running(process):
             return
-        pid = program_of(fault.node, self._children.pid(fault.node))
+        pid = program_of(process, self._children.pid(process))
         if isinstance(fault, NodeKill):
-            self._children.let_end(fault.node)
+            self._children.let_end(process)
             with contextlib.suppress(ProcessLookupError):
                 os.kill(pid, signal.SIGKILL)
             return
@@ -108,7 +109,7 @@ class ProcessFaults:
             return
         stopped, cycle = (fault.stopped, fault.cycle) if isinstance(fault, NodeSlow) else (1.0, 0.0)
         self._hindering[one.number] = _Hindrance(
-            pid, partial(self._children.running, fault.node), stopped, cycle
+            pid, partial(self._children.running, process), stopped, cycle
         )
 
     def _release(self, number: int) -> None:

@@ -58,6 +58,8 @@ def run(
             start(children)
             for line in announce(children):
                 observer.message(line)
+            if settings.fused:
+                observer.message(node_arguments.fused_line(settings))
             observer.message(f"for ros2 in another shell:\n{export_line(ports.domain)}")
             namespace = settings.namespace
             with (

@@ -89,6 +89,8 @@ def facts(metrics: Mapping[str, Any], directory: Path | None) -> Table:
     table.add_column(style="dim")
     table.add_column(overflow="fold")
     table.add_row("controller", catalogue.label(metrics["controller"]))
+    if metrics.get("layout"):
+        table.add_row("layout", metrics["layout"])
     table.add_row("payload", flight_summary.payload_story(metrics))
     table.add_row("landing", flight_summary.landing_story(metrics))
     interventions = flight_summary.supervision_story(metrics)

@@ -22,6 +22,7 @@ FACTS = (
     ("profile", "profile"),
     ("scenario", "scenario"),
     ("engine", "engine"),
+    ("layout", "layout"),
     ("clock", "clock"),
     ("autopilot", "autopilot"),
     ("seed", "seed"),

@@ -1,0 +1,47 @@
+"""Whole flights in the fused layout: the same numbers, and what is promised when it is lost."""
+
+import json
+
+import numpy as np
+from whole_flight import assert_nothing_left
+
+from uam_lab.results.timeseries import read
+from uam_msgs_py.node import wiring
+
+
+def test_a_fused_flight_in_lockstep_is_that_of_separate_nodes_to_the_digit(
+    fly, shared_flights, short_scenario
+):
+    flight = fly("--fused", "--scenario", str(short_scenario), "--seed", "3")
+    status = flight.wait()
+    assert status == 0, flight.said + flight.complained
+    inside = ", ".join(wiring.FUSED)
+    assert f"fused: {inside} in the process flight_controller" in flight.said
+    one, other = (
+        read(out / "timeseries.parquet") for out in (flight.out, shared_flights.single.out)
+    )
+    assert one.columns.names == other.columns.names and one.phase_names == other.phase_names
+    np.testing.assert_array_equal(one.values, other.values)
+    np.testing.assert_array_equal(one.phases, other.phases)
+    assert one.info["layout"] == "fused: control nodes in one process"
+    assert other.info["layout"] == "separate nodes"
+    logs = {file.stem for file in (flight.out / "logs").glob("*.log")}
+    assert wiring.FLIGHT_CONTROLLER in logs and not logs & set(wiring.FUSED)
+    assert_nothing_left(flight, [])
+
+
+def test_a_kill_of_one_of_its_nodes_ends_all_of_them_and_the_autopilot_descends(fly):
+    kill = f"node_kill@hover+0.5:node={wiring.ATTITUDE}"
+    flight = fly("--fused", "--scenario", "hover", "--clock", "realtime", "--fault", kill)
+    assert flight.wait() == 1, flight.said + flight.complained
+    affected = f"{wiring.ATTITUDE}, hence of the process {wiring.FLIGHT_CONTROLLER}, begins at"
+    assert f"fault node_kill of {affected}" in flight.said
+    lost = f"{wiring.FLIGHT_CONTROLLER} was killed by SIGKILL; the flight continues without it"
+    assert lost in flight.said and "restarted" not in flight.said
+    flown = read(flight.out / "timeseries.parquet")
+    figures = json.loads((flight.out / "metrics.json").read_text())
+    assert not figures["mission_completed"]
+    height = flown["truth.z"]
+    assert height.max() > 0.5 and height[-1] < 0.1
+    assert np.abs(flown["truth.roll"]).max() < 0.5 and np.abs(flown["truth.pitch"]).max() < 0.5
+    assert_nothing_left(flight, [])

@@ -1,0 +1,126 @@
+"""Services, timers, clients and events of nodes, served between two ticks.
+
+They are checked fifty times a second, of wall time or of tick time, events once a second of wall
+time. At most one service request and one report (timer of REPORT_PERIOD or more) is served per
+check, so that many do not delay a tick.
+Clients and events are passed to a SingleThreadedExecutor. Service requests are not: that executor
+would serve waiting messages first.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Sequence
+
+from rclpy.executors import SingleThreadedExecutor
+from rclpy.node import Node
+from rclpy.service import Service
+from rclpy.timer import Timer
+
+from uam_msgs_py.node.waiting import WaitSet
+
+REST_PERIOD = 0.02  # s between two checks
+REST_STAMPS = round(REST_PERIOD * 1e9)  # ns of ticks: a simulation may run faster than wall time
+REPORT_PERIOD = 500_000_000  # ns, from which a timer's period is that of a report
+EVENT_PERIOD = 1.0  # s between two checks of events: they only report
+
+
+class OtherEntities:
+    """What nodes have besides subscriptions; create it before, as `gather` says."""
+
+    def __init__(self, nodes: Sequence[Node]) -> None:
+        self._nodes, self._context = nodes, nodes[0].context
+        self._executor = SingleThreadedExecutor(context=self._context)
+        for node in nodes:
+            self._executor.add_node(node)
+        self._next_check, self._checked_at, self._next_events = 0.0, 0, 0.0
+        self.gather()
+
+    def gather(self) -> None:
+        """Collect the nodes' entities; call it when they have changed."""
+        nodes = self._nodes
+        self._services = [s for node in nodes for s in node.services]
+        self._clients = [c.handle for node in nodes for c in node.clients]
+        self._timers = [t for node in nodes for t in node.timers]
+        self._waitables = [w for node in nodes for w in node.waitables]
+        events = sum(waitable.get_num_entities().num_events for waitable in self._waitables)
+        counts = (len(self._timers), len(self._clients), len(self._services))
+        self._others = WaitSet(0, 0, *counts, 0, self._context.handle)
+        self._events = WaitSet(0, 0, 0, 0, 0, events, self._context.handle)
+
+    def left(self, stamp: int) -> float:
+        """Return the time [s] until a check is due, 0: now; stamp [ns]: of the newest tick."""
+        if stamp - self._checked_at >= REST_STAMPS:
+            return 0.0
+        return max(0.0, self._next_check - time.monotonic())
+
+    def serve(self, stamp: int) -> tuple[float, bool]:
+        """Serve what is ready.
+
+        Returns the time [s] until the next check, and whether the nodes' entities may have changed:
+        a service may do so, for example by setting use_sim_time.
+        """
+        served = self._serve()
+        if served:
+            self.gather()
+        left = 0.0 if served else REST_PERIOD
+        self._next_check, self._checked_at = time.monotonic() + left, stamp
+        return left, served
+
+    def _serve(self) -> bool:
+        """Serve what is ready; return whether a service, client or event was."""
+        others = self._others
+        others.clear_entities()
+        for service in self._services:
+            others.add_service(service.handle)
+        for handle in self._clients:
+            others.add_client(handle)
+        for timer in self._timers:
+            others.add_timer(timer.handle)
+        others.wait(0)
+        services, timers = (set(others.get_ready_entities(kind)) for kind in ("service", "timer"))
+        handed = len(others.get_ready_entities("client")) + self._ready_events()
+        for _ in range(handed):
+            self._executor.spin_once(timeout_sec=0)
+        self._call([timer for timer in self._timers if timer.handle.pointer in timers])
+        request = next((s for s in self._services if s.handle.pointer in services), None)
+        if request is not None:
+            _answer(request)
+        return bool(handed or services)
+
+    @staticmethod
+    def _call(ready: Sequence[Timer]) -> None:
+        """Call timers; of those that report the first one only, the next check has the others."""
+        reported = False
+        for timer in ready:
+            reports = timer.timer_period_ns >= REPORT_PERIOD
+            if reports and reported:
+                continue
+            reported = reported or reports
+            timer.handle.call_timer()
+            timer.callback()
+
+    def _ready_events(self) -> int:
+        """Return the number of ready events, once per EVENT_PERIOD."""
+        now = time.monotonic()
+        if now < self._next_events or not self._waitables:
+            return 0
+        self._next_events = now + EVENT_PERIOD
+        events = self._events
+        events.clear_entities()
+        for waitable in self._waitables:
+            waitable.add_to_wait_set(events)
+        events.wait(0)
+        return sum(waitable.is_ready(events) for waitable in self._waitables)
+
+    def shutdown(self) -> None:
+        """Shut down the inner executor."""
+        self._executor.shutdown()
+
+
+def _answer(service: Service) -> None:
+    """Take one request and send the response."""
+    request, header = service.handle.service_take_request(service.srv_type.Request)
+    if header is not None:
+        response = service.callback(request, service.srv_type.Response())
+        service.send_response(response, header)
