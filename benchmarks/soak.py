@@ -44,6 +44,8 @@ def main() -> int:
     options = parser.parse_args()
     if options.minutes < 2.0:
         parser.error("--minutes is 2 or more: what grows is not to be seen earlier")
+    if options.fused and options.engine == "direct":
+        parser.error("--fused needs --engine ros: the direct engine has no nodes")
     options.out.mkdir(parents=True, exist_ok=True)
     signal.signal(signal.SIGTERM, signal.default_int_handler)  # the flight must not fly on alone
     duration = 60.0 * options.minutes

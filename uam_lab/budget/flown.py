@@ -22,15 +22,16 @@ from uam_lab.processes.process_table import nodes
 from uam_msgs_py.node import wiring
 from uam_msgs_py.node.tick_times import read_tick_times
 
-SEPARATE = "separate"
-# layout → the way of a tick from the sensors to the setpoint
-PATHS = {
+LAYOUTS = SEPARATE, FUSED = ("separate", "fused")
+# layout → the way of a tick from the sensors to the setpoint, and the nodes in its last process
+PATHS: dict[str, tuple[tuple[str, ...], tuple[str, ...]]] = {
     SEPARATE: (
-        *(wiring.PLANT, wiring.ESTIMATOR, wiring.POSITION, wiring.ATTITUDE),
-        wiring.BRIDGE,
+        (*(wiring.PLANT, wiring.ESTIMATOR, wiring.POSITION, wiring.ATTITUDE), wiring.BRIDGE),
+        (),
     ),
+    FUSED: ((wiring.PLANT, wiring.FLIGHT_CONTROLLER), wiring.FUSED),
 }
-LAYOUTS = tuple(PATHS)
+CONTROL = FLYING | {wiring.FLIGHT_CONTROLLER}  # processes of the nodes that fly
 PERCENTILES = (50.0, 99.0, 99.9)
 
 
@@ -121,9 +122,6 @@ class Budget:
         return sum(share for name, share in self.cores.items() if name in CONTROL)
 
 
-CONTROL = FLYING
-
-
 def fly(layout: str, settings: FlightSettings, observer: Observer, stop: StopRequest) -> Budget:
     """Fly with measured ticks and return the budget. Raises NoTicks, and what a flight raises.
 
@@ -142,12 +140,13 @@ def read(
     """Return the budget from the folder of a flight. Raises NoTicks."""
     logs = folder / "logs"
     measured = {file.stem: read_tick_times(file) for file in (logs / TICK_TIMES).glob("*.npz")}
+    way, inside = PATHS[layout]
     plant: dict[str, Any] = json.loads((logs / "mujoco_sim.json").read_text())
     return Budget(
         layout=layout,
         clock=clock,
         folder=folder,
-        path=tick_path(PATHS[layout], measured),
+        path=tick_path(way, measured, inside),
         work={node: work(one) for node, one in sorted(measured.items()) if len(one["stamp"])},
         latency=1e3 * np.array(plant["latency_s"]),
         missed=plant["missed_ticks"],

@@ -128,6 +128,8 @@ def _stack(axis: Axes, budgets: Sequence[Budget], share: float) -> None:
             _bar(axis, len(labels), begin, times)
             begin += times.sum()
             labels.append(node)
+    longest = max(one.path.mean(share).sum() for one in budgets)
+    axis.set_xlim(0.0, 1.12 * longest)  # with room for the sums
     axis.set_yticks(range(len(labels)), labels)
     axis.grid(visible=False, axis="y")
 

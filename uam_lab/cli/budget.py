@@ -26,7 +26,7 @@ SCENARIO = "shuttle.yaml"
 EXAMPLES = """\
 examples:
   uam budget                               ten minutes in real time, every layout
-  uam budget --minutes 1 --layout separate
+  uam budget --minutes 1 --layout fused
   uam budget --scenario pick_and_place     another flight
   uam budget --clock lockstep              what the nodes cost where nobody waits for the clock
   uam budget --fifo 50 --lock-memory       with the options of uam fly for the processes
@@ -53,7 +53,7 @@ def add(commands: argparse._SubParsersAction) -> None:
     command.option("--minutes", "MIN", "length of the flight", 10.0, type=minutes)
     text = "in place of --minutes: a name of config/scenarios or a file"
     command.option("--scenario", "NAME|FILE", text)
-    command.choice("--layout", ("all", "separate"), "all", "of the nodes")
+    command.choice("--layout", ("all", "separate", "fused"), "all", "of the nodes")
     command.choice("--clock", CLOCKS, "realtime", "as of uam fly")
     command.vehicle()
     command.seed("of all noise")
@@ -87,7 +87,7 @@ def run(options: argparse.Namespace) -> int:
     for layout in layouts:
         console.print(f"layout {layout}")
         with Progress(console, landing.at + landing.duration) as progress, Interrupts() as stop:
-            flight = replace(settings, out=out / layout)
+            flight = replace(settings, out=out / layout, fused=layout == flown.FUSED)
             try:
                 budgets.append(flown.fly(layout, flight, progress, stop))
             except FlightFailed as error:

@@ -33,7 +33,7 @@ from uam_msgs_py.node.refusals import Refusals
 from uam_msgs_py.node.rightful import PUBLISHERS, rightful_nodes
 from uam_msgs_py.node.sole_publisher import SolePublisher, complaints, publishers
 from uam_msgs_py.node.stamp_watch import StampWatch
-from uam_msgs_py.node.tick_times import tick_times
+from uam_msgs_py.node.tick_times import DECODE, PUBLISH, tick_times
 from uam_msgs_py.node.tunable import TunableNode
 
 DIAGNOSTICS_PERIOD = 1.0  # s
@@ -90,7 +90,8 @@ class UamNode(TunableNode):
             publisher = self.create_publisher(kind, name, qos, event_callbacks=silent)
             made = self._delivery.outlet(self, topic, publisher)
         self._outlets[name] = made
-        self.times.watch(made, topic)
+        # within a process `publish` gives the message to the readers, which decode it
+        self.times.watch(made, topic, PUBLISH if self._delivery is None else DECODE)
         return made
 
     def listen(

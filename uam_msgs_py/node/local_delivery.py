@@ -35,6 +35,7 @@ from uam_msgs_py.node import wiring
 from uam_msgs_py.node.rightful import PARAMETER, PUBLISHERS, Rightful, RightfulNodes, full_name
 from uam_msgs_py.node.sole_publisher import LocalPublisher, SolePublisher
 from uam_msgs_py.node.taking import identity
+from uam_msgs_py.node.tick_times import DECODE, TAKE, NoTickTimes
 
 UNREAD_DEPTH = 1  # of a subscription that is in the graph, but not read
 
@@ -91,15 +92,18 @@ class Inlet:
         """reader: the first of them; guard: of its subscription, if any."""
         self.subscription, self.guard = reader.subscription, guard
         self.callbacks = [reader.subscription.callback]
+        self.times = NoTickTimes()  # of the process
 
     def take(self) -> None:
         """Deliver all received messages now, oldest first."""
-        subscription = self.subscription
+        subscription, times = self.subscription, self.times
         kind, raw = subscription.msg_type, subscription.raw
         take = (self.guard or subscription.handle).take_message
         while (taken := take(kind, raw)) is not None:
+            times.lap(TAKE)
             for callback in self.callbacks:
                 callback(taken[0])
+            times.lap(DECODE)
 
 
 class _Reader:

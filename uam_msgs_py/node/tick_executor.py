@@ -16,7 +16,7 @@ from uam_msgs_py.node.base_node import UamNode
 from uam_msgs_py.node.local_delivery import Inlet, LocalDelivery
 from uam_msgs_py.node.other_entities import OtherEntities
 from uam_msgs_py.node.rightful import PUBLISHERS
-from uam_msgs_py.node.tick_times import TAKE
+from uam_msgs_py.node.tick_times import PUBLISH, TAKE, NoTickTimes
 from uam_msgs_py.node.waiting import WaitSet, wait_for
 
 
@@ -44,6 +44,8 @@ class TickExecutor:
         self._nodes, self._delivery, self._steps = nodes, delivery, steps
         self._done, self._at_rest = done, at_rest
         self._times, self._busy_poll = nodes[0].times, nodes[0].process.busy_poll
+        # all nodes that measure begin their ticks with the process
+        self._measuring = [node.times for node in nodes if type(node.times) is not NoTickTimes]
         self._wake_up = min(node.wake_up for node in nodes)
         for node in nodes:
             node.defer()
@@ -52,6 +54,8 @@ class TickExecutor:
         loop = {node.resolve_topic_name(name) for node in nodes for name in PUBLISHERS}
         fast = sorted(inlets.keys() & loop, key=lambda name: (name in triggers, name))
         self._fast = [inlets[name] for name in fast]
+        for inlet in self._fast:
+            inlet.times = self._times
         self._slow = [inlet for name, inlet in inlets.items() if name not in loop]
         self._triggers = [inlets[name].subscription.handle for name in fast if name in triggers]
         self._every = [inlet.subscription.handle for inlet in self._fast]
@@ -81,21 +85,23 @@ class TickExecutor:
         """Wait for a trigger, at most `timeout` [s] (None: as the nodes say), and make a pass."""
         left = self._between(self._wake_up if timeout is None else timeout)
         delivery = self._delivery
-        times = self._times
-        times.rest()
+        for times in self._measuring:
+            times.rest()
         if delivery.again:
             delivery.again = False
         else:
             stalled = any(node.stalled() for node in self._may_stall)
             inputs = self._every if stalled or not self._triggers else self._triggers
             wait_for(self._messages, inputs, left, self._busy_poll)
-        times.woken()
+        for times in self._measuring:
+            times.woken()
         begun = time.perf_counter()
         for inlet in self._fast:
             inlet.take()
-        times.lap(TAKE)
+        self._times.lap(TAKE)
         for step in self._steps:
             step()
+        self._times.lap(PUBLISH)
         self._done(begun)
 
     def _between(self, timeout: float) -> float:
