@@ -24,7 +24,7 @@ def parameters(vehicle="s500_arm", **changes):
 
 def load(reference, **changes):
     torques = np.full(reference.shape[1] - 6, np.nan)
-    moment = arm_load(parameters(**changes).load_record()[0], reference, torques)
+    moment = arm_load(parameters(**changes).load_record(), reference, torques)
     return torques, moment
 
 
@@ -90,7 +90,7 @@ def test_the_moment_is_that_of_the_forces_on_the_links():
     reference[2, 0:3], reference[2, 6] = (1.0, 2.0, 3.0), 4.0
     torques = np.zeros(1)
     record = ArmLoadParameters.from_mapping(values).load_record()
-    moment = arm_load(record[0], reference, torques)
+    moment = arm_load(record, reference, torques)
     force = matrix_from_euler(reference[0, 3:6]).T @ (1.0, 2.0, 3.0 + 9.81)
     arm = np.array([math.sin(0.7), 0.0, -math.cos(0.7)])
     swing = 4.0 * np.array([math.cos(0.7), 0.0, math.sin(0.7)])
@@ -107,7 +107,7 @@ def test_the_moment_of_two_links_in_an_accelerated_level_base():
     reference = np.zeros((3, 8))
     reference[0, 6:], reference[2, 0] = (0.3, 0.4), 3.0
     torques = np.zeros(2)
-    moment = arm_load(ArmLoadParameters.from_mapping(values).load_record()[0], reference, torques)
+    moment = arm_load(ArmLoadParameters.from_mapping(values).load_record(), reference, torques)
     elbow = np.array([math.sin(0.3), 0.0, -math.cos(0.3)])
     tip = elbow + [math.sin(0.7), 0.0, -math.cos(0.7)]
     force = np.array([3.0, 0.0, 10.0])

@@ -7,7 +7,9 @@ import sys
 import numpy as np
 import pytest
 
+from uam_control.laws.law import LawInputs
 from uam_control.maths import compiled
+from uam_control.maths.rotations import tilt
 
 PROGRAM = """
 import json, sys
@@ -46,3 +48,35 @@ def test_identity_without_numba(monkeypatch):
         return 2 * x
 
     assert compiled.jit(function) is function
+
+
+@compiled.jit
+def summed(inputs, factor, out):
+    """Write the sum of two rows of a named tuple of arrays."""
+    for i in range(len(out)):
+        out[i] = factor * (inputs.e[i] + inputs.e_dot[i])
+
+
+@pytest.mark.parametrize("length", [1, 2, 3])
+def test_a_prepared_function_is_the_function(length):
+    e, e_dot = np.random.default_rng(length).normal(size=(2, length))
+    out, same = np.zeros(length), np.zeros(length)
+    inputs = LawInputs(e, e_dot, e, e, False, False, 0.0)
+    call = compiled.prepared(summed, inputs, 1.0, out)
+    summed(inputs, 3.0, same)
+    call(inputs, 3.0, out)
+    assert np.array_equal(out, same) and np.array_equal(out, 3.0 * (e + e_dot))
+    call(inputs, 2, out)  # a whole number is a number
+    assert np.array_equal(out, 2.0 * (e + e_dot))
+
+
+def test_a_prepared_function_serves_arrays_of_any_length():
+    call = compiled.prepared(tilt, np.zeros(3))
+    assert call(np.array([0.1, 0.0, 5.0, 9.0])) == pytest.approx(0.1)
+
+
+def test_a_function_without_machine_code_is_prepared_as_it_is():
+    def function(x):
+        return 2 * x
+
+    assert compiled.prepared(function, 1.0) is function

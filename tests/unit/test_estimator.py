@@ -9,6 +9,7 @@ import pytest
 
 from uam_control.estimation import EstimatorParameters, StateEstimator
 from uam_control.estimation.estimator import assemble
+from uam_control.estimation.pose_filter import EstimatedMotion
 from uam_control.stages.estimator_stage import PoseAge
 
 LEVEL, WEIGHT, NOTHING = np.array([1.0, 0.0, 0.0, 0.0]), np.array([0.0, 0.0, 9.81]), np.zeros(3)
@@ -21,11 +22,11 @@ def gathered(period, joints=2):
     state, rates_filter = np.full((3, 6 + joints), 77.0), np.zeros((2, 3))
     filtered = np.array([10.0, 20.0, 30.0])
     angles = np.array([np.arange(1.0, joints + 1.0), np.arange(11.0, joints + 11.0)])
-    assemble(
+    motion = EstimatedMotion(
         np.array([1.0, 2.0, 3.0]), np.array([4.0, 5.0, 6.0]), np.array([HALF, 0.0, 0.0, HALF]),
-        np.array([0.5, -1.0, 2.0]), np.array([12.0, 24.0, 36.0]), angles, period, 2.0 * ONE, ONE,
-        rates_filter, filtered, state,
+        np.array([0.5, -1.0, 2.0]), np.array([12.0, 24.0, 36.0]), np.zeros(3), np.zeros(3),
     )  # fmt: skip
+    assemble(motion, angles, period, 2.0 * ONE, ONE, rates_filter, filtered, state)
     return state, rates_filter, filtered
 
 

@@ -7,7 +7,14 @@ import math
 import numpy as np
 import pytest
 
-from uam_control.estimation.pose_filter import PoseFilter, correct, nearest, predict, shift
+from uam_control.estimation.pose_filter import (
+    EstimatedMotion,
+    PoseFilter,
+    correct,
+    nearest,
+    predict,
+    shift,
+)
 
 LEVEL = np.array([1.0, 0.0, 0.0, 0.0])
 HALF = math.sqrt(0.5)
@@ -21,13 +28,14 @@ def predicted(dt, gyro, force, quaternion=LEVEL, velocity=NOTHING, biases=(NOTHI
     """Predict from position (1, 2, 3); return all that it writes."""
     position, velocity = np.array([1.0, 2.0, 3.0]), np.array(velocity)
     quaternion, rates, acceleration = np.array(quaternion), np.zeros(3), np.zeros(3)
-    pose = np.zeros(7)
-    predict(
-        dt, GRAVITY, np.array(gyro), np.array(force), position, velocity, quaternion, rates,
-        acceleration,
-        np.array(biases[0]), np.array(biases[1]), pose,
+    poses = np.zeros((3, 7))
+    motion = EstimatedMotion(
+        position, velocity, quaternion, rates, acceleration,
+        np.array(biases[0]), np.array(biases[1]),
     )  # fmt: skip
-    np.testing.assert_array_equal(pose, [*position, *quaternion])
+    predict(dt, GRAVITY, np.array(gyro), np.array(force), motion, poses, 1)
+    np.testing.assert_array_equal(poses[1], [*position, *quaternion])
+    assert not poses[[0, 2]].any()
     return position, velocity, quaternion, rates, acceleration
 
 

@@ -70,13 +70,13 @@ class ArmLoadParameters(ParameterSet):
 
 
 @jit
-def arm_load(p: np.record, reference: np.ndarray, torques: np.ndarray) -> float:
+def arm_load(record: np.ndarray, reference: np.ndarray, torques: np.ndarray) -> float:
     """Write the joint torques (n,) [N m] of the reference; return the moment about y [N m, FLU].
 
-    p: of `ArmLoadParameters.load_record`; reference: (3, 6 + n), see `coordinates`. The moment is
-    what the rotors must add because of the arm, about the first joint.
+    record: of `ArmLoadParameters.load_record`; reference: (3, 6 + n), see `coordinates`. The moment
+    is what the rotors must add because of the arm, about the first joint.
     """
-    n = len(torques)
+    p, n = record[0], len(torques)
     acceleration = reference[CHI_DDOT, X:ROLL].copy()
     acceleration[Z] += p.arm_gravity
     force = rotate_back(matrix_from_euler(reference[CHI, ROLL:ALPHA]), acceleration)

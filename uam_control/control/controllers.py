@@ -16,12 +16,12 @@ from uam_control.control.output_limits import (
     LONGEST_PREDICTION,
     ArmLimits,
     AttitudeLimits,
+    ForceCompletion,
     PositionLimits,
     TorqueLimits,
+    complete_and_limit,
     complete_effort,
-    complete_force,
     lead_attitude,
-    limit_force,
     limit_torque,
 )
 from uam_control.control.sample_hold import SampleHold
@@ -30,6 +30,7 @@ from uam_control.coordinates import ALPHA, ARM, ATTITUDE, CHI, CHI_DOT, POSITION
 from uam_control.laws import catalogue
 from uam_control.laws.errors import FEEDFORWARD, E, tracking_errors
 from uam_control.laws.law_parameters import LawParameters
+from uam_control.maths.compiled import prepared
 from uam_control.settings.parameter_set import ParameterError
 from uam_control.vehicle import POSITION_SERVO
 
@@ -50,6 +51,10 @@ class Controller:
         self.saturated = False
         self._allocate((3, ALPHA))
         self._norms = np.zeros(3)
+        rows = self._errors
+        self._tracking_errors = prepared(
+            tracking_errors, rows, rows, rows, True, True, rows, self._norms
+        )
 
     @property
     def parameters(self) -> LawParameters:
@@ -91,7 +96,7 @@ class Controller:
         """Write the errors of this tick."""
         if state.shape != self._errors.shape:
             self._allocate(state.shape)
-        tracking_errors(
+        self._tracking_errors(
             state, reference, attitude_reference, flying, self._printed, self._errors, self._norms
         )
 
@@ -119,10 +124,23 @@ class PositionController(Controller):
     def set_parameters(self, parameters: PositionLimits) -> None:
         """See `Controller.set_parameters`; also sets the corner of the attitude filter."""
         super().set_parameters(parameters)
-        self._drag = parameters.gravity_feedforward_mass * np.array(parameters.drag_feedforward)
-        self._integral_gain = np.array(parameters.integral_gain)
-        self._inertia = np.array(parameters.inertia)
-        self._attitude.cutoff = parameters.attitude_cutoff
+        p, self._attitude.cutoff = parameters, parameters.attitude_cutoff
+        mass = p.gravity_feedforward_mass
+        self._completion = ForceCompletion(
+            mass * np.array(p.drag_feedforward),
+            np.array(p.inertia, dtype=float),
+            np.array(p.integral_gain, dtype=float),
+            float(p.integral_limit),
+            float(p.gravity) if mass > 0.0 else 0.0,
+            float(mass * p.gravity),
+            float(p.thrust_min),
+            float(p.thrust_max),
+            float(p.tilt_max),
+        )
+        self._force = prepared(
+            *(complete_and_limit, self._attitude.value, self._integral, self._completion),
+            *(False, 0.0, self._integral, self._tau, self._tau),
+        )
 
     @property
     def attitude_reference(self) -> np.ndarray:
@@ -152,28 +170,15 @@ class PositionController(Controller):
             self._flying = True
             if np.any(reference[CHI_DOT, POSITION]):  # else from the ground, or at rest
                 self._attitude.begin(state, reference)
-        p = self.parameters
         self._track(state, reference, self._attitude.value, True)
-        tau = self._law_output(dt)
-        complete_force(
-            reference[CHI_DOT, POSITION],
+        self.saturated = self._force(
+            reference,
             self._own[E],
-            self._drag,
-            self._inertia,
-            self._integral_gain,
-            p.integral_limit,
-            p.gravity if p.gravity_feedforward_mass > 0.0 else 0.0,
+            self._completion,
             self.saturated,
             dt,
             self._integral,
-            tau,
-        )
-        self.saturated = limit_force(
-            tau,
-            p.gravity_feedforward_mass * p.gravity,
-            p.thrust_min,
-            p.thrust_max,
-            p.tilt_max,
+            self._law_output(dt),
             self._tau,
         )
         self._attitude.update(self._tau, reference, dt)
@@ -188,11 +193,12 @@ class TorqueController(Controller):
     def __init__(self, parameters: TorqueLimits) -> None:
         super().__init__(parameters)
         self._tau = np.zeros(len(parameters.torque_max))
+        self._limit = prepared(limit_torque, self._tau, self._tau, self._tau)
 
     def set_parameters(self, parameters: TorqueLimits) -> None:
         """See `Controller.set_parameters`."""
         super().set_parameters(parameters)
-        self._torque_max = np.array(parameters.torque_max)
+        self._torque_max = np.array(parameters.torque_max, dtype=float)
 
     def update(
         self,
@@ -214,7 +220,7 @@ class TorqueController(Controller):
             return self._tau
         self._track(state, reference, attitude_reference, flying)
         tau = self._torque(reference, dt)
-        self.saturated = limit_torque(tau, self._torque_max, self._tau)
+        self.saturated = self._limit(tau, self._torque_max, self._tau)
         return self._tau
 
     def _torque(self, reference: np.ndarray, dt: float) -> np.ndarray:
@@ -235,13 +241,17 @@ class AttitudeController(TorqueController):
         super().__init__(parameters)
         self._measured = math.nan  # [s] loop delay
         self._slow = np.zeros(3)  # [rad/s^2] part of the feedforward that the autopilot integrates
+        slow = self._slow
+        self._lead = prepared(lead_attitude, self._errors, 0.0, 0.0, slow, 0.0, slow)
         self.set_parameters(parameters)
 
     def set_parameters(self, parameters: AttitudeLimits) -> None:
         """See `Controller.set_parameters`."""
         super().set_parameters(parameters)
-        self._washout = np.array(parameters.feedforward_washout)
+        self._washout = np.array(parameters.feedforward_washout, dtype=float)
         self._arm, self._joints = parameters.load_record(), np.zeros(len(parameters.link_masses))
+        if parameters.arm_feedforward:
+            self._arm_load = prepared(arm_load, self._arm, self._errors, self._joints)
         self.measured(self._measured)
 
     def measured(self, loop_delay: float) -> None:
@@ -258,8 +268,8 @@ class AttitudeController(TorqueController):
     def _torque(self, reference: np.ndarray, dt: float) -> np.ndarray:
         p, pitch = self.parameters, 0.0
         if p.arm_feedforward:
-            pitch = arm_load(self._arm[0], reference, self._joints) / p.inertia[1]
-        lead_attitude(self._errors, self._ahead, pitch, self._washout, dt, self._slow)
+            pitch = self._arm_load(self._arm, reference, self._joints) / p.inertia[1]
+        self._lead(self._errors, self._ahead, pitch, self._washout, dt, self._slow)
         return self._law_output(dt)
 
     def _idle(self) -> None:
@@ -282,6 +292,10 @@ class ArmController(TorqueController):
         self._hold, self._time = SampleHold(parameters.goal_rate), 0.0
         self._integral = np.zeros(len(self._tau))  # [rad/s^2] integral of integral_gain e
         self._load = np.zeros(len(self._tau))  # [N m]
+        n = self._load
+        self._complete = prepared(
+            complete_effort, n, n, n, True, n, n, 0.0, True, 0.0, self._integral, n
+        )
         self.set_parameters(parameters)
         to_goals = parameters.setpoint == POSITION_SERVO
         # goals do not exist before the first tick
@@ -291,8 +305,11 @@ class ArmController(TorqueController):
         """See `Controller.set_parameters`."""
         super().set_parameters(parameters)
         self._hold.rate = parameters.goal_rate
-        self._arm, self._inertia = parameters.load_record(), np.array(parameters.inertia)
-        self._integral_gain = np.array(parameters.integral_gain)
+        self._arm = parameters.load_record()
+        if parameters.arm_feedforward:
+            self._arm_load = prepared(arm_load, self._arm, self._errors, self._load)
+        self._inertia = np.array(parameters.inertia, dtype=float)
+        self._integral_gain = np.array(parameters.integral_gain, dtype=float)
 
     def reset_adaptation(self) -> None:
         """See `Controller.reset_adaptation`; the integral is set to zero, too."""
@@ -302,8 +319,8 @@ class ArmController(TorqueController):
     def _torque(self, reference: np.ndarray, dt: float) -> np.ndarray:
         tau, p = self._law_output(dt), self.parameters
         if p.arm_feedforward:
-            arm_load(self._arm[0], reference, self._load)
-        complete_effort(
+            self._arm_load(self._arm, reference, self._load)
+        self._complete(
             self._own[FEEDFORWARD],
             self._own[E],
             self._load,

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
 from uam_control.control.arm_load import ArmLoadParameters
-from uam_control.coordinates import ALPHA, PITCH, ROLL, YAW, Z
+from uam_control.coordinates import ALPHA, CHI_DOT, PITCH, ROLL, YAW, X, Z
 from uam_control.laws.errors import E_DOT, FEEDFORWARD, E
 from uam_control.maths.compiled import jit
 from uam_control.settings.parameter_set import (
@@ -246,6 +247,52 @@ def complete_force(
     heavier = 1.0 - integral[Z] / gravity if gravity > 0.0 else 1.0
     for i in range(len(tau)):
         tau[i] = (tau[i] + drag[i] * velocity_d[i]) * heavier - inertia[i] * integral[i]
+
+
+class ForceCompletion(NamedTuple):
+    """What `complete_force` and `limit_force` need besides the tick's values; see there."""
+
+    drag: np.ndarray
+    inertia: np.ndarray
+    integral_gain: np.ndarray
+    integral_limit: float
+    integral_gravity: float
+    weight: float
+    thrust_min: float
+    thrust_max: float
+    tilt_max: float
+
+
+@jit
+def complete_and_limit(
+    reference: np.ndarray,
+    e: np.ndarray,
+    c: ForceCompletion,
+    saturated: bool,
+    dt: float,
+    integral: np.ndarray,
+    tau: np.ndarray,
+    limited: np.ndarray,
+) -> bool:
+    """Complete the law's force tau (3,), write it within its limits to limited (3,), both [N, ENU].
+
+    reference (3, 6 + n): see `coordinates`; the others: see `complete_force`. Returns whether a
+    limit acted.
+    """
+    complete_force(
+        reference[CHI_DOT, X:ROLL],
+        e,
+        c.drag,
+        c.inertia,
+        c.integral_gain,
+        c.integral_limit,
+        c.integral_gravity,
+        saturated,
+        dt,
+        integral,
+        tau,
+    )
+    return limit_force(tau, c.weight, c.thrust_min, c.thrust_max, c.tilt_max, limited)
 
 
 @jit

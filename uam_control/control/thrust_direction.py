@@ -25,7 +25,7 @@ from uam_control.coordinates import (
     Y,
     Z,
 )
-from uam_control.maths.compiled import jit
+from uam_control.maths.compiled import jit, prepared
 from uam_control.maths.rotations import body_rates, thrust_attitude
 
 ANGLE, RATE = range(2)  # columns of the filter
@@ -46,6 +46,10 @@ class AttitudeReference:
         self.value = np.zeros((3, 3))
         self._filter = np.zeros((2, 2))  # rows roll, pitch: angle, rate
         self._lead = np.zeros(2)  # of roll, pitch [rad]
+        self._step = prepared(
+            *(attitude_reference_step, self._lead, self.value, 0.0, 0.0),
+            *(self._filter, self._lead, self.value),
+        )
 
     def reset(self, yaw: float) -> None:
         """Set the desired attitude to level at `yaw` [rad], with zero rates."""
@@ -75,9 +79,7 @@ class AttitudeReference:
         tau_p: (3,) [N, ENU], z > 0; reference: (3, 6 + n), gives roll, pitch, yaw and their
         derivatives.
         """
-        attitude_reference_step(
-            tau_p, reference, self.cutoff, dt, self._filter, self._lead, self.value
-        )
+        self._step(tau_p, reference, self.cutoff, dt, self._filter, self._lead, self.value)
         return self.value
 
 

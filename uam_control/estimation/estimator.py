@@ -11,10 +11,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from uam_control.coordinates import ALPHA, ARM, CHI, CHI_DDOT, CHI_DOT, ROLL, X
+from uam_control.coordinates import ALPHA, CHI, CHI_DDOT, CHI_DOT, ROLL, X
 from uam_control.estimation.filters import derivative_step, joint_step, low_pass_step
-from uam_control.estimation.pose_filter import PoseFilter
-from uam_control.maths.compiled import jit
+from uam_control.estimation.pose_filter import EstimatedMotion, PoseFilter
+from uam_control.maths.compiled import jit, prepared
 from uam_control.maths.rotations import euler_from_quaternion, matrix_from_quaternion
 from uam_control.settings.parameter_set import ParameterSet, number
 from uam_control.vehicle import GRAVITY
@@ -76,6 +76,15 @@ class StateEstimator:
         self._joint_stamp: float | None = None
         self._started = False
         self._period = 0.0
+        two = self._joints
+        self._follow_joints = prepared(
+            *(follow_joints, two[0], two[1], 0.0, 0.0, 0.0, 0.0),
+            *(two, self._joints_filter, self._state),
+        )
+        self._assemble = prepared(
+            *(assemble, self._pose.motion, two, 0.0, 0.0, 0.0),
+            *(self._rates_filter, self._acceleration, self._state),
+        )
 
     def set_parameters(self, parameters: EstimatorParameters) -> None:
         """Use `parameters` (validated) from the next sample on."""
@@ -148,24 +157,23 @@ class StateEstimator:
             self._joints[1] = alpha_dot
             return
         dt = min(max(stamp - last, 0.0), LONGEST_STEP)
-        joint_step(alpha, alpha_dot, p.joint_bandwidth, p.joint_velocity_weight, dt, self._joints)
-        derivative_step(
-            self._joints[1],
+        self._follow_joints(
+            alpha,
+            alpha_dot,
+            p.joint_bandwidth,
+            p.joint_velocity_weight,
             p.joint_acceleration_cutoff,
             dt,
+            self._joints,
             self._joints_filter,
-            self._state[CHI_DDOT, ARM],
+            self._state,
         )
 
     def update(self) -> np.ndarray:
         """Return the state (3, 6 + n) at the newest IMU stamp; the next call reuses the array."""
-        p, pose, state = self.parameters, self._pose, self._state
-        assemble(
-            pose.position,
-            pose.velocity,
-            pose.quaternion,
-            pose.rates,
-            pose.acceleration,
+        p, state = self.parameters, self._state
+        self._assemble(
+            self._pose.motion,
             self._joints,
             self._period,
             p.angular_acceleration_cutoff,
@@ -178,12 +186,29 @@ class StateEstimator:
 
 
 @jit
+def follow_joints(
+    alpha: np.ndarray,
+    alpha_dot: np.ndarray,
+    bandwidth: float,
+    velocity_weight: float,
+    acceleration_cutoff: float,
+    dt: float,
+    joints: np.ndarray,
+    joints_filter: np.ndarray,
+    state: np.ndarray,
+) -> None:
+    """Advance the joints by dt [s] with readings alpha (n,) [rad], alpha_dot (n,) [rad/s].
+
+    bandwidth, velocity_weight, joints (2, n): see `joint_step`; acceleration_cutoff [Hz],
+    joints_filter (2, n): see `derivative_step`. Writes the accelerations into state (3, 6 + n).
+    """
+    joint_step(alpha, alpha_dot, bandwidth, velocity_weight, dt, joints)
+    derivative_step(joints[1], acceleration_cutoff, dt, joints_filter, state[CHI_DDOT, ALPHA:])
+
+
+@jit
 def assemble(
-    position: np.ndarray,
-    velocity: np.ndarray,
-    quaternion: np.ndarray,
-    rates: np.ndarray,
-    acceleration: np.ndarray,
+    motion: EstimatedMotion,
     joints: np.ndarray,
     period: float,
     angular_cutoff: float,
@@ -194,17 +219,17 @@ def assemble(
 ) -> None:
     """Filter the accelerations over `period` [s] and write the state (3, 6 + n).
 
-    position, velocity, quaternion, rates, acceleration: see `PoseFilter`; joints (2, n): angles
-    [rad] and velocities [rad/s]; cutoffs [Hz]; rates_filter (2, 3), filtered (3,): states of the
-    filters, updated.
+    joints (2, n): angles [rad] and velocities [rad/s]; cutoffs [Hz]; rates_filter (2, 3),
+    filtered (3,): states of the filters, updated.
     """
+    rates = motion.rates
     if period > 0.0:
         derivative_step(rates, angular_cutoff, period, rates_filter, state[CHI_DDOT, ROLL:ALPHA])
-        low_pass_step(acceleration, linear_cutoff, period, filtered)
-    euler = euler_from_quaternion(quaternion)
+        low_pass_step(motion.acceleration, linear_cutoff, period, filtered)
+    euler = euler_from_quaternion(motion.quaternion)
     for i in range(3):
-        state[CHI, X + i], state[CHI, ROLL + i] = position[i], euler[i]
-        state[CHI_DOT, X + i], state[CHI_DOT, ROLL + i] = velocity[i], rates[i]
+        state[CHI, X + i], state[CHI, ROLL + i] = motion.position[i], euler[i]
+        state[CHI_DOT, X + i], state[CHI_DOT, ROLL + i] = motion.velocity[i], rates[i]
         state[CHI_DDOT, X + i] = filtered[i]
     for i in range(joints.shape[1]):
         state[CHI, ALPHA + i], state[CHI_DOT, ALPHA + i] = joints[0, i], joints[1, i]

@@ -7,13 +7,14 @@ stores the predicted poses, so that a measured pose is compared with the predict
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 
 from uam_control.coordinates import Z
 from uam_control.estimation.pose_gate import PoseGate
 from uam_control.estimation.repeats import Repeats
-from uam_control.maths.compiled import jit
+from uam_control.maths.compiled import jit, prepared
 from uam_control.maths.rotations import (
     matrix_from_quaternion,
     quaternion_from_rotation_vector,
@@ -29,12 +30,25 @@ TURN = 3  # a stored pose: position before, quaternion from this index on
 CONJUGATE = np.array([1.0, -1.0, -1.0, -1.0])
 
 
+class EstimatedMotion(NamedTuple):
+    """The arrays of a `PoseFilter`; see there."""
+
+    position: np.ndarray
+    velocity: np.ndarray
+    quaternion: np.ndarray
+    rates: np.ndarray
+    acceleration: np.ndarray
+    gyro_bias: np.ndarray
+    accelerometer_bias: np.ndarray
+
+
 class PoseFilter:
     """Estimates position, velocity, attitude and the biases of gyroscope and accelerometer.
 
     position (3,) [m, world]; velocity (3,) [m/s, world]; quaternion (4,) body → world [w x y z];
     rates (3,) [rad/s, body], without bias; acceleration (3,) [m/s^2, world], without gravity and
-    bias; gyro_bias (3,) [rad/s, body]; accelerometer_bias (3,) [m/s^2, world].
+    bias; gyro_bias (3,) [rad/s, body]; accelerometer_bias (3,) [m/s^2, world]. `motion`: all of
+    them; the arrays are never replaced.
     """
 
     def __init__(
@@ -52,11 +66,22 @@ class PoseFilter:
         self.acceleration = np.zeros(3)
         self.gyro_bias = np.zeros(3)
         self.accelerometer_bias = np.zeros(3)
+        self.motion = EstimatedMotion(
+            self.position,
+            self.velocity,
+            self.quaternion,
+            self.rates,
+            self.acceleration,
+            self.gyro_bias,
+            self.accelerometer_bias,
+        )
         self._stamps = np.full(HISTORY, -1.0)
         self._poses = np.zeros((HISTORY, 7))  # position, quaternion
         self._count = 0
         self._last_correction = -1.0
         self._repeats = Repeats()
+        still = self.position
+        self._predict = prepared(predict, 0.0, 0.0, still, still, self.motion, self._poses, 0)
 
     def set_bandwidths(self, position: float, attitude: float) -> None:
         """Set the bandwidths [rad/s] of the corrections; the estimate does not change."""
@@ -77,20 +102,7 @@ class PoseFilter:
         row = self._count % HISTORY
         self._count += 1
         self._stamps[row] = stamp
-        predict(
-            dt,
-            self.gravity,
-            gyro,
-            specific_force,
-            self.position,
-            self.velocity,
-            self.quaternion,
-            self.rates,
-            self.acceleration,
-            self.gyro_bias,
-            self.accelerometer_bias,
-            self._poses[row],
-        )
+        self._predict(dt, self.gravity, gyro, specific_force, self.motion, self._poses, row)
 
     def correct(self, stamp: float, position: np.ndarray, quaternion: np.ndarray) -> None:
         """Correct with a pose exposed at `stamp` [s].
@@ -176,20 +188,16 @@ def predict(
     gravity: float,
     gyro: np.ndarray,
     specific_force: np.ndarray,
-    position: np.ndarray,
-    velocity: np.ndarray,
-    quaternion: np.ndarray,
-    rates: np.ndarray,
-    acceleration: np.ndarray,
-    gyro_bias: np.ndarray,
-    accelerometer_bias: np.ndarray,
-    pose: np.ndarray,
+    motion: EstimatedMotion,
+    poses: np.ndarray,
+    row: int,
 ) -> None:
-    """Advance the estimate in place by dt [s]; write position and quaternion into pose (7,).
+    """Advance the estimate in place by dt [s]; write position and quaternion into poses[row] (7,).
 
-    gravity [m/s^2]; gyro (3,), specific_force (3,): see `PoseFilter.predict`. position, velocity,
-    quaternion, rates, acceleration, gyro_bias, accelerometer_bias: see `PoseFilter`.
+    gravity [m/s^2]; gyro (3,), specific_force (3,): see `PoseFilter.predict`.
     """
+    position, velocity, quaternion, rates, acceleration, gyro_bias, accelerometer_bias = motion
+    pose = poses[row]
     for i in range(3):
         rates[i] = gyro[i] - gyro_bias[i]
     turned = quaternion_multiply(quaternion, quaternion_from_rotation_vector(rates * dt))

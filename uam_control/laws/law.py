@@ -9,6 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from uam_control.laws.law_parameters import LawParameters
+from uam_control.maths.compiled import prepared
 
 
 @dataclass(frozen=True)
@@ -84,6 +85,9 @@ class Law:
         self.parameters = parameters
         self.frozen = not parameters.adapt
         self._record = parameters.record()
+        own = self._tau
+        inputs = LawInputs(own, own, own, np.zeros(3), False, False, 0.0)
+        self._step = prepared(type(self).step, self._record, inputs, self.adaptation, own)
 
     def reset(self) -> None:
         """Set the adapted gains to their initial values, and filters and time to zero."""
@@ -112,5 +116,5 @@ class Law:
         The next call reuses the returned array.
         """
         inputs = LawInputs(e, e_dot, acceleration_d, norms, saturated, self.frozen, dt)
-        type(self).step(self._record, inputs, self.adaptation, self._tau)
+        self._step(self._record, inputs, self.adaptation, self._tau)
         return self._tau

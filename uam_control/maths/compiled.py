@@ -21,11 +21,30 @@ except ImportError:
 F = TypeVar("F", bound=Callable)
 
 
+def active() -> bool:
+    """Return whether functions under `jit` are compiled."""
+    return numba is not None and not numba.config.DISABLE_JIT
+
+
 def jit(function: F) -> F:
     """Return `function`, compiled on its first call; without numba, return it unchanged."""
     if numba is None:
         return function
     compiled = numba.njit(function)
-    if not numba.config.DISABLE_JIT:
+    if active():
         compiled._cache = CompileCache(function)
     return compiled
+
+
+def prepared(function: F, *arguments: object) -> F:
+    """Return the machine code of `function` for arguments like these, for a call at every tick.
+
+    numba compares the types of all arguments at each call, which takes longer than most functions
+    here. All later arguments must have the same types and memory layout: nothing checks it. The
+    examples are not used otherwise. A function that is not compiled is returned as it is.
+    """
+    if not hasattr(function, "get_overload"):
+        return function
+    signature = tuple(map(numba.typeof, arguments))
+    function.compile(signature)
+    return function.get_overload(signature)

@@ -25,10 +25,11 @@ from uam_control.coordinates import (
     Y,
     Z,
 )
+from uam_control.maths.compiled import prepared
 from uam_control.maths.rotations import wrap_angle
 from uam_control.mission.mission_parameters import MissionParameters
 from uam_control.mission.motion.braking import Braking
-from uam_control.mission.motion.flatness import write_attitude
+from uam_control.mission.motion.flatness import write_reference
 from uam_control.mission.motion.polynomials import hermite
 from uam_control.mission.motion.quintics import quintic, quintic_at
 from uam_control.mission.motion.trajectory import Trajectory, empty_motion
@@ -167,6 +168,9 @@ class Guidance:
         self._end = end
         self.configure(parameters)
         self.reference = reference
+        self._write_reference = prepared(
+            write_reference, reference, self._drag, 0.0, 0.0, 0.0, reference
+        )
         self.motion = empty_motion(reference.shape[1] - ALPHA)
         self.scenario_time = 0.0
         self._trajectory, self._stowed = trajectory, np.array(stowed, dtype=float)
@@ -185,7 +189,7 @@ class Guidance:
     def configure(self, parameters: MissionParameters) -> None:
         """Use `parameters` (validated) from the next manoeuvre on."""
         self.parameters = parameters
-        self._drag = np.array(parameters.drag)
+        self._drag = np.array(parameters.drag, dtype=float)
 
     @property
     def end(self) -> float:
@@ -230,8 +234,7 @@ class Guidance:
     def _publish(self) -> None:
         """Write the motion to the reference, with the attitude that it needs."""
         p = self.parameters
-        self.reference[:] = self.motion[: len(self.reference)]
-        write_attitude(
+        self._write_reference(
             self.motion,
             self._drag,
             p.gravity,

@@ -17,6 +17,25 @@ from uam_control.maths.compiled import jit
 
 
 @jit
+def write_reference(
+    motion: np.ndarray,
+    drag: np.ndarray,
+    gravity: float,
+    rate_max: float,
+    acceleration_max: float,
+    reference: np.ndarray,
+) -> None:
+    """Write the motion (5, 6 + n) with its attitude into reference (3, 6 + n).
+
+    The other arguments: see `write_attitude`.
+    """
+    for row in range(reference.shape[0]):
+        for i in range(reference.shape[1]):
+            reference[row, i] = motion[row, i]
+    write_attitude(motion, drag, gravity, rate_max, acceleration_max, reference)
+
+
+@jit
 def write_attitude(
     motion: np.ndarray,
     drag: np.ndarray,

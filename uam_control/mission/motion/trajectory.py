@@ -17,7 +17,7 @@ from uam_control.coordinates import (
     SNAP,
     coordinates,
 )
-from uam_control.maths.compiled import jit
+from uam_control.maths.compiled import jit, prepared
 
 
 class Trajectory(Protocol):
@@ -54,11 +54,12 @@ class Moves:
             rows.append((names.index(name), move.start, move.end, value[name], move.to))
             value[name] = move.to
         self._rows = np.array(rows, dtype=float).reshape(-1, len(ROW))
+        self._write = prepared(write_moves, 0.0, self._start, self._rows, self._rows)
 
     def write(self, time: float, motion: np.ndarray) -> None:
         """Write the motion (5, 6 + n); see `Trajectory.write`."""
         check_rows(motion)
-        write_moves(time, self._start, self._rows, motion)
+        self._write(time, self._start, self._rows, motion)
 
 
 def check_rows(motion: np.ndarray) -> None:
