@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 
 import numpy as np
 
@@ -106,10 +107,11 @@ class Servos:
         )
         self.torque = np.zeros(len(start))
 
-    def take(self, command: np.ndarray) -> None:
+    def take(self, command: Sequence[float]) -> None:
         """Use `command` (n,) from now on; entries that are NaN, no command yet, change nothing."""
-        known = np.isfinite(command)
-        self.command[known] = np.asarray(command)[known]
+        for i, value in enumerate(command):
+            if math.isfinite(value):
+                self.command[i] = value
 
     def step(self, angle: np.ndarray, velocity: np.ndarray, output: np.ndarray) -> None:
         """Write the torque (n,) [N m] at angle (n,) [rad] and velocity (n,) [rad/s] to output."""

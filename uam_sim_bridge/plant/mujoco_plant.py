@@ -3,19 +3,28 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import NamedTuple
 
 import mujoco
 import numpy as np
 
 from uam_control.coordinates import ALPHA, CHI, CHI_DDOT, CHI_DOT, ROLL, X
-from uam_control.maths.compiled import jit
+from uam_control.maths.compiled import jit, prepared
 from uam_control.maths.rotations import euler_from_quaternion, matrix_from_quaternion
 from uam_control.vehicle import VehicleError
-from uam_sim_bridge.plant.actuators import Rotors, Servos, joint_step, rotor_step
+from uam_sim_bridge.plant.actuators import Rotors, Servos
 from uam_sim_bridge.plant.effects.acting_effects import ActingEffects
-from uam_sim_bridge.plant.effects.effect import Acting, Bench
-from uam_sim_bridge.plant.magnet import magnet_constants, pull_fraction
+from uam_sim_bridge.plant.effects.effect import Bench
+from uam_sim_bridge.plant.magnet import magnet_constants
 from uam_sim_bridge.plant.payload_hinge import PayloadHinge, add_to
+from uam_sim_bridge.plant.physics import (
+    PhysicsArrays,
+    actuate,
+    average,
+    begin_period,
+    blow,
+    step_period,
+)
 from uam_sim_bridge.plant.plant import Disturbance, Plant, Samples, Truth
 from uam_sim_bridge.plant.sensors import Delay, Encoders, Imu, Mocap, Noise, generators
 from uam_sim_bridge.plant.vehicle import BASE, MAGNET, PAYLOAD, SWING, Vehicle
@@ -77,6 +86,17 @@ class MujocoPlant(Plant):
         effects = numbers["effects"]
         self._effects = ActingEffects(effects, self._bench(), seed) if effects else None
         self._rotor_factor = self.rotors.efficiency.copy()  # with the faults, without the effects
+        self._arrays = self._physics_arrays()
+        self._addresses = model._address, data._address
+        still = np.zeros(len(self.rotors.speed))
+        self._step_period = prepared(
+            step_period, self._arrays, still, True, *self._addresses, self._steps
+        )
+        state = np.empty((3, ALPHA + self.joints))
+        self._write_state = prepared(write_state, self._motion, state)
+        pose = self._payload_pose
+        self._write_grip = prepared(write_grip, pose, self._payload_top, pose)
+        self._blow = prepared(blow, self.wind, self.wind, 1.0, self.wind)
         self._undisturbed = (
             self.rotors.efficiency.copy(),
             model.dof_frictionloss[self._arm_dofs].copy(),
@@ -97,13 +117,23 @@ class MujocoPlant(Plant):
         self._in_a_row("joint", [joint(name).dofadr[0] for name in names])
         self._alpha = data.qpos[arm_q : arm_q + self.joints]
         self._alpha_dot = data.qvel[arm_v : arm_v + self.joints]
-        self._base_acceleration = data.qacc[base_v : base_v + 6]
         self._push = data.qfrc_applied[base_v : base_v + 6]
-        self._alpha_ddot = data.qacc[arm_v : arm_v + self.joints]
-        self._swing = joint(SWING).qposadr[0]
+        self._motion = Motion(
+            self._position,
+            self._quaternion,
+            self._velocity,
+            self._rates,
+            self._alpha,
+            self._alpha_dot,
+            data.qacc[base_v : base_v + 6],
+            data.qacc[arm_v : arm_v + self.joints],
+        )
+        swing = joint(SWING).qposadr[0]
+        self._swing_angle = data.qpos[swing : swing + 1]
         payload_q = joint(PAYLOAD).qposadr[0]
         self._payload_pose = data.qpos[payload_q : payload_q + 7]
         self._payload_position = self._payload_pose[0:3]
+        self._payload_quaternion = self._payload_pose[3:7]
         plate = self.model.geom("payload_plate")
         self._payload_top = float(plate.pos[2] + plate.size[2])
         sensed = self.model.sensor("specific_force").adr[0]
@@ -111,7 +141,7 @@ class MujocoPlant(Plant):
         self._thrust_control = self._controls(described.rotor_names)
         self._torque_control = self._controls(names)
         self._force_on_base = data.xfrc_applied[self.model.body(BASE).id, 0:3]
-        self._magnet_gain = self.model.actuator(MAGNET).gainprm[0]
+        self._magnet_gain = float(self.model.actuator(MAGNET).gainprm[0])
         self._magnet_control = self._controls((MAGNET,))
         self._face = data.site_xpos[self.model.site("magnet_face").id]
         # of the same instant as the face: qpos is a physics step later
@@ -120,10 +150,39 @@ class MujocoPlant(Plant):
         gap_scale = self.vehicle.numbers["magnet"]["gap_scale"]
         self._magnet_constants = magnet_constants(self.model, gap_scale)
         self._alpha[:] = arm_start
-        data.qpos[self._swing] = -sum(arm_start)
+        self._swing_angle[:] = -sum(arm_start)
         self._payload_position[0:2] += self.vehicle.numbers["variation"]["payload_offset"]
         if payload_mass <= 0.0:  # moved far away: the model stays the same
             self._payload_position[:] = (5.0, 5.0, 0.02)
+
+    def _physics_arrays(self) -> PhysicsArrays:
+        rotors, servos = self.rotors, self.servos
+        return PhysicsArrays(
+            rotor_constants=rotors.constants,
+            rotor_gains=rotors.gains,
+            efficiency=rotors.efficiency,
+            speed=rotors.speed,
+            thrust=rotors.thrust,
+            thrust_control=self._thrust_control,
+            servo_command=servos.command,
+            angles=self._alpha,
+            joint_rates=self._alpha_dot,
+            servo_constants=servos.constants,
+            servo_loop=servos.loop,
+            torque=servos.torque,
+            torque_control=self._torque_control,
+            drag=self._drag,
+            velocity=self._velocity,
+            wind=self.wind,
+            force=self._force_on_base,
+            face=self._face,
+            payload=self._payload_centre,
+            payload_axes=self._payload_axes,
+            gap_constants=self._magnet_constants,
+            magnet_control=self._magnet_control,
+            sensed_force=self._sensed_force,
+            specific_force=self._specific_force,
+        )
 
     def _bench(self) -> Bench:
         """Return the parts on which effects act."""
@@ -180,9 +239,9 @@ class MujocoPlant(Plant):
 
     def _grip_pose(self) -> tuple[np.ndarray, np.ndarray]:
         """Return position (3,) [m] of the middle of the payload's upper side, and quaternion."""
-        quaternion = self._payload_pose[3:]
-        up = matrix_from_quaternion(quaternion)[:, 2]
-        return self._payload_position + self._payload_top * up, quaternion
+        point = np.empty(3)
+        self._write_grip(self._payload_pose, self._payload_top, point)
+        return point, self._payload_quaternion
 
     def step(self, motor_commands: np.ndarray, arm_command: np.ndarray, magnet: bool) -> None:
         """See `Plant.step`."""
@@ -192,48 +251,27 @@ class MujocoPlant(Plant):
         if due is not None:
             self.servos.take(due)
         if self._gust is not None:
-            self.wind += (1.0 - self._gust_keep) * (self._wind_mean - self.wind) + self._gust()
-        surroundings(
-            self._drag,
-            self._velocity,
-            self.wind,
-            self._force_on_base,
-            magnet,
-            self._face,
-            self._payload_centre,
-            self._payload_axes,
-            self._magnet_constants,
-            self._magnet_control,
-            self._specific_force,
-        )
-        rotors, servos = self.rotors, self.servos
-        gears: tuple[Acting, ...] = ()
-        if self._effects is not None:
-            self._effects.tick()
-            np.multiply(self._rotor_factor, self._effects.bench.lift, out=rotors.efficiency)
-            gears = self._effects.gears
+            self._blow(self.wind, self._wind_mean, self._gust_keep, self._gust())
+        if self._effects is None:
+            self._step_period(self._arrays, motor_commands, magnet, *self._addresses, self._steps)
+        else:
+            self._step_with_effects(self._effects, motor_commands, magnet)
+        self.tick += 1
+
+    def _step_with_effects(
+        self, effects: ActingEffects, motor_commands: np.ndarray, magnet: bool
+    ) -> None:
+        """Advance one control period; effects act between its parts."""
+        arrays = self._arrays
+        begin_period(arrays, magnet)
+        effects.tick()
+        np.multiply(self._rotor_factor, effects.bench.lift, out=self.rotors.efficiency)
         for _ in range(self._steps):
-            actuate(
-                motor_commands,
-                rotors.constants,
-                rotors.gains,
-                rotors.efficiency,
-                rotors.speed,
-                rotors.thrust,
-                servos.command,
-                self._alpha,
-                self._alpha_dot,
-                servos.constants,
-                servos.loop,
-                servos.torque,
-                self._thrust_control,
-                self._torque_control,
-            )
-            for gear in gears:
+            actuate(arrays, motor_commands)
+            for gear in effects.gears:
                 gear.joints()
             mujoco.mj_step(self.model, self.data)
-            average(self._sensed_force, 1.0 / self._steps, self._specific_force)
-        self.tick += 1
+            average(arrays, 1.0 / self._steps)
 
     def disturb(self, disturbance: Disturbance) -> None:
         """See `Plant.disturb`."""
@@ -270,113 +308,58 @@ class MujocoPlant(Plant):
 
     def truth(self) -> Truth:
         """See `Plant.truth`."""
-        state = np.empty((3, ALPHA + self.joints))
-        write_state(
-            self._position,
-            self._quaternion,
-            self._velocity,
-            self._rates,
-            self._alpha,
-            self._alpha_dot,
-            self._base_acceleration,
-            self._alpha_ddot,
-            state,
-        )
-        payload = self._payload_pose.copy()
+        state, payload = np.empty((3, ALPHA + self.joints)), self._payload_pose.copy()
+        self._write_state(self._motion, state)
         return Truth(
-            state=state,
-            quaternion=self._quaternion.copy(),
-            payload_position=payload[:3],
-            payload_quaternion=payload[3:],
-            magnet_force=float(self._magnet_control[0] * self._magnet_gain),
-            magnet_swing=float(self.data.qpos[self._swing]),
-            rotor_speed=self.rotors.speed.copy(),
-            rotor_thrust=self.rotors.thrust.copy(),
+            state,
+            self._quaternion.copy(),
+            payload[:3],
+            payload[3:],
+            self._magnet_control.item() * self._magnet_gain,
+            self._swing_angle.item(),
+            self.rotors.speed.copy(),
+            self.rotors.thrust.copy(),
         )
 
 
-@jit
-def write_state(
-    position: np.ndarray,
-    quaternion: np.ndarray,
-    velocity: np.ndarray,
-    rates: np.ndarray,
-    alpha: np.ndarray,
-    alpha_dot: np.ndarray,
-    base_acceleration: np.ndarray,
-    alpha_ddot: np.ndarray,
-    state: np.ndarray,
-) -> None:
-    """Write chi, chi_dot, chi_ddot into state (3, 6 + n), see uam_control.coordinates.
+class Motion(NamedTuple):
+    """The motion of the vehicle, as views into MuJoCo's arrays.
 
     position, velocity (3,) [m, m/s, ENU]; quaternion (4,) [w x y z], FLU → ENU; rates (3,) [rad/s,
     FLU]; alpha, alpha_dot, alpha_ddot (n,) [rad, rad/s, rad/s^2]; base_acceleration (6,): linear
     [m/s^2, ENU] and angular [rad/s^2, FLU].
     """
-    euler = euler_from_quaternion(quaternion)
-    for i in range(3):
-        state[CHI, X + i], state[CHI, ROLL + i] = position[i], euler[i]
-        state[CHI_DOT, X + i], state[CHI_DOT, ROLL + i] = velocity[i], rates[i]
-        state[CHI_DDOT, X + i] = base_acceleration[i]
-        state[CHI_DDOT, ROLL + i] = base_acceleration[3 + i]
-    for i in range(len(alpha)):
-        state[CHI, ALPHA + i], state[CHI_DOT, ALPHA + i] = alpha[i], alpha_dot[i]
-        state[CHI_DDOT, ALPHA + i] = alpha_ddot[i]
+
+    position: np.ndarray
+    quaternion: np.ndarray
+    velocity: np.ndarray
+    rates: np.ndarray
+    alpha: np.ndarray
+    alpha_dot: np.ndarray
+    base_acceleration: np.ndarray
+    alpha_ddot: np.ndarray
 
 
 @jit
-def surroundings(
-    drag: np.ndarray,
-    velocity: np.ndarray,
-    wind: np.ndarray,
-    force: np.ndarray,
-    magnet: bool,
-    face: np.ndarray,
-    payload: np.ndarray,
-    payload_axes: np.ndarray,
-    gap_constants: np.ndarray,
-    magnet_control: np.ndarray,
-    specific_force: np.ndarray,
-) -> None:
-    """Write the loads of the next tick: drag -c (v - wind) into force (3,), pull of the magnet.
+def write_state(m: Motion, state: np.ndarray) -> None:
+    """Write chi, chi_dot, chi_ddot into state (3, 6 + n), see uam_control.coordinates."""
+    euler = euler_from_quaternion(m.quaternion)
+    for i in range(3):
+        state[CHI, X + i], state[CHI, ROLL + i] = m.position[i], euler[i]
+        state[CHI_DOT, X + i], state[CHI_DOT, ROLL + i] = m.velocity[i], m.rates[i]
+        state[CHI_DDOT, X + i] = m.base_acceleration[i]
+        state[CHI_DDOT, ROLL + i] = m.base_acceleration[3 + i]
+    for i in range(len(m.alpha)):
+        state[CHI, ALPHA + i], state[CHI_DOT, ALPHA + i] = m.alpha[i], m.alpha_dot[i]
+        state[CHI_DDOT, ALPHA + i] = m.alpha_ddot[i]
 
-    drag (3,) [N s/m], velocity, wind (3,) [m/s], force (3,) [N], all ENU; face, payload,
-    payload_axes, gap_constants: see `pull_fraction`; magnet_control (1,): 0..1. Sets specific_force
-    (3,) to 0 for the mean over the physics steps of the tick.
+
+@jit
+def write_grip(pose: np.ndarray, height: float, point: np.ndarray) -> None:
+    """Write the point (3,) [m, world] at `height` [m] on the vertical axis of a body.
+
+    pose (7,): position [m] and quaternion [w x y z] of the body.
     """
+    matrix = matrix_from_quaternion(pose[3:])
     for i in range(3):
-        force[i] = drag[i] * (wind[i] - velocity[i])
-        specific_force[i] = 0.0
-    magnet_control[0] = pull_fraction(face, payload, payload_axes, gap_constants) if magnet else 0.0
-
-
-@jit
-def actuate(
-    commands: np.ndarray,
-    rotor_constants: np.ndarray,
-    rotor_gains: np.ndarray,
-    efficiency: np.ndarray,
-    speed: np.ndarray,
-    thrust: np.ndarray,
-    command: np.ndarray,
-    angles: np.ndarray,
-    joint_rates: np.ndarray,
-    servo_constants: np.ndarray,
-    loop: np.ndarray,
-    torque: np.ndarray,
-    thrust_control: np.ndarray,
-    torque_control: np.ndarray,
-) -> None:
-    """Write thrusts (rotors,) [N] and joint torques (n,) [N m] of the next physics step.
-
-    The arguments are those of `rotor_step` and `joint_step`.
-    """
-    rotor_step(commands, rotor_constants, rotor_gains, efficiency, speed, thrust, thrust_control)
-    joint_step(command, angles, joint_rates, servo_constants, loop, torque, torque_control)
-
-
-@jit
-def average(sample: np.ndarray, weight: float, mean: np.ndarray) -> None:
-    """Add weight * sample (3,) to mean (3,); both in the same unit and frame."""
-    for i in range(3):
-        mean[i] += weight * sample[i]
+        point[i] = pose[i] + height * matrix[i, 2]

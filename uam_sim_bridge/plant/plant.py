@@ -13,6 +13,7 @@ the simulator calls
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -23,6 +24,8 @@ from uam_sim_bridge.plant.vehicle import Vehicle
 @dataclass
 class Samples:
     """Sensor samples that arrive at one tick; each is None or a tuple with its stamp [s] first.
+
+    The arrays are contiguous, of float64.
 
     imu: (stamp, gyro (3,) [rad/s], specific force (3,) [m/s^2]), FLU, of the companion computer.
     joints: (stamp, alpha (n,) [rad], alpha_dot (n,) [rad/s], torque (n,) [N m]). mocap: (stamp,
@@ -37,6 +40,16 @@ class Samples:
     hil: tuple
     imu_copies: int = 1
     payload: tuple | None = None
+
+
+def check_arrays(arrays: Sequence[np.ndarray]) -> None:
+    """Raise TypeError unless these are contiguous arrays of float64; compiled code is for those."""
+    for array in arrays:
+        good = isinstance(array, np.ndarray) and array.dtype == np.float64
+        if not (good and array.flags.c_contiguous):
+            raise TypeError(
+                f"a plant's sample: a contiguous array of float64 expected, not {array!r}"
+            )
 
 
 @dataclass

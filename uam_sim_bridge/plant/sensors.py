@@ -6,7 +6,7 @@ from collections import deque
 
 import numpy as np
 
-from uam_control.maths.compiled import jit
+from uam_control.maths.compiled import jit, prepared
 from uam_control.maths.rotations import quaternion_from_rotation_vector, quaternion_multiply
 
 BLOCK = 2048  # noise samples drawn per call of the generator; the sequence is the same for any
@@ -62,6 +62,8 @@ class Imu:
         biases = [numbers["gyro_bias"]] * 3 + [numbers["accelerometer_bias"]] * 3
         self.bias = scale * generator.standard_normal(6) * np.array(biases)
         self._noise = Noise(generator, scale * np.array([gyro] * 3 + [accelerometer] * 3))
+        three = np.empty(3)
+        self._disturbed = prepared(disturbed, three, three, self.bias, self.bias, three, three)
 
     def sample(
         self, rates: np.ndarray, specific_force: np.ndarray
@@ -70,7 +72,9 @@ class Imu:
 
         rates (3,) [rad/s], specific_force (3,) [m/s^2]: true values, FLU.
         """
-        return disturbed(rates, specific_force, self._noise(), self.bias)
+        gyro, accelerometer = np.empty(3), np.empty(3)
+        self._disturbed(rates, specific_force, self._noise(), self.bias, gyro, accelerometer)
+        return gyro, accelerometer
 
 
 class Mocap:
@@ -82,6 +86,8 @@ class Mocap:
         self._next = 0.0
         deviations = [numbers["position_noise"]] * 3 + [numbers["attitude_noise"]] * 3
         self._noise = Noise(generator, scale * np.array(deviations))
+        any_length = np.empty(3)
+        self._noisy = prepared(noisy_pose, *(any_length,) * 5)
 
     def due(self, time: float) -> bool:
         """Return whether mocap takes a pose at `time` [s]; call it once per tick."""
@@ -94,9 +100,9 @@ class Mocap:
 
     def sample(self, position: np.ndarray, quaternion: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Return position (3,) [m, ENU] and quaternion (4,) [w x y z], FLU → ENU, with noise."""
-        noise = self._noise()
-        turn = quaternion_from_rotation_vector(noise[3:])
-        return position + noise[:3], quaternion_multiply(quaternion, turn)
+        place, attitude = np.empty(3), np.empty(4)
+        self._noisy(position, quaternion, self._noise(), place, attitude)
+        return place, attitude
 
 
 class Encoders:
@@ -105,32 +111,64 @@ class Encoders:
     def __init__(self, numbers: dict) -> None:
         """numbers: `sensors.joints` of the vehicle."""
         self._count = 2.0 * np.pi / numbers["counts_per_turn"]
-        self._velocity = numbers["velocity_unit"]
+        self._velocity = float(numbers["velocity_unit"])
+        values = np.empty(1)
+        self._quantised = prepared(quantised, values, 1.0, values, 1.0, values, values)
 
     def sample(self, angle: np.ndarray, velocity: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Return alpha (n,) [rad] and alpha_dot (n,) [rad/s] in whole counts."""
-        return quantised(angle, self._count, velocity, self._velocity)
+        angles, velocities = np.empty(len(angle)), np.empty(len(angle))
+        self._quantised(angle, self._count, velocity, self._velocity, angles, velocities)
+        return angles, velocities
 
 
 @jit
 def disturbed(
-    rates: np.ndarray, specific_force: np.ndarray, noise: np.ndarray, bias: np.ndarray
-) -> tuple[np.ndarray, np.ndarray]:
-    """Return rates (3,) [rad/s] and specific force (3,) [m/s^2], FLU, plus noise and bias (6,)."""
-    gyro, accelerometer = np.empty(3), np.empty(3)
+    rates: np.ndarray,
+    specific_force: np.ndarray,
+    noise: np.ndarray,
+    bias: np.ndarray,
+    gyro: np.ndarray,
+    accelerometer: np.ndarray,
+) -> None:
+    """Write rates (3,) [rad/s] and specific force (3,) [m/s^2], FLU, plus noise and bias (6,).
+
+    They are written to gyro (3,) and accelerometer (3,).
+    """
     for i in range(3):
         gyro[i] = rates[i] + noise[i] + bias[i]
         accelerometer[i] = specific_force[i] + noise[3 + i] + bias[3 + i]
-    return gyro, accelerometer
+
+
+@jit
+def noisy_pose(
+    position: np.ndarray,
+    quaternion: np.ndarray,
+    noise: np.ndarray,
+    place: np.ndarray,
+    attitude: np.ndarray,
+) -> None:
+    """Write position (3,) [m] and quaternion (4,) [w x y z] with noise to place and attitude.
+
+    noise (6,): added to the position [m], and a rotation vector in the body [rad].
+    """
+    for i in range(3):
+        place[i] = position[i] + noise[i]
+    turn = quaternion_from_rotation_vector(noise[3:])
+    attitude[:] = quaternion_multiply(quaternion, turn)
 
 
 @jit
 def quantised(
-    angle: np.ndarray, count: float, velocity: np.ndarray, unit: float
-) -> tuple[np.ndarray, np.ndarray]:
-    """Return angle (n,) in whole counts, both [rad], and velocity (n,) in whole units [rad/s]."""
-    angles, velocities = np.empty(len(angle)), np.empty(len(angle))
+    angle: np.ndarray,
+    count: float,
+    velocity: np.ndarray,
+    unit: float,
+    angles: np.ndarray,
+    velocities: np.ndarray,
+) -> None:
+    """Write angle (n,) [rad] in whole counts to angles (n,), velocity (n,) [rad/s] in whole units
+    to velocities (n,); count [rad], unit [rad/s]."""
     for i in range(len(angle)):
         angles[i] = count * np.round(angle[i] / count)
         velocities[i] = unit * np.round(velocity[i] / unit)
-    return angles, velocities

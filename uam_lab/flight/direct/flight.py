@@ -10,12 +10,13 @@ from collections import deque
 from collections.abc import Callable
 from typing import Any
 
+from uam_control.maths.compiled import prepared
 from uam_control.mission import Mission, Scenario
 from uam_control.mission.time_limit import DISARMED, Settled, time_limit
 from uam_control.profiles.profile import Profile, servo_mode
 from uam_control.stages.timing import Timing
 from uam_control.stamps import SECOND, nanoseconds
-from uam_lab.flight.direct.record import Places, Snapshot, record, record_blind, record_switches
+from uam_lab.flight.direct.record import Places, RowLayout, Snapshot, record, record_blind
 from uam_lab.results.timeseries import SUBSYSTEMS, FlightTable, columns_of, gain_columns
 from uam_sim_bridge.autopilot.core import Autopilot
 from uam_sim_bridge.autopilot.joined import JoinedAutopilot
@@ -28,6 +29,7 @@ from uam_sim_bridge.mavlink.offboard.setpoint_source import sent
 from uam_sim_bridge.plant import Samples, Vehicle
 from uam_sim_bridge.plant.effects.network_delay import SetpointDelay
 from uam_sim_bridge.plant.engines import DEFAULT_PLANT
+from uam_sim_bridge.plant.plant import check_arrays
 from uam_sim_bridge.stages.bridge_stage import BridgeSets, BridgeStage
 from uam_sim_bridge.stages.control_tick import ControlTick, Imu, Joints, Pose, Signals
 
@@ -81,11 +83,12 @@ class DirectFlight:
         self._truths: deque[Snapshot] = deque()  # of ticks whose IMU sample has not arrived yet
         self._complete = False  # every kind of sensor has delivered
         laws, columns = self.control.laws, columns_of(described)
-        self._places = Places.of(columns)
-        self._gains = tuple(laws[name].controller.adaptation for name in SUBSYSTEMS)
-        self._gain_columns = tuple(
-            gain_columns(name, laws[name].controller.names, columns) for name in SUBSYSTEMS
+        self._layout = RowLayout(
+            Places.of(columns),
+            tuple(laws[name].controller.adaptation for name in SUBSYSTEMS),
+            tuple(gain_columns(name, laws[name].controller.names, columns) for name in SUBSYSTEMS),
         )
+        self._write: Callable | None = None  # `record` for the types of the first row
         length = scenario.landing.at + scenario.landing.duration + 12.0
         self.recording = FlightTable(int(length / self.plant.period), columns)
 
@@ -150,9 +153,12 @@ class DirectFlight:
         """
         mocap, joints, payload = samples.mocap, samples.joints, samples.payload
         imu = self.autopilot.imu() if self._autopilot_imu else samples.imu
-        self._complete = self._complete or None not in (mocap, joints, imu)
         if not self._complete:
-            return None, None, None, None
+            self._complete = None not in (mocap, joints, imu)
+            for sample in filter(None, (mocap, joints, imu, samples.hil)):
+                check_arrays(sample[1:])
+            if not self._complete:
+                return None, None, None, None
         return (
             mocap and (nanoseconds(mocap[0]), *mocap[1:]),
             joints and (nanoseconds(joints[0]), *joints[1:]),
@@ -169,7 +175,7 @@ class DirectFlight:
         truth = shot.truth
         row = self.recording.next_row(signals.phase)
         rates, thrust = sent(signals.setpoint)
-        record(
+        arguments = (
             row,
             signals.time,
             truth.state,
@@ -181,15 +187,17 @@ class DirectFlight:
             signals.tau_alpha,
             rates,
             thrust,
-            self._gains,
-            self._gain_columns,
+            signals.thrust_factor,
             shot.motors,
             truth.rotor_thrust,
             truth.payload_position,
             truth.payload_quaternion,
-            self._places,
+            (float(shot.magnet), truth.magnet_force, truth.magnet_swing),
+            self._layout,
         )
-        record_switches(row, shot, signals.thrust_factor, self._places)
+        if self._write is None:
+            self._write = prepared(record, *arguments)
+        self._write(*arguments)
         self._lag = len(self._truths)
 
     def _record_blind(self) -> None:
@@ -200,7 +208,7 @@ class DirectFlight:
             row = self.recording.next_row(self.mission.output.phase)
             row[:] = self.recording.values[last]
             row[0] += self.plant.period
-            record_blind(row, shot, self._places)
+            record_blind(row, shot, self._layout.at)
 
     def _update_faults(self, control: ControlTick) -> bool:
         """Stage of a flight with faults: give plant and link the mission time and the phase."""

@@ -56,6 +56,15 @@ class Snapshot:
     magnet: bool
 
 
+class RowLayout(NamedTuple):
+    """Where a tick's values go: places, and three arrays each of the published gains and of their
+    columns."""
+
+    at: Places
+    gains: tuple[np.ndarray, ...]
+    gain_columns: tuple[np.ndarray, ...]
+
+
 @jit
 def record(
     row: np.ndarray,
@@ -69,19 +78,20 @@ def record(
     tau_alpha: np.ndarray,
     rates: np.ndarray,
     command: float,
-    gains: tuple[np.ndarray, ...],
-    gain_columns: tuple[np.ndarray, ...],
+    factor: float,
     motors: np.ndarray,
     thrust: np.ndarray,
     payload_position: np.ndarray,
     payload_quaternion: np.ndarray,
-    at: Places,
+    magnet: tuple[float, float, float],
+    layout: RowLayout,
 ) -> None:
     """Copy one tick into its row of the recording.
 
-    The reference of roll and pitch is the desired attitude of tau_p.
-    gains, gain_columns: three arrays each, the published gains and where they go.
+    The reference of roll and pitch is the desired attitude of tau_p. magnet: on, force [N], swing
+    [rad].
     """
+    at, gains, gain_columns = layout
     row[0] = time
     size = truth.shape[1]
     for i in range(3):
@@ -108,13 +118,9 @@ def record(
         columns, values = gain_columns[subsystem], gains[subsystem]
         for i in range(len(columns)):
             row[columns[i]] = values[i]
-
-
-def record_switches(row: np.ndarray, shot: Snapshot, factor: float, at: Places) -> None:
-    """Write the rest of a tick: the magnet's command, force and swing; the thrust factor."""
-    truth = shot.truth
-    row[at.magnet : at.magnet + 3] = shot.magnet, truth.magnet_force, truth.magnet_swing
     row[at.factor] = factor
+    for i in range(3):
+        row[at.magnet + i] = magnet[i]
 
 
 def record_blind(row: np.ndarray, shot: Snapshot, at: Places) -> None:

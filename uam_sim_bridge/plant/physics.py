@@ -1,0 +1,115 @@
+"""The physics of one control period: rotors, servos, drag and magnet around MuJoCo's steps."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from uam_control.maths.compiled import jit
+from uam_sim_bridge.plant.actuators import joint_step, rotor_step
+from uam_sim_bridge.plant.engine_step import mj_step
+from uam_sim_bridge.plant.magnet import pull_fraction
+
+
+class PhysicsArrays(NamedTuple):
+    """What the physics reads and writes, as arrays that never move; most are MuJoCo's.
+
+    rotor_constants to thrust_control: see `rotor_step`; servo_command to torque_control: see
+    `joint_step`. drag (3,) [N s/m]; velocity, wind (3,) [m/s], force (3,) [N] on the base, ENU.
+    face, payload, payload_axes, gap_constants: see `pull_fraction`; magnet_control (1,): 0..1.
+    sensed_force (3,) [m/s^2, FLU]: specific force of a physics step, specific_force: the mean.
+    """
+
+    rotor_constants: np.ndarray
+    rotor_gains: np.ndarray
+    efficiency: np.ndarray
+    speed: np.ndarray
+    thrust: np.ndarray
+    thrust_control: np.ndarray
+    servo_command: np.ndarray
+    angles: np.ndarray
+    joint_rates: np.ndarray
+    servo_constants: np.ndarray
+    servo_loop: np.ndarray
+    torque: np.ndarray
+    torque_control: np.ndarray
+    drag: np.ndarray
+    velocity: np.ndarray
+    wind: np.ndarray
+    force: np.ndarray
+    face: np.ndarray
+    payload: np.ndarray
+    payload_axes: np.ndarray
+    gap_constants: np.ndarray
+    magnet_control: np.ndarray
+    sensed_force: np.ndarray
+    specific_force: np.ndarray
+
+
+@jit
+def begin_period(a: PhysicsArrays, magnet: bool) -> None:
+    """Write the loads of the next control period: drag -c (v - wind), pull of the magnet.
+
+    Sets the specific force to 0, for the mean over the physics steps.
+    """
+    for i in range(3):
+        a.force[i] = a.drag[i] * (a.wind[i] - a.velocity[i])
+        a.specific_force[i] = 0.0
+    pull = pull_fraction(a.face, a.payload, a.payload_axes, a.gap_constants) if magnet else 0.0
+    a.magnet_control[0] = pull
+
+
+@jit
+def actuate(a: PhysicsArrays, commands: np.ndarray) -> None:
+    """Write thrusts and joint torques of the next physics step; commands (rotors,): 0..1."""
+    rotor_step(
+        commands,
+        a.rotor_constants,
+        a.rotor_gains,
+        a.efficiency,
+        a.speed,
+        a.thrust,
+        a.thrust_control,
+    )
+    joint_step(
+        a.servo_command,
+        a.angles,
+        a.joint_rates,
+        a.servo_constants,
+        a.servo_loop,
+        a.torque,
+        a.torque_control,
+    )
+
+
+@jit
+def average(a: PhysicsArrays, weight: float) -> None:
+    """Add `weight` times the specific force of a physics step to its mean."""
+    for i in range(3):
+        a.specific_force[i] += weight * a.sensed_force[i]
+
+
+@jit
+def step_period(
+    a: PhysicsArrays, commands: np.ndarray, magnet: bool, model: int, data: int, steps: int
+) -> None:
+    """Advance one control period of `steps` physics steps.
+
+    commands (rotors,): 0..1; model, data: addresses of MuJoCo's structures, to which `a` belongs.
+    """
+    begin_period(a, magnet)
+    for _ in range(steps):
+        actuate(a, commands)
+        mj_step(model, data)
+        average(a, 1.0 / steps)
+
+
+@jit
+def blow(wind: np.ndarray, mean: np.ndarray, keep: float, gust: np.ndarray) -> None:
+    """Advance wind (3,) by a control period: it returns to `mean` by 1 - keep; gust (3,) is added.
+
+    All in [m/s, ENU].
+    """
+    for i in range(3):
+        wind[i] += (1.0 - keep) * (mean[i] - wind[i]) + gust[i]
