@@ -22,7 +22,15 @@ from uam_control.supervision import (
     State,
     Supervisor,
 )
-from uam_control.supervision.checks import CHECKS, LATE, LATE_LOOP, Checks, measure, read
+from uam_control.supervision.checks import (
+    CHECKS,
+    LATE,
+    LATE_LOOP,
+    Checks,
+    measure,
+    read,
+    readings_of,
+)
 from uam_control.supervision.monitor import Level, Monitor
 from uam_control.supervision.states import TARGETS, TRANSITIONS
 
@@ -75,7 +83,8 @@ def test_every_check_has_a_value():
     values, seen, two, three = np.full(len(CHECKS), np.nan), observation(), np.ones(2), np.ones(3)
     measure(seen.state, seen.reference, three, 0.0, 0.0, np.zeros((2, 3)), two, values)
     assert np.isnan(values).sum() == 14
-    read(Readings(), two, three, values)
+    nothing = Readings()
+    read(readings_of(nothing), nothing.joint_effort, nothing.gains, two, three, values)
     assert np.flatnonzero(np.isnan(values)).tolist() == [LATE, LATE_LOOP]  # by `Checks.update`
     checks = Checks(S500)
     assert checks.update(0.0, seen, True) is None

@@ -9,7 +9,15 @@ import numpy as np
 import pytest
 
 from uam_control.supervision import Observation, Readings, SupervisionParameters
-from uam_control.supervision.checks import CHECKS, LATE, LATE_LOOP, Checks, measure, read
+from uam_control.supervision.checks import (
+    CHECKS,
+    LATE,
+    LATE_LOOP,
+    Checks,
+    measure,
+    read,
+    readings_of,
+)
 from uam_control.supervision.monitor import Level
 
 A, B = math.atan2(0.6, 0.8), math.atan2(0.8, 0.6)  # of the 3-4-5 triangle
@@ -91,7 +99,8 @@ def test_readings_have_their_places():
         contradiction=19.0, slower=20.0,
         joint_effort=np.array([1.0, -6.0, 2.0]), gains=np.array([3.0, math.nan, 1.0]),
     )  # fmt: skip
-    read(readings, np.array([2.0, 4.0, 8.0]), np.array([2.0, 1.0, 0.25]), values)
+    limits = np.array([2.0, 4.0, 8.0]), np.array([2.0, 1.0, 0.25])
+    read(readings_of(readings), readings.joint_effort, readings.gains, *limits, values)
     np.testing.assert_array_equal(values[:8], 77.0)
     # effort: 6/4; gains: 1/.25, the unknown one left out
     np.testing.assert_array_equal(
@@ -102,7 +111,11 @@ def test_readings_have_their_places():
 def test_what_is_unknown_is_below_every_limit():
     values = np.zeros(len(CHECKS))
     values[[LATE, LATE_LOOP]] = -math.inf  # by `Checks.update`
-    read(Readings(), np.ones(2), np.ones(3), values)
+    nothing = Readings()
+    read(
+        *(readings_of(nothing), nothing.joint_effort, nothing.gains),
+        *(np.ones(2), np.ones(3), values),
+    )
     np.testing.assert_array_equal(values[8:], -math.inf)
 
 

@@ -13,10 +13,10 @@ from typing import NamedTuple
 import numpy as np
 
 from uam_control.coordinates import ALPHA, CHI, CHI_DOT, ROLL, X, Z
-from uam_control.maths.compiled import jit
+from uam_control.maths.compiled import jit, prepared
 from uam_control.maths.rotations import tilt
 from uam_control.supervision.monitor import Level, Monitor
-from uam_control.supervision.observation import Observation, Readings
+from uam_control.supervision.observation import Observation
 from uam_control.supervision.setpoint_delay import by_link, by_loop, larger
 from uam_control.supervision.supervision_parameters import SupervisionParameters
 
@@ -100,12 +100,25 @@ CHECKS = (
     Check("simulation", "the {name} runs {value:.0%} slower than the wall clock, {limit:.0%} "
           "allowed; the autopilot has its own clock", "slower_hold", reading="slower"),
 )  # fmt: skip
-LATE, LATE_LOOP = (
-    [check.name for check in CHECKS].index(it) for it in (SETPOINT_DELAY, LOOP_DELAY)
+LATE, LATE_LOOP, EFFORT, GAIN = (
+    [check.name for check in CHECKS].index(it)
+    for it in (SETPOINT_DELAY, LOOP_DELAY, "joint torque", "adapted gain")
 )
-_ROWS = [i for i, check in enumerate(CHECKS) if check.reading]
-_SIGNS = np.array([CHECKS[i].sign for i in _ROWS])
-_readings = attrgetter(*(CHECKS[i].reading for i in _ROWS))
+_ROWS = tuple(i for i, check in enumerate(CHECKS) if check.reading)
+_SIGNS = tuple(CHECKS[i].sign for i in _ROWS)
+readings_of = attrgetter(*(CHECKS[i].reading for i in _ROWS))
+
+
+class _Bounds(NamedTuple):
+    """Limits as arrays. calm: below these values no monitor changes, unless a limit was exceeded
+    before; box (2, 3): low and high corner [m]; joints, efforts (n,): of angles [rad] and torques
+    [N m]; gains (3,): of position, attitude, arm."""
+
+    calm: np.ndarray
+    box: np.ndarray
+    joints: np.ndarray
+    efforts: np.ndarray
+    gains: np.ndarray
 
 
 class ExceededLimit(NamedTuple):
@@ -130,6 +143,11 @@ class Checks:
         self.finding: ExceededLimit | None = None
         self.setpoint_delay = math.nan
         self.configure(parameters)
+        rows, three, readings = np.zeros((3, ALPHA)), np.zeros(3), (0.0,) * len(_ROWS)
+        self._measure = prepared(
+            *(measure_all, rows, rows, three, 0.0, 0.0, readings, three, three, 0.0, 0.0),
+            *(self._bounds, self._values),
+        )
 
     def configure(self, parameters: SupervisionParameters) -> None:
         """Use `parameters` (validated) from the next tick on."""
@@ -142,39 +160,43 @@ class Checks:
             (p.hold_after, getattr(p, check.land_after), getattr(p, check.failsafe_after))
             for check in CHECKS
         )
-        # below these values no monitor changes, unless a limit was exceeded before
         first = [min(limits) for limits in self._limits]
-        self._calm = np.array([limit - p.hysteresis * abs(limit) for limit in first])
-        self._box = np.array([p.geofence_low, p.geofence_high])
-        self._joints = np.array(p.joint_angle_hold)
-        self._efforts, self._gains = np.array(p.joint_effort_hold), np.array(p.gain_hold)
+        self._bounds = _Bounds(
+            np.array([limit - p.hysteresis * abs(limit) for limit in first]),
+            np.array([p.geofence_low, p.geofence_high], dtype=float),
+            np.array(p.joint_angle_hold, dtype=float),
+            np.array(p.joint_effort_hold, dtype=float),
+            np.array(p.gain_hold, dtype=float),
+        )
 
     def update(self, stamp: float, seen: Observation, in_flight: bool) -> ExceededLimit | None:
         """Check the tick at `stamp` [s]; return the worst exceeded limit, None without one.
 
         in_flight: whether the vehicle follows the reference.
         """
-        readings, values = seen.readings, self._values
-        measure(
+        readings, p = seen.readings, self._parameters
+        link = by_link(readings, p, in_flight)
+        loop = by_loop(readings, p) if in_flight else math.nan
+        self.setpoint_delay = larger(link, loop)
+        calm = self._measure(
             seen.state,
             seen.reference,
             readings.mocap_position,
             readings.mocap_age,
             seen.ground,
-            self._box,
-            self._joints,
-            values,
+            readings_of(readings),
+            readings.joint_effort,
+            readings.gains,
+            link,
+            loop,
+            self._bounds,
+            self._values,
         )
-        read(readings, self._efforts, self._gains, values)
-        link = by_link(readings, self._parameters, in_flight)
-        loop = by_loop(readings, self._parameters) if in_flight else math.nan
-        values[LATE], values[LATE_LOOP] = _known(link), _known(loop)
-        self.setpoint_delay = larger(link, loop)
-        if self.quiet and _below(values, self._calm):
+        if calm and self.quiet:
             return None
-        p, worst = self._parameters, None
+        worst = None
         for check, monitor, value, limits, after in zip(
-            CHECKS, self._monitors, values.tolist(), self._limits, self._after, strict=True
+            CHECKS, self._monitors, self._values.tolist(), self._limits, self._after, strict=True
         ):
             if check.in_flight and not in_flight:
                 value = -math.inf
@@ -196,11 +218,6 @@ class Checks:
                 yield check, value, min(limits)
 
 
-def _known(value: float) -> float:
-    """Return the value; -inf, which passes every check, for an unknown one."""
-    return -math.inf if math.isnan(value) else value
-
-
 def _limit(parameters: SupervisionParameters, check: Check, limit: str | float) -> float:
     if isinstance(limit, str):
         return check.sign * getattr(parameters, limit)
@@ -209,6 +226,32 @@ def _limit(parameters: SupervisionParameters, check: Check, limit: str | float) 
 
 def _cause(check: Check, value: float, limit: float) -> str:
     return check.form.format(name=check.name, value=check.sign * value, limit=check.sign * limit)
+
+
+@jit
+def measure_all(
+    state: np.ndarray,
+    reference: np.ndarray,
+    mocap: np.ndarray,
+    mocap_age: float,
+    ground: float,
+    readings: tuple[float, ...],
+    efforts: np.ndarray,
+    gains: np.ndarray,
+    link: float,
+    loop: float,
+    bounds: _Bounds,
+    values: np.ndarray,
+) -> bool:
+    """Write all quantities into values, in the order of CHECKS; return whether all are calm.
+
+    state to ground: see `measure`; readings to gains: see `read`; link, loop: setpoint delays [s],
+    NaN if unknown.
+    """
+    measure(state, reference, mocap, mocap_age, ground, bounds.box, bounds.joints, values)
+    read(readings, efforts, gains, bounds.efforts, bounds.gains, values)
+    values[LATE], values[LATE_LOOP] = _known(link), _known(loop)
+    return _below(values, bounds.calm)
 
 
 @jit
@@ -251,18 +294,30 @@ def measure(
     values[7] = -math.inf if math.isnan(apart) else math.sqrt(apart)
 
 
+@jit
 def read(
-    readings: Readings, effort_limits: np.ndarray, gain_limits: np.ndarray, values: np.ndarray
+    readings: tuple[float, ...],
+    efforts: np.ndarray,
+    gains: np.ndarray,
+    effort_limits: np.ndarray,
+    gain_limits: np.ndarray,
+    values: np.ndarray,
 ) -> None:
-    """Write the readings into values[8:]; NaN (unknown) passes every check.
+    """Write the readings into values[8:].
 
-    effort_limits (n,): of the joints [N m]; gain_limits (3,): of position, attitude, arm.
+    readings: those of CHECKS; efforts (n,): of the joints [N m], gains (3,): of position, attitude,
+    arm, with their limits.
     """
-    known = np.array(_readings(readings)) * _SIGNS
-    known[np.isnan(known)] = -math.inf
-    values[_ROWS] = known
-    values[17] = _largest(readings.joint_effort, effort_limits)
-    values[18] = _largest(readings.gains, gain_limits)
+    for i in range(len(_ROWS)):
+        values[_ROWS[i]] = _known(readings[i] * _SIGNS[i])
+    values[EFFORT] = _largest(efforts, effort_limits)
+    values[GAIN] = _largest(gains, gain_limits)
+
+
+@jit
+def _known(value: float) -> float:
+    """Return the value; -inf, which passes every check, for an unknown one (NaN)."""
+    return -math.inf if math.isnan(value) else value
 
 
 @jit
