@@ -300,7 +300,7 @@ def test_parameters_are_checked_and_take_effect():
         with pytest.raises(ParameterError, match=name):
             autopilot.set_parameter(name, value)
     autopilot.set_parameter("MC_ROLLRATE_K", 2.0)
-    assert autopilot._gains[0, 0] == pytest.approx(0.3)
+    assert autopilot._loop.gains[0, 0] == pytest.approx(0.3)
     with pytest.raises(ValueError, match="geometry"):  # all rotors turning one way: no yaw
         for i in range(4):
             autopilot.set_parameter(f"CA_ROTOR{i}_KM", 0.01)

@@ -9,10 +9,11 @@ their own estimator.
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 
-from uam_control.maths.compiled import jit
+from uam_control.maths.compiled import jit, prepared
 from uam_control.maths.rotations import (
     matrix_from_quaternion,
     quaternion_from_rotation_vector,
@@ -52,22 +53,38 @@ def age_of(stamp: float, time: float) -> float:
     return age if 0.0 <= age <= OLDEST else 0.0
 
 
+class EstimatorArrays(NamedTuple):
+    """The state of the filter.
+
+    estimate (10,). bias (3,): of the acceleration, NED [m/s^2], estimated from vision; without it a
+    descent without vision would climb or fall. mean_force (3,) [m/s^2, FRD]: low-pass filtered
+    specific force for the check before arming. past (HISTORY, 7): attitude and position of the last
+    samples; stamps (HISTORY,) [s]. vision_down (3,): vertical axis of the newest pose, FRD.
+    """
+
+    estimate: np.ndarray
+    bias: np.ndarray
+    mean_force: np.ndarray
+    past: np.ndarray
+    stamps: np.ndarray
+    vision_down: np.ndarray
+
+
 @jit
 def predict(
     gyro: np.ndarray,
     accel: np.ndarray,
+    time: float,
     dt: float,
     aided: bool,
-    estimate: np.ndarray,
-    bias: np.ndarray,
-    mean_force: np.ndarray,
+    newest: int,
+    arrays: EstimatorArrays,
 ) -> None:
-    """Advance estimate (10,) by dt [s] with gyro (3,) [rad/s] and specific force (3,) [m/s^2], FRD.
+    """Advance the estimate by dt [s] with gyro (3,) [rad/s] and specific force (3,) [m/s^2], FRD.
 
-    bias (3,): of the acceleration, NED [m/s^2], estimated from vision; without it a descent without
-    vision would climb or fall. mean_force (3,) [m/s^2, FRD]: low-pass filtered specific force for
-    the check before arming.
+    newest: row of the history for this sample, of `time` [s].
     """
+    estimate, bias, mean_force, past, stamps, _ = arrays
     for i in range(3):
         mean_force[i] += min(1.0, dt / _FORCE_TIME) * (accel[i] - mean_force[i])
     matrix = matrix_from_quaternion(estimate[:_PLACE])
@@ -90,6 +107,9 @@ def predict(
         acceleration = force[i] - bias[i] + (GRAVITY if i == 2 else 0.0)
         estimate[_PLACE + i] += dt * (estimate[_SPEED + i] + 0.5 * dt * acceleration)
         estimate[_SPEED + i] += dt * acceleration
+    for i in range(_SPEED):
+        past[newest, i] = estimate[i]
+    stamps[newest] = time
 
 
 @jit
@@ -120,6 +140,61 @@ def correct(
             bias[i] = min(_BIAS_MAX, max(-_BIAS_MAX, learnt))
 
 
+@jit
+def fuse(
+    position: np.ndarray,
+    quaternion: np.ndarray,
+    exposed: float,
+    age: float,
+    gap: float,
+    arrays: EstimatorArrays,
+) -> None:
+    """Correct the estimate by a pose of `exposed` [s], `gap` [s] after the last one.
+
+    position (3,), quaternion (4,), age: see `Estimator.vision`.
+    """
+    estimate, past, stamps = arrays.estimate, arrays.past, arrays.stamps
+    before = estimate[_PLACE:].copy()
+    if age > 0.0:
+        position, quaternion = moved_on(exposed, position, quaternion, arrays)
+    arrays.vision_down[:] = matrix_from_quaternion(quaternion)[2]
+    if gap > VISION_TIMEOUT:
+        estimate[:_PLACE] = quaternion
+        estimate[_PLACE:_SPEED] = position
+        if gap > _VELOCITY_KEPT:
+            estimate[_SPEED:] = 0.0
+        return
+    correct(position, quaternion, gap, estimate, arrays.bias)
+    if age <= 0.0:
+        return
+    change = estimate[_PLACE:] - before  # of position and velocity
+    for row in range(len(stamps)):
+        if stamps[row] >= exposed:
+            for i in range(3):
+                past[row, _PLACE + i] += change[i] + (stamps[row] - exposed) * change[3 + i]
+    for i in range(3):
+        estimate[_PLACE + i] += age * change[3 + i]
+
+
+@jit
+def moved_on(
+    exposed: float, position: np.ndarray, quaternion: np.ndarray, arrays: EstimatorArrays
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return a pose of `exposed` [s], moved by the estimated motion since then."""
+    now, past, stamps = arrays.estimate, arrays.past, arrays.stamps
+    then = 0
+    for row in range(len(stamps)):
+        if abs(stamps[row] - exposed) < abs(stamps[then] - exposed):
+            then = row
+    back = past[then, :_PLACE].copy()
+    for i in range(1, 4):
+        back[i] = -back[i]
+    moved = np.empty(3)
+    for i in range(3):
+        moved[i] = position[i] + now[_PLACE + i] - past[then, _PLACE + i]
+    return moved, quaternion_multiply(now[:_PLACE], quaternion_multiply(back, quaternion))
+
+
 class Estimator:
     """The filter with the state of its vision input; NED and FRD throughout.
 
@@ -138,6 +213,13 @@ class Estimator:
         self._stamps = np.full(HISTORY, -math.inf)  # [s]
         self._newest = 0
         self._bias = np.zeros(3)
+        self._arrays = EstimatorArrays(
+            *(self.estimate, self._bias, self._force),
+            *(self._past, self._stamps, self._vision_down),
+        )
+        still = np.zeros(3)
+        self._fuse = prepared(fuse, still, still, 0.0, 0.0, 0.0, self._arrays)
+        self._predict = prepared(predict, still, still, 0.0, 0.0, True, 0, self._arrays)
 
     def aided(self, time: float) -> bool:
         """Whether the last vision pose is younger than VISION_TIMEOUT at `time` [s]."""
@@ -149,9 +231,8 @@ class Estimator:
         gyro (3,) [rad/s], accel (3,) [m/s^2], FRD; dt [s].
         """
         aided = self.aided(time)
-        predict(gyro, accel, dt, aided, self.estimate, self._bias, self._force)
         self._newest = (self._newest + 1) % HISTORY
-        self._past[self._newest], self._stamps[self._newest] = self.estimate[:_SPEED], time
+        self._predict(gyro, accel, time, dt, aided, self._newest, self._arrays)
         return aided
 
     def vision(
@@ -163,37 +244,10 @@ class Estimator:
         with the estimate at time - age, as PX4's EKF2 fuses at its delayed horizon. The estimates
         since then are corrected, too: the next late pose shows what is left, not the same again.
         """
-        exposed, before = time - age, self.estimate[_PLACE:].copy()
-        if age > 0.0:
-            position, quaternion = self._moved_on(exposed, position, quaternion)
         gap = time - self._vision_time
         self._vision_time = time
-        self._vision_down = matrix_from_quaternion(quaternion)[2].copy()
-        if gap > VISION_TIMEOUT:
-            self._vision_count = 1
-            self.estimate[ATTITUDE] = quaternion
-            self.estimate[POSITION] = position
-            if gap > _VELOCITY_KEPT:
-                self.estimate[VELOCITY] = 0.0
-            return
-        self._vision_count += 1
-        correct(position, quaternion, gap, self.estimate, self._bias)
-        if age > 0.0:
-            moved, faster = np.split(self.estimate[_PLACE:] - before, 2)
-            since = np.maximum(self._stamps - exposed, 0.0)
-            late = self._stamps >= exposed
-            self._past[late, _PLACE:] += moved + since[late, None] * faster
-            self.estimate[POSITION] += age * faster
-
-    def _moved_on(
-        self, exposed: float, position: np.ndarray, quaternion: np.ndarray
-    ) -> tuple[np.ndarray, np.ndarray]:
-        """Return a pose of `exposed` [s], moved by the estimated motion since then."""
-        past = self._past[np.argmin(np.abs(self._stamps - exposed))]
-        now, back = self.estimate, past[ATTITUDE] * np.array([1.0, -1.0, -1.0, -1.0])
-        error = quaternion_multiply(back, quaternion)
-        moved = quaternion_multiply(now[ATTITUDE], error)
-        return position + now[POSITION] - past[POSITION], moved
+        self._vision_count = 1 if gap > VISION_TIMEOUT else self._vision_count + 1
+        self._fuse(position, quaternion, time - age, age, gap, self._arrays)
 
     def faults(self, time: float) -> list[str]:
         """Return the reasons against arming in PX4's wording; empty if the estimate is valid."""

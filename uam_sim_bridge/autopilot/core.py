@@ -12,7 +12,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from uam_control.maths.compiled import jit
+from uam_control.maths.compiled import jit, prepared
 from uam_control.vehicle import load_description
 from uam_sim_bridge.autopilot.autopilot_estimator import ATTITUDE as ESTIMATED_ATTITUDE
 from uam_sim_bridge.autopilot.autopilot_estimator import POSITION, VELOCITY, Estimator
@@ -66,27 +66,31 @@ class AutopilotStatus(NamedTuple):
     intended: Mode = Mode.UNKNOWN
 
 
+class RateLoop(NamedTuple):
+    """Parameters, state and output of the rate loop.
+
+    model_factor: THR_MDL_FAC; filters (7,), gains (5, 3), memory (7, 3): see `rate_control`; mixer
+    (rotors, 4) and its pseudo-inverse, inverse (4, rotors); motors (rotors,): output, 0..1.
+    """
+
+    model_factor: float
+    filters: np.ndarray
+    gains: np.ndarray
+    mixer: np.ndarray
+    inverse: np.ndarray
+    memory: np.ndarray
+    motors: np.ndarray
+
+
 @jit
 def control_tick(
-    gyro: np.ndarray,
-    dt: float,
-    armed: bool,
-    landed: bool,
-    setpoint: np.ndarray,
-    model_factor: float,
-    filters: np.ndarray,
-    gains: np.ndarray,
-    mixer: np.ndarray,
-    inverse: np.ndarray,
-    memory: np.ndarray,
-    motors: np.ndarray,
+    gyro: np.ndarray, dt: float, armed: bool, landed: bool, setpoint: np.ndarray, loop: RateLoop
 ) -> None:
-    """Run one cycle of the rate loop and write motors (rotors,), 0..1.
+    """Run one cycle of the rate loop and write the motors.
 
-    gyro (3,) [rad/s, FRD]; dt [s]; setpoint (4,): body rates [rad/s, FRD], thrust; model_factor:
-    THR_MDL_FAC; filters (7,), gains (5, 3), memory (7, 3): see `rate_control`; mixer (rotors, 4)
-    and its pseudo-inverse, inverse (4, rotors).
+    gyro (3,) [rad/s, FRD]; dt [s]; setpoint (4,): body rates [rad/s, FRD], thrust.
     """
+    model_factor, filters, gains, mixer, inverse, memory, motors = loop
     filter_gyro(gyro, dt, filters, memory)
     if not armed:
         for axis in range(3):
@@ -143,6 +147,8 @@ class Autopilot:
         self._desired: np.ndarray | None = None  # attitude FRD → NED, None: body rates are flown
         self._yaw_rate = 0.0  # [rad/s] about the world's z axis, down
         self._memory = np.zeros((7, 3))
+        self.rates = self._memory[FILTERED]  # filtered body rates (3,) [rad/s, FRD]
+        self._velocity = self.estimator.estimate[VELOCITY]
         self._time: float | None = None
         self.actuators = np.full(ACTUATORS, np.nan)  # set by DO_SET_ACTUATOR; NaN: disarmed value
         self.gripper: dict[int, bool] = {}  # number → whether DO_GRIPPER has closed it
@@ -290,19 +296,8 @@ class Autopilot:
                     attitude, self._desired, self._yaw_rate, self._attitude_gains, setpoint
                 )
         self._cycle(gyro, dt, commander.armed, landing.maybe_landed, setpoint)
-        if commander.armed:
-            memory = self._memory
-            velocity = tuple(self.estimator.estimate[VELOCITY].tolist()) if aided else None
-            landing.update(
-                time,
-                True,
-                descending,
-                float(setpoint[3]),
-                (float(memory[FILTERED, 0]), float(memory[FILTERED, 1])),
-                velocity,
-            )
-        else:
-            landing.update(time, False, False, 0.0, (0.0, 0.0), (0.0, 0.0, 0.0))
+        velocity = self._velocity if aided else None
+        landing.update(time, commander.armed, descending, float(setpoint[3]), self.rates, velocity)
         return self.motors
 
     def rate_loop(self, gyro: np.ndarray, dt: float, setpoint: np.ndarray) -> np.ndarray:
@@ -316,31 +311,13 @@ class Autopilot:
     def _cycle(
         self, gyro: np.ndarray, dt: float, armed: bool, landed: bool, setpoint: np.ndarray
     ) -> None:
-        control_tick(
-            gyro,
-            dt,
-            armed,
-            landed,
-            setpoint,
-            self._model_factor,
-            self._filters,
-            self._gains,
-            self._mixer,
-            self._inverse,
-            self._memory,
-            self.motors,
-        )
+        self._control_tick(gyro, dt, armed, landed, setpoint, self._loop)
 
     @property
     def status(self) -> AutopilotStatus:
         """The state that HEARTBEAT and EXTENDED_SYS_STATE report."""
         c = self.commander
         return AutopilotStatus(c.armed, c.mode, self.landing.landed, c.failsafe, c.intended)
-
-    @property
-    def rates(self) -> np.ndarray:
-        """Filtered body rates (3,) FRD [rad/s]."""
-        return self._memory[FILTERED]
 
     def _own_setpoint(self, mode: Mode, aided: bool, dt: float) -> tuple[np.ndarray, bool]:
         """Return the setpoint (4,) of a mode without a companion, and whether it descends."""
@@ -356,21 +333,27 @@ class Autopilot:
     def _configure(self) -> None:
         p = self.parameters
         mixer = normalised_mixer(*map(np.array, p.rotors()))
-        self._mixer, self._inverse = mixer, np.ascontiguousarray(np.linalg.pinv(mixer))
+        inverse = np.ascontiguousarray(np.linalg.pinv(mixer))
         axes = ("ROLLRATE", "PITCHRATE", "YAWRATE")
         k = np.array([p[f"MC_{axis}_K"] for axis in axes])
-        self._gains = np.array(
+        gains = np.array(
             [[p[f"MC_{axis}_{what}"] for axis in axes] for what in "PID"]
             + [
                 [p[f"MC_{axis}_FF"] for axis in axes],
                 p.vector("MC_RR_INT_LIM", "MC_PR_INT_LIM", "MC_YR_INT_LIM"),
             ]
         )
-        self._gains[:3] *= k
+        gains[:3] *= k
         self._filters = filter_coefficients(
             self._sample_rate, p["IMU_GYRO_CUTOFF"], p["IMU_DGYRO_CUTOFF"], p["MC_YAW_TQ_CUTOFF"]
         )
-        self._model_factor = p["THR_MDL_FAC"]
+        factor = float(p["THR_MDL_FAC"])
+        self._loop = RateLoop(
+            *(factor, self._filters, gains, mixer, inverse, self._memory, self.motors)
+        )
+        self._control_tick = prepared(
+            control_tick, np.zeros(3), 0.0, True, True, self._setpoint, self._loop
+        )
         self._attitude_gains = attitude_gains(p)
         self.landing.configure(p)
         self._descent.configure(p)

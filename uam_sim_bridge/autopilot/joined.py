@@ -14,6 +14,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from uam_control.maths.compiled import prepared
 from uam_sim_bridge.autopilot.autopilot_estimator import age_of
 from uam_sim_bridge.autopilot.core import Autopilot, AutopilotStatus
 from uam_sim_bridge.mavlink.offboard.sequence import (
@@ -24,7 +25,7 @@ from uam_sim_bridge.mavlink.offboard.sequence import (
     Request,
 )
 from uam_sim_bridge.mavlink.offboard.setpoints.desired import Target
-from uam_sim_bridge.mavlink.protocol.frames import swap_body, swap_quaternion, swap_world
+from uam_sim_bridge.mavlink.protocol.frames import swap_quaternion, swap_sample, swap_world
 from uam_sim_bridge.mavlink.protocol.modes import MavResult, Mode, Severity
 from uam_sim_bridge.mavlink.protocol.vision import VisionPose
 
@@ -67,6 +68,8 @@ class JoinedAutopilot:
         self.time = 0.0
         self._received_at = -math.inf
         self._sample: tuple[float, np.ndarray, np.ndarray] | None = None
+        self._own_sample = np.zeros(3), np.zeros(3)  # gyro, specific force, FRD
+        self._swap = prepared(swap_sample, *self._own_sample, *self._own_sample)
         self._told: AutopilotStatus | None = None
         self._heartbeat_due = self._landed_due = -math.inf  # [s]
         self._heartbeat = self._landed = False  # sent, not yet received
@@ -173,7 +176,9 @@ class JoinedAutopilot:
 
         gyro (3,) [rad/s] and specific force (3,) [m/s^2], FLU: sample of the autopilot's IMU.
         """
-        motors = self.autopilot.update(time, swap_body(gyro), swap_body(force))
+        own_gyro, own_force = self._own_sample
+        self._swap(gyro, force, own_gyro, own_force)
+        motors = self.autopilot.update(time, own_gyro, own_force)
         self._sample = time, gyro, force
         status = self.autopilot.status
         if status != self._told:

@@ -7,6 +7,9 @@ some time. Each stage takes a third of LNDMC_TRIG_TIME; a violated condition res
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
+
+import numpy as np
 
 from uam_sim_bridge.autopilot.params import Parameters
 
@@ -42,11 +45,11 @@ class LandDetector:
         armed: bool,
         descending: bool,
         thrust: float,
-        rates: tuple[float, float],
-        velocity: tuple[float, float, float] | None,
+        rates: Sequence[float] | np.ndarray,
+        velocity: Sequence[float] | np.ndarray | None,
     ) -> None:
-        """Update the stages with this tick's thrust command, roll and pitch rate [rad/s] and
-        velocity [m/s, NED].
+        """Update the stages with this tick's thrust command, body rates [rad/s], roll and pitch
+        first, and velocity [m/s, NED].
 
         velocity: None without vision. The integrated velocity drifts, and a drifting descent would
         never count as landed: low thrust alone then means ground contact.
@@ -54,13 +57,17 @@ class LandDetector:
         if not armed:
             self._contact = self.maybe_landed = self.landed = True
             return
+        if thrust > self._low:  # as in all of a flight: no evidence of any stage
+            self._since[:] = math.inf, math.inf, math.inf
+            self._contact = self.maybe_landed = self.landed = False
+            return
         wider = _WIDER if self.maybe_landed else 1.0
         contact = thrust <= self._low and (
             velocity is None
             or abs(velocity[2]) <= wider * self._vertical
             and math.hypot(velocity[0], velocity[1]) <= self._horizontal
         )
-        still = math.hypot(*rates) <= wider * self._rotation
+        still = math.hypot(rates[0], rates[1]) <= wider * self._rotation
         none = thrust <= (self._none_descending if descending else self._none)
         since, reached = self._since, [self._contact, self.maybe_landed, self.landed]
         evidence = True

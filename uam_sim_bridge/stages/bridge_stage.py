@@ -184,14 +184,15 @@ class BridgeStage:
         self._send(now, setpoint)
         self.report = self._reports.due(stamp)
         thrust, self.factor = setpoint.thrust if setpoint else 0.0, self.map.thrust_factor
+        assumed = self.map.assumed_thrust(thrust)
         self.map.thrust_factor = self.identification.update(
             now,
             state,
             thrust,
-            self.map.assumed_thrust(thrust),
+            assumed,
             flying and situation.armed and not situation.let_go and math.isfinite(thrust),
         )
-        self._note_lift(stamp, self.factor * self.map.assumed_thrust(thrust))
+        self._note_lift(stamp, self.factor * assumed)
         return setpoint
 
     def _sampled(self, now: float, setpoint: Setpoint, flying: bool) -> Setpoint:

@@ -26,10 +26,11 @@ is unknown if they contradict each other. A loop that begins to oscillate makes 
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 
-from uam_control.maths.compiled import jit
+from uam_control.maths.compiled import jit, prepared
 
 DELAYS = 31  # T of 0 to 30 periods, 120 ms at 250 Hz
 LOW, HIGH = 1.0, 10.0  # [Hz] corners of the band-pass; two low-passes: propellers shake the gyro
@@ -40,6 +41,7 @@ STILL = 0.15  # [rad/s^2] RMS below which there is no value
 GAIN = (0.1, 1.0)  # g times the lag: least, largest
 UNIQUE = 0.6  # of the best fit's explained variance: the most that another maximum may explain
 APART, SHARE_APART = 0.012, 0.25  # [s], of their mean: largest difference of the axes, the larger
+LEAST_WEIGHT = MEMORY * (1.0 - math.exp(-ENOUGH / MEMORY))  # [s] of that flight
 AXES = 2  # roll and pitch; yaw responds too slowly
 
 # rows of the filters' state, per axis
@@ -49,6 +51,21 @@ STAGES = 3
 _ROWS = BAND + 3 * STAGES
 # rows of the sums, per axis
 WITH, OWN = 0, 1  # sum of product with the acceleration, sum of squares; per delay
+
+
+class DelaySums(NamedTuple):
+    """Numbers and state of a LoopDelay.
+
+    keep (3,): decay over a period of motor lag, high-pass, low-pass; filters (12, 2); past
+    (2, DELAYS): setpoints; sums (2, 2, DELAYS); total (3,): sums of the squared accelerations, of
+    the weights.
+    """
+
+    keep: np.ndarray
+    filters: np.ndarray
+    past: np.ndarray
+    sums: np.ndarray
+    total: np.ndarray
 
 
 class LoopDelay:
@@ -69,6 +86,10 @@ class LoopDelay:
         self._past = np.zeros((AXES, DELAYS))
         self._sums = np.zeros((AXES, 2, DELAYS))
         self._total = np.zeros(AXES + 1)  # sums of the squared accelerations, of the weights
+        self._arrays = DelaySums(self._keep, self._filters, self._past, self._sums, self._total)
+        self._follow = prepared(
+            follow, self._keep, self._keep, 1.0, 1.0, 0, self._arrays, self._gains
+        )
         self._newest = 0
         self._stamp: float | None = None
         self._settling = 0
@@ -89,13 +110,11 @@ class LoopDelay:
         self._newest = (self._newest + 1) % DELAYS
         counts = self._settling <= 0
         self._settling -= 1
-        follow(
-            setpoint, rates, self._period, self._keep, self._forget if counts else -1.0,
-            self._newest, self._filters, self._past, self._sums, self._total,
-        )  # fmt: skip
-        enough = self._total[AXES] * self._period >= MEMORY * (1.0 - math.exp(-ENOUGH / MEMORY))
-        delay, self.explained = both_axes(self._sums, self._total, self._gains, self._period)
-        self.value = delay if enough else math.nan
+        forget = self._forget if counts else -1.0
+        delay, self.explained, weights = self._follow(
+            setpoint, rates, self._period, forget, self._newest, self._arrays, self._gains
+        )
+        self.value = delay if weights * self._period >= LEAST_WEIGHT else math.nan
         return self.value
 
     def pause(self) -> None:
@@ -108,20 +127,35 @@ def follow(
     setpoint: np.ndarray,
     rates: np.ndarray,
     period: float,
-    keep: np.ndarray,
     forget: float,
     newest: int,
-    filters: np.ndarray,
-    past: np.ndarray,
-    sums: np.ndarray,
-    total: np.ndarray,
+    arrays: DelaySums,
+    gains: tuple[float, float],
+) -> tuple[float, float, float]:
+    """Take a tick; return delay [s], explained share, and the sum of the weights of all ticks.
+
+    The arguments are those of `advance` and `both_axes`.
+    """
+    advance(setpoint, rates, period, forget, newest, arrays)
+    delay, explained = both_axes(arrays.sums, arrays.total, gains, period)
+    return delay, explained, arrays.total[AXES]
+
+
+@jit
+def advance(
+    setpoint: np.ndarray,
+    rates: np.ndarray,
+    period: float,
+    forget: float,
+    newest: int,
+    arrays: DelaySums,
 ) -> None:
     """Advance the filters by a tick, and the sums unless forget is negative.
 
-    keep (3,): decay over a period of motor lag, high-pass, low-pass; forget: of the sums; newest:
-    column of past (2, DELAYS) for this tick's setpoint; filters (12, 2), sums (2, 2, DELAYS),
-    total (3,): see LoopDelay.
+    setpoint, rates (3,) [rad/s]; forget: decay of the sums over a period [s]; newest: column of
+    `past` for this tick's setpoint.
     """
+    keep, filters, past, sums, total = arrays
     passed = np.empty(3)
     for axis in range(past.shape[0]):
         acceleration = (rates[axis] - filters[LAST, axis]) / period

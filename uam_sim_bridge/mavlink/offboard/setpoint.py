@@ -39,7 +39,7 @@ from typing import Any, Self
 
 import numpy as np
 
-from uam_control.maths.compiled import jit
+from uam_control.maths.compiled import jit, prepared
 from uam_control.settings.parameter_set import ParameterSet, number, vector
 from uam_control.vehicle import VehicleDescription, derived_parameters, load_description
 from uam_sim_bridge.mavlink.offboard.rotor_geometry import torque_scale
@@ -206,11 +206,15 @@ class RateThrustMap:
         self._factor = 1.0
         self._vehicle = vehicle or load_description()
         self.configure(parameters or RateThrustParameters.of(self._vehicle))
+        three = self.rates
+        self._thrust = prepared(thrust_of_command, 0.0, *self._assumed)
+        self._map = prepared(rate_thrust_map, three, three, three, three, self._flat, three)
 
     def configure(self, parameters: RateThrustParameters) -> None:
         """Apply new parameters; a ParameterError names the bad one and changes nothing."""
         checked = parameters.validated()
-        self._flat = checked.flat(self._vehicle)
+        self._flat = p = checked.flat(self._vehicle)
+        self._assumed = tuple(p[[_FULL, _BATTERY, _MOTOR, _MODEL]].tolist())  # without the factor
         self.parameters = checked
         self.thrust_factor = self._factor
 
@@ -240,7 +244,7 @@ class RateThrustMap:
         tau_p (3,) [N, ENU], tau_q (3,) [N m, FLU], attitude (3,) roll, pitch, yaw [rad, FLU in
         ENU], body_rates (3,) [rad/s, FLU]; float64. Raises SetpointRefused if one is not finite.
         """
-        thrust = rate_thrust_map(tau_p, tau_q, attitude, body_rates, self._flat, self.rates)
+        thrust = self._map(tau_p, tau_q, attitude, body_rates, self._flat, self.rates)
         if thrust < 0.0:
             raise SetpointRefused(f"{INPUTS[int(-thrust) - 1]} is not finite")
         return self.rates, thrust
@@ -253,7 +257,4 @@ class RateThrustMap:
 
     def assumed_thrust(self, command: float) -> float:
         """Return the collective [N] of a normalised thrust by the curve without `thrust_factor`."""
-        p = self._flat
-        return thrust_of_command(
-            command, p[_FULL], self.parameters.battery_factor, p[_MOTOR], p[_MODEL]
-        )
+        return self._thrust(command, *self._assumed)

@@ -77,7 +77,7 @@ class AttitudeTarget(NamedTuple):
         """Return why no autopilot should fly it: the mask, or what is not finite; "" if nothing."""
         if self.type_mask not in (RATES, ATTITUDE, ATTITUDE_AND_YAW_RATE):
             return f"type_mask {self.type_mask}, allowed: {FLOWN}"
-        total = self.thrust + self.rates[0] + self.rates[1] + self.rates[2]
+        total = self.thrust + sum(self.rates.tolist())
         if self.type_mask != RATES:
             q = self.quaternion
             squared = q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3]

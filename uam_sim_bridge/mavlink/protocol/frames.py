@@ -31,14 +31,21 @@ def swap_world(v: np.ndarray) -> np.ndarray:
     return out
 
 
-@jit
 def swap_body(v: np.ndarray) -> np.ndarray:
     """Convert a body vector v (3,) from FLU to FRD, or back."""
-    out = np.empty(3)
+    out = -v
     out[0] = v[0]
-    out[1] = -v[1]
-    out[2] = -v[2]
     return out
+
+
+@jit
+def swap_sample(
+    gyro: np.ndarray, force: np.ndarray, other_gyro: np.ndarray, other_force: np.ndarray
+) -> None:
+    """Convert two body vectors (3,) as `swap_body`, into other_gyro and other_force (3,)."""
+    for i in range(3):
+        other_gyro[i] = gyro[i] if i == 0 else -gyro[i]
+        other_force[i] = force[i] if i == 0 else -force[i]
 
 
 @jit
