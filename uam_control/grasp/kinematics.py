@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 
 import numpy as np
 
-from uam_control.coordinates import ALPHA, POSITION, ROLL
+from uam_control.coordinates import ALPHA, POSITION, ROLL, Z
+from uam_control.maths.compiled import jit
 from uam_control.maths.rotations import matrix_from_euler
 
 
@@ -18,11 +20,11 @@ def magnet_position(
     chi (6 + n,): generalised coordinates; mount (3,) [m, FLU]: first joint; links (n,) [m]: the
     last one to the magnet's pivot; magnet [m]: pivot to face. The magnet hangs vertically.
     """
-    angles = np.cumsum(chi[ALPHA:])
-    lengths = np.asarray(links)
-    arm = np.array([np.sum(lengths * np.sin(angles)), 0.0, -np.sum(lengths * np.cos(angles))])
-    pivot = chi[POSITION] + matrix_from_euler(chi[ROLL:ALPHA]) @ (np.asarray(mount) + arm)
-    return pivot - np.array([0.0, 0.0, magnet])
+    point = np.empty(3)
+    below_joint(chi, np.asarray(mount, dtype=float), np.asarray(links, dtype=float), point)
+    pivot = chi[POSITION] + matrix_from_euler(chi[ROLL:ALPHA]) @ point
+    pivot[Z] -= magnet
+    return pivot
 
 
 def lever(chi: np.ndarray, links: Sequence[float]) -> float:
@@ -30,4 +32,20 @@ def lever(chi: np.ndarray, links: Sequence[float]) -> float:
 
     chi (6 + n,): generalised coordinates; links (n,) [m].
     """
-    return float(np.sum(np.asarray(links) * np.sin(np.cumsum(chi[ALPHA:]))))
+    return below_joint(chi, np.zeros(3), np.asarray(links, dtype=float), np.empty(3))
+
+
+@jit
+def below_joint(chi: np.ndarray, mount: np.ndarray, links: np.ndarray, point: np.ndarray) -> float:
+    """Write the magnet's pivot in the base frame (3,) [m, FLU]; return its distance from the first
+    joint along x [m].
+
+    chi (6 + n,), mount (3,), links (n,): see `magnet_position`.
+    """
+    angle = along = above = 0.0
+    for i in range(len(links)):
+        angle += chi[ALPHA + i]
+        along += links[i] * math.sin(angle)
+        above += links[i] * math.cos(angle)
+    point[0], point[1], point[2] = mount[0] + along, mount[1], mount[2] - above
+    return along

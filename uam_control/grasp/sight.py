@@ -7,6 +7,8 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from uam_control.maths.compiled import jit
+
 MEMORY = 0.8  # [s] time constant of the means
 
 
@@ -59,7 +61,7 @@ class RunningMean:
 
     def add(self, stamp: float, value: np.ndarray) -> None:
         """Add value (n,) at `stamp` [s]; values that are not finite restart the mean."""
-        if not np.isfinite(value).all():
+        if not math.isfinite(sum(value.tolist())):
             self.restart()
             return
         if self._begun == math.inf:
@@ -67,9 +69,16 @@ class RunningMean:
         else:  # a plain mean at first, so that the first value weighs no more than the others
             step = stamp - self._stamp
             gain = step / min(MEMORY, stamp - self._begun + step)
-            self.mean = self.mean + gain * (value - self.mean)
-            self._square = self._square + gain * (value**2 - self._square)
+            blend(value, gain, self.mean, self._square)
         self._stamp = stamp
+
+
+@jit
+def blend(value: np.ndarray, gain: float, mean: np.ndarray, square: np.ndarray) -> None:
+    """Move mean and square (n,) towards value and its square by the part `gain`, in place."""
+    for i in range(len(value)):
+        mean[i] += gain * (value[i] - mean[i])
+        square[i] += gain * (value[i] * value[i] - square[i])
 
 
 class Lasting:

@@ -49,7 +49,8 @@ class PayloadWatch:
     ) -> None:
         windows = grasp_windows(scenario.moves, scenario.magnet)
         self.executive = GraspExecutive(windows, scenario.payload_mass, parameters)
-        self._guidance, self._parameters = guidance, parameters
+        self._guidance = guidance
+        self.configure(parameters)
         self._shift = Shift()
         guidance.shift = self._shift.add
         self._stepped = -math.inf  # stamp [s]
@@ -63,6 +64,7 @@ class PayloadWatch:
     def configure(self, parameters: MissionParameters) -> None:
         """Use `parameters` (validated) from the next step on."""
         self._parameters = self.executive.parameters = parameters
+        self._mount, self._links = np.array(parameters.arm_mount), np.array(parameters.arm_links)
 
     def advance(self, stamp: float) -> None:
         """Set the shift of the path for `stamp` [s]; call it before the guidance writes."""
@@ -83,8 +85,9 @@ class PayloadWatch:
         state (3, 6 + n). Returns the reason to end the mission, "" without one.
         """
         executive, guidance = self.executive, self._guidance
-        due = executive.due(guidance.scenario_time) and np.isfinite(state[CHI]).all()
-        if not due or stamp - self._stepped < PERIOD - 1e-6:
+        if stamp - self._stepped < PERIOD - 1e-6 or not executive.due(guidance.scenario_time):
+            return ""
+        if not np.isfinite(state[CHI]).all():
             return ""
         self._stepped = stamp
         directive = executive.step(self._sight(stamp, state, readings))
@@ -99,11 +102,11 @@ class PayloadWatch:
     def _sight(self, stamp: float, state: np.ndarray, readings: Readings) -> Sight:
         p, chi = self._parameters, state[CHI]
         known = len(p.arm_links) == len(chi) - ALPHA
-        links = p.arm_links if known else np.zeros(len(chi) - ALPHA)
+        links = self._links if known else np.zeros(len(chi) - ALPHA)
         sight = Sight(
             stamp,
             self._guidance.scenario_time,
-            magnet_position(chi, p.arm_mount, links, p.magnet_length),
+            magnet_position(chi, self._mount, links, p.magnet_length),
             error=chi[POSITION] - self._guidance.reference[CHI, POSITION],
             lift=readings.lift,
             lever=lever(chi, links),

@@ -18,13 +18,14 @@ class Shift:
     def __init__(self) -> None:
         self._values = np.zeros((MOTION_ROWS, 3))
         self._goal = np.zeros(3)
+        self._beside = False  # whether the goal is not zero
         self._segment: Segment | None = None
 
     def aim(self, stamp: float, goal: np.ndarray) -> None:
         """Change to `goal` (3,) [m] from `stamp` [s] on; no effect if that is the goal already."""
         if np.array_equal(goal, self._goal):
             return
-        self._goal = goal.copy()
+        self._goal, self._beside = goal.copy(), bool(goal.any())
         way = float(np.max(np.abs(goal - self._values[CHI])))
         length = max(SHORTEST, PEAK * way / SPEED)
         self._segment = Segment(stamp, self._values, goal, np.full(3, length))
@@ -38,5 +39,5 @@ class Shift:
 
     def add(self, motion: np.ndarray) -> None:
         """Add the shift to the positions of a motion (5, 6 + n)."""
-        if self._goal.any() or self._segment is not None:
+        if self._beside or self._segment is not None:
             motion[:, POSITION] += self._values
