@@ -1,9 +1,12 @@
-"""Measure the computing time of a direct flight relative to its physics, on one core.
+"""Measure the computing time of a direct flight relative to its physics, and where it goes.
 
-    .venv/bin/python benchmarks/direct_engine.py [--profile] [--seconds 90]
+    .venv/bin/python benchmarks/direct_engine.py
+    .venv/bin/python benchmarks/direct_engine.py --runs 1 --picture docs/images/direct_engine.svg
+    .venv/bin/python benchmarks/direct_engine.py --profile    # the slowest functions, too
 
 Alternates a part of the flight with the same number of `mj_step` of the same model, so that both
-run under the same load. Prints the real-time factor and the ratio; --profile lists the functions.
+run under the same load. Prints the real-time factor, the ratio, and a table of the parts of a tick.
+Times are CPU times of this process, on one core.
 """
 
 from __future__ import annotations
@@ -13,16 +16,20 @@ import cProfile
 import os
 import pstats
 import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
 
 import mujoco
 
 from uam_control.mission import load_scenario
 from uam_control.profiles.profile import load_profile
 from uam_lab.flight.direct.flight import DirectFlight
-from uam_lab.flight.direct.warm_up import warm_up
+from uam_lab.flight.direct.warm_up import prepare
 from uam_sim_bridge.plant import Vehicle
 
 STRETCH = 250  # ticks
+PHYSICS, REST = "bare mj_step", "between the parts"
 
 
 def new_flight() -> DirectFlight:
@@ -32,39 +39,120 @@ def new_flight() -> DirectFlight:
     )
 
 
-def measure() -> tuple[float, float, float]:
-    """Return wall time of a flight, wall time of its physics, and simulated time [s]."""
+def measure(watch: Callable[[DirectFlight], None] = lambda flight: None) -> tuple[float, ...]:
+    """Return time of a flight, time of its physics [s], simulated time [s], ticks.
+
+    watch: prepares the flight.
+    """
     flight, bare = new_flight(), new_flight()
+    watch(flight)
     model, data = bare.plant.model, bare.plant.data
     steps = round(bare.plant.period / model.opt.timestep)
     flown = physics = 0.0
     while not flight.mission.output.done:
-        before = time.perf_counter()
+        before = time.process_time()
         ticks = 0
         while ticks < STRETCH and not flight.mission.output.done:
             flight.tick()
             ticks += 1
-        between = time.perf_counter()
+        between = time.process_time()
         for _ in range(ticks * steps):
             mujoco.mj_step(model, data)
         flown += between - before
-        physics += time.perf_counter() - between
-    return flown, physics, flight.plant.time
+        physics += time.process_time() - between
+    return flown, physics, flight.plant.time, flight.plant.tick
+
+
+class Watch:
+    """Adds up the time in each part of the ticks of a flight; `times` [s] by name."""
+
+    def __init__(self) -> None:
+        self.times: dict[str, float] = {}
+
+    def __call__(self, flight: DirectFlight) -> None:
+        """Watch a flight that begins."""
+        control = flight.control
+        control.stages[:] = [(name, self._timed(name, run)) for name, run in control.stages]
+        for name, owner, method in (
+            ("sensors", flight.plant, "sense"),
+            ("truth", flight.plant, "truth"),
+            ("physics, rotors, servos", flight.plant, "step"),
+            ("autopilot", flight.autopilot, "update"),
+            ("recording", flight, "_record"),
+        ):
+            setattr(owner, method, self._timed(name, getattr(owner, method)))
+
+    def _timed(self, name: str, run: Callable) -> Callable:
+        times, clock = self.times, time.perf_counter
+        times[name] = 0.0
+
+        def timed(*arguments: Any) -> Any:
+            begin = clock()
+            result = run(*arguments)
+            times[name] += clock() - begin
+            return result
+
+        return timed
+
+
+def parts() -> dict[str, float]:
+    """Return the time [us] of each part of a tick, the longest first.
+
+    The physics is apart from what the plant computes around it.
+    """
+    watch = Watch()
+    flown, physics, _, ticks = measure(watch)
+    times = dict(sorted(watch.times.items(), key=lambda item: -item[1]))
+    times[REST] = flown - sum(times.values())
+    plant = "physics, rotors, servos"
+    times["rotors, servos, air"] = times.pop(plant) - physics
+    shown = {name: 1e6 * seconds / ticks for name, seconds in times.items()}
+    return {PHYSICS: 1e6 * physics / ticks} | dict(sorted(shown.items(), key=lambda one: -one[1]))
+
+
+def table(found: dict[str, float]) -> str:
+    """Return the parts as a table."""
+    total = sum(found.values())
+    lines = ["| part of a tick | us | |", "|---|---|---|"]
+    lines += [f"| {name} | {us:.1f} | {us / total:.0%} |" for name, us in found.items()]
+    return "\n".join([*lines, f"| all | {total:.1f} | |"])
+
+
+def draw(found: dict[str, float], ratio: float, file: Path) -> None:
+    """Draw the parts as bars."""
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(8.0, 0.3 * len(found) + 1.0), layout="constrained")
+    axes = figure.subplots()
+    names = list(found)[::-1]
+    colours = ["#888888" if name == PHYSICS else "#1f77b4" for name in names]
+    bars = axes.barh(names, [found[name] for name in names], color=colours)
+    axes.bar_label(bars, fmt="%.1f", padding=3)
+    axes.set_xlabel(f"time per tick [us]; a tick takes {ratio:.1f} times its physics")
+    axes.spines[["top", "right"]].set_visible(False)
+    figure.savefig(file, metadata={"Date": None} if file.suffix == ".svg" else None)
 
 
 def main() -> None:
     """Measure and print."""
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
     parser.add_argument("--profile", action="store_true", help="list the slowest functions")
+    parser.add_argument("--picture", type=Path, help="file for a picture of the parts")
     parser.add_argument("--runs", type=int, default=5, help="runs; the best counts (default 5)")
     options = parser.parse_args()
     if hasattr(os, "sched_setaffinity"):
         os.sched_setaffinity(0, {min(os.sched_getaffinity(0))})
-    warm_up()
-    flown, physics, simulated = min(measure() for _ in range(options.runs))
+    prepare(print)
+    flown, physics, simulated, _ = min(measure() for _ in range(options.runs))
     print(f"flight          {flown:.2f} s for {simulated:.1f} s, {simulated / flown:.0f} x real")
     print(f"bare mj_step    {physics:.2f} s, {simulated / physics:.0f} x real")
-    print(f"ratio           {flown / physics:.2f}")
+    print(f"ratio           {flown / physics:.2f}\n")
+    found = parts()
+    print(table(found))
+    if options.picture:
+        draw(found, flown / physics, options.picture)
     if options.profile:
         flight, profile = new_flight(), cProfile.Profile()
         profile.runcall(flight.run)
