@@ -83,7 +83,7 @@ class Watch:
             setattr(owner, method, self._timed(name, getattr(owner, method)))
 
     def _timed(self, name: str, run: Callable) -> Callable:
-        times, clock = self.times, time.perf_counter
+        times, clock = self.times, time.process_time
         times[name] = 0.0
 
         def timed(*arguments: Any) -> Any:

@@ -11,6 +11,7 @@ from uam_control.estimation.pose_filter import (
     EstimatedMotion,
     PoseFilter,
     correct,
+    match,
     nearest,
     predict,
     shift,
@@ -69,11 +70,13 @@ def test_correction_gains():
     # attitude, w = 3: 2w dt = .6 and w^2 dt = .9 times (.72, .96, 0)
     position, velocity, quaternion = np.ones(3), np.zeros(3), LEVEL.copy()
     gyro_bias, accelerometer_bias = np.zeros(3), np.zeros(3)
-    pose = np.array([0.5, 1.0, 1.75, *LEVEL])
-    correct(
-        0.1, np.array([2.0, 3.0]), np.array([1.0, 0.0, 2.0]), TURNED, pose,
-        position, velocity, quaternion, gyro_bias, accelerometer_bias,
-    )  # fmt: skip
+    poses = np.array([np.zeros(7), [0.5, 1.0, 1.75, *LEVEL]])
+    still = np.zeros(3)
+    motion = EstimatedMotion(
+        position, velocity, quaternion, still, still, gyro_bias, accelerometer_bias
+    )
+    bandwidths, measured = np.array([2.0, 3.0]), np.array([1.0, 0.0, 2.0])
+    correct(0.1, bandwidths, measured, TURNED, poses, 1, motion)
     np.testing.assert_allclose(position, [1.3, 0.4, 1.15])
     np.testing.assert_allclose(velocity, [0.6, -1.2, 0.3])
     np.testing.assert_allclose(accelerometer_bias, [-0.4, 0.8, -0.2])
@@ -81,6 +84,15 @@ def test_correction_gains():
     # the turn is .6 * 1.2 = .72 rad about (.6, .8, 0)
     half = math.sin(0.36)
     np.testing.assert_allclose(quaternion, [math.cos(0.36), 0.6 * half, 0.8 * half, 0.0])
+
+
+def test_a_pose_is_matched_with_its_prediction():
+    stamps, poses = np.array([1.0, 2.0]), np.zeros((2, 7))
+    poses[1, :3] = 1.0, 2.0, 3.0
+    bias = np.array([2.0, -3.0, 6.0])
+    motion = EstimatedMotion(*(np.zeros(3),) * 6, bias)
+    found = match(stamps, poses, 1.75, np.array([3.0, 5.0, -3.0]), motion)
+    assert found == (1, 0.25, 7.0, 7.0)  # 2 3 6 makes 7, twice
 
 
 def test_the_nearest_stamp_and_of_two_the_first():

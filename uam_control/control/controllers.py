@@ -45,7 +45,7 @@ class Controller:
     columns: slice
 
     def __init__(self, parameters: LawParameters) -> None:
-        self.law = catalogue.law(parameters.law)(parameters)
+        self.law, self._parameters = catalogue.law(parameters.law)(parameters), parameters
         self.names = self.law.names
         self.adaptation = self.law.adaptation[: len(self.names)]
         self.saturated = False
@@ -59,7 +59,7 @@ class Controller:
     @property
     def parameters(self) -> LawParameters:
         """The parameters in use."""
-        return self.law.parameters
+        return self._parameters
 
     def set_parameters(self, parameters: LawParameters) -> None:
         """Use `parameters` (validated) from the next tick on; the adapted gains stay.
@@ -70,6 +70,7 @@ class Controller:
         if parameters.law != flying:
             raise ParameterError(f"law: {flying} flies, it cannot change to {parameters.law}")
         self.law.set_parameters(parameters)
+        self._parameters = parameters
         self._printed = parameters.error_rate_form == "printed"
 
     def reset_adaptation(self) -> None:
@@ -266,7 +267,7 @@ class AttitudeController(TorqueController):
             self._ahead = min(LONGEST_PREDICTION, p.prediction + beyond)
 
     def _torque(self, reference: np.ndarray, dt: float) -> np.ndarray:
-        p, pitch = self.parameters, 0.0
+        p, pitch = self._parameters, 0.0
         if p.arm_feedforward:
             pitch = self._arm_load(self._arm, reference, self._joints) / p.inertia[1]
         self._lead(self._errors, self._ahead, pitch, self._washout, dt, self._slow)
@@ -317,7 +318,7 @@ class ArmController(TorqueController):
         self._integral[:] = 0.0
 
     def _torque(self, reference: np.ndarray, dt: float) -> np.ndarray:
-        tau, p = self._law_output(dt), self.parameters
+        tau, p = self._law_output(dt), self._parameters
         if p.arm_feedforward:
             self._arm_load(self._arm, reference, self._load)
         self._complete(
@@ -344,7 +345,7 @@ class ArmController(TorqueController):
         dt: float,
     ) -> np.ndarray:
         """See `TorqueController.update`; also sets `command`."""
-        tau, p = super().update(state, reference, attitude_reference, flying, dt), self.parameters
+        tau, p = super().update(state, reference, attitude_reference, flying, dt), self._parameters
         if p.setpoint == POSITION_SERVO:
             self._time += dt
             if self._hold.due(self._time):

@@ -81,7 +81,10 @@ class PoseFilter:
         self._last_correction = -1.0
         self._repeats = Repeats()
         still = self.position
-        self._predict = prepared(predict, 0.0, 0.0, still, still, self.motion, self._poses, 0)
+        motion, poses = self.motion, self._poses
+        self._predict = prepared(predict, 0.0, 0.0, still, still, motion, poses, 0)
+        self._match = prepared(match, self._stamps, poses, 0.0, still, motion)
+        self._correct = prepared(correct, 0.0, self._bandwidths, still, still, poses, 0, motion)
 
     def set_bandwidths(self, position: float, attitude: float) -> None:
         """Set the bandwidths [rad/s] of the corrections; the estimate does not change."""
@@ -111,13 +114,10 @@ class PoseFilter:
         older than the stored predictions, repeats the last pose exactly (`Repeats`), or has jumped
         away from the estimate (`PoseGate`).
         """
-        row = nearest(self._stamps, stamp)
-        if abs(self._stamps[row] - stamp) > OLDEST_MATCH or self._repeats(position, quaternion):
+        motion, poses = self.motion, self._poses
+        row, apart, jump, bias = self._match(self._stamps, poses, stamp, position, motion)
+        if apart > OLDEST_MATCH or self._repeats(position, quaternion):
             return
-        jump, bias = (
-            math.dist(position, self._poses[row, :TURN]),
-            math.hypot(*self.accelerometer_bias),
-        )
         if self.gate(stamp, jump, bias):
             return
         dt = min(max(stamp - self._last_correction, 1e-3), 0.05)
@@ -125,18 +125,7 @@ class PoseFilter:
         since = self._stamps[(self._count - 1) % HISTORY] - self._stamps[row]
         if since > LATE:
             before = self.position.copy(), self.velocity.copy(), self.quaternion.copy()
-        correct(
-            dt,
-            self._bandwidths,
-            position,
-            quaternion,
-            self._poses[row],
-            self.position,
-            self.velocity,
-            self.quaternion,
-            self.gyro_bias,
-            self.accelerometer_bias,
-        )
+        self._correct(dt, self._bandwidths, position, quaternion, poses, row, motion)
         if since > LATE:
             self.position += since * (self.velocity - before[1])
             shift(
@@ -157,6 +146,27 @@ def nearest(stamps: np.ndarray, stamp: float) -> int:
         if abs(stamps[row] - stamp) < abs(stamps[best] - stamp):
             best = row
     return best
+
+
+@jit
+def match(
+    stamps: np.ndarray,
+    poses: np.ndarray,
+    stamp: float,
+    position: np.ndarray,
+    motion: EstimatedMotion,
+) -> tuple[int, float, float, float]:
+    """Compare a pose of `stamp` [s] at position (3,) [m, world] with the stored predictions.
+
+    Returns the row of the nearest one, its difference in time [s], its distance from the pose [m],
+    and the norm of the accelerometer bias [m/s^2]. stamps (m,) [s]; poses (m, 7).
+    """
+    row = nearest(stamps, stamp)
+    jump = bias = 0.0
+    for i in range(3):
+        jump += (position[i] - poses[row, i]) ** 2
+        bias += motion.accelerometer_bias[i] ** 2
+    return row, abs(stamps[row] - stamp), math.sqrt(jump), math.sqrt(bias)
 
 
 @jit
@@ -219,20 +229,18 @@ def correct(
     bandwidths: np.ndarray,
     measured_position: np.ndarray,
     measured_quaternion: np.ndarray,
-    pose: np.ndarray,
-    position: np.ndarray,
-    velocity: np.ndarray,
-    quaternion: np.ndarray,
-    gyro_bias: np.ndarray,
-    accelerometer_bias: np.ndarray,
+    poses: np.ndarray,
+    row: int,
+    motion: EstimatedMotion,
 ) -> None:
-    """Correct the estimate in place with a measured pose and its prediction pose (7,).
+    """Correct the estimate in place with a measured pose and its prediction poses[row] (7,).
 
     Observer gains: 3w, 3w^2, w^3 (triple pole) for position; 2w, w^2 (double pole) for attitude.
     dt [s]: since the last correction; bandwidths (2,): w of position and attitude [rad/s];
-    measured_position (3,) [m, world]; measured_quaternion (4,) body → world [w x y z]. position,
-    velocity, quaternion, gyro_bias, accelerometer_bias: see `PoseFilter`.
+    measured_position (3,) [m, world]; measured_quaternion (4,) body → world [w x y z].
     """
+    position, velocity, quaternion, _, _, gyro_bias, accelerometer_bias = motion
+    pose = poses[row]
     w = bandwidths[0]
     for i in range(3):
         innovation = measured_position[i] - pose[i]

@@ -222,7 +222,8 @@ class Mission:
             seen = self._observe(stamp, state, armed_since, readings or Readings())
             seen.authority, self._seen = authority or Authority(), seen
             command, goal = self._requests.popleft() if self._requests else (None, None)
-            before = len(self.changes)
+            changes = self._supervisor.changes
+            before = len(changes)
             decision = self._supervisor.step(stamp, seen, command)
             if guidance is not None:
                 guidance.write(stamp)
@@ -231,7 +232,7 @@ class Mission:
                     guidance.stay(stamp, state, self._ground, self._age)
                 if output.state is State.RELEASED:
                     guidance.follow(stamp, state)
-                event = self.changes[-1].event if len(self.changes) > before else None
+                event = changes[-1].event if len(changes) > before else None
                 if event is Event.GOAL:
                     guidance.fly(stamp, goal.plan(stamp, guidance.motion, self._parameters))
                 elif event is Event.RESUME:
@@ -368,8 +369,9 @@ class Mission:
         seen.on_ground = touchdown.on_ground(state, self._ground, p)
         landing, time = self.scenario.landing, guidance.scenario_time
         seen.end_mission = self._over
-        seen.landing_due = time >= landing.at and not guidance.planned
-        seen.off_path, seen.arrived = guidance.planned, guidance.arrived(stamp)
+        seen.off_path = planned = guidance.planned
+        seen.landing_due = time >= landing.at and not planned
+        seen.arrived = planned and guidance.arrived(stamp)
         half = landing.at + 0.5 * landing.duration
         if time >= half or touchdown.late_in_descent(stamp):
             seen.touchdown = touchdown.at_rest(stamp, seen.on_ground, p)
@@ -395,7 +397,8 @@ class Mission:
         if decision.state is not output.state:
             before, output.state = output.state, decision.state
             self._enter(stamp, before, decision)
-        self._stow_released(stamp, decision.state is State.RELEASED and decision.stow)
+        if decision.state is State.RELEASED or self._standing is not None:
+            self._stow_released(stamp, decision.state is State.RELEASED and decision.stow)
         output.cause, output.arm, output.regains = decision.cause, decision.arm, decision.regains
         output.flying = decision.guide is not Guide.NOTHING
         output.phase = self._phase(decision)
@@ -442,7 +445,7 @@ class Mission:
         start = self._seen.state[0].copy()
         start[3:5] = 0.0
         start[ARM] = self.scenario.arm_start
-        self._takeoff, self._ground = stamp, start[2]
+        self._takeoff, self._ground = stamp, start.item(Z)
         self.scenario = self._planned.begun_at(start)
         self._guidance = Guidance(
             self.scenario.trajectory(start),

@@ -9,6 +9,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from uam_control.estimation.repeats import Repeats
+from uam_control.maths.compiled import jit
 from uam_control.supervision.observation import Readings
 from uam_control.supervision.pace import Pace
 
@@ -43,7 +44,7 @@ class Inputs:
         self._controllers: dict[str, float] = {}  # stamps of the newest gains [s]
         self._last: float | None = None
         self._gaps: deque[tuple[float, int]] = deque()  # stamp [s], ticks missed before it
-        self._watched: dict[tuple[str, ...], list[int]] = {}
+        self._watched: dict[tuple[str, ...], np.ndarray] = {}
         self._pace = Pace()
 
     def mocap(self, stamp: float, position: np.ndarray, quaternion: np.ndarray) -> None:
@@ -106,9 +107,9 @@ class Inputs:
         """Store the adapted gains of one of SUBSYSTEMS at `stamp` [s]: names (n), values (n,)."""
         key = tuple(names)
         if key not in self._watched:
-            self._watched[key] = [i for i, n in enumerate(names) if n.startswith(WATCHED)]
-        watched = values[self._watched[key]]
-        largest = float(np.maximum.reduce(np.abs(watched))) if len(watched) else math.nan
+            watched = [i for i, n in enumerate(names) if n.startswith(WATCHED)]
+            self._watched[key] = np.array(watched, dtype=int)
+        largest = largest_of(values, self._watched[key])
         self._readings.gains[SUBSYSTEMS.index(subsystem)] = largest
         self._controllers[subsystem] = stamp
         self._oldest = min(self._controllers.values())
@@ -142,3 +143,16 @@ class Inputs:
         readings.controller_age = stamp - self._oldest
         readings.pose_controller_age = stamp - self._oldest_of_pose
         return readings
+
+
+@jit
+def largest_of(values: np.ndarray, places: np.ndarray) -> float:
+    """Return the largest |value| at `places` (m,) of values (n,); NaN for m = 0 or with a NaN."""
+    found = math.nan
+    for place in places:
+        size = abs(values[place])
+        if math.isnan(size):
+            return size
+        if not found >= size:
+            found = size
+    return found

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import tempfile
 from dataclasses import dataclass, field
+from functools import cached_property
 from pathlib import Path
 from typing import Any
 
@@ -52,7 +53,11 @@ class Trial:
     carried: Carried | None = None
 
     def load_scenario(self) -> Scenario:
-        """Return the scenario, for the vehicle. Raises ScenarioError."""
+        """Return the scenario, for the vehicle; it is read once. Raises ScenarioError."""
+        return self._scenario
+
+    @cached_property
+    def _scenario(self) -> Scenario:
         if self.carried is not None and self.carried.scenario is not None:
             return self.carried.scenario
         return load_scenario(self.scenario, self.profile.vehicle)

@@ -194,9 +194,7 @@ class Autopilot:
             return ""
         self._position = None
         setpoint, rates = self._setpoint, target.rates
-        setpoint[0] = rates[0]
-        setpoint[1] = rates[1]
-        setpoint[2] = rates[2]
+        setpoint[:3] = rates
         setpoint[3] = min(1.0, max(0.0, target.thrust))
         self._desired = None
         if target.type_mask != RATES:

@@ -76,7 +76,8 @@ class BridgeStage:
 
     `hands`: a person holds the disarmed vehicle and looks at the commands, see docs/preflight.md:
     they are returned, and the autopilot gets none of them.
-    `factor`: thrust factor used for the last setpoint; `lift` [N]: low-pass of the collective by
+    `sent`: body rates (3,) [rad/s, FLU] and thrust of the last setpoint, see `sent`;
+    `factor`: thrust factor used for it; `lift` [N]: low-pass of the collective by
     that factor, at LIFT_CUTOFF; `lift_due`: whether factor and lift are reported; `report`: the
     report of the autopilot due after the last tick, None if none is due.
     """
@@ -108,6 +109,7 @@ class BridgeStage:
         self.report: AutopilotReport | None = None
         self.hands = False
         self.factor = 1.0
+        self.sent = sent(None)
         self.lift, self.lift_due = 0.0, False
         self._last = 0  # stamp [ns] of the last tick
 
@@ -177,13 +179,14 @@ class BridgeStage:
             now, state, flying, tau_p, tau_q, attitude, situation, reference
         )
         setpoint = self._sampled(now, setpoint, flying)
+        self.sent = rates, thrust = sent(setpoint)
         if flying and situation.armed and setpoint is not None and not self.source.holding:
-            self.loop_delay.update(now, sent(setpoint)[0], state[CHI_DOT, ATTITUDE])
+            self.loop_delay.update(now, rates, state[CHI_DOT, ATTITUDE])
         else:
             self.loop_delay.pause()
         self._send(now, setpoint)
         self.report = self._reports.due(stamp)
-        thrust, self.factor = setpoint.thrust if setpoint else 0.0, self.map.thrust_factor
+        self.factor = self.map.thrust_factor
         assumed = self.map.assumed_thrust(thrust)
         self.map.thrust_factor = self.identification.update(
             now,
@@ -217,6 +220,7 @@ class BridgeStage:
         now, self._kept = stamp / SECOND, None
         self.loop_delay.pause()
         setpoint = self.source.without(now, self._situation)
+        self.sent = sent(setpoint)
         self._send(now, setpoint)
         self.report = self._reports.due(stamp)
         self.factor = self.map.thrust_factor

@@ -25,7 +25,6 @@ from uam_sim_bridge.faults import Schedule
 from uam_sim_bridge.faults.direct import DirectFaults
 from uam_sim_bridge.faults.faulty_plant import make_plant
 from uam_sim_bridge.mavlink.offboard.sequence import OffboardParameters, OffboardSequence
-from uam_sim_bridge.mavlink.offboard.setpoint_source import sent
 from uam_sim_bridge.plant import Samples, Vehicle
 from uam_sim_bridge.plant.effects.network_delay import SetpointDelay
 from uam_sim_bridge.plant.engines import DEFAULT_PLANT
@@ -174,7 +173,7 @@ class DirectFlight:
         shot = truths.popleft()  # when the IMU sample was taken
         truth = shot.truth
         row = self.recording.next_row(signals.phase)
-        rates, thrust = sent(signals.setpoint)
+        rates, thrust = self.control.bridge.sent
         arguments = (
             row,
             signals.time,

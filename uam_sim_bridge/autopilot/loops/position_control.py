@@ -48,7 +48,8 @@ class PositionControl:
 
     def reset(self) -> None:
         """Clear the memory."""
-        self._integral[:], self._slope[:], self._velocity = 0.0, 0.0, None
+        if self._velocity is not None:
+            self._integral[:], self._slope[:], self._velocity = 0.0, 0.0, None
 
     def update(self, target: PositionTarget, estimate: np.ndarray, dt: float) -> np.ndarray:
         """Return the setpoint (4,): body rates [rad/s, FRD], thrust.

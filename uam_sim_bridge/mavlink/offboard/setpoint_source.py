@@ -20,7 +20,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from uam_control.coordinates import ALPHA, ATTITUDE, CHI, CHI_DDOT, CHI_DOT, POSITION, Z
+from uam_control.coordinates import ALPHA, ATTITUDE, CHI, CHI_DDOT, CHI_DOT, POSITION, YAW, Z
 from uam_control.maths.rotations import euler_from_quaternion, matrix_from_euler
 from uam_sim_bridge.mavlink.offboard.hold import UNKNOWN, HoldParameters, LevelHold
 from uam_sim_bridge.mavlink.offboard.setpoint import RateThrustMap, SetpointRefused
@@ -78,10 +78,9 @@ class SetpointSource:
         self._margin = hold.ground_margin
         self._fresh_for = fresh
         self._say = say
-        self._estimated = -math.inf, UNKNOWN  # stamp [s]; roll, pitch, yaw
+        self._estimated = -math.inf  # stamp [s] of the estimate
         self._seen = -math.inf, UNKNOWN  # stamp [s]; quaternion
-        self._velocity = UNKNOWN
-        self._motion = np.zeros((3, ALPHA))  # estimate
+        self._motion = np.full((3, ALPHA), math.nan)  # estimate
         self._height = 0.0
         self._ground: float | None = None  # height [m] at which the vehicle stood
         self._present_at = -math.inf  # [s] newest setpoint for a released vehicle
@@ -93,8 +92,7 @@ class SetpointSource:
 
     def note_state(self, stamp: float, state: np.ndarray) -> None:
         """Store the estimate (3, 6 + n), see uam_control.coordinates, of `stamp` [s] uncopied."""
-        self._estimated, self._velocity = (stamp, state[CHI, ATTITUDE]), state[CHI_DOT, POSITION]
-        self._motion, self._height = state, float(state[CHI, Z])
+        self._estimated, self._motion, self._height = stamp, state, state.item(CHI, Z)
 
     def note_pose(self, stamp: float, quaternion: np.ndarray) -> None:
         """Store the attitude (4,) [w x y z], FLU → ENU, of a mocap pose of `stamp` [s]."""
@@ -152,8 +150,8 @@ class SetpointSource:
             return self._at_present(now)
         if not armed or (landed and not self._high(armed)):
             return self._idle
-        hopeless = let_go or not self._fresh(self._estimated[0], now)
-        velocity = UNKNOWN if hopeless else self._velocity
+        hopeless = let_go or not self._fresh(self._estimated, now)
+        velocity = UNKNOWN if hopeless else self._motion[CHI_DOT, POSITION]
         desired = self._hold.setpoint(now, self._attitude(now), velocity, hopeless)
         doing = "holding level" if desired else "stream stopped, the failsafe acts"
         self._say(f"no usable commands in flight: {doing}", "hold")
@@ -178,7 +176,7 @@ class SetpointSource:
         """
         angles, rates, lift = np.zeros((3, 3)), np.zeros(3), 1.0
         angles[0] = np.nan_to_num(self._attitude(now))
-        if self._fresh(self._estimated[0], now) and np.all(np.isfinite(self._motion)):
+        if self._fresh(self._estimated, now) and np.all(np.isfinite(self._motion)):
             part = 1.0 - min(1.0, max(0.0, now - self._present_at) / HANDOVER)
             rates = part * np.clip(self._motion[CHI_DOT, ATTITUDE], -MOST_RATE, MOST_RATE)
             gravity = self.map.gravity
@@ -189,7 +187,7 @@ class SetpointSource:
 
     @property
     def _idle(self) -> Target:
-        yaw = self._estimated[1][2]
+        yaw = self._motion.item(CHI, YAW)
         return self._type(Desired(np.zeros(3), level(yaw if math.isfinite(yaw) else 0.0), 0.0))
 
     def _handed_over(self, now: float) -> bool:
@@ -209,8 +207,8 @@ class SetpointSource:
 
     def _attitude(self, now: float) -> np.ndarray:
         """Return roll, pitch, yaw (3,) [rad]: the estimate, else mocap's if fresh, else NaN."""
-        if self._fresh(self._estimated[0], now):
-            return self._estimated[1]
+        if self._fresh(self._estimated, now):
+            return self._motion[CHI, ATTITUDE]
         return euler_from_quaternion(self._seen[1]) if self._fresh(self._seen[0], now) else UNKNOWN
 
     def _fresh(self, stamp: float, now: float) -> bool:

@@ -34,7 +34,7 @@ from typing import Any, Self
 import numpy as np
 
 from uam_control.coordinates import CHI, CHI_DDOT, PITCH, ROLL, YAW, X, Y, Z
-from uam_control.maths.compiled import jit
+from uam_control.maths.compiled import jit, prepared
 from uam_control.settings.parameter_set import ParameterSet, choice, number
 from uam_control.vehicle import VehicleDescription, derived_parameters, load_description
 
@@ -166,6 +166,7 @@ class ThrustIdentification:
         self._released: float | None = None  # s, magnet off; None once no payload hangs
         self._recent = math.nan  # measurement since the release, fast low pass
         self._before: float | None = None  # settled factor before the magnet went on
+        self._steady_force = prepared(steady_force, np.zeros((3, 3)), 0.0, 0.0, 0.0)
         self.configure(parameters or ThrustIdentificationParameters.of(vehicle))
 
     def configure(self, parameters: ThrustIdentificationParameters) -> None:
@@ -202,7 +203,8 @@ class ThrustIdentification:
         self._assumed += (1.0 - math.exp(-dt / max(p.identification_lag, 1e-3))) * (
             assumed - self._assumed
         )
-        self._follow_magnet(time)
+        if self._switches:
+            self._follow_magnet(time)
         if p.thrust_identification == "off":
             self._learnt = 0.0
             self._move(1.0 - self.factor, dt)
@@ -219,7 +221,7 @@ class ThrustIdentification:
         """Measure the factor in steady flight and follow the measurement."""
         p = self.parameters
         limits = (p.identification_tilt, p.identification_acceleration)
-        force = steady_force(state, *limits, self._gravity)
+        force = self._steady_force(state, *limits, self._gravity)
         if force == 0.0 or self._assumed <= 0.0 or not USABLE[0] <= command <= USABLE[1]:
             self._unsteady = time
         # A swaying vehicle is at rest for moments, and its motors saturate: rest must last.
