@@ -32,8 +32,8 @@ class Touchdown:
     @staticmethod
     def on_ground(state: np.ndarray, ground: float, p: MissionParameters) -> bool:
         """Return whether the vehicle is low and slow; state (3, 6 + n); ground [m]: its height."""
-        low = state[CHI, Z] < ground + p.touchdown_height
-        return bool(low and abs(state[CHI_DOT, Z]) < p.touchdown_speed)
+        low = state.item(CHI, Z) < ground + p.touchdown_height
+        return low and abs(state.item(CHI_DOT, Z)) < p.touchdown_speed
 
     def at_rest(self, stamp: float, on_ground: bool, p: MissionParameters) -> bool:
         """Return whether the vehicle has been on the ground for touchdown_time."""
