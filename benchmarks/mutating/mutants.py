@@ -34,8 +34,8 @@ class Mutant:
 def mutants(source: str, operators: list[str]) -> Iterator[Mutant]:
     """Yield the mutants of a module; operators: regular expressions of cosmic-ray's names.
 
-    Left out: annotations, decorators and declarations of parameters, see `not_code`. Nothing of
-    them is executed at a tick.
+    Left out: annotations, decorators, declarations of parameters and examples of `prepared`, see
+    `not_code`. Nothing of them is executed at a tick.
     """
     skipped = not_code(source)
     nodes = list(ast_nodes(get_ast(source)))
@@ -56,7 +56,8 @@ def mutants(source: str, operators: list[str]) -> Iterator[Mutant]:
 
 
 def not_code(source: str) -> list[tuple[tuple[int, int], tuple[int, int]]]:
-    """Return begin and end (line, column) of annotations, decorators, declared parameters."""
+    """Return begin and end (line, column) of annotations, decorators, declared parameters, and of
+    the calls of `prepared`, whose arguments are examples."""
     found: list[ast.expr] = []
     for node in ast.walk(ast.parse(source)):
         found += getattr(node, "decorator_list", [])
@@ -65,6 +66,8 @@ def not_code(source: str) -> list[tuple[tuple[int, int], tuple[int, int]]]:
             for part in (getattr(node, "annotation", None), getattr(node, "returns", None))
             if part is not None
         ]
+        if isinstance(node, ast.Call) and getattr(node.func, "id", "") == "prepared":
+            found.append(node)
         if isinstance(node, ast.AnnAssign) and isinstance(node.value, ast.Call):
             function = node.value.func
             if isinstance(function, ast.Name) and function.id in DECLARATIONS:
