@@ -1,5 +1,6 @@
 """Base class of all nodes: inputs, diagnostics, start and end of the process."""
 
+import faulthandler
 import re
 import signal
 import sys
@@ -37,6 +38,7 @@ from uam_msgs_py.node.tick_times import DECODE, PUBLISH, tick_times
 from uam_msgs_py.node.tunable import TunableNode
 
 DIAGNOSTICS_PERIOD = 1.0  # s
+END_PATIENCE = 6.0  # s, for the middleware at a node's end; `uam fly` waits 10 s
 LOG_PERIOD = 2.0  # s, shortest time between two log lines of the same kind
 
 
@@ -75,6 +77,7 @@ class UamNode(TunableNode):
         self._at_last_report = (0, 0.0)
         self._dropped_before = 0
         self._waiting: list[str] = []  # required inputs without a message in the last LOG_PERIOD
+        self._guards_end = False  # see `destroy_node`
         self._diagnostics = self.publisher(topics.DIAGNOSTICS)
         steady = Clock(clock_type=ClockType.STEADY_TIME)
         self.create_timer(LOG_PERIOD, self._check_inputs, clock=steady)
@@ -219,6 +222,20 @@ class UamNode(TunableNode):
         """Return the absolute name of a topic, for messages."""
         return expanded(self.get_namespace(), name)
 
+    def guard_end(self) -> None:
+        """End the process if the middleware hangs in `destroy_node`."""
+        self._guards_end = True
+
+    def destroy_node(self) -> None:
+        """Destroy the node; a subclass ends its own work before.
+
+        The middleware may hang here when other nodes end at the same moment. In a process of
+        `run` it is then ended after END_PATIENCE: exit status 1, and where it hung on stderr.
+        """
+        if self._guards_end:
+            faulthandler.dump_traceback_later(END_PATIENCE, exit=True)
+        super().destroy_node()
+
     def diagnose(self) -> tuple[bytes, str, dict[str, object]]:
         """Return level, summary and further values for /diagnostics; overridden by subclasses."""
         return OK, "running", {}
@@ -333,9 +350,11 @@ def run_together(
     finally:
         for node in nodes:
             node.times.close()
+            node.guard_end()
             node.destroy_node()
         rclpy.try_shutdown()
         stop.ignore()
+        faulthandler.cancel_dump_traceback_later()
 
 
 def _failure_of(nodes: Sequence[UamNode]) -> str:
