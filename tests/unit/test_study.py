@@ -9,6 +9,10 @@ import pytest
 
 from uam_control.laws import catalogue
 from uam_control.laws.law import LawInputs
+from uam_control.mission import load_scenario
+from uam_lab.flight.flight_settings import FlightSettings
+from uam_lab.flight.ros import node_arguments
+from uam_lab.results.result_folder import ResultFolder
 from uam_lab.results.timeseries import SUBSYSTEMS
 from uam_lab.study import design, kept, report
 from uam_lab.study.description import StudyError, load_study
@@ -16,9 +20,12 @@ from uam_lab.study.flights import FLOWN, StudyResult
 from uam_lab.study.run import Runner
 from uam_lab.study.search import cost
 from uam_lab.workers.place import Workplace
+from uam_sim_bridge.autopilot.params import Parameters
 from uam_sim_bridge.plant import Vehicle
+from uam_sim_bridge.ports import Ports
 
 STEP = 1e-6
+INTEGRATORS = {f"MC_{axis}RATE_I": 0.0 for axis in ("ROLL", "PITCH", "YAW")}
 LAWS = (
     "PD",
     "proposed",
@@ -207,3 +214,17 @@ def no_flight(planned, place, out):
     marks = pq.read_table(out / kept.FILE)["mark"].to_pylist()
     assert all(kept.mark(one) in marks for one in planned)
     return kept.fly(planned, place, out, lambda done, one: pytest.fail("flown again"))
+
+
+def test_the_nodes_fly_with_the_autopilot_gains_of_the_study(study, tmp_path):
+    """The stand-in reads the vehicle's file, which has other gains."""
+    profile = design.profile(study, study.rows[0], study.document["strengths"])
+    settings = FlightSettings(load_scenario("hover"), profile, profile.vehicle, 0.0)
+    (tmp_path / "logs").mkdir()
+    module, arguments = node_arguments.autopilot(settings, ResultFolder(tmp_path), Ports(0))
+    file = arguments[arguments.index("--params") + 1]
+    assert module == node_arguments.STAND_IN
+    flown = Parameters.of(study.vehicle, file)
+    assert {name: flown[name] for name in INTEGRATORS} == INTEGRATORS
+    own = FlightSettings(load_scenario("hover"), profile, study.vehicle, 0.0)
+    assert "--params" not in node_arguments.autopilot(own, ResultFolder(tmp_path), Ports(0))[1]

@@ -6,8 +6,11 @@ import json
 from pathlib import Path
 from typing import Any
 
+import yaml
+
 from uam_control.mission.time_limit import time_limit
 from uam_control.profiles.profile import servo_mode
+from uam_control.vehicle import VehicleDescription, load_description
 from uam_lab.cockpit import page_address
 from uam_lab.flight.conclude import settings_facts
 from uam_lab.flight.flight_settings import AUTOPILOT_IMU, BUILTIN, FlightSettings
@@ -42,6 +45,7 @@ PX4_LOG = "px4.ulg"
 AUTOPILOT_WAIT = 60.0  # [s] for which the autopilot waits for the simulator
 FACTS = "facts.json"
 REQUIRED = "px4_parameters.yaml"
+GAINS = "autopilot_gains.yaml"
 TICK_TIMES = "tick_times"  # folder of logs/
 FLYING = set(wiring.FUSED)  # nodes of the control tick
 MEASURED = FLYING | {wiring.PLANT, wiring.FLIGHT_CONTROLLER}  # nodes that can measure their ticks
@@ -299,12 +303,24 @@ def autopilot(
     vehicle = ["--vehicle", settings.vehicle.source]
     if in_the_loop(settings):
         return HITL_ROUTER, [settings.autopilot, *instance, *patience]
+    changed = changed_gains(settings.vehicle)
     if settings.px4 is not None:
         log = folder.path / PX4_LOG
         own = ["--px4-dir", str(settings.px4.directory), "--log", str(log.absolute())]
         own += ["--once"]
-        own += [word for text in settings.px4_params for word in ("--param", text)]
+        given = [f"{name}={value:g}" for name, value in changed.items()]
+        own += [word for text in (*given, *settings.px4_params) for word in ("--param", text)]
         return SITL, [*instance, *own, *vehicle]
     if users_autopilot(settings):
         return "", []
+    if changed:
+        file = folder.path / "logs" / GAINS
+        file.write_text(yaml.safe_dump(changed))
+        vehicle += ["--params", str(file.absolute())]
     return STAND_IN, [*instance, *patience, *vehicle, "--once"]
+
+
+def changed_gains(vehicle: VehicleDescription) -> dict[str, float]:
+    """Return the gains of the autopilot that differ from those of the vehicle's file."""
+    written = load_description(vehicle.source).autopilot_gains
+    return {k: v for k, v in vehicle.autopilot_gains.items() if written.get(k) != v}
