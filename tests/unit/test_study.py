@@ -22,7 +22,7 @@ from uam_lab.study.search import cost
 from uam_lab.workers.place import Workplace
 from uam_sim_bridge.autopilot.params import Parameters
 from uam_sim_bridge.plant import Vehicle
-from uam_sim_bridge.ports import Ports
+from uam_sim_bridge.ports import ports_of
 
 STEP = 1e-6
 INTEGRATORS = {f"MC_{axis}RATE_I": 0.0 for axis in ("ROLL", "PITCH", "YAW")}
@@ -221,10 +221,10 @@ def test_the_nodes_fly_with_the_autopilot_gains_of_the_study(study, tmp_path):
     profile = design.profile(study, study.rows[0], study.document["strengths"])
     settings = FlightSettings(load_scenario("hover"), profile, profile.vehicle, 0.0)
     (tmp_path / "logs").mkdir()
-    module, arguments = node_arguments.autopilot(settings, ResultFolder(tmp_path), Ports(0))
+    module, arguments = node_arguments.autopilot(settings, ResultFolder(tmp_path), ports_of(0))
     file = arguments[arguments.index("--params") + 1]
     assert module == node_arguments.STAND_IN
     flown = Parameters.of(study.vehicle, file)
     assert {name: flown[name] for name in INTEGRATORS} == INTEGRATORS
     own = FlightSettings(load_scenario("hover"), profile, study.vehicle, 0.0)
-    assert "--params" not in node_arguments.autopilot(own, ResultFolder(tmp_path), Ports(0))[1]
+    assert "--params" not in node_arguments.autopilot(own, ResultFolder(tmp_path), ports_of(0))[1]
