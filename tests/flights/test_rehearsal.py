@@ -9,6 +9,7 @@ import os
 import subprocess
 import sys
 
+import psutil
 import pytest
 import yaml
 
@@ -43,7 +44,7 @@ def rehearse(folder, *options, px4=False, **changes):
         timeout=PATIENCE,
         env=os.environ | {"COLUMNS": "300"} | chosen,
     )
-    assert not nodes()
+    assert not nodes(psutil.Process().children(recursive=True)), "a node has stayed"
     assert not any((out / "devices").glob("tty*"))
     return done.returncode, done.stdout + done.stderr, out
 
