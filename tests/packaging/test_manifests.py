@@ -19,6 +19,7 @@ KEYS = {
     **{name: f"python3-{name}-pip" for name in ("mujoco", "pymavlink")},
     "websockets": "python3-websockets",
     "mcap": "mcap-ros2-support",  # there is no key for mcap alone, which this one brings
+    "llvmlite": "python3-numba",  # which brings it
     "serial": "python3-serial",
     "PIL": "python3-pil",
     "yaml": "python3-yaml",
