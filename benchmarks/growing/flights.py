@@ -15,6 +15,7 @@ import numpy as np
 import psutil
 
 from growing.further_recorder import recording
+from uam_control.laws import catalogue
 from uam_control.mission import load_scenario
 from uam_control.profiles.profile import default_profile
 from uam_control.vehicle import load_description
@@ -129,9 +130,12 @@ def _own(process: psutil.Process) -> float:
 def direct(what: str, size: int, scenario: Path, vehicle: str) -> Point:
     """Fly once in the direct engine, in this process."""
     described = load_description(vehicle)
-    profile, loaded = default_profile("modular", described), load_scenario(str(scenario), described)
+    profile, loaded = (
+        default_profile(catalogue.DEFAULT, described),
+        load_scenario(str(scenario), described),
+    )
     given = (loaded, profile, Vehicle.of(described), 0.0)
-    warm_up()
+    warm_up([catalogue.DEFAULT])
     DirectFlight(*given, seed=1).tick()  # compiles what this vehicle needs
     flight = DirectFlight(*given, seed=1)
     begun = time.perf_counter()
