@@ -19,7 +19,6 @@ KEYS = {
     **{name: f"python3-{name}-pip" for name in ("mujoco", "pymavlink")},
     "websockets": "python3-websockets",
     "mcap": "mcap-ros2-support",  # there is no key for mcap alone, which this one brings
-    "llvmlite": "python3-numba",  # which brings it
     "serial": "python3-serial",
     "PIL": "python3-pil",
     "yaml": "python3-yaml",
@@ -28,6 +27,7 @@ KEYS = {
 WITHOUT_KEY = {"dask", "distributed", "imageio_ffmpeg", "optuna", "pyarrow", "viser"}
 # of the extra `hardware`, imported where a device is chosen; rosdep has no key for them either
 WITHOUT_KEY |= {"gpiod", "motioncapture", "natnet"}
+WITHOUT_KEY |= {"llvmlite"}  # numba brings it
 # imported only where they are installed
 OPTIONAL = {"pandas", "OpenGL", "ament_index_python", "dynamixel_sdk"}
 
