@@ -12,6 +12,9 @@ from collections.abc import Callable, Iterable, Iterator
 
 import numpy as np
 
+from uam_control.coordinates import ALPHA
+from uam_control.grasp.kinematics import lever
+from uam_control.grasp.sight import RunningMean
 from uam_control.laws import catalogue
 from uam_control.laws.catalogue import LAWS
 from uam_control.mission import load_scenario
@@ -91,6 +94,10 @@ def _others() -> None:
     Polynomials(np.array([0.0, 1.0]), np.zeros((1, 6, 4))).rows(np.zeros(2))
     curve = load_scenario("circle")
     curve.trajectory(standing(curve.arm_start)).write(4.0, empty_motion(len(curve.arm_start)))
+    mean = RunningMean()  # of the grasp, which a flight without a payload does not check
+    for stamp in (0.0, 0.004):
+        mean.add(stamp, np.zeros(3))
+    lever(np.zeros(ALPHA + len(curve.arm_start)), [0.0] * len(curve.arm_start))
     VisionPose(0.0, np.zeros(3), np.array([1.0, 0.0, 0.0, 0.0]), 0.0, 0.0).message()
     companion.warm_up()  # the stand-in's descent, which a flight without failures does not call
 
