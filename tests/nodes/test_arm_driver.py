@@ -145,7 +145,7 @@ def test_a_missing_device_is_refused_in_one_line(start):
         ("missed_reads:=0", "missed_reads: 0 is outside 1 to 1000"),
         ("ends_with:=brake", "ends_with: 'brake' is not one of torque_off, hold"),
         ("hardware:=none", "hardware: unknown lab 'none'; there are: "),
-        ("speed:=1", "speed: unknown; allowed: answer_timeout, device"),
+        ("speed:=1", "speed: unknown; allowed: answer_timeout, "),
     ],
 )
 def test_a_bad_parameter_is_refused_in_one_line(start, setting, reason):

@@ -127,6 +127,7 @@ class StampJoin:
             if served is None:
                 return
             tick.values[self._ahead] = served
+            tick.missing = 0
         self._dropped += self._close(stamp) - 1  # all but this one
         self._backlog.put((stamp, tick.values))
         if not self.deferred:
