@@ -8,6 +8,7 @@ import math
 import shlex
 import sys
 import threading
+import time
 from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -16,12 +17,13 @@ from uam_control.mission.mission_output import PHASES
 from uam_control.profiles.profile import load_profile
 from uam_control.settings import configuration
 from uam_control.supervision import State
+from uam_control.supervision.preflight import UNKNOWN
 from uam_lab.flight import flight_settings
 from uam_lab.flight.conclude import conclude
 from uam_lab.flight.direct.warm_up import prepare
 from uam_lab.flight.flight_settings import FlightSettings, SettingsError
 from uam_lab.flight.observer import FlightStatus, Observer
-from uam_lab.library.errors import FlightEnded, FlightError, NotInTime
+from uam_lab.library.errors import CommandRefused, FlightEnded, FlightError, NotInTime
 from uam_lab.library.flight_result import FlightFailed, FlightResult
 from uam_lab.library.history import Condition, History
 from uam_lab.processes.interrupts import StopRequest
@@ -35,6 +37,7 @@ if TYPE_CHECKING:
     from uam_lab.processes.guest import Guest
 
 CONNECTED = 60.0  # [s] of wall time for the nodes to find each other before a command
+START_PATIENCE = 10.0  # [s] of wall time for the first values of the pre-arm report
 POLL = 0.05  # [s] between two looks of a waiting coroutine
 Kind = str | Condition
 Engine = Callable[[FlightSettings, ResultFolder, Observer, StopRequest], Outcome]
@@ -261,9 +264,17 @@ class Flight:
     def start(self) -> str:
         """Arm and take off, if the pre-arm report is green (with auto_start=False).
 
-        Returns the answer, as do all commands. Raises CommandRefused with the reason.
+        Returns the answer, as do all commands. Waits for values that are still unknown after the
+        launch, for at most START_PATIENCE. Raises CommandRefused with the reason.
         """
-        return self._command("start")
+        end = time.monotonic() + START_PATIENCE
+        while True:
+            try:
+                return self._command("start")
+            except CommandRefused as refusal:
+                if UNKNOWN not in str(refusal) or time.monotonic() > end:
+                    raise
+            time.sleep(POLL)
 
     def hold(self) -> str:
         """Stop on the path and hold the position."""
