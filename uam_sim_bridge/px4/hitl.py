@@ -14,7 +14,6 @@ from __future__ import annotations
 import argparse
 import signal
 import sys
-import tempfile
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
@@ -24,14 +23,7 @@ from uam_sim_bridge.mavlink.hil.sitl_options import add_instance, add_vehicle
 from uam_sim_bridge.mavlink.transport.transport import parse_url
 from uam_sim_bridge.ports import PortError
 from uam_sim_bridge.px4 import px4_parameters as parameters
-from uam_sim_bridge.px4.process import (
-    FOLDERS,
-    Px4Process,
-    add_px4_options,
-    ended,
-    keep,
-    say_kept,
-)
+from uam_sim_bridge.px4.process import Px4Process, add_px4_options, run
 from uam_sim_bridge.px4.px4_installation import LOOP_VARIABLE, Px4Error, Px4Installation
 
 NAME = "px4_hitl"
@@ -136,17 +128,11 @@ def main(arguments: Sequence[str] | None = None) -> int:
         MAVLINK: mavlink_script(line.place, line.number, options.usb),
     }
     variables = parameters.environment(values)
-    with tempfile.TemporaryDirectory(prefix=FOLDERS) as folder:
-        px4 = Px4Process(installation, options.instance, scripts, variables, Path(folder))
-        try:
-            with px4:
-                status = px4.process.wait()
-        except KeyboardInterrupt:
-            return 0
-        finally:
-            if options.log is not None:
-                say_kept(NAME, keep(px4.logs(), options.log))
-    return ended(NAME, status)
+
+    def start(folder: Path) -> Px4Process:
+        return Px4Process(installation, options.instance, scripts, variables, folder)
+
+    return run(NAME, start, options.log)
 
 
 if __name__ == "__main__":

@@ -9,7 +9,8 @@ import shutil
 import signal
 import subprocess
 import sys
-from collections.abc import Mapping, Sequence
+import tempfile
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 
 from uam_sim_bridge.px4 import px4_parameters as parameters
@@ -134,6 +135,48 @@ def say_kept(program: str, kept: Sequence[Path]) -> None:
     """Say where PX4's logs are."""
     names = ", ".join(str(file) for file in kept) or "PX4 wrote none"
     print(f"{program}: log: {names}", flush=True)
+
+
+def end_of_all(px4: Px4Process) -> bool:
+    """Wait until PX4 has ended; return that none is started after it."""
+    px4.process.wait()
+    return False
+
+
+def run(
+    program: str,
+    start: Callable[[Path], Px4Process],
+    log: Path | None,
+    over: Callable[[Px4Process], bool] = end_of_all,
+    anew: str = "",
+) -> int:
+    """Run PX4 until interrupted; return the exit status of `program`.
+
+    start: returns a running PX4 in the given new folder; log: where its logs are kept, if at all;
+    over: waits for the end, and returns whether PX4 is started anew (by default never); anew: said
+    then.
+
+    0: interrupted; PX4's status if PX4 ended by itself. If a signal ended PX4, the same signal ends
+    this process.
+    """
+    kept: list[Path] = []
+    again = True
+    while again:
+        with tempfile.TemporaryDirectory(prefix=FOLDERS) as folder:
+            px4 = start(Path(folder))
+            try:
+                with px4:
+                    again = over(px4)
+                status = px4.process.returncode
+            except KeyboardInterrupt:
+                return 0
+            finally:
+                if log is not None:
+                    kept += (new := keep(px4.logs(), log, len(kept) + 1))
+                    say_kept(program, new)
+        if again:
+            print(f"{program}: {anew}", flush=True)
+    return ended(program, status)
 
 
 def add_px4_options(p: argparse.ArgumentParser, required: str) -> None:

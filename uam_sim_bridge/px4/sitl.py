@@ -12,9 +12,8 @@ from __future__ import annotations
 import argparse
 import signal
 import sys
-import tempfile
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 
 import psutil
@@ -25,57 +24,30 @@ from uam_sim_bridge.mavlink.hil.sitl_options import add_instance, add_vehicle
 from uam_sim_bridge.mavlink.hil.sitl_ports import HOST
 from uam_sim_bridge.ports import SIMULATOR_TCP
 from uam_sim_bridge.px4 import px4_parameters as parameters
-from uam_sim_bridge.px4.process import (
-    FOLDERS,
-    Px4Process,
-    add_px4_options,
-    ended,
-    keep,
-    say_kept,
-)
+from uam_sim_bridge.px4.process import Px4Process, add_px4_options, run
 from uam_sim_bridge.px4.px4_installation import REQUIRED, Px4Error, Px4Installation
 
 NAME = "px4_sitl"
+HUNG_UP = "the simulator hung up; PX4 starts anew for the next one"
 POLL, LOOK = 0.05, 0.5  # s between two looks at PX4, and at its connection
 
 
-class Sitl(Px4Process):
-    """PX4 in software at a simulator's port."""
+def until_over(px4: Px4Process, port: int | None) -> bool:
+    """Wait until PX4 has ended (False), or its simulator at TCP `port` has hung up (True).
 
-    def __init__(
-        self,
-        installation: Px4Installation,
-        instance: int,
-        values: Mapping[str, parameters.Value],
-        folder: Path,
-        host: str = HOST,
-    ) -> None:
-        """values: parameters by name; folder: working directory, existing and empty; host: of the
-        simulator."""
-        super().__init__(
-            installation,
-            instance,
-            {parameters.STARTED_LATE: parameters.start_script(values)},
-            parameters.environment(values) | {"PX4_SIM_HOSTNAME": host},
-            folder,
-        )
-
-    def until_over(self, port: int | None) -> bool:
-        """Wait until PX4 has ended (False), or its simulator at TCP `port` has hung up (True).
-
-        port None: only until PX4 has ended.
-        """
-        met, look = False, 0.0
-        while self.process.poll() is None:
-            time.sleep(POLL)
-            if port is None or time.monotonic() < look:
-                continue
-            look = time.monotonic() + LOOK
-            connected = _connected(self.process.pid, port)
-            if met and not connected:
-                return True
-            met = met or connected
-        return False
+    port None: only until PX4 has ended.
+    """
+    met, look = False, 0.0
+    while px4.process.poll() is None:
+        time.sleep(POLL)
+        if port is None or time.monotonic() < look:
+            continue
+        look = time.monotonic() + LOOK
+        connected = _connected(px4.process.pid, port)
+        if met and not connected:
+            return True
+        met = met or connected
+    return False
 
 
 def _connected(pid: int, port: int) -> bool:
@@ -132,25 +104,14 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except (Px4Error, ConfigurationError, VehicleError) as error:
         print(f"{NAME}: {error}", file=sys.stderr, flush=True)
         return 2
+    scripts = {parameters.STARTED_LATE: parameters.start_script(values)}
+    variables = parameters.environment(values) | {"PX4_SIM_HOSTNAME": options.sim_host}
     port = None if options.once else SIMULATOR_TCP + options.instance
-    kept: list[Path] = []
-    hung_up = True
-    while hung_up:
-        with tempfile.TemporaryDirectory(prefix=FOLDERS) as folder:
-            px4 = Sitl(installation, options.instance, values, Path(folder), options.sim_host)
-            try:
-                with px4:
-                    hung_up = px4.until_over(port)
-                status = px4.process.returncode
-            except KeyboardInterrupt:
-                return 0
-            finally:
-                if options.log is not None:
-                    kept += (new := keep(px4.logs(), options.log, len(kept) + 1))
-                    say_kept(NAME, new)
-        if hung_up:
-            print(f"{NAME}: the simulator hung up; PX4 starts anew for the next one", flush=True)
-    return ended(NAME, status)
+
+    def start(folder: Path) -> Px4Process:
+        return Px4Process(installation, options.instance, scripts, variables, folder)
+
+    return run(NAME, start, options.log, lambda px4: until_over(px4, port), HUNG_UP)
 
 
 if __name__ == "__main__":
