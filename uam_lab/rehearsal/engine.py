@@ -17,13 +17,10 @@ from typing import Any
 from uam_lab.flight.flight_settings import FlightSettings
 from uam_lab.flight.observer import Observer
 from uam_lab.flight.ros import node_arguments, supervise
-from uam_lab.flight.ros.engine import FORKER
 from uam_lab.flight.ros.status_listener import StatusListener
-from uam_lab.processes import child
 from uam_lab.processes.guest import Guest
 from uam_lab.processes.interrupts import StopRequest
 from uam_lab.processes.node_environment import environment
-from uam_lab.processes.process_table import await_orphans
 from uam_lab.processes.processes import NodeFailed, Processes
 from uam_lab.rehearsal import device_figures, emulated_lab, laboratory_process
 from uam_lab.rehearsal.laboratory_process import AUTOPILOT, LABORATORY, LABORATORY_MODULE
@@ -75,8 +72,7 @@ class RehearsalEngine:
             own = settings_of(lab, settings.command)
             settings = replace(settings, link=own.link, autopilot=own.autopilot)
             modules = vehicle_nodes.processes(lab)
-            child.prepare([*modules.values(), LABORATORY_MODULE, FORKER])
-            await_orphans(observer.message)
+            supervise.prepare([*modules.values(), LABORATORY_MODULE], observer)
             sections = vehicle_nodes.parameters(lab, settings, folder)
             required = laboratory_process.required_parameters(self._options.px4, logs)
             sections[wiring.BRIDGE] = required | sections[wiring.BRIDGE]
@@ -84,8 +80,7 @@ class RehearsalEngine:
             sections[LABORATORY] = laboratory_process.parameters(
                 lab, self._options, devices, logs, ports
             )
-            folder.write_parameters(sections)
-            node_arguments.write_facts(settings, folder)
+            node_arguments.write(sections, settings, folder)
             rehearsal = _Rehearsal(lab, settings, self._options, folder, ports, observer, stop)
             failure = rehearsal.run(devices)
         refused = rehearsal.refused

@@ -13,14 +13,11 @@ from uam_lab.cockpit import page_address
 from uam_lab.flight.flight_settings import COCKPIT, FlightSettings
 from uam_lab.flight.observer import Observer
 from uam_lab.flight.ros import node_arguments, supervise
-from uam_lab.flight.ros.engine import FORKER
 from uam_lab.flight.ros.logged_outcome import read_outcome
 from uam_lab.flight.ros.status_listener import StatusListener
-from uam_lab.processes import child
 from uam_lab.processes.guest import Guest
 from uam_lab.processes.interrupts import StopRequest
 from uam_lab.processes.node_environment import environment
-from uam_lab.processes.process_table import await_orphans
 from uam_lab.processes.processes import Processes
 from uam_lab.results.outcome import Outcome
 from uam_lab.results.result_folder import ResultFolder
@@ -59,12 +56,10 @@ class VehicleEngine:
         with Reservation(
             None, own_autopilot=False, domain=settings.domain, namespace=settings.namespace
         ) as reservation:
-            child.prepare([*vehicle_nodes.processes(lab).values(), FORKER])
-            await_orphans(observer.message)
+            supervise.prepare(vehicle_nodes.processes(lab).values(), observer)
             ports = reservation.ports
             sections = vehicle_nodes.parameters(lab, settings, folder)
-            folder.write_parameters(sections)
-            node_arguments.write_facts(settings, folder)
+            node_arguments.write(sections, settings, folder)
             page = sections[wiring.COCKPIT]
             observer.message(f"cockpit: {page_address.address(page['host'], page['port'])}")
             logs, publishers = folder.path / "logs", vehicle_nodes.publishers(lab)

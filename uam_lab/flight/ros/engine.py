@@ -18,9 +18,7 @@ from uam_lab.flight.ros import node_arguments, supervise
 from uam_lab.flight.ros.logged_outcome import read_outcome
 from uam_lab.flight.ros.process_fault_injection import ProcessFaults
 from uam_lab.flight.ros.status_listener import StatusListener
-from uam_lab.processes import child
 from uam_lab.processes.interrupts import StopRequest
-from uam_lab.processes.process_table import await_orphans
 from uam_lab.processes.processes import NodeFailed, Processes
 from uam_lab.results.outcome import Outcome
 from uam_lab.results.result_folder import ResultFolder
@@ -32,7 +30,6 @@ from uam_sim_bridge.nodes.plant_options import NOT_READY
 from uam_sim_bridge.ports import Ports, Reservation
 
 AUTOPILOT = "autopilot"
-FORKER = "uam_lab.flight.ros.forker"
 
 
 def fly(
@@ -50,12 +47,10 @@ def fly(
         domain=settings.domain,
         namespace=settings.namespace,
     ) as reservation:
-        child.prepare([*node_arguments.modules(settings).values(), FORKER])
-        await_orphans(observer.message)
+        supervise.prepare(node_arguments.modules(settings).values(), observer)
         ports = reservation.ports
         sections = node_arguments.parameters(settings, folder, ports)
-        folder.write_parameters(sections)
-        node_arguments.write_facts(settings, folder)
+        node_arguments.write(sections, settings, folder)
         if wiring.COCKPIT in sections:
             port = sections[wiring.COCKPIT]["port"]
             observer.message(f"cockpit: {page_address.address(page_address.LOCAL, port)}")

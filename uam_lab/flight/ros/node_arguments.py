@@ -191,8 +191,12 @@ def _network_delay(settings: FlightSettings) -> str:
     return "" if delay is None else delay.to_text()
 
 
-def write_facts(settings: FlightSettings, folder: ResultFolder) -> None:
-    """Write the facts for the log's metadata: settings, scenario, parameters, versions."""
+def write(
+    sections: dict[str, dict[str, Any]], settings: FlightSettings, folder: ResultFolder
+) -> None:
+    """Write the parameters of the nodes, and the facts for the log's metadata: settings, scenario,
+    parameters, versions."""
+    folder.write_parameters(sections)
     texts = {
         folder.parameters.name: folder.parameters.read_text(),
         folder.versions.name: as_json(versions()),

@@ -12,14 +12,17 @@ from uam_lab.flight.observer import Observer
 from uam_lab.flight.ros import node_arguments
 from uam_lab.flight.ros.restarts import ChangedParameters, RestartTopic
 from uam_lab.flight.ros.status_listener import StatusListener
+from uam_lab.processes import child
 from uam_lab.processes.interrupts import StopRequest
 from uam_lab.processes.node_environment import environment, export_line
+from uam_lab.processes.process_table import await_orphans
 from uam_lab.processes.processes import NodeFailed, Processes
 from uam_lab.results.result_folder import ResultFolder
 from uam_msgs_py.node import wiring
 from uam_msgs_py.node.rightful import PARAMETER as PUBLISHERS
 from uam_sim_bridge.ports import Ports
 
+FORKER = "uam_lab.flight.ros.forker"
 RESTARTS = 3  # of each node that may be restarted, in a flight
 POLL = 0.05  # [s]
 
@@ -30,6 +33,12 @@ class Course(Protocol):
     def goes_on(self) -> bool:
         """Do what is due; return whether the flight goes on."""
         ...
+
+
+def prepare(modules: Iterable[str], observer: Observer) -> None:
+    """Begin to import the modules of the processes; wait for the end of a killed flight's nodes."""
+    child.prepare([*modules, FORKER])
+    await_orphans(observer.message)
 
 
 def run(
