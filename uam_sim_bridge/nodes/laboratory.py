@@ -18,7 +18,6 @@ from pathlib import Path
 
 import numpy as np
 import rclpy
-from diagnostic_msgs.msg import DiagnosticArray
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 from rclpy.signals import SignalHandlerOptions
@@ -31,7 +30,7 @@ from uam_control.stamps import SECOND
 from uam_control.vehicle import VehicleDescription
 from uam_msgs_py.messages import topics
 from uam_msgs_py.messages.layouts import BadMessage
-from uam_msgs_py.messages.status import MissionStatus
+from uam_msgs_py.messages.status import ChecklistState, MissionStatus
 from uam_msgs_py.node import polling
 from uam_msgs_py.node.base_node import StopSignal, refuse
 from uam_msgs_py.node.node_parameters import refuse_unknown
@@ -114,7 +113,7 @@ class Rehearsal:
         self.clock = PacedClock(self.lab.plant.period)
         self._mission = MissionStatus()
         self._person = Person(vehicle.joint_names, self.lab.folded)
-        self._step, self._needs, self._asked = "", "", -math.inf
+        self._list, self._asked = ChecklistState(), -math.inf
         (folder / READY).write_text(f"{self.lab.mocap.port}\n")
 
     def await_autopilot(self) -> None:
@@ -186,14 +185,17 @@ class Rehearsal:
                 stamp / SECOND - shift, self._mission.time, self._mission.phase
             )
         for message in polling.messages(self._checklist):
-            self._step, self._needs = value_of(message, "step"), value_of(message, "needs")
+            try:
+                self._list = ChecklistState.from_message(message)[1]
+            except BadMessage:
+                continue
 
     def _be_the_person(self, chi: np.ndarray) -> None:
         if not self._p.person:
             return
         now = self.lab.plant.time
-        self.lab.grip = self._person.update(now, self._step, chi)
-        wishes = self._person.wishes_to_confirm and self._needs == CONFIRM
+        self.lab.grip = self._person.update(now, self._list.step, chi)
+        wishes = self._person.wishes_to_confirm and self._list.needs == CONFIRM
         if wishes and now - self._asked > ASK_AGAIN:
             self._asked = now
             if self._confirm.service_is_ready():
@@ -218,15 +220,6 @@ class Rehearsal:
         for driver in (self._imu, self._poses):
             if driver is not None:
                 driver.close()
-
-
-def value_of(message: DiagnosticArray, key: str) -> str:
-    """Return a value of the list as a whole, its first status; "" for none."""
-    for status in message.status[:1]:
-        for pair in status.values:
-            if pair.key == key:
-                return pair.value
-    return ""
 
 
 def main() -> int:

@@ -15,7 +15,7 @@ import argparse
 import signal
 import sys
 from collections.abc import Mapping, Sequence
-from pathlib import Path
+from functools import partial
 
 from uam_control.settings.configuration import ConfigurationError
 from uam_control.vehicle import VehicleDescription, VehicleError, load_description
@@ -128,10 +128,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         MAVLINK: mavlink_script(line.place, line.number, options.usb),
     }
     variables = parameters.environment(values)
-
-    def start(folder: Path) -> Px4Process:
-        return Px4Process(installation, options.instance, scripts, variables, folder)
-
+    start = partial(Px4Process, installation, options.instance, scripts, variables)
     return run(NAME, start, options.log)
 
 

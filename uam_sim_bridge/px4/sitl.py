@@ -14,7 +14,7 @@ import signal
 import sys
 import time
 from collections.abc import Sequence
-from pathlib import Path
+from functools import partial
 
 import psutil
 
@@ -107,10 +107,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     scripts = {parameters.STARTED_LATE: parameters.start_script(values)}
     variables = parameters.environment(values) | {"PX4_SIM_HOSTNAME": options.sim_host}
     port = None if options.once else SIMULATOR_TCP + options.instance
-
-    def start(folder: Path) -> Px4Process:
-        return Px4Process(installation, options.instance, scripts, variables, folder)
-
+    start = partial(Px4Process, installation, options.instance, scripts, variables)
     return run(NAME, start, options.log, lambda px4: until_over(px4, port), HUNG_UP)
 
 
