@@ -1,6 +1,7 @@
 """A study: equal feedback and margins by construction, shares, cost, kept results."""
 
 import json
+from copy import deepcopy
 from dataclasses import replace
 
 import numpy as np
@@ -18,7 +19,7 @@ from uam_lab.study import design, kept, report
 from uam_lab.study.description import StudyError, load_study
 from uam_lab.study.flights import FLOWN, StudyResult
 from uam_lab.study.run import Runner
-from uam_lab.study.search import cost
+from uam_lab.study.search import cost, search
 from uam_lab.workers.place import Workplace
 from uam_sim_bridge.autopilot.params import Parameters
 from uam_sim_bridge.plant import Vehicle
@@ -228,3 +229,13 @@ def test_the_nodes_fly_with_the_autopilot_gains_of_the_study(study, tmp_path):
     assert {name: flown[name] for name in INTEGRATORS} == INTEGRATORS
     own = FlightSettings(load_scenario("hover"), profile, study.vehicle, 0.0)
     assert "--params" not in node_arguments.autopilot(own, ResultFolder(tmp_path), ports_of(0))[1]
+
+
+def test_a_candidate_outside_a_parameters_range_costs_as_a_failed_flight(study, tmp_path):
+    changed = replace(study, document=deepcopy(study.document))
+    beyond = 1e9  # of the law's rate: Q, which follows from it, is beyond its range
+    changed.document["ranges"]["modular"]["arm.rate"] = [1.0, 2.0 * beyond]
+    changed.document["tuning"]["start"]["modular"]["arm.rate"] = beyond
+    strengths = changed.document["strengths"]
+    found = search(changed, "modular", strengths, 1, tmp_path, lambda _: None)
+    assert found.costs == (changed.document["tuning"]["failed"],)

@@ -15,7 +15,7 @@ from uam_control.profiles.profile import load_profile
 from uam_control.settings import configuration
 from uam_lab.campaign.trial import TrialResult
 from uam_lab.cli.main import main
-from uam_lab.tuning import front
+from uam_lab.tuning import convergence, front
 from uam_lab.tuning.space import Cost, TuningError, load_space
 
 COST = Cost(
@@ -186,3 +186,24 @@ def test_wrong_use_is_one_line(tmp_path, capsys, monkeypatch, arguments, complai
     assert main(["tune", *arguments]) == 2
     message = capsys.readouterr().err
     assert message.startswith("uam tune: ") and complaint in message and message.count("\n") == 1
+
+
+def test_convergence_by_hand():
+    curve = [4.0, 3.0, 2.0, 1.99, 1.985]
+    assert convergence.improvement(curve, 2) == pytest.approx(0.0075)  # from 2.0 to 1.985
+    assert convergence.improvement(curve, 4) == pytest.approx(2.015 / 4.0)
+    assert convergence.improvement(curve, 5) == math.inf
+    assert convergence.in_words(curve, 2).startswith("converged: the last 2 of 5 evaluations")
+    assert convergence.in_words(curve, 4).startswith("not converged: the last 4")
+    assert convergence.in_words(curve, 9).startswith("not converged: 5 evaluations")
+
+
+def test_patience_ends_a_search_that_improves_no_more(tmp_path, capsys):
+    # a knob that hardly moves: every evaluation costs nearly what the start costs
+    varpi = load_profile("s500").sets["arm_controller"].varpi
+    knobs = [{**SPACE["knobs"][1], "low": 0.999 * varpi, "high": 1.001 * varpi}]
+    out = tmp_path / "out"
+    command = ["tune", "--space", write(tmp_path, knobs=knobs), "--jobs", "1", "--out", str(out)]
+    assert main([*command, "--evaluations", "9", "--patience", "2"]) == 0
+    assert "converged: the last 2 of 3 evaluations" in capsys.readouterr().out
+    assert len((out / "evaluations.csv").read_text().splitlines()) == 1 + 3

@@ -21,6 +21,8 @@ from uam_lab.cli.counting import Counting
 from uam_lab.flight.conclude import command_line
 from uam_lab.flight.direct.warm_up import prepare
 from uam_lab.results.result_folder import make_folder
+from uam_lab.tuning.convergence import SMALL
+from uam_lab.tuning.convergence import in_words as convergence
 from uam_lab.tuning.space import TuningError, load_space
 
 EXAMPLES = """\
@@ -30,6 +32,7 @@ examples:
   uam tune --out results/tune-mine           continue a stopped search
   uam tune --space mine.yaml --profile best.yaml
   uam tune --controller late_links --evaluations 300     cost and delay margin, with their front
+  uam tune --evaluations 2000 --patience 300     until 300 evaluations improve it by less than 1 %
   uam tune --vehicle mine.yaml
   uam tune --study arm --storage mysql://user@host/optuna    on several machines with one study:
                                              the same command on each
@@ -60,6 +63,11 @@ def add(commands: argparse._SubParsersAction) -> None:
     command.plant()
     text = "total number of evaluations of the study"
     command.option("--evaluations", "N", text, 200, type=count)
+    text = (
+        "end before, when N evaluations in a row improved the least cost, or the front's area, "
+        f"by less than {SMALL:.0%} (default: all evaluations)"
+    )
+    command.option("--patience", "N", text, type=count)
     command.workers()
     command.seed("of the optimiser; with --jobs 1 the search is repeatable")
     text = (
@@ -76,7 +84,7 @@ def add(commands: argparse._SubParsersAction) -> None:
 def run(options: argparse.Namespace) -> int:
     """Search, show the progress, write the results; return the exit status."""
     from uam_lab.tuning import search_results
-    from uam_lab.tuning.search import Task, open_study, search
+    from uam_lab.tuning.search import Task, curve, open_study, search
 
     vehicle = load_description(options.vehicle)
     start = given_profile(options.profile, vehicle) if options.profile else None
@@ -90,7 +98,13 @@ def run(options: argparse.Namespace) -> int:
         print("uam tune: with --scheduler the workers need to reach --storage", file=sys.stderr)
     storage = options.storage or str((out / "study.journal").resolve())
     task = Task(
-        space, options.study or space.name, storage, options.evaluations, options.seed, options.step
+        space,
+        options.study or space.name,
+        storage,
+        options.evaluations,
+        options.seed,
+        options.step,
+        options.patience or 0,
     )
     prepare(print)
     status = 0
@@ -119,6 +133,8 @@ def run(options: argparse.Namespace) -> int:
     search_results.plot(out / "search.png", space, study)
     best, told = search_results.best_of(space, study), search_results.in_words
     print(f"best      evaluation {best.number}, {told(best)}; start: {told(study.trials[0])}")
+    values = curve(study)
+    print(f"search    {convergence(values, options.patience or len(values) // 2)}")
     print(f"profile   {out / 'best.yaml'}   (uam fly --profile {out / 'best.yaml'})")
     print(f"plot      {out / 'search.png'}")
     return status

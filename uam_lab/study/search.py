@@ -11,6 +11,7 @@ import numpy as np
 import optuna
 
 from uam_control.settings.configuration import ConfigurationError
+from uam_control.settings.parameter_file import ProfileError
 from uam_lab.study import design
 from uam_lab.study.description import Row, Study
 from uam_lab.study.flights import StudyResult, flights, measure
@@ -69,7 +70,10 @@ def search(
     def measured(values: dict[str, float]) -> float:
         try:
             made = design.profile(study.with_adaptation(law, values), Row(law, law), strength)
-        except ConfigurationError:  # a parameter that follows from the values is out of its range
+        except (
+            ConfigurationError,
+            ProfileError,
+        ):  # a parameter that follows from the values is out of its range
             return float(entry["failed"])
         flown = flights(study, {law: made}, conditions, [entry["seed"]], folder)
         return cost([measure(one) for one in flown], entry["aim"], entry["failed"])

@@ -22,6 +22,7 @@ from optuna.trial import TrialState
 
 from uam_lab.campaign.trial import measure
 from uam_lab.flight.direct.warm_up import prepare
+from uam_lab.tuning.convergence import SMALL, improvement
 from uam_lab.tuning.front import delay_margin, hypervolumes
 from uam_lab.tuning.space import Space, TuningError
 from uam_lab.workers.place import Workplace
@@ -42,6 +43,7 @@ class Task:
     evaluations: int
     seed: int
     step: float = STEP
+    patience: int = 0  # evaluations without improvement that end the search; 0: none do
 
 
 def open_storage(where: str) -> JournalStorage | RDBStorage:
@@ -107,28 +109,42 @@ def evaluate(space: Space, trial: optuna.Trial, best: float | None) -> float | t
 def work(task: Task) -> None:
     """Evaluate candidates until the study has task.evaluations; runs in each worker."""
     study = open_study(task)
+
+    def end(study: optuna.Study, _: optuna.trial.FrozenTrial) -> None:
+        if finished(study, task):
+            study.stop()
+
     study.optimize(
         lambda trial: evaluate(
             task.space, trial, _progress(study) if task.space.delay_margin is None else None
         ),
-        callbacks=[optuna.study.MaxTrialsCallback(task.evaluations, states=DONE)],
+        callbacks=[end],
     )
 
 
-def _progress(study: optuna.Study) -> float | None:
-    """Return the least cost so far, or the volume that the front of two objectives dominates."""
+def curve(study: optuna.Study) -> list[float]:
+    """Return the least cost after each evaluation; with two objectives the area of the front."""
+    trials = study.get_trials(deepcopy=False, states=DONE)
     if len(study.directions) > 1:
-        return next(reversed(hypervolumes(study.get_trials(deepcopy=False, states=DONE))), None)
-    try:
-        return study.best_value
-    except ValueError:
-        return None
+        return hypervolumes(trials)
+    return list(itertools.accumulate((trial.values[0] for trial in trials), min))
+
+
+def finished(study: optuna.Study, task: Task) -> bool:
+    """Return whether the study has its evaluations, or has converged (`Task.patience`)."""
+    values = curve(study)
+    converged = task.patience and improvement(values, task.patience) < SMALL
+    return len(values) >= task.evaluations or bool(converged)
+
+
+def _progress(study: optuna.Study) -> float | None:
+    return next(reversed(curve(study)), None)
 
 
 def search(
     task: Task, place: Workplace, progress: Callable[[int, float | None], None]
 ) -> optuna.Study:
-    """Extend the study until it has task.evaluations, each worker with its own seed; return it.
+    """Extend the study until it is `finished`, each worker with its own seed; return it.
 
     progress: called about once per second with the number of evaluations and the best cost, or with
     the volume of the front. A worker that is lost or comes later continues the same study. Raises
@@ -138,13 +154,13 @@ def search(
     study = open_study(task)
     seeds = itertools.count(task.seed)
     tasks = itertools.takewhile(
-        lambda _: _done(study) < task.evaluations, (replace(task, seed=one) for one in seeds)
+        lambda _: not finished(study, task), (replace(task, seed=one) for one in seeds)
     )
 
     def show() -> None:
         progress(_done(study), _progress(study))
 
-    if _done(study) < task.evaluations:
+    if not finished(study, task):
         prepare()
         with workers(place, prepare, partial(print, flush=True)) as crew:
             for _ in crew.completed(work, tasks, per_worker=1, idle=show):
