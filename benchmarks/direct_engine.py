@@ -74,11 +74,10 @@ class Watch:
         control = flight.control
         control.stages[:] = [(name, self._timed(name, run)) for name, run in control.stages]
         for name, owner, method in (
-            ("sensors", flight.plant, "sense"),
-            ("truth", flight.plant, "truth"),
+            ("sensors, truth", flight.plant, "observe"),
             ("physics, rotors, servos", flight.plant, "step"),
             ("autopilot", flight.autopilot, "update"),
-            ("recording", flight, "_record"),
+            ("recording", flight.recorder, "write"),
         ):
             setattr(owner, method, self._timed(name, getattr(owner, method)))
 

@@ -88,12 +88,12 @@ def test_a_fence_left_is_landed_at():
 def test_without_mocap_it_holds_on_the_imu_then_the_autopilot_brings_it_down():
     made = flight("hover", payload=0.0)
     until(made, lambda o: o.time > 5.0)
-    sense = made.plant.sense
+    observe = made.plant.observe
 
-    def blind():
-        return dataclasses.replace(sense(), mocap=None)
+    def blind(row):
+        return dataclasses.replace(observe(row), mocap=None)
 
-    made.plant.sense = blind
+    made.plant.observe = blind
     output = until(made, lambda o: o.done)
     assert states(made)[-2:] == [State.HOLDING, State.FAILSAFE]
     assert output.abort_reason.startswith("mocap pose is 1.") and output.phase == "aborted"

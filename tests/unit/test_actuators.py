@@ -50,6 +50,7 @@ SERVOS = {
     "no_load_speed": 8.0,
     "torque_per_current": 0.5,
     "current_unit": 0.25,  # .125 N m
+    "command_latency_ticks": 0,
 }
 
 

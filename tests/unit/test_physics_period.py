@@ -13,16 +13,14 @@ from uam_sim_bridge.plant import Vehicle
 from uam_sim_bridge.plant.mujoco_plant import MujocoPlant
 from uam_sim_bridge.plant.physics import actuate, average, begin_period
 from uam_sim_bridge.plant.plant import check_arrays
+from uam_sim_bridge.plant.sensors import Delay
 
 VEHICLES = {name: Vehicle.of(load_description(name)) for name in ("s500_arm3", "hexa_arm")}
 
 
 def one_by_one(plant, motors, effort, magnet):
     """As `MujocoPlant.step`, with MuJoCo's own step."""
-    due = plant._command_delay(plant.tick, tuple(effort))
-    if due is not None:
-        plant.servos.take(due)
-    begin_period(plant._arrays, magnet)
+    begin_period(plant._arrays, effort, magnet, np.zeros(3), plant.tick)
     for _ in range(plant._steps):
         actuate(plant._arrays, motors)
         mujoco.mj_step(plant.model, plant.data)
@@ -56,3 +54,43 @@ def test_a_sample_that_compiled_code_would_misread_is_refused(bad):
     check_arrays((np.zeros(3), np.zeros(2)))
     with pytest.raises(TypeError, match="contiguous array of float64"):
         check_arrays((np.zeros(3), bad))
+
+
+@pytest.mark.parametrize("latency", [0, 1, 3])
+def test_an_arm_command_arrives_after_the_latency_of_the_bus(latency):
+    vehicle = VEHICLES["s500_arm3"].changed({"servos.command_latency_ticks": latency})
+    plant, line = MujocoPlant(vehicle, 0.0, seed=1), Delay(latency)
+    plant.count_from(5)  # of an earlier simulation
+    held = np.zeros(3)
+    for k in range(12):
+        sent = np.array([0.1 * k, np.nan if k % 3 else -0.2 * k, 0.5])
+        plant.step(np.zeros(4), sent, False)
+        due = line(k, sent)
+        if due is not None:
+            held = np.where(np.isnan(due), held, due)
+        np.testing.assert_array_equal(plant.servos.command, held)
+
+
+def test_sense_truth_and_observe_agree():
+    one, other = (MujocoPlant(VEHICLES["hexa_arm"], 0.2, seed=1) for _ in range(2))
+    row = np.full(one.truth_row.width, np.nan)
+    for _ in range(600):  # more than a block of noise
+        samples, again = one.sense(), other.observe(row)
+        for a, b in ((samples.hil, again.hil), (samples.joints, again.joints)):
+            assert a is None or all(np.array_equal(x, y) for x, y in zip(a, b, strict=True))
+        expected = np.full_like(row, np.nan)
+        one.truth_row.write(one.truth(), expected)
+        np.testing.assert_array_equal(row, expected)
+        for plant in (one, other):
+            plant.step(np.full(6, 0.6), np.full(one.joints, 0.1), plant.tick > 300)
+    assert row[one.truth_row.magnet] > 0.0 and np.all(row[:6] != 0.0)
+
+
+def test_a_sample_is_never_overwritten():
+    plant = MujocoPlant(VEHICLES["s500_arm3"], 0.0, seed=1)
+    first = plant.sense().hil
+    kept = [array.copy() for array in first[1:]]
+    for _ in range(600):
+        plant.sense()
+    for array, was in zip(first[1:], kept, strict=True):
+        np.testing.assert_array_equal(array, was)

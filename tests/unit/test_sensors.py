@@ -7,7 +7,17 @@ import math
 import numpy as np
 import pytest
 
-from uam_sim_bridge.plant.sensors import Delay, Encoders, Imu, Mocap, Noise, generators
+from uam_sim_bridge.plant.sensors import (
+    Delay,
+    Encoders,
+    Imu,
+    Mocap,
+    Noise,
+    disturbed,
+    generators,
+    quantised,
+    sample_rows,
+)
 
 
 class Counting:
@@ -47,12 +57,14 @@ def test_imu_adds_bias_and_noise_of_each_axis():
     imu = Imu(numbers, 2.0, Counting())
     # the bias takes 1..6 of the generator, doubled
     np.testing.assert_array_equal(imu.bias, [0.5, 1.0, 1.5, 4.0, 5.0, 6.0])
-    gyro, force = imu.sample(np.array([10.0, 20.0, 30.0]), np.array([1.0, 2.0, 3.0]))
+    gyro, force = np.zeros((2, 3))
+    rates, true_force = np.array([10.0, 20.0, 30.0]), np.array([1.0, 2.0, 3.0])
+    disturbed(rates, true_force, imu.noise(), imu.bias, gyro, force)
     # the noise 7..12: gyro 14, 16, 18; accelerometer 40, 44, 48
     np.testing.assert_array_equal(gyro, [24.5, 37.0, 49.5])
     np.testing.assert_array_equal(force, [45.0, 51.0, 57.0])
     # the next row of noise, 13..18: 26, 28, 30 and 64, 68, 72
-    gyro, force = imu.sample(np.zeros(3), np.zeros(3))
+    disturbed(np.zeros(3), np.zeros(3), imu.noise(), imu.bias, gyro, force)
     np.testing.assert_array_equal(gyro, [26.5, 29.0, 31.5])
     np.testing.assert_array_equal(force, [68.0, 73.0, 78.0])
 
@@ -99,9 +111,9 @@ def test_a_delay_hands_out_one_sample_when_it_is_due():
 @pytest.mark.parametrize("sign", [1.0, -1.0])
 def test_encoders_count(sign):
     encoders = Encoders({"counts_per_turn": 8, "velocity_unit": 0.25})
-    angle, velocity = encoders.sample(
-        sign * np.array([1.0, 2.0, 0.3]), sign * np.array([0.6, 0.1, 1.15])
-    )
+    angles, velocities = sign * np.array([1.0, 2.0, 0.3]), sign * np.array([0.6, 0.1, 1.15])
+    angle, velocity = np.zeros((2, 3))
+    quantised(angles, velocities, encoders.units, angle, velocity)
     # an eighth of a turn is .785: 1.27, 2.55 and .38 of them are 1, 3 and 0
     np.testing.assert_allclose(angle, sign * math.pi / 4.0 * np.array([1.0, 3.0, 0.0]))
     np.testing.assert_allclose(velocity, sign * np.array([0.5, 0.0, 1.25]))
@@ -121,3 +133,15 @@ def test_mocap_of_a_plant_that_begins_later_keeps_its_rate_from_there():
     ]  # fmt: skip
     mocap = Mocap(MOCAP, 1.0, Counting())
     assert [mocap.due(t) for t in (0.25, 0.25, 0.5)] == [True, True, True]
+
+
+def test_rows_of_samples_go_with_the_sequence_of_the_noise():
+    ticks = 600
+    rows = sample_rows(Noise(np.random.default_rng(3), np.ones(6)), 2)
+    taken = [next(rows) for _ in range(ticks)]
+    noise = np.array([one[0] for one in taken])
+    np.testing.assert_array_equal(noise, np.random.default_rng(3).standard_normal((ticks, 6)))
+    _, row, *parts = taken[-1]
+    row[:] = np.arange(12.0)
+    expected = [[0, 1, 2], [3, 4, 5], [6, 7], [8, 9], [10, 11]]
+    assert [part.tolist() for part in parts] == expected

@@ -144,12 +144,20 @@ class FlightTable:
 
     def next_row(self, phase: str) -> np.ndarray:
         """Return the row (columns,) of the next tick, to fill in place; a full table grows."""
-        if self.count == len(self.values):
+        number = self.next_number(phase)  # may replace `values`
+        return self.values[number]
+
+    def next_number(self, phase: str) -> int:
+        """Return the number of the next tick's row in `values`; a full table grows."""
+        number = self.count
+        if number == len(self.values):
             self.values = np.concatenate([self.values, np.full_like(self.values, np.nan)])
             self.phases = np.concatenate([self.phases, np.zeros_like(self.phases)])
-        self.phases[self.count] = self.phase_names.setdefault(phase, len(self.phase_names))
-        self.count += 1
-        return self.values[self.count - 1]
+        if phase not in self.phase_names:
+            self.phase_names[phase] = len(self.phase_names)
+        self.phases[number] = self.phase_names[phase]
+        self.count = number + 1
+        return number
 
     def series(self, info: Mapping[str, Any] | None = None) -> Series:
         """Return the recorded rows, with error columns and countdown computed."""

@@ -84,13 +84,25 @@ class FaultyPlant(Plant):
 
     def sense(self) -> Samples:
         """Return the samples of the inner plant, changed by the active faults."""
+        self._begin_and_end()
+        return self._changed(self.inner.sense())
+
+    def observe(self, row: np.ndarray) -> Samples:
+        """See `Plant.observe`; the true values are those of the inner plant."""
+        self._begin_and_end()
+        return self._changed(self.inner.observe(row))
+
+    def _begin_and_end(self) -> None:
+        """Find the faults that are active at this tick."""
         self.changed = self.timeline.update(self.time)
         for one in self.changed:
             if one.active:
                 self._active[one.number] = one.fault, Occurrence(self._noise[one.number])
             else:
                 del self._active[one.number]
-        samples = self.inner.sense()
+
+    def _changed(self, samples: Samples) -> Samples:
+        """Return the samples, changed by the active faults."""
         for fault, now in self._active.values():
             fault.sense(samples, now)
         return samples

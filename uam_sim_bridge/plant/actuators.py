@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 
 import numpy as np
 
@@ -106,16 +105,31 @@ class Servos:
             ]
         )
         self.torque = np.zeros(len(start))
+        self.waiting = np.full((numbers["command_latency_ticks"], len(start)), np.nan)
 
-    def take(self, command: Sequence[float]) -> None:
-        """Use `command` (n,) from now on; entries that are NaN, no command yet, change nothing."""
-        for i, value in enumerate(command):
-            if math.isfinite(value):
-                self.command[i] = value
+    def take(self, command: np.ndarray, tick: int = 0) -> None:
+        """Send `command` (n,) at the control tick `tick`; see `receive`."""
+        receive(command, tick, self.waiting, self.command)
 
     def step(self, angle: np.ndarray, velocity: np.ndarray, output: np.ndarray) -> None:
         """Write the torque (n,) [N m] at angle (n,) [rad] and velocity (n,) [rad/s] to output."""
         joint_step(self.command, angle, velocity, self.constants, self.loop, self.torque, output)
+
+
+@jit
+def receive(sent: np.ndarray, tick: int, waiting: np.ndarray, held: np.ndarray) -> None:
+    """Send a command on the bus; the one that arrives at this tick is written to `held` (n,).
+
+    sent (n,): NaN for no command, as at the begin: `held` stays; waiting (latency, n): those on
+    their way, exchanged in turns, one at each control tick.
+    """
+    latency = len(waiting)
+    for i in range(len(held)):
+        value = sent[i]
+        if latency:
+            value, waiting[tick % latency, i] = waiting[tick % latency, i], value
+        if math.isfinite(value):
+            held[i] = value
 
 
 @jit

@@ -3,30 +3,27 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import NamedTuple
 
 import mujoco
 import numpy as np
 
-from uam_control.coordinates import ALPHA, CHI, CHI_DDOT, CHI_DOT, ROLL, X
-from uam_control.maths.compiled import jit, prepared
-from uam_control.maths.rotations import euler_from_quaternion, matrix_from_quaternion
+from uam_control.maths.compiled import prepared
 from uam_control.vehicle import VehicleError
 from uam_sim_bridge.plant.actuators import Rotors, Servos
 from uam_sim_bridge.plant.effects.acting_effects import ActingEffects
 from uam_sim_bridge.plant.effects.effect import Bench
 from uam_sim_bridge.plant.magnet import magnet_constants
+from uam_sim_bridge.plant.observation import Observed, observe, write_grip, write_truth
 from uam_sim_bridge.plant.payload_hinge import PayloadHinge, add_to
 from uam_sim_bridge.plant.physics import (
     PhysicsArrays,
     actuate,
     average,
     begin_period,
-    blow,
     step_period,
 )
 from uam_sim_bridge.plant.plant import Disturbance, Plant, Samples, Truth
-from uam_sim_bridge.plant.sensors import Delay, Encoders, Imu, Mocap, Noise, generators
+from uam_sim_bridge.plant.sensors import Delay, Encoders, Imu, Mocap, Noise, generators, sample_rows
 from uam_sim_bridge.plant.vehicle import BASE, MAGNET, PAYLOAD, SWING, Vehicle
 
 STIFF = 0.9999  # constraint impedance for friction without creep, see MuJoCo's solimp
@@ -62,10 +59,10 @@ class MujocoPlant(Plant):
         self._tracks_payload = sensors["mocap"].get("payload", False)
         self._payload_mocap = Mocap(sensors["mocap"], scale, payload_noise)
         self._encoders = Encoders(sensors["joints"])
+        self._rows = sample_rows(self._imu.noise, self.joints)
         self._imu_delay, self._mocap_delay, self._joints_delay, self._payload_delay = (
             Delay(sensors[name]["latency_ticks"]) for name in ("imu", "mocap", "joints", "mocap")
         )
-        self._command_delay = Delay(numbers["servos"]["command_latency_ticks"])
 
         self.rotors = Rotors(numbers["rotors"], model.opt.timestep)
         self.servos = Servos(numbers["servos"], self._alpha)
@@ -73,8 +70,9 @@ class MujocoPlant(Plant):
         self._drag = np.array(air["drag"], dtype=float)
         self._wind_mean = np.array(air["wind"], dtype=float)
         self.wind = self._wind_mean.copy()
-        self._gust_keep = np.exp(-self.period / air["gust_time"])
-        spread = air["gust"] * np.sqrt(1.0 - self._gust_keep**2)
+        keep = np.exp(-self.period / air["gust_time"])
+        self._gust_keep, self._still = np.array([keep]), np.zeros(3)
+        spread = air["gust"] * np.sqrt(1.0 - keep**2)
         self._gust = Noise(gusts, np.full(3, spread)) if air["gust"] else None
 
         mujoco.mj_forward(model, data)
@@ -86,17 +84,10 @@ class MujocoPlant(Plant):
         effects = numbers["effects"]
         self._effects = ActingEffects(effects, self._bench(), seed) if effects else None
         self._rotor_factor = self.rotors.efficiency.copy()  # with the faults, without the effects
-        self._arrays = self._physics_arrays()
+        self._arrays, self._observed = self._physics_arrays(), self._observed_arrays()
         self._addresses = model._address, data._address
-        still = np.zeros(len(self.rotors.speed))
-        self._step_period = prepared(
-            step_period, self._arrays, still, True, *self._addresses, self._steps
-        )
-        state = np.empty((3, ALPHA + self.joints))
-        self._write_state = prepared(write_state, self._motion, state)
-        pose = self._payload_pose
-        self._write_grip = prepared(write_grip, pose, self._payload_top, pose)
-        self._blow = prepared(blow, self.wind, self.wind, 1.0, self.wind)
+        self._unused_truth = np.empty(self.truth_row.width)
+        self._prepare()
         self._undisturbed = (
             self.rotors.efficiency.copy(),
             model.dof_frictionloss[self._arm_dofs].copy(),
@@ -118,16 +109,6 @@ class MujocoPlant(Plant):
         self._alpha = data.qpos[arm_q : arm_q + self.joints]
         self._alpha_dot = data.qvel[arm_v : arm_v + self.joints]
         self._push = data.qfrc_applied[base_v : base_v + 6]
-        self._motion = Motion(
-            self._position,
-            self._quaternion,
-            self._velocity,
-            self._rates,
-            self._alpha,
-            self._alpha_dot,
-            data.qacc[base_v : base_v + 6],
-            data.qacc[arm_v : arm_v + self.joints],
-        )
         swing = joint(SWING).qposadr[0]
         self._swing_angle = data.qpos[swing : swing + 1]
         payload_q = joint(PAYLOAD).qposadr[0]
@@ -164,6 +145,7 @@ class MujocoPlant(Plant):
             speed=rotors.speed,
             thrust=rotors.thrust,
             thrust_control=self._thrust_control,
+            waiting_commands=servos.waiting,
             servo_command=servos.command,
             angles=self._alpha,
             joint_rates=self._alpha_dot,
@@ -174,6 +156,8 @@ class MujocoPlant(Plant):
             drag=self._drag,
             velocity=self._velocity,
             wind=self.wind,
+            wind_mean=self._wind_mean,
+            gust_keep=self._gust_keep,
             force=self._force_on_base,
             face=self._face,
             payload=self._payload_centre,
@@ -183,6 +167,40 @@ class MujocoPlant(Plant):
             sensed_force=self._sensed_force,
             specific_force=self._specific_force,
         )
+
+    def _observed_arrays(self) -> Observed:
+        data, names = self.data, self.vehicle.description.joint_names
+        base, arm = (self.model.joint(name).dofadr[0] for name in (BASE, names[0]))
+        return Observed(
+            position=self._position,
+            quaternion=self._quaternion,
+            velocity=self._velocity,
+            rates=self._rates,
+            alpha=self._alpha,
+            alpha_dot=self._alpha_dot,
+            base_acceleration=data.qacc[base : base + 6],
+            alpha_ddot=data.qacc[arm : arm + self.joints],
+            specific_force=self._specific_force,
+            imu_bias=self._imu.bias,
+            servo_torque=self.servos.torque,
+            encoder_units=self._encoders.units,
+            rotor_thrust=self.rotors.thrust,
+            payload=self._payload_pose,
+            magnet_control=self._magnet_control,
+            swing=self._swing_angle,
+        )
+
+    def _prepare(self) -> None:
+        """Look up the machine code of what each tick calls."""
+        arrays, observed, at = self._arrays, self._observed, self.truth_row
+        motors, arm, noise = (np.empty(size) for size in (self.rotors.speed.size, self.joints, 6))
+        samples, pose = np.empty(6 + 3 * self.joints), self._payload_pose
+        self._step_period = prepared(
+            step_period, arrays, motors, arm, True, noise, 0, *self._addresses, self._steps
+        )
+        self._observe = prepared(observe, observed, noise, samples, 1.0, at, self._unused_truth)
+        self._write_truth = prepared(write_truth, observed, 1.0, at, self._unused_truth)
+        self._write_grip = prepared(write_grip, pose, self._payload_top, pose)
 
     def _bench(self) -> Bench:
         """Return the parts on which effects act."""
@@ -215,13 +233,17 @@ class MujocoPlant(Plant):
 
     def sense(self) -> Samples:
         """See `Plant.sense`."""
+        return self.observe(self._unused_truth)
+
+    def observe(self, row: np.ndarray) -> Samples:
+        """See `Plant.observe`."""
         tick, time = self.tick, self.tick * self.period
+        noise, samples, gyro, force, angles, speeds, torques = next(self._rows)
+        self._observe(self._observed, noise, samples, self._magnet_gain, self.truth_row, row)
         effects = self._effects
-        gyro, force = self._imu.sample(self._rates, self._specific_force)
         if effects is not None:
             gyro, force = effects.imu(gyro, force)
         hil = (time, gyro, force)
-        joints = (time, *self._encoders.sample(self._alpha, self._alpha_dot))
         mocap, payload, late = None, None, 0
         if self._mocap.due(time):
             mocap = (time, *self._mocap.sample(self._position, self._quaternion))
@@ -231,10 +253,10 @@ class MujocoPlant(Plant):
                 mocap, late = effects.pose(mocap)
         return Samples(
             self._imu_delay(tick, hil),
-            self._joints_delay(tick, (*joints, self.servos.torque.copy())),
+            self._joints_delay(tick, (time, angles, speeds, torques)),
             self._mocap_delay(tick, mocap, late),
             hil,
-            payload=self._payload_delay(tick, payload, late),
+            payload=self._payload_delay(tick, payload, late) if self._tracks_payload else None,
         )
 
     def _grip_pose(self) -> tuple[np.ndarray, np.ndarray]:
@@ -247,23 +269,33 @@ class MujocoPlant(Plant):
         """See `Plant.step`."""
         if self._hinge is not None:
             magnet = self._held_by_magnet(magnet)
-        due = self._command_delay(self.tick, tuple(map(float, arm_command)))
-        if due is not None:
-            self.servos.take(due)
-        if self._gust is not None:
-            self._blow(self.wind, self._wind_mean, self._gust_keep, self._gust())
+        gust = self._still if self._gust is None else self._gust()
         if self._effects is None:
-            self._step_period(self._arrays, motor_commands, magnet, *self._addresses, self._steps)
+            self._step_period(
+                self._arrays,
+                motor_commands,
+                arm_command,
+                magnet,
+                gust,
+                self.tick,
+                *self._addresses,
+                self._steps,
+            )
         else:
-            self._step_with_effects(self._effects, motor_commands, magnet)
+            self._step_with_effects(self._effects, motor_commands, arm_command, magnet, gust)
         self.tick += 1
 
     def _step_with_effects(
-        self, effects: ActingEffects, motor_commands: np.ndarray, magnet: bool
+        self,
+        effects: ActingEffects,
+        motor_commands: np.ndarray,
+        arm_command: np.ndarray,
+        magnet: bool,
+        gust: np.ndarray,
     ) -> None:
         """Advance one control period; effects act between its parts."""
         arrays = self._arrays
-        begin_period(arrays, magnet)
+        begin_period(arrays, arm_command, magnet, gust, self.tick)
         effects.tick()
         np.multiply(self._rotor_factor, effects.bench.lift, out=self.rotors.efficiency)
         for _ in range(self._steps):
@@ -308,58 +340,15 @@ class MujocoPlant(Plant):
 
     def truth(self) -> Truth:
         """See `Plant.truth`."""
-        state, payload = np.empty((3, ALPHA + self.joints)), self._payload_pose.copy()
-        self._write_state(self._motion, state)
+        at, row = self.truth_row, np.empty(self.truth_row.width)
+        self._write_truth(self._observed, self._magnet_gain, at, row)
         return Truth(
-            state,
+            row[: at.rotor_thrust].reshape(3, -1),
             self._quaternion.copy(),
-            payload[:3],
-            payload[3:],
-            self._magnet_control.item() * self._magnet_gain,
-            self._swing_angle.item(),
+            row[at.payload : at.payload + 3],
+            row[at.payload + 3 : at.magnet],
+            float(row[at.magnet]),
+            float(row[at.magnet + 1]),
             self.rotors.speed.copy(),
-            self.rotors.thrust.copy(),
+            row[at.rotor_thrust : at.payload],
         )
-
-
-class Motion(NamedTuple):
-    """The motion of the vehicle, as views into MuJoCo's arrays.
-
-    position, velocity (3,) [m, m/s, ENU]; quaternion (4,) [w x y z], FLU → ENU; rates (3,) [rad/s,
-    FLU]; alpha, alpha_dot, alpha_ddot (n,) [rad, rad/s, rad/s^2]; base_acceleration (6,): linear
-    [m/s^2, ENU] and angular [rad/s^2, FLU].
-    """
-
-    position: np.ndarray
-    quaternion: np.ndarray
-    velocity: np.ndarray
-    rates: np.ndarray
-    alpha: np.ndarray
-    alpha_dot: np.ndarray
-    base_acceleration: np.ndarray
-    alpha_ddot: np.ndarray
-
-
-@jit
-def write_state(m: Motion, state: np.ndarray) -> None:
-    """Write chi, chi_dot, chi_ddot into state (3, 6 + n), see uam_control.coordinates."""
-    euler = euler_from_quaternion(m.quaternion)
-    for i in range(3):
-        state[CHI, X + i], state[CHI, ROLL + i] = m.position[i], euler[i]
-        state[CHI_DOT, X + i], state[CHI_DOT, ROLL + i] = m.velocity[i], m.rates[i]
-        state[CHI_DDOT, X + i] = m.base_acceleration[i]
-        state[CHI_DDOT, ROLL + i] = m.base_acceleration[3 + i]
-    for i in range(len(m.alpha)):
-        state[CHI, ALPHA + i], state[CHI_DOT, ALPHA + i] = m.alpha[i], m.alpha_dot[i]
-        state[CHI_DDOT, ALPHA + i] = m.alpha_ddot[i]
-
-
-@jit
-def write_grip(pose: np.ndarray, height: float, point: np.ndarray) -> None:
-    """Write the point (3,) [m, world] at `height` [m] on the vertical axis of a body.
-
-    pose (7,): position [m] and quaternion [w x y z] of the body.
-    """
-    matrix = matrix_from_quaternion(pose[3:])
-    for i in range(3):
-        point[i] = pose[i] + height * matrix[i, 2]

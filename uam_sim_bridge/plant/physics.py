@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from uam_control.maths.compiled import jit
-from uam_sim_bridge.plant.actuators import joint_step, rotor_step
+from uam_sim_bridge.plant.actuators import joint_step, receive, rotor_step
 from uam_sim_bridge.plant.engine_step import mj_step
 from uam_sim_bridge.plant.magnet import pull_fraction
 
@@ -15,8 +15,9 @@ from uam_sim_bridge.plant.magnet import pull_fraction
 class PhysicsArrays(NamedTuple):
     """What the physics reads and writes, as arrays that never move; most are MuJoCo's.
 
-    rotor_constants to thrust_control: see `rotor_step`; servo_command to torque_control: see
-    `joint_step`. drag (3,) [N s/m]; velocity, wind (3,) [m/s], force (3,) [N] on the base, ENU.
+    rotor_constants to thrust_control: see `rotor_step`; waiting_commands: see `receive`;
+    servo_command to torque_control: see `joint_step`. drag (3,) [N s/m]; velocity (3,) [m/s], force
+    (3,) [N] on the base, ENU; wind, wind_mean (3,) [m/s], gust_keep (1,): see `blow`.
     face, payload, payload_axes, gap_constants: see `pull_fraction`; magnet_control (1,): 0..1.
     sensed_force (3,) [m/s^2, FLU]: specific force of a physics step, specific_force: the mean.
     """
@@ -27,6 +28,7 @@ class PhysicsArrays(NamedTuple):
     speed: np.ndarray
     thrust: np.ndarray
     thrust_control: np.ndarray
+    waiting_commands: np.ndarray
     servo_command: np.ndarray
     angles: np.ndarray
     joint_rates: np.ndarray
@@ -37,6 +39,8 @@ class PhysicsArrays(NamedTuple):
     drag: np.ndarray
     velocity: np.ndarray
     wind: np.ndarray
+    wind_mean: np.ndarray
+    gust_keep: np.ndarray
     force: np.ndarray
     face: np.ndarray
     payload: np.ndarray
@@ -48,11 +52,16 @@ class PhysicsArrays(NamedTuple):
 
 
 @jit
-def begin_period(a: PhysicsArrays, magnet: bool) -> None:
-    """Write the loads of the next control period: drag -c (v - wind), pull of the magnet.
+def begin_period(
+    a: PhysicsArrays, arm_command: np.ndarray, magnet: bool, gust: np.ndarray, tick: int
+) -> None:
+    """Write the loads of control period `tick`: drag -c (v - wind), pull of the magnet.
 
-    Sets the specific force to 0, for the mean over the physics steps.
+    arm_command (n,): sent now, see `receive`; gust (3,): see `blow`. Sets the specific force to 0,
+    for the mean over the physics steps.
     """
+    receive(arm_command, tick, a.waiting_commands, a.servo_command)
+    blow(a.wind, a.wind_mean, a.gust_keep[0], gust)
     for i in range(3):
         a.force[i] = a.drag[i] * (a.wind[i] - a.velocity[i])
         a.specific_force[i] = 0.0
@@ -92,13 +101,22 @@ def average(a: PhysicsArrays, weight: float) -> None:
 
 @jit
 def step_period(
-    a: PhysicsArrays, commands: np.ndarray, magnet: bool, model: int, data: int, steps: int
+    a: PhysicsArrays,
+    commands: np.ndarray,
+    arm_command: np.ndarray,
+    magnet: bool,
+    gust: np.ndarray,
+    tick: int,
+    model: int,
+    data: int,
+    steps: int,
 ) -> None:
-    """Advance one control period of `steps` physics steps.
+    """Advance control period `tick` by its `steps` physics steps.
 
-    commands (rotors,): 0..1; model, data: addresses of MuJoCo's structures, to which `a` belongs.
+    commands (rotors,): 0..1; arm_command, magnet, gust: of `begin_period`; model, data: addresses
+    of MuJoCo's structures, to which `a` belongs.
     """
-    begin_period(a, magnet)
+    begin_period(a, arm_command, magnet, gust, tick)
     for _ in range(steps):
         actuate(a, commands)
         mj_step(model, data)
@@ -109,7 +127,7 @@ def step_period(
 def blow(wind: np.ndarray, mean: np.ndarray, keep: float, gust: np.ndarray) -> None:
     """Advance wind (3,) by a control period: it returns to `mean` by 1 - keep; gust (3,) is added.
 
-    All in [m/s, ENU].
+    All in [m/s, ENU]. Without gusts the wind is its mean and stays so.
     """
     for i in range(3):
         wind[i] += (1.0 - keep) * (mean[i] - wind[i]) + gust[i]

@@ -6,6 +6,7 @@ the simulator calls
 
     samples = plant.sense()                    samples of the sensors
     truth = plant.truth()                      for the recording and the autopilot's simulator link
+    samples = plant.observe(row)               both in one call, in the direct engine
     plant.disturb(disturbance)                 only in a flight with faults of the physics
     plant.step(motors, arm, magnet)            physics of one control period
 """
@@ -15,13 +16,16 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
+from uam_control.coordinates import ALPHA
+from uam_control.vehicle import VehicleDescription
 from uam_sim_bridge.plant.vehicle import Vehicle
 
 
-@dataclass
+@dataclass(slots=True)
 class Samples:
     """Sensor samples that arrive at one tick; each is None or a tuple with its stamp [s] first.
 
@@ -71,6 +75,34 @@ class Truth:
     rotor_thrust: np.ndarray
 
 
+class TruthRow(NamedTuple):
+    """Where the true values of one tick begin in a flat row (width,) of float64; see `Truth`.
+
+    state: row by row; rotor_thrust; payload: position and quaternion; magnet: force, swing.
+    """
+
+    state: int
+    rotor_thrust: int
+    payload: int
+    magnet: int
+    width: int
+
+    @classmethod
+    def of(cls, vehicle: VehicleDescription) -> TruthRow:
+        """Return the places for a vehicle."""
+        thrust = 3 * (ALPHA + len(vehicle.joints))
+        payload = thrust + len(vehicle.rotors)
+        return cls(0, thrust, payload, payload + 7, payload + 9)
+
+    def write(self, truth: Truth, row: np.ndarray) -> None:
+        """Write the values of `truth` to row (width,)."""
+        row[self.state : self.rotor_thrust] = truth.state.ravel()
+        row[self.rotor_thrust : self.payload] = truth.rotor_thrust
+        row[self.payload : self.payload + 3] = truth.payload_position
+        row[self.payload + 3 : self.magnet] = truth.payload_quaternion
+        row[self.magnet : self.width] = truth.magnet_force, truth.magnet_swing
+
+
 @dataclass
 class Disturbance:
     """Changes of the physics by faults during one period; see `none`.
@@ -97,9 +129,10 @@ class Plant(ABC):
     """Vehicle, payload and surroundings. A class is made with the arguments of `MujocoPlant`.
 
     `vehicle`: as flown; `period` [s]: of control; `joints`: their number n; `tick`: number of
-    periods stepped. `DISTURBABLE`: whether the class implements `disturb`; if not, faults of the
-    physics are refused, faults of sensors and commands are accepted. `HAS_EFFECTS`: whether it
-    simulates the effects of a preset (`vehicle.numbers["effects"]`); if not, presets are refused.
+    periods stepped; `truth_row`: the places in the row of `observe`. `DISTURBABLE`: whether the
+    class implements `disturb`; if not, faults of the physics are refused, faults of sensors and
+    commands are accepted. `HAS_EFFECTS`: whether it simulates the effects of a preset
+    (`vehicle.numbers["effects"]`); if not, presets are refused.
     """
 
     DISTURBABLE = True
@@ -110,6 +143,7 @@ class Plant(ABC):
         self.period: float = vehicle.description.control_period
         self.joints = len(vehicle.description.joints)
         self.tick = 0
+        self.truth_row = TruthRow.of(vehicle.description)
 
     @property
     def time(self) -> float:
@@ -129,13 +163,22 @@ class Plant(ABC):
         """Advance one control period, and `tick` by 1.
 
         motor_commands (rotors,): 0..1 in PX4's order; arm_command (n,): effort [N m], or goal
-        positions [rad] of servos in position control, sent now, delayed by the bus; magnet: current
-        on.
+        positions [rad] of servos in position control, sent now, delayed by the bus; both contiguous
+        arrays of float64; magnet: current on.
         """
 
     @abstractmethod
     def truth(self) -> Truth:
         """Return a copy of the true values at this tick."""
+
+    def observe(self, row: np.ndarray) -> Samples:
+        """Return the samples of `sense`; write the true values to row (truth_row.width,).
+
+        The direct engine calls it instead of `sense` and `truth`. A class may do both at once.
+        """
+        samples = self.sense()
+        self.truth_row.write(self.truth(), row)
+        return samples
 
     def disturb(self, disturbance: Disturbance) -> None:
         """Apply `disturbance` until the next call."""

@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 from collections import deque
+from collections.abc import Iterator
+from itertools import pairwise
 
 import numpy as np
 
 from uam_control.maths.compiled import jit, prepared
 from uam_control.maths.rotations import quaternion_from_rotation_vector, quaternion_multiply
 
-BLOCK = 2048  # noise samples drawn per call of the generator; the sequence is the same for any
+BLOCK = 256  # noise samples drawn per call of the generator; the sequence is the same for any
 
 
 class Noise:
@@ -23,10 +25,14 @@ class Noise:
     def __call__(self) -> np.ndarray:
         row = next(self._rows, None)
         if row is None:
-            shape = (BLOCK, len(self._deviations))
-            self._rows = iter(self._generator.standard_normal(shape) * self._deviations)
+            self._rows = iter(self.block())
             row = next(self._rows)
         return row
+
+    def block(self) -> np.ndarray:
+        """Return the next BLOCK rows (BLOCK, width); not to be mixed with single rows."""
+        shape = (BLOCK, len(self._deviations))
+        return self._generator.standard_normal(shape) * self._deviations
 
 
 class Delay:
@@ -54,27 +60,14 @@ def generators(seed: int, count: int) -> list[np.random.Generator]:
 
 
 class Imu:
-    """Gyroscope and accelerometer: specific force and body rates, FLU."""
+    """Gyroscope and accelerometer, FLU; `disturbed` adds `bias` (6,) and `noise` to the truth."""
 
     def __init__(self, numbers: dict, scale: float, generator: np.random.Generator) -> None:
         """numbers: `sensors.imu` of the vehicle; scale: factor on noise and bias."""
         gyro, accelerometer = numbers["gyro_noise"], numbers["accelerometer_noise"]
         biases = [numbers["gyro_bias"]] * 3 + [numbers["accelerometer_bias"]] * 3
         self.bias = scale * generator.standard_normal(6) * np.array(biases)
-        self._noise = Noise(generator, scale * np.array([gyro] * 3 + [accelerometer] * 3))
-        three = np.empty(3)
-        self._disturbed = prepared(disturbed, three, three, self.bias, self.bias, three, three)
-
-    def sample(
-        self, rates: np.ndarray, specific_force: np.ndarray
-    ) -> tuple[np.ndarray, np.ndarray]:
-        """Return gyro (3,) [rad/s] and accelerometer (3,) [m/s^2], FLU, with noise and bias.
-
-        rates (3,) [rad/s], specific_force (3,) [m/s^2]: true values, FLU.
-        """
-        gyro, accelerometer = np.empty(3), np.empty(3)
-        self._disturbed(rates, specific_force, self._noise(), self.bias, gyro, accelerometer)
-        return gyro, accelerometer
+        self.noise = Noise(generator, scale * np.array([gyro] * 3 + [accelerometer] * 3))
 
 
 class Mocap:
@@ -106,20 +99,26 @@ class Mocap:
 
 
 class Encoders:
-    """Dynamixel position and velocity with their quantisation."""
+    """Dynamixel position and velocity with their quantisation: `units` (2,) of `quantised`."""
 
     def __init__(self, numbers: dict) -> None:
         """numbers: `sensors.joints` of the vehicle."""
-        self._count = 2.0 * np.pi / numbers["counts_per_turn"]
-        self._velocity = float(numbers["velocity_unit"])
-        values = np.empty(1)
-        self._quantised = prepared(quantised, values, 1.0, values, 1.0, values, values)
+        self.units = np.array([2.0 * np.pi / numbers["counts_per_turn"], numbers["velocity_unit"]])
 
-    def sample(self, angle: np.ndarray, velocity: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Return alpha (n,) [rad] and alpha_dot (n,) [rad/s] in whole counts."""
-        angles, velocities = np.empty(len(angle)), np.empty(len(angle))
-        self._quantised(angle, self._count, velocity, self._velocity, angles, velocities)
-        return angles, velocities
+
+def sample_rows(noise: Noise, joints: int) -> Iterator[tuple[np.ndarray, ...]]:
+    """Yield for each tick: noise of the IMU (6,), row of its samples (6 + 3 n,), and its parts.
+
+    The parts are views: gyro, specific force (3,), angles, velocities, torques (n,). A row is
+    written once and never again: whoever has a sample may keep it. noise: of `Imu`.
+    """
+    edges = np.cumsum([0, 3, 3, joints, joints, joints])
+    while True:
+        drawn = noise.block()
+        rows = np.empty((len(drawn), edges[-1]))
+        yield from zip(
+            drawn, rows, *(rows[:, a:b] for a, b in pairwise(edges)), strict=True
+        )  # as views
 
 
 @jit
@@ -161,14 +160,14 @@ def noisy_pose(
 @jit
 def quantised(
     angle: np.ndarray,
-    count: float,
     velocity: np.ndarray,
-    unit: float,
+    units: np.ndarray,
     angles: np.ndarray,
     velocities: np.ndarray,
 ) -> None:
     """Write angle (n,) [rad] in whole counts to angles (n,), velocity (n,) [rad/s] in whole units
-    to velocities (n,); count [rad], unit [rad/s]."""
+    to velocities (n,); units (2,): count [rad], unit of the velocity [rad/s]."""
+    count, unit = units[0], units[1]
     for i in range(len(angle)):
         angles[i] = count * np.round(angle[i] / count)
         velocities[i] = unit * np.round(velocity[i] / unit)

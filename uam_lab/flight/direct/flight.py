@@ -6,17 +6,15 @@ stages of `ControlTick`, autopilot, physics.
 
 from __future__ import annotations
 
-from collections import deque
 from collections.abc import Callable
 from typing import Any
 
-from uam_control.maths.compiled import prepared
 from uam_control.mission import Mission, Scenario
 from uam_control.mission.time_limit import DISARMED, Settled, time_limit
 from uam_control.profiles.profile import Profile, servo_mode
 from uam_control.stages.timing import Timing
 from uam_control.stamps import SECOND, nanoseconds
-from uam_lab.flight.direct.record import Places, RowLayout, Snapshot, record, record_blind
+from uam_lab.flight.direct.record import TickRecorder
 from uam_lab.results.timeseries import SUBSYSTEMS, FlightTable, columns_of, gain_columns
 from uam_sim_bridge.autopilot.core import Autopilot
 from uam_sim_bridge.autopilot.joined import JoinedAutopilot
@@ -30,7 +28,7 @@ from uam_sim_bridge.plant.effects.network_delay import SetpointDelay
 from uam_sim_bridge.plant.engines import DEFAULT_PLANT
 from uam_sim_bridge.plant.plant import check_arrays
 from uam_sim_bridge.stages.bridge_stage import BridgeSets, BridgeStage
-from uam_sim_bridge.stages.control_tick import ControlTick, Imu, Joints, Pose, Signals
+from uam_sim_bridge.stages.control_tick import ControlTick, Imu, Joints, Pose
 
 LONGEST_WAIT = 20.0  # [s] simulated, for the autopilot to get ready and armed
 
@@ -78,18 +76,18 @@ class DirectFlight:
             self.autopilot.late_to = lambda: usual() + network.at(signals.stamp / SECOND)
         self.ended_by = ""  # reason of an end before that of the mission
         self._limit = time_limit(scenario, sets["mission"])
-        self._lag = 0  # ticks from an IMU sample to its arrival
-        self._truths: deque[Snapshot] = deque()  # of ticks whose IMU sample has not arrived yet
         self._complete = False  # every kind of sensor has delivered
         laws, columns = self.control.laws, columns_of(described)
-        self._layout = RowLayout(
-            Places.of(columns),
-            tuple(laws[name].controller.adaptation for name in SUBSYSTEMS),
-            tuple(gain_columns(name, laws[name].controller.names, columns) for name in SUBSYSTEMS),
-        )
-        self._write: Callable | None = None  # `record` for the types of the first row
         length = scenario.landing.at + scenario.landing.duration + 12.0
         self.recording = FlightTable(int(length / self.plant.period), columns)
+        controllers = {name: laws[name].controller for name in SUBSYSTEMS}
+        self.recorder = TickRecorder(
+            self.recording,
+            self.plant.truth_row,
+            [one.adaptation for one in controllers.values()],
+            [gain_columns(name, one.names, columns) for name, one in controllers.items()],
+            self.plant.period,
+        )
 
     def run(self, progress: Callable[[float, str], None] | None = None) -> FlightTable:
         """Fly until the mission is done; progress(mission time [s], phase) once a second."""
@@ -130,17 +128,15 @@ class DirectFlight:
     def tick(self) -> None:
         """One control period of the whole vehicle."""
         plant, control, autopilot = self.plant, self.control, self.autopilot
-        signals = control.signals
-        now, samples = plant.time, plant.sense()
-        shot = Snapshot(now, plant.truth(), autopilot.motors.copy(), signals.magnet)
-        self._truths.append(shot)
+        signals, recorder = control.signals, self.recorder
+        now, magnet = plant.time, signals.magnet
+        samples = plant.observe(recorder.truth())
         autopilot.time = now
-        seen = control.tick(*self._delivered(samples))
-        motors = autopilot.update(*samples.hil)
-        if seen:
-            self._record(signals)
+        if control.tick(*self._delivered(samples)):
+            recorder.write(now, autopilot.motors, magnet, signals, control.bridge.sent)
         else:
-            self._record_blind()
+            recorder.write_blind(now, autopilot.motors, magnet, self.mission.output.phase)
+        motors = autopilot.update(*samples.hil)
         plant.step(motors, signals.arm_command, signals.magnet)
 
     def _delivered(
@@ -159,55 +155,11 @@ class DirectFlight:
             if not self._complete:
                 return None, None, None, None
         return (
-            mocap and (nanoseconds(mocap[0]), *mocap[1:]),
-            joints and (nanoseconds(joints[0]), *joints[1:]),
-            imu and (nanoseconds(imu[0]), *imu[1:]),
-            payload and (nanoseconds(payload[0]), *payload[1:]),
+            mocap and (nanoseconds(mocap[0]), mocap[1], mocap[2]),
+            joints and (nanoseconds(joints[0]), joints[1], joints[2], joints[3]),
+            imu and (nanoseconds(imu[0]), imu[1], imu[2]),
+            payload and (nanoseconds(payload[0]), payload[1], payload[2]),
         )
-
-    def _record(self, signals: Signals) -> None:
-        """Write a tick's row."""
-        truths, stamp = self._truths, signals.stamp / SECOND
-        while len(truths) > 1 and truths[0].time < stamp - self.plant.period / 2.0:
-            truths.popleft()
-        shot = truths.popleft()  # when the IMU sample was taken
-        truth = shot.truth
-        row = self.recording.next_row(signals.phase)
-        rates, thrust = self.control.bridge.sent
-        arguments = (
-            row,
-            signals.time,
-            truth.state,
-            signals.state,
-            signals.reference,
-            signals.attitude_reference,
-            signals.tau_p,
-            signals.tau_q,
-            signals.tau_alpha,
-            rates,
-            thrust,
-            signals.thrust_factor,
-            shot.motors,
-            truth.rotor_thrust,
-            truth.payload_position,
-            truth.payload_quaternion,
-            (float(shot.magnet), truth.magnet_force, truth.magnet_swing),
-            self._layout,
-        )
-        if self._write is None:
-            self._write = prepared(record, *arguments)
-        self._write(*arguments)
-        self._lag = len(self._truths)
-
-    def _record_blind(self) -> None:
-        """Write the row of a tick without an IMU sample: the last row with the new true state."""
-        if self.recording.count and len(self._truths) > self._lag:
-            shot = self._truths.popleft()
-            last = self.recording.count - 1
-            row = self.recording.next_row(self.mission.output.phase)
-            row[:] = self.recording.values[last]
-            row[0] += self.plant.period
-            record_blind(row, shot, self._layout.at)
 
     def _update_faults(self, control: ControlTick) -> bool:
         """Stage of a flight with faults: give plant and link the mission time and the phase."""

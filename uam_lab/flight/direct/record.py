@@ -1,16 +1,25 @@
-"""One tick of the direct engine into its row of the recording."""
+"""One tick of the direct engine into its row of the recording.
+
+An IMU sample arrives some ticks after it was taken. The true values and the commands in force are
+kept that long in a ring, so that a row has those of the moment of its sample.
+"""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
 import numpy as np
 
 from uam_control.coordinates import ROLL
-from uam_control.maths.compiled import jit
-from uam_lab.results.timeseries import Columns
-from uam_sim_bridge.plant import Truth
+from uam_control.maths.compiled import jit, prepared
+from uam_control.stamps import SECOND
+from uam_lab.results.timeseries import Columns, FlightTable
+from uam_sim_bridge.plant import TruthRow
+from uam_sim_bridge.stages.control_tick import Signals
+
+KEPT = 64  # ticks in the ring: a quarter of a second, more than any sample takes
+TIME, MAGNET, MOTORS = 0, 1, 2  # columns of the ring; the true values follow the motors'
 
 
 class Places(NamedTuple):
@@ -43,33 +52,123 @@ class Places(NamedTuple):
         )
 
 
-@dataclass(slots=True)
-class Snapshot:
-    """The truth of one tick, at plant time [s].
-
-    motors (n,), magnet: the commands in force then, which are those of the tick before.
-    """
-
-    time: float
-    truth: Truth
-    motors: np.ndarray
-    magnet: bool
-
-
 class RowLayout(NamedTuple):
-    """Where a tick's values go: places, and three arrays each of the published gains and of their
-    columns."""
+    """Where a tick's values go: places, the row of the truth, and three arrays each of the
+    published gains and of their columns."""
 
     at: Places
+    truth: TruthRow
     gains: tuple[np.ndarray, ...]
     gain_columns: tuple[np.ndarray, ...]
 
 
+class TickRecorder:
+    """Writes the ticks of a flight into `table`."""
+
+    def __init__(
+        self,
+        table: FlightTable,
+        truth: TruthRow,
+        gains: Sequence[np.ndarray],
+        gain_columns: Sequence[np.ndarray],
+        period: float,
+    ) -> None:
+        """truth: of the plant; gains, gain_columns: as in `RowLayout`; period [s] of the ticks."""
+        self.table = table
+        rotors = table.columns.rotors
+        places = Places.of(table.columns)
+        self._layout = RowLayout(places, truth, tuple(gains), tuple(gain_columns))
+        self._ring = np.full((KEPT, MOTORS + rotors + truth.width), np.nan)
+        self._truths = list(self._ring[:, MOTORS + rotors :])
+        self._period = period
+        self._first = self._next = 0  # ticks whose IMU sample has not arrived: first, last + 1
+        self._lag = 0  # ticks from an IMU sample to its arrival
+        self._write: Callable | None = None  # `record` for the types of the first row
+
+    def truth(self) -> np.ndarray:
+        """Return the row for the true values of this tick, see `Plant.observe`."""
+        return self._truths[self._next % KEPT]
+
+    def write(
+        self,
+        time: float,
+        motors: np.ndarray,
+        magnet: bool,
+        signals: Signals,
+        sent: tuple[np.ndarray, float],
+    ) -> None:
+        """Write the row of a tick.
+
+        time [s] of the plant; motors (rotors,) 0..1 and magnet: the commands in force at its
+        begin; sent: body rates (3,) [rad/s] and thrust of the setpoint.
+        """
+        table = self.table
+        number = table.next_number(signals.phase)
+        arguments = (
+            table.values,
+            number,
+            self._ring,
+            self._first,
+            self._next,
+            time,
+            motors,
+            float(magnet),
+            signals.stamp / SECOND - self._period / 2.0,
+            signals.time,
+            signals.state,
+            signals.reference,
+            signals.attitude_reference,
+            signals.tau_p,
+            signals.tau_q,
+            signals.tau_alpha,
+            sent[0],
+            sent[1],
+            signals.thrust_factor,
+            self._layout,
+        )
+        if self._write is None:
+            self._write = prepared(record, *arguments)
+        self._first = self._write(*arguments)
+        self._next += 1
+        self._lag = self._next - self._first
+
+    def write_blind(self, time: float, motors: np.ndarray, magnet: bool, phase: str) -> None:
+        """Write the row of a tick without an IMU sample: the last row with the new true state.
+
+        Arguments as of `write`. There is no row before the first tick with a sample.
+        """
+        keep(self._ring[self._next % KEPT], time, motors, float(magnet))
+        self._next += 1
+        table = self.table
+        if table.count and self._next - self._first > self._lag:
+            row = table.next_row(phase)
+            row[:] = table.values[table.count - 2]
+            row[0] += self._period
+            write_truth(row, self._ring[self._first % KEPT], len(motors), self._layout)
+            self._first += 1
+
+
+@jit
+def keep(row: np.ndarray, time: float, motors: np.ndarray, magnet: float) -> None:
+    """Write time [s] and the commands in force, motors (rotors,) and magnet, to a row of the
+    ring."""
+    row[TIME], row[MAGNET] = time, magnet
+    for i in range(len(motors)):
+        row[MOTORS + i] = motors[i]
+
+
 @jit
 def record(
-    row: np.ndarray,
+    table: np.ndarray,
+    number: int,
+    ring: np.ndarray,
+    first: int,
+    newest: int,
+    now: float,
+    motors: np.ndarray,
+    magnet: float,
+    earliest: float,
     time: float,
-    truth: np.ndarray,
     state: np.ndarray,
     reference: np.ndarray,
     attitude_reference: np.ndarray,
@@ -79,24 +178,26 @@ def record(
     rates: np.ndarray,
     command: float,
     factor: float,
-    motors: np.ndarray,
-    thrust: np.ndarray,
-    payload_position: np.ndarray,
-    payload_quaternion: np.ndarray,
-    magnet: tuple[float, float, float],
     layout: RowLayout,
-) -> None:
-    """Copy one tick into its row of the recording.
+) -> int:
+    """Copy one tick into row `number` of the table (rows, columns).
 
-    The reference of roll and pitch is the desired attitude of tau_p. magnet: on, force [N], swing
-    [rad].
+    first, newest: numbers of the ticks that the ring (KEPT, ...) has: the first without a row, and
+    this one, begun at `now` [s] with the commands motors (rotors,) and magnet. Returns the number
+    after the tick that is written: the first one that is not before `earliest` [s], when the IMU
+    sample was taken. The reference of roll and pitch is the desired attitude of tau_p.
     """
-    at, gains, gain_columns = layout
+    keep(ring[newest % len(ring)], now, motors, magnet)
+    first = max(first, newest + 1 - len(ring))
+    while first < newest and ring[first % len(ring), TIME] < earliest:
+        first += 1
+    row = table[number]
+    write_truth(row, ring[first % len(ring)], len(motors), layout)
+    at, gains, gain_columns = layout.at, layout.gains, layout.gain_columns
     row[0] = time
-    size = truth.shape[1]
+    size = state.shape[1]
     for i in range(3):
         for j in range(size):
-            row[at.truth + size * i + j] = truth[i, j]
             row[at.estimate + size * i + j] = state[i, j]
             row[at.reference + size * i + j] = reference[i, j]
         for j in range(3):
@@ -107,28 +208,25 @@ def record(
     for i in range(len(tau_alpha)):
         row[at.tau_alpha + i] = tau_alpha[i]
     row[at.setpoint + 3] = command
-    for i in range(len(motors)):
-        row[at.command + i] = motors[i]
-        row[at.thrust + i] = thrust[i]
-    for i in range(3):
-        row[at.payload + i] = payload_position[i]
-    for i in range(4):
-        row[at.payload + 3 + i] = payload_quaternion[i]
     for subsystem in range(3):
         columns, values = gain_columns[subsystem], gains[subsystem]
         for i in range(len(columns)):
             row[columns[i]] = values[i]
     row[at.factor] = factor
-    for i in range(3):
-        row[at.magnet + i] = magnet[i]
+    return first + 1
 
 
-def record_blind(row: np.ndarray, shot: Snapshot, at: Places) -> None:
-    """Write the true state of a tick without an IMU sample into a copy of the last row."""
-    truth, rotors = shot.truth, len(shot.motors)
-    row[at.truth : at.truth + truth.state.size] = truth.state.ravel()
-    row[at.command : at.command + rotors] = shot.motors
-    row[at.thrust : at.thrust + rotors] = truth.rotor_thrust
-    row[at.payload : at.payload + 3] = truth.payload_position
-    row[at.payload + 3 : at.payload + 7] = truth.payload_quaternion
-    row[at.magnet : at.magnet + 3] = shot.magnet, truth.magnet_force, truth.magnet_swing
+@jit
+def write_truth(row: np.ndarray, kept: np.ndarray, rotors: int, layout: RowLayout) -> None:
+    """Write the true values and the commands of a row of the ring into a row of the recording."""
+    at, of, begin = layout.at, layout.truth, MOTORS + rotors
+    for i in range(of.rotor_thrust - of.state):
+        row[at.truth + i] = kept[begin + of.state + i]
+    for i in range(rotors):
+        row[at.command + i] = kept[MOTORS + i]
+        row[at.thrust + i] = kept[begin + of.rotor_thrust + i]
+    for i in range(7):
+        row[at.payload + i] = kept[begin + of.payload + i]
+    row[at.magnet] = kept[MAGNET]
+    row[at.magnet + 1] = kept[begin + of.magnet]
+    row[at.magnet + 2] = kept[begin + of.magnet + 1]
