@@ -9,7 +9,7 @@ from free_port import free_port
 from uam_control.coordinates import arm_coordinates, coordinates
 from uam_msgs_py.messages import topics
 from uam_msgs_py.messages.convert import ImuWriter, JointStateWriter, PoseWriter
-from uam_msgs_py.messages.status import OK, STALE, WARN
+from uam_msgs_py.messages.status import ERROR, OK, STALE, WARN
 from uam_msgs_py.messages.trajectories import TrajectoryWriter
 
 COORDINATES = coordinates(2)
@@ -91,6 +91,38 @@ def test_loop_time_and_age_are_those_of_the_work(start, probe):
     assert found.values["age of /uam/autopilot/state [ms]"] == ""
     probe.until(lambda: found.status.level == STALE, "it waits again")
     assert float(found.values["age of /uam/state [ms]"]) > 1000.0
+
+
+def test_an_estimator_that_diverges_says_so_and_is_silent_for_a_second(start, probe):
+    found = NodeDiagnostics(probe, "state_estimator")
+    node = start("uam_control.nodes.state_estimator")
+    mocap, joints, imu = map(probe.publisher, (topics.MOCAP, topics.JOINTS, topics.IMU))
+    states = probe.collect_raw(topics.STATE)
+    probe.until_connected("state_estimator", [mocap, joints, imu])
+    pose, joint, sample = PoseWriter(), JointStateWriter(JOINTS), ImuWriter()
+    stamp, force = 0, 9.81
+
+    def fed(level):
+        nonlocal stamp
+        stamp += 4_000_000
+        position = np.array([1e-12 * stamp, 0.0, 0.0])
+        mocap.publish(pose.fill(stamp, position, np.array([1.0, 0.0, 0.0, 0.0])))
+        joints.publish(joint.stamped(stamp))
+        imu.publish(sample.fill(stamp, np.zeros(3), np.array([0.0, 0.0, force])))
+        return found.status and found.status.level == level and states
+
+    probe.until(lambda: fed(OK), "states")
+    force = 1e12  # of an IMU gone mad
+    before = len(states)
+    probe.until(lambda: fed(ERROR), "an error")
+    assert "the estimate has diverged" in found.status.message
+    node.until_logged("the estimate has diverged")
+    known = len(states)
+    probe.until(lambda: fed(ERROR) and found.status, "the same")
+    assert len(states) == known > 0 and known < before + 100
+    assert int(found.values["estimates begun anew"]) >= 1
+    force = 9.81
+    probe.until(lambda: fed(OK), "states again")
 
 
 def test_an_estimator_reports_rejected_poses(start, probe):

@@ -8,6 +8,7 @@ import pytest
 from uam_control.estimation import EstimatorParameters, StateEstimator
 from uam_control.estimation.repeats import Repeats
 from uam_control.maths.rotations import matrix_from_euler, quaternion_from_euler
+from uam_control.stages.estimator_stage import EstimatorStage
 
 DT = 0.004
 
@@ -94,3 +95,35 @@ def test_gravity_is_not_an_acceleration():
         estimator.imu(k * DT, np.zeros(3), np.array([0.0, 0.0, 9.81]))
         state = estimator.update()
     np.testing.assert_allclose(state, 0.0, atol=1e-9)
+
+
+@pytest.mark.parametrize("stall", [0.0, 0.05, 0.3])
+@pytest.mark.parametrize("lost", [0.5, 0.9, 0.97])
+@pytest.mark.parametrize("input_", ["imu", "mocap", "joints", "all"])
+def test_it_stays_bounded_on_an_overloaded_computer(input_, lost, stall):
+    """At rest; samples of an input are lost or come in bursts after stalls of this mean [s]."""
+    noise = np.random.default_rng(1)
+    stage = EstimatorStage(EstimatorParameters(), 2, DT)
+    arrivals = []
+    for name, period, delay in (("imu", DT, 1e-3), ("mocap", 1 / 120, 0.012), ("joints", DT, 1e-3)):
+        free, bad = 0.0, input_ in (name, "all")
+        for k in range(round(20.0 / period)):
+            if bad and noise.random() < lost:
+                continue
+            late = noise.exponential(stall + 1e-9) if bad and noise.random() < 0.05 else 0.0
+            free = max(free, k * period + delay + late)
+            arrivals.append((free, name, round(1e9 * k * period)))
+    for _, name, stamp in sorted(arrivals):
+        if name == "mocap":
+            seen = quaternion_from_euler(0.002 * noise.normal(size=3))
+            stage.mocap(stamp, 0.001 * noise.normal(size=3), seen)
+        elif name == "joints":
+            stage.joints(stamp, 0.001 * noise.normal(size=2), 0.02 * noise.normal(size=2))
+        else:
+            force = np.array([0.1, 0.0, 9.81]) + 0.1 * noise.normal(size=3)
+            state = stage.imu(stamp, 0.01 * noise.normal(size=3), force)
+            if state is not None:
+                assert np.abs(state[0, :3]).max() < 1.0
+                assert np.abs(state[0, 3:6]).max() < 0.3
+                assert np.abs(state[0, 6:]).max() < 0.05
+    assert not stage.diverged

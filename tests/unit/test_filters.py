@@ -40,9 +40,28 @@ def test_low_pass_step_response_by_hand():
 
 
 def test_joint_observer_by_hand():
+    # (3 + 5/2) * .1 < .8: one step
     # angle 1 + .1*2 = 1.2, seen .2 further; + 2*3*.1*.2 = 1.32
     # rate 2 + .1 (3^2*.2 + 5 (2.6 - 2)) = 2.48
     # second joint: 0, seen -1; 2*3*.1*(-1) = -.6; rate .1 (-9 + 5*1) = -.4
     state = np.array([[1.0, 0.0], [2.0, 0.0]])
     joint_step(np.array([1.4, -1.0]), np.array([2.6, 1.0]), 3.0, 5.0, 0.1, state)
     np.testing.assert_allclose(state, [[1.32, -0.6], [2.48, -0.4]])
+
+
+@pytest.mark.parametrize("bandwidth", [1.0, 60.0, 125.0])
+@pytest.mark.parametrize("weight", [0.0, 80.0, 200.0])
+def test_the_joint_observer_is_stable_at_any_rate(bandwidth, weight):
+    """An undivided step diverges below some 80 Hz with the usual gains."""
+    for dt in (0.004, 0.008, 0.0125, 0.02, 0.05):
+        state = np.array([[1.0], [0.0]])
+        for _ in range(round(40.0 / dt)):
+            joint_step(np.zeros(1), np.zeros(1), bandwidth, weight, dt, state)
+        assert np.abs(state).max() < 1e-6
+
+
+def test_the_joint_observer_follows_a_ramp_at_a_low_rate():
+    state, dt = np.array([[0.0], [2.0]]), 0.05
+    for k in range(1, 100):
+        joint_step(np.array([2.0 * k * dt]), np.array([2.0]), 60.0, 80.0, dt, state)
+        np.testing.assert_allclose(state, [[2.0 * k * dt], [2.0]], rtol=1e-12)

@@ -129,21 +129,41 @@ def test_it_begins_level_and_at_rest():
     np.testing.assert_array_equal([*vectors, found.accelerometer_bias], np.zeros((6, 3)))
 
 
-def test_corrections_count_for_the_time_since_the_last_but_no_less_than_1_and_no_more_than_50_ms():
-    found = at_rest([0.0])
+def test_corrections_count_for_the_time_since_the_last_but_no_less_than_1_ms():
+    found = at_rest([0.0, 0.01, 0.0105])
     gain = 6.0  # 3w per second
-    found.correct(0.0, np.array([1.0, 0.0, 0.0]), LEVEL)  # the first
+    found.correct(0.0, np.array([1.0, 0.0, 0.0]), LEVEL)  # the first counts for 50 ms
     np.testing.assert_allclose(found.position, [gain * 0.05, 0.0, 0.0])
     found.correct(0.01, np.array([0.0, 1.0, 0.0]), LEVEL)
     np.testing.assert_allclose(found.position, [gain * 0.05, gain * 0.01, 0.0])
-    found.correct(0.01, np.array([0.0, 0.0, 1.0]), LEVEL)
+    found.correct(0.0105, np.array([0.0, 0.0, 1.0]), LEVEL)
     np.testing.assert_allclose(found.position, [gain * 0.05, gain * 0.01, gain * 0.001])
 
 
-def test_the_first_correction_of_early_stamps_counts_for_50_ms_too():
-    found = at_rest([-0.96])
-    found.correct(-0.96, np.array([1.0, 0.0, 0.0]), LEVEL)  # 40 ms after -1, where it begins
-    np.testing.assert_allclose(found.position, [6.0 * 0.04, 0.0, 0.0])
+def test_of_sparse_poses_each_corrects_by_the_same_share():
+    """Bandwidth times interval is 0.3 at most: the position moves by 3 · 0.3 of the difference."""
+    for interval in (0.2, 0.5, 2.0):
+        found = at_rest([0.0, interval])
+        found.correct(0.0, NOTHING, LEVEL)
+        found.correct(interval, np.array([0.1, 0.0, 0.0]), LEVEL)
+        np.testing.assert_allclose(found.position, [0.09, 0.0, 0.0])
+        np.testing.assert_allclose(found.velocity, [3.0 * 0.09 / interval * 0.1, 0.0, 0.0])
+
+
+def test_a_prediction_is_compared_with_one_pose():
+    found = at_rest([0.0])
+    for stamp in (0.0, 0.008, 0.016):
+        found.correct(stamp, np.array([1.0, stamp, 0.0]), LEVEL)
+    np.testing.assert_allclose(found.position, [0.3, 0.0, 0.0])
+
+
+def test_a_pose_ahead_of_the_imu_waits_for_its_sample():
+    found = at_rest([0.0])
+    found.correct(0.1, np.array([1.0, 0.0, 0.0]), LEVEL)
+    found.predict(0.09, 0.01, NOTHING, WEIGHT)
+    assert not found.position.any()
+    found.predict(0.1, 0.01, NOTHING, WEIGHT)
+    assert found.position[0] == pytest.approx(0.3)
 
 
 @pytest.mark.parametrize(("stamp", "used"), [(0.02, True), (0.021, False), (-0.02, True)])

@@ -53,6 +53,26 @@ def test_the_estimator_refuses_a_stamp_that_does_not_follow():
         stage.imu(0, REST, WEIGHT)
 
 
+@pytest.mark.parametrize("force", [np.nan, 1e9])
+def test_a_diverged_estimate_is_held_back_for_a_second_and_begins_anew(force):
+    stage = EstimatorStage(EstimatorParameters(), joints=2, period=0.004)
+    assert not stage.held_back
+    held = []
+    for stamp in range(0, 3000 * MS, PERIOD):
+        stage.joints(stamp, np.zeros(2), np.zeros(2))
+        stage.mocap(stamp, 1e-12 * stamp * np.ones(3), LEVEL)
+        now = WEIGHT if stamp != 500 * MS else np.array([0.0, 0.0, force])
+        state = stage.imu(stamp, REST, now)
+        if state is None:
+            held.append(stamp)
+            assert stage.held_back
+        else:
+            assert not stage.held_back
+            np.testing.assert_allclose(state[:2], 0.0, atol=0.1)
+    assert stage.diverged == 1
+    assert held == list(range(500 * MS, 1500 * MS, PERIOD))
+
+
 def test_the_bias_of_the_imu_is_found_in_the_body_frame_and_due_every_20_ms():
     stage = EstimatorStage(EstimatorParameters(), joints=2, period=0.004)
     stage.joints(0, np.zeros(2), np.zeros(2))

@@ -9,6 +9,8 @@ import numpy as np
 from uam_control.maths.compiled import jit
 
 VALUE, RATE = range(2)  # rows of a second-order filter's state
+# (bandwidth + velocity_weight / 2) × step of the joint observer: below 1 it is stable for all gains
+LARGEST_GAIN = 0.8
 
 
 @jit
@@ -51,11 +53,19 @@ def joint_step(
 
     angle (n,) [rad], velocity (n,) [rad/s]: readings. state (2, n): estimated angle and velocity.
     bandwidth [rad/s]: correction by the angle; velocity_weight [1/s]: by the velocity.
+
+    A step too long for these gains, as of a slow bus or after lost readings, would make the
+    observer unstable. It is divided, and the reading followed back along its velocity.
     """
+    steps = max(1, math.ceil((bandwidth + 0.5 * velocity_weight) * dt / LARGEST_GAIN - 1e-6))
+    step = dt / steps
     for i in range(len(angle)):
-        state[VALUE, i] += dt * state[RATE, i]
-        innovation = angle[i] - state[VALUE, i]
-        state[VALUE, i] += 2.0 * bandwidth * dt * innovation
-        state[RATE, i] += dt * (
-            bandwidth * bandwidth * innovation + velocity_weight * (velocity[i] - state[RATE, i])
-        )
+        for left in range(steps - 1, -1, -1):
+            reading = angle[i] - left * step * velocity[i] if left else angle[i]
+            state[VALUE, i] += step * state[RATE, i]
+            innovation = reading - state[VALUE, i]
+            state[VALUE, i] += 2.0 * bandwidth * step * innovation
+            state[RATE, i] += step * (
+                bandwidth * bandwidth * innovation
+                + velocity_weight * (velocity[i] - state[RATE, i])
+            )

@@ -7,6 +7,7 @@ stores the predicted poses, so that a measured pose is compared with the predict
 from __future__ import annotations
 
 import math
+from collections import deque
 from typing import NamedTuple
 
 import numpy as np
@@ -26,6 +27,10 @@ from uam_control.maths.rotations import (
 HISTORY = 64  # stored predictions, 256 ms at 250 Hz
 OLDEST_MATCH = 0.02  # s, largest distance in time between a pose and its prediction
 LATE = 0.03  # s, delay above which a pose also corrects the later predictions
+FIRST = 0.05  # s, interval that the first correction counts for
+# bandwidth × interval between two poses: with sparser poses the bandwidth falls, or the observer
+# would be unstable
+LARGEST_GAIN = 0.3
 TURN = 3  # a stored pose: position before, quaternion from this index on
 CONJUGATE = np.array([1.0, -1.0, -1.0, -1.0])
 
@@ -78,7 +83,9 @@ class PoseFilter:
         self._stamps = np.full(HISTORY, -1.0)
         self._poses = np.zeros((HISTORY, 7))  # position, quaternion
         self._count = 0
-        self._last_correction = -1.0
+        self._last_correction: float | None = None  # stamp [s]
+        self._compared = math.nan  # stamp [s] of the newest prediction compared with a pose
+        self._ahead: deque[tuple[float, np.ndarray, np.ndarray]] = deque(maxlen=HISTORY)
         self._repeats = Repeats()
         still = self.position
         motion, poses = self.motion, self._poses
@@ -106,26 +113,39 @@ class PoseFilter:
         self._count += 1
         self._stamps[row] = stamp
         self._predict(dt, self.gravity, gyro, specific_force, self.motion, self._poses, row)
+        while self._ahead and self._ahead[0][0] <= stamp:
+            self.correct(*self._ahead.popleft())
 
     def correct(self, stamp: float, position: np.ndarray, quaternion: np.ndarray) -> None:
         """Correct with a pose exposed at `stamp` [s].
 
         position (3,) [m, world]; quaternion (4,) body → world [w x y z]. A pose is ignored if it is
         older than the stored predictions, repeats the last pose exactly (`Repeats`), or has jumped
-        away from the estimate (`PoseGate`).
+        away from the estimate (`PoseGate`). One that is ahead of the IMU waits for its sample. A
+        prediction is compared with one pose: with a slow IMU the same difference would count
+        several times.
         """
         motion, poses = self.motion, self._poses
         row, apart, jump, bias = self._match(self._stamps, poses, stamp, position, motion)
-        if apart > OLDEST_MATCH or self._repeats(position, quaternion):
+        newest = self._stamps[(self._count - 1) % HISTORY]
+        if apart > OLDEST_MATCH:
+            if self._count and stamp > newest:
+                self._ahead.append((stamp, position.copy(), quaternion.copy()))
+            return
+        if self._repeats(position, quaternion) or self._stamps[row] == self._compared:
             return
         if self.gate(stamp, jump, bias):
             return
-        dt = min(max(stamp - self._last_correction, 1e-3), 0.05)
-        self._last_correction = stamp
-        since = self._stamps[(self._count - 1) % HISTORY] - self._stamps[row]
+        bandwidths, dt = self._bandwidths, FIRST
+        if self._last_correction is not None:
+            dt = max(stamp - self._last_correction, 1e-3)
+            if dt * max(bandwidths[0], bandwidths[1]) > LARGEST_GAIN:
+                bandwidths = np.minimum(bandwidths, LARGEST_GAIN / dt)
+        self._last_correction, self._compared = stamp, self._stamps[row]
+        since = newest - self._stamps[row]
         if since > LATE:
             before = self.position.copy(), self.velocity.copy(), self.quaternion.copy()
-        self._correct(dt, self._bandwidths, position, quaternion, poses, row, motion)
+        self._correct(dt, bandwidths, position, quaternion, poses, row, motion)
         if since > LATE:
             self.position += since * (self.velocity - before[1])
             shift(

@@ -15,7 +15,7 @@ from uam_control.stamps import NEW_TIME, SECOND
 from uam_msgs_py.messages import topics
 from uam_msgs_py.messages.convert import ImuWriter, read_imu, read_joints, read_pose
 from uam_msgs_py.messages.navigation import odometry_message
-from uam_msgs_py.messages.status import OK, WARN
+from uam_msgs_py.messages.status import ERROR, OK, WARN
 from uam_msgs_py.messages.trajectories import TrajectoryWriter
 from uam_msgs_py.node.base_node import UamNode, run
 from uam_msgs_py.node.joins import Backlog
@@ -25,6 +25,7 @@ from uam_msgs_py.node.node_parameters import NodeParameters
 from uam_msgs_py.node.tick_times import DECODE, STAGE
 
 NAME = "state_estimator"
+DIVERGED = "the estimate has diverged: no state for 1 s; look at the rates of IMU, poses and joints"
 
 
 @dataclass(frozen=True)
@@ -49,7 +50,7 @@ class StateEstimatorNode(UamNode):
         self.parameter_set = NodeParameters(self, EstimatorParameters, defaults=section)
         self._period = vehicle.control_period
         self._stage = EstimatorStage(self.parameter_set.current, len(self._names), self._period)
-        self.parameter_set.apply = self._stage.estimator.set_parameters
+        self.parameter_set.apply = self._stage.set_parameters
         self._warm_up()
         self._state = self.publisher(topics.STATE)
         self._writer = TrajectoryWriter(vehicle.coordinates)
@@ -65,6 +66,7 @@ class StateEstimatorNode(UamNode):
         self._joints = self.listen(topics.JOINTS, self._on_joints)
         self.listen(topics.IMU, self._on_imu)
         self.triggers = (topics.IMU.name,)
+        self._diverged_before = 0  # times that the estimate had diverged at the last look
         self._refused_before = 0  # number of refused poses at the last report
         self._updates, self._biases = Backlog(), Backlog()
 
@@ -89,6 +91,7 @@ class StateEstimatorNode(UamNode):
             return
         self.times.lap(STAGE)
         if state is None:
+            self._tell_divergence()
             return
         stamp = self._stage.stamp
         # one output per sample: the filters need every sample
@@ -102,6 +105,12 @@ class StateEstimatorNode(UamNode):
         if not self.deferred:
             self.settle()
 
+    def _tell_divergence(self) -> None:
+        """Say so if the estimate has diverged in this tick."""
+        if self._stage.diverged > self._diverged_before:
+            self._diverged_before = self._stage.diverged
+            self.get_logger().error(f"{DIVERGED}; it begins anew")
+
     def _begin_anew(self, stamp: int) -> None:
         """Forget all samples: the stamps, now `stamp` [ns], are those of a new simulation."""
         self.get_logger().warning(
@@ -109,7 +118,8 @@ class StateEstimatorNode(UamNode):
             f"{stamp / SECOND:.3f} s: the estimate begins anew"
         )
         self._stage = EstimatorStage(self.parameter_set.current, len(self._names), self._period)
-        self.parameter_set.apply = self._stage.estimator.set_parameters
+        self.parameter_set.apply = self._stage.set_parameters
+        self._diverged_before = 0
 
     def settle(self) -> None:
         for stamp, data, begun in self._updates.take():
@@ -127,12 +137,15 @@ class StateEstimatorNode(UamNode):
         ticks, age = self._stage.ticks, self._stage.pose_age
         values: dict[str, object] = {
             "poses refused": refused,
+            "estimates begun anew": self._stage.diverged,
             "IMU samples repeated": ticks.repeated,
             "IMU samples missing": ticks.missing,
             "pose age at arrival, mean [ms]": "" if age.mean is None else f"{1e-6 * age.mean:.1f}",
             "pose age at arrival, max [ms]": f"{1e-6 * age.largest:.1f}",
         }
         age.restart()
+        if self._stage.held_back:
+            return ERROR, DIVERGED, values
         if fresh:
             return WARN, f"{fresh} new poses refused: too far from the estimate", values
         return OK, "running", values

@@ -2,13 +2,20 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 
+from uam_control.coordinates import CHI_DDOT
 from uam_control.estimation import EstimatorParameters, StateEstimator
+from uam_control.maths.compiled import jit
 from uam_control.stages.tick_stamps import TickStamps
 from uam_control.stamps import SECOND
 
 MEMORY = 100  # poses
+HELD_BACK = 1_000_000_000  # [ns] without a state after the estimate has diverged
+# [m, rad, m/s, rad/s] largest believable entry of chi and chi_dot; no vehicle of a room reaches it
+BELIEVABLE = 1e3
 BIAS_PERIOD = 20_000_000  # [ns] between two publications of the estimated biases
 
 
@@ -46,12 +53,15 @@ class EstimatorStage:
     All stamps are in [ns]. The IMU sample starts a tick; the other samples of the tick come before.
     `ticks`: the stamps of the ticks, see `TickStamps`; `pose_age`: of the poses at their arrival;
     `bias_due`: whether to publish the estimated biases of the IMU after this tick, see
-    `StateEstimator.bias_known`.
+    `StateEstimator.bias_known`; `diverged`: how often the estimate has, which then begins anew.
     """
 
     def __init__(self, parameters: EstimatorParameters, joints: int, period: float) -> None:
         """joints: number of joints of the arm; period [s]: of the control ticks."""
         self.estimator = StateEstimator(parameters, joints)
+        self._joint_count = joints
+        self.diverged = 0
+        self._held_until = 0  # [ns]
         self.ticks = TickStamps(round(period * SECOND))
         self.pose_age = PoseAge()
         self.bias_due = False
@@ -61,6 +71,15 @@ class EstimatorStage:
     def stamp(self) -> int:
         """Return the stamp [ns] of the newest tick."""
         return self.ticks.stamp
+
+    @property
+    def held_back(self) -> bool:
+        """Return whether no states come because the estimate has diverged."""
+        return self.diverged > 0 and self.stamp < self._held_until
+
+    def set_parameters(self, parameters: EstimatorParameters) -> None:
+        """Use `parameters` (validated) from the next sample on."""
+        self.estimator.set_parameters(parameters)
 
     def mocap(self, stamp: int, position: np.ndarray, quaternion: np.ndarray) -> None:
         """Take a pose: position (3,) [m, ENU], unit quaternion (4,) [w x y z], FLU → ENU."""
@@ -75,7 +94,9 @@ class EstimatorStage:
         """Take an IMU sample: gyro (3,) [rad/s], specific force (3,) [m/s^2], FLU.
 
         Returns the state (3, 6 + n) of the tick `stamp`, see `coordinates`; the next call reuses
-        the array. Returns None until every input has arrived once, and for a repeated sample.
+        the array. Returns None until every input has arrived once, for a repeated sample, and for
+        HELD_BACK after a state that is not finite or not believable: whoever flies by the state
+        then reacts as to an estimator that is gone.
         Raises ValueError if the stamp is older than the last one.
         """
         before = self.ticks.repeated
@@ -89,4 +110,25 @@ class EstimatorStage:
         self.pose_age.tick(tick)
         estimator.imu(tick / SECOND, gyro, force)
         self._waiting = self._waiting and bool(estimator.waiting_for)
-        return None if self._waiting else estimator.update()
+        if self._waiting:
+            return None
+        state = estimator.update()
+        if not believable(state):
+            self.diverged += 1
+            self._held_until = tick + HELD_BACK
+            self.estimator = StateEstimator(estimator.parameters, self._joint_count)
+            self._waiting = True
+            return None
+        return None if tick < self._held_until else state
+
+
+@jit
+def believable(state: np.ndarray) -> bool:
+    """Return whether the state (3, 6 + n) is finite, and chi and chi_dot within BELIEVABLE."""
+    for i in range(state.shape[1]):
+        for j in range(CHI_DDOT):
+            if not abs(state[j, i]) < BELIEVABLE:
+                return False
+        if not math.isfinite(state[CHI_DDOT, i]):
+            return False
+    return True
