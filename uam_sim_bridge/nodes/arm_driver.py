@@ -36,6 +36,7 @@ from uam_sim_bridge.drivers.dynamixel.chain import (
     hardware_file,
     load_chain,
 )
+from uam_sim_bridge.drivers.dynamixel.cycle_pace import CyclePace
 from uam_sim_bridge.drivers.dynamixel.driver import ArmDriver, Reading
 from uam_sim_bridge.drivers.dynamixel.parameters import ArmDriverParameters
 from uam_sim_bridge.drivers.dynamixel.servo_bus import BusLost
@@ -168,22 +169,17 @@ class ArmDriverNode(UamNode):
     def _exchange(self) -> None:
         """Run the cycles until the node ends; an error that nothing handles ends the node."""
         try:
-            period = 1.0 / self.driver.rate
             while not self._take_bus():
                 if self._ending.wait(ABSENT_WAIT):
                     return
-            due = time.monotonic()
+            pace = CyclePace(self.driver.rate)
             while not self._ending.is_set():
                 begun = time.perf_counter()
                 reading = self.driver.cycle()
                 if reading is not None:
                     self._publish(reading, begun)
-                due += period
-                left = due - time.monotonic()
-                if left > 0.0:
+                if left := pace.left():
                     time.sleep(left)
-                else:
-                    due = time.monotonic()  # no burst after a stall
         except Exception as error:
             self.failure = f"{type(error).__name__}: {error}"
 

@@ -82,15 +82,31 @@ class EmulatedBus:
             self._answer(self._terminal, time.monotonic())
 
     def _answer(self, terminal: PseudoTerminal, started: float) -> None:
-        """Hand the bytes to the line; send each answer at its time."""
+        """Hand the bytes to the line; send the answers at their times.
+
+        An adapter with a latency timer keeps what it receives within this time, and hands it over
+        at once.
+        """
         data, speed = terminal.read(), _SPEEDS.get(terminal.speed)
         sent = started + self._duration(len(data), speed) + self._latency
+        first, kept = sent, b""
         for delay, answer in self.line.receive(data, speed):
-            sent += delay + self._duration(len(answer), speed)
-            left = sent - time.monotonic()
-            if self._timing and left > 0.0:
-                time.sleep(left)
-            terminal.write(answer)
+            due = sent + delay + self._duration(len(answer), speed)
+            if kept and due > first + self._latency:
+                self._send(terminal, kept, sent)
+                kept = b""
+            if not kept:
+                first = due
+            kept, sent = kept + answer, due
+        if kept:
+            self._send(terminal, kept, sent)
+
+    def _send(self, terminal: PseudoTerminal, data: bytes, at: float) -> None:
+        """Hand over bytes at `at` [s], with timing."""
+        left = at - time.monotonic()
+        if self._timing and left > 0.0:
+            time.sleep(left)
+        terminal.write(data)
 
     def _duration(self, count: int, speed: int | None) -> float:
         return BITS_PER_BYTE * count / speed if self._timing and speed else 0.0
