@@ -16,11 +16,9 @@ from typing import Any, Self
 import numpy as np
 
 from uam_control.control.sample_hold import SampleHold
-from uam_control.coordinates import ATTITUDE, CHI_DOT
 from uam_control.stamps import SECOND
 from uam_control.vehicle import VehicleDescription
 from uam_sim_bridge.mavlink.offboard.hold import HoldParameters
-from uam_sim_bridge.mavlink.offboard.loop_delay import LoopDelay
 from uam_sim_bridge.mavlink.offboard.sequence import OffboardSequence
 from uam_sim_bridge.mavlink.offboard.setpoint import RateThrustMap, RateThrustParameters
 from uam_sim_bridge.mavlink.offboard.setpoint_source import (
@@ -31,12 +29,10 @@ from uam_sim_bridge.mavlink.offboard.setpoint_source import (
     silent,
 )
 from uam_sim_bridge.mavlink.offboard.setpoints.catalogue import SetpointParameters
-from uam_sim_bridge.mavlink.offboard.thrust_identification import (
-    ThrustIdentification,
-    ThrustIdentificationParameters,
-)
+from uam_sim_bridge.mavlink.offboard.thrust_identification import ThrustIdentificationParameters
 from uam_sim_bridge.stages.autopilot_port import AutopilotPort
 from uam_sim_bridge.stages.autopilot_report import AutopilotReport, AutopilotReports
+from uam_sim_bridge.stages.flight_measurements import FlightMeasurements
 from uam_sim_bridge.stages.vision_pacing import VisionPacing, VisionParameters
 
 # The mission's status comes from another process. It counts from a stamp on by which it has arrived
@@ -67,7 +63,6 @@ class BridgeSets:
 
 
 LIFT_PERIOD = 100_000_000  # [ns] between two reports of thrust factor and lift
-LIFT_CUTOFF = 1.0  # [Hz]
 LONGEST_STEP = 0.05  # [s] of the low-pass; a longer gap has no setpoints
 
 
@@ -97,11 +92,12 @@ class BridgeStage:
         self._dry_run = dry_run
         self.autopilot, self.sequence = autopilot, sequence
         self.map = RateThrustMap(sets.mapping, vehicle)
-        self.identification = ThrustIdentification(sets.identification, vehicle)
+        self._measurements = FlightMeasurements(sets.identification, vehicle)
+        self.identification = self._measurements.identification
+        self.loop_delay = self._measurements.loop_delay
         self.source = SetpointSource(self.map, sets.hold, sets.setpoint.type, fresh, say)
         self._vision = VisionPacing(sets.vision)
         self._hold, self._kept = SampleHold(sets.setpoint.setpoint_rate), None
-        self.loop_delay = LoopDelay(vehicle.rotor.lag, vehicle.control_period)
         self._reports = AutopilotReports(autopilot, sequence, self.loop_delay)
         self._orders: deque[tuple[int, bool, int]] = deque()  # stamp [ns], failsafe, regains
         self._regains = 0
@@ -110,7 +106,7 @@ class BridgeStage:
         self.hands = False
         self.factor = 1.0
         self.sent = sent(None)
-        self.lift, self.lift_due = 0.0, False
+        self.lift_due = False
         self._last = 0  # stamp [ns] of the last tick
 
     def mocap(self, stamp: int, position: np.ndarray, quaternion: np.ndarray) -> None:
@@ -180,23 +176,31 @@ class BridgeStage:
         )
         setpoint = self._sampled(now, setpoint, flying)
         self.sent = rates, thrust = sent(setpoint)
-        if flying and situation.armed and setpoint is not None and not self.source.holding:
-            self.loop_delay.update(now, rates, state[CHI_DOT, ATTITUDE])
-        else:
-            self.loop_delay.pause()
         self._send(now, setpoint)
-        self.report = self._reports.due(stamp)
-        self.factor = self.map.thrust_factor
-        assumed = self.map.assumed_thrust(thrust)
-        self.map.thrust_factor = self.identification.update(
+        airborne = flying and situation.armed
+        self.factor = factor = self.map.thrust_factor
+        found = self._measurements.update(
             now,
+            min(max(stamp - self._last, 0) / SECOND, LONGEST_STEP),
             state,
+            rates,
             thrust,
-            assumed,
-            flying and situation.armed and not situation.let_go and math.isfinite(thrust),
+            airborne and setpoint is not None and not self.source.holding,
+            airborne and not situation.let_go,
+            factor,
+            self.map.curve,
         )
-        self._note_lift(stamp, self.factor * assumed)
+        if found != factor:
+            self.map.thrust_factor = found
+        self.lift_due = stamp // LIFT_PERIOD != self._last // LIFT_PERIOD
+        self._last = stamp
+        self.report = self._reports.due(stamp)
         return setpoint
+
+    @property
+    def lift(self) -> float:
+        """See the class."""
+        return self._measurements.lift
 
     def _sampled(self, now: float, setpoint: Setpoint, flying: bool) -> Setpoint:
         """Return the setpoint of the last period at `now` [s] if this one is not due."""
@@ -206,14 +210,6 @@ class BridgeStage:
         if self._hold.due(now) or self._kept is None:
             self._kept = setpoint
         return self._kept
-
-    def _note_lift(self, stamp: int, collective: float) -> None:
-        """Filter the collective [N] of the tick `stamp` [ns]."""
-        step = min(max(stamp - self._last, 0) / SECOND, LONGEST_STEP)
-        gain = 1.0 - math.exp(-2.0 * math.pi * LIFT_CUTOFF * step)
-        self.lift += gain * (collective - self.lift)
-        self.lift_due = stamp // LIFT_PERIOD != self._last // LIFT_PERIOD
-        self._last = stamp
 
     def without(self, stamp: int) -> Setpoint:
         """Send the setpoint of a tick without valid commands, and return it."""

@@ -72,6 +72,7 @@ class LevelHold:
         self._gravity = gravity
         self.rates = np.zeros(3)
         self._desired = np.zeros((3, 3))  # see `Desired.attitude`
+        self._yaw = 0.0  # [rad] of the last valid command
         self._integral = np.zeros(2)  # rad/s
         self._thrust: float | None = None
         self._time = -math.inf
@@ -90,7 +91,7 @@ class LevelHold:
     def good(self, time: float, desired: Desired) -> None:
         """Store thrust and yaw of a valid command at `time` [s]."""
         self._since = None
-        self._desired[CHI, Z], thrust = desired.attitude[CHI, Z], desired.thrust
+        self._yaw, thrust = desired.attitude.item(CHI, Z), desired.thrust
         dt = time - self._time
         self._time = time
         if self._thrust is None or not 0.0 < dt < _THRUST_TIME:
@@ -115,7 +116,7 @@ class LevelHold:
             return None
         if self._since is None:
             self._since = self._time = time
-            self._integral[:] = 0.0
+            self._integral[:], self._desired[CHI, Z] = 0.0, self._yaw
         longest = self.parameters.release_time if hopeless else self.parameters.hold_time
         remaining = longest - (time - self._since)
         dt, self._time = max(0.0, time - self._time), time

@@ -51,17 +51,35 @@ STAGES = 3
 _ROWS = BAND + 3 * STAGES
 # rows of the sums, per axis
 WITH, OWN = 0, 1  # sum of product with the acceleration, sum of squares; per delay
+# entries of `now`: delay [s] and explained share, stamp [s] of the last tick (NaN: none), column
+# of `past` for its setpoint, ticks for which the filters settle
+VALUE, SHARE, STAMP, NEWEST, SETTLING = range(5)
+
+
+class DelayNumbers(NamedTuple):
+    """Numbers of a LoopDelay.
+
+    period [s]; forget: decay of the sums over a period; least, largest [1/s]: gains of a rate loop;
+    lag, low, high: decay over a period of the motor lag, and with the corners LOW and HIGH.
+    """
+
+    period: float
+    forget: float
+    least: float
+    largest: float
+    lag: float
+    low: float
+    high: float
 
 
 class DelaySums(NamedTuple):
-    """Numbers and state of a LoopDelay.
+    """State of a LoopDelay.
 
-    keep (3,): decay over a period of motor lag, high-pass, low-pass; filters (12, 2); past
-    (2, DELAYS): setpoints; sums (2, 2, DELAYS); total (3,): sums of the squared accelerations, of
-    the weights.
+    now (5,): see the entries VALUE..SETTLING; filters (12, 2); past (2, DELAYS): setpoints; sums
+    (2, 2, DELAYS); total (3,): sums of the squared accelerations, of the weights.
     """
 
-    keep: np.ndarray
+    now: np.ndarray
     filters: np.ndarray
     past: np.ndarray
     sums: np.ndarray
@@ -69,117 +87,124 @@ class DelaySums(NamedTuple):
 
 
 class LoopDelay:
-    """Measures the delay of the attitude loop. `value` [s]: NaN while unknown.
+    """Measures the delay of the attitude loop.
 
-    `explained`: share of the variance that the better axis' fit explains, 0 before.
+    `numbers`, `sums`: what the compiled `follow` reads and writes.
     """
 
     def __init__(self, motor_lag: float, period: float) -> None:
         """motor_lag [s]: of the rotors' speed; period [s]: of the control ticks."""
-        self._keep = np.exp(
+        keep = np.exp(
             -np.array([period / motor_lag, *(2.0 * math.pi * f * period for f in (LOW, HIGH))])
         )
-        self._forget = math.exp(-period / MEMORY)
-        self._period = period
-        self._gains = (GAIN[0] / motor_lag, GAIN[1] / motor_lag)
-        self._filters = np.zeros((_ROWS, AXES))
-        self._past = np.zeros((AXES, DELAYS))
-        self._sums = np.zeros((AXES, 2, DELAYS))
-        self._total = np.zeros(AXES + 1)  # sums of the squared accelerations, of the weights
-        self._arrays = DelaySums(self._keep, self._filters, self._past, self._sums, self._total)
-        self._follow = prepared(
-            follow, self._keep, self._keep, 1.0, 1.0, 0, self._arrays, self._gains
+        gains = GAIN[0] / motor_lag, GAIN[1] / motor_lag
+        self.numbers = DelayNumbers(
+            float(period), math.exp(-period / MEMORY), *gains, *keep.tolist()
         )
-        self._newest = 0
-        self._stamp: float | None = None
-        self._settling = 0
-        self.value, self.explained = math.nan, 0.0
+        self.sums = DelaySums(
+            np.array([math.nan, 0.0, math.nan, 0.0, 0.0]),
+            np.zeros((_ROWS, AXES)),
+            np.zeros((AXES, DELAYS)),
+            np.zeros((AXES, 2, DELAYS)),
+            np.zeros(AXES + 1),
+        )
+        self._follow = prepared(follow, 0.0, np.zeros(3), np.zeros(3), self.sums, self.numbers)
+
+    @property
+    def value(self) -> float:
+        """The delay [s], NaN while unknown."""
+        return self.sums.now.item(VALUE)
+
+    @property
+    def explained(self) -> float:
+        """Share of the variance that the better axis' fit explains, 0 before."""
+        return self.sums.now.item(SHARE)
 
     def update(self, stamp: float, setpoint: np.ndarray, rates: np.ndarray) -> float:
-        """Take a tick and return `value`.
-
-        stamp [s]; setpoint (3,), rates (3,) [rad/s, FLU]: sent at the tick, measured at the tick.
-        After a gap the filters settle first.
-        """
-        last, self._stamp = self._stamp, stamp
-        if last is None or not 0.5 < (stamp - last) / self._period < 1.5:
-            self._filters[:] = self._past[:] = 0.0
-            self._filters[SETPOINT], self._filters[RATE] = setpoint[:AXES], rates[:AXES]
-            self._filters[LAST] = rates[:AXES]
-            self._settling = DELAYS
-        self._newest = (self._newest + 1) % DELAYS
-        counts = self._settling <= 0
-        self._settling -= 1
-        forget = self._forget if counts else -1.0
-        delay, self.explained, weights = self._follow(
-            setpoint, rates, self._period, forget, self._newest, self._arrays, self._gains
-        )
-        self.value = delay if weights * self._period >= LEAST_WEIGHT else math.nan
+        """Take a tick and return `value`; stamp [s], setpoint, rates: see `follow`."""
+        self._follow(stamp, setpoint, rates, self.sums, self.numbers)
         return self.value
 
     def pause(self) -> None:
         """Take no tick: no setpoint from the laws was sent. The value is unknown."""
-        self._stamp, self.value = None, math.nan
+        now = self.sums.now
+        now[STAMP] = now[VALUE] = math.nan
 
 
 @jit
 def follow(
+    stamp: float,
     setpoint: np.ndarray,
     rates: np.ndarray,
-    period: float,
-    forget: float,
-    newest: int,
-    arrays: DelaySums,
-    gains: tuple[float, float],
-) -> tuple[float, float, float]:
-    """Take a tick; return delay [s], explained share, and the sum of the weights of all ticks.
+    state: DelaySums,
+    numbers: DelayNumbers,
+) -> None:
+    """Take a tick: advance the state, write delay and explained share into `now`.
 
-    The arguments are those of `advance` and `both_axes`.
+    stamp [s]; setpoint (3,), rates (3,) [rad/s, FLU]: sent at the tick, measured at the tick.
+    After a gap the filters settle first.
     """
-    advance(setpoint, rates, period, forget, newest, arrays)
-    delay, explained = both_axes(arrays.sums, arrays.total, gains, period)
-    return delay, explained, arrays.total[AXES]
+    now, filters, past, sums, total = state
+    period = numbers.period
+    # false for the NaN of no last tick, too
+    if not 0.5 < (stamp - now[STAMP]) / period < 1.5:
+        filters[:] = 0.0
+        past[:] = 0.0
+        for axis in range(AXES):
+            filters[SETPOINT, axis] = setpoint[axis]
+            filters[RATE, axis] = filters[LAST, axis] = rates[axis]
+        now[SETTLING] = DELAYS
+    now[STAMP] = stamp
+    now[NEWEST] = (now[NEWEST] + 1.0) % DELAYS
+    counts = now[SETTLING] <= 0.0
+    now[SETTLING] -= 1.0
+    advance(setpoint, rates, counts, state, numbers)
+    delay, explained = both_axes(sums, total, (numbers.least, numbers.largest), period)
+    now[VALUE] = delay if total[AXES] * period >= LEAST_WEIGHT else math.nan
+    now[SHARE] = explained
 
 
 @jit
 def advance(
     setpoint: np.ndarray,
     rates: np.ndarray,
-    period: float,
-    forget: float,
-    newest: int,
-    arrays: DelaySums,
+    counts: bool,
+    state: DelaySums,
+    numbers: DelayNumbers,
 ) -> None:
-    """Advance the filters by a tick, and the sums unless forget is negative.
+    """Advance the filters by a tick, and the sums if it counts.
 
-    setpoint, rates (3,) [rad/s]; forget: decay of the sums over a period [s]; newest: column of
-    `past` for this tick's setpoint.
+    setpoint, rates (3,) [rad/s].
     """
-    keep, filters, past, sums, total = arrays
+    now, filters, past, sums, total = state
+    period, forget, newest = numbers.period, numbers.forget, int(now[NEWEST])
+    count = past.shape[1]
     passed = np.empty(3)
     for axis in range(past.shape[0]):
         acceleration = (rates[axis] - filters[LAST, axis]) / period
         filters[LAST, axis] = rates[axis]
         for row in (SETPOINT, RATE):
             value = setpoint[axis] if row == SETPOINT else rates[axis]
-            filters[row, axis] = keep[0] * filters[row, axis] + (1.0 - keep[0]) * value
+            filters[row, axis] = numbers.lag * filters[row, axis] + (1.0 - numbers.lag) * value
         for i in range(3):
             value = acceleration if i == 2 else filters[i, axis]
             for stage in range(STAGES):
-                row, rest = BAND + STAGES * i + stage, keep[1] if stage == STAGES - 1 else keep[2]
+                row = BAND + STAGES * i + stage
+                rest = numbers.low if stage == STAGES - 1 else numbers.high
                 filters[row, axis] = rest * filters[row, axis] + (1.0 - rest) * value
                 if stage == STAGES - 1:
                     passed[i] = value - filters[row, axis]
                 value = filters[row, axis]
         past[axis, newest] = passed[SETPOINT]
-        if forget < 0.0:
+        if not counts:
             continue
-        for delay in range(past.shape[1]):
-            error = past[axis, (newest - delay) % past.shape[1]] - passed[RATE]
+        for delay in range(count):
+            before = newest - delay
+            error = past[axis, before if before >= 0 else before + count] - passed[RATE]
             sums[axis, WITH, delay] = forget * sums[axis, WITH, delay] + error * passed[2]
             sums[axis, OWN, delay] = forget * sums[axis, OWN, delay] + error * error
         total[axis] = forget * total[axis] + passed[2] * passed[2]
-    if forget >= 0.0:
+    if counts:
         total[-1] = forget * total[-1] + 1.0
 
 

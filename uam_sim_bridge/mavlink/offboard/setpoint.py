@@ -39,6 +39,7 @@ from typing import Any, Self
 
 import numpy as np
 
+from uam_control.coordinates import ALPHA, CHI, CHI_DOT, ROLL
 from uam_control.maths.compiled import jit, prepared
 from uam_control.settings.parameter_set import ParameterSet, number, vector
 from uam_control.vehicle import VehicleDescription, derived_parameters, load_description
@@ -189,11 +190,21 @@ def rate_thrust_map(
     return thrust
 
 
+@jit
+def rate_thrust_of_state(
+    tau_p: np.ndarray, tau_q: np.ndarray, state: np.ndarray, p: np.ndarray, rates: np.ndarray
+) -> float:
+    """Return `rate_thrust_map` of the attitude and body rates in state (3, 6 + n)."""
+    attitude, body_rates = state[CHI, ROLL:ALPHA], state[CHI_DOT, ROLL:ALPHA]
+    return rate_thrust_map(tau_p, tau_q, attitude, body_rates, p, rates)
+
+
 class RateThrustMap:
     """`rate_thrust_map` with its parameters; one instance per flight.
 
     `rates` (3,) [rad/s, FLU] is reused by every call: copy it to keep it. `thrust_factor`: true
-    thrust / thrust of the parameters' curve, 1 at first.
+    thrust / thrust of the parameters' curve, 1 at first. `curve`: the numbers of that curve, as
+    `thrust_of_command` takes them.
     """
 
     def __init__(
@@ -207,14 +218,17 @@ class RateThrustMap:
         self._vehicle = vehicle or load_description()
         self.configure(parameters or RateThrustParameters.of(self._vehicle))
         three = self.rates
-        self._thrust = prepared(thrust_of_command, 0.0, *self._assumed)
+        self._thrust = prepared(thrust_of_command, 0.0, *self.curve)
         self._map = prepared(rate_thrust_map, three, three, three, three, self._flat, three)
+        self._map_state = prepared(
+            rate_thrust_of_state, three, three, np.zeros((3, ALPHA)), self._flat, three
+        )
 
     def configure(self, parameters: RateThrustParameters) -> None:
         """Apply new parameters; a ParameterError names the bad one and changes nothing."""
         checked = parameters.validated()
         self._flat = p = checked.flat(self._vehicle)
-        self._assumed = tuple(p[[_FULL, _BATTERY, _MOTOR, _MODEL]].tolist())  # without the factor
+        self.curve = tuple(p[[_FULL, _BATTERY, _MOTOR, _MODEL]].tolist())
         self.parameters = checked
         self.thrust_factor = self._factor
 
@@ -245,9 +259,14 @@ class RateThrustMap:
         ENU], body_rates (3,) [rad/s, FLU]; float64. Raises SetpointRefused if one is not finite.
         """
         thrust = self._map(tau_p, tau_q, attitude, body_rates, self._flat, self.rates)
-        if thrust < 0.0:
-            raise SetpointRefused(f"{INPUTS[int(-thrust) - 1]} is not finite")
-        return self.rates, thrust
+        return self.rates, _accepted(thrust)
+
+    def map_state(
+        self, tau_p: np.ndarray, tau_q: np.ndarray, state: np.ndarray
+    ) -> tuple[np.ndarray, float]:
+        """Return `map` of the attitude and body rates in state (3, 6 + n), see `coordinates`."""
+        thrust = self._map_state(tau_p, tau_q, state, self._flat, self.rates)
+        return self.rates, thrust if thrust >= 0.0 else _accepted(thrust)
 
     def scaled(self, command: float, factor: float) -> float:
         """Return the normalised thrust that makes `factor` times the thrust of `command`."""
@@ -257,4 +276,11 @@ class RateThrustMap:
 
     def assumed_thrust(self, command: float) -> float:
         """Return the collective [N] of a normalised thrust by the curve without `thrust_factor`."""
-        return self._thrust(command, *self._assumed)
+        return self._thrust(command, *self.curve)
+
+
+def _accepted(thrust: float) -> float:
+    """Return a thrust of `rate_thrust_map`; raises SetpointRefused if it names a bad input."""
+    if thrust < 0.0:
+        raise SetpointRefused(f"{INPUTS[int(-thrust) - 1]} is not finite")
+    return thrust

@@ -120,9 +120,7 @@ class SetpointSource:
             return self.without(now, situation)
         if flying and tau_q is not None:
             try:
-                rates, thrust = self.map.map(
-                    tau_p, tau_q, state[CHI, ATTITUDE], state[CHI_DOT, ATTITUDE]
-                )
+                rates, thrust = self.map.map_state(tau_p, tau_q, state)
             except SetpointRefused as error:
                 self._say(f"setpoint refused: {error}", None)
             else:

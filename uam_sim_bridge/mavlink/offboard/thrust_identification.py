@@ -34,8 +34,9 @@ from typing import Any, Self
 import numpy as np
 
 from uam_control.coordinates import CHI, CHI_DDOT, PITCH, ROLL, YAW, X, Y, Z
+from uam_control.laws.law_parameters import structured
 from uam_control.maths.compiled import jit, prepared
-from uam_control.settings.parameter_set import ParameterSet, choice, number
+from uam_control.settings.parameter_set import Bound, ParameterSet, choice, number
 from uam_control.vehicle import VehicleDescription, derived_parameters, load_description
 
 USABLE = (0.1, 0.9)  # normalised thrust: outside, the allocation reduces it in favour of torques
@@ -44,6 +45,7 @@ SETTLED = 3.0  # [times `identification_start`] of learning, after which a paylo
 # The magnet's state comes from another process. It counts only after this delay, at which it has
 # arrived in every process: so a lockstep flight is reproducible.
 MAGNET_DELAY = 0.01  # s
+OFF, ON, FROZEN = 0.0, 1.0, 2.0  # the parameter thrust_identification as a number
 
 
 @dataclass(frozen=True)
@@ -141,10 +143,119 @@ def steady_force(
     return force if force > 0.0 else 0.0
 
 
+@jit
+def identify(
+    time: float,
+    state: np.ndarray,
+    command: float,
+    assumed: float,
+    flying: bool,
+    record: np.ndarray,
+    memory: np.ndarray,
+) -> float:
+    """Advance the identification by one tick and return the factor.
+
+    time, state, command, assumed, flying: see `ThrustIdentification.update`; record: numbers of the
+    parameters, `numbers`; memory: state, `new_memory`; both structured arrays (1,).
+    """
+    p, m = record[0], memory[0]
+    if not math.isfinite(time + assumed + command):
+        return m.factor
+    dt = time - m.time
+    m.time = time
+    if not 0.0 < dt <= LONGEST_GAP:  # the first tick, or ticks are missing
+        m.assumed = assumed
+        m.unsteady = time
+        return m.factor
+    m.assumed += (1.0 - math.exp(-dt / max(p.identification_lag, 1e-3))) * (assumed - m.assumed)
+    if p.mode == OFF:
+        m.learnt = 0.0
+        move(1.0 - m.factor, dt, p, m)
+        return m.factor
+    height = state[CHI, Z]
+    if not flying or math.isnan(m.ground):
+        if math.isfinite(height):
+            m.ground = height
+        m.released = math.nan
+        m.unsteady = time
+    elif m.magnet == 0.0 and p.identification_height < height - m.ground < math.inf:
+        compare(time, dt, state, command, p, m)
+    return m.factor
+
+
+@jit
+def compare(
+    time: float, dt: float, state: np.ndarray, command: float, p: np.record, m: np.record
+) -> None:
+    """Measure the factor in steady flight and follow the measurement; see `identify`."""
+    force = steady_force(state, p.identification_tilt, p.identification_acceleration, p.gravity)
+    if force == 0.0 or m.assumed <= 0.0 or not USABLE[0] <= command <= USABLE[1]:
+        m.unsteady = time
+    # A swaying vehicle is at rest for moments, and its motors saturate: rest must last.
+    if time - m.unsteady <= p.identification_settling:
+        return
+    measured = p.identification_mass * force / m.assumed
+    measured = min(p.factor_max, max(p.factor_min, measured))
+    if not math.isnan(m.released) and hanging(time, dt, measured, p, m):
+        return
+    if p.mode == ON:
+        m.learnt += dt
+        span = min(p.identification_time, max(p.identification_start, m.learnt))
+        gain = 1.0 - math.exp(-dt / span)
+        move(gain * (measured - m.factor), dt, p, m)
+
+
+@jit
+def hanging(time: float, dt: float, measured: float, p: np.record, m: np.record) -> bool:
+    """Whether a payload may still hang on the magnet that is off; see `identify`."""
+    if math.isnan(m.recent):
+        m.recent = measured
+    m.recent += min(1.0, 2.0 * dt / p.identification_release) * (measured - m.recent)
+    if time - m.released < p.identification_release:
+        return True
+    if math.isnan(m.before):  # the factor without payload is unknown: wait for the landing
+        return True
+    mass = p.identification_mass
+    if m.recent < m.before * mass / (mass + p.hanging_mass):
+        return True
+    m.released = math.nan
+    return False
+
+
+@jit
+def move(step: float, dt: float, p: np.record, m: np.record) -> None:
+    """Change the factor by `step`, within slew limit and bounds; see `identify`."""
+    limit = p.factor_slew * dt
+    step = min(limit, max(-limit, step))
+    m.factor = min(p.factor_max, max(p.factor_min, m.factor + step))
+
+
+def numbers(parameters: ThrustIdentificationParameters, gravity: float) -> np.ndarray:
+    """Return the structured array (1,) of the parameters that `identify` reads; gravity [m/s^2]."""
+    specs = parameters.specs().items()
+    values = {name: getattr(parameters, name) for name, one in specs if isinstance(one, Bound)}
+    mode = (OFF, ON, FROZEN)[("off", "on", "freeze").index(parameters.thrust_identification)]
+    return structured(values | {"mode": mode, "gravity": gravity})
+
+
+def new_memory() -> np.ndarray:
+    """Return the structured array (1,) of the state before the first tick.
+
+    factor; time [s] of the last tick; assumed [N]: lagged as the motors; ground [m]: height of the
+    vehicle on the ground; learnt [s]: of learning so far; unsteady [s]: last time at which the
+    flight was not steady; magnet: 1 on; released [s]: magnet off, NaN once no payload hangs;
+    recent: measurement since the release, fast low pass; before: settled factor before the magnet
+    went on. NaN: unknown.
+    """
+    unknown = ("ground", "released", "recent", "before")
+    values = {"factor": 1.0, "time": -math.inf, "assumed": 0.0, "learnt": 0.0, "magnet": 0.0}
+    return structured(values | {"unsteady": -math.inf} | dict.fromkeys(unknown, math.nan))
+
+
 class ThrustIdentification:
     """Estimate of the thrust factor, and the conditions under which it changes.
 
-    `factor`: true / assumed thrust, always within its bounds.
+    `record`, `memory`: what the compiled `identify` reads and writes.
     """
 
     def __init__(
@@ -155,24 +266,31 @@ class ThrustIdentification:
         """parameters: None for those of the vehicle; vehicle: None for the default one."""
         vehicle = vehicle or load_description()
         self._gravity = vehicle.gravity
-        self.factor = 1.0
-        self._time = -math.inf
-        self._assumed = 0.0  # N, lagged as the motors
-        self._ground: float | None = None  # m, height of the vehicle on the ground
-        self._learnt = 0.0  # s of learning so far
-        self._unsteady = -math.inf  # s, last time at which the flight was not steady
+        self.memory = new_memory()
         self._switches: deque[tuple[float, bool]] = deque()
-        self._magnet = False
-        self._released: float | None = None  # s, magnet off; None once no payload hangs
-        self._recent = math.nan  # measurement since the release, fast low pass
-        self._before: float | None = None  # settled factor before the magnet went on
-        self._steady_force = prepared(steady_force, np.zeros((3, 3)), 0.0, 0.0, 0.0)
-        self.configure(parameters or ThrustIdentificationParameters.of(vehicle))
+        first = (parameters or ThrustIdentificationParameters.of(vehicle)).validated()
+        self.record = numbers(first, self._gravity)
+        self.configure(first)
+        self._identify = prepared(
+            identify, 0.0, np.zeros((3, 3)), 0.0, 0.0, True, self.record, self.memory
+        )
 
     def configure(self, parameters: ThrustIdentificationParameters) -> None:
         """Apply new parameters; a ParameterError names the bad one and changes nothing."""
         p = self.parameters = parameters.validated()
-        self.factor = min(p.factor_max, max(p.factor_min, self.factor))
+        self.record[:] = numbers(p, self._gravity)
+        memory = self.memory[0]
+        memory.factor = min(p.factor_max, max(p.factor_min, memory.factor))
+
+    @property
+    def factor(self) -> float:
+        """True / assumed thrust, always within its bounds."""
+        return float(self.memory[0].factor)
+
+    @property
+    def magnet_waits(self) -> bool:
+        """Whether a state of the magnet does not count yet."""
+        return bool(self._switches)
 
     def switch(self, time: float, on: bool) -> None:
         """Store the magnet's state at `time` [s]; it counts MAGNET_DELAY later."""
@@ -193,85 +311,27 @@ class ThrustIdentification:
         this tick; assumed [N]: its collective by the curve, without the factor; flying: armed and
         controlled.
         """
-        if not math.isfinite(time + assumed + command):
-            return self.factor
-        dt, self._time = time - self._time, time
-        if not 0.0 < dt <= LONGEST_GAP:  # the first tick, or ticks are missing
-            self._assumed, self._unsteady = assumed, time
-            return self.factor
-        p = self.parameters
-        self._assumed += (1.0 - math.exp(-dt / max(p.identification_lag, 1e-3))) * (
-            assumed - self._assumed
-        )
-        if self._switches:
-            self._follow_magnet(time)
-        if p.thrust_identification == "off":
-            self._learnt = 0.0
-            self._move(1.0 - self.factor, dt)
-            return self.factor
-        height = float(state[CHI, Z])
-        if not flying or self._ground is None:
-            self._land(height)
-            self._unsteady = time
-        elif not self._magnet and p.identification_height < height - self._ground < math.inf:
-            self._compare(time, dt, state, command)
-        return self.factor
+        self.follow_magnet(time, math.isfinite(time + assumed + command))
+        return self._identify(time, state, command, assumed, flying, self.record, self.memory)
 
-    def _compare(self, time: float, dt: float, state: np.ndarray, command: float) -> None:
-        """Measure the factor in steady flight and follow the measurement."""
-        p = self.parameters
-        limits = (p.identification_tilt, p.identification_acceleration)
-        force = self._steady_force(state, *limits, self._gravity)
-        if force == 0.0 or self._assumed <= 0.0 or not USABLE[0] <= command <= USABLE[1]:
-            self._unsteady = time
-        # A swaying vehicle is at rest for moments, and its motors saturate: rest must last.
-        if time - self._unsteady <= p.identification_settling:
+    def follow_magnet(self, time: float, usable: bool = True) -> None:
+        """Take the magnet's states that count at the tick `time` [s], before `identify`.
+
+        They wait for a tick without a gap before it; usable: whether its numbers are finite.
+        """
+        switches = self._switches
+        if not switches or not usable:
             return
-        measured = p.identification_mass * force / self._assumed
-        measured = min(p.factor_max, max(p.factor_min, measured))
-        if self._released is not None and self._hanging(time, dt, measured):
+        m = self.memory[0]
+        if not 0.0 < time - m.time <= LONGEST_GAP:
             return
-        if p.thrust_identification == "on":
-            self._learnt += dt
-            span = min(p.identification_time, max(p.identification_start, self._learnt))
-            gain = 1.0 - math.exp(-dt / span)
-            self._move(gain * (measured - self.factor), dt)
-
-    def _hanging(self, time: float, dt: float, measured: float) -> bool:
-        """Whether a payload may still hang on the magnet that is off."""
-        p = self.parameters
-        if math.isnan(self._recent):
-            self._recent = measured
-        self._recent += min(1.0, 2.0 * dt / p.identification_release) * (measured - self._recent)
-        if time - self._released < p.identification_release:
-            return True
-        if self._before is None:  # the factor without payload is unknown: wait for the landing
-            return True
-        mass = p.identification_mass
-        if self._recent < self._before * mass / (mass + p.hanging_mass):
-            return True
-        self._released = None
-        return False
-
-    def _follow_magnet(self, time: float) -> None:
-        while self._switches and self._switches[0][0] <= time - MAGNET_DELAY:
-            on = self._switches.popleft()[1]
-            if on and not self._magnet:
-                settled = self._learnt >= SETTLED * self.parameters.identification_start
-                # if the last payload never came off, `_before` keeps its value
-                if self._released is None:
-                    self._before = self.factor if settled else None
-            elif self._magnet and not on:
-                self._released, self._recent = time, math.nan
-            self._magnet = on
-
-    def _land(self, height: float) -> None:
-        if math.isfinite(height):
-            self._ground = height
-        self._released = None
-
-    def _move(self, step: float, dt: float) -> None:
-        p = self.parameters
-        limit = p.factor_slew * dt
-        step = min(limit, max(-limit, step))
-        self.factor = min(p.factor_max, max(p.factor_min, self.factor + step))
+        while switches and switches[0][0] <= time - MAGNET_DELAY:
+            on = switches.popleft()[1]
+            if on and not m.magnet:
+                settled = m.learnt >= SETTLED * self.parameters.identification_start
+                # if the last payload never came off, `before` keeps its value
+                if math.isnan(m.released):
+                    m.before = m.factor if settled else math.nan
+            elif m.magnet and not on:
+                m.released, m.recent = time, math.nan
+            m.magnet = float(on)
