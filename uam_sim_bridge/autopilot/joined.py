@@ -41,6 +41,16 @@ class _Received(NamedTuple):
     landed: bool | None
 
 
+def always() -> bool:
+    """Whether a message of a link without faults arrives."""
+    return True
+
+
+def at_once() -> float:
+    """Return the delay [s] of a message of a link without faults."""
+    return 0.0
+
+
 class JoinedAutopilot:
     """An `AutopilotPort` to the `Autopilot` in the same process.
 
@@ -56,10 +66,10 @@ class JoinedAutopilot:
         self.intended, self.failsafe = Mode.UNKNOWN, False
         self._delivered = -math.inf  # [s] newest setpoint that reached the autopilot
         self.armed_since: float | None = None
-        self.passes: Callable[[], bool] = lambda: True  # whether a message reaches the autopilot
-        self.receives: Callable[[], bool] = lambda: True  # whether one of the autopilot arrives
-        self.late_to: Callable[[], float] = lambda: 0.0  # [s] of a message to the autopilot
-        self.late_from: Callable[[], float] = lambda: 0.0  # [s] of a message of the autopilot
+        self.passes: Callable[[], bool] = always  # whether a message reaches the autopilot
+        self.receives: Callable[[], bool] = always  # whether one of the autopilot arrives
+        self.late_to: Callable[[], float] = at_once  # [s] of a message to the autopilot
+        self.late_from: Callable[[], float] = at_once  # [s] of a message of the autopilot
         self._outgoing: deque[tuple[float, Callable[[], None]]] = deque()  # due [s], delivers it
         self._incoming: deque[tuple[float, _Received]] = deque()
         self.round_trip: float | None = None
@@ -87,7 +97,7 @@ class JoinedAutopilot:
         """
         self._period, self._now = min(self._period, time - self._now), time
         late_to, late_from, period = self.late_to(), self.late_from(), self._period
-        self.round_trip = period + late_to + late_from if math.isfinite(period) else None
+        self.round_trip = period + late_to + late_from if period < math.inf else None
         while self._outgoing and self._outgoing[0][0] <= time + 1e-9:
             self._outgoing.popleft()[1]()
         texts = self.autopilot.commander.texts
@@ -142,7 +152,10 @@ class JoinedAutopilot:
 
     def send_setpoint(self, target: Target, time: float) -> None:
         """Send the setpoint of the tick `time` [s]."""
-        self._send(lambda: self._target(target))
+        if self.passes is always and self.late_to is at_once and not self._outgoing:
+            self._target(target)
+        else:
+            self._send(lambda: self._target(target))
 
     def _send(self, deliver: Callable[[], object]) -> None:
         """Send a message: call `deliver` in the cycle in which it arrives, if it arrives."""

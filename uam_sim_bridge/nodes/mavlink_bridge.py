@@ -21,7 +21,6 @@ from rclpy.parameter import Parameter
 from std_msgs.msg import Bool
 from std_srvs.srv import Trigger
 
-from uam_control.coordinates import ATTITUDE, CHI, CHI_DOT
 from uam_control.mission.mission_output import HAND_CHECK
 from uam_control.nodes.described import described_vehicle
 from uam_control.settings.parameter_set import ParameterError
@@ -46,16 +45,12 @@ from uam_msgs_py.node.node_parameters import NodeParameters
 from uam_msgs_py.node.tick_times import DECODE, STAGE
 from uam_sim_bridge.mavlink.link.link_report import faults, report
 from uam_sim_bridge.mavlink.offboard.hold import HoldParameters
-from uam_sim_bridge.mavlink.offboard.loop_delay import LoopDelay
 from uam_sim_bridge.mavlink.offboard.sequence import OffboardParameters, OffboardSequence
 from uam_sim_bridge.mavlink.offboard.setpoint import RateThrustMap, RateThrustParameters
 from uam_sim_bridge.mavlink.offboard.setpoint_source import Setpoint, sent
 from uam_sim_bridge.mavlink.offboard.setpoints.catalogue import SETPOINTS, SetpointParameters
 from uam_sim_bridge.mavlink.offboard.setpoints.desired import Desired
-from uam_sim_bridge.mavlink.offboard.thrust_identification import (
-    ThrustIdentificationParameters,
-    steady_force,
-)
+from uam_sim_bridge.mavlink.offboard.thrust_identification import ThrustIdentificationParameters
 from uam_sim_bridge.mavlink.protocol.vision import VisionPose
 from uam_sim_bridge.mavlink.telemetry.parameter_check import adopted, differences
 from uam_sim_bridge.nodes.autopilot_imu_topic import (
@@ -70,6 +65,7 @@ from uam_sim_bridge.nodes.bridge_link import BridgeParameters, open_links
 from uam_sim_bridge.nodes.bridge_magnet import bridge_magnet
 from uam_sim_bridge.nodes.fault_topic import FaultTopic
 from uam_sim_bridge.stages.bridge_stage import BridgeSets, BridgeStage
+from uam_sim_bridge.stages.flight_measurements import FlightMeasurements
 from uam_sim_bridge.stages.vision_pacing import VisionParameters
 
 NAME = "mavlink_bridge"
@@ -357,12 +353,13 @@ class MavlinkBridgeNode(UamNode):
         """Compile the functions of a tick before the flight: a first call takes a second."""
         spare, zero, level = RateThrustMap(), np.zeros(3), np.array([1.0, 0.0, 0.0, 0.0])
         state = np.zeros((3, len(self._vehicle.coordinates)))
-        spare.map(zero, zero, state[CHI, ATTITUDE], state[CHI_DOT, ATTITUDE])
-        spare.assumed_thrust(0.5)
+        spare.map_state(zero, zero, state)
         for setpoint in SETPOINTS.values():
             setpoint(Desired(zero, np.zeros((3, 3)), 0.5))
-        LoopDelay(self._vehicle.rotor.lag, self._vehicle.control_period).update(0.0, zero, zero)
-        steady_force(state, 0.1, 1.0, self._vehicle.gravity)
+        measured = FlightMeasurements(
+            ThrustIdentificationParameters.of(self._vehicle), self._vehicle
+        )
+        measured.update(0.0, 0.004, state, zero, 0.5, True, False, 1.0, spare.curve)
         VisionPose(0.0, zero, level, 1.0, 1.0).message()
 
 

@@ -53,11 +53,16 @@ class AutopilotReports:
     def due(self, stamp: int) -> AutopilotReport | None:
         """Return the report that is due at the tick `stamp` [ns], None for none."""
         autopilot, sequence = self._autopilot, self._sequence
-        connected = autopilot.connected(stamp / SECOND)
-        phase, reasons = sequence.phase, sequence.reasons
-        state = connected, autopilot.mode, autopilot.armed
-        what = *state, phase, reasons, sequence.released_to, autopilot.landed
-        if what == self._reported and stamp < self._due:
+        what = (
+            autopilot.connected(stamp / SECOND),
+            autopilot.mode,
+            autopilot.armed,
+            sequence.phase,
+            sequence.reasons,
+            sequence.released_to,
+            autopilot.landed,
+        )
+        if stamp < self._due and what == self._reported:
             return None
         since, delay = autopilot.armed_since, self._loop_delay.value
         self._due, self._reported = stamp + REPORT_PERIOD, what

@@ -123,6 +123,7 @@ class OffboardParameters(ParameterSet):
     )
 
 
+_FLYING, _IN_OFFBOARD = Phase.FLYING, Mode.OFFBOARD  # an enumeration's lookup is slow
 _BEGIN_AND_END = (
     *(Phase.WAITING, Phase.STREAMING, Phase.OFFBOARD, Phase.ARMING),
     *(Phase.DISARMING, Phase.DISARMED),
@@ -208,6 +209,17 @@ class OffboardSequence:
     def update(self, time: float, seen: Reported) -> Request | None:
         """Advance to `time` [s] and return the request to send now, None for none."""
         self._time = time
+        if (
+            self.phase is _FLYING
+            and self._desired
+            and self._offboard_since is not None
+            and seen.connected
+            and seen.armed
+            and seen.mode is _IN_OFFBOARD
+            and not self._killed
+            and time - min(self._streamed, seen.delivered) <= LINK_GAP
+        ):
+            return None  # most ticks: nothing has changed
         if self._in_flight and time - min(self._streamed, seen.delivered) > LINK_GAP:
             self._stream_lost = time
         if self._killed:

@@ -75,10 +75,10 @@ class AttitudeTarget(NamedTuple):
 
     def refused(self) -> str:
         """Return why no autopilot should fly it: the mask, or what is not finite; "" if nothing."""
-        if self.type_mask not in (RATES, ATTITUDE, ATTITUDE_AND_YAW_RATE):
-            return f"type_mask {self.type_mask}, allowed: {FLOWN}"
         total = self.thrust + sum(self.rates.tolist())
         if self.type_mask != RATES:
+            if self.type_mask not in (ATTITUDE, ATTITUDE_AND_YAW_RATE):
+                return f"type_mask {self.type_mask}, allowed: {FLOWN}"
             q = self.quaternion
             squared = q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3]
             if squared == 0.0:

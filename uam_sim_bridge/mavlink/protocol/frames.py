@@ -19,6 +19,7 @@ import numpy as np
 from uam_control.maths.compiled import jit
 
 _HALF = math.sqrt(0.5)
+_ABOUT_FORWARD = np.array([1.0, -1.0, -1.0])  # half turn of the body
 
 
 @jit
@@ -33,9 +34,7 @@ def swap_world(v: np.ndarray) -> np.ndarray:
 
 def swap_body(v: np.ndarray) -> np.ndarray:
     """Convert a body vector v (3,) from FLU to FRD, or back."""
-    out = -v
-    out[0] = v[0]
-    return out
+    return v * _ABOUT_FORWARD
 
 
 @jit
