@@ -8,8 +8,12 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from uam_control.mission import load_scenario
+from uam_control.profiles.profile import load_profile
 from uam_control.vehicle import load_description
+from uam_lab.flight.direct.flight import DirectFlight
 from uam_sim_bridge.plant import Vehicle
+from uam_sim_bridge.plant.effects import presets
 from uam_sim_bridge.plant.mujoco_plant import MujocoPlant
 from uam_sim_bridge.plant.physics import actuate, average, begin_period
 from uam_sim_bridge.plant.plant import check_arrays
@@ -94,3 +98,20 @@ def test_a_sample_is_never_overwritten():
         plant.sense()
     for array, was in zip(first[1:], kept, strict=True):
         np.testing.assert_array_equal(array, was)
+
+
+@pytest.mark.parametrize("effects", [{}, {"rotor_spread": presets.laboratory()["rotor_spread"]}])
+def test_an_internal_error_of_mujoco_ends_the_flight_not_the_process(effects):
+    scenario, vehicle = load_scenario("hover"), Vehicle.load().changed({"effects": effects})
+    flight = DirectFlight(scenario, load_profile("s500"), vehicle, 0.0, seed=1)
+
+    def break_it(time, phase):
+        flight.plant.model.opt.integrator = 99
+
+    flight.run(break_it)
+    assert flight.ended_by == "MuJoCo: mj_step: invalid integrator"
+    assert flight.recording.count > 200 and np.isfinite(flight.recording.values[200, 0])
+    sound = MujocoPlant(Vehicle.load(), 0.0, seed=1)  # another plant of the process goes on
+    sound.step(np.zeros(4), np.zeros(2), False)
+    with pytest.raises(mujoco.FatalError, match="invalid integrator"):  # so does MuJoCo's own
+        mujoco.mj_step(flight.plant.model, flight.plant.data)

@@ -66,7 +66,7 @@ from uam_sim_bridge.nodes.plant_topics import (
 from uam_sim_bridge.nodes.restart import Restart
 from uam_sim_bridge.paced_clock import PacedClock
 from uam_sim_bridge.patience import Patience
-from uam_sim_bridge.plant import Plant, Samples, Truth, Vehicle
+from uam_sim_bridge.plant import PhysicsError, Plant, Samples, Truth, Vehicle
 from uam_sim_bridge.plant.effects import presets
 
 NAME = "mujoco_sim"
@@ -267,7 +267,11 @@ class Simulator:
             if self._faulty:
                 stamp, mission = self.answers.mission_stamp * 1e-9, self.answers.mission
                 self._faulty.mission_at(stamp, mission.time, mission.phase)
-            self.plant.step(self.hil.motors, self.answers.arm_command, self.answers.magnet)
+            try:
+                self.plant.step(self.hil.motors, self.answers.arm_command, self.answers.magnet)
+            except PhysicsError as error:
+                self.statistics.ended_by = str(error)
+                break
             self.health.done_tick(begun, self.plant.time)
             if not self.options.end_with_mission:
                 if self.plant.time >= limit:

@@ -12,6 +12,7 @@ from uam_control.vehicle import VehicleError
 from uam_sim_bridge.plant.actuators import Rotors, Servos
 from uam_sim_bridge.plant.effects.acting_effects import ActingEffects
 from uam_sim_bridge.plant.effects.effect import Bench
+from uam_sim_bridge.plant.engine_step import error_text
 from uam_sim_bridge.plant.magnet import magnet_constants
 from uam_sim_bridge.plant.observation import Observed, observe, write_grip, write_truth
 from uam_sim_bridge.plant.payload_hinge import PayloadHinge, add_to
@@ -22,7 +23,7 @@ from uam_sim_bridge.plant.physics import (
     begin_period,
     step_period,
 )
-from uam_sim_bridge.plant.plant import Disturbance, Plant, Samples, Truth
+from uam_sim_bridge.plant.plant import Disturbance, PhysicsError, Plant, Samples, Truth
 from uam_sim_bridge.plant.sensors import Delay, Encoders, Imu, Mocap, Noise, generators, sample_rows
 from uam_sim_bridge.plant.vehicle import BASE, MAGNET, PAYLOAD, SWING, Vehicle
 
@@ -271,7 +272,7 @@ class MujocoPlant(Plant):
             magnet = self._held_by_magnet(magnet)
         gust = self._still if self._gust is None else self._gust()
         if self._effects is None:
-            self._step_period(
+            error = self._step_period(
                 self._arrays,
                 motor_commands,
                 arm_command,
@@ -281,6 +282,8 @@ class MujocoPlant(Plant):
                 *self._addresses,
                 self._steps,
             )
+            if error:
+                raise PhysicsError(f"MuJoCo: {error_text(error)}")
         else:
             self._step_with_effects(self._effects, motor_commands, arm_command, magnet, gust)
         self.tick += 1
@@ -302,7 +305,10 @@ class MujocoPlant(Plant):
             actuate(arrays, motor_commands)
             for gear in effects.gears:
                 gear.joints()
-            mujoco.mj_step(self.model, self.data)
+            try:
+                mujoco.mj_step(self.model, self.data)
+            except mujoco.FatalError as fatal:
+                raise PhysicsError(f"MuJoCo: {' '.join(str(fatal).split())}") from None
             average(arrays, 1.0 / self._steps)
 
     def disturb(self, disturbance: Disturbance) -> None:

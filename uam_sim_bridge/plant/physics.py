@@ -110,17 +110,21 @@ def step_period(
     model: int,
     data: int,
     steps: int,
-) -> None:
+) -> int:
     """Advance control period `tick` by its `steps` physics steps.
 
     commands (rotors,): 0..1; arm_command, magnet, gust: of `begin_period`; model, data: addresses
-    of MuJoCo's structures, to which `a` belongs.
+    of MuJoCo's structures, to which `a` belongs. Returns 0, or an error as of `mj_step`: the state
+    is then undefined.
     """
     begin_period(a, arm_command, magnet, gust, tick)
     for _ in range(steps):
         actuate(a, commands)
-        mj_step(model, data)
+        error = mj_step(model, data)
+        if error:
+            return error
         average(a, 1.0 / steps)
+    return 0
 
 
 @jit

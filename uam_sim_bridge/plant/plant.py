@@ -25,6 +25,10 @@ from uam_control.vehicle import VehicleDescription
 from uam_sim_bridge.plant.vehicle import Vehicle
 
 
+class PhysicsError(RuntimeError):
+    """The physics engine cannot go on; the text is one line. The plant must not be used again."""
+
+
 @dataclass(slots=True)
 class Samples:
     """Sensor samples that arrive at one tick; each is None or a tuple with its stamp [s] first.
@@ -164,7 +168,7 @@ class Plant(ABC):
 
         motor_commands (rotors,): 0..1 in PX4's order; arm_command (n,): effort [N m], or goal
         positions [rad] of servos in position control, sent now, delayed by the bus; both contiguous
-        arrays of float64; magnet: current on.
+        arrays of float64; magnet: current on. Raises PhysicsError.
         """
 
     @abstractmethod

@@ -23,7 +23,7 @@ from uam_sim_bridge.faults import Schedule
 from uam_sim_bridge.faults.direct import DirectFaults
 from uam_sim_bridge.faults.faulty_plant import make_plant
 from uam_sim_bridge.mavlink.offboard.sequence import OffboardParameters, OffboardSequence
-from uam_sim_bridge.plant import Samples, Vehicle
+from uam_sim_bridge.plant import PhysicsError, Samples, Vehicle
 from uam_sim_bridge.plant.effects.network_delay import SetpointDelay
 from uam_sim_bridge.plant.engines import DEFAULT_PLANT
 from uam_sim_bridge.plant.plant import check_arrays
@@ -94,7 +94,11 @@ class DirectFlight:
         plant, output = self.plant, self.mission.output
         ticks_a_second, settled = round(1.0 / plant.period), Settled()
         while not output.done:
-            self.tick()
+            try:
+                self.tick()
+            except PhysicsError as error:
+                self.ended_by = str(error)
+                break
             if plant.tick % ticks_a_second == 0:
                 if progress is not None:
                     progress(output.time, output.phase)
