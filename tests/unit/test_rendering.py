@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
+from uam_lab.report import build
 from uam_lab.report.build import build_report
 from uam_lab.report.figures import figures
 from uam_lab.report.figures.poses import Poses
@@ -113,3 +114,22 @@ def test_snapshots_and_video_are_rendered_without_a_screen(tmp_path, flight):
     assert "848x480" in probe.stderr
     frames, _ = imageio_ffmpeg.count_frames_and_secs(str(rendered.video))
     assert frames == len(video.frame_rows(short)[0])
+
+
+def test_an_error_of_the_figures_ends_the_rendering(flight_folder, monkeypatch):
+    started = []
+
+    class Noted(flight_video.Rendering):
+        def _start(self, platform):
+            started.append(super()._start(platform))
+            return started[-1]
+
+    def fail(*_):
+        assert started[0].poll() is None  # the pictures are rendered meanwhile
+        raise ValueError("no figure")
+
+    monkeypatch.setattr(build, "Rendering", Noted)
+    monkeypatch.setattr(figures, "draw", fail)
+    with pytest.raises(ValueError, match="no figure"):
+        build_report(flight_folder)
+    assert len(started) == 1 and started[0].poll() is not None

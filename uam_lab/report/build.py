@@ -4,12 +4,13 @@
 |---|---|---|
 | stability | `stability_of` | stability.json |
 | figures | `figures.draw` | figures/*.png, *.svg |
-| pictures | `flight_video.render` | figures/snapshots/*.png, snapshots.png, flight.mp4 |
+| pictures | `flight_video.Rendering` | figures/snapshots/*.png, snapshots.png, flight.mp4 |
 | page | `flight_page.write_page` | report.html |
 """
 
 from __future__ import annotations
 
+import contextlib
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
@@ -20,7 +21,7 @@ from uam_lab.analysis.stability import Stability, analyse_folder
 from uam_lab.report.figures import figures
 from uam_lab.report.figures.panels import DrawnFlight
 from uam_lab.report.page import flight_page
-from uam_lab.report.video import flight_video
+from uam_lab.report.video.flight_video import Rendering
 from uam_lab.results import timeseries
 from uam_lab.results.result_folder import write_json
 
@@ -48,10 +49,13 @@ def build_report(
     directory = Path(directory)
     series = timeseries.read(directory / "timeseries.parquet")
     label = catalogue.label(series.info.get("controller") or directory.name)
-    progress("stability")
-    flight = DrawnFlight(label, series, stability_of(directory, series))
-    figures.draw([flight], directory / "figures", progress)
-    rendered = flight_video.render(directory, video, progress) if pictures else None
+    with contextlib.ExitStack() as stack:
+        # the pictures take longest; they are rendered while this process draws the figures
+        rendering = stack.enter_context(Rendering(directory, video)) if pictures else None
+        progress("stability")
+        flight = DrawnFlight(label, series, stability_of(directory, series))
+        figures.draw([flight], directory / "figures", progress)
+        rendered = rendering.result(progress) if rendering else None
     progress("page")
     written = flight_page.write_page(directory, rendered)
     return Report(written, rendered.problem if rendered else "")

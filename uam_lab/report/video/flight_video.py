@@ -2,9 +2,9 @@
 
     python -m uam_lab.report.video.flight_video DIR [--no-video]
 
-renders the flight in the result folder DIR. `render` does so in a child process: MuJoCo selects
+renders the flight in the result folder DIR. `Rendering` does so in a child process: MuJoCo selects
 its OpenGL at import, and a broken driver may crash the process. The child writes its progress to
-standard output, one line per step.
+standard output, one line per step; a pipe holds all of them.
 """
 
 from __future__ import annotations
@@ -45,6 +45,70 @@ class Rendered:
     problem: str = ""
 
 
+class Rendering:
+    """Renders a flight in a child process, while this process does other work.
+
+    A context manager: the child has ended after the `with` block.
+    """
+
+    def __init__(
+        self, directory: Path, video: bool = True, platforms: Sequence[str] | None = None
+    ) -> None:
+        """Start to render the flight in `directory`; see `render`."""
+        if platforms is None:
+            platforms = list(dict.fromkeys(filter(None, (os.environ.get("MUJOCO_GL"), PLATFORM))))
+        self._directory, self._video = directory, video
+        self._child = self._start(platforms[0])
+        self._further = platforms[1:]
+
+    def _start(self, platform: str) -> subprocess.Popen[str]:
+        """Run this module as a process."""
+        command = [sys.executable, "-m", "uam_lab.report.video.flight_video", str(self._directory)]
+        return subprocess.Popen(
+            command if self._video else [*command, "--no-video"],
+            env=os.environ | {"MUJOCO_GL": platform},
+            stdout=subprocess.PIPE,
+            stderr=subprocess.STDOUT,
+            text=True,
+            errors="replace",
+        )
+
+    def result(self, progress: Callable[[str], None] = lambda text: None) -> Rendered:
+        """Wait for the end; return the pictures. Missing OpenGL is no error."""
+        status, last_line = self._wait(progress)
+        for platform in self._further:
+            if status != NO_RENDERER:
+                break
+            self._child = self._start(platform)
+            status, last_line = self._wait(progress)
+        problem = ""
+        if status == NO_RENDERER:
+            problem = f"{HOW_TO_GET_ONE} ({last_line[:120]})"
+        elif status != 0:
+            problem = f"rendering failed: {last_line or f'exit status {status}'}"
+        return replace(existing(self._directory), problem=problem)
+
+    def _wait(self, progress: Callable[[str], None]) -> tuple[int, str]:
+        """Return exit status of the child and its last line that is no progress."""
+        last_line = ""
+        for line in self._child.stdout or ():
+            if line.startswith(PROGRESS):
+                progress(line.removeprefix(PROGRESS).strip())
+            elif line.strip():
+                last_line = line.strip()
+        return self._child.wait(), last_line
+
+    def __enter__(self) -> Rendering:
+        return self
+
+    def __exit__(self, *exception) -> None:
+        if self._child.poll() is None:
+            self._child.terminate()
+            self._child.wait()
+        if self._child.stdout is not None:
+            self._child.stdout.close()
+
+
 def render(
     directory: Path,
     video: bool = True,
@@ -55,45 +119,8 @@ def render(
 
     platforms: values of MUJOCO_GL to try; default: that of the environment, then PLATFORM.
     """
-    if platforms is None:
-        platforms = dict.fromkeys(filter(None, (os.environ.get("MUJOCO_GL"), PLATFORM)))
-    for platform in platforms:
-        status, last_line = _child(directory, video, progress, platform)
-        if status != NO_RENDERER:
-            break
-    problem = ""
-    if status == NO_RENDERER:
-        problem = f"{HOW_TO_GET_ONE} ({last_line[:120]})"
-    elif status != 0:
-        problem = f"rendering failed: {last_line or f'exit status {status}'}"
-    return replace(existing(directory), problem=problem)
-
-
-def _child(
-    directory: Path, video: bool, progress: Callable[[str], None], platform: str
-) -> tuple[int, str]:
-    """Run this module as a process; return exit status and last line that is no progress."""
-    command = [sys.executable, "-m", "uam_lab.report.video.flight_video", str(directory)]
-    child = subprocess.Popen(
-        command if video else [*command, "--no-video"],
-        env=os.environ | {"MUJOCO_GL": platform},
-        stdout=subprocess.PIPE,
-        stderr=subprocess.STDOUT,
-        text=True,
-        errors="replace",
-    )
-    last_line = ""
-    try:
-        for line in child.stdout:
-            if line.startswith(PROGRESS):
-                progress(line.removeprefix(PROGRESS).strip())
-            elif line.strip():
-                last_line = line.strip()
-        return child.wait(), last_line
-    finally:
-        if child.poll() is None:
-            child.terminate()
-            child.wait()
+    with Rendering(directory, video, platforms) as rendering:
+        return rendering.result(progress)
 
 
 def existing(directory: Path) -> Rendered:
