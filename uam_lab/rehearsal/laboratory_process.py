@@ -94,7 +94,8 @@ def autopilot(
     parameters = str(configuration.path(PARAMETERS))
     vehicle = ["--vehicle", lab.vehicle.source, "--companion", line]
     if options.px4 is None:
-        place = ["--sim-port", str(ports.simulator_tcp), "--wait", str(AUTOPILOT_WAIT), "--once"]
+        place = ["--sim-port", str(ports.simulator_tcp), "--wait", str(AUTOPILOT_WAIT)]
+        place += ["--once", "--prefer"]
         return STAND_IN, [*vehicle, "--params", parameters, *place]
     log = folder / PX4_LOG
     own = ["--px4-dir", str(options.px4.directory), "--log", str(log.absolute())]

@@ -65,6 +65,9 @@ def parameters(
         sections[wiring.MOCAP_DRIVER] = WAITS | lab.mocap.to_mapping()
     if lab.magnet.through == GPIO:
         sections[wiring.MAGNET_DRIVER] = WAITS | lab.magnet.line.to_mapping() | _switching(lab)
+    own = {key: value for key, value in lab.process.items() if key != "busy_poll"}
+    for node in DRIVERS.keys() & sections.keys():  # in the loop as the nodes behind them
+        sections[node] |= own
     sections[CHECKLIST] = _checklist(lab, settings, folder)
     sections[wiring.MISSION]["require_checklist"] = True
     for node in (wiring.ARM_DRIVER, CHECKLIST):

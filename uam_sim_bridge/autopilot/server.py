@@ -35,6 +35,7 @@ from uam_sim_bridge.mavlink.hil.sitl_options import add_port_options, add_vehicl
 from uam_sim_bridge.mavlink.hil.sitl_ports import UdpPort, connect
 from uam_sim_bridge.mavlink.protocol.signing import Signing
 from uam_sim_bridge.mavlink.protocol.wire import Codec, Framer, Message, mavlink2
+from uam_sim_bridge.rehearsal import hardware_priority
 
 _GYRO_AND_ACCELEROMETER = 0x3F  # HIL_SENSOR.fields_updated
 _LOCKSTEP = 1  # HIL_ACTUATOR_CONTROLS.flags
@@ -155,6 +156,12 @@ def parser() -> argparse.ArgumentParser:
         help="end with the simulator (default: wait for the next one)",
     )
     p.add_argument(
+        "--prefer",
+        action="store_true",
+        help="run ahead of ordinary processes, as hardware of its own does; ignored where the "
+        "system does not permit it",
+    )
+    p.add_argument(
         "--signing-key",
         default="",
         metavar="KEY",
@@ -203,6 +210,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
         else:
             udp = UdpPort(options.mavlink_port, options.companion_port, codec)
         warm_up()
+        if options.prefer:
+            hardware_priority.prefer()
         wait = options.wait
         while True:
             link = connect("autopilot", options.sim_host, options.sim_port, wait)

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import dataclasses
 import math
+import sys
 import threading
 import time
 
@@ -43,6 +44,7 @@ from uam_sim_bridge.drivers.dynamixel.servo_bus import BusLost
 from uam_sim_bridge.nodes.late_device import LateDevice
 
 NAME = "arm_driver"
+SWITCH = 0.0005  # [s] the bus thread waits at most so long for the interpreter; Python's is 5 ms
 ABSENT_WAIT = 0.1  # [s] between two looks for an absent bus
 SLOWEST = 0.95  # share of the rate below which the bus counts as too slow
 
@@ -265,4 +267,5 @@ def _described_chain(hardware: str, device: str, vehicle: VehicleDescription) ->
 
 def main() -> int:
     """Run the node; return its exit status."""
+    sys.setswitchinterval(SWITCH)
     return run(ArmDriverNode, NAME)

@@ -43,6 +43,7 @@ from uam_sim_bridge.nodes.laboratory_topics import DriverTopic, imu_driver, pose
 from uam_sim_bridge.nodes.plant_topics import TruthTopics
 from uam_sim_bridge.paced_clock import PacedClock
 from uam_sim_bridge.plant import Vehicle
+from uam_sim_bridge.rehearsal import hardware_priority
 from uam_sim_bridge.rehearsal.cables import Cables
 from uam_sim_bridge.rehearsal.laboratory import Laboratory
 from uam_sim_bridge.rehearsal.person import Person
@@ -51,14 +52,17 @@ NAME = "laboratory"
 READY = "ready"  # file in the folder of the devices, when they are there
 # [ticks] between two messages of rotors, payload and magnet, and looks at topics; at services
 LISTEN_TICKS, SERVE_TICKS = 5, 25
-SWITCH = 0.0005  # [s] a thread of a device waits at most so long for the interpreter
+SWITCH = 0.0002  # [s] a thread of a device waits at most so long for the interpreter
 CONFIRM = "confirm"  # a step that needs it
 ASK_AGAIN = 2.0  # [s] between two confirmations of a step
 
 
 @dataclass
 class Statistics:
-    """Of a rehearsal, written at its end. lost_s: see PacedClock; steps: done by the person."""
+    """Of a rehearsal, written at its end.
+
+    lost_s: see PacedClock; steps: done by the person; fifo_priority: see `hardware_priority`.
+    """
 
     ticks: int = 0
     wall_s: float = 0.0
@@ -66,6 +70,7 @@ class Statistics:
     lost_s: float = 0.0
     armed: bool = False
     ended_by: str = ""
+    fifo_priority: int = 0
     serial_bytes: tuple[int, int] = (0, 0)
     bus_packets: int = 0
     bus_packets_damaged: int = 0
@@ -126,6 +131,7 @@ class Rehearsal:
         lab, clock, numbers = self.lab, self.clock, self.statistics
         gc.collect()
         gc.freeze()
+        numbers.fifo_priority = hardware_priority.prefer()
         clock.begin()
         begin, end, settled = time.monotonic(), math.inf, Settled()
         while not self._stop.raised and not numbers.ended_by:
