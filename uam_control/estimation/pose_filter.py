@@ -47,13 +47,37 @@ class EstimatedMotion(NamedTuple):
     accelerometer_bias: np.ndarray
 
 
+MOTION = 22  # numbers of an `EstimatedMotion`
+MEMORY = MOTION + 8 * HISTORY  # numbers of a filter's memory, see `parts_of`
+
+
+@jit
+def parts_of(memory: np.ndarray) -> tuple[EstimatedMotion, np.ndarray, np.ndarray]:
+    """Return motion, stamps (HISTORY,) [s] and poses (HISTORY, 7) of the stored predictions.
+
+    They are views of memory (MEMORY,): a call passes one array instead of nine.
+    """
+    motion = EstimatedMotion(
+        memory[0:3],
+        memory[3:6],
+        memory[6:10],
+        memory[10:13],
+        memory[13:16],
+        memory[16:19],
+        memory[19:MOTION],
+    )
+    poses = MOTION + HISTORY
+    return motion, memory[MOTION:poses], memory[poses:].reshape((HISTORY, 7))
+
+
 class PoseFilter:
     """Estimates position, velocity, attitude and the biases of gyroscope and accelerometer.
 
     position (3,) [m, world]; velocity (3,) [m/s, world]; quaternion (4,) body → world [w x y z];
     rates (3,) [rad/s, body], without bias; acceleration (3,) [m/s^2, world], without gravity and
     bias; gyro_bias (3,) [rad/s, body]; accelerometer_bias (3,) [m/s^2, world]. `motion`: all of
-    them; the arrays are never replaced.
+    them; `memory`: see `parts_of`. The arrays are never replaced. `ahead`: poses that wait for their
+    IMU sample.
     """
 
     def __init__(
@@ -64,38 +88,28 @@ class PoseFilter:
         self.gravity = gravity
         self.gate = PoseGate(gate)
         self.set_bandwidths(position_bandwidth, attitude_bandwidth)
-        self.position = np.zeros(3)
-        self.velocity = np.zeros(3)
-        self.quaternion = np.array([1.0, 0.0, 0.0, 0.0])
-        self.rates = np.zeros(3)
-        self.acceleration = np.zeros(3)
-        self.gyro_bias = np.zeros(3)
-        self.accelerometer_bias = np.zeros(3)
-        self.motion = EstimatedMotion(
-            self.position,
-            self.velocity,
-            self.quaternion,
-            self.rates,
-            self.acceleration,
-            self.gyro_bias,
-            self.accelerometer_bias,
-        )
-        self._stamps = np.full(HISTORY, -1.0)
-        self._poses = np.zeros((HISTORY, 7))  # position, quaternion
+        self.memory = np.zeros(MEMORY)
+        self.motion, self._stamps, self._poses = parts_of(self.memory)
+        self.position, self.velocity, self.quaternion, self.rates = self.motion[:4]
+        self.acceleration, self.gyro_bias, self.accelerometer_bias = self.motion[4:]
+        self.quaternion[0] = 1.0
+        self._stamps[:] = -1.0
         self._count = 0
         self._last_correction: float | None = None  # stamp [s]
         self._compared = math.nan  # stamp [s] of the newest prediction compared with a pose
-        self._ahead: deque[tuple[float, np.ndarray, np.ndarray]] = deque(maxlen=HISTORY)
+        self.ahead: deque[tuple[float, np.ndarray, np.ndarray]] = deque(maxlen=HISTORY)
         self._repeats = Repeats()
-        still = self.position
-        motion, poses = self.motion, self._poses
-        self._predict = prepared(predict, 0.0, 0.0, still, still, motion, poses, 0)
-        self._match = prepared(match, self._stamps, poses, 0.0, still, motion)
-        self._correct = prepared(correct, 0.0, self._bandwidths, still, still, poses, 0, motion)
+        memory, still = self.memory, np.zeros(3)
+        self._predict = prepared(predict_next, memory, 0, 0.0, 0.0, 0.0, still, still)
+        self._match = prepared(match_stored, memory, 0, 0.0, still)
+        self._correct = prepared(
+            correct_stored, memory, 0, 0.0, self._bandwidths, still, np.zeros(4)
+        )
 
     def set_bandwidths(self, position: float, attitude: float) -> None:
         """Set the bandwidths [rad/s] of the corrections; the estimate does not change."""
         self._bandwidths = np.array([position, attitude], dtype=float)
+        self._widest = max(position, attitude)
 
     def start(self, position: np.ndarray, quaternion: np.ndarray) -> None:
         """Begin at rest at a measured pose: position (3,) [m, world], quaternion (4,) [w x y z]."""
@@ -109,12 +123,16 @@ class PoseFilter:
 
         stamp [s]: of the sample; gyro (3,) [rad/s, FLU]; specific_force (3,) [m/s^2, FLU].
         """
+        row = self.next_row()
+        self._predict(self.memory, row, stamp, dt, self.gravity, gyro, specific_force)
+        while self.ahead and self.ahead[0][0] <= stamp:
+            self.correct(*self.ahead.popleft())
+
+    def next_row(self) -> int:
+        """Return the row of the stored predictions for the next IMU sample."""
         row = self._count % HISTORY
         self._count += 1
-        self._stamps[row] = stamp
-        self._predict(dt, self.gravity, gyro, specific_force, self.motion, self._poses, row)
-        while self._ahead and self._ahead[0][0] <= stamp:
-            self.correct(*self._ahead.popleft())
+        return row
 
     def correct(self, stamp: float, position: np.ndarray, quaternion: np.ndarray) -> None:
         """Correct with a pose exposed at `stamp` [s].
@@ -125,27 +143,27 @@ class PoseFilter:
         prediction is compared with one pose: with a slow IMU the same difference would count
         several times.
         """
-        motion, poses = self.motion, self._poses
-        row, apart, jump, bias = self._match(self._stamps, poses, stamp, position, motion)
-        newest = self._stamps[(self._count - 1) % HISTORY]
+        newest = (self._count - 1) % HISTORY
+        found = self._match(self.memory, newest, stamp, position)
+        row, apart, jump, bias, last, compared = found
         if apart > OLDEST_MATCH:
-            if self._count and stamp > newest:
-                self._ahead.append((stamp, position.copy(), quaternion.copy()))
+            if self._count and stamp > last:
+                self.ahead.append((stamp, position.copy(), quaternion.copy()))
             return
-        if self._repeats(position, quaternion) or self._stamps[row] == self._compared:
+        if self._repeats(position, quaternion) or compared == self._compared:
             return
         if self.gate(stamp, jump, bias):
             return
         bandwidths, dt = self._bandwidths, FIRST
         if self._last_correction is not None:
             dt = max(stamp - self._last_correction, 1e-3)
-            if dt * max(bandwidths[0], bandwidths[1]) > LARGEST_GAIN:
+            if dt * self._widest > LARGEST_GAIN:
                 bandwidths = np.minimum(bandwidths, LARGEST_GAIN / dt)
-        self._last_correction, self._compared = stamp, self._stamps[row]
-        since = newest - self._stamps[row]
+        self._last_correction, self._compared = stamp, compared
+        since = last - compared
         if since > LATE:
             before = self.position.copy(), self.velocity.copy(), self.quaternion.copy()
-        self._correct(dt, bandwidths, position, quaternion, poses, row, motion)
+        self._correct(self.memory, row, dt, bandwidths, position, quaternion)
         if since > LATE:
             self.position += since * (self.velocity - before[1])
             shift(
@@ -156,6 +174,50 @@ class PoseFilter:
                 self.velocity - before[1],
                 quaternion_multiply(before[2] * CONJUGATE, self.quaternion),
             )
+
+
+@jit
+def predict_next(
+    memory: np.ndarray,
+    row: int,
+    stamp: float,
+    dt: float,
+    gravity: float,
+    gyro: np.ndarray,
+    specific_force: np.ndarray,
+) -> None:
+    """Integrate the IMU sample of `stamp` [s] in memory (MEMORY,), with its prediction in `row`.
+
+    The other arguments: see `predict`.
+    """
+    motion, stamps, poses = parts_of(memory)
+    stamps[row] = stamp
+    predict(dt, gravity, gyro, specific_force, motion, poses, row)
+
+
+@jit
+def match_stored(
+    memory: np.ndarray, newest: int, stamp: float, position: np.ndarray
+) -> tuple[int, float, float, float, float, float]:
+    """Return what `match` returns for memory (MEMORY,), and the stamps [s] of the row `newest` and
+    of the row that is returned."""
+    motion, stamps, poses = parts_of(memory)
+    row, apart, jump, bias = match(stamps, poses, stamp, position, motion)
+    return row, apart, jump, bias, stamps[newest], stamps[row]
+
+
+@jit
+def correct_stored(
+    memory: np.ndarray,
+    row: int,
+    dt: float,
+    bandwidths: np.ndarray,
+    position: np.ndarray,
+    quaternion: np.ndarray,
+) -> None:
+    """Correct memory (MEMORY,) with a pose and the prediction in `row`, see `correct`."""
+    motion, _, poses = parts_of(memory)
+    correct(dt, bandwidths, position, quaternion, poses, row, motion)
 
 
 @jit

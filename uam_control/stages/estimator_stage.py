@@ -6,9 +6,9 @@ import math
 
 import numpy as np
 
-from uam_control.coordinates import CHI_DDOT
+from uam_control.coordinates import ALPHA, CHI_DDOT
 from uam_control.estimation import EstimatorParameters, StateEstimator
-from uam_control.maths.compiled import jit
+from uam_control.maths.compiled import jit, prepared
 from uam_control.stages.tick_stamps import TickStamps
 from uam_control.stamps import SECOND
 
@@ -65,6 +65,7 @@ class EstimatorStage:
         self.ticks = TickStamps(round(period * SECOND))
         self.pose_age = PoseAge()
         self.bias_due = False
+        self._believable = prepared(believable, np.zeros((3, ALPHA + joints)))
         self._waiting = True  # for the first sample of an input
 
     @property
@@ -99,21 +100,24 @@ class EstimatorStage:
         then reacts as to an estimator that is gone.
         Raises ValueError if the stamp is older than the last one.
         """
-        before = self.ticks.repeated
-        if not self.ticks.follows(stamp):
-            if self.ticks.repeated > before:
+        estimator, ticks = self.estimator, self.ticks
+        before = ticks.repeated
+        if not ticks.follows(stamp):
+            if ticks.repeated > before:
                 return None
             raise ValueError(f"IMU stamp {stamp} ns does not follow {self.stamp} ns")
-        estimator = self.estimator
-        last, tick = self.stamp, self.ticks.next(stamp)
+        last, tick = ticks.stamp, ticks.next(stamp)
         self.bias_due = tick // BIAS_PERIOD != last // BIAS_PERIOD and estimator.bias_known
         self.pose_age.tick(tick)
-        estimator.imu(tick / SECOND, gyro, force)
-        self._waiting = self._waiting and bool(estimator.waiting_for)
-        if self._waiting:
-            return None
-        state = estimator.update()
-        if not believable(state):
+        if not self._waiting:
+            state = estimator.imu_update(tick / SECOND, gyro, force)
+        else:
+            estimator.imu(tick / SECOND, gyro, force)
+            self._waiting = bool(estimator.waiting_for)
+            if self._waiting:
+                return None
+            state = estimator.update()
+        if not self._believable(state):
             self.diverged += 1
             self._held_until = tick + HELD_BACK
             self.estimator = StateEstimator(estimator.parameters, self._joint_count)

@@ -47,12 +47,12 @@ class TickStamps:
         self._sample = sample
         self._window.append(sample)
         late = sample - self.stamp - self.period
-        if self.stamp < 0 or late > LONG * self.period or self._other_rate():
-            self.stamp, self._difference = max(sample, self.stamp + 1), 0.0
-            return self.stamp
         if not late and not self._difference:  # the exact stamps of a simulation
             self.stamp = sample
             return sample
+        if self.stamp < 0 or late > LONG * self.period or self._other_rate():
+            self.stamp, self._difference = max(sample, self.stamp + 1), 0.0
+            return self.stamp
         gap = max(0, int(late / self.period + 1.0 - MISSING))
         self.missing += gap
         self._difference += GAIN * (late - gap * self.period - self._difference)
