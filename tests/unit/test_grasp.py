@@ -11,7 +11,7 @@ import pytest
 from uam_control.coordinates import MOTION_ROWS
 from uam_control.grasp import Grasp, GraspExecutive, GraspParameters, Sight, grasp_windows
 from uam_control.grasp.evidence import Load, by_mass, by_travel, identified_mass
-from uam_control.grasp.kinematics import lever, magnet_position
+from uam_control.grasp.kinematics import magnet_and_lever
 from uam_control.grasp.sight import RunningMean
 from uam_control.mission import load_scenario
 
@@ -36,12 +36,12 @@ def test_a_flight_without_magnet_has_no_window(name):
 def test_magnet_position_by_hand():
     """(45, 45) deg: 0.1 sin 45 + 0.14 forward, 0.1 cos 45 down; the face hangs 0.03 below."""
     chi = np.array([-1.0, 0.0, 0.94, 0.0, 0.0, 0.0, math.pi / 4, math.pi / 4])
-    at = magnet_position(chi, (0.0, 0.0, -0.073), (0.1, 0.14), 0.03)
+    at, lever = magnet_and_lever(chi, (0.0, 0.0, -0.073), (0.1, 0.14), 0.03)
     down = 0.1 * math.sqrt(0.5)
     assert at == pytest.approx([-1.0 + down + 0.14, 0.0, 0.94 - 0.073 - down - 0.03])
-    assert lever(chi, (0.1, 0.14)) == pytest.approx(down + 0.14)
+    assert lever == pytest.approx(down + 0.14)
     chi[5] = math.pi / 2  # heading north: the arm points along y
-    at = magnet_position(chi, (0.0, 0.0, -0.073), (0.1, 0.14), 0.03)
+    at, _ = magnet_and_lever(chi, (0.0, 0.0, -0.073), (0.1, 0.14), 0.03)
     assert at[:2] == pytest.approx([-1.0, down + 0.14])
 
 
@@ -148,7 +148,7 @@ class Flight:
         self.path.write(self.time, motion)
         chi = motion[0]
         chi[:3] += self.shift + self.error + self.noise()
-        return magnet_position(chi, (0.0, 0.0, -0.073), (0.1, 0.14), 0.03)
+        return magnet_and_lever(chi, (0.0, 0.0, -0.073), (0.1, 0.14), 0.03)[0]
 
     def attempt(self):
         decisions = self.executive.decisions

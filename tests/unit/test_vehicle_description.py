@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 import yaml
 
-from uam_control.grasp.kinematics import magnet_position
+from uam_control.grasp.kinematics import magnet_and_lever
 from uam_control.mission import load_scenario
 from uam_control.profiles.profile import default_profile
 from uam_control.settings import configuration
@@ -138,7 +138,8 @@ def test_the_arm_reaches_as_far_as_in_the_mjcf(name):
     plant = MujocoPlant(vehicle, 0.2, 1, tuple(angles))
     chi = np.concatenate([plant.data.qpos[:3], np.zeros(3), angles])
     face = plant.data.site_xpos[plant.model.site("magnet_face").id]
-    assert magnet_position(chi, arm.mount, arm.links, arm.magnet) == pytest.approx(face, abs=1e-6)
+    found, _ = magnet_and_lever(chi, arm.mount, arm.links, arm.magnet)
+    assert found == pytest.approx(face, abs=1e-6)
 
 
 def test_a_range_of_the_mjcf_may_repeat_but_not_contradict(tmp_path):

@@ -48,7 +48,7 @@ def by_pose(sight: Sight, p: GraspParameters) -> Evidence:
     """Return the evidence of the payload's distance from the magnet; it cannot tell held."""
     if not sight.tracked:
         return Evidence(None, "payload not tracked")
-    apart = float(np.linalg.norm(sight.payload - sight.magnet))
+    apart = math.dist(sight.payload.tolist(), sight.magnet.tolist())
     if apart > p.held_distance:
         return Evidence(False, f"{1e3 * apart:.0f} mm from the payload at {place(sight.payload)}")
     return Evidence(None, f"payload {1e3 * apart:.0f} mm from the magnet")

@@ -250,11 +250,11 @@ class GraspExecutive:
 
     def _touches(self, sight: Sight) -> bool:
         """Return whether the arm has had contact with the stand for CONTACT_AFTER."""
-        beyond = float(np.hypot(*sight.error[:2])) > self.parameters.contact_error
+        beyond = _across(sight.error) > self.parameters.contact_error
         return self._contact(sight.stamp, beyond) >= CONTACT_AFTER
 
     def _leave_contact(self, sight: Sight) -> None:
-        error = float(np.hypot(*sight.error[:2]))
+        error = _across(sight.error)
         text = f"contact near the stand, position error {error:.2f} m: climbs"
         self._decide(sight, self.grasp, text)
         self._go(Step.CLIMB, sight, pace=0.0)
@@ -276,11 +276,11 @@ class GraspExecutive:
         if sight.time >= window.release:
             self._go(Step.RELEASE, sight)
             return
-        beside = np.hypot(*(sight.magnet - self._start)[:2]) < BESIDE
+        beside = _across(sight.magnet - self._start) < BESIDE
         if beside and self._touches(sight):
             self._leave_contact(sight)
             return
-        if not beside:
+        if not beside and self.directive.shift.any():
             self.directive.shift = np.zeros(3)
         if self.grasp not in (Grasp.HELD, Grasp.UNVERIFIED):
             return
@@ -310,3 +310,8 @@ class GraspExecutive:
                 self.directive.pace = 1.0
                 self._decide(sight, Grasp.STUCK, f"not released, {pose.text}")
                 self._end()
+
+
+def _across(way: np.ndarray) -> float:
+    """Return the horizontal length [m] of way (3,)."""
+    return math.hypot(way.item(0), way.item(1))

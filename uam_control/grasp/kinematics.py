@@ -12,27 +12,20 @@ from uam_control.maths.compiled import jit
 from uam_control.maths.rotations import matrix_from_euler
 
 
-def magnet_position(
+def magnet_and_lever(
     chi: np.ndarray, mount: Sequence[float], links: Sequence[float], magnet: float
-) -> np.ndarray:
-    """Return the centre of the magnet's face (3,) [m, world].
+) -> tuple[np.ndarray, float]:
+    """Return the centre of the magnet's face (3,) [m, world], and the distance [m] of the magnet's
+    pivot from the first joint along the body's x axis.
 
     chi (6 + n,): generalised coordinates; mount (3,) [m, FLU]: first joint; links (n,) [m]: the
     last one to the magnet's pivot; magnet [m]: pivot to face. The magnet hangs vertically.
     """
     point = np.empty(3)
-    below_joint(chi, np.asarray(mount, dtype=float), np.asarray(links, dtype=float), point)
+    along = below_joint(chi, np.asarray(mount, dtype=float), np.asarray(links, dtype=float), point)
     pivot = chi[POSITION] + matrix_from_euler(chi[ROLL:ALPHA]) @ point
     pivot[Z] -= magnet
-    return pivot
-
-
-def lever(chi: np.ndarray, links: Sequence[float]) -> float:
-    """Return the distance [m] of the magnet's pivot from the first joint along the body's x axis.
-
-    chi (6 + n,): generalised coordinates; links (n,) [m].
-    """
-    return below_joint(chi, np.zeros(3), np.asarray(links, dtype=float), np.empty(3))
+    return pivot, along
 
 
 @jit
@@ -40,7 +33,7 @@ def below_joint(chi: np.ndarray, mount: np.ndarray, links: np.ndarray, point: np
     """Write the magnet's pivot in the base frame (3,) [m, FLU]; return its distance from the first
     joint along x [m].
 
-    chi (6 + n,), mount (3,), links (n,): see `magnet_position`.
+    chi (6 + n,), mount (3,), links (n,): see `magnet_and_lever`.
     """
     angle = along = above = 0.0
     for i in range(len(links)):

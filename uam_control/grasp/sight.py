@@ -34,7 +34,8 @@ class Sight:
     @property
     def tracked(self) -> bool:
         """Whether the payload's pose is known."""
-        return bool(np.isfinite(self.payload).all())
+        x, y, z = self.payload.tolist()
+        return math.isfinite(x) and math.isfinite(y) and math.isfinite(z)
 
 
 class RunningMean:

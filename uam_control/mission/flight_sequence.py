@@ -32,6 +32,7 @@ from uam_control.mission.permission import ChecklistReport, Permission
 from uam_control.mission.plans import GoalPose, PlanRefused, Points, check
 from uam_control.mission.scenarios.scenario import Scenario
 from uam_control.mission.standing import Standing
+from uam_control.mission.steps import Steps
 from uam_control.mission.touchdown import Touchdown
 from uam_control.supervision import (
     Authority,
@@ -49,6 +50,7 @@ from uam_control.supervision import (
 )
 from uam_control.vehicle import VehicleDescription
 
+NOBODY = Authority()  # has taken control from the companion
 _OLDEST = 0.02  # [s] largest age of a state; the time between two steps is longer after a gap
 
 
@@ -81,7 +83,8 @@ class Mission:
 
     def _begin(self, parameters: MissionParameters) -> None:
         """Set the state before a flight; the object of the output stays."""
-        reference, self.scenario = self.output.reference, self._planned
+        reference = self.output.reference
+        self._use(self._planned)
         reference[:] = 0.0
         reference[CHI, ARM] = self.scenario.arm_start
         vars(self.output).update(vars(MissionOutput(reference)))
@@ -98,6 +101,14 @@ class Mission:
         self._override = MagnetOverride()
         self._standing: Standing | None = None  # while the arm of a released vehicle is stowed
         self._ground_pose = GroundPose()
+        self._followed: Decision | None = None  # the newest decision whose values are in the output
+        self._in_flight: Observation | None = None  # of every tick after the take-off
+
+    def _use(self, scenario: Scenario) -> None:
+        """Fly `scenario`."""
+        self.scenario = scenario
+        self._phases = Steps(scenario.phase, (at for at, _ in scenario.phases))
+        self._magnet = Steps(scenario.magnet_on, (at for at, _ in scenario.magnet))
 
     def start(self) -> tuple[bool, str]:
         """Desire an armed autopilot from the next step on; the take-off follows.
@@ -220,7 +231,7 @@ class Mission:
                 guidance.advance(stamp)
                 self._watch.advance(stamp)
             seen = self._observe(stamp, state, armed_since, readings or Readings())
-            seen.authority, self._seen = authority or Authority(), seen
+            seen.authority, self._seen = authority or NOBODY, seen
             command, goal = self._requests.popleft() if self._requests else (None, None)
             changes = self._supervisor.changes
             before = len(changes)
@@ -357,15 +368,16 @@ class Mission:
         self, stamp: float, state: np.ndarray, armed_since: float | None, readings: Readings
     ) -> Observation:
         p, guidance, armed = self._parameters, self._guidance, armed_since is not None
-        seen = Observation(
-            state, self.output.reference, self._ground, armed=armed, readings=readings
-        )
         if guidance is None:
+            seen = Observation(
+                state, self.output.reference, self._ground, armed=armed, readings=readings
+            )
             started = armed and self.output.arm
             seen.ready = started and stamp >= armed_since + p.takeoff_delay
             seen.on_ground = True
             return seen
-        touchdown = self._touchdown
+        seen, touchdown = self._in_flight, self._touchdown  # a new object takes time
+        seen.state, seen.armed, seen.readings, seen.touchdown = state, armed, readings, False
         seen.on_ground = touchdown.on_ground(state, self._ground, p)
         landing, time = self.scenario.landing, guidance.scenario_time
         seen.end_mission = self._over
@@ -399,8 +411,11 @@ class Mission:
             self._enter(stamp, before, decision)
         if decision.state is State.RELEASED or self._standing is not None:
             self._stow_released(stamp, decision.state is State.RELEASED and decision.stow)
-        output.cause, output.arm, output.regains = decision.cause, decision.arm, decision.regains
-        output.flying = decision.guide is not Guide.NOTHING
+        if decision is not self._followed:
+            self._followed = decision
+            output.cause, output.arm = decision.cause, decision.arm
+            output.regains = decision.regains
+        output.flying = decision.guide is not Guide.NOTHING  # `GroundPose` writes it, too
         output.phase = self._phase(decision)
         output.magnet = self._magnet_on(decision)
 
@@ -446,7 +461,8 @@ class Mission:
         start[3:5] = 0.0
         start[ARM] = self.scenario.arm_start
         self._takeoff, self._ground = stamp, start.item(Z)
-        self.scenario = self._planned.begun_at(start)
+        self._use(self._planned.begun_at(start))
+        self._in_flight = Observation(self._seen.state, self.output.reference, self._ground)
         self._guidance = Guidance(
             self.scenario.trajectory(start),
             stamp,
@@ -471,12 +487,12 @@ class Mission:
         if decision.guide is Guide.SCENARIO:
             if self._guidance.planned:
                 return GOAL
-            return self.scenario.phase(self._guidance.scenario_time)
+            return self._phases.at(self._guidance.scenario_time)
         return {Guide.STOP: HOLD, Guide.DESCEND: LAND, Guide.NOTHING: ABORTED}[decision.guide]
 
     def _scenario_magnet(self) -> bool:
         guidance = self._guidance
-        return guidance is not None and self.scenario.magnet_on(guidance.scenario_time)
+        return guidance is not None and self._magnet.at(guidance.scenario_time)
 
     def _magnet_on(self, decision: Decision) -> bool:
         """Return the overriding value until the scenario switches, else the scenario's value."""

@@ -36,6 +36,8 @@ from uam_control.mission.motion.trajectory import Trajectory, empty_motion
 from uam_control.mission.plans import BASE, PEAK, RAMP, Plan, still
 from uam_control.mission.scenarios.route import SINK
 
+STEADY = (1.0, 0.0, 0.0, 0.0)  # derivatives of a scenario time that passes as the stamps do
+
 
 class PathClock:
     """Scenario time as a function of the stamp: it advances, slows down to a stop, or restarts.
@@ -47,15 +49,27 @@ class PathClock:
         """stamp [s] at which the scenario begins."""
         self._begin = stamp
         self._ramp: tuple[float, float, float, float, float, float] | None = None
+        self._end: tuple[float, ...] = ()  # see `_on_ramp`, at the end of the ramp
 
     def at(self, stamp: float) -> tuple[float, float, float, float, float]:
         """Return scenario time [s] and its first to fourth derivative [1, 1/s, 1/s^2, 1/s^3]."""
         if self._ramp is None:
             return stamp - self._begin, 1.0, 0.0, 0.0, 0.0
-        begin, length, time, rate, slope, goal = self._ramp
-        u = min(max((stamp - begin) / length, 0.0), 1.0)
-        after = max(stamp - begin - length, 0.0)
-        time += goal * after + length * (
+        begin, length, time, _, _, goal = self._ramp
+        elapsed = stamp - begin
+        if elapsed >= length:  # for most of a flight: only the time changes
+            gained, one, two, three, four = self._end
+            return time + (goal * (elapsed - length) + gained), one, two, three, four
+        gained, one, two, three, four = self._on_ramp(max(elapsed / length, 0.0))
+        return time + gained, one, two, three, four
+
+    def _on_ramp(self, u: float) -> tuple[float, float, float, float, float]:
+        """Return the scenario time [s] since the begin of the ramp, and its derivatives.
+
+        u = 0..1: part of the ramp's length that has passed.
+        """
+        _, length, _, rate, slope, goal = self._ramp
+        gained = length * (
             rate * (u - u**3 + u**4 / 2)
             + length * slope * (u**2 / 2 - 2 * u**3 / 3 + u**4 / 4)
             + goal * (u**3 - u**4 / 2)
@@ -64,10 +78,10 @@ class PathClock:
         now += length * slope * (u - 2 * u**2 + u**3)
         change = (goal - rate) * 6 * (u - u**2) / length + slope * (1 - 4 * u + 3 * u**2)
         if not 0.0 < u < 1.0:
-            return time, now, change, 0.0, 0.0
+            return gained, now, change, 0.0, 0.0
         third = (goal - rate) * 6 * (1 - 2 * u) / length**2 + slope * (6 * u - 4) / length
         fourth = (rate - goal) * 12 / length**3 + slope * 6 / length**2
-        return time, now, change, third, fourth
+        return gained, now, change, third, fourth
 
     @property
     def goal(self) -> float:
@@ -87,6 +101,7 @@ class PathClock:
         if self._ramp is not None and goal == self.goal:
             return
         self._ramp = (stamp, length, *self.at(stamp)[:3], goal)
+        self._end = self._on_ramp(1.0)
 
 
 class Segment:
@@ -175,7 +190,7 @@ class Guidance:
         self.scenario_time = 0.0
         self._trajectory, self._stowed = trajectory, np.array(stowed, dtype=float)
         self._clock = PathClock(stamp)
-        self._rates = 1.0, 0.0, 0.0, 0.0  # derivatives of the scenario time
+        self._rates = STEADY  # derivatives of the scenario time
         self._path = np.zeros_like(self.motion)
         self._arm: Segment | None = None  # in place of the path's, while holding
         self._away: WayBack | None = None  # offset from the path, on the way back to it
@@ -205,7 +220,8 @@ class Guidance:
         if stamp >= self._go_on_at:
             self._arm, self._go_on_at = None, math.inf
             self._clock.change(stamp, 1.0, self._ramp_length())
-        self.scenario_time, *self._rates = self._clock.at(stamp)
+        time, one, two, three, four = self._clock.at(stamp)
+        self.scenario_time, self._rates = time, (one, two, three, four)
 
     def write(self, stamp: float) -> None:
         """Write motion and reference at `stamp` [s]."""
@@ -413,14 +429,13 @@ class Guidance:
     def _write_path(self, path: np.ndarray) -> None:
         """Write the path (5, 6 + n) at the scenario time, by the chain rule for its clock."""
         self._trajectory.write(self.scenario_time, path)
-        self._scale(path)
+        if self._rates != STEADY:
+            self._scale(path)
         self.shift(path)
 
     def _scale(self, path: np.ndarray) -> None:
         """Apply the derivatives of the scenario's clock to the path (5, 6 + n)."""
         one, two, three, four = self._rates
-        if one == 1.0 and two == three == four == 0.0:
-            return
         path[SNAP] = (
             one**4 * path[SNAP]
             + 6.0 * one**2 * two * path[JERK]

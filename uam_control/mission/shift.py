@@ -18,14 +18,18 @@ class Shift:
     def __init__(self) -> None:
         self._values = np.zeros((MOTION_ROWS, 3))
         self._goal = np.zeros(3)
+        self._aimed: np.ndarray | None = None  # the array of the last change
         self._beside = False  # whether the goal is not zero
         self._segment: Segment | None = None
 
     def aim(self, stamp: float, goal: np.ndarray) -> None:
-        """Change to `goal` (3,) [m] from `stamp` [s] on; no effect if that is the goal already."""
-        if np.array_equal(goal, self._goal):
+        """Change to `goal` (3,) [m] from `stamp` [s] on; no effect if that is the goal already.
+
+        The array must not change afterwards.
+        """
+        if goal is self._aimed or np.array_equal(goal, self._goal):
             return
-        self._goal, self._beside = goal.copy(), bool(goal.any())
+        self._aimed, self._goal, self._beside = goal, goal.copy(), bool(goal.any())
         way = float(np.max(np.abs(goal - self._values[CHI])))
         length = max(SHORTEST, PEAK * way / SPEED)
         self._segment = Segment(stamp, self._values, goal, np.full(3, length))

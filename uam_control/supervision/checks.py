@@ -106,19 +106,9 @@ LATE, LATE_LOOP, EFFORT, GAIN = (
 )
 _ROWS = tuple(i for i, check in enumerate(CHECKS) if check.reading)
 _SIGNS = tuple(CHECKS[i].sign for i in _ROWS)
+_CHECKED = len(CHECKS)
+_MOCAP_AGE = [CHECKS[i].reading for i in _ROWS].index("mocap_age")
 readings_of = attrgetter(*(CHECKS[i].reading for i in _ROWS))
-
-
-class _Bounds(NamedTuple):
-    """Limits as arrays. calm: below these values no monitor changes, unless a limit was exceeded
-    before; box (2, 3): low and high corner [m]; joints, efforts (n,): of angles [rad] and torques
-    [N m]; gains (3,): of position, attitude, arm."""
-
-    calm: np.ndarray
-    box: np.ndarray
-    joints: np.ndarray
-    efforts: np.ndarray
-    gains: np.ndarray
 
 
 class ExceededLimit(NamedTuple):
@@ -145,8 +135,8 @@ class Checks:
         self.configure(parameters)
         rows, three, readings = np.zeros((3, ALPHA)), np.zeros(3), (0.0,) * len(_ROWS)
         self._measure = prepared(
-            *(measure_all, rows, rows, three, 0.0, 0.0, readings, three, three, 0.0, 0.0),
-            *(self._bounds, self._values),
+            *(measure_all, rows, rows, three, 0.0, readings, three, three, 0.0, 0.0),
+            *(self._bounds, 0, self._values),
         )
 
     def configure(self, parameters: SupervisionParameters) -> None:
@@ -161,13 +151,11 @@ class Checks:
             for check in CHECKS
         )
         first = [min(limits) for limits in self._limits]
-        self._bounds = _Bounds(
-            np.array([limit - p.hysteresis * abs(limit) for limit in first]),
-            np.array([p.geofence_low, p.geofence_high], dtype=float),
-            np.array(p.joint_angle_hold, dtype=float),
-            np.array(p.joint_effort_hold, dtype=float),
-            np.array(p.gain_hold, dtype=float),
-        )
+        calm = [limit - p.hysteresis * abs(limit) for limit in first]
+        parts = calm, p.geofence_low, p.geofence_high, p.gain_hold, p.joint_angle_hold
+        self._bounds = np.concatenate([np.array(part) for part in (*parts, p.joint_effort_hold)])
+        self._bounds = self._bounds.astype(float)
+        self._joints = len(p.joint_angle_hold)
 
     def update(self, stamp: float, seen: Observation, in_flight: bool) -> ExceededLimit | None:
         """Check the tick at `stamp` [s]; return the worst exceeded limit, None without one.
@@ -182,7 +170,6 @@ class Checks:
             seen.state,
             seen.reference,
             readings.mocap_position,
-            readings.mocap_age,
             seen.ground,
             readings_of(readings),
             readings.joint_effort,
@@ -190,6 +177,7 @@ class Checks:
             link,
             loop,
             self._bounds,
+            self._joints,
             self._values,
         )
         if calm and self.quiet:
@@ -233,25 +221,31 @@ def measure_all(
     state: np.ndarray,
     reference: np.ndarray,
     mocap: np.ndarray,
-    mocap_age: float,
     ground: float,
     readings: tuple[float, ...],
     efforts: np.ndarray,
     gains: np.ndarray,
     link: float,
     loop: float,
-    bounds: _Bounds,
+    bounds: np.ndarray,
+    joints: int,
     values: np.ndarray,
 ) -> bool:
     """Write all quantities into values, in the order of CHECKS; return whether all are calm.
 
     state to ground: see `measure`; readings to gains: see `read`; link, loop: setpoint delays [s],
-    NaN if unknown.
+    NaN if unknown. bounds: all limits in one array. Of every quantity the value below which no
+    monitor changes, unless a limit was exceeded before; low and high corner (3,) of the box [m];
+    gains (3,) of position, attitude, arm; `joints` angles [rad]; torques [N m].
     """
-    measure(state, reference, mocap, mocap_age, ground, bounds.box, bounds.joints, values)
-    read(readings, efforts, gains, bounds.efforts, bounds.gains, values)
+    box, gain = _CHECKED, _CHECKED + 6
+    angle = gain + 3
+    effort = angle + joints
+    corners, age = bounds[box:gain].reshape((2, 3)), readings[_MOCAP_AGE]
+    measure(state, reference, mocap, age, ground, corners, bounds[angle:effort], values)
+    read(readings, efforts, gains, bounds[effort:], bounds[gain:angle], values)
     values[LATE], values[LATE_LOOP] = _known(link), _known(loop)
-    return _below(values, bounds.calm)
+    return _below(values, bounds[:box])
 
 
 @jit

@@ -37,7 +37,7 @@ class Inputs:
         self._moved = math.nan  # stamp [s] of the first pose like the newest
         self._repeats = Repeats()
         # stamps [s] of first and newest bias, mean (3,) [m/s^2]
-        self._bias: tuple[float, float, np.ndarray] | None = None
+        self._bias: tuple[float, float, list[float]] | None = None
         self._temperatures: dict[str, float] = {}
         self._oldest = self._oldest_of_pose = math.nan  # [s] stamps of gains
         self._of_pose: dict[str, float] = {}
@@ -73,10 +73,12 @@ class Inputs:
         A real bias changes slowly. The estimate changes fast where motion capture and IMU
         contradict each other: exchanged axes, a wrong body.
         """
-        first, last, mean = self._bias or (stamp, stamp, np.array(bias, dtype=float))
+        now = bias.tolist()  # three floats: numpy takes longer
+        first, last, mean = self._bias or (stamp, stamp, now)
         step, memory = max(stamp - last, 0.0), min(max(stamp - first, 1e-3), BIAS_MEMORY)
-        self._bias = first, stamp, mean + min(step / memory, 1.0) * (bias - mean)
-        self._readings.contradiction = math.dist(bias, mean)
+        gain = min(step / memory, 1.0)
+        self._bias = first, stamp, [m + gain * (b - m) for m, b in zip(mean, now, strict=True)]
+        self._readings.contradiction = math.dist(now, mean)
 
     def lift(self, thrust: float) -> None:
         """Store the filtered collective thrust [N]."""

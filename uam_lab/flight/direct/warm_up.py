@@ -13,7 +13,7 @@ from collections.abc import Callable, Iterable, Iterator
 import numpy as np
 
 from uam_control.coordinates import ALPHA
-from uam_control.grasp.kinematics import lever
+from uam_control.grasp.kinematics import magnet_and_lever
 from uam_control.grasp.sight import RunningMean
 from uam_control.laws import catalogue
 from uam_control.laws.catalogue import LAWS
@@ -97,7 +97,8 @@ def _others() -> None:
     mean = RunningMean()  # of the grasp, which a flight without a payload does not check
     for stamp in (0.0, 0.004):
         mean.add(stamp, np.zeros(3))
-    lever(np.zeros(ALPHA + len(curve.arm_start)), [0.0] * len(curve.arm_start))
+    joints = len(curve.arm_start)
+    magnet_and_lever(np.zeros(ALPHA + joints), [0.0] * 3, [0.0] * joints, 0.0)
     VisionPose(0.0, np.zeros(3), np.array([1.0, 0.0, 0.0, 0.0]), 0.0, 0.0).message()
     companion.warm_up()  # the stand-in's descent, which a flight without failures does not call
 
