@@ -20,7 +20,11 @@ from uam_control.estimation.pose_filter import (
     predict_next,
 )
 from uam_control.maths.compiled import jit, prepared
-from uam_control.maths.rotations import euler_from_quaternion, matrix_from_quaternion
+from uam_control.maths.rotations import (
+    euler_from_quaternion,
+    matrix_from_quaternion,
+    rotate_back,
+)
 from uam_control.settings.parameter_set import ParameterSet, number
 from uam_control.vehicle import GRAVITY
 
@@ -80,6 +84,7 @@ class StateEstimator:
         self._period = 0.0
         pose, own, sample, angles = self._pose.memory, self._memory, np.zeros(3), np.zeros(joints)
         self._follow_joints = prepared(follow_joints, own, angles, angles, 0.0, 0.0, 0.0, 0.0)
+        self._write_biases = prepared(write_biases, pose, np.empty((2, 3)))
         self._assemble = prepared(assemble_stored, pose, own, 0.0, 0.0, 0.0)
         self._predict_and_assemble = prepared(
             predict_and_assemble, pose, own, 0, 0.0, 0.0, 0.0, sample, sample, 0.0, 0.0
@@ -121,9 +126,9 @@ class StateEstimator:
     @property
     def imu_bias(self) -> tuple[np.ndarray, np.ndarray]:
         """Return the estimated biases (3,) of gyroscope [rad/s] and accelerometer [m/s^2], FLU."""
-        pose = self._pose
-        to_body = matrix_from_quaternion(pose.quaternion).T
-        return pose.gyro_bias.copy(), to_body @ pose.accelerometer_bias
+        found = np.empty((2, 3))
+        self._write_biases(self._pose.memory, found)
+        return found[0], found[1]
 
     def mocap(self, stamp: float, position: np.ndarray, quaternion: np.ndarray) -> None:
         """Process a pose exposed at `stamp` [s].
@@ -259,6 +264,14 @@ def follow_joints(
     state, joints, joints_filter, _, _ = arrays_of(memory)
     joint_step(alpha, alpha_dot, bandwidth, velocity_weight, dt, joints)
     derivative_step(joints[1], acceleration_cutoff, dt, joints_filter, state[CHI_DDOT, ALPHA:])
+
+
+@jit
+def write_biases(pose: np.ndarray, found: np.ndarray) -> None:
+    """Write the biases of gyroscope and accelerometer into found (2, 3), FLU; pose: `parts_of`."""
+    motion, _, _ = parts_of(pose)
+    found[0] = motion.gyro_bias
+    found[1] = rotate_back(matrix_from_quaternion(motion.quaternion), motion.accelerometer_bias)
 
 
 @jit

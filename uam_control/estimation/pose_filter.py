@@ -76,8 +76,8 @@ class PoseFilter:
     position (3,) [m, world]; velocity (3,) [m/s, world]; quaternion (4,) body → world [w x y z];
     rates (3,) [rad/s, body], without bias; acceleration (3,) [m/s^2, world], without gravity and
     bias; gyro_bias (3,) [rad/s, body]; accelerometer_bias (3,) [m/s^2, world]. `motion`: all of
-    them; `memory`: see `parts_of`. The arrays are never replaced. `ahead`: poses that wait for their
-    IMU sample.
+    them; `memory`: see `parts_of`. The arrays are never replaced.
+    `ahead`: poses that wait for their IMU sample.
     """
 
     def __init__(

@@ -5,7 +5,10 @@ from __future__ import annotations
 from enum import Enum
 from typing import NamedTuple
 
+from uam_control.settings.plain_members import plain_members
 
+
+@plain_members
 class Grasp(Enum):
     """What the executive knows about the payload; the value is used in texts and messages."""
 

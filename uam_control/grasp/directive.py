@@ -8,8 +8,10 @@ from enum import Enum
 import numpy as np
 
 from uam_control.grasp.windows import GraspWindow
+from uam_control.settings.plain_members import plain_members
 
 
+@plain_members
 class Step(Enum):
     """What the executive does."""
 

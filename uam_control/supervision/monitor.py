@@ -5,7 +5,10 @@ from __future__ import annotations
 import math
 from enum import IntEnum
 
+from uam_control.settings.plain_members import plain_members
 
+
+@plain_members
 class Level(IntEnum):
     """Required reaction, in order of severity."""
 

@@ -9,9 +9,11 @@ from typing import NamedTuple
 
 import numpy as np
 
+from uam_control.settings.plain_members import plain_members
 from uam_control.supervision.states import Event
 
 
+@plain_members
 class OperatorCommand(Enum):
     """Commands of the operator in flight; the value is the event. GOAL: leave the path."""
 

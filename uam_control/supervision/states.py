@@ -9,7 +9,10 @@ from __future__ import annotations
 from enum import Enum
 from typing import NamedTuple
 
+from uam_control.settings.plain_members import plain_members
 
+
+@plain_members
 class State(Enum):
     """State of the flight; the value is used in texts and messages."""
 
@@ -23,6 +26,7 @@ class State(Enum):
     DISARMED = "disarmed"
 
 
+@plain_members
 class Event(Enum):
     """Reason of a transition; the value is used in texts."""
 

@@ -14,6 +14,7 @@ from enum import Enum
 from typing import NamedTuple
 
 from uam_control.coordinates import CHI, Z
+from uam_control.settings.plain_members import plain_members
 from uam_control.supervision.checks import SETPOINT_DELAY, Checks
 from uam_control.supervision.holds import Holds
 from uam_control.supervision.monitor import Level
@@ -22,6 +23,7 @@ from uam_control.supervision.states import AIRBORNE_STATES, ORDINARY, TARGETS, E
 from uam_control.supervision.supervision_parameters import SupervisionParameters
 
 
+@plain_members
 class Guide(Enum):
     """Behaviour of the reference."""
 

@@ -4,9 +4,11 @@ from __future__ import annotations
 
 from enum import IntEnum
 
+from uam_control.settings.plain_members import plain_members
 from uam_sim_bridge.autopilot.params import Parameters
 
 
+@plain_members
 class ChargeState(IntEnum):
     """MAV_BATTERY_CHARGE_STATE: the values in use. `LOW` and worse are PX4's warnings."""
 

@@ -28,6 +28,7 @@ from enum import Enum
 from typing import NamedTuple
 
 from uam_control.settings.parameter_set import ParameterSet, integer, number, switch
+from uam_control.settings.plain_members import plain_members
 from uam_sim_bridge.mavlink.offboard.advice import passing, with_advice
 from uam_sim_bridge.mavlink.protocol.modes import (
     CUSTOM_MODE_ENABLED,
@@ -47,6 +48,7 @@ REGAIN_REQUESTS = 5  # requests for OFFBOARD after one command of an operator
 _KEPT_REASONS = 5
 
 
+@plain_members
 class Phase(Enum):
     """Phase of the sequence; the value is the text for logs."""
 
@@ -61,6 +63,7 @@ class Phase(Enum):
     FAILED = "failed"
 
 
+@plain_members
 class Request(Enum):
     """A request to the autopilot; the value is the text for logs."""
 

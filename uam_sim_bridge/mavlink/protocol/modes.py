@@ -4,7 +4,10 @@ from __future__ import annotations
 
 from enum import Enum, IntEnum
 
+from uam_control.settings.plain_members import plain_members
 
+
+@plain_members
 class Mode(Enum):
     """Flight modes that the bridge uses; value: PX4's (main mode, sub mode)."""
 
@@ -41,6 +44,7 @@ class Mode(Enum):
             return cls.UNKNOWN
 
 
+@plain_members
 class MavResult(IntEnum):
     """MAV_RESULT."""
 
@@ -60,6 +64,7 @@ def result_word(result: int) -> str:
         return f"result {result}"
 
 
+@plain_members
 class Severity(IntEnum):
     """MAV_SEVERITY: the values in use."""
 
@@ -70,6 +75,7 @@ class Severity(IntEnum):
     INFO = 6
 
 
+@plain_members
 class MavCmd(IntEnum):
     """MAV_CMD: the values in use."""
 
