@@ -63,10 +63,11 @@ class ArmLoadParameters(ParameterSet):
             raise ParameterError("arm_feedforward: needs link_masses, the mass of each link")
 
     def load_record(self) -> np.ndarray:
-        """Return the structured array (1,) that `arm_load` reads."""
+        """Return the structured array (1,) that `arm_load` reads; without links one of zeros."""
         names = ("link_masses", "link_centres", "link_lengths", "arm_gravity")
         names += ("joint_armature", "joint_damping", "joint_friction")
-        return structured({name: getattr(self, name) for name in names})
+        values = {name: getattr(self, name) for name in names}
+        return structured({name: (0.0,) if one == () else one for name, one in values.items()})
 
 
 @jit

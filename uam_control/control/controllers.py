@@ -11,7 +11,7 @@ import math
 
 import numpy as np
 
-from uam_control.control.arm_load import arm_load
+from uam_control.control.around_law import begin_attitude, end_arm, end_position
 from uam_control.control.output_limits import (
     LONGEST_PREDICTION,
     ArmLimits,
@@ -19,16 +19,13 @@ from uam_control.control.output_limits import (
     ForceCompletion,
     PositionLimits,
     TorqueLimits,
-    complete_and_limit,
-    complete_effort,
-    lead_attitude,
     limit_torque,
 )
 from uam_control.control.sample_hold import SampleHold
 from uam_control.control.thrust_direction import AttitudeReference
 from uam_control.coordinates import ALPHA, ARM, ATTITUDE, CHI, CHI_DOT, POSITION, YAW
 from uam_control.laws import catalogue
-from uam_control.laws.errors import FEEDFORWARD, E, tracking_errors
+from uam_control.laws.errors import E, tracking_errors
 from uam_control.laws.law_parameters import LawParameters
 from uam_control.maths.compiled import prepared
 from uam_control.settings.parameter_set import ParameterError
@@ -95,8 +92,6 @@ class Controller:
         flying: bool,
     ) -> None:
         """Write the errors of this tick."""
-        if state.shape != self._errors.shape:
-            self._allocate(state.shape)
         self._tracking_errors(
             state, reference, attitude_reference, flying, self._printed, self._errors, self._norms
         )
@@ -138,9 +133,11 @@ class PositionController(Controller):
             float(p.thrust_max),
             float(p.tilt_max),
         )
-        self._force = prepared(
-            *(complete_and_limit, self._attitude.value, self._integral, self._completion),
-            *(False, 0.0, self._integral, self._tau, self._tau),
+        desired = self._attitude
+        self._end = prepared(
+            *(end_position, desired.value, self._integral, self._completion, False, 0.0),
+            *(self._integral, self._tau, self._tau, 0.0, desired.filter, desired.lead),
+            desired.value,
         )
 
     @property
@@ -171,8 +168,11 @@ class PositionController(Controller):
             self._flying = True
             if np.any(reference[CHI_DOT, POSITION]):  # else from the ground, or at rest
                 self._attitude.begin(state, reference)
-        self._track(state, reference, self._attitude.value, True)
-        self.saturated = self._force(
+        if state.shape != self._errors.shape:
+            self._allocate(state.shape)
+        desired = self._attitude
+        self._track(state, reference, desired.value, True)
+        self.saturated = self._end(
             reference,
             self._own[E],
             self._completion,
@@ -181,8 +181,11 @@ class PositionController(Controller):
             self._integral,
             self._law_output(dt),
             self._tau,
+            desired.cutoff,
+            desired.filter,
+            desired.lead,
+            desired.value,
         )
-        self._attitude.update(self._tau, reference, dt)
         return self._tau
 
 
@@ -194,7 +197,6 @@ class TorqueController(Controller):
     def __init__(self, parameters: TorqueLimits) -> None:
         super().__init__(parameters)
         self._tau = np.zeros(len(parameters.torque_max))
-        self._limit = prepared(limit_torque, self._tau, self._tau, self._tau)
 
     def set_parameters(self, parameters: TorqueLimits) -> None:
         """See `Controller.set_parameters`."""
@@ -219,13 +221,25 @@ class TorqueController(Controller):
             self._idle()
             self._tau[:] = 0.0
             return self._tau
-        self._track(state, reference, attitude_reference, flying)
-        tau = self._torque(reference, dt)
-        self.saturated = self._limit(tau, self._torque_max, self._tau)
+        if state.shape != self._errors.shape:
+            self._allocate(state.shape)
+        self._begin(state, reference, attitude_reference, flying, dt)
+        self.saturated = self._end(reference, self._law_output(dt), dt)
         return self._tau
 
-    def _torque(self, reference: np.ndarray, dt: float) -> np.ndarray:
-        """Return the torque (n,) [N m] before its limits; the errors are those of this tick."""
+    def _begin(
+        self,
+        state: np.ndarray,
+        reference: np.ndarray,
+        attitude_reference: np.ndarray,
+        flying: bool,
+        dt: float,
+    ) -> None:
+        """Write the errors of this tick, for the law."""
+        raise NotImplementedError
+
+    def _end(self, reference: np.ndarray, tau: np.ndarray, dt: float) -> bool:
+        """Write the law's output tau (n,) within its limits to `_tau`; whether a limit acted."""
         raise NotImplementedError
 
 
@@ -242,8 +256,7 @@ class AttitudeController(TorqueController):
         super().__init__(parameters)
         self._measured = math.nan  # [s] loop delay
         self._slow = np.zeros(3)  # [rad/s^2] part of the feedforward that the autopilot integrates
-        slow = self._slow
-        self._lead = prepared(lead_attitude, self._errors, 0.0, 0.0, slow, 0.0, slow)
+        self._limit = prepared(limit_torque, self._tau, self._tau, self._tau)
         self.set_parameters(parameters)
 
     def set_parameters(self, parameters: AttitudeLimits) -> None:
@@ -251,8 +264,11 @@ class AttitudeController(TorqueController):
         super().set_parameters(parameters)
         self._washout = np.array(parameters.feedforward_washout, dtype=float)
         self._arm, self._joints = parameters.load_record(), np.zeros(len(parameters.link_masses))
-        if parameters.arm_feedforward:
-            self._arm_load = prepared(arm_load, self._arm, self._errors, self._joints)
+        rows, axes = self._errors, self._slow
+        self._prepare = prepared(
+            *(begin_attitude, rows, rows, rows, True, True, self._arm, True, 0.0, 0.0),
+            *(axes, 0.0, rows, self._norms, self._joints, axes),
+        )
         self.measured(self._measured)
 
     def measured(self, loop_delay: float) -> None:
@@ -266,12 +282,35 @@ class AttitudeController(TorqueController):
             beyond = max(0.0, loop_delay - p.prediction_nominal)
             self._ahead = min(LONGEST_PREDICTION, p.prediction + beyond)
 
-    def _torque(self, reference: np.ndarray, dt: float) -> np.ndarray:
-        p, pitch = self._parameters, 0.0
-        if p.arm_feedforward:
-            pitch = self._arm_load(self._arm, reference, self._joints) / p.inertia[1]
-        self._lead(self._errors, self._ahead, pitch, self._washout, dt, self._slow)
-        return self._law_output(dt)
+    def _begin(
+        self,
+        state: np.ndarray,
+        reference: np.ndarray,
+        attitude_reference: np.ndarray,
+        flying: bool,
+        dt: float,
+    ) -> None:
+        p = self._parameters
+        self._prepare(
+            state,
+            reference,
+            attitude_reference,
+            flying,
+            self._printed,
+            self._arm,
+            p.arm_feedforward,
+            p.inertia[1],
+            self._ahead,
+            self._washout,
+            dt,
+            self._errors,
+            self._norms,
+            self._joints,
+            self._slow,
+        )
+
+    def _end(self, reference: np.ndarray, tau: np.ndarray, dt: float) -> bool:
+        return self._limit(tau, self._torque_max, self._tau)
 
     def _idle(self) -> None:
         super()._idle()
@@ -293,10 +332,6 @@ class ArmController(TorqueController):
         self._hold, self._time = SampleHold(parameters.goal_rate), 0.0
         self._integral = np.zeros(len(self._tau))  # [rad/s^2] integral of integral_gain e
         self._load = np.zeros(len(self._tau))  # [N m]
-        n = self._load
-        self._complete = prepared(
-            complete_effort, n, n, n, True, n, n, 0.0, True, 0.0, self._integral, n
-        )
         self.set_parameters(parameters)
         to_goals = parameters.setpoint == POSITION_SERVO
         # goals do not exist before the first tick
@@ -307,8 +342,11 @@ class ArmController(TorqueController):
         super().set_parameters(parameters)
         self._hold.rate = parameters.goal_rate
         self._arm = parameters.load_record()
-        if parameters.arm_feedforward:
-            self._arm_load = prepared(arm_load, self._arm, self._errors, self._load)
+        n = self._load
+        self._complete = prepared(
+            *(end_arm, self._errors, self._errors, self._arm, True, n, n, 0.0, n, True, 0.0),
+            *(n, n, n, n),
+        )
         self._inertia = np.array(parameters.inertia, dtype=float)
         self._integral_gain = np.array(parameters.integral_gain, dtype=float)
 
@@ -317,24 +355,34 @@ class ArmController(TorqueController):
         super().reset_adaptation()
         self._integral[:] = 0.0
 
-    def _torque(self, reference: np.ndarray, dt: float) -> np.ndarray:
-        tau, p = self._law_output(dt), self._parameters
-        if p.arm_feedforward:
-            self._arm_load(self._arm, reference, self._load)
-        self._complete(
-            self._own[FEEDFORWARD],
-            self._own[E],
-            self._load,
+    def _begin(
+        self,
+        state: np.ndarray,
+        reference: np.ndarray,
+        attitude_reference: np.ndarray,
+        flying: bool,
+        dt: float,
+    ) -> None:
+        self._track(state, reference, attitude_reference, flying)
+
+    def _end(self, reference: np.ndarray, tau: np.ndarray, dt: float) -> bool:
+        p = self._parameters
+        return self._complete(
+            reference,
+            self._errors,
+            self._arm,
             p.arm_feedforward,
             self._inertia,
             self._integral_gain,
             p.integral_limit,
+            self._torque_max,
             self.saturated,
             dt,
+            self._load,
             self._integral,
             tau,
+            self._tau,
         )
-        return tau
 
     def update(
         self,

@@ -37,23 +37,24 @@ class AttitudeReference:
     """Desired attitude: roll and pitch from tau_p, yaw from the mission.
 
     `value` (3, 3): rows q_d = roll, pitch, yaw [rad], Omega_d [rad/s], Omega_d_dot [rad/s^2]; the
-    last two rows are in the desired body frame (FLU). Columns: about X, Y, Z.
+    last two rows are in the desired body frame (FLU). Columns: about X, Y, Z. `filter`, `lead`:
+    state of `attitude_reference_step`.
     """
 
     def __init__(self, cutoff: float) -> None:
         """cutoff: corner frequency of the filter on the correction [Hz]."""
         self.cutoff = cutoff
         self.value = np.zeros((3, 3))
-        self._filter = np.zeros((2, 2))  # rows roll, pitch: angle, rate
-        self._lead = np.zeros(2)  # of roll, pitch [rad]
+        self.filter = np.zeros((2, 2))  # rows roll, pitch: angle, rate
+        self.lead = np.zeros(2)  # of roll, pitch [rad]
         self._step = prepared(
-            *(attitude_reference_step, self._lead, self.value, 0.0, 0.0),
-            *(self._filter, self._lead, self.value),
+            *(attitude_reference_step, self.lead, self.value, 0.0, 0.0),
+            *(self.filter, self.lead, self.value),
         )
 
     def reset(self, yaw: float) -> None:
         """Set the desired attitude to level at `yaw` [rad], with zero rates."""
-        self._filter[:] = self._lead[:] = 0.0
+        self.filter[:] = self.lead[:] = 0.0
         self.value[:] = 0.0
         self.value[CHI, Z] = yaw
 
@@ -67,11 +68,11 @@ class AttitudeReference:
         (roll, pitch, _), about = state[CHI, ATTITUDE], state[CHI_DOT, ATTITUDE]
         across = math.sin(roll) * about[Y] + math.cos(roll) * about[Z]
         level = max(_LEAST_COSINE, math.cos(pitch))
-        self._filter[X] = roll, about[X] + across * math.sin(pitch) / level
-        self._filter[Y] = pitch, math.cos(roll) * about[Y] - math.sin(roll) * about[Z]
-        self._filter[:, ANGLE] -= reference[CHI, ROLL:YAW]
-        self._filter[:, RATE] -= reference[CHI_DOT, ROLL:YAW]
-        self._lead[:] = math.nan
+        self.filter[X] = roll, about[X] + across * math.sin(pitch) / level
+        self.filter[Y] = pitch, math.cos(roll) * about[Y] - math.sin(roll) * about[Z]
+        self.filter[:, ANGLE] -= reference[CHI, ROLL:YAW]
+        self.filter[:, RATE] -= reference[CHI_DOT, ROLL:YAW]
+        self.lead[:] = math.nan
 
     def update(self, tau_p: np.ndarray, reference: np.ndarray, dt: float) -> np.ndarray:
         """Advance by dt [s] and return `value` (3, 3).
@@ -79,7 +80,7 @@ class AttitudeReference:
         tau_p: (3,) [N, ENU], z > 0; reference: (3, 6 + n), gives roll, pitch, yaw and their
         derivatives.
         """
-        self._step(tau_p, reference, self.cutoff, dt, self._filter, self._lead, self.value)
+        self._step(tau_p, reference, self.cutoff, dt, self.filter, self.lead, self.value)
         return self.value
 
 

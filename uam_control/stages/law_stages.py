@@ -48,6 +48,7 @@ class LawStage:
         self.controller = controller
         self.gains_due = False
         self._period = timing.period  # [ns]
+        self._reported = range(GAINS_PERIOD)  # stamps [ns] of the period of the last tick
         self._last: int | None = None  # [ns] last tick
 
     def update(self, stamp: int, *inputs: np.ndarray | bool) -> np.ndarray:
@@ -58,7 +59,10 @@ class LawStage:
         back in time: the laws must not integrate over a time without samples.
         """
         last, self._last = self._last, stamp
-        self.gains_due = stamp // GAINS_PERIOD != (last or 0) // GAINS_PERIOD
+        self.gains_due = stamp not in self._reported
+        if self.gains_due:
+            begin = stamp // GAINS_PERIOD * GAINS_PERIOD
+            self._reported = range(begin, begin + GAINS_PERIOD)
         step = self._period if last is None else stamp - last
         if not 0 < step <= 10 * self._period:
             step = self._period
