@@ -10,12 +10,12 @@ import sys
 
 import pytest
 
-from uam_sim_bridge.rehearsal.hardware_priority import PRIORITY
+from uam_sim_bridge.hardware_priority import PRIORITY
 
 PERMITTED = os.geteuid() == 0 or resource.getrlimit(resource.RLIMIT_RTPRIO)[0] >= PRIORITY
 PROGRAM = """
 import json, os, threading
-from uam_sim_bridge.rehearsal import hardware_priority
+from uam_sim_bridge import hardware_priority
 {before}
 stay = threading.Event()
 threading.Thread(target=stay.wait, daemon=True).start()

@@ -24,6 +24,7 @@ import numpy as np
 from uam_control.settings.configuration import ConfigurationError
 from uam_control.settings.parameter_set import ParameterError
 from uam_control.vehicle import load_description
+from uam_sim_bridge import hardware_priority
 from uam_sim_bridge.autopilot.autopilot_estimator import GRAVITY
 from uam_sim_bridge.autopilot.companion import Companion, warm_up
 from uam_sim_bridge.autopilot.core import Autopilot
@@ -35,7 +36,6 @@ from uam_sim_bridge.mavlink.hil.sitl_options import add_port_options, add_vehicl
 from uam_sim_bridge.mavlink.hil.sitl_ports import UdpPort, connect
 from uam_sim_bridge.mavlink.protocol.signing import Signing
 from uam_sim_bridge.mavlink.protocol.wire import Codec, Framer, Message, mavlink2
-from uam_sim_bridge.rehearsal import hardware_priority
 
 _GYRO_AND_ACCELEROMETER = 0x3F  # HIL_SENSOR.fields_updated
 _LOCKSTEP = 1  # HIL_ACTUATOR_CONTROLS.flags
