@@ -61,7 +61,7 @@ def _flier(planned: Sequence[StudyFlight], place: Workplace, out: Path) -> list[
 
 def _tune(study: Study, evaluations: int, out: Path) -> int:
     from uam_lab.study import figures
-    from uam_lab.study.search import search
+    from uam_lab.study.search import PATIENCE, search
     from uam_lab.tuning.convergence import in_words as convergence
 
     file = out / TUNING
@@ -84,7 +84,7 @@ def _tune(study: Study, evaluations: int, out: Path) -> int:
         figures.save(figures.tuning(costs), out / "tuning.png")
     for law, one in done.items():
         print(f"{law}: cost {one['costs'][0]:.4g} to {min(one['costs']):.4g}: {one['best']}")
-        print(f"  {convergence(list(accumulate(one['costs'], min)), evaluations // 2)}")
+        print(f"  {convergence(list(accumulate(one['costs'], min)), PATIENCE)}")
     print(f"results  {out}")
     return 0
 

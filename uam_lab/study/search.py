@@ -17,6 +17,7 @@ from uam_lab.study.description import Row, Study
 from uam_lab.study.flights import StudyResult, flights, measure
 
 DIGITS = 3  # significant digits of a value
+PATIENCE = 80  # last evaluations, which tell whether a search has converged
 STEP = 0.1  # initial step around the study's own numbers, as a share of the logarithmic range
 
 
