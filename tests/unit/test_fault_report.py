@@ -11,7 +11,7 @@ from default_columns import COLUMNS
 
 from uam_control.settings import configuration
 from uam_lab.campaign import fault_matrix, fault_report
-from uam_lab.campaign.fault_outcome import OUTCOMES, classify, down_after
+from uam_lab.campaign.fault_outcome import OUTCOMES, classify, down_after, explained
 from uam_lab.campaign.fault_trial import FaultResult
 from uam_lab.cli.main import main
 from uam_lab.report.figures import fault_marks, figures
@@ -120,6 +120,16 @@ def test_how_a_flight_ended(make_flight, end, outcome):
     assert classify(series, {"mission_completed": False}) == outcome
     assert classify(series, {"mission_completed": True}) == "completed"
     assert outcome in OUTCOMES
+
+
+def test_every_flight_that_is_not_completed_has_a_reason():
+    done = {"mission_completed": True, "shortfalls": []}
+    cut = {"mission_completed": False, "shortfalls": ["payload given up", "landed elsewhere"]}
+    assert explained("completed", done) == ""
+    assert explained("failsafe", done) == (
+        "reached the ground in flight, while its reference was above it"
+    )
+    assert explained("failsafe", cut) == "payload given up; landed elsewhere"
 
 
 def test_the_matrix_of_the_configuration_has_every_fault_and_moment():

@@ -68,6 +68,10 @@ def ending(series: Series, limits: OutcomeLimits | None = None) -> Ending:
     )
 
 
+# why a flight that fulfils the criteria of its mission is no completed one
+TOUCHED = "reached the ground in flight, while its reference was above it"
+
+
 def classify(
     series: Series, figures: Mapping[str, Any], limits: OutcomeLimits | None = None
 ) -> str:
@@ -84,6 +88,13 @@ def classify(
         commanded = series.in_phase("landed").any() and not _down_early(series, limits)
         return LANDED if commanded and not left else FAILSAFE
     return LOST
+
+
+def explained(outcome: str, figures: Mapping[str, Any]) -> str:
+    """Return why a flight counts as `outcome`, one of OUTCOMES; figures: metrics.json of it."""
+    if figures["mission_completed"] and outcome == FAILSAFE:
+        return TOUCHED
+    return "; ".join(figures["shortfalls"])
 
 
 def down_after(series: Series, begun: float, limits: OutcomeLimits | None = None) -> float | None:

@@ -14,7 +14,7 @@ from uam_control.coordinates import ALPHA, coordinates
 from uam_control.mission import Scenario, load_scenario
 from uam_control.profiles.profile import Profile
 from uam_lab.campaign.carried import Carried
-from uam_lab.campaign.fault_outcome import COMPLETED, LOST, classify
+from uam_lab.campaign.fault_outcome import COMPLETED, LOST, classify, explained
 from uam_lab.flight.direct.flight import DirectFlight
 from uam_lab.flight.direct.warm_up import prepare
 from uam_lab.flight.flight_settings import ONLOOKERS, FlightSettings
@@ -69,7 +69,7 @@ class TrialResult:
     deg, NaN without a take-off.
 
     flown: flown time / planned time; cut_short: not landed by the mission. outcome: one of
-    `fault_outcome.OUTCOMES`; why: unmet criteria of a completed mission. restless: RMS change from
+    `fault_outcome.OUTCOMES`; why: see `fault_outcome.explained`. restless: RMS change from
     tick to tick of body-rate setpoints [rad/s] and joint torques [N m].
     peaks: the largest value of each adaptation column.
     """
@@ -184,6 +184,7 @@ def measure(trial: Trial) -> TrialResult:
         series.write(trial.keep)
     figures = figures_of(trial, outcome, outcome.abort_reason)
     flown, landing = series.flown, trial.load_scenario().landing
+    end = classify(series, figures)
     return TrialResult(
         label=trial.label,
         payload_mass=trial.payload_mass,
@@ -192,8 +193,8 @@ def measure(trial: Trial) -> TrialResult:
         largest=_row(figures["max"]),
         flown=min(1.0, figures["duration_s"] / (landing.at + landing.duration)),
         cut_short=not bool(series.in_phase("landed").any()),
-        outcome=classify(series, figures),
-        why="; ".join(figures["shortfalls"]),
+        outcome=end,
+        why=explained(end, figures),
         place_error=figures["payload_place_error_m"],
         restless=(_change(_rates(series)[flown]), _change(series.block("tau_alpha.")[flown])),
         peaks=_peaks(series, flown),
