@@ -80,8 +80,13 @@ def test_without_a_renderer_the_report_is_written_with_advice(flight_folder, mon
     assert "<video" not in html
 
 
+def rendered_in(folder, progress=lambda text: None):
+    with flight_video.Rendering(folder) as rendering:
+        return rendering.result(progress)
+
+
 def test_a_folder_without_a_flight_is_one_line(tmp_path):
-    rendered = flight_video.render(tmp_path)
+    rendered = rendered_in(tmp_path)
     assert rendered.problem.startswith("rendering failed: ")
     assert "timeseries.parquet" in rendered.problem
 
@@ -91,7 +96,7 @@ def test_snapshots_and_video_are_rendered_without_a_screen(tmp_path, flight):
     short.write(tmp_path / "timeseries.parquet")
     (tmp_path / "metrics.json").write_text(json.dumps({}))
     steps = []
-    rendered = flight_video.render(tmp_path, progress=steps.append)
+    rendered = rendered_in(tmp_path, progress=steps.append)
     if rendered.problem.startswith(flight_video.HOW_TO_GET_ONE):
         pytest.skip(rendered.problem)
     assert rendered.problem == ""

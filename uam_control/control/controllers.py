@@ -236,7 +236,7 @@ class TorqueController(Controller):
         dt: float,
     ) -> None:
         """Write the errors of this tick, for the law."""
-        raise NotImplementedError
+        self._track(state, reference, attitude_reference, flying)
 
     def _end(self, reference: np.ndarray, tau: np.ndarray, dt: float) -> bool:
         """Write the law's output tau (n,) within its limits to `_tau`; whether a limit acted."""
@@ -354,16 +354,6 @@ class ArmController(TorqueController):
         """See `Controller.reset_adaptation`; the integral is set to zero, too."""
         super().reset_adaptation()
         self._integral[:] = 0.0
-
-    def _begin(
-        self,
-        state: np.ndarray,
-        reference: np.ndarray,
-        attitude_reference: np.ndarray,
-        flying: bool,
-        dt: float,
-    ) -> None:
-        self._track(state, reference, attitude_reference, flying)
 
     def _end(self, reference: np.ndarray, tau: np.ndarray, dt: float) -> bool:
         p = self._parameters

@@ -10,7 +10,6 @@ from pathlib import Path
 import numpy as np
 import optuna
 
-from uam_control.settings.configuration import ConfigurationError
 from uam_control.settings.parameter_file import ProfileError
 from uam_lab.study import design
 from uam_lab.study.description import Row, Study
@@ -71,10 +70,7 @@ def search(
     def measured(values: dict[str, float]) -> float:
         try:
             made = design.profile(study.with_adaptation(law, values), Row(law, law), strength)
-        except (
-            ConfigurationError,
-            ProfileError,
-        ):  # a parameter that follows from the values is out of its range
+        except ProfileError:  # a parameter that follows from the values is out of its range
             return float(entry["failed"])
         flown = flights(study, {law: made}, conditions, [entry["seed"]], folder)
         return cost([measure(one) for one in flown], entry["aim"], entry["failed"])

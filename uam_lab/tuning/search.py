@@ -107,7 +107,7 @@ def evaluate(space: Space, trial: optuna.Trial, best: float | None) -> float | t
 
 
 def work(task: Task) -> None:
-    """Evaluate candidates until the study has task.evaluations; runs in each worker."""
+    """Evaluate candidates until the study is `finished`; runs in each worker."""
     study = open_study(task)
 
     def end(study: optuna.Study, _: optuna.trial.FrozenTrial) -> None:
@@ -132,9 +132,9 @@ def curve(study: optuna.Study) -> list[float]:
 
 def finished(study: optuna.Study, task: Task) -> bool:
     """Return whether the study has its evaluations, or has converged (`Task.patience`)."""
-    values = curve(study)
-    converged = task.patience and improvement(values, task.patience) < SMALL
-    return len(values) >= task.evaluations or bool(converged)
+    if _done(study) >= task.evaluations:
+        return True
+    return task.patience > 0 and improvement(curve(study), task.patience) < SMALL
 
 
 def _progress(study: optuna.Study) -> float | None:

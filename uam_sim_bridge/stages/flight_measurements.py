@@ -14,12 +14,11 @@ from uam_control.coordinates import ALPHA, CHI_DOT, ROLL
 from uam_control.maths.compiled import jit, prepared
 from uam_control.vehicle import VehicleDescription
 from uam_sim_bridge.mavlink.offboard.loop_delay import (
-    STAMP,
-    VALUE,
     DelayNumbers,
     DelaySums,
     LoopDelay,
     follow,
+    pause,
 )
 from uam_sim_bridge.mavlink.offboard.thrust_curve import thrust_of_command
 from uam_sim_bridge.mavlink.offboard.thrust_identification import (
@@ -69,8 +68,7 @@ def measure(
     if looped:
         follow(now, rates, state[CHI_DOT, ROLL:ALPHA], sums, numbers)
     else:
-        sums.now[STAMP] = math.nan
-        sums.now[VALUE] = math.nan
+        pause(sums)
     assumed = thrust_of_command(thrust, curve[0], curve[1], curve[2], curve[3])
     gain = 1.0 - math.exp(-2.0 * math.pi * LIFT_CUTOFF * step)
     lift[0] += gain * (factor * assumed - lift[0])

@@ -54,7 +54,10 @@ class Rendering:
     def __init__(
         self, directory: Path, video: bool = True, platforms: Sequence[str] | None = None
     ) -> None:
-        """Start to render the flight in `directory`; see `render`."""
+        """Start to render the flight in `directory` to `directory`/figures.
+
+        platforms: values of MUJOCO_GL to try; default: that of the environment, then PLATFORM.
+        """
         if platforms is None:
             platforms = list(dict.fromkeys(filter(None, (os.environ.get("MUJOCO_GL"), PLATFORM))))
         self._directory, self._video = directory, video
@@ -107,20 +110,6 @@ class Rendering:
             self._child.wait()
         if self._child.stdout is not None:
             self._child.stdout.close()
-
-
-def render(
-    directory: Path,
-    video: bool = True,
-    progress: Callable[[str], None] = lambda text: None,
-    platforms: Sequence[str] | None = None,
-) -> Rendered:
-    """Render the flight in `directory` to `directory`/figures; missing OpenGL is no error.
-
-    platforms: values of MUJOCO_GL to try; default: that of the environment, then PLATFORM.
-    """
-    with Rendering(directory, video, platforms) as rendering:
-        return rendering.result(progress)
 
 
 def existing(directory: Path) -> Rendered:

@@ -127,8 +127,14 @@ class LoopDelay:
 
     def pause(self) -> None:
         """Take no tick: no setpoint from the laws was sent. The value is unknown."""
-        now = self.sums.now
-        now[STAMP] = now[VALUE] = math.nan
+        pause(self.sums)
+
+
+@jit
+def pause(state: DelaySums) -> None:
+    """Forget the last tick; the delay is unknown."""
+    state.now[STAMP] = math.nan
+    state.now[VALUE] = math.nan
 
 
 @jit

@@ -126,7 +126,6 @@ class OffboardParameters(ParameterSet):
     )
 
 
-_FLYING, _IN_OFFBOARD = Phase.FLYING, Mode.OFFBOARD  # an enumeration's lookup is slow
 _BEGIN_AND_END = (
     *(Phase.WAITING, Phase.STREAMING, Phase.OFFBOARD, Phase.ARMING),
     *(Phase.DISARMING, Phase.DISARMED),
@@ -213,12 +212,12 @@ class OffboardSequence:
         """Advance to `time` [s] and return the request to send now, None for none."""
         self._time = time
         if (
-            self.phase is _FLYING
+            self.phase is Phase.FLYING
             and self._desired
             and self._offboard_since is not None
             and seen.connected
             and seen.armed
-            and seen.mode is _IN_OFFBOARD
+            and seen.mode is Mode.OFFBOARD
             and not self._killed
             and time - min(self._streamed, seen.delivered) <= LINK_GAP
         ):

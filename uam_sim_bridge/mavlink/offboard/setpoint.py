@@ -266,7 +266,7 @@ class RateThrustMap:
     ) -> tuple[np.ndarray, float]:
         """Return `map` of the attitude and body rates in state (3, 6 + n), see `coordinates`."""
         thrust = self._map_state(tau_p, tau_q, state, self._flat, self.rates)
-        return self.rates, thrust if thrust >= 0.0 else _accepted(thrust)
+        return self.rates, _accepted(thrust)
 
     def scaled(self, command: float, factor: float) -> float:
         """Return the normalised thrust that makes `factor` times the thrust of `command`."""
