@@ -1,4 +1,4 @@
-"""Plant time against the wall clock: when a tick is due, and which wall time it has.
+"""Ticks against the wall clock: when a tick is due, and which wall time it has.
 
 A plant that is late runs a little faster until it is on time again, but not in a burst: the other
 nodes could not follow. One that is late by more than `latest` lets this time go: the world has then

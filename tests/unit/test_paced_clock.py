@@ -63,3 +63,38 @@ def test_a_little_lateness_of_every_tick_does_not_add_up(lateness, latest):
         clock.note(tick)
     assert steady.now - 1.0 <= len(lateness) * PERIOD + 0.0007 + 1e-9
     assert clock.lost == 0.0
+
+
+class Bus:
+    """Servo cycles of given lengths [s] at 250 Hz; `begun`: when each began."""
+
+    def __init__(self):
+        self.now, self.begun = 0.0, []
+        self.pace = PacedClock(PERIOD, steady=lambda: self.now, catch_up=math.inf)
+
+    def run(self, *lengths):
+        for cycle, length in enumerate(lengths):
+            self.pace.note(cycle)
+            self.begun.append(self.now)
+            self.now += length
+            self.now += self.pace.left(cycle + 1)
+        return self.now
+
+
+def test_bus_cycles_begin_at_absolute_deadlines():
+    bus = Bus()
+    bus.run(*[0.001, 0.003] * 50)
+    assert bus.begun == pytest.approx([0.004 * k for k in range(100)])
+
+
+def test_late_bus_cycles_do_not_lower_the_rate():
+    """Three of four take longer than a period, but not on the average."""
+    bus = Bus()
+    assert bus.run(*[0.005, 0.005, 0.005, 0.001] * 50) == pytest.approx(0.8, abs=0.004)
+
+
+def test_a_stalled_bus_is_not_made_up_for_by_a_burst():
+    bus = Bus()
+    bus.run(0.5, *[0.001] * 10)
+    assert bus.begun[1:] == pytest.approx([0.5 + 0.004 * k for k in range(10)])
+    assert bus.begun[0] == 0.0

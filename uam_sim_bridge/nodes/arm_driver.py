@@ -37,11 +37,11 @@ from uam_sim_bridge.drivers.dynamixel.chain import (
     hardware_file,
     load_chain,
 )
-from uam_sim_bridge.drivers.dynamixel.cycle_pace import CyclePace
 from uam_sim_bridge.drivers.dynamixel.driver import ArmDriver, Reading
 from uam_sim_bridge.drivers.dynamixel.parameters import ArmDriverParameters
 from uam_sim_bridge.drivers.dynamixel.servo_bus import BusLost
 from uam_sim_bridge.nodes.late_device import LateDevice
+from uam_sim_bridge.paced_clock import PacedClock
 
 NAME = "arm_driver"
 SWITCH = 0.0005  # [s] the bus thread waits at most so long for the interpreter; Python's is 5 ms
@@ -174,13 +174,15 @@ class ArmDriverNode(UamNode):
             while not self._take_bus():
                 if self._ending.wait(ABSENT_WAIT):
                     return
-            pace = CyclePace(self.driver.rate)
+            pace, cycle = PacedClock(1.0 / self.driver.rate, catch_up=math.inf), 0
             while not self._ending.is_set():
+                pace.note(cycle)
+                cycle += 1
                 begun = time.perf_counter()
                 reading = self.driver.cycle()
                 if reading is not None:
                     self._publish(reading, begun)
-                if left := pace.left():
+                if left := pace.left(cycle):
                     time.sleep(left)
         except Exception as error:
             self.failure = f"{type(error).__name__}: {error}"
