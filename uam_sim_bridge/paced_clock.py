@@ -3,7 +3,8 @@
 A plant that is late runs a little faster until it is on time again, but not in a burst: the other
 nodes could not follow. One that is late by more than `latest` lets this time go: the world has then
 stood still for this time, and everything that is stamped stays as old as that at most, as an
-autopilot with a clock of its own requires.
+autopilot with a clock of its own requires. The cycles of the servo bus have the same rules, but no
+limit to how fast they catch up: nothing waits for them.
 """
 
 from __future__ import annotations
