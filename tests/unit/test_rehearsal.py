@@ -23,7 +23,7 @@ from uam_sim_bridge.mavlink.protocol.wire import Codec, Framer, mavlink2
 from uam_sim_bridge.paced_clock import CATCH_UP, LATEST, PacedClock
 from uam_sim_bridge.plant import Vehicle
 from uam_sim_bridge.rehearsal.cables import Cables
-from uam_sim_bridge.rehearsal.ground_station import GroundStation
+from uam_sim_bridge.rehearsal.ground_station import ALTITUDE, LATITUDE, LONGITUDE, GroundStation
 from uam_sim_bridge.rehearsal.hands import Grip, joint_torque, wrench
 from uam_sim_bridge.rehearsal.hil_line import SILENT, STOPPED, HilLine
 from uam_sim_bridge.rehearsal.laboratory import Devices, Laboratory
@@ -396,7 +396,12 @@ def test_the_ground_station_asks_for_the_origin_until_it_is_there():
         kinds += [message.get_type() for message in station.due(0.0501 * k)]
     assert kinds.count("MANUAL_CONTROL") == 100 and kinds.count("HEARTBEAT") == 5
     assert kinds.count("SET_GPS_GLOBAL_ORIGIN") == 3
-    station.take(mavlink2.MAVLink_gps_global_origin_message(0, 0, 0))
+    # PX4 keeps latitude and longitude alone while its height is not valid
+    station.take(mavlink2.MAVLink_gps_global_origin_message(LATITUDE, LONGITUDE, 0))
+    assert not station.origin_known
+    again = [message.get_type() for message in station.due(30.0)]
+    assert "SET_GPS_GLOBAL_ORIGIN" in again
+    station.take(mavlink2.MAVLink_gps_global_origin_message(LATITUDE - 1, LONGITUDE, ALTITUDE))
     assert station.origin_known
     later = [message.get_type() for message in station.due(60.0)]
     assert "SET_GPS_GLOBAL_ORIGIN" not in later and "HEARTBEAT" in later

@@ -1,7 +1,9 @@
 """The pilot's ground station and radio in a rehearsal with PX4: without them PX4 does not arm.
 
 PX4 as a vehicle needs it (config/px4/vehicle.yaml) requires the heartbeat of a ground station, a
-radio or joystick, and a global position, whose origin the ground station sets.
+radio or joystick, and a global position, whose origin the ground station sets. An origin that comes
+before EKF2's height is valid loses its altitude, and PX4 does not arm: it is sent until PX4
+reports it complete.
 """
 
 from __future__ import annotations
@@ -10,14 +12,15 @@ from uam_sim_bridge.mavlink.protocol.wire import Message, mavlink2
 
 SYSTEM, COMPONENT = 255, 190  # of a ground station
 HEARTBEAT_PERIOD, STICKS_PERIOD = 1.0, 0.05  # [s]; PX4 regards sticks as lost after 0.5 s
-ORIGIN_PERIOD = 2.0  # [s] until PX4 reports the origin
+ORIGIN_PERIOD = 2.0  # [s] until PX4 reports the origin complete
 CENTRED = 500  # throttle of MANUAL_CONTROL, 0 to 1000
 # of the room: any place will do; the same as that of the simulated magnetometer and barometer
 LATITUDE, LONGITUDE, ALTITUDE = 473977420, 85455940, 488000  # [1e-7 deg], [mm]
+NEAR = 100, 100, 1000  # differences of a reported origin, in the same units: PX4 rounds
 
 
 class GroundStation:
-    """Sends heartbeats, centred sticks and the origin; `origin_known`: PX4 has reported it."""
+    """Sends heartbeats, centred sticks and the origin; `origin_known`: PX4 has it."""
 
     def __init__(self, autopilot: int = 1) -> None:
         """autopilot: its MAVLink system id."""
@@ -45,8 +48,14 @@ class GroundStation:
         return found
 
     def take(self, message: Message) -> None:
-        """Take a message of the autopilot."""
-        self.origin_known = self.origin_known or message.get_type() == "GPS_GLOBAL_ORIGIN"
+        """Take a message of the autopilot; a complete origin stays known."""
+        if message.get_type() != "GPS_GLOBAL_ORIGIN" or self.origin_known:
+            return
+        reported = message.latitude, message.longitude, message.altitude
+        sent = LATITUDE, LONGITUDE, ALTITUDE
+        self.origin_known = all(
+            abs(has - given) <= near for has, given, near in zip(reported, sent, NEAR, strict=True)
+        )
 
     def _at(self, what: str, now: float, period: float) -> bool:
         """Return whether `what` is due, at most once per `period` [s]."""
