@@ -214,12 +214,20 @@ def test_a_vehicles_log_has_the_estimate_in_place_of_the_truth(tmp_path):
 class ReferencesOnly:
     """A log with references alone: checks by hand from 1 s on, take-off at 5 s."""
 
+    def __init__(self, count=5):
+        self.count = count
+
     def blocks(self, topic):
-        stamps = np.array([1, 2, 5, 6, 7], dtype=np.int64) * 1_000_000_000
-        fields = {row: np.zeros((5, 8)) for row in log_reader.STATE_ROWS}
-        fields["time_from_start"] = np.array([0, 0, 0, 1, 2], dtype=np.int64) * 1_000_000_000
-        return [cdr.Block(np.arange(5), stamps, [""] * 8, fields)]
+        n = self.count
+        stamps = np.array([1, 2, 5, 6, 7], dtype=np.int64)[:n] * 1_000_000_000
+        fields = {row: np.zeros((n, 8)) for row in log_reader.STATE_ROWS}
+        fields["time_from_start"] = np.array([0, 0, 0, 1, 2], dtype=np.int64)[:n] * 1_000_000_000
+        return [cdr.Block(np.arange(n), stamps, [""] * 8, fields)]
 
 
 def test_checks_by_hand_before_the_flight_are_no_take_off():
     assert log_reader.References(ReferencesOnly(), 8).takeoff == 5_000_000_000
+
+
+def test_a_start_refused_after_checks_by_hand_has_no_take_off():
+    assert log_reader.References(ReferencesOnly(2), 8).takeoff is None

@@ -49,7 +49,7 @@ class References:
     def __init__(self, log: Log, size: int):
         """size: number of entries of chi."""
         stamps, rows, flying = [], [], []
-        self.takeoff: int | None = None  # stamp [ns] of mission time 0
+        self.takeoff: int | None = None  # stamp [ns] of mission time 0; None: no take-off
         for block in log.blocks(topics.REFERENCE):
             whole = len(block.names) == size
             values = np.zeros((len(block.stamps), 3, size))
@@ -61,8 +61,8 @@ class References:
             if whole:
                 since = block.fields["time_from_start"]
                 flown = since > 0  # 0 also while a person tilts the vehicle by hand, before it
-                begun = block.stamps - since
-                self.takeoff = int(np.min(begun[flown] if flown.any() else begun))
+                if flown.any():
+                    self.takeoff = int(np.min((block.stamps - since)[flown]))
         if not stamps:
             raise UnreadableLog("the log has no reference: the mission did not start")
         joined = np.hstack([np.vstack(rows), np.vstack(flying)])
