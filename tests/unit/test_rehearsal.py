@@ -4,6 +4,7 @@ import math
 import time
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -13,6 +14,7 @@ from hypothesis import strategies as st
 
 from uam_control.maths.rotations import quaternion_from_euler
 from uam_control.vehicle import load_description
+from uam_lab.rehearsal.engine import RehearsalCourse
 from uam_sim_bridge.drivers.dynamixel.chain import hardware_file, load_chain
 from uam_sim_bridge.drivers.mocap import calibration
 from uam_sim_bridge.drivers.mocap.calibration import Calibration
@@ -482,3 +484,36 @@ def test_a_file_of_the_matrix_has_thirty_flights():
         (one,) = cell.schedule.faults
         assert one.fault.PLACE == CABLE
         assert (cell.moment == "start") == (cell.promise.outcomes == (REFUSED,))
+
+
+class RefusesMeanwhile:
+    """A start that is refused while the vehicle's messages are read."""
+
+    def __init__(self):
+        self.started, self.refused, self.waits_for = False, "", "the lists"
+
+    def vehicle_course(self, listener):
+        return self
+
+    def starter(self):
+        return self
+
+    def say(self, line):
+        pass
+
+    def running(self, name):
+        return True
+
+    def goes_on(self):
+        self.waits_for = self.refused = "open: clear"
+        return True
+
+
+def test_a_start_refused_at_any_moment_is_never_called_an_interrupt():
+    rehearsal = RefusesMeanwhile()
+    stored = SimpleNamespace(
+        vehicle_course=rehearsal.vehicle_course, starter=rehearsal.starter, say=rehearsal.say
+    )
+    course = RehearsalCourse(stored, rehearsal, None)
+    assert not course.goes_on()
+    assert stored.refused == "open: clear"

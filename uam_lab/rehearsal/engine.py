@@ -213,10 +213,11 @@ class RehearsalCourse:
     def goes_on(self) -> bool:
         """Return whether the laboratory and the vehicle's flight go on."""
         starter, rehearsal = self._starter, self._rehearsal
+        vehicle = self._vehicle.goes_on()
         rehearsal.started, rehearsal.refused = starter.started, starter.refused
         now = time.monotonic()
         if starter.waits_for != self._said and not starter.started and now >= self._say_at:
             self._said, self._say_at = starter.waits_for, now + SAY_PERIOD
             rehearsal.say(f"before the start: {self._said}")
-        vehicle = self._vehicle.goes_on()
-        return vehicle and not starter.refused and self._children.running(LABORATORY)
+        # the starter decides in a thread of its own: what ends the rehearsal is what was stored
+        return vehicle and not rehearsal.refused and self._children.running(LABORATORY)
