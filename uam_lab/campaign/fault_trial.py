@@ -23,7 +23,7 @@ class FaultTrial:
 
 @dataclass(frozen=True)
 class FaultResult:
-    """Result of one flight. why: unmet criteria of a completed mission.
+    """Result of one flight. why: unmet criteria of a completed mission, notes of the flight.
 
     down_after_s: from the fault to the final touchdown, None if the mission was completed or
     without touchdown. kept: whether the promise was kept, None without a promise. worst: largest
@@ -64,7 +64,7 @@ def judged(cell: Cell, outcome: Outcome, figures: Mapping[str, Any] | None) -> F
         fault=cell.fault,
         moment=cell.moment,
         outcome=ending,
-        why="; ".join(figures["shortfalls"]),
+        why="; ".join([*figures["shortfalls"], *outcome.notes]),
         duration_s=figures["duration_s"],
         down_after_s=down,
         kept=None if promise is None else promise.kept(ending, down),

@@ -13,7 +13,8 @@ from diagnostic_msgs.msg import DiagnosticArray
 from rclpy.serialization import deserialize_message
 
 from uam_lab.recording.mcap_reader import UnreadableLog, read_log
-from uam_lab.rehearsal.rehearsed_outcome import statistics
+from uam_lab.recording.node_statistics import statistics
+from uam_lab.rehearsal.laboratory_process import STATISTICS
 from uam_msgs_py.messages import topics
 
 NAME = "devices.json"
@@ -52,7 +53,7 @@ def read(log: Path, logs: Path) -> dict[str, Any]:
         found = {}
     data = found[topics.DIAGNOSTICS.name].messages if found else []
     figures = of_reports(values_of(deserialize_message(one, DiagnosticArray) for one in data))
-    return figures | of_laboratory(statistics(logs))
+    return figures | of_laboratory(statistics(logs / STATISTICS))
 
 
 def values_of(messages: Iterable[DiagnosticArray]) -> dict[str, list[Mapping[str, str]]]:

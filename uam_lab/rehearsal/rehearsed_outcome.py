@@ -2,10 +2,6 @@
 
 from __future__ import annotations
 
-import json
-from pathlib import Path
-from typing import Any
-
 import numpy as np
 
 from uam_lab.flight.flight_settings import FlightSettings
@@ -13,6 +9,7 @@ from uam_lab.processes.processes import NodeFailed
 from uam_lab.recording.log_reader import read_flight
 from uam_lab.recording.logged_topics import Log
 from uam_lab.recording.mcap_reader import UnreadableLog
+from uam_lab.recording.node_statistics import losses, statistics
 from uam_lab.rehearsal.laboratory_process import STATISTICS
 from uam_lab.results.outcome import Outcome
 from uam_lab.results.result_folder import ResultFolder
@@ -34,7 +31,8 @@ def read_outcome(
     failure: the failed node, if any; refused: why the mission was not started, "" if it was.
     """
     outcome = Outcome(series=None, interrupted=interrupted)
-    numbers = statistics(folder.path / "logs")
+    logs = folder.path / "logs"
+    numbers = statistics(logs / STATISTICS)
     if refused:
         outcome.failure = REFUSED + refused
     elif failure is not None and not interrupted:
@@ -42,6 +40,7 @@ def read_outcome(
     outcome.wall_s = float(numbers.get("wall_s", 0.0))
     if lost := numbers.get("lost_s"):
         outcome.notes.append(f"the plant could not keep real time: {lost:.2f} s lost")
+    outcome.notes.extend(losses(logs))
     try:
         log = Log.read(folder.log)
         flight = read_flight(folder.log, settings.scenario, vehicle=settings.vehicle)
@@ -56,14 +55,6 @@ def read_outcome(
     if not flight.done and not outcome.partial:
         outcome.failure = numbers.get("ended_by") or "the mission did not end"
     return outcome
-
-
-def statistics(logs: Path) -> dict[str, Any]:
-    """Return what the laboratory wrote at its end, {} without it."""
-    try:
-        return json.loads((logs / STATISTICS).read_text())
-    except (OSError, ValueError):
-        return {}
 
 
 def latencies(log: Log, period: float) -> tuple[np.ndarray, int]:

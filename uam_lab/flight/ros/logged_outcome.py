@@ -2,14 +2,11 @@
 
 from __future__ import annotations
 
-import json
-from pathlib import Path
-from typing import Any
-
 from uam_lab.flight.flight_settings import FlightSettings
 from uam_lab.processes.processes import NodeFailed
 from uam_lab.recording.log_reader import read_flight
 from uam_lab.recording.mcap_reader import UnreadableLog
+from uam_lab.recording.node_statistics import RECORDER, losses, statistics
 from uam_lab.results.outcome import Outcome
 from uam_lab.results.result_folder import ResultFolder
 
@@ -24,7 +21,8 @@ def read_outcome(
     outcome = Outcome(series=None, interrupted=interrupted)
     if failure is not None and not interrupted:
         outcome.failure, outcome.details = str(failure), failure.last_lines
-    numbers = _statistics(folder.path / "logs" / "mujoco_sim.json")
+    logs = folder.path / "logs"
+    numbers = statistics(logs / "mujoco_sim.json")
     outcome.wall_s = numbers.get("wall_s", 0.0)
     if settings.clock == "realtime":
         outcome.latency_s = numbers.get("latency_s", [])
@@ -34,10 +32,7 @@ def read_outcome(
             outcome.notes.append(
                 f"{late} of {total} setpoints were more than one control period late"
             )
-    recorder = _statistics(folder.path / "logs" / "recorder.json")
-    if lost := recorder.get("lost"):
-        text = ", ".join(f"{count} of {topic}" for topic, count in lost.items())
-        outcome.notes.append(f"the recorder lost messages: {text}")
+    outcome.notes.extend(losses(logs))
     try:
         flight = read_flight(folder.log, settings.scenario, vehicle=settings.vehicle)
     except (UnreadableLog, OSError) as error:
@@ -50,17 +45,10 @@ def read_outcome(
         outcome.errors_of, outcome.wall_s = flight.errors_of, flight.wall_s
         outcome.latency_s, outcome.missed_ticks = flight.latency_s, flight.missed
     if not flight.done and not outcome.partial:
-        ended = recorder.get("ended") or numbers.get("ended_by")
-        if settings.dry_run and ended and not recorder.get("ended"):
+        full = statistics(logs / RECORDER).get("ended")
+        ended = full or numbers.get("ended_by")
+        if settings.dry_run and ended and not full:
             outcome.abort_reason = f"dry run, {ended}: nothing was armed"
         else:
             outcome.failure = ended or "the mission did not end"
     return outcome
-
-
-def _statistics(file: Path) -> dict[str, Any]:
-    """Return the statistics that a node wrote at its end, {} without them."""
-    try:
-        return json.loads(file.read_text())
-    except (OSError, ValueError):
-        return {}

@@ -1,0 +1,26 @@
+"""What nodes write at their end, as JSON in the folder of the logs."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+RECORDER = "recorder.json"
+
+
+def statistics(file: Path) -> dict[str, Any]:
+    """Return what a node wrote at its end, {} without it."""
+    try:
+        return json.loads(file.read_text())
+    except (OSError, ValueError):
+        return {}
+
+
+def losses(logs: Path) -> list[str]:
+    """Return a note about the messages that the recorder lost, in a list; [] if it lost none."""
+    lost = statistics(logs / RECORDER).get("lost")
+    if not lost:
+        return []
+    text = ", ".join(f"{count} of {topic}" for topic, count in lost.items())
+    return [f"the recorder lost messages: {text}"]
