@@ -9,12 +9,14 @@ DISARMED = "the autopilot has disarmed, and the mission did not end"
 OVERTIME = 60.0  # s of simulation time for start, holds by limits and touchdown
 
 
-def time_limit(scenario: Scenario, parameters: MissionParameters) -> float:
-    """Return the simulation time [s] at which a flight of this scenario is ended.
+def time_limit(scenario: Scenario, parameters: MissionParameters | None) -> float:
+    """Return the time [s] at which a flight of this scenario is ended, simulated or since arming.
 
-    A hold by command lasts up to command_timeout and then lands; this limit comes later.
+    A hold by command lasts up to command_timeout and then lands; this limit comes later. Without
+    parameters: of a flight to which nobody gives commands.
     """
-    return scenario.landing.at + scenario.landing.duration + OVERTIME + parameters.command_timeout
+    commanded = 0.0 if parameters is None else parameters.command_timeout
+    return scenario.landing.at + scenario.landing.duration + OVERTIME + commanded
 
 
 class Settled:

@@ -14,6 +14,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+from uam_control.mission.time_limit import time_limit
 from uam_lab.flight.flight_settings import FlightSettings
 from uam_lab.flight.observer import Observer
 from uam_lab.flight.ros import node_arguments, supervise
@@ -78,7 +79,7 @@ class RehearsalEngine:
             sections[wiring.BRIDGE] = required | sections[wiring.BRIDGE]
             _prepare_checklist(sections, self._options.checklist)
             sections[LABORATORY] = laboratory_process.parameters(
-                lab, self._options, devices, logs, ports
+                lab, self._options, devices, logs, ports, _flight_limit(settings)
             )
             node_arguments.write(sections, settings, folder)
             rehearsal = _Rehearsal(lab, settings, self._options, folder, ports, observer, stop)
@@ -89,6 +90,16 @@ class RehearsalEngine:
         outcome = read_outcome(settings, folder, failure, refused, stop.raised)
         write_json(folder.path / device_figures.NAME, device_figures.read(folder.log, logs))
         return outcome
+
+
+def _flight_limit(settings: FlightSettings) -> float:
+    """Return the time [s] after arming that ends a flight with faults, which may never land.
+
+    0, never, without faults: a person may fly by goals.
+    """
+    if not settings.faults:
+        return 0.0
+    return time_limit(settings.scenario, None)
 
 
 def _prepare_checklist(sections: dict[str, dict[str, Any]], required: bool) -> None:

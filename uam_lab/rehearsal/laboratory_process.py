@@ -37,9 +37,17 @@ AUTOPILOT_WAIT = 60.0  # [s] for which the autopilot waits for the simulator
 
 
 def parameters(
-    lab: Lab, options: RehearsalOptions, devices: Path, logs: Path, ports: Ports
+    lab: Lab,
+    options: RehearsalOptions,
+    devices: Path,
+    logs: Path,
+    ports: Ports,
+    flight_limit: float = 0.0,
 ) -> dict[str, Any]:
-    """Return the parameters of the laboratory; lab: as rehearsed; devices, logs: folders."""
+    """Return the parameters of the laboratory; lab: as rehearsed; devices, logs: folders.
+
+    flight_limit [s]: see `LaboratoryParameters`.
+    """
     found = {
         "vehicle": lab.vehicle.source,
         "vehicle_changes": json.dumps(dict(options.vehicle_changes)),
@@ -58,7 +66,7 @@ def parameters(
         "hil": TCP if options.px4 is None else LINE,
         "faults": options.faults.only(CABLE).to_text(),
         "person": options.checklist,
-        "time_limit": options.time_limit,
+        "flight_limit": flight_limit,
         "statistics": str(logs / STATISTICS),
     }
     found["poses"] = TOPIC if lab.mocap is None else NATNET

@@ -15,7 +15,7 @@ class RehearsalOptions:
     too; faults: of cables.
 
     arm_start (n,) [rad]: joint angles on the ground, () for stowed; checklist: whether the lists
-    are required and a person does them; time_limit [s], 0 for none; px4: a build without lockstep
+    are required and a person does them; px4: a build without lockstep
     that flies in the stand-in's place, px4_params: NAME=VALUE for it.
     """
 
@@ -25,6 +25,5 @@ class RehearsalOptions:
     faults: Schedule = Schedule()
     arm_start: tuple[float, ...] = ()
     checklist: bool = True
-    time_limit: float = 0.0
     px4: Px4Installation | None = None
     px4_params: tuple[str, ...] = ()

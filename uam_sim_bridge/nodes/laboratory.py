@@ -127,27 +127,29 @@ class Rehearsal:
             pass
 
     def run(self) -> None:
-        """Run ticks until the mission is over, the time limit, or a signal."""
+        """Run ticks until the mission is over, the limit of the flight, or a signal."""
         lab, clock, numbers = self.lab, self.clock, self.statistics
         gc.collect()
         gc.freeze()
         numbers.fifo_priority = hardware_priority.prefer()
         clock.begin()
         begin, end, settled = time.monotonic(), math.inf, Settled()
+        limit, latest = self._p.flight_limit or math.inf, math.inf
         while not self._stop.raised and not numbers.ended_by:
             clock.note(lab.plant.tick)
             host = clock.host(lab.plant.tick)
             self._tick(host)
             now = lab.plant.time
-            numbers.armed = numbers.armed or lab.hil.armed
+            if lab.hil.armed and not numbers.armed:
+                numbers.armed, latest = True, now + limit
             if self._mission.done and math.isinf(end):
                 end = now + self._p.linger
             if now >= end:
                 numbers.ended_by = "mission"
             elif settled.over(now, lab.hil.armed):
                 numbers.ended_by = DISARMED
-            elif 0.0 < self._p.time_limit <= now:
-                numbers.ended_by = f"time limit of {self._p.time_limit:g} s"
+            elif now >= latest:
+                numbers.ended_by = f"time limit of {limit:g} s after arming"
         numbers.ended_by = numbers.ended_by or "interrupt"
         numbers.wall_s = time.monotonic() - begin
 

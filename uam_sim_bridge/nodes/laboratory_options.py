@@ -77,8 +77,8 @@ class LaboratoryParameters(SimulatedParameters):
     linger: float = number(
         1.0, "time after the mission, in which the autopilot can land and disarm", "s", 0.0, 600.0
     )
-    time_limit: float = number(
-        0.0, "time at which the rehearsal ends in any case, 0 = never", "s", 0.0, 1e6
+    flight_limit: float = number(
+        0.0, "time after the first arming, after which the rehearsal ends, 0: never", "s", 0.0, 1e6
     )
 
 
