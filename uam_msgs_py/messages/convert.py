@@ -28,6 +28,7 @@ from uam_msgs_py.messages.serialized import (
 )
 from uam_msgs_py.messages.topics import BODY, WORLD
 
+W_FIRST = np.array([3, 0, 1, 2])  # x y z w of ROS → w x y z
 SWITCH = {on: serialize_message(Bool(data=on)) for on in (False, True)}
 
 
@@ -124,7 +125,7 @@ def read_pose(data: bytes, frame: str = WORLD) -> tuple[int, np.ndarray, np.ndar
     message = Serialized(PoseStamped, data)
     if message.layout.frame != frame:
         raise BadMessage(f"frame '{message.layout.frame}', expected '{frame}'")
-    quaternion = np.roll(message.numbers("orientation"), 1)
+    quaternion = message.numbers("orientation").take(W_FIRST)
     norm = math.sqrt(quaternion @ quaternion)
     if not abs(norm - 1.0) < 0.01:
         raise BadMessage(f"orientation has norm {norm:.3g}, 1 expected")

@@ -112,12 +112,20 @@ class Serialized:
     def vector(self, field: str) -> np.ndarray:
         """Return a copy (n,) of a field of numbers; raises BadMessage unless all are finite."""
         values = self.numbers(field).copy()
-        if not math.isfinite(values.sum()):
+        if not all_finite(values):
             raise BadMessage(f"{field} is {values.tolist()}, finite numbers expected")
         return values
 
 
 _NOTHING = np.zeros(0)
+
+
+def all_finite(values: np.ndarray) -> bool:
+    """Return whether no number is infinite or NaN, and their sum does not overflow.
+
+    The ufunc itself: the method `sum` takes twice as long.
+    """
+    return math.isfinite(np.add.reduce(values, None))
 
 
 def _converted(kind: type, data: bytes) -> bytes:
@@ -144,7 +152,7 @@ def check_length(what: str, length: int, names: Sequence[str]) -> None:
 
 def refuse_infinite(what: str, values: np.ndarray, names: Sequence[str]) -> None:
     """Raise BadMessage unless all values (n,) of the joints `names` (n) are finite."""
-    if not math.isfinite(values.sum()):
+    if not all_finite(values):
         for name, value in zip(names, values, strict=True):
             if not math.isfinite(value):
                 raise BadMessage(f"{what} of {name} is {value}")

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 
 import numpy as np
@@ -12,6 +11,7 @@ from uam_msgs_py.messages.layouts import BadMessage, Layout
 from uam_msgs_py.messages.serialized import (
     Serialized,
     Template,
+    all_finite,
     check_length,
     check_names,
     refuse_infinite,
@@ -75,7 +75,7 @@ class TrajectoryReader:
             checked = message.layout.checked[self] = self._check(message.layout)
         shape, start, strides = checked
         values = np.ndarray(shape, "<f8", message.data, start, strides).copy()
-        if not math.isfinite(values.sum()):
+        if not all_finite(values):
             for row, numbers in zip(self._rows, values, strict=True):
                 refuse_infinite(row, numbers, self._names)
             raise BadMessage("overflow")

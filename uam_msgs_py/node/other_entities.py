@@ -2,7 +2,8 @@
 
 They are checked fifty times a second, of wall time or of tick time, events once a second of wall
 time. At most one service request and one report (timer of REPORT_PERIOD or more) is served per
-check, so that many do not delay a tick.
+check, so that many do not delay a tick. Where a process has several nodes, a check looks at the
+parameter services of one of them, in turn: all together would take a millisecond.
 Clients and events are passed to a SingleThreadedExecutor. Service requests are not: that executor
 would serve waiting messages first.
 """
@@ -34,17 +35,20 @@ class OtherEntities:
         for node in nodes:
             self._executor.add_node(node)
         self._next_check, self._checked_at, self._next_events = 0.0, 0, 0.0
+        self._turn = 0  # of the node whose parameter services were looked at
         self.gather()
 
     def gather(self) -> None:
         """Collect the nodes' entities; call it when they have changed."""
         nodes = self._nodes
-        self._services = [s for node in nodes for s in node.services]
+        self._services = [s for node in nodes for s in node.services if not _of_parameters(s)]
+        self._in_turn = [[s for s in node.services if _of_parameters(s)] for node in nodes]
+        services = len(self._services) + max(map(len, self._in_turn))
         self._clients = [c.handle for node in nodes for c in node.clients]
         self._timers = [t for node in nodes for t in node.timers]
         self._waitables = [w for node in nodes for w in node.waitables]
         events = sum(waitable.get_num_entities().num_events for waitable in self._waitables)
-        counts = (len(self._timers), len(self._clients), len(self._services))
+        counts = (len(self._timers), len(self._clients), services)
         self._others = WaitSet(0, 0, *counts, 0, self._context.handle)
         self._events = WaitSet(0, 0, 0, 0, 0, events, self._context.handle)
 
@@ -69,9 +73,10 @@ class OtherEntities:
 
     def _serve(self) -> bool:
         """Serve what is ready; return whether a service, client or event was."""
-        others = self._others
+        self._turn = (self._turn + 1) % len(self._in_turn)
+        others, looked_at = self._others, [*self._services, *self._in_turn[self._turn]]
         others.clear_entities()
-        for service in self._services:
+        for service in looked_at:
             others.add_service(service.handle)
         for handle in self._clients:
             others.add_client(handle)
@@ -83,7 +88,7 @@ class OtherEntities:
         for _ in range(handed):
             self._executor.spin_once(timeout_sec=0)
         self._call([timer for timer in self._timers if timer.handle.pointer in timers])
-        request = next((s for s in self._services if s.handle.pointer in services), None)
+        request = next((s for s in looked_at if s.handle.pointer in services), None)
         if request is not None:
             _answer(request)
         return bool(handed or services)
@@ -116,6 +121,11 @@ class OtherEntities:
     def shutdown(self) -> None:
         """Shut down the inner executor."""
         self._executor.shutdown()
+
+
+def _of_parameters(service: Service) -> bool:
+    """Return whether a service reads, lists or sets the parameters of its node."""
+    return service.srv_type.__module__.startswith("rcl_interfaces.")
 
 
 def _answer(service: Service) -> None:
