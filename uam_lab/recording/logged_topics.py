@@ -60,6 +60,7 @@ class Log:
             for topic in TOPICS
             if (name := expanded(namespace, topic.name)) in found
         }
+        self._blocks: dict[Topic, list[cdr.Block]] = {}
 
     @classmethod
     def read(cls, path: Path) -> Log:
@@ -97,9 +98,13 @@ class Log:
         return np.concatenate([one.stamps for one in blocks]), np.array(log.published)
 
     def blocks(self, topic: Topic) -> list[cdr.Block]:
-        """Return the decoded messages of a topic; may be empty."""
-        log = self._topics.get(topic)
-        return cdr.read(log.type_name, log.messages) if log and log.messages else []
+        """Return the decoded messages of a topic, decoded once; may be empty."""
+        made = self._blocks.get(topic)
+        if made is None:
+            log = self._topics.get(topic)
+            made = cdr.read(log.type_name, log.messages) if log and log.messages else []
+            self._blocks[topic] = made
+        return made
 
     def samples(self, topic: Topic, fields: Sequence[str], width: int) -> StampedRows:
         """Return `fields` side by side, `width` numbers each; zeros for empty (idle) messages."""

@@ -1,14 +1,24 @@
-"""Reads an MCAP log in one pass, also without an index (after a kill of the recorder)."""
+"""Reads an MCAP log in one pass, also without an index (after a kill of the recorder).
+
+Records are told apart here, by struct: the reader of the library makes an object of each message
+and of each entry of the index, which takes five times as long. Chunks, channels, schemas and
+metadata are read by the library. Layout of the records: the MCAP specification, "Records".
+"""
 
 import struct
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
+from io import BytesIO
 from pathlib import Path
 
-from mcap.exceptions import EndOfFile
-from mcap.records import Channel, DataEnd, McapRecord, Message, Metadata, Schema
-from mcap.stream_reader import MAGIC_SIZE, StreamReader
+from mcap.data_stream import ReadDataStream
+from mcap.opcode import Opcode
+from mcap.records import Channel, Chunk, Metadata, Schema
+from mcap.stream_reader import MAGIC_SIZE, get_chunk_data_stream
 from mcap.writer import MCAP0_MAGIC
+
+HEADER = struct.Struct("<BQ")  # opcode, length of the content [bytes]
+MESSAGE = struct.Struct("<HIQQ")  # channel, sequence, log time [ns], publish time [ns]
 
 
 class UnreadableLog(ValueError):
@@ -30,40 +40,77 @@ def read_log(path: Path, chosen: Callable[[str], bool] = lambda _: True) -> dict
 
     An incomplete last record is ignored. Raises UnreadableLog, OSError.
     """
-    found: dict[str, TopicLog] = {}
-    types: dict[int, str] = {}  # schema id → type name
-    logs: dict[int, TopicLog] = {}  # channel id → its topic's messages
-    for record in _records(path):
-        if isinstance(record, Message):
-            log = logs.get(record.channel_id)
+    topics = _Topics(chosen)
+    for opcode, content in _records(path):
+        if opcode == Opcode.CHUNK:
+            stream, length = get_chunk_data_stream(Chunk.read(_stream(content)))
+            topics.read(stream.read(length))
+        else:
+            topics.read_one(opcode, content, 0, len(content))
+    return topics.found
+
+
+class _Topics:
+    """Collects the messages of the chosen topics in `found`."""
+
+    def __init__(self, chosen: Callable[[str], bool]) -> None:
+        self.found: dict[str, TopicLog] = {}
+        self._chosen = chosen
+        self._types: dict[int, str] = {}  # schema id → type name
+        self._logs: dict[int, TopicLog] = {}  # channel id → its topic's messages
+
+    def read(self, records: bytes) -> None:
+        """Take the records of a chunk."""
+        at, end = 0, len(records)
+        while at < end:
+            opcode, length = HEADER.unpack_from(records, at)
+            at += HEADER.size
+            self.read_one(opcode, records, at, at + length)
+            at += length
+
+    def read_one(self, opcode: int, data: bytes, begin: int, end: int) -> None:
+        """Take the record with the content data[begin:end]."""
+        if opcode == Opcode.MESSAGE:
+            channel, _, logged, published = MESSAGE.unpack_from(data, begin)
+            log = self._logs.get(channel)
             if log is not None:
-                log.times.append(record.log_time)
-                log.published.append(record.publish_time)
-                log.messages.append(record.data)
-        elif isinstance(record, Schema):
-            types[record.id] = record.name
-        elif isinstance(record, Channel) and chosen(record.topic):
-            log = TopicLog(types[record.schema_id])
-            logs[record.id] = found.setdefault(record.topic, log)
-    return found
+                log.times.append(logged)
+                log.published.append(published)
+                log.messages.append(data[begin + MESSAGE.size : end])
+        elif opcode == Opcode.SCHEMA:
+            schema = Schema.read(_stream(data[begin:end]))
+            self._types[schema.id] = schema.name
+        elif opcode == Opcode.CHANNEL:
+            channel = Channel.read(_stream(data[begin:end]))
+            if self._chosen(channel.topic):
+                log = TopicLog(self._types[channel.schema_id])
+                self._logs[channel.id] = self.found.setdefault(channel.topic, log)
 
 
 def read_metadata(path: Path) -> dict[str, dict[str, str]]:
     """Return the metadata of a log, also of a truncated one. Raises UnreadableLog, OSError."""
-    records = _records(path, emit_chunks=True)
-    return {record.name: record.metadata for record in records if isinstance(record, Metadata)}
+    records = (
+        Metadata.read(_stream(content))
+        for opcode, content in _records(path)
+        if opcode == Opcode.METADATA
+    )
+    return {record.name: record.metadata for record in records}
 
 
-def _records(path: Path, emit_chunks: bool = False) -> Iterator[McapRecord]:
-    """Yield the complete records before the index; emit_chunks: do not unpack chunks."""
-    with path.open("rb") as stream:
-        if stream.read(MAGIC_SIZE) != MCAP0_MAGIC:  # a shorter file, too
+def _stream(content: bytes) -> ReadDataStream:
+    return ReadDataStream(BytesIO(content))
+
+
+def _records(path: Path) -> Iterator[tuple[int, bytes]]:
+    """Yield opcode and content of the complete records before the index of the file."""
+    size = path.stat().st_size
+    with path.open("rb") as file:
+        if file.read(MAGIC_SIZE) != MCAP0_MAGIC:  # a shorter file, too
             raise UnreadableLog(f"{path} is not an MCAP file")
-        stream.seek(0)
-        try:
-            for record in StreamReader(stream, emit_chunks=emit_chunks).records:
-                if isinstance(record, DataEnd):
-                    return
-                yield record
-        except (EndOfFile, struct.error):  # the log was cut off here
-            return
+        while len(header := file.read(HEADER.size)) == HEADER.size:
+            opcode, length = HEADER.unpack(header)
+            if opcode == Opcode.DATA_END:
+                return
+            if length > size - file.tell():  # the log was cut off here
+                return
+            yield opcode, file.read(length)
