@@ -141,6 +141,7 @@ def test_the_drivers_run_with_the_priority_of_the_nodes_behind_them(tmp_path):
     for driver in vehicle_nodes.DRIVERS:
         assert sections[driver]["fifo_priority"] == 50
         assert "busy_poll" not in sections[driver], "a driver has no tick to wait for"
+    assert sections[wiring.RECORDER]["fifo_priority"] == 1  # it loses messages if it starves
     assert "fifo_priority" not in sections[wiring.COCKPIT]
 
 

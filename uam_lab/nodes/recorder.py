@@ -20,12 +20,20 @@ from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 from rclpy.signals import SignalHandlerOptions
 
-from uam_control.settings.parameter_set import ParameterError, ParameterSet, number, switch, text
+from uam_control.settings.parameter_set import (
+    ParameterError,
+    ParameterSet,
+    integer,
+    number,
+    switch,
+    text,
+)
+from uam_control.settings.process_parameters import ProcessParameters
 from uam_lab.recording.bag import new_log_file
 from uam_lab.recording.topic_recorder import TopicRecorder
 from uam_msgs_py.messages import topics
 from uam_msgs_py.messages.status import ERROR, OK, WARN, diagnostic
-from uam_msgs_py.node import connections
+from uam_msgs_py.node import connections, process_options
 from uam_msgs_py.node.base_node import DIAGNOSTICS_PERIOD, StopSignal, refuse
 from uam_msgs_py.node.health import LoopTime, ages
 from uam_msgs_py.node.namespace import adopt_sections, label
@@ -51,6 +59,9 @@ class RecorderParameters(ParameterSet):
     size_limit: float = number(0.0, "size at which the log ends, 0 = none", "MB", 0.0, 1e6)
     flush_period: float = number(0.5, "time between two writes to the disk", "s", 0.02, 60.0)
     poll_period: float = number(0.02, "time between two polls of the topics", "s", 0.001, 1.0)
+    fifo_priority: int = integer(
+        0, "real-time priority under SCHED_FIFO; 0: none. Below that of the nodes that fly", 0, 98
+    )
 
 
 def _health(
@@ -122,6 +133,7 @@ def main() -> int:
         rightful = rightful_nodes(node)
         refuse_unknown(node)
         recording = _open(node, options, rightful)
+        process_options.apply(ProcessParameters(fifo_priority=options.fifo_priority))
     except ParameterError as error:
         return refuse(NAME, error)
     health = node.create_publisher(

@@ -47,6 +47,7 @@ FACTS = "facts.json"
 REQUIRED = "px4_parameters.yaml"
 GAINS = "autopilot_gains.yaml"
 TICK_TIMES = "tick_times"  # folder of logs/
+RECORDER_PRIORITY = 1  # where nodes have a real-time priority: the recorder may not starve
 FLYING = set(wiring.FUSED)  # nodes of the control tick
 MEASURED = FLYING | {wiring.PLANT, wiring.FLIGHT_CONTROLLER}  # nodes that can measure their ticks
 # nodes that load the description of the vehicle
@@ -163,6 +164,8 @@ def complete(
     processes = {wiring.FLIGHT_CONTROLLER} if settings.fused else FLYING
     for node in processes & sections.keys():
         sections[node] |= settings.process.changes()
+    if settings.process.fifo_priority and wiring.RECORDER in sections:
+        sections[wiring.RECORDER]["fifo_priority"] = RECORDER_PRIORITY
     if settings.tick_times:
         place = folder.path / "logs" / TICK_TIMES
         place.mkdir(exist_ok=True)
