@@ -7,6 +7,7 @@ pytest.importorskip("rclpy")
 
 from default_columns import COLUMNS
 from rclpy.serialization import serialize_message
+from std_msgs.msg import Bool
 
 from uam_control.coordinates import coordinates
 from uam_control.laws.catalogue import LAWS
@@ -214,8 +215,8 @@ def test_a_vehicles_log_has_the_estimate_in_place_of_the_truth(tmp_path):
 class ReferencesOnly:
     """A log with references alone: checks by hand from 1 s on, take-off at 5 s."""
 
-    def __init__(self, count=5):
-        self.count = count
+    def __init__(self, count=5, arming_commanded=True):
+        self.count, self.arming_commanded = count, arming_commanded
 
     def blocks(self, topic):
         n = self.count
@@ -230,4 +231,18 @@ def test_checks_by_hand_before_the_flight_are_no_take_off():
 
 
 def test_a_start_refused_after_checks_by_hand_has_no_take_off():
-    assert log_reader.References(ReferencesOnly(2), 8).takeoff is None
+    refused = ReferencesOnly(2, arming_commanded=False)
+    assert log_reader.References(refused, 8).takeoff is None
+
+
+def test_a_mission_that_does_not_count_its_time_takes_off_with_its_first_reference():
+    assert log_reader.References(ReferencesOnly(2), 8).takeoff == 1_000_000_000
+
+
+@pytest.mark.parametrize(
+    ("commands", "commanded"), [([], True), ([False], False), ([False, True, False], True)]
+)
+def test_arming_is_commanded_unless_the_log_says_that_it_never_was(commands, commanded):
+    topic, found = topics.ARMING, TopicLog("std_msgs/msg/Bool")
+    found.messages = [serialize_message(Bool(data=one)) for one in commands]
+    assert Log({f"/{topic.name}": found}).arming_commanded is commanded

@@ -61,6 +61,8 @@ class References:
             if whole:
                 since = block.fields["time_from_start"]
                 flown = since > 0  # 0 also while a person tilts the vehicle by hand, before it
+                if not flown.any() and log.arming_commanded:  # a mission that does not count it
+                    flown[:] = True
                 if flown.any():
                     self.takeoff = int(np.min((block.stamps - since)[flown]))
         if not stamps:

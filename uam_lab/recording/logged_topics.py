@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 from diagnostic_msgs.msg import DiagnosticArray
 from rclpy.serialization import deserialize_message
+from std_msgs.msg import Bool
 
 from uam_lab.recording import cdr
 from uam_lab.recording.mcap_reader import TopicLog, UnreadableLog, read_log
@@ -24,7 +25,8 @@ ADAPTATION = {
 }
 TOPICS = (
     *(topics.TRUTH_STATE, topics.TRUTH_PAYLOAD, topics.TRUTH_ROTORS, topics.TRUTH_MAGNET),
-    *(topics.STATE, topics.REFERENCE, topics.MISSION_STATUS, topics.CHANGES, topics.FAULTS),
+    *(topics.STATE, topics.REFERENCE, topics.MISSION_STATUS, topics.ARMING, topics.CHANGES),
+    topics.FAULTS,
     *(topics.POSITION_COMMAND, topics.ATTITUDE_COMMAND, topics.ARM_COMMAND),
     *(topics.SETPOINT, topics.THRUST, topics.PAYLOAD, *ADAPTATION.values()),
 )
@@ -115,6 +117,12 @@ class Log:
         if not stamps:
             return StampedRows(np.zeros(0, np.int64), np.zeros((0, width * len(fields))))
         return StampedRows(np.concatenate(stamps), np.vstack(rows))
+
+    @property
+    def arming_commanded(self) -> bool:
+        """Whether the mission asked for arming; True also for a log without its commands."""
+        commands = self.messages(topics.ARMING)
+        return not commands or any(deserialize_message(one, Bool).data for one in commands)
 
     def statuses(self) -> list[tuple[int, MissionStatus]]:
         """Return stamps [ns] and statuses of the mission, in order."""
