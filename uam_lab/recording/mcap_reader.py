@@ -12,6 +12,7 @@ from io import BytesIO
 from pathlib import Path
 
 from mcap.data_stream import ReadDataStream
+from mcap.exceptions import EndOfFile
 from mcap.opcode import Opcode
 from mcap.records import Channel, Chunk, Metadata, Schema
 from mcap.stream_reader import MAGIC_SIZE, get_chunk_data_stream
@@ -41,12 +42,15 @@ def read_log(path: Path, chosen: Callable[[str], bool] = lambda _: True) -> dict
     An incomplete last record is ignored. Raises UnreadableLog, OSError.
     """
     topics = _Topics(chosen)
-    for opcode, content in _records(path):
-        if opcode == Opcode.CHUNK:
-            stream, length = get_chunk_data_stream(Chunk.read(_stream(content)))
-            topics.read(stream.read(length))
-        else:
-            topics.read_one(opcode, content, 0, len(content))
+    try:
+        for opcode, content in _records(path):
+            if opcode == Opcode.CHUNK:
+                stream, length = get_chunk_data_stream(Chunk.read(_stream(content)))
+                topics.read(stream.read(length))
+            else:
+                topics.read_one(opcode, content, 0, len(content))
+    except (EndOfFile, struct.error):  # a damaged record: what was read before it counts
+        pass
     return topics.found
 
 
