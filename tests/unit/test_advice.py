@@ -97,6 +97,6 @@ def test_the_sequences_reasons_carry_it():
     s.answer(Request.ARM, MavResult.TEMPORARILY_REJECTED)
     assert s.reasons[0] == (
         "Preflight Fail: ekf2 missing data → the estimator has no vision pose "
-        "yet: check mocap and EKF2_EV_CTRL"
+        "yet: check mocap and EKF2_EV_CTRL; in HITL reboot the autopilot"
     )
     assert s.reasons[1].startswith("arming refused (temporarily rejected) → an arming check failed")

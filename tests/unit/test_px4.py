@@ -37,13 +37,18 @@ LOOP_SCRIPT = """#!/bin/bash
 note() { echo "$*" >> found; }
 param() { note "$*"; }
 mavlink() { note "mavlink $*"; }
-for name in px4-pwm_out_sim px4-sensors px4-commander; do
+for name in px4-pwm_out_sim px4-sensors px4-commander px4-ekf2; do
     eval "$name() { note $name \\"\\$@\\"; }"
 done
+px4-listener() {
+    note listened
+    test "$(grep -c listened found)" -lt 3 && echo never published || echo " timestamp: 1"
+}
 px4_instance=$2
 . px4-rc.simulator
 sensors start
 commander start
+ekf2 start
 . px4-rc.mavlink
 mkdir -p log && echo first > log/1.ulg
 echo "arguments $*"
@@ -237,6 +242,8 @@ def test_in_the_loop_px4_starts_with_its_lines_and_without_a_simulator(build, tm
     assert "px4-pwm_out_sim --instance 9 start -m hil" in found
     for program in ("px4-sensors", "px4-commander"):
         assert f"{program} --instance 9 start -h" in found
+    estimator = found.index("px4-ekf2 --instance 9 start")
+    assert found[:estimator].count("listened") == 3  # after the first IMU sample
     links = [line for line in found if line.startswith("mavlink start")]
     assert links == [
         "mavlink start -d /dev/pts/77 -b 460800 -m onboard -r 36864",

@@ -98,6 +98,15 @@ def test_a_slow_answer_is_no_jump():
     assert run(sync, 3.0, 2.0, offset=1.0, delay=0.6, back=0.0) == []
 
 
+@pytest.mark.parametrize(("there", "back"), [(0.0, 1.1), (1.1, 0.0)])
+def test_quick_answers_after_slow_ones_are_no_jump(there, back):
+    sync = TimeSync()  # a link that begins with a second of messages in its buffers
+    assert run(sync, 1.5, 0.0, offset=1.0, delay=there, back=back) == []
+    assert abs(sync.offset - 1.0) > 0.5
+    assert run(sync, 10.0, 1.5, offset=1.0, delay=0.002) == []
+    assert sync.offset == pytest.approx(1.0, abs=0.02)
+
+
 def test_answers_to_others_are_ignored():
     sync = TimeSync()
     ts1 = sync.request(1.0)

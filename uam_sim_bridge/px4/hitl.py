@@ -34,6 +34,16 @@ BITS_PER_BYTE = 10
 MOTOR, ACTUATOR_SET, GRIPPER = 100, 300, 430  # output functions: the last number before the first
 OUTPUTS_OF_SET, FIRST_OF_SET = 6, 11  # outputs 11 to 16
 OUTPUT = "PWM_MAIN_FUNC"  # of the outputs of a build for a computer; HIL_ACT_FUNC on a board
+# PX4 takes the computer's whole time so far for the time step of its first IMU sample, and an
+# estimator that gets this sample begins after 5 % of that time. So it starts after the sample.
+ESTIMATOR = """\
+ekf2() {
+    while said=$(px4-listener --instance $px4_instance sensor_combined -n 1); do
+        case "$said" in *timestamp*) break ;; esac
+        sleep 0.1
+    done
+    px4-ekf2 --instance $px4_instance "$@"
+}"""
 
 
 def loop_values(
@@ -58,9 +68,10 @@ def start_script(values: Mapping[str, parameters.Value]) -> str:
             "#!/bin/sh",
             "# parameters of this flight; no simulator at a port; sensors and commander for HITL",
             *parameters.set_lines(values),
-            "unalias sensors commander",
+            "unalias sensors commander ekf2",
             "sensors() { px4-sensors --instance $px4_instance start -h; }",
             "commander() { px4-commander --instance $px4_instance start -h; }",
+            ESTIMATOR,
             "px4-pwm_out_sim --instance $px4_instance start -m hil",
             "",
         ]

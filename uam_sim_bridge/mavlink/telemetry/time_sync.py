@@ -12,7 +12,7 @@ import math
 from collections import deque
 
 PERIOD = 0.2  # s between two requests
-JUMP = 0.1  # s of offset error beyond half the round trip: one of the clocks has jumped
+JUMP = 0.1  # s of offset error beyond half the round trips: one of the clocks has jumped
 JUMPS_TO_RESET = 2  # in a row: a single one may be a damaged answer
 _OUTSTANDING = 16  # newest requests whose answers are accepted
 _RECENT = 25  # answers, window of the shortest round trip for the weights
@@ -80,7 +80,9 @@ class TimeSync:
         time = max(time, asked)  # an answer in the tick of its request is early by rounding
         round_trip = time - asked
         offset = tc1 * 1e-9 - (asked + time) / 2.0
-        if self.offset is not None and abs(offset - self.offset) > JUMP + round_trip / 2.0:
+        # the estimate may be wrong by half its round trip, too: the first answers may be slow
+        unsure = (round_trip + (self.round_trip or 0.0)) / 2.0
+        if self.offset is not None and abs(offset - self.offset) > JUMP + unsure:
             self._jumps += 1
             if self._jumps < JUMPS_TO_RESET:
                 return False
