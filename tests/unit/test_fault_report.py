@@ -202,25 +202,29 @@ def test_what_is_promised_of_a_row_is_read_and_judged(tmp_path):
     file = tmp_path / "mine.yaml"
     file.write_text(
         "{scenario: hover, moments: {a: {at: 3}}, faults: ["
-        "{fault: servo_jam, promise: {outcome: [held, landed], within: 4}}, {fault: magnet_stuck}]}"
+        "{fault: servo_jam, promise: {outcome: [held, landed], within: 4}}, {fault: magnet_stuck},"
+        "{fault: mocap_jump, promise: {outcome: landed, because: exceeds}}]}"
     )
     matrix = fault_matrix.read(file, "direct")
-    first, second = matrix.promises
+    first, second, third = matrix.promises
     assert second is None and matrix.rows[0] == "servo_jam"
-    assert first.kept("held", None) and first.kept("landed", 3.9)
-    assert not first.kept("landed", 4.1) and not first.kept("lost", 1.0)
+    assert first.kept("held", None, "") and first.kept("landed", 3.9, "")
+    assert not first.kept("landed", 4.1, "") and not first.kept("lost", 1.0, "")
+    assert third.kept("landed", 9.0, "tilt exceeds it") and not third.kept("landed", 9.0, "tilt")
     cells = matrix.cells(1, repeat=3)
-    assert len(cells) == 7 and [cell.promise for cell in cells[1:]] == 3 * [first] + 3 * [None]
+    promised = 3 * [first] + 3 * [None] + 3 * [third]
+    assert [cell.promise for cell in cells[1:]] == promised
 
 
 @pytest.mark.parametrize(
     ("promise", "message"),
     [
-        ("landed", "{outcome: ..., within: seconds} expected"),
+        ("landed", "{outcome: ..., within: seconds, because: text} expected"),
         ("{outcome: [[held]]}", "unknown outcome '['held']'; there are: refused, completed"),
         ("{outcome: fine}", "unknown outcome 'fine'; there are: refused, completed"),
+        ("{outcome: held, because: 3}", "because: 3 is not a text"),
         ("{outcome: held, within: soon}", "within: 'soon' is not a time"),
-        ("{outcome: held, by: 3}", "{outcome: ..., within: seconds} expected"),
+        ("{outcome: held, by: 3}", "{outcome: ..., within: seconds, because: text} expected"),
     ],
 )
 def test_a_bad_promise_is_refused_in_one_line(tmp_path, promise, message):

@@ -120,24 +120,31 @@ def _down_early(series: Series, limits: OutcomeLimits) -> bool:
 @dataclass(frozen=True)
 class Promise:
     """outcomes: the allowed ones of OUTCOMES; within [s]: longest time from the fault to the final
-    touchdown, if the mission is not completed."""
+    touchdown, if the mission is not completed; because: part of the reason."""
 
     outcomes: tuple[str, ...]
     within: float = math.inf
+    because: str = ""
 
-    def kept(self, outcome: str, down_after: float | None) -> bool:
-        """Return whether a flight kept the promise; down_after [s]: None without touchdown."""
+    def kept(self, outcome: str, down_after: float | None, why: str) -> bool:
+        """Return whether a flight kept the promise.
+
+        down_after [s]: None without touchdown; why: the reason of the end.
+        """
         soon = down_after is None or down_after <= self.within
-        return outcome in self.outcomes and soon
+        return outcome in self.outcomes and soon and self.because in why
 
 
 def read_promise(given: Any, where: str) -> Promise:
-    """Read an entry `promise` of a matrix: {outcome: one or a list, within: seconds}.
+    """Read an entry `promise` of a matrix: {outcome: one or a list, within: 8, because: text}.
 
     Raises FaultError.
     """
-    if not isinstance(given, Mapping) or not {"outcome"} <= set(given) <= {"outcome", "within"}:
-        raise FaultError(f"{where}: promise: {{outcome: ..., within: seconds}} expected")
+    entries = {"outcome", "within", "because"}
+    if not isinstance(given, Mapping) or not {"outcome"} <= set(given) <= entries:
+        raise FaultError(
+            f"{where}: promise: {{outcome: ..., within: seconds, because: text}} expected"
+        )
     named = given["outcome"]
     outcomes = tuple(named) if isinstance(named, list) else (named,)
     for one in outcomes:
@@ -148,4 +155,7 @@ def read_promise(given: Any, where: str) -> Promise:
     within = given.get("within", math.inf)
     if isinstance(within, bool) or not isinstance(within, int | float) or not within > 0.0:
         raise FaultError(f"{where}: promise: within: {within!r} is not a time above 0 s")
-    return Promise(outcomes, float(within))
+    because = given.get("because", "")
+    if not isinstance(because, str):
+        raise FaultError(f"{where}: promise: because: {because!r} is not a text")
+    return Promise(outcomes, float(within), because)

@@ -60,14 +60,15 @@ def judged(cell: Cell, outcome: Outcome, figures: Mapping[str, Any] | None) -> F
     begun = min((one["begin_s"] for one in outcome.faults), default=math.nan)
     unknown = ending == COMPLETED or math.isnan(begun)
     down = None if unknown else down_after(series, begun)
+    why = "; ".join([*figures["shortfalls"], *outcome.notes])
     return FaultResult(
         fault=cell.fault,
         moment=cell.moment,
         outcome=ending,
-        why="; ".join([*figures["shortfalls"], *outcome.notes]),
+        why=why,
         duration_s=figures["duration_s"],
         down_after_s=down,
-        kept=None if promise is None else promise.kept(ending, down),
+        kept=None if promise is None else promise.kept(ending, down, why),
         worst=figures["max"],
         happened=tuple(outcome.faults),
     )

@@ -69,5 +69,5 @@ def judged(cell: Cell, outcome: Outcome, figures: dict | None) -> FaultResult:
     promise = cell.promise
     flown = outcome.series is not None and bool(outcome.series.flown.any())
     ending = LOST if flown else REFUSED
-    kept = None if promise is None else promise.kept(ending, None)
+    kept = None if promise is None else promise.kept(ending, None, outcome.failure)
     return FaultResult(cell.fault, cell.moment, ending, outcome.failure, 0.0, kept=kept)
