@@ -10,6 +10,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 
+from uam_sim_bridge.mavlink.link.flight_state import FlightState
 from uam_sim_bridge.mavlink.offboard.autopilot_magnet import AutopilotMagnet
 from uam_sim_bridge.mavlink.offboard.sequence import (
     COMMANDS,
@@ -48,12 +49,11 @@ EXPLAIN_PERIOD = 3.0  # s between two requests for the failed arming checks
 class OffboardLink:
     """State of the autopilot from its messages, and the messages to it.
 
-    `armed`, `mode`, `intended`, `failsafe`, `landed`: latest report; `armed_since` [s] or None:
-    tick of the first report that it is armed; `values`: its parameters (of WATCHED, and
-    required ones) by name; `parameters`: their comparison; `ignored`: number of messages from
-    other systems or for other receivers; `vitals`: battery, estimator and sensors; `reboots`:
-    number of restarts; `imu`: its IMU, if it is requested; `magnet`: on one of its outputs, if
-    the owner sets it; `killed`: the kill switch is engaged.
+    `failsafe`, `landed`, `killed` (the kill switch is engaged): latest report; `values`: its
+    parameters (of WATCHED, and required ones) by name; `parameters`: their comparison; `ignored`:
+    number of messages from other systems or for other receivers; `vitals`: battery, estimator and
+    sensors; `reboots`: number of restarts; `imu`: its IMU, if it is requested; `magnet`: on one of
+    its outputs, if the owner sets it.
     """
 
     def __init__(
@@ -72,10 +72,8 @@ class OffboardLink:
         to compare."""
         self._clock = clock
         self.sequence = sequence
-        self.mode, self.armed, self.landed = Mode.UNKNOWN, False, True
-        self.intended, self.failsafe = Mode.UNKNOWN, False
-        self.killed = False
-        self.armed_since: float | None = None
+        self.landed, self.failsafe, self.killed = True, False, False
+        self._state = FlightState()
         self.ignored = self.reboots = 0
         self.vitals = Vitals()
         self.time_sync = TimeSync()
@@ -96,6 +94,26 @@ class OffboardLink:
         self._heartbeat_in = self._heartbeat_out = self._explained = -math.inf
         self._was_connected = False  # at the last tick
         self._told_unsigned = False
+
+    @property
+    def mode(self) -> Mode:
+        """Return the mode of the autopilot."""
+        return self._state.mode
+
+    @property
+    def intended(self) -> Mode:
+        """Return the mode that was chosen last by a person or a companion."""
+        return self._state.intended
+
+    @property
+    def armed(self) -> bool:
+        """Return whether the autopilot is armed."""
+        return self._state.armed
+
+    @property
+    def armed_since(self) -> float | None:
+        """Return the tick [s] of the first report that it is armed, None while it is not."""
+        return self._state.armed_since
 
     def set_mapping(self, mapping: RateThrustParameters) -> None:
         """Compare the autopilot's parameters with this mapping from now on."""
@@ -196,6 +214,7 @@ class OffboardLink:
             self._told_unsigned = True
             self.sequence.text(Severity.ERROR, UNSIGNED)
         connected = self.maintain(time)
+        self._state.update(time)
         delivered = self.time_sync.delivered
         seen = Reported(connected, self.armed, self.mode, self.intended, self.failsafe, delivered)
         request = self.sequence.update(time, seen)
@@ -251,17 +270,14 @@ class OffboardLink:
                 self._heartbeat_in = time
                 self.failsafe = m.system_status == mavlink2.MAV_STATE_CRITICAL
                 self.killed = m.system_status == mavlink2.MAV_STATE_FLIGHT_TERMINATION
-                self._take_state(
+                self._state.heartbeat(
                     time,
                     Mode.from_custom_mode(m.custom_mode),
                     bool(m.base_mode & mavlink2.MAV_MODE_FLAG_SAFETY_ARMED),
                 )
-        elif kind == "CURRENT_MODE":  # sent on a change, so before the next heartbeat
-            self.intended = Mode.from_custom_mode(m.intended_custom_mode)
-            mode = Mode.from_custom_mode(m.custom_mode)
-            # PX4 goes back to OFFBOARD when it disarms; only the heartbeat says that it has
-            if mode is not Mode.OFFBOARD or not self.landed:
-                self._take_state(time, mode, self.armed)
+        elif kind == "CURRENT_MODE":
+            modes = map(Mode.from_custom_mode, (m.custom_mode, m.intended_custom_mode))
+            self._state.current_mode(time, *modes, self.landed)
         elif kind == "COMMAND_ACK":
             self._acknowledged(time, m.command, m.result)
         elif kind == "EXTENDED_SYS_STATE":
@@ -316,13 +332,6 @@ class OffboardLink:
         self._pending.clear()
         self.parameters.restart()
 
-    def _take_state(self, time: float, mode: Mode, armed: bool) -> None:
-        if armed and not self.armed:
-            self.armed_since = time
-        elif not armed:
-            self.armed_since = None
-        self.mode, self.armed = mode, armed
-
     def _acknowledged(self, time: float, command: int, result: int) -> None:
         if command == MavCmd.SET_MESSAGE_INTERVAL:
             self.streams.answer(result)
@@ -339,11 +348,7 @@ class OffboardLink:
                 self._explained = time
                 self._command(MavCmd.RUN_PREARM_CHECKS)
             return
-        # take the new state now: the next heartbeat may be a second later
-        mode = Mode.OFFBOARD if request is Request.OFFBOARD else self.mode
-        changed = {Request.ARM: True, Request.DISARM: False, Request.KILL: False}
-        armed = changed.get(request, self.armed)
-        self._take_state(time, mode, armed)
+        self._state.accepted(time, request)
 
     def _request(self, request: Request) -> None:
         command, parameters = COMMANDS[request]
