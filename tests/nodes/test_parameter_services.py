@@ -1,4 +1,4 @@
-"""Nodes of one process: their parameter services are looked at in turn, commands at every check."""
+"""Services of several nodes of one process are answered, one request per check."""
 
 import rclpy
 from rcl_interfaces.srv import ListParameters

@@ -2,10 +2,9 @@
 
 They are checked fifty times a second, of wall time or of tick time, events once a second of wall
 time. At most one service request and one report (timer of REPORT_PERIOD or more) is served per
-check, so that many do not delay a tick. Where a process has several nodes, a check looks at the
-parameter services of one of them, in turn: all together would take a millisecond.
-Clients and events are passed to a SingleThreadedExecutor. Service requests are not: that executor
-would serve waiting messages first.
+check, so that many do not delay a tick. A service is asked for a request: a microsecond, where a
+wait set needs ten for each entity. Clients and events are passed to a SingleThreadedExecutor.
+Service requests are not: that executor would serve waiting messages first.
 """
 
 from __future__ import annotations
@@ -35,21 +34,17 @@ class OtherEntities:
         for node in nodes:
             self._executor.add_node(node)
         self._next_check, self._checked_at, self._next_events = 0.0, 0, 0.0
-        self._turn = 0  # of the node whose parameter services were looked at
         self.gather()
 
     def gather(self) -> None:
         """Collect the nodes' entities; call it when they have changed."""
         nodes = self._nodes
-        self._services = [s for node in nodes for s in node.services if not _of_parameters(s)]
-        self._in_turn = [[s for s in node.services if _of_parameters(s)] for node in nodes]
-        services = len(self._services) + max(map(len, self._in_turn))
+        self._services = [service for node in nodes for service in node.services]
         self._clients = [c.handle for node in nodes for c in node.clients]
         self._timers = [t for node in nodes for t in node.timers]
         self._waitables = [w for node in nodes for w in node.waitables]
         events = sum(waitable.get_num_entities().num_events for waitable in self._waitables)
-        counts = (len(self._timers), len(self._clients), services)
-        self._others = WaitSet(0, 0, *counts, 0, self._context.handle)
+        self._answers = WaitSet(0, 0, 0, len(self._clients), 0, 0, self._context.handle)
         self._events = WaitSet(0, 0, 0, 0, 0, events, self._context.handle)
 
     def left(self, stamp: int) -> float:
@@ -73,25 +68,22 @@ class OtherEntities:
 
     def _serve(self) -> bool:
         """Serve what is ready; return whether a service, client or event was."""
-        self._turn = (self._turn + 1) % len(self._in_turn)
-        others, looked_at = self._others, [*self._services, *self._in_turn[self._turn]]
-        others.clear_entities()
-        for service in looked_at:
-            others.add_service(service.handle)
-        for handle in self._clients:
-            others.add_client(handle)
-        for timer in self._timers:
-            others.add_timer(timer.handle)
-        others.wait(0)
-        services, timers = (set(others.get_ready_entities(kind)) for kind in ("service", "timer"))
-        handed = len(others.get_ready_entities("client")) + self._ready_events()
+        handed = self._answered_clients() + self._ready_events()
         for _ in range(handed):
             self._executor.spin_once(timeout_sec=0)
-        self._call([timer for timer in self._timers if timer.handle.pointer in timers])
-        request = next((s for s in looked_at if s.handle.pointer in services), None)
-        if request is not None:
-            _answer(request)
-        return bool(handed or services)
+        self._call([timer for timer in self._timers if timer.handle.is_timer_ready()])
+        return any(map(_answered, self._services)) or bool(handed)
+
+    def _answered_clients(self) -> int:
+        """Return the number of clients that have an answer."""
+        if not self._clients:
+            return 0
+        answers = self._answers
+        answers.clear_entities()
+        for handle in self._clients:
+            answers.add_client(handle)
+        answers.wait(0)
+        return len(answers.get_ready_entities("client"))
 
     @staticmethod
     def _call(ready: Sequence[Timer]) -> None:
@@ -123,14 +115,11 @@ class OtherEntities:
         self._executor.shutdown()
 
 
-def _of_parameters(service: Service) -> bool:
-    """Return whether a service reads, lists or sets the parameters of its node."""
-    return service.srv_type.__module__.startswith("rcl_interfaces.")
-
-
-def _answer(service: Service) -> None:
-    """Take one request and send the response."""
+def _answered(service: Service) -> bool:
+    """Take one request and send the response; return whether there was one."""
     request, header = service.handle.service_take_request(service.srv_type.Request)
-    if header is not None:
-        response = service.callback(request, service.srv_type.Response())
-        service.send_response(response, header)
+    if header is None:
+        return False
+    response = service.callback(request, service.srv_type.Response())
+    service.send_response(response, header)
+    return True

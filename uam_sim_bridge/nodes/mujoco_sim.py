@@ -301,10 +301,9 @@ class Simulator:
         self._clock.note(plant.tick - self._first_tick)
         now = self.node.stamp = nanoseconds(plant.time)
         self.answers.begin()
-        samples, truth = plant.sense(), plant.truth()
+        samples = plant.sense()
         if self._faulty and self._faulty.changed:
             self._fault_topic.publish(now, self._faulty.changed)
-        self.sensors.clock(now)
         # Sensors with latency deliver no sample at first, and the estimator needs all sensors.
         # Earlier samples are not sent: how many of them it would receive is not reproducible.
         self._complete = self._complete or None not in (samples.imu, samples.joints, samples.mocap)
@@ -313,7 +312,9 @@ class Simulator:
         self._stamp = self.sensors.publish(samples) if self._complete else None
         if self._stamp is not None:
             self._times.tick(self._stamp)
-        # No node waits for the truth: it is published while the estimator works.
+        # No node waits for time and truth: they are published while the estimator works.
+        self.sensors.clock(now)
+        truth = plant.truth()
         self.truth.publish(now, truth, self.hil.motors, self.answers.magnet)
         return samples, truth
 
