@@ -3,6 +3,8 @@
 import dataclasses
 import math
 
+from set_clock import SetClock
+
 from uam_control.vehicle import load_description
 from uam_sim_bridge.drivers.dynamixel.chain import hardware_file, load_chain
 from uam_sim_bridge.drivers.dynamixel.driver import ArmDriver
@@ -14,16 +16,6 @@ from uam_sim_bridge.emulation.dynamixel import EmulatedServo, ServoLine, StillSh
 BAUD = 1_000_000
 STOWED = (0.0, math.pi / 2)
 PATIENT = 30.0  # [s] for an answer on a pseudo-terminal: on a busy machine it may take long
-
-
-class Clock:
-    """Seconds that pass by hand."""
-
-    def __init__(self):
-        self.now = 100.0
-
-    def __call__(self):
-        return self.now
 
 
 class LinePort(PatientPort):
@@ -73,7 +65,7 @@ class ArmRig:
         self, shafts=None, servos=None, chain=None, mode="current", seed=1, clock=None, **parameters
     ):
         """shafts, servos: in place of still ones; chain: changes of every servo's description."""
-        self.clock = clock or Clock()
+        self.clock = clock or SetClock(100.0)
         self.vehicle = load_description()
         self.chain = described(**(chain or {}))
         self.shafts = shafts or [StillShaft(angle) for angle in STOWED]

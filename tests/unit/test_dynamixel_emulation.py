@@ -5,10 +5,11 @@ import random
 import time
 
 import pytest
-from arm_rig import BAUD, PATIENT, ArmRig, Clock, LinePort, described, raw_bus
+from arm_rig import BAUD, PATIENT, ArmRig, LinePort, described, raw_bus
 from dynamixel_sdk import COMM_SUCCESS, GroupSyncRead, Protocol2PacketHandler
 from hypothesis import given
 from hypothesis import strategies as st
+from set_clock import SetClock
 
 from uam_sim_bridge.drivers.dynamixel.control_table import (
     ControlTableError,
@@ -41,7 +42,7 @@ WATCHDOG = TABLE["Bus Watchdog"]
 
 @pytest.fixture
 def clock():
-    return Clock()
+    return SetClock(100.0)
 
 
 @pytest.fixture

@@ -1,8 +1,9 @@
 """Late answers of servos: an answer that was given up is never taken for another one."""
 
-from arm_rig import BAUD, ArmRig, Clock, LinePort
+from arm_rig import BAUD, ArmRig, LinePort
 from hypothesis import given
 from hypothesis import strategies as st
+from set_clock import SetClock
 
 from uam_sim_bridge.drivers.dynamixel.control_table import control_table
 from uam_sim_bridge.drivers.dynamixel.overdue import LATEST, Instruction, Overdue
@@ -64,7 +65,7 @@ class LatePort(LinePort):
 
 
 def late_bus():
-    servo = EmulatedServo(1, StillShaft(0.0), baud_rate=BAUD, clock=Clock())
+    servo = EmulatedServo(1, StillShaft(0.0), baud_rate=BAUD, clock=SetClock(100.0))
     for name, value in CONTENTS.items():
         servo.set(name, value)
     port = LatePort(ServoLine([servo]))
@@ -120,7 +121,7 @@ def test_after_a_silence_the_bus_answers_as_before():
 
 
 def test_an_overdue_answer_is_forgotten_after_its_time():
-    clock = Clock()
+    clock = SetClock(100.0)
     overdue, one = Overdue(clock), Instruction(1, 2, b"\x08\x00\x01\x00", 1)
     other = Instruction(1, 2, b"\x09\x00\x01\x00", 1)
     overdue.add(one)

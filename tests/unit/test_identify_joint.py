@@ -6,9 +6,10 @@ import math
 import numpy as np
 import pytest
 import yaml
-from arm_rig import BAUD, ArmRig, Clock
+from arm_rig import BAUD, ArmRig
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from set_clock import SetClock
 
 from uam_control.vehicle import load_description
 from uam_control.vehicle.arm_model import ArmModel
@@ -33,7 +34,7 @@ class Bench:
     """Two joints with friction; the second is excited."""
 
     def __init__(self, **shaft):
-        self.clock = Clock()
+        self.clock = SetClock(100.0)
         self.weight_at_90 = shaft.get("weight", 0.5)
         shaft = {"weight": self.weight_at_90, "inertia": 0.006} | shaft
         self.shafts = [
@@ -200,7 +201,7 @@ def test_the_holding_torque_by_hand():
 
 def test_the_command_on_a_device(tmp_path, monkeypatch, capsys):
     """Behind a pseudo-terminal, its time by hand; the weight is that of the vehicle's arm."""
-    clock = Clock()
+    clock = SetClock(100.0)
     vehicle = load_description()
     weight = ArmModel.of(vehicle).holding_torques(np.array([0.0, math.pi / 2]), 9.81, 0.2)[1]
     shafts = [

@@ -1,16 +1,15 @@
 """The laboratory of a rehearsal: its clock, its cameras, its person, its wiring and its cables."""
 
 import math
-import time
 from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
-import serial
 from hypothesis import given
 from hypothesis import strategies as st
+from set_clock import SetClock
 
 from uam_control.maths.rotations import quaternion_from_euler
 from uam_control.vehicle import load_description
@@ -21,15 +20,11 @@ from uam_sim_bridge.drivers.mocap.calibration import Calibration
 from uam_sim_bridge.drivers.mocap.frame import BodyPose
 from uam_sim_bridge.faults import CABLE, FAULTS, FaultError, Schedule
 from uam_sim_bridge.faults.schedule import timed
-from uam_sim_bridge.mavlink.protocol.wire import Codec, Framer, mavlink2
 from uam_sim_bridge.paced_clock import CATCH_UP, LATEST, PacedClock
 from uam_sim_bridge.plant import Vehicle
 from uam_sim_bridge.rehearsal.cables import Cables
-from uam_sim_bridge.rehearsal.ground_station import ALTITUDE, LATITUDE, LONGITUDE, GroundStation
-from uam_sim_bridge.rehearsal.hands import Grip, joint_torque, wrench
-from uam_sim_bridge.rehearsal.hil_line import SILENT, STOPPED, HilLine
 from uam_sim_bridge.rehearsal.laboratory import Devices, Laboratory
-from uam_sim_bridge.rehearsal.person import MOTIONS, Person, eased
+from uam_sim_bridge.rehearsal.person import Person
 from uam_sim_bridge.rehearsal.tracked_room import RoomBody
 from uam_sim_bridge.rehearsal.wiring_mistakes import mistaken_chain
 
@@ -37,16 +32,6 @@ VEHICLE = load_description()
 CHAIN = load_chain(hardware_file("s500_lab"), VEHICLE)
 PERIOD = 0.004
 NOW = 1.8e9  # [s] of the host
-
-
-class Clock:
-    """A clock that the test sets."""
-
-    def __init__(self, now=0.0):
-        self.now = now
-
-    def __call__(self):
-        return self.now
 
 
 def mistakes(name, **values):
@@ -57,7 +42,7 @@ def mistakes(name, **values):
 
 
 def test_ticks_are_due_one_period_apart_and_have_the_system_time():
-    steady, system = Clock(5.0), Clock(1000.0)
+    steady, system = SetClock(5.0), SetClock(1000.0)
     clock = PacedClock(PERIOD, steady, system)
     clock.begin()
     assert clock.host(0) == 1000.0 and clock.host(250) == pytest.approx(1001.0)
@@ -69,8 +54,8 @@ def test_ticks_are_due_one_period_apart_and_have_the_system_time():
 
 @given(st.floats(0.009, 2.0))
 def test_after_a_stall_ticks_run_faster_until_they_are_on_time(stall):
-    steady = Clock()
-    clock = PacedClock(PERIOD, steady, Clock())
+    steady = SetClock()
+    clock = PacedClock(PERIOD, steady, SetClock())
     clock.begin()
     clock.note(0)
     steady.now = stall
@@ -141,74 +126,6 @@ def test_wiring_mistakes_by_hand():
     assert found[1].zero == second.zero + 1024
     with pytest.raises(FaultError, match="joint 3: the vehicle has 2"):
         mistaken_chain(CHAIN, mistakes("direction_reversed", joint=3))
-
-
-# --- person ------------------------------------------------------------------------------------
-
-
-@given(st.floats(0.0, 1.0), st.floats(0.0, 1.0))
-def test_a_motion_goes_one_way_only(a, b):
-    assert eased(0.0) == 0.0 and eased(1.0) == 1.0
-    assert eased(min(a, b)) <= eased(max(a, b))
-
-
-@pytest.mark.parametrize("step", MOTIONS)
-def test_the_person_moves_slowly_and_comes_back(step):
-    person, chi = Person(VEHICLE.joint_names, VEHICLE.stowed), np.zeros(8)
-    time = 0.0
-    while not person.wishes_to_confirm:  # the hands take it
-        grip = person.update(time, "hands_on", chi)
-        time += 0.02
-    home = grip.pose.copy()
-    assert home == pytest.approx([0.0, 0.0, 0.6, 0.0, 0.0, 0.0])
-    poses = []
-    while not person.wishes_to_confirm or person.done[-1] != step:
-        poses.append(person.update(time, step, chi).pose.copy())
-        time += 0.02
-    poses = np.array(poses) - home
-    for axis, value in MOTIONS[step]:
-        far = poses[:, axis] / value
-        assert far.max() == pytest.approx(1.0)
-        assert np.sum(far > 0.999) * 0.02 >= 1.0  # held
-    assert poses[-1] == pytest.approx(np.zeros(6), abs=1e-9)
-    speed = np.abs(np.diff(poses, axis=0)) / 0.02
-    assert speed[:, :3].max() < 0.7 and speed[:, 3:].max() < 1.0
-
-
-def test_the_person_moves_one_joint_and_puts_the_vehicle_down():
-    person, chi = Person(VEHICLE.joint_names, VEHICLE.stowed), np.zeros(8)
-    chi[6:] = 0.1, 1.5
-    time, seen = 0.0, []
-    for step in ("hands_on", "joint:alpha_2", "clear"):
-        while not person.done or person.done[-1] != step:
-            grip = person.update(time, step, chi)
-            time += 0.02
-            if step == "joint:alpha_2" and grip.joints is not None:
-                seen.append(grip.joints.copy())
-    assert seen[0] == pytest.approx([0.1, 1.5], abs=1e-3)  # where it was, then folded
-    assert np.max(seen, axis=0) == pytest.approx([0.1, math.pi / 2 + 0.3], abs=1e-3)
-    assert grip.pose is None and grip.joints is None  # hands off
-    assert person.done == ["hands_on", "joint:alpha_2", "clear"]
-    assert person.update(time, "", chi).pose is None
-
-
-def test_a_step_that_does_not_pass_is_done_again():
-    person, chi, time = Person(VEHICLE.joint_names, VEHICLE.stowed), np.zeros(8), 0.0
-    while len(person.done) < 3:
-        person.update(time, "lift", chi)
-        time += 0.02
-        assert time < 60.0
-    assert person.done == ["lift"] * 3
-
-
-def test_hands_pull_towards_the_grip_and_carry_the_weight():
-    state = np.zeros((3, 8))
-    force, torque = wrench(Grip(np.array([0.1, 0.0, 0.0, 0.2, 0.0, 0.0])), state, 20.0)
-    assert force == pytest.approx([40.0, 0.0, 20.0]) and torque[0] > 0.0
-    assert torque[1:] == pytest.approx([0.0, 0.0])
-    assert joint_torque(Grip(joints=np.array([0.1, -9.0])), state) == pytest.approx([0.4, -2.0])
-    assert wrench(Grip(), state, 20.0)[0] == pytest.approx(np.zeros(3))
-    assert joint_torque(Grip(), state) == pytest.approx(np.zeros(2))
 
 
 # --- the laboratory as a whole, without pace ---------------------------------------------------
@@ -309,104 +226,6 @@ def test_a_magnet_is_on_where_the_output_is_nearer_to_its_value_for_on(laborator
         lab.hil.controls[11] = value
         ticks(lab, 1)
         assert lab.magnet is expected
-
-
-# --- an autopilot in HITL on a line of its own ------------------------------------------------
-
-
-class Px4:
-    """What PX4 does on its USB line: opens the device, sends messages, reads those that come."""
-
-    def __init__(self, path):
-        self.port = serial.Serial(str(path), 921600, timeout=0)
-        self._codec = Codec(1, 1)
-        self._framer = Framer(self._codec)
-
-    def send(self, *messages):
-        for message in messages:
-            self.port.write(self._codec.encode(message))
-
-    def read(self):
-        return self._framer.stream(self.port.read(65536))
-
-
-HEARTBEAT = mavlink2.MAVLink_heartbeat_message(2, 12, 81, 0, 3, 3)
-
-
-def motors(*values, armed=True, magnet=0.0):
-    controls = [*values, *[0.0] * (10 - len(values)), magnet, *[0.0] * 5]
-    return mavlink2.MAVLink_hil_actuator_controls_message(5, controls, 128 if armed else 0, 0)
-
-
-def until(condition):
-    end = time.monotonic() + 30.0
-    while not condition():
-        assert time.monotonic() < end
-        time.sleep(0.002)
-
-
-@pytest.fixture
-def line(tmp_path):
-    clock = Clock(100.0)
-    made = HilLine(tmp_path / "ttyUSB", 4, 1, clock)
-    yield made, clock
-    made.close()
-    assert not (tmp_path / "ttyUSB").exists()
-
-
-def test_sensors_go_to_the_autopilot_and_motors_come_back_over_the_line(line):
-    hil, clock = line
-    assert not hil.connected and not hil.accept(0.0)
-    px4 = Px4(hil.path)
-    px4.send(HEARTBEAT)
-    until(lambda: hil.accept(0.1))
-    body = np.zeros(3), np.array([0.0, 0.0, 9.81]), np.zeros(3), np.array([1.0, 0.0, 0.0, 0.0])
-    hil.send(0.004, *body)
-    seen = []
-    until(lambda: (seen.extend(px4.read()), "HIL_SENSOR" in {m.get_type() for m in seen})[1])
-    sensor = next(m for m in seen if m.get_type() == "HIL_SENSOR")
-    assert (sensor.time_usec, sensor.get_srcSystem()) == (4000, 1)
-    assert sensor.zacc == pytest.approx(-9.81)
-    # the ground station is on the same line, with an id of its own
-    kinds = {m.get_type(): m.get_srcSystem() for m in seen}
-    station = {"HEARTBEAT": 255, "MANUAL_CONTROL": 255, "SET_GPS_GLOBAL_ORIGIN": 255}
-    assert kinds == station | {"HIL_SENSOR": 1}
-    px4.send(motors(0.1, 0.2, 0.3, 0.4, magnet=1.0))
-    until(lambda: hil.receive(0.0).any())
-    assert hil.motors == pytest.approx([0.1, 0.2, 0.3, 0.4]) and hil.armed
-    assert hil.controls[10] == 1.0
-    px4.port.close()
-
-
-def test_motors_stop_when_the_autopilot_is_silent(line):
-    hil, clock = line
-    px4 = Px4(hil.path)
-    px4.send(motors(0.5, 0.5, 0.5, 0.5))
-    until(lambda: hil.receive().any())
-    clock.now += 0.9 * STOPPED
-    assert hil.receive().all()
-    clock.now += 0.2 * STOPPED
-    assert not hil.receive().any() and not hil.armed and hil.connected
-    clock.now += SILENT
-    assert not hil.connected
-    px4.port.close()
-
-
-def test_the_ground_station_asks_for_the_origin_until_it_is_there():
-    station, kinds = GroundStation(), []
-    for k in range(100):
-        kinds += [message.get_type() for message in station.due(0.0501 * k)]
-    assert kinds.count("MANUAL_CONTROL") == 100 and kinds.count("HEARTBEAT") == 5
-    assert kinds.count("SET_GPS_GLOBAL_ORIGIN") == 3
-    # PX4 keeps latitude and longitude alone while its height is not valid
-    station.take(mavlink2.MAVLink_gps_global_origin_message(LATITUDE, LONGITUDE, 0))
-    assert not station.origin_known
-    again = [message.get_type() for message in station.due(30.0)]
-    assert "SET_GPS_GLOBAL_ORIGIN" in again
-    station.take(mavlink2.MAVLink_gps_global_origin_message(LATITUDE - 1, LONGITUDE, ALTITUDE))
-    assert station.origin_known
-    later = [message.get_type() for message in station.due(60.0)]
-    assert "SET_GPS_GLOBAL_ORIGIN" not in later and "HEARTBEAT" in later
 
 
 def test_the_person_lifts_tilts_and_sets_the_vehicle_down(laboratory):

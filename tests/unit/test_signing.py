@@ -1,6 +1,7 @@
 """MAVLink 2 signing: accepted and refused packets."""
 
 import pytest
+from set_clock import SetClock
 
 from uam_sim_bridge.mavlink.protocol.signing import EPOCH, Signing, wall_steps
 from uam_sim_bridge.mavlink.protocol.wire import Codec, Framer, mavlink2
@@ -10,23 +11,13 @@ KEY, OTHER = bytes(range(32)), bytes(32)
 MINUTE = 6_000_000
 
 
-class Clock:
-    """Time of signatures, set by the test."""
-
-    def __init__(self, now=10 * MINUTE):
-        self.now = now
-
-    def __call__(self):
-        return self.now
-
-
 def message(k=1):
     return mavlink2.MAVLink_timesync_message(k, 7)
 
 
 def pair(sender_key=KEY, clock=None, **options):
     """Return a sender and the framer of a receiver that requires KEY."""
-    clock = clock or Clock()
+    clock = clock or SetClock(10 * MINUTE)
     sender = Codec(1, 1, Signing(sender_key, clock=clock, **options))
     return sender, Framer(Codec(2, 2, Signing(KEY, clock=clock)))
 
@@ -81,11 +72,11 @@ def test_replay_is_refused_also_of_an_older_packet():
 
 
 def test_the_first_packet_of_a_sender_may_be_a_minute_old():
-    clock = Clock()
+    clock = SetClock(10 * MINUTE)
     old = Codec(1, 1, Signing(KEY, clock=clock))
     early = [old.encode(message()) for _ in range(2)]
     for late, passes in ((MINUTE - 10, 1), (MINUTE + 10, 0)):
-        _, framer = pair(clock=Clock(clock.now + late))
+        _, framer = pair(clock=SetClock(clock.now + late))
         assert len(framer.datagram(early[0])) == passes
 
 
@@ -99,13 +90,13 @@ def test_one_flipped_bit_of_the_signature_is_refused():
 def test_a_forged_packet_from_the_future_does_not_lock_out_its_sender():
     sender, framer = pair()
     assert len(framer.datagram(sender.encode(message()))) == 1
-    forger, _ = pair(OTHER, Clock(1000 * MINUTE))
+    forger, _ = pair(OTHER, SetClock(1000 * MINUTE))
     assert framer.datagram(forger.encode(message())) == []
     assert len(framer.datagram(sender.encode(message()))) == 1 and refused(framer) == 1
 
 
 def test_time_grows_with_every_packet_and_never_goes_back():
-    clock = Clock()
+    clock = SetClock(10 * MINUTE)
     sender, framer = pair(clock=clock)
 
     def stamp():

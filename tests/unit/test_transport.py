@@ -6,6 +6,7 @@ import time
 import tty
 
 import pytest
+from set_clock import SetClock
 
 from uam_sim_bridge.mavlink.protocol.wire import Codec, Framer, mavlink2
 from uam_sim_bridge.mavlink.transport.tcp_transport import TcpTransport
@@ -125,16 +126,6 @@ def test_udp_reads_a_flood_in_bounded_pieces(opened):
     assert seen == 50
 
 
-class Clock:
-    """Wall time [s], set by the test."""
-
-    def __init__(self):
-        self.now = 0.0
-
-    def __call__(self):
-        return self.now
-
-
 def listener(port=0):
     s = socket.socket(socket.AF_INET, socket.SOCK_STREAM)
     s.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
@@ -145,7 +136,7 @@ def listener(port=0):
 
 
 def test_tcp_connects_again_after_a_loss_with_growing_intervals(opened):
-    server, clock = listener(), Clock()
+    server, clock = listener(), SetClock()
     port = server.getsockname()[1]
     link = TcpTransport(("localhost", port), clock)
     opened.append(link)
@@ -223,7 +214,7 @@ def line(opened, tmp_path):
     device = tmp_path / "ttyACM0"
     device.symlink_to(os.ttyname(near))
     os.close(near)
-    clock = Clock()
+    clock = SetClock()
     link = open_transport(f"serial:{device}:921600")
     link._clock = clock
     opened.append(link)

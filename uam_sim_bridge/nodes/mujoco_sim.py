@@ -409,13 +409,13 @@ class Simulator:
         )
 
     def _wait_until(self, deadline: float) -> None:
-        if self.plant.tick % SERVICE_TICKS == 0:
-            self.answers.take()  # before the executor, which would discard their source time
-            self.executor.spin_once(0.0)
         left = deadline - time.monotonic()
         if left > 0.0:
             time.sleep(left)
         self.answers.take()
+        # now that the setpoint is taken: the executor would discard its source time
+        if self.plant.tick % SERVICE_TICKS == 0:
+            self.executor.spin_once(0.0)
 
     def _measure(self) -> None:
         """Measure the latency of this tick, and of ticks whose setpoints have arrived."""
