@@ -50,7 +50,8 @@ def draw(points: Sequence[Point], *files: Path) -> None:
                     colour = style.flight_colour(number)
                     axis.plot(sizes, values, "o-", color=colour, label=layout)
                     axis.set_xticks(sizes)
-                axis.set_ylim(0.0, None)
+                nodes = [value(p) for p in points if p.layout != DIRECT]
+                axis.set_ylim(0.0, _top(nodes))
                 if column == 0:
                     axis.set_ylabel(label)
             axes[-1, column].set_xlabel(what)
@@ -58,12 +59,18 @@ def draw(points: Sequence[Point], *files: Path) -> None:
                 right = axes[0, column].twinx()
                 sizes, values = [p.size for p in curve], [p.ticks_per_second for p in curve]
                 right.plot(sizes, values, "s--", color=style.MUTED, label=DIRECT)
-                right.set_ylim(0.0, None)
+                direct = [p.ticks_per_second for p in points if p.layout == DIRECT]
+                right.set_ylim(0.0, _top(direct))
                 right.grid(visible=False)
                 right.legend(loc="lower left")
         axes[0, -1].legend(loc="upper right")
         for file in files:
             style.save(figure, file)
+
+
+def _top(values: Sequence[float]) -> float:
+    """Return the end of an axis from 0 that shows all values, also those of other columns."""
+    return 1.1 * max(values)
 
 
 def _curve(points: Sequence[Point], what: str, layout: str) -> list[Point]:

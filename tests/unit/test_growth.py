@@ -67,6 +67,15 @@ def test_curves_are_drawn(tmp_path):
     assert "<svg" in (tmp_path / "growth.svg").read_text()
 
 
+def test_axes_show_the_points_of_every_column(monkeypatch, tmp_path):
+    drawn = []
+    monkeypatch.setattr(curves.style, "save", lambda figure, file: drawn.append(figure))
+    more = Point("vehicles", 2, "separate", 900.0, 3000.0, 15.5)
+    curves.draw([*POINTS, more], tmp_path / "growth.png")
+    assert drawn[0].axes[0].get_ylim()[1] > 900.0
+    assert all(axis.dataLim.y1 <= axis.get_ylim()[1] for axis in drawn[0].axes)
+
+
 def test_a_further_recorder_begins_with_the_topics_of_every_tick():
     assert set(CHOSEN) == set(topics.RECORDED)
     assert topics.STATE in CHOSEN[:10] and len(CHOSEN) >= 40
