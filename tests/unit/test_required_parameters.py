@@ -210,7 +210,6 @@ def test_parameters_are_written_only_if_desired_and_disarmed():
     for writing, armed in ((False, False), (True, True), (True, False)):
         vehicle = Vehicle(good_values() | wrong)
         vehicle.link.parameters.writing = writing
-        vehicle.link.armed = armed
         vehicle.armed = armed
         vehicle.run(3.0)
         writes = [(clean_text(m.param_id), m.param_value) for m in vehicle.writes]

@@ -304,6 +304,7 @@ class Simulator:
         samples = plant.sense()
         if self._faulty and self._faulty.changed:
             self._fault_topic.publish(now, self._faulty.changed)
+        self.sensors.clock(now)  # first: the recorder stamps what has no stamp by it
         # Sensors with latency deliver no sample at first, and the estimator needs all sensors.
         # Earlier samples are not sent: how many of them it would receive is not reproducible.
         self._complete = self._complete or None not in (samples.imu, samples.joints, samples.mocap)
@@ -312,8 +313,7 @@ class Simulator:
         self._stamp = self.sensors.publish(samples) if self._complete else None
         if self._stamp is not None:
             self._times.tick(self._stamp)
-        # No node waits for time and truth: they are published while the estimator works.
-        self.sensors.clock(now)
+        # No node waits for the truth: it is published while the estimator works.
         truth = plant.truth()
         self.truth.publish(now, truth, self.hil.motors, self.answers.magnet)
         return samples, truth
