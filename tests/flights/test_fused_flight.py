@@ -3,10 +3,13 @@
 import json
 
 import numpy as np
+import pytest
 from whole_flight import assert_nothing_left
 
 from uam_lab.results.timeseries import read
 from uam_msgs_py.node import wiring
+
+ATTEMPTS = 3  # flights in real time: beside other tests one may end before its fault begins
 
 
 def test_a_fused_flight_in_lockstep_is_that_of_separate_nodes_to_the_digit(
@@ -32,10 +35,14 @@ def test_a_fused_flight_in_lockstep_is_that_of_separate_nodes_to_the_digit(
 
 def test_a_kill_of_one_of_its_nodes_ends_all_of_them_and_the_autopilot_descends(fly):
     kill = f"node_kill@hover+0.5:node={wiring.ATTITUDE}"
-    flight = fly("--fused", "--scenario", "hover", "--clock", "realtime", "--fault", kill)
-    assert flight.wait() == 1, flight.said + flight.complained
     affected = f"{wiring.ATTITUDE}, hence of the process {wiring.FLIGHT_CONTROLLER}, begins at"
-    assert f"fault node_kill of {affected}" in flight.said
+    for _ in range(ATTEMPTS):
+        flight = fly("--fused", "--scenario", "hover", "--clock", "realtime", "--fault", kill)
+        assert flight.wait() == 1, flight.said + flight.complained
+        if f"fault node_kill of {affected}" in flight.said:
+            break
+    else:
+        pytest.fail(f"the flights ended before the fault: {flight.said}")
     lost = f"{wiring.FLIGHT_CONTROLLER} was killed by SIGKILL; the flight continues without it"
     assert lost in flight.said and "restarted" not in flight.said
     flown = read(flight.out / "timeseries.parquet")
