@@ -32,7 +32,7 @@ from uam_lab.workers.place import Workplace
 from uam_lab.workers.workers import workers
 
 BLOCKS = 4  # turns of loop and worker, so that both see the same machine
-WORKER = "spawn_main"  # in the command line of a worker process
+WORKER = "dask worker"  # title of a worker process
 POLL = 0.5  # [s]
 
 
