@@ -50,8 +50,6 @@ def draw(points: Sequence[Point], *files: Path) -> None:
                     colour = style.flight_colour(number)
                     axis.plot(sizes, values, "o-", color=colour, label=layout)
                     axis.set_xticks(sizes)
-                nodes = [value(p) for p in points if p.layout != DIRECT]
-                axis.set_ylim(0.0, _top(nodes))
                 if column == 0:
                     axis.set_ylabel(label)
             axes[-1, column].set_xlabel(what)
@@ -59,18 +57,14 @@ def draw(points: Sequence[Point], *files: Path) -> None:
                 right = axes[0, column].twinx()
                 sizes, values = [p.size for p in curve], [p.ticks_per_second for p in curve]
                 right.plot(sizes, values, "s--", color=style.MUTED, label=DIRECT)
-                direct = [p.ticks_per_second for p in points if p.layout == DIRECT]
-                right.set_ylim(0.0, _top(direct))
+                right.set_ylim(0.0, None)
                 right.grid(visible=False)
                 right.legend(loc="lower left")
+        for axis in axes[:, 0]:  # shared by its row, so after the last column's points
+            axis.set_ylim(0.0, None)
         axes[0, -1].legend(loc="upper right")
         for file in files:
             style.save(figure, file)
-
-
-def _top(values: Sequence[float]) -> float:
-    """Return the end of an axis from 0 that shows all values, also those of other columns."""
-    return 1.1 * max(values)
 
 
 def _curve(points: Sequence[Point], what: str, layout: str) -> list[Point]:

@@ -17,6 +17,7 @@ import numpy as np
 from uam_control.maths.compiled import prepared
 from uam_sim_bridge.autopilot.autopilot_estimator import age_of
 from uam_sim_bridge.autopilot.core import Autopilot, AutopilotStatus
+from uam_sim_bridge.mavlink.link.flight_state import FlightState
 from uam_sim_bridge.mavlink.offboard.sequence import (
     COMMANDS,
     HEARTBEAT_TIMEOUT,
@@ -26,7 +27,7 @@ from uam_sim_bridge.mavlink.offboard.sequence import (
 )
 from uam_sim_bridge.mavlink.offboard.setpoints.desired import Target
 from uam_sim_bridge.mavlink.protocol.frames import swap_quaternion, swap_sample, swap_world
-from uam_sim_bridge.mavlink.protocol.modes import MavResult, Mode, Severity
+from uam_sim_bridge.mavlink.protocol.modes import MavResult, Severity
 from uam_sim_bridge.mavlink.protocol.vision import VisionPose
 
 HEARTBEAT, LANDED = 1.0, 0.2  # [s] between two regular reports, as `telemetry.STREAMS`
@@ -51,7 +52,7 @@ def at_once() -> float:
     return 0.0
 
 
-class JoinedAutopilot:
+class JoinedAutopilot(FlightState):
     """An `AutopilotPort` to the `Autopilot` in the same process.
 
     `motors` (n,): commands 0..1 of the last cycle; rewritten by the next one. `time` [s]: of the
@@ -60,12 +61,11 @@ class JoinedAutopilot:
 
     def __init__(self, autopilot: Autopilot, sequence: OffboardSequence) -> None:
         """sequence: of the bridge; it receives answers and texts."""
+        super().__init__()
         self.autopilot, self.sequence = autopilot, sequence
         self.motors = autopilot.motors
-        self.armed, self.mode, self.landed = False, Mode.UNKNOWN, True
-        self.intended, self.failsafe = Mode.UNKNOWN, False
+        self.landed, self.failsafe = True, False
         self._delivered = -math.inf  # [s] newest setpoint that reached the autopilot
-        self.armed_since: float | None = None
         self.passes: Callable[[], bool] = always  # whether a message reaches the autopilot
         self.receives: Callable[[], bool] = always  # whether one of the autopilot arrives
         self.late_to: Callable[[], float] = at_once  # [s] of a message to the autopilot
@@ -124,11 +124,7 @@ class JoinedAutopilot:
         status = received.status
         if status is not None:
             self._received_at = time
-            if status.armed and not self.armed:
-                self.armed_since = time
-            elif not status.armed:
-                self.armed_since = None
-            self.armed, self.mode = status.armed, status.mode
+            self.take_heartbeat(time, status.mode, status.armed)
             self.intended, self.failsafe = status.intended, status.failsafe
 
     def tick(self, time: float) -> None:

@@ -20,7 +20,7 @@ class FlightState:
     """`mode`, `armed`: newest ones; `intended`: the mode that was chosen last by a person or a
     companion; `armed_since` [s] or None: tick of the first report that it is armed.
 
-    All times are those of the ticks [s].
+    The part of an `AutopilotPort` that both ports have; all times are those of the ticks [s].
     """
 
     def __init__(self) -> None:
@@ -30,25 +30,25 @@ class FlightState:
         self._mode_settles = self._arming_settles = -math.inf
         self._doubted: Mode | None = None  # reported while the mode settles
 
-    def update(self, time: float) -> None:
+    def settle(self, time: float) -> None:
         """Believe the mode that was reported while it settled, if no newer report denies it."""
         if self._doubted is not None and time >= self._mode_settles:
             self.mode, self._doubted = self._doubted, None
 
-    def heartbeat(self, time: float, mode: Mode, armed: bool) -> None:
+    def take_heartbeat(self, time: float, mode: Mode, armed: bool) -> None:
         """Take a HEARTBEAT; one that denies an answer just before counts with the next one."""
         self._take_mode(time, mode)
         if time >= self._arming_settles:
             self._take_arming(time, armed)
 
-    def current_mode(self, time: float, mode: Mode, intended: Mode, landed: bool) -> None:
+    def take_current_mode(self, time: float, mode: Mode, intended: Mode, landed: bool) -> None:
         """Take a CURRENT_MODE, which is sent on a change, so before the next heartbeat."""
         self.intended = intended
         # PX4 goes back to OFFBOARD when it disarms; only the heartbeat says that it has
         if mode is not Mode.OFFBOARD or not landed or mode is self.mode:
             self._take_mode(time, mode)
 
-    def accepted(self, time: float, request: Request) -> None:
+    def take_accepted(self, time: float, request: Request) -> None:
         """Take the state of an accepted request: the next heartbeat may be a second later."""
         if request is Request.OFFBOARD:
             self.mode, self._doubted = Mode.OFFBOARD, None

@@ -46,14 +46,14 @@ UNSIGNED = (
 EXPLAIN_PERIOD = 3.0  # s between two requests for the failed arming checks
 
 
-class OffboardLink:
+class OffboardLink(FlightState):
     """State of the autopilot from its messages, and the messages to it.
 
-    `failsafe`, `landed`, `killed` (the kill switch is engaged): latest report; `values`: its
-    parameters (of WATCHED, and required ones) by name; `parameters`: their comparison; `ignored`:
-    number of messages from other systems or for other receivers; `vitals`: battery, estimator and
-    sensors; `reboots`: number of restarts; `imu`: its IMU, if it is requested; `magnet`: on one of
-    its outputs, if the owner sets it.
+    `mode`, `armed`, `intended`, `armed_since`: see `FlightState`; `failsafe`, `landed`, `killed`
+    (the kill switch is engaged): latest report; `values`: its parameters (of WATCHED, and required
+    ones) by name; `parameters`: their comparison; `ignored`: number of messages from other systems
+    or for other receivers; `vitals`: battery, estimator and sensors; `reboots`: number of restarts;
+    `imu`: its IMU, if it is requested; `magnet`: on one of its outputs, if the owner sets it.
     """
 
     def __init__(
@@ -70,10 +70,10 @@ class OffboardLink:
         """imu_rate [Hz]: of the autopilot's IMU, 0: not requested; clock: the companion's [s], to
         which stamps of that IMU are converted, None: the times of the ticks; required: parameters
         to compare."""
+        super().__init__()
         self._clock = clock
         self.sequence = sequence
         self.landed, self.failsafe, self.killed = True, False, False
-        self._state = FlightState()
         self.ignored = self.reboots = 0
         self.vitals = Vitals()
         self.time_sync = TimeSync()
@@ -94,26 +94,6 @@ class OffboardLink:
         self._heartbeat_in = self._heartbeat_out = self._explained = -math.inf
         self._was_connected = False  # at the last tick
         self._told_unsigned = False
-
-    @property
-    def mode(self) -> Mode:
-        """Return the mode of the autopilot."""
-        return self._state.mode
-
-    @property
-    def intended(self) -> Mode:
-        """Return the mode that was chosen last by a person or a companion."""
-        return self._state.intended
-
-    @property
-    def armed(self) -> bool:
-        """Return whether the autopilot is armed."""
-        return self._state.armed
-
-    @property
-    def armed_since(self) -> float | None:
-        """Return the tick [s] of the first report that it is armed, None while it is not."""
-        return self._state.armed_since
 
     def set_mapping(self, mapping: RateThrustParameters) -> None:
         """Compare the autopilot's parameters with this mapping from now on."""
@@ -214,7 +194,7 @@ class OffboardLink:
             self._told_unsigned = True
             self.sequence.text(Severity.ERROR, UNSIGNED)
         connected = self.maintain(time)
-        self._state.update(time)
+        self.settle(time)
         delivered = self.time_sync.delivered
         seen = Reported(connected, self.armed, self.mode, self.intended, self.failsafe, delivered)
         request = self.sequence.update(time, seen)
@@ -270,14 +250,14 @@ class OffboardLink:
                 self._heartbeat_in = time
                 self.failsafe = m.system_status == mavlink2.MAV_STATE_CRITICAL
                 self.killed = m.system_status == mavlink2.MAV_STATE_FLIGHT_TERMINATION
-                self._state.heartbeat(
+                self.take_heartbeat(
                     time,
                     Mode.from_custom_mode(m.custom_mode),
                     bool(m.base_mode & mavlink2.MAV_MODE_FLAG_SAFETY_ARMED),
                 )
         elif kind == "CURRENT_MODE":
             modes = map(Mode.from_custom_mode, (m.custom_mode, m.intended_custom_mode))
-            self._state.current_mode(time, *modes, self.landed)
+            self.take_current_mode(time, *modes, self.landed)
         elif kind == "COMMAND_ACK":
             self._acknowledged(time, m.command, m.result)
         elif kind == "EXTENDED_SYS_STATE":
@@ -348,7 +328,7 @@ class OffboardLink:
                 self._explained = time
                 self._command(MavCmd.RUN_PREARM_CHECKS)
             return
-        self._state.accepted(time, request)
+        self.take_accepted(time, request)
 
     def _request(self, request: Request) -> None:
         command, parameters = COMMANDS[request]
