@@ -2,6 +2,7 @@
 
 import json
 import os
+import signal
 import subprocess
 import sys
 
@@ -27,9 +28,9 @@ def beside(tmp_path):
         return running[-1]
 
     yield start
-    for process in running:
-        process.kill()
-        process.wait()
+    for process in running:  # not killed: nodes of the next flight in this domain would see it
+        process.send_signal(signal.SIGINT)
+        process.wait(PATIENCE)
 
 
 @pytest.mark.long

@@ -127,19 +127,21 @@ def on_vehicle(publishers: Mapping[str, str], subscribers: Mapping[str, str]) ->
     return found
 
 
-def _listeners(node: Node, topic: topics.Topic) -> set[str]:
+def _listeners(node: Node, topic: topics.Topic) -> list[str]:
     """Return the names of the vehicle's nodes that subscribe to `topic`."""
     name = node.resolve_topic_name(topic.name)
     return _own(node, node.get_subscriptions_info_by_topic(name))
 
 
-def _own(node: Node, ends: Sequence[TopicEndpointInfo]) -> set[str]:
+def _own(node: Node, ends: Sequence[TopicEndpointInfo]) -> list[str]:
     """Return the names of the nodes of `ends` that are in the namespace of `node`."""
-    return {end.node_name for end in ends if end.node_namespace == node.get_namespace()}
+    return [end.node_name for end in ends if end.node_namespace == node.get_namespace()]
 
 
 def missing(node: Node, recorded: bool, wires: Sequence[Wire] = WIRES) -> list[str]:
     """Return one text per end of `wires` that the ROS graph of `node` does not contain yet.
+
+    A publisher that is there twice has a text, too: one may be of an earlier flight.
 
     recorded: the recorder must subscribe to each of these topics as well.
     """
@@ -150,6 +152,8 @@ def missing(node: Node, recorded: bool, wires: Sequence[Wire] = WIRES) -> list[s
         listeners = _listeners(node, wire.topic)
         if wire.publisher not in publishers:
             found.append(f"{wire.publisher} to publish {name}")
+        if publishers.count(wire.publisher) > 1:
+            found.append(f"one of the two nodes named {wire.publisher} that publish {name} to end")
         required = wire.listeners(recorded)
         found += [f"{one} to listen to {name}" for one in required if one not in listeners]
     return found

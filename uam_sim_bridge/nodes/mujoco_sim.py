@@ -173,7 +173,9 @@ class Simulator:
         while time.monotonic() < settled and not self._stop.raised:
             self.executor.spin_once(0.05)
         self._log.info("all nodes are connected")
-        if not self.options.end_with_mission:
+        if self.options.end_with_mission:
+            self.answers.forget_mission()  # that of an earlier flight does not end this one
+        else:
             self._begin_after(max(self.answers.mission_stamp, self._newest_report()))
 
     def _newest_report(self) -> int:

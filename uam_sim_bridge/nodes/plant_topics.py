@@ -174,7 +174,7 @@ class Answers:
         # NaN: no goal yet, the servos hold their position
         self.arm_command = np.full(len(self._names), np.nan if to_goals else 0.0)
         self.magnet = False
-        self.mission, self.mission_stamp = MissionStatus(), 0  # [ns]
+        self.forget_mission()
         self.setpoints: dict[int, int] = {}
         self.arrivals: dict[str, float] = {}  # time.monotonic() of the newest, by topic
         self.restarts = 0  # of nodes that were lost
@@ -203,6 +203,10 @@ class Answers:
             for name, inlet in self.inlets.items()
             if name in PUBLISHERS
         }
+
+    def forget_mission(self) -> None:
+        """Put the state of the mission back to that before its first message."""
+        self.mission, self.mission_stamp = MissionStatus(), 0  # [ns]
 
     def begin(self) -> None:
         """Begin a tick: clear the set of received answers."""
