@@ -100,16 +100,20 @@ class Processes:
         optional: bool = False,
         again: int = 0,
         nodes: tuple[str, ...] = (),
+        place: Callable[[int], None] = lambda process: None,
     ) -> NodeProcess:
         """Run `module.main()` as the process `name`.
 
         may_end: it ends by itself when finished; optional: its end is no failure of the flight, see
-        `missed`; again: number of restarts by `revive`; nodes: of the process, see `process_of`.
+        `missed`; again: number of restarts by `revive`; nodes: of the process, see `process_of`;
+        place: called with the process id after each start.
         """
         log = self._logs / f"{name}.log"
 
         def run(further: Sequence[str]) -> BaseProcess:
-            return fork(name, module, [*arguments, *further], log, self._environment)
+            made = fork(name, module, [*arguments, *further], log, self._environment)
+            place(made.pid)
+            return made
 
         child = NodeProcess(name, run([]), log, run, may_end, optional, again, nodes)
         self._children[name] = child

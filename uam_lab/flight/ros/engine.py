@@ -16,6 +16,7 @@ from uam_lab.flight.flight_settings import ONLOOKERS, FlightSettings
 from uam_lab.flight.observer import FlightStatus, Observer
 from uam_lab.flight.ros import node_arguments, supervise
 from uam_lab.flight.ros.logged_outcome import read_outcome
+from uam_lab.flight.ros.placement import placing
 from uam_lab.flight.ros.process_fault_injection import ProcessFaults
 from uam_lab.flight.ros.status_listener import StatusListener
 from uam_lab.processes.interrupts import StopRequest
@@ -119,10 +120,12 @@ def _start(
             optional=name in ONLOOKERS,
             again=supervise.RESTARTS if name in CONTROLLERS else 0,
             nodes=node_arguments.nodes_in(name, settings),
+            place=placing(settings, ports.instance, name),
         )
     module, own = node_arguments.autopilot(settings, folder, ports)
     if module:
-        children.start(AUTOPILOT, module, own, may_end=True)
+        place = placing(settings, ports.instance, AUTOPILOT)
+        children.start(AUTOPILOT, module, own, may_end=True, place=place)
 
 
 def _announcement(children: Processes, settings: FlightSettings, ports: Ports) -> Iterator[str]:

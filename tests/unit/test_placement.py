@@ -1,0 +1,60 @@
+"""Cores of the processes of a lockstep flight."""
+
+import os
+import subprocess
+import sys
+from types import SimpleNamespace
+
+import pytest
+
+from uam_control.settings.process_parameters import ProcessParameters
+from uam_lab.flight.flight_settings import BUILTIN
+from uam_lab.flight.ros.placement import pair, placing
+from uam_msgs_py.node import wiring
+
+
+def test_each_instance_has_two_cores():
+    assert pair([0, 1], 0) == pair([0, 1], 7) == (0, 1)
+    assert [pair([2, 3, 5, 8], n) for n in range(3)] == [(2, 3), (5, 8), (2, 3)]
+    assert pair([1, 2, 4], 1) == (4, 1)
+    assert pair([3], 0) is None
+
+
+def settings(clock="lockstep", autopilot=BUILTIN, cores=""):
+    process = ProcessParameters(cores=cores)
+    return SimpleNamespace(clock=clock, autopilot=autopilot, process=process)
+
+
+@pytest.fixture
+def process():
+    sleeping = subprocess.Popen([sys.executable, "-c", "input()"], stdin=subprocess.PIPE)
+    yield sleeping.pid
+    sleeping.kill()
+    sleeping.communicate()
+
+
+@pytest.mark.skipif(len(os.sched_getaffinity(0)) < 2, reason="one core")
+def test_who_computes_the_setpoint_has_one_core_and_the_others_the_second(process):
+    first, second = pair(sorted(os.sched_getaffinity(0)), 0)
+    for name in (wiring.FLIGHT_CONTROLLER, wiring.ESTIMATOR, wiring.BRIDGE):
+        placing(settings(), 0, name)(process)
+        assert os.sched_getaffinity(process) == {first}
+    for name in (wiring.PLANT, wiring.MISSION, wiring.ARM, "autopilot"):
+        placing(settings(), 0, name)(process)
+        assert os.sched_getaffinity(process) == {second}
+    assert os.sched_getscheduler(process) == os.SCHED_OTHER
+    placing(settings(), 0, wiring.RECORDER)(process)
+    assert os.sched_getscheduler(process) == os.SCHED_BATCH
+
+
+def test_nothing_is_placed_in_real_time_with_another_autopilot_or_with_chosen_cores(process):
+    before = os.sched_getaffinity(process)
+    for one in (settings("realtime"), settings(autopilot="px4"), settings(cores="0")):
+        placing(one, 0, wiring.PLANT)(process)
+        assert os.sched_getaffinity(process) == before
+
+
+def test_a_process_that_has_ended_is_no_error():
+    ended = subprocess.Popen([sys.executable, "-c", ""])
+    ended.wait()
+    placing(settings(), 0, wiring.RECORDER)(ended.pid)
