@@ -10,9 +10,10 @@ from rclpy.clock import Clock, ClockType
 from std_msgs.msg import Bool
 
 from uam_control.control.output_limits import PositionLimits
-from uam_control.coordinates import ARM
+from uam_control.coordinates import ARM, ATTITUDE, CHI
 from uam_control.grasp import Grasp
 from uam_control.laws.catalogue import DEFAULT
+from uam_control.maths.rotations import tilt
 from uam_control.mission import (
     ChecklistReport,
     Feasibility,
@@ -32,7 +33,8 @@ from uam_control.settings.parameter_set import ParameterSet, number
 from uam_control.stages.mission_stage import MissionStage
 from uam_control.stages.timing import Timing
 from uam_control.stamps import SECOND
-from uam_control.supervision import Authority, State
+from uam_control.supervision import Authority, Inputs, State
+from uam_control.supervision.inputs import SUBSYSTEMS
 from uam_control.supervision.setpoint_delay import margin_left
 from uam_control.vehicle import VehicleDescription, derived_parameters
 from uam_msgs_py.messages import topics
@@ -99,7 +101,7 @@ class MissionNode(UamNode):
         self._mission = Mission(scenario, self.parameter_set.current, start, vehicle)
         self._stage = MissionStage(self._mission, timing)
         spare = Mission(self._mission.scenario, self.parameter_set.current)
-        warm_up(spare, self.parameter_set.current.takeoff_delay)
+        warm_up(spare, self.parameter_set.current.takeoff_delay, timing.control_period)
         self.parameter_set.apply = self._mission.configure
         self._arm: bool | None = None
         self._published: tuple = ()  # content of the last status
@@ -345,11 +347,19 @@ class MissionNode(UamNode):
         return level, summary, values
 
 
-def warm_up(spare: Mission, takeoff: float) -> None:
-    """Compile the functions of a flight with a spare mission; takeoff [s]: its take-off delay."""
+def warm_up(spare: Mission, takeoff: float, period: float) -> None:
+    """Compile the functions of a flight with a spare mission.
+
+    takeoff [s]: its take-off delay; period [s]: between two ticks. What a message holds cannot be
+    written: for numba it is another type than the arrays of a mission.
+    """
     state = np.zeros_like(spare.output.reference)
-    for stamp in (0.0, takeoff, takeoff + 0.004):
+    for stamp in (0.0, takeoff, takeoff + period):
         spare.step(stamp, state, 0.0)
+    received = np.zeros(2)
+    received.flags.writeable = False
+    Inputs(period).gains(0.0, SUBSYSTEMS[0], ("rho", "rho_dot"), received)
+    tilt(state[CHI, ATTITUDE])
 
 
 def main() -> int:

@@ -22,7 +22,7 @@ from uam_msgs_py.messages.layouts import BadMessage, stamp_of
 from uam_msgs_py.messages.serialized import stays_serialized, stays_stamped
 from uam_msgs_py.messages.status import ERROR, OK, STALE, WARN, diagnostic
 from uam_msgs_py.messages.topics import Topic
-from uam_msgs_py.node import connections, polling, process_options
+from uam_msgs_py.node import connections, log_callers, polling, process_options
 from uam_msgs_py.node.executor import spin
 from uam_msgs_py.node.garbage import GarbageCollection
 from uam_msgs_py.node.health import LoopTime, ages
@@ -339,6 +339,7 @@ def run_together(
                 refuse_unknown(node, node.get_name() if len(nodes) > 1 else "")
             process = nodes[0].process
             process_options.apply(process)
+            log_callers.find_modules()
         except (ValueError, OSError) as error:  # ParameterError, ProfileError, ScenarioError ...
             return refuse(name, error)
         with GarbageCollection(process.collect_between_ticks) as garbage:

@@ -1,13 +1,16 @@
 """Preparation of the process that forks a flight's nodes; importing this module runs it.
 
-It loads the compiled functions and runs them once, so that no node has to repeat this.
+It loads the compiled functions and runs them once, and prepares the log, so that no node has to
+repeat this.
 """
 
 import gc
 
 from uam_control.laws import catalogue
 from uam_lab.flight.direct.warm_up import warm_up
+from uam_msgs_py.node import log_callers
 
 warm_up([catalogue.DEFAULT])
+log_callers.find_modules()
 gc.collect()
 gc.freeze()  # a garbage collection in a child must not copy the shared memory pages
