@@ -123,9 +123,9 @@ _NOTHING = np.zeros(0)
 def all_finite(values: np.ndarray) -> bool:
     """Return whether no number is infinite or NaN, and their sum does not overflow.
 
-    The ufunc itself: the method `sum` takes twice as long.
+    For so few numbers Python's sum takes half the time of NumPy's.
     """
-    return math.isfinite(np.add.reduce(values, None))
+    return math.isfinite(sum(values.ravel().tolist()))
 
 
 def _converted(kind: type, data: bytes) -> bytes:

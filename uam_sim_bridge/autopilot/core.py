@@ -157,9 +157,9 @@ class Autopilot:
         self._configure()
 
     @property
-    def outputs(self) -> np.ndarray:
-        """The outputs of actuator set and grippers (6,), -1..1; 0: the disarmed value."""
-        values = np.nan_to_num(self.actuators)
+    def outputs(self) -> list[float]:
+        """The outputs of actuator set and grippers (6), -1..1; 0: the disarmed value."""
+        values = [0.0 if math.isnan(value) else value for value in self.actuators.tolist()]
         for number, closed in self.gripper.items():
             if 1 <= number <= ACTUATORS:
                 values[number - 1] = 1.0 if closed else -1.0

@@ -104,7 +104,7 @@ class Server:
         self._udp.send(self._companion.tick(time))
         mode = _CUSTOM_MODE | (_ARMED if self._autopilot.status.armed else 0)
         controls = [*motors.tolist(), *[0.0] * (CONTROLS - len(motors))]
-        actuators = self._autopilot.outputs.tolist()
+        actuators = self._autopilot.outputs
         controls[CONTROLS - len(actuators) :] = actuators
         answer = mavlink2.MAVLink_hil_actuator_controls_message(
             m.time_usec, controls, mode, _LOCKSTEP

@@ -360,6 +360,7 @@ class MavlinkBridgeNode(UamNode):
             ThrustIdentificationParameters.of(self._vehicle), self._vehicle
         )
         measured.update(0.0, 0.004, state, zero, 0.5, True, False, 1.0, spare.curve)
+        measured.loop_delay.pause()
         VisionPose(0.0, zero, level, 1.0, 1.0).message()
 
 

@@ -66,7 +66,7 @@ from uam_sim_bridge.nodes.plant_topics import (
 from uam_sim_bridge.nodes.restart import Restart
 from uam_sim_bridge.paced_clock import PacedClock
 from uam_sim_bridge.patience import Patience
-from uam_sim_bridge.plant import PhysicsError, Plant, Samples, Truth, Vehicle
+from uam_sim_bridge.plant import PhysicsError, Plant, Vehicle
 from uam_sim_bridge.plant.effects import presets
 
 NAME = "mujoco_sim"
@@ -252,18 +252,18 @@ class Simulator:
             begun = time.perf_counter()
             if self._reset_due:
                 self._reset()
-            samples, truth = self._begin_tick()
+            self._begin_tick()
             if realtime:
-                self._send_hil(samples, truth)
+                self.hil.flush()
                 self._wait_until(self._clock.deadline(self.plant.tick - self._first_tick + 1))
                 self._measure()
                 self._receive_hil(0.0)
             elif self.options.publish_imu:
                 self._wait_for_answers()
-                self._send_hil(samples, truth)
+                self.hil.flush()
                 self._receive_hil()
             else:
-                self._send_hil(samples, truth)
+                self.hil.flush()
                 self._receive_hil()
                 self._wait_for_answers()
             if self._faulty:
@@ -296,8 +296,8 @@ class Simulator:
         self.statistics.wall_s = time.monotonic() - begin
         self._recorder_has_caught_up(0.0, LAST_WAIT)  # unread messages are lost when the node ends
 
-    def _begin_tick(self) -> tuple[Samples, Truth]:
-        """Publish the samples and the truth of this tick, and return them."""
+    def _begin_tick(self) -> None:
+        """Publish the samples and the truth of this tick, and prepare those of the autopilot."""
         plant = self.plant
         self._begun, self._begun_at = time.monotonic(), plant.time
         self._clock.note(plant.tick - self._first_tick)
@@ -315,15 +315,11 @@ class Simulator:
         self._stamp = self.sensors.publish(samples) if self._complete else None
         if self._stamp is not None:
             self._times.tick(self._stamp)
-        # No node waits for the truth: it is published while the estimator works.
+        # No node waits for what follows: it is done while the estimator works.
         truth = plant.truth()
+        taken, gyro, force = samples.hil
+        self.hil.prepare(taken, gyro, force, truth.state[0, POSITION], truth.quaternion)
         self.truth.publish(now, truth, self.hil.motors, self.answers.magnet)
-        return samples, truth
-
-    def _send_hil(self, samples: Samples, truth: Truth) -> None:
-        """Send the autopilot its sensor samples."""
-        now, gyro, force = samples.hil
-        self.hil.send(now, gyro, force, truth.state[0, POSITION], truth.quaternion)
 
     def _receive_hil(self, timeout: float | None = None) -> None:
         """Receive the autopilot's motor commands; timeout [s], None: see HilServer.receive."""

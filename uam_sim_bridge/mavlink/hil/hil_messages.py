@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 
 from uam_sim_bridge.mavlink.hil.hil_sensors import TEMPERATURE, SlowSensors
@@ -81,9 +83,11 @@ class HilMessages:
             return False
         self.armed = bool(message.mode & _ARMED)
         self.controls[:] = message.controls
-        commands = self.controls[: len(self.motors)]
-        good = self.armed and bool(np.all(np.isfinite(commands)))
-        self.motors[:] = np.clip(commands, 0.0, 1.0) if good else 0.0
+        commands = message.controls[: len(self.motors)]
+        if self.armed and all(map(math.isfinite, commands)):
+            self.motors[:] = [min(max(command, 0.0), 1.0) for command in commands]
+        else:
+            self.motors[:] = 0.0
         return True
 
     def forget(self) -> np.ndarray:

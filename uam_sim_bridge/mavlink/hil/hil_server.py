@@ -71,6 +71,7 @@ class HilServer(HilMessages):
         self.answered = False
         self.missed = 0
         self._ever = False
+        self._prepared = b""
         self._link: socket.socket | None = None
         self._listener = socket.socket(socket.AF_INET, socket.SOCK_STREAM)
         self._listener.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
@@ -98,6 +99,30 @@ class HilServer(HilMessages):
             self._link.setblocking(False)
         return self.connected
 
+    def prepare(
+        self,
+        time: float,
+        gyro: np.ndarray,
+        accel: np.ndarray,
+        position: np.ndarray,
+        quaternion: np.ndarray,
+    ) -> None:
+        """Encode the sensors of the tick at `time` [s] for `flush`; arguments: see `sensors`."""
+        if self._link is not None:
+            self._prepared = self.sensors(time, gyro, accel, position, quaternion)
+
+    def flush(self) -> None:
+        """Send what is prepared."""
+        data, self._prepared = self._prepared, b""
+        if self._link is None:
+            return
+        try:
+            self._link.settimeout(self.parameters.answer_timeout)
+            self._link.sendall(data)
+            self._link.setblocking(False)
+        except (ConnectionError, TimeoutError):
+            self._stop()
+
     def send(
         self,
         time: float,
@@ -107,15 +132,8 @@ class HilServer(HilMessages):
         quaternion: np.ndarray,
     ) -> None:
         """Send the sensors of the tick at `time` [s]; arguments: see `sensors`."""
-        if self._link is None:
-            return
-        data = self.sensors(time, gyro, accel, position, quaternion)
-        try:
-            self._link.settimeout(self.parameters.answer_timeout)
-            self._link.sendall(data)
-            self._link.setblocking(False)
-        except (ConnectionError, TimeoutError):
-            self._stop()
+        self.prepare(time, gyro, accel, position, quaternion)
+        self.flush()
 
     def receive(self, timeout: float | None = None) -> np.ndarray:
         """Wait for the answer to the last `send`; return `motors` (n,), also without an answer.
@@ -161,6 +179,6 @@ class HilServer(HilMessages):
     def _stop(self) -> np.ndarray:
         if self._link is not None:
             self._link.close()
-            self._link = None
+            self._link, self._prepared = None, b""
         self._ever = self.answered = False
         return self.forget()

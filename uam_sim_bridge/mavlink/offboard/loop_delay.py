@@ -51,9 +51,9 @@ STAGES = 3
 _ROWS = BAND + 3 * STAGES
 # rows of the sums, per axis
 WITH, OWN = 0, 1  # sum of product with the acceleration, sum of squares; per delay
-# entries of `now`: delay [s] and explained share, stamp [s] of the last tick (NaN: none), column
-# of `past` for its setpoint, ticks for which the filters settle
-VALUE, SHARE, STAMP, NEWEST, SETTLING = range(5)
+# entries of `now`: stamp [s] of the last tick (NaN: none), column of `past` for its setpoint, ticks
+# for which the filters settle
+STAMP, NEWEST, SETTLING = range(3)
 
 
 class DelayNumbers(NamedTuple):
@@ -75,7 +75,7 @@ class DelayNumbers(NamedTuple):
 class DelaySums(NamedTuple):
     """State of a LoopDelay.
 
-    now (5,): see the entries VALUE..SETTLING; filters (12, 2); past (2, DELAYS): setpoints; sums
+    now (3,): see the entries STAMP..SETTLING; filters (12, 2); past (2, DELAYS): setpoints; sums
     (2, 2, DELAYS); total (3,): sums of the squared accelerations, of the weights.
     """
 
@@ -89,7 +89,8 @@ class DelaySums(NamedTuple):
 class LoopDelay:
     """Measures the delay of the attitude loop.
 
-    `numbers`, `sums`: what the compiled `follow` reads and writes.
+    `numbers`, `sums`: what the compiled `follow` reads and writes at each tick. The fit is made
+    when a value is asked for.
     """
 
     def __init__(self, motor_lag: float, period: float) -> None:
@@ -102,23 +103,30 @@ class LoopDelay:
             float(period), math.exp(-period / MEMORY), *gains, *keep.tolist()
         )
         self.sums = DelaySums(
-            np.array([math.nan, 0.0, math.nan, 0.0, 0.0]),
+            np.array([math.nan, 0.0, 0.0]),
             np.zeros((_ROWS, AXES)),
             np.zeros((AXES, DELAYS)),
             np.zeros((AXES, 2, DELAYS)),
             np.zeros(AXES + 1),
         )
         self._follow = prepared(follow, 0.0, np.zeros(3), np.zeros(3), self.sums, self.numbers)
+        self._both_axes = prepared(both_axes, self.sums.sums, self.sums.total, self.numbers)
 
     @property
     def value(self) -> float:
         """The delay [s], NaN while unknown."""
-        return self.sums.now.item(VALUE)
+        weight = self.sums.total.item(AXES) * self.numbers.period
+        if math.isnan(self.sums.now.item(STAMP)) or weight < LEAST_WEIGHT:
+            return math.nan
+        return self._fit()[0]
 
     @property
     def explained(self) -> float:
         """Share of the variance that the better axis' fit explains, 0 before."""
-        return self.sums.now.item(SHARE)
+        return self._fit()[1]
+
+    def _fit(self) -> tuple[float, float]:
+        return self._both_axes(self.sums.sums, self.sums.total, self.numbers)
 
     def update(self, stamp: float, setpoint: np.ndarray, rates: np.ndarray) -> float:
         """Take a tick and return `value`; stamp [s], setpoint, rates: see `follow`."""
@@ -134,7 +142,6 @@ class LoopDelay:
 def pause(state: DelaySums) -> None:
     """Forget the last tick; the delay is unknown."""
     state.now[STAMP] = math.nan
-    state.now[VALUE] = math.nan
 
 
 @jit
@@ -145,12 +152,12 @@ def follow(
     state: DelaySums,
     numbers: DelayNumbers,
 ) -> None:
-    """Take a tick: advance the state, write delay and explained share into `now`.
+    """Take a tick: advance the state.
 
     stamp [s]; setpoint (3,), rates (3,) [rad/s, FLU]: sent at the tick, measured at the tick.
     After a gap the filters settle first.
     """
-    now, filters, past, sums, total = state
+    now, filters, past = state.now, state.filters, state.past
     period = numbers.period
     # false for the NaN of no last tick, too
     if not 0.5 < (stamp - now[STAMP]) / period < 1.5:
@@ -165,9 +172,6 @@ def follow(
     counts = now[SETTLING] <= 0.0
     now[SETTLING] -= 1.0
     advance(setpoint, rates, counts, state, numbers)
-    delay, explained = both_axes(sums, total, (numbers.least, numbers.largest), period)
-    now[VALUE] = delay if total[AXES] * period >= LEAST_WEIGHT else math.nan
-    now[SHARE] = explained
 
 
 @jit
@@ -215,13 +219,12 @@ def advance(
 
 
 @jit
-def both_axes(
-    sums: np.ndarray, total: np.ndarray, gains: tuple[float, float], period: float
-) -> tuple[float, float]:
+def both_axes(sums: np.ndarray, total: np.ndarray, numbers: DelayNumbers) -> tuple[float, float]:
     """Return the delay [s], NaN if unknown, and the explained share of the better axis.
 
-    sums (2, 2, DELAYS), total (3,): see LoopDelay; gains [1/s]: least, largest; period [s].
+    sums (2, 2, DELAYS), total (3,): see LoopDelay.
     """
+    gains, period = (numbers.least, numbers.largest), numbers.period
     least = largest = math.nan
     weighted = weights = better = 0.0
     for axis in range(sums.shape[0]):
