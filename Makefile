@@ -49,7 +49,8 @@ clean:           ## remove what setup, tests and colcon made; results/ stays
 	find . -name __pycache__ -type d -prune -exec rm -rf {} +
 
 # Where ROS 2 is already there (a sourced apt installation) its own rclpy is used, not the wheels.
-# --no-compile: Python compiles a module when it is first imported, and most never are.
+# --no-compile: Python compiles a module when it is first imported, and most never are. What a flight
+# imports and its control path are compiled at the end, so that the first one starts like the others.
 $(STAMP): $(INSTALLED_FROM)
 	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11))' 2>/dev/null || { \
 	  echo "setup: Python 3.11 or newer is needed and $(PYTHON) is not; try make PYTHON=python3.12 $(MAKECMDGOALS)" >&2; exit 2; }
@@ -59,4 +60,6 @@ $(STAMP): $(INSTALLED_FROM)
 	  echo "setup: installing uam[$$extras] into $(VENV), once (a few minutes)"; \
 	  $(BIN)/python -m pip install --quiet --disable-pip-version-check --no-compile -e ".[$$extras]" || { \
 	  echo "setup: the installation failed; the lines above say why" >&2; exit 2; }
+	@$(BIN)/python -m uam_lab.flight.direct.warm_up
+	@$(BIN)/python -c "import uam_lab.flight.ros.forker, uam_lab.report.build"
 	@touch $@

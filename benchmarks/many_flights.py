@@ -2,8 +2,9 @@
 
     .venv/bin/python benchmarks/many_flights.py                           # 40 flights, twice
     .venv/bin/python benchmarks/many_flights.py --scenario hover --flights 12
-    .venv/bin/python benchmarks/many_flights.py --disturbed --flights 10000 --scenario benchmarks/hop.yaml
-    .venv/bin/python benchmarks/many_flights.py --disturbed --scheduled   # and by a scheduler's
+    .venv/bin/python benchmarks/many_flights.py --disturbed               # 40 flights, twice
+    .venv/bin/python benchmarks/many_flights.py --disturbed --scheduled --flights 10000 \\
+        --scenario benchmarks/hop.yaml                                    # an hour
 
 The first form flies in turns in this process and on one worker, in blocks of the same flights, and
 prints the ratio of the times. --disturbed flies a campaign in peace and one in which two workers
@@ -93,7 +94,8 @@ def disturbed(options) -> int:
 def _tell(name: str, begun: float, flights: int, out: Path) -> None:
     seconds = time.perf_counter() - begun
     size = len(_table(out)) / flights
-    print(f"{name:<9} {seconds:.0f} s, {flights / seconds:.1f} flights/s, {size:.0f} B per flight")
+    rate = f"{flights / seconds:.1f} flights/s"
+    print(f"{name:<9} {seconds:.0f} s, {rate}, {size:.0f} B per flight", flush=True)
 
 
 def _command(options, out: Path) -> list[str]:

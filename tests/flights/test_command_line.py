@@ -1,5 +1,12 @@
 """Wrong use of `uam fly`: one clear line, exit status 2, nothing written."""
 
+import os
+import signal
+import subprocess
+import sys
+import time
+
+import psutil
 import pytest
 
 from uam_lab.cli.main import main
@@ -133,3 +140,19 @@ def test_help_shows_examples(capsys):
     assert stop.value.code == 0
     for word in ("examples:", "--scenario", "--clock", "--payload-mass", "Exit status"):
         assert word in out
+
+
+def test_an_interrupt_while_the_command_loads_is_one_line():
+    command = [sys.executable, "-m", "uam_lab.cli.main", "fly", "--scenario", "hover"]
+    with subprocess.Popen(
+        command, stderr=subprocess.PIPE, text=True, start_new_session=True
+    ) as run:
+        process = psutil.Process(run.pid)
+        # its second child loads the nodes, while it loads the command
+        while len(children := process.children()) < 2:
+            time.sleep(0.01)
+        os.killpg(run.pid, signal.SIGINT)  # as a terminal does
+        _, said = run.communicate()
+    assert (run.returncode, said) == (130, "uam: interrupted\n")
+    _, left = psutil.wait_procs(children, timeout=30)
+    assert not left

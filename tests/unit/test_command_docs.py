@@ -11,7 +11,7 @@ import pytest
 from pid_law import PidLaw
 
 from uam_control.laws import catalogue
-from uam_lab.cli.main import parser
+from uam_lab.cli.parser import parser
 from uam_lab.compare import plan
 
 ROOT = Path(__file__).resolve().parents[2]

@@ -6,7 +6,7 @@ import re
 import shlex
 from pathlib import Path
 
-from uam_lab.cli.main import parser
+from uam_lab.cli.parser import parser
 from uam_sim_bridge.plant.effects import presets
 
 TEXT = (Path(__file__).resolve().parents[2] / "docs/plant.md").read_text()

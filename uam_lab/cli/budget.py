@@ -11,13 +11,13 @@ from rich.console import Console
 
 from uam_control.mission import load_scenario
 from uam_lab.budget.shuttle import JOINTS, shuttle
-from uam_lab.cli.command import INTERRUPTED, Command, chosen_process, number
+from uam_lab.cli.command import Command, chosen_process, number
 from uam_lab.flight import flight_settings
 from uam_lab.flight.conclude import command_line
 from uam_lab.flight.flight_settings import CLOCKS, FlightSettings, require_ros
 from uam_lab.flight.progress import Progress
 from uam_lab.library.flight_result import FlightFailed
-from uam_lab.processes.interrupts import Interrupts
+from uam_lab.processes.interrupts import INTERRUPTED, Interrupts
 from uam_lab.results.atomic import write_text
 from uam_lab.results.result_folder import make_folder
 

@@ -38,7 +38,7 @@ from uam_sim_bridge.plant.engines import PlantError
 from uam_sim_bridge.ports import INSTANCES, PortError, flight_of
 from uam_sim_bridge.px4.px4_installation import Px4Error
 
-WRONG_USE, INTERRUPTED = 2, 130  # exit status
+WRONG_USE = 2  # exit status
 # the text of each is one line for the user
 USER_ERRORS = (
     *(ConfigurationError, ProfileError, ScenarioError, VehicleError, SettingsError, PortError),

@@ -8,12 +8,12 @@ from dataclasses import replace
 
 from rich.console import Console
 
-from uam_lab.cli.command import INTERRUPTED, Command, chosen_effects, number
+from uam_lab.cli.command import Command, chosen_effects, number
 from uam_lab.cli.fly import COMPLETED, NOT_COMPLETED
 from uam_lab.flight.conclude import command_line
 from uam_lab.flight.flight_settings import require_ros
 from uam_lab.flight.progress import Progress
-from uam_lab.processes.interrupts import Interrupts
+from uam_lab.processes.interrupts import INTERRUPTED, Interrupts
 from uam_lab.report.page.console import reporting, summary
 from uam_lab.vehicle.lab_file import TEMPLATE, load_lab
 from uam_lab.vehicle.lab_settings import settings_of

@@ -10,7 +10,6 @@ from uam_control.laws import catalogue
 from uam_control.settings import configuration
 from uam_control.vehicle import load_description
 from uam_lab.cli.command import (
-    INTERRUPTED,
     Command,
     chosen_effects,
     count,
@@ -20,6 +19,7 @@ from uam_lab.cli.command import (
 from uam_lab.cli.counting import Counting
 from uam_lab.flight.conclude import command_line
 from uam_lab.flight.direct.warm_up import prepare
+from uam_lab.processes.interrupts import INTERRUPTED
 from uam_lab.results.result_folder import make_folder
 from uam_lab.tuning.convergence import SMALL
 from uam_lab.tuning.convergence import in_words as convergence

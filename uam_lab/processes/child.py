@@ -11,10 +11,13 @@ lets the recorder close its file.
 
 from __future__ import annotations
 
+import atexit
+import contextlib
 import importlib
 import multiprocessing
 import multiprocessing.connection
 import multiprocessing.forkserver
+import multiprocessing.resource_tracker
 import multiprocessing.spawn
 import os
 import signal
@@ -32,6 +35,7 @@ from setproctitle import setproctitle
 from uam_lab.processes.borrowed_environment import borrowed
 
 GRACE = 5.0  # [s] from SIGINT to SIGKILL, after the end of the orchestrator
+FORKER = "uam_lab.flight.ros.forker"  # module that prepares the forking process for a flight
 TITLE = "uam-node"  # first word of a child's command line, for `ps` and `process_table`
 POLL = 0.002  # seconds
 # One thread per node: the matrices are small, and thread pools on few cores delay each other. The
@@ -61,10 +65,33 @@ def prepare(modules: Iterable[str]) -> None:
     """Start the forking process, which imports `modules`; return at once.
 
     Without this call the first child starts that process, and each child does its own imports.
+    Ctrl-C in the terminal does not interrupt its imports.
     """
     with borrowed(SINGLE_THREAD):
         _context.set_forkserver_preload([__name__, *modules])
-        multiprocessing.forkserver.ensure_running()
+        multiprocessing.resource_tracker.ensure_running()  # its start unblocks the signal
+        before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+        try:
+            multiprocessing.forkserver.ensure_running()
+        finally:
+            signal.pthread_sigmask(signal.SIG_SETMASK, before)
+
+
+def prepare_early() -> None:
+    """Start the forking process for a flight, before it is known which one; return at once.
+
+    At the end of this process it ends, too, though it may still be loading.
+    """
+    prepare([FORKER])
+    atexit.register(discard)
+
+
+def discard() -> None:
+    """End the forking process, if there is one; no child of it may run."""
+    pid = multiprocessing.forkserver._forkserver._forkserver_pid
+    if pid is not None:
+        with contextlib.suppress(ProcessLookupError):
+            os.kill(pid, signal.SIGKILL)
 
 
 def fork(
@@ -96,6 +123,7 @@ def _run(
 ) -> None:
     """Main function of the child: import the module and call its `main()`, which reads sys.argv."""
     os.setpgid(0, 0)  # Ctrl-C in the terminal reaches only the orchestrator
+    signal.pthread_sigmask(signal.SIG_UNBLOCK, {signal.SIGINT})  # see `prepare`
     setproctitle(f"{TITLE} {name}")  # before a change of the environment, next to it in memory
     with open(log, "ab", buffering=0) as output:
         for stream in (1, 2):

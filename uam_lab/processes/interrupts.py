@@ -6,6 +6,7 @@ import queue
 import signal
 from typing import Any
 
+INTERRUPTED = 128 + signal.SIGINT  # exit status
 SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 
 

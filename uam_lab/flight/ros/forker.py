@@ -1,15 +1,19 @@
 """Preparation of the process that forks a flight's nodes; importing this module runs it.
 
-It loads the compiled functions and runs them once, and prepares the log, so that no node has to
-repeat this.
+It imports the nodes, loads the compiled functions and runs them once, and prepares the log, so that
+no node has to repeat this.
 """
 
 import gc
+import importlib
 
 from uam_control.laws import catalogue
 from uam_lab.flight.direct.warm_up import warm_up
+from uam_lab.flight.ros import node_arguments
 from uam_msgs_py.node import log_callers
 
+for module in (*node_arguments.MODULES.values(), node_arguments.FUSED):
+    importlib.import_module(module)
 warm_up([catalogue.DEFAULT])
 log_callers.find_modules()
 gc.collect()

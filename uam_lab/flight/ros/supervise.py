@@ -22,7 +22,6 @@ from uam_msgs_py.node import wiring
 from uam_msgs_py.node.rightful import PARAMETER as PUBLISHERS
 from uam_sim_bridge.ports import Ports
 
-FORKER = "uam_lab.flight.ros.forker"
 RESTARTS = 3  # of each node that may be restarted, in a flight
 POLL = 0.05  # [s]
 
@@ -36,8 +35,9 @@ class Course(Protocol):
 
 
 def prepare(modules: Iterable[str], observer: Observer) -> None:
-    """Begin to import the modules of the processes; wait for the end of a killed flight's nodes."""
-    child.prepare([*modules, FORKER])
+    """Begin to import the modules of the processes, unless `uam` has begun to; wait for the end of
+    a killed flight's nodes."""
+    child.prepare([*modules, child.FORKER])
     await_orphans(observer.message)
 
 

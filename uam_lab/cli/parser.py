@@ -1,0 +1,81 @@
+"""Parser of the command `uam`: one module of this package per subcommand."""
+
+from __future__ import annotations
+
+import argparse
+import importlib
+import sys
+from collections.abc import Sequence
+
+from uam_lab.cli.command import USER_ERRORS, WRONG_USE
+from uam_lab.processes.interrupts import INTERRUPTED
+
+# Subcommands and their modules; each module has add(subparsers), which sets `run`: arguments → exit
+# status. Only the module of the chosen command is imported: all of them take seconds.
+OPERATE = ("start", "hold", "resume", "land", "disarm", "kill", "goto", "status", "preflight")
+COMMANDS = {
+    "fly": "fly",
+    "rehearse": "rehearse",
+    **dict.fromkeys(OPERATE, "operate"),
+    "checklist": "checklist",
+    "view": "view",
+    "profile": "profile",
+    "report": "report",
+    "compare": "compare",
+    "tune": "tune",
+    "campaign": "campaign",
+    "faults": "faults",
+    "margins": "margins",
+    "budget": "budget",
+    "vehicle": "vehicle",
+    "arm": "arm",
+    "identify-joint": "identify_joint",
+    "doctor": "doctor",
+    "calibrate-mocap": "calibrate_mocap",
+}
+
+
+class OneLineParser(argparse.ArgumentParser):
+    """Parser that reports an error in one line, without the usage."""
+
+    def error(self, message: str) -> None:
+        """Print the line and exit with status 2."""
+        self.exit(WRONG_USE, f"{self.prog}: {message} (see {self.prog} --help)\n")
+
+
+def parser(command: str = "") -> argparse.ArgumentParser:
+    """Return the parser of `uam`, with the module of this subcommand; with all if there is none."""
+    top = OneLineParser(
+        prog="uam",
+        description="Flight control for aerial manipulators, and flights of it in simulation.",
+        epilog="uam <command> --help explains a command.",
+    )
+    commands = top.add_subparsers(dest="command", metavar="<command>", required=True)
+    modules = [COMMANDS[command]] if command in COMMANDS else dict.fromkeys(COMMANDS.values())
+    for module in modules:
+        importlib.import_module(f"uam_lab.cli.{module}").add(commands)
+    return top
+
+
+def parsed(given: Sequence[str]) -> argparse.Namespace:
+    """Return the options of the words `given`; raises SystemExit for wrong ones."""
+    top = parser(*given[:1])
+    options, unknown = top.parse_known_args(given)
+    if unknown:
+        top.prog = f"{top.prog} {options.command}"
+        top.error(f"unrecognized arguments: {' '.join(unknown)}")
+    return options
+
+
+def run(options: argparse.Namespace) -> int:
+    """Run the chosen command; return the exit status."""
+    try:
+        return options.run(options)
+    except KeyboardInterrupt:
+        print(f"uam {options.command}: interrupted", file=sys.stderr)
+        return INTERRUPTED
+    except BrokenPipeError:  # the reader of the output has ended, as in `uam fly | head`
+        return 1
+    except (*USER_ERRORS, OSError) as error:
+        print(f"uam {options.command}: {error}", file=sys.stderr)
+        return WRONG_USE
