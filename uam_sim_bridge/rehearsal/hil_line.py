@@ -49,16 +49,8 @@ class HilLine(HilMessages):
             self._take()
         return self.connected
 
-    def send(
-        self,
-        time: float,
-        gyro: np.ndarray,
-        accel: np.ndarray,
-        position: np.ndarray,
-        quaternion: np.ndarray,
-    ) -> None:
-        """Send the sensors of the tick at `time` [s]; arguments: see `sensors`."""
-        data = self.sensors(time, gyro, accel, position, quaternion)
+    def flush(self) -> None:
+        data, self._prepared = self._prepared, b""
         for message in self._station.due(self._clock()):
             data += self._codec_of_station.encode(message)
         self._terminal.write(data)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from typing import Any
 
 import numpy as np
 
@@ -31,6 +32,7 @@ class HilMessages:
         self.stamp = 0
         self._codec = Codec(1, 200)
         self._framer = Framer(self._codec)
+        self._prepared = b""
         self._slow = SlowSensors(seed)
         self._slow_due = 0.0
         self._mag = [0.0, 0.0, 0.0]
@@ -76,6 +78,19 @@ class HilMessages:
             0,
         )
         return self.encode(message)
+
+    def prepare(self, *sample: Any) -> None:
+        """Encode the sensors of a tick for `flush`; sample: see `sensors`."""
+        self._prepared = self.sensors(*sample)
+
+    def flush(self) -> None:
+        """Send what is prepared."""
+        raise NotImplementedError
+
+    def send(self, *sample: Any) -> None:
+        """Send the sensors of a tick; sample: see `sensors`."""
+        self.prepare(*sample)
+        self.flush()
 
     def take(self, message: Message) -> bool:
         """Take a message of the autopilot; return whether it has motor commands."""

@@ -11,6 +11,7 @@ import ipaddress
 import select
 import socket
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -71,7 +72,6 @@ class HilServer(HilMessages):
         self.answered = False
         self.missed = 0
         self._ever = False
-        self._prepared = b""
         self._link: socket.socket | None = None
         self._listener = socket.socket(socket.AF_INET, socket.SOCK_STREAM)
         self._listener.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
@@ -99,20 +99,11 @@ class HilServer(HilMessages):
             self._link.setblocking(False)
         return self.connected
 
-    def prepare(
-        self,
-        time: float,
-        gyro: np.ndarray,
-        accel: np.ndarray,
-        position: np.ndarray,
-        quaternion: np.ndarray,
-    ) -> None:
-        """Encode the sensors of the tick at `time` [s] for `flush`; arguments: see `sensors`."""
+    def prepare(self, *sample: Any) -> None:
         if self._link is not None:
-            self._prepared = self.sensors(time, gyro, accel, position, quaternion)
+            super().prepare(*sample)
 
     def flush(self) -> None:
-        """Send what is prepared."""
         data, self._prepared = self._prepared, b""
         if self._link is None:
             return
@@ -122,18 +113,6 @@ class HilServer(HilMessages):
             self._link.setblocking(False)
         except (ConnectionError, TimeoutError):
             self._stop()
-
-    def send(
-        self,
-        time: float,
-        gyro: np.ndarray,
-        accel: np.ndarray,
-        position: np.ndarray,
-        quaternion: np.ndarray,
-    ) -> None:
-        """Send the sensors of the tick at `time` [s]; arguments: see `sensors`."""
-        self.prepare(time, gyro, accel, position, quaternion)
-        self.flush()
 
     def receive(self, timeout: float | None = None) -> np.ndarray:
         """Wait for the answer to the last `send`; return `motors` (n,), also without an answer.
