@@ -21,6 +21,8 @@ import subprocess
 import sys
 import tempfile
 import time
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
 import psutil
@@ -70,31 +72,33 @@ def disturbed(options) -> int:
     """Compare the tables of disturbed campaigns with that of an undisturbed one."""
     with tempfile.TemporaryDirectory() as folder:
         peaceful, other, third = (Path(folder) / name for name in ("peaceful", "other", "third"))
-        begun = time.perf_counter()
-        subprocess.run(_command(options, peaceful), check=True, stdout=subprocess.DEVNULL)
-        _tell("in peace", begun, options.flights, peaceful)
-        begun = time.perf_counter()
-        _disturb(_command(options, other))
-        _tell("disturbed", begun, options.flights, other)
+        with _told("in peace", options, peaceful) as command:
+            subprocess.run(command, check=True, stdout=subprocess.DEVNULL)
+        with _told("disturbed", options, other) as command:
+            _disturb(command)
         tables = [_table(other)]
         if options.scheduled:
-            begun = time.perf_counter()
-            with LocalCluster(
-                n_workers=2, threads_per_worker=1, host="127.0.0.1", silence_logs=50
-            ) as cluster:
-                address = cluster.scheduler_address
-                _disturb([*_command(options, third), "--scheduler", address], os.getpid())
-            _tell("scheduler", begun, options.flights, third)
+            with (
+                _told("scheduler", options, third) as command,
+                LocalCluster(
+                    n_workers=2, threads_per_worker=1, host="127.0.0.1", silence_logs=50
+                ) as cluster,
+            ):
+                _disturb([*command, "--scheduler", cluster.scheduler_address], os.getpid())
             tables.append(_table(third))
         same = all(table == _table(peaceful) for table in tables)
     print(f"two workers killed, one Ctrl-C, {options.flights} flights: same table: {same}")
     return 0 if same else 1
 
 
-def _tell(name: str, begun: float, flights: int, out: Path) -> None:
+@contextmanager
+def _told(name: str, options, out: Path) -> Iterator[list[str]]:
+    """Give the command of the campaign to `out`; print the time of the block, and the size."""
+    begun = time.perf_counter()
+    yield _command(options, out)
     seconds = time.perf_counter() - begun
-    size = len(_table(out)) / flights
-    rate = f"{flights / seconds:.1f} flights/s"
+    size = len(_table(out)) / options.flights
+    rate = f"{options.flights / seconds:.1f} flights/s"
     print(f"{name:<9} {seconds:.0f} s, {rate}, {size:.0f} B per flight", flush=True)
 
 
