@@ -49,8 +49,7 @@ class HilLine(HilMessages):
             self._take()
         return self.connected
 
-    def flush(self) -> None:
-        data, self._prepared = self._prepared, b""
+    def _put(self, data: bytes) -> None:
         for message in self._station.due(self._clock()):
             data += self._codec_of_station.encode(message)
         self._terminal.write(data)

@@ -84,7 +84,12 @@ class HilMessages:
         self._prepared = self.sensors(*sample)
 
     def flush(self) -> None:
-        """Send what is prepared."""
+        """Send what is prepared, once."""
+        data, self._prepared = self._prepared, b""
+        self._put(data)
+
+    def _put(self, data: bytes) -> None:
+        """Send `data` on the link."""
         raise NotImplementedError
 
     def send(self, *sample: Any) -> None:

@@ -103,8 +103,7 @@ class HilServer(HilMessages):
         if self._link is not None:
             super().prepare(*sample)
 
-    def flush(self) -> None:
-        data, self._prepared = self._prepared, b""
+    def _put(self, data: bytes) -> None:
         if self._link is None:
             return
         try:
