@@ -8,8 +8,8 @@ from types import SimpleNamespace
 import pytest
 
 from uam_control.settings.process_parameters import ProcessParameters
-from uam_lab.flight.flight_settings import BUILTIN
-from uam_lab.flight.ros.placement import pair, placing
+from uam_lab.flight.flight_settings import AUTOPILOT, BUILTIN
+from uam_lab.flight.ros.placement import NICE, pair, placing
 from uam_msgs_py.node import wiring
 
 
@@ -39,12 +39,20 @@ def test_who_computes_the_setpoint_has_one_core_and_the_others_the_second(proces
     for name in (wiring.FLIGHT_CONTROLLER, wiring.ESTIMATOR, wiring.BRIDGE):
         placing(settings(), 0, name)(process)
         assert os.sched_getaffinity(process) == {first}
-    for name in (wiring.PLANT, wiring.MISSION, wiring.ARM, "autopilot"):
+    for name in (wiring.PLANT, wiring.MISSION, wiring.ARM):
         placing(settings(), 0, name)(process)
         assert os.sched_getaffinity(process) == {second}
     assert os.sched_getscheduler(process) == os.SCHED_OTHER
-    placing(settings(), 0, wiring.RECORDER)(process)
+    assert os.getpriority(os.PRIO_PROCESS, process) == 0
+
+
+@pytest.mark.skipif(len(os.sched_getaffinity(0)) < 2, reason="one core")
+@pytest.mark.parametrize("name, nice", [(AUTOPILOT, 0), (wiring.RECORDER, NICE), ("scene", NICE)])
+def test_who_does_not_interrupt_the_tick_and_who_is_interrupted_by_it(process, name, nice):
+    placing(settings(), 0, name)(process)
+    assert os.sched_getaffinity(process) == {pair(sorted(os.sched_getaffinity(0)), 0)[1]}
     assert os.sched_getscheduler(process) == os.SCHED_BATCH
+    assert os.getpriority(os.PRIO_PROCESS, process) == nice
 
 
 def test_nothing_is_placed_in_real_time_with_another_autopilot_or_with_chosen_cores(process):

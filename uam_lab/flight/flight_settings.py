@@ -58,6 +58,7 @@ COCKPIT = "cockpit"
 LAYOUTS = {False: "separate nodes", True: "fused: control nodes in one process"}
 NODE_NAME = re.compile(r"[A-Za-z_]\w*", re.ASCII)
 LOG_LIMIT = 4000.0  # [MB] some four hours of flight
+AUTOPILOT = "autopilot"  # name of its process
 ONLOOKERS = ("scene", COCKPIT)  # nodes that only display: their end does not end the flight
 
 

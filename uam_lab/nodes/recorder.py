@@ -145,6 +145,7 @@ def main() -> int:
     polls, loop, ended = 0, LoopTime(), ""
     foreign: list[str] = []  # lines about foreign publishers at the last report
     due = 0.0  # time.monotonic() of the next comparison
+    reported = 0.0  # [s] `until` of the last report: a simulation may run faster than wall time
     while not stop.raised:
         time.sleep(options.poll_period)
         begun = time.perf_counter()
@@ -153,8 +154,9 @@ def main() -> int:
         polls += 1
         if polls % POLLS_PER_SERVICE == 0:
             services.spin_once(timeout_sec=0.0)
-        if polls % polls_per_flush == 0:
+        if polls % polls_per_flush == 0 or recording.until - reported >= connections.RECORDED_STEP:
             recording.flush()
+            reported = recording.until
             if recording.ended and not ended:
                 ended = recording.ended
                 log.error(f"{ended}; recorded until {recording.until:g} s")

@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import Any
 
 from uam_control.mission.time_limit import time_limit
-from uam_lab.flight.flight_settings import FlightSettings
+from uam_lab.flight.flight_settings import AUTOPILOT, FlightSettings
 from uam_lab.flight.observer import Observer
 from uam_lab.flight.ros import node_arguments, supervise
 from uam_lab.flight.ros.status_listener import StatusListener
@@ -24,7 +24,7 @@ from uam_lab.processes.interrupts import StopRequest
 from uam_lab.processes.node_environment import environment
 from uam_lab.processes.processes import NodeFailed, Processes
 from uam_lab.rehearsal import device_figures, emulated_lab, laboratory_process
-from uam_lab.rehearsal.laboratory_process import AUTOPILOT, LABORATORY, LABORATORY_MODULE
+from uam_lab.rehearsal.laboratory_process import LABORATORY, LABORATORY_MODULE
 from uam_lab.rehearsal.options import RehearsalOptions
 from uam_lab.rehearsal.rehearsed_outcome import read_outcome
 from uam_lab.rehearsal.starter import Starter

@@ -26,7 +26,7 @@ from uam_sim_bridge.px4.px4_installation import Px4Installation
 from uam_sim_bridge.rehearsal.laboratory import SERIAL_FAR, USB
 
 LABORATORY, LABORATORY_MODULE = "laboratory", "uam_sim_bridge.nodes.laboratory"
-AUTOPILOT, STAND_IN = "autopilot", "uam_sim_bridge.autopilot.server"
+STAND_IN = "uam_sim_bridge.autopilot.server"
 PX4 = "uam_sim_bridge.px4.hitl"
 STATISTICS = "laboratory.json"
 PARAMETERS = "px4/rehearsed.yaml"  # of config/: as a real vehicle needs them

@@ -20,6 +20,7 @@ from uam_msgs_py.node.namespace import expanded, prefix
 NAMELESS = "_NODE_NAME_UNKNOWN_"  # of the middleware, before it has a node's name
 READERS, WRITERS = "readers of ", "writers of "
 RECORDER, RECORDED_UNTIL = "recorder", "recorded until [s]"
+RECORDED_STEP = 1.0  # [s] of the flight, after which the recorder reports again at the latest
 
 
 class Counted(Protocol):

@@ -43,7 +43,7 @@ from uam_msgs_py.messages import topics
 from uam_msgs_py.messages.ros_time import nanoseconds as from_message
 from uam_msgs_py.node import polling, wiring
 from uam_msgs_py.node.base_node import StopSignal, refuse
-from uam_msgs_py.node.connections import Connections, of
+from uam_msgs_py.node.connections import RECORDED_STEP, Connections, of
 from uam_msgs_py.node.executor import LeanExecutor
 from uam_msgs_py.node.node_parameters import refuse_unknown
 from uam_msgs_py.node.tick_times import tick_times
@@ -75,7 +75,7 @@ CATCH_UP = 1.25  # [1] largest real-time factor after a stall of the machine
 REPORT_INTERVAL = 5.0  # [s] between two log lines with the missing nodes
 FOREIGN_WAIT = 1.0  # [s] for discovery by foreign nodes, which do not report their connections
 LAST_WAIT = 3.0  # [s] longest wait for the recorder after the last tick
-RECORDER_LAG = 2.0  # [s] the recorder reports its progress each second; its queue is 4 times longer
+RECORDER_LAG = 2.0 * RECORDED_STEP  # [s] the recorder's queue is four times as long
 LATCHED_WAIT = 0.5  # [s] of wall time, in which a latched message arrives
 AFTER_OTHERS = 1.0  # [s] the status of a mission is at most half a second older than its last tick
 # [s], [ticks]: single samples of the autopilot's IMU may be lost. After these ticks time goes on at

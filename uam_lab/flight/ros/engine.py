@@ -12,7 +12,7 @@ from pathlib import Path
 
 from uam_control.profiles.profile import CONTROLLERS
 from uam_lab.cockpit import page_address
-from uam_lab.flight.flight_settings import ONLOOKERS, FlightSettings
+from uam_lab.flight.flight_settings import AUTOPILOT, ONLOOKERS, FlightSettings
 from uam_lab.flight.observer import FlightStatus, Observer
 from uam_lab.flight.ros import node_arguments, supervise
 from uam_lab.flight.ros.logged_outcome import read_outcome
@@ -29,8 +29,6 @@ from uam_sim_bridge.faults.timeline import FaultState
 from uam_sim_bridge.nodes.fault_topic import FaultTopic
 from uam_sim_bridge.nodes.plant_options import NOT_READY
 from uam_sim_bridge.ports import Ports, Reservation
-
-AUTOPILOT = "autopilot"
 
 
 def fly(

@@ -3,7 +3,8 @@
 In lockstep the processes of a tick wait for each other. A wake-up on the same core is cheaper than
 one on another core, and the caches are warm. So what computes between sensors and setpoint has one
 core, all others share a second one. Recorder, scene and cockpit do not interrupt those that the
-tick waits for (SCHED_BATCH).
+tick waits for (SCHED_BATCH), and are interrupted by them (nice). The autopilot does not interrupt
+the plant, which has sent it the sensors and waits for its answer next.
 """
 
 from __future__ import annotations
@@ -12,7 +13,7 @@ import contextlib
 import os
 from collections.abc import Callable, Sequence
 
-from uam_lab.flight.flight_settings import BUILTIN, ONLOOKERS, FlightSettings
+from uam_lab.flight.flight_settings import AUTOPILOT, BUILTIN, ONLOOKERS, FlightSettings
 from uam_msgs_py.node import wiring
 
 FIRST_CORE = {
@@ -20,6 +21,8 @@ FIRST_CORE = {
     *(wiring.ESTIMATOR, wiring.POSITION, wiring.ATTITUDE, wiring.BRIDGE),
 }
 YIELDING = {wiring.RECORDER, *ONLOOKERS}
+BATCH = {AUTOPILOT, *YIELDING}
+NICE = 10  # of those that yield: a tenth of the core where the tick does not leave it to them
 
 
 def pair(usable: Sequence[int], instance: int) -> tuple[int, int] | None:
@@ -44,7 +47,9 @@ def placing(settings: FlightSettings, instance: int, name: str) -> Callable[[int
     def place(process: int) -> None:
         with contextlib.suppress(OSError):  # it has ended, or the system does not permit it
             os.sched_setaffinity(process, {cores[name not in FIRST_CORE]})
-            if name in YIELDING:
+            if name in BATCH:
                 os.sched_setscheduler(process, os.SCHED_BATCH, os.sched_param(0))
+            if name in YIELDING:
+                os.setpriority(os.PRIO_PROCESS, process, NICE)
 
     return place

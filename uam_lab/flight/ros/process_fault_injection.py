@@ -18,6 +18,7 @@ from functools import partial
 
 import psutil
 
+from uam_lab.flight.flight_settings import AUTOPILOT
 from uam_lab.processes.processes import Processes
 from uam_lab.processes.thread_stop import StoppedThreads
 from uam_sim_bridge.faults import Schedule
@@ -28,7 +29,6 @@ from uam_sim_bridge.ports import is_discovery_port
 
 # threads of Fast DDS: one sends the announcements, one per UDP port receives
 EVENTS, PORT = "dds.ev.", "dds.udp."
-AUTOPILOT = "autopilot"
 
 
 def of_discovery(thread: str) -> bool:
