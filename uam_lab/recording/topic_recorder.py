@@ -5,7 +5,9 @@ topics shared by several vehicles only the own part is written, see `own_part`. 
 in the sequence numbers of one publisher.
 
 The subscriptions are polled and have no callbacks: the threads of the middleware collect the
-messages, and taking fifty messages in one poll costs a tenth of fifty callbacks.
+messages, and taking fifty messages in one poll costs a tenth of fifty callbacks. A poll takes some
+milliseconds; the recorder offers its core to others after every few messages, because a process
+that the flight waits for would often wait for the end of the poll.
 
 Log time is simulation time: the stamp in the header. For types without a header, and for
 /diagnostics, whose publishers may not have received a tick yet, it is the last /clock published
@@ -15,6 +17,7 @@ are wall time.
 
 from __future__ import annotations
 
+import os
 import time
 from bisect import bisect_right
 from collections.abc import Callable, Mapping
@@ -39,6 +42,7 @@ from uam_msgs_py.node.sole_publisher import UNKNOWN, SolePublisher, complaints, 
 from uam_msgs_py.node.taking import Taker
 
 DEPTH = 2000  # queue length per topic: 8 s at control rate
+AT_ONCE = 4  # messages between two offers of the core
 
 
 def begins_with_stamp(message_type: type) -> bool:
@@ -135,7 +139,11 @@ class TopicRecorder:
                     continue
                 batch.append((track, data, published, sequence))
                 track.arrived = now
-        for track, data, published, sequence in batch:
+                if not len(batch) % AT_ONCE:
+                    os.sched_yield()
+        for number, (track, data, published, sequence) in enumerate(batch):
+            if not number % AT_ONCE:
+                os.sched_yield()
             at = stamp_of(data) if track.stamped else self._sim_time(published)
             self._writer.write(track.channel, max(at, 0), published, data, sequence & 0xFFFFFFFF)
         del self._clock_wall[:-DEPTH], self._clock_sim[:-DEPTH]
