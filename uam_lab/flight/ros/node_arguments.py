@@ -164,7 +164,8 @@ def complete(
     processes = {wiring.FLIGHT_CONTROLLER} if settings.fused else FLYING
     for node in processes & sections.keys():
         sections[node] |= settings.process.changes()
-    if settings.process.fifo_priority and wiring.RECORDER in sections:
+    realtime = settings.clock == "realtime"  # in lockstep the plant waits for the recorder
+    if settings.process.fifo_priority and realtime and wiring.RECORDER in sections:
         sections[wiring.RECORDER]["fifo_priority"] = RECORDER_PRIORITY
     if settings.tick_times:
         place = folder.path / "logs" / TICK_TIMES
