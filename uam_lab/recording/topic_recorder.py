@@ -6,8 +6,7 @@ in the sequence numbers of one publisher.
 
 The subscriptions are polled and have no callbacks: the threads of the middleware collect the
 messages, and taking fifty messages in one poll costs a tenth of fifty callbacks. A poll takes some
-milliseconds; the recorder offers its core to others after every few messages, because a process
-that the flight waits for would often wait for the end of the poll.
+milliseconds, in which it offers its core to others, see `core_offers`.
 
 Log time is simulation time: the stamp in the header. For types without a header, and for
 /diagnostics, whose publishers may not have received a tick yet, it is the last /clock published
@@ -17,7 +16,6 @@ are wall time.
 
 from __future__ import annotations
 
-import os
 import time
 from bisect import bisect_right
 from collections.abc import Callable, Mapping
@@ -31,6 +29,7 @@ from rclpy.subscription import Subscription
 from uam_control.stamps import SECOND
 from uam_lab.recording.bag import BagTopic, add_topic, write_metadata
 from uam_lab.recording.bounded_log import BoundedLog
+from uam_lab.recording.core_offers import CoreOffers
 from uam_lab.recording.own_part import Filter, own_part
 from uam_msgs_py.messages import topics
 from uam_msgs_py.messages.layouts import stamp_of
@@ -42,7 +41,6 @@ from uam_msgs_py.node.sole_publisher import UNKNOWN, SolePublisher, complaints, 
 from uam_msgs_py.node.taking import Taker
 
 DEPTH = 2000  # queue length per topic: 8 s at control rate
-AT_ONCE = 4  # messages between two offers of the core
 
 
 def begins_with_stamp(message_type: type) -> bool:
@@ -92,6 +90,7 @@ class TopicRecorder:
         self._bag: list[BagTopic] = []
         self._guards: list[SolePublisher] = []
         self._node, self._rightful = node, rightful
+        self._offers = CoreOffers()
         self._tracks = [self._track(node, topic) for topic in chosen]
         # /clock is taken last in each poll: then every /clock published before any other message
         # of this poll is available
@@ -124,7 +123,8 @@ class TopicRecorder:
 
     def poll(self) -> int:
         """Write all received messages; return their number."""
-        batch, now = [], time.monotonic()
+        batch, now, offers = [], time.monotonic(), self._offers
+        offers.begin()
         for track in self._tracks:
             taker, info = track.taker, track.taker.info
             while (data := track.take()) is not None:
@@ -139,11 +139,9 @@ class TopicRecorder:
                     continue
                 batch.append((track, data, published, sequence))
                 track.arrived = now
-                if not len(batch) % AT_ONCE:
-                    os.sched_yield()
+                offers.after(len(batch))
         for number, (track, data, published, sequence) in enumerate(batch):
-            if not number % AT_ONCE:
-                os.sched_yield()
+            offers.after(number)
             at = stamp_of(data) if track.stamped else self._sim_time(published)
             self._writer.write(track.channel, max(at, 0), published, data, sequence & 0xFFFFFFFF)
         del self._clock_wall[:-DEPTH], self._clock_sim[:-DEPTH]
