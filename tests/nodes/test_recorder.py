@@ -12,6 +12,7 @@ from rosbags.highlevel import AnyReader
 from rosgraph_msgs.msg import Clock
 from std_msgs.msg import Bool
 
+from uam_control.stamps import SECOND
 from uam_lab.recording.mcap_reader import read_log
 from uam_msgs_py.messages import topics
 from uam_msgs_py.messages.convert import SetpointWriter
@@ -120,6 +121,20 @@ def test_a_gap_in_the_sequence_is_counted_as_lost(recorder, probe):
     times = read_log(file)[SETPOINT].times  # contains the last messages
     assert report["messages"][SETPOINT] == len(times)
     assert report["lost"][SETPOINT] == times[-1] - times[0] + 1 - len(times) > 0
+
+
+def test_a_fast_simulation_learns_its_progress_before_the_next_flush(start, tmp_path, probe):
+    never = ["-p", "flush_period:=60.0"]
+    start(MODULE, "--ros-args", "-p", f"file:={tmp_path / 'log.mcap'}", *never)
+    clock, connections, now = probe.publisher(topics.CLOCK), Connections(probe.node), Clock()
+
+    def reported(until):
+        set_stamp(now.clock, until * SECOND)
+        clock.publish(now)  # again and again: the recorder may not be connected yet
+        return connections.recorded_until() == until
+
+    for second in (1, 2, 3):
+        probe.until(lambda until=second: reported(until), "the recorder's report")
 
 
 def test_a_killed_recorder_leaves_what_was_flushed(recorder, probe):
