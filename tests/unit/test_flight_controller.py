@@ -7,6 +7,7 @@ pytest.importorskip("rclpy")
 from uam_lab.flight import flight_settings
 from uam_lab.flight.flight_settings import SettingsError
 from uam_lab.flight.ros import node_arguments
+from uam_lab.results.result_folder import ResultFolder
 from uam_msgs_py.node import wiring
 from uam_msgs_py.node.tick_times import NoTickTimes
 from uam_sim_bridge.nodes import flight_controller
@@ -93,6 +94,15 @@ def test_remappings_of_a_node_keep_to_that_node():
 def test_options_that_need_the_layout_are_refused_without_it(given, text):
     with pytest.raises(SettingsError, match=text):
         settings(**given)
+
+
+@pytest.mark.parametrize("clock, priority", [("realtime", 1), ("lockstep", None)])
+def test_the_recorder_has_a_priority_where_nobody_waits_for_it(clock, priority, tmp_path):
+    chosen = settings(fused=True, clock=clock, process={"fifo_priority": 50})
+    sections = {wiring.FLIGHT_CONTROLLER: {}, wiring.RECORDER: {}}
+    found = node_arguments.complete(sections, chosen, ResultFolder(tmp_path))
+    assert found[wiring.FLIGHT_CONTROLLER]["fifo_priority"] == 50
+    assert found[wiring.RECORDER].get("fifo_priority") == priority
 
 
 def test_the_inner_rate_is_a_parameter_of_the_process():

@@ -20,8 +20,8 @@ def test_each_instance_has_two_cores():
     assert pair([3], 0) is None
 
 
-def settings(clock="lockstep", autopilot=BUILTIN, cores=""):
-    process = ProcessParameters(cores=cores)
+def settings(clock="lockstep", autopilot=BUILTIN, cores="", fifo=0):
+    process = ProcessParameters(cores=cores, fifo_priority=fifo)
     return SimpleNamespace(clock=clock, autopilot=autopilot, process=process)
 
 
@@ -53,6 +53,21 @@ def test_who_does_not_interrupt_the_tick_and_who_is_interrupted_by_it(process, n
     assert os.sched_getaffinity(process) == {pair(sorted(os.sched_getaffinity(0)), 0)[1]}
     assert os.sched_getscheduler(process) == os.SCHED_BATCH
     assert os.getpriority(os.PRIO_PROCESS, process) == nice
+
+
+@pytest.mark.skipif(len(os.sched_getaffinity(0)) < 2, reason="one core")
+def test_plant_and_autopilot_have_the_priority_of_the_nodes_that_wait_for_them(process):
+    try:
+        os.sched_setscheduler(process, os.SCHED_FIFO, os.sched_param(7))
+    except PermissionError:
+        pytest.skip("the system permits no real-time priority")
+    for name in (wiring.PLANT, AUTOPILOT):
+        os.sched_setscheduler(process, os.SCHED_OTHER, os.sched_param(0))
+        placing(settings(fifo=7), 0, name)(process)
+        assert os.sched_getscheduler(process) == os.SCHED_FIFO
+        assert os.sched_getparam(process).sched_priority == 7
+    placing(settings(fifo=7), 0, wiring.RECORDER)(process)
+    assert os.sched_getscheduler(process) == os.SCHED_BATCH
 
 
 def test_nothing_is_placed_in_real_time_with_another_autopilot_or_with_chosen_cores(process):

@@ -45,6 +45,7 @@ examples:
   uam fly --namespace uav1 --domain 1        one of several vehicles in a ROS domain
   uam fly --without arm_controller           with your own arm controller: examples/
   uam fly --fused                            control nodes in one process: fewer cores
+  uam fly --fused --fifo 1                   lockstep ahead of other programs: faster
   uam fly --imu autopilot                    the estimator has the autopilot's IMU
   uam fly --payload-mass 0.3 --wind 2 0 0    heavier payload, 2 m/s from the west
   uam fly --setpoint-delay 16 --mocap-delay 8 --mocap-jitter 4    later by so many milliseconds
