@@ -39,7 +39,7 @@ def test_who_computes_the_setpoint_has_one_core_and_the_others_the_second(proces
     for name in (wiring.FLIGHT_CONTROLLER, wiring.ESTIMATOR, wiring.BRIDGE):
         placing(settings(), 0, name)(process)
         assert os.sched_getaffinity(process) == {first}
-    for name in (wiring.PLANT, wiring.MISSION, wiring.ARM):
+    for name in (wiring.PLANT, wiring.MISSION, wiring.ARM, AUTOPILOT):
         placing(settings(), 0, name)(process)
         assert os.sched_getaffinity(process) == {second}
     assert os.sched_getscheduler(process) == os.SCHED_OTHER
@@ -47,12 +47,12 @@ def test_who_computes_the_setpoint_has_one_core_and_the_others_the_second(proces
 
 
 @pytest.mark.skipif(len(os.sched_getaffinity(0)) < 2, reason="one core")
-@pytest.mark.parametrize("name, nice", [(AUTOPILOT, 0), (wiring.RECORDER, NICE), ("scene", NICE)])
-def test_who_does_not_interrupt_the_tick_and_who_is_interrupted_by_it(process, name, nice):
+@pytest.mark.parametrize("name", [wiring.RECORDER, "scene", "cockpit"])
+def test_who_does_not_interrupt_the_tick_and_is_interrupted_by_it(process, name):
     placing(settings(), 0, name)(process)
     assert os.sched_getaffinity(process) == {pair(sorted(os.sched_getaffinity(0)), 0)[1]}
     assert os.sched_getscheduler(process) == os.SCHED_BATCH
-    assert os.getpriority(os.PRIO_PROCESS, process) == nice
+    assert os.getpriority(os.PRIO_PROCESS, process) == NICE
 
 
 @pytest.mark.skipif(len(os.sched_getaffinity(0)) < 2, reason="one core")

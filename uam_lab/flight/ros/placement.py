@@ -3,9 +3,8 @@
 In lockstep the processes of a tick wait for each other. A wake-up on the same core is cheaper than
 one on another core, and the caches are warm. So what computes between sensors and setpoint has one
 core, all others share a second one. Recorder, scene and cockpit do not interrupt those that the
-tick waits for (SCHED_BATCH), and are interrupted by them (nice). The autopilot does not interrupt
-the plant, which has sent it the sensors and waits for its answer next. Where the nodes that fly
-have a real-time priority, plant and autopilot have it, too: they wait for each other.
+tick waits for (SCHED_BATCH), and are interrupted by them (nice). Where the nodes that fly have a
+real-time priority, plant and autopilot have it, too: they wait for each other.
 """
 
 from __future__ import annotations
@@ -23,7 +22,6 @@ FIRST_CORE = {
 }
 YIELDING = {wiring.RECORDER, *ONLOOKERS}
 ANSWERING = {wiring.PLANT, AUTOPILOT}
-BATCH = {AUTOPILOT, *YIELDING}
 NICE = 10  # of those that yield: a tenth of the core where the tick does not leave it to them
 
 
@@ -52,9 +50,8 @@ def placing(settings: FlightSettings, instance: int, name: str) -> Callable[[int
             if settings.process.fifo_priority and name in ANSWERING:
                 priority = os.sched_param(settings.process.fifo_priority)
                 os.sched_setscheduler(process, os.SCHED_FIFO, priority)
-            elif name in BATCH:
-                os.sched_setscheduler(process, os.SCHED_BATCH, os.sched_param(0))
             if name in YIELDING:
+                os.sched_setscheduler(process, os.SCHED_BATCH, os.sched_param(0))
                 os.setpriority(os.PRIO_PROCESS, process, NICE)
 
     return place
