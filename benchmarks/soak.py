@@ -39,20 +39,23 @@ def main() -> int:
         help="of the nodes (default %(default)s)",
     )
     option("--fused", action="store_true", help="control nodes in one process")
+    option("--fifo", type=int, metavar="PRIORITY", help="as of uam fly (default: none)")
     option("--log-limit", type=float, default=200.0, help="[MB] of the log (default %(default)g)")
     option("--out", type=Path, default=Path("results/soak"), help="(default %(default)s)")
     options = parser.parse_args()
     if options.minutes < 2.0:
         parser.error("--minutes is 2 or more: what grows is not to be seen earlier")
-    if options.fused and options.engine == "direct":
-        parser.error("--fused needs --engine ros: the direct engine has no nodes")
+    further = ["--fused"] if options.fused else []
+    further += [] if options.fifo is None else ["--fifo", str(options.fifo)]
+    if further and options.engine == "direct":
+        parser.error(f"{further[0]} needs --engine ros: the direct engine has no nodes")
     options.out.mkdir(parents=True, exist_ok=True)
     signal.signal(signal.SIGTERM, signal.default_int_handler)  # the flight must not fly on alone
     duration = 60.0 * options.minutes
     if options.engine == "direct":
         soak = watch.missions(duration)
     else:
-        soak = watch.flight(duration, options.clock, options.log_limit, options.out, options.fused)
+        soak = watch.flight(duration, options.clock, options.log_limit, options.out, further)
     verdicts = judgement.judge(soak)
     print(judgement.table(verdicts))
     for line in soak.notes:

@@ -8,6 +8,7 @@ import signal
 import subprocess
 import sys
 import time
+from collections.abc import Sequence
 from pathlib import Path
 
 import psutil
@@ -26,14 +27,19 @@ SPOKEN = 30  # samples between two lines of progress
 ORCHESTRATOR = "uam fly"
 
 
-def flight(duration: float, clock: str, log_limit: float, out: Path, fused: bool = False) -> Soak:
-    """Fly once for `duration` [s] with all nodes; log_limit [MB]; results in `out`/flight."""
+def flight(
+    duration: float, clock: str, log_limit: float, out: Path, further: Sequence[str] = ()
+) -> Soak:
+    """Fly once for `duration` [s] with all nodes; log_limit [MB]; results in `out`/flight.
+
+    further: options of `uam fly`.
+    """
     scenario = out / "shuttle.yaml"
     scenario.write_text(shuttle(duration))
     log = out / "flight.txt"
     command = ["-m", "uam_lab.cli.main", "fly", "--scenario", str(scenario)]
     command += ["--clock", clock, "--no-video", "--log-limit", str(log_limit)]
-    command += ["--fused"] if fused else []
+    command += further
     folder = new_folder(out, "flight")
     with log.open("w") as output:
         run = subprocess.Popen(
@@ -42,9 +48,8 @@ def flight(duration: float, clock: str, log_limit: float, out: Path, fused: bool
             stderr=output,
             process_group=0,  # Ctrl-C does not reach it; this process sends SIGINT once
         )
-    soak = Soak(
-        f"{duration / 60.0:g} minutes through the nodes, {clock}{', fused' * fused}", "wall time"
-    )
+    layout = ", fused" if "--fused" in further else ""
+    soak = Soak(f"{duration / 60.0:g} minutes through the nodes, {clock}{layout}", "wall time")
     while run.poll() is None:
         try:
             _look(soak, run, folder / "logs" / "mujoco_sim.json")
