@@ -12,6 +12,7 @@ from uam_control.mission import (
     Feasibility,
     InfeasibleReference,
     Mission,
+    feasibility,
     load_scenario,
 )
 from uam_control.mission.feasibility import in_words
@@ -202,6 +203,21 @@ def test_retimed_is_feasible_and_not_slower_than_necessary(
 def test_a_place_outside_the_geofence_is_not_retimed(tmp_path):
     with pytest.raises(InfeasibleReference, match="x 6 m exceeds 5 m .* a slowdown does not help"):
         checked().retimed(circle(tmp_path, more=", centre: [5, 0]"))
+
+
+HARD = replace(OPEN, reference_thrust=19.0, reference_tilt=0.1, tilt_hold=0.3)
+
+
+@pytest.mark.parametrize("name", ["quick_pick", "circle", "circle_payload", "lemniscate"])
+@pytest.mark.parametrize("part", [7, 100, 1999])
+def test_a_flight_checked_in_parts_exceeds_what_the_whole_exceeds(name, part, monkeypatch):
+    scenario, check = load_scenario(name), checked(HARD, payload=0.3)
+    whole = check.exceeded(check.demand(scenario))
+    assert whole
+    monkeypatch.setattr(feasibility, "PART", part)
+    for found, expected in zip(check.excesses(scenario), whole, strict=True):
+        assert found.text == expected.text
+        assert found.value == pytest.approx(expected.value, rel=1e-9)
 
 
 def test_payload_counts_while_the_magnet_is_on():

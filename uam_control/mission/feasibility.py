@@ -14,16 +14,18 @@ from typing import NamedTuple
 import numpy as np
 
 from uam_control.coordinates import ALPHA, ARM, CHI, CHI_DDOT, CHI_DOT, POSITION, YAW, Z
+from uam_control.maths.compiled import jit
 from uam_control.maths.rotations import body_rates, matrix_from_euler, thrust_attitude
 from uam_control.mission.mission_parameters import MissionParameters
-from uam_control.mission.motion.polynomials import Polynomials
-from uam_control.mission.motion.trajectory import Trajectory, empty_motion
+from uam_control.mission.motion.trajectory import Tabulated, Trajectory, empty_motion
 from uam_control.mission.scenarios.scenario import Scenario, ScenarioError, standing
 from uam_control.mission.scenarios.scenario_options import SLOWEST
 from uam_control.vehicle import VehicleDescription, VehicleError
 from uam_control.vehicle.arm_model import ArmModel
 
 STEP = 0.01  # [s] between two checks
+PART = 60000  # checks in one part of a long flight
+BESIDE = 4  # further ones on both sides of a part: second derivatives there are those of the whole
 ROUNDING = 1e-6  # [SI]
 PRECISION = 1e-3  # of the slowdown, relative
 ROOM = 1.002  # by which the slowdown is larger than the least one found
@@ -72,6 +74,21 @@ class Demand(NamedTuple):
     joint_torques: np.ndarray
     magnet_force: np.ndarray
 
+    def within(self, part: slice) -> Demand:
+        """Return that of a part of the times."""
+        return Demand(*(values[part] for values in self))
+
+
+class _Planned:
+    """A flight from the origin: its times (m,) [s], trajectory, and height [m] at the begin."""
+
+    def __init__(self, scenario: Scenario) -> None:
+        start = standing(scenario.arm_start)
+        self.scenario, self.ground = scenario.begun_at(start), float(start[Z])
+        landing = self.scenario.landing
+        self.trajectory = self.scenario.trajectory(start)
+        self.times = np.arange(0.0, landing.at + landing.duration, STEP)
+
 
 @dataclass(frozen=True)
 class Feasibility:
@@ -85,14 +102,32 @@ class Feasibility:
     payload_mass: float
 
     def excesses(self, scenario: Scenario) -> list[Excess]:
-        """Return every limit that the scenario exceeds on a flight from the origin."""
-        return self.exceeded(self.demand(scenario))
+        """Return every limit that the scenario exceeds on a flight from the origin, the earliest
+        first.
 
-    def exceeded(self, demand: Demand) -> list[Excess]:
-        """Return every limit that a demand exceeds, the earliest first."""
+        A flight of many hours is computed in parts, so that its memory is bounded.
+        """
+        flight = _Planned(scenario)
+        found: dict[tuple[str, float], Excess] = {}
+        for begin in range(0, len(flight.times), PART):
+            part = slice(max(begin - BESIDE, 0), begin + PART + BESIDE)
+            demand = self._planned(flight, part)
+            demand = demand.within(slice(begin - part.start, begin - part.start + PART))
+            for one in self.exceeded(demand, flight.ground):
+                known = found.get((one.quantity, one.limit), one)
+                worst = max(known, one, key=lambda excess: abs(excess.value - excess.limit))
+                found[one.quantity, one.limit] = worst._replace(first=known.first)
+        return sorted(found.values(), key=lambda excess: excess.first)
+
+    def exceeded(self, demand: Demand, ground: float | None = None) -> list[Excess]:
+        """Return every limit that a demand exceeds, the earliest first.
+
+        ground [m]: height of the origin at the take-off, None for that of the demand's begin.
+        """
         p, servo = self.limits, self.vehicle.servo
+        ground = demand.position[0, Z] if ground is None else ground
         low, high = np.array(p.geofence_low), np.array(p.geofence_high)
-        high[Z] = min(high[Z], demand.position[0, Z] + p.altitude_hold)
+        high[Z] = min(high[Z], ground + p.altitude_hold)
         rates = np.abs(demand.body_rates).max(axis=1)
         upper = [
             ("thrust", demand.thrust, p.reference_thrust, "N"),
@@ -159,14 +194,18 @@ class Feasibility:
 
     def demand(self, scenario: Scenario) -> Demand:
         """Return what a flight from the origin needs, from the take-off to the landing."""
-        start = standing(scenario.arm_start)
-        begun = scenario.begun_at(start)
-        times = np.arange(0.0, begun.landing.at + begun.landing.duration, STEP)
-        return self.along(begun.trajectory(start), times, self.carried(begun, times))
+        return self._planned(_Planned(scenario), slice(None))
+
+    def _planned(self, flight: _Planned, part: slice) -> Demand:
+        """Return what a part of a flight needs."""
+        times = flight.times[part]
+        return self.along(flight.trajectory, times, self.carried(flight.scenario, times))
 
     def carried(self, scenario: Scenario, times: np.ndarray) -> np.ndarray:
         """Return the carried mass (m,) [kg] at times (m,) [s]."""
-        on = np.array([scenario.magnet_on(time) for time in times.tolist()])
+        on = np.zeros(len(times))
+        for at, energised in scenario.magnet:
+            on[times >= at] = energised
         return self.payload_mass * on
 
     def along(self, trajectory: Trajectory, times: np.ndarray, carried: np.ndarray) -> Demand:
@@ -177,10 +216,11 @@ class Feasibility:
         drag = np.array(self.vehicle.numbers["air"]["drag"])
         up = np.array([0.0, 0.0, self.vehicle.gravity])
         force = mass[:, None] * (acceleration + up) + drag * velocity
-        yaw = rows[CHI, :, YAW]
-        roll, pitch = np.array([thrust_attitude(*one) for one in zip(force, yaw, strict=True)]).T
-        turns = np.gradient(roll, times), np.gradient(pitch, times), rows[CHI_DOT, :, YAW]
-        rates = np.array([body_rates(*one) for one in zip(roll, pitch, *turns, strict=True)])
+        angles, rotation = np.empty((len(times), 3)), np.empty((len(times), 3, 3))
+        _attitudes(force, np.ascontiguousarray(rows[CHI, :, YAW]), angles)
+        turning, rates = np.gradient(angles, times, axis=0), np.empty_like(angles)
+        turning[:, 2] = rows[CHI_DOT, :, YAW]
+        _turns(angles, turning, rates, rotation)
         thrust = np.linalg.norm(force, axis=1)
         return Demand(
             times,
@@ -191,24 +231,17 @@ class Feasibility:
             rates,
             rows[CHI, :, ARM],
             rows[CHI_DOT, :, ARM],
-            *self._arm_loads(times, rows[CHI], roll, pitch, carried),
+            *self._arm_loads(times, rows[CHI], rotation, carried),
         )
 
     def _arm_loads(
-        self,
-        times: np.ndarray,
-        chi: np.ndarray,
-        roll: np.ndarray,
-        pitch: np.ndarray,
-        carried: np.ndarray,
+        self, times: np.ndarray, chi: np.ndarray, rotation: np.ndarray, carried: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray]:
         """Return the joint torques (m, n) [N m] and the force on the magnet (m,) [N]."""
         try:
             arm = ArmModel.of(self.vehicle)
         except VehicleError:
             return np.full((len(times), chi.shape[1] - ALPHA), np.nan), np.full(len(times), np.nan)
-        euler = np.column_stack([roll, pitch, chi[:, YAW]])
-        rotation = np.array([matrix_from_euler(one) for one in euler])
         gravity = self.vehicle.gravity
         motion = times, chi[:, POSITION], rotation, chi[:, ARM]
         lift = arm.payload_acceleration(*motion) + np.array([0.0, 0.0, gravity])
@@ -221,9 +254,34 @@ def in_words(excesses: list[Excess]) -> str:
     return "; ".join(excess.text for excess in excesses)
 
 
+@jit
+def _attitudes(force: np.ndarray, yaw: np.ndarray, angles: np.ndarray) -> None:
+    """Write roll, pitch, yaw [rad] of force (m, 3) [N] and yaw (m,) into angles (m, 3)."""
+    for i in range(len(yaw)):
+        angles[i, 0], angles[i, 1] = thrust_attitude(force[i], yaw[i])
+        angles[i, 2] = yaw[i]
+
+
+@jit
+def _turns(
+    angles: np.ndarray, turning: np.ndarray, rates: np.ndarray, rotations: np.ndarray
+) -> None:
+    """Write the body rates (m, 3) [rad/s, FLU] and rotations (m, 3, 3), body → world.
+
+    angles, turning (m, 3): roll, pitch, yaw [rad] and their rates [rad/s].
+    """
+    for i in range(len(angles)):
+        roll, pitch, one = angles[i, 0], angles[i, 1], turning[i]
+        rates[i, 0], rates[i, 1], rates[i, 2] = body_rates(roll, pitch, one[0], one[1], one[2])
+        matrix = matrix_from_euler(angles[i])
+        for j in range(3):
+            for k in range(3):
+                rotations[i, j, k] = matrix[j, k]
+
+
 def _rows(trajectory: Trajectory, times: np.ndarray, joints: int) -> np.ndarray:
     """Return the reference (3, m, 6 + n) at times (m,) [s]."""
-    if isinstance(trajectory, Polynomials):
+    if isinstance(trajectory, Tabulated):
         return trajectory.rows(times, CHI_DDOT + 1)
     found = np.empty((len(times), *empty_motion(joints).shape))
     for time, motion in zip(times.tolist(), found, strict=True):

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Protocol
+from typing import Protocol, runtime_checkable
 
 import numpy as np
 
@@ -30,6 +30,14 @@ class Trajectory(Protocol):
         """
 
 
+@runtime_checkable
+class Tabulated(Protocol):
+    """A motion that writes many times in one call."""
+
+    def rows(self, times: np.ndarray, count: int) -> np.ndarray:
+        """Return the first `count` rows of the motion (count, m, 6 + n) at times (m,) [s]."""
+
+
 @dataclass(frozen=True)
 class Move:
     """Motion of one coordinate to `to` [m or rad] from time `start` to `end` [s], rest to rest."""
@@ -53,13 +61,21 @@ class Moves:
             name = move.coordinate
             rows.append((names.index(name), move.start, move.end, value[name], move.to))
             value[name] = move.to
+        rows.sort(key=lambda row: row[COORDINATE])  # stable: of each coordinate by start
         self._rows = np.array(rows, dtype=float).reshape(-1, len(ROW))
-        self._write = prepared(write_moves, 0.0, self._start, self._rows, self._rows)
+        self._first = np.searchsorted(self._rows[:, COORDINATE], np.arange(len(names) + 1))
+        self._write = prepared(write_moves, 0.0, self._start, self._first, self._rows, self._rows)
 
     def write(self, time: float, motion: np.ndarray) -> None:
         """Write the motion (5, 6 + n); see `Trajectory.write`."""
         check_rows(motion)
-        self._write(time, self._start, self._rows, motion)
+        self._write(time, self._start, self._first, self._rows, motion)
+
+    def rows(self, times: np.ndarray, count: int = MOTION_ROWS) -> np.ndarray:
+        """Return the first `count` rows of the motions (count, m, 6 + n) at times (m,) [s]."""
+        motions = np.empty((len(times), MOTION_ROWS, len(self._start)))
+        _write_all(times, self._start, self._first, self._rows, motions)
+        return motions.swapaxes(0, 1)[:count]
 
 
 def check_rows(motion: np.ndarray) -> None:
@@ -72,19 +88,30 @@ COORDINATE, START, END, FROM, TO = ROW = range(5)  # columns of the rows of move
 
 
 @jit
-def write_moves(time: float, start: np.ndarray, rows: np.ndarray, motion: np.ndarray) -> None:
+def write_moves(
+    time: float, start: np.ndarray, first: np.ndarray, rows: np.ndarray, motion: np.ndarray
+) -> None:
     """Write the motion (5, 6 + n) at mission time [s].
 
-    start (6 + n,): chi at mission time 0; rows (m, 5), sorted by start: index of the coordinate,
-    start [s], end [s], value at start, value at end. The polynomial of a move has degree seven:
-    rate, acceleration and jerk are zero at both ends (least integral of the snap squared).
+    start (6 + n,): chi at mission time 0; rows (m, 5), sorted by coordinate and start: index of the
+    coordinate, start [s], end [s], value at start, value at end; first (7 + n,): index of each
+    coordinate's first row, and m. The newest move that has begun counts. Its polynomial has degree
+    seven: rate, acceleration and jerk are zero at both ends (least integral of the snap squared).
     """
     motion[:] = 0.0
     motion[CHI] = start
-    for row in rows:
-        if time < row[START]:
+    for i in range(len(start)):
+        begun, later = first[i], first[i + 1]  # rows before `begun` have begun, from `later` not
+        while begun < later:
+            middle = (begun + later) // 2
+            if rows[middle, START] <= time:
+                begun = middle + 1
+            else:
+                later = middle
+        if begun == first[i]:
             continue
-        i, length, distance = int(row[COORDINATE]), row[END] - row[START], row[TO] - row[FROM]
+        row = rows[begun - 1]
+        length, distance = row[END] - row[START], row[TO] - row[FROM]
         s = min((time - row[START]) / length, 1.0)
         c = 1.0 - s
         per = distance
@@ -98,6 +125,19 @@ def write_moves(time: float, start: np.ndarray, rows: np.ndarray, motion: np.nda
         per /= length
         inside = 1.0 if s < 1.0 else 0.0  # the snap of a move that has ended is zero
         motion[SNAP, i] = inside * per * 840.0 * (1.0 + s * (-12.0 + s * (30.0 - 20.0 * s)))
+
+
+@jit
+def _write_all(
+    times: np.ndarray,
+    start: np.ndarray,
+    first: np.ndarray,
+    rows: np.ndarray,
+    motions: np.ndarray,
+) -> None:
+    """Write the motions (m, 5, 6 + n) at times (m,) [s]; see `write_moves`."""
+    for i in range(len(times)):
+        write_moves(times[i], start, first, rows, motions[i])
 
 
 def empty_reference(joints: int) -> np.ndarray:

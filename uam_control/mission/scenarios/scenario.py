@@ -128,7 +128,7 @@ class Scenario:
 class Added:
     """Moves, and the motion of a curve from its first value on."""
 
-    def __init__(self, moves: Trajectory, curve: Polynomials) -> None:
+    def __init__(self, moves: Moves, curve: Polynomials) -> None:
         """moves, curve: of mission time, with the same coordinates."""
         self._moves, self._curve, self._first = moves, curve, curve.first
         self._offset = np.empty((0, 0))
@@ -141,6 +141,12 @@ class Added:
         self._curve.write(time, self._offset)
         motion += self._offset
         motion[CHI] -= self._first
+
+    def rows(self, times: np.ndarray, count: int) -> np.ndarray:
+        """Return the first `count` rows (count, m, 6 + n) at times (m,) [s]."""
+        found = self._moves.rows(times, count) + self._curve.rows(times, count)
+        found[CHI] -= self._first
+        return found
 
 
 def standing(arm_start: tuple[float, ...]) -> np.ndarray:

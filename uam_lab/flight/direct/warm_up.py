@@ -17,8 +17,7 @@ from uam_control.grasp.kinematics import magnet_and_lever
 from uam_control.grasp.sight import RunningMean
 from uam_control.laws import catalogue
 from uam_control.laws.catalogue import LAWS
-from uam_control.mission import load_scenario
-from uam_control.mission.motion.polynomials import Polynomials
+from uam_control.mission import Feasibility, load_scenario
 from uam_control.mission.motion.trajectory import empty_motion
 from uam_control.mission.scenarios.scenario import standing
 from uam_control.profiles.profile import default_profile
@@ -91,8 +90,11 @@ def _stand_in() -> None:
 
 
 def _others() -> None:
-    Polynomials(np.array([0.0, 1.0]), np.zeros((1, 6, 4))).rows(np.zeros(2))
     curve = load_scenario("circle")
+    limits = default_profile(catalogue.DEFAULT).sets["mission"]
+    check = Feasibility(Vehicle.load().description, limits, 0.0)
+    for scenario in (load_scenario("hover"), curve):
+        check.excesses(scenario)
     curve.trajectory(standing(curve.arm_start)).write(4.0, empty_motion(len(curve.arm_start)))
     mean = RunningMean()  # of the grasp, which a flight without a payload does not check
     for stamp in (0.0, 0.004):
