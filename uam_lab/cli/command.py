@@ -155,7 +155,10 @@ class Command:
 
     def process(self) -> None:
         """Add the options of the processes of the nodes that fly, for `chosen_process`."""
-        text = "real-time priority of the nodes that fly, SCHED_FIFO 1..98 (default: ordinary)"
+        text = (
+            "real-time priority of the nodes that fly, in lockstep of plant and autopilot, too: "
+            "SCHED_FIFO 1..98 (default: ordinary)"
+        )
         self.option("--fifo", "PRIORITY", text, type=int, dest="fifo_priority")
         text = "nice value of the nodes that fly, -20..19 (default: 0)"
         self.option("--nice", "N", text, type=int)
