@@ -324,3 +324,22 @@ def test_a_state_that_is_not_finite_does_not_reach_the_reference():
     before = fly(guide, 20.0, 25.0)[-1]
     guide.stay(125.0, state, START[2])
     np.testing.assert_array_equal(guide.reference, before)
+
+
+def test_the_preview_is_the_planned_path_up_to_a_length():
+    flown = fly(guidance(), 0.0, 40.0)
+    scenario, end = load_scenario("pick_and_place"), 90.0
+    made = scenario.trajectory(START), 100.0, np.zeros((3, 8)), scenario.arm_start
+    guide = Guidance(*made, MissionParameters(), end)
+    fly(guide, 0.0, 10.0)
+    stamps, chi = guide.preview(109.99, 0.25, 20.0)
+    assert stamps[0] == pytest.approx(109.99) and 20.0 <= stamps[-1] - stamps[0] < 20.5
+    np.testing.assert_allclose(chi, flown[999 : 999 + 25 * len(chi) : 25, 0], atol=1e-9)
+    assert guide.preview(109.99, 0.25, 1e9)[0][-1] == pytest.approx(100.0 + end, abs=0.25)
+    guide.stop(109.99, stow=False)
+    fly(guide, 10.0, 20.0)
+    stamps, chi = guide.preview(119.99, 0.25, 20.0)
+    assert len(stamps) == len(chi) == 1
+    guide.descend(119.99, guide.motion[:3], 0.28, stow=False)
+    stamps, chi = guide.preview(119.99, 0.25, 2.0)
+    assert stamps[-1] - stamps[0] == pytest.approx(2.0) and chi[-1, 2] < chi[0, 2]

@@ -330,15 +330,17 @@ class Mission:
         self._requests.append((OperatorCommand.GOAL, goal))
         return True, f"accepted: at the end in {made.end - self._stamp:.1f} s"
 
-    def preview(self, step: float) -> tuple[np.ndarray, np.ndarray]:
+    def preview(self, step: float, longest: float) -> tuple[np.ndarray, np.ndarray]:
         """Return stamps (m,) [s] and planned chi (m, 6 + n), every `step` [s]; m = 0 on the ground.
+
+        longest [s]: of the part that is returned.
 
         Nothing is planned in failsafe or while somebody else has control.
         """
         idle = self.output.state in (State.FAILSAFE, State.DISARMED, State.RELEASED)
         if self._guidance is None or idle:
             return np.zeros(0), np.zeros((0, self.output.reference.shape[1]))
-        return self._guidance.preview(self._stamp, step)
+        return self._guidance.preview(self._stamp, step, longest)
 
     def switch_magnet(self, on: bool) -> tuple[bool, str]:
         """Override the magnet until the scenario switches it next; returns as `request` does."""

@@ -286,26 +286,21 @@ class Guidance:
         """Return whether every plan is at its end at `stamp` [s]; False without a plan."""
         return self.planned and all(stamp >= plan.end for plan in self._plans.values())
 
-    def preview(self, stamp: float, step: float) -> tuple[np.ndarray, np.ndarray]:
+    def preview(self, stamp: float, step: float, longest: float) -> tuple[np.ndarray, np.ndarray]:
         """Return the planned chi (m, 6 + n) from `stamp` [s] on, every `step` [s] to its end.
 
         Also returns the stamps (m,) [s]. A hold is one point; after it the path is not planned.
+        longest [s]: of the part that is returned.
         """
-        row, rows = np.zeros_like(self.motion), []
         motion = self._last or self._plans.get(True) or self._brake
-        if motion is not None:
-            stamps = np.arange(stamp, max(motion.end, stamp) + step, step)
-            for one in stamps:
-                row[:] = self.motion
-                motion.write(min(one, motion.end), row)
-                rows.append(row[CHI].copy())
-            return stamps, np.array(rows)
-        if self._clock.goal == 0.0 and math.isinf(self._go_on_at):
+        begin, end = (stamp, motion.end) if motion else (self.scenario_time, self._end)
+        if motion is None and self._clock.goal == 0.0 and math.isinf(self._go_on_at):
             return np.array([stamp]), self.motion[CHI][None].copy()
-        begin = self.scenario_time
-        times = np.arange(begin, max(self._end, begin) + step, step)
-        for one in times:
-            self._trajectory.write(min(one, self._end), row)
+        times = np.arange(begin, min(max(end, begin), begin + longest) + step, step)
+        row, rows = np.zeros_like(self.motion), []
+        for time in times.tolist():
+            row[:] = self.motion
+            (motion or self._trajectory).write(min(time, end), row)
             rows.append(row[CHI].copy())
         return stamp + times - begin, np.array(rows)
 

@@ -61,6 +61,7 @@ NAME = "mission"
 POSITION_CONTROLLER = "position_controller"
 STATUS_PERIOD = 500_000_000  # [ns]
 PATH_STEP = 0.25  # [s] between two poses of the path
+PATH_LENGTH = 250.0  # [s] of the flight in it: a tick must not wait for the path of hours
 WATCH_PERIOD = 0.05  # [s] of the watch on states
 
 
@@ -284,11 +285,15 @@ class MissionNode(UamNode):
         )
 
     def _publish_path(self, stamp: int) -> None:
-        """Publish the planned positions after a change, if the topic has a subscriber."""
-        plan = f"{len(self._mission.changes)} {self._mission.output.state}"
+        """Publish the planned positions of the next PATH_LENGTH, if the topic has a subscriber.
+
+        After a change, and once half of a path is flown.
+        """
+        part = int(2.0 * self._stage.time / PATH_LENGTH)
+        plan = f"{len(self._mission.changes)} {self._mission.output.state} {part}"
         if plan != self._path_of and self._path.get_subscription_count():
             self._path_of = plan
-            stamps, chi = self._mission.preview(PATH_STEP)
+            stamps, chi = self._mission.preview(PATH_STEP, PATH_LENGTH)
             self._path.publish(path_message(stamp, np.rint(stamps * SECOND).astype(int), chi))
 
     def _publish_answer(self) -> None:
@@ -360,6 +365,7 @@ def warm_up(spare: Mission, takeoff: float, period: float) -> None:
     received.flags.writeable = False
     Inputs(period).gains(0.0, SUBSYSTEMS[0], ("rho", "rho_dot"), received)
     tilt(state[CHI, ATTITUDE])
+    path_message(0, np.zeros(1, dtype=int), state[:1])
 
 
 def main() -> int:

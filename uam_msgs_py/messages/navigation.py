@@ -2,12 +2,17 @@
 
 from __future__ import annotations
 
+from functools import cache
+
 import numpy as np
 from geometry_msgs.msg import Pose, PoseStamped
 from nav_msgs.msg import Odometry, Path
+from rclpy.serialization import serialize_message
 
 from uam_control.coordinates import ATTITUDE, CHI, CHI_DOT, POSITION
 from uam_control.maths.rotations import matrix_from_euler, quaternion_from_euler, rotate_back
+from uam_control.stamps import SECOND
+from uam_msgs_py.messages.layouts import STAMP
 from uam_msgs_py.messages.ros_time import set_stamp
 from uam_msgs_py.messages.topics import BODY, WORLD
 
@@ -28,18 +33,40 @@ def odometry_message(stamp: int, state: np.ndarray, frame: str = BODY) -> Odomet
     return message
 
 
-def path_message(stamp: int, times: np.ndarray, chi: np.ndarray) -> Path:
-    """Return the path at `stamp` [ns] through chi (m, 6 + n), each at its times (m,) [ns]."""
+def path_message(stamp: int, times: np.ndarray, chi: np.ndarray) -> bytes:
+    """Return the serialized path at `stamp` [ns] through chi (m, 6 + n), at its times (m,) [ns]."""
+    head, pose = _serialized_path()
+    count = len(times)
+    header = head.copy()
+    header[STAMP].view("<i4")[:] = divmod(stamp, SECOND)
+    header[-4:].view("<u4")[:] = count
+    poses = np.tile(pose, (count, 1))
+    poses[:, :8].view("<i4")[:] = np.column_stack(np.divmod(times, SECOND))
+    numbers = poses[:, -56:].view("<f8")
+    numbers[:, :3] = chi[:, POSITION]
+    for row, turned in zip(numbers, chi[:, ATTITUDE], strict=True):
+        row[6], row[3], row[4], row[5] = quaternion_from_euler(turned)
+    return header.tobytes() + poses.tobytes()
+
+
+@cache
+def _serialized_path() -> tuple[np.ndarray, np.ndarray]:
+    """Return the bytes of a path up to its first pose, and those of a pose.
+
+    All poses have the same bytes apart from their numbers, as all begin at a multiple of 8: at the
+    end of a pose there are seven float64.
+    """
     message = Path()
     message.header.frame_id = WORLD
-    set_stamp(message.header.stamp, stamp)
-    for time, row in zip(times.tolist(), chi, strict=True):
+    lengths = []
+    for _ in range(2):
         pose = PoseStamped()
         pose.header.frame_id = WORLD
-        set_stamp(pose.header.stamp, time)
-        _fill(pose.pose, row)
         message.poses.append(pose)
-    return message
+        data = np.frombuffer(serialize_message(message), dtype=np.uint8)
+        lengths.append(len(data))
+    size = lengths[1] - lengths[0]
+    return data[: -2 * size], data[-size:]
 
 
 def _fill(pose: Pose, chi: np.ndarray) -> None:

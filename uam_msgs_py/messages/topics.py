@@ -202,7 +202,7 @@ ODOMETRY = Topic(
     recorded=False,
 )
 PATH = Topic(
-    "path", Path, LATCHED, "planned positions, world; on change, only with a subscriber",
+    "path", Path, LATCHED, "planned positions of the next 250 s; on change, only with a subscriber",
     recorded=False,
 )  # fmt: skip
 
