@@ -43,7 +43,7 @@ def test_who_computes_the_setpoint_has_one_core_and_the_others_the_second(proces
         placing(settings(), 0, name)(process)
         assert os.sched_getaffinity(process) == {second}
     assert os.sched_getscheduler(process) == os.SCHED_OTHER
-    assert os.getpriority(os.PRIO_PROCESS, process) == 0
+    assert os.getpriority(os.PRIO_PROCESS, process) == os.getpriority(os.PRIO_PROCESS, 0)
 
 
 @pytest.mark.skipif(len(os.sched_getaffinity(0)) < 2, reason="one core")
@@ -52,7 +52,13 @@ def test_who_does_not_interrupt_the_tick_and_is_interrupted_by_it(process, name)
     placing(settings(), 0, name)(process)
     assert os.sched_getaffinity(process) == {pair(sorted(os.sched_getaffinity(0)), 0)[1]}
     assert os.sched_getscheduler(process) == os.SCHED_BATCH
-    assert os.getpriority(os.PRIO_PROCESS, process) == NICE
+    assert os.getpriority(os.PRIO_PROCESS, process) == max(NICE, os.getpriority(os.PRIO_PROCESS, 0))
+
+
+def test_a_flight_that_gives_way_to_others_has_no_node_that_does_not(process):
+    os.setpriority(os.PRIO_PROCESS, process, 19)
+    placing(settings(), 0, wiring.RECORDER)(process)
+    assert os.getpriority(os.PRIO_PROCESS, process) == 19
 
 
 @pytest.mark.skipif(len(os.sched_getaffinity(0)) < 2, reason="one core")

@@ -52,6 +52,7 @@ def placing(settings: FlightSettings, instance: int, name: str) -> Callable[[int
                 os.sched_setscheduler(process, os.SCHED_FIFO, priority)
             if name in YIELDING:
                 os.sched_setscheduler(process, os.SCHED_BATCH, os.sched_param(0))
-                os.setpriority(os.PRIO_PROCESS, process, NICE)
+                given = os.getpriority(os.PRIO_PROCESS, process)
+                os.setpriority(os.PRIO_PROCESS, process, max(NICE, given))
 
     return place
