@@ -13,6 +13,7 @@ import sys
 import threading
 from collections.abc import Iterator, Sequence
 
+from uam_lab.flight.ros import FORKER
 from uam_lab.processes import child
 from uam_lab.processes.interrupts import INTERRUPTED
 
@@ -24,7 +25,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     given = sys.argv[1:] if arguments is None else arguments
     with _ended_by_interrupt():
         if given[:1] == ["fly"] and not WITHOUT_NODES.intersection(given):
-            child.prepare_early()
+            child.prepare_early([FORKER])
         from uam_lab.cli.parser import parsed, run  # takes a second or two
 
         options = parsed(given)

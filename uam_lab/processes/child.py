@@ -35,7 +35,6 @@ from setproctitle import setproctitle
 from uam_lab.processes.borrowed_environment import borrowed
 
 GRACE = 5.0  # [s] from SIGINT to SIGKILL, after the end of the orchestrator
-FORKER = "uam_lab.flight.ros.forker"  # module that prepares the forking process for a flight
 TITLE = "uam-node"  # first word of a child's command line, for `ps` and `process_table`
 POLL = 0.002  # seconds
 # One thread per node: the matrices are small, and thread pools on few cores delay each other. The
@@ -77,12 +76,12 @@ def prepare(modules: Iterable[str]) -> None:
             signal.pthread_sigmask(signal.SIG_SETMASK, before)
 
 
-def prepare_early() -> None:
-    """Start the forking process for a flight, before it is known which one; return at once.
+def prepare_early(modules: Iterable[str]) -> None:
+    """Start the forking process as `prepare` does, before it is known whether it is needed.
 
     At the end of this process it ends, too, though it may still be loading.
     """
-    prepare([FORKER])
+    prepare(modules)
     atexit.register(discard)
 
 

@@ -9,7 +9,7 @@ from typing import Protocol
 
 from uam_lab.flight.flight_settings import FlightSettings
 from uam_lab.flight.observer import Observer
-from uam_lab.flight.ros import node_arguments
+from uam_lab.flight.ros import FORKER, node_arguments
 from uam_lab.flight.ros.restarts import ChangedParameters, RestartTopic
 from uam_lab.flight.ros.status_listener import StatusListener
 from uam_lab.processes import child
@@ -37,7 +37,7 @@ class Course(Protocol):
 def prepare(modules: Iterable[str], observer: Observer) -> None:
     """Begin to import the modules of the processes, unless `uam` has begun to; wait for the end of
     a killed flight's nodes."""
-    child.prepare([*modules, child.FORKER])
+    child.prepare([*modules, FORKER])
     await_orphans(observer.message)
 
 
