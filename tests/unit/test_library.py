@@ -8,7 +8,7 @@ from uam_lab import Flight, FlightError, NotInTime
 from uam_lab.flight.flight_settings import SettingsError
 from uam_lab.flight.observer import FlightStatus, Observer
 from uam_lab.flight.ros import node_arguments
-from uam_lab.library.history import History
+from uam_lab.library.history import KEPT, History
 from uam_lab.results.result_folder import ResultFolderError
 from uam_sim_bridge.faults import FaultError
 
@@ -136,3 +136,17 @@ def test_a_status_is_found_once_and_the_newest_again():
     history.update(status("land"))
     history.forget()
     assert found("carry") is None and found("land").phase == "land"
+
+
+def test_a_flight_of_many_hours_keeps_its_newest_statuses():
+    history = History(Observer())
+    for number in range(3 * KEPT):
+        history.update(status(str(number)))
+    assert len(history.statuses) == KEPT
+    first = history.found(lambda one: True)
+    assert first.phase == str(2 * KEPT), "of those that are kept"
+    assert history.found(lambda one: True).phase == str(2 * KEPT + 1)
+    history.forget()
+    assert history.found(lambda one: True).phase == str(3 * KEPT - 1)
+    history.update(status("land"))
+    assert history.found(lambda one: one.phase == "land") is history.statuses[-1]

@@ -4,21 +4,26 @@ from __future__ import annotations
 
 import threading
 import time
+from collections import deque
 from collections.abc import Callable, Sequence
+from itertools import islice
 
 from uam_lab.flight.observer import DeviceState, FlightStatus, Observer
 from uam_lab.library.errors import NotInTime
 
 Condition = Callable[[FlightStatus], bool]
 
+KEPT = 4000  # statuses, of half an hour of flight: a flight may last for many hours
+
 
 class History(Observer):
-    """Stores every status and message, and passes them on to another observer."""
+    """Stores the newest statuses and every message, and passes them on to another observer."""
 
     def __init__(self, further: Observer) -> None:
         self._further = further
         self._news = threading.Condition()
-        self.statuses: list[FlightStatus] = []
+        self.statuses: deque[FlightStatus] = deque(maxlen=KEPT)
+        self._count = 0  # of all statuses so far
         self.messages: list[str] = []
         self.running = False  # from the start of the processes to their end
         self.over = False  # the result is complete
@@ -45,6 +50,7 @@ class History(Observer):
         """Store a status."""
         with self._news:
             self.statuses.append(status)
+            self._count += 1
             self._news.notify_all()
         self._further.update(status)
 
@@ -61,7 +67,7 @@ class History(Observer):
     def forget(self) -> None:
         """Ignore the statuses so far in the next `found`, except the newest."""
         with self._news:
-            self._seen = len(self.statuses)
+            self._seen = self._count
 
     def found(self, condition: Condition) -> FlightStatus | None:
         """Return the first status of this kind since the last one found; None without one.
@@ -69,11 +75,12 @@ class History(Observer):
         The newest status counts again.
         """
         with self._news:
-            first = min(self._seen, max(len(self.statuses) - 1, 0))
-            for number in range(first, len(self.statuses)):
-                if condition(self.statuses[number]):
+            forgotten = self._count - len(self.statuses)
+            first = max(min(self._seen, self._count - 1), forgotten)
+            for number, status in enumerate(islice(self.statuses, first - forgotten, None), first):
+                if condition(status):
                     self._seen = number + 1
-                    return self.statuses[number]
+                    return status
         return None
 
     def wait(self, done: Callable[[], bool], timeout: float | None, what: str) -> None:
