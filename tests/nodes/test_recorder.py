@@ -12,10 +12,10 @@ from rosbags.highlevel import AnyReader
 from rosgraph_msgs.msg import Clock
 from std_msgs.msg import Bool
 
-from uam_control.stamps import SECOND
 from uam_lab.recording.mcap_reader import read_log
 from uam_msgs_py.messages import topics
 from uam_msgs_py.messages.convert import SetpointWriter
+from uam_msgs_py.messages.layouts import stamp_of
 from uam_msgs_py.messages.ros_time import set_stamp
 from uam_msgs_py.messages.serialized import type_name
 from uam_msgs_py.messages.transforms import transforms_message
@@ -123,18 +123,25 @@ def test_a_gap_in_the_sequence_is_counted_as_lost(recorder, probe):
     assert report["lost"][SETPOINT] == times[-1] - times[0] + 1 - len(times) > 0
 
 
-def test_a_fast_simulation_learns_its_progress_before_the_next_flush(start, tmp_path, probe):
+def test_a_simulation_learns_its_progress_at_each_poll(start, tmp_path, probe):
     never = ["-p", "flush_period:=60.0"]
     start(MODULE, "--ros-args", "-p", f"file:={tmp_path / 'log.mcap'}", *never)
-    clock, connections, now = probe.publisher(topics.CLOCK), Connections(probe.node), Clock()
+    clock, told = probe.publisher(topics.CLOCK), probe.collect(topics.RECORDED_UNTIL)
+    now = Clock()
 
-    def reported(until):
-        set_stamp(now.clock, until * SECOND)
+    def reported(tick):
+        set_stamp(now.clock, tick * TICK)
         clock.publish(now)  # again and again: the recorder may not be connected yet
-        return connections.recorded_until() == until
+        return tick * TICK in map(stamp_of, told)
 
-    for second in (1, 2, 3):
-        probe.until(lambda until=second: reported(until), "the recorder's report")
+    for tick in (1, 2, 3):
+        probe.until(lambda tick=tick: reported(tick), "the recorder's progress")
+
+
+def test_the_progress_is_told_again_as_a_message_may_be_lost(recorder, probe):
+    told = probe.collect(topics.RECORDED_UNTIL)
+    probe.until(lambda: len(told) >= 2, "the progress twice")
+    assert set(map(stamp_of, told)) == {0}
 
 
 def test_a_killed_recorder_leaves_what_was_flushed(recorder, probe):

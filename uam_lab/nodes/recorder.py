@@ -9,7 +9,7 @@ from __future__ import annotations
 import json
 import sys
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from datetime import datetime
 from pathlib import Path
@@ -19,6 +19,7 @@ from diagnostic_msgs.msg import DiagnosticArray
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 from rclpy.signals import SignalHandlerOptions
+from rosgraph_msgs.msg import Clock
 
 from uam_control.settings.parameter_set import (
     ParameterError,
@@ -32,6 +33,7 @@ from uam_control.settings.process_parameters import ProcessParameters
 from uam_lab.recording.bag import new_log_file
 from uam_lab.recording.topic_recorder import TopicRecorder
 from uam_msgs_py.messages import topics
+from uam_msgs_py.messages.serialized import Template
 from uam_msgs_py.messages.status import ERROR, OK, WARN, diagnostic
 from uam_msgs_py.node import connections, process_options
 from uam_msgs_py.node.base_node import DIAGNOSTICS_PERIOD, StopSignal, refuse
@@ -64,24 +66,42 @@ class RecorderParameters(ParameterSet):
     )
 
 
+class Progress:
+    """Publishes the simulation time up to which every topic is recorded."""
+
+    def __init__(self, node: Node) -> None:
+        topic = topics.RECORDED_UNTIL
+        self._publisher = node.create_publisher(topic.type, topic.name, topic.qos)
+        self._writer, self._until = Template(Clock()), 0
+
+    def tell(self, until: int) -> None:
+        """Publish `until` [ns] if it has changed."""
+        if until != self._until:
+            self._until = until
+            self.repeat()
+
+    def repeat(self) -> None:
+        """Publish the last time again: a message may be lost."""
+        self._publisher.publish(self._writer.stamped(self._until))
+
+
 def _health(
     node: Node,
     recording: TopicRecorder,
     polls: LoopTime,
-    connected: Mapping[str, int],
     new: Sequence[str],
 ) -> DiagnosticArray:
     """Return the node's /diagnostics entry: lost messages, loop times, connections.
 
-    connected: of `connections.of`; new: lines about foreign publishers since the last entry.
+    new: lines about foreign publishers since the last entry.
     """
     lost = sum(recording.lost.values())
     summary = recording.ended or (f"{lost} messages lost" if lost else "recording")
     values = {"messages lost": lost, "lost of": _losses(recording)}
-    values[connections.RECORDED_UNTIL] = recording.until
+    values["recorded until [s]"] = recording.until
     namespace = node.get_namespace()
     values |= polls.report("poll") | ages(recording.inlets, recording.arrivals, namespace)
-    values |= connected
+    values |= connections.of(node, {}, recording.inlets)
     now = node.get_clock().now().nanoseconds
     values["foreign publishers"] = "; ".join(recording.foreign)
     level = ERROR if recording.ended else WARN if lost else OK
@@ -143,14 +163,13 @@ def main() -> int:
     health = node.create_publisher(
         topics.DIAGNOSTICS.type, topics.DIAGNOSTICS.name, topics.DIAGNOSTICS.qos
     )
+    progress = Progress(node)
     services = SingleThreadedExecutor()
     services.add_node(node)
     polls_per_flush = max(1, round(options.flush_period / options.poll_period))
     polls, loop, ended = 0, LoopTime(), ""
     foreign: list[str] = []  # lines about foreign publishers at the last report
     due = 0.0  # time.monotonic() of the next comparison
-    reported = 0.0  # [s] `until` of the last report: a simulation may run faster than wall time
-    connected: Mapping[str, int] = {}
     while not stop.raised:
         time.sleep(options.poll_period)
         begun = time.perf_counter()
@@ -159,12 +178,10 @@ def main() -> int:
         polls += 1
         if polls % POLLS_PER_SERVICE == 0:
             services.spin_once(timeout_sec=0.0)
-        periodic = polls % polls_per_flush == 0
-        if periodic or recording.until - reported >= connections.RECORDED_STEP:
+        progress.tell(recording.until_ns)
+        if polls % polls_per_flush == 0:
             recording.flush()
-            if periodic:  # counting takes longer than the rest of a report
-                connected = connections.of(node, {}, recording.inlets)
-            reported = recording.until
+            progress.repeat()
             if recording.ended and not ended:
                 ended = recording.ended
                 log.error(f"{ended}; recorded until {recording.until:g} s")
@@ -175,7 +192,7 @@ def main() -> int:
                 foreign = recording.foreign
                 if new:
                     log.error("; ".join(new))
-            health.publish(_health(node, recording, loop, connected, new))
+            health.publish(_health(node, recording, loop, new))
     recording.drain()
     if not recording.close():
         log.warning("the folder has the metadata.yaml of another log: give this one's file a name")

@@ -200,7 +200,12 @@ class TopicRecorder:
     @property
     def until(self) -> float:
         """Simulation time [s] of the newest /clock, 0 before the first."""
-        return self._clock_sim[-1] / SECOND if self._clock_sim else 0.0
+        return self.until_ns / SECOND
+
+    @property
+    def until_ns(self) -> int:
+        """Simulation time [ns] of the newest /clock, 0 before the first."""
+        return self._clock_sim[-1] if self._clock_sim else 0
 
     @property
     def lost(self) -> dict[str, int]:

@@ -257,6 +257,15 @@ MARKERS = Topic(
     "uam/markers", MarkerArray, LATCHED, "paths, payload, magnet, phase", one_publisher=False
 )
 
+# Of the recording
+RECORDED_UNTIL = Topic(
+    "uam/recorded_until",
+    Clock,
+    _qos(1, reliable=False),
+    "simulation time up to which every topic is recorded; in lockstep the plant waits for it",
+    recorded=False,
+)
+
 # ROS conventions
 DIAGNOSTICS = Topic("/diagnostics", DiagnosticArray, RELIABLE, "health, 1 Hz", one_publisher=False)
 ROSOUT = Topic("/rosout", Log, _qos(1000, latched=True), "log of all nodes", one_publisher=False)

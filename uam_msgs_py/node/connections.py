@@ -19,8 +19,6 @@ from uam_msgs_py.node.namespace import expanded, prefix
 
 NAMELESS = "_NODE_NAME_UNKNOWN_"  # of the middleware, before it has a node's name
 READERS, WRITERS = "readers of ", "writers of "
-RECORDER, RECORDED_UNTIL = "recorder", "recorded until [s]"
-RECORDED_STEP = 1.0  # [s] of the flight, after which the recorder reports again at the latest
 
 
 class Counted(Protocol):
@@ -86,12 +84,5 @@ class Connections:
 
     def count(self, node: str, kind: str, topic: str) -> int:
         """Return the number of READERS or WRITERS (kind) of `topic` that `node` is connected to."""
-        return int(self._of(node).get(kind + expanded(self._namespace, topic), 0))
-
-    def recorded_until(self) -> float:
-        """Return the simulation time [s] up to which the recorder has reported a complete log."""
-        return float(self._of(RECORDER).get(RECORDED_UNTIL, 0.0))
-
-    def _of(self, node: str) -> Mapping[str, str]:
-        """Return the values of the node of this name in the same namespace."""
-        return self._values.get(prefix(self._namespace) + node, {})
+        values = self._values.get(prefix(self._namespace) + node, {})
+        return int(values.get(kind + expanded(self._namespace, topic), 0))

@@ -43,7 +43,7 @@ from uam_msgs_py.messages import topics
 from uam_msgs_py.messages.ros_time import nanoseconds as from_message
 from uam_msgs_py.node import polling, wiring
 from uam_msgs_py.node.base_node import StopSignal, refuse
-from uam_msgs_py.node.connections import RECORDED_STEP, Connections, of
+from uam_msgs_py.node.connections import Connections, of
 from uam_msgs_py.node.executor import LeanExecutor
 from uam_msgs_py.node.node_parameters import refuse_unknown
 from uam_msgs_py.node.tick_times import tick_times
@@ -59,6 +59,7 @@ from uam_sim_bridge.nodes.plant_topics import (
     SETPOINT,
     SUSPECTS,
     Answers,
+    RecorderProgress,
     Sensors,
     TruthTopics,
     nanoseconds,
@@ -75,7 +76,7 @@ CATCH_UP = 1.25  # [1] largest real-time factor after a stall of the machine
 REPORT_INTERVAL = 5.0  # [s] between two log lines with the missing nodes
 FOREIGN_WAIT = 1.0  # [s] for discovery by foreign nodes, which do not report their connections
 LAST_WAIT = 3.0  # [s] longest wait for the recorder after the last tick
-RECORDER_LAG = 2.0 * RECORDED_STEP  # [s] the recorder's queue is four times as long
+RECORDER_LAG = SECOND  # [ns] receive buffers have room for more, see config/dds/fastdds.xml
 LATCHED_WAIT = 0.5  # [s] of wall time, in which a latched message arrives
 AFTER_OTHERS = 1.0  # [s] the status of a mission is at most half a second older than its last tick
 # [s], [ticks]: single samples of the autopilot's IMU may be lost. After these ticks time goes on at
@@ -119,7 +120,8 @@ class Simulator:
         servo_mode = vehicle.numbers["servos"]["mode"]
         self.answers = Answers(node, described, declared.rightful, servo_mode)
         self.connections = Connections(node)
-        self.executor = LeanExecutor(node, [topics.SETPOINT.name], lambda: self._setpoint_is_there)
+        self.recorded = RecorderProgress(node, declared.rightful)
+        self.executor = LeanExecutor(node, [topics.SETPOINT.name], lambda: self._any_input_wakes)
         patience = options.answer_timeout
         rotors = len(described.rotors)
         waits = HilParameters(answer_timeout=patience)
@@ -137,7 +139,7 @@ class Simulator:
         pairs = [entry.partition("=") for entry in options.foreign.split(",") if entry]
         self._own_names = {node: name or node for node, _, name in pairs}
         self._foreign = tuple(self._own_names.values())
-        self._setpoint_is_there = False  # usually the last answer to arrive
+        self._any_input_wakes = False  # else the setpoint alone: usually the last answer to arrive
         self._complete = False  # every kind of sensor has delivered a sample
         self._stamp: int | None = None  # of this tick's IMU sample [ns]
         self._unanswered = 0  # ticks in a row without an answer
@@ -147,7 +149,6 @@ class Simulator:
         self._begun = 0.0  # wall time [s] at which this tick began
         latest = options.let_go or math.inf
         self._clock = PacedClock(self.plant.period, catch_up=CATCH_UP, latest=latest)
-        self._begun_at = 0.0  # and simulation time [s]
         self._latencies = Latencies(self.statistics, self.plant.period)
 
     def wait_for_nodes(self) -> None:
@@ -294,12 +295,12 @@ class Simulator:
         else:
             self.statistics.ended_by = "interrupt"
         self.statistics.wall_s = time.monotonic() - begin
-        self._recorder_has_caught_up(0.0, LAST_WAIT)  # unread messages are lost when the node ends
+        self._recorder_has_caught_up(0, LAST_WAIT)  # unread messages are lost when the node ends
 
     def _begin_tick(self) -> None:
         """Publish the samples and the truth of this tick, and prepare those of the autopilot."""
         plant = self.plant
-        self._begun, self._begun_at = time.monotonic(), plant.time
+        self._begun = time.monotonic()
         self._clock.note(plant.tick - self._first_tick)
         now = self.node.stamp = nanoseconds(plant.time)
         self.answers.begin()
@@ -346,8 +347,7 @@ class Simulator:
     def _wait_for_answers(self) -> None:
         if not self._recorder_has_caught_up(RECORDER_LAG, self.options.answer_timeout):
             raise PlantStopped(
-                f"nothing recorded since {self.connections.recorded_until():g} s"
-                "; the recorder is silent"
+                f"nothing recorded since {self.recorded.until / SECOND:g} s; the recorder is silent"
             )
         if self._stop.raised:
             return
@@ -362,7 +362,7 @@ class Simulator:
             self._patience = Patience(self.options.answer_timeout)
         slack = 0.0 if self._unanswered >= IMU_MISSING and not own_imu else IMU_WAIT
         while missing := self.answers.missing(self._stamp):
-            self._setpoint_is_there = SETPOINT not in missing
+            self._any_input_wakes = SETPOINT not in missing
             left = self._begun + self.plant.period - time.monotonic()
             hurried = self._restart.going_on or not slack
             self.executor.spin_once(max(0.0, left) if hurried else 0.1)
@@ -385,17 +385,18 @@ class Simulator:
         while (left := end - time.monotonic()) > 0.0 and not self._stop.raised:
             self.executor.spin_once(left)
 
-    def _recorder_has_caught_up(self, lag: float, patience: float) -> bool:
-        """Wait until the recorder is at most `lag` [s] behind; return False after `patience`.
+    def _recorder_has_caught_up(self, lag: int, patience: float) -> bool:
+        """Wait until the recorder is at most `lag` [ns] behind; return False after `patience`.
 
         patience: longest wait [s of wall time].
         """
         waiting = Patience(patience)
         while self.options.recorded and not self._stop.raised:
-            if self._begun_at - self.connections.recorded_until() <= lag:
+            if self.node.stamp - self.recorded.until <= lag:
                 break
             if waiting.over:
                 return False
+            self._any_input_wakes = True
             self.executor.spin_once(0.1)
         return True
 

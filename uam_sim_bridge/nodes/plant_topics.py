@@ -140,6 +140,26 @@ class TruthTopics(Outlets):
         self._state.publish(self._state_writer.fill(stamp, truth.state))
 
 
+class RecorderProgress:
+    """Listens to the recorder. `until` [ns]: simulation time up to which the log is complete.
+
+    A further recorder, under another name, is not waited for, and is no reason to complain.
+    """
+
+    def __init__(self, node: Node, rightful: RightfulNodes):
+        self.until = 0
+        topic = topics.RECORDED_UNTIL
+        events = SubscriptionEventCallbacks(use_default_callbacks=False)
+        inlet = node.create_subscription(
+            topic.type, topic.name, self._on_progress, topic.qos, raw=True, event_callbacks=events
+        )
+        guard = SolePublisher(node, inlet, rightful.of(topic.name), lambda: self.until > 0)
+        node.sole_publishers = node.sole_publishers | {inlet: guard}
+
+    def _on_progress(self, data: bytes) -> None:
+        self.until = stamp_of(data)
+
+
 SETPOINT, ARM, MAGNET = "setpoint", "arm command", "magnet command"  # the answers, in messages
 # The node named when answers are missing: the last one that all of them depend on.
 SUSPECTS = {
