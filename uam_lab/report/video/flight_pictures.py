@@ -21,8 +21,9 @@ TRAIL_RGBA = (0.12, 0.37, 0.66, 0.95)
 REFERENCE_RGBA = (0.35, 0.40, 0.45, 0.55)
 SEGMENTS = 140  # of a path; of the reference every second one is drawn
 GEOMS = 2000
-SHADOW = 1024  # pixels of the shadow map up to LOW rows of a picture, twice as many above
-LOW = 600
+# Pixels of the shadow map, samples per pixel; coarse: pictures of up to LOW rows, as in a video.
+# Without a GPU smooth edges double the time of a picture, and the video's compression hides them.
+COARSE, FINE, LOW = (1024, 0), (2048, 4), 600
 
 
 class Scene:
@@ -33,7 +34,7 @@ class Scene:
         self.poses = Poses(series)
         self.series = series
         self._thickness = height / 480  # lines are measured in pixels
-        _light(self.poses.model, SHADOW if height <= LOW else 2 * SHADOW)
+        _light(self.poses.model, *(COARSE if height <= LOW else FINE))
         vis = self.poses.model.vis
         vis.global_.offwidth, vis.global_.offheight = width, height
         self._renderer = mujoco.Renderer(self.poses.model, height, width, GEOMS)
@@ -81,17 +82,17 @@ class Scene:
             scene.ngeom += 1
 
 
-def _light(model: mujoco.MjModel, shadow: int) -> None:
+def _light(model: mujoco.MjModel, shadow: int, samples: int) -> None:
     """Set bright surroundings and light shadows; no floor reflection (one render pass less).
 
-    shadow: pixels of the shadow map; without a GPU it takes up to a fifth of a picture's time.
+    shadow: pixels of the shadow map; samples: per pixel, 0 for edges that are not smooth.
     """
     model.vis.headlight.ambient[:] = 0.50
     model.vis.headlight.diffuse[:] = 0.22
     model.light_diffuse[:] = 0.42
     model.light_specular[:] = 0.25
     model.mat_reflectance[:] = 0.0
-    model.vis.quality.offsamples = 4
+    model.vis.quality.offsamples = samples
     model.vis.quality.shadowsize = shadow
     model.vis.map.fogstart, model.vis.map.fogend = 4.0, 12.0
 
