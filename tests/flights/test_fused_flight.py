@@ -33,6 +33,31 @@ def test_a_fused_flight_in_lockstep_is_that_of_separate_nodes_to_the_digit(
     assert_nothing_left(flight, [])
 
 
+@pytest.mark.long
+def test_the_table_of_a_thinned_log_has_the_ticks_that_were_sent(fly, short_scenario):
+    tables, figures = [], []
+    for rate in ((), ("--inner-rate", "25")):
+        flight = fly("--fused", "--scenario", str(short_scenario), *rate)
+        assert flight.wait() == 0, flight.said + flight.complained
+        tables.append(read(flight.out / "timeseries.parquet"))
+        figures.append(json.loads((flight.out / "metrics.json").read_text()))
+    full, thinned = tables
+    assert "see inner_rate" not in "".join(full.info["notes"])
+    assert f"have {len(thinned)} of" in "".join(thinned.info["notes"])
+    assert 9.9 < len(full) / len(thinned) < 10.1
+    rows = np.searchsorted(full.time, thinned.time[thinned.flown] - 1e-6)
+    np.testing.assert_allclose(thinned.time[thinned.flown], full.time[rows], atol=1e-9)
+    sent = ("truth.", "estimate.", "reference.", "tau_", "setpoint.", "rotor_", "magnet.")
+    columns = [n for n, name in enumerate(full.columns.names) if name.startswith(sent)]
+    flown = thinned.values[thinned.flown][:, columns]
+    np.testing.assert_array_equal(flown, full.values[rows][:, columns])
+    for axis in range(3):
+        of_all, of_sent = (one["rms"]["position_m"][axis] for one in figures)
+        assert of_sent == pytest.approx(of_all, rel=0.05, abs=2e-4)
+    whole, part = (one["max"]["position_m"] for one in figures)
+    assert max(part) <= max(whole)
+
+
 def test_a_kill_of_one_of_its_nodes_ends_all_of_them_and_the_autopilot_descends(fly):
     kill = f"node_kill@hover+0.5:node={wiring.ATTITUDE}"
     affected = f"{wiring.ATTITUDE}, hence of the process {wiring.FLIGHT_CONTROLLER}, begins at"

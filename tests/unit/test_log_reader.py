@@ -212,6 +212,25 @@ def test_a_vehicles_log_has_the_estimate_in_place_of_the_truth(tmp_path):
     assert flight.wall_s == pytest.approx(2.996)
 
 
+class SetpointsOnly:
+    """A log with setpoints at these stamps."""
+
+    def __init__(self, stamps):
+        self.stamps = np.array(stamps)
+
+    def published(self, topic):
+        assert topic is topics.SETPOINT
+        return self.stamps, self.stamps
+
+
+def test_ticks_that_were_not_sent_are_known_from_ticks_that_were_not_flown():
+    ticks = np.arange(6)
+    log = SetpointsOnly([0, 1, 2, 4])  # 3: no node answered; 5: the bridge alone is late
+    states, references = np.array([0, 4, 5]), np.array([0, 1, 5])
+    left_out = log_reader.withheld(log, ticks, states, references)
+    np.testing.assert_array_equal(np.flatnonzero(left_out), [2])
+
+
 class ReferencesOnly:
     """A log with references alone: checks by hand from 1 s on, take-off at 5 s."""
 

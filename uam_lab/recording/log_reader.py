@@ -3,7 +3,8 @@
 A tick is a stamp of /uam/truth/state for which the mission had a reference. All other topics are
 joined to it by stamp. A vehicle has no truth: then the estimate, /uam/state, stands in its columns.
 Without a message of the same stamp (gains come at 50 Hz; in real time messages may be lost) a tick
-has the last value before it, as in the receiving nodes.
+has the last value before it, as in the receiving nodes. Ticks whose state and reference the fused
+process did not send (`inner_rate`) are left out: their errors would contain the motion since.
 """
 
 from __future__ import annotations
@@ -85,7 +86,7 @@ class LoggedFlight:
     """Content of a log. series: table of the ticks; done: the mission ended; abort_reason: of the
     mission; parameter_changes, transitions, grasps, faults: in order; wall_s: wall time [s];
     errors_of: ESTIMATE where the log has no truth, else ""; latency_s (m,), missed: of a log
-    without truth, see `latencies`."""
+    without truth, see `latencies`; notes: lines for the report."""
 
     series: Series
     done: bool
@@ -95,6 +96,7 @@ class LoggedFlight:
     grasps: list[dict[str, Any]]
     faults: list[dict[str, Any]]
     wall_s: float
+    notes: list[str]
     errors_of: str = ""
     latency_s: list[float] | None = None
     missed: int | None = None
@@ -129,15 +131,19 @@ def read_flight(
     # The mission is one tick ahead: its last reference is for a tick without control. Ticks after
     # the mission's end depend on the time until the plant receives the end, so they are cut off.
     last = min(last, end + 1) if end is not None else _last_of_all(last, truth.stamps)
-    ticks = truth.stamps[(truth.stamps >= first) & (truth.stamps < last)]
-    if not len(ticks):
+    every = truth.stamps[(truth.stamps >= first) & (truth.stamps < last)]
+    if not len(every):
         raise UnreadableLog(f"{path} has no control tick")
+    state = log.samples(topics.STATE, STATE_ROWS, columns.size)
+    ticks = every[~withheld(log, every, state.stamps, references.samples.stamps)]
+    notes = []
+    if len(ticks) < len(every):
+        notes = [f"table and errors have {len(ticks)} of {len(every)} ticks, see inner_rate"]
     recording = FlightTable(len(ticks), columns)
     values = recording.values
     takeoff = references.takeoff if references.takeoff is not None else int(last)
     time = values[:, columns["time"]] = (ticks - takeoff) / SECOND
     values[:, columns.block("truth.")] = truth.at(ticks)
-    state = log.samples(topics.STATE, STATE_ROWS, columns.size)
     values[:, columns.block("estimate.")] = state.at(ticks)
     reference = references.samples.at(ticks)
     flying = (reference[:, -1] > 0.5) & (time >= 0.0)  # without the checks by hand
@@ -163,8 +169,20 @@ def read_flight(
     series = recording.series(info)
     decided = grasps(statuses, takeoff)
     ended = end is not None
-    found = LoggedFlight(series, ended, abort_reason, changes, entered, decided, faults, wall)
+    events = changes, entered, decided, faults
+    found = LoggedFlight(series, ended, abort_reason, *events, wall, notes)
     return found if simulated else replace(found, errors_of=ESTIMATE, **latencies(log, ticks))
+
+
+def withheld(log: Log, ticks: np.ndarray, states: np.ndarray, references: np.ndarray) -> np.ndarray:
+    """Return (m,) whether the fused process kept the inner topics of ticks (m,) [ns] to itself.
+
+    Their setpoint is there, state and reference are not. states, references: stamps of the messages
+    [ns]. A node that is late or lost leaves no setpoint of its ticks.
+    """
+    setpoints, _ = log.published(topics.SETPOINT)
+    inner = np.isin(ticks, states) | np.isin(ticks, references)
+    return np.isin(ticks, setpoints) & ~inner
 
 
 def _last_of_all(last: int, truth: np.ndarray) -> int:

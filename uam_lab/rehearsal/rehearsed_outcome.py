@@ -52,6 +52,7 @@ def read_outcome(
     outcome.series, outcome.abort_reason = flight.series, flight.abort_reason
     outcome.parameter_changes, outcome.transitions = flight.parameter_changes, flight.transitions
     outcome.grasps, outcome.faults = flight.grasps, flight.faults
+    outcome.notes.extend(flight.notes)
     if not flight.done and not outcome.partial:
         outcome.failure = numbers.get("ended_by") or "the mission did not end"
     return outcome

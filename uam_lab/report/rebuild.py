@@ -48,7 +48,7 @@ def rebuild(directory: Path, out: Path, scenario: str | None = None) -> dict[str
         latency_s=numbers.get("latency_s", flight.latency_s) if realtime else None,
         missed_ticks=numbers.get("missed_ticks", flight.missed) if realtime else None,
         errors_of=flight.errors_of,
-        notes=[note for note in before.get("notes") or [] if not note.startswith(PARTIAL)],
+        notes=list(dict.fromkeys([*_notes(before), *flight.notes])),
         parameter_changes=flight.parameter_changes,
         transitions=flight.transitions,
         grasps=flight.grasps,
@@ -60,6 +60,11 @@ def rebuild(directory: Path, out: Path, scenario: str | None = None) -> dict[str
     for name in FILES:
         _take_over(name, directory, out, facts.texts)
     return complete(ResultFolder(out), known, outcome)
+
+
+def _notes(before: Mapping[str, Any]) -> list[str]:
+    """Return the notes of a flight's facts, without those that are made anew."""
+    return [note for note in before.get("notes") or [] if not note.startswith(PARTIAL)]
 
 
 def series_of(directory: Path) -> timeseries.Series:
