@@ -23,4 +23,5 @@ def losses(logs: Path) -> list[str]:
     if not lost:
         return []
     text = ", ".join(f"{count} of {topic}" for topic, count in lost.items())
-    return [f"the recorder lost messages: {text}"]
+    buffers = "uam doctor checks the receive buffers"
+    return [f"the recorder lost {sum(lost.values())} messages, {buffers}: {text}"]
