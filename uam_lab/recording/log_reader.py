@@ -138,7 +138,8 @@ def read_flight(
     ticks = every[~withheld(log, every, state.stamps, references.samples.stamps)]
     notes = []
     if len(ticks) < len(every):
-        notes = [f"table and errors have {len(ticks)} of {len(every)} ticks, see inner_rate"]
+        text = f"table and errors have {len(ticks)} of {len(every)} ticks"
+        notes = [f"{text}: the log has no state and no reference of the others (inner_rate)"]
     recording = FlightTable(len(ticks), columns)
     values = recording.values
     takeoff = references.takeoff if references.takeoff is not None else int(last)
