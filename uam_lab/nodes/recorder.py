@@ -30,6 +30,7 @@ from uam_control.settings.parameter_set import (
     text,
 )
 from uam_control.settings.process_parameters import ProcessParameters
+from uam_control.stamps import SECOND
 from uam_lab.recording.bag import new_log_file
 from uam_lab.recording.topic_recorder import TopicRecorder
 from uam_msgs_py.messages import topics
@@ -98,7 +99,7 @@ def _health(
     lost = sum(recording.lost.values())
     summary = recording.ended or (f"{lost} messages lost" if lost else "recording")
     values = {"messages lost": lost, "lost of": _losses(recording)}
-    values["recorded until [s]"] = recording.until
+    values["recorded until [s]"] = recording.until / SECOND
     namespace = node.get_namespace()
     values |= polls.report("poll") | ages(recording.inlets, recording.arrivals, namespace)
     values |= connections.of(node, {}, recording.inlets)
@@ -178,13 +179,13 @@ def main() -> int:
         polls += 1
         if polls % POLLS_PER_SERVICE == 0:
             services.spin_once(timeout_sec=0.0)
-        progress.tell(recording.until_ns)
+        progress.tell(recording.until)
         if polls % polls_per_flush == 0:
             recording.flush()
             progress.repeat()
             if recording.ended and not ended:
                 ended = recording.ended
-                log.error(f"{ended}; recorded until {recording.until:g} s")
+                log.error(f"{ended}; recorded until {recording.until / SECOND:g} s")
             new = []
             if time.monotonic() >= due:
                 due = time.monotonic() + DIAGNOSTICS_PERIOD

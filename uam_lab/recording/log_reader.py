@@ -29,7 +29,7 @@ from uam_lab.recording import fault_records as fault_log
 from uam_lab.recording.logged_topics import ADAPTATION, SECOND, Log, StampedRows
 from uam_lab.recording.mcap_reader import UnreadableLog
 from uam_lab.results import timeseries
-from uam_lab.results.outcome import grasp_decision, transition
+from uam_lab.results.outcome import Outcome, grasp_decision, transition
 from uam_lab.results.timeseries import SUBSYSTEMS, Columns, FlightTable, Series, gain_columns
 from uam_msgs_py.messages import topics
 from uam_msgs_py.messages.parameter_changes import ParameterChange
@@ -100,6 +100,13 @@ class LoggedFlight:
     errors_of: str = ""
     latency_s: list[float] | None = None
     missed: int | None = None
+
+    def tell(self, outcome: Outcome) -> None:
+        """Write table, events and notes to `outcome`; a note that it already has stays once."""
+        outcome.series, outcome.abort_reason = self.series, self.abort_reason
+        outcome.parameter_changes, outcome.transitions = self.parameter_changes, self.transitions
+        outcome.grasps, outcome.faults = self.grasps, self.faults
+        outcome.notes.extend(note for note in self.notes if note not in outcome.notes)
 
 
 def read_flight(

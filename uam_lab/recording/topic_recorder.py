@@ -26,7 +26,6 @@ from rclpy.node import Node
 from rclpy.qos import QoSHistoryPolicy, QoSProfile
 from rclpy.subscription import Subscription
 
-from uam_control.stamps import SECOND
 from uam_lab.recording.bag import BagTopic, add_topic, write_metadata
 from uam_lab.recording.bounded_log import BoundedLog
 from uam_lab.recording.core_offers import CoreOffers
@@ -198,12 +197,7 @@ class TopicRecorder:
         return self._writer.ended
 
     @property
-    def until(self) -> float:
-        """Simulation time [s] of the newest /clock, 0 before the first."""
-        return self.until_ns / SECOND
-
-    @property
-    def until_ns(self) -> int:
+    def until(self) -> int:
         """Simulation time [ns] of the newest /clock, 0 before the first."""
         return self._clock_sim[-1] if self._clock_sim else 0
 

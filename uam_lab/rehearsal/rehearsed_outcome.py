@@ -49,10 +49,7 @@ def read_outcome(
         return outcome
     period = settings.vehicle.control_period
     outcome.latency_s, outcome.missed_ticks = latencies(log, period)
-    outcome.series, outcome.abort_reason = flight.series, flight.abort_reason
-    outcome.parameter_changes, outcome.transitions = flight.parameter_changes, flight.transitions
-    outcome.grasps, outcome.faults = flight.grasps, flight.faults
-    outcome.notes.extend(flight.notes)
+    flight.tell(outcome)
     if not flight.done and not outcome.partial:
         outcome.failure = numbers.get("ended_by") or "the mission did not end"
     return outcome

@@ -42,29 +42,20 @@ def rebuild(directory: Path, out: Path, scenario: str | None = None) -> dict[str
     numbers = _json(directory / "logs" / "mujoco_sim.json")
     realtime = known.get("clock") == "realtime"
     outcome = Outcome(
-        series=flight.series,
+        series=None,
         wall_s=numbers.get("wall_s") or before.get("wall_s") or flight.wall_s,
-        abort_reason=flight.abort_reason,
         latency_s=numbers.get("latency_s", flight.latency_s) if realtime else None,
         missed_ticks=numbers.get("missed_ticks", flight.missed) if realtime else None,
         errors_of=flight.errors_of,
-        notes=list(dict.fromkeys([*_notes(before), *flight.notes])),
-        parameter_changes=flight.parameter_changes,
-        transitions=flight.transitions,
-        grasps=flight.grasps,
-        faults=flight.faults,
+        notes=[note for note in before.get("notes") or [] if not note.startswith(PARTIAL)],
     )
+    flight.tell(outcome)
     if not flight.done:
         outcome.failure = before.get("abort_reason") or CUT_OFF
     out.mkdir(parents=True, exist_ok=True)
     for name in FILES:
         _take_over(name, directory, out, facts.texts)
     return complete(ResultFolder(out), known, outcome)
-
-
-def _notes(before: Mapping[str, Any]) -> list[str]:
-    """Return the notes of a flight's facts, without those that are made anew."""
-    return [note for note in before.get("notes") or [] if not note.startswith(PARTIAL)]
 
 
 def series_of(directory: Path) -> timeseries.Series:

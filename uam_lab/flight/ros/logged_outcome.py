@@ -38,10 +38,7 @@ def read_outcome(
     except (UnreadableLog, OSError) as error:
         outcome.failure = outcome.failure or f"nothing recorded: {error}"
         return outcome
-    outcome.series, outcome.abort_reason = flight.series, flight.abort_reason
-    outcome.parameter_changes, outcome.transitions = flight.parameter_changes, flight.transitions
-    outcome.grasps, outcome.faults = flight.grasps, flight.faults
-    outcome.notes.extend(flight.notes)
+    flight.tell(outcome)
     if flight.errors_of:
         outcome.errors_of, outcome.wall_s = flight.errors_of, flight.wall_s
         outcome.latency_s, outcome.missed_ticks = flight.latency_s, flight.missed
