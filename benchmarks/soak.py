@@ -27,7 +27,9 @@ FAILED, INTERRUPTED = 1, 130
 def main() -> int:
     """Fly, evaluate, print; return the exit status."""
     parser = argparse.ArgumentParser(
-        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+        description=__doc__,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+        allow_abbrev=False,  # an option of uam fly is not a short form of one here
     )
     option = parser.add_argument
     option("--minutes", type=float, default=60.0, help="of simulated time (default %(default)g)")
@@ -38,15 +40,11 @@ def main() -> int:
         default="realtime",
         help="of the nodes (default %(default)s)",
     )
-    option("--fused", action="store_true", help="control nodes in one process")
-    option("--fifo", type=int, metavar="PRIORITY", help="as of uam fly (default: none)")
     option("--log-limit", type=float, default=200.0, help="[MB] of the log (default %(default)g)")
     option("--out", type=Path, default=Path("results/soak"), help="(default %(default)s)")
-    options = parser.parse_args()
+    options, further = parser.parse_known_args()
     if options.minutes < 2.0:
         parser.error("--minutes is 2 or more: what grows is not to be seen earlier")
-    further = ["--fused"] if options.fused else []
-    further += [] if options.fifo is None else ["--fifo", str(options.fifo)]
     if further and options.engine == "direct":
         parser.error(f"{further[0]} needs --engine ros: the direct engine has no nodes")
     options.out.mkdir(parents=True, exist_ok=True)
