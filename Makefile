@@ -33,7 +33,7 @@ test: setup      ## all but the long and the slow tests; options: make test ARGS
 long: setup      ## further flights, examples among them; CI runs these, too
 	@$(BIN)/python -m pytest -m long $(AT_ONCE) tests
 
-slow: setup      ## the slow tests: whole missions, browser, PX4 if it is there; a quarter of an hour
+slow: setup      ## the slow tests: whole missions, browser, PX4 if it is there; half an hour
 	@$(BIN)/python -m pip install --quiet --disable-pip-version-check -e ".[browser]"
 	@$(BIN)/python -m pytest -m slow tests
 
