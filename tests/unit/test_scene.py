@@ -17,7 +17,8 @@ from visualization_msgs.msg import Marker
 
 from uam_control.maths.rotations import matrix_from_quaternion, quaternion_from_euler
 from uam_control.mission import load_scenario
-from uam_lab.nodes.scene_markers import FlownPath, Markers, ReferencePath
+from uam_lab.budget.shuttle import CYCLE, shuttle
+from uam_lab.nodes.scene_markers import PATH_POINTS, PATH_STEP, FlownPath, Markers, ReferencePath
 from uam_lab.recording.bounded_log import BoundedLog
 from uam_lab.recording.message_definitions import schema
 from uam_msgs_py.messages import tf_message
@@ -162,6 +163,18 @@ def test_the_reference_path_leads_from_now_to_the_landing():
     later = path.ahead(6.0)
     assert 2 <= len(later) < len(whole) and later[0][2] == pytest.approx(1.0)
     assert len(path.ahead(1e3)) == 0
+
+
+def test_of_the_path_of_hours_the_next_minutes_are_shown(tmp_path):
+    """All points of it, twice a second, took most of a core."""
+    file = tmp_path / "hours.yaml"
+    file.write_text(shuttle(7200.0))
+    path = ReferencePath(load_scenario(str(file)), np.zeros(8))
+    for time in (0.0, 4 * CYCLE, 2 * CYCLE, 3000.0):
+        points, first = path.ahead(time), int(CYCLE / PATH_STEP)
+        assert len(points) == PATH_POINTS
+        assert points[first : 2 * first] == pytest.approx(points[2 * first : 3 * first])
+    assert 1 < len(path.ahead(7100.0)) < PATH_POINTS
 
 
 def test_a_long_flown_path_is_thinned_out():

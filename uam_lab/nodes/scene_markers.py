@@ -22,7 +22,7 @@ from uam_sim_bridge.plant.frames import Box
 
 PAYLOAD, MAGNET = "payload", "magnet"  # frames
 PATH_STEP = 0.2  # [s] of mission time between two points of a path
-PATH_POINTS = 2000  # of the flown path; beyond it every second point is removed
+PATH_POINTS = 2000  # of a path, at most: a flight of hours must not make its messages large
 LINE_WIDTH, TEXT_HEIGHT, TEXT_ABOVE = 0.01, 0.08, 0.35  # [m]
 DROP_RADIUS, MAGNET_MARGIN = 0.06, 0.004  # [m]
 AHEAD, FLOWN = (0.95, 0.55, 0.10, 0.9), (0.12, 0.37, 0.66, 0.95)
@@ -31,25 +31,30 @@ ENERGISED, OFF, FAILED = (0.15, 0.90, 0.25, 0.9), (0.45, 0.45, 0.45, 0.6), (0.8,
 
 
 class ReferencePath:
-    """The path of a scenario, sampled once."""
+    """The path of a scenario; each point is sampled once, when it is shown first."""
 
     def __init__(self, scenario: Scenario, start: np.ndarray):
         """start: chi (6 + n,) at take-off, SI units."""
         landing = scenario.begun_at(start).landing
         self._times = np.arange(0.0, landing.at + landing.duration + PATH_STEP, PATH_STEP)
         self._points = np.empty((len(self._times), 3))
-        trajectory, motion = scenario.trajectory(start), empty_motion(len(start) - ALPHA)
-        for time, point in zip(self._times, self._points, strict=True):
-            trajectory.write(float(time), motion)
-            point[:] = motion[CHI, POSITION]
+        self._sampled = 0  # points so far
+        self._trajectory = scenario.trajectory(start)
+        self._motion = empty_motion(len(start) - ALPHA)
 
     def ahead(self, time: float) -> np.ndarray:
-        """Return the points (n, 3) [m, world] from mission time [s] to the landing."""
-        return self._points[np.searchsorted(self._times, time) :]
+        """Return the next PATH_POINTS points (n, 3) [m, world] from mission time [s] on."""
+        begin = int(np.searchsorted(self._times, time))
+        end = min(begin + PATH_POINTS, len(self._times))
+        for i in range(self._sampled, end):
+            self._trajectory.write(self._times.item(i), self._motion)
+            self._points[i] = self._motion[CHI, POSITION]
+        self._sampled = max(self._sampled, end)
+        return self._points[begin:end]
 
 
 class FlownPath:
-    """The flown path, with a limited number of points."""
+    """The flown path; beyond PATH_POINTS every second point is removed."""
 
     def __init__(self) -> None:
         self._points: list[np.ndarray] = []
