@@ -1,10 +1,12 @@
 """Services of several nodes of one process are answered, one request per check."""
 
+import pytest
 import rclpy
 from rcl_interfaces.srv import ListParameters
 from rclpy.node import Node
 from std_srvs.srv import Trigger
 
+from uam_msgs_py.node import arrivals, other_entities
 from uam_msgs_py.node.other_entities import OtherEntities
 
 NAMES = ("first", "second", "third")
@@ -44,4 +46,46 @@ def test_the_services_of_every_node_are_answered(probe):
         rest.shutdown()
         for node in nodes:
             node.destroy_node()
+        context.try_shutdown()
+
+
+@pytest.mark.parametrize("told", [True, False], ids=["told of requests", "asking all"])
+def test_a_service_without_request_is_asked_only_where_nobody_tells(probe, monkeypatch, told):
+    if not told:  # as without compiled functions
+        monkeypatch.setattr(arrivals, "_note", lambda: None)
+    asked = []
+
+    def answered(service):
+        asked.append(service)
+        return answer_it(service)
+
+    answer_it = other_entities._answered
+    monkeypatch.setattr(other_entities, "_answered", answered)
+    context = rclpy.Context()
+    rclpy.init(context=context)
+    node = Node("quiet", context=context)
+    node.create_service(Trigger, "land", landing)
+    rest = OtherEntities([node])
+    try:
+        services = len(list(node.services))
+        rest.serve(0)
+        assert len(asked) == services  # at first a request may wait in each
+        rest.serve(0)
+        assert len(asked) == services * (1 if told else 2)
+        client = probe.node.create_client(Trigger, "land")
+        probe.until(client.service_is_ready, "land")
+        futures = [client.call_async(Trigger.Request()) for _ in range(3)]
+
+        def all_answered():
+            rest.serve(0)
+            return all(future.done() for future in futures)
+
+        probe.until(all_answered, "three answers to three requests at once")
+        assert [future.result().message for future in futures] == ["landing"] * 3
+        asked.clear()
+        rest.serve(0)
+        assert bool(asked) is not told
+    finally:
+        rest.shutdown()
+        node.destroy_node()
         context.try_shutdown()

@@ -2,9 +2,10 @@
 
 They are checked fifty times a second, of wall time or of tick time, events once a second of wall
 time. At most one service request and one report (timer of REPORT_PERIOD or more) is served per
-check, so that many do not delay a tick. A service is asked for a request: a microsecond, where a
-wait set needs ten for each entity. Clients and events are passed to a SingleThreadedExecutor.
-Service requests are not: that executor would serve waiting messages first.
+check, so that many do not delay a tick. A service is asked for its request once the middleware has
+told of one (`arrivals`): a wait set needs ten microseconds for each entity. Clients and events are
+passed to a SingleThreadedExecutor. Service requests are not: that executor would serve waiting
+messages first.
 """
 
 from __future__ import annotations
@@ -17,6 +18,7 @@ from rclpy.node import Node
 from rclpy.service import Service
 from rclpy.timer import Timer
 
+from uam_msgs_py.node.arrivals import Arrivals
 from uam_msgs_py.node.waiting import WaitSet
 
 REST_PERIOD = 0.02  # s between two checks
@@ -34,12 +36,13 @@ class OtherEntities:
         for node in nodes:
             self._executor.add_node(node)
         self._next_check, self._checked_at, self._next_events = 0.0, 0, 0.0
+        self._requests = Arrivals()
         self.gather()
 
     def gather(self) -> None:
         """Collect the nodes' entities; call it when they have changed."""
         nodes = self._nodes
-        self._services = [service for node in nodes for service in node.services]
+        self._requests.watch([service for node in nodes for service in node.services])
         self._clients = [c.handle for node in nodes for c in node.clients]
         self._timers = [t for node in nodes for t in node.timers]
         self._waitables = [w for node in nodes for w in node.waitables]
@@ -72,7 +75,15 @@ class OtherEntities:
         for _ in range(handed):
             self._executor.spin_once(timeout_sec=0)
         self._call([timer for timer in self._timers if timer.handle.is_timer_ready()])
-        return any(map(_answered, self._services)) or bool(handed)
+        return self._answer_one() or bool(handed)
+
+    def _answer_one(self) -> bool:
+        """Answer the first service request that waits; return whether there was one."""
+        for service in self._requests.waiting():
+            if _answered(service):
+                self._requests.more(service)
+                return True
+        return False
 
     def _answered_clients(self) -> int:
         """Return the number of clients that have an answer."""

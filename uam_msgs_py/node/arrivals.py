@@ -1,0 +1,86 @@
+"""Which services have a request, told by the middleware: nobody has to ask them one by one.
+
+Asking takes a microsecond or two for each service, and a process of several nodes has seventy: five
+per cent of its time. librcl calls a function at each request, from a thread of the middleware that
+must not wait for Python's lock. The function is therefore machine code: it sets a byte. The bytes
+are never freed, because the thread may end after them.
+
+rcl_event_callback_t: void (const void * user_data, size_t number_of_events), rcl/event_callback.h
+of ROS 2 Jazzy. Where functions are not compiled (`uam_control.maths.compiled`), or the middleware
+cannot tell, every service is asked.
+"""
+
+from __future__ import annotations
+
+import ctypes
+from collections.abc import Iterator, Sequence
+from functools import cache
+
+from rclpy.service import Service
+
+from uam_control.maths import compiled
+
+_NAME = "uam_note_arrival"
+_NOTE = f"""
+define void @{_NAME}(ptr %flag, i64 %count) {{
+  store atomic i8 1, ptr %flag release, align 1
+  ret void
+}}
+"""
+TOLD = 0  # RCL_RET_OK
+SET, CLEAR = b"\1", b"\0"
+_kept: list[object] = []  # what the middleware may still use: machine code, bytes
+
+_tell = ctypes.CDLL("librcl.so").rcl_service_set_on_new_request_callback  # loaded by rclpy
+_tell.argtypes = [ctypes.c_void_p, ctypes.c_void_p, ctypes.c_void_p]
+_tell.restype = ctypes.c_int
+
+
+@cache
+def _note() -> int | None:
+    """Return the address of the function that sets a byte; None where nothing is compiled."""
+    if not compiled.active():
+        return None
+    from llvmlite import binding
+
+    binding.initialize_native_target()
+    binding.initialize_native_asmprinter()
+    machine = binding.Target.from_default_triple().create_target_machine()
+    owner = binding.create_mcjit_compiler(binding.parse_assembly(_NOTE), machine)
+    owner.finalize_object()
+    _kept.append(owner)
+    return owner.get_function_address(_NAME)
+
+
+class Arrivals:
+    """The services of a process that may have a request; at first all of them."""
+
+    def __init__(self) -> None:
+        self._services: list[Service] = []
+        self._flags = ctypes.create_string_buffer(1)
+        self._told: list[bool] = []  # by the middleware
+
+    def watch(self, services: Sequence[Service]) -> None:
+        """Watch these services from now on, and no others; no effect if they are the same."""
+        if services == self._services:
+            return
+        self._services = list(services)
+        self._flags = ctypes.create_string_buffer(SET * len(services), len(services) + 1)
+        _kept.append(self._flags)
+        first, note = ctypes.addressof(self._flags), _note()
+        self._told = [
+            note is not None and _tell(service.handle.pointer, note, first + at) == TOLD
+            for at, service in enumerate(services)
+        ]
+
+    def waiting(self) -> Iterator[Service]:
+        """Yield each service that may have a request it has not been yielded for."""
+        flags, at = self._flags, -1
+        while (at := flags.raw.find(SET, at + 1)) >= 0:
+            if self._told[at]:
+                flags[at] = CLEAR  # before the caller takes one: the next may come meanwhile
+            yield self._services[at]
+
+    def more(self, service: Service) -> None:
+        """Yield a service again: it had a request, and may have another one."""
+        self._flags[self._services.index(service)] = SET
