@@ -5,8 +5,9 @@
     .venv/bin/python benchmarks/soak.py --minutes 600 --clock lockstep --fused    # one process
     .venv/bin/python benchmarks/soak.py --minutes 600 --engine direct         # missions in a row
 
-With nodes it is one flight to and fro with a moving arm; with the direct engine many missions in
-one process. Every process is sampled every few seconds. Writes soak.json and soak.png to --out;
+With nodes it is one flight to and fro with a moving arm, and all further options are those of
+uam fly, for example --fifo 1 or --inner-rate 25; with the direct engine it is many missions in one
+process. Every process is sampled every few seconds. Writes soak.json and soak.png to --out;
 the exit status is 1 if memory, handles or threads have grown. Ctrl-C ends the flight; the samples
 up to then are evaluated.
 """
@@ -55,9 +56,12 @@ def main() -> int:
     else:
         soak = watch.flight(duration, options.clock, options.log_limit, options.out, further)
     verdicts = judgement.judge(soak)
-    print(judgement.table(verdicts))
+    if verdicts:
+        print(judgement.table(verdicts))
     for line in soak.notes:
         print(line)
+    if not verdicts:
+        return FAILED
     (options.out / "soak.json").write_text(json.dumps(soak.to_mapping(verdicts), indent=1))
     picture.draw(soak, options.out / "soak.png")
     print(f"picture  {options.out / 'soak.png'}")

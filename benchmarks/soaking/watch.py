@@ -57,7 +57,7 @@ def flight(
         except KeyboardInterrupt:
             soak.interrupted = True
             run.send_signal(signal.SIGINT)
-    _conclude(soak, folder, duration)
+    _conclude(soak, folder, duration, log)
     return soak
 
 
@@ -79,13 +79,15 @@ def _look(soak: Soak, run: subprocess.Popen, ended: Path) -> None:
         time.sleep(PERIOD)
 
 
-def _conclude(soak: Soak, folder: Path, duration: float) -> None:
+def _conclude(soak: Soak, folder: Path, duration: float, log: Path) -> None:
+    """Judge the flight in `folder` by its statistics; log: what `uam fly` has printed."""
     try:
         plant = json.loads((folder / "logs" / "mujoco_sim.json").read_text())
         recorder = json.loads((folder / "logs" / "recorder.json").read_text())
-    except OSError as error:
+    except OSError:
         soak.failed = True
-        soak.notes.append(f"the flight left no {error.filename}")
+        said = log.read_text().split("\n")
+        soak.notes.append(next((line for line in reversed(said) if line), "uam fly said nothing"))
         return
     soak.failed = not soak.interrupted and (
         plant["ended_by"] != "mission" or plant["simulated_s"] < 0.9 * duration
