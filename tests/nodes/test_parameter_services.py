@@ -51,6 +51,7 @@ def test_the_services_of_every_node_are_answered(probe):
 
 @pytest.mark.parametrize("told", [True, False], ids=["told of requests", "asking all"])
 def test_a_service_without_request_is_asked_only_where_nobody_tells(probe, monkeypatch, told):
+    monkeypatch.setattr(other_entities, "ASK_PERIOD", 3600.0)
     if not told:  # as without compiled functions
         monkeypatch.setattr(arrivals, "_note", lambda: None)
     asked = []
@@ -85,6 +86,22 @@ def test_a_service_without_request_is_asked_only_where_nobody_tells(probe, monke
         asked.clear()
         rest.serve(0)
         assert bool(asked) is not told
+    finally:
+        rest.shutdown()
+        node.destroy_node()
+        context.try_shutdown()
+
+
+def test_a_request_that_nobody_told_of_is_answered_within_a_second_or_two(probe, monkeypatch):
+    monkeypatch.setattr(arrivals, "_tell", lambda *_: arrivals.TOLD)
+    context = rclpy.Context()
+    rclpy.init(context=context)
+    node = Node("untold", context=context)
+    node.create_service(Trigger, "land", landing)
+    rest = OtherEntities([node])
+    try:
+        rest.serve(0)
+        assert answer(probe, rest, Trigger, "land").message == "landing"
     finally:
         rest.shutdown()
         node.destroy_node()

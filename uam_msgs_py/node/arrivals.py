@@ -81,6 +81,10 @@ class Arrivals:
                 flags[at] = CLEAR  # before the caller takes one: the next may come meanwhile
             yield self._services[at]
 
+    def ask_all(self) -> None:
+        """Yield every service once: a command must arrive even if nobody has told of it."""
+        self._flags[: len(self._services)] = SET * len(self._services)
+
     def more(self, service: Service) -> None:
         """Yield a service again: it had a request, and may have another one."""
         self._flags[self._services.index(service)] = SET

@@ -3,9 +3,9 @@
 They are checked fifty times a second, of wall time or of tick time, events once a second of wall
 time. At most one service request and one report (timer of REPORT_PERIOD or more) is served per
 check, so that many do not delay a tick. A service is asked for its request once the middleware has
-told of one (`arrivals`): a wait set needs ten microseconds for each entity. Clients and events are
-passed to a SingleThreadedExecutor. Service requests are not: that executor would serve waiting
-messages first.
+told of one (`arrivals`), and once a second without: a wait set needs ten microseconds for each
+entity. Clients and events are passed to a SingleThreadedExecutor. Service requests are not: that
+executor would serve waiting messages first.
 """
 
 from __future__ import annotations
@@ -25,6 +25,7 @@ REST_PERIOD = 0.02  # s between two checks
 REST_STAMPS = round(REST_PERIOD * 1e9)  # ns of ticks: a simulation may run faster than wall time
 REPORT_PERIOD = 500_000_000  # ns, from which a timer's period is that of a report
 EVENT_PERIOD = 1.0  # s between two checks of events: they only report
+ASK_PERIOD = 1.0  # s after which every service is asked, whatever the middleware tells
 
 
 class OtherEntities:
@@ -36,6 +37,7 @@ class OtherEntities:
         for node in nodes:
             self._executor.add_node(node)
         self._next_check, self._checked_at, self._next_events = 0.0, 0, 0.0
+        self._next_asking = 0.0
         self._requests = Arrivals()
         self.gather()
 
@@ -79,6 +81,10 @@ class OtherEntities:
 
     def _answer_one(self) -> bool:
         """Answer the first service request that waits; return whether there was one."""
+        now = time.monotonic()
+        if now >= self._next_asking:
+            self._next_asking = now + ASK_PERIOD
+            self._requests.ask_all()
         for service in self._requests.waiting():
             if _answered(service):
                 self._requests.more(service)
