@@ -1,5 +1,7 @@
 """Services of several nodes of one process are answered, one request per check."""
 
+from contextlib import contextmanager
+
 import pytest
 import rclpy
 from rcl_interfaces.srv import ListParameters
@@ -17,6 +19,23 @@ def landing(_, response):
     return response
 
 
+@contextmanager
+def served(*names):
+    """Nodes of these names with what serves them; the first one has the service `land`."""
+    context = rclpy.Context()
+    rclpy.init(context=context)
+    nodes = [Node(name, context=context) for name in names]
+    nodes[0].create_service(Trigger, "land", landing)
+    rest = OtherEntities(nodes)
+    try:
+        yield nodes, rest
+    finally:
+        rest.shutdown()
+        for node in nodes:
+            node.destroy_node()
+        context.try_shutdown()
+
+
 def answer(probe, rest, kind, name):
     """Return the answer of a service that `rest` serves."""
     client = probe.node.create_client(kind, name)
@@ -32,26 +51,16 @@ def answer(probe, rest, kind, name):
 
 
 def test_the_services_of_every_node_are_answered(probe):
-    context = rclpy.Context()
-    rclpy.init(context=context)
-    nodes = [Node(name, context=context) for name in NAMES]
-    nodes[0].create_service(Trigger, "land", landing)
-    rest = OtherEntities(nodes)
-    try:
+    with served(*NAMES) as (_, rest):
         for name in (*NAMES, *NAMES):
             parameters = answer(probe, rest, ListParameters, f"{name}/list_parameters")
             assert "use_sim_time" in parameters.result.names
             assert answer(probe, rest, Trigger, "land").message == "landing"
-    finally:
-        rest.shutdown()
-        for node in nodes:
-            node.destroy_node()
-        context.try_shutdown()
 
 
 @pytest.mark.parametrize("told", [True, False], ids=["told of requests", "asking all"])
 def test_a_service_without_request_is_asked_only_where_nobody_tells(probe, monkeypatch, told):
-    monkeypatch.setattr(other_entities, "ASK_PERIOD", 3600.0)
+    monkeypatch.setattr(other_entities, "FULL_PERIOD", 3600.0)
     if not told:  # as without compiled functions
         monkeypatch.setattr(arrivals, "_note", lambda: None)
     asked = []
@@ -62,13 +71,8 @@ def test_a_service_without_request_is_asked_only_where_nobody_tells(probe, monke
 
     answer_it = other_entities._answered
     monkeypatch.setattr(other_entities, "_answered", answered)
-    context = rclpy.Context()
-    rclpy.init(context=context)
-    node = Node("quiet", context=context)
-    node.create_service(Trigger, "land", landing)
-    rest = OtherEntities([node])
-    try:
-        services = len(list(node.services))
+    with served("quiet") as (nodes, rest):
+        services = len(list(nodes[0].services))
         rest.serve(0)
         assert len(asked) == services  # at first a request may wait in each
         rest.serve(0)
@@ -86,23 +90,10 @@ def test_a_service_without_request_is_asked_only_where_nobody_tells(probe, monke
         asked.clear()
         rest.serve(0)
         assert bool(asked) is not told
-    finally:
-        rest.shutdown()
-        node.destroy_node()
-        context.try_shutdown()
 
 
 def test_a_request_that_nobody_told_of_is_answered_within_a_second_or_two(probe, monkeypatch):
     monkeypatch.setattr(arrivals, "_tell", lambda *_: arrivals.TOLD)
-    context = rclpy.Context()
-    rclpy.init(context=context)
-    node = Node("untold", context=context)
-    node.create_service(Trigger, "land", landing)
-    rest = OtherEntities([node])
-    try:
+    with served("untold") as (_, rest):
         rest.serve(0)
         assert answer(probe, rest, Trigger, "land").message == "landing"
-    finally:
-        rest.shutdown()
-        node.destroy_node()
-        context.try_shutdown()

@@ -17,7 +17,7 @@ from uam_control.coordinates import ALPHA, ARM, CHI, CHI_DDOT, CHI_DOT, POSITION
 from uam_control.maths.compiled import jit
 from uam_control.maths.rotations import body_rates, matrix_from_euler, thrust_attitude
 from uam_control.mission.mission_parameters import MissionParameters
-from uam_control.mission.motion.trajectory import Tabulated, Trajectory, empty_motion
+from uam_control.mission.motion.trajectory import Trajectory, reference_rows
 from uam_control.mission.scenarios.scenario import Scenario, ScenarioError, standing
 from uam_control.mission.scenarios.scenario_options import SLOWEST
 from uam_control.vehicle import VehicleDescription, VehicleError
@@ -210,7 +210,7 @@ class Feasibility:
 
     def along(self, trajectory: Trajectory, times: np.ndarray, carried: np.ndarray) -> Demand:
         """Return the demand of a reference at times (m,) [s], STEP apart; carried (m,) [kg]."""
-        rows = _rows(trajectory, times, len(self.vehicle.joints))
+        rows = reference_rows(trajectory, times, len(self.vehicle.joints))
         velocity, acceleration = rows[CHI_DOT, :, POSITION], rows[CHI_DDOT, :, POSITION]
         mass = self.vehicle.mass + carried
         drag = np.array(self.vehicle.numbers["air"]["drag"])
@@ -277,13 +277,3 @@ def _turns(
         for j in range(3):
             for k in range(3):
                 rotations[i, j, k] = matrix[j, k]
-
-
-def _rows(trajectory: Trajectory, times: np.ndarray, joints: int) -> np.ndarray:
-    """Return the reference (3, m, 6 + n) at times (m,) [s]."""
-    if isinstance(trajectory, Tabulated):
-        return trajectory.rows(times, CHI_DDOT + 1)
-    found = np.empty((len(times), *empty_motion(joints).shape))
-    for time, motion in zip(times.tolist(), found, strict=True):
-        trajectory.write(time, motion)
-    return found.swapaxes(0, 1)[: CHI_DDOT + 1]

@@ -14,7 +14,7 @@ from visualization_msgs.msg import Marker, MarkerArray
 
 from uam_control.coordinates import ALPHA, CHI, POSITION
 from uam_control.mission import Scenario
-from uam_control.mission.motion.trajectory import empty_motion
+from uam_control.mission.motion.trajectory import reference_rows
 from uam_msgs_py.messages.ros_time import set_stamp
 from uam_msgs_py.messages.status import MissionStatus
 from uam_msgs_py.messages.topics import BODY, WORLD
@@ -39,17 +39,17 @@ class ReferencePath:
         self._times = np.arange(0.0, landing.at + landing.duration + PATH_STEP, PATH_STEP)
         self._points = np.empty((len(self._times), 3))
         self._sampled = 0  # points so far
-        self._trajectory = scenario.trajectory(start)
-        self._motion = empty_motion(len(start) - ALPHA)
+        self._trajectory, self._joints = scenario.trajectory(start), len(start) - ALPHA
 
     def ahead(self, time: float) -> np.ndarray:
         """Return the next PATH_POINTS points (n, 3) [m, world] from mission time [s] on."""
         begin = int(np.searchsorted(self._times, time))
         end = min(begin + PATH_POINTS, len(self._times))
-        for i in range(self._sampled, end):
-            self._trajectory.write(self._times.item(i), self._motion)
-            self._points[i] = self._motion[CHI, POSITION]
-        self._sampled = max(self._sampled, end)
+        new = slice(self._sampled, end)
+        if new.start < new.stop:
+            rows = reference_rows(self._trajectory, self._times[new], self._joints)
+            self._points[new] = rows[CHI][:, POSITION]
+            self._sampled = end
         return self._points[begin:end]
 
 

@@ -19,6 +19,7 @@ from functools import cache
 from rclpy.service import Service
 
 from uam_control.maths import compiled
+from uam_control.maths.assembly import machine_code
 
 _NAME = "uam_note_arrival"
 _NOTE = f"""
@@ -29,7 +30,7 @@ define void @{_NAME}(ptr %flag, i64 %count) {{
 """
 TOLD = 0  # RCL_RET_OK
 SET, CLEAR = b"\1", b"\0"
-_kept: list[object] = []  # what the middleware may still use: machine code, bytes
+_kept: list[object] = []  # bytes that the middleware may still set
 
 _tell = ctypes.CDLL("librcl.so").rcl_service_set_on_new_request_callback  # loaded by rclpy
 _tell.argtypes = [ctypes.c_void_p, ctypes.c_void_p, ctypes.c_void_p]
@@ -39,17 +40,7 @@ _tell.restype = ctypes.c_int
 @cache
 def _note() -> int | None:
     """Return the address of the function that sets a byte; None where nothing is compiled."""
-    if not compiled.active():
-        return None
-    from llvmlite import binding
-
-    binding.initialize_native_target()
-    binding.initialize_native_asmprinter()
-    machine = binding.Target.from_default_triple().create_target_machine()
-    owner = binding.create_mcjit_compiler(binding.parse_assembly(_NOTE), machine)
-    owner.finalize_object()
-    _kept.append(owner)
-    return owner.get_function_address(_NAME)
+    return machine_code(_NOTE, _NAME) if compiled.active() else None
 
 
 class Arrivals:

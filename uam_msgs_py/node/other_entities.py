@@ -24,8 +24,7 @@ from uam_msgs_py.node.waiting import WaitSet
 REST_PERIOD = 0.02  # s between two checks
 REST_STAMPS = round(REST_PERIOD * 1e9)  # ns of ticks: a simulation may run faster than wall time
 REPORT_PERIOD = 500_000_000  # ns, from which a timer's period is that of a report
-EVENT_PERIOD = 1.0  # s between two checks of events: they only report
-ASK_PERIOD = 1.0  # s after which every service is asked, whatever the middleware tells
+FULL_PERIOD = 1.0  # s between two checks of events, which only report, and of every service
 
 
 class OtherEntities:
@@ -36,8 +35,7 @@ class OtherEntities:
         self._executor = SingleThreadedExecutor(context=self._context)
         for node in nodes:
             self._executor.add_node(node)
-        self._next_check, self._checked_at, self._next_events = 0.0, 0, 0.0
-        self._next_asking = 0.0
+        self._next_check, self._checked_at, self._next_full_check = 0.0, 0, 0.0
         self._requests = Arrivals()
         self.gather()
 
@@ -73,7 +71,12 @@ class OtherEntities:
 
     def _serve(self) -> bool:
         """Serve what is ready; return whether a service, client or event was."""
-        handed = self._answered_clients() + self._ready_events()
+        handed = self._answered_clients()
+        now = time.monotonic()
+        if now >= self._next_full_check:
+            self._next_full_check = now + FULL_PERIOD
+            self._requests.ask_all()
+            handed += self._ready_events()
         for _ in range(handed):
             self._executor.spin_once(timeout_sec=0)
         self._call([timer for timer in self._timers if timer.handle.is_timer_ready()])
@@ -81,10 +84,6 @@ class OtherEntities:
 
     def _answer_one(self) -> bool:
         """Answer the first service request that waits; return whether there was one."""
-        now = time.monotonic()
-        if now >= self._next_asking:
-            self._next_asking = now + ASK_PERIOD
-            self._requests.ask_all()
         for service in self._requests.waiting():
             if _answered(service):
                 self._requests.more(service)
@@ -115,11 +114,9 @@ class OtherEntities:
             timer.callback()
 
     def _ready_events(self) -> int:
-        """Return the number of ready events, once per EVENT_PERIOD."""
-        now = time.monotonic()
-        if now < self._next_events or not self._waitables:
+        """Return the number of ready events."""
+        if not self._waitables:
             return 0
-        self._next_events = now + EVENT_PERIOD
         events = self._events
         events.clear_entities()
         for waitable in self._waitables:

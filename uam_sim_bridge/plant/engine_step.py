@@ -18,6 +18,7 @@ from pathlib import Path
 import mujoco
 
 from uam_control.maths import compiled
+from uam_control.maths.assembly import machine_code
 
 _LIBRARY = str(next(Path(mujoco.__file__).parent.glob("libmujoco*")))
 _NAME = "uam_guarded_mj_step"
@@ -53,28 +54,25 @@ end:
 """
 
 
-def _compiled_step() -> tuple[Callable[[int, int], int], object]:
-    """Return mj_step(model, data) for compiled functions, and the owner of its code."""
+def _compiled_step() -> Callable[[int, int], int]:
+    """Return mj_step(model, data) for compiled functions."""
     from llvmlite import binding
     from numba import types
 
     binding.load_library_permanently(_LIBRARY)
-    machine = binding.Target.from_default_triple().create_target_machine()
-    owner = binding.create_mcjit_compiler(binding.parse_assembly(_GUARD), machine)
-    owner.finalize_object()
-    binding.add_symbol(_NAME, owner.get_function_address(_NAME))
-    return types.ExternalFunction(_NAME, types.intp(types.intp, types.intp)), owner
+    binding.add_symbol(_NAME, machine_code(_GUARD, _NAME))
+    return types.ExternalFunction(_NAME, types.intp(types.intp, types.intp))
 
 
-def _plain_step() -> tuple[Callable[[int, int], int | None], object]:
+def _plain_step() -> Callable[[int, int], int | None]:
     """Return mj_step(model, data) for plain Python, where an internal error ends the process."""
     function = ctypes.CDLL(_LIBRARY).mj_step
     function.argtypes, function.restype = (ctypes.c_void_p, ctypes.c_void_p), None
-    return function, None
+    return function
 
 
 # 0, or the address of the text of an internal error, valid until the next one
-mj_step, _owner = _compiled_step() if compiled.active() else _plain_step()
+mj_step = _compiled_step() if compiled.active() else _plain_step()
 
 
 def error_text(address: int) -> str:

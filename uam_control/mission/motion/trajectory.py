@@ -148,3 +148,13 @@ def empty_reference(joints: int) -> np.ndarray:
 def empty_motion(joints: int) -> np.ndarray:
     """Return a motion (5, 6 + joints) of zeros."""
     return np.zeros((MOTION_ROWS, ALPHA + joints))
+
+
+def reference_rows(trajectory: Trajectory, times: np.ndarray, joints: int) -> np.ndarray:
+    """Return the reference (3, m, 6 + joints) of a trajectory at times (m,) [s]."""
+    if isinstance(trajectory, Tabulated):
+        return trajectory.rows(times, CHI_DDOT + 1)
+    found = np.empty((len(times), *empty_motion(joints).shape))
+    for time, motion in zip(times.tolist(), found, strict=True):
+        trajectory.write(time, motion)
+    return found.swapaxes(0, 1)[: CHI_DDOT + 1]
