@@ -20,6 +20,9 @@ INSTANCE = 31
 HEARTBEAT = 1.0  # [s]
 PATIENCE = 400.0  # [s] wall time; only a failing test waits that long
 UPRIGHT = 30.0  # [deg]
+# [rad/s] noise of the gyro makes 0.15; RETURN turns the vehicle meanwhile: PX4's own setpoint is
+# then up to 0.4 from the present rates, with which the laws begin
+RATE_STEP = {Mode.HOLD: 0.25, Mode.POSITION: 0.25, Mode.RETURN: 0.5}
 
 pytestmark = [
     pytest.mark.slow,
@@ -63,7 +66,7 @@ def test_a_mode_of_the_pilot_stays_until_the_command(tmp_path, mode, phase):
     assert early == [] and found.commanded < np.inf, answer
     assert pilot.since_acted[0] is mode
     assert found.back - found.commanded < HEARTBEAT
-    assert found.rate_step < 0.5 and found.thrust_step < 0.1, found
+    assert found.rate_step < RATE_STEP[mode] and found.thrust_step < 0.1, found
     assert found.tilt < UPRIGHT
     assert result.completed, result.reason
 

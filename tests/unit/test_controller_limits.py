@@ -70,6 +70,13 @@ def test_wash_out_by_hand():
     np.testing.assert_allclose(feedforward, [3.0, 4.0])
 
 
+def test_a_feedforward_that_has_lasted_is_washed_out_at_once():
+    feedforward, slow = np.array([8.0, 4.0]), np.full(2, math.nan)
+    wash_out(feedforward, np.array([2.0, 0.0]), 0.004, slow)
+    np.testing.assert_array_equal(slow, [8.0, 0.0])
+    np.testing.assert_array_equal(feedforward, [0.0, 4.0])
+
+
 def test_integral_by_hand():
     integral = np.array([0.1, 0.2, 0.0])
     integrate(np.array([0.5, -1.0, 4.0]), np.array([2.0, 4.0, 1.0]), 1.0, False, 0.5, integral)

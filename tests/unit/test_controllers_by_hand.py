@@ -369,6 +369,24 @@ def test_the_moment_of_the_arm_is_added_to_pitch():
         np.testing.assert_allclose(tau, [0.0, expected, 0.0], atol=1e-12)
 
 
+def test_a_law_that_begins_in_flight_leaves_the_moment_of_the_arm_to_the_autopilot():
+    """Its integral has the -10 N m already; without them, half is left after ln 2 / corner.
+
+    Without washout the moment is always that of the law; from the ground none is left yet.
+    """
+    for speed, corner, expected in ((0.1, 2.0, (0.0, 5.0)), (0.1, 0.0, (-10.0, 0.0))):
+        state, arm = forward_arm()
+        hanging = np.zeros((3, 7))
+        state[1, 0] = hanging[1, 0] = speed
+        controller = torque(AttitudeController, 3, feedforward_washout=[corner] * 3, **arm)
+        for _ in range(2):  # once for each flight
+            for given, pitch in zip((state, hanging), expected, strict=True):
+                step = math.log(2.0) / 2.0
+                tau = controller.update(given, given, np.zeros((3, 3)), True, step)
+                np.testing.assert_allclose(tau, [0.0, pitch, 0.0], atol=1e-12)
+            controller.update(state, state, np.zeros((3, 3)), False, 0.004)
+
+
 def test_arm_torque_is_law_load_and_integral():
     """10 N m of weight; gain 4, e = 0.5 rad for two ticks of 0.1 s: 0.4 rad/s^2 of 2 kg m^2."""
     reference, arm = forward_arm()

@@ -166,7 +166,7 @@ class PositionController(Controller):
             return self._tau
         if not self._flying:
             self._flying = True
-            if np.any(reference[CHI_DOT, POSITION]):  # else from the ground, or at rest
+            if _in_flight(reference):
                 self._attitude.begin(state, reference)
         if state.shape != self._errors.shape:
             self._allocate(state.shape)
@@ -247,7 +247,8 @@ class AttitudeController(TorqueController):
     """tau_q (3,) [N m, FLU], eq. (18), ct2.
 
     The autopilot's rate loop integrates: it adds its integral of the feedforward's effect to
-    tau_q. `feedforward_washout` takes this part out of Omega_d_dot beforehand.
+    tau_q. `feedforward_washout` takes this part out of Omega_d_dot beforehand. Where the law begins
+    in flight, the autopilot's integral already has all of it.
     """
 
     columns = ATTITUDE
@@ -256,6 +257,7 @@ class AttitudeController(TorqueController):
         super().__init__(parameters)
         self._measured = math.nan  # [s] loop delay
         self._slow = np.zeros(3)  # [rad/s^2] part of the feedforward that the autopilot integrates
+        self._flying = False
         self._limit = prepared(limit_torque, self._tau, self._tau, self._tau)
         self.set_parameters(parameters)
 
@@ -291,6 +293,10 @@ class AttitudeController(TorqueController):
         dt: float,
     ) -> None:
         p = self._parameters
+        if not self._flying:
+            self._flying = True
+            if _in_flight(reference):
+                self._slow[:] = math.nan
         self._prepare(
             state,
             reference,
@@ -314,7 +320,7 @@ class AttitudeController(TorqueController):
 
     def _idle(self) -> None:
         super()._idle()
-        self._slow[:] = 0.0
+        self._slow[:], self._flying = 0.0, False
 
 
 class ArmController(TorqueController):
@@ -390,3 +396,11 @@ class ArmController(TorqueController):
                 base = reference if p.goal_from == "reference" else state
                 self.command[:] = base[CHI, ARM] + p.goal_compliance * tau
         return tau
+
+
+def _in_flight(reference: np.ndarray) -> bool:
+    """Return whether a law begins with a vehicle in flight, which somebody hands back.
+
+    reference (3, 6 + n): then it begins with the vehicle's velocity; on the ground it is at rest.
+    """
+    return bool(np.any(reference[CHI_DOT, POSITION]))

@@ -176,9 +176,12 @@ def limit_torque(tau: np.ndarray, torque_max: np.ndarray, limited: np.ndarray) -
 def wash_out(feedforward: np.ndarray, corner: np.ndarray, dt: float, slow: np.ndarray) -> None:
     """Take the slow part out of feedforward (n,), in place: a first-order high-pass.
 
-    corner (n,): [rad/s], 0 = no change; dt [s]; slow (n,): state of the filter, of the same unit.
+    corner (n,): [rad/s], 0 = no change; dt [s]; slow (n,): state of the filter, of the same unit;
+    NaN: the present feedforward has lasted long enough, all of it is slow.
     """
     for i in range(len(feedforward)):
+        if math.isnan(slow[i]):
+            slow[i] = feedforward[i] if corner[i] > 0.0 else 0.0
         slow[i] += (1.0 - math.exp(-corner[i] * dt)) * (feedforward[i] - slow[i])
         feedforward[i] -= slow[i]
 

@@ -20,6 +20,7 @@ from rclpy.service import Service
 
 from uam_control.maths import compiled
 from uam_control.maths.assembly import machine_code
+from uam_msgs_py.node.librcl import OK, rcl
 
 _NAME = "uam_note_arrival"
 _NOTE = f"""
@@ -28,11 +29,10 @@ define void @{_NAME}(ptr %flag, i64 %count) {{
   ret void
 }}
 """
-TOLD = 0  # RCL_RET_OK
 SET, CLEAR = b"\1", b"\0"
 _kept: list[object] = []  # bytes that the middleware may still set
 
-_tell = ctypes.CDLL("librcl.so").rcl_service_set_on_new_request_callback  # loaded by rclpy
+_tell = rcl.rcl_service_set_on_new_request_callback
 _tell.argtypes = [ctypes.c_void_p, ctypes.c_void_p, ctypes.c_void_p]
 _tell.restype = ctypes.c_int
 
@@ -60,7 +60,7 @@ class Arrivals:
         _kept.append(self._flags)
         first, note = ctypes.addressof(self._flags), _note()
         self._told = [
-            note is not None and _tell(service.handle.pointer, note, first + at) == TOLD
+            note is not None and _tell(service.handle.pointer, note, first + at) == OK
             for at, service in enumerate(services)
         ]
 

@@ -23,7 +23,8 @@ from ctypes import (
 from rclpy.publisher import Publisher
 from rclpy.subscription import Subscription
 
-TAKEN = 0  # RCL_RET_OK
+from uam_msgs_py.node.librcl import OK, rcl, rcutils
+
 GID_SIZE = 16  # RMW_GID_STORAGE_SIZE
 
 
@@ -58,16 +59,14 @@ class _Gid(ctypes.Structure):
     _fields_ = [("implementation", c_char_p), ("data", c_uint8 * GID_SIZE)]
 
 
-# rclpy has loaded both libraries; this opens them again by their names
-_rcl, _rcutils = ctypes.CDLL("librcl.so"), ctypes.CDLL("librcutils.so")
-_take = _rcl.rcl_take_serialized_message
+_take = rcl.rcl_take_serialized_message
 _take.argtypes = [c_void_p, POINTER(_Bytes), POINTER(_Info), c_void_p]
 _take.restype = c_int
-_rcutils.rcutils_get_default_allocator.restype = _Allocator
-_rcutils.rcutils_uint8_array_fini.argtypes = [POINTER(_Bytes)]
-_rcl.rcl_publisher_get_rmw_handle.argtypes = [c_void_p]
-_rcl.rcl_publisher_get_rmw_handle.restype = c_void_p
-_get_gid = _rcl.rmw_get_gid_for_publisher  # of the middleware, which librcl has loaded
+rcutils.rcutils_get_default_allocator.restype = _Allocator
+rcutils.rcutils_uint8_array_fini.argtypes = [POINTER(_Bytes)]
+rcl.rcl_publisher_get_rmw_handle.argtypes = [c_void_p]
+rcl.rcl_publisher_get_rmw_handle.restype = c_void_p
+_get_gid = rcl.rmw_get_gid_for_publisher  # of the middleware, which librcl has loaded
 _get_gid.argtypes = [c_void_p, POINTER(_Gid)]
 _get_gid.restype = c_int
 
@@ -75,8 +74,8 @@ _get_gid.restype = c_int
 def identity(publisher: Publisher) -> bytes:
     """Return what `Taker.gid` is for the messages of a publisher; b"" if it is not known."""
     found = _Gid()
-    handle = _rcl.rcl_publisher_get_rmw_handle(publisher.handle.pointer)
-    if _get_gid(handle, ctypes.byref(found)) != TAKEN:
+    handle = rcl.rcl_publisher_get_rmw_handle(publisher.handle.pointer)
+    if _get_gid(handle, ctypes.byref(found)) != OK:
         return b""
     return bytes(found.data)
 
@@ -92,7 +91,7 @@ class Taker:
         self._handle = subscription.handle  # keeps the pointer valid
         self.info = _Info()
         self.gid = memoryview(self.info).cast("B")[_Info.gid.offset :][:GID_SIZE]
-        self._data = _Bytes(allocator=_rcutils.rcutils_get_default_allocator())
+        self._data = _Bytes(allocator=rcutils.rcutils_get_default_allocator())
         self._arguments = (
             c_void_p(subscription.handle.pointer),
             ctypes.byref(self._data),
@@ -102,9 +101,9 @@ class Taker:
 
     def take(self) -> bytes | None:
         """Return the next received message, None without one."""
-        if _take(*self._arguments) != TAKEN:
+        if _take(*self._arguments) != OK:
             return None
         return ctypes.string_at(self._data.buffer, self._data.length)
 
     def __del__(self):
-        _rcutils.rcutils_uint8_array_fini(ctypes.byref(self._data))
+        rcutils.rcutils_uint8_array_fini(ctypes.byref(self._data))
