@@ -70,6 +70,15 @@ def test_px4_flies_the_mission_with_attitude_setpoints(fly):
         assert np.all(np.array(found["rms"][group]) <= limit), (group, found["rms"][group], rms)
 
 
+def test_px4_flies_a_hexacopter_as_the_stand_in_does(fly):
+    options = ("--vehicle", "hexa_arm", "--scenario", "circle")
+    found, ours = metrics(fly("px4", "--autopilot", "px4", *options)), metrics(fly("own", *options))
+    assert found["mission_completed"]
+    for group, rms in ours["rms"].items():
+        limit = TIMES_THE_STAND_INS * np.array(rms)
+        assert np.all(np.array(found["rms"][group]) <= limit), (group, found["rms"][group], rms)
+
+
 def test_two_flights_with_px4_at_once(fly):
     both = [fly(name, "--autopilot", "px4", "--scenario", "hover") for name in ("one", "other")]
     for flight in both:

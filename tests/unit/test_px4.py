@@ -127,6 +127,12 @@ def test_a_bad_parameter_of_the_command_line_is_refused(text, message):
 RANGES = {"COM_OF_LOSS_T": Range(False, 0.0, 60.0), "SDLOG_MODE": Range(True)}
 
 
+def test_every_motor_has_an_output():
+    """PX4's airframe of a simulated quadrotor has four; without the others a hexacopter falls."""
+    six = parameters.motor_outputs(load_description("hexa_arm"))
+    assert six == {f"PWM_MAIN_FUNC{n}": 100 + n for n in (1, 2, 3, 4, 5, 6)}
+
+
 def test_parameters_of_the_command_line_go_before_the_files():
     given = ["COM_OF_LOSS_T=1", "SDLOG_MODE=0"]
     values = parameters.load(load_description(), None, given, RANGES)
@@ -206,7 +212,7 @@ def test_nothing_is_left_but_the_logs(build, tmp_path, signum):
     seen = (folder / "seen").read_text()
     assert "PX4_SYS_AUTOSTART=10016" in seen and "PX4_PARAM_MC_ROLL_P=99" not in seen
     found = (folder / "found").read_text().splitlines()  # by PX4's start script
-    assert {"set THR_MDL_FAC 0.3", "set SDLOG_MODE 4"} <= set(found)
+    assert {"set THR_MDL_FAC 0.3", "set SDLOG_MODE 4", "set PWM_MAIN_FUNC4 104"} <= set(found)
     assert found[0] == "the original"
     assert f"arguments -i 7 -d {build / 'etc'}" in _until(output.read_text)
     px4 = psutil.Process(process.pid).children()

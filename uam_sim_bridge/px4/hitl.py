@@ -31,9 +31,8 @@ MAVLINK = "px4-rc.mavlink"  # PX4's script that starts the links
 USB_BAUD = 921600  # a USB device has none; PX4 asks for one
 SHARE = 0.8  # of a line's bytes that PX4 may send
 BITS_PER_BYTE = 10
-MOTOR, ACTUATOR_SET, GRIPPER = 100, 300, 430  # output functions: the last number before the first
+ACTUATOR_SET, GRIPPER = 300, 430  # output functions: the last number before the first
 OUTPUTS_OF_SET, FIRST_OF_SET = 6, 11  # outputs 11 to 16
-OUTPUT = "PWM_MAIN_FUNC"  # of the outputs of a build for a computer; HIL_ACT_FUNC on a board
 # PX4 takes the computer's whole time so far for the time step of its first IMU sample, and an
 # estimator that gets this sample begins after 5 % of that time. So it starts after the sample.
 ESTIMATOR = """\
@@ -50,15 +49,17 @@ def loop_values(
     values: Mapping[str, parameters.Value], vehicle: VehicleDescription
 ) -> dict[str, parameters.Value]:
     """Return the parameters of PX4 in the loop: outputs, and no simulated battery unless given."""
-    motors = {f"{OUTPUT}{n}": MOTOR + n for n in range(1, len(vehicle.rotors) + 1)}
-    others = {f"{OUTPUT}{FIRST_OF_SET + n}": ACTUATOR_SET + 1 + n for n in range(OUTPUTS_OF_SET)}
+    motors, first = parameters.motor_outputs(vehicle), FIRST_OF_SET
+    others = {
+        f"{parameters.OUTPUT}{first + n}": ACTUATOR_SET + 1 + n for n in range(OUTPUTS_OF_SET)
+    }
     defaults = {"SIM_BAT_ENABLE": 0, "IMU_INTEG_RATE": 250}
     return motors | others | defaults | dict(values) | {"SYS_HITL": 1, parameters.SYSTEM: 1}
 
 
 def gripper_parameter(number: int) -> str:
     """Return NAME=VALUE that puts gripper `number`, 1 to 6, on the output of that actuator."""
-    return f"{OUTPUT}{FIRST_OF_SET + number - 1}={GRIPPER}"
+    return f"{parameters.OUTPUT}{FIRST_OF_SET + number - 1}={GRIPPER}"
 
 
 def start_script(values: Mapping[str, parameters.Value]) -> str:

@@ -100,7 +100,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     try:
         installation = Px4Installation.find(options.px4_dir)
         vehicle = load_description(options.vehicle)
-        values = parameters.load(vehicle, options.params, options.param, installation.ranges())
+        given = parameters.load(vehicle, options.params, options.param, installation.ranges())
+        values = parameters.motor_outputs(vehicle) | given
     except (Px4Error, ConfigurationError, VehicleError) as error:
         print(f"{NAME}: {error}", file=sys.stderr, flush=True)
         return 2
