@@ -93,7 +93,7 @@ def test_a_service_without_request_is_asked_only_where_nobody_tells(probe, monke
 
 
 def test_a_request_that_nobody_told_of_is_answered_within_a_second_or_two(probe, monkeypatch):
-    monkeypatch.setattr(arrivals, "_tell", lambda *_: arrivals.TOLD)
+    monkeypatch.setattr(arrivals, "_tell", lambda *_: arrivals.OK)
     with served("untold") as (_, rest):
         rest.serve(0)
         assert answer(probe, rest, Trigger, "land").message == "landing"
