@@ -21,8 +21,8 @@ HEARTBEAT = 1.0  # [s]
 PATIENCE = 400.0  # [s] wall time; only a failing test waits that long
 UPRIGHT = 30.0  # [deg]
 # [rad/s] noise of the gyro makes 0.15; RETURN turns the vehicle meanwhile: PX4's own setpoint is
-# then up to 0.5 from the present rates, with which the laws begin
-RATE_STEP = {Mode.HOLD: 0.25, Mode.POSITION: 0.25, Mode.RETURN: 0.6}
+# then up to 0.47 from the present rates, with which the laws begin
+RATE_STEP = {Mode.HOLD: 0.25, Mode.POSITION: 0.25, Mode.RETURN: 0.5}
 
 pytestmark = [
     pytest.mark.slow,

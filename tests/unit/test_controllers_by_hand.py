@@ -372,7 +372,7 @@ def test_the_moment_of_the_arm_is_added_to_pitch():
 def test_a_law_that_begins_in_flight_leaves_the_moment_of_the_arm_to_the_autopilot():
     """Its integral has the -10 N m already; without them, half is left after ln 2 / corner.
 
-    Without washout the moment is always that of the law; from the ground none is left yet.
+    Without washout the moment is always that of the law.
     """
     for speed, corner, expected in ((0.1, 2.0, (0.0, 5.0)), (0.1, 0.0, (-10.0, 0.0))):
         state, arm = forward_arm()

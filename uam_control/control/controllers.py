@@ -45,7 +45,7 @@ class Controller:
         self.law, self._parameters = catalogue.law(parameters.law)(parameters), parameters
         self.names = self.law.names
         self.adaptation = self.law.adaptation[: len(self.names)]
-        self.saturated = False
+        self.saturated = self._flying = False
         self._allocate((3, ALPHA))
         self._norms = np.zeros(3)
         rows = self._errors
@@ -99,9 +99,19 @@ class Controller:
     def _law_output(self, dt: float) -> np.ndarray:
         return self.law.update(*self._own, self._norms, self.saturated, dt)
 
+    def _begins_in_flight(self, reference: np.ndarray) -> bool:
+        """Return whether this is the first tick since `_idle`, of a vehicle handed back in flight.
+
+        reference (3, 6 + n): it begins with the vehicle's velocity; on the ground it is at rest.
+        """
+        if self._flying:
+            return False
+        self._flying = True
+        return bool(np.any(reference[CHI_DOT, POSITION]))
+
     def _idle(self) -> None:
         self.law.reset()
-        self.saturated = False
+        self.saturated = self._flying = False
 
 
 class PositionController(Controller):
@@ -114,7 +124,6 @@ class PositionController(Controller):
         self._attitude = AttitudeReference(parameters.attitude_cutoff)
         self._integral = np.zeros(3)  # [m/s^2] integral of integral_gain e
         self._tau = np.zeros(3)
-        self._flying = False
         self.set_parameters(parameters)
 
     def set_parameters(self, parameters: PositionLimits) -> None:
@@ -162,12 +171,9 @@ class PositionController(Controller):
             self._idle()
             self._tau[:] = self._integral[:] = 0.0
             self._attitude.reset(state[CHI, YAW])
-            self._flying = False
             return self._tau
-        if not self._flying:
-            self._flying = True
-            if _in_flight(reference):
-                self._attitude.begin(state, reference)
+        if self._begins_in_flight(reference):
+            self._attitude.begin(state, reference)
         if state.shape != self._errors.shape:
             self._allocate(state.shape)
         desired = self._attitude
@@ -257,7 +263,6 @@ class AttitudeController(TorqueController):
         super().__init__(parameters)
         self._measured = math.nan  # [s] loop delay
         self._slow = np.zeros(3)  # [rad/s^2] part of the feedforward that the autopilot integrates
-        self._flying = False
         self._limit = prepared(limit_torque, self._tau, self._tau, self._tau)
         self.set_parameters(parameters)
 
@@ -293,10 +298,8 @@ class AttitudeController(TorqueController):
         dt: float,
     ) -> None:
         p = self._parameters
-        if not self._flying:
-            self._flying = True
-            if _in_flight(reference):
-                self._slow[:] = math.nan
+        if self._begins_in_flight(reference):
+            self._slow[:] = math.nan
         self._prepare(
             state,
             reference,
@@ -320,7 +323,7 @@ class AttitudeController(TorqueController):
 
     def _idle(self) -> None:
         super()._idle()
-        self._slow[:], self._flying = 0.0, False
+        self._slow[:] = 0.0
 
 
 class ArmController(TorqueController):
@@ -396,11 +399,3 @@ class ArmController(TorqueController):
                 base = reference if p.goal_from == "reference" else state
                 self.command[:] = base[CHI, ARM] + p.goal_compliance * tau
         return tau
-
-
-def _in_flight(reference: np.ndarray) -> bool:
-    """Return whether a law begins with a vehicle in flight, which somebody hands back.
-
-    reference (3, 6 + n): then it begins with the vehicle's velocity; on the ground it is at rest.
-    """
-    return bool(np.any(reference[CHI_DOT, POSITION]))

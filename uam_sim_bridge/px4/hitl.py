@@ -49,17 +49,15 @@ def loop_values(
     values: Mapping[str, parameters.Value], vehicle: VehicleDescription
 ) -> dict[str, parameters.Value]:
     """Return the parameters of PX4 in the loop: outputs, and no simulated battery unless given."""
-    motors, first = parameters.motor_outputs(vehicle), FIRST_OF_SET
-    others = {
-        f"{parameters.OUTPUT}{first + n}": ACTUATOR_SET + 1 + n for n in range(OUTPUTS_OF_SET)
-    }
+    motors, output = parameters.motor_outputs(vehicle), parameters.output
+    others = {output(FIRST_OF_SET + n): ACTUATOR_SET + 1 + n for n in range(OUTPUTS_OF_SET)}
     defaults = {"SIM_BAT_ENABLE": 0, "IMU_INTEG_RATE": 250}
     return motors | others | defaults | dict(values) | {"SYS_HITL": 1, parameters.SYSTEM: 1}
 
 
 def gripper_parameter(number: int) -> str:
     """Return NAME=VALUE that puts gripper `number`, 1 to 6, on the output of that actuator."""
-    return f"{parameters.OUTPUT}{FIRST_OF_SET + number - 1}={GRIPPER}"
+    return f"{parameters.output(FIRST_OF_SET + number - 1)}={GRIPPER}"
 
 
 def start_script(values: Mapping[str, parameters.Value]) -> str:

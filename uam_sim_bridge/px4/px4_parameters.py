@@ -20,7 +20,6 @@ _NAME = re.compile(r"[A-Z][A-Z0-9_]{0,15}")  # at most 16 bytes in MAVLink
 # of modules that a build may lack; their values in SIMULATION switch the modules off
 _OPTIONAL = ("MC_AT_EN", "IMU_GYRO_FFT_EN")
 STARTED_LATE = "px4-rc.simulator"  # script of PX4, found by PATH
-OUTPUT = "PWM_MAIN_FUNC"  # of the outputs of a build for a computer; HIL_ACT_FUNC on a board
 _MOTOR = 100  # output functions: the last number before the first motor
 Value = int | float
 
@@ -42,12 +41,17 @@ def load(
     return values | parse(given, ranges)
 
 
+def output(number: int) -> str:
+    """Return the parameter of an output of a build for a computer; HIL_ACT_FUNC on a board."""
+    return f"PWM_MAIN_FUNC{number}"
+
+
 def motor_outputs(vehicle: VehicleDescription) -> dict[str, Value]:
     """Return the outputs of a build for a computer: motor n at output n.
 
     PX4's airframe of a simulated quadrotor has the first four only.
     """
-    return {f"{OUTPUT}{n}": _MOTOR + n for n in range(1, len(vehicle.rotors) + 1)}
+    return {output(n): _MOTOR + n for n in range(1, len(vehicle.rotors) + 1)}
 
 
 def parse(given: Iterable[str], ranges: Mapping[str, Range] | None = None) -> dict[str, Value]:
