@@ -10,7 +10,6 @@ import numpy as np
 
 from uam_control.coordinates import ARM, CHI, CHI_DOT, Z
 from uam_control.grasp import Grasp, GraspDecision
-from uam_control.mission.feasibility import Feasibility, in_words
 from uam_control.mission.ground_pose import GroundPose
 from uam_control.mission.guidance import Guidance
 from uam_control.mission.magnet_override import MagnetOverride
@@ -25,11 +24,12 @@ from uam_control.mission.mission_output import (
     MissionOutput,
 )
 from uam_control.mission.mission_parameters import MissionParameters, StartParameters
-from uam_control.mission.motion.braking import Braking
+from uam_control.mission.motion.braking import leaves_geofence
 from uam_control.mission.motion.trajectory import empty_reference
 from uam_control.mission.payload_watch import PayloadWatch
-from uam_control.mission.permission import ChecklistReport, Permission
+from uam_control.mission.permission import ChecklistReport
 from uam_control.mission.plans import GoalPose, PlanRefused, Points, check
+from uam_control.mission.pre_arm import PreArm
 from uam_control.mission.scenarios.scenario import Scenario
 from uam_control.mission.standing import Standing
 from uam_control.mission.steps import Steps
@@ -46,7 +46,6 @@ from uam_control.supervision import (
     State,
     StateTransition,
     Supervisor,
-    preflight,
 )
 from uam_control.vehicle import VehicleDescription
 
@@ -75,11 +74,9 @@ class Mission:
         self._stamp = 0.0
         self._age = 0.0  # [s] of the newest state: one tick
         self._seen: Observation | None = None
-        self._vehicle = vehicle
-        self._feasible: tuple[PreflightCheck, ...] = ()
-        self._permission = Permission(self._start.require_checklist)
+        self._pre_arm = PreArm(scenario, self._start.require_checklist, vehicle)
         self._begin(parameters)
-        self._check_reference(parameters)
+        self._pre_arm.check_reference(parameters)
 
     def _begin(self, parameters: MissionParameters) -> None:
         """Set the state before a flight; the object of the output stays."""
@@ -135,34 +132,18 @@ class Mission:
         """Forget the flight and wait on the ground: for stamps of a new simulation."""
         self._begin(self._parameters)
         self._seen, self._stamp = None, 0.0
-        self._permission.take(None)
+        self._pre_arm.permission.take(None)
 
     def checklist(self, report: ChecklistReport) -> None:
         """Take the newest state of the checklist; it counts where it is required."""
-        self._permission.take(report)
+        self._pre_arm.permission.take(report)
 
     def preflight(self) -> tuple[PreflightCheck, ...]:
         """Return the pre-arm report of the newest step; () before the first one."""
         if self._seen is None:
             return ()
-        p = self._parameters
-        report = preflight(
-            self._supervisor.checks,
-            self._seen,
-            self.scenario.arm_start,
-            p.start_speed,
-            p.start_arm_error,
-        )
-        return report + self._feasible + self._permission.lines(self._stamp)
-
-    def _check_reference(self, parameters: MissionParameters) -> None:
-        """Update the line of the pre-arm report about the whole reference."""
-        if self._vehicle is None:
-            return
-        check = Feasibility(self._vehicle, parameters, self._planned.payload_mass)
-        found = in_words(check.excesses(self._planned))
-        line = PreflightCheck("reference", found or "within", "within all limits", not found)
-        self._feasible = (line,)
+        checks = self._supervisor.checks
+        return self._pre_arm.report(self._stamp, checks, self._seen, self._parameters)
 
     @property
     def not_ready(self) -> str:
@@ -174,8 +155,8 @@ class Mission:
         self._parameters = parameters
         self._supervisor.configure(parameters)
         if self._guidance is None:
-            self._check_reference(parameters)
-        if self._guidance is not None:
+            self._pre_arm.check_reference(parameters)
+        else:
             self._guidance.configure(parameters)
         if self._watch is not None:
             self._watch.configure(parameters)
@@ -295,19 +276,10 @@ class Mission:
 
         Control stays with the pilot then: taken over there, the vehicle would only land.
         """
-        state, p = self._seen.state, self._parameters
+        state = self._seen.state
         if self.output.state is not State.RELEASED or not np.all(np.isfinite(state[CHI])):
             return ""
-        places = Braking(self._stamp, state, p, self._ground).places()
-        low, high = np.array(p.geofence_low), np.array(p.geofence_high)
-        beyond = np.maximum(low - places, places - high).max(axis=0)
-        axis = int(np.argmax(beyond))
-        if beyond[axis] <= 0.0:
-            return ""
-        return (
-            f"the vehicle would leave the geofence by {beyond[axis]:.1f} m in {'xyz'[axis]} before "
-            "it stops: slow down, or fly back first"
-        )
+        return leaves_geofence(self._stamp, state, self._parameters, self._ground)
 
     def plan(self, goal: GoalPose | Points) -> tuple[bool, str]:
         """Check a goal or trajectory; queue it for the next step if it can be flown.
@@ -357,12 +329,12 @@ class Mission:
         if self._start.dry_run:
             self._ground_pose.dry_run(output, state)
         else:
-            looks = self._permission.commands(self._stamp)
+            looks = self._pre_arm.permission.commands(self._stamp)
             self._ground_pose.hand_check(output, state, looks)
 
     def _check_permission(self, stamp: float) -> None:
         """End a flight that is not armed yet when the checklist takes its permission back."""
-        refusal = self._permission.refusal(stamp)
+        refusal = self._pre_arm.permission.refusal(stamp)
         if refusal:
             self.give_up(stamp, refusal)
 

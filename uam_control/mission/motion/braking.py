@@ -133,6 +133,23 @@ class Braking:
             reference[:, columns] = stop.at(stamp - self._stamp)[: len(reference)]
 
 
+def leaves_geofence(stamp: float, state: np.ndarray, p: MissionParameters, ground: float) -> str:
+    """Say by how much a vehicle that brakes from `stamp` [s] on would leave the geofence, or "".
+
+    state (3, 6 + n), ground [m]: see `Braking`.
+    """
+    places = Braking(stamp, state, p, ground).places()
+    low, high = np.array(p.geofence_low), np.array(p.geofence_high)
+    beyond = np.maximum(low - places, places - high).max(axis=0)
+    axis = int(np.argmax(beyond))
+    if beyond[axis] <= 0.0:
+        return ""
+    return (
+        f"the vehicle would leave the geofence by {beyond[axis]:.1f} m in {'xyz'[axis]} before "
+        "it stops: slow down, or fly back first"
+    )
+
+
 def present_motion(state: np.ndarray) -> np.ndarray:
     """Return value, rate, acceleration and jerk (4, 6) of position and yaw of state (3, 6 + n).
 
