@@ -288,6 +288,18 @@ def test_a_flight_that_begins_in_motion_begins_with_the_attitude_of_the_vehicle(
             controller.update(state, reference, False, 1e-6)
 
 
+def test_a_vehicle_that_is_handed_back_in_flight_still_carries_what_it_carried():
+    """An integral of -0.5 m/s^2 is 1 N of 2 kg, above the weight of 10 N; on the ground it ends."""
+    controller, (state, reference, _) = position(integral_gain=[0.0, 0.0, 5.0]), vehicle()
+    state[0, 2] = -1.0
+    controller.update(state, reference, True, 0.1)
+    state[0, 2] = 0.0
+    for moving, upward in ((1.0, 11.0), (0.0, 10.0)):
+        np.testing.assert_array_equal(controller.update(state, reference, False, 0.1), 0.0)
+        reference[1, 0] = state[1, 0] = moving
+        assert controller.update(state, reference, True, 0.1)[2] == pytest.approx(upward)
+
+
 def test_on_the_ground_the_washout_starts_afresh():
     washed = torque(AttitudeController, 3, feedforward_washout=[2.0] * 3)
     state, reference, attitude = vehicle()

@@ -295,3 +295,19 @@ def test_a_restless_vehicle_does_not_descend():
     decisions = flight.until()
     assert decisions[-1] is Grasp.GIVEN_UP
     assert all("no descent" in one.text for one in flight.executive.decisions[:-1])
+
+
+def test_time_in_which_the_scenario_is_not_flown_does_not_count_as_waiting():
+    """Twice align_timeout of interruption, then half of it restless: no approach is lost."""
+    flight = Flight(lambda attempt: True)
+    flight.noise = lambda: 0.03 * np.sin(9.0 * flight.stamp) * np.array([1.0, 1.0, 0.0])
+    while flight.executive.directive.pace:
+        flight.step()
+    for _ in range(round(2.0 * P.align_timeout / STEP)):
+        flight.executive.interrupt()
+        flight.stamp += STEP
+    for _ in range(round(0.5 * P.align_timeout / STEP)):
+        flight.step()
+    assert flight.executive.decisions == []
+    flight.noise = lambda: np.zeros(3)
+    assert flight.until() == [Grasp.APPROACHED, Grasp.HELD, Grasp.RELEASED]

@@ -10,6 +10,7 @@ from hypothesis import strategies as st
 from uam_control.mission import MissionParameters, load_scenario
 from uam_control.mission.guidance import Guidance, PathClock, Segment
 from uam_control.mission.motion.trajectory import empty_motion
+from uam_control.mission.shift import Shift
 
 START = np.array([0.0, 0.0, 0.28, 0.0, 0.0, 0.0, 0.0, np.pi / 2])
 DT = 0.01
@@ -258,6 +259,26 @@ def test_the_way_back_leads_straight_to_the_path(flown, at, held):
         assert stamp < 200.0 + back
     low, high = np.minimum(way[0], way[-1]), np.maximum(way[0], way[-1])
     assert np.all(np.array(way) > low - 0.01) and np.all(np.array(way) < high + 0.01)
+
+
+def test_the_way_back_begins_once_the_shift_of_the_path_is_at_rest():
+    """A shift by 5 cm takes 1.9 s, the brake from 0.1 m/s less; the way back begins at rest."""
+    guide, shift = guidance(), Shift()
+    state = state_of((-1.0, 0.0, 1.4, 0.0, 0.1, 0.0, 0.0))
+    back = stamp = 100.0 + release(guide, 20.0, state)
+    guide.shift = shift.add
+    guide.stay(stamp, state, START[2])
+    shift.aim(stamp, np.array([0.05, 0.0, 0.0]))
+    guide.go_on(stamp)
+    while guide._brake is not None:
+        before = guide.motion[:3, 0].copy()
+        stamp += DT
+        guide.advance(stamp)
+        shift.advance(stamp)
+        guide.write(stamp)
+        assert stamp < back + 3.0
+    assert stamp > back + 1.8
+    np.testing.assert_allclose(guide.motion[:3, 0], before, atol=1e-3)
 
 
 def test_a_fast_vehicle_lands_from_its_brake_within_the_brakes_acceleration():

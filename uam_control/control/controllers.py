@@ -166,14 +166,19 @@ class PositionController(Controller):
 
         state, reference: (3, 6 + n), see `coordinates`; dt [s]. ||xi|| uses the desired attitude of
         the last tick, because that of this tick follows from tau_p. The next call reuses the array.
+        The integral of a vehicle that is handed back in flight is that of its last tick: the weight
+        of a payload and the wind are still there.
         """
         if not flying:
             self._idle()
-            self._tau[:] = self._integral[:] = 0.0
+            self._tau[:] = 0.0
             self._attitude.reset(state[CHI, YAW])
             return self._tau
+        begins = not self._flying
         if self._begins_in_flight(reference):
             self._attitude.begin(state, reference)
+        elif begins:
+            self._integral[:] = 0.0
         if state.shape != self._errors.shape:
             self._allocate(state.shape)
         desired = self._attitude

@@ -53,6 +53,7 @@ class GraspExecutive:
         self.grasp = Grasp.NONE
         self._windows, self._expected = list(windows), expected
         self._step, self._since = Step.IDLE, 0.0
+        self._interrupted = False
         self._attempt = 0
         self._alignment = Alignment()
         self._load, self._before = RunningMean(), Load()
@@ -83,12 +84,15 @@ class GraspExecutive:
         window = self._windows[0]
         if self._step is Step.IDLE:
             self._go(Step.APPROACH, sight)
+        if self._interrupted:
+            self._since, self._interrupted = sight.stamp, False
         self._load.add(sight.stamp, np.array([sight.lift, sight.effort]))
         self._steps[self._step](sight, window)
         return self.directive
 
     def interrupt(self) -> None:
-        """Forget running values: the scenario is not flown now."""
+        """Forget running values and the time waited: the scenario is not flown now."""
+        self._interrupted = True
         for one in (self._alignment, self._load, self._lasting, self._contact):
             one.restart()
 

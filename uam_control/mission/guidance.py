@@ -264,9 +264,14 @@ class Guidance:
 
         No effect while the path is left, or about to go on after a stop.
         """
-        going_on = self._go_on_at != math.inf or self._away is not None or self._brake is not None
-        if rate != self._clock.goal and not self._plans and not going_on:
+        if rate != self._clock.goal and not self._plans and not self.off_path:
             self._clock.change(stamp, rate, self._ramp_length())
+
+    @property
+    def off_path(self) -> bool:
+        """Return whether the path is left, or about to go on after a stop."""
+        going_on = self._go_on_at != math.inf
+        return going_on or self._away is not None or self._brake is not None
 
     def replace(self, trajectory: Trajectory) -> None:
         """Follow `trajectory` from now on; it must equal the present one at the scenario time."""
@@ -365,12 +370,12 @@ class Guidance:
     def go_on(self, stamp: float) -> None:
         """Continue on the path once the stop is complete and the arm is back at its path angles.
 
-        A brake comes to rest first.
+        A brake comes to rest first, and so does the path, which a shift may still move.
         """
         if self._brake is not None:
             rest = max(self._brake.end, self._clock.settled)
-            if stamp < rest:
-                self._return_at = rest
+            if stamp < rest or np.any(self._on_path()[CHI_DOT:JERK, POSITION]):
+                self._return_at = max(rest, stamp)
                 return
         self._go_on_at, self._return_at = max(stamp, self._clock.settled), math.inf
         if self._brake is not None or self._plans.pop(True, None) is not None:
