@@ -291,7 +291,7 @@ def assert_final(outcomes: dict[str, Outcome]) -> None:
             continue
         assert outcome.resumed, (by, outcome.answer)
         rates, thrust = outcome.steps
-        assert rates < 0.25 and thrust < 0.03 and outcome.unlike < 1.0, (by, outcome)
+        assert rates < 0.25 and thrust < 0.05 and outcome.unlike < 1.0, (by, outcome)
         assert outcome.phase == "landed" and not outcome.abort_reason, by
 
 

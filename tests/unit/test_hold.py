@@ -78,6 +78,14 @@ def test_thrust_is_an_average_not_the_last_value():
     assert 0.52 < thrust < 0.53
 
 
+def test_the_thrust_of_a_command_that_is_not_flown_does_not_count():
+    hold = flown()
+    before = hold.mean_thrust
+    for k in range(100):
+        hold.good(4.0 + 0.004 * k, Desired(np.zeros(3), level(0.0), 0.9), followed=False)
+    assert hold.mean_thrust == before and not hold.active
+
+
 def test_ends_after_its_time_and_starts_anew():
     hold = flown()
     assert hold.setpoint(4.0, TILTED, UNKNOWN) is not None

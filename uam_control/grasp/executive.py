@@ -78,12 +78,18 @@ class GraspExecutive:
         return bool(self._windows) and time >= self._windows[0].descent - BEFORE
 
     def step(self, sight: Sight) -> Directive:
-        """Return the directive after `sight`; call it while the scenario is flown."""
+        """Return the directive after `sight`; call it while the scenario is flown.
+
+        Off the path nothing is aligned; contacts are noticed.
+        """
         if not self._windows:
             return self.directive
         window = self._windows[0]
         if self._step is Step.IDLE:
             self._go(Step.APPROACH, sight)
+        if not sight.on_path and self._step in (Step.APPROACH, Step.ALIGN):
+            self.interrupt()
+            return self.directive
         if self._interrupted:
             self._since, self._interrupted = sight.stamp, False
         self._load.add(sight.stamp, np.array([sight.lift, sight.effort]))

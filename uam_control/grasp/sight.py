@@ -19,7 +19,8 @@ class Sight:
     stamp [s]; time [s]: of the scenario; magnet (3,) [m, world]: face, from the estimate; error
     (3,) [m]: position - reference; payload (3,) [m, world]: grip point from its mocap pose; lift
     [N]: filtered collective thrust; effort [N m]: measured torque of the first joint; lever [m]:
-    horizontal distance of the magnet from that joint. NaN: unknown.
+    horizontal distance of the magnet from that joint; on_path: whether the vehicle flies on the
+    path, and not on its way back to it. NaN: unknown.
     """
 
     stamp: float
@@ -30,6 +31,7 @@ class Sight:
     lift: float = math.nan
     effort: float = math.nan
     lever: float = 0.0
+    on_path: bool = True
 
     @property
     def tracked(self) -> bool:

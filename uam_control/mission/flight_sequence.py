@@ -370,8 +370,7 @@ class Mission:
         output, watch = self.output, self._watch
         if watch is None or self._parameters.grasp_checks == "off":
             return
-        guidance = self._guidance
-        if output.state is not State.FLYING or guidance.planned or guidance.off_path:
+        if output.state is not State.FLYING or self._guidance.planned:
             watch.interrupt()
             return
         self._over = self._over or watch.step(stamp, seen.state, seen.readings)

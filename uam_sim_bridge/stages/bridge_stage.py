@@ -30,6 +30,7 @@ from uam_sim_bridge.mavlink.offboard.setpoint_source import (
 )
 from uam_sim_bridge.mavlink.offboard.setpoints.catalogue import SetpointParameters
 from uam_sim_bridge.mavlink.offboard.thrust_identification import ThrustIdentificationParameters
+from uam_sim_bridge.mavlink.protocol.modes import Mode
 from uam_sim_bridge.stages.autopilot_port import AutopilotPort
 from uam_sim_bridge.stages.autopilot_report import AutopilotReport, AutopilotReports
 from uam_sim_bridge.stages.flight_measurements import FlightMeasurements
@@ -150,6 +151,7 @@ class BridgeStage:
             self.autopilot.landed,
             sequence.let_go,
             sequence.released,
+            self.autopilot.mode is Mode.OFFBOARD,
         )
         if situation != self._situation:
             self._situation = Situation(*situation)

@@ -88,10 +88,15 @@ class LevelHold:
         """The mean thrust setpoint 0..1 of the flight so far, 0 without one."""
         return self._thrust or 0.0
 
-    def good(self, time: float, desired: Desired) -> None:
-        """Store thrust and yaw of a valid command at `time` [s]."""
+    def good(self, time: float, desired: Desired, followed: bool = True) -> None:
+        """Store thrust and yaw of a valid command at `time` [s]; the thrust of one that is flown.
+
+        followed: the autopilot is in OFFBOARD.
+        """
         self._since = None
         self._yaw, thrust = desired.attitude.item(CHI, Z), desired.thrust
+        if not followed:
+            return
         dt = time - self._time
         self._time = time
         if self._thrust is None or not 0.0 < dt < _THRUST_TIME:

@@ -47,12 +47,14 @@ class Situation(NamedTuple):
     """State of the autopilot.
 
     let_go: the mission requires the autopilot's failsafe. released: somebody else has control.
+    followed: it flies the setpoints, in OFFBOARD.
     """
 
     armed: bool
     landed: bool
     let_go: bool
     released: bool = False
+    followed: bool = True
 
 
 def silent(text: str, key: str | None) -> None:
@@ -128,7 +130,7 @@ class SetpointSource:
                 setpoint = self._type(desired)
                 refused = setpoint.refused()
                 if not refused:
-                    self._hold.good(now, desired)
+                    self._hold.good(now, desired, situation.followed)
                     return setpoint
                 self._say(f"setpoint refused: {refused}", None)
         elif not flying and tau_q is None and self._low(now, situation.armed):
@@ -138,7 +140,7 @@ class SetpointSource:
 
     def without(self, now: float, situation: Situation) -> Setpoint:
         """Return the setpoint at `now` [s] without valid commands."""
-        armed, landed, let_go, released = situation
+        armed, landed, let_go, released, _ = situation
         if released and armed and self._high(armed):
             self._say(
                 "no usable commands while released: no stream, OFFBOARD is not possible", "hold"
