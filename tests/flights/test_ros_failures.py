@@ -76,7 +76,7 @@ def test_a_recorder_without_processor_time_loses_nothing(fly, short_scenario):
         ticks = [tick.publish_time for *_, tick in make_reader(file).iter_messages(["/clock"])]
     for begin, end in stops:
         flown = sum(begin < tick < end for tick in ticks) * 0.004
-        # a second, and what is flown until the signal acts; without the wait it were 2 s and more
+        # a second, and what is flown until the signal acts; without the wait, 2 s and more
         assert flown < 1.2, "the receive buffers have room for a second"
     assert json.loads((flight.out / "logs/recorder.json").read_text())["lost"] == {}
     time_of = timeseries.read(flight.out / "timeseries.parquet").time
