@@ -4,7 +4,6 @@ import json
 import re
 import tempfile
 from pathlib import Path
-from types import MappingProxyType
 
 import numpy as np
 import pytest
@@ -49,7 +48,7 @@ def metrics(flight):
     return json.loads((flight.out / "metrics.json").read_text())
 
 
-def assert_flown_alike(found, ours, beyond=MappingProxyType({})):
+def assert_flown_alike(found, ours, **beyond):
     """Twice the RMS of the stand-in's flight at most, plus `beyond` by group."""
     for group, rms in ours["rms"].items():
         limit = TIMES_THE_STAND_INS * np.array(rms) + beyond.get(group, 0.0)
@@ -69,7 +68,7 @@ def test_px4_flies_the_mission_with_attitude_setpoints(fly):
     profiles = ("--profile", "s500", "--profile", "attitude_setpoints")
     found = metrics(fly("attitude", "--autopilot", "px4", *profiles))
     assert found["mission_completed"] and found["payload_place_error_m"] < PLACED
-    assert_flown_alike(found, metrics(fly("stand-in", *profiles)), LEVEL_OFF)
+    assert_flown_alike(found, metrics(fly("stand-in", *profiles)), **LEVEL_OFF)
 
 
 def test_px4_flies_a_hexacopter_as_the_stand_in_does(fly):

@@ -99,15 +99,10 @@ class Controller:
     def _law_output(self, dt: float) -> np.ndarray:
         return self.law.update(*self._own, self._norms, self.saturated, dt)
 
-    def _begins_in_flight(self, reference: np.ndarray) -> bool:
-        """Return whether this is the first tick since `_idle`, of a vehicle handed back in flight.
-
-        reference (3, 6 + n): it begins with the vehicle's velocity; on the ground it is at rest.
-        """
-        if self._flying:
-            return False
-        self._flying = True
-        return bool(np.any(reference[CHI_DOT, POSITION]))
+    def _begins(self) -> bool:
+        """Return whether this is the first tick of the law since `_idle`."""
+        begins, self._flying = not self._flying, True
+        return begins
 
     def _idle(self) -> None:
         self.law.reset()
@@ -174,11 +169,11 @@ class PositionController(Controller):
             self._tau[:] = 0.0
             self._attitude.reset(state[CHI, YAW])
             return self._tau
-        begins = not self._flying
-        if self._begins_in_flight(reference):
-            self._attitude.begin(state, reference)
-        elif begins:
-            self._integral[:] = 0.0
+        if self._begins():
+            if _in_flight(reference):
+                self._attitude.begin(state, reference)
+            else:
+                self._integral[:] = 0.0
         if state.shape != self._errors.shape:
             self._allocate(state.shape)
         desired = self._attitude
@@ -303,7 +298,7 @@ class AttitudeController(TorqueController):
         dt: float,
     ) -> None:
         p = self._parameters
-        if self._begins_in_flight(reference):
+        if self._begins() and _in_flight(reference):
             self._slow[:] = math.nan
         self._prepare(
             state,
@@ -404,3 +399,11 @@ class ArmController(TorqueController):
                 base = reference if p.goal_from == "reference" else state
                 self.command[:] = base[CHI, ARM] + p.goal_compliance * tau
         return tau
+
+
+def _in_flight(reference: np.ndarray) -> bool:
+    """Return whether a law begins with a vehicle in flight, which somebody hands back.
+
+    reference (3, 6 + n): then it begins with the vehicle's velocity; on the ground it is at rest.
+    """
+    return bool(np.any(reference[CHI_DOT, POSITION]))

@@ -53,7 +53,6 @@ class GraspExecutive:
         self.grasp = Grasp.NONE
         self._windows, self._expected = list(windows), expected
         self._step, self._since = Step.IDLE, 0.0
-        self._interrupted = False
         self._attempt = 0
         self._alignment = Alignment()
         self._load, self._before = RunningMean(), Load()
@@ -90,15 +89,14 @@ class GraspExecutive:
         if not sight.on_path and self._step in (Step.APPROACH, Step.ALIGN):
             self.interrupt()
             return self.directive
-        if self._interrupted:
-            self._since, self._interrupted = sight.stamp, False
+        self._since = min(self._since, sight.stamp)
         self._load.add(sight.stamp, np.array([sight.lift, sight.effort]))
         self._steps[self._step](sight, window)
         return self.directive
 
     def interrupt(self) -> None:
         """Forget running values and the time waited: the scenario is not flown now."""
-        self._interrupted = True
+        self._since = math.inf  # until the next step
         for one in (self._alignment, self._load, self._lasting, self._contact):
             one.restart()
 

@@ -264,12 +264,12 @@ class Guidance:
 
         No effect while the path is left, or about to go on after a stop.
         """
-        if rate != self._clock.goal and not self._plans and not self.off_path:
+        if rate != self._clock.goal and not self._plans and not self.coming_back:
             self._clock.change(stamp, rate, self._ramp_length())
 
     @property
-    def off_path(self) -> bool:
-        """Return whether the path is left, or about to go on after a stop."""
+    def coming_back(self) -> bool:
+        """Return whether the path is left, or about to go on after a stop; not for a plan."""
         going_on = self._go_on_at != math.inf
         return going_on or self._away is not None or self._brake is not None
 

@@ -111,7 +111,7 @@ class PayloadWatch:
             error=chi[POSITION] - self._guidance.reference[CHI, POSITION],
             lift=readings.lift,
             lever=arm,
-            on_path=not self._guidance.off_path,
+            on_path=not self._guidance.coming_back,
         )
         if known and readings.payload_age <= p.payload_age:
             sight.payload = readings.payload_position.copy()
