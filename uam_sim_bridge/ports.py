@@ -49,13 +49,16 @@ def ports_of(instance: int) -> Ports:
     )
 
 
-def in_use(kind: int, port: int, host: str = "127.0.0.1") -> bool:
-    """Return whether `port` cannot be bound; kind: socket.SOCK_STREAM (TCP), SOCK_DGRAM (UDP)."""
+def in_use(kind: int, port: int) -> bool:
+    """Return whether `port` of 127.0.0.1 cannot be bound.
+
+    kind: socket.SOCK_STREAM (TCP), SOCK_DGRAM (UDP).
+    """
     with socket.socket(socket.AF_INET, kind) as probe:
         if kind == socket.SOCK_STREAM:  # ignore TIME_WAIT of a closed connection
             probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
         try:
-            probe.bind((host, port))
+            probe.bind(("127.0.0.1", port))
         except OSError as error:
             if error.errno in (errno.EADDRINUSE, errno.EACCES):
                 return True

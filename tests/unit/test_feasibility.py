@@ -18,6 +18,7 @@ from uam_control.mission import (
 from uam_control.mission.feasibility import in_words
 from uam_control.mission.scenarios.scenario_options import SLOWEST
 from uam_control.profiles.profile import load_profile
+from uam_control.supervision import Readings
 from uam_control.vehicle import VehicleError, load_description
 from uam_control.vehicle.arm_model import ArmModel
 from uam_lab.flight.flight_settings import settings as flight_settings
@@ -250,6 +251,26 @@ def test_a_flight_is_refused_before_it_starts_or_slowed_down():
     factor = made.scenario_options.slowdown
     assert factor > 1.0 and made.notes == (f"retimed: {factor:.4g} times as slow",)
     assert made.scenario.landing.at > load_scenario("ellipse").landing.at
+
+
+def test_the_second_flight_is_compared_with_the_limits_of_its_time():
+    """A limit that was lowered in the first flight is not checked there, but before the next."""
+    parameters = PROFILE.sets["mission"]
+    mission = Mission(load_scenario("hover"), parameters, vehicle=PROFILE.vehicle)
+    state = np.zeros((3, 8))
+    state[0, 2], state[0, 6:] = 0.285, mission.scenario.arm_start
+    fresh = Readings(mocap_age=0.0, joint_age=0.0, controller_age=0.0, autopilot_age=0.0)
+    mission.step(0.0, state, None, fresh)
+    assert mission.start() == (True, "arming")
+    mission.step(0.01, state, 0.01, fresh)
+    mission.step(3.0, state, 0.01, fresh)
+    mission.configure(replace(parameters, geofence_high=(5.0, 5.0, 0.6)))
+    stamp = 3.0
+    while not mission.output.done:  # disarmed on the ground
+        stamp += 0.01
+        mission.step(stamp, state, None, fresh)
+    accepted, why = mission.start()
+    assert not accepted and "z 1 m exceeds 0.6 m" in why
 
 
 def test_the_pre_arm_report_has_the_reference():

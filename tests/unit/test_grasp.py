@@ -231,6 +231,16 @@ def test_a_payload_that_has_fallen_is_not_approached_again():
     assert flight.executive.decisions[-1].attempt == 1
 
 
+@pytest.mark.parametrize("period", [0.3, 0.4, 0.6])
+def test_a_payload_that_is_seen_at_times_only_is_not_waited_for_without_end(period):
+    flight = Flight(lambda attempt: True, offset=(0.03, 0.0))
+    while flight.executive.grasp is Grasp.NONE:
+        flight.tracked = flight.stamp % period < 0.5 * period
+        flight.step()
+        assert flight.stamp < 128.0 + 2.0 + 3.0 * P.align_timeout
+    assert flight.executive.decisions[0].text == "no descent, payload seen at times only"
+
+
 def test_given_up_may_land():
     flight = Flight(lambda attempt: False, grasp_given_up="land", grasp_attempts=1)
     while not flight.step().land:

@@ -91,6 +91,15 @@ def test_without_the_request_only_the_arm_is_commanded():
     assert not output.reference[CHI, :6].any()
 
 
+def test_a_vehicle_that_somebody_else_armed_gets_no_commands():
+    ground = Ground()
+    ground.step(ground.report())
+    assert ground.step(ground.report()).flying
+    output = ground.step(ground.report(), armed_since=ground.time)
+    assert not output.flying and output.phase == WAITING
+    assert not output.reference[CHI, :6].any()
+
+
 def test_where_no_checklist_is_required_it_commands_nothing():
     ground = Ground(require_checklist=False)
     assert not ground.step(ground.report()).flying

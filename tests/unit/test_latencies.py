@@ -2,7 +2,7 @@
 
 import pytest
 
-from uam_sim_bridge.nodes.latencies import Latencies
+from uam_sim_bridge.nodes.latencies import MOST_UNANSWERED, Latencies
 from uam_sim_bridge.nodes.plant_options import Statistics
 
 PERIOD, MS = 0.004, 1_000_000
@@ -73,3 +73,13 @@ def test_a_setpoint_twice_counts_once():
     latencies.tick(TICK, TICK, {TICK: TICK + MS})
     latencies.tick(None, 0, {TICK: TICK + 2 * MS})
     assert numbers.latency_s == pytest.approx([0.001])
+
+
+def test_samples_of_hours_without_a_companion_are_not_kept():
+    numbers = Statistics("realtime")
+    latencies = Latencies(numbers, PERIOD)
+    for k in range(3 * MOST_UNANSWERED):
+        latencies.tick(k * 4_000_000, k * 4_000_000, {})
+    assert len(latencies._unanswered) == MOST_UNANSWERED
+    latencies.conclude(10**12)
+    assert numbers.missed_ticks == numbers.late_ticks == 3 * MOST_UNANSWERED

@@ -97,6 +97,32 @@ def test_the_papers_scenario():
             "landing: {at: 5, duration: 3}\nmagnet: [{at: 1, energised: 1}]",
             r"magnet\[0\].energised: true or false expected, got 1",
         ),
+        ("landing: {at: 5, duration: 0}", "landing.duration: 0 is not above 0"),
+        ("landing: {at: 5, duration: -1}", "landing.duration: -1 is not above 0"),
+        ("landing: {at: -5, duration: 1}", "landing.at: -5 is below 0"),
+        (
+            "landing: {at: 5, duration: 3}\nmoves: [{coordinate: z, from: 0, until: 5.5, to: 1}]",
+            r"moves\[0\].until: 5.5 s, but the landing begins at 5 s",
+        ),
+        (
+            "landing: {at: 5, duration: 3}\n"
+            "moves: [{coordinate: alpha_1, from: 0, until: 8.5, to_deg: 1}]",
+            r"moves\[0\].until: 8.5 s, but the landing ends at 8 s",
+        ),
+        (
+            "landing: {at: 5, duration: 3}\nmoves: [{coordinate: z, from: -1, until: 2, to: 1}]",
+            r"moves\[0\].from: -1 is below 0",
+        ),
+        (
+            "landing: {at: 5, duration: 3}\n"
+            "magnet: [{at: 4, energised: false}, {at: 2, energised: true}]",
+            r"magnet\[1\].at: 2 s is not after the entry before, 4 s",
+        ),
+        (
+            "landing: {at: 5, duration: 3}\nphases: [{from: 1, name: late}]",
+            "phases: the first begins at 1 s, it must begin at 0",
+        ),
+        ("landing: {at: 5, duration: 3}\npayload: {mass: -0.2}", "payload.mass: -0.2 is below 0"),
     ],
 )
 def test_bad_scenario_is_refused(tmp_path, text, reason):

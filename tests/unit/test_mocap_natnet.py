@@ -295,6 +295,17 @@ def test_packets_of_another_server_in_the_group_are_ignored(connect):
             assert all(pose.position[0] == pytest.approx(1.0) for pose in poses(driver, 30))
 
 
+def test_a_group_that_cannot_be_joined_is_said_and_tried_again(connect):
+    with serving(multicast=True) as server:
+        driver = connect(server)
+        source = driver._source
+        here, source._local = source._local, "203.0.113.7"  # an address that the computer lost
+        until(driver, lambda: source.failure, "failure")
+        assert source.failure.startswith("cannot receive the frames: ")
+        source._local = here
+        assert poses(driver, 3)
+
+
 @pytest.mark.parametrize(
     ("server", "local", "reason"),
     [

@@ -139,6 +139,17 @@ def test_disarm():
     assert s.phase is Phase.DISARMED and s.reasons == () and s.streaming
 
 
+def test_a_gap_of_the_link_while_disarming_changes_nothing():
+    s = flying()
+    s.set_desired(False)
+    run(s, 0.1, 2.0, armed=True, mode=Mode.OFFBOARD)
+    assert s.phase is Phase.DISARMING
+    run(s, 1.0, 2.1, connected=False, armed=True, mode=Mode.OFFBOARD)
+    assert run(s, 0.1, 3.1, armed=True, mode=Mode.OFFBOARD) == [(3.1, Request.DISARM)]
+    run(s, 0.1, 3.2, mode=Mode.OFFBOARD)
+    assert s.phase is Phase.DISARMED
+
+
 def test_stream_goes_on_when_heartbeats_stop_in_flight():
     s = flying()
     run(s, 1.0, 2.0, connected=False, armed=True, mode=Mode.OFFBOARD)

@@ -111,6 +111,15 @@ def test_an_answer_to_a_tick_counts_from_the_next_tick_on():
     assert read == ["of 20 ms"]
 
 
+def test_an_answer_that_is_early_does_not_replace_the_one_before_it():
+    """A mission one tick behind its controllers: gains of the reading's tick are there already."""
+    inputs, read = SupervisorInputs(0.004), []
+    for stamp in range(0, 101 * MS, 20 * MS):
+        inputs.keep("gains", read.append, (stamp // MS,), answers=stamp)
+        inputs.tick(stamp)
+    assert read == [0, 20, 40, 60, 80]
+
+
 def mission_stage():
     parameters = load_profile("s500").sets["mission"]
     return MissionStage(Mission(load_scenario("hover"), parameters), Timing())

@@ -115,6 +115,22 @@ def test_a_second_release_forgets_the_resume():
     assert watch(supervisor, observation(), 20.0, 4.0).state is State.HOLDING
 
 
+def test_a_resume_that_was_not_answered_does_not_act_minutes_later():
+    supervisor, seen = flying(), observation(authority=PILOT)
+    watch(supervisor, seen, 1.0)
+    supervisor.step(3.0, seen, OperatorCommand.RESUME)
+    watch(supervisor, seen, S500.regain_timeout, 3.0)
+    assert watch(supervisor, observation(), 10.0, 9.0).state is State.HOLDING
+
+
+def test_a_person_who_chooses_another_mode_ends_a_resume():
+    supervisor, seen = flying(), observation(authority=PILOT)
+    watch(supervisor, seen, 1.0)
+    supervisor.step(3.0, seen, OperatorCommand.RESUME)
+    supervisor.step(3.1, observation(authority=Authority("the pilot, in HOLD")))
+    assert watch(supervisor, observation(), 10.0, 3.2).state is State.HOLDING
+
+
 @pytest.mark.parametrize(
     ("command", "changes", "refusal"),
     [

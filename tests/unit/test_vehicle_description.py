@@ -93,6 +93,13 @@ def test_what_the_model_is_made_of():
         ((("joints", 1, "stowed_deg"), 150), "joints[1].stowed_deg: 150 is outside the joint"),
         ((("servos", "effort_limit"), 4.0), "4 N m is above stall_torque, 3 N m"),
         ((("joints",), 2), "joints: a list of mappings expected, got 2"),
+        ((("air", "drag"), [0.1]), "air.drag: a list of 3 numbers expected"),
+        ((("sensors", "mocap", "rate"), 0), "sensors.mocap.rate: 0 is not above 0"),
+        (
+            (("sensors", "imu", "latency_ticks"), 1.5),
+            "latency_ticks: 0, 1, 2, .. expected, got 1.5",
+        ),
+        ((("magnet", "holding_force"), "strong"), "magnet.holding_force: a number expected"),
     ],
 )
 def test_what_cannot_be_a_vehicle_is_refused_in_one_line(change, message):
@@ -101,7 +108,13 @@ def test_what_cannot_be_a_vehicle_is_refused_in_one_line(change, message):
     assert message in str(error.value) and "\n" not in str(error.value)
 
 
-@pytest.mark.parametrize("key", ["model", "mass", "rotors", "joints", "servos", "autopilot"])
+@pytest.mark.parametrize(
+    "key",
+    [
+        *("model", "mass", "rotors", "joints", "servos", "autopilot"),
+        *("air", "sensors", "variation", "magnet"),
+    ],
+)
 def test_what_is_missing_is_named(key):
     numbers = deepcopy(S500.numbers)
     del numbers[key]

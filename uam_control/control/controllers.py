@@ -31,6 +31,8 @@ from uam_control.maths.compiled import prepared
 from uam_control.settings.parameter_set import ParameterError
 from uam_control.vehicle import POSITION_SERVO
 
+AT_REST = 1e-4  # [m/s] velocity of the reference in the first ticks of a take-off
+
 
 class Controller:
     """Base of the three controllers: errors of the whole vehicle, one law, its saturation.
@@ -404,6 +406,7 @@ class ArmController(TorqueController):
 def _in_flight(reference: np.ndarray) -> bool:
     """Return whether a law begins with a vehicle in flight, which somebody hands back.
 
-    reference (3, 6 + n): then it begins with the vehicle's velocity; on the ground it is at rest.
+    reference (3, 6 + n): then it begins with the vehicle's velocity; on the ground it is at rest,
+    and nearly so if the first tick of a take-off was lost.
     """
-    return bool(np.any(reference[CHI_DOT, POSITION]))
+    return bool(np.max(np.abs(reference[CHI_DOT, POSITION])) > AT_REST)

@@ -15,8 +15,8 @@ import numpy as np
 
 from uam_control.grasp.grasp_parameters import GraspParameters
 from uam_control.grasp.sight import Sight
+from uam_control.vehicle import GRAVITY
 
-GRAVITY = 9.81  # [m/s^2] to express a force as a mass
 LIFT_DEVIATION = 0.03  # [kg] of the mass from the force: vertical gusts during a lift
 TORQUE_DEVIATION = 0.08  # [N m] of the torque: dry friction of a joint
 SHARE = 0.5  # of the magnet's travel that the payload must follow

@@ -35,7 +35,7 @@ FALLEN = 0.05  # [m] below its place from which on a payload counts as fallen fr
 NEAR = 0.015  # [m] height above the payload below which a miss breaks off the descent
 BESIDE = 0.5  # [m] horizontal distance from the stand within which a contact is one with it
 CONTACT_AFTER = MISSED_AFTER = 0.2  # [s]
-LATE = 2.0  # factor on the tolerances of the alignment after align_timeout
+LATE = 2.0  # after align_timeout: factor on the tolerances of the alignment, and on the timeout
 WEIGHED_FOR = 0.5  # [s] for which an identified mass alone must show the payload: no transient
 CALM, CALM_FOR = 0.5, 0.5  # of contact_error, and [s] below it, after which a contact is over
 
@@ -139,9 +139,10 @@ class GraspExecutive:
         late = self._waited(sight) >= p.align_timeout
         if alignment.good(p) or (late and alignment.good(p, LATE)):
             self._begin_descent(sight)
-        elif late and alignment.known:
+        elif late and (alignment.known or self._waited(sight) >= LATE * p.align_timeout):
             self._attempt += 1
-            self._decide(sight, Grasp.APPROACHED, f"no descent, {alignment.text}")
+            seen = alignment.text if alignment.known else "payload seen at times only"
+            self._decide(sight, Grasp.APPROACHED, f"no descent, {seen}")
             self._again_or_give_up(sight, window)
         else:
             self.directive.shift = alignment.correction(self.directive.shift, p)

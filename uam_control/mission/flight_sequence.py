@@ -76,7 +76,6 @@ class Mission:
         self._seen: Observation | None = None
         self._pre_arm = PreArm(scenario, self._start.require_checklist, vehicle)
         self._begin(parameters)
-        self._pre_arm.check_reference(parameters)
 
     def _begin(self, parameters: MissionParameters) -> None:
         """Set the state before a flight; the object of the output stays."""
@@ -100,6 +99,7 @@ class Mission:
         self._ground_pose = GroundPose()
         self._followed: Decision | None = None  # the newest decision whose values are in the output
         self._in_flight: Observation | None = None  # of every tick after the take-off
+        self._pre_arm.check_reference(parameters)
 
     def _use(self, scenario: Scenario) -> None:
         """Fly `scenario`."""
@@ -154,7 +154,7 @@ class Mission:
         """Use `parameters` (validated) from the next step on."""
         self._parameters = parameters
         self._supervisor.configure(parameters)
-        if self._guidance is None:
+        if self._guidance is None or self.output.done:
             self._pre_arm.check_reference(parameters)
         else:
             self._guidance.configure(parameters)
@@ -232,7 +232,7 @@ class Mission:
             self._follow(stamp, decision)
             self._watch_payload(stamp, seen)
             if output.state is State.GROUNDED and not output.arm:
-                self._wait(state)
+                self._wait(state, armed_since is not None)
             elif output.state is State.GROUNDED and armed_since is None:
                 self._check_permission(stamp)
             if output.state is State.FAILSAFE and self._end is None:
@@ -321,15 +321,18 @@ class Mission:
         self._override.give(on, self._scenario_magnet())
         return True, f"magnet {'on' if on else 'off'} until the scenario switches it next"
 
-    def _wait(self, state: np.ndarray) -> None:
-        """Start by itself if it may; in a dry run follow the pose of the first state (3, 6 + n)."""
+    def _wait(self, state: np.ndarray, armed: bool) -> None:
+        """Start by itself if it may; in a dry run follow the pose of the first state (3, 6 + n).
+
+        A vehicle that somebody else armed obeys the setpoints in OFFBOARD: no hand check then.
+        """
         output = self.output
         if self._start.auto_start and not self._start.dry_run and not self.not_ready:
             self._supervisor.start()
         if self._start.dry_run:
             self._ground_pose.dry_run(output, state)
         else:
-            looks = self._pre_arm.permission.commands(self._stamp)
+            looks = not armed and self._pre_arm.permission.commands(self._stamp)
             self._ground_pose.hand_check(output, state, looks)
 
     def _check_permission(self, stamp: float) -> None:

@@ -22,11 +22,13 @@ class PreArm:
         self.permission = Permission(require_checklist)
         self._scenario, self._vehicle = scenario, vehicle
         self._reference: tuple[PreflightCheck, ...] = ()
+        self._checked: MissionParameters | None = None  # with which the reference was compared
 
     def check_reference(self, parameters: MissionParameters) -> None:
         """Compare the whole reference with the limits; the time grows with the flight's length."""
-        if self._vehicle is None:
+        if self._vehicle is None or parameters == self._checked:
             return
+        self._checked = parameters
         check = Feasibility(self._vehicle, parameters, self._scenario.payload_mass)
         found = in_words(check.excesses(self._scenario))
         line = PreflightCheck("reference", found or "within", "within all limits", not found)

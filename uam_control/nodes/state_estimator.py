@@ -12,6 +12,7 @@ from uam_control.profiles.profile import default_profile
 from uam_control.settings.parameter_set import ParameterSet, number
 from uam_control.stages.estimator_stage import EstimatorStage
 from uam_control.stamps import NEW_TIME, SECOND
+from uam_control.vehicle import derived_parameters
 from uam_msgs_py.messages import topics
 from uam_msgs_py.messages.convert import ImuWriter, read_imu, read_joints, read_pose
 from uam_msgs_py.messages.navigation import odometry_message
@@ -47,7 +48,10 @@ class StateEstimatorNode(UamNode):
         vehicle = described_vehicle(self)
         self._names = list(vehicle.joint_names)
         section = default_profile(DEFAULT, vehicle).section(NAME)
-        self.parameter_set = NodeParameters(self, EstimatorParameters, defaults=section)
+        derived = derived_parameters(vehicle)[NAME]
+        self.parameter_set = NodeParameters(
+            self, EstimatorParameters, defaults=section, derived=derived
+        )
         self._period = vehicle.control_period
         self._stage = EstimatorStage(self.parameter_set.current, len(self._names), self._period)
         self.parameter_set.apply = self._stage.set_parameters
@@ -133,7 +137,8 @@ class StateEstimatorNode(UamNode):
 
     def diagnose(self) -> tuple[bytes, str, dict[str, object]]:
         refused = self._stage.estimator.refused_poses
-        fresh, self._refused_before = refused - self._refused_before, refused
+        # a new estimate counts from zero
+        fresh, self._refused_before = max(0, refused - self._refused_before), refused
         ticks, age = self._stage.ticks, self._stage.pose_age
         values: dict[str, object] = {
             "poses refused": refused,

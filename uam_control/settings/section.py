@@ -86,6 +86,20 @@ class Section:
             raise self._error(f"{self._name(key)}: {value:g} is not above 0")
         return value
 
+    def not_negative(self, key: str) -> float:
+        """Return the entry `key`, a finite number of 0 or more."""
+        value = self.number(key)
+        if value < 0.0:
+            raise self._error(f"{self._name(key)}: {value:g} is below 0")
+        return value
+
+    def whole(self, key: str) -> int:
+        """Return the entry `key`, a whole number of 0 or more."""
+        value = self.entry(key)
+        if isinstance(value, bool) or not isinstance(value, int) or value < 0:
+            raise self._error(f"{self._name(key)}: 0, 1, 2, .. expected, got {value!r}")
+        return value
+
     def numbers(self, key: str, count: int) -> tuple[float, ...]:
         """Return the entry `key`, a list of `count` finite numbers."""
         return self._listed(key, self.entry(key), count)

@@ -15,6 +15,7 @@ from uam_control.stamps import SECOND
 from uam_control.supervision import Inputs, Readings
 
 READ_PERIOD = 20_000_000  # [ns] of stamps between two readings
+Kept = tuple[Callable[..., None], tuple, int]  # reader, its arguments, tick answered [ns]
 
 
 class SupervisorInputs:
@@ -24,7 +25,7 @@ class SupervisorInputs:
         """control_period [s]: time between two ticks."""
         self.inputs = Inputs(control_period)
         self.readings = Readings()
-        self._kept: dict[str, tuple[Callable[..., None], tuple, int]] = {}
+        self._kept: dict[str, list[Kept]] = {}
         self._read_at = -READ_PERIOD
 
     def keep(self, name: str, read: Callable[..., None], message: tuple, answers: int = -1) -> None:
@@ -33,7 +34,9 @@ class SupervisorInputs:
         answers [ns]: the tick of which the message is a result. It is used from the next tick on:
         the message of another process may arrive before or after the reading of the same tick.
         """
-        self._kept[name] = read, message, answers
+        before = self._kept.get(name, ())
+        # the one before it may be read at a tick that is too early for the newest
+        self._kept[name] = [*before[-1:], (read, message, answers)]
 
     def begin_anew(self) -> None:
         """Forget all values: stamps of a new simulation follow."""
@@ -60,10 +63,12 @@ class SupervisorInputs:
         if stamp - self._read_at >= READ_PERIOD or stamp < self._read_at:
             self._read_at = stamp
             kept, self._kept = self._kept, {}
-            for name, (read, message, answers) in kept.items():
-                if answers >= stamp:
-                    self._kept[name] = read, message, answers
-                else:
+            for name, messages in kept.items():
+                early = [one for one in messages if one[2] >= stamp]
+                if early:
+                    self._kept[name] = early
+                if len(early) < len(messages):
+                    read, message, _ = messages[-1 - len(early)]
                     read(*message)
         self.readings = self.inputs.at(stamp / SECOND)
         return self.readings

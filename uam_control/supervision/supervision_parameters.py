@@ -157,6 +157,13 @@ class Reactions(ParameterSet):
     command_timeout: float = number(
         300.0, "the same for a hold by command and at a goal", "s", 1.0, 36000.0
     )
+    regain_timeout: float = number(
+        5.0,
+        "time in which OFFBOARD must be back after a resume; later it is a hold",
+        "s",
+        0.5,
+        60.0,
+    )
     after_restart: str = choice(
         "go_on",
         "reaction when a lost controller is back: go_on, stay (hold until a command) or land",

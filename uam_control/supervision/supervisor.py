@@ -72,6 +72,7 @@ class Supervisor:
         self.changes: list[StateTransition] = []
         self._arm = False
         self._regains = 0  # commands to regain a released vehicle
+        self._regained = -math.inf  # stamp [s] of the newest one that still counts
         self._lands = False  # whether the autopilot lands a released vehicle
         self._goes_on = False  # whether the scenario goes on after the vehicle is regained
         self._planned = False  # whether a landing is the scenario's
@@ -263,24 +264,25 @@ class Supervisor:
             self._holds.begin(self._stamp, event, quantity)
         else:
             self._holds.end(event)
-        self._goes_on = self._goes_on and event is Event.REGAINED
+        in_time = self._stamp - self._regained <= self._parameters.regain_timeout
+        self._goes_on, self._regained = event is Event.REGAINED and in_time, -math.inf
         self._arm = self._arm and self.state is not State.DISARMED
         self.decision = self._decide()
         self.changes.append(StateTransition(self._stamp, source, self.state, event, cause))
 
     def _held_by(self, authority: Authority) -> None:
-        """Store who has control of a released vehicle now."""
+        """Store who has control of a released vehicle now; a change ends a resume."""
         self._lands = authority.lands
         if self.state is State.RELEASED and authority.released_to:
             cause = _in_control(authority.released_to)
             if cause != self.cause:
-                self.cause = cause
+                self.cause, self._regained = cause, -math.inf
                 self.decision = self._decide()
 
     def _regain(self) -> None:
-        """Ask for the released vehicle; the scenario goes on once it is regained."""
+        """Ask for the released vehicle; the scenario goes on if it is regained in time."""
         self._regains += 1
-        self._goes_on = True
+        self._regained = self._stamp
         self.decision = self._decide()
 
     def _event(self, command: OperatorCommand, seen: Observation) -> Event:

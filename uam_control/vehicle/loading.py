@@ -18,6 +18,7 @@ from uam_control.vehicle.description import (
     Servo,
     VehicleDescription,
 )
+from uam_control.vehicle.plant_numbers import check_plant_numbers
 
 DEFAULT_VEHICLE = "s500_arm"
 DIRECTIONS = ("ccw", "cw")
@@ -66,6 +67,7 @@ def describe(document: dict[str, Any], file: Path) -> VehicleDescription:
     _check_names(described)
     _check_rotors(described, rotor)
     _check_servo(described.servo, servo)
+    check_plant_numbers(top)
     return described
 
 

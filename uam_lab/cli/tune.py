@@ -65,7 +65,7 @@ def add(commands: argparse._SubParsersAction) -> None:
     command.option("--evaluations", "N", text, 200, type=count)
     text = (
         "end before, when N evaluations in a row improved the least cost, or the front's area, "
-        f"by less than {SMALL:.0%} (default: all evaluations)"
+        f"by less than {SMALL:.0%}% (default: all evaluations)"
     )
     command.option("--patience", "N", text, type=count)
     command.workers()

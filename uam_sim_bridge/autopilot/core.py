@@ -233,8 +233,10 @@ class Autopilot:
                 return self.commander.request_disarm(self.landing.landed, force)
             if first != 1.0:
                 return MavResult.DENIED
+            flies = self.commander.armed
             result = self.commander.request_arm(time, [] if force else self.estimator.faults(time))
-            self._position_modes.home[:] = self.estimator.estimate[POSITION]
+            if result is MavResult.ACCEPTED and not flies:
+                self._position_modes.home[:] = self.estimator.estimate[POSITION]
             return result
         if command == MavCmd.DO_SET_MODE:
             if not (math.isfinite(first) and int(first) & CUSTOM_MODE_ENABLED):

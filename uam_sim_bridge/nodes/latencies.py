@@ -5,6 +5,7 @@ from __future__ import annotations
 from uam_control.stamps import nanoseconds
 from uam_sim_bridge.nodes.plant_options import Statistics
 
+MOST_UNANSWERED = 1000  # samples without a setpoint that are kept
 DEADLINE_TICKS = 3  # [control periods] 12 ms, about a rotor's time constant
 
 
@@ -25,6 +26,9 @@ class Latencies:
         if stamp is not None:
             self._unanswered[stamp] = published
             numbers.answerable_ticks += 1
+            if len(self._unanswered) > MOST_UNANSWERED:  # without a companion, for hours
+                del self._unanswered[next(iter(self._unanswered))]
+                self._count_missed(1)
         for answered, sent in setpoints.items():
             sample = self._answered(answered)
             if sample is None:
@@ -48,7 +52,10 @@ class Latencies:
     def conclude(self, now: int) -> None:
         """Count unanswered samples as missed if their deadline is over at `now` [ns]."""
         underway = DEADLINE_TICKS * self._period * 1e9
-        never = sum(now - sent > underway for sent in self._unanswered.values())
+        self._count_missed(sum(now - sent > underway for sent in self._unanswered.values()))
+        self._unanswered.clear()
+
+    def _count_missed(self, never: int) -> None:
+        """Count samples that never had a setpoint."""
         self._statistics.late_ticks += never
         self._statistics.missed_ticks += never
-        self._unanswered.clear()

@@ -26,20 +26,20 @@ SHAPES = {
 }
 
 
-def urdf(vehicle: Vehicle, root_name: str = BASE_LINK) -> str:
+def urdf(vehicle: Vehicle) -> str:
     """Return the URDF text: base and arm, inertia and visuals; frames as in the MJCF (FLU)."""
     model = vehicle.compile(0.0)
     robot = ElementTree.Element("robot", name=model.body(BASE).name)
     root = model.body(BASE).id
     for body in (root, *carried(model)):
-        name = root_name if body == root else model.body(body).name
+        name = BASE_LINK if body == root else model.body(body).name
         link = ElementTree.SubElement(robot, "link", name=name)
         _inertial(link, model, body)
         for geom in np.flatnonzero(model.geom_bodyid == body):
             _visual(link, model, geom)
         if body != root:
             parent = model.body_parentid[body]
-            owner = root_name if parent == root else model.body(parent).name
+            owner = BASE_LINK if parent == root else model.body(parent).name
             _joint(robot, model, body, owner, vehicle.description.servo)
     ElementTree.indent(robot)
     return ElementTree.tostring(robot, encoding="unicode")

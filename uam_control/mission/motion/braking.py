@@ -16,7 +16,6 @@ import numpy as np
 from uam_control.coordinates import ALPHA, ATTITUDE, CHI, CHI_DDOT, CHI_DOT, POSITION, YAW, X, Y, Z
 from uam_control.maths.rotations import matrix_from_euler
 from uam_control.mission.mission_parameters import MissionParameters
-from uam_control.vehicle import GRAVITY
 
 PLACES = 20  # on the way to rest, for the check of the geofence
 DERIVATIVES = 5  # value, rate, acceleration, jerk, snap
@@ -110,7 +109,7 @@ class Braking:
         than 0.3 s; the bounds give way to this.
         """
         self._stamp = stamp
-        start = present_motion(state)
+        start = present_motion(state, p.gravity)
         bounds = p.brake_acceleration, p.brake_jerk
         low = ground + max(0.0, float(state[CHI, Z]) - ground) / 2.0
         yaw_bounds = p.brake_yaw_acceleration, p.brake_yaw_jerk
@@ -150,8 +149,10 @@ def leaves_geofence(stamp: float, state: np.ndarray, p: MissionParameters, groun
     )
 
 
-def present_motion(state: np.ndarray) -> np.ndarray:
+def present_motion(state: np.ndarray, gravity: float) -> np.ndarray:
     """Return value, rate, acceleration and jerk (4, 6) of position and yaw of state (3, 6 + n).
+
+    gravity [m/s^2].
 
     The acceleration is that of the present thrust in the direction of the present thrust axis, the
     jerk that of the present body rates. A law that follows them begins with the present attitude,
@@ -165,7 +166,7 @@ def present_motion(state: np.ndarray) -> np.ndarray:
     roll, pitch, yaw = np.nan_to_num(state[CHI, ATTITUDE])
     rotation = matrix_from_euler(np.array([roll, pitch, yaw]))
     axis, about = rotation[:, Z], moving[0, ATTITUDE]
-    up = np.array([0.0, 0.0, GRAVITY])
+    up = np.array([0.0, 0.0, gravity])
     lift = float((moving[1, POSITION] + up) @ axis)
     acceleration = lift * axis - up
     across = float(np.hypot(acceleration[X], acceleration[Y]))

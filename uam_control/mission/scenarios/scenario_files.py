@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
+from typing import TypeVar
 
 import numpy as np
 
@@ -23,6 +25,8 @@ from uam_control.mission.scenarios.scenario_options import (
 from uam_control.settings import configuration
 from uam_control.settings.section import Section, read_section
 from uam_control.vehicle import VehicleDescription, load_description
+
+T = TypeVar("T")
 
 KEYS = (
     *("description", "arm_start", "phases", "moves", "trajectory", "end", "magnet", "payload"),
@@ -68,27 +72,29 @@ def from_yaml(file: Path, vehicle: VehicleDescription, options: ScenarioOptions)
         return _along_route(file, top, arm_start, vehicle, options)
     if "end" in top.values:
         raise top.error("end", "only for a trajectory without moves and landing")
-    landing = top.section("landing")
-    phases = [(p.number("from"), p.values.get("name", "")) for p in top.entries("phases", True)]
+    phases = _timeline(top, "phases", "from", lambda entry: str(entry.values.get("name", "")))
+    if phases and phases[0][0] > 0.0:
+        raise top.error("phases", f"the first begins at {phases[0][0]:g} s, it must begin at 0")
     payload = top.section("payload") if top.values.get("payload") else None
     faults = top.values.get("faults") or []
     if not isinstance(faults, list):
         raise ScenarioError(f"{file}: 'faults' is not a list")
+    entry = top.section("landing")
+    landing = Landing(entry.not_negative("at"), entry.positive("duration"))
     scenario = Scenario(
         name=file.stem,
         description=str(top.values.get("description", "")),
         arm_start=arm_start,
-        phases=tuple((start, str(name)) for start, name in phases or [(0.0, "flight")]),
-        landing=Landing(landing.number("at"), landing.number("duration")),
-        moves=_moves(top, vehicle),
-        magnet=tuple((m.number("at"), m.switch("energised")) for m in top.entries("magnet", True)),
-        payload_mass=payload.number("mass") if payload else 0.0,
+        phases=phases or ((0.0, "flight"),),
+        landing=landing,
+        moves=_moves(top, vehicle, landing),
+        magnet=_timeline(top, "magnet", "at", lambda entry: entry.switch("energised")),
+        payload_mass=payload.not_negative("mass") if payload else 0.0,
         drop_point=(
             payload.numbers("drop_point", 2) if payload and "drop_point" in payload.values else None
         ),
-        snapshots=tuple(
-            (s.number("at"), str(s.values.get("caption", "")))
-            for s in top.entries("snapshots", True)
+        snapshots=_timeline(
+            top, "snapshots", "at", lambda entry: str(entry.values.get("caption", ""))
         ),
         faults=tuple(faults),
     )
@@ -137,7 +143,7 @@ def _with_trajectory(
 ) -> Scenario:
     """Return the scenario with its trajectory, which begins where the moves are at `at`."""
     entry = top.section("trajectory")
-    at = entry.number("at")
+    at = entry.not_negative("at")
     for key in ("height", "centre", "arm_deg"):
         if key in entry.values:
             raise entry.error(key, "not with at: the trajectory begins where the moves are")
@@ -194,10 +200,33 @@ def _angle(entry: Section, key: str, coordinate: str, vehicle: VehicleDescriptio
     return angle
 
 
-def _moves(top: Section, vehicle: VehicleDescription) -> tuple[Move, ...]:
-    """Return `moves`; angles are in degrees. Moves of one coordinate must not overlap in time."""
+def _timeline(
+    top: Section, key: str, time: str, value: Callable[[Section], T]
+) -> tuple[tuple[float, T], ...]:
+    """Return the entries of the list `key` as (time [s], value); the times must increase."""
+    found: list[tuple[float, T]] = []
+    for entry in top.entries(key, True):
+        at = entry.not_negative(time)
+        if found and at <= found[-1][0]:
+            raise entry.error(time, f"{at:g} s is not after the entry before, {found[-1][0]:g} s")
+        found.append((at, value(entry)))
+    return tuple(found)
+
+
+def _moves(top: Section, vehicle: VehicleDescription, landing: Landing) -> tuple[Move, ...]:
+    """Return `moves`; angles are in degrees.
+
+    Moves of one coordinate must not overlap in time. The vehicle is at rest when the landing
+    begins, the arm when it ends.
+    """
     moves = tuple(_move(entry, vehicle) for entry in top.entries("moves", True))
     last: dict[str, Move] = {}
+    for i, move in enumerate(moves):
+        base = move.coordinate in BASE_COORDINATES
+        latest = landing.at if base else landing.at + landing.duration
+        if move.end > latest:
+            what = "landing begins" if base else "landing ends"
+            raise top.error(f"moves[{i}].until", f"{move.end:g} s, but the {what} at {latest:g} s")
     for move in sorted(moves, key=lambda m: m.start):
         before = last.get(move.coordinate)
         if before and before.end > move.start:
@@ -217,7 +246,7 @@ def _move(entry: Section, vehicle: VehicleDescription) -> Move:
         )
     length = coordinate in ("x", "y", "z")
     target = entry.number("to") if length else _angle(entry, "to_deg", coordinate, vehicle)
-    start, end = entry.number("from"), entry.number("until")
+    start, end = entry.not_negative("from"), entry.number("until")
     if end <= start:
         raise ScenarioError(f"{entry.where}: ends at {end} s, before it begins")
     return Move(coordinate, start, end, target)

@@ -21,7 +21,6 @@ from uam_sim_bridge.drivers.dynamixel.excitation import Record
 
 SLOWEST = 0.15  # [rad/s]
 WINDOW = 0.2  # [s] of the smoothing
-DEVIATIONS = 3.0  # for a range that contains the true value
 LEAST = 200  # samples
 SCALE_UNCERTAIN = 0.05  # relative; beyond it the scale is not used
 

@@ -61,7 +61,7 @@ class NatNetSource:
         self._asked = self._listed = NEVER  # time.monotonic() [s]
         self._heard = NEVER
         self.bad = self.sessions = 0
-        self.failure = ""  # why the list of bodies cannot be read
+        self.failure = ""  # why frames or the list of bodies cannot be read
 
     @property
     def connected(self) -> bool:
@@ -146,6 +146,8 @@ class NatNetSource:
                 self._take_models(content)
         except UNREADABLE:
             self.bad += 1
+        except OSError as error:  # the group cannot be joined for now: asked again
+            self.failure = f"cannot receive the frames: {error.strerror}"
 
     def _take_models(self, content: bytes) -> None:
         """Read the list of bodies; the old one stays valid if this one cannot be read."""

@@ -130,6 +130,8 @@ _BEGIN_AND_END = (
     *(Phase.WAITING, Phase.STREAMING, Phase.OFFBOARD, Phase.ARMING),
     *(Phase.DISARMING, Phase.DISARMED),
 )
+# after a gap of the link the vehicle is still the one that this sequence armed, or gave up
+_KEPT_WITHOUT_LINK = (Phase.FLYING, Phase.RELEASED, Phase.FAILED, Phase.DISARMING)
 
 
 class OffboardSequence:
@@ -229,7 +231,7 @@ class OffboardSequence:
                 return self._ask(time, Phase.FAILED, Request.KILL)
             self._killed = time - self._asked < self.parameters.retry_interval
         if not seen.connected:
-            if self.phase not in (Phase.FLYING, Phase.RELEASED, Phase.FAILED):
+            if self.phase not in _KEPT_WITHOUT_LINK:
                 self.phase = Phase.WAITING
             return None
         if self.phase is Phase.WAITING:

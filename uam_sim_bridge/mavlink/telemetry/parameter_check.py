@@ -9,7 +9,11 @@ from dataclasses import replace
 from uam_sim_bridge.mavlink.offboard.setpoint import RateThrustParameters
 from uam_sim_bridge.mavlink.protocol.wire import Message
 from uam_sim_bridge.mavlink.telemetry.parameter_reader import ATTEMPTS, RETRY, ParameterReader
-from uam_sim_bridge.mavlink.telemetry.required_parameters import Difference, RequiredParameters
+from uam_sim_bridge.mavlink.telemetry.required_parameters import (
+    Difference,
+    RequiredParameters,
+    same,
+)
 
 _AXES = ("ROLLRATE", "PITCHRATE", "YAWRATE")
 # parameters read from the autopilot; those that the mapping does not use are only recorded
@@ -17,7 +21,6 @@ WATCHED = (
     *(f"MC_{axis}_{what}" for axis in _AXES for what in "PIDK"),
     "THR_MDL_FAC", "MPC_THR_HOVER", "COM_OF_LOSS_T",
 )  # fmt: skip
-_TOLERANCE = 1e-4  # relative: MAVLink carries 32-bit numbers
 WRITES = 3  # of each parameter that is set
 HICCUP = 0.5  # s, longest normal gap in the setpoint stream (busy computer or link)
 
@@ -34,9 +37,7 @@ def differences(mapping: RateThrustParameters, values: dict[str, float]) -> Iter
     """Yield one line for each parameter in `values` that disagrees with the mapping."""
     for name, assumed in expected(mapping).items():
         found = values.get(name)
-        if found is not None and not math.isclose(
-            found, assumed, rel_tol=_TOLERANCE, abs_tol=_TOLERANCE
-        ):
+        if found is not None and not same(found, assumed):
             yield f"{name} is {found:g} on the autopilot, the bridge assumes {assumed:g}"
 
 
@@ -72,7 +73,7 @@ def stream_loss(values: dict[str, float]) -> Iterator[str]:
         return
     if wait <= 0.0:
         yield "COM_OF_LOSS_T is 0 on the autopilot: any late setpoint starts its failsafe"
-    elif wait < HICCUP * (1.0 - _TOLERANCE):
+    elif wait < HICCUP and not same(wait, HICCUP):
         yield (
             f"COM_OF_LOSS_T is {wait:g} s on the autopilot: a gap of {HICCUP:g} s between "
             "setpoints starts its failsafe; set a longer time"

@@ -56,10 +56,10 @@ class Rule:
         if not math.isfinite(value):
             return False
         if self.values:
-            return any(_same(value, allowed) for allowed in self.values)
+            return any(same(value, allowed) for allowed in self.values)
         if self.bits:
             return int(value) & self.bits == self.bits
-        return self.least <= value <= self.most or _same(value, self.least, self.most)
+        return self.least <= value <= self.most or same(value, self.least, self.most)
 
     @property
     def required(self) -> str:
@@ -75,7 +75,8 @@ class Rule:
         return f"{self.least:g} to {self.most:g}"
 
 
-def _same(value: float, *others: float) -> bool:
+def same(value: float, *others: float) -> bool:
+    """Return whether a parameter's value equals one of `others`, as MAVLink carries them."""
     return any(
         math.isclose(value, other, rel_tol=_TOLERANCE, abs_tol=_TOLERANCE)
         for other in others

@@ -1,0 +1,34 @@
+"""Check of the numbers of a vehicle's description that the simulated plant reads."""
+
+from __future__ import annotations
+
+from uam_control.settings.section import Section
+
+
+def check_plant_numbers(top: Section) -> None:
+    """Raise the section's error if a number of air, sensors, variation or magnet is not usable."""
+    air = top.section("air")
+    air.numbers("drag", 3)
+    air.numbers("wind", 3)
+    air.not_negative("gust")
+    air.positive("gust_time")
+    sensors = top.section("sensors")
+    sensors.not_negative("noise_scale")
+    mocap, imu, joints = (sensors.section(name) for name in ("mocap", "imu", "joints"))
+    mocap.positive("rate")
+    joints.positive("counts_per_turn")
+    joints.positive("velocity_unit")
+    for name in ("position_noise", "attitude_noise"):
+        mocap.not_negative(name)
+    for name in ("gyro_noise", "gyro_bias", "accelerometer_noise", "accelerometer_bias"):
+        imu.not_negative(name)
+    for sensor in (mocap, imu, joints):
+        sensor.whole("latency_ticks")
+    top.section("servos").whole("command_latency_ticks")
+    variation = top.section("variation")
+    for name in ("mass", "inertia"):
+        variation.positive(name)
+    variation.numbers("payload_offset", 2)
+    magnet = top.section("magnet")
+    magnet.positive("holding_force")
+    magnet.positive("gap_scale")
