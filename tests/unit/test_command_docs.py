@@ -30,6 +30,11 @@ def words(line: str) -> list[str]:
     return shlex.split(re.split(r" [>|] ", line)[0])
 
 
+@pytest.mark.parametrize("name", commands())
+def test_the_help_of_a_command_can_be_printed(name):
+    assert f"uam {name}" in commands()[name].format_help()
+
+
 def test_there_is_a_section_for_every_command():
     assert set(SECTIONS) == set(commands())
 

@@ -80,6 +80,12 @@ def test_an_autopilot_of_this_computer_does_not_start_by_itself_either(tmp_path)
     assert not settings_of(load_lab(written(tmp_path, autopilot="udp:127.0.0.1:14580"))).auto_start
 
 
+def test_a_ground_station_is_connected_through_the_bridge(tmp_path):
+    url = "udp:192.168.1.20:14550"
+    assert settings_of(load_lab(written(tmp_path, gcs=url))).gcs == url
+    assert settings_of(load_lab(written(tmp_path))).gcs == ""
+
+
 def test_the_layout_is_that_of_the_file(tmp_path):
     lab = load_lab(
         written(tmp_path, layout="fused", nodes={"flight_controller": {"inner_rate": 50.0}})
@@ -106,6 +112,8 @@ def test_a_missing_section_is_named_with_the_required_ones(tmp_path, section):
         ({"profile": "px4_position_servos"}, "px4_position_servos"),
         ({"autopilot": "builtin"}, "autopilot: 'builtin' is no link; allowed: udp:HOST:PORT"),
         ({"autopilot": "serial:/dev/ttyS0"}, "autopilot: "),
+        ({"gcs": "udp:no port"}, "gcs: "),
+        ({"gcs": "serial:/dev/ttyUSB0:57600"}, "is no link to a ground station: udp:HOST:PORT"),
         ({"imu": "both"}, "imu: 'both' is not one of autopilot, topic"),
         ({"layout": "one"}, "layout: 'one' is not one of separate, fused"),
         ({"nodes": {"flight_controller": {"inner_rate": 50.0}}}, "only the fused layout has this"),

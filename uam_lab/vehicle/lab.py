@@ -58,7 +58,7 @@ class Lab:
     link; imu: one of IMUS; mocap: None where another driver publishes the poses; arm: its servos,
     arm_file: the file with them; nodes: node → parameter → value, beside those of the sections;
     out: folder of the result folders; process: parameters of `ProcessParameters` of the nodes that
-    fly; fused: the control nodes are one process.
+    fly; fused: the control nodes are one process; gcs: URL of a ground station behind the bridge.
     """
 
     file: Path
@@ -77,3 +77,4 @@ class Lab:
     out: Path = OUT
     process: dict[str, Any] = field(default_factory=dict)
     fused: bool = False
+    gcs: str = ""

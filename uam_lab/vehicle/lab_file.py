@@ -46,7 +46,7 @@ from uam_sim_bridge.ports import PortError
 
 FOLDER, TEMPLATE = "lab", "s500_lab"
 REQUIRED = ("vehicle", "scenario", "autopilot", "imu", "room", "mocap", "arm", "magnet")
-OPTIONAL = ("profile", "cockpit", "nodes", "out", "process", "layout")
+OPTIONAL = ("profile", "cockpit", "nodes", "out", "process", "layout", "gcs")
 SEPARATE, FUSED = LAYOUTS = ("separate", "fused")
 GEOFENCE = ("geofence_low", "geofence_high")
 ARM_DRIVER = "arm_driver"
@@ -81,6 +81,7 @@ def load_lab(name_or_file: str | Path) -> Lab:
         profile=_profile(top),
         scenario=_near(top, top.text("scenario")),
         autopilot=_autopilot(top),
+        gcs=_gcs(top),
         imu=_one_of(top, "imu", IMUS),
         room=_room(top),
         mocap=mocap,
@@ -149,6 +150,15 @@ def _autopilot(top: Section) -> str:
     if ":" not in url:
         raise top.error("autopilot", f"'{url}' is no link; allowed: {ALLOWED}")
     _tried(top, "autopilot", lambda: parse_url(url))
+    return url
+
+
+def _gcs(top: Section) -> str:
+    if "gcs" not in top.values:
+        return ""
+    url = top.text("gcs")
+    if ":" not in url or _tried(top, "gcs", lambda: parse_url(url)).kind != "udp":
+        raise top.error("gcs", f"'{url}' is no link to a ground station: udp:HOST:PORT expected")
     return url
 
 

@@ -38,6 +38,7 @@ def settings_of(lab: Lab, command: str = "", dry_run: bool = False) -> FlightSet
         clock="realtime",
         imu=lab.imu,
         autopilot=lab.autopilot,
+        gcs=lab.gcs,
         auto_start=False,
         dry_run=dry_run,
         view=True,

@@ -13,9 +13,8 @@ from typing import ClassVar
 
 import numpy as np
 
-from uam_sim_bridge.plant.effects.effect import Acting, Bench, Effect, size
+from uam_sim_bridge.plant.effects.effect import AIR, Acting, Bench, Effect, size
 
-AIR = 1.2  # [kg/m^3]
 SMOOTHING = 0.1  # [s] of the current: the voltage follows the load after capacitors and ESCs
 
 

@@ -19,10 +19,9 @@ from typing import ClassVar
 import numpy as np
 
 from uam_control.maths.compiled import jit
-from uam_sim_bridge.plant.effects.effect import Acting, Bench, Effect, size
+from uam_sim_bridge.plant.effects.effect import AIR, Acting, Bench, Effect, size
 from uam_sim_bridge.plant.vehicle import PAYLOAD
 
-AIR = 1.2  # [kg/m^3]
 EDDY = 0.1  # [s] correlation time of the turbulence: some decimetres at 5 m/s
 STILL = 1e-3  # [N] below this the payload is left alone, so that it can sleep
 

@@ -22,6 +22,8 @@ from uam_sim_bridge.plant.vehicle import Vehicle
 
 Pose = tuple[float, np.ndarray, np.ndarray]  # stamp [s], position [m, ENU], quaternion [w x y z]
 
+AIR = 1.2  # [kg/m^3] density
+
 
 def size(description: str, unit: str, low: float, high: float) -> Any:
     """Declare a parameter of an effect, within [low, high]; its value comes from config/plant."""
