@@ -76,7 +76,7 @@ def test_every_pattern_is_reachable():
             "Arm auth: Denied",
             "arming refused (temporarily rejected)",
             "arming refused (denied)",
-            "the autopilot disarmed in flight",
+            "the autopilot disarmed by itself",
             "Missing FMU SD Card",
         ]
     )

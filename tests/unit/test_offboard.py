@@ -127,7 +127,7 @@ def test_gives_up_with_the_reasons():
 def test_unexpected_disarm_is_a_failure():
     s = flying()
     run(s, 0.1, 2.0, armed=False, mode=Mode.OFFBOARD)
-    assert s.phase is Phase.FAILED and "disarmed in flight" in s.reasons[-1]
+    assert s.phase is Phase.FAILED and "disarmed by itself" in s.reasons[-1]
 
 
 def test_disarm():

@@ -74,15 +74,15 @@ def test_the_pilots_own_switch_gives_control_back():
 
 def test_regain_is_five_requests_half_a_second_apart_and_no_more():
     flight = Ticks()
-    flight.sequence.regain()  # nobody else has control: no effect
+    flight.sequence.regain(flight.time)  # nobody else has control: no effect
     assert flight.run(1.0, OFFBOARD) == []
     flight.run(1.0, CHOSEN)
-    flight.sequence.regain()
+    flight.sequence.regain(flight.time)
     first = flight.time
     assert flight.run(2.1, CHOSEN) == [Request.OFFBOARD] * 5
     assert flight.run(30.0, CHOSEN) == [] and flight.sequence.phase is Phase.RELEASED
     assert first + 2.0 < flight.time
-    flight.sequence.regain()
+    flight.sequence.regain(flight.time)
     assert flight.run(PERIOD, CHOSEN) == [Request.OFFBOARD]
     flight.run(1.0, OFFBOARD)
     assert flight.sequence.phase is Phase.FLYING
@@ -246,10 +246,53 @@ def test_a_mode_chosen_after_regain_ends_its_requests():
     for seen in (FAILSAFE, CHOSEN):
         flight = Ticks()
         flight.run(1.0, seen)
-        flight.sequence.regain()
+        flight.sequence.regain(flight.time)
         assert flight.run(0.1, seen) == [Request.OFFBOARD]
         other = Reported(True, True, Mode.POSITION, Mode.POSITION)
         assert flight.run(30.0, other) == [] and flight.sequence.phase is Phase.RELEASED
+
+
+def test_a_mode_chosen_since_the_command_is_not_overruled():
+    """The command reaches the sequence two ticks after it was given; the pilot was faster."""
+    flight = Ticks()
+    flight.run(1.0, CHOSEN)
+    commanded = flight.time
+    other = Reported(True, True, Mode.LAND, Mode.LAND)
+    flight.run(2 * PERIOD, other)
+    flight.sequence.regain(commanded)
+    assert flight.run(30.0, other) == [] and flight.sequence.phase is Phase.RELEASED
+
+
+def test_a_second_switch_of_the_pilot_counts_at_once():
+    flight = Ticks()
+    flight.run(1.0, CHOSEN)
+    flight.run(0.1, OFFBOARD)
+    assert flight.sequence.phase is Phase.FLYING
+    flight.run(PERIOD, CHOSEN)
+    assert flight.sequence.phase is Phase.RELEASED
+
+
+def test_after_a_failsafe_of_the_mission_a_person_is_noticed_and_never_disarmed():
+    flight = Ticks()
+    flight.sequence.let_go = True
+    flight.run(1.0, FAILSAFE)
+    assert flight.sequence.phase is Phase.FLYING  # the failsafe that was asked for
+    flight.run(PERIOD, CHOSEN)
+    assert flight.sequence.in_control == "the pilot or a ground station, in HOLD"
+    flight.sequence.set_desired(False)
+    assert flight.run(30.0, CHOSEN) == []
+
+
+def test_after_a_release_that_ended_with_disarming_the_next_flight_can_start():
+    flight = Ticks()
+    flight.run(1.0, CHOSEN)
+    flight.run(1.0, CHOSEN._replace(armed=False))
+    flight.sequence.set_desired(False)
+    flight.run(1.0, CHOSEN._replace(armed=False))
+    assert flight.sequence.released_to == "" and flight.sequence.in_control == "nobody"
+    flight.sequence.set_desired(True)
+    asked = flight.run(3.0, CHOSEN._replace(armed=False))
+    assert asked and set(asked) == {Request.OFFBOARD}
 
 
 REPORTS = st.builds(
@@ -271,7 +314,7 @@ EVENTS = st.tuples(
 def happen(flight, event):
     sequence = flight.sequence
     actions = {
-        "regain": sequence.regain,
+        "regain": lambda: sequence.regain(flight.time),
         "reboot": lambda: sequence.rebooted(flight.time),
         "disarm": lambda: sequence.set_desired(False),
         "arm": lambda: sequence.set_desired(True),

@@ -230,6 +230,26 @@ def test_a_released_vehicle_gets_its_own_attitude_rates_and_thrust(kind, flying)
     assert said == []
 
 
+@pytest.mark.parametrize("commands", [True, False])
+def test_without_a_flight_before_there_is_no_stream_for_a_vehicle_in_the_air(commands):
+    """A pilot flies a vehicle whose mission has not flown, or whose companion was restarted."""
+    said: list[str] = []
+    source = SetpointSource(
+        RateThrustMap(), HoldParameters(), say=lambda text, _: said.append(text)
+    )
+    for height in (0.9, 0.91):  # this process saw it in the air only
+        state = state_at(height)
+        source.note_state(1.0, state)
+        for situation in (RELEASED, FLYING._replace(landed=False)):
+            sent = (
+                source.commanded(1.0, state, False, WEIGHT, None, ATTITUDE, situation)
+                if commands
+                else source.without(1.0, situation)
+            )
+            assert sent is None
+    assert any("OFFBOARD is not possible" in text for text in said)
+
+
 @pytest.mark.parametrize(("lift", "part"), [(0.0, 0.5), (5.0, 1.5)])
 def test_thrust_and_rates_of_a_released_vehicle_are_bounded(lift, part):
     source = in_flight()

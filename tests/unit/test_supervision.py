@@ -223,6 +223,22 @@ def test_an_exceeded_limit_has_its_reaction_and_cause(seen, state, cause):
     assert decision.state is state and decision.cause.startswith(cause)
 
 
+@pytest.mark.parametrize(
+    ("height", "on_ground", "state"), [(0.0, True, State.DISARMED), (0.2, False, State.LANDING)]
+)
+def test_a_vehicle_that_does_not_lift_off_gives_up(height, on_ground, state):
+    supervisor = Supervisor(S500)
+    supervisor.start()
+    seen = observation(on_ground=on_ground)
+    seen.state[0, 2], seen.reference[0, 2] = height, S500.airborne_height
+    assert watch(supervisor, seen, 10.0).state is State.TAKING_OFF
+    seen.reference[0, 2] = S500.airborne_height + 0.01
+    assert watch(supervisor, seen, S500.liftoff_timeout - 0.1, 11.0).state is State.TAKING_OFF
+    decision = watch(supervisor, seen, 0.2, 11.0 + S500.liftoff_timeout - 0.1)
+    assert decision.state is state
+    assert decision.cause == "no lift-off: too little thrust for the weight"
+
+
 def test_poses_away_from_the_estimate_start_failsafe_after_the_same_time_as_no_poses():
     seen = observation(readings=Readings(mocap_age=0.01, mocap_position=np.array([0.3, -0.4, 1])))
     supervisor = flying()

@@ -123,6 +123,30 @@ def test_a_resume_that_was_not_answered_does_not_act_minutes_later():
     assert watch(supervisor, observation(), 10.0, 9.0).state is State.HOLDING
 
 
+def test_a_disarming_before_the_take_off_ends_the_flight():
+    supervisor, seen = Supervisor(S500), observation(on_ground=True, armed=False, ready=False)
+    supervisor.step(0.0, seen)
+    supervisor.start()
+    assert watch(supervisor, seen, 1.0, 0.1).state is State.GROUNDED
+    supervisor.step(1.2, observation(on_ground=True, ready=False))
+    decision = supervisor.step(1.3, seen)
+    assert decision.state is State.DISARMED and not decision.arm
+    assert decision.cause == "the autopilot disarmed before the take-off"
+
+
+def test_in_failsafe_a_pilot_is_shown_and_not_disarmed():
+    supervisor = flying()
+    supervisor.lose_states("no states")
+    seen = observation(authority=PILOT)
+    decision = supervisor.step(1.0, seen)
+    assert decision.state is State.FAILSAFE
+    assert decision.cause == "the pilot, in POSITION, has control"
+    refusal = supervisor.refusal(OperatorCommand.DISARM, seen)
+    assert refusal == "the pilot, in POSITION has control"
+    assert supervisor.step(1.1, seen, OperatorCommand.DISARM).state is State.FAILSAFE
+    assert supervisor.step(1.2, observation(), OperatorCommand.DISARM).state is State.DISARMED
+
+
 def test_a_person_who_chooses_another_mode_ends_a_resume():
     supervisor, seen = flying(), observation(authority=PILOT)
     watch(supervisor, seen, 1.0)

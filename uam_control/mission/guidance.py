@@ -33,7 +33,7 @@ from uam_control.mission.motion.flatness import write_reference
 from uam_control.mission.motion.polynomials import hermite
 from uam_control.mission.motion.quintics import quintic, quintic_at
 from uam_control.mission.motion.trajectory import Trajectory, empty_motion
-from uam_control.mission.plans import BASE, PEAK, RAMP, Plan, still
+from uam_control.mission.plans import BASE, HARDEST, PEAK, RAMP, Plan, still
 from uam_control.mission.scenarios.route import SINK
 
 STEADY = (1.0, 0.0, 0.0, 0.0)  # derivatives of a scenario time that passes as the stamps do
@@ -408,7 +408,11 @@ class Guidance:
         goal[Z] = ground - SINK
         way = abs(goal[Z] - now[CHI, Z])
         # the other coordinates are at rest before touchdown
-        lengths[Z] = max(np.max(lengths) + p.stop_time, PEAK * way / p.travel_speed)
+        lengths[Z] = max(
+            np.max(lengths) + p.stop_time,
+            PEAK * way / p.travel_speed,
+            math.sqrt(HARDEST * way / p.stop_acceleration),
+        )
         self._last = Segment(stamp, now, goal, lengths)
         self._clock.change(stamp, 0.0, self._ramp_length())  # for a scenario that goes on later
 

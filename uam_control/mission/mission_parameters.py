@@ -106,8 +106,8 @@ class MissionParameters(
         0.3, "largest distance of a joint from its angle at the start", "rad", 0.01, 6.3
     )
     takeoff_delay: float = number(0.5, "time from armed to take-off", "s", 0.0, 60.0)
-    touchdown_height: float = number(0.05, "height that counts as on the ground", "m", 0.0, 0.5)
-    touchdown_speed: float = number(0.10, "vertical speed that counts as at rest", "m/s", 0.0, 1.0)
+    touchdown_height: float = number(0.05, "height that counts as on the ground", "m", 0.0, 0.15)
+    touchdown_speed: float = number(0.10, "vertical speed that counts as at rest", "m/s", 0.0, 0.3)
     touchdown_time: float = number(
         0.3, "time on the ground and at rest before touchdown is detected", "s", 0.0, 5.0
     )

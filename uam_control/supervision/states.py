@@ -33,6 +33,7 @@ class Event(Enum):
     READY = "armed, no limit exceeded"
     AIRBORNE = "airborne"
     LANDING_DUE = "the scenario lands"
+    NO_LIFTOFF = "no lift-off in time"
     TOUCHDOWN = "touchdown"
     HOLD_LIMIT = "hold limit exceeded"
     LAND_LIMIT = "land limit exceeded"
@@ -82,6 +83,7 @@ TRANSITIONS = (
     Transition(_S.TAKING_OFF, _E.HARD_LIMIT_ON_GROUND, _S.DISARMED),
     Transition(_S.TAKING_OFF, _E.DISARM_ON_GROUND, _S.DISARMED),
     Transition(_S.TAKING_OFF, _E.LOST_ARMING, _S.DISARMED),
+    Transition(_S.TAKING_OFF, _E.NO_LIFTOFF, _S.DISARMED),
     Transition(_S.FLYING, _E.HOLD_LIMIT, _S.HOLDING),
     Transition(_S.FLYING, _E.HOLD, _S.HOLDING),
     Transition(_S.FLYING, _E.ARRIVED, _S.HOLDING),

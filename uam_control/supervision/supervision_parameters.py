@@ -187,6 +187,10 @@ class Reactions(ParameterSet):
     airborne_height: float = number(
         0.3, "height above take-off from which the vehicle counts as flying", "m", 0.05, 10.0
     )
+    liftoff_timeout: float = number(
+        2.0, "time of a reference above airborne_height without the vehicle, then it gives up", "s",
+        0.2, 60.0,
+    )  # fmt: skip
     stop_time: float = number(1.0, "shortest time to stop or to resume", "s", 0.1, 30.0)
     stop_acceleration: float = number(
         0.5, "acceleration of the reference when stopping or resuming", "m/s^2", 0.05, 10.0

@@ -73,6 +73,10 @@ class Supervisor:
         self._arm = False
         self._regains = 0  # commands to regain a released vehicle
         self._regained = -math.inf  # stamp [s] of the newest one that still counts
+        self._left_behind = (
+            math.inf
+        )  # stamp [s] from which the reference climbs without the vehicle
+        self._was_armed = False  # the autopilot, at the last step before the take-off
         self._lands = False  # whether the autopilot lands a released vehicle
         self._goes_on = False  # whether the scenario goes on after the vehicle is regained
         self._planned = False  # whether a landing is the scenario's
@@ -105,6 +109,7 @@ class Supervisor:
             if (self.state, event) in TARGETS:
                 self._go(event, cause)
                 break
+        self._was_armed = seen.armed
         if self._arm and self.state is State.FAILSAFE and not seen.armed:
             self._arm = False
             self.decision = self._decide()
@@ -146,7 +151,9 @@ class Supervisor:
 
     def refusal(self, command: OperatorCommand, seen: Observation) -> str:
         """Return why `command` is refused now, "" if it is accepted."""
-        event = self._event(command, seen)
+        event, holder = self._event(command, seen), seen.authority.released_to
+        if self.state is State.FAILSAFE and holder:
+            return f"{holder} has control"
         if self.state is State.RELEASED and command is OperatorCommand.RESUME:
             event = Event.REGAINED  # the autopilot is asked first
             if seen.on_ground or seen.authority.landed:
@@ -154,7 +161,7 @@ class Supervisor:
         on_path = self.state is State.FLYING and not seen.off_path
         if (self.state, event) not in TARGETS or (event is Event.RESUME and on_path):
             if self.state is State.RELEASED:
-                return f"{seen.authority.released_to} has control"
+                return f"{holder} has control"
             if command is OperatorCommand.DISARM and self.state in AIRBORNE_STATES:
                 return f"{self.state.value} and not on the ground: land first"
             return f"not while {self.state.value}"
@@ -209,6 +216,8 @@ class Supervisor:
             if self.state is State.RELEASED:
                 when = f"while released: {self.cause}"
             yield Event.LOST_ARMING, f"the autopilot disarmed {when}"
+            if self._arm and self._was_armed:
+                yield Event.GIVEN_UP, "the autopilot disarmed before the take-off"
         if seen.authority.released_to:
             yield Event.RELEASED, _in_control(seen.authority.released_to)
             if self._arm:
@@ -253,6 +262,20 @@ class Supervisor:
             yield _planned(Event.ARRIVED)
         if seen.state[CHI, Z] - seen.ground > p.airborne_height:
             yield _planned(Event.AIRBORNE)
+        elif self.state is State.TAKING_OFF and self._stays_behind(seen):
+            cause = "no lift-off: too little thrust for the weight"
+            if seen.on_ground:
+                yield Event.NO_LIFTOFF, cause
+            yield Event.LAND_LIMIT, cause
+
+    def _stays_behind(self, seen: Observation) -> bool:
+        """Whether the reference has been airborne for liftoff_timeout, without the vehicle."""
+        p = self._parameters
+        if seen.reference[CHI, Z] - seen.ground <= p.airborne_height:
+            self._left_behind = math.inf
+            return False
+        self._left_behind = min(self._left_behind, self._stamp)
+        return self._stamp - self._left_behind >= p.liftoff_timeout
 
     def _go(self, event: Event, cause: str) -> None:
         source, self.state = self.state, TARGETS[self.state, event]
@@ -271,9 +294,9 @@ class Supervisor:
         self.changes.append(StateTransition(self._stamp, source, self.state, event, cause))
 
     def _held_by(self, authority: Authority) -> None:
-        """Store who has control of a released vehicle now; a change ends a resume."""
+        """Store who has control now, released or in failsafe; a change ends a resume."""
         self._lands = authority.lands
-        if self.state is State.RELEASED and authority.released_to:
+        if self.state in (State.RELEASED, State.FAILSAFE) and authority.released_to:
             cause = _in_control(authority.released_to)
             if cause != self.cause:
                 self.cause, self._regained = cause, -math.inf

@@ -64,7 +64,7 @@ class JoinedAutopilot(FlightState):
         super().__init__()
         self.autopilot, self.sequence = autopilot, sequence
         self.motors = autopilot.motors
-        self.landed, self.failsafe = True, False
+        self.landed = self.failsafe = False
         self._delivered = -math.inf  # [s] newest setpoint that reached the autopilot
         self.passes: Callable[[], bool] = always  # whether a message reaches the autopilot
         self.receives: Callable[[], bool] = always  # whether one of the autopilot arrives

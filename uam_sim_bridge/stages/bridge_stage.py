@@ -141,9 +141,9 @@ class BridgeStage:
         """Take what the autopilot has sent, and the mission's status that counts by now."""
         self.autopilot.poll(stamp / SECOND)
         while self._orders and self._orders[0][0] <= stamp - STATUS_DELAY:
-            _, self.sequence.let_go, regains = self._orders.popleft()
+            commanded, self.sequence.let_go, regains = self._orders.popleft()
             if regains > self._regains:
-                self.sequence.regain()
+                self.sequence.regain(commanded / SECOND)
             self._regains = regains
         sequence = self.sequence
         situation = (

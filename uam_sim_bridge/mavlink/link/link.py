@@ -73,7 +73,7 @@ class OffboardLink(FlightState):
         super().__init__()
         self._clock = clock
         self.sequence = sequence
-        self.landed, self.failsafe, self.killed = True, False, False
+        self.landed = self.failsafe = self.killed = False
         self.ignored = self.reboots = 0
         self.vitals = Vitals()
         self.time_sync = TimeSync()

@@ -158,6 +158,7 @@ class OffboardSequence:
         self._stream_lost = -math.inf  # [s] newest time at which no setpoint reached the autopilot
         self._regain_requests = 0  # left of an operator's command
         self._chosen = (Mode.UNKNOWN, Mode.UNKNOWN)  # mode and intended one, while released
+        self._chosen_at = -math.inf  # [s] since when
         self._returns = 0  # requests of return_after_lost_link in this flight
         self._lost_link = False  # the autopilot left OFFBOARD because it had no setpoints
         self._killed = False
@@ -192,10 +193,14 @@ class OffboardSequence:
         self._killed = self._killed and not armed
         if self.phase in (Phase.FAILED, Phase.DISARMED):
             self.phase, self._in_flight = Phase.STREAMING, False
+            self.released_to, self._offboard_since = "", None
 
-    def regain(self) -> None:
-        """Request OFFBOARD again by an operator's command; no effect if not released."""
-        if self.released:
+    def regain(self, commanded: float) -> None:
+        """Request OFFBOARD again by an operator's command of `commanded` [s].
+
+        No effect if not released, or if a person has chosen a mode since.
+        """
+        if self.released and commanded > self._chosen_at:
             self._regain_requests, self._asked = REGAIN_REQUESTS, -math.inf
 
     def kill(self) -> None:
@@ -237,11 +242,12 @@ class OffboardSequence:
         if self.phase is Phase.WAITING:
             self.phase = Phase.STREAMING
             self._stream_start = time
-        left = self._left_offboard(time, seen.mode)
+        left = self._left_offboard(time, seen)
+        away = seen.mode is not Mode.OFFBOARD and self._offboard_since is None
         if not self._desired:
-            return self._stay_disarmed(time, seen, left)
+            return self._stay_disarmed(time, seen, away)
         if self.phase is Phase.FLYING:
-            return self._keep_flying(time, seen, left or self._offboard_since is None)
+            return self._keep_flying(time, seen, away)
         if self.phase is Phase.RELEASED:
             return self._stay_released(time, seen)
         if self.phase is Phase.FAILED:
@@ -313,18 +319,23 @@ class OffboardSequence:
         others = tuple(reason for reason in self.reasons if reason != text)
         self.reasons = (*others, text)[-_KEPT_REASONS:]
 
-    def _left_offboard(self, time: float, mode: Mode) -> bool:
-        """Return whether the autopilot has left OFFBOARD by now, which it had entered before."""
-        if mode is Mode.OFFBOARD:
-            if self._offboard_since is None:
+    def _left_offboard(self, time: float, seen: Reported) -> bool:
+        """Return whether the autopilot has left OFFBOARD by now, which it had entered before.
+
+        In flight a person's choice counts at once: no report of before the start can arrive there.
+        """
+        since = self._offboard_since
+        if seen.mode is Mode.OFFBOARD:
+            if since is None:
                 self._offboard_since = time
             return False
-        left = self._offboard_since is not None and time - self._offboard_since >= SETTLING
+        chosen = self._in_flight and seen.mode is seen.intended
+        left = since is not None and (chosen or time - since >= SETTLING)
         if left:
             self._offboard_since = None
         return left
 
-    def _stay_disarmed(self, time: float, seen: Reported, left: bool) -> Request | None:
+    def _stay_disarmed(self, time: float, seen: Reported, away: bool) -> Request | None:
         """Disarm a vehicle that this sequence has armed; one that somebody else armed stays.
 
         So does one that a person took over after the landing: it may take off again.
@@ -332,7 +343,8 @@ class OffboardSequence:
         ours = self.phase in (Phase.OFFBOARD, Phase.ARMING, Phase.FLYING, Phase.DISARMING)
         given_back = self.phase is Phase.RELEASED and seen.mode is Mode.OFFBOARD
         armed = seen.armed
-        if armed and left and self.phase in (Phase.FLYING, Phase.DISARMING) and not self.let_go:
+        of_flight = self.phase in (Phase.FLYING, Phase.DISARMING)
+        if armed and away and of_flight and self._taken_over(seen):
             self._release(time, seen)
         elif armed and (ours or given_back):
             return self._ask(time, Phase.DISARMING, Request.DISARM)
@@ -354,16 +366,23 @@ class OffboardSequence:
         self._forget()
         self.released_to, self._in_flight, self._regain_requests = "", True, 0
 
-    def _keep_flying(self, time: float, seen: Reported, left: bool) -> None:
+    def _keep_flying(self, time: float, seen: Reported, away: bool) -> None:
         if not seen.armed:
-            self._fail("the autopilot disarmed in flight")
-        elif left and seen.mode is not Mode.OFFBOARD and not self.let_go:
+            self._fail("the autopilot disarmed by itself")
+        elif away and self._taken_over(seen):
             self._release(time, seen)
+
+    def _taken_over(self, seen: Reported) -> bool:
+        """Whether somebody has taken control, by leaving OFFBOARD.
+
+        After `let_go` the autopilot's failsafe does so, as it must; a person still may.
+        """
+        return not self.let_go or seen.intended not in (Mode.OFFBOARD, Mode.UNKNOWN)
 
     def _release(self, time: float, seen: Reported) -> None:
         self.phase, self._regain_requests, self._asked = Phase.RELEASED, 0, time
         self._in_flight, self._offboard_since = True, None
-        self._chosen = seen.mode, seen.intended
+        self._chosen, self._chosen_at = (seen.mode, seen.intended), time
         self._lost_link = time - self._stream_lost < LOST_RECENTLY
         self.released_to = self._holder(seen)
         self._reason(f"left OFFBOARD: {self.released_to}, has control")
@@ -386,7 +405,8 @@ class OffboardSequence:
             self._lost_link = False  # a person has chosen a mode since
         chosen = seen.mode, seen.intended
         if chosen != self._chosen and seen.intended is not Mode.OFFBOARD:
-            self._regain_requests = 0  # a person has chosen another mode since the command
+            # a person has chosen another mode since the command
+            self._regain_requests, self._chosen_at = 0, time
         self._chosen = chosen
         self.released_to = self._holder(seen)
         if self._regain_requests > 0:

@@ -29,8 +29,11 @@ from uam_sim_bridge.mavlink.offboard.setpoints.rates import rates_setpoint
 from uam_sim_bridge.mavlink.protocol.attitude_target import STILL
 
 HANDOVER = 0.2  # s after control came back in which the first commands arrive
-MOST_RATE = 2.0  # rad/s, largest body rate that is kept for a released vehicle
+# [rad/s] largest body rates that are kept for a released vehicle; a pilot yaws faster than it rolls
+MOST_RATES = np.array([2.0, 2.0, 3.5])
 LEAST_LIFT, MOST_LIFT = 0.5, 1.5  # bounds of its thrust, in parts of the mean thrust
+
+NO_STREAM = "no stream, OFFBOARD is not possible"
 
 Setpoint = Target | None  # None: no setpoint is sent
 
@@ -116,10 +119,10 @@ class SetpointSource:
         now [s]; state (3, 6 + n); flying: whether tau_p (3,) [N, ENU] is valid; tau_q (3,)
         [N m, FLU], None for idle; attitude, reference (3, 3): see `Desired`.
         """
-        if situation.released:
-            return self._present(now, situation)
         if situation.let_go:
             return self.without(now, situation)
+        if situation.released:
+            return self._present(now, situation)
         if flying and tau_q is not None:
             try:
                 rates, thrust = self.map.map_state(tau_p, tau_q, state)
@@ -133,7 +136,7 @@ class SetpointSource:
                     self._hold.good(now, desired, situation.followed)
                     return setpoint
                 self._say(f"setpoint refused: {refused}", None)
-        elif not flying and tau_q is None and self._low(now, situation.armed):
+        elif not flying and tau_q is None and self._low(now, situation):
             self._hold.reset()
             return self._idle
         return self.without(now, situation)
@@ -141,14 +144,13 @@ class SetpointSource:
     def without(self, now: float, situation: Situation) -> Setpoint:
         """Return the setpoint at `now` [s] without valid commands."""
         armed, landed, let_go, released, _ = situation
-        if released and armed and self._high(armed):
-            self._say(
-                "no usable commands while released: no stream, OFFBOARD is not possible", "hold"
-            )
+        high = self._high(situation)
+        if released and armed and high:
+            self._say(f"no usable commands while released: {NO_STREAM}", "hold")
             return None
         if self._handed_over(now):
             return self._at_present(now)
-        if not armed or (landed and not self._high(armed)):
+        if not armed or (landed and not high):
             return self._idle
         hopeless = let_go or not self._fresh(self._estimated, now)
         velocity = UNKNOWN if hopeless else self._motion[CHI_DOT, POSITION]
@@ -162,8 +164,11 @@ class SetpointSource:
 
         When OFFBOARD comes back, the autopilot begins with it: it must be free of a jump.
         """
-        if not situation.armed or (situation.landed and not self._high(situation.armed)):
+        if not situation.armed or (situation.landed and not self._high(situation)):
             return self._idle
+        if not self._hold.mean_thrust:
+            self._say(f"thrust to hover unknown: {NO_STREAM}", "hold")
+            return None
         self._present_at = now
         return self._at_present(now)
 
@@ -178,7 +183,7 @@ class SetpointSource:
         angles[0] = np.nan_to_num(self._attitude(now))
         if self._fresh(self._estimated, now) and np.all(np.isfinite(self._motion)):
             part = 1.0 - min(1.0, max(0.0, now - self._present_at) / HANDOVER)
-            rates = part * np.clip(self._motion[CHI_DOT, ATTITUDE], -MOST_RATE, MOST_RATE)
+            rates = part * np.clip(self._motion[CHI_DOT, ATTITUDE], -MOST_RATES, MOST_RATES)
             gravity = self.map.gravity
             force = self._motion[CHI_DDOT, POSITION] + np.array([0.0, 0.0, gravity])
             lift = float(force @ matrix_from_euler(angles[0])[:, Z]) / gravity
@@ -194,16 +199,16 @@ class SetpointSource:
         """Whether control came back just before, and the mission may not have resumed yet."""
         return now - self._present_at < HANDOVER
 
-    def _low(self, now: float, armed: bool) -> bool:
+    def _low(self, now: float, situation: Situation) -> bool:
         """Whether an idle command means thrust 0."""
-        return not self._high(armed) and not self._handed_over(now)
+        return not self._high(situation) and not self._handed_over(now)
 
-    def _high(self, armed: bool) -> bool:
+    def _high(self, situation: Situation) -> bool:
         """Whether the vehicle is armed and more than `ground_margin` above its last disarmed
-        height."""
-        if self._ground is None or not armed:
+        height; also if it was in the air already when this process began."""
+        if not situation.armed or (self._ground is None and situation.landed):
             self._ground = self._height
-        return self._height - self._ground > self._margin
+        return self._ground is None or self._height - self._ground > self._margin
 
     def _attitude(self, now: float) -> np.ndarray:
         """Return roll, pitch, yaw (3,) [rad]: the estimate, else mocap's if fresh, else NaN."""
