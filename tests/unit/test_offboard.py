@@ -139,6 +139,29 @@ def test_disarm():
     assert s.phase is Phase.DISARMED and s.reasons == () and s.streaming
 
 
+def test_a_vehicle_that_arms_after_the_mission_gave_up_is_disarmed():
+    """The answer to the request to arm was under way."""
+    s = OffboardSequence()
+    s.set_desired(True)
+    run(s, 1.1, 0.0)
+    assert run(s, 0.1, 1.1, mode=Mode.OFFBOARD) == [(1.1, Request.ARM)]
+    s.set_desired(False)
+    assert run(s, 0.5, 1.2, mode=Mode.OFFBOARD) == []
+    assert run(s, 0.1, 1.7, armed=True, mode=Mode.OFFBOARD) == [(1.7, Request.DISARM)]
+    run(s, 0.1, 1.8, mode=Mode.OFFBOARD)
+    assert s.phase is Phase.DISARMED
+
+
+def test_a_vehicle_that_somebody_arms_later_is_left_alone():
+    s = OffboardSequence()
+    s.set_desired(True)
+    run(s, 1.1, 0.0)
+    run(s, 0.1, 1.1, mode=Mode.OFFBOARD)
+    s.set_desired(False)
+    run(s, 3.0, 1.2, mode=Mode.OFFBOARD)
+    assert run(s, 5.0, 4.2, armed=True, mode=Mode.POSITION) == []
+
+
 def test_a_gap_of_the_link_while_disarming_changes_nothing():
     s = flying()
     s.set_desired(False)

@@ -166,6 +166,22 @@ def test_a_pose_ahead_of_the_imu_waits_for_its_sample():
     assert found.position[0] == pytest.approx(0.3)
 
 
+@pytest.mark.parametrize("before", [0.0, 0.03])
+def test_poses_of_a_clock_that_is_ahead_for_long_are_refused_until_it_is_right_again(before):
+    """The clock of the poses is set forward by 0.3 s: waiting, they would count 0.3 s late."""
+    found, place = at_rest([0.0]), np.array([0.1, 0.0, 0.0])
+    for tick in range(1, 501):
+        now = 0.004 * tick
+        found.predict(now, 0.004, NOTHING, WEIGHT)
+        found.correct(now + (before if tick <= 50 else 0.3), place, LEVEL)
+        place[1] += 1e-6  # no repeat
+    assert found.gate.refused > 300 and not found.ahead
+    moved = found.position[0]
+    found.predict(2.1, 0.004, NOTHING, WEIGHT)
+    found.correct(2.1, place, LEVEL)
+    assert found.position[0] != moved
+
+
 @pytest.mark.parametrize(("stamp", "used"), [(0.02, True), (0.021, False), (-0.02, True)])
 def test_a_pose_needs_a_prediction_within_20_ms(stamp, used):
     found = at_rest([0.0])

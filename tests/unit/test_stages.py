@@ -101,6 +101,15 @@ def test_the_newest_message_is_read_every_20_ms():
     assert read == [0, 20, 40]
 
 
+def test_a_pose_from_the_future_does_not_count_as_young():
+    inputs = SupervisorInputs(0.004)
+    for stamp in range(0, 600 * MS, PERIOD):
+        ahead = 0 if stamp < 200 * MS else 300 * MS
+        inputs.keep("mocap", inputs.mocap, (stamp + ahead, np.full(3, 1e-9 * stamp), LEVEL))
+        readings = inputs.tick(stamp)
+    assert readings.mocap_age == pytest.approx(0.4, abs=0.03)
+
+
 def test_an_answer_to_a_tick_counts_from_the_next_tick_on():
     inputs, read = SupervisorInputs(0.004), []
     inputs.tick(0)

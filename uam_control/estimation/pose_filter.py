@@ -23,10 +23,12 @@ from uam_control.maths.rotations import (
     rotate,
     rotation_error,
 )
+from uam_control.stamps import MOST_AHEAD
 
 HISTORY = 64  # stored predictions, 256 ms at 250 Hz
 OLDEST_MATCH = 0.02  # s, largest distance in time between a pose and its prediction
 LATE = 0.03  # s, delay above which a pose also corrects the later predictions
+AHEAD_FOR = 0.35  # s, in which poses ahead of the IMU wait: longer than its samples may come late
 FIRST = 0.05  # s, interval that the first correction counts for
 # bandwidth × interval between two poses: with sparser poses the bandwidth falls, or the observer
 # would be unstable
@@ -97,6 +99,8 @@ class PoseFilter:
         self._count = 0
         self._last_correction: float | None = None  # stamp [s]
         self._compared = math.nan  # stamp [s] of the newest prediction compared with a pose
+        self._ahead_since = math.inf  # stamp [s] from which on a pose far ahead waits at any time
+        self._clock_ahead = False  # whether the clock of the poses is wrong
         self.ahead: deque[tuple[float, np.ndarray, np.ndarray]] = deque(maxlen=HISTORY)
         self._repeats = Repeats()
         memory, still = self.memory, np.zeros(3)
@@ -147,7 +151,7 @@ class PoseFilter:
         found = self._match(self.memory, newest, stamp, position)
         row, apart, jump, bias, last, compared = found
         if apart > OLDEST_MATCH:
-            if self._count and stamp > last:
+            if self._count and stamp > last and self._waits(stamp, last):
                 self.ahead.append((stamp, position.copy(), quaternion.copy()))
             return
         if self._repeats(position, quaternion) or compared == self._compared:
@@ -174,6 +178,21 @@ class PoseFilter:
                 self.velocity - before[1],
                 quaternion_multiply(before[2] * CONJUGATE, self.quaternion),
             )
+
+    def _waits(self, stamp: float, newest: float) -> bool:
+        """Whether a pose of `stamp` waits for its IMU sample, newer than `newest` [s].
+
+        Poses that are ahead while samples keep coming have a wrong clock: they would count late.
+        """
+        if stamp - newest <= MOST_AHEAD:
+            self._clock_ahead, self._ahead_since = False, math.inf
+        elif not self._clock_ahead:
+            self._ahead_since = min(self._ahead_since, newest) if self.ahead else newest
+            self._clock_ahead = newest - self._ahead_since > AHEAD_FOR
+            if self._clock_ahead:
+                self.ahead.clear()
+        self.gate.refused += self._clock_ahead
+        return not self._clock_ahead
 
 
 @jit

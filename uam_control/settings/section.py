@@ -68,6 +68,13 @@ class Section:
             raise self._error(f"{self._name(key)}: a name expected, got {value!r}")
         return value
 
+    def texts(self, key: str) -> tuple[str, ...]:
+        """Return the entry `key`, a list of one text or more."""
+        value = self.entry(key)
+        if not isinstance(value, list) or not value or not all(isinstance(v, str) for v in value):
+            raise self._error(f"{self._name(key)}: a list of names expected, got {value!r}")
+        return tuple(value)
+
     def switch(self, key: str) -> bool:
         """Return the entry `key`, true or false."""
         value = self.entry(key)

@@ -11,7 +11,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from uam_control.stamps import SECOND
+from uam_control.stamps import MOST_AHEAD, SECOND
 from uam_control.supervision import Inputs, Readings
 
 READ_PERIOD = 20_000_000  # [ns] of stamps between two readings
@@ -24,6 +24,7 @@ class SupervisorInputs:
     def __init__(self, control_period: float) -> None:
         """control_period [s]: time between two ticks."""
         self.inputs = Inputs(control_period)
+        self._now = 0  # [ns] of the reading
         self.readings = Readings()
         self._kept: dict[str, list[Kept]] = {}
         self._read_at = -READ_PERIOD
@@ -45,8 +46,12 @@ class SupervisorInputs:
         self._kept.clear()
 
     def mocap(self, stamp: int, position: np.ndarray, quaternion: np.ndarray) -> None:
-        """Read a pose of `stamp` [ns]: position (3,) [m, ENU], quaternion (4,) [w x y z]."""
-        self.inputs.mocap(stamp / SECOND, position, quaternion)
+        """Read a pose of `stamp` [ns]: position (3,) [m, ENU], quaternion (4,) [w x y z].
+
+        A pose from the future is none: its age would never reach a limit.
+        """
+        if (stamp - self._now) / SECOND <= MOST_AHEAD:
+            self.inputs.mocap(stamp / SECOND, position, quaternion)
 
     def payload(self, stamp: int, position: np.ndarray, quaternion: np.ndarray) -> None:
         """Read a pose of the payload's grip point, as `mocap` does."""
@@ -61,7 +66,7 @@ class SupervisorInputs:
     def tick(self, stamp: int) -> Readings:
         """Return the readings at the tick `stamp` [ns]; the next call reuses the object."""
         if stamp - self._read_at >= READ_PERIOD or stamp < self._read_at:
-            self._read_at = stamp
+            self._read_at = self._now = stamp
             kept, self._kept = self._kept, {}
             for name, messages in kept.items():
                 early = [one for one in messages if one[2] >= stamp]

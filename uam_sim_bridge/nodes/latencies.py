@@ -6,7 +6,9 @@ from uam_control.stamps import nanoseconds
 from uam_sim_bridge.nodes.plant_options import Statistics
 
 MOST_UNANSWERED = 1000  # samples without a setpoint that are kept
-DEADLINE_TICKS = 3  # [control periods] 12 ms, about a rotor's time constant
+# [control periods] from a sample to its setpoint, beyond which the tick is missed: at 250 Hz 12 ms,
+# about a rotor's time constant
+DEADLINE_TICKS = 3
 
 
 class Latencies:

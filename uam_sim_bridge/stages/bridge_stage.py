@@ -230,7 +230,7 @@ class BridgeStage:
         if self.hands and not self._situation.armed:
             setpoint = self.source.without(now, self._situation)
         autopilot.tick(now)
-        self._vision.send(autopilot)
+        self._vision.send(autopilot, now)
         if setpoint is not None and self.sequence.streaming and not self._dry_run:
             autopilot.send_setpoint(setpoint, now)
             self.sequence.streamed(now)

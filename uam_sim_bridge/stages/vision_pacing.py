@@ -8,6 +8,7 @@ import numpy as np
 
 from uam_control.estimation.repeats import Repeats
 from uam_control.settings.parameter_set import ParameterSet, number
+from uam_control.stamps import MOST_AHEAD
 from uam_sim_bridge.mavlink.protocol.vision import VisionPose
 from uam_sim_bridge.stages.autopilot_port import AutopilotPort
 
@@ -50,9 +51,9 @@ class VisionPacing:
         self._pose = exposed, position, quaternion
         return True
 
-    def send(self, autopilot: AutopilotPort) -> None:
-        """Send the newest pose if it is due."""
-        if self._pose is None:
+    def send(self, autopilot: AutopilotPort, now: float) -> None:
+        """Send the newest pose if it is due at `now` [s], and not of the future."""
+        if self._pose is None or self._pose[0] - now > MOST_AHEAD:
             return
         p = self._parameters
         exposed, position, quaternion = self._pose

@@ -81,14 +81,14 @@ class _Table:
     @classmethod
     def read(cls, file: Path, joints: int) -> _Table:
         """Read and check the header and the numbers."""
-        with file.open(newline="") as lines:
-            rows = csv.DictReader(lines)
-            header = [name.strip() for name in rows.fieldnames or []]
-            rows.fieldnames = header
-            names = _names(file, header, joints)
-            numbers = np.array(
-                [_numbers(file, i, row, names) for i, row in enumerate(rows, start=2)]
-            )
+        try:
+            rows = csv.DictReader(file.read_text().splitlines())
+        except UnicodeDecodeError:
+            raise ScenarioError(f"{file}: not a text in UTF-8") from None
+        header = [name.strip() for name in rows.fieldnames or []]
+        rows.fieldnames = header
+        names = _names(file, header, joints)
+        numbers = np.array([_numbers(file, i, row, names) for i, row in enumerate(rows, start=2)])
         if len(numbers) < 2:
             raise ScenarioError(f"{file}: at least two rows expected, got {len(numbers)}")
         table = cls(file, names, numbers)

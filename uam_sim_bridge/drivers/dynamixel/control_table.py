@@ -101,7 +101,10 @@ def folder() -> Path:
     """Return the maker's folder of .model files. Raises ControlTableError without the package."""
     found = importlib.util.find_spec("dynamixel_easy_sdk")
     if found is None or found.origin is None:
-        raise ControlTableError("dynamixel-sdk is not installed: pip install 'uam[hardware]'")
+        raise ControlTableError(
+            "the package dynamixel-sdk is missing: pip install -e '.[hardware]' in a clone; "
+            "colcon: docs/install.md"
+        )
     return Path(found.origin).parent / "control_table"
 
 

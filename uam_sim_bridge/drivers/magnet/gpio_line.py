@@ -39,7 +39,10 @@ class GpioLine:
     def __init__(self, chip: str, number: int, active_low: bool) -> None:
         """chip: its device; active_low: on is a low level. Raises MagnetError."""
         if gpiod is None:
-            raise MagnetError("chip: the package gpiod is missing: pip install uam[hardware]")
+            raise MagnetError(
+                "chip: the package gpiod is missing: pip install -e '.[hardware]' in a clone; "
+                "colcon: docs/install.md"
+            )
         settings = gpiod.LineSettings(
             direction=Direction.OUTPUT, active_low=active_low, output_value=Value.INACTIVE
         )

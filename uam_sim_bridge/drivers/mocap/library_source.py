@@ -41,7 +41,8 @@ class LibrarySource:
         commands. Only OptiTrack has the last two. Raises MocapError."""
         if importlib.util.find_spec("motioncapture") is None:
             raise MocapError(
-                "source motioncapture needs the package motioncapture: pip install uam[hardware]"
+                "source motioncapture needs the package motioncapture: pip install -e "
+                "'.[hardware]' in a clone; colcon: docs/install.md"
             )
         options = {"hostname": server}
         if system == "optitrack":

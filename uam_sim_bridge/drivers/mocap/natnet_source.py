@@ -46,7 +46,10 @@ class NatNetSource:
         Raises MocapError.
         """
         if Version is None:
-            raise MocapError("source natnet needs the package natnet: pip install uam[hardware]")
+            raise MocapError(
+                "source natnet needs the package natnet: pip install -e '.[hardware]' in a clone; "
+                "colcon: docs/install.md"
+            )
         try:
             self._server = socket.gethostbyname(server), port
             self._local = local or _route(self._server)

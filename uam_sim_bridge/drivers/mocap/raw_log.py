@@ -28,22 +28,24 @@ def write(file: Path, poses: Sequence[TimedPose]) -> None:
 def read(file: Path) -> list[TimedPose]:
     """Read the poses; raises MocapError with the line, OSError."""
     found: list[TimedPose] = []
-    with file.open(newline="") as lines:
-        rows = csv.DictReader(lines)
-        missing = [name for name in COLUMNS if name not in (rows.fieldnames or ())]
-        if missing:
-            raise MocapError(f"{file}: no column {', '.join(missing)}; needed: {','.join(COLUMNS)}")
-        for row in rows:
-            try:
-                numbers = [float(row[name]) for name in COLUMNS]
-            except (TypeError, ValueError):
-                raise MocapError(f"{file} line {rows.line_num}: not a number") from None
-            quaternion = np.array(numbers[4:])
-            norm = math.sqrt(quaternion @ quaternion)
-            if not (all(map(math.isfinite, numbers)) and 0.9 < norm < 1.1):
-                raise MocapError(f"{file} line {rows.line_num}: not a pose")
-            if found and numbers[0] <= found[-1].time:
-                raise MocapError(f"{file} line {rows.line_num}: t does not grow")
-            pose = BodyPose(np.array(numbers[1:4]), quaternion / norm)
-            found.append(TimedPose(numbers[0], pose))
+    try:
+        rows = csv.DictReader(file.read_text().splitlines())
+    except UnicodeDecodeError:
+        raise MocapError(f"{file}: not a text in UTF-8") from None
+    missing = [name for name in COLUMNS if name not in (rows.fieldnames or ())]
+    if missing:
+        raise MocapError(f"{file}: no column {', '.join(missing)}; needed: {','.join(COLUMNS)}")
+    for row in rows:
+        try:
+            numbers = [float(row[name]) for name in COLUMNS]
+        except (TypeError, ValueError):
+            raise MocapError(f"{file} line {rows.line_num}: not a number") from None
+        quaternion = np.array(numbers[4:])
+        norm = math.sqrt(quaternion @ quaternion)
+        if not (all(map(math.isfinite, numbers)) and 0.9 < norm < 1.1):
+            raise MocapError(f"{file} line {rows.line_num}: not a pose")
+        if found and numbers[0] <= found[-1].time:
+            raise MocapError(f"{file} line {rows.line_num}: t does not grow")
+        pose = BodyPose(np.array(numbers[1:4]), quaternion / norm)
+        found.append(TimedPose(numbers[0], pose))
     return found

@@ -44,6 +44,7 @@ HEARTBEAT_TIMEOUT = 3.0  # s without a heartbeat: not connected
 LINK_GAP = 0.45  # s without a setpoint that arrives: the stream counts as lost; below COM_OF_LOSS_T
 LOST_RECENTLY = 5.0  # s after a lost stream in which the autopilot may leave OFFBOARD because of it
 SETTLING = 0.3  # s after the switch to OFFBOARD in which an older report may still arrive
+ARMING_UNDERWAY = 2.0  # s after a request to arm in which the autopilot may still obey it
 REGAIN_REQUESTS = 5  # requests for OFFBOARD after one command of an operator
 _KEPT_REASONS = 5
 
@@ -156,6 +157,7 @@ class OffboardSequence:
         self._offboard_since: float | None = None  # [s] the autopilot is in OFFBOARD since then
         self._streamed = -math.inf  # [s] newest setpoint
         self._stream_lost = -math.inf  # [s] newest time at which no setpoint reached the autopilot
+        self._arm_asked = -math.inf  # [s] newest request to arm
         self._regain_requests = 0  # left of an operator's command
         self._chosen = (Mode.UNKNOWN, Mode.UNKNOWN)  # mode and intended one, while released
         self._chosen_at = -math.inf  # [s] since when
@@ -264,7 +266,9 @@ class OffboardSequence:
         if seen.mode is not Mode.OFFBOARD:
             return self._ask(time, Phase.OFFBOARD, Request.OFFBOARD)
         if not seen.armed:
-            return self._ask(time, Phase.ARMING, Request.ARM)
+            request = self._ask(time, Phase.ARMING, Request.ARM)
+            self._arm_asked = self._arm_asked if request is None else time
+            return request
         self._fly()
         return None
 
@@ -357,6 +361,8 @@ class OffboardSequence:
             self.phase, self._in_flight = Phase.DISARMED, False
             self._forget()
             self.released_to, self._offboard_since = "", None
+        elif self.phase is Phase.ARMING and time - self._arm_asked < ARMING_UNDERWAY:
+            pass  # a vehicle that is armed now is ours
         elif not armed and self.phase is not Phase.DISARMED:
             self.phase = Phase.STREAMING
         return None
