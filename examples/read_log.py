@@ -1,6 +1,6 @@
 """Read a flight's log.mcap with pandas: RMS tracking errors from the messages.
 
-    pip install 'uam[examples]'
+    pip install -e '.[examples]'      in a clone; make setup has done it
     python examples/read_log.py results/latest/log.mcap
 
 mcap and mcap_ros2 read the log without ROS.

@@ -55,8 +55,9 @@ def add(commands: argparse._SubParsersAction) -> None:
         _goto,
         "fly to a position",
         "Fly to a position [m, ENU] and hold it there.",
-        "  uam goto 0.5 0 1.2                  keep the heading\n"
-        "  uam goto 0.5 0 1.2 --yaw 90         turn north\n",
+        "  uam goto 0.5 0 1.2 --yaw 90         turn north; without --yaw the heading stays\n"
+        "  uam goto 0.5 0 0                    keep the height\n",
+        " 0.5 0 1.2",
     )
     for axis, text in (("x", "[m]"), ("y", "[m]"), ("z", "[m]; 0: as it is")):
         goto.option(axis, axis.upper(), text, type=number("coordinate", "m"))
@@ -79,8 +80,10 @@ def _command(
     summary: str,
     description: str,
     examples: str = "",
+    arguments: str = "",
 ) -> Command:
-    text = f"examples:\n{examples}{ELSEWHERE.format(name=name)}"
+    """Add a command; arguments: those that it needs, for its examples, behind a space."""
+    text = f"examples:\n{examples}{ELSEWHERE.format(name=name + arguments)}"
     command = Command(commands, name, partial(_run, act), summary, description, text)
     command.instance()
     return command
